@@ -1,0 +1,2 @@
+//! The one command line of an Edgepuck workstation.
+fn main() {}
