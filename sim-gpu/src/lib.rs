@@ -1,6 +1,10 @@
 //! Casts LiDAR beams against triangle meshes.
 //!
 //! The modules stand in the order in which data flows through them: mesh,
-//! BVH, sensor and scene, casting (on a GPU or on the CPU), scan.
+//! BVH, target, sensor and scene, casting (on a GPU or on the CPU), scan.
 
+pub mod bvh;
+pub mod cpu;
 pub mod mesh;
+pub mod ray;
+pub mod target;

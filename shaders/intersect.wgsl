@@ -1,0 +1,86 @@
+// Watertight ray-triangle test: Woop, Benthin, Wald, "Watertight ray/triangle
+// intersection", JCGT 2(1), 2013. Twin: `sim-gpu/src/cpu/intersect.rs`.
+//
+// Two triangles that share an edge must get exactly opposite values of its
+// edge function. Corners come in canonical order, so a shared edge is always
+// evaluated on the same endpoints in the same order; and every product that
+// could be contracted is spelled as fma(), so that a compiler has no choice to
+// make differently in two places.
+
+// Rows of the shear that maps the ray onto +z.
+struct Shear {
+    x: vec3f,
+    y: vec3f,
+    z: vec3f,
+}
+
+fn shear_of(direction: vec3f) -> Shear {
+    let size = abs(direction);
+    let along_x = size.x > size.y && size.x > size.z;
+    let along_y = !along_x && size.y > size.z;
+    var ex = vec3f(1.0, 0.0, 0.0);
+    var ey = vec3f(0.0, 1.0, 0.0);
+    var ez = vec3f(0.0, 0.0, 1.0);
+    var d = direction;
+    if along_x {
+        ex = vec3f(0.0, 1.0, 0.0);
+        ey = vec3f(0.0, 0.0, 1.0);
+        ez = vec3f(1.0, 0.0, 0.0);
+        d = direction.yzx;
+    } else if along_y {
+        ex = vec3f(0.0, 0.0, 1.0);
+        ey = vec3f(1.0, 0.0, 0.0);
+        ez = vec3f(0.0, 1.0, 0.0);
+        d = direction.zxy;
+    }
+    let per_z = 1.0 / d.z;
+    return Shear(ex - ez * (d.x * per_z), ey - ez * (d.y * per_z), ez * per_z);
+}
+
+fn row(r: vec3f, p: vec3f) -> f32 {
+    return fma(r.z, p.z, fma(r.y, p.y, r.x * p.x));
+}
+
+fn edge(px: f32, py: f32, qx: f32, qy: f32) -> f32 {
+    return fma(px, qy, -(py * qx));
+}
+
+struct Candidate {
+    hit: bool,
+    t: f32,
+    error: f32,
+}
+
+// Rounding moves a triangle by at most this much against the ray, in unit
+// lengths: see `cpu/intersect.rs`.
+const DISPLACEMENT: f32 = 48.0 / 16777216.0;
+
+fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
+    let a = triangle.a - origin;
+    let b = triangle.b - origin;
+    let c = triangle.c - origin;
+    let ax = row(shear.x, a);
+    let ay = row(shear.y, a);
+    let bx = row(shear.x, b);
+    let by = row(shear.y, b);
+    let cx = row(shear.x, c);
+    let cy = row(shear.y, c);
+    let u = edge(bx, by, cx, cy);
+    let v = -edge(ax, ay, cx, cy);
+    let w = edge(ax, ay, bx, by);
+    let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
+    let determinant = u + v + w;
+    if outside || determinant == 0.0 {
+        return Candidate(false, 0.0, 0.0);
+    }
+    let az = row(shear.z, a);
+    let bz = row(shear.z, b);
+    let cz = row(shear.z, c);
+    let t = fma(u, az, fma(v, bz, w * cz)) / determinant;
+    // The normal in sheared space has the determinant as its z: their ratio is
+    // the tangent that turns a displacement into an error of distance.
+    let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
+    let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
+    let slope = (abs(slope_x) + abs(slope_y)) / abs(determinant);
+    return Candidate(t >= 0.0, t, DISPLACEMENT * (1.0 + slope));
+}

@@ -1,0 +1,36 @@
+// Counter-based random numbers. Twin: `formats/src/rng.rs` and
+// `sim-gpu/src/cpu/effects/stream.rs`.
+
+// Key in x and y, beam in z.
+@group(1) @binding(1) var<storage, read> streams: array<vec4u>;
+
+// The high half of a 64-bit product, from 16-bit halves.
+fn multiply_high(a: u32, b: u32) -> u32 {
+    let a0 = a & 0xFFFFu;
+    let a1 = a >> 16u;
+    let b0 = b & 0xFFFFu;
+    let b1 = b >> 16u;
+    let middle = a1 * b0 + ((a0 * b0) >> 16u);
+    let carry = (a0 * b1 + (middle & 0xFFFFu)) >> 16u;
+    return a1 * b1 + (middle >> 16u) + carry;
+}
+
+// Philox4x32-10: Salmon et al., SC 2011.
+fn philox(counter: vec4u, key: vec2u) -> vec4u {
+    var x = counter;
+    var k = key;
+    for (var round = 0; round < 10; round++) {
+        let high0 = multiply_high(0xD2511F53u, x.x);
+        let high1 = multiply_high(0xCD9E8D57u, x.z);
+        let low0 = 0xD2511F53u * x.x;
+        let low1 = 0xCD9E8D57u * x.z;
+        x = vec4u(high1 ^ x.y ^ k.x, low1, high0 ^ x.w ^ k.y, low0);
+        k += vec2u(0x9E3779B9u, 0xBB67AE85u);
+    }
+    return x;
+}
+
+fn stream_words(i: u32, purpose: u32) -> vec4u {
+    let stream = streams[i];
+    return philox(vec4u(stream.z, purpose, 0u, 0u), stream.xy);
+}

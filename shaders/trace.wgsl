@@ -1,0 +1,25 @@
+// One ray per invocation: the nearest triangle's code, and what the effects
+// asked for. Twin: `sim-gpu/src/cpu/trace.rs`.
+
+@group(0) @binding(0) var<storage, read> nodes: array<Node>;
+@group(0) @binding(1) var<storage, read> triangles: array<LeafTriangle>;
+@group(0) @binding(2) var<storage, read> rays: array<TraceRay>;
+@group(0) @binding(3) var<storage, read_write> codes: array<u32>;
+
+const WORKGROUP_SIZE: u32 = 64u;
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) workgroups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let i = (workgroup.y * workgroups.x + workgroup.x) * WORKGROUP_SIZE + lane;
+    if i >= arrayLength(&rays) {
+        return;
+    }
+    let ray = rays[i];
+    let nearest = traverse(ray);
+    codes[i] = code_of(nearest, ray.skipped);
+    finish(i, ray, nearest);
+}

@@ -1,0 +1,105 @@
+// Finds the nearest triangle along a ray. Twin: `sim-gpu/src/cpu/traverse.rs`.
+
+const STACK_SIZE: u32 = 64u;
+const NO_HIT: f32 = 1e30;
+
+// Directions closer to zero than this count as this: a reciprocal stays finite
+// and boxes are padded by far more than a ray drifts by it.
+const LEAST_COMPONENT: f32 = 1e-20;
+
+// Bounds the rounding of near and far together: Ize, "Robust BVH ray
+// traversal", JCGT 2(2), 2013; twice his 1 + 2 gamma(3), and room for the
+// 2.5 ULP that WGSL allows a division.
+const FAR_SCALE: f32 = 1.0 + 32.0 / 16777216.0;
+
+fn reciprocal(direction: vec3f) -> vec3f {
+    let away = select(vec3f(-LEAST_COMPONENT), vec3f(LEAST_COMPONENT), direction >= vec3f(0.0));
+    return 1.0 / select(direction, away, abs(direction) < vec3f(LEAST_COMPONENT));
+}
+
+// Where the ray enters the box, or NO_HIT.
+fn enter(low: vec3f, high: vec3f, origin: vec3f, per_direction: vec3f, farthest: f32) -> f32 {
+    let t0 = (low - origin) * per_direction;
+    let t1 = (high - origin) * per_direction;
+    let nearer = min(t0, t1);
+    let farther = max(t0, t1);
+    let near = max(max(nearer.x, nearer.y), max(nearer.z, 0.0));
+    let far = min(min(farther.x, farther.y), min(farther.z, farthest)) * FAR_SCALE;
+    return select(NO_HIT, near, near <= far);
+}
+
+fn consider(nearest: ptr<function, Nearest>, candidate: Candidate, leaf: u32, index: u32) {
+    if !candidate.hit {
+        return;
+    }
+    let best = *nearest;
+    let wins = candidate.t < best.t || (candidate.t == best.t && index < best.index);
+    let loser = select(candidate.t - candidate.error, best.t - best.error, wins);
+    (*nearest).rival = min(best.rival, loser);
+    (*nearest).farthest = min(best.farthest, candidate.t + candidate.error);
+    if wins {
+        (*nearest).t = candidate.t;
+        (*nearest).error = candidate.error;
+        (*nearest).leaf = leaf;
+        (*nearest).index = index;
+    }
+}
+
+fn traverse(ray: TraceRay) -> Nearest {
+    let shear = shear_of(ray.direction);
+    let per_direction = reciprocal(ray.direction);
+    var nearest = Nearest(NO_HIT, 0.0, 0u, MISS, NO_HIT, NO_HIT);
+    var stack: array<u32, STACK_SIZE>;
+    var height = 0u;
+    var at = ray.root;
+    loop {
+        let node = nodes[at];
+        var left = enter(node.left_min, node.left_max, ray.origin, per_direction, nearest.farthest);
+        var right = enter(node.right_min, node.right_max, ray.origin, per_direction, nearest.farthest);
+        if left < NO_HIT && node.left_count > 0u {
+            for (var i = 0u; i < node.left_count; i++) {
+                let leaf = node.left + i;
+                let triangle = triangles[leaf];
+                consider(&nearest, intersect(ray.origin, shear, triangle), leaf, triangle.index);
+            }
+            left = NO_HIT;
+        }
+        if right < NO_HIT && node.right_count > 0u {
+            for (var i = 0u; i < node.right_count; i++) {
+                let leaf = node.right + i;
+                let triangle = triangles[leaf];
+                consider(&nearest, intersect(ray.origin, shear, triangle), leaf, triangle.index);
+            }
+            right = NO_HIT;
+        }
+        let left_first = left <= right;
+        let near = min(left, right);
+        let far = max(left, right);
+        if near < NO_HIT {
+            at = select(node.right, node.left, left_first);
+            if far < NO_HIT {
+                stack[height] = select(node.left, node.right, left_first);
+                height += 1u;
+            }
+        } else {
+            if height == 0u {
+                break;
+            }
+            height -= 1u;
+            at = stack[height];
+        }
+    }
+    return nearest;
+}
+
+// Whether another triangle may truly be nearer by more than the promised
+// accuracy.
+const ACCURACY: f32 = 1e-6;
+
+fn code_of(nearest: Nearest, skipped: f32) -> u32 {
+    if nearest.index == MISS {
+        return MISS;
+    }
+    let doubt = nearest.t + nearest.error - nearest.rival;
+    return nearest.index | select(0u, AMBIGUOUS, doubt > ACCURACY * (skipped + nearest.t));
+}

@@ -1,0 +1,61 @@
+//! Axis-aligned boxes.
+
+use glam::Vec3A;
+
+/// An axis-aligned box in the unit frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// The lowest corner.
+    pub min: Vec3A,
+    /// The highest corner; below `min` for the empty box.
+    pub max: Vec3A,
+}
+
+impl Bounds {
+    /// The box of nothing. Finite, so that no ray arithmetic makes a NaN of it.
+    pub const EMPTY: Self = Self { min: Vec3A::splat(f32::MAX), max: Vec3A::splat(f32::MIN) };
+
+    /// The box of three corners.
+    #[must_use]
+    pub fn of(corners: &[[f32; 3]; 3]) -> Self {
+        let [a, b, c] = corners.map(Vec3A::from_array);
+        Self { min: a.min(b).min(c), max: a.max(b).max(c) }
+    }
+
+    /// The smallest box around both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Grown to hold `point`.
+    #[must_use]
+    pub fn with(self, point: Vec3A) -> Self {
+        Self { min: self.min.min(point), max: self.max.max(point) }
+    }
+
+    /// Half the surface area; 0 for the empty box.
+    #[must_use]
+    pub fn half_area(self) -> f32 {
+        let size = (self.max - self.min).max(Vec3A::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
+    /// Twice the centre.
+    #[must_use]
+    pub fn doubled_centre(self) -> Vec3A {
+        self.min + self.max
+    }
+
+    /// Grown by `margin` on all sides; the empty box stays empty.
+    #[must_use]
+    pub fn padded(self, margin: f32) -> Self {
+        Self { min: self.min - margin, max: self.max + margin }
+    }
+
+    /// Whether `other` lies inside.
+    #[must_use]
+    pub fn contains(self, other: Self) -> bool {
+        self.min.cmple(other.min).all() && self.max.cmpge(other.max).all()
+    }
+}

@@ -1,0 +1,89 @@
+//! Bounding volume hierarchies over triangles in the unit frame.
+//!
+//! One layout for every caster: two-wide nodes of 64 bytes that hold the
+//! boxes of both children (Aila and Laine 2009), and triangles of 48 bytes
+//! sorted so that each leaf's lie side by side.
+
+mod bounds;
+mod morton;
+mod node;
+mod sah;
+mod validate;
+
+pub use bounds::Bounds;
+pub use node::{LeafTriangle, Node, canonical_corners};
+pub use validate::assert_well_formed;
+
+/// No path from the root to a leaf is longer; casters size their stacks by it.
+pub const MAX_DEPTH: usize = 64;
+
+/// Builders switch from their own split to halving below this depth, so that
+/// `HALVING_DEPTH + log2(triangles) <= MAX_DEPTH` for up to 2^31 triangles.
+const HALVING_DEPTH: usize = 32;
+
+/// Leaves hold at most this many triangles.
+const MAX_LEAF: usize = 4;
+
+/// How far boxes reach beyond their triangles, in the unit frame (every
+/// coordinate at most 1).
+///
+/// A triangle test may accept a ray that passes outside the triangle by its
+/// own rounding: 48 units of 2^-24 by the account in `cpu::trace`. The box
+/// must not reject that ray first. 2^-18 is 64 such units.
+const BOX_PADDING: f32 = 1.0 / (1 << 18) as f32;
+
+/// Which algorithm builds the hierarchy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Builder {
+    /// Binned surface area heuristic (Wald 2007), in parallel: the fastest
+    /// tree to trace.
+    Sah,
+    /// Midpoint splits along a Morton curve (Lauterbach et al. 2009): the
+    /// fastest tree to build.
+    Morton,
+}
+
+/// A hierarchy over the triangles of one mesh.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    /// Nodes; the root is number 0. Never empty.
+    pub nodes: Vec<Node>,
+    /// Triangles in leaf order.
+    pub triangles: Vec<LeafTriangle>,
+}
+
+/// One triangle on its way into a tree.
+#[derive(Clone, Copy)]
+struct Primitive {
+    bounds: Bounds,
+    triangle: u32,
+}
+
+impl Bvh {
+    /// Builds over `corners`, each triangle's corners in the unit frame, whose
+    /// indices for the caster's answer are `indices`. Both `[n_triangles]`.
+    #[must_use]
+    pub fn build(builder: Builder, corners: &[[[f32; 3]; 3]], indices: &[u32]) -> Self {
+        debug_assert_eq!(corners.len(), indices.len());
+        let mut primitives: Vec<Primitive> = corners
+            .iter()
+            .zip(0..)
+            .map(|(corners, triangle)| Primitive { bounds: Bounds::of(corners), triangle })
+            .collect();
+        let nodes = match builder {
+            Builder::Sah => sah::build(&mut primitives),
+            Builder::Morton => morton::build(&mut primitives),
+        };
+        let triangles = primitives
+            .iter()
+            .map(|p| LeafTriangle::new(corners[p.triangle as usize], indices[p.triangle as usize]))
+            .collect();
+        Self { nodes, triangles }
+    }
+
+    /// Bytes of nodes and triangles together.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.triangles[..])
+    }
+}

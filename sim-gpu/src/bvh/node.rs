@@ -1,0 +1,113 @@
+//! The records that casters read. `shaders/shared/bvh.wgsl` declares the same
+//! two; a test compares size and offsets.
+
+use super::{BOX_PADDING, Bounds};
+use bytemuck::{Pod, Zeroable};
+
+/// An inner node: both children's boxes, and where each child is.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Node {
+    /// Lowest corner of the left child's box.
+    pub left_min: [f32; 3],
+    /// The left child: a node, or the first triangle of a leaf.
+    pub left: u32,
+    /// Highest corner of the left child's box.
+    pub left_max: [f32; 3],
+    /// Triangles in the left leaf; 0 if the left child is a node.
+    pub left_count: u32,
+    /// Lowest corner of the right child's box.
+    pub right_min: [f32; 3],
+    /// The right child: a node, or the first triangle of a leaf.
+    pub right: u32,
+    /// Highest corner of the right child's box.
+    pub right_max: [f32; 3],
+    /// Triangles in the right leaf; 0 if the right child is a node.
+    pub right_count: u32,
+}
+
+/// One triangle, corners in canonical order.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct LeafTriangle {
+    /// The lowest corner in lexicographic order.
+    pub a: [f32; 3],
+    /// The triangle's index in its mesh.
+    pub index: u32,
+    /// The middle corner.
+    pub b: [f32; 3],
+    /// Keeps `c` on the 16-byte boundary that WGSL gives a `vec3f`.
+    pub _padding_b: u32,
+    /// The highest corner.
+    pub c: [f32; 3],
+    /// Fills the record up to WGSL's array stride.
+    pub _padding_c: u32,
+}
+
+/// A child as builders see it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Child {
+    pub bounds: Bounds,
+    pub first: u32,
+    pub count: u32,
+}
+
+impl Child {
+    /// A child that no ray can hit, for trees of one leaf.
+    pub(super) const NONE: Self = Self { bounds: Bounds::EMPTY, first: 0, count: 1 };
+}
+
+impl Node {
+    pub(super) fn new(left: Child, right: Child) -> Self {
+        let padded = |child: Child| {
+            if child.bounds == Bounds::EMPTY {
+                child.bounds
+            } else {
+                child.bounds.padded(BOX_PADDING)
+            }
+        };
+        let (l, r) = (padded(left), padded(right));
+        Self {
+            left_min: l.min.to_array(),
+            left: left.first,
+            left_max: l.max.to_array(),
+            left_count: left.count,
+            right_min: r.min.to_array(),
+            right: right.first,
+            right_max: r.max.to_array(),
+            right_count: right.count,
+        }
+    }
+
+    /// The same node in a buffer where this tree's nodes start at `node_base`
+    /// and its triangles at `triangle_base`.
+    #[must_use]
+    pub fn moved(mut self, node_base: u32, triangle_base: u32) -> Self {
+        let base = |count: u32| if count == 0 { node_base } else { triangle_base };
+        self.left += base(self.left_count);
+        self.right += base(self.right_count);
+        self
+    }
+}
+
+impl LeafTriangle {
+    pub(super) fn new(corners: [[f32; 3]; 3], index: u32) -> Self {
+        let [a, b, c] = canonical_corners(corners);
+        Self { a, index, b, _padding_b: 0, c, _padding_c: 0 }
+    }
+}
+
+/// The corners in lexicographic order of their coordinates.
+///
+/// Two triangles that share an edge then evaluate its edge function on the
+/// same endpoints in the same order, so that both get exactly opposite values
+/// however the compiler contracts it. By position, not by index: CAD files
+/// repeat vertices.
+#[must_use]
+pub fn canonical_corners(mut corners: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
+    corners.sort_unstable_by(|p, q| {
+        let order = |i: usize| p[i].total_cmp(&q[i]);
+        order(0).then_with(|| order(1)).then_with(|| order(2))
+    });
+    corners
+}

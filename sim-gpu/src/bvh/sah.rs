@@ -1,0 +1,187 @@
+//! Binned surface area heuristic: Wald, "On fast construction of SAH-based
+//! bounding volume hierarchies", RT 2007.
+
+use super::node::Child;
+use super::{Bounds, HALVING_DEPTH, MAX_LEAF, Node, Primitive};
+use glam::Vec3A;
+
+const BINS: usize = 16;
+
+/// Cost of a triangle test in units of a node visit.
+const TRIANGLE_COST: f32 = 1.0;
+
+/// Smaller subtrees are built on the thread at hand.
+const PARALLEL_ABOVE: usize = 8192;
+
+/// Sorts `primitives` into leaf order and returns the nodes above them.
+pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
+    let mut nodes = Vec::with_capacity(primitives.len() / 2 + 1);
+    let root = subtree(primitives, 0, 0, &mut nodes);
+    if root.count > 0 || nodes.is_empty() {
+        let leaf = if primitives.is_empty() { Child::NONE } else { root };
+        nodes.push(Node::new(leaf, Child::NONE));
+    }
+    nodes
+}
+
+/// Appends the subtree over `primitives`, whose first is number `first` of the
+/// mesh, to `nodes` and describes it to its parent.
+fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut Vec<Node>) -> Child {
+    let (bounds, centres) = extent(primitives);
+    let leaf = Child { bounds, first, count: primitives.len() as u32 };
+    if primitives.len() <= 1 {
+        return leaf;
+    }
+    let split = if depth >= HALVING_DEPTH { None } else { best_split(primitives, centres) };
+    if primitives.len() <= MAX_LEAF {
+        let leaf_cost = TRIANGLE_COST * primitives.len() as f32 * bounds.half_area();
+        let split_cost = split.map_or(f32::INFINITY, |s| s.cost + bounds.half_area());
+        if leaf_cost <= split_cost {
+            return leaf;
+        }
+    }
+    let middle = split.map_or(0, |split| partition(primitives, |p| split.is_left(p)));
+    let middle = if middle == 0 || middle == primitives.len() {
+        halve(primitives, centres)
+    } else {
+        middle
+    };
+    let (left, right) = primitives.split_at_mut(middle);
+    let at = nodes.len();
+    nodes.push(Node::new(Child::NONE, Child::NONE));
+    let right_first = first + middle as u32;
+    let (left, right) = if left.len().min(right.len()) > PARALLEL_ABOVE {
+        in_parallel((left, first), (right, right_first), depth + 1, nodes)
+    } else {
+        let left = subtree(left, first, depth + 1, nodes);
+        (left, subtree(right, right_first, depth + 1, nodes))
+    };
+    nodes[at] = Node::new(left, right);
+    Child { bounds, first: at as u32, count: 0 }
+}
+
+/// Both subtrees at once, appended to `nodes` in order.
+fn in_parallel(
+    left: (&mut [Primitive], u32),
+    right: (&mut [Primitive], u32),
+    depth: usize,
+    nodes: &mut Vec<Node>,
+) -> (Child, Child) {
+    let build = |(primitives, first): (&mut [Primitive], u32)| {
+        let mut nodes = Vec::with_capacity(primitives.len() / 2);
+        let child = subtree(primitives, first, depth, &mut nodes);
+        (child, nodes)
+    };
+    let (left, right) = rayon::join(|| build(left), || build(right));
+    let mut append = |(mut child, subtree): (Child, Vec<Node>)| {
+        let base = nodes.len() as u32;
+        nodes.extend(subtree.iter().map(|node| node.moved(base, 0)));
+        if child.count == 0 {
+            child.first += base;
+        }
+        child
+    };
+    (append(left), append(right))
+}
+
+/// The box of the primitives and the box of their doubled centres.
+pub(super) fn extent(primitives: &[Primitive]) -> (Bounds, Bounds) {
+    primitives.iter().fold((Bounds::EMPTY, Bounds::EMPTY), |(bounds, centres), p| {
+        (bounds.union(p.bounds), centres.with(p.bounds.doubled_centre()))
+    })
+}
+
+#[derive(Clone, Copy)]
+struct Split {
+    axis: usize,
+    last_left_bin: usize,
+    cost: f32,
+    origin: f32,
+    bins_per_unit: f32,
+}
+
+impl Split {
+    fn is_left(&self, primitive: &Primitive) -> bool {
+        let centre = primitive.bounds.doubled_centre()[self.axis];
+        bin(centre, self.origin, self.bins_per_unit) <= self.last_left_bin
+    }
+}
+
+fn bin(centre: f32, origin: f32, bins_per_unit: f32) -> usize {
+    (((centre - origin) * bins_per_unit) as usize).min(BINS - 1)
+}
+
+/// The cheapest split between bins on any axis; `None` if all centres agree.
+fn best_split(primitives: &[Primitive], centres: Bounds) -> Option<Split> {
+    let size = centres.max - centres.min;
+    let bins_per_unit =
+        Vec3A::from_array(size.to_array().map(|s| {
+            let scale = BINS as f32 / s;
+            if scale.is_finite() { scale } else { 0.0 }
+        }));
+    let mut bins = [[(Bounds::EMPTY, 0u32); BINS]; 3];
+    for p in primitives {
+        let at = (p.bounds.doubled_centre() - centres.min) * bins_per_unit;
+        for (axis, bins) in bins.iter_mut().enumerate() {
+            let (bounds, count) = &mut bins[(at[axis] as usize).min(BINS - 1)];
+            *bounds = bounds.union(p.bounds);
+            *count += 1;
+        }
+    }
+    (0..3)
+        .filter(|&axis| bins_per_unit[axis] > 0.0)
+        .map(|axis| {
+            let (last_left_bin, cost) = cheapest_boundary(&bins[axis]);
+            let origin = centres.min[axis];
+            Split { axis, last_left_bin, cost, origin, bins_per_unit: bins_per_unit[axis] }
+        })
+        .min_by(|p, q| p.cost.total_cmp(&q.cost))
+}
+
+/// The last bin on the left of the cheapest boundary, and its cost: area times
+/// triangles, summed over both sides.
+fn cheapest_boundary(bins: &[(Bounds, u32); BINS]) -> (usize, f32) {
+    let mut right_cost = [0.0; BINS];
+    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+    for i in (1..BINS).rev() {
+        bounds = bounds.union(bins[i].0);
+        count += bins[i].1;
+        right_cost[i] = bounds.half_area() * count as f32;
+    }
+    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+    let mut best = (0, f32::INFINITY);
+    for i in 0..BINS - 1 {
+        bounds = bounds.union(bins[i].0);
+        count += bins[i].1;
+        let cost = TRIANGLE_COST * (bounds.half_area() * count as f32 + right_cost[i + 1]);
+        if cost < best.1 {
+            best = (i, cost);
+        }
+    }
+    best
+}
+
+/// Moves the primitives that satisfy `is_left` to the front; how many they are.
+fn partition(primitives: &mut [Primitive], is_left: impl Fn(&Primitive) -> bool) -> usize {
+    let mut left = 0;
+    for i in 0..primitives.len() {
+        if is_left(&primitives[i]) {
+            primitives.swap(i, left);
+            left += 1;
+        }
+    }
+    left
+}
+
+/// Sorts the half with the lower centres along the longest axis to the front.
+/// Ties go by triangle, so that the tree is the same on every run.
+fn halve(primitives: &mut [Primitive], centres: Bounds) -> usize {
+    let size = (centres.max - centres.min).to_array();
+    let axis = (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0);
+    let middle = primitives.len() / 2;
+    primitives.select_nth_unstable_by(middle, |p, q| {
+        let centre = |p: &Primitive| p.bounds.doubled_centre()[axis];
+        centre(p).total_cmp(&centre(q)).then(p.triangle.cmp(&q.triangle))
+    });
+    middle
+}

@@ -1,0 +1,155 @@
+//! Rays in an object's own frame.
+
+use crate::target::Target;
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DMat3, DVec3};
+
+/// One ray as casters read it. `shaders/shared/ray.wgsl` declares the same; a
+/// test compares size and offsets.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct TraceRay {
+    /// Where the ray starts, in the unit frame: on the object's bounding
+    /// sphere, or the sensor itself if it is inside.
+    pub origin: [f32; 3],
+    /// The root node of the object's tree in the caster's buffer.
+    pub root: u32,
+    /// Unit direction in the unit frame.
+    pub direction: [f32; 3],
+    /// Distance from the sensor to `origin`, in unit lengths.
+    pub skipped: f32,
+}
+
+/// What a caster answers where a ray hits nothing.
+pub const MISS: u32 = u32::MAX;
+
+/// Set in a caster's answer where another triangle may be truly nearer by
+/// more than the promised accuracy, and f64 must decide.
+pub const AMBIGUOUS: u32 = 1 << 31;
+
+/// A ray in f64. `origin + t * direction` is `t` metres from the sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// The sensor, in the unit frame.
+    pub origin: DVec3,
+    /// One metre along the beam, in the unit frame.
+    pub direction: DVec3,
+}
+
+/// How one sensor sees one object: sends beams into the object's unit frame.
+#[derive(Clone, Copy, Debug)]
+pub struct RayFrame {
+    origin: DVec3,
+    unit_from_sensor: DMat3,
+    radius: f64,
+}
+
+/// The cone around an object as its sensor sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Cone {
+    /// Unit axis, in the sensor frame.
+    pub axis: DVec3,
+    /// Half the opening, radians; pi if the sensor is inside.
+    pub half_angle_rad: f64,
+}
+
+impl RayFrame {
+    /// The frame of a sensor at `position_m`, turned by `world_from_sensor`,
+    /// that looks at `target`, placed by `world_from_object`.
+    ///
+    /// Differences of positions are taken first, so that a scene far from the
+    /// world's origin loses nothing but what its own coordinates lack.
+    #[must_use]
+    pub fn new(
+        target: &Target,
+        world_from_object: &DAffine3,
+        position_m: DVec3,
+        world_from_sensor: DMat3,
+    ) -> Self {
+        let object_from_world = world_from_object.matrix3.inverse();
+        let in_object = object_from_world * (position_m - world_from_object.translation);
+        Self {
+            origin: target.frame.to_unit(in_object),
+            unit_from_sensor: object_from_world * world_from_sensor * target.frame.scale.recip(),
+            radius: target.radius,
+        }
+    }
+
+    /// The beam that leaves the sensor in `direction`, a unit vector in the
+    /// sensor frame.
+    #[must_use]
+    pub fn ray(&self, direction: DVec3) -> Ray {
+        Ray { origin: self.origin, direction: self.unit_from_sensor * direction }
+    }
+
+    /// The cone of directions that may hit the object's bounding sphere.
+    #[must_use]
+    pub fn cone(&self) -> Cone {
+        let everything = Cone { axis: DVec3::X, half_angle_rad: std::f64::consts::PI };
+        let distance = self.origin.length();
+        let sensor_from_unit = self.unit_from_sensor.inverse();
+        let stretch = anisotropy(&self.unit_from_sensor);
+        let Some(axis) = (sensor_from_unit * -self.origin).try_normalize() else {
+            return everything;
+        };
+        let sine = self.radius / distance * stretch;
+        if !(sine < 1.0) {
+            return everything;
+        }
+        Cone { axis, half_angle_rad: sine.asin() }
+    }
+
+    /// The record of `ray` for a tree whose root is node `root`; `None` if the
+    /// ray passes the bounding sphere by.
+    #[must_use]
+    pub fn trace_ray(&self, ray: &Ray, root: u32) -> Option<TraceRay> {
+        let direction = ray.direction.normalize();
+        let along = -ray.origin.dot(direction);
+        let closest = ray.origin + direction * along;
+        let half_chord_squared = self.radius * self.radius - closest.length_squared();
+        if !(half_chord_squared >= 0.0) {
+            return None;
+        }
+        let half_chord = half_chord_squared.sqrt();
+        if along + half_chord < 0.0 {
+            return None;
+        }
+        let skipped = (along - half_chord).max(0.0);
+        Some(record(ray.origin, direction, skipped, root))
+    }
+
+    /// The record of a ray whether or not it can hit: what is cast when
+    /// culling is off.
+    #[must_use]
+    pub fn trace_ray_unculled(&self, ray: &Ray, root: u32) -> TraceRay {
+        self.trace_ray(ray, root).unwrap_or_else(|| {
+            let direction = ray.direction.normalize();
+            let skipped = (-ray.origin.dot(direction) - self.radius).max(0.0);
+            record(ray.origin, direction, skipped, root)
+        })
+    }
+}
+
+fn record(origin: DVec3, direction: DVec3, skipped: f64, root: u32) -> TraceRay {
+    TraceRay {
+        origin: (origin + direction * skipped).as_vec3().to_array(),
+        root,
+        direction: direction.as_vec3().to_array(),
+        skipped: skipped as f32,
+    }
+}
+
+/// Largest over smallest stretch of a map; 1 for a uniform scale. An object
+/// scaled unevenly looks wider than its unit sphere by at most this.
+fn anisotropy(map: &DMat3) -> f64 {
+    let gram = map.transpose() * *map;
+    let (low, high) = (0..3).map(|i| gram.col(i).to_array().map(f64::abs)).enumerate().fold(
+        (f64::INFINITY, 0.0f64),
+        |(low, high), (i, column)| {
+            // Gershgorin's discs bound the eigenvalues.
+            let off: f64 = column.iter().sum::<f64>() - column[i];
+            (low.min(column[i] - off), high.max(column[i] + off))
+        },
+    );
+    if low > 0.0 { (high / low).sqrt() } else { f64::INFINITY }
+}

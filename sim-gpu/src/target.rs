@@ -1,0 +1,123 @@
+//! A mesh made ready for casting.
+
+use crate::bvh::{Builder, Bvh};
+use crate::mesh::Mesh;
+use glam::DVec3;
+
+/// Maps an object to its unit frame: box centre to 0, half the longest side to
+/// (0.5, 1]. The scale is a power of two, so that it rounds nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitFrame {
+    /// The centre of the bounding box, in the object's units.
+    pub centre: DVec3,
+    /// Object units per unit length; a power of two.
+    pub scale: f64,
+}
+
+impl UnitFrame {
+    /// The frame of these vertices; the identity if there are none.
+    #[must_use]
+    pub fn of(vertices: impl Iterator<Item = DVec3>) -> Self {
+        let infinite = DVec3::splat(f64::INFINITY);
+        let (low, high) =
+            vertices.fold((infinite, -infinite), |(low, high), v| (low.min(v), high.max(v)));
+        if low.x > high.x {
+            return Self { centre: DVec3::ZERO, scale: 1.0 };
+        }
+        // Halved before they are added: the sum of two huge values overflows.
+        let half_size = high * 0.5 - low * 0.5;
+        Self { centre: low + half_size, scale: power_of_two_above(half_size.max_element()) }
+    }
+
+    /// From the object's frame.
+    #[must_use]
+    pub fn to_unit(&self, point: DVec3) -> DVec3 {
+        (point - self.centre) / self.scale
+    }
+}
+
+/// The least power of two that is not below `x`; 1 for zero.
+fn power_of_two_above(x: f64) -> f64 {
+    if !(x >= f64::MIN_POSITIVE) {
+        return 1.0;
+    }
+    let floor = f64::from_bits(x.to_bits() & (0x7FF << 52));
+    if floor == x { floor } else { floor * 2.0 }
+}
+
+/// A mesh made ready for casting: its triangles in the unit frame, in f64 for
+/// ranges and as a hierarchy in f32 for finding them.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// How the object's frame maps to the unit frame.
+    pub frame: UnitFrame,
+    /// The hierarchy that casters traverse.
+    pub bvh: Bvh,
+    /// Radius of a sphere around the unit frame's origin that holds every
+    /// triangle, with room for the caster's rounding.
+    pub radius: f64,
+    vertices: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Target {
+    /// Prepares the triangles of `mesh` whose indices `kept` lists (ascending;
+    /// `mesh::survey` lists those that are neither degenerate nor duplicates).
+    #[must_use]
+    pub fn new(mesh: &Mesh, kept: &[u32], builder: Builder) -> Self {
+        let corner_ids = |&t: &u32| mesh.triangles[t as usize];
+        let used = kept.iter().flat_map(corner_ids).map(|v| mesh.vertices[v as usize]);
+        let frame = UnitFrame::of(used);
+        let vertices: Vec<DVec3> = mesh.vertices.iter().map(|&v| frame.to_unit(v)).collect();
+        let rounded: Vec<[f32; 3]> = vertices.iter().map(|v| v.as_vec3().to_array()).collect();
+        let corners: Vec<[[f32; 3]; 3]> =
+            kept.iter().map(|t| corner_ids(t).map(|v| rounded[v as usize])).collect();
+        let bvh = Bvh::build(builder, &corners, kept);
+        let farthest = kept
+            .iter()
+            .flat_map(corner_ids)
+            .map(|v| vertices[v as usize].length_squared())
+            .fold(0.0, f64::max)
+            .sqrt();
+        // The sphere must hold the padded boxes' contents as the caster rounds
+        // them: 2^-18 per axis (`bvh::BOX_PADDING`), times sqrt(3).
+        let radius = farthest + 1e-5;
+        Self { frame, bvh, radius, vertices, triangles: mesh.triangles.clone() }
+    }
+
+    /// The corners of triangle `index` of the mesh, in the unit frame.
+    #[must_use]
+    pub fn corners(&self, index: u32) -> [DVec3; 3] {
+        self.triangles[index as usize].map(|v| self.vertices[v as usize])
+    }
+
+    /// Bytes held, for memory budgets.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.bvh.bytes()
+            + size_of_val(&self.vertices[..])
+            + size_of_val(&self.triangles[..])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_unit_frame_scales_by_powers_of_two_only() {
+        for (half, scale) in [(1.0, 1.0), (0.75, 1.0), (1.01, 2.0), (1e-300, 0.0), (1.7e12, 0.0)] {
+            let frame = UnitFrame::of([DVec3::splat(-half), DVec3::splat(half)].into_iter());
+            let unit = frame.to_unit(DVec3::splat(half)).x;
+            assert!(unit > 0.5 && unit <= 1.0, "{half} maps to {unit}");
+            assert_eq!(frame.scale.to_bits() << 12, 0, "{} is a power of two", frame.scale);
+            assert!(scale == 0.0 || frame.scale == scale);
+        }
+    }
+
+    #[test]
+    fn a_huge_box_does_not_overflow() {
+        let frame = UnitFrame::of([DVec3::splat(-1e308), DVec3::splat(1e308)].into_iter());
+        assert!(frame.centre.is_finite() && frame.scale.is_finite());
+    }
+}
