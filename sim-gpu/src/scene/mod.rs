@@ -109,7 +109,14 @@ impl Scene {
 
         let mut sensors = Vec::new();
         for (i, sensor) in table.sensor.into_iter().enumerate() {
-            let profile = Sensor::resolve_in(folder, &sensor.profile)?;
+            let profile =
+                Sensor::resolve_in(folder, &sensor.profile).map_err(|error| match error {
+                    ConfigError::UnknownSensor { .. } => {
+                        let key = format!("sensor[{i}].profile");
+                        in_file(InvalidValue::new(key, error.to_string()))
+                    }
+                    in_profile => in_profile,
+                })?;
             effects.for_sensor(&profile).map_err(in_file)?;
             sensors.push(sensor.validate(i, profile).map_err(in_file)?);
         }

@@ -82,7 +82,10 @@ fn bad_scenes_are_named() {
         (object("name = \" \""), "object[0].name: is empty"),
         (object("yaw_deg = 1\nquaternion_xyzw = [0, 0, 0, 1]"), "exclude each other"),
         (format!("[[object]]\nmesh = \"\"\n{SENSOR}"), "object[0].mesh: names no file"),
-        (sensor("profile = \"vlp23\"\nposition_m = [0, 0, 0]\nyaw_deg = 0"), "known are vlp32c"),
+        (
+            sensor("profile = \"vlp23\"\nposition_m = [0, 0, 0]\nyaw_deg = 0"),
+            "sensor[0].profile: no sensor \"vlp23\"",
+        ),
         (sensor("profile = \"vlp16\"\nposition_m = [0, 0, 0]"), "sensor[0]: no orientation"),
         (sensor("profile = \"./none.toml\"\nposition_m = [0, 0, 0]"), "scenes/./none.toml"),
         (sensor("position_m = [0, 0, 0]"), "profile"),
@@ -103,8 +106,6 @@ fn bad_scenes_are_named() {
     ] {
         let error = parse(&text).unwrap_err().to_string();
         assert!(error.contains(part), "{text}\n-> {error}");
-        assert!(
-            error.contains("my.toml") || error.contains("vlp23") || error.contains("none.toml")
-        );
+        assert!(error.contains("my.toml") || error.contains("none.toml"), "{error}");
     }
 }

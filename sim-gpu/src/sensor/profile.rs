@@ -10,6 +10,9 @@ use super::{
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
 
+/// Farther than any sensor sees, and its square is still finite in f32.
+const MAX_RANGE_M: f64 = 1e9;
+
 /// The keys of a profile.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -105,6 +108,7 @@ fn layout(
 fn check_range(range: &RangeLimits) -> Result<(), InvalidValue> {
     within("range.min_m", range.min_m, 0.0, f64::MAX)?;
     positive("range.max_m", range.max_m)?;
+    within("range.max_m", range.max_m, 0.0, MAX_RANGE_M)?;
     if range.min_m >= range.max_m {
         let cause = format!("{} is not above range.min_m = {}", range.max_m, range.min_m);
         return Err(InvalidValue::new("range.max_m", cause));

@@ -58,6 +58,7 @@ fn bad_profiles_are_named() {
         (TINY, "max_m = 10", "max_m = 0", "range.max_m: 0 is not above 0"),
         (TINY, "max_m = 10", "max_m = nan", "range.max_m"),
         (TINY, "max_m = 10", "max_m = inf", "range.max_m"),
+        (TINY, "max_m = 10", "max_m = 1e10", "range.max_m"),
         (TINY, "max_m = 10", "min_m = 10, max_m = 10", "range.max_m: 10 is not above range.min_m"),
         (TINY, "max_m = 10", "min_m = -1, max_m = 10", "range.min_m"),
         (TINY, "max_m = 10", "max_m = 10, quantum_m = 0", "range.quantum_m"),
