@@ -4,7 +4,14 @@
 //! BVH, target, sensor and scene, casting (on a GPU or on the CPU), scan.
 
 pub mod bvh;
+pub mod caster;
+pub mod config;
 pub mod cpu;
+pub mod effects;
+pub mod gpu;
 pub mod mesh;
+pub mod pose;
 pub mod ray;
+pub mod scene;
+pub mod sensor;
 pub mod target;

@@ -1,5 +1,6 @@
 //! Rays in an object's own frame.
 
+use crate::sensor::Cone;
 use crate::target::Target;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec3};
@@ -42,15 +43,6 @@ pub struct RayFrame {
     origin: DVec3,
     unit_from_sensor: DMat3,
     radius: f64,
-}
-
-/// The cone around an object as its sensor sees it.
-#[derive(Clone, Copy, Debug)]
-pub struct Cone {
-    /// Unit axis, in the sensor frame.
-    pub axis: DVec3,
-    /// Half the opening, radians; pi if the sensor is inside.
-    pub half_angle_rad: f64,
 }
 
 impl RayFrame {

@@ -2,8 +2,12 @@
 //! `shaders/trace.wgsl`.
 
 use super::traverse::traverse;
+use super::effects::words;
 use crate::bvh::{LeafTriangle, Node};
-use crate::ray::TraceRay;
+use crate::caster::{Cast, CastJob};
+use crate::effects::Effects;
+use crate::ray::{AMBIGUOUS, MISS, TraceRay};
+use crate::sensor::BeamPattern;
 use rayon::prelude::*;
 
 /// Rays that one task traces: enough to hide the cost of handing it over.

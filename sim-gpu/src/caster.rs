@@ -1,0 +1,173 @@
+//! One interface to every way of casting.
+
+use crate::bvh::MAX_DEPTH;
+use crate::cpu;
+use crate::effects::Effects;
+use crate::gpu::{AdapterError, AdapterRequest, GpuCaster, GpuError, Pending, adapter};
+use crate::ray::{RayFrame, TraceRay};
+use crate::sensor::BeamPattern;
+use crate::target::Target;
+use formats::rng::StreamKey;
+use std::sync::Arc;
+
+const _: () = assert!(MAX_DEPTH == 64, "the shader's stack holds 64 nodes");
+
+/// The rays of one sensor against one object.
+#[derive(Clone, Debug)]
+pub struct CastJob {
+    /// The object.
+    pub target: Arc<Target>,
+    /// How the sensor sees it.
+    pub frame: RayFrame,
+    /// The beam of each ray, `[n_rays]`.
+    pub beams: Vec<u32>,
+    /// The rays, `[n_rays]`; roots are relative to the target's tree.
+    pub rays: Vec<TraceRay>,
+    /// Keys the random numbers of this sensor and object.
+    pub stream: StreamKey,
+    /// The object's reflectivity, 0 to 1.
+    pub reflectivity: f32,
+}
+
+/// Whether beams that cannot hit are cast. The answers are the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Culling {
+    /// Only beams that may hit the object's bounding sphere are cast.
+    #[default]
+    On,
+    /// All beams are cast: for tests and measurements.
+    Off,
+}
+
+impl CastJob {
+    /// Aims the beams of `pattern` at `target` through `frame`.
+    #[must_use]
+    pub fn aim(
+        target: Arc<Target>,
+        frame: RayFrame,
+        pattern: &BeamPattern,
+        culling: Culling,
+        stream: StreamKey,
+        reflectivity: f32,
+    ) -> Self {
+        let (beams, rays) = match culling {
+            Culling::On => pattern
+                .within(&frame.cone())
+                .into_iter()
+                .filter_map(|beam| {
+                    let ray = frame.ray(pattern.directions[beam as usize]);
+                    Some((beam, frame.trace_ray(&ray, 0)?))
+                })
+                .unzip(),
+            Culling::Off => pattern
+                .order
+                .iter()
+                .map(|&beam| {
+                    let ray = frame.ray(pattern.directions[beam as usize]);
+                    (beam, frame.trace_ray_unculled(&ray, 0))
+                })
+                .unzip(),
+        };
+        Self { target, frame, beams, rays, stream, reflectivity }
+    }
+}
+
+/// What a caster answers for one job.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cast {
+    /// Per ray: triangle index, [`crate::ray::MISS`] or
+    /// [`crate::ray::AMBIGUOUS`]; `[n_rays]`.
+    pub codes: Vec<u32>,
+    /// The effects' words where the code is no miss, `[n_rays, words]`.
+    pub words: Vec<f32>,
+}
+
+/// A way of casting.
+pub enum Caster {
+    /// The CPU twin.
+    Cpu(Effects),
+    /// A GPU, or software Vulkan.
+    Gpu(Box<GpuCaster>),
+}
+
+/// Jobs under way.
+pub enum Casting {
+    /// Already done, on the CPU.
+    Done(Vec<Cast>),
+    /// On their way through the adapter.
+    Pending(Box<Pending>),
+}
+
+impl Caster {
+    /// The caster that answers `request` and models `effects`.
+    ///
+    /// `Auto` falls back to the CPU twin where no adapter is found.
+    ///
+    /// # Errors
+    /// If a named adapter is missing or the device cannot be opened.
+    pub fn open(request: &AdapterRequest, effects: &Effects) -> Result<Self, GpuError> {
+        let name = match request {
+            AdapterRequest::Cpu => return Ok(Self::Cpu(effects.clone())),
+            AdapterRequest::Auto => None,
+            AdapterRequest::Named(name) => Some(name.as_str()),
+        };
+        match adapter::find_adapter(name) {
+            Ok(adapter) => Ok(Self::Gpu(Box::new(GpuCaster::open(&adapter, effects)?))),
+            Err(AdapterError::None) if name.is_none() => Ok(Self::Cpu(effects.clone())),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// The adapter's name, `cpu` for the twin.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Cpu(_) => "cpu",
+            Self::Gpu(gpu) => &gpu.summary().name,
+        }
+    }
+
+    /// Whether `target` fits the adapter's bindings; if not, the CPU twin
+    /// casts it.
+    #[must_use]
+    pub fn fits(&self, target: &Target) -> bool {
+        match self {
+            Self::Cpu(_) => true,
+            Self::Gpu(gpu) => gpu.limits().holds(target),
+        }
+    }
+
+    /// Starts casting `jobs` all together.
+    ///
+    /// # Errors
+    /// If the device is lost or out of memory.
+    pub fn submit(&self, jobs: &[CastJob]) -> Result<Casting, GpuError> {
+        match self {
+            Self::Cpu(effects) => Ok(Casting::Done(
+                jobs.iter().map(|job| cpu::trace::cast(job, effects)).collect(),
+            )),
+            Self::Gpu(gpu) => Ok(Casting::Pending(Box::new(gpu.submit(jobs)?))),
+        }
+    }
+
+    /// Casts `jobs` and waits.
+    ///
+    /// # Errors
+    /// As [`Caster::submit`].
+    pub fn cast(&self, jobs: &[CastJob]) -> Result<Vec<Cast>, GpuError> {
+        self.submit(jobs)?.wait()
+    }
+}
+
+impl Casting {
+    /// The answers, one per job, in order.
+    ///
+    /// # Errors
+    /// If the device was lost.
+    pub fn wait(self) -> Result<Vec<Cast>, GpuError> {
+        match self {
+            Self::Done(casts) => Ok(casts),
+            Self::Pending(pending) => pending.wait(),
+        }
+    }
+}

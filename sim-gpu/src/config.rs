@@ -1,0 +1,124 @@
+//! Reading TOML files that users write: sensors, poses and scenes.
+//!
+//! Every error names the file, the key and the cause. A `toml` error points at
+//! line and column; an [`InvalidValue`] carries the key's path as one would
+//! write it, `object[2].scale`.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+/// No file a person writes is longer; the limit keeps a wrong path (a mesh, a
+/// device) from filling the memory.
+const MAX_FILE_BYTES: u64 = 16 << 20;
+
+/// Why a TOML file could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be opened or read.
+    #[error("{}: {source}", file.display())]
+    Read {
+        /// The file as named by the user.
+        file: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The file is longer than any configuration is.
+    #[error("{}: longer than {} MiB, so not a configuration file", file.display(), MAX_FILE_BYTES >> 20)]
+    TooLong {
+        /// The file as named by the user.
+        file: PathBuf,
+    },
+    /// The text is not TOML, or a key is unknown, missing or of another type.
+    #[error("{}: {message}", file.display())]
+    Syntax {
+        /// The file as named by the user.
+        file: PathBuf,
+        /// Line, column, key and cause.
+        message: String,
+    },
+    /// A value cannot be used.
+    #[error("{}: {invalid}", file.display())]
+    Value {
+        /// The file as named by the user.
+        file: PathBuf,
+        /// Key and cause.
+        invalid: InvalidValue,
+    },
+    /// A sensor's name is neither built in nor a file.
+    #[error("no sensor \"{name}\": known are {known}; a path to a TOML profile works too")]
+    UnknownSensor {
+        /// The name that was asked for.
+        name: String,
+        /// All built-in names.
+        known: String,
+    },
+}
+
+/// A key whose value cannot be used, and why.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{key}: {cause}")]
+pub struct InvalidValue {
+    /// The path of the key, such as `rotating.beam[3].elevation_deg`.
+    pub key: String,
+    /// What is wrong with it.
+    pub cause: String,
+}
+
+impl InvalidValue {
+    /// The error that `key` is wrong because of `cause`.
+    pub fn new(key: impl Into<String>, cause: impl Into<String>) -> Self {
+        Self { key: key.into(), cause: cause.into() }
+    }
+
+    /// The same error in the file it was found in.
+    #[must_use]
+    pub fn in_file(self, file: &Path) -> ConfigError {
+        ConfigError::Value { file: file.to_owned(), invalid: self }
+    }
+}
+
+/// Reads `file` and parses it.
+pub(crate) fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
+    let failed = |source| ConfigError::Read { file: file.to_owned(), source };
+    let opened = std::fs::File::open(file).map_err(failed)?;
+    let mut text = String::new();
+    opened.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
+    if text.len() as u64 > MAX_FILE_BYTES {
+        return Err(ConfigError::TooLong { file: file.to_owned() });
+    }
+    parse(&text, file)
+}
+
+/// Parses `text`, which stands in `file`.
+pub(crate) fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ConfigError> {
+    toml::from_str(text).map_err(|error| ConfigError::Syntax {
+        file: file.to_owned(),
+        message: error.to_string().trim_end().to_owned(),
+    })
+}
+
+/// `value`, if it is neither infinite nor NaN: TOML can write both.
+pub(crate) fn finite(key: &str, value: f64) -> Result<f64, InvalidValue> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    Err(InvalidValue::new(key, format!("{value} is not a finite number")))
+}
+
+/// `value`, if it is finite and above 0.
+pub(crate) fn positive(key: &str, value: f64) -> Result<f64, InvalidValue> {
+    if finite(key, value)? > 0.0 {
+        return Ok(value);
+    }
+    Err(InvalidValue::new(key, format!("{value} is not above 0")))
+}
+
+/// `value`, if it is finite and lies in `from..=to`.
+pub(crate) fn within(key: &str, value: f64, from: f64, to: f64) -> Result<f64, InvalidValue> {
+    if (from..=to).contains(&finite(key, value)?) {
+        return Ok(value);
+    }
+    Err(InvalidValue::new(key, format!("{value} is not within {from}..={to}")))
+}

@@ -1,0 +1,153 @@
+//! Scenes: which objects stand where, which sensors look at them, and which
+//! effects and attributes are wanted. Meshes are named here, not loaded.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DAffine3, DQuat, DVec3};
+
+use crate::config::{self, ConfigError, InvalidValue};
+use crate::effects::Effects;
+use crate::pose::Pose;
+use crate::sensor::Sensor;
+
+pub(crate) use table::check_normalize;
+
+mod table;
+
+#[cfg(test)]
+mod tests;
+
+/// The attributes that a point may carry besides its position.
+pub const ATTRIBUTES: [&str; 8] =
+    ["range", "beam", "ring", "time", "triangle", "object", "intensity", "normal"];
+
+/// A scene, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Seed of all random effects; default 0.
+    pub seed: u64,
+    /// The objects, at least one, with different names.
+    pub objects: Vec<SceneObject>,
+    /// The sensors, at least one, with different names; one scan each.
+    pub sensors: Vec<SceneSensor>,
+    /// The effects that are wanted, for all sensors.
+    pub effects: Effects,
+    /// The attributes that are wanted, of [`ATTRIBUTES`].
+    pub attributes: Vec<String>,
+}
+
+/// An object of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneObject {
+    /// The mesh's file; relative paths were relative to the scene's file.
+    pub mesh: PathBuf,
+    /// Default: the stem of the mesh's file name.
+    pub name: String,
+    /// A class name, if it has one.
+    pub label: Option<String>,
+    /// The mesh's upward axis, `y` or `z`; `None` is the format's default.
+    pub up: Option<String>,
+    /// `unit-sphere`, `bbox` or `none`. `None`, the default, is `none`: a scene
+    /// places a mesh in its own units.
+    pub normalize: Option<String>,
+    /// Where the mesh's origin comes to stand, metres.
+    pub position_m: DVec3,
+    /// How the mesh is turned, after it was turned upright and scaled.
+    pub rotation: DQuat,
+    /// Factors along the mesh's axes once upright, all above 0.
+    pub scale: DVec3,
+    /// The part of the light that comes back at vertical incidence, 0..=1.
+    /// Used for intensity alone; default 1.
+    pub reflectivity: f64,
+}
+
+/// A sensor of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneSensor {
+    /// The profile as the scene names it.
+    pub profile: String,
+    /// The sensor it names.
+    pub sensor: Sensor,
+    /// Default: the sensor's name.
+    pub name: String,
+    /// Where it stands.
+    pub pose: Pose,
+}
+
+impl Scene {
+    /// Reads a scene and the sensor profiles it names.
+    ///
+    /// # Errors
+    ///
+    /// Names the file, the key and the cause.
+    pub fn load(file: &Path) -> Result<Self, ConfigError> {
+        let table: table::SceneTable = config::read(file)?;
+        Self::from_table(table, file)
+    }
+
+    /// Parses a scene that stands in `file`, which need not exist; relative
+    /// paths start from its folder.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::load`].
+    pub fn parse(text: &str, file: &Path) -> Result<Self, ConfigError> {
+        Self::from_table(config::parse(text, file)?, file)
+    }
+
+    fn from_table(table: table::SceneTable, file: &Path) -> Result<Self, ConfigError> {
+        let in_file = |invalid: InvalidValue| invalid.in_file(file);
+        let folder = file.parent().unwrap_or(Path::new(""));
+        let effects = table.effects.clone();
+        table::check_attributes(&table.attributes, &effects).map_err(in_file)?;
+
+        let mut objects = Vec::new();
+        for (i, object) in table.object.into_iter().enumerate() {
+            objects.push(object.validate(i, folder).map_err(in_file)?);
+        }
+        check_names("object", objects.iter().map(|object| &object.name)).map_err(in_file)?;
+
+        let mut sensors = Vec::new();
+        for (i, sensor) in table.sensor.into_iter().enumerate() {
+            let profile =
+                Sensor::resolve_in(folder, &sensor.profile).map_err(|error| match error {
+                    ConfigError::UnknownSensor { .. } => {
+                        let key = format!("sensor[{i}].profile");
+                        in_file(InvalidValue::new(key, error.to_string()))
+                    }
+                    in_profile => in_profile,
+                })?;
+            effects.for_sensor(&profile).map_err(in_file)?;
+            sensors.push(sensor.validate(i, profile).map_err(in_file)?);
+        }
+        check_names("sensor", sensors.iter().map(|sensor| &sensor.name)).map_err(in_file)?;
+
+        Ok(Self { seed: table.seed, objects, sensors, effects, attributes: table.attributes })
+    }
+}
+
+impl SceneObject {
+    /// The map from the upright, normalised mesh to the world.
+    #[must_use]
+    pub fn world_from_object(&self) -> DAffine3 {
+        DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.position_m)
+    }
+}
+
+/// That there is an item and no two have one name.
+fn check_names<'a>(
+    kind: &str,
+    names: impl Iterator<Item = &'a String>,
+) -> Result<(), InvalidValue> {
+    let mut first_with = std::collections::HashMap::new();
+    for (i, name) in names.enumerate() {
+        if let Some(first) = first_with.insert(name, i) {
+            let cause = format!("\"{name}\" is also the name of {kind}[{first}]; set `name`");
+            return Err(InvalidValue::new(format!("{kind}[{i}].name"), cause));
+        }
+    }
+    if first_with.is_empty() {
+        return Err(InvalidValue::new(kind, format!("a scene needs at least one [[{kind}]]")));
+    }
+    Ok(())
+}

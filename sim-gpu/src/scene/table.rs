@@ -1,0 +1,169 @@
+//! A scene as TOML holds it, and its checks.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DQuat, DVec3};
+use serde::Deserialize;
+
+use super::{ATTRIBUTES, SceneObject, SceneSensor};
+use crate::config::{InvalidValue, positive, within};
+use crate::effects::Effects;
+use crate::pose::{OrientationKeys, vector};
+use crate::sensor::Sensor;
+
+/// The keys of a scene.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneTable {
+    #[serde(default)]
+    pub seed: u64,
+    #[serde(default)]
+    pub object: Vec<ObjectTable>,
+    #[serde(default)]
+    pub sensor: Vec<SensorTable>,
+    #[serde(default)]
+    pub effects: Effects,
+    #[serde(default)]
+    pub attributes: Vec<String>,
+}
+
+/// The keys of an object.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ObjectTable {
+    mesh: PathBuf,
+    name: Option<String>,
+    label: Option<String>,
+    up: Option<String>,
+    normalize: Option<String>,
+    #[serde(default)]
+    position_m: [f64; 3],
+    yaw_deg: Option<f64>,
+    pitch_deg: Option<f64>,
+    roll_deg: Option<f64>,
+    quaternion_xyzw: Option<[f64; 4]>,
+    scale: Option<Scale>,
+    reflectivity: Option<f64>,
+}
+
+/// The keys of a sensor.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SensorTable {
+    pub profile: String,
+    name: Option<String>,
+    position_m: [f64; 3],
+    look_at_m: Option<[f64; 3]>,
+    yaw_deg: Option<f64>,
+    pitch_deg: Option<f64>,
+    roll_deg: Option<f64>,
+    quaternion_xyzw: Option<[f64; 4]>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "scale takes one number or a list of three")]
+enum Scale {
+    Uniform(f64),
+    PerAxis([f64; 3]),
+}
+
+impl ObjectTable {
+    pub fn validate(self, index: usize, folder: &Path) -> Result<SceneObject, InvalidValue> {
+        let table = format!("object[{index}]");
+        let key = |field: &str| format!("{table}.{field}");
+        let Some(stem) = self.mesh.file_stem() else {
+            return Err(InvalidValue::new(key("mesh"), "names no file"));
+        };
+        if let Some(up) = &self.up {
+            check_up(&key("up"), up)?;
+        }
+        if let Some(normalize) = &self.normalize {
+            check_normalize(&key("normalize"), normalize)?;
+        }
+        let scale = match self.scale.unwrap_or(Scale::Uniform(1.0)) {
+            Scale::Uniform(factor) => [factor; 3],
+            Scale::PerAxis(factors) => factors,
+        };
+        for factor in scale {
+            positive(&key("scale"), factor)?;
+        }
+        let orientation = OrientationKeys {
+            look_at_m: None,
+            yaw_deg: self.yaw_deg,
+            pitch_deg: self.pitch_deg,
+            roll_deg: self.roll_deg,
+            quaternion_xyzw: self.quaternion_xyzw,
+        };
+        let name = self.name.unwrap_or_else(|| stem.to_string_lossy().into_owned());
+        Ok(SceneObject {
+            name: named(&table, name)?,
+            mesh: folder.join(&self.mesh),
+            label: self.label,
+            up: self.up,
+            normalize: self.normalize,
+            position_m: vector(&key("position_m"), self.position_m)?,
+            rotation: orientation.rotation(&table)?.unwrap_or(DQuat::IDENTITY),
+            scale: DVec3::from_array(scale),
+            reflectivity: within(&key("reflectivity"), self.reflectivity.unwrap_or(1.0), 0.0, 1.0)?,
+        })
+    }
+}
+
+impl SensorTable {
+    pub fn validate(self, index: usize, sensor: Sensor) -> Result<SceneSensor, InvalidValue> {
+        let table = format!("sensor[{index}]");
+        let orientation = OrientationKeys {
+            look_at_m: self.look_at_m,
+            yaw_deg: self.yaw_deg,
+            pitch_deg: self.pitch_deg,
+            roll_deg: self.roll_deg,
+            quaternion_xyzw: self.quaternion_xyzw,
+        };
+        let pose = orientation.pose(&table, self.position_m)?;
+        let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
+        Ok(SceneSensor { profile: self.profile, sensor, name, pose })
+    }
+}
+
+/// That all attributes are known, wanted once, and have their effect.
+pub(super) fn check_attributes(
+    attributes: &[String],
+    effects: &Effects,
+) -> Result<(), InvalidValue> {
+    for (i, attribute) in attributes.iter().enumerate() {
+        let wrong = |cause: String| Err(InvalidValue::new(format!("attributes[{i}]"), cause));
+        if !ATTRIBUTES.contains(&attribute.as_str()) {
+            return wrong(format!("no \"{attribute}\": known are {}", ATTRIBUTES.join(", ")));
+        }
+        if attributes[..i].contains(attribute) {
+            return wrong(format!("\"{attribute}\" stands in the list twice"));
+        }
+        if attribute == "intensity" && effects.intensity.is_none() {
+            return wrong("intensity needs effects.intensity = true".to_owned());
+        }
+    }
+    Ok(())
+}
+
+/// That `value` names a way to normalise a mesh.
+pub(crate) fn check_normalize(key: &str, value: &str) -> Result<(), InvalidValue> {
+    one_of(key, value, &["unit-sphere", "bbox", "none"])
+}
+
+fn check_up(key: &str, value: &str) -> Result<(), InvalidValue> {
+    one_of(key, value, &["y", "z"])
+}
+
+fn one_of(key: &str, value: &str, known: &[&str]) -> Result<(), InvalidValue> {
+    if known.contains(&value) {
+        return Ok(());
+    }
+    Err(InvalidValue::new(key, format!("no \"{value}\": known are {}", known.join(", "))))
+}
+
+fn named(table: &str, name: String) -> Result<String, InvalidValue> {
+    if name.trim().is_empty() {
+        return Err(InvalidValue::new(format!("{table}.name"), "is empty"));
+    }
+    Ok(name)
+}

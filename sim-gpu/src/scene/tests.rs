@@ -1,0 +1,111 @@
+use super::*;
+use crate::effects::{Intensity, Noise, NoiseModel, Quantum};
+
+fn shipped(name: &str) -> Scene {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes");
+    Scene::load(&folder.join(name)).unwrap()
+}
+
+const OBJECT: &str = "[[object]]\nmesh = \"a.obj\"\n";
+const SENSOR: &str = "[[sensor]]\nprofile = \"vlp16\"\nposition_m = [1, 0, 0]\nyaw_deg = 0\n";
+
+fn parse(text: &str) -> Result<Scene, ConfigError> {
+    Scene::parse(text, Path::new("scenes/my.toml"))
+}
+
+#[test]
+fn the_plain_scene_wants_nothing() {
+    let scene = shipped("plain.toml");
+    assert!(scene.effects.is_plain());
+    assert!(scene.attributes.is_empty());
+    assert_eq!((scene.objects.len(), scene.sensors.len()), (1, 1));
+}
+
+#[test]
+fn the_two_chairs_show_every_effect() {
+    let scene = shipped("two_chairs.toml");
+    assert_eq!(scene.seed, 7);
+    let noise = Noise { mean_m: 0.0, sigma_m: 0.01, model: NoiseModel::Range };
+    assert_eq!(scene.effects.noise, Some(noise));
+    assert_eq!(scene.effects.dropout.map(|dropout| dropout.probability), Some(0.05));
+    assert_eq!(scene.effects.quantum, Some(Quantum { step_m: None }));
+    assert_eq!(scene.effects.intensity, Some(Intensity));
+    let [near, far] = scene.objects.as_slice() else { panic!("two chairs") };
+    assert_eq!((near.name.as_str(), far.name.as_str()), ("near_chair", "far_chair"));
+    assert!(near.mesh.ends_with("assets/scenes/../meshes/chair.obj"), "{:?}", near.mesh);
+    assert_eq!(far.scale, DVec3::new(1.1, 1.0, 1.2));
+    assert_eq!(scene.sensors[0].name, "roof");
+    assert_eq!(scene.sensors[0].sensor.name, "vlp32c");
+}
+
+#[test]
+fn an_object_stands_upright_at_the_origin_by_default() {
+    let scene = parse(&format!("{OBJECT}{SENSOR}")).unwrap();
+    let object = &scene.objects[0];
+    assert_eq!(object.mesh, Path::new("scenes/a.obj"));
+    assert_eq!(object.name, "a");
+    assert_eq!(object.reflectivity, 1.0);
+    assert_eq!(object.world_from_object(), DAffine3::IDENTITY);
+}
+
+#[test]
+fn an_object_is_scaled_then_turned_then_moved() {
+    let keys = "position_m = [0, 0, 5]\nyaw_deg = 90\nscale = 2";
+    let scene = parse(&format!("{OBJECT}{keys}\n{SENSOR}")).unwrap();
+    let moved = scene.objects[0].world_from_object().transform_point3(DVec3::X);
+    assert!(moved.abs_diff_eq(DVec3::new(0.0, 2.0, 5.0), 1e-15), "{moved}");
+}
+
+#[test]
+fn bad_scenes_are_named() {
+    let object = |keys: &str| format!("{OBJECT}{keys}\n{SENSOR}");
+    let sensor = |keys: &str| format!("{OBJECT}[[sensor]]\n{keys}\n");
+    let both = |keys: &str| format!("{keys}\n{OBJECT}{SENSOR}");
+    for (text, part) in [
+        (String::new(), "at least one [[object]]"),
+        (OBJECT.to_owned(), "at least one [[sensor]]"),
+        (SENSOR.to_owned(), "at least one [[object]]"),
+        (
+            format!("{OBJECT}{OBJECT}{SENSOR}"),
+            "object[1].name: \"a\" is also the name of object[0]",
+        ),
+        (format!("{OBJECT}{SENSOR}{SENSOR}"), "sensor[1].name: \"vlp16\" is also the name of"),
+        (object("colour = 1"), "colour"),
+        (object("scale = 0"), "object[0].scale"),
+        (object("scale = [1, -1, 1]"), "object[0].scale"),
+        (object("scale = [1, 1]"), "scale takes one number"),
+        (object("reflectivity = 1.5"), "object[0].reflectivity"),
+        (object("reflectivity = nan"), "object[0].reflectivity"),
+        (object("up = \"x\""), "object[0].up: no \"x\": known are y, z"),
+        (object("normalize = \"sphere\""), "object[0].normalize"),
+        (object("position_m = [0, 0, inf]"), "object[0].position_m"),
+        (object("name = \" \""), "object[0].name: is empty"),
+        (object("yaw_deg = 1\nquaternion_xyzw = [0, 0, 0, 1]"), "exclude each other"),
+        (format!("[[object]]\nmesh = \"\"\n{SENSOR}"), "object[0].mesh: names no file"),
+        (
+            sensor("profile = \"vlp23\"\nposition_m = [0, 0, 0]\nyaw_deg = 0"),
+            "sensor[0].profile: no sensor \"vlp23\"",
+        ),
+        (sensor("profile = \"vlp16\"\nposition_m = [0, 0, 0]"), "sensor[0]: no orientation"),
+        (sensor("profile = \"./none.toml\"\nposition_m = [0, 0, 0]"), "scenes/./none.toml"),
+        (sensor("position_m = [0, 0, 0]"), "profile"),
+        (both("seed = -1"), "seed"),
+        (both("attributes = [\"range\", \"colour\"]"), "attributes[1]: no \"colour\""),
+        (both("attributes = [\"range\", \"range\"]"), "attributes[1]: \"range\" stands"),
+        (both("attributes = [\"intensity\"]"), "needs effects.intensity"),
+        (both("effects = { fog = true }"), "fog"),
+        (both("effects = { dropout = { probability = 2 } }"), "effects.dropout.probability"),
+        (
+            format!(
+                "{OBJECT}[[sensor]]\nprofile = \"kinect-v2\"\nposition_m = [1, 0, 0]\n\
+                     yaw_deg = 0\n[effects]\nquantise_m = true"
+            ),
+            "has no range.quantum_m",
+        ),
+        ("seed = \n".to_owned(), "line 1"),
+    ] {
+        let error = parse(&text).unwrap_err().to_string();
+        assert!(error.contains(part), "{text}\n-> {error}");
+        assert!(error.contains("my.toml") || error.contains("none.toml"), "{error}");
+    }
+}

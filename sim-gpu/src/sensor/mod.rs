@@ -1,0 +1,238 @@
+//! Sensors: which way each beam points, when it fires, how far it measures.
+//!
+//! A sensor is a TOML profile, built in (`assets/sensors`) or given by path.
+//! Angles are in degrees as in the profile; [`Sensor::pattern`] turns them
+//! into unit vectors of the sensor frame (x forward, y left, z up).
+
+use std::num::NonZeroU32;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::{self, ConfigError, InvalidValue};
+
+pub use cone::Cone;
+pub use grid::Grid;
+pub use pattern::BeamPattern;
+pub use rings::{Rings, polar_angle_rad};
+pub use rotating::{Beam, Rotating};
+pub use sample::Sample;
+pub use uniform::Uniform;
+pub use views::Views;
+
+mod coherence;
+mod cone;
+mod grid;
+mod pattern;
+mod profile;
+mod rings;
+mod rotating;
+mod sample;
+mod uniform;
+mod views;
+
+#[cfg(test)]
+mod tests;
+
+/// The names of all sensors that are part of the program.
+pub const BUILTIN_NAMES: [&str; 7] = [
+    "vlp32c",
+    "blainder-ultrapuck",
+    "generic-static",
+    "kinect-v2",
+    "vlp16",
+    "hdl64e",
+    "modelnet40c-lidar",
+];
+
+/// The profiles of [`BUILTIN_NAMES`], in its order.
+const BUILTIN_PROFILES: [&str; BUILTIN_NAMES.len()] = [
+    include_str!("../../../assets/sensors/vlp32c.toml"),
+    include_str!("../../../assets/sensors/blainder-ultrapuck.toml"),
+    include_str!("../../../assets/sensors/generic-static.toml"),
+    include_str!("../../../assets/sensors/kinect-v2.toml"),
+    include_str!("../../../assets/sensors/vlp16.toml"),
+    include_str!("../../../assets/sensors/hdl64e.toml"),
+    include_str!("../../../assets/sensors/modelnet40c-lidar.toml"),
+];
+
+/// The most rays a sensor may have: an image of 8192 x 8192 pixels. The
+/// pattern of so many takes 2.5 GB.
+pub const MAX_RAYS: u64 = 1 << 26;
+
+/// A sensor, checked: its pattern can be built without error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "profile::Profile")]
+pub struct Sensor {
+    /// A short name, as in `--sensor`.
+    pub name: String,
+    /// One line for people.
+    pub description: String,
+    /// Where the constants come from.
+    pub sources: Vec<String>,
+    /// The ranges it measures.
+    pub range: RangeLimits,
+    /// Typical noise: stated by the maker, applied only where asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<TypicalNoise>,
+    /// The arrangement of the beams.
+    #[serde(flatten)]
+    pub layout: Layout,
+    /// Only each so-manyth azimuth step or pixel column is kept; 1 keeps all.
+    pub decimation: NonZeroU32,
+    /// Points are snapped to rings after the scan.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rings: Option<Rings>,
+    /// So many points are drawn after the scan.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<Sample>,
+    /// The views this sensor is meant to be used with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub views: Option<Views>,
+}
+
+/// The ranges that a sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RangeLimits {
+    /// Nearest range in metres, 0 or more; default 0.
+    #[serde(default)]
+    pub min_m: f64,
+    /// Farthest range in metres.
+    pub max_m: f64,
+    /// The unit in which the sensor reports ranges, metres. Ranges are rounded
+    /// to it only where the quantisation effect is named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantum_m: Option<f64>,
+}
+
+/// The noise that the maker of a sensor states.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TypicalNoise {
+    /// Standard deviation of the range in metres.
+    pub typical_sigma_m: f64,
+}
+
+/// How the beams are arranged.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// A table of beams that turns and fires in sequence.
+    Rotating(Rotating),
+    /// A regular grid in azimuth and elevation.
+    Uniform(Uniform),
+    /// The pixels of a camera.
+    Grid(Grid),
+}
+
+impl Sensor {
+    /// The built-in sensor of this name, if there is one.
+    #[must_use]
+    pub fn builtin(name: &str) -> Option<Self> {
+        let index = BUILTIN_NAMES.iter().position(|&known| known == name)?;
+        let file = format!("assets/sensors/{name}.toml");
+        let sensor = profile::parse(BUILTIN_PROFILES[index], Path::new(&file));
+        Some(sensor.expect("invariant: a test parses all built-in profiles"))
+    }
+
+    /// Reads a profile.
+    ///
+    /// # Errors
+    ///
+    /// Names the file, the key and the cause.
+    pub fn load(file: &Path) -> Result<Self, ConfigError> {
+        let profile: profile::Profile = config::read(file)?;
+        Self::try_from(profile).map_err(|invalid| invalid.in_file(file))
+    }
+
+    /// A built-in sensor by name, or else a profile by path.
+    ///
+    /// # Errors
+    ///
+    /// As [`Sensor::load`]; where there is neither such a name nor such a
+    /// file, the error lists the known names.
+    pub fn resolve(name_or_path: &str) -> Result<Self, ConfigError> {
+        Self::resolve_in(Path::new(""), name_or_path)
+    }
+
+    /// As [`Sensor::resolve`], with relative paths taken from `folder`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Sensor::resolve`].
+    pub fn resolve_in(folder: &Path, name_or_path: &str) -> Result<Self, ConfigError> {
+        if let Some(sensor) = Self::builtin(name_or_path) {
+            return Ok(sensor);
+        }
+        let file = folder.join(name_or_path);
+        let meant_as_path = name_or_path.contains(['/', '\\']) || name_or_path.ends_with(".toml");
+        if meant_as_path || file.exists() {
+            return Self::load(&file);
+        }
+        let known = BUILTIN_NAMES.join(", ");
+        Err(ConfigError::UnknownSensor { name: name_or_path.to_owned(), known })
+    }
+
+    /// The beams of one revolution or image.
+    #[must_use]
+    pub fn pattern(&self) -> BeamPattern {
+        let keep_each = self.decimation.get();
+        let rays = match &self.layout {
+            Layout::Rotating(rotating) => rotating.rays(keep_each),
+            Layout::Uniform(uniform) => uniform.rays(keep_each),
+            Layout::Grid(grid) => grid.rays(keep_each),
+        };
+        BeamPattern::new(rays.directions, rays.ring, rays.time_s)
+    }
+
+    /// The same sensor with only each `k`-th azimuth step, or column of
+    /// pixels, starting with the first. Its rays are some of this sensor's, in
+    /// the same order.
+    #[must_use]
+    pub fn decimated(&self, k: NonZeroU32) -> Self {
+        Self { decimation: self.decimation.saturating_mul(k), ..self.clone() }
+    }
+
+    /// The views this sensor is meant for: its own, or else
+    /// [`Views::STATIC`] for a camera and [`Views::ROTATING`] for all others.
+    #[must_use]
+    pub fn default_views(&self) -> Views {
+        self.views.clone().unwrap_or(match self.layout {
+            Layout::Grid(_) => Views::STATIC,
+            Layout::Rotating(_) | Layout::Uniform(_) => Views::ROTATING,
+        })
+    }
+}
+
+/// The rays of a layout in firing order.
+struct Rays {
+    directions: Vec<glam::DVec3>,
+    ring: Vec<u16>,
+    time_s: Vec<f64>,
+}
+
+impl Rays {
+    fn with_capacity(n_rays: usize) -> Self {
+        Self {
+            directions: Vec::with_capacity(n_rays),
+            ring: Vec::with_capacity(n_rays),
+            time_s: Vec::with_capacity(n_rays),
+        }
+    }
+
+    fn push(&mut self, direction: glam::DVec3, ring: u16, time_s: f64) {
+        self.directions.push(direction);
+        self.ring.push(ring);
+        self.time_s.push(time_s);
+    }
+}
+
+/// `n_rays`, if there is at least one and not too many.
+fn checked_ray_count(key: &str, n_rays: u64) -> Result<(), InvalidValue> {
+    match n_rays {
+        0 => Err(InvalidValue::new(key, "gives not a single ray")),
+        1..=MAX_RAYS => Ok(()),
+        _ => Err(InvalidValue::new(key, format!("gives {n_rays} rays, more than {MAX_RAYS}"))),
+    }
+}

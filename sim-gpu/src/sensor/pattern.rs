@@ -1,0 +1,83 @@
+//! All beams of a sensor at once, and the few that can hit something.
+
+use glam::DVec3;
+
+use super::coherence::coherent_order;
+use super::cone::{BlockCone, Cone};
+
+/// Rays of one block share a bounding cone.
+const BLOCK_RAYS: usize = 64;
+/// Blocks of one group share a bounding cone.
+const GROUP_BLOCKS: usize = 32;
+
+/// The rays of one revolution or image, in firing order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BeamPattern {
+    /// Unit vectors in the sensor frame, `[n_rays]`.
+    pub directions: Vec<DVec3>,
+    /// Rank by elevation, 0 from below; for a camera the row from below,
+    /// `[n_rays]`.
+    pub ring: Vec<u16>,
+    /// Time since the start of the revolution, `[n_rays]`.
+    pub time_s: Vec<f64>,
+    /// All ray indices once, `[n_rays]`; neighbours in this list point in
+    /// neighbouring directions and so traverse a tree together.
+    pub order: Vec<u32>,
+    /// Bounding cones of each [`BLOCK_RAYS`] rays of `order`.
+    blocks: Vec<BlockCone>,
+    /// Bounding cones of each [`GROUP_BLOCKS`] blocks.
+    groups: Vec<BlockCone>,
+}
+
+impl BeamPattern {
+    /// A pattern of rays in firing order. All three lists must be of one
+    /// length, below 2^32, and all directions of unit length.
+    #[must_use]
+    pub fn new(directions: Vec<DVec3>, ring: Vec<u16>, time_s: Vec<f64>) -> Self {
+        debug_assert!(directions.len() == ring.len() && directions.len() == time_s.len());
+        let order = coherent_order(&directions);
+        let bound = |rays: &[u32]| BlockCone::around(rays.iter().map(|&i| directions[i as usize]));
+        let blocks = order.chunks(BLOCK_RAYS).map(bound).collect();
+        let groups = order.chunks(BLOCK_RAYS * GROUP_BLOCKS).map(bound).collect();
+        Self { directions, ring, time_s, order, blocks, groups }
+    }
+
+    /// Number of rays.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.directions.len()
+    }
+
+    /// Whether there is no ray.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.directions.is_empty()
+    }
+
+    /// The rays within `cone`, as indices in the order of `order`.
+    ///
+    /// No ray is lost whose angle to the axis is at most the half angle. Rays
+    /// up to 1e-9 rad outside, or up to 4e-15 in the cosine (1e-7 rad for a
+    /// cone thinner than that), may be among them. A half angle of pi or more,
+    /// or NaN, gives all rays.
+    #[must_use]
+    pub fn within(&self, cone: &Cone) -> Vec<u32> {
+        let Some(widened) = cone.widened() else { return self.order.clone() };
+        let mut found = Vec::new();
+        let groups = self.groups.iter().zip(self.blocks.chunks(GROUP_BLOCKS));
+        let rays = self.order.chunks(BLOCK_RAYS * GROUP_BLOCKS);
+        for ((group, blocks), rays) in groups.zip(rays) {
+            if widened.misses(group) {
+                continue;
+            }
+            for (block, rays) in blocks.iter().zip(rays.chunks(BLOCK_RAYS)) {
+                if widened.misses(block) {
+                    continue;
+                }
+                let holds = |&ray: &u32| widened.holds(self.directions[ray as usize]);
+                found.extend(rays.iter().copied().filter(holds));
+            }
+        }
+        found
+    }
+}

@@ -1,0 +1,120 @@
+//! A sensor's profile as TOML holds it, and its checks.
+
+use std::num::NonZeroU32;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::{
+    Grid, Layout, RangeLimits, Rings, Rotating, Sample, Sensor, TypicalNoise, Uniform, Views,
+};
+use crate::config::{self, ConfigError, InvalidValue, positive, within};
+
+/// Farther than any sensor sees, and its square is still finite in f32.
+const MAX_RANGE_M: f64 = 1e9;
+
+/// The keys of a profile.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Profile {
+    name: String,
+    #[serde(default)]
+    description: String,
+    #[serde(default)]
+    sources: Vec<String>,
+    range: RangeLimits,
+    noise: Option<TypicalNoise>,
+    rotating: Option<Rotating>,
+    uniform: Option<Uniform>,
+    grid: Option<Grid>,
+    #[serde(default = "keep_all")]
+    decimation: NonZeroU32,
+    rings: Option<Rings>,
+    sample: Option<Sample>,
+    views: Option<Views>,
+}
+
+fn keep_all() -> NonZeroU32 {
+    NonZeroU32::MIN
+}
+
+/// Parses a profile that stands in `file`.
+pub(super) fn parse(text: &str, file: &Path) -> Result<Sensor, ConfigError> {
+    let profile: Profile = config::parse(text, file)?;
+    Sensor::try_from(profile).map_err(|invalid| invalid.in_file(file))
+}
+
+impl TryFrom<Profile> for Sensor {
+    type Error = InvalidValue;
+
+    fn try_from(profile: Profile) -> Result<Self, InvalidValue> {
+        if profile.name.trim().is_empty() {
+            return Err(InvalidValue::new("name", "is empty"));
+        }
+        check_range(&profile.range)?;
+        if let Some(noise) = profile.noise {
+            within("noise.typical_sigma_m", noise.typical_sigma_m, 0.0, f64::MAX)?;
+        }
+        if let Some(rings) = &profile.rings {
+            rings.validate()?;
+        }
+        if let Some(sample) = &profile.sample {
+            sample.validate()?;
+        }
+        if let Some(views) = &profile.views {
+            views.validate()?;
+        }
+        Ok(Self {
+            name: profile.name,
+            description: profile.description,
+            sources: profile.sources,
+            range: profile.range,
+            noise: profile.noise,
+            layout: layout(profile.rotating, profile.uniform, profile.grid)?,
+            decimation: profile.decimation,
+            rings: profile.rings,
+            sample: profile.sample,
+            views: profile.views,
+        })
+    }
+}
+
+fn layout(
+    rotating: Option<Rotating>,
+    uniform: Option<Uniform>,
+    grid: Option<Grid>,
+) -> Result<Layout, InvalidValue> {
+    let layout = match (rotating, uniform, grid) {
+        (Some(rotating), None, None) => Layout::Rotating(rotating),
+        (None, Some(uniform), None) => Layout::Uniform(uniform),
+        (None, None, Some(grid)) => Layout::Grid(grid),
+        (None, None, None) => {
+            let cause = "missing: a profile needs one of [rotating], [uniform] and [grid]";
+            return Err(InvalidValue::new("rotating", cause));
+        }
+        _ => {
+            let cause = "[rotating], [uniform] and [grid] exclude each other";
+            return Err(InvalidValue::new("rotating, uniform, grid", cause));
+        }
+    };
+    match &layout {
+        Layout::Rotating(rotating) => rotating.validate()?,
+        Layout::Uniform(uniform) => uniform.validate()?,
+        Layout::Grid(grid) => grid.validate()?,
+    }
+    Ok(layout)
+}
+
+fn check_range(range: &RangeLimits) -> Result<(), InvalidValue> {
+    within("range.min_m", range.min_m, 0.0, f64::MAX)?;
+    positive("range.max_m", range.max_m)?;
+    within("range.max_m", range.max_m, 0.0, MAX_RANGE_M)?;
+    if range.min_m >= range.max_m {
+        let cause = format!("{} is not above range.min_m = {}", range.max_m, range.min_m);
+        return Err(InvalidValue::new("range.max_m", cause));
+    }
+    if let Some(quantum_m) = range.quantum_m {
+        positive("range.quantum_m", quantum_m)?;
+    }
+    Ok(())
+}

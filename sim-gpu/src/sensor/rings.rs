@@ -1,0 +1,59 @@
+//! Snapping points to rings of constant polar angle, as ModelNet40-C does.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::config::{InvalidValue, positive, within};
+
+/// Rings of points: between a first polar angle and the last, each step of
+/// `step_deg` keeps a part of its points and moves them to its middle.
+/// Source: jiachens/ModelNet40-C, `data/generate_c.py`, `simulate_lidar`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rings {
+    /// Angle from ring to ring.
+    pub step_deg: f64,
+    /// Start of the part of a step that is kept, in 0..1.
+    pub keep_from: f64,
+    /// End of that part, which is not itself kept, in 0..=1.
+    pub keep_to: f64,
+}
+
+impl Rings {
+    /// The direction snapped to its ring, `None` if it lies between two rings.
+    ///
+    /// `direction` is of unit length in a frame at the sensor whose axes are
+    /// the world's. `first_polar_rad` is where the first ring begins: the
+    /// recipe takes the smallest [`polar_angle_rad`] of the scan. The azimuth
+    /// stays, as does the range, which is no matter of directions.
+    #[must_use]
+    pub fn snap_to_ring(&self, direction: DVec3, first_polar_rad: f64) -> Option<DVec3> {
+        let step_rad = self.step_deg.to_radians();
+        let steps = (polar_angle_rad(direction) - first_polar_rad) / step_rad;
+        let ring = steps.floor();
+        if !(self.keep_from..self.keep_to).contains(&(steps - ring)) {
+            return None;
+        }
+        let polar_rad = first_polar_rad + (ring + 0.5) * step_rad;
+        let (sin_polar, cos_polar) = polar_rad.sin_cos();
+        let (sin_azimuth, cos_azimuth) = direction.y.atan2(direction.x).sin_cos();
+        Some(DVec3::new(sin_polar * cos_azimuth, sin_polar * sin_azimuth, cos_polar))
+    }
+
+    pub(super) fn validate(&self) -> Result<(), InvalidValue> {
+        positive("rings.step_deg", self.step_deg)?;
+        within("rings.keep_from", self.keep_from, 0.0, 1.0)?;
+        within("rings.keep_to", self.keep_to, 0.0, 1.0)?;
+        if self.keep_from >= self.keep_to {
+            let cause = format!("{} is not above rings.keep_from", self.keep_to);
+            return Err(InvalidValue::new("rings.keep_to", cause));
+        }
+        Ok(())
+    }
+}
+
+/// The angle between a vector and the z axis, radians in 0..=pi.
+#[must_use]
+pub fn polar_angle_rad(vector: DVec3) -> f64 {
+    vector.x.hypot(vector.y).atan2(vector.z)
+}

@@ -1,0 +1,82 @@
+//! Drawing a fixed number of points from a scan.
+
+use formats::rng::StreamKey;
+use serde::{Deserialize, Serialize};
+
+use crate::config::InvalidValue;
+
+/// How many points of a scan are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sample {
+    /// The number of points drawn.
+    pub points: u32,
+    /// Whether a point may be drawn more than once. If not, a scan with fewer
+    /// points keeps them all.
+    pub with_replacement: bool,
+    /// So many points are drawn from the scan before its points are snapped to
+    /// rings: without replacement from a scan that has as many, with
+    /// replacement from a smaller one (ModelNet40-C, `occlusion_1`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before_rings: Option<u32>,
+}
+
+impl Sample {
+    /// The points to keep of `n_available`, as indices, in the order drawn.
+    #[must_use]
+    pub fn draw(&self, n_available: u32, key: StreamKey) -> Vec<u32> {
+        if self.with_replacement {
+            draw_with_replacement(n_available, self.points, key)
+        } else {
+            draw_without_replacement(n_available, self.points, key)
+        }
+    }
+
+    /// The points to keep of `n_available` before the rings, as indices; all
+    /// of them where the profile does not ask for this.
+    #[must_use]
+    pub fn draw_before_rings(&self, n_available: u32, key: StreamKey) -> Vec<u32> {
+        match self.before_rings {
+            None => (0..n_available).collect(),
+            Some(points) if points <= n_available => {
+                draw_without_replacement(n_available, points, key)
+            }
+            Some(points) => draw_with_replacement(n_available, points, key),
+        }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), InvalidValue> {
+        let counts = [
+            ("sample.points", self.points),
+            ("sample.before_rings", self.before_rings.unwrap_or(1)),
+        ];
+        for (key, points) in counts {
+            if !(1..=super::MAX_RAYS as u32).contains(&points) {
+                let cause = format!("{points} is not within 1..={}", super::MAX_RAYS);
+                return Err(InvalidValue::new(key, cause));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `n_drawn` indices below `n_available`, each independent; none from nothing.
+fn draw_with_replacement(n_available: u32, n_drawn: u32, key: StreamKey) -> Vec<u32> {
+    if n_available == 0 {
+        return Vec::new();
+    }
+    (0..n_drawn).map(|n| key.below(u64::from(n_available), u64::from(n)) as u32).collect()
+}
+
+/// `n_drawn` different indices below `n_available`, or all if there are fewer:
+/// the first steps of a Fisher-Yates shuffle.
+fn draw_without_replacement(n_available: u32, n_drawn: u32, key: StreamKey) -> Vec<u32> {
+    let mut indices: Vec<u32> = (0..n_available).collect();
+    let n_drawn = n_drawn.min(n_available);
+    for n in 0..n_drawn {
+        let left = u64::from(n_available - n);
+        indices.swap(n as usize, n as usize + key.below(left, u64::from(n)) as usize);
+    }
+    indices.truncate(n_drawn as usize);
+    indices
+}

@@ -1,0 +1,208 @@
+use glam::DVec3;
+
+use super::*;
+
+/// Products of sines and cosines err by a few units in the last place.
+const TOLERANCE: f64 = 1e-15;
+
+fn assert_near(found: DVec3, expected: DVec3) {
+    assert!(found.abs_diff_eq(expected, TOLERANCE), "{found} is not {expected}");
+}
+
+/// The direction at this elevation and azimuth, counterclockwise, in degrees.
+fn at(elevation_deg: f64, azimuth_deg: f64) -> DVec3 {
+    let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
+    let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
+    DVec3::new(cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation)
+}
+
+fn elevation_deg(direction: DVec3) -> f64 {
+    direction.z.asin().to_degrees()
+}
+
+#[test]
+fn every_sensor_has_its_number_of_rays() {
+    for (name, n_rays) in [
+        ("vlp32c", 57_870),              // floor(32 x 0.1 s / 55.296 us)
+        ("blainder-ultrapuck", 219_600), // 1800 x 122
+        ("generic-static", 10_000),
+        ("kinect-v2", 217_088),         // 512 x 424
+        ("vlp16", 28_935),              // floor(16 x 0.1 s / 55.296 us)
+        ("hdl64e", 133_333),            // floor(64 x 0.1 s / 48 us)
+        ("modelnet40c-lidar", 777_600), // 1080 x 720
+    ] {
+        assert_eq!(sensor(name).pattern().len(), n_rays, "{name}");
+    }
+}
+
+#[test]
+fn every_direction_is_of_unit_length_and_every_ray_once_in_the_order() {
+    for name in BUILTIN_NAMES {
+        let pattern = sensor(name).pattern();
+        for direction in &pattern.directions {
+            assert!((direction.length() - 1.0).abs() < TOLERANCE, "{name}: {direction}");
+        }
+        let mut order = pattern.order.clone();
+        order.sort_unstable();
+        assert!(order.into_iter().eq(0..pattern.len() as u32), "{name}");
+    }
+}
+
+/// A higher ring never points lower.
+#[test]
+fn rings_are_ranked_from_below() {
+    for name in BUILTIN_NAMES {
+        if let Layout::Grid(_) = sensor(name).layout {
+            continue;
+        }
+        let pattern = sensor(name).pattern();
+        let n_rings = usize::from(*pattern.ring.iter().max().unwrap()) + 1;
+        let mut elevations_deg = vec![f64::NAN; n_rings];
+        for (&ring, &direction) in pattern.ring.iter().zip(&pattern.directions) {
+            elevations_deg[usize::from(ring)] = elevation_deg(direction);
+        }
+        assert!(elevations_deg.is_sorted(), "{name}: {elevations_deg:?}");
+    }
+}
+
+#[test]
+fn the_vlp32c_starts_with_its_first_two_lasers() {
+    let pattern = sensor("vlp32c").pattern();
+    // Laser 0: offset -1.4 degrees, so 1.4 degrees clockwise. Laser 1: +4.2.
+    assert_near(pattern.directions[0], at(-25.0, -1.4));
+    assert_near(pattern.directions[1], at(-1.0, 4.2));
+    assert_eq!(pattern.time_s[..3], [0.0, 0.0, 2.304e-6]);
+    assert_eq!(pattern.ring[0], 0);
+    assert_eq!(*pattern.ring.iter().max().unwrap(), 31);
+    assert_eq!(elevation_deg(pattern.directions[29]).round(), 15.0);
+    assert_eq!(pattern.ring[29], 31);
+}
+
+#[test]
+fn the_vlp32c_ends_with_the_14th_laser_of_sequence_1808() {
+    let pattern = sensor("vlp32c").pattern();
+    let time_us = 1808.0 * 55.296 + 6.0 * 2.304;
+    // Sums of microseconds up to 1e5 are rounded to 1.5e-11 us.
+    assert!((pattern.time_s[57_869] - time_us * 1e-6).abs() < 1e-16);
+    // Laser 13: offset +1.4 degrees, elevation 1.333.
+    let clockwise_deg = 360.0 * time_us * 1e-6 / 0.1 - 1.4;
+    let found = pattern.directions[57_869];
+    // Both ways round some ten times by 1.1e-16 of an azimuth of 6.3.
+    assert!(found.abs_diff_eq(at(1.333, -clockwise_deg), 1e-14), "{found}");
+}
+
+#[test]
+fn the_vlp32c_steps_by_a_fifth_of_a_degree_clockwise() {
+    let pattern = sensor("vlp32c").pattern();
+    let azimuth_deg = |ray: usize| {
+        let direction = pattern.directions[ray];
+        direction.y.atan2(direction.x).to_degrees()
+    };
+    // 360 x 10 Hz x 55.296 us; SIMULATORS.md section 3 has 0.19907.
+    assert!((azimuth_deg(0) - azimuth_deg(32) - 0.199_065_6).abs() < 1e-12);
+    assert!(pattern.time_s.is_sorted());
+    assert!(pattern.time_s.iter().all(|&time_s| time_s < 0.1));
+}
+
+#[test]
+fn an_azimuth_quantum_moves_beams_to_its_multiples() {
+    let mut coarse = sensor("vlp32c");
+    let Layout::Rotating(rotating) = &mut coarse.layout else { panic!("it rotates") };
+    rotating.azimuth_quantum_deg = Some(0.01);
+    let pattern = coarse.pattern();
+    // 0.1990656 degrees become 0.20: laser 0 points to -1.4 - 0.2.
+    assert_near(pattern.directions[32], at(-25.0, -1.6));
+}
+
+#[test]
+fn the_blainder_grid_has_its_corners_and_its_seam_twice() {
+    let pattern = sensor("blainder-ultrapuck").pattern();
+    let [first, last] = [pattern.directions[0], pattern.directions[219_599]];
+    assert_near(first, at(-20.0, -180.0));
+    assert_near(last, at(20.0, 180.0));
+    for row in 0..122 {
+        let [first, last] = [row, 1799 * 122 + row].map(|ray| pattern.directions[ray]);
+        assert_near(first, last);
+    }
+    // linspace: 360 / 1799 and 40 / 121 degrees a step, y inner.
+    assert_near(pattern.directions[1], at(-20.0 + 40.0 / 121.0, -180.0));
+    assert_near(pattern.directions[122], at(-20.0, -180.0 + 360.0 / 1799.0));
+    assert_eq!(pattern.ring[..3], [0, 1, 2]);
+    assert!((pattern.time_s[219_599] - 0.05).abs() < 1e-17);
+}
+
+#[test]
+fn a_static_scanner_has_pixel_centres_on_the_edges_of_its_view() {
+    let pattern = sensor("generic-static").pattern();
+    let edge = 30_f64.to_radians().tan();
+    let corner = |left: f64, up: f64| DVec3::new(1.0, left * edge, up * edge).normalize();
+    assert_near(pattern.directions[0], corner(1.0, 1.0));
+    assert_near(pattern.directions[99], corner(-1.0, 1.0));
+    assert_near(pattern.directions[9_900], corner(1.0, -1.0));
+    assert_near(pattern.directions[1], corner(1.0 - 2.0 / 99.0, 1.0));
+    assert_eq!((pattern.ring[0], pattern.ring[9_999]), (99, 0));
+}
+
+#[test]
+fn a_pinhole_camera_has_its_principal_point() {
+    let pattern = sensor("modelnet40c-lidar").pattern();
+    let pixel = |column: f64, row: f64| {
+        DVec3::new(1.0, (539.5 - column) / 365.0, (359.5 - row) / 365.0).normalize()
+    };
+    assert_near(pattern.directions[0], pixel(0.0, 0.0));
+    assert_near(pattern.directions[1080 * 100 + 7], pixel(7.0, 100.0));
+    // The recipe's camera stands on its head: the set of rays is the same.
+    assert_near(pattern.directions[1080 * 720 - 1], pixel(0.0, 0.0) * DVec3::new(1.0, -1.0, -1.0));
+}
+
+#[test]
+fn beams_fire_by_time_and_the_last_sequence_is_cut() {
+    let pattern = parse(TINY).unwrap().pattern();
+    // 2 x 1 s / 0.4 s = 5 rays.
+    assert_eq!(pattern.ring, [0, 1, 0, 1, 0]);
+    // Sixth decimals of seconds are not binary fractions: a unit in the last place.
+    for (found, expected) in pattern.time_s.iter().zip([0.0, 0.1, 0.4, 0.5, 0.8]) {
+        assert!((found - expected).abs() < 1e-15);
+    }
+    assert_near(pattern.directions[0], at(-5.0, -90.0));
+}
+
+#[test]
+fn decimation_keeps_each_kth_column_as_it_is() {
+    for (name, per_column) in [("vlp32c", 32), ("blainder-ultrapuck", 122)] {
+        let whole = sensor(name).pattern();
+        let kept = sensor(name).decimated(NonZeroU32::new(3).unwrap()).pattern();
+        let columns = whole.directions.chunks(per_column).step_by(3);
+        assert!(columns.flatten().eq(&kept.directions), "{name}");
+        let times = whole.time_s.chunks(per_column).step_by(3);
+        assert!(times.flatten().eq(&kept.time_s), "{name}");
+    }
+    let kept = sensor("generic-static").decimated(NonZeroU32::new(7).unwrap()).pattern();
+    assert_eq!(kept.len(), 15 * 100);
+    let twice = NonZeroU32::new(2).unwrap();
+    assert_eq!(sensor("vlp16").decimated(twice).decimated(twice).decimation.get(), 4);
+    assert_eq!(sensor("vlp16").decimated(NonZeroU32::MAX).pattern().len(), 16);
+}
+
+/// Blocks of 64 rays traverse a tree together: on the mean they should be no
+/// wider than a patch of as many rays at the sensor's own spacing.
+#[test]
+fn neighbours_in_the_order_point_alike() {
+    for name in ["vlp32c", "blainder-ultrapuck", "hdl64e", "kinect-v2"] {
+        let pattern = sensor(name).pattern();
+        let blocks = pattern.order.chunks(64).map(|block| {
+            let first = pattern.directions[block[0] as usize];
+            let angles =
+                block.iter().map(|&ray| first.angle_between(pattern.directions[ray as usize]));
+            angles.fold(0.0, f64::max).to_degrees()
+        });
+        let n_blocks = blocks.len() as f64;
+        let mean_deg = blocks.sum::<f64>() / n_blocks;
+        // A square patch of 64 rays of a sensor that spreads n rays over its
+        // 360 x 40 degrees (or 70 x 60): its diagonal, and as much again for
+        // the bends of the curve and the widest gaps between rings.
+        let area_deg2 = if name == "kinect-v2" { 4200.0 } else { 14400.0 };
+        let patch_deg = 2.0 * (2.0 * 64.0 * area_deg2 / pattern.len() as f64).sqrt();
+        assert!(mean_deg < patch_deg, "{name}: {mean_deg} of {patch_deg} degrees");
+    }
+}

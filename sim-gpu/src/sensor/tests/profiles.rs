@@ -1,0 +1,109 @@
+use super::*;
+
+#[test]
+fn every_builtin_profile_is_sound_named_and_sourced() {
+    for (name, text) in BUILTIN_NAMES.into_iter().zip(BUILTIN_PROFILES) {
+        let sensor = parse(text).unwrap();
+        assert_eq!(sensor.name, name);
+        assert!(!sensor.description.is_empty() && !sensor.sources.is_empty(), "{name}");
+        assert_eq!(Sensor::builtin(name), Some(sensor));
+    }
+}
+
+#[test]
+fn every_sensor_survives_a_round_trip_through_json() {
+    for name in BUILTIN_NAMES {
+        let json = serde_json::to_string(&sensor(name)).unwrap();
+        assert_eq!(serde_json::from_str::<Sensor>(&json).unwrap(), sensor(name), "{json}");
+    }
+}
+
+#[test]
+fn a_name_a_path_and_neither() {
+    assert_eq!(Sensor::resolve("vlp16").unwrap().name, "vlp16");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("own.toml");
+    std::fs::write(&file, TINY).unwrap();
+    assert_eq!(Sensor::resolve(file.to_str().unwrap()).unwrap().name, "tiny");
+    assert_eq!(Sensor::resolve_in(folder.path(), "own.toml").unwrap().name, "tiny");
+    let unknown = Sensor::resolve("vlp33").unwrap_err().to_string();
+    assert!(unknown.contains("vlp33") && unknown.contains("blainder-ultrapuck"), "{unknown}");
+    let missing = Sensor::resolve("no/such.toml").unwrap_err().to_string();
+    assert!(missing.contains("no/such.toml"), "{missing}");
+    let folder_error = Sensor::load(folder.path()).unwrap_err().to_string();
+    assert!(folder_error.contains(folder.path().to_str().unwrap()), "{folder_error}");
+}
+
+#[test]
+fn a_file_too_long_or_not_text_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("mesh.toml");
+    std::fs::write(&file, vec![b' '; (16 << 20) + 1]).unwrap();
+    assert!(matches!(Sensor::load(&file), Err(ConfigError::TooLong { .. })));
+    std::fs::write(&file, [0xff, 0xfe]).unwrap();
+    assert!(matches!(Sensor::load(&file), Err(ConfigError::Read { .. })));
+}
+
+/// Each row replaces the first text by the second in a sound profile, and the
+/// error must hold the third.
+#[test]
+fn bad_profiles_are_named() {
+    let uniform = BUILTIN_PROFILES[1];
+    let grid = BUILTIN_PROFILES[2];
+    let recipe = BUILTIN_PROFILES[6];
+    for (profile, from, to, part) in [
+        (TINY, "name = \"tiny\"", "name = \"\"", "name: is empty"),
+        (TINY, "name = \"tiny\"", "", "name"),
+        (TINY, "name =", "nam =", "nam"),
+        (TINY, "max_m = 10", "max_m = 0", "range.max_m: 0 is not above 0"),
+        (TINY, "max_m = 10", "max_m = nan", "range.max_m"),
+        (TINY, "max_m = 10", "max_m = inf", "range.max_m"),
+        (TINY, "max_m = 10", "max_m = 1e10", "range.max_m"),
+        (TINY, "max_m = 10", "min_m = 10, max_m = 10", "range.max_m: 10 is not above range.min_m"),
+        (TINY, "max_m = 10", "min_m = -1, max_m = 10", "range.min_m"),
+        (TINY, "max_m = 10", "max_m = 10, quantum_m = 0", "range.quantum_m"),
+        (TINY, "max_m = 10", "max_m = \"far\"", "line 3"),
+        (TINY, "[rotating]", "[noise]\ntypical_sigma_m = -1\n[rotating]", "noise.typical_sigma_m"),
+        (TINY, "rpm = 60", "rmp = 60", "unknown field `rmp`"),
+        (TINY, "rpm = 60", "rpm = 0", "rotating.rpm"),
+        (TINY, "rpm = 60", "rpm = 1e300", "rotating: gives not a single ray"),
+        (TINY, "rpm = 60", "rpm = 1e-300", "more than 67108864"),
+        (TINY, "rpm = 60", "rpm = 60\nazimuth_quantum_deg = -0.01", "azimuth_quantum_deg"),
+        (TINY, "sequence_us = 400_000", "sequence_us = nan", "rotating.sequence_us"),
+        (TINY, "firing_us = 100_000", "firing_us = 400_000", "rotating.beam[0].firing_us"),
+        (TINY, "firing_us = 0", "firing_us = -1", "rotating.beam[1].firing_us"),
+        (TINY, "elevation_deg = -5", "elevation_deg = -91", "rotating.beam[1].elevation_deg"),
+        (TINY, "azimuth_offset_deg = -90", "azimuth_offset_deg = inf", "beam[1].azimuth_offset"),
+        (TINY, "[rotating]", "decimation = 0\n[rotating]", "decimation"),
+        (TINY, "[rotating]", "[grid]\nwidth = 1\nheight = 1\n[rotating]", "exclude each other"),
+        (uniform, "azimuth_steps = 1800", "azimuth_steps = 0", "not a single ray"),
+        (uniform, "azimuth_steps = 1800", "azimuth_steps = 4000000000", "more than 67108864"),
+        (uniform, "elevation_steps = 122", "elevation_steps = 70000", "uniform.elevation_steps"),
+        (uniform, "elevation_to_deg = 20.0", "elevation_to_deg = 90.1", "uniform.elevation_to_deg"),
+        (uniform, "azimuth_steps = 1800", "azimuth_steps = -1", "line"),
+        (grid, "fov_x_deg = 60.0", "fov_x_deg = 180", "grid.fov_x_deg: 180 is not below 180"),
+        (grid, "fov_x_deg = 60.0", "fov_x_deg = -60", "grid.fov_x_deg"),
+        (grid, "fov_x_deg = 60.0", "", "grid: state either"),
+        (grid, "fov_x_deg = 60.0", "fov_x_deg = 60\nfx = 3", "grid: state either"),
+        (grid, "width = 100", "width = 4294967295", "more than 67108864"),
+        (grid, "height = 100", "height = 0", "not a single ray"),
+        (recipe, "fx = 365.0", "fx = 0", "grid.fx"),
+        (recipe, "cy = 359.5", "cy = nan", "grid.cy"),
+        (recipe, "step_deg = 1.0", "step_deg = 0", "rings.step_deg"),
+        (recipe, "keep_to = 0.75", "keep_to = 0.25", "rings.keep_to"),
+        (recipe, "points = 768", "points = 0", "sample.points"),
+        (recipe, "before_rings = 1024", "before_rings = 0", "sample.before_rings"),
+        (recipe, "count = 5", "count = 70000", "views.count"),
+        (recipe, "distance_m = 5.0", "distance_m = 0", "views.distance_m"),
+        (recipe, "normalize = \"bbox\"", "normalize = \"box\"", "views.normalize: no \"box\""),
+    ] {
+        assert!(profile.contains(from), "{from} stands in no profile");
+        let error = parse(&profile.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(error.contains(part) && error.contains("my_sensor.toml"), "{to}: {error}");
+    }
+    let error = parse("name = \"a\"\nrange = { max_m = 1 }").unwrap_err().to_string();
+    assert!(error.contains("needs one of [rotating], [uniform] and [grid]"), "{error}");
+    let no_beam = "name = \"a\"\nrange = { max_m = 1 }\n\
+                   rotating = { rpm = 60, sequence_us = 9, beam = [] }";
+    assert!(parse(no_beam).unwrap_err().to_string().contains("rotating.beam: is empty"));
+}
