@@ -127,3 +127,88 @@ fn lowest_equal(items: impl Iterator<Item = [u32; 3]>) -> Vec<u32> {
     }
     lowest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Mesh {
+        let vertices = vertices.iter().copied().map(DVec3::from_array).collect();
+        Mesh { vertices, triangles: triangles.to_vec() }
+    }
+
+    const SQUARE: [[f64; 3]; 4] =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[test]
+    fn a_clean_mesh_is_kept_whole() {
+        let survey = survey(&mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(survey, Survey { census: Census::default(), kept: vec![0, 1] });
+    }
+
+    #[test]
+    fn a_triangle_in_any_order_is_a_duplicate_and_the_first_is_kept() {
+        let triangles = [[0, 2, 3], [2, 1, 0], [0, 1, 2], [1, 2, 0], [3, 2, 0]];
+        let survey = survey(&mesh(&SQUARE, &triangles));
+        assert_eq!(survey.census.duplicate, 3);
+        assert_eq!(survey.kept, [0, 1]);
+    }
+
+    #[test]
+    fn positions_count_not_indices() {
+        let mut vertices = SQUARE.to_vec();
+        // The first three again, one with a zero of the other sign.
+        vertices.extend([[-0.0, 0.0, -0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]);
+        let survey = survey(&mesh(&vertices, &[[0, 1, 2], [6, 5, 4], [0, 4, 1], [3, 0, 2]]));
+        assert_eq!(survey.census, Census { degenerate: 1, duplicate: 1, unreferenced: 0 });
+        assert_eq!(survey.kept, [0, 3]);
+    }
+
+    #[test]
+    fn a_triangle_without_area_in_f32_is_degenerate() {
+        let mut vertices = SQUARE.to_vec();
+        // On a side; and off a corner by less than f32 can tell from it, which
+        // is 2^-25 for coordinates just below 1 (here half the side is 0.5, so
+        // that it becomes 1).
+        vertices.extend([[0.5, 0.0, 0.0], [1.0 - 1e-9, 1.0, 0.0]]);
+        let triangles = [[0, 4, 1], [0, 2, 5], [0, 1, 1], [0, 1, 2], [0, 4, 2]];
+        let survey = survey(&mesh(&vertices, &triangles));
+        assert_eq!(survey.census, Census { degenerate: 3, duplicate: 0, unreferenced: 1 });
+        assert_eq!(survey.kept, [3, 4]);
+    }
+
+    #[test]
+    fn a_mesh_far_away_is_surveyed_as_if_it_were_here() {
+        let far = SQUARE.map(|position| position.map(|coordinate| coordinate + 1e7));
+        let survey = survey(&mesh(&far, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(survey.census, Census::default());
+    }
+
+    #[test]
+    fn size_does_not_matter() {
+        for size in [1e-310, 1e-300, 1e-6, 1.7e12, 1e300, 1.7e308] {
+            let scaled = SQUARE.map(|position| position.map(|coordinate| coordinate * size));
+            let survey = survey(&mesh(&scaled, &[[0, 1, 2], [2, 1, 0], [0, 1, 1], [0, 2, 3]]));
+            assert_eq!(survey.census, Census { degenerate: 1, duplicate: 1, unreferenced: 0 });
+            assert_eq!(survey.kept, [0, 3], "{size}");
+        }
+    }
+
+    #[test]
+    fn the_half_extent_lands_between_a_half_and_one() {
+        for half_extent in [1e-300, 0.4, 0.5, 0.50001, 1.0, 1.5, 2.0, 3e7, 1e300] {
+            let scaled = half_extent * inverse_unit(half_extent);
+            assert!(scaled > 0.5 && scaled <= 1.0, "{half_extent}: {scaled}");
+        }
+        assert_eq!(inverse_unit(0.0), 1.0);
+    }
+
+    #[test]
+    fn a_stray_vertex_is_counted_and_changes_nothing_else() {
+        let mut vertices = SQUARE.to_vec();
+        vertices.push([1e300, 0.0, 0.0]);
+        let survey = survey(&mesh(&vertices, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(survey.census, Census { unreferenced: 1, ..Census::default() });
+        assert_eq!(survey.kept, [0, 1]);
+    }
+}

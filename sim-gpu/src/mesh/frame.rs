@@ -176,3 +176,111 @@ fn length(v: DVec3) -> f64 {
     let longest = v.abs().max_element();
     if longest == 0.0 { 0.0 } else { (v / longest).length() * longest }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tetrahedron of size `size` at `centre`, and a stray vertex.
+    fn tetrahedron(size: f64, centre: DVec3) -> Mesh {
+        let corners = [DVec3::ZERO, DVec3::X, 2.0 * DVec3::Y, DVec3::Z];
+        let mut vertices: Vec<_> = corners.iter().map(|c| centre + size * *c).collect();
+        vertices.push(DVec3::splat(-9e99));
+        Mesh { vertices, triangles: vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] }
+    }
+
+    /// A few roundings of coordinates of the order of 1.
+    const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+    #[test]
+    fn y_up_turns_to_z_up_without_a_mirror() {
+        let position = DVec3::new(1.0, 2.0, 3.0);
+        assert_eq!(z_up(position, Up::Y), DVec3::new(1.0, -3.0, 2.0));
+        assert_eq!(z_up(position, Up::Z), position);
+        let turned = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| z_up(axis, Up::Y));
+        assert_eq!(turned[0].cross(turned[1]), turned[2]);
+    }
+
+    #[test]
+    fn a_unit_sphere_has_its_mean_at_0_and_radius_1() {
+        let world = to_world(&tetrahedron(1.0, DVec3::ZERO), Up::Z, Normalize::UnitSphere);
+        assert!(world.centre.abs_diff_eq(DVec3::new(0.25, 0.5, 0.25), ROUNDING));
+        let mean: DVec3 = world.mesh.vertices[..4].iter().sum::<DVec3>() / 4.0;
+        assert!(mean.length() < ROUNDING);
+        let radius = world.mesh.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
+        assert!((radius - 1.0).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn a_box_has_its_centre_at_0_and_longest_side_2() {
+        let world = to_world(&tetrahedron(1.0, DVec3::ZERO), Up::Z, Normalize::Bbox);
+        assert_eq!(world.centre, DVec3::new(0.5, 1.0, 0.5));
+        assert_eq!(world.scale, 1.0);
+        assert_eq!(world.mesh.vertices[2], DVec3::new(-0.5, 1.0, -0.5));
+    }
+
+    #[test]
+    fn none_moves_only() {
+        let world = to_world(&tetrahedron(4.0, DVec3::splat(8.0)), Up::Y, Normalize::None);
+        assert_eq!(world.centre, DVec3::new(10.0, -10.0, 12.0));
+        assert_eq!(world.scale, 1.0);
+        assert_eq!(world.mesh.vertices[0], DVec3::new(-2.0, 2.0, -4.0));
+    }
+
+    #[test]
+    fn the_result_is_the_same_for_every_unit() {
+        for normalize in [Normalize::UnitSphere, Normalize::Bbox] {
+            let plain = to_world(&tetrahedron(1.0, DVec3::ZERO), Up::Z, normalize);
+            // 1.7e12: ModelNet40's largest; the others, ends of what f64 holds.
+            for size in [1.7e12, 1e300, 8e307, 0.03, 1e-200, 1e-300] {
+                let world = to_world(&tetrahedron(size, DVec3::ZERO), Up::Z, normalize);
+                for (a, b) in world.mesh.vertices.iter().zip(&plain.mesh.vertices) {
+                    assert!(a.abs_diff_eq(*b, ROUNDING), "{size}: {a} is not {b}");
+                }
+                assert!((world.scale * size / plain.scale - 1.0).abs() < ROUNDING, "{size}");
+                assert!(world.centre.is_finite());
+            }
+        }
+    }
+
+    #[test]
+    fn a_far_centre_costs_only_the_digits_of_the_coordinates() {
+        let centre = DVec3::splat(1e7);
+        let far = to_world(&tetrahedron(1.0, centre), Up::Z, Normalize::UnitSphere);
+        let near = to_world(&tetrahedron(1.0, DVec3::ZERO), Up::Z, Normalize::UnitSphere);
+        for (a, b) in far.mesh.vertices.iter().zip(&near.mesh.vertices) {
+            // 1e7 + k is exact in f64, so nothing is lost before the centring.
+            assert!(a.abs_diff_eq(*b, ROUNDING), "{a} is not {b}");
+        }
+    }
+
+    #[test]
+    fn a_stray_vertex_goes_to_the_origin() {
+        let world = to_world(&tetrahedron(1e-300, DVec3::ZERO), Up::Z, Normalize::None);
+        assert_eq!(world.mesh.vertices[4], DVec3::ZERO);
+    }
+
+    #[test]
+    fn a_mesh_without_extent_has_scale_1() {
+        for position in [DVec3::ZERO, DVec3::splat(1e300), DVec3::splat(5e-324)] {
+            let mesh = Mesh { vertices: vec![position; 3], triangles: vec![[0, 1, 2]] };
+            for normalize in [Normalize::UnitSphere, Normalize::Bbox, Normalize::None] {
+                let world = to_world(&mesh, Up::Z, normalize);
+                assert_eq!((world.scale, world.centre), (1.0, position));
+                assert_eq!(world.mesh.vertices, [DVec3::ZERO; 3]);
+            }
+        }
+    }
+
+    #[test]
+    fn words_are_read_as_they_are_written() {
+        for normalize in [Normalize::UnitSphere, Normalize::Bbox, Normalize::None] {
+            assert_eq!(normalize.to_string().parse(), Ok(normalize));
+        }
+        for up in [Up::Y, Up::Z] {
+            assert_eq!(up.to_string().parse(), Ok(up));
+        }
+        let error = "sphere".parse::<Normalize>().unwrap_err().to_string();
+        assert_eq!(error, "\"sphere\" is none of unit-sphere, bbox, none");
+    }
+}

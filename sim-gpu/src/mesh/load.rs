@@ -155,3 +155,61 @@ fn check(mesh: &Mesh) -> Result<(), ParseError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: &str = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+    #[test]
+    fn a_file_is_read_with_its_hash_and_its_extension_in_either_case() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.OFF");
+        fs::write(&path, TRIANGLE).unwrap();
+        let loaded = load(&path).unwrap();
+        assert_eq!(loaded.format, MeshFormat::Off);
+        assert_eq!(loaded.mesh.triangles, [[0, 1, 2]]);
+        let expected: [u8; 32] = Sha256::digest(TRIANGLE).into();
+        assert_eq!(loaded.sha256, expected);
+    }
+
+    #[test]
+    fn what_is_no_mesh_file_is_named_with_its_cause() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = |name: &str| {
+            let error = load(&folder.path().join(name)).unwrap_err().to_string();
+            error.strip_prefix(&folder.path().display().to_string()).unwrap()[1..].to_owned()
+        };
+        fs::create_dir(folder.path().join("folder.off")).unwrap();
+        fs::write(folder.path().join("empty.off"), "").unwrap();
+        fs::write(folder.path().join("bad.off"), "OFF\n3 1 0\n0 0 nan\n").unwrap();
+        fs::write(folder.path().join("notes.txt"), "").unwrap();
+        assert_eq!(message("folder.off"), "folder.off: is a directory, not a mesh file");
+        assert_eq!(message("empty.off"), "empty.off: the file is empty");
+        assert_eq!(message("bad.off"), "bad.off:3: coordinate nan is not finite");
+        assert_eq!(message("notes.txt"), "notes.txt: its extension is none of off, obj, ply, stl");
+        assert!(message("missing.off").starts_with("missing.off: cannot be read: "));
+    }
+
+    #[test]
+    fn every_format_refuses_what_has_no_triangle_or_is_not_finite() {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+                   property float z\nelement face 0\nproperty list uchar int vertex_index\n\
+                   end_header\n0 0 0\n";
+        for (text, format) in [
+            ("OFF\n1 0 0\n0 0 0\n", MeshFormat::Off),
+            ("v 0 0 0\n", MeshFormat::Obj),
+            (ply, MeshFormat::Ply),
+            ("solid a\nendsolid a\n", MeshFormat::Stl),
+        ] {
+            let error = parse(text.as_bytes(), format).unwrap_err();
+            assert_eq!(error.cause, Malformed::NoTriangle, "{format}");
+        }
+        let mut stl = vec![0; 84 + 50];
+        stl[80] = 1;
+        stl[100..104].copy_from_slice(&f32::NAN.to_le_bytes());
+        let error = parse(&stl, MeshFormat::Stl).unwrap_err();
+        assert!(matches!(error.cause, Malformed::NotFinite { .. }), "{error}");
+    }
+}

@@ -119,8 +119,8 @@ impl Geometry {
         for word in words {
             self.text.push(b' ');
             let position = word.split(|&byte| byte == b'/').next().unwrap_or_default();
-            // An empty index would change the corner count in silence.
-            self.text.extend_from_slice(if position.is_empty() { b"/" } else { position });
+            // Left out, it would change the number of corners in silence.
+            self.text.extend_from_slice(if position.is_empty() { b"?" } else { position });
             n_corners += 1;
         }
         if n_corners < 3 {
@@ -162,5 +162,87 @@ impl Geometry {
             }
         }
         Malformed::Syntax(LoadError::FaceVertexOutOfBounds.to_string()).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+
+    fn read(text: &str) -> Result<Parsed, ParseError> {
+        parse(text.as_bytes())
+    }
+
+    #[track_caller]
+    fn is_the_triangle(text: &str) {
+        let mesh = read(text).expect(text).mesh;
+        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y], "{text:?}");
+        assert_eq!(mesh.triangles, [[0, 1, 2]], "{text:?}");
+    }
+
+    #[track_caller]
+    fn fails(text: &str, line: usize, message: &str) {
+        let error = read(text).expect_err(text);
+        assert_eq!(error.to_string(), format!("line {line}: {message}"), "{text:?}");
+    }
+
+    #[test]
+    fn indices_count_from_either_end_and_may_have_companions() {
+        is_the_triangle(&format!("{CORNERS}f 1 2 3\n"));
+        is_the_triangle(&format!("{CORNERS}f -3 -2 -1\n"));
+        is_the_triangle(&format!("{CORNERS}vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\n"));
+        // Companions that point nowhere have no part in a beam's way.
+        is_the_triangle(&format!("{CORNERS}vt bad\nf 1/7/-9 2//8 3/-5\n"));
+    }
+
+    #[test]
+    fn weights_divide_and_colours_are_ignored() {
+        is_the_triangle("v 0 0 0 2\nv 2 0 0 2\nv 0 .5 0 .5\nf 1 2 3");
+        is_the_triangle("v 0 0 0 1 .5 0\nv 1 0 0 1 2 3 4\nv 0 1 0 9 9\nf 1 2 3");
+    }
+
+    #[test]
+    fn line_ends_comments_and_continuations_do_not_matter() {
+        is_the_triangle(&format!("# C:\\meshes\\\n{CORNERS}f 1 2 3 # 4").replace('\n', "\r\n"));
+        is_the_triangle(&format!("{CORNERS}f 1 \\\n2 \\\r\n3\n"));
+        let mut latin = b"# na\xEFve\no caf\xE9\n".to_vec();
+        latin.extend_from_slice(format!("{CORNERS}f 1 2 3\n").as_bytes());
+        assert!(parse(&latin).is_ok());
+    }
+
+    #[test]
+    fn objects_groups_and_materials_share_their_vertices() {
+        let text = format!(
+            "mtllib none.mtl\no a\n{CORNERS}usemtl red\nf 1 2 3\ng b\nusemtl\nv 0 0 1\nf 1 3 4\n"
+        );
+        let mesh = read(&text).unwrap().mesh;
+        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn polygons_become_fans_and_smaller_faces_are_counted() {
+        let text = format!("{CORNERS}v 0 0 1\nv 1 1 1\nf 1 2 3 4 5\nf 1\nf 2 3\nl 1 2\np 1\n");
+        let parsed = read(&text).unwrap();
+        assert_eq!(parsed.mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        assert_eq!(parsed.dropped_faces, 2);
+    }
+
+    #[test]
+    fn errors_name_their_line() {
+        let out_of_range = |index| format!("index {index} is out of range: there are 3 vertices");
+        for index in ["4", "0", "-4"] {
+            let text = format!("{CORNERS}f 1 2 3\n\nf 1 2 {index}\n");
+            fails(&text, 6, &out_of_range(index));
+        }
+        fails(&format!("f -1 -1 -1\n{CORNERS}"), 1, &out_of_range("-1"));
+        fails(&format!("{CORNERS}f 1 /2 3\n"), 4, "face parse error in \"f 1 ? 3\"");
+        fails("v 0 0\n", 1, "position parse error in \"v 0 0\"");
+        fails("#\nv 0 x 0\n", 2, "position parse error in \"v 0 x 0\"");
+        fails("v 1 1 1 0\n", 1, "scaling (w) by zero in \"v 1 1 1 0\"");
+        fails("\n\nv 0 NaN 0\n", 3, "coordinate NaN is not finite");
+        fails("v 0 -inf 0\n", 1, "coordinate -inf is not finite");
     }
 }

@@ -171,3 +171,109 @@ impl PropertyAccess for Element {
         PropertyAccessResult::Set
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BODY: &str = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+    fn header(encoding: &str, coordinate: &str, n_vertices: u64, n_faces: u64) -> String {
+        format!(
+            "ply\nformat {encoding} 1.0\ncomment a triangle\nelement vertex {n_vertices}\n\
+             property {coordinate} x\nproperty {coordinate} y\nproperty {coordinate} z\n\
+             element face {n_faces}\nproperty list uchar int vertex_indices\nend_header\n"
+        )
+    }
+
+    #[track_caller]
+    fn is_the_triangle(bytes: &[u8]) {
+        let mesh = parse(bytes).unwrap().mesh;
+        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y]);
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+    }
+
+    #[track_caller]
+    fn fails(bytes: &[u8], message: &str) {
+        let error = parse(bytes).expect_err(message).to_string();
+        assert!(error.starts_with(message), "{error}");
+    }
+
+    #[test]
+    fn text_and_both_byte_orders_are_read_in_either_precision() {
+        is_the_triangle((header("ascii", "float", 3, 1) + BODY).as_bytes());
+        is_the_triangle((header("ascii", "double", 3, 1) + BODY).as_bytes());
+        let positions = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        for precision in ["float", "double"] {
+            let mut little = header("binary_little_endian", precision, 3, 1).into_bytes();
+            let mut big = header("binary_big_endian", precision, 3, 1).into_bytes();
+            for position in positions {
+                if precision == "double" {
+                    little.extend(f64::to_le_bytes(position));
+                    big.extend(f64::to_be_bytes(position));
+                } else {
+                    little.extend(f32::to_le_bytes(position as f32));
+                    big.extend(f32::to_be_bytes(position as f32));
+                }
+            }
+            little.push(3);
+            big.push(3);
+            for index in [0i32, 1, 2] {
+                little.extend(index.to_le_bytes());
+                big.extend(index.to_be_bytes());
+            }
+            is_the_triangle(&little);
+            is_the_triangle(&big);
+            fails(&little[..little.len() - 1], "Unexpected end of file");
+        }
+    }
+
+    #[test]
+    fn other_properties_elements_and_names_are_skipped() {
+        let text = "ply\r\nformat ascii 1.0\r\nelement material 1\r\nproperty list uchar float k\r\n\
+                    element vertex 3\r\nproperty uchar red\r\nproperty double x\r\n\
+                    property double y\r\nproperty double z\r\nelement face 1\r\n\
+                    property int flags\r\nproperty list uchar uint vertex_index\r\nend_header\r\n\
+                    2 .5e0 1\r\n9 0 0 0\r\n9 1 0 0\r\n9 0 1 0\r\n-1 3 0 1 2\r\n";
+        is_the_triangle(text.replace(".5e0", "0.5e0").as_bytes());
+    }
+
+    #[test]
+    fn polygons_become_fans_and_smaller_faces_are_counted() {
+        let text =
+            header("ascii", "float", 4, 3) + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n2 0 1\n0\n";
+        let parsed = parse(text.as_bytes()).unwrap();
+        assert_eq!(parsed.mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(parsed.dropped_faces, 2);
+    }
+
+    #[test]
+    fn a_promise_of_billions_is_checked_against_the_file() {
+        let message = "truncated: the header promises 4000000000 vertices, the file holds";
+        for encoding in ["ascii", "binary_little_endian"] {
+            fails((header(encoding, "float", 4_000_000_000, 1) + BODY).as_bytes(), message);
+        }
+        let message = "truncated: the header promises 18446744073709551615 faces, the file holds";
+        fails((header("binary_big_endian", "float", 1, u64::MAX) + BODY).as_bytes(), message);
+        let empty = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n\
+                     property float y\nproperty float z\nelement face 1\n\
+                     property list int int vertex_index\nelement nothing 9000000000\nend_header\n";
+        let message = "truncated: the header promises 9000000000 faces";
+        fails(format!("{empty}{BODY}").as_bytes(), message);
+    }
+
+    #[test]
+    fn errors_name_their_cause_and_in_text_their_line() {
+        let ascii = |body: &str| (header("ascii", "float", 3, 1) + body).into_bytes();
+        fails(b"plx\n", "line 1: not a PLY file: it begins with \"plx \"");
+        fails(b"ply\nformat ascii 1.0\nend_header\n", "the header has no element vertex");
+        fails(&ascii("0 0 0\n1 0 zero\n"), "line 12: ");
+        fails(&ascii("0 0 0\n"), "line 12: Unexpected end of file");
+        fails(&ascii("0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "index 3 is out of range");
+        fails(&ascii("0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n"), "index -1 is out of range");
+        let no_z = String::from_utf8(ascii(BODY)).unwrap().replace("float z", "float w");
+        fails(no_z.as_bytes(), "vertices have no coordinate z");
+        let no_list = String::from_utf8(ascii(BODY)).unwrap().replace("vertex_indices", "strip");
+        fails(no_list.as_bytes(), "faces have no list vertex_indices or vertex_index");
+    }
+}

@@ -92,3 +92,88 @@ fn read<R: Read + Seek>(source: &mut R) -> std::io::Result<Parsed> {
 fn syntax(error: std::io::Error) -> Malformed {
     Malformed::Syntax(error.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FACET: &str = "facet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  \
+                         vertex 0 1 0\n endloop\nendfacet\n";
+
+    fn binary(header: &[u8], promised: u32, triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
+        let mut bytes = header.to_vec();
+        bytes.resize(HEADER, b' ');
+        bytes.extend(promised.to_le_bytes());
+        for corners in triangles {
+            let normal = [0.0; 3];
+            let numbers = [&normal, &corners[0], &corners[1], &corners[2]].into_iter().flatten();
+            bytes.extend(numbers.flat_map(|number| number.to_le_bytes()));
+            bytes.extend([0; 2]);
+        }
+        bytes
+    }
+
+    const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[track_caller]
+    fn is_the_triangle(bytes: &[u8]) {
+        let mesh = parse(bytes).unwrap().mesh;
+        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y]);
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+    }
+
+    #[track_caller]
+    fn fails(bytes: &[u8], message: &str) {
+        let error = parse(bytes).expect_err(message).to_string();
+        assert!(error.starts_with(message), "{error}");
+    }
+
+    #[test]
+    fn text_is_read_whatever_its_name_case_and_line_ends() {
+        for name in [" mesh", "", " two words", " caf\u{e9}"] {
+            is_the_triangle(format!("solid{name}\n{FACET}endsolid{name}\n").as_bytes());
+        }
+        is_the_triangle(format!("SOLID A\r\n{}ENDSOLID A", FACET.to_uppercase()).as_bytes());
+    }
+
+    #[test]
+    fn all_solids_of_a_text_are_read() {
+        let second = FACET.replace("0 1 0", "0 0 1");
+        let text = format!("solid a\n{FACET}endsolid a\nsolid b\n{second}endsolid b\n");
+        let mesh = parse(text.as_bytes()).unwrap().mesh;
+        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 1, 3]]);
+    }
+
+    #[test]
+    fn a_binary_file_is_known_by_its_length_whatever_it_begins_with() {
+        is_the_triangle(&binary(b"made by a program", 1, &[TRIANGLE]));
+        is_the_triangle(&binary(b"solid made by another", 1, &[TRIANGLE]));
+    }
+
+    #[test]
+    fn equal_positions_become_one_vertex() {
+        let second = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]];
+        let mesh = parse(&binary(b"", 2, &[TRIANGLE, second])).unwrap().mesh;
+        assert_eq!(mesh.vertices.len(), 4);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3]]);
+    }
+
+    #[test]
+    fn a_promise_of_billions_is_checked_against_the_file() {
+        let message = "truncated: the header promises 4294967295 faces, the file holds 1";
+        fails(&binary(b"", u32::MAX, &[TRIANGLE]), message);
+        let message = "truncated: the header promises 2 faces, the file holds 1";
+        fails(&binary(b"solid\0", 2, &[TRIANGLE]), message);
+    }
+
+    #[test]
+    fn errors_name_their_cause_and_in_text_their_line() {
+        fails(b"OFF\n", "not an STL file: it begins with \"OFF \"");
+        let text = format!("solid a\n{FACET}endsolid a\n");
+        fails(text.replace("1 0 0", "1 0 x").as_bytes(), "line 5: ");
+        fails(text.replace("1 0 0", "1 nan 0").as_bytes(), "line 5: ");
+        fails(&text.as_bytes()[..text.len() - 11], "line 9: EOF while expecting facet");
+        fails(&text.as_bytes()[..60], "line 5: ");
+    }
+}

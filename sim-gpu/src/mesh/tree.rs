@@ -233,3 +233,158 @@ fn is_device(name: &str) -> bool {
     matches!(stem.as_str(), "CON" | "PRN" | "AUX" | "NUL")
         || port.is_some_and(|n| n.len() == 1 && n.bytes().all(|n| n.is_ascii_digit() && n != b'0'))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// A folder called `data` with empty files at the given paths.
+    fn tree(paths: &[&str]) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().join("data");
+        fs::create_dir(&root).unwrap();
+        for path in paths {
+            let path = root.join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        (folder, root)
+    }
+
+    fn listed(root: &Path) -> Vec<(String, Split, String)> {
+        let entries = discover(root, 1).unwrap();
+        entries.into_iter().map(|entry| (entry.class, entry.split, entry.name)).collect()
+    }
+
+    fn item(class: &str, split: Split, name: &str) -> (String, Split, String) {
+        (class.into(), split, name.into())
+    }
+
+    #[test]
+    fn modelnets_layout_keeps_its_splits_and_is_sorted() {
+        let (_folder, root) = tree(&[
+            "cup/test/cup_2.off",
+            "cup/train/cup_1.OFF",
+            "chair/train/chair_1.off",
+            "chair/train/notes.txt",
+            "chair/train/._chair_1.off",
+            "__MACOSX/chair/train/chair_1.off",
+        ]);
+        let expected = [
+            item("chair", Split::Train, "chair_1"),
+            item("cup", Split::Train, "cup_1"),
+            item("cup", Split::Test, "cup_2"),
+        ];
+        assert_eq!(listed(&root), expected);
+        let entries = discover(&root, 2).unwrap();
+        assert_eq!(entries[0].relative, "chair/train/chair_1.off");
+        assert!(entries[0].path.is_file());
+        assert_eq!(listed(&root.join("cup"))[..], expected[1..]);
+        assert_eq!(listed(&root.join("cup/train")), expected[1..2]);
+        assert_eq!(listed(&root.join("cup/test/cup_2.off")), expected[2..]);
+    }
+
+    #[test]
+    fn another_tree_takes_the_parent_as_class_and_splits_4_to_1() {
+        let names: Vec<_> = (0..1000).map(|n| format!("deep/cups/cup_{n}.ply")).collect();
+        let mut paths: Vec<_> = names.iter().map(String::as_str).collect();
+        paths.push("loose.stl");
+        let (_folder, root) = tree(&paths);
+        let entries = discover(&root, 1).unwrap();
+        let (loose, cups): (Vec<_>, Vec<_>) = entries.iter().partition(|e| e.class == "data");
+        assert_eq!((loose.len(), cups.len()), (1, 1000));
+        assert!(cups.iter().all(|entry| entry.class == "cups"));
+        let n_train = cups.iter().filter(|entry| entry.split == Split::Train).count();
+        // Binomial: 800 with a standard deviation of 12.6; four of them.
+        assert!(n_train.abs_diff(800) < 51, "{n_train}");
+        let other = discover(&root, 2).unwrap();
+        let split = |entries: &[MeshEntry]| {
+            let mut list: Vec<_> = entries.iter().map(|e| (e.name.clone(), e.split)).collect();
+            list.sort();
+            list
+        };
+        assert_ne!(split(&entries), split(&other), "the seed has a say");
+    }
+
+    #[test]
+    fn to_add_a_mesh_moves_no_other() {
+        let (_folder, root) = tree(&["a/1.off", "a/2.off", "a/3.obj", "b/1.off"]);
+        let before = listed(&root);
+        fs::write(root.join("a/4.off"), "").unwrap();
+        let after = listed(&root);
+        assert!(before.iter().all(|entry| after.contains(entry)));
+    }
+
+    #[test]
+    fn equal_names_are_told_apart_by_their_paths() {
+        let (_folder, root) = tree(&["x/a/m.off", "x/a/m.obj", "y/a/M.off", "y/a/n.off"]);
+        let entries = discover(&root, 1).unwrap();
+        let split_of = |relative: &str| {
+            entries.iter().find(|entry| entry.relative == relative).map(|entry| entry.split)
+        };
+        assert_eq!(split_of("x/a/m.off"), split_of("x/a/m.obj"), "one split for one name");
+        let mut names: Vec<_> = entries.iter().map(|entry| entry.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), 4);
+        assert!(names.contains(&"n"), "a name of its own stays: {names:?}");
+        let again = discover(&root, 1).unwrap();
+        assert_eq!(again, entries);
+    }
+
+    #[test]
+    fn names_are_safe_on_every_platform() {
+        for (text, safe) in [
+            ("chair_0001", "chair_0001"),
+            ("stuhl größe 2", "stuhl größe 2"),
+            ("a:b*c?", "a_b_c_"),
+            ("tab\tand\nline", "tab_and_line"),
+            ("dots. .", "dots___"),
+            ("", "_"),
+            ("..", "__"),
+            (".hidden", "_.hidden"),
+            ("con", "_con"),
+            ("Lpt1.old", "_Lpt1.old"),
+            ("com10", "com10"),
+        ] {
+            assert_eq!(safe_name(text), safe, "{text:?}");
+        }
+        let long = safe_name(&"ä".repeat(300));
+        assert_eq!(long, "ä".repeat(LONGEST_NAME / 2));
+    }
+
+    #[test]
+    fn an_empty_or_missing_tree_is_named() {
+        let (_folder, root) = tree(&["a/readme.txt"]);
+        let message = discover(&root, 1).unwrap_err().to_string();
+        let expected = "data: no mesh found; looked for *.off, *.obj, *.ply, *.stl";
+        assert!(message.ends_with(expected), "{message}");
+        let message = discover(&root.join("nowhere"), 1).unwrap_err().to_string();
+        assert!(message.contains("nowhere: cannot be read: "), "{message}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_but_not_in_circles() {
+        use std::os::unix::fs::symlink;
+        let (_folder, root) = tree(&["cup/train/a.off"]);
+        symlink(&root, root.join("cup/train/circle")).unwrap();
+        symlink(root.join("cup/train/a.off"), root.join("cup/train/b.off")).unwrap();
+        symlink(root.join("gone.off"), root.join("cup/train/c.off")).unwrap();
+        symlink(root.join("gone"), root.join("cup/train/gone")).unwrap();
+        let names: Vec<_> = listed(&root).into_iter().map(|(_, _, name)| name).collect();
+        assert_eq!(names, ["a", "b", "c"], "a link to no file fails when it is loaded");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_name_that_is_not_unicode_is_an_error() {
+        use std::os::unix::ffi::OsStrExt;
+        let (_folder, root) = tree(&["cup/a.off"]);
+        fs::write(root.join("cup").join(OsStr::from_bytes(b"caf\xE9.txt")), "").unwrap();
+        assert_eq!(discover(&root, 1).unwrap().len(), 1);
+        fs::write(root.join("cup").join(OsStr::from_bytes(b"caf\xE9.off")), "").unwrap();
+        assert!(matches!(discover(&root, 1), Err(TreeError::NotUnicode(_))));
+    }
+}
