@@ -20,7 +20,7 @@ fn shared(relative: &str) -> Option<PathBuf> {
 }
 
 fn load_all(root: &Path) -> Vec<(MeshEntry, LoadedMesh)> {
-    let entries = discover(root, 0).unwrap();
+    let entries = discover(root, 0).expect("the shared data can be listed");
     let read = |entry: MeshEntry| {
         let loaded = load(&entry.path).unwrap_or_else(|error| panic!("{error}"));
         (entry, loaded)

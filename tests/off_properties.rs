@@ -1,7 +1,5 @@
 //! Property tests of the hand-written OFF parser.
 
-use std::fmt::Write;
-
 use proptest::prelude::*;
 use sim_gpu::mesh::{MeshFormat, parse};
 
@@ -53,14 +51,14 @@ fn polygons() -> impl Strategy<Value = (Vec<[f64; 3]>, Vec<Vec<u32>>)> {
 
 fn write(positions: &[[f64; 3]], faces: &[Vec<u32>], quirks: &Quirks) -> String {
     let mut text = String::from(if quirks.glued { "OFF" } else { "OFF\n" });
-    write!(text, "{} {}", positions.len(), faces.len()).unwrap();
-    text.push_str(if quirks.edges { " 0\n" } else { "\n" });
+    text += &format!("{} {}", positions.len(), faces.len());
+    text += if quirks.edges { " 0\n" } else { "\n" };
     for [x, y, z] in positions {
-        writeln!(text, "{x:?} {y} {z:e}{}", quirks.vertex_columns).unwrap();
+        text += &format!("{x:?} {y} {z:e}{}\n", quirks.vertex_columns);
     }
     for face in faces {
         let corners: Vec<_> = face.iter().map(u32::to_string).collect();
-        writeln!(text, "{} {}{}", face.len(), corners.join(" "), quirks.face_columns).unwrap();
+        text += &format!("{} {}{}\n", face.len(), corners.join(" "), quirks.face_columns);
     }
     let comment = if quirks.comments { " # 1 2 3\n# a comment\n" } else { "\n" };
     let blank = if quirks.blank_lines { "\n  \n" } else { "" };

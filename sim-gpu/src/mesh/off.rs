@@ -14,10 +14,10 @@ use super::error::{Malformed, ParseError, Part, excerpt};
 use super::load::Parsed;
 use super::words::{Words, short};
 
-/// The shortest line of a vertex, `0 0 0` and its end, and of a face,
-/// `1 0` and its end: a file cannot hold more of them than fit.
+/// The bytes of the shortest lines that hold a vertex, `0 0 0`, and a triangle,
+/// `3 0 0 0`, with their ends: a file cannot hold more of them than fit.
 const SHORTEST_VERTEX: usize = 6;
-const SHORTEST_FACE: usize = 4;
+const SHORTEST_TRIANGLE: usize = 8;
 
 /// Reads an ASCII OFF file from its bytes.
 ///
@@ -43,6 +43,7 @@ fn header(words: &mut Words<'_>) -> Result<(u64, u64), ParseError> {
         return Err(Malformed::Empty.into());
     }
     let keyword = words.next().unwrap_or_default();
+    // Before it at most the letters of every variant there is.
     let found = keyword.windows(3).position(|part| part == b"OFF" || part == b"off");
     let Some(at) = found.filter(|&at| at <= "STCN4n".len()) else {
         return Err(words.fault(Malformed::WrongStart {
@@ -104,7 +105,7 @@ fn faces(
     n_vertices: u64,
     promised: u64,
 ) -> Result<(Vec<[u32; 3]>, usize), ParseError> {
-    let mut triangles = Vec::with_capacity(words.room(promised, 2 * SHORTEST_FACE));
+    let mut triangles = Vec::with_capacity(words.room(promised, SHORTEST_TRIANGLE));
     let mut dropped = 0;
     for held in 0..promised {
         if !words.next_data_line() {
