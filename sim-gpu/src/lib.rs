@@ -12,6 +12,7 @@ pub mod gpu;
 pub mod mesh;
 pub mod pose;
 pub mod ray;
+pub mod resolve;
 pub mod scene;
 pub mod sensor;
 pub mod target;

@@ -1,13 +1,14 @@
-//! One ray per call: the nearest triangle's code. Twin of
-//! `shaders/trace.wgsl`.
+//! One ray per call: the nearest triangle's code, and what the effects asked
+//! for. Twin of `shaders/trace.wgsl`.
 
+use super::effects::append_words;
 use super::traverse::traverse;
-use super::effects::words;
 use crate::bvh::{LeafTriangle, Node};
 use crate::caster::{Cast, CastJob};
 use crate::effects::Effects;
-use crate::ray::{AMBIGUOUS, MISS, TraceRay};
-use crate::sensor::BeamPattern;
+use crate::gpu::{modules, words_per_ray};
+use crate::ray::{AMBIGUOUS, MISS, Ray, TraceRay};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Rays that one task traces: enough to hide the cost of handing it over.
@@ -23,4 +24,29 @@ pub fn trace(nodes: &[Node], triangles: &[LeafTriangle], rays: &[TraceRay]) -> V
         }
     });
     codes
+}
+
+/// Casts `job` and models `effects`, on all cores.
+#[must_use]
+pub fn cast(job: &CastJob, effects: &Effects) -> Cast {
+    let bvh = &job.target.bvh;
+    let codes = trace(&bvh.nodes, &bvh.triangles, &job.rays);
+    let words_per_ray = words_per_ray(&modules(effects));
+    if words_per_ray == 0 {
+        return Cast { codes, words: Vec::new() };
+    }
+    let mut words = Vec::with_capacity(codes.len() * words_per_ray);
+    for ((&code, &beam), ray) in codes.iter().zip(&job.beams).zip(&job.rays) {
+        if code == MISS {
+            words.resize(words.len() + words_per_ray, 0.0);
+            continue;
+        }
+        // Only the direction matters to an effect, and f32 holds it well.
+        let ray = Ray {
+            origin: Vec3::from_array(ray.origin).as_dvec3(),
+            direction: Vec3::from_array(ray.direction).as_dvec3(),
+        };
+        append_words(&mut words, effects, job, beam, &ray, code & !AMBIGUOUS);
+    }
+    Cast { codes, words }
 }

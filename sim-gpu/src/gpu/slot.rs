@@ -109,7 +109,7 @@ impl Slot {
         });
         core.queue.submit([encoder.finish()]);
         let (send, receive) = channel();
-        let mut map = |buffer: &wgpu::Buffer, bytes| {
+        let map = |buffer: &wgpu::Buffer, bytes| {
             let send = send.clone();
             buffer.slice(..bytes).map_async(wgpu::MapMode::Read, move |mapped| {
                 // The receiver is gone only if nobody waits any more.

@@ -1,0 +1,214 @@
+//! Which triangles of a mesh a beam can meet, and how many it cannot.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::Mesh;
+use super::frame::named_vertices;
+
+/// What a mesh has that no beam can meet, or can meet elsewhere as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Census {
+    /// Triangles without area once their corners are f32.
+    pub degenerate: usize,
+    /// Triangles with area whose three f32 corners are those of an earlier
+    /// triangle, in any order.
+    pub duplicate: usize,
+    /// Vertices that no triangle names.
+    pub unreferenced: usize,
+}
+
+/// A census and the triangles that remain.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Survey {
+    /// What was left out, and why.
+    pub census: Census,
+    /// Indices of the triangles that are neither degenerate nor duplicate,
+    /// ascending; of equal triangles the first is kept.
+    pub kept: Vec<u32>,
+}
+
+/// Counts what [`survey`] leaves out of `mesh`.
+#[must_use]
+pub fn census(mesh: &Mesh) -> Census {
+    survey(mesh).census
+}
+
+/// Sorts the triangles of `mesh` into those to cast at and the rest.
+///
+/// Corners are compared as the casting sees them: f32, about the centre of the
+/// box, in units of a power of two with which half the longest side lies in
+/// (0.5, 1]. Vertices at one position are one corner, whatever their indices,
+/// since CAD files often repeat them for each face.
+#[must_use]
+pub fn survey(mesh: &Mesh) -> Survey {
+    let named = named_vertices(mesh);
+    let positions = rounded_positions(mesh, &named);
+    let corner_ids = lowest_equal(positions.iter().map(|position| key(*position)));
+
+    let mut solid = Vec::with_capacity(mesh.triangles.len());
+    for (index, corners) in mesh.triangles.iter().enumerate() {
+        if has_area(corners.map(|corner| positions[corner as usize])) {
+            solid.push(index as u32);
+        }
+    }
+
+    let sorted_corners = solid.iter().map(|&index| {
+        let mut ids = mesh.triangles[index as usize].map(|corner| corner_ids[corner as usize]);
+        ids.sort_unstable();
+        ids
+    });
+    let firsts = lowest_equal(sorted_corners);
+    let is_first = |(nth, index): (usize, &u32)| (firsts[nth] as usize == nth).then_some(*index);
+    let kept: Vec<u32> = solid.iter().enumerate().filter_map(is_first).collect();
+    let census = Census {
+        degenerate: mesh.triangles.len() - solid.len(),
+        duplicate: solid.len() - kept.len(),
+        unreferenced: named.iter().filter(|named| !**named).count(),
+    };
+    Survey { census, kept }
+}
+
+/// The vertices in f32, recentred and scaled; those not named at the origin.
+fn rounded_positions(mesh: &Mesh, named: &[bool]) -> Vec<Vec3> {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (vertex, _) in mesh.vertices.iter().zip(named).filter(|(_, named)| **named) {
+        (low, high) = (low.min(*vertex), high.max(*vertex));
+    }
+    // Halved first: the sum or difference of two finite numbers may not be.
+    let centre = 0.5 * low + 0.5 * high;
+    let inverse = inverse_unit((0.5 * high - 0.5 * low).max_element());
+    let rounded = |(vertex, named): (&DVec3, &bool)| {
+        if *named { ((*vertex - centre) * inverse).as_vec3() } else { Vec3::ZERO }
+    };
+    mesh.vertices.iter().zip(named).map(rounded).collect()
+}
+
+/// The power of two that brings `half_extent` into (0.5, 1], as far as f64 has
+/// one; 1 if there is no extent.
+fn inverse_unit(half_extent: f64) -> f64 {
+    const BIAS: i64 = 1023;
+    const MANTISSA_BITS: u32 = 52;
+    if half_extent.is_nan() || half_extent <= 0.0 {
+        return 1.0;
+    }
+    let bits = half_extent.to_bits();
+    let is_power = bits.trailing_zeros() >= MANTISSA_BITS;
+    let exponent = (bits >> MANTISSA_BITS) as i64 - BIAS + i64::from(!is_power);
+    let exponent = (-exponent).clamp(1 - BIAS, BIAS);
+    f64::from_bits(((exponent + BIAS) as u64) << MANTISSA_BITS)
+}
+
+/// Whether the cross product of two edges, in f64, is other than zero.
+fn has_area(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    (b - a).cross(c - a) != DVec3::ZERO
+}
+
+/// Three words that are equal exactly for equal positions: -0 counts as 0.
+fn key(position: Vec3) -> [u32; 3] {
+    position.to_array().map(|coordinate| (coordinate + 0.0).to_bits())
+}
+
+/// For each item the index of the first one that equals it.
+///
+/// By sorting, which takes as long whatever the items are, and needs no hash.
+fn lowest_equal(items: impl Iterator<Item = [u32; 3]>) -> Vec<u32> {
+    let pack = |(index, [a, b, c]): (usize, [u32; 3])| {
+        u128::from(a) << 96 | u128::from(b) << 64 | u128::from(c) << 32 | index as u128
+    };
+    let mut packed: Vec<u128> = items.enumerate().map(pack).collect();
+    packed.sort_unstable();
+    let mut lowest = vec![0; packed.len()];
+    for equal in packed.chunk_by(|a, b| a >> 32 == b >> 32) {
+        for item in equal {
+            lowest[*item as u32 as usize] = equal[0] as u32;
+        }
+    }
+    lowest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Mesh {
+        let vertices = vertices.iter().copied().map(DVec3::from_array).collect();
+        Mesh { vertices, triangles: triangles.to_vec() }
+    }
+
+    const SQUARE: [[f64; 3]; 4] =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[test]
+    fn a_clean_mesh_is_kept_whole() {
+        let survey = survey(&mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(survey, Survey { census: Census::default(), kept: vec![0, 1] });
+    }
+
+    #[test]
+    fn a_triangle_in_any_order_is_a_duplicate_and_the_first_is_kept() {
+        let triangles = [[0, 2, 3], [2, 1, 0], [0, 1, 2], [1, 2, 0], [3, 2, 0]];
+        let survey = survey(&mesh(&SQUARE, &triangles));
+        assert_eq!(survey.census.duplicate, 3);
+        assert_eq!(survey.kept, [0, 1]);
+    }
+
+    #[test]
+    fn positions_count_not_indices() {
+        let mut vertices = SQUARE.to_vec();
+        // The first three again, one with a zero of the other sign.
+        vertices.extend([[-0.0, 0.0, -0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]);
+        let survey = survey(&mesh(&vertices, &[[0, 1, 2], [6, 5, 4], [0, 4, 1], [3, 0, 2]]));
+        assert_eq!(survey.census, Census { degenerate: 1, duplicate: 1, unreferenced: 0 });
+        assert_eq!(survey.kept, [0, 3]);
+    }
+
+    #[test]
+    fn a_triangle_without_area_in_f32_is_degenerate() {
+        let mut vertices = SQUARE.to_vec();
+        // On a side; and off a corner by less than f32 can tell from it, which
+        // is 2^-25 for coordinates just below 1 (here half the side is 0.5, so
+        // that it becomes 1).
+        vertices.extend([[0.5, 0.0, 0.0], [1.0 - 1e-9, 1.0, 0.0]]);
+        let triangles = [[0, 4, 1], [0, 2, 5], [0, 1, 1], [0, 1, 2], [0, 4, 2]];
+        let survey = survey(&mesh(&vertices, &triangles));
+        assert_eq!(survey.census, Census { degenerate: 3, duplicate: 0, unreferenced: 1 });
+        assert_eq!(survey.kept, [3, 4]);
+    }
+
+    #[test]
+    fn a_mesh_far_away_is_surveyed_as_if_it_were_here() {
+        let far = SQUARE.map(|position| position.map(|coordinate| coordinate + 1e7));
+        let survey = survey(&mesh(&far, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(survey.census, Census::default());
+    }
+
+    #[test]
+    fn size_does_not_matter() {
+        for size in [1e-310, 1e-300, 1e-6, 1.7e12, 1e300, 1.7e308] {
+            let scaled = SQUARE.map(|position| position.map(|coordinate| coordinate * size));
+            let survey = survey(&mesh(&scaled, &[[0, 1, 2], [2, 1, 0], [0, 1, 1], [0, 2, 3]]));
+            assert_eq!(survey.census, Census { degenerate: 1, duplicate: 1, unreferenced: 0 });
+            assert_eq!(survey.kept, [0, 3], "{size}");
+        }
+    }
+
+    #[test]
+    fn the_half_extent_lands_between_a_half_and_one() {
+        for half_extent in [1e-300, 0.4, 0.5, 0.50001, 1.0, 1.5, 2.0, 3e7, 1e300] {
+            let scaled = half_extent * inverse_unit(half_extent);
+            assert!(scaled > 0.5 && scaled <= 1.0, "{half_extent}: {scaled}");
+        }
+        assert_eq!(inverse_unit(0.0), 1.0);
+    }
+
+    #[test]
+    fn a_stray_vertex_is_counted_and_changes_nothing_else() {
+        let mut vertices = SQUARE.to_vec();
+        vertices.push([1e300, 0.0, 0.0]);
+        let survey = survey(&mesh(&vertices, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(survey.census, Census { unreferenced: 1, ..Census::default() });
+        assert_eq!(survey.kept, [0, 1]);
+    }
+}

@@ -1,0 +1,215 @@
+//! From a path to a mesh that the rest can rely on.
+
+use std::fmt;
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::error::{Malformed, MeshError, ParseError, excerpt};
+use super::frame::Up;
+use super::{Mesh, obj, off, ply, stl};
+
+/// The mesh formats read here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MeshFormat {
+    /// Object File Format of Geomview, ASCII.
+    Off,
+    /// Wavefront OBJ.
+    Obj,
+    /// Stanford PLY, ASCII or binary of either byte order.
+    Ply,
+    /// Stereolithography, ASCII or binary.
+    Stl,
+}
+
+impl MeshFormat {
+    const ALL: [Self; 4] = [Self::Off, Self::Obj, Self::Ply, Self::Stl];
+
+    /// The format that the extension of `path` stands for, in either case.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?;
+        Self::ALL.into_iter().find(|format| extension.eq_ignore_ascii_case(format.extension()))
+    }
+
+    /// The axis that points up in most files of this format: z in ModelNet's
+    /// OFF and in CAD's STL and PLY, y in OBJ.
+    #[must_use]
+    pub fn default_up(self) -> Up {
+        match self {
+            Self::Off | Self::Ply | Self::Stl => Up::Z,
+            Self::Obj => Up::Y,
+        }
+    }
+
+    /// The file name extension, in lower case, without its dot.
+    #[must_use]
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Obj => "obj",
+            Self::Ply => "ply",
+            Self::Stl => "stl",
+        }
+    }
+}
+
+impl fmt::Display for MeshFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.extension())
+    }
+}
+
+/// The extensions of all mesh formats, in lower case, without dots.
+#[must_use]
+pub fn mesh_extensions() -> [&'static str; 4] {
+    MeshFormat::ALL.map(MeshFormat::extension)
+}
+
+/// A mesh as its file holds it, and what is to be known of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedMesh {
+    /// The mesh, in the file's own axes and units. It has a triangle, fewer
+    /// than 2^32 vertices, all of them finite, and all indices in range.
+    pub mesh: Mesh,
+    /// The format by the file's extension.
+    pub format: MeshFormat,
+    /// SHA-256 of the file's bytes.
+    pub sha256: [u8; 32],
+    /// Faces of fewer than three corners, which were left out.
+    pub dropped_faces: usize,
+}
+
+/// What a format's parser makes of a file's bytes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Parsed {
+    /// The mesh, as in [`LoadedMesh`].
+    pub mesh: Mesh,
+    /// Faces of fewer than three corners, which were left out.
+    pub dropped_faces: usize,
+}
+
+/// Reads the mesh at `path`; its extension says in which format.
+///
+/// # Errors
+///
+/// [`MeshError`], naming the path, the line where there is one, and the cause:
+/// a file that cannot be read, is no file, is empty, truncated, not of its
+/// format, or holds an index out of range, a coordinate that is not finite, or
+/// no triangle.
+pub fn load(path: &Path) -> Result<LoadedMesh, MeshError> {
+    let format = MeshFormat::of(path).ok_or_else(|| MeshError::UnknownFormat { path: path.into() });
+    let bytes = read(path)?;
+    let format = format?;
+    let Parsed { mesh, dropped_faces } = parse(&bytes, format).map_err(|error| {
+        MeshError::Malformed { path: path.into(), line: error.line, cause: error.cause }
+    })?;
+    Ok(LoadedMesh { mesh, format, sha256: Sha256::digest(&bytes).into(), dropped_faces })
+}
+
+/// Reads a mesh of `format` from a file's bytes.
+///
+/// # Errors
+///
+/// As [`load`]'s, without the path.
+pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
+    let parsed = match format {
+        _ if bytes.is_empty() => Err(Malformed::Empty.into()),
+        MeshFormat::Off => off::parse(bytes),
+        MeshFormat::Obj => obj::parse(bytes),
+        MeshFormat::Ply => ply::parse(bytes),
+        MeshFormat::Stl => stl::parse(bytes),
+    }?;
+    check(&parsed.mesh)?;
+    Ok(parsed)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
+    let failed = |source| MeshError::Read { path: path.into(), source };
+    let kind = fs::metadata(path).map_err(failed)?;
+    if !kind.is_file() {
+        let what = if kind.is_dir() { "a directory" } else { "a pipe or device" };
+        return Err(MeshError::NotAFile { path: path.into(), what });
+    }
+    fs::read(path).map_err(failed)
+}
+
+/// What every mesh must satisfy, whatever its format and reader.
+fn check(mesh: &Mesh) -> Result<(), ParseError> {
+    let n_vertices = mesh.vertices.len() as u64;
+    if n_vertices > u64::from(u32::MAX) {
+        return Err(Malformed::TooManyVertices(n_vertices).into());
+    }
+    if let Some(vertex) = mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {
+        return Err(Malformed::NotFinite { found: excerpt(vertex.to_string().as_bytes()) }.into());
+    }
+    let mut corners = mesh.triangles.iter().flatten();
+    if let Some(index) = corners.find(|&&index| u64::from(index) >= n_vertices) {
+        return Err(Malformed::IndexOutOfRange { found: index.to_string(), n_vertices }.into());
+    }
+    if mesh.triangles.is_empty() {
+        return Err(Malformed::NoTriangle.into());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: &str = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+    #[test]
+    fn a_file_is_read_with_its_hash_and_its_extension_in_either_case() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.OFF");
+        fs::write(&path, TRIANGLE).unwrap();
+        let loaded = load(&path).unwrap();
+        assert_eq!(loaded.format, MeshFormat::Off);
+        assert_eq!(loaded.mesh.triangles, [[0, 1, 2]]);
+        let expected: [u8; 32] = Sha256::digest(TRIANGLE).into();
+        assert_eq!(loaded.sha256, expected);
+    }
+
+    #[test]
+    fn what_is_no_mesh_file_is_named_with_its_cause() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = |name: &str| {
+            let error = load(&folder.path().join(name)).unwrap_err().to_string();
+            error.strip_prefix(&folder.path().display().to_string()).unwrap()[1..].to_owned()
+        };
+        fs::create_dir(folder.path().join("folder.off")).unwrap();
+        fs::write(folder.path().join("empty.off"), "").unwrap();
+        fs::write(folder.path().join("bad.off"), "OFF\n3 1 0\n0 0 nan\n").unwrap();
+        fs::write(folder.path().join("notes.txt"), "").unwrap();
+        assert_eq!(message("folder.off"), "folder.off: is a directory, not a mesh file");
+        assert_eq!(message("empty.off"), "empty.off: the file is empty");
+        assert_eq!(message("bad.off"), "bad.off:3: coordinate nan is not finite");
+        assert_eq!(message("notes.txt"), "notes.txt: its extension is none of off, obj, ply, stl");
+        assert!(message("missing.off").starts_with("missing.off: cannot be read: "));
+    }
+
+    #[test]
+    fn every_format_refuses_what_has_no_triangle_or_is_not_finite() {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+                   property float z\nelement face 0\nproperty list uchar int vertex_index\n\
+                   end_header\n0 0 0\n";
+        for (text, format) in [
+            ("OFF\n1 0 0\n0 0 0\n", MeshFormat::Off),
+            ("v 0 0 0\n", MeshFormat::Obj),
+            (ply, MeshFormat::Ply),
+            ("solid a\nendsolid a\n", MeshFormat::Stl),
+        ] {
+            let error = parse(text.as_bytes(), format).unwrap_err();
+            assert_eq!(error.cause, Malformed::NoTriangle, "{format}");
+        }
+        let mut stl = vec![0; 84 + 50];
+        stl[80] = 1;
+        stl[100..104].copy_from_slice(&f32::NAN.to_le_bytes());
+        let error = parse(&stl, MeshFormat::Stl).unwrap_err();
+        assert!(matches!(error.cause, Malformed::NotFinite { .. }), "{error}");
+    }
+}

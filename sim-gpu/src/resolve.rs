@@ -1,0 +1,66 @@
+//! From a caster's codes to ranges, in f64.
+//!
+//! A caster finds which triangle a ray hits; this solves where. So ranges are
+//! the same to the last bit on every adapter that finds the same triangle,
+//! and as accurate near grazing as elsewhere.
+
+use crate::caster::{Cast, CastJob};
+use crate::cpu::effects::append_words;
+use crate::cpu::oracle;
+use crate::effects::Effects;
+use crate::ray::{AMBIGUOUS, MISS};
+use crate::sensor::BeamPattern;
+
+/// One beam's nearest surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hit {
+    /// The beam, as an index into its pattern.
+    pub beam: u32,
+    /// The triangle, as an index into its mesh.
+    pub triangle: u32,
+    /// Distance from the sensor, metres, without any effect.
+    pub range_m: f64,
+}
+
+/// The hits of one job and what the effects say of each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Hits {
+    /// By beam, ascending.
+    pub hits: Vec<Hit>,
+    /// `[n_hits, words_per_ray]`.
+    pub words: Vec<f32>,
+    /// Rays for which f32 left more than one surface in question.
+    pub decided_in_f64: usize,
+}
+
+/// Solves the ranges of `job`'s hits and puts them in the order of beams.
+#[must_use]
+pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effects) -> Hits {
+    let words_per_ray = cast.words.len() / cast.codes.len().max(1);
+    let mut order: Vec<usize> = (0..cast.codes.len()).filter(|&i| cast.codes[i] != MISS).collect();
+    order.sort_unstable_by_key(|&i| job.beams[i]);
+    let mut resolved = Hits { hits: Vec::with_capacity(order.len()), ..Hits::default() };
+    for i in order {
+        let beam = job.beams[i];
+        let ray = job.frame.ray(pattern.directions[beam as usize]);
+        let found = cast.codes[i] & !AMBIGUOUS;
+        let mut triangle = found;
+        let mut range_m = oracle::range_to(&job.target, &ray, found);
+        if cast.codes[i] & AMBIGUOUS != 0 {
+            resolved.decided_in_f64 += 1;
+            // Where f64 finds nothing the ray grazes a silhouette: the caster's
+            // answer stands.
+            if let Some(nearest) = oracle::nearest(&job.target, &ray) {
+                (triangle, range_m) = (nearest.index, Some(nearest.range_m));
+            }
+        }
+        let Some(range_m) = range_m else { continue };
+        resolved.hits.push(Hit { beam, triangle, range_m });
+        if triangle == found {
+            resolved.words.extend(&cast.words[i * words_per_ray..(i + 1) * words_per_ray]);
+        } else {
+            append_words(&mut resolved.words, effects, job, beam, &ray, triangle);
+        }
+    }
+    resolved
+}
