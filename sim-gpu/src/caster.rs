@@ -143,9 +143,9 @@ impl Caster {
     /// If the device is lost or out of memory.
     pub fn submit(&self, jobs: &[CastJob]) -> Result<Casting, GpuError> {
         match self {
-            Self::Cpu(effects) => Ok(Casting::Done(
-                jobs.iter().map(|job| cpu::trace::cast(job, effects)).collect(),
-            )),
+            Self::Cpu(effects) => {
+                Ok(Casting::Done(jobs.iter().map(|job| cpu::trace::cast(job, effects)).collect()))
+            }
             Self::Gpu(gpu) => Ok(Casting::Pending(Box::new(gpu.submit(jobs)?))),
         }
     }

@@ -1,7 +1,8 @@
 //! Rays in an object's own frame.
 
+use crate::pose::Pose;
 use crate::sensor::Cone;
-use crate::target::Target;
+use crate::target::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -46,24 +47,20 @@ pub struct RayFrame {
 }
 
 impl RayFrame {
-    /// The frame of a sensor at `position_m`, turned by `world_from_sensor`,
-    /// that looks at `target`, placed by `world_from_object`.
+    /// The frame of a sensor at `pose` that looks at `surface`, placed in the
+    /// world by `world_from_object`.
     ///
     /// Differences of positions are taken first, so that a scene far from the
     /// world's origin loses nothing but what its own coordinates lack.
     #[must_use]
-    pub fn new(
-        target: &Target,
-        world_from_object: &DAffine3,
-        position_m: DVec3,
-        world_from_sensor: DMat3,
-    ) -> Self {
+    pub fn new(surface: &Surface, world_from_object: &DAffine3, pose: &Pose) -> Self {
         let object_from_world = world_from_object.matrix3.inverse();
-        let in_object = object_from_world * (position_m - world_from_object.translation);
+        let in_object = object_from_world * (pose.position_m - world_from_object.translation);
+        let world_from_sensor = DMat3::from_quat(pose.world_from_sensor);
         Self {
-            origin: target.frame.to_unit(in_object),
-            unit_from_sensor: object_from_world * world_from_sensor * target.frame.scale.recip(),
-            radius: target.radius,
+            origin: surface.frame.to_unit(in_object),
+            unit_from_sensor: object_from_world * world_from_sensor * surface.frame.scale.recip(),
+            radius: surface.radius,
         }
     }
 

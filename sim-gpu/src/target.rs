@@ -45,44 +45,47 @@ fn power_of_two_above(x: f64) -> f64 {
     if floor == x { floor } else { floor * 2.0 }
 }
 
-/// A mesh made ready for casting: its triangles in the unit frame, in f64 for
-/// ranges and as a hierarchy in f32 for finding them.
+/// The surface of a mesh in its unit frame, in f64.
 #[derive(Clone, Debug)]
-pub struct Target {
+pub struct Surface {
     /// How the object's frame maps to the unit frame.
     pub frame: UnitFrame,
-    /// The hierarchy that casters traverse.
-    pub bvh: Bvh,
     /// Radius of a sphere around the unit frame's origin that holds every
     /// triangle, with room for the caster's rounding.
     pub radius: f64,
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
+    kept: Vec<u32>,
 }
 
-impl Target {
-    /// Prepares the triangles of `mesh` whose indices `kept` lists (ascending;
-    /// `mesh::survey` lists those that are neither degenerate nor duplicates).
+/// A mesh made ready for casting: its surface for ranges, and a hierarchy over
+/// it in f32 for finding them.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// The surface, in f64.
+    pub surface: Surface,
+    /// The hierarchy that casters traverse.
+    pub bvh: Bvh,
+}
+
+impl Surface {
+    /// The triangles of `mesh` whose indices `kept` lists, ascending;
+    /// `mesh::census::survey` lists those that are neither degenerate nor
+    /// duplicates.
     #[must_use]
-    pub fn new(mesh: &Mesh, kept: &[u32], builder: Builder) -> Self {
-        let corner_ids = |&t: &u32| mesh.triangles[t as usize];
-        let used = kept.iter().flat_map(corner_ids).map(|v| mesh.vertices[v as usize]);
-        let frame = UnitFrame::of(used);
-        let vertices: Vec<DVec3> = mesh.vertices.iter().map(|&v| frame.to_unit(v)).collect();
-        let rounded: Vec<[f32; 3]> = vertices.iter().map(|v| v.as_vec3().to_array()).collect();
-        let corners: Vec<[[f32; 3]; 3]> =
-            kept.iter().map(|t| corner_ids(t).map(|v| rounded[v as usize])).collect();
-        let bvh = Bvh::build(builder, &corners, kept);
-        let farthest = kept
+    pub fn new(mesh: Mesh, kept: Vec<u32>) -> Self {
+        let used = kept
             .iter()
-            .flat_map(corner_ids)
-            .map(|v| vertices[v as usize].length_squared())
-            .fold(0.0, f64::max)
-            .sqrt();
+            .flat_map(|&t| mesh.triangles[t as usize])
+            .map(|v| mesh.vertices[v as usize]);
+        let frame = UnitFrame::of(used.clone());
+        let farthest = used.map(|v| frame.to_unit(v).length_squared()).fold(0.0, f64::max).sqrt();
+        let mut vertices = mesh.vertices;
+        vertices.iter_mut().for_each(|v| *v = frame.to_unit(*v));
         // The sphere must hold the padded boxes' contents as the caster rounds
         // them: 2^-18 per axis (`bvh::BOX_PADDING`), times sqrt(3).
         let radius = farthest + 1e-5;
-        Self { frame, bvh, radius, vertices, triangles: mesh.triangles.clone() }
+        Self { frame, radius, vertices, triangles: mesh.triangles, kept }
     }
 
     /// The corners of triangle `index` of the mesh, in the unit frame.
@@ -91,12 +94,42 @@ impl Target {
         self.triangles[index as usize].map(|v| self.vertices[v as usize])
     }
 
+    /// How many triangles a ray can meet.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// Whether no triangle can be met.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.kept.is_empty()
+    }
+}
+
+impl Target {
+    /// Builds the hierarchy over `surface`.
+    #[must_use]
+    pub fn new(surface: Surface, builder: Builder) -> Self {
+        let rounded: Vec<[f32; 3]> =
+            surface.vertices.iter().map(|v| v.as_vec3().to_array()).collect();
+        let corners: Vec<[[f32; 3]; 3]> = surface
+            .kept
+            .iter()
+            .map(|&t| surface.triangles[t as usize].map(|v| rounded[v as usize]))
+            .collect();
+        let bvh = Bvh::build(builder, &corners, &surface.kept);
+        Self { surface, bvh }
+    }
+
     /// Bytes held, for memory budgets.
     #[must_use]
     pub fn bytes(&self) -> usize {
+        let Surface { vertices, triangles, kept, .. } = &self.surface;
         self.bvh.bytes()
-            + size_of_val(&self.vertices[..])
-            + size_of_val(&self.triangles[..])
+            + size_of_val(&vertices[..])
+            + size_of_val(&triangles[..])
+            + size_of_val(&kept[..])
     }
 }
 

@@ -41,11 +41,8 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
         }
     }
     let middle = split.map_or(0, |split| partition(primitives, |p| split.is_left(p)));
-    let middle = if middle == 0 || middle == primitives.len() {
-        halve(primitives, centres)
-    } else {
-        middle
-    };
+    let middle =
+        if middle == 0 || middle == primitives.len() { halve(primitives, centres) } else { middle };
     let (left, right) = primitives.split_at_mut(middle);
     let at = nodes.len();
     nodes.push(Node::new(Child::NONE, Child::NONE));
@@ -114,11 +111,10 @@ fn bin(centre: f32, origin: f32, bins_per_unit: f32) -> usize {
 /// The cheapest split between bins on any axis; `None` if all centres agree.
 fn best_split(primitives: &[Primitive], centres: Bounds) -> Option<Split> {
     let size = centres.max - centres.min;
-    let bins_per_unit =
-        Vec3A::from_array(size.to_array().map(|s| {
-            let scale = BINS as f32 / s;
-            if scale.is_finite() { scale } else { 0.0 }
-        }));
+    let bins_per_unit = Vec3A::from_array(size.to_array().map(|s| {
+        let scale = BINS as f32 / s;
+        if scale.is_finite() { scale } else { 0.0 }
+    }));
     let mut bins = [[(Bounds::EMPTY, 0u32); BINS]; 3];
     for p in primitives {
         let at = (p.bounds.doubled_centre() - centres.min) * bins_per_unit;

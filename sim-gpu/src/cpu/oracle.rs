@@ -41,7 +41,7 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
             }
             let leaf = child.first as usize..(child.first + child.count) as usize;
             for triangle in &target.bvh.triangles[leaf] {
-                let corners = target.corners(triangle.index);
+                let corners = target.surface.corners(triangle.index);
                 let Some(range_m) = cross(ray.origin, &shear, corners) else { continue };
                 let wins = best.is_none_or(|b| {
                     range_m < b.range_m || (range_m == b.range_m && triangle.index < b.index)
@@ -60,14 +60,13 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
 /// ray, however grazing. `None` if all of it lies behind the sensor.
 #[must_use]
 pub fn range_to(target: &Target, ray: &Ray, index: u32) -> Option<f64> {
-    let corners = target.corners(index);
+    let corners = target.surface.corners(index);
     let [a, b, c] = corners.map(|v| v - ray.origin);
     let normal = (b - a).cross(c - a);
     let length_squared = ray.direction.length_squared();
     let along = [a, b, c].map(|v| v.dot(ray.direction) / length_squared);
-    let (low, high) = along
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &t| (l.min(t), h.max(t)));
+    let (low, high) =
+        along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &t| (l.min(t), h.max(t)));
     let t = normal.dot(a) / normal.dot(ray.direction);
     let t = if t.is_finite() { t.clamp(low, high) } else { low };
     (high >= 0.0).then_some(t.max(0.0))
@@ -76,7 +75,7 @@ pub fn range_to(target: &Target, ray: &Ray, index: u32) -> Option<f64> {
 /// The unit normal of triangle `index` in the unit frame; zero if it has none.
 #[must_use]
 pub fn normal(target: &Target, index: u32) -> DVec3 {
-    let [a, b, c] = target.corners(index);
+    let [a, b, c] = target.surface.corners(index);
     (b - a).cross(c - a).normalize_or_zero()
 }
 

@@ -57,20 +57,13 @@ fn enter(low: [f32; 3], high: [f32; 3], origin: Vec3A, per_direction: Vec3A, far
 }
 
 impl Nearest {
-    const NONE: Self = Self {
-        t: NO_HIT,
-        error: 0.0,
-        leaf: 0,
-        index: MISS,
-        farthest: NO_HIT,
-        rival: NO_HIT,
-    };
+    const NONE: Self =
+        Self { t: NO_HIT, error: 0.0, leaf: 0, index: MISS, farthest: NO_HIT, rival: NO_HIT };
 
     #[inline]
     fn consider(&mut self, candidate: Candidate, leaf: u32, index: u32) {
         let wins = candidate.t < self.t || (candidate.t == self.t && index < self.index);
-        let loser =
-            if wins { self.t - self.error } else { candidate.t - candidate.error };
+        let loser = if wins { self.t - self.error } else { candidate.t - candidate.error };
         self.rival = self.rival.min(loser);
         self.farthest = self.farthest.min(candidate.t + candidate.error);
         if wins {
@@ -106,8 +99,7 @@ pub fn traverse(nodes: &[Node], triangles: &[LeafTriangle], ray: &TraceRay) -> N
     let mut at = ray.root;
     loop {
         let node = &nodes[at as usize];
-        let mut left =
-            enter(node.left_min, node.left_max, corner, per_direction, nearest.farthest);
+        let mut left = enter(node.left_min, node.left_max, corner, per_direction, nearest.farthest);
         let mut right =
             enter(node.right_min, node.right_max, corner, per_direction, nearest.farthest);
         if left < NO_HIT && node.left_count > 0 {

@@ -97,18 +97,13 @@ pub(crate) fn find_adapter(name: Option<&str>) -> Result<wgpu::Adapter, AdapterE
     let Some(wanted) = name else {
         return adapters.drain(..).next().ok_or(AdapterError::None);
     };
-    let holds = |a: &wgpu::Adapter| {
-        a.get_info().name.to_lowercase().contains(&wanted.to_lowercase())
-    };
+    let holds =
+        |a: &wgpu::Adapter| a.get_info().name.to_lowercase().contains(&wanted.to_lowercase());
     match adapters.iter().position(holds) {
         Some(at) => Ok(adapters.swap_remove(at)),
         None => Err(AdapterError::Unknown {
             wanted: wanted.to_owned(),
-            present: adapters
-                .iter()
-                .map(|a| a.get_info().name)
-                .chain(["cpu".to_owned()])
-                .collect(),
+            present: adapters.iter().map(|a| a.get_info().name).chain(["cpu".to_owned()]).collect(),
         }),
     }
 }
@@ -131,9 +126,7 @@ fn adapters() -> Vec<wgpu::Adapter> {
         pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY))
             .into_iter()
             .filter(|a| {
-                a.get_downlevel_capabilities()
-                    .flags
-                    .contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+                a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
             })
             .collect();
     adapters.sort_by_key(|a| kind(a.get_info().device_type));

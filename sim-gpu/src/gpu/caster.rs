@@ -194,10 +194,9 @@ impl Pending {
         let words_per_ray = words_per_ray(&self.core.modules);
         let mut casts = vec![Cast::default(); self.jobs];
         for (slot, parts) in self.dispatches {
-            let answer = slot.wait(&self.core).map_err(|cause| GpuError::Lost {
-                name: self.core.summary.name.clone(),
-                cause,
-            });
+            let answer = slot
+                .wait(&self.core)
+                .map_err(|cause| GpuError::Lost { name: self.core.summary.name.clone(), cause });
             self.core.check()?;
             let (codes, words) = answer?;
             let (mut codes, mut words) = (&codes[..], &words[..]);
@@ -238,8 +237,7 @@ fn pipeline(device: &wgpu::Device, modules: &[Module]) -> wgpu::ComputePipeline 
     let layout = |entries: &[wgpu::BindGroupLayoutEntry]| {
         device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries })
     };
-    let trace =
-        layout(&[storage(0, true), storage(1, true), storage(2, true), storage(3, false)]);
+    let trace = layout(&[storage(0, true), storage(1, true), storage(2, true), storage(3, false)]);
     let mut entries = vec![storage(0, false)];
     entries.extend(reads(modules, Input::Stream).then(|| storage(1, true)));
     entries.extend(reads(modules, Input::Reflectivity).then(|| storage(2, true)));

@@ -50,8 +50,7 @@ pub struct Module {
 #[must_use]
 pub fn modules(effects: &Effects) -> Vec<Module> {
     let noise = effects.noise.map(|noise| {
-        let constants =
-            vec![("noise_mean_m", noise.mean_m), ("noise_sigma_m", noise.sigma_m)];
+        let constants = vec![("noise_mean_m", noise.mean_m), ("noise_sigma_m", noise.sigma_m)];
         let (name, source, words) = match noise.model {
             NoiseModel::Range => ("noise_range", shader!("effects/noise_range.wgsl"), 1),
             NoiseModel::Xyz => ("noise_xyz", shader!("effects/noise_xyz.wgsl"), 3),

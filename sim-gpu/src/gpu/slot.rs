@@ -131,7 +131,10 @@ impl Slot {
             result.map_err(|error| error.to_string())?;
         }
         let [codes_bytes, words_bytes] = self.answer_bytes;
-        Ok((copy_out(&self.codes_readback, codes_bytes)?, copy_out(&self.words_readback, words_bytes)?))
+        Ok((
+            copy_out(&self.codes_readback, codes_bytes)?,
+            copy_out(&self.words_readback, words_bytes)?,
+        ))
     }
 }
 
@@ -145,7 +148,12 @@ fn copy_out<T: bytemuck::AnyBitPattern>(from: &Growing, bytes: u64) -> Result<Ve
     Ok(copy)
 }
 
-fn bind(core: &Core, group: u32, bindings: &[u32], buffers: &[(wgpu::Buffer, u64)]) -> wgpu::BindGroup {
+fn bind(
+    core: &Core,
+    group: u32,
+    bindings: &[u32],
+    buffers: &[(wgpu::Buffer, u64)],
+) -> wgpu::BindGroup {
     let entries: Vec<_> = bindings
         .iter()
         .zip(buffers)
