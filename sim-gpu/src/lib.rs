@@ -13,6 +13,7 @@ pub mod mesh;
 pub mod pose;
 pub mod ray;
 pub mod resolve;
+pub mod scan;
 pub mod scene;
 pub mod sensor;
 pub mod target;
