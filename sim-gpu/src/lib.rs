@@ -7,6 +7,7 @@ pub mod bvh;
 pub mod caster;
 pub mod config;
 pub mod cpu;
+pub mod dataset;
 pub mod effects;
 pub mod gpu;
 pub mod mesh;

@@ -84,7 +84,10 @@ pub fn assemble(view: &View, seen: &[Seen]) -> (Scan, Tally) {
     tally.points = returns.len() as u64;
     let scan = Scan {
         origin: origin.to_array(),
-        positions: returns.iter().map(|r| f32x3(r.from_sensor + (view.pose.position_m - origin))).collect(),
+        positions: returns
+            .iter()
+            .map(|r| f32x3(r.from_sensor + (view.pose.position_m - origin)))
+            .collect(),
         ..Scan::default()
     };
     (with_attributes(scan, view, seen, &returns), tally)
