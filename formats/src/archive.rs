@@ -20,8 +20,17 @@ pub(crate) struct NpzWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> NpzWriter<W> {
-    pub fn new(writer: W) -> Self {
-        Self { zip: ZipWriter::new(writer) }
+    /// Writes the archive whose arrays `fill` writes.
+    pub fn write(writer: W, fill: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
+        let mut npz = Self { zip: ZipWriter::new(writer) };
+        if let Err(error) = fill(&mut npz) {
+            // Dropped, it would try to end the archive and complain to stderr
+            // that it cannot; the caller reports the error.
+            std::mem::forget(npz.zip);
+            return Err(error);
+        }
+        npz.zip.finish()?;
+        Ok(())
     }
 
     /// Begins the array `key`; its `n_bytes`, header included, must follow.
@@ -68,11 +77,6 @@ impl<W: Write + Seek> NpzWriter<W> {
             }
         }
         writer.flush()
-    }
-
-    pub fn finish(self) -> io::Result<()> {
-        self.zip.finish()?;
-        Ok(())
     }
 }
 

@@ -7,6 +7,7 @@
 
 pub mod cloud;
 pub mod error;
+pub mod hash;
 pub mod rng;
 pub mod scan;
 pub mod split;

@@ -30,23 +30,24 @@ use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 /// An attribute of another length than the positions; what the system reports.
 pub fn write_scan(path: &Path, scan: &Scan) -> Result<(), FormatError> {
     scan.check_lengths()?;
-    atomic::write(path, |writer| {
-        let mut npz = NpzWriter::new(writer);
-        write_columns(&mut npz, "positions", scan.positions.as_flattened(), 3)?;
-        for (attribute, column) in scan.columns() {
-            let key = attribute.name();
-            match column {
-                Column::F32(values) => write_columns(&mut npz, key, values, 1)?,
-                Column::U16(values) => write_columns(&mut npz, key, values, 1)?,
-                Column::U32(values) => write_columns(&mut npz, key, values, 1)?,
-                Column::Vector(values) => write_columns(&mut npz, key, values.as_flattened(), 3)?,
-            }
+    atomic::write(path, |writer| NpzWriter::write(writer, |npz| write_arrays(npz, scan)))
+}
+
+fn write_arrays<W: io::Write + io::Seek>(npz: &mut NpzWriter<W>, scan: &Scan) -> io::Result<()> {
+    write_columns(npz, "positions", scan.positions.as_flattened(), 3)?;
+    for (attribute, column) in scan.columns() {
+        let key = attribute.name();
+        match column {
+            Column::F32(values) => write_columns(npz, key, values, 1)?,
+            Column::U16(values) => write_columns(npz, key, values, 1)?,
+            Column::U32(values) => write_columns(npz, key, values, 1)?,
+            Column::Vector(values) => write_columns(npz, key, values.as_flattened(), 3)?,
         }
-        if scan.origin != [0.0; 3] {
-            npz.array("origin", ArrayView1::from(&scan.origin))?;
-        }
-        npz.finish()
-    })
+    }
+    if scan.origin != [0.0; 3] {
+        npz.array("origin", ArrayView1::from(&scan.origin))?;
+    }
+    Ok(())
 }
 
 fn write_columns<W: io::Write + io::Seek, A: WritableElement>(

@@ -115,17 +115,17 @@ impl PackedWriter {
         let mut points = points.into_inner().map_err(|error| here(error.into_error()))?;
         points.rewind().map_err(here)?;
         atomic::write(&path, |writer| {
-            let mut npz = NpzWriter::new(writer);
-            let header = npy::header_bytes("<f4", &[labels.len(), n_points, 3]);
-            let n_bytes = header.len() as u64 + points.metadata()?.len();
-            let entry = npz.begin("points", n_bytes)?;
-            entry.write_all(&header)?;
-            io::copy(&mut points, entry)?;
-            npz.array("labels", ArrayView1::from(&labels))?;
-            npz.text("names", &names)?;
-            npz.array("n_raw", ArrayView1::from(&n_raw))?;
-            npz.text("classes", &classes)?;
-            npz.finish()
+            NpzWriter::write(writer, |npz| {
+                let header = npy::header_bytes("<f4", &[labels.len(), n_points, 3]);
+                let n_bytes = header.len() as u64 + points.metadata()?.len();
+                let entry = npz.begin("points", n_bytes)?;
+                entry.write_all(&header)?;
+                io::copy(&mut points, entry)?;
+                npz.array("labels", ArrayView1::from(&labels))?;
+                npz.text("names", &names)?;
+                npz.array("n_raw", ArrayView1::from(&n_raw))?;
+                npz.text("classes", &classes)
+            })
         })
     }
 }

@@ -3,7 +3,8 @@
 //! Properties: `x y z`, then `range` (float), `beam` (uint), `ring` (ushort),
 //! `time` (float), `triangle` (uint), `object` (uint), `intensity` (float),
 //! `nx ny nz` (float), as far as the scan has them. An origin that is not 0 is
-//! the comment `origin X Y Z`.
+//! the comment `origin X Y Z`. Open3D 0.20 reads the properties of type float
+//! and passes over the others; NPZ gives it all of them.
 
 use std::fs::File;
 use std::io::{BufReader, Write};

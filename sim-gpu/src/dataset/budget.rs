@@ -29,8 +29,7 @@ impl Budget {
     pub fn take(&self, bytes: u64) -> Share<'_> {
         let held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         let full = |held: &mut u64| *held > 0 && *held + bytes > self.limit;
-        let mut held =
-            self.released.wait_while(held, full).unwrap_or_else(PoisonError::into_inner);
+        let mut held = self.released.wait_while(held, full).unwrap_or_else(PoisonError::into_inner);
         *held += bytes;
         Share { budget: self, bytes }
     }

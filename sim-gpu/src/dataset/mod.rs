@@ -4,11 +4,17 @@
 //! [`journal`] so that a killed run can go on, [`finish`] packs them and
 //! writes the manifest.
 
+mod budget;
 pub mod config;
 pub mod error;
 pub mod journal;
 pub mod layout;
+pub mod pipeline;
+mod prepare;
+pub mod progress;
 pub mod record;
+mod under_way;
+mod write;
 
 pub use config::{DatasetConfig, SetConfig, Variant, Viewpoints};
 pub use error::DatasetError;

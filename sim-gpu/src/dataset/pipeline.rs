@@ -2,16 +2,16 @@
 //! thread that keeps the adapter busy. Queues are bounded and a budget bounds
 //! the meshes under way, so memory does not grow with their number.
 
-use super::budget::{Budget, Share};
+use super::budget::Budget;
 use super::config::DatasetConfig;
 use super::error::DatasetError;
 use super::journal::Journal;
-use super::prepare::{Prepared, prepare};
+use super::prepare::prepare;
 use super::progress::{Progress, Stage};
 use super::record::{Entry, MeshFailure, MeshRecord};
+use super::under_way::{Held, gather, submit};
 use super::write::{Output, write_mesh};
-use crate::caster::{Cast, CastJob, Caster, Casting, Culling};
-use crate::gpu::GpuError;
+use crate::caster::{Cast, Caster, Culling};
 use crate::mesh::tree::MeshEntry;
 use crate::sensor::BeamPattern;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -30,9 +30,6 @@ const BYTES_PER_FILE_BYTE: u64 = 8;
 
 /// Bytes for the rays and scans of one mesh whatever its size.
 const BYTES_PER_MESH: u64 = 4 << 20;
-
-/// Rays gathered before a batch is sent, unless no mesh is waiting.
-const RAYS_PER_BATCH: usize = 1 << 20;
 
 /// Batches on their way through the adapter at once: while one is traced, the
 /// next is uploaded.
@@ -59,12 +56,6 @@ pub struct Scanned {
     pub records: Vec<MeshRecord>,
     /// Meshes that could not be.
     pub failures: Vec<MeshFailure>,
-}
-
-/// A mesh on its way, with its share of the memory budget.
-struct Held<'b> {
-    prepared: Prepared,
-    _share: Share<'b>,
 }
 
 struct Shared<'a> {
@@ -107,8 +98,8 @@ pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError
             scope.spawn(move || shared.write_all(&cast));
         }
         drop(to_caster);
-        shared.cast_all(&prepared, &to_writers);
-        drop(to_writers);
+        drop(cast);
+        shared.cast_all(prepared, to_writers);
     });
     if let Some(error) = lock(&shared.error).take() {
         return Err(error);
@@ -143,10 +134,10 @@ impl Shared<'_> {
             let share = budget.take(
                 file_bytes.saturating_mul(BYTES_PER_FILE_BYTE).saturating_add(BYTES_PER_MESH),
             );
-            let Run { config, culling, progress, .. } = *self.run;
-            match prepare(mesh, config, &self.patterns, culling, progress) {
+            let Run { config, culling, progress, .. } = self.run;
+            match prepare(mesh, config, &self.patterns, *culling, progress) {
                 Ok(prepared) => {
-                    if to_caster.send(Held { prepared, _share: share }).is_err() {
+                    if to_caster.send(Held { prepared, share }).is_err() {
                         return;
                     }
                 }
@@ -162,18 +153,19 @@ impl Shared<'_> {
     /// Gathers meshes into batches and keeps some of them under way.
     fn cast_all<'b>(
         &self,
-        prepared: &Receiver<Held<'b>>,
-        to_writers: &Sender<(Held<'b>, Vec<Cast>)>,
+        prepared: Receiver<Held<'b>>,
+        to_writers: Sender<(Held<'b>, Vec<Cast>)>,
     ) {
         let mut under_way = VecDeque::new();
         loop {
-            let batch = gather(prepared, under_way.is_empty());
+            let batch = gather(&prepared, under_way.is_empty());
             let nothing_waits = batch.is_empty();
             if nothing_waits && under_way.is_empty() {
                 return;
             }
             if !nothing_waits {
-                match self.run.progress.time(Stage::Cast, || self.submit(batch)) {
+                let run = self.run;
+                match run.progress.time(Stage::Cast, || submit(batch, run.caster, run.progress)) {
                     Ok(batch) => under_way.push_back(batch),
                     Err(error) => return self.stop(error.into()),
                 }
@@ -192,26 +184,6 @@ impl Shared<'_> {
                 }
             }
         }
-    }
-
-    /// Starts casting at all meshes of `batch`. A mesh too large for the
-    /// adapter goes to the CPU twin.
-    fn submit<'b>(&self, mut batch: Vec<Held<'b>>) -> Result<UnderWay<'b>, GpuError> {
-        let caster = self.run.caster;
-        let fits = |held: &Held| held.prepared.jobs.iter().all(|job| caster.fits(&job.target));
-        let (mut large, mut fitting) = (Vec::new(), Vec::new());
-        for held in &mut batch {
-            let jobs = std::mem::take(&mut held.prepared.jobs);
-            held.prepared.jobs = jobs;
-            if fits(held) {
-                fitting.append(&mut held.prepared.jobs.clone());
-            } else {
-                large.append(&mut held.prepared.jobs.clone());
-            }
-        }
-        let _ = (&mut large, &mut fitting);
-        let casting = caster.submit(&fitting)?;
-        Ok(UnderWay { batch, casting, jobs: fitting })
     }
 
     /// Writes the scans of meshes that were cast.

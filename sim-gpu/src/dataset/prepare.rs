@@ -55,7 +55,8 @@ pub fn prepare(
     let views = plan(config, &id);
     let frames: Vec<RayFrame> =
         views.iter().map(|v| RayFrame::new(&surface, &DAffine3::IDENTITY, &v.pose)).collect();
-    let rays = views.iter().zip(&frames).map(|(v, f)| patterns[v.set].within(&f.cone()).len()).sum();
+    let rays =
+        views.iter().zip(&frames).map(|(v, f)| patterns[v.set].within(&f.cone()).len()).sum();
     let builder = Builder::for_rays(surface.len(), rays);
     let target = Arc::new(progress.time(Stage::Build, || Target::new(surface, builder)));
     let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {
@@ -77,7 +78,11 @@ fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
     let mut views = Vec::new();
     for (set, set_config) in config.sets.iter().enumerate() {
         let poses = set_config.poses(config.seed, id);
-        views.extend(poses.into_iter().zip(0..).map(|(pose, view)| PlannedView { set, view, pose }));
+        views.extend(poses.into_iter().zip(0..).map(|(pose, view)| PlannedView {
+            set,
+            view,
+            pose,
+        }));
     }
     views
 }

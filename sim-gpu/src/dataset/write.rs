@@ -77,7 +77,7 @@ fn write_view(
         let (scan, tally) = output.progress.time(Stage::Resolve, || assemble(&view, &seen));
         output.progress.scans.fetch_add(1, Relaxed);
         output.progress.points.fetch_add(tally.points, Relaxed);
-        let files = output.progress.time(Stage::Write, || {
+        let files: Result<_, DatasetError> = output.progress.time(Stage::Write, || {
             let path = |format| {
                 layout::scan(output.out, &set.name, variant, &record.entry, planned.view, format)
             };
