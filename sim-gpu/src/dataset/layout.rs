@@ -24,6 +24,12 @@ pub fn journal(out: &Path) -> PathBuf {
     out.join("journal")
 }
 
+/// The picture of an example.
+#[must_use]
+pub fn example(out: &Path) -> PathBuf {
+    out.join("example.png")
+}
+
 /// One scan's file.
 #[must_use]
 pub fn scan(
@@ -58,7 +64,8 @@ pub fn packed(out: &Path, set: &SetConfig, variant: Variant, split: Split) -> Pa
 pub fn top_level(config: &DatasetConfig) -> Vec<String> {
     let mut names: Vec<String> = config.sets.iter().map(|set| set.name.clone()).collect();
     names.extend(
-        ["packed", "layouts", "journal", "manifest.json", "failures.jsonl"].map(String::from),
+        ["packed", "layouts", "journal", "manifest.json", "failures.jsonl", "example.png"]
+            .map(String::from),
     );
     names
 }
