@@ -21,6 +21,26 @@ pub enum DatasetError {
         /// What it holds.
         what: &'static str,
     },
+    /// A run that was not finished.
+    #[error("{}: is not finished; continue it with --resume", path.display())]
+    Unfinished {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A folder that holds no finished dataset.
+    #[error("{}: holds no manifest.json, so no finished dataset", path.display())]
+    NoManifest {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A layout that cannot hold the dataset.
+    #[error("layout {layout}: {cause}")]
+    Layout {
+        /// The layout's name.
+        layout: &'static str,
+        /// Why.
+        cause: &'static str,
+    },
     /// An unfinished or finished run in the folder was another one.
     #[error("{}: was begun with other settings: {difference}", path.display())]
     Different {
