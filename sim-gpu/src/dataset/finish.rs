@@ -3,7 +3,7 @@
 use super::clouds::Scans;
 use super::error::DatasetError;
 use super::foreign::write_layouts;
-use super::journal::{Journal, Terms};
+use super::journal::{Journal, Terms, unless_absent};
 use super::layout;
 use super::manifest::{self, Manifest, TOOL};
 use super::pack::pack;
@@ -93,12 +93,4 @@ fn remove(path: &Path) -> Result<(), DatasetError> {
 
 fn remove_folder(path: &Path) -> Result<(), DatasetError> {
     unless_absent(path, std::fs::remove_dir_all(path))
-}
-
-/// The outcome of removing `path`, which need not have been there.
-pub(super) fn unless_absent(path: &Path, outcome: io::Result<()>) -> Result<(), DatasetError> {
-    match outcome {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(DatasetError::io(path, error)),
-        _ => Ok(()),
-    }
 }

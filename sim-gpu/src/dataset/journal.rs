@@ -3,7 +3,6 @@
 
 use super::config::DatasetConfig;
 use super::error::DatasetError;
-use super::finish::unless_absent;
 use super::layout;
 use super::record::{Entry, MeshRecord};
 use formats::atomic;
@@ -114,4 +113,14 @@ pub(super) fn write_json<T: Serialize>(file: &Path, value: &T) -> Result<(), Dat
         out.write_all(b"\n")
     })?;
     Ok(())
+}
+
+/// The outcome of removing `path`, which need not have been there.
+pub(super) fn unless_absent(path: &Path, outcome: std::io::Result<()>) -> Result<(), DatasetError> {
+    match outcome {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(DatasetError::io(path, error))
+        }
+        _ => Ok(()),
+    }
 }

@@ -146,6 +146,9 @@ impl Manifest {
         if self.tool != TOOL {
             return Some(format!("made by `{}`, not by `{TOOL}`", self.tool));
         }
+        if let Some((number, of)) = self.shard.filter(|(number, of)| number >= of) {
+            return Some(format!("part {number} from 0 of {of} parts"));
+        }
         let folders = self.config.sets.iter().map(|set| &set.name);
         let names = self.entries().flat_map(|entry| [&entry.class, &entry.name]);
         folders
