@@ -27,10 +27,10 @@ pub enum DatasetError {
         /// The folder.
         path: PathBuf,
     },
-    /// A folder that holds no finished dataset.
-    #[error("{}: holds no manifest.json, so no finished dataset", path.display())]
+    /// No manifest where a finished dataset has one.
+    #[error("{}: is not there, so this is no finished dataset", path.display())]
     NoManifest {
-        /// The folder.
+        /// The manifest's place.
         path: PathBuf,
     },
     /// A layout that cannot hold the dataset.

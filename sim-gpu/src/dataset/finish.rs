@@ -63,7 +63,7 @@ pub(super) fn complete(out: &Path, mut manifest: Manifest) -> Result<Manifest, D
     let layout_files = write_layouts(&scans)?;
     manifest.poses = manifest::poses(config, records);
     (manifest.packed, manifest.layout_files) = (packed, layout_files);
-    manifest.write(out)?;
+    manifest.write(&layout::manifest(out))?;
     Journal::of(out).remove()?;
     Ok(manifest)
 }

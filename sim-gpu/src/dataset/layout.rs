@@ -24,6 +24,12 @@ pub fn journal(out: &Path) -> PathBuf {
     out.join("journal")
 }
 
+/// The picture of an example.
+#[must_use]
+pub fn example(out: &Path) -> PathBuf {
+    out.join("example.png")
+}
+
 /// One scan's file.
 #[must_use]
 pub fn scan(
@@ -84,7 +90,7 @@ pub fn folders(config: &DatasetConfig) -> Vec<String> {
 #[must_use]
 pub fn top_level(config: &DatasetConfig) -> Vec<String> {
     let mut names = folders(config);
-    names.extend(["manifest.json", "failures.jsonl"].map(String::from));
+    names.extend(["manifest.json", "failures.jsonl", "example.png"].map(String::from));
     names
 }
 

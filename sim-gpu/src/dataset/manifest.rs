@@ -5,8 +5,7 @@
 
 use super::config::{DatasetConfig, SetConfig, Viewpoints};
 use super::error::DatasetError;
-use super::journal::{read_json, write_json};
-use super::layout;
+use super::journal::{Terms, read_json, write_json};
 use super::record::{Entry, MeshFailure, MeshRecord};
 use crate::pose::Pose;
 use serde::{Deserialize, Serialize};
@@ -74,9 +73,10 @@ pub struct MeshPoses {
 /// One packed file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PackedRecord {
-    /// The file and its hash.
-    #[serde(flatten)]
-    pub file: HashedFile,
+    /// Its path from the dataset's folder, with forward slashes.
+    pub file: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
     /// Clouds in it.
     pub clouds: u64,
     /// The scans that are not in it: they have fewer points than
@@ -103,29 +103,39 @@ pub struct HashedFile {
 }
 
 impl Manifest {
-    /// The manifest of the dataset in `out`.
+    /// Reads the manifest `file`.
     ///
     /// # Errors
     /// [`DatasetError::NoManifest`] if there is none; a manifest that cannot be
     /// read, is not ours, or holds a name that would lead out of the folder.
-    pub fn read(out: &Path) -> Result<Self, DatasetError> {
-        let path = layout::manifest(out);
-        if !path.exists() {
-            return Err(DatasetError::NoManifest { path: out.into() });
+    pub fn read(file: &Path) -> Result<Self, DatasetError> {
+        if !file.exists() {
+            return Err(DatasetError::NoManifest { path: file.into() });
         }
-        let manifest: Self = read_json(&path)?;
+        let manifest: Self = read_json(file)?;
         match manifest.flaw() {
             None => Ok(manifest),
-            Some(cause) => Err(DatasetError::Malformed { path, cause }),
+            Some(cause) => Err(DatasetError::Malformed { path: file.into(), cause }),
         }
     }
 
-    /// Writes it to its place in `out`, whole or not at all.
+    /// Writes it to `file`, whole or not at all.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self, out: &Path) -> Result<(), DatasetError> {
-        write_json(&layout::manifest(out), self)
+    pub fn write(&self, file: &Path) -> Result<(), DatasetError> {
+        write_json(file, self)
+    }
+
+    /// The terms of the run that made the dataset.
+    #[must_use]
+    pub fn terms(&self) -> Terms {
+        Terms {
+            version: self.version.clone(),
+            config: self.config.clone(),
+            adapter: self.adapters.join(", "),
+            shard: self.shard,
+        }
     }
 
     /// All classes, sorted: a label is an index into them. Those of meshes that

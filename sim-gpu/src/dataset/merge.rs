@@ -52,7 +52,7 @@ impl Part {
         if Journal::of(path).exists() {
             return Err(DatasetError::Unfinished { path: path.into() });
         }
-        let manifest = Manifest::read(path)?;
+        let manifest = Manifest::read(&layout::manifest(path))?;
         let Some((number, of)) = manifest.shard else {
             return Err(shard_error(path, "is no shard: it was made without --shard"));
         };

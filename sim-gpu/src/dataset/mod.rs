@@ -21,6 +21,7 @@ pub mod pipeline;
 mod prepare;
 pub mod progress;
 pub mod record;
+pub mod start;
 mod under_way;
 pub mod verify;
 mod write;

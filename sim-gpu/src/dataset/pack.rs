@@ -3,7 +3,7 @@
 use super::clouds::{Part, Scans};
 use super::error::DatasetError;
 use super::layout;
-use super::manifest::{HashedFile, PackedRecord};
+use super::manifest::PackedRecord;
 use formats::packed::PackedWriter;
 use formats::{Split, hash};
 use rayon::prelude::*;
@@ -35,7 +35,6 @@ fn pack_part(scans: &Scans, part: &Part) -> Result<PackedRecord, DatasetError> {
     })?;
     let clouds = writer.len() as u64;
     writer.finish()?;
-    let file =
-        HashedFile { file: layout::slashed(&place(Path::new(""))), sha256: hash::of_file(&path)? };
-    Ok(PackedRecord { file, clouds, left_out })
+    let file = layout::slashed(&place(Path::new("")));
+    Ok(PackedRecord { file, sha256: hash::of_file(&path)?, clouds, left_out })
 }

@@ -63,7 +63,7 @@ pub fn verify(out: &Path) -> Result<Report, DatasetError> {
     if Journal::of(out).exists() {
         return Err(DatasetError::Unfinished { path: out.into() });
     }
-    let manifest = Manifest::read(out)?;
+    let manifest = Manifest::read(&layout::manifest(out))?;
     let expected = expected_files(&manifest);
     // Packed files fill the memory: one at a time.
     let (packed, others): (Vec<_>, Vec<_>) =
@@ -112,8 +112,8 @@ fn expected_files(manifest: &Manifest) -> Vec<Expected<'_>> {
         }
     }
     expected.extend(manifest.packed.iter().map(|packed| Expected {
-        path: PathBuf::from(&packed.file.file),
-        sha256: &packed.file.sha256,
+        path: PathBuf::from(&packed.file),
+        sha256: &packed.sha256,
         holds: Holds::Clouds(packed.clouds),
     }));
     expected.extend(manifest.layout_files.iter().map(|file| Expected {
