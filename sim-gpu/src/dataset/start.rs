@@ -1,5 +1,6 @@
 //! How a run begins: in an empty folder, or where another one was stopped.
 
+use super::difference::difference;
 use super::error::DatasetError;
 use super::journal::{Journal, Terms};
 use super::layout;
@@ -44,6 +45,8 @@ pub fn begin(out: &Path, terms: &Terms, how: Begin) -> Result<Start, DatasetErro
         Begin::Resume if finished => {
             let manifest = Manifest::read(&layout::manifest(out))?;
             same_terms(out, &manifest.terms(), terms)?;
+            // A run killed at its very end leaves parts of its journal.
+            journal.remove()?;
             return Ok(Start::Complete(Box::new(manifest)));
         }
         Begin::Resume => refuse_occupied(out, terms)?,
@@ -89,32 +92,8 @@ fn remove(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
 
 /// Names the first setting that differs.
 fn same_terms(out: &Path, begun: &Terms, asked: &Terms) -> Result<(), DatasetError> {
-    let json = |terms: &Terms| {
-        serde_json::to_value(terms)
-            .map_err(|error| DatasetError::Malformed { path: out.into(), cause: error.to_string() })
-    };
-    match first_difference("", &json(begun)?, &json(asked)?) {
+    match difference(begun, asked) {
         None => Ok(()),
         Some(difference) => Err(DatasetError::Different { path: out.into(), difference }),
-    }
-}
-
-fn first_difference(
-    at: &str,
-    begun: &serde_json::Value,
-    asked: &serde_json::Value,
-) -> Option<String> {
-    use serde_json::Value::{Array, Object};
-    match (begun, asked) {
-        (Object(p), Object(q)) if p.keys().eq(q.keys()) => {
-            p.iter().find_map(|(key, value)| first_difference(&format!("{at}.{key}"), value, &q[key]))
-        }
-        (Array(p), Array(q)) if p.len() == q.len() => p
-            .iter()
-            .zip(q)
-            .enumerate()
-            .find_map(|(i, (p, q))| first_difference(&format!("{at}[{i}]"), p, q)),
-        (p, q) if p == q => None,
-        (p, q) => Some(format!("{} was {p}, now {q}", at.trim_start_matches('.'))),
     }
 }
