@@ -66,9 +66,11 @@ fn every_caster_keeps_the_promise() {
         });
         println!("{}: {all}", caster.name());
         assert!(all.hits > 100_000);
-        // Ranges are solved in f64, so all but rays at edges, where f32 took
-        // the neighbour, are exact to a few roundings.
-        assert!(all.worst < 1e-7);
+        // Ranges are solved in f64 on the triangle found, by the plane here and
+        // by edge functions there. Both amplify roundings of 2^-53 by the
+        // tangent of the incidence, at most 573, and by the ratio of the
+        // distance to a triangle's height, here at most 2^8.
+        assert!(all.worst < 1e-10);
     }
 }
 
