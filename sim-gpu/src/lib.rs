@@ -4,3 +4,4 @@
 //! BVH, sensor and scene, casting (on a GPU or on the CPU), scan.
 
 pub mod mesh;
+pub mod shapes;
