@@ -48,11 +48,9 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
         let mut range_m = oracle::range_to(&job.target, &ray, found);
         if cast.codes[i] & AMBIGUOUS != 0 {
             resolved.decided_in_f64 += 1;
-            // Where f64 finds nothing the ray grazes a silhouette: the caster's
-            // answer stands.
-            if let Some(nearest) = oracle::nearest(&job.target, &ray) {
-                (triangle, range_m) = (nearest.index, Some(nearest.range_m));
-            }
+            let nearest = oracle::nearest(&job.target, &ray);
+            triangle = nearest.map_or(MISS, |crossing| crossing.index);
+            range_m = nearest.map(|crossing| crossing.range_m);
         }
         let Some(range_m) = range_m else { continue };
         resolved.hits.push(Hit { beam, triangle, range_m });
