@@ -6,3 +6,4 @@ pub mod judge;
 pub mod meshes;
 pub mod random;
 pub mod shared_data;
+pub mod written_dataset;
