@@ -51,8 +51,7 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
             triangle = nearest.index;
         }
         // By the same formula whoever found the triangle.
-        let range_m = oracle::range_to(&job.target, &ray, triangle);
-        let Some(range_m) = range_m else { continue };
+        let Some(range_m) = oracle::range_to(&job.target, &ray, triangle) else { continue };
         resolved.hits.push(Hit { beam, triangle, range_m });
         if triangle == found {
             resolved.words.extend(&cast.words[i * words_per_ray..(i + 1) * words_per_ray]);
