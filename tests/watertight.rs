@@ -72,7 +72,7 @@ fn cast_from_inside(target: &Arc<Target>, expected: usize, effects: &Effects) {
         let pattern = aimed(target, sensor, &points);
         let job = job(target, &at(in_world(target, sensor)), &pattern);
         for caster in casters(effects) {
-            let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
+            let casts = caster.cast(std::slice::from_ref(&job)).expect("the adapter casts");
             // Before f64 has its say on any ray, and after.
             let misses = casts[0].codes.iter().filter(|&&code| code == MISS).count();
             let hits = resolve(&job, &casts[0], &pattern, effects);
