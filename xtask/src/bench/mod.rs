@@ -1,0 +1,90 @@
+//! `cargo xtask bench`: measures, and writes down what it measured and where.
+//!
+//! One file per question asked: [`speed`] of building and tracing, [`trade`]
+//! of speed against accuracy, which [`builders`] pays when, the share of each
+//! stage of the [`pipeline`], and how [`peers`] compare.
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand};
+use serde::Serialize;
+use sim_gpu::gpu::AdapterRequest;
+use std::path::PathBuf;
+
+mod clock;
+mod lanes;
+mod machine;
+mod scenes;
+mod shot;
+mod speed;
+mod subject;
+mod table;
+
+/// What to measure.
+#[derive(Args, Debug)]
+pub struct BenchArgs {
+    #[command(subcommand)]
+    what: Benchmark,
+}
+
+#[derive(Subcommand, Debug)]
+enum Benchmark {
+    /// Measure the simulator: building, casting, the whole way to disk.
+    Sim(SimArgs),
+}
+
+#[derive(Args, Debug)]
+struct SimArgs {
+    /// Meshes to measure besides the ones made by rule: a file or a folder.
+    meshes: Option<PathBuf>,
+    /// Measure this adapter only: `auto`, `cpu` or part of a name [default: all].
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Write everything measured to this file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Counted repeats of each measurement; the median is shown.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+    /// Sizes of the meshes made by rule, triangles.
+    #[arg(long, value_delimiter = ',', default_value = "1000,10000,100000,1000000")]
+    triangles: Vec<usize>,
+    /// Take at most this many of the meshes given, spread over their list.
+    #[arg(long, default_value_t = 16, value_name = "N")]
+    limit: usize,
+}
+
+/// Everything that a run measured.
+#[derive(Serialize)]
+struct Report {
+    machine: machine::Machine,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speed: Option<speed::Speed>,
+    peak_memory_bytes: Option<u64>,
+}
+
+/// Runs the benchmark that `args` ask for.
+///
+/// # Errors
+/// If no mesh can be read, an adapter fails or the report cannot be written.
+pub fn run(args: &BenchArgs) -> Result<()> {
+    let Benchmark::Sim(args) = &args.what;
+    let request: Option<AdapterRequest> = match &args.adapter {
+        Some(name) => Some(name.parse()?),
+        None => None,
+    };
+    let lanes = lanes::open(request.as_ref())?;
+    let mut subjects = subject::tori(&args.triangles);
+    if let Some(meshes) = &args.meshes {
+        subjects.extend(subject::real(meshes, args.limit)?);
+    }
+    let mut report = Report { machine: machine::Machine::here(), speed: None, peak_memory_bytes: None };
+    let measured = speed::measure(&subjects, &lanes, args.rounds.into())?;
+    measured.tables().iter().for_each(|table| print!("{table}"));
+    report.speed = Some(measured);
+    report.peak_memory_bytes = machine::peak_memory_bytes();
+    if let Some(file) = &args.json {
+        let text = serde_json::to_string_pretty(&report)?;
+        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
+    }
+    Ok(())
+}
