@@ -5,6 +5,7 @@
 //! sorted so that each leaf's lie side by side.
 
 mod bounds;
+mod choose;
 mod morton;
 mod node;
 mod sah;

@@ -10,6 +10,8 @@ use serde::Serialize;
 use sim_gpu::gpu::AdapterRequest;
 use std::path::PathBuf;
 
+mod bins;
+mod builders;
 mod clock;
 mod lanes;
 mod machine;
@@ -51,6 +53,9 @@ struct SimArgs {
     /// Take at most this many of the meshes given, spread over their list.
     #[arg(long, default_value_t = 16, value_name = "N")]
     limit: usize,
+    /// Measure instead which builder pays for how many rays.
+    #[arg(long)]
+    builders: bool,
 }
 
 /// Everything that a run measured.
@@ -59,6 +64,8 @@ struct Report {
     machine: machine::Machine,
     #[serde(skip_serializing_if = "Option::is_none")]
     speed: Option<speed::Speed>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    builders: Option<builders::Ways>,
     peak_memory_bytes: Option<u64>,
 }
 
@@ -72,15 +79,27 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         Some(name) => Some(name.parse()?),
         None => None,
     };
-    let lanes = lanes::open(request.as_ref())?;
     let mut subjects = subject::tori(&args.triangles);
     if let Some(meshes) = &args.meshes {
         subjects.extend(subject::real(meshes, args.limit)?);
     }
-    let mut report = Report { machine: machine::Machine::here(), speed: None, peak_memory_bytes: None };
-    let measured = speed::measure(&subjects, &lanes, args.rounds.into())?;
-    measured.tables().iter().for_each(|table| print!("{table}"));
-    report.speed = Some(measured);
+    let mut report = Report {
+        machine: machine::Machine::here(),
+        speed: None,
+        builders: None,
+        peak_memory_bytes: None,
+    };
+    let rounds = args.rounds.into();
+    if args.builders {
+        let measured = builders::measure(&subjects, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.builders = Some(measured);
+    } else {
+        let lanes = lanes::open(request.as_ref())?;
+        let measured = speed::measure(&subjects, &lanes, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.speed = Some(measured);
+    }
     report.peak_memory_bytes = machine::peak_memory_bytes();
     if let Some(file) = &args.json {
         let text = serde_json::to_string_pretty(&report)?;
