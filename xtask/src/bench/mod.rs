@@ -15,6 +15,7 @@ mod builders;
 mod clock;
 mod lanes;
 mod machine;
+mod peers;
 mod scenes;
 mod shot;
 mod speed;
@@ -56,6 +57,10 @@ struct SimArgs {
     /// Measure instead which builder pays for how many rays.
     #[arg(long)]
     builders: bool,
+    /// Measure instead against Embree, from a Python environment made from
+    /// PyPI under `target/peers`.
+    #[arg(long)]
+    peers: bool,
 }
 
 /// Everything that a run measured.
@@ -66,6 +71,8 @@ struct Report {
     speed: Option<speed::Speed>,
     #[serde(skip_serializing_if = "Option::is_none")]
     builders: Option<builders::Ways>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peers: Option<peers::Comparison>,
     peak_memory_bytes: Option<u64>,
 }
 
@@ -87,6 +94,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         machine: machine::Machine::here(),
         speed: None,
         builders: None,
+        peers: None,
         peak_memory_bytes: None,
     };
     let rounds = args.rounds.into();
@@ -94,6 +102,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         let measured = builders::measure(&subjects, rounds)?;
         measured.tables().iter().for_each(|table| print!("{table}"));
         report.builders = Some(measured);
+    } else if args.peers {
+        report.peers = peers::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
+        report.peers.iter().for_each(|measured| print!("{}", measured.table()));
     } else {
         let lanes = lanes::open(request.as_ref())?;
         let measured = speed::measure(&subjects, &lanes, rounds)?;

@@ -65,7 +65,7 @@ pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Sp
         builds(subject, rounds, &mut speed)?;
         let object = target(subject.mesh.clone(), Builder::Sah);
         let room = target(in_a_room(subject.mesh.clone()), Builder::Sah);
-        let pose = Pose::look_at(SENSOR_M, DVec3::ZERO)?;
+        let pose = sweep_pose()?;
         for (name, shot, beams) in [
             ("sweep, all hit", Shot::sweep(&room, &pose, &pattern, Culling::Off), pattern.len()),
             ("sweep, object", Shot::sweep(&object, &pose, &pattern, Culling::On), pattern.len()),
@@ -81,6 +81,14 @@ pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Sp
 pub fn vlp32c() -> BeamPattern {
     let sensor = Sensor::builtin("vlp32c").expect("invariant: this profile is built in");
     sensor.pattern()
+}
+
+/// Where sweeps are made from.
+///
+/// # Errors
+/// Never: the place is fixed and good.
+pub fn sweep_pose() -> Result<Pose> {
+    Ok(Pose::look_at(SENSOR_M, DVec3::ZERO)?)
 }
 
 /// `mesh` as casters want it.
