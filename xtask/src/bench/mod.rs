@@ -10,17 +10,20 @@ use serde::Serialize;
 use sim_gpu::gpu::AdapterRequest;
 use std::path::PathBuf;
 
+mod accuracy;
 mod bins;
 mod builders;
 mod clock;
 mod lanes;
 mod machine;
+mod moller_trumbore;
 mod peers;
 mod scenes;
 mod shot;
 mod speed;
 mod subject;
 mod table;
+mod trade;
 
 /// What to measure.
 #[derive(Args, Debug)]
@@ -61,6 +64,9 @@ struct SimArgs {
     /// PyPI under `target/peers`.
     #[arg(long)]
     peers: bool,
+    /// Measure instead what each knob trades of speed for accuracy.
+    #[arg(long)]
+    trade: bool,
 }
 
 /// Everything that a run measured.
@@ -73,6 +79,8 @@ struct Report {
     builders: Option<builders::Ways>,
     #[serde(skip_serializing_if = "Option::is_none")]
     peers: Option<peers::Comparison>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trade: Option<trade::Trade>,
     peak_memory_bytes: Option<u64>,
 }
 
@@ -95,6 +103,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         speed: None,
         builders: None,
         peers: None,
+        trade: None,
         peak_memory_bytes: None,
     };
     let rounds = args.rounds.into();
@@ -105,6 +114,10 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     } else if args.peers {
         report.peers = peers::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
         report.peers.iter().for_each(|measured| print!("{}", measured.table()));
+    } else if args.trade {
+        let measured = trade::measure(&lanes::open(request.as_ref())?, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.trade = Some(measured);
     } else {
         let lanes = lanes::open(request.as_ref())?;
         let measured = speed::measure(&subjects, &lanes, rounds)?;

@@ -3,6 +3,7 @@
 mod embree;
 mod venv;
 
+use super::accuracy::Accuracy;
 use super::clock::{Contestant, Costs, interleave, measured};
 use super::lanes::Lane;
 use super::scenes::in_a_room;
@@ -39,15 +40,6 @@ struct Entry {
     costs: Costs,
     #[serde(flatten)]
     accuracy: Accuracy,
-}
-
-/// How ranges compare with the f64 oracle's.
-#[derive(Clone, Copy, Serialize)]
-struct Accuracy {
-    /// Rays that hit for one and miss for the other.
-    mismatches: usize,
-    /// Greatest difference of two ranges, metres.
-    worst_m: f64,
 }
 
 /// All figures, and the versions of what they were compared with.
@@ -123,7 +115,6 @@ impl Bench<'_> {
         self.embree.borrow_mut().aim(shot, copies)?;
         contestants.push(Box::new(|| self.embree.borrow_mut().cast()));
         let costs = interleave(self.rounds, &mut contestants)?;
-        drop(contestants);
         let ranges = |caster: &Caster| -> Result<_> {
             let cast = caster.cast(std::slice::from_ref(&shot.job))?;
             Ok(shot.ranges(cast.first().unwrap_or(&Cast::default())))
@@ -165,7 +156,6 @@ impl Bench<'_> {
         self.embree.borrow_mut().aim(&all, copies)?;
         contestants.push(Box::new(|| self.embree.borrow_mut().cast()));
         let costs = interleave(self.rounds, &mut contestants)?;
-        drop(contestants);
         let ranges = |caster: &Caster| -> Result<_> {
             let job = aim();
             let casts = caster.cast(std::slice::from_ref(&job))?;
@@ -211,19 +201,6 @@ impl Bench<'_> {
     }
 }
 
-impl Accuracy {
-    fn of(ranges: &[Option<f64>], truth: &[Option<f64>]) -> Self {
-        let pairs = || ranges.iter().zip(truth);
-        let difference = |(found, true_m): (&Option<f64>, &Option<f64>)| {
-            found.zip(*true_m).map(|(found, true_m)| (found - true_m).abs())
-        };
-        Self {
-            mismatches: pairs().filter(|(found, true_m)| found.is_some() != true_m.is_some()).count(),
-            worst_m: pairs().filter_map(difference).fold(0.0, f64::max),
-        }
-    }
-}
-
 impl Comparison {
     /// The figures for people.
     pub fn table(&self) -> Table {
@@ -250,7 +227,7 @@ impl Comparison {
                     millions_per_s(entry.rays, entry.costs.wall_s().median),
                     milliseconds(cpu_s),
                     digits(embree.costs.cpu_s().median / cpu_s),
-                    entry.accuracy.mismatches.to_string(),
+                    (entry.accuracy.false_hits + entry.accuracy.misses).to_string(),
                     digits(entry.accuracy.worst_m),
                 ]);
             }
