@@ -18,6 +18,7 @@ mod lanes;
 mod machine;
 mod moller_trumbore;
 mod peers;
+mod pipeline;
 mod scenes;
 mod shot;
 mod speed;
@@ -75,6 +76,9 @@ struct Report {
     machine: machine::Machine,
     #[serde(skip_serializing_if = "Option::is_none")]
     speed: Option<speed::Speed>,
+    /// Empty unless meshes were given.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pipeline: Vec<pipeline::Pipeline>,
     #[serde(skip_serializing_if = "Option::is_none")]
     builders: Option<builders::Ways>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -101,6 +105,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let mut report = Report {
         machine: machine::Machine::here(),
         speed: None,
+        pipeline: Vec::new(),
         builders: None,
         peers: None,
         trade: None,
@@ -123,6 +128,10 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         let measured = speed::measure(&subjects, &lanes, rounds)?;
         measured.tables().iter().for_each(|table| print!("{table}"));
         report.speed = Some(measured);
+        if let Some(meshes) = &args.meshes {
+            report.pipeline = pipeline::measure(meshes, args.limit, &lanes, rounds)?;
+            print!("{}", pipeline::table(&report.pipeline));
+        }
     }
     report.peak_memory_bytes = machine::peak_memory_bytes();
     if let Some(file) = &args.json {

@@ -36,8 +36,8 @@ pub fn in_a_room(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
-/// A plate of 2 m by 2 m in `n` by `n` squares with ripples of 1 mm: seen from
-/// its edge, nearly every beam grazes it.
+/// A plate of 2 m by 2 m in `n` by `n` squares with ripples of 1 mm: from just
+/// above, nearly every beam grazes it.
 pub fn rippled_plate(n: usize) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..=n {
