@@ -150,6 +150,16 @@ impl Caster {
         }
     }
 
+    /// Casts `jobs` with the CPU twin, whatever the adapter.
+    #[must_use]
+    pub fn cast_on_cpu(&self, jobs: &[CastJob]) -> Vec<Cast> {
+        let effects = match self {
+            Self::Cpu(effects) => effects,
+            Self::Gpu(gpu) => gpu.effects(),
+        };
+        jobs.iter().map(|job| cpu::trace::cast(job, effects)).collect()
+    }
+
     /// Casts `jobs` and waits.
     ///
     /// # Errors

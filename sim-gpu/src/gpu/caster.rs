@@ -60,6 +60,7 @@ pub(super) struct Core {
     pub(super) queue: wgpu::Queue,
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) modules: Vec<Module>,
+    effects: Effects,
     summary: AdapterSummary,
     limits: BatchLimits,
     idle: Mutex<Vec<Slot>>,
@@ -103,7 +104,9 @@ impl GpuCaster {
         let pipeline = pipeline(&device, &modules);
         let limits = limits(&device.limits(), &modules);
         let idle = Mutex::new(Vec::new());
-        let core = Core { device, queue, pipeline, modules, summary, limits, idle, failure };
+        let effects = effects.clone();
+        let core =
+            Core { device, queue, pipeline, modules, effects, summary, limits, idle, failure };
         Ok(Self { core: Arc::new(core) })
     }
 
@@ -111,6 +114,12 @@ impl GpuCaster {
     #[must_use]
     pub fn summary(&self) -> &AdapterSummary {
         &self.core.summary
+    }
+
+    /// The effects that are modelled.
+    #[must_use]
+    pub fn effects(&self) -> &Effects {
+        &self.core.effects
     }
 
     /// What one dispatch can hold.

@@ -2,11 +2,10 @@
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
-use std::fmt;
 use std::path::{Path, PathBuf};
 
+use formats::Split;
 use formats::rng::StreamKey;
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use walkdir::WalkDir;
 
@@ -21,25 +20,6 @@ const LONGEST_NAME: usize = 180;
 
 /// Hexadecimal digits of a hash that set equal names apart.
 const HASH_DIGITS: usize = 12;
-
-/// What a mesh is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Split {
-    /// To train on.
-    Train,
-    /// To test with.
-    Test,
-}
-
-impl fmt::Display for Split {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Train => "train",
-            Self::Test => "test",
-        })
-    }
-}
 
 /// A mesh file of a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,23 +3,19 @@
 
 use std::path::{Path, PathBuf};
 
+use formats::scan::AttributeSet;
 use glam::{DAffine3, DQuat, DVec3};
 
 use crate::config::{self, ConfigError, InvalidValue};
 use crate::effects::Effects;
+use crate::mesh::frame::{Normalize, Up};
 use crate::pose::Pose;
 use crate::sensor::Sensor;
-
-pub(crate) use table::check_normalize;
 
 mod table;
 
 #[cfg(test)]
 mod tests;
-
-/// The attributes that a point may carry besides its position.
-pub const ATTRIBUTES: [&str; 8] =
-    ["range", "beam", "ring", "time", "triangle", "object", "intensity", "normal"];
 
 /// A scene, checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,8 +28,8 @@ pub struct Scene {
     pub sensors: Vec<SceneSensor>,
     /// The effects that are wanted, for all sensors.
     pub effects: Effects,
-    /// The attributes that are wanted, of [`ATTRIBUTES`].
-    pub attributes: Vec<String>,
+    /// The attributes that are wanted, positions aside.
+    pub attributes: AttributeSet,
 }
 
 /// An object of a scene.
@@ -46,10 +42,10 @@ pub struct SceneObject {
     /// A class name, if it has one.
     pub label: Option<String>,
     /// The mesh's upward axis, `y` or `z`; `None` is the format's default.
-    pub up: Option<String>,
+    pub up: Option<Up>,
     /// `unit-sphere`, `bbox` or `none`. `None`, the default, is `none`: a scene
     /// places a mesh in its own units.
-    pub normalize: Option<String>,
+    pub normalize: Option<Normalize>,
     /// Where the mesh's origin comes to stand, metres.
     pub position_m: DVec3,
     /// How the mesh is turned, after it was turned upright and scaled.
@@ -99,7 +95,7 @@ impl Scene {
         let in_file = |invalid: InvalidValue| invalid.in_file(file);
         let folder = file.parent().unwrap_or(Path::new(""));
         let effects = table.effects.clone();
-        table::check_attributes(&table.attributes, &effects).map_err(in_file)?;
+        let attributes = table::check_attributes(&table.attributes, &effects).map_err(in_file)?;
 
         let mut objects = Vec::new();
         for (i, object) in table.object.into_iter().enumerate() {
@@ -122,7 +118,7 @@ impl Scene {
         }
         check_names("sensor", sensors.iter().map(|sensor| &sensor.name)).map_err(in_file)?;
 
-        Ok(Self { seed: table.seed, objects, sensors, effects, attributes: table.attributes })
+        Ok(Self { seed: table.seed, objects, sensors, effects, attributes })
     }
 }
 

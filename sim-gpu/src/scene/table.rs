@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use formats::scan::{Attribute, AttributeSet};
 use glam::{DQuat, DVec3};
 use serde::Deserialize;
 
-use super::{ATTRIBUTES, SceneObject, SceneSensor};
+use super::{SceneObject, SceneSensor};
 use crate::config::{InvalidValue, positive, within};
 use crate::effects::Effects;
+use crate::mesh::frame::{Normalize, Up};
 use crate::pose::{OrientationKeys, vector};
 use crate::sensor::Sensor;
 
@@ -34,8 +36,8 @@ pub(super) struct ObjectTable {
     mesh: PathBuf,
     name: Option<String>,
     label: Option<String>,
-    up: Option<String>,
-    normalize: Option<String>,
+    up: Option<Up>,
+    normalize: Option<Normalize>,
     #[serde(default)]
     position_m: [f64; 3],
     yaw_deg: Option<f64>,
@@ -74,12 +76,6 @@ impl ObjectTable {
         let Some(stem) = self.mesh.file_stem() else {
             return Err(InvalidValue::new(key("mesh"), "names no file"));
         };
-        if let Some(up) = &self.up {
-            check_up(&key("up"), up)?;
-        }
-        if let Some(normalize) = &self.normalize {
-            check_normalize(&key("normalize"), normalize)?;
-        }
         let scale = match self.scale.unwrap_or(Scale::Uniform(1.0)) {
             Scale::Uniform(factor) => [factor; 3],
             Scale::PerAxis(factors) => factors,
@@ -125,40 +121,26 @@ impl SensorTable {
     }
 }
 
-/// That all attributes are known, wanted once, and have their effect.
+/// The attributes, if all are known, wanted once, and have their effect.
 pub(super) fn check_attributes(
     attributes: &[String],
     effects: &Effects,
-) -> Result<(), InvalidValue> {
-    for (i, attribute) in attributes.iter().enumerate() {
+) -> Result<AttributeSet, InvalidValue> {
+    let mut set = AttributeSet::new();
+    for (i, word) in attributes.iter().enumerate() {
         let wrong = |cause: String| Err(InvalidValue::new(format!("attributes[{i}]"), cause));
-        if !ATTRIBUTES.contains(&attribute.as_str()) {
-            return wrong(format!("no \"{attribute}\": known are {}", ATTRIBUTES.join(", ")));
-        }
-        if attributes[..i].contains(attribute) {
-            return wrong(format!("\"{attribute}\" stands in the list twice"));
-        }
-        if attribute == "intensity" && effects.intensity.is_none() {
+        let attribute = match word.parse() {
+            Ok(attribute) => attribute,
+            Err(error) => return wrong(format!("{error}")),
+        };
+        if attribute == Attribute::Intensity && effects.intensity.is_none() {
             return wrong("intensity needs effects.intensity = true".to_owned());
         }
+        if !set.insert(attribute) {
+            return wrong(format!("\"{word}\" stands in the list twice"));
+        }
     }
-    Ok(())
-}
-
-/// That `value` names a way to normalise a mesh.
-pub(crate) fn check_normalize(key: &str, value: &str) -> Result<(), InvalidValue> {
-    one_of(key, value, &["unit-sphere", "bbox", "none"])
-}
-
-fn check_up(key: &str, value: &str) -> Result<(), InvalidValue> {
-    one_of(key, value, &["y", "z"])
-}
-
-fn one_of(key: &str, value: &str, known: &[&str]) -> Result<(), InvalidValue> {
-    if known.contains(&value) {
-        return Ok(());
-    }
-    Err(InvalidValue::new(key, format!("no \"{value}\": known are {}", known.join(", "))))
+    Ok(set)
 }
 
 fn named(table: &str, name: String) -> Result<String, InvalidValue> {

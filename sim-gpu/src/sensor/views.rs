@@ -1,12 +1,11 @@
 //! The places from which a sensor is meant to look at an object.
 
-use std::borrow::Cow;
-
 use formats::rng::StreamKey;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
+use crate::mesh::frame::Normalize;
 use crate::pose::{Pose, ring_of_views};
 
 /// Views of an object, evenly spread over azimuth.
@@ -24,9 +23,9 @@ pub struct Views {
     /// Each view's azimuth is moved by a uniform random angle of at most this.
     #[serde(default)]
     pub azimuth_jitter_deg: f64,
-    /// How the object should be normalised: `unit-sphere`, `bbox` or `none`.
+    /// How the object should be normalised.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub normalize: Option<Cow<'static, str>>,
+    pub normalize: Option<Normalize>,
 }
 
 impl Views {
@@ -75,9 +74,6 @@ impl Views {
         within("views.elevation_deg", self.elevation_deg, -90.0, 90.0)?;
         within("views.azimuth_deg", self.azimuth_deg, -360.0, 360.0)?;
         within("views.azimuth_jitter_deg", self.azimuth_jitter_deg, 0.0, 180.0)?;
-        match self.normalize.as_deref() {
-            None => Ok(()),
-            Some(name) => crate::scene::check_normalize("views.normalize", name),
-        }
+        Ok(())
     }
 }

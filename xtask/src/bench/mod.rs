@@ -24,6 +24,7 @@ mod shot;
 mod speed;
 mod subject;
 mod table;
+mod to_disk;
 mod trade;
 
 /// What to measure.
@@ -79,6 +80,8 @@ struct Report {
     /// Empty unless meshes were given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pipeline: Vec<pipeline::Pipeline>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    datasets: Vec<to_disk::Dataset>,
     #[serde(skip_serializing_if = "Option::is_none")]
     builders: Option<builders::Ways>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -106,6 +109,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         machine: machine::Machine::here(),
         speed: None,
         pipeline: Vec::new(),
+        datasets: Vec::new(),
         builders: None,
         peers: None,
         trade: None,
@@ -131,6 +135,8 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         if let Some(meshes) = &args.meshes {
             report.pipeline = pipeline::measure(meshes, args.limit, &lanes, rounds)?;
             print!("{}", pipeline::table(&report.pipeline));
+            report.datasets = to_disk::measure(meshes, args.limit, &lanes, rounds)?;
+            print!("{}", to_disk::table(&report.datasets));
         }
     }
     report.peak_memory_bytes = machine::peak_memory_bytes();

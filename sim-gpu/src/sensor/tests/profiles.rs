@@ -95,7 +95,7 @@ fn bad_profiles_are_named() {
         (recipe, "before_rings = 1024", "before_rings = 0", "sample.before_rings"),
         (recipe, "count = 5", "count = 70000", "views.count"),
         (recipe, "distance_m = 5.0", "distance_m = 0", "views.distance_m"),
-        (recipe, "normalize = \"bbox\"", "normalize = \"box\"", "views.normalize: no \"box\""),
+        (recipe, "normalize = \"bbox\"", "normalize = \"box\"", "unknown variant `box`"),
     ] {
         assert!(profile.contains(from), "{from} stands in no profile");
         let error = parse(&profile.replacen(from, to, 1)).unwrap_err().to_string();

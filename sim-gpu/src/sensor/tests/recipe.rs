@@ -4,6 +4,7 @@ use formats::rng::StreamKey;
 use glam::DVec3;
 
 use super::*;
+use crate::mesh::frame::Normalize;
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -84,7 +85,7 @@ fn draws_are_many_as_asked_and_in_range() {
 #[test]
 fn the_recipe_looks_from_five_sectors_of_72_degrees() {
     let views = sensor("modelnet40c-lidar").default_views();
-    assert_eq!(views.normalize.as_deref(), Some("bbox"));
+    assert_eq!(views.normalize, Some(Normalize::Bbox));
     let poses = views.poses(DVec3::ZERO, StreamKey::new(1, "cup_0001", 0));
     assert_eq!(poses.len(), 5);
     assert_ne!(poses, views.poses(DVec3::ZERO, StreamKey::new(2, "cup_0001", 0)));

@@ -1,0 +1,183 @@
+//! NPZ archives: NumPy arrays under names, in a zip file.
+
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use ndarray::{ArrayD, ArrayView, Dimension};
+use ndarray_npy::{ReadNpyExt, ReadableElement, WritableElement, WriteNpyError, WriteNpyExt};
+use zip::read::ZipFile;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
+
+use crate::error::FormatError;
+use crate::npy::{self, invalid};
+
+/// An archive that is being written: uncompressed, and with the same bytes
+/// whenever and wherever it is written.
+pub(crate) struct NpzWriter<W: Write + Seek> {
+    zip: ZipWriter<W>,
+}
+
+impl<W: Write + Seek> NpzWriter<W> {
+    /// Writes the archive whose arrays `fill` writes.
+    pub fn write(writer: W, fill: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
+        let mut npz = Self { zip: ZipWriter::new(writer) };
+        if let Err(error) = fill(&mut npz) {
+            // Dropped, it would try to end the archive and complain to stderr
+            // that it cannot; the caller reports the error.
+            std::mem::forget(npz.zip);
+            return Err(error);
+        }
+        npz.zip.finish()?;
+        Ok(())
+    }
+
+    /// Begins the array `key`; its `n_bytes`, header included, must follow.
+    pub fn begin(&mut self, key: &str, n_bytes: u64) -> io::Result<&mut impl Write> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .large_file(n_bytes >= u64::from(u32::MAX))
+            .last_modified_time(DateTime::default())
+            .system(System::Unix)
+            .unix_permissions(0o644);
+        self.zip.start_file(format!("{key}.npy"), options)?;
+        Ok(&mut self.zip)
+    }
+
+    /// Writes the array `key`.
+    pub fn array<A, D>(&mut self, key: &str, array: ArrayView<'_, A, D>) -> io::Result<()>
+    where
+        A: WritableElement,
+        D: Dimension,
+    {
+        // The header of an array of ours takes at most 128 bytes.
+        let n_bytes = (size_of::<A>() * array.len()) as u64 + 128;
+        // `ndarray-npy` writes element by element; zip sums up each write.
+        let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
+        array.write_npy(&mut writer).map_err(|error| match error {
+            WriteNpyError::Io(error) => error,
+            other => io::Error::other(other),
+        })?;
+        writer.flush()
+    }
+
+    /// Writes the array `key` of NumPy's fixed-width text (`<U`), which
+    /// `np.load` takes without pickle.
+    pub fn text(&mut self, key: &str, lines: &[String]) -> io::Result<()> {
+        // NumPy knows no text of width 0.
+        let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0).max(1);
+        let header = npy::header_bytes(&format!("<U{width}"), &[lines.len()]);
+        let n_bytes = header.len() as u64 + (lines.len() * width * 4) as u64;
+        let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
+        writer.write_all(&header)?;
+        for line in lines {
+            for letter in line.chars().chain(std::iter::repeat('\0')).take(width) {
+                writer.write_all(&u32::from(letter).to_le_bytes())?;
+            }
+        }
+        writer.flush()
+    }
+}
+
+/// An archive that is being read. Its errors name the file and the key.
+pub(crate) struct NpzReader {
+    path: PathBuf,
+    file_size: u64,
+    zip: ZipArchive<BufReader<File>>,
+}
+
+/// An array's shape and its elements in C order.
+pub(crate) struct Values<A> {
+    pub shape: Vec<usize>,
+    pub elements: Vec<A>,
+}
+
+impl NpzReader {
+    pub fn open(path: &Path) -> Result<Self, FormatError> {
+        let here = |source| FormatError::io(path, source);
+        let file = File::open(path).map_err(here)?;
+        let file_size = file.metadata().map_err(here)?.len();
+        let zip = ZipArchive::new(BufReader::new(file))
+            .map_err(|cause| FormatError::malformed(path, "archive", cause))?;
+        Ok(Self { path: path.to_path_buf(), file_size, zip })
+    }
+
+    pub fn error(&self, key: &str, cause: impl ToString) -> FormatError {
+        FormatError::malformed(&self.path, key, cause)
+    }
+
+    pub fn has(&self, key: &str) -> bool {
+        self.zip.index_for_name(&format!("{key}.npy")).is_some()
+    }
+
+    /// The array `key`.
+    pub fn array<A: ReadableElement + Clone>(
+        &mut self,
+        key: &str,
+    ) -> Result<Values<A>, FormatError> {
+        self.entry(key, |header, size, entry| {
+            check_size(&header, size_of::<A>(), size)?;
+            let shape = header.shape;
+            let array = ArrayD::<A>::read_npy(Cursor::new(header.bytes).chain(entry));
+            let array = array.map_err(invalid)?;
+            let array = array.as_standard_layout().into_owned();
+            Ok(Values { shape, elements: array.into_raw_vec_and_offset().0 })
+        })
+    }
+
+    /// The array `key` of text.
+    pub fn text(&mut self, key: &str) -> Result<Vec<String>, FormatError> {
+        self.entry(key, |header, size, entry| {
+            let width = header.descr.strip_prefix("<U").and_then(|width| width.parse().ok());
+            let width: usize = width
+                .filter(|&width| width > 0 && header.shape.len() == 1)
+                .ok_or_else(|| invalid(format!("{} is no list of text", header.descr)))?;
+            let line_size = width.checked_mul(4).ok_or_else(|| invalid("lines without end"))?;
+            check_size(&header, line_size, size)?;
+            let mut bytes = Vec::new();
+            entry.read_to_end(&mut bytes)?;
+            bytes.chunks_exact(line_size).map(decode_line).collect()
+        })
+    }
+
+    fn entry<T>(
+        &mut self,
+        key: &str,
+        read: impl FnOnce(npy::Header, u64, &mut ZipFile<'_, BufReader<File>>) -> io::Result<T>,
+    ) -> Result<T, FormatError> {
+        let Self { path, file_size, zip } = self;
+        let here = |cause: String| FormatError::malformed(path, key, cause);
+        let mut entry = zip.by_name(&format!("{key}.npy")).map_err(|error| match error {
+            zip::result::ZipError::FileNotFound => here("missing".to_owned()),
+            other => here(other.to_string()),
+        })?;
+        // No deflated byte becomes more than 1032 (zlib's technical notes), so
+        // that an entry cannot honestly be larger than this.
+        if entry.size() / 1032 > *file_size {
+            return Err(here(format!("{} bytes in a file of {file_size}", entry.size())));
+        }
+        let header = npy::read_header(&mut entry).map_err(|error| here(error.to_string()))?;
+        let size = entry.size().saturating_sub(header.bytes.len() as u64);
+        read(header, size, &mut entry).map_err(|error| here(error.to_string()))
+    }
+}
+
+fn check_size(header: &npy::Header, element_size: usize, found: u64) -> io::Result<()> {
+    let promised = header.n_elements().and_then(|n| n.checked_mul(element_size));
+    if promised.is_some_and(|promised| promised as u64 == found) {
+        return Ok(());
+    }
+    let (descr, shape) = (&header.descr, &header.shape);
+    let cause = format!(
+        "{descr} of shape {shape:?} in {found} bytes, expected {element_size} bytes an element"
+    );
+    Err(invalid(cause))
+}
+
+fn decode_line(bytes: &[u8]) -> io::Result<String> {
+    let letters = bytes.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes));
+    let line: Option<String> = letters.map(char::from_u32).collect();
+    let line = line.ok_or_else(|| invalid("text that is not Unicode"))?;
+    Ok(line.trim_end_matches('\0').to_owned())
+}

@@ -1,0 +1,162 @@
+//! Files that are there whole or not at all.
+//!
+//! A file is filled under a temporary name in its own folder and renamed when
+//! it is complete, so that a process killed at any moment leaves no part of a
+//! file under its final name. Nothing is synced to the disk: that guards
+//! against a power cut, and would cost more than writing a small scan.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use tempfile::NamedTempFile;
+
+use crate::error::FormatError;
+
+const PREFIX: &str = ".edgepuck-";
+const SUFFIX: &str = ".tmp";
+
+/// Writes the file at `path` by `fill`, atomically, replacing what was there.
+/// Folders that are missing are made.
+///
+/// # Errors
+/// Whatever the system or `fill` reports, with the file's name; a full disk as
+/// [`FormatError::DiskFull`]. Nothing is left behind in that case.
+pub fn write(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), FormatError> {
+    let here = |source| FormatError::io(path, source);
+    let folder = make_folder_of(path)?;
+    let temporary = named_temporary(folder).map_err(here)?;
+    let (file, temporary) = temporary.into_parts();
+    let mut writer = BufWriter::new(file);
+    fill(&mut writer).and_then(|()| writer.flush()).map_err(here)?;
+    // Windows renames no file that is open for writing.
+    drop(writer);
+    temporary.persist(path).map_err(|error| here(error.error))
+}
+
+/// The folder that holds `path`, made if it is missing.
+pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(folder).map_err(|source| FormatError::io(folder, source))?;
+    Ok(folder)
+}
+
+fn named_temporary(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // What `File::create` asks for; the umask takes its share.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+/// Removes the temporary files that killed runs left in `folder` and below,
+/// and returns how many there were. Links are not followed. A folder that is
+/// not there holds none.
+///
+/// Call it only where nothing else is writing: a live temporary file cannot be
+/// told from a dead one.
+///
+/// # Errors
+/// A folder that cannot be listed, a file that cannot be removed.
+pub fn sweep_leftovers(folder: &Path) -> Result<usize, FormatError> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
+        entries => entries.map_err(|source| FormatError::io(folder, source))?,
+    };
+    let mut removed = 0;
+    for entry in entries {
+        let entry = entry.map_err(|source| FormatError::io(folder, source))?;
+        let path = entry.path();
+        let kind = entry.file_type().map_err(|source| FormatError::io(&path, source))?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if kind.is_dir() {
+            removed += sweep_leftovers(&path)?;
+        } else if name.starts_with(PREFIX) && name.ends_with(SUFFIX) {
+            fs::remove_file(&path).map_err(|source| FormatError::io(&path, source))?;
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_appears_only_when_it_is_complete() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b/scan.bin");
+        write(&path, |writer| {
+            writer.write_all(b"half")?;
+            writer.flush()?;
+            assert!(!path.exists());
+            let beside = names(path.parent().unwrap());
+            assert!(beside[0].starts_with('.') && beside[0].ends_with(".tmp"), "{beside:?}");
+            writer.write_all(b" and half")
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"half and half");
+        assert_eq!(names(path.parent().unwrap()), ["scan.bin"]);
+    }
+
+    #[test]
+    fn a_failed_write_keeps_the_old_file_and_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scan.bin");
+        fs::write(&path, "old").unwrap();
+        let error = write(&path, |writer| {
+            writer.write_all(b"new")?;
+            Err(io::ErrorKind::StorageFull.into())
+        })
+        .unwrap_err();
+        assert!(matches!(error, FormatError::DiskFull { .. }));
+        assert!(error.to_string().ends_with("scan.bin: the disk is full"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["scan.bin"]);
+    }
+
+    #[test]
+    fn leftovers_of_a_killed_process_are_swept_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let below = folder.path().join("chair/train");
+        fs::create_dir_all(&below).unwrap();
+        named_temporary(&below).unwrap().keep().unwrap();
+        fs::write(below.join(".hidden.tmp"), "").unwrap();
+        assert_eq!(sweep_leftovers(folder.path()).unwrap(), 1);
+        assert_eq!(names(&below), [".hidden.tmp"]);
+        assert_eq!(sweep_leftovers(&folder.path().join("absent")).unwrap(), 0);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_those_of_any_new_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let mode =
+            |name: &str| fs::metadata(folder.path().join(name)).unwrap().permissions().mode();
+        fs::write(folder.path().join("plain"), "").unwrap();
+        write(&folder.path().join("atomic"), |_| Ok(())).unwrap();
+        assert_eq!(mode("atomic"), mode("plain"));
+    }
+}

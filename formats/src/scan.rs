@@ -1,0 +1,250 @@
+//! What one sensor saw from one place.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::FormatError;
+
+/// The points one sensor saw from one place, and what is known of each.
+///
+/// Every attribute that is there has one value for each position; a scan may
+/// hold no point at all.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scan {
+    /// What to add to every position, in metres. Almost always zero; it lets a
+    /// scene that lies 1e7 m from the world's origin keep its micrometres.
+    pub origin: [f64; 3],
+    /// Where the beams ended: metres, in the world's frame, from `origin`.
+    pub positions: Vec<[f32; 3]>,
+    /// Distance from the sensor in metres.
+    pub range_m: Option<Vec<f32>>,
+    /// Number of the beam in the sensor's firing order.
+    pub beam: Option<Vec<u32>>,
+    /// Row of the beam, counted from the lowest elevation.
+    pub ring: Option<Vec<u16>>,
+    /// Seconds since the revolution began. At 0.1 s, a revolution's end at
+    /// 600 rpm, f32 resolves 8 ns; lasers fire 2.3 microseconds apart.
+    pub time_s: Option<Vec<f32>>,
+    /// Index of the triangle that was hit, in its mesh file's order.
+    pub triangle: Option<Vec<u32>>,
+    /// Index of the object that was hit, in the scene's order.
+    pub object: Option<Vec<u32>>,
+    /// Returned intensity, 0 to 1.
+    pub intensity: Option<Vec<f32>>,
+    /// Unit normal of the surface, towards the sensor, in the world's frame.
+    pub normal: Option<Vec<[f32; 3]>>,
+}
+
+/// Something that may be known of each point besides its position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Attribute {
+    /// [`Scan::range_m`].
+    Range,
+    /// [`Scan::beam`].
+    Beam,
+    /// [`Scan::ring`].
+    Ring,
+    /// [`Scan::time_s`].
+    Time,
+    /// [`Scan::triangle`].
+    Triangle,
+    /// [`Scan::object`].
+    Object,
+    /// [`Scan::intensity`].
+    Intensity,
+    /// [`Scan::normal`].
+    Normal,
+}
+
+/// The attributes that are wanted, in the order in which files hold them.
+pub type AttributeSet = BTreeSet<Attribute>;
+
+/// One attribute's values, one for each point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Column<'a> {
+    /// Real numbers.
+    F32(&'a [f32]),
+    /// Small whole numbers.
+    U16(&'a [u16]),
+    /// Whole numbers.
+    U32(&'a [u32]),
+    /// Vectors.
+    Vector(&'a [[f32; 3]]),
+}
+
+impl Column<'_> {
+    /// How many values there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(values) => values.len(),
+            Self::U16(values) => values.len(),
+            Self::U32(values) => values.len(),
+            Self::Vector(values) => values.len(),
+        }
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Where a reader puts one attribute's values.
+pub enum ColumnSlot<'a> {
+    /// Real numbers.
+    F32(&'a mut Option<Vec<f32>>),
+    /// Small whole numbers.
+    U16(&'a mut Option<Vec<u16>>),
+    /// Whole numbers.
+    U32(&'a mut Option<Vec<u32>>),
+    /// Vectors.
+    Vector(&'a mut Option<Vec<[f32; 3]>>),
+}
+
+impl Scan {
+    /// How many points there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether the sensor saw nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// One attribute's values, if they are known.
+    #[must_use]
+    pub fn column(&self, attribute: Attribute) -> Option<Column<'_>> {
+        match attribute {
+            Attribute::Range => self.range_m.as_deref().map(Column::F32),
+            Attribute::Beam => self.beam.as_deref().map(Column::U32),
+            Attribute::Ring => self.ring.as_deref().map(Column::U16),
+            Attribute::Time => self.time_s.as_deref().map(Column::F32),
+            Attribute::Triangle => self.triangle.as_deref().map(Column::U32),
+            Attribute::Object => self.object.as_deref().map(Column::U32),
+            Attribute::Intensity => self.intensity.as_deref().map(Column::F32),
+            Attribute::Normal => self.normal.as_deref().map(Column::Vector),
+        }
+    }
+
+    /// The place of one attribute's values.
+    pub fn slot(&mut self, attribute: Attribute) -> ColumnSlot<'_> {
+        match attribute {
+            Attribute::Range => ColumnSlot::F32(&mut self.range_m),
+            Attribute::Beam => ColumnSlot::U32(&mut self.beam),
+            Attribute::Ring => ColumnSlot::U16(&mut self.ring),
+            Attribute::Time => ColumnSlot::F32(&mut self.time_s),
+            Attribute::Triangle => ColumnSlot::U32(&mut self.triangle),
+            Attribute::Object => ColumnSlot::U32(&mut self.object),
+            Attribute::Intensity => ColumnSlot::F32(&mut self.intensity),
+            Attribute::Normal => ColumnSlot::Vector(&mut self.normal),
+        }
+    }
+
+    /// The attributes that are known, in the order in which files hold them.
+    pub fn columns(&self) -> impl Iterator<Item = (Attribute, Column<'_>)> {
+        Attribute::ALL
+            .into_iter()
+            .filter_map(|attribute| Some((attribute, self.column(attribute)?)))
+    }
+
+    /// Checks that every attribute has one value for each point.
+    ///
+    /// # Errors
+    /// [`FormatError::Length`] for the first that has not.
+    pub fn check_lengths(&self) -> Result<(), FormatError> {
+        let expected = self.len();
+        match self.columns().find(|(_, column)| column.len() != expected) {
+            None => Ok(()),
+            Some((attribute, column)) => {
+                Err(FormatError::Length { attribute, expected, found: column.len() })
+            }
+        }
+    }
+}
+
+impl Attribute {
+    /// All attributes, in the order in which files hold them.
+    pub const ALL: [Self; 8] = [
+        Self::Range,
+        Self::Beam,
+        Self::Ring,
+        Self::Time,
+        Self::Triangle,
+        Self::Object,
+        Self::Intensity,
+        Self::Normal,
+    ];
+
+    /// The attribute's name on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Range => "range",
+            Self::Beam => "beam",
+            Self::Ring => "ring",
+            Self::Time => "time",
+            Self::Triangle => "triangle",
+            Self::Object => "object",
+            Self::Intensity => "intensity",
+            Self::Normal => "normal",
+        }
+    }
+}
+
+impl fmt::Display for Attribute {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Attribute {
+    type Err = FormatError;
+
+    fn from_str(word: &str) -> Result<Self, FormatError> {
+        Self::ALL.into_iter().find(|attribute| attribute.name() == word).ok_or_else(|| {
+            FormatError::UnknownName {
+                word: word.to_owned(),
+                what: "attribute",
+                choices: Self::ALL.map(Self::name).join(", "),
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_attribute_is_found_by_its_name() {
+        for attribute in Attribute::ALL {
+            assert_eq!(attribute.to_string().parse::<Attribute>().unwrap(), attribute);
+        }
+        let error = "colour".parse::<Attribute>().unwrap_err().to_string();
+        assert!(
+            error.starts_with("`colour` is no attribute; choose one of range, beam"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_column_of_another_length_is_named() {
+        let scan = Scan {
+            positions: vec![[0.0; 3]; 2],
+            ring: Some(vec![1, 2]),
+            time_s: Some(vec![0.5]),
+            ..Scan::default()
+        };
+        let error = scan.check_lengths().unwrap_err().to_string();
+        assert_eq!(error, "attribute time has 1 values for 2 points");
+    }
+}

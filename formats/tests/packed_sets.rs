@@ -1,0 +1,102 @@
+//! Packed sets survive their files and grow no memory on their way.
+#![cfg(feature = "dataset")]
+#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+use std::fs;
+use std::path::Path;
+
+use formats::packed::{PackedSet, PackedWriter, read_packed};
+
+fn classes() -> Vec<String> {
+    ["bowl", "chaise longue", "étagère"].map(str::to_owned).to_vec()
+}
+
+fn write(path: &Path, m: usize, n_points: usize) {
+    let mut writer = PackedWriter::create(path, n_points, classes()).unwrap();
+    for i in 0..m {
+        let cloud: Vec<_> = (0..n_points).map(|j| [i as f32, j as f32, 0.5]).collect();
+        writer.push(&cloud, i % 3, &format!("mesh_{i}_v0"), 10 + i as u32).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_set_comes_back_from_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("packed/rotational-clean-train.npz");
+    write(&path, 4, 2);
+    let set = read_packed(&path).unwrap();
+    assert_eq!(set.len(), 4);
+    assert_eq!(set.cloud(3), [[3.0, 0.0, 0.5], [3.0, 1.0, 0.5]]);
+    assert_eq!(set.labels, [0, 1, 2, 0]);
+    assert_eq!(set.names, ["mesh_0_v0", "mesh_1_v0", "mesh_2_v0", "mesh_3_v0"]);
+    assert_eq!(set.n_raw, [10, 11, 12, 13]);
+    assert_eq!(set.classes, classes());
+}
+
+#[test]
+fn a_set_may_be_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.npz");
+    write(&path, 0, 1024);
+    let set = read_packed(&path).unwrap();
+    let none = PackedSet {
+        points: vec![],
+        n_points: 1024,
+        labels: vec![],
+        names: vec![],
+        n_raw: vec![],
+        classes: classes(),
+    };
+    assert_eq!(set, none);
+}
+
+#[test]
+fn the_same_clouds_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first.npz", "second.npz"].map(|name| {
+        let path = folder.path().join(name);
+        write(&path, 50, 64);
+        fs::read(path).unwrap()
+    });
+    assert_eq!(first, second);
+}
+
+#[test]
+fn an_unfinished_set_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.npz");
+    let mut writer = PackedWriter::create(&path, 1, classes()).unwrap();
+    writer.push(&[[0.0; 3]], 0, "a", 1).unwrap();
+    drop(writer);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.npz");
+    let mut writer = PackedWriter::create(&path, 2, classes()).unwrap();
+    let size = writer.push(&[[0.0; 3]], 0, "a_v1", 1).unwrap_err().to_string();
+    assert_eq!(size, "instance `a_v1`: 1 points in a set of 2");
+    let label = writer.push(&[[0.0; 3]; 2], 3, "a_v1", 1).unwrap_err().to_string();
+    assert_eq!(label, "instance `a_v1`: label 3 of 3 classes");
+    writer.finish().unwrap();
+    assert_eq!(read_packed(&path).unwrap().len(), 0);
+}
+
+#[test]
+fn no_damaged_byte_makes_the_reader_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.npz");
+    write(&path, 2, 2);
+    let whole = fs::read(&path).unwrap();
+    for at in (0..whole.len()).step_by(5) {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0x15;
+        fs::write(&path, &bytes).unwrap();
+        let _ = read_packed(&path);
+        fs::write(&path, &whole[..at]).unwrap();
+        assert!(read_packed(&path).is_err(), "cut at {at}");
+    }
+}

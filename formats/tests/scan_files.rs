@@ -1,0 +1,151 @@
+//! Scans survive their files, and files that are not scans are refused.
+#![cfg(feature = "dataset")]
+#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+use std::fs;
+use std::path::Path;
+
+use formats::scan_file::{ScanFormat, read_scan, write_scan};
+use formats::{Attribute, Scan};
+use proptest::prelude::*;
+
+/// A scan of `n` points with the attributes whose bits are set in `wanted`.
+fn scan(n: usize, wanted: u8) -> Scan {
+    let real = |at: Attribute, scale: f32| {
+        (wanted >> at as u8 & 1 == 1).then(|| (0..n).map(|i| i as f32 * scale).collect())
+    };
+    let whole = |at: Attribute| {
+        (wanted >> at as u8 & 1 == 1).then(|| (0..n as u32).map(|i| u32::MAX - i).collect())
+    };
+    Scan {
+        origin: [0.0; 3],
+        positions: (0..n).map(|i| [i as f32 * 0.1, -1e-30, f32::MAX]).collect(),
+        range_m: real(Attribute::Range, 1.1),
+        beam: whole(Attribute::Beam),
+        ring: (wanted >> Attribute::Ring as u8 & 1 == 1)
+            .then(|| (0..n).map(|i| u16::MAX - i as u16).collect()),
+        time_s: real(Attribute::Time, 2.304e-6),
+        triangle: whole(Attribute::Triangle),
+        object: whole(Attribute::Object),
+        intensity: real(Attribute::Intensity, 0.01),
+        normal: (wanted >> Attribute::Normal as u8 & 1 == 1)
+            .then(|| (0..n).map(|i| [0.0, i as f32, -1.0]).collect()),
+    }
+}
+
+fn there_and_back(scan: &Scan, format: ScanFormat) -> Scan {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan").with_extension(format.extension());
+    write_scan(&path, format, scan).unwrap();
+    read_scan(&path).unwrap()
+}
+
+proptest! {
+    #[test]
+    fn a_scan_comes_back_from_its_file(n in 0usize..40, wanted in any::<u8>()) {
+        let scan = scan(n, wanted);
+        prop_assert_eq!(&there_and_back(&scan, ScanFormat::Npz), &scan);
+        prop_assert_eq!(&there_and_back(&scan, ScanFormat::Ply), &scan);
+    }
+
+    /// No byte of a file, wherever it is changed or cut, makes a reader panic.
+    #[test]
+    fn a_damaged_file_is_an_error_or_a_scan(
+        at in any::<prop::sample::Index>(), value in any::<u8>(), cut in any::<bool>(),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        for format in [ScanFormat::Npz, ScanFormat::Ply] {
+            let path = folder.path().join("scan").with_extension(format.extension());
+            write_scan(&path, format, &scan(5, 0xff)).unwrap();
+            let mut bytes = fs::read(&path).unwrap();
+            let at = at.index(bytes.len());
+            if cut { bytes.truncate(at) } else { bytes[at] = value }
+            fs::write(&path, &bytes).unwrap();
+            if let Ok(read) = read_scan(&path) {
+                prop_assert!(read.check_lengths().is_ok());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scan_without_points_is_a_scan() {
+    for format in [ScanFormat::Npz, ScanFormat::Ply] {
+        assert_eq!(there_and_back(&scan(0, 0xff), format), scan(0, 0xff));
+    }
+}
+
+#[test]
+fn a_distant_origin_keeps_its_micrometres() {
+    let far = Scan { origin: [1e7, -1e7 + 1e-6, 0.0], ..scan(3, 0) };
+    for format in [ScanFormat::Npz, ScanFormat::Ply] {
+        assert_eq!(there_and_back(&far, format), far);
+    }
+}
+
+#[test]
+fn the_same_scan_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    for format in ScanFormat::ALL {
+        let [first, second] = ["first", "second"].map(|name| {
+            let path = folder.path().join(name);
+            write_scan(&path, format, &scan(100, 0xff)).unwrap();
+            fs::read(&path).unwrap()
+        });
+        assert_eq!(first, second);
+    }
+}
+
+#[test]
+fn csv_has_a_name_and_a_number_for_each_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.csv");
+    let scan = Scan {
+        origin: [1e7, 0.0, 0.0],
+        positions: vec![[0.5, 0.1, -0.0]],
+        ring: Some(vec![31]),
+        normal: Some(vec![[0.0, 1.0, 0.25]]),
+        ..Scan::default()
+    };
+    write_scan(&path, ScanFormat::Csv, &scan).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    assert_eq!(text, "x,y,z,ring,nx,ny,nz\n10000000.5,0.1,-0,31,0,1,0.25\n");
+    write_scan(&path, ScanFormat::Csv, &Scan::default()).unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "x,y,z\n");
+}
+
+#[test]
+fn an_attribute_of_another_length_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.npz");
+    let scan = Scan { ring: Some(vec![1]), ..scan(2, 0) };
+    for format in ScanFormat::ALL {
+        let error = write_scan(&path, format, &scan).unwrap_err();
+        assert_eq!(error.to_string(), "attribute ring has 1 values for 2 points");
+        assert!(!path.exists());
+    }
+}
+
+fn error_of(name: &str, bytes: &[u8]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    let error = read_scan(&path).unwrap_err().to_string();
+    let (file, cause) = error.split_once(name).unwrap();
+    assert_eq!(Path::new(file), folder.path().join(""));
+    cause.to_owned()
+}
+
+#[test]
+fn errors_name_the_file_and_the_part() {
+    assert!(error_of("a.npz", b"no archive").starts_with(": archive: "));
+    assert!(error_of("a.npz", b"").starts_with(": archive: "));
+    assert!(error_of("a.xyz", b"").starts_with(": extension: `xyz` is no scan format"));
+    assert!(error_of("a.ply", b"ply\n").starts_with(": header: "));
+    let header = "ply\nformat ascii 1.0\nelement vertex 1000000000\nproperty float x\n";
+    assert!(error_of("a.ply", format!("{header}end_header\n").as_bytes()).contains("end of file"));
+    let short = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n";
+    assert_eq!(error_of("a.ply", short.as_bytes()), ": element vertex: no property y");
+    let ring = "ply\nformat ascii 1.0\nelement vertex 1\nproperty int ring\nend_header\n65536\n";
+    assert!(error_of("a.ply", ring.as_bytes()).starts_with(": element vertex: "));
+}

@@ -1,0 +1,68 @@
+//! Keeps the meshes under way within a memory budget.
+
+use std::sync::{Condvar, Mutex, PoisonError};
+
+/// Bytes that meshes under way may hold together.
+#[derive(Debug)]
+pub struct Budget {
+    limit: u64,
+    held: Mutex<u64>,
+    released: Condvar,
+}
+
+/// A share of a budget, given back when dropped.
+#[derive(Debug)]
+pub struct Share<'a> {
+    budget: &'a Budget,
+    bytes: u64,
+}
+
+impl Budget {
+    /// A budget of `limit` bytes.
+    #[must_use]
+    pub fn new(limit: u64) -> Self {
+        Self { limit, held: Mutex::new(0), released: Condvar::new() }
+    }
+
+    /// Waits until `bytes` are free. More than the whole budget is granted
+    /// once nothing else is held, so that the largest mesh passes too.
+    pub fn take(&self, bytes: u64) -> Share<'_> {
+        let held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        let full = |held: &mut u64| *held > 0 && *held + bytes > self.limit;
+        let mut held = self.released.wait_while(held, full).unwrap_or_else(PoisonError::into_inner);
+        *held += bytes;
+        Share { budget: self, bytes }
+    }
+}
+
+impl Drop for Share<'_> {
+    fn drop(&mut self) {
+        *self.budget.held.lock().unwrap_or_else(PoisonError::into_inner) -= self.bytes;
+        self.budget.released.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
+
+    #[test]
+    fn no_more_than_the_budget_is_held_unless_by_one() {
+        let budget = Budget::new(10);
+        let (held, worst) = (AtomicU64::new(0), AtomicU64::new(0));
+        std::thread::scope(|threads| {
+            for bytes in [3, 4, 5, 25, 6, 2, 9, 1] {
+                let (budget, held, worst) = (&budget, &held, &worst);
+                threads.spawn(move || {
+                    let _share = budget.take(bytes);
+                    let now = held.fetch_add(bytes, SeqCst) + bytes;
+                    worst.fetch_max(if now == 25 { 0 } else { now }, SeqCst);
+                    std::thread::yield_now();
+                    held.fetch_sub(bytes, SeqCst);
+                });
+            }
+        });
+        assert!(worst.load(SeqCst) <= 10, "{worst:?}");
+    }
+}

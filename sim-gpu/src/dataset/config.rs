@@ -1,0 +1,136 @@
+//! What a dataset is to hold. The manifest keeps it in full.
+
+use crate::config::InvalidValue;
+use crate::effects::Effects;
+use crate::mesh::frame::{Normalize, Up};
+use crate::pose::Pose;
+use crate::sensor::{Sensor, Views};
+use formats::rng::StreamKey;
+use formats::scan::AttributeSet;
+use formats::scan_file::ScanFormat;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// What a dataset is to hold: with the meshes and the adapter, this decides
+/// every byte of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DatasetConfig {
+    /// Keys every random number.
+    pub seed: u64,
+    /// How meshes are scaled into the world.
+    pub normalize: Normalize,
+    /// The meshes' upward axis; `None` is each format's default.
+    pub up: Option<Up>,
+    /// What points carry besides positions.
+    pub attributes: AttributeSet,
+    /// The files each scan is written to; NPZ is always among them.
+    pub formats: Vec<ScanFormat>,
+    /// The effects of [`Variant::Noisy`].
+    pub effects: Effects,
+    /// Which variants are written.
+    pub variants: Vec<Variant>,
+    /// The sensors and where they stand.
+    pub sets: Vec<SetConfig>,
+    /// Points in each packed cloud.
+    pub packed_points: u32,
+    /// Scans with fewer points are left out of packed sets.
+    pub min_points: u32,
+    /// Layouts of other projects, besides ours.
+    pub layouts: Vec<Layout>,
+}
+
+/// One sensor and where it stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SetConfig {
+    /// The set's folder, such as `rotational`.
+    pub name: String,
+    /// The sensor, in full.
+    pub sensor: Sensor,
+    /// Where it stands.
+    pub viewpoints: Viewpoints,
+}
+
+/// Where a sensor stands around each mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Viewpoints {
+    /// Evenly around the mesh.
+    Views(Views),
+    /// At these poses.
+    Poses(Vec<Pose>),
+}
+
+/// Which effects a scan has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variant {
+    /// Exact ranges.
+    Clean,
+    /// All the effects asked for.
+    Noisy,
+}
+
+/// A layout that another project reads as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// Text files of yanx27/Pointnet_Pointnet2_pytorch.
+    Yanx27,
+    /// ModelNet40's HDF5 files.
+    ModelnetH5,
+}
+
+impl DatasetConfig {
+    /// The effects of one variant of one set. Intensity belongs to both.
+    ///
+    /// # Errors
+    /// If quantisation is wanted and the set's sensor states no quantum.
+    pub fn effects_of(&self, set: &SetConfig, variant: Variant) -> Result<Effects, InvalidValue> {
+        match variant {
+            Variant::Clean => {
+                Ok(Effects { intensity: self.effects.intensity, ..Effects::default() })
+            }
+            Variant::Noisy => self.effects.for_sensor(&set.sensor),
+        }
+    }
+
+    /// The effects that must be cast for all variants.
+    #[must_use]
+    pub fn cast_effects(&self) -> Effects {
+        if self.variants.contains(&Variant::Noisy) {
+            return self.effects.clone();
+        }
+        Effects { intensity: self.effects.intensity, ..Effects::default() }
+    }
+}
+
+impl SetConfig {
+    /// The poses around the mesh called `id`, whose jitter, if any, is its own.
+    #[must_use]
+    pub fn poses(&self, seed: u64, id: &str) -> Vec<Pose> {
+        match &self.viewpoints {
+            Viewpoints::Poses(poses) => poses.clone(),
+            Viewpoints::Views(views) => {
+                let name = format!("views/{}/{id}", self.name);
+                views.poses(DVec3::ZERO, StreamKey::new(seed, &name, 0))
+            }
+        }
+    }
+
+    /// The random stream of view `view` of the mesh called `id`.
+    #[must_use]
+    pub fn stream(&self, seed: u64, id: &str, view: u32) -> StreamKey {
+        StreamKey::new(seed, &format!("{}/{id}", self.name), view)
+    }
+}
+
+impl Variant {
+    /// The variant's folder.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clean => "clean",
+            Self::Noisy => "noisy",
+        }
+    }
+}

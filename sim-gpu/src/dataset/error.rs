@@ -1,0 +1,79 @@
+//! Why a dataset cannot be made, merged or verified.
+
+use crate::config::{ConfigError, InvalidValue};
+use crate::gpu::GpuError;
+use crate::mesh::tree::TreeError;
+use formats::FormatError;
+use std::path::PathBuf;
+
+/// Why a dataset cannot be made, merged or verified. A bad mesh is no such
+/// error: it is a [`super::MeshFailure`].
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// The folder holds something already.
+    #[error(
+        "{}: holds {what} already; continue it with --resume, replace it with --overwrite, or \
+         choose another folder with --out", path.display()
+    )]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+        /// What it holds.
+        what: &'static str,
+    },
+    /// An unfinished or finished run in the folder was another one.
+    #[error("{}: was begun with other settings: {difference}", path.display())]
+    Different {
+        /// The folder.
+        path: PathBuf,
+        /// The first difference.
+        difference: String,
+    },
+    /// A record or a manifest cannot be read.
+    #[error("{}: {cause}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: String,
+    },
+    /// Shards do not make one dataset.
+    #[error("{}: {cause}", path.display())]
+    Shard {
+        /// The shard's folder.
+        path: PathBuf,
+        /// Why.
+        cause: String,
+    },
+    /// A file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A setting is bad.
+    #[error(transparent)]
+    Invalid(#[from] InvalidValue),
+    /// A configuration file is bad.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The meshes cannot be listed.
+    #[error(transparent)]
+    Tree(#[from] TreeError),
+    /// A scan or packed file cannot be read or written.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// The adapter failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+impl DatasetError {
+    /// An error of `source` on `path`.
+    #[must_use]
+    pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+}

@@ -1,0 +1,219 @@
+//! Scans many meshes: reading, building and writing on all cores, beside one
+//! thread that keeps the adapter busy. Queues are bounded and a budget bounds
+//! the meshes under way, so memory does not grow with their number.
+
+use super::budget::Budget;
+use super::config::DatasetConfig;
+use super::error::DatasetError;
+use super::journal::Journal;
+use super::prepare::prepare;
+use super::progress::{Progress, Stage};
+use super::record::{Entry, MeshFailure, MeshRecord};
+use super::under_way::{Held, gather, submit};
+use super::write::{Output, write_mesh};
+use crate::caster::{Cast, Caster, Culling};
+use crate::mesh::tree::MeshEntry;
+use crate::sensor::BeamPattern;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::atomic::Ordering::{Relaxed, SeqCst};
+use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Bytes that meshes under way may hold together.
+const MEMORY_BUDGET: u64 = 1 << 30;
+
+/// Bytes of memory per byte of a mesh file: 8 is what OFF, OBJ and binary STL
+/// stay under, with trees and rays.
+const BYTES_PER_FILE_BYTE: u64 = 8;
+
+/// Bytes for the rays and scans of one mesh whatever its size.
+const BYTES_PER_MESH: u64 = 4 << 20;
+
+/// Batches on their way through the adapter at once: while one is traced, the
+/// next is uploaded.
+const BATCHES_UNDER_WAY: usize = 2;
+
+/// One run over a list of meshes.
+pub struct Run<'a> {
+    /// The dataset's folder.
+    pub out: &'a Path,
+    /// What it is to hold.
+    pub config: &'a DatasetConfig,
+    /// Casts the rays; opened for the configuration's cast effects.
+    pub caster: &'a Caster,
+    /// Whether beams that cannot hit are cast.
+    pub culling: Culling,
+    /// Counters.
+    pub progress: &'a Progress,
+}
+
+/// What a run makes of its meshes, each list sorted by entry.
+#[derive(Debug, Default)]
+pub struct Scanned {
+    /// Meshes that were scanned.
+    pub records: Vec<MeshRecord>,
+    /// Meshes that could not be.
+    pub failures: Vec<MeshFailure>,
+}
+
+struct Shared<'a> {
+    run: &'a Run<'a>,
+    meshes: &'a [MeshEntry],
+    journal: Journal,
+    patterns: Vec<BeamPattern>,
+    next: AtomicUsize,
+    stopped: AtomicBool,
+    scanned: Mutex<Scanned>,
+    error: Mutex<Option<DatasetError>>,
+}
+
+/// Scans `meshes`, but for those whose scans the journal says are there.
+///
+/// # Errors
+/// If a file cannot be written or the adapter fails: the run stops. A mesh
+/// that cannot be read is no error; it is listed as a failure.
+pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError> {
+    let shared = Shared {
+        run,
+        meshes,
+        journal: Journal::of(run.out),
+        patterns: run.config.sets.iter().map(|set| set.sensor.pattern()).collect(),
+        next: AtomicUsize::new(0),
+        stopped: AtomicBool::new(false),
+        scanned: Mutex::default(),
+        error: Mutex::default(),
+    };
+    let budget = Budget::new(MEMORY_BUDGET);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let (to_caster, prepared) = bounded(2 * threads);
+    let (to_writers, cast) = bounded(2 * threads);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            let to_caster = to_caster.clone();
+            let (shared, budget) = (&shared, &budget);
+            scope.spawn(move || shared.prepare_all(budget, &to_caster));
+            let cast = cast.clone();
+            scope.spawn(move || shared.write_all(&cast));
+        }
+        drop(to_caster);
+        drop(cast);
+        shared.cast_all(prepared, to_writers);
+    });
+    if let Some(error) = lock(&shared.error).take() {
+        return Err(error);
+    }
+    let mut scanned = std::mem::take(&mut *lock(&shared.scanned));
+    scanned.records.sort_unstable_by(|p, q| p.entry.cmp(&q.entry));
+    scanned.failures.sort_unstable_by(|p, q| p.entry.cmp(&q.entry));
+    Ok(scanned)
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Shared<'_> {
+    /// Takes meshes from the list until none is left.
+    fn prepare_all<'b>(&self, budget: &'b Budget, to_caster: &Sender<Held<'b>>) {
+        while let Some(mesh) = self.meshes.get(self.next.fetch_add(1, SeqCst)) {
+            if self.stopped.load(SeqCst) {
+                return;
+            }
+            match self.journal.find(&Entry::from(mesh)) {
+                Err(error) => return self.stop(error),
+                Ok(Some(record)) => {
+                    self.run.progress.meshes.fetch_add(1, Relaxed);
+                    lock(&self.scanned).records.push(record);
+                    continue;
+                }
+                Ok(None) => {}
+            }
+            let file_bytes = std::fs::metadata(&mesh.path).map_or(0, |file| file.len());
+            let share = budget.take(
+                file_bytes.saturating_mul(BYTES_PER_FILE_BYTE).saturating_add(BYTES_PER_MESH),
+            );
+            let Run { config, culling, progress, .. } = self.run;
+            match prepare(mesh, config, &self.patterns, *culling, progress) {
+                Ok(prepared) => {
+                    if to_caster.send(Held { prepared, share }).is_err() {
+                        return;
+                    }
+                }
+                Err(failure) => {
+                    progress.failures.fetch_add(1, Relaxed);
+                    progress.meshes.fetch_add(1, Relaxed);
+                    lock(&self.scanned).failures.push(failure);
+                }
+            }
+        }
+    }
+
+    /// Gathers meshes into batches and keeps some of them under way.
+    fn cast_all<'b>(
+        &self,
+        prepared: Receiver<Held<'b>>,
+        to_writers: Sender<(Held<'b>, Vec<Cast>)>,
+    ) {
+        let mut under_way = VecDeque::new();
+        loop {
+            let batch = gather(&prepared, under_way.is_empty());
+            let nothing_waits = batch.is_empty();
+            if nothing_waits && under_way.is_empty() {
+                return;
+            }
+            if !nothing_waits {
+                let run = self.run;
+                match run.progress.time(Stage::Cast, || submit(batch, run.caster, run.progress)) {
+                    Ok(batch) => under_way.push_back(batch),
+                    Err(error) => return self.stop(error.into()),
+                }
+            }
+            if nothing_waits || under_way.len() >= BATCHES_UNDER_WAY {
+                let Some(oldest) = under_way.pop_front() else { continue };
+                match self.run.progress.time(Stage::Cast, || oldest.wait()) {
+                    Ok(meshes) => {
+                        for mesh in meshes {
+                            if to_writers.send(mesh).is_err() {
+                                return;
+                            }
+                        }
+                    }
+                    Err(error) => return self.stop(error.into()),
+                }
+            }
+        }
+    }
+
+    /// Writes the scans of meshes that were cast.
+    fn write_all(&self, cast: &Receiver<(Held, Vec<Cast>)>) {
+        let cast_effects = self.run.config.cast_effects();
+        let output = Output {
+            out: self.run.out,
+            config: self.run.config,
+            patterns: &self.patterns,
+            cast_effects: &cast_effects,
+            progress: self.run.progress,
+        };
+        for (held, casts) in cast {
+            if self.stopped.load(SeqCst) {
+                continue;
+            }
+            let record = write_mesh(&output, held.prepared, &casts);
+            match record.and_then(|record| self.journal.note(&record).map(|()| record)) {
+                Ok(record) => {
+                    self.run.progress.meshes.fetch_add(1, Relaxed);
+                    lock(&self.scanned).records.push(record);
+                }
+                Err(error) => self.stop(error),
+            }
+        }
+    }
+
+    /// Ends the run; the first error is the one that is told.
+    fn stop(&self, error: DatasetError) {
+        self.stopped.store(true, SeqCst);
+        lock(&self.error).get_or_insert(error);
+    }
+}

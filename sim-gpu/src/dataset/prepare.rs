@@ -1,0 +1,124 @@
+//! From a mesh's file to the rays that will be cast at it.
+
+use super::config::{DatasetConfig, SetConfig};
+use super::progress::{Progress, Stage};
+use super::record::{Entry, MeshFailure, MeshRecord};
+use crate::bvh::Builder;
+use crate::caster::{CastJob, Culling};
+use crate::mesh::census::survey;
+use crate::mesh::frame::to_world;
+use crate::mesh::tree::MeshEntry;
+use crate::mesh::{LoadedMesh, MeshError, load};
+use crate::pose::Pose;
+use crate::ray::RayFrame;
+use crate::sensor::BeamPattern;
+use crate::target::{Surface, Target};
+use glam::DAffine3;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// A mesh and everything that is to be cast at it.
+pub struct Prepared {
+    /// Its record, without scans.
+    pub record: MeshRecord,
+    /// Its views, each with a job of the same number.
+    pub views: Vec<PlannedView>,
+    /// The rays of each view.
+    pub jobs: Vec<CastJob>,
+}
+
+/// One view of one mesh.
+pub struct PlannedView {
+    /// The set's place in the configuration.
+    pub set: usize,
+    /// The view's number in its set.
+    pub view: u32,
+    /// Where the sensor stands.
+    pub pose: Pose,
+}
+
+/// Reads the mesh of `entry` and aims every beam that may hit it.
+///
+/// # Errors
+/// Says why the mesh cannot be scanned.
+pub fn prepare(
+    entry: &MeshEntry,
+    config: &DatasetConfig,
+    patterns: &[BeamPattern],
+    culling: Culling,
+    progress: &Progress,
+) -> Result<Prepared, MeshFailure> {
+    let (record, surface) = progress
+        .time(Stage::Read, || read(entry, config))
+        .map_err(|error| failure(entry, &error))?;
+    let id = record.entry.id();
+    let views = plan(config, &id);
+    let frames: Vec<RayFrame> =
+        views.iter().map(|v| RayFrame::new(&surface, &DAffine3::IDENTITY, &v.pose)).collect();
+    let rays =
+        views.iter().zip(&frames).map(|(v, f)| patterns[v.set].within(&f.cone()).len()).sum();
+    let builder = Builder::for_rays(surface.len(), rays);
+    let target = Arc::new(progress.time(Stage::Build, || Target::new(surface, builder)));
+    let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {
+        let aim = |(view, frame): (&PlannedView, RayFrame)| {
+            let set: &SetConfig = &config.sets[view.set];
+            let stream = set.stream(config.seed, &id, view.view);
+            CastJob::aim(Arc::clone(&target), frame, &patterns[view.set], culling, stream, 1.0)
+        };
+        views.iter().zip(frames).map(aim).collect()
+    });
+    let cast: usize = jobs.iter().map(|job| job.rays.len()).sum();
+    let beams: usize = views.iter().map(|view| patterns[view.set].len()).sum();
+    progress.rays_cast.fetch_add(cast as u64, Relaxed);
+    progress.rays_culled.fetch_add((beams - cast) as u64, Relaxed);
+    Ok(Prepared { record, views, jobs })
+}
+
+fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
+    let mut views = Vec::new();
+    for (set, set_config) in config.sets.iter().enumerate() {
+        let poses = set_config.poses(config.seed, id);
+        views.extend(poses.into_iter().zip(0..).map(|(pose, view)| PlannedView {
+            set,
+            view,
+            pose,
+        }));
+    }
+    views
+}
+
+fn read(entry: &MeshEntry, config: &DatasetConfig) -> Result<(MeshRecord, Surface), MeshError> {
+    let LoadedMesh { mesh, format, sha256, dropped_faces } = load(&entry.path)?;
+    let up = config.up.unwrap_or(format.default_up());
+    let world = to_world(&mesh, up, config.normalize);
+    let survey = survey(&world.mesh);
+    let record = MeshRecord {
+        entry: entry.into(),
+        source: entry.relative.clone(),
+        sha256: formats::hash::hexadecimal(&sha256),
+        up,
+        centre: world.centre.to_array(),
+        scale: world.scale,
+        triangles: mesh.triangles.len() as u64,
+        dropped_faces: dropped_faces as u64,
+        census: survey.census,
+        scans: Vec::new(),
+    };
+    Ok((record, Surface::new(world.mesh, survey.kept)))
+}
+
+fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {
+    let (line, cause) = match error {
+        MeshError::Malformed { line, cause, .. } => {
+            (line.map(|line| line as u64), cause.to_string())
+        }
+        other => (None, other.to_string()),
+    };
+    MeshFailure { entry: entry.into(), source: entry.relative.clone(), line, cause }
+}
+
+impl From<&MeshEntry> for Entry {
+    fn from(entry: &MeshEntry) -> Self {
+        Self { class: entry.class.clone(), split: entry.split, name: entry.name.clone() }
+    }
+}

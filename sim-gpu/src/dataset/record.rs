@@ -1,0 +1,101 @@
+//! What is known of each mesh once its scans are written.
+
+use super::config::Variant;
+use crate::mesh::census::Census;
+use crate::mesh::frame::Up;
+use crate::scan::Tally;
+use formats::Split;
+use formats::scan_file::ScanFormat;
+use serde::{Deserialize, Serialize};
+
+/// Which mesh of a dataset: orders everything that is listed.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Entry {
+    /// Its class.
+    pub class: String,
+    /// Its split.
+    pub split: Split,
+    /// Its name, unique in class and split.
+    pub name: String,
+}
+
+/// One mesh that was scanned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeshRecord {
+    /// Which.
+    #[serde(flatten)]
+    pub entry: Entry,
+    /// The file, from the dataset's folder, with forward slashes.
+    pub source: String,
+    /// SHA-256 of the file's bytes, hexadecimal.
+    pub sha256: String,
+    /// The axis that was taken for upward.
+    pub up: Up,
+    /// What was subtracted from the upright vertices.
+    pub centre: [f64; 3],
+    /// What they were then multiplied by.
+    pub scale: f64,
+    /// Triangles in the file, polygons cut up.
+    pub triangles: u64,
+    /// Faces of fewer than three corners.
+    pub dropped_faces: u64,
+    /// What was found among the triangles and vertices.
+    #[serde(flatten)]
+    pub census: Census,
+    /// Its scans: by set in the order of the configuration, then by view.
+    pub scans: Vec<ScanRecord>,
+}
+
+/// One view of one mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScanRecord {
+    /// The set.
+    pub set: String,
+    /// The view's number.
+    pub view: u32,
+    /// What was written, in the configuration's order of variants.
+    pub variants: Vec<VariantRecord>,
+}
+
+/// One scan as written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VariantRecord {
+    /// Which effects.
+    pub variant: Variant,
+    /// What became of the returns.
+    #[serde(flatten)]
+    pub tally: Tally,
+    /// The files, in the configuration's order of formats.
+    pub files: Vec<FileRecord>,
+}
+
+/// One file as written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FileRecord {
+    /// Its format.
+    pub format: ScanFormat,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+}
+
+/// One mesh that could not be scanned.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeshFailure {
+    /// Which.
+    #[serde(flatten)]
+    pub entry: Entry,
+    /// The file, from the dataset's folder.
+    pub source: String,
+    /// The line where it went wrong, if the file has lines.
+    pub line: Option<u64>,
+    /// Why.
+    pub cause: String,
+}
+
+impl Entry {
+    /// `CLASS/NAME`: what random numbers are keyed by.
+    #[must_use]
+    pub fn id(&self) -> String {
+        format!("{}/{}", self.class, self.name)
+    }
+}

@@ -1,0 +1,98 @@
+//! From what was cast at one mesh to its scans on disk.
+
+use super::config::DatasetConfig;
+use super::error::DatasetError;
+use super::layout;
+use super::prepare::{PlannedView, Prepared};
+use super::progress::{Progress, Stage};
+use super::record::{FileRecord, MeshRecord, ScanRecord, VariantRecord};
+use crate::caster::{Cast, CastJob};
+use crate::effects::Effects;
+use crate::resolve::{Hits, resolve};
+use crate::scan::{Seen, View, assemble};
+use crate::sensor::BeamPattern;
+use formats::Scan;
+use formats::scan_file::write_scan;
+use glam::DAffine3;
+use std::path::Path;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// What all meshes of a run share.
+pub struct Output<'a> {
+    /// The dataset's folder.
+    pub out: &'a Path,
+    /// What it is to hold.
+    pub config: &'a DatasetConfig,
+    /// Each set's beams.
+    pub patterns: &'a [BeamPattern],
+    /// The effects that are cast.
+    pub cast_effects: &'a Effects,
+    /// Counters.
+    pub progress: &'a Progress,
+}
+
+/// Writes every scan of one mesh; returns its record, complete.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_mesh(
+    output: &Output,
+    prepared: Prepared,
+    casts: &[Cast],
+) -> Result<MeshRecord, DatasetError> {
+    let Prepared { mut record, views, jobs } = prepared;
+    for ((planned, job), cast) in views.iter().zip(&jobs).zip(casts) {
+        let hits = output.progress.time(Stage::Resolve, || {
+            resolve(job, cast, &output.patterns[planned.set], output.cast_effects)
+        });
+        output.progress.rays_decided_in_f64.fetch_add(hits.decided_in_f64 as u64, Relaxed);
+        let scan = write_view(output, &record, planned, job, &hits)?;
+        record.scans.push(scan);
+    }
+    Ok(record)
+}
+
+fn write_view(
+    output: &Output,
+    record: &MeshRecord,
+    planned: &PlannedView,
+    job: &CastJob,
+    hits: &Hits,
+) -> Result<ScanRecord, DatasetError> {
+    let config = output.config;
+    let set = &config.sets[planned.set];
+    let seen = [Seen { object: 0, world_from_object: &DAffine3::IDENTITY, job, hits }];
+    let mut variants = Vec::new();
+    for &variant in &config.variants {
+        let effects = config.effects_of(set, variant)?;
+        let view = View {
+            sensor: &set.sensor,
+            pattern: &output.patterns[planned.set],
+            pose: &planned.pose,
+            cast_effects: output.cast_effects,
+            effects: &effects,
+            attributes: &config.attributes,
+            stream: job.stream,
+        };
+        let (scan, tally) = output.progress.time(Stage::Resolve, || assemble(&view, &seen));
+        output.progress.scans.fetch_add(1, Relaxed);
+        output.progress.points.fetch_add(tally.points, Relaxed);
+        let files: Result<_, DatasetError> = output.progress.time(Stage::Write, || {
+            let path = |format| {
+                layout::scan(output.out, &set.name, variant, &record.entry, planned.view, format)
+            };
+            config.formats.iter().map(|&format| write(&path(format), format, &scan)).collect()
+        });
+        variants.push(VariantRecord { variant, tally, files: files? });
+    }
+    Ok(ScanRecord { set: set.name.clone(), view: planned.view, variants })
+}
+
+fn write(
+    path: &Path,
+    format: formats::scan_file::ScanFormat,
+    scan: &Scan,
+) -> Result<FileRecord, DatasetError> {
+    write_scan(path, format, scan)?;
+    Ok(FileRecord { format, sha256: formats::hash::of_file(path)? })
+}

@@ -1,0 +1,254 @@
+//! From hits to the points of a scan: effects, clipping, attributes.
+
+use crate::caster::CastJob;
+use crate::cpu::oracle;
+use crate::effects::{Effects, NoiseModel};
+use crate::pose::Pose;
+use crate::resolve::Hits;
+use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
+use formats::rng::StreamKey;
+use formats::scan::{Attribute, AttributeSet, Scan};
+use glam::{DAffine3, DVec3};
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// One sensor at one place, and what is wanted of its scan.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The sensor.
+    pub sensor: &'a Sensor,
+    /// Its beams.
+    pub pattern: &'a BeamPattern,
+    /// Where it stands.
+    pub pose: &'a Pose,
+    /// The effects that were cast: they say what each hit's words mean.
+    pub cast_effects: &'a Effects,
+    /// The effects to apply, a part of those cast; a quantum must be in metres
+    /// ([`Effects::for_sensor`]).
+    pub effects: &'a Effects,
+    /// What each point carries besides its position.
+    pub attributes: &'a AttributeSet,
+    /// Keys what is drawn per scan: the points of sensors that sample.
+    pub stream: StreamKey,
+}
+
+/// What one object returned.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// The object's number in its scene.
+    pub object: u32,
+    /// Where it stands.
+    pub world_from_object: &'a DAffine3,
+    /// The rays that were cast at it.
+    pub job: &'a CastJob,
+    /// What they hit.
+    pub hits: &'a Hits,
+}
+
+/// What became of a scan's returns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Points in the scan.
+    pub points: u64,
+    /// Beams whose nearest surface lies outside the sensor's range.
+    pub out_of_range: u64,
+    /// Returns lost to dropout.
+    pub dropped: u64,
+    /// Returns whose measured range is not positive.
+    pub negative: u64,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.points += other.points;
+        self.out_of_range += other.out_of_range;
+        self.dropped += other.dropped;
+        self.negative += other.negative;
+    }
+}
+
+/// Beyond this, positions are stored from an origin near the sensor: f32 holds
+/// 1 km to 0.06 mm and no better.
+const ORIGIN_BEYOND_M: f64 = 1024.0;
+
+/// The scan of `view` over all objects `seen`: for each beam the nearest
+/// surface, in the order of firing.
+#[must_use]
+pub fn assemble(view: &View, seen: &[Seen]) -> (Scan, Tally) {
+    let origin = origin_for(view.pose.position_m);
+    let mut tally = Tally::default();
+    let mut returns: Vec<Return> = nearest_per_beam(seen)
+        .filter_map(|(object, hit)| measure(view, &seen[object], object, hit, &mut tally))
+        .collect();
+    post_process(view, &mut returns);
+    tally.points = returns.len() as u64;
+    let scan = Scan {
+        origin: origin.to_array(),
+        positions: returns
+            .iter()
+            .map(|r| f32x3(r.from_sensor + (view.pose.position_m - origin)))
+            .collect(),
+        ..Scan::default()
+    };
+    (with_attributes(scan, view, seen, &returns), tally)
+}
+
+/// Zero near the world's origin, else whole metres near the sensor.
+fn origin_for(position_m: DVec3) -> DVec3 {
+    if position_m.abs().max_element() < ORIGIN_BEYOND_M { DVec3::ZERO } else { position_m.round() }
+}
+
+fn f32x3(v: DVec3) -> [f32; 3] {
+    v.as_vec3().to_array()
+}
+
+/// Places in `seen` and in its hits: one per beam, ascending. Of equal ranges
+/// the object that comes first wins.
+fn nearest_per_beam(seen: &[Seen]) -> impl Iterator<Item = (usize, usize)> {
+    let mut all: Vec<(u32, f64, usize, usize)> = seen
+        .iter()
+        .enumerate()
+        .flat_map(|(object, seen)| {
+            let hits = seen.hits.hits.iter().enumerate();
+            hits.map(move |(i, hit)| (hit.beam, hit.range_m, object, i))
+        })
+        .collect();
+    if seen.len() > 1 {
+        all.sort_unstable_by(|p, q| {
+            p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)).then((p.2, p.3).cmp(&(q.2, q.3)))
+        });
+        all.dedup_by_key(|entry| entry.0);
+    }
+    all.into_iter().map(|(_, _, object, i)| (object, i))
+}
+
+/// One point on its way into a scan.
+#[derive(Clone, Copy)]
+struct Return {
+    object: usize,
+    hit: usize,
+    /// The point as measured, from the sensor, in world axes.
+    from_sensor: DVec3,
+}
+
+/// What the sensor makes of a hit; `None` if it returns nothing.
+fn measure(
+    view: &View,
+    seen: &Seen,
+    object: usize,
+    hit: usize,
+    tally: &mut Tally,
+) -> Option<Return> {
+    let nearest = &seen.hits.hits[hit];
+    let limits = &view.sensor.range;
+    if !(limits.min_m..=limits.max_m).contains(&nearest.range_m) {
+        tally.out_of_range += 1;
+        return None;
+    }
+    let words = Words::of(view.cast_effects, seen.hits, hit);
+    if view.effects.dropout.is_some() && words.dropped {
+        tally.dropped += 1;
+        return None;
+    }
+    let noise = view.effects.noise.map(|noise| noise.model);
+    let along = if noise == Some(NoiseModel::Range) { words.noise.x } else { 0.0 };
+    let mut range_m = nearest.range_m + along;
+    if let Some(step_m) = view.effects.quantum.and_then(|quantum| quantum.step_m) {
+        range_m = (range_m / step_m).round() * step_m;
+    }
+    if range_m <= 0.0 {
+        tally.negative += 1;
+        return None;
+    }
+    let beam = view.pose.world_from_sensor * view.pattern.directions[nearest.beam as usize];
+    let sideways = if noise == Some(NoiseModel::Xyz) { words.noise } else { DVec3::ZERO };
+    Some(Return { object, hit, from_sensor: beam * range_m + sideways })
+}
+
+/// One hit's words, by meaning.
+struct Words {
+    noise: DVec3,
+    dropped: bool,
+    intensity: f32,
+}
+
+impl Words {
+    /// Reads them in the order of `gpu::modules`.
+    fn of(cast_effects: &Effects, hits: &Hits, hit: usize) -> Self {
+        let per_hit = hits.words.len() / hits.hits.len().max(1);
+        let mut words = hits.words[hit * per_hit..(hit + 1) * per_hit].iter().copied();
+        let mut next = || words.next().unwrap_or_default();
+        let noise = match cast_effects.noise.map(|noise| noise.model) {
+            Some(NoiseModel::Range) => DVec3::new(next().into(), 0.0, 0.0),
+            Some(NoiseModel::Xyz) => DVec3::new(next().into(), next().into(), next().into()),
+            None => DVec3::ZERO,
+        };
+        let dropped = cast_effects.dropout.is_some() && next() != 0.0;
+        let intensity = if cast_effects.intensity.is_some() { next() } else { 0.0 };
+        Self { noise, dropped, intensity }
+    }
+}
+
+/// The rings and the drawing of points that a sensor's profile may ask for.
+fn post_process(view: &View, returns: &mut Vec<Return>) {
+    let Sensor { rings, sample, .. } = view.sensor;
+    if let (Some(sample), Some(_)) = (sample, rings) {
+        let drawn = sample.draw_before_rings(returns.len() as u32, view.stream);
+        *returns = drawn.iter().map(|&i| returns[i as usize]).collect();
+    }
+    if let Some(rings) = rings {
+        let polar = |r: &Return| polar_angle_rad(r.from_sensor);
+        let first_rad = returns.iter().map(polar).fold(f64::INFINITY, f64::min);
+        returns.retain_mut(|r| {
+            let range_m = r.from_sensor.length();
+            let snapped = rings.snap_to_ring(r.from_sensor / range_m, first_rad);
+            r.from_sensor = snapped.unwrap_or_default() * range_m;
+            snapped.is_some()
+        });
+    }
+    if let Some(sample) = sample {
+        let [low, high] = view.stream.0;
+        let drawn = sample.draw(returns.len() as u32, StreamKey([!low, high]));
+        *returns = drawn.iter().map(|&i| returns[i as usize]).collect();
+    }
+}
+
+fn with_attributes(mut scan: Scan, view: &View, seen: &[Seen], returns: &[Return]) -> Scan {
+    let hit = |r: &Return| &seen[r.object].hits.hits[r.hit];
+    let beam = |r: &Return| hit(r).beam as usize;
+    for attribute in view.attributes {
+        match attribute {
+            Attribute::Range => {
+                scan.range_m = column(returns, |r| r.from_sensor.length() as f32);
+            }
+            Attribute::Beam => scan.beam = column(returns, |r| hit(r).beam),
+            Attribute::Ring => scan.ring = column(returns, |r| view.pattern.ring[beam(r)]),
+            Attribute::Time => {
+                scan.time_s = column(returns, |r| view.pattern.time_s[beam(r)] as f32);
+            }
+            Attribute::Triangle => scan.triangle = column(returns, |r| hit(r).triangle),
+            Attribute::Object => scan.object = column(returns, |r| seen[r.object].object),
+            Attribute::Intensity => {
+                scan.intensity = column(returns, |r| {
+                    Words::of(view.cast_effects, seen[r.object].hits, r.hit).intensity
+                });
+            }
+            Attribute::Normal => {
+                scan.normal = column(returns, |r| normal(&seen[r.object], hit(r).triangle, r));
+            }
+        }
+    }
+    scan
+}
+
+fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>> {
+    Some(returns.iter().map(value).collect())
+}
+
+/// The surface's unit normal in world axes, towards the sensor.
+fn normal(seen: &Seen, triangle: u32, point: &Return) -> [f32; 3] {
+    let in_object = oracle::normal(&seen.job.target, triangle);
+    let turned = seen.world_from_object.matrix3.inverse().transpose() * in_object;
+    let normal = turned.normalize_or_zero();
+    f32x3(if normal.dot(point.from_sensor) > 0.0 { -normal } else { normal })
+}

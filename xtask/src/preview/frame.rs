@@ -1,0 +1,74 @@
+//! Which part of space the picture shows, and from where.
+
+use formats::Scan;
+
+/// Room around the points, as a share of the cube they lie in.
+const MARGIN: f64 = 1.06;
+
+/// A cube in metres: the same for all panels, so that they share one scale.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Its middle.
+    pub centre: [f64; 3],
+    /// Half of its edge.
+    pub half: f64,
+}
+
+impl Frame {
+    /// The frame of the first of `scans` that has a finite point; a cube of a
+    /// metre if none has. Noise far from the object would else shrink it to a
+    /// dot.
+    pub fn around(scans: &[&Scan]) -> Self {
+        let bounds = scans.iter().find_map(|scan| bounds(&scan.positions));
+        let (low, high) = bounds.unwrap_or(([0.0; 3], [0.0; 3]));
+        let axes = [0, 1, 2];
+        let centre = axes.map(|axis| (low[axis] + high[axis]) / 2.0);
+        let half = axes.map(|axis| (high[axis] - low[axis]) / 2.0).into_iter().fold(0.0, f64::max);
+        Self { centre, half: if half > 0.0 { half * MARGIN } else { 0.5 } }
+    }
+
+    /// The cube's extent along `axis`.
+    pub fn extent(&self, axis: usize) -> std::ops::Range<f64> {
+        self.centre[axis] - self.half..self.centre[axis] + self.half
+    }
+
+    /// Whether the cube holds `point`; it never holds one that is not finite.
+    pub fn holds(&self, point: [f32; 3]) -> bool {
+        (0..3).all(|axis| self.extent(axis).contains(&f64::from(point[axis])))
+    }
+}
+
+fn bounds(points: &[[f32; 3]]) -> Option<([f64; 3], [f64; 3])> {
+    let finite = points.iter().filter(|point| point.iter().all(|x| x.is_finite()));
+    finite.map(|point| point.map(f64::from)).fold(None, |bounds, point| {
+        let (mut low, mut high) = bounds.unwrap_or((point, point));
+        for axis in 0..3 {
+            low[axis] = low[axis].min(point[axis]);
+            high[axis] = high[axis].max(point[axis]);
+        }
+        Some((low, high))
+    })
+}
+
+/// A direction to look in.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// What the panel is called.
+    pub name: &'static str,
+    /// The axis that points right.
+    pub right: usize,
+    /// The axis that points up.
+    pub up: usize,
+    /// The axis along which one looks, and the side one looks from.
+    pub depth: (usize, f32),
+}
+
+impl View {
+    /// The panels from left to right. Each is seen from the side that keeps
+    /// the axes right-handed.
+    pub const ALL: [Self; 3] = [
+        Self { name: "side", right: 0, up: 2, depth: (1, -1.0) },
+        Self { name: "top", right: 0, up: 1, depth: (2, 1.0) },
+        Self { name: "front", right: 1, up: 2, depth: (0, 1.0) },
+    ];
+}

@@ -1,0 +1,155 @@
+//! A picture of a scan: side, top and front views, clean above noisy, as in
+//! the paper's figure.
+
+mod canvas;
+mod colours;
+mod frame;
+mod panel;
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use formats::Scan;
+use plotters::prelude::*;
+
+use canvas::{Canvas, text};
+use colours::Colours;
+use frame::{Frame, View};
+
+const TITLE_HEIGHT: u32 = 52;
+const ROW_HEADING_HEIGHT: u32 = 30;
+const BAR_WIDTH: u32 = 120;
+
+/// Draws `clean`, and `noisy` below it, to the PNG file `out`, atomically.
+///
+/// All panels share one scale, in metres: the frame is the bounding box of the
+/// clean points, with a margin. Points are coloured by range where both scans
+/// know it and by height otherwise, as the colour bar says. Points outside the
+/// frame are counted in their row's heading; those that are not finite count
+/// with them. Axes start at the scans' origin where that is not 0.
+///
+/// # Errors
+/// A scan whose attributes differ in length, a file that cannot be written.
+pub fn draw(clean: &Scan, noisy: Option<&Scan>, title: &str, out: &Path) -> Result<()> {
+    let rows: Vec<_> =
+        [(if noisy.is_some() { "clean" } else { "" }, Some(clean)), ("noisy", noisy)]
+            .into_iter()
+            .filter_map(|(name, scan)| Some((name, scan?)))
+            .collect();
+    for (_, scan) in &rows {
+        scan.check_lengths()?;
+    }
+    let scans: Vec<_> = rows.iter().map(|&(_, scan)| scan).collect();
+    let frame = Frame::around(&scans);
+    let colours = Colours::of(&scans, &frame);
+
+    let width = panel::WIDTH * View::ALL.len() as u32 + BAR_WIDTH;
+    let row_height = ROW_HEADING_HEIGHT + panel::HEIGHT;
+    let height = TITLE_HEIGHT + row_height * rows.len() as u32;
+    let mut canvas = Canvas::new(width, height)?;
+    {
+        let area = canvas.area();
+        area.fill(&WHITE)?;
+        let (heading, below) = area.split_vertically(TITLE_HEIGHT);
+        heading.draw_text(title, &text(24), (16, 16))?;
+        let (panels, bar) = below.split_horizontally(width - BAR_WIDTH);
+        colours.draw_bar(&bar)?;
+        for (row, &(name, scan)) in panels.split_evenly((rows.len(), 1)).iter().zip(&rows) {
+            let (heading, views) = row.split_vertically(ROW_HEADING_HEIGHT);
+            heading.draw_text(&row_heading(name, scan, &frame), &text(17), (16, 6))?;
+            let tints = colours.tints(scan);
+            for (area, view) in views.split_evenly((1, View::ALL.len())).iter().zip(View::ALL) {
+                panel::draw(area, view, scan, &tints, &frame)?;
+            }
+        }
+        area.present()?;
+    }
+    canvas.write_png(out).with_context(|| format!("drawing {}", out.display()))
+}
+
+fn row_heading(name: &str, scan: &Scan, frame: &Frame) -> String {
+    let outside = scan.positions.iter().filter(|point| !frame.holds(**point)).count();
+    let mut heading = match scan.len() {
+        1 => "1 point".to_owned(),
+        n => format!("{n} points"),
+    };
+    if !name.is_empty() {
+        heading = format!("{name}: {heading}");
+    }
+    if outside > 0 {
+        heading += &format!(", {outside} of them outside the frame");
+    }
+    if scan.origin != [0.0; 3] {
+        let [x, y, z] = scan.origin;
+        heading += &format!(", from origin ({x}, {y}, {z}) m");
+    }
+    heading
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn sphere(n: usize, range: bool) -> Scan {
+        let golden = std::f32::consts::PI * (3.0 - 5f32.sqrt());
+        let positions: Vec<_> = (0..n)
+            .map(|i| {
+                let z = 1.0 - 2.0 * (i as f32 + 0.5) / n as f32;
+                let (sin, cos) = (golden * i as f32).sin_cos();
+                let r = (1.0 - z * z).sqrt();
+                [r * cos, r * sin, z]
+            })
+            .collect();
+        let range_m = range.then(|| positions.iter().map(|p| 3.0 - p[0]).collect());
+        Scan { positions, range_m, ..Scan::default() }
+    }
+
+    /// Width and height of a PNG stand after its signature and chunk header.
+    fn size(png: &[u8]) -> [u32; 2] {
+        [16, 20].map(|at| u32::from_be_bytes(png[at..at + 4].try_into().unwrap()))
+    }
+
+    #[test]
+    fn any_scan_has_a_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("new/scan.png");
+        let far = Scan { origin: [1e7, 0.0, 0.0], ..sphere(9, true) };
+        let wild = Scan {
+            positions: vec![[f32::NAN, 0.0, 0.0], [f32::MAX; 3], [-f32::MAX; 3], [0.0; 3]],
+            range_m: Some(vec![f32::NAN, f32::INFINITY, -1.0, 0.0]),
+            ..Scan::default()
+        };
+        for n in [0, 1, 2, 500] {
+            for scan in [sphere(n, true), sphere(n, false), far.clone(), wild.clone()] {
+                draw(&scan, Some(&sphere(n, true)), "a sphere", &out).unwrap();
+                let two_rows = size(&fs::read(&out).unwrap());
+                draw(&scan, None, "", &out).unwrap();
+                let one_row = size(&fs::read(&out).unwrap());
+                assert_eq!(one_row[0], two_rows[0]);
+                assert_eq!(two_rows[1] - one_row[1], panel::HEIGHT + ROW_HEADING_HEIGHT);
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_scan_gives_the_same_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, second] = ["first.png", "second.png"].map(|name| {
+            let out = folder.path().join(name);
+            draw(&sphere(2000, true), None, "a sphere", &out).unwrap();
+            fs::read(out).unwrap()
+        });
+        assert_eq!(first, second);
+        assert!(first.starts_with(b"\x89PNG"));
+    }
+
+    #[test]
+    fn what_lies_outside_is_counted() {
+        let clean = sphere(10, false);
+        let frame = Frame::around(&[&clean]);
+        let noisy = Scan { positions: vec![[0.0; 3], [9.0; 3], [f32::NAN; 3]], ..clean };
+        let heading = row_heading("noisy", &noisy, &frame);
+        assert_eq!(heading, "noisy: 3 points, 2 of them outside the frame");
+    }
+}

@@ -1,0 +1,75 @@
+//! One view of one scan.
+
+use anyhow::{Result, anyhow};
+use formats::Scan;
+use plotters::prelude::*;
+
+use super::canvas::{Area, metres, text};
+use super::frame::{Frame, View};
+
+/// Edge of the square that shows the frame, in pixels.
+const SQUARE: u32 = 380;
+const AXIS_X: u32 = 46;
+const AXIS_Y: u32 = 66;
+const CAPTION: u32 = 26;
+const MARGIN: u32 = 12;
+
+/// Pixels a panel takes, from the one before it to the one after.
+pub const WIDTH: u32 = AXIS_Y + SQUARE + 2 * MARGIN;
+/// Pixels a panel takes from top to bottom.
+pub const HEIGHT: u32 = CAPTION + SQUARE + AXIS_X + 2 * MARGIN;
+
+const AXIS_NAMES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
+const GRID: RGBColor = RGBColor(232, 232, 232);
+
+/// Draws what `view` shows of `scan`, nearer points over farther ones, each in
+/// its tint.
+pub fn draw(
+    area: &Area<'_>,
+    view: View,
+    scan: &Scan,
+    tints: &[RGBColor],
+    frame: &Frame,
+) -> Result<()> {
+    let (caption, below) = area.split_vertically(CAPTION);
+    let middle = (MARGIN + AXIS_Y + SQUARE / 2) as i32 - 4 * view.name.len() as i32;
+    caption.draw_text(view.name, &text(16), (middle, 10))?;
+    let mut chart = ChartBuilder::on(&below)
+        .margin(MARGIN)
+        .x_label_area_size(AXIS_X)
+        .y_label_area_size(AXIS_Y)
+        .build_cartesian_2d(frame.extent(view.right), frame.extent(view.up))?;
+    // About five ticks: none is nearer to the next than this.
+    let label = |value: &f64| metres(*value, frame.half / 5.0);
+    chart
+        .configure_mesh()
+        .x_labels(5)
+        .y_labels(5)
+        .max_light_lines(0)
+        .bold_line_style(GRID)
+        .axis_style(RGBColor(90, 90, 90))
+        .label_style(text(14))
+        .axis_desc_style(text(15))
+        .x_label_formatter(&label)
+        .y_label_formatter(&label)
+        .x_desc(AXIS_NAMES[view.right])
+        .y_desc(AXIS_NAMES[view.up])
+        .draw()?;
+
+    let radius = if scan.len() < 20_000 { 2 } else { 1 };
+    let points = from_far_to_near(scan, view, frame).into_iter().map(|i| {
+        let point = scan.positions[i];
+        let place = (f64::from(point[view.right]), f64::from(point[view.up]));
+        Circle::new(place, radius, tints[i].filled())
+    });
+    chart.draw_series(points).map_err(|error| anyhow!("drawing the points: {error}"))?;
+    Ok(())
+}
+
+fn from_far_to_near(scan: &Scan, view: View, frame: &Frame) -> Vec<usize> {
+    let (axis, side) = view.depth;
+    let nearness = |i: &usize| scan.positions[*i][axis] * side;
+    let mut order: Vec<_> = (0..scan.len()).filter(|&i| frame.holds(scan.positions[i])).collect();
+    order.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
+    order
+}
