@@ -3,9 +3,9 @@
 Reads one JSON request a line, answers with one JSON object a line:
 
 {"mesh": [VERTICES.npy, TRIANGLES.npy]}   f32 [v, 3], u32 [t, 3]: builds a scene
-{"rays": RAYS.npy, "copies": N}           f32 [n, 6], cast N times over
-{"cast": true}                            casts all copies once
-{"answers": RANGES.npy}                   writes f32 [n], infinite where missed
+{"rays": RAYS.npy, "copies": N, "as": KEY}  f32 [n, 6], to be cast N times over
+{"cast": KEY}                             casts all copies once
+{"answers": RANGES.npy, "of": KEY}        writes f32 [n], infinite where missed
 
 Each answer holds `wall_s` and `cpu_s`, the latter of all threads.
 """
@@ -21,8 +21,8 @@ import open3d
 class Peer:
     def __init__(self):
         self.scene = None
-        self.rays = None
-        self.first_copy = 0
+        self.rays = {}
+        self.first_copy = {}
 
     def mesh(self, vertices_file, triangles_file):
         vertices = open3d.core.Tensor(numpy.load(vertices_file))
@@ -36,17 +36,18 @@ class Peer:
 
         return timed(build)
 
-    def aim(self, rays_file, copies):
+    def aim(self, rays_file, copies, key):
         rays = numpy.load(rays_file)
-        self.first_copy = len(rays)
-        self.rays = open3d.core.Tensor(numpy.tile(rays, (copies, 1)))
+        self.first_copy[key] = len(rays)
+        self.rays[key] = open3d.core.Tensor(numpy.tile(rays, (copies, 1)))
         return timed(lambda: None)
 
-    def cast(self):
-        return timed(lambda: self.scene.cast_rays(self.rays))
+    def cast(self, key):
+        return timed(lambda: self.scene.cast_rays(self.rays[key]))
 
-    def answers(self, ranges_file):
-        ranges = self.scene.cast_rays(self.rays[: self.first_copy])["t_hit"].numpy()
+    def answers(self, ranges_file, key):
+        rays = self.rays[key][: self.first_copy[key]]
+        ranges = self.scene.cast_rays(rays)["t_hit"].numpy()
         numpy.save(ranges_file, ranges)
         return timed(lambda: None)
 
@@ -65,11 +66,11 @@ def main():
         if "mesh" in request:
             answer = peer.mesh(*request["mesh"])
         elif "rays" in request:
-            answer = peer.aim(request["rays"], request["copies"])
+            answer = peer.aim(request["rays"], request["copies"], request["as"])
         elif "cast" in request:
-            answer = peer.cast()
+            answer = peer.cast(request["cast"])
         else:
-            answer = peer.answers(request["answers"])
+            answer = peer.answers(request["answers"], request["of"])
         print(json.dumps(answer), flush=True)
 
 

@@ -248,3 +248,35 @@ fn halve(primitives: &mut [Primitive], centres: Bounds) -> usize {
     });
     middle
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::bvh::{Builder, Bvh, assert_well_formed};
+    use formats::rng::StreamKey;
+
+    /// Small triangles at random places of a grid, so that many centres agree.
+    fn soup(n: u64) -> Vec<[[f32; 3]; 3]> {
+        let key = StreamKey::new(1, "soup", 0);
+        let at = |i: u64| (8.0 * key.unit(i)).floor() as f32 / 8.0;
+        let corner = |i: u64, far: f32| [at(3 * i), at(3 * i + 1) + far, at(3 * i + 2)];
+        (0..n).map(|i| [corner(i, 0.0), corner(i, 0.1), corner(i + 1, 0.0)]).collect()
+    }
+
+    #[test]
+    fn every_number_of_triangles_gives_a_good_tree() {
+        for n in (0..=130).chain([1000, 20_000]) {
+            let corners = soup(n);
+            let indices: Vec<u32> = (0..n as u32).collect();
+            for builder in [Builder::Sah, Builder::Morton] {
+                assert_well_formed(&Bvh::build(builder, &corners, &indices));
+            }
+        }
+    }
+
+    #[test]
+    fn triangles_at_one_place_are_halved() {
+        let corners = vec![[[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]; 1000];
+        let indices: Vec<u32> = (0..1000).collect();
+        assert_well_formed(&Bvh::build(Builder::Sah, &corners, &indices));
+    }
+}

@@ -135,7 +135,8 @@ impl Bins {
             let width = (fold(axis, f32::max) - low[axis]).max(f32::MIN_POSITIVE);
             side as f32 / width
         });
-        let mut bins = Self { rays: Vec::new(), starts: vec![0; side * side + 1], side, low, per_bin };
+        let mut bins =
+            Self { rays: Vec::new(), starts: vec![0; side * side + 1], side, low, per_bin };
         let places: Vec<usize> =
             points.iter().map(|p| bins.bin(1, p[1]) * side + bins.bin(0, p[0])).collect();
         let mut order: Vec<u32> = (0..points.len() as u32).collect();

@@ -106,8 +106,7 @@ fn at(subject: &Subject, pattern: &BeamPattern, rays: usize, rounds: usize) -> V
 /// About `rays` rays from at least four views, as the default set has them.
 fn views(target: &Arc<Target>, pattern: &BeamPattern, rays: usize) -> Vec<Shot> {
     let n_views = rays.div_ceil(RAYS_PER_VIEW).max(4);
-    let poses =
-        ring_of_views(n_views as u32, 3.0, 20f64.to_radians(), 0.0, DVec3::ZERO);
+    let poses = ring_of_views(n_views as u32, 3.0, 20f64.to_radians(), 0.0, DVec3::ZERO);
     let share = rays / n_views;
     let view = |pose| {
         let mut shot = Shot::sweep(target, pose, pattern, Culling::On);
@@ -181,7 +180,16 @@ impl Ways {
     fn per_mesh(&self) -> Table {
         let mut table = Table::new(
             "Build + trace, CPU ms (rays to break even: where SAH's slower build is paid back)",
-            &["mesh", "triangles", "rays", "Sah", "Morton", "bins", "break-even / triangle", "different"],
+            &[
+                "mesh",
+                "triangles",
+                "rays",
+                "Sah",
+                "Morton",
+                "bins",
+                "break-even / triangle",
+                "different",
+            ],
         );
         for group in self.groups() {
             let [sah, morton, rest @ ..] = group else { continue };

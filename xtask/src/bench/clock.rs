@@ -48,10 +48,7 @@ pub type Contestant<'a> = Box<dyn FnMut() -> anyhow::Result<Cost> + 'a>;
 ///
 /// # Errors
 /// The first that a contestant answers.
-pub fn interleave(
-    rounds: usize,
-    contestants: &mut [Contestant<'_>],
-) -> anyhow::Result<Vec<Costs>> {
+pub fn interleave(rounds: usize, contestants: &mut [Contestant<'_>]) -> anyhow::Result<Vec<Costs>> {
     let mut costs = vec![Costs::default(); contestants.len()];
     for round in 0..=rounds {
         for (contestant, costs) in contestants.iter_mut().zip(&mut costs) {
@@ -82,11 +79,7 @@ impl Spread {
         let mut figures: Vec<f64> = figures.into_iter().collect();
         figures.sort_unstable_by(f64::total_cmp);
         let at = |i: usize| figures.get(i).copied().unwrap_or(0.0);
-        Self {
-            median: at(figures.len() / 2),
-            min: at(0),
-            max: at(figures.len().saturating_sub(1)),
-        }
+        Self { median: at(figures.len() / 2), min: at(0), max: at(figures.len().saturating_sub(1)) }
     }
 }
 

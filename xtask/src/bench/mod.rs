@@ -14,6 +14,7 @@ mod accuracy;
 mod bins;
 mod builders;
 mod clock;
+mod kernel;
 mod lanes;
 mod machine;
 mod moller_trumbore;

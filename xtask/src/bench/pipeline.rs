@@ -115,9 +115,10 @@ impl Pipeline {
         let (patterns, jobs): (Vec<&BeamPattern>, Vec<CastJob>) =
             jobs.into_iter().flatten().unzip();
         let (casts, cast) = measured(|| lane.caster.cast(&jobs));
-        let (points, ranges) = each(jobs.iter().zip(casts?).zip(patterns), |((job, cast), pattern)| {
-            black_box(resolve(job, &cast, pattern, &Effects::default())).hits.len()
-        });
+        let (points, ranges) =
+            each(jobs.iter().zip(casts?).zip(patterns), |((job, cast), pattern)| {
+                black_box(resolve(job, &cast, pattern, &Effects::default())).hits.len()
+            });
         self.scans = jobs.len();
         self.rays = jobs.iter().map(|job| job.rays.len()).sum();
         self.points = points.iter().sum();

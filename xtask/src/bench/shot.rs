@@ -90,12 +90,23 @@ impl Shot {
         Self { job, rays: self.rays.clone() }
     }
 
+    /// The same rays in the order of their beams: as the sensor fires them.
+    pub fn in_firing_order(&self) -> Self {
+        let mut order: Vec<usize> = (0..self.rays.len()).collect();
+        order.sort_unstable_by_key(|&i| self.job.beams[i]);
+        let mut shot = self.clone();
+        shot.rays = order.iter().map(|&i| self.rays[i]).collect();
+        shot.job.rays = order.iter().map(|&i| self.job.rays[i]).collect();
+        shot.job.beams = order.iter().map(|&i| self.job.beams[i]).collect();
+        shot
+    }
+
     /// Each ray's origin and unit direction in the world, metres.
     pub fn in_world(&self) -> impl Iterator<Item = (DVec3, DVec3)> {
         let frame = self.job.target.surface.frame;
-        self.rays.iter().map(move |ray| {
-            (ray.origin * frame.scale + frame.centre, ray.direction * frame.scale)
-        })
+        self.rays
+            .iter()
+            .map(move |ray| (ray.origin * frame.scale + frame.centre, ray.direction * frame.scale))
     }
 
     /// The ranges that follow from a caster's codes, in metres, as

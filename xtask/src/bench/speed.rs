@@ -1,11 +1,12 @@
 //! How fast hierarchies are built and rays are traced.
 
-use super::clock::{Contestant, Cost, Costs, interleave, measured};
+use super::clock::{Contestant, Cost, Costs, Spread, interleave, measured};
+use super::kernel;
 use super::lanes::Lane;
 use super::scenes::in_a_room;
 use super::shot::Shot;
 use super::subject::Subject;
-use super::table::{Table, digits, milliseconds, millions_per_s};
+use super::table::{Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use glam::{DVec3, dvec3};
 use serde::Serialize;
@@ -44,6 +45,9 @@ pub struct Trace {
     /// Rays that hit.
     hits: usize,
     costs: Costs,
+    /// Seconds of the kernel alone in each repeat, by the adapter's clock.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kernel_s: Option<Vec<f64>>,
 }
 
 /// All speeds of a run.
@@ -153,6 +157,7 @@ fn traces(
             beams: copies(lane) * beams,
             hits: copies(lane) * hits,
             costs,
+            kernel_s: kernel::measure(lane, &shot.job, copies(lane), rounds)?,
         });
     }
     Ok(())
@@ -195,8 +200,17 @@ impl Speed {
             "Tracing, million rays a second (upload and read-back included; \
              beams count those that culling spared)",
             &[
-                "mesh", "rays", "adapter", "batch", "hits %", "per CPU-s", "min", "max",
-                "per wall s", "beams per CPU-s",
+                "mesh",
+                "rays",
+                "adapter",
+                "batch",
+                "hits %",
+                "per CPU-s",
+                "min",
+                "max",
+                "per wall s",
+                "beams per CPU-s",
+                "kernel alone",
             ],
         );
         for trace in &self.traces {
@@ -212,6 +226,12 @@ impl Speed {
                 millions_per_s(trace.rays, cpu.min),
                 millions_per_s(trace.rays, wall.median),
                 millions_per_s(trace.beams, cpu.median),
+                match &trace.kernel_s {
+                    Some(seconds) => {
+                        millions_per_s(trace.rays, Spread::of(seconds.iter().copied()).median)
+                    }
+                    None => "-".to_owned(),
+                },
             ]);
         }
         traces

@@ -29,7 +29,7 @@ pub struct Dataset {
     points: u64,
     rays_cast: u64,
     rays_culled: u64,
-    /// The fastest of all repeats, warm caches and all.
+    /// The repeat of the median CPU time.
     cost: Cost,
     /// Seconds that all threads together spent in each stage of that repeat.
     stages: Vec<(&'static str, f64)>,
@@ -53,14 +53,12 @@ pub fn measure(root: &Path, limit: usize, lanes: &[Lane], rounds: usize) -> Resu
             Caster::Gpu(_) => AdapterRequest::Named(lane.name().to_owned()),
         };
         let caster = Caster::open(&request, &config.cast_effects())?;
-        let mut best: Option<Dataset> = None;
+        let mut repeats = Vec::with_capacity(rounds);
         for _ in 0..rounds {
-            let dataset = once(&config, &caster, &chosen)?;
-            if best.as_ref().is_none_or(|best| dataset.cost.cpu_s < best.cost.cpu_s) {
-                best = Some(dataset);
-            }
+            repeats.push(once(&config, &caster, &chosen)?);
         }
-        datasets.extend(best);
+        repeats.sort_by(|a, b| a.cost.cpu_s.total_cmp(&b.cost.cpu_s));
+        datasets.extend(repeats.into_iter().nth(rounds / 2));
     }
     Ok(datasets)
 }

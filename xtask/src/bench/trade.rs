@@ -7,7 +7,7 @@ use super::moller_trumbore;
 use super::scenes::{closed_sphere, edge_midpoints, in_a_room, rippled_plate, torus};
 use super::shot::Shot;
 use super::speed::{short, sweep_pose, target, vlp32c};
-use super::table::{Table, digits, milliseconds, millions_per_s};
+use super::table::{Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -101,7 +101,8 @@ fn scenes() -> Result<Vec<(&'static str, Mesh, Aim)>> {
 fn places_within() -> Vec<DVec3> {
     let key = StreamKey::new(0, "places within", 0);
     let coordinate = |n: u64| 0.8 * key.unit(n) - 0.4;
-    let place = |i: u64| DVec3::new(coordinate(3 * i), coordinate(3 * i + 1), coordinate(3 * i + 2));
+    let place =
+        |i: u64| DVec3::new(coordinate(3 * i), coordinate(3 * i + 1), coordinate(3 * i + 2));
     (0..20).map(place).collect()
 }
 
@@ -244,8 +245,15 @@ impl Trade {
         let mut settings = Table::new(
             "Speed against accuracy (errors against the f64 oracle)",
             &[
-                "scene", "knobs", "hits %", "M rays/CPU-s", "M rays/s", "worst error m", "RMS error m",
-                "false hits/M", "misses/M",
+                "scene",
+                "knobs",
+                "hits %",
+                "M rays/CPU-s",
+                "M rays/s",
+                "worst error m",
+                "RMS error m",
+                "false hits/M",
+                "misses/M",
             ],
         );
         for setting in &self.settings {

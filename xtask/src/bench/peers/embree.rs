@@ -61,11 +61,11 @@ impl Embree {
         self.ask(&json!({ "mesh": files }))
     }
 
-    /// Prepares to cast the rays of `shot`, `copies` times over.
+    /// Prepares to cast the rays of `shot`, `copies` times over, as `key`.
     ///
     /// # Errors
     /// If the program ends.
-    pub fn aim(&mut self, shot: &Shot, copies: usize) -> Result<()> {
+    pub fn aim(&mut self, key: &str, shot: &Shot, copies: usize) -> Result<()> {
         let rays = shot
             .in_world()
             .flat_map(|(origin, direction)| [origin.as_vec3(), direction.as_vec3()])
@@ -73,25 +73,25 @@ impl Embree {
             .collect();
         let file = self.files.path().join("rays.npy");
         write(&file, rays, 6)?;
-        self.ask::<Cost>(&json!({ "rays": file, "copies": copies }))?;
+        self.ask::<Cost>(&json!({ "rays": file, "copies": copies, "as": key }))?;
         Ok(())
     }
 
-    /// Casts them once; what it cost.
+    /// Casts the rays of `key` once; what it cost.
     ///
     /// # Errors
     /// If the program ends.
-    pub fn cast(&mut self) -> Result<Cost> {
-        self.ask(&json!({ "cast": true }))
+    pub fn cast(&mut self, key: &str) -> Result<Cost> {
+        self.ask(&json!({ "cast": key }))
     }
 
-    /// The ranges of one copy, metres; infinite where nothing is hit.
+    /// The ranges of one copy of the rays of `key`, metres; infinite where nothing is hit.
     ///
     /// # Errors
     /// If the program ends.
-    pub fn ranges(&mut self) -> Result<Vec<f32>> {
+    pub fn ranges(&mut self, key: &str) -> Result<Vec<f32>> {
         let file = self.files.path().join("ranges.npy");
-        self.ask::<Cost>(&json!({ "answers": file }))?;
+        self.ask::<Cost>(&json!({ "answers": file, "of": key }))?;
         let ranges: Array1<f32> = ndarray_npy::read_npy(&file)?;
         Ok(ranges.to_vec())
     }

@@ -18,8 +18,7 @@ pub fn programs() -> PathBuf {
 /// Why there can be none, in words for the user.
 pub fn interpreter() -> Result<PathBuf, String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/peers/venv");
-    let interpreter =
-        folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+    let interpreter = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     let requirements = programs().join("requirements.txt");
     let pinned = std::fs::read_to_string(&requirements).map_err(|e| e.to_string())?;
     let done = folder.join("edgepuck-requirements.txt");
