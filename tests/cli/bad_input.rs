@@ -49,8 +49,7 @@ fn commands_that_cannot_be_are_usage_errors() {
     meshes::write_tree(&folder.path().join("meshes"));
     for (words, part) in [
         ("gen-dataset meshes --views 0", "--views"),
-        ("gen-dataset meshes --noise -1", "--noise"),
-        ("gen-dataset meshes --noise=-1", "sigma"),
+        ("gen-dataset meshes --noise -1", "sigma"),
         ("gen-dataset meshes --noise=nan", "sigma"),
         ("gen-dataset meshes --dropout 2", "probability"),
         ("gen-dataset meshes --distance 0", "distance"),

@@ -1,6 +1,7 @@
 //! The one command line of an Edgepuck workstation.
 
 mod adapters;
+mod bench;
 mod caster;
 mod gen_dataset;
 mod gen_shapes;
@@ -32,6 +33,8 @@ enum Command {
     Preview(preview_scan::Args),
     /// List the adapters that can cast
     Adapters,
+    /// Measure speed and accuracy
+    Bench(bench::BenchArgs),
     /// Make one dataset of the shards of one
     MergeDataset(merge_dataset::Args),
     /// Install what tests need and run all of them
@@ -53,6 +56,7 @@ fn main() -> ExitCode {
         Command::Scan(args) => scan::run(&args),
         Command::Preview(args) => preview_scan::run(&args),
         Command::Adapters => adapters::run(),
+        Command::Bench(args) => bench::run(&args).map(|()| Outcome::Success),
         Command::MergeDataset(args) => merge_dataset::run(&args),
         Command::Test(args) => test::run(&args),
     };

@@ -5,7 +5,14 @@ use super::node::Child;
 use super::{Bounds, HALVING_DEPTH, MAX_LEAF, Node, Primitive};
 use glam::Vec3A;
 
+/// Bins per axis of nodes above [`FEW`] triangles, and of nodes below.
 const BINS: usize = 16;
+const BINS_OF_FEW: usize = 8;
+const FEW: usize = 64;
+
+/// Nodes of at most so many triangles try each of their orders' splits: that
+/// takes less than to fill bins.
+const EXACT: usize = 8;
 
 /// Cost of a triangle test in units of a node visit.
 const TRIANGLE_COST: f32 = 1.0;
@@ -32,17 +39,21 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
     if primitives.len() <= 1 {
         return leaf;
     }
-    let split = if depth >= HALVING_DEPTH { None } else { best_split(primitives, centres) };
-    if primitives.len() <= MAX_LEAF {
-        let leaf_cost = TRIANGLE_COST * primitives.len() as f32 * bounds.half_area();
-        let split_cost = split.map_or(f32::INFINITY, |s| s.cost + bounds.half_area());
-        if leaf_cost <= split_cost {
+    let middle = if depth >= HALVING_DEPTH {
+        if primitives.len() <= MAX_LEAF {
             return leaf;
         }
-    }
-    let middle = split.map_or(0, |split| partition(primitives, |p| split.is_left(p)));
-    let middle =
-        if middle == 0 || middle == primitives.len() { halve(primitives, centres) } else { middle };
+        halve(primitives, centres)
+    } else if primitives.len() <= EXACT {
+        let (middle, cost) = split_exactly(primitives);
+        let leaf_cost = TRIANGLE_COST * primitives.len() as f32 * bounds.half_area();
+        if primitives.len() <= MAX_LEAF && leaf_cost <= cost + bounds.half_area() {
+            return leaf;
+        }
+        middle
+    } else {
+        split_between_bins(primitives, centres)
+    };
     let (left, right) = primitives.split_at_mut(middle);
     let at = nodes.len();
     nodes.push(Node::new(Child::NONE, Child::NONE));
@@ -92,6 +103,7 @@ pub(super) fn extent(primitives: &[Primitive]) -> (Bounds, Bounds) {
 struct Split {
     axis: usize,
     last_left_bin: usize,
+    last_bin: usize,
     cost: f32,
     origin: f32,
     bins_per_unit: f32,
@@ -100,16 +112,70 @@ struct Split {
 impl Split {
     fn is_left(&self, primitive: &Primitive) -> bool {
         let centre = primitive.bounds.doubled_centre()[self.axis];
-        bin(centre, self.origin, self.bins_per_unit) <= self.last_left_bin
+        let bin = ((centre - self.origin) * self.bins_per_unit) as usize;
+        bin.min(self.last_bin) <= self.last_left_bin
     }
 }
 
-fn bin(centre: f32, origin: f32, bins_per_unit: f32) -> usize {
-    (((centre - origin) * bins_per_unit) as usize).min(BINS - 1)
+/// Sorts the left side of the cheapest split between bins to the front; how
+/// many they are. Where no split parts the centres, halves them.
+fn split_between_bins(primitives: &mut [Primitive], centres: Bounds) -> usize {
+    let split = if primitives.len() <= FEW {
+        best_split::<BINS_OF_FEW>(primitives, centres)
+    } else {
+        best_split::<BINS>(primitives, centres)
+    };
+    let middle = split.map_or(0, |split| partition(primitives, |p| split.is_left(p)));
+    if middle == 0 || middle == primitives.len() { halve(primitives, centres) } else { middle }
+}
+
+/// Sorts `primitives` along the axis whose cheapest split is the cheapest of
+/// all; how many come left of it, and its cost. Ties go by triangle, so that
+/// the tree is the same on every run.
+fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
+    let sort = |primitives: &mut [Primitive], axis: usize| {
+        primitives.sort_unstable_by(|p, q| {
+            let centre = |p: &Primitive| p.bounds.doubled_centre()[axis];
+            centre(p).total_cmp(&centre(q)).then(p.triangle.cmp(&q.triangle))
+        });
+    };
+    let (mut best_axis, mut best) = (0, (1, f32::INFINITY));
+    for axis in 0..3 {
+        sort(primitives, axis);
+        let split = cheapest_prefix(primitives);
+        if split.1 < best.1 {
+            (best_axis, best) = (axis, split);
+        }
+    }
+    if best_axis != 2 {
+        sort(primitives, best_axis);
+    }
+    best
+}
+
+/// How many of `primitives`, at most [`EXACT`] and in this order, the cheapest
+/// split puts on the left, and its cost.
+fn cheapest_prefix(primitives: &[Primitive]) -> (usize, f32) {
+    let mut right_cost = [0.0; EXACT];
+    let mut bounds = Bounds::EMPTY;
+    for (i, p) in primitives.iter().enumerate().skip(1).rev() {
+        bounds = bounds.union(p.bounds);
+        right_cost[i] = bounds.half_area() * (primitives.len() - i) as f32;
+    }
+    let mut best = (1, f32::INFINITY);
+    let mut bounds = Bounds::EMPTY;
+    for (i, p) in primitives.iter().enumerate().take(primitives.len() - 1) {
+        bounds = bounds.union(p.bounds);
+        let cost = TRIANGLE_COST * (bounds.half_area() * (i + 1) as f32 + right_cost[i + 1]);
+        if cost < best.1 {
+            best = (i + 1, cost);
+        }
+    }
+    best
 }
 
 /// The cheapest split between bins on any axis; `None` if all centres agree.
-fn best_split(primitives: &[Primitive], centres: Bounds) -> Option<Split> {
+fn best_split<const BINS: usize>(primitives: &[Primitive], centres: Bounds) -> Option<Split> {
     let size = centres.max - centres.min;
     let bins_per_unit = Vec3A::from_array(size.to_array().map(|s| {
         let scale = BINS as f32 / s;
@@ -129,14 +195,15 @@ fn best_split(primitives: &[Primitive], centres: Bounds) -> Option<Split> {
         .map(|axis| {
             let (last_left_bin, cost) = cheapest_boundary(&bins[axis]);
             let origin = centres.min[axis];
-            Split { axis, last_left_bin, cost, origin, bins_per_unit: bins_per_unit[axis] }
+            let bins_per_unit = bins_per_unit[axis];
+            Split { axis, last_left_bin, last_bin: BINS - 1, cost, origin, bins_per_unit }
         })
         .min_by(|p, q| p.cost.total_cmp(&q.cost))
 }
 
 /// The last bin on the left of the cheapest boundary, and its cost: area times
 /// triangles, summed over both sides.
-fn cheapest_boundary(bins: &[(Bounds, u32); BINS]) -> (usize, f32) {
+fn cheapest_boundary<const BINS: usize>(bins: &[(Bounds, u32); BINS]) -> (usize, f32) {
     let mut right_cost = [0.0; BINS];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     for i in (1..BINS).rev() {
@@ -180,4 +247,36 @@ fn halve(primitives: &mut [Primitive], centres: Bounds) -> usize {
         centre(p).total_cmp(&centre(q)).then(p.triangle.cmp(&q.triangle))
     });
     middle
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::bvh::{Builder, Bvh, assert_well_formed};
+    use formats::rng::StreamKey;
+
+    /// Small triangles at random places of a grid, so that many centres agree.
+    fn soup(n: u64) -> Vec<[[f32; 3]; 3]> {
+        let key = StreamKey::new(1, "soup", 0);
+        let at = |i: u64| (8.0 * key.unit(i)).floor() as f32 / 8.0;
+        let corner = |i: u64, far: f32| [at(3 * i), at(3 * i + 1) + far, at(3 * i + 2)];
+        (0..n).map(|i| [corner(i, 0.0), corner(i, 0.1), corner(i + 1, 0.0)]).collect()
+    }
+
+    #[test]
+    fn every_number_of_triangles_gives_a_good_tree() {
+        for n in (0..=130).chain([1000, 20_000]) {
+            let corners = soup(n);
+            let indices: Vec<u32> = (0..n as u32).collect();
+            for builder in [Builder::Sah, Builder::Morton] {
+                assert_well_formed(&Bvh::build(builder, &corners, &indices));
+            }
+        }
+    }
+
+    #[test]
+    fn triangles_at_one_place_are_halved() {
+        let corners = vec![[[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]; 1000];
+        let indices: Vec<u32> = (0..1000).collect();
+        assert_well_formed(&Bvh::build(Builder::Sah, &corners, &indices));
+    }
 }

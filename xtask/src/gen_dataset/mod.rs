@@ -104,7 +104,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     if let Start::Complete(manifest) = begin(&out, &terms, how)? {
         eprintln!("{}: complete already.", out.display());
-        return Ok(outcome(&manifest));
+        return end(&out, &manifest);
     }
 
     let started = Instant::now();
@@ -119,15 +119,16 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let packing = Instant::now();
     let manifest = finish(&out, &terms, scanned.records, scanned.failures)?;
     summary::print(&out, &manifest, &progress, started.elapsed(), packing.elapsed());
-    match example::draw(&out, &manifest).context("cannot draw the preview")? {
+    end(&out, &manifest)
+}
+
+/// Draws the example, which a killed run may lack, and names it.
+fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
+    match example::draw(out, manifest).context("cannot draw the example")? {
         Some(picture) => eprintln!("An example to look at: {}", picture.display()),
         None => eprintln!("No scan holds a point, so there is no example to look at."),
     }
-    Ok(outcome(&manifest))
-}
-
-fn outcome(manifest: &Manifest) -> Outcome {
-    if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed }
+    Ok(if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
 }
 
 fn check(folder: &Path) -> anyhow::Result<Outcome> {

@@ -36,7 +36,7 @@ pub struct Settings {
     poses: Option<PathBuf>,
 
     /// Standard deviation of the noisy scans' error, metres; 0 writes clean scans alone
-    #[arg(long, default_value_t = 0.01, value_name = "M")]
+    #[arg(long, default_value_t = 0.01, value_name = "M", allow_negative_numbers = true)]
     noise: f64,
 
     /// What the noise is added to: range, along the ray, or xyz, each coordinate
@@ -48,7 +48,7 @@ pub struct Settings {
     noise_mean: f64,
 
     /// Probability that a noisy scan loses a return
-    #[arg(long, default_value_t = 0.0, value_name = "P")]
+    #[arg(long, default_value_t = 0.0, value_name = "P", allow_negative_numbers = true)]
     dropout: f64,
 
     /// Round noisy ranges to a quantum in metres, or to the sensor's own

@@ -1,0 +1,105 @@
+//! What a piece of work costs.
+//!
+//! Machines are shared, so wall time says as much about the neighbours as
+//! about the work. CPU time of the whole process is the figure to compare:
+//! it holds rayon's threads, and lavapipe's, which live in this process too.
+
+use cpu_time::ProcessTime;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// What one repeat cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Seconds on the wall clock.
+    pub wall_s: f64,
+    /// Seconds of CPU time, all threads together.
+    pub cpu_s: f64,
+}
+
+/// What each repeat cost, in the order in which they ran.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Costs(pub Vec<Cost>);
+
+/// The middle and the ends of some figures.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// The upper median.
+    pub median: f64,
+    /// The least.
+    pub min: f64,
+    /// The greatest.
+    pub max: f64,
+}
+
+/// Does `work` once.
+pub fn measured<T>(work: impl FnOnce() -> T) -> (T, Cost) {
+    let (cpu, wall) = (ProcessTime::now(), Instant::now());
+    let answer = work();
+    let cost = Cost { wall_s: wall.elapsed().as_secs_f64(), cpu_s: cpu.elapsed().as_secs_f64() };
+    (answer, cost)
+}
+
+/// One of several that do comparable work; each call is one repeat.
+pub type Contestant<'a> = Box<dyn FnMut() -> anyhow::Result<Cost> + 'a>;
+
+/// Lets all `contestants` have one repeat uncounted, then `rounds` rounds of
+/// one repeat each: what disturbs the machine for a while disturbs them all.
+///
+/// # Errors
+/// The first that a contestant answers.
+pub fn interleave(rounds: usize, contestants: &mut [Contestant<'_>]) -> anyhow::Result<Vec<Costs>> {
+    let mut costs = vec![Costs::default(); contestants.len()];
+    for round in 0..=rounds {
+        for (contestant, costs) in contestants.iter_mut().zip(&mut costs) {
+            let cost = contestant()?;
+            if round > 0 {
+                costs.0.push(cost);
+            }
+        }
+    }
+    Ok(costs)
+}
+
+impl Costs {
+    /// Of the wall times.
+    pub fn wall_s(&self) -> Spread {
+        Spread::of(self.0.iter().map(|cost| cost.wall_s))
+    }
+
+    /// Of the CPU times.
+    pub fn cpu_s(&self) -> Spread {
+        Spread::of(self.0.iter().map(|cost| cost.cpu_s))
+    }
+}
+
+impl Spread {
+    /// Of `figures`; zeros if there are none.
+    pub fn of(figures: impl IntoIterator<Item = f64>) -> Self {
+        let mut figures: Vec<f64> = figures.into_iter().collect();
+        figures.sort_unstable_by(f64::total_cmp);
+        let at = |i: usize| figures.get(i).copied().unwrap_or(0.0);
+        Self { median: at(figures.len() / 2), min: at(0), max: at(figures.len().saturating_sub(1)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_repeat_is_not_counted() {
+        let mut calls = 0;
+        let contestant: Contestant<'_> = Box::new(|| {
+            calls += 1;
+            Ok(Cost { wall_s: f64::from(calls), cpu_s: 0.0 })
+        });
+        let costs = interleave(3, &mut [contestant]).unwrap();
+        assert_eq!(costs[0].wall_s(), Spread { median: 3.0, min: 2.0, max: 4.0 });
+    }
+
+    #[test]
+    fn nothing_has_a_spread_of_zeros() {
+        assert_eq!(Spread::of([]), Spread { median: 0.0, min: 0.0, max: 0.0 });
+    }
+}

@@ -1,0 +1,103 @@
+//! What a benchmark record must say of the machine and the program.
+
+use serde::Serialize;
+use sim_gpu::gpu::list_adapters;
+use std::fs;
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Where and when figures were measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct Machine {
+    /// Seconds since 1970 at the start of the run.
+    pub unix_time_s: u64,
+    /// The command line.
+    pub command: Vec<String>,
+    /// Version of this program.
+    pub version: &'static str,
+    /// The commit of the working tree, `+` behind it if it has changes; `None`
+    /// outside a clone.
+    pub commit: Option<String>,
+    /// The processor's name; `None` where the system does not tell.
+    pub cpu: Option<String>,
+    /// Hardware threads that this process may use.
+    pub threads: usize,
+    /// The operating system and the processor's architecture.
+    pub system: String,
+    /// Mean number of runnable threads over 1, 5 and 15 minutes, on Linux.
+    pub load_average: Option<String>,
+    /// All adapters there are, measured or not.
+    pub adapters: Vec<Adapter>,
+}
+
+/// One adapter.
+#[derive(Clone, Debug, Serialize)]
+pub struct Adapter {
+    /// The device's name.
+    pub name: String,
+    /// What sort of device it is.
+    pub kind: String,
+    /// The graphics interface.
+    pub backend: String,
+    /// The driver and its version.
+    pub driver: String,
+}
+
+impl Machine {
+    /// This machine, now.
+    pub fn here() -> Self {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH);
+        Self {
+            unix_time_s: now.map_or(0, |since| since.as_secs()),
+            command: std::env::args().skip(1).collect(),
+            version: env!("CARGO_PKG_VERSION"),
+            commit: commit(),
+            cpu: field("/proc/cpuinfo", "model name"),
+            threads: rayon::current_num_threads(),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            load_average: load_average(),
+            adapters: list_adapters()
+                .into_iter()
+                .map(|a| Adapter {
+                    name: a.name,
+                    kind: a.kind.to_string(),
+                    backend: a.backend,
+                    driver: a.driver,
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The most memory this process has held so far, bytes; `None` where the
+/// system does not tell.
+pub fn peak_memory_bytes() -> Option<u64> {
+    let text = field("/proc/self/status", "VmHWM")?;
+    let kibibytes: u64 = text.trim_end_matches("kB").trim().parse().ok()?;
+    Some(kibibytes * 1024)
+}
+
+/// The value of the first line `key : value` in one of Linux's own files.
+fn field(file: &str, key: &str) -> Option<String> {
+    let text = fs::read_to_string(file).ok()?;
+    let line = text.lines().find(|line| line.starts_with(key))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+fn load_average() -> Option<String> {
+    let text = fs::read_to_string("/proc/loadavg").ok()?;
+    Some(text.split_whitespace().take(3).collect::<Vec<_>>().join(" "))
+}
+
+fn commit() -> Option<String> {
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git").args(arguments).output().ok()?;
+        let text = String::from_utf8(output.stdout).ok()?;
+        output.status.success().then(|| text.trim().to_owned())
+    };
+    let mut commit = git(&["rev-parse", "--short=12", "HEAD"])?;
+    if git(&["status", "--porcelain"]).is_none_or(|changes| !changes.is_empty()) {
+        commit.push('+');
+    }
+    Some(commit)
+}

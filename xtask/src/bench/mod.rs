@@ -1,0 +1,149 @@
+//! `cargo xtask bench`: measures, and writes down what it measured and where.
+//!
+//! One file per question asked: [`speed`] of building and tracing, [`trade`]
+//! of speed against accuracy, which [`builders`] pays when, the share of each
+//! stage of the [`pipeline`], and how [`peers`] compare.
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand};
+use serde::Serialize;
+use sim_gpu::gpu::AdapterRequest;
+use std::path::PathBuf;
+
+mod accuracy;
+mod bins;
+mod builders;
+mod clock;
+mod kernel;
+mod lanes;
+mod machine;
+mod moller_trumbore;
+mod peers;
+mod pipeline;
+mod scenes;
+mod shot;
+mod speed;
+mod subject;
+mod table;
+mod to_disk;
+mod trade;
+
+/// What to measure.
+#[derive(Args, Debug)]
+pub struct BenchArgs {
+    #[command(subcommand)]
+    what: Benchmark,
+}
+
+#[derive(Subcommand, Debug)]
+enum Benchmark {
+    /// Measure the simulator: building, casting, the whole way to disk.
+    Sim(SimArgs),
+}
+
+#[derive(Args, Debug)]
+struct SimArgs {
+    /// Meshes to measure besides the ones made by rule: a file or a folder.
+    meshes: Option<PathBuf>,
+    /// Measure this adapter only: `auto`, `cpu` or part of a name [default: all].
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Write everything measured to this file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Counted repeats of each measurement; the median is shown.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+    /// Sizes of the meshes made by rule, triangles.
+    #[arg(long, value_delimiter = ',', default_value = "1000,10000,100000,1000000")]
+    triangles: Vec<usize>,
+    /// Take at most this many of the meshes given, spread over their list.
+    #[arg(long, default_value_t = 16, value_name = "N")]
+    limit: usize,
+    /// Measure instead which builder pays for how many rays.
+    #[arg(long)]
+    builders: bool,
+    /// Measure instead against Embree, from a Python environment made from
+    /// PyPI under `target/peers`.
+    #[arg(long)]
+    peers: bool,
+    /// Measure instead what each knob trades of speed for accuracy.
+    #[arg(long)]
+    trade: bool,
+}
+
+/// Everything that a run measured.
+#[derive(Serialize)]
+struct Report {
+    machine: machine::Machine,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speed: Option<speed::Speed>,
+    /// Empty unless meshes were given.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pipeline: Vec<pipeline::Pipeline>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    datasets: Vec<to_disk::Dataset>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    builders: Option<builders::Ways>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peers: Option<peers::Comparison>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trade: Option<trade::Trade>,
+    peak_memory_bytes: Option<u64>,
+}
+
+/// Runs the benchmark that `args` ask for.
+///
+/// # Errors
+/// If no mesh can be read, an adapter fails or the report cannot be written.
+pub fn run(args: &BenchArgs) -> Result<()> {
+    let Benchmark::Sim(args) = &args.what;
+    let request: Option<AdapterRequest> = match &args.adapter {
+        Some(name) => Some(name.parse()?),
+        None => None,
+    };
+    let mut subjects = subject::tori(&args.triangles);
+    if let Some(meshes) = &args.meshes {
+        subjects.extend(subject::real(meshes, args.limit)?);
+    }
+    let mut report = Report {
+        machine: machine::Machine::here(),
+        speed: None,
+        pipeline: Vec::new(),
+        datasets: Vec::new(),
+        builders: None,
+        peers: None,
+        trade: None,
+        peak_memory_bytes: None,
+    };
+    let rounds = args.rounds.into();
+    if args.builders {
+        let measured = builders::measure(&subjects, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.builders = Some(measured);
+    } else if args.peers {
+        report.peers = peers::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
+        report.peers.iter().for_each(|measured| print!("{}", measured.table()));
+    } else if args.trade {
+        let measured = trade::measure(&lanes::open(request.as_ref())?, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.trade = Some(measured);
+    } else {
+        let lanes = lanes::open(request.as_ref())?;
+        let measured = speed::measure(&subjects, &lanes, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.speed = Some(measured);
+        if let Some(meshes) = &args.meshes {
+            report.pipeline = pipeline::measure(meshes, args.limit, &lanes, rounds)?;
+            print!("{}", pipeline::table(&report.pipeline));
+            report.datasets = to_disk::measure(meshes, args.limit, &lanes, rounds)?;
+            print!("{}", to_disk::table(&report.datasets));
+        }
+    }
+    report.peak_memory_bytes = machine::peak_memory_bytes();
+    if let Some(file) = &args.json {
+        let text = serde_json::to_string_pretty(&report)?;
+        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
+    }
+    Ok(())
+}

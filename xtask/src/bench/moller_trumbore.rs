@@ -1,0 +1,71 @@
+//! The common way of casting in f32, as a measure of what watertightness and
+//! accuracy cost: Möller and Trumbore, "Fast, minimum storage ray/triangle
+//! intersection", JGT 2(1), 1997, over the same tree, with a plain slab test.
+
+use glam::{Vec3, Vec3A};
+use sim_gpu::bvh::{Bvh, LeafTriangle, MAX_DEPTH};
+use sim_gpu::ray::TraceRay;
+
+/// Distance to the nearest triangle along `ray` from its origin, unit lengths;
+/// infinite if there is none.
+pub fn nearest(bvh: &Bvh, ray: &TraceRay) -> f32 {
+    let (origin, direction) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
+    let (corner, per_direction) = (Vec3A::from(origin), Vec3A::from(direction.recip()));
+    let mut nearest = f32::INFINITY;
+    let mut stack = [0u32; MAX_DEPTH + 1];
+    let mut height = 1;
+    while height > 0 {
+        height -= 1;
+        let node = &bvh.nodes[stack[height] as usize];
+        let enter = |low, high| enter(low, high, corner, per_direction, nearest);
+        let mut children = [
+            (enter(node.left_min, node.left_max), node.left, node.left_count),
+            (enter(node.right_min, node.right_max), node.right, node.right_count),
+        ];
+        if children[0].0 < children[1].0 {
+            children.swap(0, 1);
+        }
+        for (enters, first, count) in children {
+            if enters == f32::INFINITY {
+                continue;
+            }
+            if count == 0 {
+                stack[height] = first;
+                height += 1;
+                continue;
+            }
+            for triangle in &bvh.triangles[first as usize..(first + count) as usize] {
+                nearest = nearest.min(intersect(origin, direction, triangle));
+            }
+        }
+    }
+    nearest
+}
+
+fn enter(low: [f32; 3], high: [f32; 3], origin: Vec3A, per_direction: Vec3A, farthest: f32) -> f32 {
+    let t0 = (Vec3A::from_array(low) - origin) * per_direction;
+    let t1 = (Vec3A::from_array(high) - origin) * per_direction;
+    let near = t0.min(t1).max_element().max(0.0);
+    let far = t0.max(t1).min_element().min(farthest);
+    if near <= far { near } else { f32::INFINITY }
+}
+
+fn intersect(origin: Vec3, direction: Vec3, triangle: &LeafTriangle) -> f32 {
+    let [a, b, c] = [triangle.a, triangle.b, triangle.c].map(Vec3::from_array);
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant == 0.0 {
+        return f32::INFINITY;
+    }
+    let per_determinant = 1.0 / determinant;
+    let from_a = origin - a;
+    let u = from_a.dot(p) * per_determinant;
+    let q = from_a.cross(ab);
+    let v = direction.dot(q) * per_determinant;
+    if u < 0.0 || v < 0.0 || u + v > 1.0 {
+        return f32::INFINITY;
+    }
+    let t = ac.dot(q) * per_determinant;
+    if t >= 0.0 { t } else { f32::INFINITY }
+}

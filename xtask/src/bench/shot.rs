@@ -1,0 +1,126 @@
+//! Rays to be cast at one target, as a caster and as the oracle see them.
+
+use formats::rng::StreamKey;
+use glam::{DAffine3, DQuat, DVec3};
+use sim_gpu::caster::{Cast, CastJob, Culling};
+use sim_gpu::cpu::oracle;
+use sim_gpu::pose::Pose;
+use sim_gpu::ray::{AMBIGUOUS, MISS, Ray, RayFrame};
+use sim_gpu::sensor::BeamPattern;
+use sim_gpu::target::Target;
+use std::sync::Arc;
+
+/// Numbers the benchmark's own random streams.
+const SEED: u64 = 0x000E_D6E9;
+
+/// Rays against one target. Ray `i` of both lists is the same.
+#[derive(Clone)]
+pub struct Shot {
+    /// The rays as casters read them; beam `i` is number `i` of a sensor's
+    /// pattern, or simply of this list.
+    pub job: CastJob,
+    /// The rays in f64, in the target's unit frame.
+    pub rays: Vec<Ray>,
+}
+
+impl Shot {
+    /// One revolution or image of a sensor at `pose`.
+    pub fn sweep(
+        target: &Arc<Target>,
+        pose: &Pose,
+        pattern: &BeamPattern,
+        culling: Culling,
+    ) -> Self {
+        let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
+        let stream = StreamKey::new(SEED, "sweep", 0);
+        let job = CastJob::aim(Arc::clone(target), frame, pattern, culling, stream, 1.0);
+        let rays =
+            job.beams.iter().map(|&beam| frame.ray(pattern.directions[beam as usize])).collect();
+        Self { job, rays }
+    }
+
+    /// Rays from each of `origins` through each of `points`, all in the world.
+    pub fn through(target: &Arc<Target>, origins: &[DVec3], points: &[DVec3]) -> Self {
+        let pairs = origins.iter().flat_map(|&o| points.iter().map(move |&p| (o, p)));
+        Self::of(target, pairs)
+    }
+
+    /// `n` rays from random places 5 m away through random points of the unit
+    /// ball: hardly two of them traverse alike.
+    pub fn incoherent(target: &Arc<Target>, n: usize) -> Self {
+        const DISTANCE_M: f64 = 5.0;
+        let key = StreamKey::new(SEED, "incoherent", 0);
+        let on_sphere = |i: u64| {
+            let z = 2.0 * key.unit(i) - 1.0;
+            let (sin, cos) = (std::f64::consts::TAU * key.unit(i + 1)).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            DVec3::new(r * cos, r * sin, z)
+        };
+        let pairs = (0..n as u64).map(|i| {
+            let point = on_sphere(5 * i + 2) * key.unit(5 * i + 4).cbrt();
+            (on_sphere(5 * i) * DISTANCE_M, point)
+        });
+        Self::of(target, pairs)
+    }
+
+    fn of(target: &Arc<Target>, pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Self {
+        let surface = &target.surface;
+        let anywhere = Pose { position_m: DVec3::ZERO, world_from_sensor: DQuat::IDENTITY };
+        let frame = RayFrame::new(surface, &DAffine3::IDENTITY, &anywhere);
+        let rays: Vec<Ray> = pairs
+            .map(|(origin, point)| Ray {
+                origin: surface.frame.to_unit(origin),
+                direction: (point - origin).normalize() / surface.frame.scale,
+            })
+            .collect();
+        let job = CastJob {
+            target: Arc::clone(target),
+            frame,
+            beams: (0..rays.len() as u32).collect(),
+            rays: rays.iter().map(|ray| frame.trace_ray_unculled(ray, 0)).collect(),
+            stream: StreamKey::new(SEED, "points", 0),
+            reflectivity: 1.0,
+        };
+        Self { job, rays }
+    }
+
+    /// The same rays against another hierarchy over the same surface.
+    pub fn at(&self, target: &Arc<Target>) -> Self {
+        let job = CastJob { target: Arc::clone(target), ..self.job.clone() };
+        Self { job, rays: self.rays.clone() }
+    }
+
+    /// The same rays in the order of their beams: as the sensor fires them.
+    pub fn in_firing_order(&self) -> Self {
+        let mut order: Vec<usize> = (0..self.rays.len()).collect();
+        order.sort_unstable_by_key(|&i| self.job.beams[i]);
+        let mut shot = self.clone();
+        shot.rays = order.iter().map(|&i| self.rays[i]).collect();
+        shot.job.rays = order.iter().map(|&i| self.job.rays[i]).collect();
+        shot.job.beams = order.iter().map(|&i| self.job.beams[i]).collect();
+        shot
+    }
+
+    /// Each ray's origin and unit direction in the world, metres.
+    pub fn in_world(&self) -> impl Iterator<Item = (DVec3, DVec3)> {
+        let frame = self.job.target.surface.frame;
+        self.rays
+            .iter()
+            .map(move |ray| (ray.origin * frame.scale + frame.centre, ray.direction * frame.scale))
+    }
+
+    /// The ranges that follow from a caster's codes, in metres, as
+    /// `sim_gpu::resolve` finds them; `[n_rays]`.
+    pub fn ranges(&self, cast: &Cast) -> Vec<Option<f64>> {
+        let target = &self.job.target;
+        let range = |(ray, &code): (&Ray, &u32)| match code {
+            MISS => None,
+            code if code & AMBIGUOUS == 0 => oracle::range_to(target, ray, code),
+            code => match oracle::nearest(target, ray) {
+                Some(nearest) => Some(nearest.range_m),
+                None => oracle::range_to(target, ray, code & !AMBIGUOUS),
+            },
+        };
+        self.rays.iter().zip(&cast.codes).map(range).collect()
+    }
+}
