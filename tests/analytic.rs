@@ -71,7 +71,9 @@ fn poses(target: DVec3) -> Vec<Pose> {
     let mut random = Random::new("poses");
     [1.5, 3.0, 10.0, 50.0]
         .iter()
-        .map(|&distance| Pose::look_at(target + random.direction() * distance, target).unwrap())
+        .map(|&distance| {
+            Pose::look_at(target + random.direction() * distance, target).expect("two places")
+        })
         .collect()
 }
 

@@ -56,7 +56,7 @@ fn streams() -> Vec<StreamKey> {
 }
 
 fn words(caster: &sim_gpu::caster::Caster, job: &CastJob) -> Cast {
-    let mut casts = caster.cast(std::slice::from_ref(job)).unwrap();
+    let mut casts = caster.cast(std::slice::from_ref(job)).expect("the adapter casts");
     let cast = casts.remove(0);
     assert!(cast.codes.iter().all(|&code| code != MISS));
     cast

@@ -35,7 +35,7 @@ fn surfaces() -> Vec<(&'static str, Mesh)> {
 /// Sensors far, near and within.
 fn poses() -> Vec<Pose> {
     let from = [DVec3::new(5.0, 0.0, 0.5), DVec3::new(1.2, 1.1, 1.3), DVec3::new(0.1, -0.2, 0.05)];
-    from.iter().map(|&p| Pose::look_at(p, DVec3::ZERO).unwrap()).collect()
+    from.iter().map(|&p| Pose::look_at(p, DVec3::ZERO).expect("two places")).collect()
 }
 
 fn sensors() -> [BeamPattern; 2] {

@@ -37,7 +37,11 @@ fn view() -> Pose {
 
 fn survey_folder(root: &Path, every: usize) {
     let pattern = builtin("vlp32c");
-    let entries: Vec<_> = discover(root, 0).unwrap().into_iter().step_by(every).collect();
+    let entries: Vec<_> = discover(root, 0)
+        .expect("the shared data can be listed")
+        .into_iter()
+        .step_by(every)
+        .collect();
     let casters = casters(&Effects::default());
     let mut tallies: Vec<Tally> = casters.iter().map(|_| Tally::default()).collect();
     for entry in &entries {
@@ -72,7 +76,7 @@ impl Tally {
         pattern: &BeamPattern,
     ) {
         let start = Instant::now();
-        let casts = caster.cast(std::slice::from_ref(job)).unwrap();
+        let casts = caster.cast(std::slice::from_ref(job)).expect("the adapter casts");
         self.cast_s += start.elapsed().as_secs_f64();
         let start = Instant::now();
         let hits = resolve(job, &casts[0], pattern, &Effects::default());

@@ -63,17 +63,17 @@ fn root() -> PathBuf {
 }
 
 fn read(file: &str) -> String {
-    std::fs::read_to_string(root().join("shaders").join(file)).unwrap()
+    std::fs::read_to_string(root().join("shaders").join(file)).expect("a shader is text")
 }
 
 /// All files under `shaders`, by their path there.
 fn all_files() -> BTreeSet<String> {
     let mut files = BTreeSet::new();
     for folder in ["", "shared/", "effects/"] {
-        for entry in std::fs::read_dir(root().join("shaders").join(folder)).unwrap() {
-            let entry = entry.unwrap();
-            if entry.file_type().unwrap().is_file() {
-                files.insert(format!("{folder}{}", entry.file_name().to_str().unwrap()));
+        for entry in std::fs::read_dir(root().join("shaders").join(folder)).expect("a folder") {
+            let entry = entry.expect("a file");
+            if entry.file_type().expect("a file's type").is_file() {
+                files.insert(format!("{folder}{}", entry.file_name().display()));
             }
         }
     }

@@ -16,7 +16,7 @@ use sim_gpu::target::Target;
 use tests::adapter::casters;
 use tests::casting::{at, beams, hits, job, target};
 use tests::judge::judge;
-use tests::meshes::{cube, icosphere, mapped, unmerged};
+use tests::meshes::{cube, icosphere, mapped, tiled_cube, unmerged};
 use tests::random::Random;
 
 const SENSORS: usize = 20;
@@ -72,7 +72,7 @@ fn cast_from_inside(target: &Arc<Target>, expected: usize, effects: &Effects) {
         let pattern = aimed(target, sensor, &points);
         let job = job(target, &at(in_world(target, sensor)), &pattern);
         for caster in casters(effects) {
-            let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
+            let casts = caster.cast(std::slice::from_ref(&job)).expect("the adapter casts");
             // Before f64 has its say on any ray, and after.
             let misses = casts[0].codes.iter().filter(|&&code| code == MISS).count();
             let hits = resolve(&job, &casts[0], &pattern, effects);
@@ -102,6 +102,18 @@ fn no_ray_leaves_a_sphere_whose_triangles_share_no_vertex() {
 fn no_ray_leaves_a_cube() {
     // 8 corners; 12 edges and a diagonal on each of 6 faces.
     cast_from_inside(&target(&cube()), (8 + 18) * SENSORS, &Effects::default());
+}
+
+/// Squares of a third of a power of two: no coordinate is exact in f32, and
+/// flat boxes meet at every edge.
+#[test]
+fn no_ray_leaves_a_tiled_cube() {
+    let target = target(&tiled_cube(48));
+    // (48 + 1)^2 on 6 faces, shared along 12 edges and at 8 corners; edges by
+    // Euler's formula.
+    let vertices = 6 * 48 * 48 + 2;
+    let edges = vertices + 12 * 48 * 48 - 2;
+    cast_from_inside(&target, (vertices + edges) * SENSORS, &Effects::default());
 }
 
 #[test]

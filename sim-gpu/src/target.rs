@@ -40,7 +40,7 @@ impl UnitFrame {
 /// 1 for zero.
 fn power_of_two_above(x: f64) -> f64 {
     const LARGEST: f64 = f64::from_bits(0x7FE << 52);
-    if !(x >= f64::MIN_POSITIVE) {
+    if x.is_nan() || x < f64::MIN_POSITIVE {
         return 1.0;
     }
     let floor = f64::from_bits(x.to_bits() & (0x7FF << 52));

@@ -112,7 +112,7 @@ fn what_is_asked_for_is_there_and_nothing_else() {
     assert_eq!(read_scan(&scans.join("ball_0003_v1.ply")).unwrap().positions, npz.positions);
     let csv = std::fs::read_to_string(scans.join("ball_0003_v1.csv")).unwrap();
     assert_eq!(csv.lines().count(), npz.len() + 1);
-    let plain = crate::succeeds(folder.path(), "gen-dataset meshes --out plain --noise 0");
+    let plain = succeeds(folder.path(), "gen-dataset meshes --out plain --noise 0");
     assert!(plain.status.success());
     let scan = folder.path().join("plain/rotational/clean/ball/test/ball_0003_v1.npz");
     assert_eq!(read_scan(&scan).unwrap().columns().count(), 0);

@@ -81,6 +81,31 @@ pub fn cube() -> Mesh {
     cuboid(DVec3::NEG_ONE, DVec3::ONE)
 }
 
+/// The cube from -1 to 1, each face of `n` x `n` squares: boxes of its triangles
+/// are flat and touch without overlap.
+#[must_use]
+pub fn tiled_cube(n: u32) -> Mesh {
+    let at = |i: u32| f64::from(i) / f64::from(n) * 2.0 - 1.0;
+    let mut mesh = Mesh::default();
+    for face in 0..6usize {
+        let base = mesh.vertices.len() as u32;
+        let side = if face < 3 { -1.0 } else { 1.0 };
+        for i in 0..=n {
+            for j in 0..=n {
+                let mut v = [at(i), at(j), side];
+                v.rotate_right(face % 3);
+                mesh.vertices.push(DVec3::from_array(v));
+            }
+        }
+        let id = |i: u32, j: u32| base + i * (n + 1) + j;
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            mesh.triangles.push([id(i, j), id(i + 1, j), id(i + 1, j + 1)]);
+            mesh.triangles.push([id(i, j), id(i + 1, j + 1), id(i, j + 1)]);
+        }
+    }
+    mesh
+}
+
 /// A wavy torus about z, within 1.1 of the origin, of `2 n^2` triangles.
 #[must_use]
 pub fn torus(n: u32) -> Mesh {

@@ -69,7 +69,7 @@ impl FromStr for Shard {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (number, of) = text.split_once('/').ok_or("expected I/N, such as 1/4")?;
-        match (number.parse(), of.parse()) {
+        match (number.parse::<u32>(), of.parse::<u32>()) {
             (Ok(number), Ok(of)) if 1 <= number && number <= of => {
                 Ok(Self { number: number - 1, of })
             }
