@@ -36,7 +36,7 @@ fn failures() -> Vec<MeshFailure> {
 fn make(out: &Path) -> Manifest {
     let terms = terms(config(), None);
     let records = write(out, &terms, &entries());
-    finish(out, &terms, records, failures()).unwrap()
+    finish(out, &terms, records, failures()).expect("a dataset")
 }
 
 #[test]

@@ -24,7 +24,7 @@ fn failures() -> Vec<MeshFailure> {
 
 fn make(out: &Path, terms: &Terms, entries: &[Entry], failures: &[MeshFailure]) {
     let records = write(out, terms, entries);
-    finish(out, terms, records, failures.to_vec()).unwrap();
+    finish(out, terms, records, failures.to_vec()).expect("a dataset");
 }
 
 /// Three shards; the last has a class less, and all failures.
