@@ -35,7 +35,7 @@ fn a_folder_in_use_is_refused_unless_told_otherwise() {
     assert!(refused.contains("--resume") && refused.contains("--overwrite"), "{refused}");
     let other =
         exits(1, folder.path(), "gen-dataset meshes --out out --adapter cpu --resume --seed 9");
-    assert!(other.contains("seed was 0, now 9"), "{other}");
+    assert!(other.contains("config.seed: 0 against 9"), "{other}");
     std::fs::write(folder.path().join("out/mine.txt"), "mine").unwrap();
     succeeds(folder.path(), "gen-dataset meshes --out out --adapter cpu --overwrite --seed 9");
     assert!(folder.path().join("out/mine.txt").exists(), "what is not ours stays");

@@ -1,5 +1,7 @@
 //! The command line as a user meets it: the real binary, in folders of its own.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
 mod bad_input;
 mod datasets;
 mod interrupted;

@@ -5,7 +5,7 @@ use super::error::DatasetError;
 use super::journal::{Journal, Terms};
 use super::layout;
 use super::manifest::Manifest;
-use std::path::Path;
+use std::path::{Component, Path};
 
 /// What to do where the folder holds a dataset already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +77,12 @@ fn remove(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
     } else if let Ok(begun) = Journal::of(out).terms() {
         names.extend(layout::top_level(&begun.config));
     }
-    for path in names.iter().map(|name| out.join(name)) {
+    // What a damaged journal calls a set must not lead out of the folder.
+    let inside = |name: &&String| {
+        let mut parts = Path::new(name.as_str()).components();
+        matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
+    };
+    for path in names.iter().filter(inside).map(|name| out.join(name)) {
         let removed = if path.is_dir() {
             std::fs::remove_dir_all(&path)
         } else if path.exists() {

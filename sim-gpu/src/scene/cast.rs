@@ -72,7 +72,7 @@ fn place(object: &SceneObject) -> Result<Placed, MeshError> {
     let mut world_from_object = object.world_from_object();
     if normalize == Normalize::None {
         // The mesh keeps its own origin: undo the recentring.
-        world_from_object = world_from_object * DAffine3::from_translation(world.centre);
+        world_from_object *= DAffine3::from_translation(world.centre);
     }
     let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
     Ok(Placed { target: Arc::new(target), world_from_object })

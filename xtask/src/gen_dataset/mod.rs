@@ -9,6 +9,7 @@ use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, gen_shapes};
 use anyhow::Context;
 use settings::Settings;
+use sim_gpu::dataset::check_layouts;
 use sim_gpu::dataset::finish::finish;
 use sim_gpu::dataset::journal::Terms;
 use sim_gpu::dataset::manifest::Manifest;
@@ -18,6 +19,7 @@ use sim_gpu::dataset::start::{Begin, Start, begin};
 use sim_gpu::dataset::verify::verify;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::shapes;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
@@ -90,6 +92,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&meshes_folder));
     let meshes = shard(discover(&meshes_folder, config.seed)?, args.shard);
+    let classes: BTreeSet<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
+    check_layouts(&config, &Vec::from_iter(classes))?;
     let caster = args.caster.open(&config.cast_effects())?;
     let terms = Terms {
         version: env!("CARGO_PKG_VERSION").to_owned(),
