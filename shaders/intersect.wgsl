@@ -49,11 +49,17 @@ struct Candidate {
     hit: bool,
     t: f32,
     error: f32,
+    rival: f32,
 }
 
 // Rounding moves a triangle by at most this much against the ray, in unit
 // lengths: see `cpu/intersect.rs`.
 const DISPLACEMENT: f32 = 48.0 / 16777216.0;
+const STEEPEST: f32 = 573.0;
+
+fn within(edge: f32, x: f32, y: f32) -> bool {
+    return edge * edge <= DISPLACEMENT * DISPLACEMENT * (x * x + y * y);
+}
 
 fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
     let a = triangle.a - origin;
@@ -71,7 +77,7 @@ fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
     let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
     let determinant = u + v + w;
     if outside || determinant == 0.0 {
-        return Candidate(false, 0.0, 0.0);
+        return Candidate(false, 0.0, 0.0, NO_HIT);
     }
     let az = row(shear.z, a);
     let bz = row(shear.z, b);
@@ -82,5 +88,16 @@ fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
     let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
     let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
     let slope = (abs(slope_x) + abs(slope_y)) / abs(determinant);
-    return Candidate(t >= 0.0, t, DISPLACEMENT * (1.0 + slope));
+    let error = DISPLACEMENT * (1.0 + slope);
+    let near_edge = within(u, cx - bx, cy - by)
+        || within(v, cx - ax, cy - ay)
+        || within(w, bx - ax, by - ay);
+    // What the ray may truly meet: the neighbour, or nothing.
+    var rival = NO_HIT;
+    if near_edge {
+        rival = t - 2.0 * error - DISPLACEMENT * STEEPEST;
+    } else if t < error {
+        rival = t - error;
+    }
+    return Candidate(t + error >= 0.0, t, error, rival);
 }

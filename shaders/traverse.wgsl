@@ -35,7 +35,7 @@ fn consider(nearest: ptr<function, Nearest>, candidate: Candidate, leaf: u32, in
     let best = *nearest;
     let wins = candidate.t < best.t || (candidate.t == best.t && index < best.index);
     let loser = select(candidate.t - candidate.error, best.t - best.error, wins);
-    (*nearest).rival = min(best.rival, loser);
+    (*nearest).rival = min(min(best.rival, loser), candidate.rival);
     (*nearest).farthest = min(best.farthest, candidate.t + candidate.error);
     if wins {
         (*nearest).t = candidate.t;

@@ -20,6 +20,6 @@ struct Nearest {
     index: u32,
     // No surface that starts beyond this can be the nearest.
     farthest: f32,
-    // The lowest distance that another candidate may truly have.
+    // The lowest distance that another surface may truly have.
     rival: f32,
 }

@@ -17,4 +17,5 @@ pub mod resolve;
 pub mod scan;
 pub mod scene;
 pub mod sensor;
+pub mod shapes;
 pub mod target;

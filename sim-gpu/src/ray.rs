@@ -82,7 +82,7 @@ impl RayFrame {
             return everything;
         };
         let sine = self.radius / distance * stretch;
-        if !(sine < 1.0) {
+        if sine.is_nan() || sine >= 1.0 {
             return everything;
         }
         Cone { axis, half_angle_rad: sine.asin() }
@@ -96,7 +96,7 @@ impl RayFrame {
         let along = -ray.origin.dot(direction);
         let closest = ray.origin + direction * along;
         let half_chord_squared = self.radius * self.radius - closest.length_squared();
-        if !(half_chord_squared >= 0.0) {
+        if half_chord_squared.is_nan() || half_chord_squared < 0.0 {
             return None;
         }
         let half_chord = half_chord_squared.sqrt();

@@ -45,16 +45,13 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
         let ray = job.frame.ray(pattern.directions[beam as usize]);
         let found = cast.codes[i] & !AMBIGUOUS;
         let mut triangle = found;
-        let mut range_m = oracle::range_to(&job.target, &ray, found);
         if cast.codes[i] & AMBIGUOUS != 0 {
             resolved.decided_in_f64 += 1;
-            // Where f64 finds nothing the ray grazes a silhouette: the caster's
-            // answer stands.
-            if let Some(nearest) = oracle::nearest(&job.target, &ray) {
-                (triangle, range_m) = (nearest.index, Some(nearest.range_m));
-            }
+            let Some(nearest) = oracle::nearest(&job.target, &ray) else { continue };
+            triangle = nearest.index;
         }
-        let Some(range_m) = range_m else { continue };
+        // By the same formula whoever found the triangle.
+        let Some(range_m) = oracle::range_to(&job.target, &ray, triangle) else { continue };
         resolved.hits.push(Hit { beam, triangle, range_m });
         if triangle == found {
             resolved.words.extend(&cast.words[i * words_per_ray..(i + 1) * words_per_ray]);

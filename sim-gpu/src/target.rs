@@ -36,13 +36,15 @@ impl UnitFrame {
     }
 }
 
-/// The least power of two that is not below `x`; 1 for zero.
+/// The least power of two that is not below `x`, or the largest that f64 has;
+/// 1 for zero.
 fn power_of_two_above(x: f64) -> f64 {
-    if !(x >= f64::MIN_POSITIVE) {
+    const LARGEST: f64 = f64::from_bits(0x7FE << 52);
+    if x.is_nan() || x < f64::MIN_POSITIVE {
         return 1.0;
     }
     let floor = f64::from_bits(x.to_bits() & (0x7FF << 52));
-    if floor == x { floor } else { floor * 2.0 }
+    if floor == x { floor } else { (floor * 2.0).min(LARGEST) }
 }
 
 /// The surface of a mesh in its unit frame, in f64.

@@ -1,18 +1,92 @@
 //! The one command line of an Edgepuck workstation.
 
-use clap::Parser;
-
+mod adapters;
 mod bench;
+mod caster;
+mod gen_dataset;
+mod gen_shapes;
+mod merge_dataset;
+mod preview_scan;
+mod scan;
+mod test;
 
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Turns CAD meshes into realistic LiDAR training data.
 #[derive(Parser)]
-#[command(version, about)]
-enum Command {
-    /// Measure speed and accuracy.
-    Bench(bench::BenchArgs),
+#[command(name = "cargo xtask", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
 }
 
-fn main() -> anyhow::Result<()> {
-    match Command::parse() {
-        Command::Bench(args) => bench::run(&args),
+#[derive(Subcommand)]
+enum Command {
+    /// Scan a folder of meshes into a LiDAR dataset (without arguments: shapes of our own)
+    GenDataset(Box<gen_dataset::Args>),
+    /// Write the parametric shapes that gen-dataset uses by default as OFF files
+    GenShapes(gen_shapes::Args),
+    /// Scan one scene
+    Scan(scan::Args),
+    /// Draw a scan from the side, from above and from the front
+    Preview(preview_scan::Args),
+    /// List the adapters that can cast
+    Adapters,
+    /// Measure speed and accuracy
+    Bench(bench::BenchArgs),
+    /// Make one dataset of the shards of one
+    MergeDataset(merge_dataset::Args),
+    /// Install what tests need and run all of them
+    Test(test::Args),
+}
+
+/// How a command that ran to its end ended.
+enum Outcome {
+    /// All inputs were fine.
+    Success,
+    /// Some inputs failed and were named.
+    SomeFailed,
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::GenDataset(args) => gen_dataset::run(&args),
+        Command::GenShapes(args) => gen_shapes::run(&args),
+        Command::Scan(args) => scan::run(&args),
+        Command::Preview(args) => preview_scan::run(&args),
+        Command::Adapters => adapters::run(),
+        Command::Bench(args) => bench::run(&args).map(|()| Outcome::Success),
+        Command::MergeDataset(args) => merge_dataset::run(&args),
+        Command::Test(args) => test::run(&args),
+    };
+    match outcome {
+        Ok(Outcome::Success) => ExitCode::SUCCESS,
+        Ok(Outcome::SomeFailed) => ExitCode::from(1),
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+        }
     }
+}
+
+/// A command line that asks for something that cannot be.
+#[derive(Debug)]
+struct Usage(String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
+/// Whether whoever read our output has gone, which is no failure of ours.
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
+        .any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
 }

@@ -12,8 +12,13 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box of nothing. Finite, so that no ray arithmetic makes a NaN of it.
+    /// The box of nothing, for growing. A ray test that takes the corners in
+    /// any order hits it always: trees hold [`Bounds::NOWHERE`] instead.
     pub const EMPTY: Self = Self { min: Vec3A::splat(f32::MAX), max: Vec3A::splat(f32::MIN) };
+
+    /// A box that no ray hits: a point beyond all distances that casters know.
+    /// Finite, so that no ray arithmetic makes a NaN of it.
+    pub const NOWHERE: Self = Self { min: Vec3A::splat(f32::MAX), max: Vec3A::splat(f32::MAX) };
 
     /// The box of three corners.
     #[must_use]

@@ -54,13 +54,13 @@ pub(super) struct Child {
 
 impl Child {
     /// A child that no ray can hit, for trees of one leaf.
-    pub(super) const NONE: Self = Self { bounds: Bounds::EMPTY, first: 0, count: 1 };
+    pub(super) const NONE: Self = Self { bounds: Bounds::NOWHERE, first: 0, count: 1 };
 }
 
 impl Node {
     pub(super) fn new(left: Child, right: Child) -> Self {
         let padded = |child: Child| {
-            if child.bounds == Bounds::EMPTY {
+            if child.bounds == Bounds::NOWHERE {
                 child.bounds
             } else {
                 child.bounds.padded(BOX_PADDING)

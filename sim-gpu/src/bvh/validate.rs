@@ -19,7 +19,7 @@ pub fn assert_well_formed(bvh: &Bvh) {
         assert!(!visited[at], "node {at} is reached twice");
         visited[at] = true;
         for (bounds, first, count) in children(&bvh.nodes[at]) {
-            if bounds == Bounds::EMPTY {
+            if bounds == Bounds::NOWHERE {
                 continue;
             }
             if let Some(parent) = parent_box {

@@ -20,6 +20,9 @@ pub struct Crossing {
 /// Two triangles at exactly the same range: the lower index.
 #[must_use]
 pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
+    if target.surface.is_empty() {
+        return None;
+    }
     let shear = Shear::of(ray.direction);
     let per_direction = reciprocal(ray.direction);
     let mut best: Option<Crossing> = None;
@@ -57,10 +60,11 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
 
 /// The range at which `ray` meets the plane of triangle `index`, which a
 /// caster found it to hit; never outside the triangle's own extent along the
-/// ray, however grazing. `None` if all of it lies behind the sensor.
+/// ray, however grazing. `None` if all of it lies behind the sensor. The order
+/// of the triangle's corners has no say, to the last bit.
 #[must_use]
 pub fn range_to(target: &Target, ray: &Ray, index: u32) -> Option<f64> {
-    let corners = target.surface.corners(index);
+    let corners = canonical(target.surface.corners(index));
     let [a, b, c] = corners.map(|v| v - ray.origin);
     let normal = (b - a).cross(c - a);
     let length_squared = ray.direction.length_squared();

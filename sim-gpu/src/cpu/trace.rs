@@ -17,7 +17,10 @@ const TASK: usize = 2048;
 /// The code of each ray, on all cores. `[n_rays]`, in order.
 #[must_use]
 pub fn trace(nodes: &[Node], triangles: &[LeafTriangle], rays: &[TraceRay]) -> Vec<u32> {
-    let mut codes = vec![0; rays.len()];
+    let mut codes = vec![MISS; rays.len()];
+    if triangles.is_empty() {
+        return codes;
+    }
     codes.par_chunks_mut(TASK).zip(rays.par_chunks(TASK)).for_each(|(codes, rays)| {
         for (code, ray) in codes.iter_mut().zip(rays) {
             *code = traverse(nodes, triangles, ray).code(ray.skipped);

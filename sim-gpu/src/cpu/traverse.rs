@@ -5,7 +5,8 @@ use crate::bvh::{LeafTriangle, MAX_DEPTH, Node};
 use crate::ray::{AMBIGUOUS, MISS, TraceRay};
 use glam::{Vec3, Vec3A};
 
-const NO_HIT: f32 = 1e30;
+/// Beyond every distance, and finite.
+pub(super) const NO_HIT: f32 = 1e30;
 
 /// Directions closer to zero than this count as this: a reciprocal stays
 /// finite and boxes are padded by far more than a ray drifts by it.
@@ -29,7 +30,7 @@ pub struct Nearest {
     pub index: u32,
     /// No surface that starts beyond this can be the nearest.
     farthest: f32,
-    /// The lowest distance that another candidate may truly have.
+    /// The lowest distance that another surface may truly have.
     rival: f32,
 }
 
@@ -64,7 +65,7 @@ impl Nearest {
     fn consider(&mut self, candidate: Candidate, leaf: u32, index: u32) {
         let wins = candidate.t < self.t || (candidate.t == self.t && index < self.index);
         let loser = if wins { self.t - self.error } else { candidate.t - candidate.error };
-        self.rival = self.rival.min(loser);
+        self.rival = self.rival.min(loser).min(candidate.rival);
         self.farthest = self.farthest.min(candidate.t + candidate.error);
         if wins {
             (self.t, self.error) = (candidate.t, candidate.error);

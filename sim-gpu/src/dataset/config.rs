@@ -124,6 +124,17 @@ impl SetConfig {
     }
 }
 
+impl Layout {
+    /// The layout's name on the command line, and its folder.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Yanx27 => "yanx27",
+            Self::ModelnetH5 => "modelnet-h5",
+        }
+    }
+}
+
 impl Variant {
     /// The variant's folder.
     #[must_use]

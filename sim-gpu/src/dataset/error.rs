@@ -21,6 +21,26 @@ pub enum DatasetError {
         /// What it holds.
         what: &'static str,
     },
+    /// A run that was not finished.
+    #[error("{}: is not finished; continue it with --resume", path.display())]
+    Unfinished {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// No manifest where a finished dataset has one.
+    #[error("{}: is not there, so this is no finished dataset", path.display())]
+    NoManifest {
+        /// The manifest's place.
+        path: PathBuf,
+    },
+    /// A layout that cannot hold the dataset.
+    #[error("layout {layout}: {cause}")]
+    Layout {
+        /// The layout's name.
+        layout: &'static str,
+        /// Why.
+        cause: &'static str,
+    },
     /// An unfinished or finished run in the folder was another one.
     #[error("{}: was begun with other settings: {difference}", path.display())]
     Different {

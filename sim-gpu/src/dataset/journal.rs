@@ -76,17 +76,15 @@ impl Journal {
         write_json(&self.record_file(&record.entry), record)
     }
 
-    /// Removes the journal of a finished run.
+    /// Removes the journal of a finished run. If it is killed meanwhile, what
+    /// remains is no journal, and is removed when this is called again.
     ///
     /// # Errors
     /// If a file cannot be removed.
     pub fn remove(&self) -> Result<(), DatasetError> {
-        match std::fs::remove_dir_all(&self.folder) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(DatasetError::io(&self.folder, error))
-            }
-            _ => Ok(()),
-        }
+        let terms = self.terms_file();
+        unless_absent(&terms, std::fs::remove_file(&terms))?;
+        unless_absent(&self.folder, std::fs::remove_dir_all(&self.folder))
     }
 
     fn terms_file(&self) -> PathBuf {
@@ -115,4 +113,14 @@ pub(super) fn write_json<T: Serialize>(file: &Path, value: &T) -> Result<(), Dat
         out.write_all(b"\n")
     })?;
     Ok(())
+}
+
+/// The outcome of removing `path`, which need not have been there.
+pub(super) fn unless_absent(path: &Path, outcome: std::io::Result<()>) -> Result<(), DatasetError> {
+    match outcome {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(DatasetError::io(path, error))
+        }
+        _ => Ok(()),
+    }
 }

@@ -1,6 +1,6 @@
 //! Where everything lies in a dataset's folder.
 
-use super::config::{DatasetConfig, SetConfig, Variant};
+use super::config::{DatasetConfig, Layout, SetConfig, Variant};
 use super::record::Entry;
 use formats::Split;
 use formats::scan_file::ScanFormat;
@@ -22,6 +22,12 @@ pub fn failures(out: &Path) -> PathBuf {
 #[must_use]
 pub fn journal(out: &Path) -> PathBuf {
     out.join("journal")
+}
+
+/// The picture of an example.
+#[must_use]
+pub fn example(out: &Path) -> PathBuf {
+    out.join("example.png")
 }
 
 /// One scan's file.
@@ -47,18 +53,50 @@ pub fn packed_name(set: &SetConfig, variant: Variant) -> String {
     format!("{}-{}", set.name, variant.name())
 }
 
+/// The folder of packed files.
+#[must_use]
+pub fn packed_root(out: &Path) -> PathBuf {
+    out.join("packed")
+}
+
 /// One packed file.
 #[must_use]
 pub fn packed(out: &Path, set: &SetConfig, variant: Variant, split: Split) -> PathBuf {
-    out.join("packed").join(format!("{}-{}.npz", packed_name(set, variant), split.name()))
+    packed_root(out).join(format!("{}-{}.npz", packed_name(set, variant), split.name()))
+}
+
+/// The folder of other projects' layouts.
+#[must_use]
+pub fn foreign_root(out: &Path) -> PathBuf {
+    out.join("layouts")
+}
+
+/// A set's variant in another project's layout.
+#[must_use]
+pub fn foreign(out: &Path, layout: Layout, set: &SetConfig, variant: Variant) -> PathBuf {
+    foreign_root(out).join(layout.name()).join(packed_name(set, variant))
+}
+
+/// The names of the folders that a dataset of `config` may hold, which are
+/// all its own.
+#[must_use]
+pub fn folders(config: &DatasetConfig) -> Vec<String> {
+    let mut names: Vec<String> = config.sets.iter().map(|set| set.name.clone()).collect();
+    names.extend(["packed", "layouts", "journal"].map(String::from));
+    names
 }
 
 /// The top-level names that a dataset of `config` may hold.
 #[must_use]
 pub fn top_level(config: &DatasetConfig) -> Vec<String> {
-    let mut names: Vec<String> = config.sets.iter().map(|set| set.name.clone()).collect();
-    names.extend(
-        ["packed", "layouts", "journal", "manifest.json", "failures.jsonl"].map(String::from),
-    );
+    let mut names = folders(config);
+    names.extend(["manifest.json", "failures.jsonl", "example.png"].map(String::from));
     names
+}
+
+/// A relative path as manifests have it: with forward slashes.
+#[must_use]
+pub fn slashed(path: &Path) -> String {
+    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
+    parts.join("/")
 }

@@ -2,20 +2,32 @@
 //!
 //! [`config`] says what is wanted, [`pipeline`] makes the scans and keeps a
 //! [`journal`] so that a killed run can go on, [`finish`] packs them and
-//! writes the manifest.
+//! writes the manifest, which [`verify`] checks a dataset against. [`merge`]
+//! makes one dataset of parts.
 
 mod budget;
+mod clouds;
 pub mod config;
+pub mod difference;
 pub mod error;
+pub mod finish;
+mod foreign;
 pub mod journal;
 pub mod layout;
+pub mod manifest;
+pub mod merge;
+mod pack;
 pub mod pipeline;
 mod prepare;
 pub mod progress;
 pub mod record;
+pub mod start;
 mod under_way;
+pub mod verify;
 mod write;
 
 pub use config::{DatasetConfig, SetConfig, Variant, Viewpoints};
 pub use error::DatasetError;
+pub use foreign::check_layouts;
+pub use manifest::Manifest;
 pub use record::{Entry, MeshFailure, MeshRecord, ScanRecord, VariantRecord};

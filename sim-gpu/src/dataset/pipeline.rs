@@ -137,7 +137,7 @@ impl Shared<'_> {
             let Run { config, culling, progress, .. } = self.run;
             match prepare(mesh, config, &self.patterns, *culling, progress) {
                 Ok(prepared) => {
-                    if to_caster.send(Held { prepared, share }).is_err() {
+                    if to_caster.send(Held { prepared, _share: share }).is_err() {
                         return;
                     }
                 }

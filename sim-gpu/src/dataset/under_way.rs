@@ -15,7 +15,7 @@ pub struct Held<'b> {
     /// The mesh.
     pub prepared: Prepared,
     /// Given back once its scans are written.
-    pub share: Share<'b>,
+    pub _share: Share<'b>,
 }
 
 /// Meshes that are being cast at.

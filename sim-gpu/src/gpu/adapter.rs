@@ -115,7 +115,7 @@ pub(crate) fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
         kind: kind(info.device_type),
         backend: info.backend.to_string(),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
-        max_binding_bytes: adapter.limits().max_storage_buffer_binding_size.into(),
+        max_binding_bytes: adapter.limits().max_storage_buffer_binding_size,
         name: info.name,
     }
 }

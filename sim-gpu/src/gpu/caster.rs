@@ -274,3 +274,91 @@ fn pipeline(device: &wgpu::Device, modules: &[Module]) -> wgpu::ComputePipeline 
         cache: None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::Builder;
+    use crate::caster::Culling;
+    use crate::effects::{Dropout, Intensity, Noise, NoiseModel};
+    use crate::mesh::Mesh;
+    use crate::pose::Pose;
+    use crate::ray::RayFrame;
+    use crate::sensor::Sensor;
+    use crate::target::{Surface, Target};
+    use formats::rng::StreamKey;
+    use glam::{DAffine3, DVec3};
+
+    /// A caster of all effects, or one line if there is no adapter.
+    fn caster() -> Option<GpuCaster> {
+        let effects = Effects {
+            noise: Some(Noise { mean_m: 0.0, sigma_m: 1.0, model: NoiseModel::Xyz }),
+            dropout: Some(Dropout { probability: 0.5 }),
+            intensity: Some(Intensity),
+            quantum: None,
+        };
+        let required = std::env::var("EDGEPUCK_REQUIRE_ADAPTER").is_ok_and(|value| value == "1");
+        match adapter::find_adapter(None) {
+            Ok(adapter) => Some(GpuCaster::open(&adapter, &effects).unwrap()),
+            Err(error) => {
+                assert!(!required, "{error}");
+                println!("the GPU half did not run: {error}");
+                None
+            }
+        }
+    }
+
+    /// Pyramids of different sizes, each from its own side.
+    fn jobs() -> Vec<CastJob> {
+        let pattern = Sensor::builtin("generic-static").unwrap().pattern();
+        (1..6u32)
+            .map(|i| {
+                let vertices = vec![DVec3::X, DVec3::Y, DVec3::Z, -DVec3::ONE * f64::from(i)];
+                let triangles = vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]];
+                let surface = Surface::new(Mesh { vertices, triangles }, vec![0, 1, 2, 3]);
+                let position_m = DVec3::new(4.0, f64::from(i) - 3.0, 1.0) * f64::from(i);
+                let pose = Pose::look_at(position_m, DVec3::ZERO).unwrap();
+                let frame = RayFrame::new(&surface, &DAffine3::IDENTITY, &pose);
+                let target = Arc::new(Target::new(surface, Builder::Sah));
+                let stream = StreamKey::new(0, "pyramid", i);
+                CastJob::aim(target, frame, &pattern, Culling::Off, stream, 0.1 * i as f32)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn rays_cut_into_many_dispatches_answer_as_in_one() {
+        let Some(mut caster) = caster() else { return };
+        let jobs = jobs();
+        let whole = caster.submit(&jobs).unwrap().wait().unwrap();
+        assert_eq!(whole.iter().map(|cast| cast.codes.len()).sum::<usize>(), 50_000);
+        // Less than a workgroup, no multiple of one, less than a job, more.
+        for rays in [40, 1000, 6400, 25_001] {
+            Arc::get_mut(&mut caster.core).unwrap().limits.rays = rays;
+            let pending = caster.submit(&jobs).unwrap();
+            assert!(pending.dispatches.len() >= 50_000 / rays);
+            assert_eq!(pending.wait().unwrap(), whole, "{rays} rays a dispatch");
+        }
+    }
+
+    #[test]
+    fn targets_that_fill_a_binding_are_parted() {
+        let Some(mut caster) = caster() else { return };
+        let jobs = jobs();
+        let whole = caster.submit(&jobs).unwrap().wait().unwrap();
+        // Four triangles of 48 bytes each: room for two targets.
+        Arc::get_mut(&mut caster.core).unwrap().limits.binding_bytes = 2 * 4 * 48;
+        let pending = caster.submit(&jobs).unwrap();
+        assert_eq!(pending.dispatches.len(), 3);
+        assert_eq!(pending.wait().unwrap(), whole);
+    }
+
+    #[test]
+    fn a_target_beyond_a_binding_is_refused_by_name() {
+        let Some(mut caster) = caster() else { return };
+        Arc::get_mut(&mut caster.core).unwrap().limits.binding_bytes = 100;
+        let Err(error) = caster.submit(&jobs()) else { panic!("it was accepted") };
+        assert!(matches!(error, GpuError::TooLarge { binding_bytes: 100, .. }), "{error}");
+        assert!(error.to_string().contains(&caster.summary().name));
+    }
+}

@@ -127,7 +127,9 @@ impl Slot {
     pub(super) fn wait(&self, core: &Core) -> Result<(Vec<u32>, Vec<f32>), String> {
         let mapped = self.mapped.as_ref().ok_or("nothing was dispatched")?;
         core.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
-        while let Ok(result) = mapped.try_recv() {
+        // Another thread may be the one that runs the callbacks: this waits for
+        // it, until both ends of the channel were dropped.
+        for result in mapped {
             result.map_err(|error| error.to_string())?;
         }
         let [codes_bytes, words_bytes] = self.answer_bytes;

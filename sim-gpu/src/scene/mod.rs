@@ -1,5 +1,5 @@
 //! Scenes: which objects stand where, which sensors look at them, and which
-//! effects and attributes are wanted. Meshes are named here, not loaded.
+//! effects and attributes are wanted. [`cast`] loads the meshes and scans them.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,10 @@ use crate::mesh::frame::{Normalize, Up};
 use crate::pose::Pose;
 use crate::sensor::Sensor;
 
+mod cast;
 mod table;
+
+pub use cast::{SceneError, SceneScan, cast};
 
 #[cfg(test)]
 mod tests;

@@ -66,7 +66,12 @@ impl Views {
         (0..self.count).map(view).collect()
     }
 
-    pub(super) fn validate(&self) -> Result<(), InvalidValue> {
+    /// Checks all numbers.
+    ///
+    /// # Errors
+    ///
+    /// On the first number that is not finite or out of its bounds.
+    pub fn validate(&self) -> Result<(), InvalidValue> {
         if self.count > u32::from(u16::MAX) {
             return Err(InvalidValue::new("views.count", "more than 65535 views"));
         }

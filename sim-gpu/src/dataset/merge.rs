@@ -1,0 +1,184 @@
+//! One dataset from the parts that several machines made.
+
+use super::difference::difference;
+use super::error::DatasetError;
+use super::finish::complete;
+use super::journal::Journal;
+use super::layout;
+use super::manifest::Manifest;
+use super::record::Entry;
+use formats::atomic;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Merges `shards`, all parts of one dataset, into `out`, which must be empty
+/// or absent. Scans are hard-linked where the file system can, else copied;
+/// the result has the bytes of one run over all meshes.
+///
+/// On failure `out` is emptied again. A process that is killed leaves files,
+/// but no manifest that would make a dataset of them.
+///
+/// # Errors
+/// [`DatasetError::Shard`] where the shards do not make one dataset; a shard
+/// that is not finished; a file that cannot be read or written.
+pub fn merge(shards: &[PathBuf], out: &Path) -> Result<Manifest, DatasetError> {
+    let parts: Vec<Part> = shards.iter().map(|path| Part::read(path)).collect::<Result<_, _>>()?;
+    check_agreement(&parts)?;
+    check_numbers(&parts, out)?;
+    check_entries(&parts)?;
+    check_empty(out)?;
+    let merged = parts.iter().try_for_each(|part| link_scans(part, out));
+    let merged = merged.and_then(|()| complete(out, union(parts)));
+    if merged.is_err() {
+        // The first error is the one to tell; what is left has no manifest.
+        let _ = empty(out);
+    }
+    merged
+}
+
+/// A shard: which part of how many.
+struct Part {
+    path: PathBuf,
+    manifest: Manifest,
+    number: u32,
+    of: u32,
+}
+
+impl Part {
+    fn read(path: &Path) -> Result<Self, DatasetError> {
+        if Journal::of(path).exists() {
+            return Err(DatasetError::Unfinished { path: path.into() });
+        }
+        let manifest = Manifest::read(&layout::manifest(path))?;
+        let Some((number, of)) = manifest.shard else {
+            return Err(shard_error(path, "is no shard: it was made without --shard"));
+        };
+        Ok(Self { path: path.into(), manifest, number, of })
+    }
+}
+
+fn shard_error(path: &Path, cause: impl Into<String>) -> DatasetError {
+    DatasetError::Shard { path: path.into(), cause: cause.into() }
+}
+
+fn check_agreement(parts: &[Part]) -> Result<(), DatasetError> {
+    let ours = env!("CARGO_PKG_VERSION");
+    for part in parts {
+        let Part { path, manifest, of, .. } = part;
+        if manifest.version != ours {
+            let cause = format!("was made by version {}; this is {ours}", manifest.version);
+            return Err(shard_error(path, cause));
+        }
+        let first = &parts[0];
+        if *of != first.of {
+            let cause = format!("is one of {of}; {} is one of {}", first.path.display(), first.of);
+            return Err(shard_error(path, cause));
+        }
+        if let Some(difference) = difference(&manifest.config, &first.manifest.config) {
+            let cause = format!("differs from {}: {difference}", first.path.display());
+            return Err(shard_error(path, cause));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that each part is there exactly once.
+fn check_numbers(parts: &[Part], out: &Path) -> Result<(), DatasetError> {
+    let mut seen = BTreeMap::new();
+    for part in parts {
+        if let Some(first) = seen.insert(part.number, &part.path) {
+            let cause = format!("is the same part as {}", first.display());
+            return Err(shard_error(&part.path, cause));
+        }
+    }
+    let of = parts.first().map_or(1, |part| part.of);
+    match (0..of).find(|number| !seen.contains_key(number)) {
+        Some(number) => {
+            // The command line counts from 1.
+            Err(shard_error(out, format!("part {}/{of} is not among the shards", number + 1)))
+        }
+        None => Ok(()),
+    }
+}
+
+fn check_entries(parts: &[Part]) -> Result<(), DatasetError> {
+    let mut seen = BTreeMap::new();
+    for part in parts {
+        for entry in part.manifest.entries() {
+            if let Some(first) = seen.insert(entry, &part.path) {
+                let Entry { split, .. } = entry;
+                let cause = format!("{} ({split}) is also in {}", entry.id(), first.display());
+                return Err(shard_error(&part.path, cause));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_empty(out: &Path) -> Result<(), DatasetError> {
+    match fs::read_dir(out).map(|mut items| items.next().is_none()) {
+        Ok(true) => Ok(()),
+        Ok(false) => Err(shard_error(out, "holds files already; merge into an empty folder")),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(DatasetError::io(out, error)),
+    }
+}
+
+/// Puts all scans of one shard into `out`.
+fn link_scans(part: &Part, out: &Path) -> Result<(), DatasetError> {
+    part.manifest.meshes.par_iter().try_for_each(|mesh| {
+        for scan in &mesh.scans {
+            for written in &scan.variants {
+                for file in &written.files {
+                    let (entry, format) = (&mesh.entry, file.format);
+                    let place = |root: &Path| {
+                        layout::scan(root, &scan.set, written.variant, entry, scan.view, format)
+                    };
+                    link(&place(&part.path), &place(out))?;
+                }
+            }
+        }
+        Ok(())
+    })
+}
+
+fn link(from: &Path, to: &Path) -> Result<(), DatasetError> {
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder).map_err(|error| DatasetError::io(folder, error))?;
+    }
+    if fs::hard_link(from, to).is_ok() {
+        return Ok(());
+    }
+    let mut scan = File::open(from).map_err(|error| DatasetError::io(from, error))?;
+    Ok(atomic::write(to, |copy| io::copy(&mut scan, copy).map(|_| ()))?)
+}
+
+/// The manifest of one run, as far as the shards know it.
+fn union(parts: Vec<Part>) -> Manifest {
+    let mut manifests = parts.into_iter().map(|part| part.manifest);
+    let mut whole = manifests.next().expect("invariant: check_numbers wants one part at least");
+    whole.shard = None;
+    for manifest in manifests {
+        whole.adapters.extend(manifest.adapters);
+        whole.meshes.extend(manifest.meshes);
+        whole.failures.extend(manifest.failures);
+    }
+    whole.adapters.sort();
+    whole.adapters.dedup();
+    whole
+}
+
+fn empty(out: &Path) -> io::Result<()> {
+    for item in fs::read_dir(out)? {
+        let item = item?;
+        if item.file_type()?.is_dir() {
+            fs::remove_dir_all(item.path())?;
+        } else {
+            fs::remove_file(item.path())?;
+        }
+    }
+    Ok(())
+}

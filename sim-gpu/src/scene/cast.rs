@@ -1,0 +1,131 @@
+//! Scans a scene: every sensor against every object.
+
+use super::{Scene, SceneObject, SceneSensor};
+use crate::bvh::Builder;
+use crate::caster::{CastJob, Caster, Culling};
+use crate::config::InvalidValue;
+use crate::gpu::GpuError;
+use crate::mesh::census::survey;
+use crate::mesh::frame::{Normalize, to_world};
+use crate::mesh::{LoadedMesh, MeshError, load};
+use crate::ray::RayFrame;
+use crate::resolve::resolve;
+use crate::scan::{Seen, Tally, View, assemble};
+use crate::target::{Surface, Target};
+use formats::Scan;
+use formats::rng::StreamKey;
+use glam::DAffine3;
+use std::sync::Arc;
+
+/// Why a scene cannot be scanned.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// A mesh cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// An effect does not fit a sensor.
+    #[error(transparent)]
+    Invalid(#[from] InvalidValue),
+    /// The adapter failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// What one sensor saw.
+#[derive(Clone, Debug)]
+pub struct SceneScan {
+    /// The sensor's name.
+    pub sensor: String,
+    /// The points.
+    pub scan: Scan,
+    /// What became of the returns.
+    pub tally: Tally,
+}
+
+/// An object ready to be cast at.
+struct Placed {
+    target: Arc<Target>,
+    world_from_object: DAffine3,
+}
+
+/// One scan per sensor of `scene`. `caster` must have been opened for the
+/// scene's effects.
+///
+/// # Errors
+/// If a mesh cannot be read, an effect does not fit a sensor, or the adapter
+/// fails.
+pub fn cast(
+    scene: &Scene,
+    caster: &Caster,
+    culling: Culling,
+) -> Result<Vec<SceneScan>, SceneError> {
+    let objects = scene.objects.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+    let sensors = scene.sensors.iter().zip(0..);
+    sensors.map(|(sensor, i)| cast_sensor(scene, sensor, i, &objects, caster, culling)).collect()
+}
+
+fn place(object: &SceneObject) -> Result<Placed, MeshError> {
+    let LoadedMesh { mesh, format, .. } = load(&object.mesh)?;
+    let normalize = object.normalize.unwrap_or(Normalize::None);
+    let world = to_world(&mesh, object.up.unwrap_or(format.default_up()), normalize);
+    let kept = survey(&world.mesh).kept;
+    let mut world_from_object = object.world_from_object();
+    if normalize == Normalize::None {
+        // The mesh keeps its own origin: undo the recentring.
+        world_from_object = world_from_object * DAffine3::from_translation(world.centre);
+    }
+    let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
+    Ok(Placed { target: Arc::new(target), world_from_object })
+}
+
+fn cast_sensor(
+    scene: &Scene,
+    sensor: &SceneSensor,
+    number: u32,
+    objects: &[Placed],
+    caster: &Caster,
+    culling: Culling,
+) -> Result<SceneScan, SceneError> {
+    let pattern = sensor.sensor.pattern();
+    let effects = scene.effects.for_sensor(&sensor.sensor)?;
+    let aim = |(placed, object): (&Placed, &SceneObject)| {
+        let Placed { target, world_from_object } = placed;
+        let frame = RayFrame::new(&target.surface, world_from_object, &sensor.pose);
+        let stream = StreamKey::new(scene.seed, &object.name, number);
+        let reflectivity = object.reflectivity as f32;
+        CastJob::aim(Arc::clone(target), frame, &pattern, culling, stream, reflectivity)
+    };
+    let jobs: Vec<CastJob> = objects.iter().zip(&scene.objects).map(aim).collect();
+    let casts = if jobs.iter().all(|job| caster.fits(&job.target)) {
+        caster.cast(&jobs)?
+    } else {
+        caster.cast_on_cpu(&jobs)
+    };
+    let hits: Vec<_> = jobs
+        .iter()
+        .zip(&casts)
+        .map(|(job, cast)| resolve(job, cast, &pattern, &scene.effects))
+        .collect();
+    let seen: Vec<Seen> = objects
+        .iter()
+        .zip(jobs.iter().zip(&hits))
+        .zip(0..)
+        .map(|((placed, (job, hits)), object)| Seen {
+            object,
+            world_from_object: &placed.world_from_object,
+            job,
+            hits,
+        })
+        .collect();
+    let view = View {
+        sensor: &sensor.sensor,
+        pattern: &pattern,
+        pose: &sensor.pose,
+        cast_effects: &scene.effects,
+        effects: &effects,
+        attributes: &scene.attributes,
+        stream: StreamKey::new(scene.seed, &sensor.name, number),
+    };
+    let (scan, tally) = assemble(&view, &seen);
+    Ok(SceneScan { sensor: sensor.name.clone(), scan, tally })
+}

@@ -1,0 +1,82 @@
+//! An airplane's body.
+
+use glam::{DVec2, DVec3};
+
+use super::super::builder::Builder;
+use super::super::primitives::loft::{Caps, loft};
+use super::super::primitives::outline;
+
+/// A body from its nose at y = -length / 2 to its tail at y = length / 2.
+#[derive(Clone, Copy, Debug)]
+pub struct Fuselage {
+    /// Length from nose to tail.
+    pub length_m: f64,
+    /// Length over diameter.
+    pub slender: f64,
+    /// Share of the length in which the nose widens.
+    pub nose: f64,
+    /// Share of the length in which the tail narrows.
+    pub tail: f64,
+    /// How far the tail's end is raised, over the radius.
+    pub upsweep: f64,
+}
+
+impl Fuselage {
+    /// The largest radius.
+    pub fn radius_m(&self) -> f64 {
+        0.5 * self.length_m / self.slender
+    }
+
+    /// The foremost point.
+    pub fn nose(&self) -> DVec3 {
+        DVec3::new(0.0, -0.5 * self.length_m, 0.0)
+    }
+
+    /// The middle of the section at this share of the length from the nose.
+    pub fn spine(&self, share: f64) -> DVec3 {
+        let rise = self.upsweep * self.radius_m() * self.along_tail(share).powi(2);
+        DVec3::new(0.0, (share - 0.5) * self.length_m, rise)
+    }
+
+    /// 0 ahead of the tail, 1 at its end.
+    fn along_tail(&self, share: f64) -> f64 {
+        ((share - 1.0 + self.tail) / self.tail).max(0.0)
+    }
+
+    /// The radius at this share of the length: an ellipse's quarter at the
+    /// nose, then a cylinder, then a parabola to a quarter of it.
+    fn radius_at(&self, share: f64) -> f64 {
+        let ahead = (1.0 - share / self.nose).max(0.0);
+        let nose = (1.0 - ahead * ahead).max(0.0).sqrt().max(0.06);
+        let tail = 1.0 - 0.8 * self.along_tail(share).powf(1.4);
+        self.radius_m() * nose * tail
+    }
+
+    /// Adds the body.
+    pub fn build(&self, b: &mut Builder) {
+        let n_around = b.around(self.radius_m(), 10);
+        let n_nose = b.curved(self.nose * self.length_m, 4);
+        let n_middle = b.straight((1.0 - self.nose - self.tail) * self.length_m);
+        let n_tail = b.curved(self.tail * self.length_m, 4);
+        // Squares crowd the nose's sections where it is blunt.
+        let nose = (0..n_nose).map(|k| self.nose * (k as f64 / n_nose as f64).powi(2));
+        let middle = spread(self.nose, 1.0 - self.tail, n_middle);
+        let tail = spread(1.0 - self.tail, 1.0, n_tail).chain([1.0]);
+        let circle = outline::ellipse(DVec2::ONE, n_around);
+        let sections: Vec<Vec<DVec3>> = nose
+            .chain(middle)
+            .chain(tail)
+            .map(|share| {
+                let (centre, radius) = (self.spine(share), self.radius_at(share));
+                // Counter-clockwise about +y: x mirrored.
+                circle.iter().map(|p| centre + radius * DVec3::new(-p.x, 0.0, p.y)).collect()
+            })
+            .collect();
+        loft(b, &sections, Caps::BOTH);
+    }
+}
+
+/// `n` numbers from `low` (included) to `high` (not).
+fn spread(low: f64, high: f64, n: usize) -> impl Iterator<Item = f64> {
+    (0..n).map(move |k| low + (high - low) * k as f64 / n as f64)
+}

@@ -1,0 +1,68 @@
+//! Wings, stabilizers, fins.
+
+use glam::{DAffine3, DVec3};
+
+use super::super::builder::Builder;
+use super::super::primitives::loft::{Caps, loft};
+use super::super::primitives::outline;
+
+/// A pair of wings. Slopes are per metre of span.
+#[derive(Clone, Copy, Debug)]
+pub struct Wing {
+    /// The leading edge at the plane of symmetry.
+    pub root: DVec3,
+    /// From the plane of symmetry to the tip.
+    pub half_span_m: f64,
+    /// Chord at the plane of symmetry.
+    pub root_chord_m: f64,
+    /// Chord at the tip over that at the root.
+    pub taper: f64,
+    /// How far the leading edge falls back.
+    pub sweep: f64,
+    /// How far the wing rises.
+    pub dihedral: f64,
+    /// Thickness over chord.
+    pub thickness: f64,
+}
+
+impl Wing {
+    /// The leading edge of the right wing at this share of the half span.
+    pub fn leading_edge(&self, share: f64) -> DVec3 {
+        let out_m = share * self.half_span_m;
+        self.root + DVec3::new(1.0, self.sweep, self.dihedral) * out_m
+    }
+
+    /// The chord at this share of the half span.
+    pub fn chord_m(&self, share: f64) -> f64 {
+        self.root_chord_m * (1.0 + share * (self.taper - 1.0))
+    }
+
+    /// Adds both wings.
+    pub fn build(&self, b: &mut Builder) {
+        let section = outline::airfoil(self.thickness, b.curved(self.root_chord_m, 4));
+        let ends = [0.0, 1.0].map(|share| {
+            let (nose, chord) = (self.leading_edge(share), self.chord_m(share));
+            section.iter().map(|p| nose + chord * DVec3::new(0.0, p.x, p.y)).collect()
+        });
+        b.mirrored(|b| loft(b, &ends, Caps { start: false, end: true }));
+    }
+
+    /// Adds small fins at both tips.
+    pub fn winglets(&self, b: &mut Builder, high_m: f64) {
+        let chord = self.chord_m(1.0);
+        let tip = self.leading_edge(1.0);
+        b.mirrored(|b| fin(b, tip, high_m, chord, 0.7));
+    }
+}
+
+/// An upright fin whose leading edge starts at `root` and falls back by
+/// `sweep` a metre of height.
+pub fn fin(b: &mut Builder, root: DVec3, high_m: f64, chord_m: f64, sweep: f64) {
+    let section = outline::airfoil(0.09, b.curved(chord_m, 4));
+    let ends = [(0.0, chord_m), (high_m, 0.5 * chord_m)].map(|(up, chord)| {
+        section.iter().map(|p| DVec3::new(chord * p.y, sweep * up + chord * p.x, up)).collect()
+    });
+    // (y, x) as (x, y) runs clockwise; mirrored, it looks outwards.
+    let frame = DAffine3::from_translation(root) * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+    b.place(frame, |b| loft(b, &ends, Caps { start: false, end: true }));
+}

@@ -1,0 +1,102 @@
+//! Bowls.
+
+use glam::DVec3;
+
+use super::builder::Builder;
+use super::primitives::revolve::{Profile, Section};
+use super::primitives::spline::smooth;
+use super::primitives::sweep::tube;
+use super::primitives::vessel::{Vessel, Wall};
+use super::sampler::Sampler;
+
+/// The outline of a bowl.
+#[derive(Clone, Copy)]
+enum Kind {
+    Round,
+    Conical,
+    Flared,
+    Closing,
+}
+
+/// Builds a bowl; deep ones have a cup's or a vase's proportions.
+pub fn build(b: &mut Builder, s: &mut Sampler) {
+    let rim_m = s.log_uniform(0.05, 0.2);
+    let height_m = rim_m * s.log_uniform(0.3, 1.5);
+    let foot_m = rim_m * s.uniform(0.25, 0.65);
+    let ring_m = if s.chance(0.45) { height_m * s.uniform(0.05, 0.35) } else { 0.0 };
+    let outside = outside(s, [rim_m, foot_m], [height_m, ring_m]);
+    let mut vessel = Vessel::new(outside, Wall::draw(s, rim_m), section(s));
+    vessel.hollow_from_m = ring_m;
+    vessel.build(b);
+    if matches!(vessel.section, Section::Round) && s.chance(0.15) {
+        lugs(b, s, rim_m, height_m);
+    }
+}
+
+fn section(s: &mut Sampler) -> Section {
+    let round = Section::Round;
+    let oval = Section::Oval(s.uniform(0.55, 0.9));
+    let square = Section::Square(s.uniform(3.0, 7.0));
+    let polygon = Section::Polygon(s.count(6, 10));
+    let fluted = Section::Fluted { count: s.count(8, 20), depth: s.uniform(0.02, 0.06) };
+    s.pick(&[round, round, round, round, round, round, oval, square, polygon, fluted])
+}
+
+/// The outside, from radii at the rim and the foot, and the heights of the
+/// rim and of the ring it stands on.
+fn outside(s: &mut Sampler, [rim_m, foot_m]: [f64; 2], [height_m, ring_m]: [f64; 2]) -> Profile {
+    let ring_foot_m = foot_m * s.uniform(0.9, 1.3);
+    let kind = s.pick(&[
+        Kind::Round,
+        Kind::Round,
+        Kind::Round,
+        Kind::Conical,
+        Kind::Flared,
+        Kind::Closing,
+    ]);
+    let depth_m = height_m - ring_m;
+    let at = |share: f64| ring_m + share * depth_m;
+    let mut profile = Profile::from(0.0, 0.0);
+    if ring_m > 0.0 {
+        profile = profile.line(ring_foot_m, 0.0);
+    }
+    let profile = profile.line(foot_m, ring_m);
+    let between = |share: f64| foot_m + share * (rim_m - foot_m);
+    match kind {
+        Kind::Conical => profile.line(rim_m, height_m),
+        Kind::Flared => {
+            profile.curve(&[(between(0.45), at(0.25)), (between(0.6), at(0.75)), (rim_m, height_m)])
+        }
+        Kind::Closing => {
+            let profile = profile.curve(&[
+                (between(0.75), at(0.25)),
+                (rim_m, at(0.6)),
+                (0.85 * rim_m, height_m),
+            ]);
+            if s.chance(0.4) { profile.line(0.95 * rim_m, 1.03 * height_m) } else { profile }
+        }
+        Kind::Round => {
+            let profile = profile.curve(&[
+                (between(0.55), at(0.17)),
+                (between(0.87), at(0.52)),
+                (rim_m, height_m),
+            ]);
+            if s.chance(0.3) { profile.line(1.15 * rim_m, 1.01 * height_m) } else { profile }
+        }
+    }
+}
+
+/// Two small handles at the rim.
+fn lugs(b: &mut Builder, s: &mut Sampler, rim_m: f64, height_m: f64) {
+    let out_m = rim_m * s.uniform(1.2, 1.4);
+    let side_m = 0.3 * rim_m;
+    let z = 0.85 * height_m;
+    let points = [
+        DVec3::new(0.8 * rim_m, -side_m, z),
+        DVec3::new(out_m, -0.6 * side_m, z),
+        DVec3::new(out_m, 0.6 * side_m, z),
+        DVec3::new(0.8 * rim_m, side_m, z),
+    ];
+    let path = smooth(b, &points, 3);
+    b.mirrored(|b| tube(b, &path, 0.06 * rim_m));
+}

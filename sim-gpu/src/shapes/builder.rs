@@ -1,0 +1,148 @@
+//! Collects the surfaces of a shape at one fineness of tessellation.
+
+use glam::{DAffine3, DVec3};
+
+use crate::mesh::Mesh;
+
+/// A mesh under construction.
+///
+/// Primitives ask it how finely to divide and hand it grids of points, which
+/// it places by the current placement.
+#[derive(Clone, Debug)]
+pub struct Builder {
+    mesh: Mesh,
+    parts: Vec<usize>,
+    edge_m: f64,
+    flat_edge_m: f64,
+    placement: DAffine3,
+}
+
+impl Builder {
+    /// Starts empty. Curved surfaces get edges of about `edge_m`, flat ones of
+    /// `edge_m * flat_ratio`; infinity gives the coarsest mesh there is.
+    pub fn new(edge_m: f64, flat_ratio: f64) -> Self {
+        Self {
+            mesh: Mesh::default(),
+            parts: Vec::new(),
+            edge_m,
+            flat_edge_m: edge_m * flat_ratio,
+            placement: DAffine3::IDENTITY,
+        }
+    }
+
+    /// How many triangles there are so far.
+    pub fn n_triangles(&self) -> usize {
+        self.mesh.triangles.len()
+    }
+
+    /// What was built so far.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// The mesh, and the index of the first triangle of each of its parts.
+    pub fn finish(self) -> (Mesh, Vec<usize>) {
+        (self.mesh, self.parts)
+    }
+
+    /// Runs `build` in the frame that `frame` places in the present one.
+    pub fn place(&mut self, frame: DAffine3, build: impl FnOnce(&mut Self)) {
+        let outer = self.placement;
+        self.placement = outer * frame;
+        build(self);
+        self.placement = outer;
+    }
+
+    /// Runs `build` as it is and once more mirrored at the plane x = 0.
+    pub fn mirrored(&mut self, build: impl Fn(&mut Self)) {
+        build(self);
+        self.place(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)), build);
+    }
+
+    /// Segments for a circle of `radius_m`, at least `least`.
+    pub fn around(&self, radius_m: f64, least: usize) -> usize {
+        self.curved(std::f64::consts::TAU * radius_m, least)
+    }
+
+    /// Segments for a curve of `length_m`, at least `least`.
+    pub fn curved(&self, length_m: f64, least: usize) -> usize {
+        ((length_m / self.edge_m).round() as usize).max(least)
+    }
+
+    /// Segments for a straight edge of `length_m`, at least one.
+    pub fn straight(&self, length_m: f64) -> usize {
+        ((length_m / self.flat_edge_m).round() as usize).max(1)
+    }
+
+    /// Adds the surface through rows of points as a part of its own.
+    ///
+    /// Rows hold the same number of points, or one (a pole). `wrap` joins the
+    /// last point of each row to its first. Front faces look along
+    /// (direction in a row) x (direction from row to row).
+    pub fn grid(&mut self, rows: &[Vec<DVec3>], wrap: bool) {
+        self.parts.push(self.mesh.triangles.len());
+        let mut below: Option<(u32, u32)> = None;
+        for row in rows {
+            let start = self.mesh.vertices.len() as u32;
+            let len = row.len() as u32;
+            let placement = self.placement;
+            self.mesh.vertices.extend(row.iter().map(|&p| placement.transform_point3(p)));
+            if let Some(below) = below {
+                self.join(below, (start, len), wrap);
+            }
+            below = Some((start, len));
+        }
+    }
+
+    /// Joins two rows, each given as (first vertex, length).
+    fn join(&mut self, below: (u32, u32), above: (u32, u32), wrap: bool) {
+        let longest = below.1.max(above.1);
+        let columns = if wrap { longest } else { longest - 1 };
+        let vertex = |row: (u32, u32), column: u32| row.0 + column % row.1;
+        for c in 0..columns {
+            let [a, b] = [vertex(below, c), vertex(below, c + 1)];
+            let [d, e] = [vertex(above, c), vertex(above, c + 1)];
+            if a != b {
+                self.mesh.triangles.push([a, b, e]);
+            }
+            if d != e {
+                self.mesh.triangles.push([a, e, d]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pole_makes_a_fan_and_a_wrapped_row_closes() {
+        let ring: Vec<DVec3> = (0..5)
+            .map(|k| (f64::from(k) * std::f64::consts::TAU / 5.0).sin_cos())
+            .map(|(y, x)| DVec3::new(x, y, 0.0))
+            .collect();
+        let mut builder = Builder::new(1.0, 1.0);
+        builder.grid(&[ring, vec![DVec3::Z]], true);
+        let (mesh, parts) = builder.finish();
+        assert_eq!(mesh.triangles, [[0, 1, 5], [1, 2, 5], [2, 3, 5], [3, 4, 5], [4, 0, 5]]);
+        assert_eq!(parts, [0]);
+    }
+
+    #[test]
+    fn infinite_edges_give_the_least_number_of_segments() {
+        let coarse = Builder::new(f64::INFINITY, 2.0);
+        assert_eq!([coarse.around(1.0, 7), coarse.straight(9.0)], [7, 1]);
+    }
+
+    #[test]
+    fn mirroring_adds_the_same_part_on_the_other_side() {
+        let mut builder = Builder::new(1.0, 1.0);
+        builder.mirrored(|b| {
+            b.grid(&[vec![DVec3::X, DVec3::X * 2.0], vec![DVec3::new(1.0, 1.0, 0.0)]], false);
+        });
+        let (mesh, _) = builder.finish();
+        assert_eq!(mesh.vertices[4], DVec3::new(-2.0, 0.0, 0.0));
+        assert_eq!(mesh.triangles.len(), 2);
+    }
+}

@@ -1,0 +1,197 @@
+//! Monitors and televisions.
+
+mod screen;
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use super::builder::Builder;
+use super::class::Make;
+use super::primitives::block::block;
+use super::primitives::loft::{Caps, loft, prism};
+use super::primitives::outline;
+use super::primitives::revolve::cylinder;
+use super::primitives::sheet::sheet;
+use super::primitives::sweep::{bar, rod};
+use super::sampler::Sampler;
+use screen::Screen;
+
+/// What a flat screen stands on.
+#[derive(Clone, Copy)]
+enum Stand {
+    Disc,
+    Plate,
+    Feet,
+    BentSheet,
+    Wedge,
+    /// Screens for the wall.
+    Nothing,
+}
+
+/// The makes, some of them more frequent.
+const MAKES: [Make; 7] = [flat, flat, flat, flat, tube_monitor, tube_monitor, pair];
+
+/// Builds a monitor.
+pub fn build(b: &mut Builder, s: &mut Sampler) {
+    s.pick(&MAKES)(b, s);
+}
+
+/// One flat screen on a stand of some kind.
+fn flat(b: &mut Builder, s: &mut Sampler) {
+    let screen = Screen::draw(s);
+    let gap_m = screen.height_m * s.uniform(0.08, 0.4);
+    let middle_m = gap_m + 0.5 * screen.height_m;
+    let tilt_rad = if s.chance(0.5) { s.uniform(-0.25, 0.0) } else { 0.0 };
+    stand(b, s, &screen, gap_m);
+    let frame =
+        DAffine3::from_translation(middle_m * DVec3::Z) * DAffine3::from_rotation_y(tilt_rad);
+    b.place(frame, |b| screen.build(b, s));
+}
+
+fn stand(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64) {
+    let stand = s.pick(&[
+        Stand::Disc,
+        Stand::Disc,
+        Stand::Plate,
+        Stand::Plate,
+        Stand::Feet,
+        Stand::BentSheet,
+        Stand::Wedge,
+        Stand::Nothing,
+    ]);
+    let foot = DVec2::new(0.35 * screen.height_m, screen.width_m * s.uniform(0.2, 0.35));
+    let thick_m = 0.03 * screen.height_m;
+    match stand {
+        Stand::Disc => {
+            let oval = outline::ellipse(foot * DVec2::new(0.7, 0.8), b.around(foot.y, 16));
+            prism(b, &oval, 0.0, thick_m, 0.9);
+            neck(b, s, screen, gap_m);
+        }
+        Stand::Plate => {
+            block(b, 0.5 * thick_m * DVec3::Z, DVec3::new(1.2 * foot.x, 1.5 * foot.y, thick_m));
+            neck(b, s, screen, gap_m);
+        }
+        Stand::Feet => feet(b, screen, gap_m, foot),
+        Stand::BentSheet => bent_foot(b, screen, gap_m, foot),
+        Stand::Wedge => wedge(b, screen, gap_m, foot),
+        Stand::Nothing => {}
+    }
+}
+
+/// A round or flat neck from the foot to the back of the screen.
+fn neck(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64) {
+    let top_m = gap_m + screen.height_m * s.uniform(0.1, 0.5);
+    let back_m = -0.5 * screen.depth_m - 0.02 * screen.height_m;
+    let wide_m = screen.width_m * s.uniform(0.05, 0.2);
+    let thick_m = screen.height_m * s.uniform(0.03, 0.07);
+    let top = DVec3::new(back_m, 0.0, top_m);
+    if s.chance(0.4) {
+        rod(b, DVec3::new(back_m, 0.0, 0.0), top, [0.6 * thick_m; 2]);
+    } else {
+        bar(b, DVec3::new(back_m - 0.05 * screen.height_m, 0.0, 0.0), top, wide_m, thick_m);
+    }
+    let deep_m = 0.04 * screen.height_m + screen.depth_m;
+    block(b, top, DVec3::new(deep_m, 1.2 * wide_m, 2.0 * thick_m));
+}
+
+/// Two splayed feet near the ends, as under a television.
+fn feet(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
+    let wide_m = 0.03 * screen.width_m;
+    for side in [-1.0, 1.0] {
+        let y = side * 0.35 * screen.width_m;
+        let top = DVec3::new(0.0, y, gap_m + 0.02 * screen.height_m);
+        for reach in [-1.0, 1.0] {
+            let tip = DVec3::new(reach * foot.x, y + side * 0.02, 0.5 * wide_m);
+            bar(b, tip, top, wide_m, wide_m);
+        }
+    }
+}
+
+/// One bent sheet of metal: foot, bow and back support.
+fn bent_foot(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
+    let half_m = 0.6 * foot.y;
+    let top_m = gap_m + 0.4 * screen.height_m;
+    let back_m = -0.5 * screen.depth_m;
+    let thick_m = 0.015 * screen.height_m;
+    let path = [(foot.x, 0.0), (-0.5 * foot.x, 0.0), (back_m, top_m)];
+    for pair in path.windows(2) {
+        let at = |(x, z): (f64, f64)| DVec3::new(x, 0.0, z + thick_m);
+        bar(b, at(pair[0]), at(pair[1]), 2.0 * half_m, thick_m);
+    }
+}
+
+/// A solid foot that narrows upwards.
+fn wedge(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
+    let low = outline::rectangle(DVec2::new(0.6 * foot.x, foot.y));
+    let high = outline::rectangle(DVec2::new(0.5 * screen.depth_m, 0.5 * foot.y));
+    let top_m = gap_m + 0.05 * screen.height_m;
+    let sections = [outline::at_height(&low, 0.0), outline::at_height(&high, top_m)];
+    loft(b, &sections, Caps::BOTH);
+}
+
+/// A deep housing that narrows to the back, on a swivel foot.
+fn tube_monitor(b: &mut Builder, s: &mut Sampler) {
+    let width_m = s.uniform(0.32, 0.6);
+    let height_m = width_m * s.uniform(0.75, 0.95);
+    let depth_m = width_m * s.uniform(0.6, 1.05);
+    let front_m = depth_m * s.uniform(0.12, 0.35);
+    let back = s.uniform(0.45, 0.75);
+    let foot_m = height_m * s.uniform(0.05, 0.15);
+    cylinder(b, DVec3::ZERO, 0.3 * width_m, 0.5 * foot_m);
+    // The column ends inside the housing, wherever its underside is there.
+    cylinder(b, 0.4 * foot_m * DVec3::Z, 0.15 * width_m, 0.6 * foot_m + 0.4 * height_m);
+    let half = DVec2::new(0.5 * height_m, 0.5 * width_m);
+    let section = |x: f64, scale: f64| -> Vec<DVec3> {
+        let outline = outline::rounded_rectangle(half * scale, 0.08 * height_m * scale, 2);
+        // The outline's x runs down, so that it is counter-clockwise about +x.
+        outline.iter().map(|p| DVec3::new(x, p.y, foot_m + half.x - p.x)).collect()
+    };
+    let waist = 0.5 * (1.0 + back);
+    let sections = [
+        section(-depth_m, 0.9 * back),
+        section(-0.85 * depth_m, back),
+        section(-front_m - 0.05 * depth_m, waist),
+        section(-front_m, 1.0),
+        section(0.0, 1.0),
+        section(0.0, 0.86),
+        section(-0.03 * depth_m, 0.82),
+    ];
+    let centred = DAffine3::from_translation(0.45 * depth_m * DVec3::X);
+    b.place(centred, |b| {
+        loft(b, &sections, Caps { start: true, end: false });
+        let glass = DVec3::new(-0.03 * depth_m, 0.0, foot_m + half.x);
+        picture(b, glass, 1.64 * half, s.uniform(0.0, 0.05) * depth_m);
+    });
+}
+
+/// A bulging picture tube of `size` (height, width) about `centre`.
+fn picture(b: &mut Builder, centre: DVec3, size: DVec2, bulge_m: f64) {
+    sheet(b, [size.y, size.x], |u, v| {
+        let bulge = bulge_m * 16.0 * u * (1.0 - u) * v * (1.0 - v);
+        centre + DVec3::new(bulge, (u - 0.5) * size.y, (v - 0.5) * size.x)
+    });
+}
+
+/// Two equal screens, turned to each other, on one pole or on a foot each.
+fn pair(b: &mut Builder, s: &mut Sampler) {
+    let mut screen = Screen::draw(s);
+    screen.width_m = s.uniform(0.4, 0.65);
+    screen.height_m = screen.width_m / s.uniform(1.25, 1.8);
+    let gap_m = screen.height_m * s.uniform(0.2, 0.4);
+    let turn_rad = s.uniform(0.05, 0.35);
+    let middle_m = gap_m + 0.5 * screen.height_m;
+    for side in [-1.0, 1.0] {
+        let y = side * 0.52 * screen.width_m * turn_rad.cos();
+        let frame = DAffine3::from_translation(DVec3::new(0.0, y, middle_m))
+            * DAffine3::from_rotation_z(-side * turn_rad);
+        b.place(frame, |b| screen.build(b, s));
+    }
+    let back_m = -screen.depth_m - 0.04;
+    let reach = DVec3::new(back_m, 0.5 * screen.width_m, middle_m);
+    bar(b, reach * DVec3::new(1.0, -1.0, 1.0), reach, 0.04, 0.04);
+    for side in [-1.0, 1.0] {
+        block(b, DVec3::new(0.5 * back_m, side * reach.y, middle_m), DVec3::new(-back_m, 0.1, 0.1));
+    }
+    let foot = DVec3::new(0.6 * screen.height_m, 0.5 * screen.width_m, 0.02);
+    block(b, DVec3::new(back_m, 0.0, 0.01), foot);
+    cylinder(b, DVec3::new(back_m, 0.0, 0.0), 0.022, middle_m);
+}

@@ -1,0 +1,105 @@
+//! Flat screens in their housings.
+
+use glam::DVec3;
+
+use super::super::builder::Builder;
+use super::super::primitives::block::{block, block_between, cushion};
+use super::super::primitives::sheet::board;
+use super::super::sampler::Sampler;
+
+/// A screen: it looks to +x, is as wide as y, its middle at the origin.
+#[derive(Clone, Copy)]
+pub struct Screen {
+    /// From side to side.
+    pub width_m: f64,
+    /// From foot to top.
+    pub height_m: f64,
+    /// From front to back.
+    pub depth_m: f64,
+    housing: Housing,
+}
+
+/// What a screen sits in.
+#[derive(Clone, Copy)]
+enum Housing {
+    Framed,
+    FramedWithBox,
+    Slab,
+    Rounded,
+    Bent,
+}
+
+impl Screen {
+    /// Draws a screen of some size and make.
+    pub fn draw(s: &mut Sampler) -> Self {
+        let width_m = s.log_uniform(0.35, 1.3);
+        let ratio = s.pick(&[4.0 / 3.0, 1.25, 1.6, 16.0 / 9.0, 16.0 / 9.0, 21.0 / 9.0]);
+        let portrait = width_m < 0.6 && s.chance(0.1);
+        let height_m = width_m / ratio;
+        let depth_m = width_m * s.log_uniform(0.015, 0.12);
+        let housing = s.pick(&[
+            Housing::Framed,
+            Housing::Framed,
+            Housing::FramedWithBox,
+            Housing::Slab,
+            Housing::Rounded,
+            Housing::Bent,
+        ]);
+        if portrait {
+            Self { width_m: height_m, height_m: width_m, depth_m, housing }
+        } else {
+            Self { width_m, height_m, depth_m, housing }
+        }
+    }
+
+    /// Adds the screen.
+    pub fn build(self, b: &mut Builder, s: &mut Sampler) {
+        let Self { width_m, height_m, depth_m, housing } = self;
+        let size = DVec3::new(depth_m, width_m, height_m);
+        match housing {
+            Housing::Framed => framed(b, s, size),
+            Housing::FramedWithBox => {
+                framed(b, s, size);
+                back_box(b, s, size);
+            }
+            Housing::Rounded => cushion(b, DVec3::ZERO, size, 0.4 * depth_m),
+            Housing::Bent => bent(b, size),
+            Housing::Slab => block(b, DVec3::ZERO, size),
+        }
+    }
+}
+
+/// A frame about a screen that lies a little behind it.
+fn framed(b: &mut Builder, s: &mut Sampler, size: DVec3) {
+    let frame_m = size.z * s.uniform(0.02, 0.08);
+    let chin_m = frame_m * s.uniform(1.0, 2.5);
+    let half = size / 2.0;
+    let back = -half.x;
+    for side in [-1.0, 1.0] {
+        let outer = DVec3::new(half.x, side * half.y, half.z);
+        block_between(b, DVec3::new(back, side * (half.y - frame_m), -half.z), outer);
+    }
+    let inner_m = half.y - frame_m;
+    let top = DVec3::new(half.x, inner_m, half.z);
+    block_between(b, DVec3::new(back, -inner_m, half.z - frame_m), top);
+    let chin = DVec3::new(half.x, inner_m, -half.z + chin_m);
+    block_between(b, DVec3::new(back, -inner_m, -half.z), chin);
+    let glass = DVec3::new(half.x - 0.2 * size.x, inner_m, half.z - frame_m);
+    block_between(b, DVec3::new(back, -inner_m, -half.z + chin_m), glass);
+}
+
+/// The housing of the electronics behind a flat screen.
+fn back_box(b: &mut Builder, s: &mut Sampler, size: DVec3) {
+    let inner = size * DVec3::new(1.0, s.uniform(0.4, 0.75), s.uniform(0.4, 0.7));
+    cushion(b, -0.8 * size.x * DVec3::X, inner, 0.2 * size.x);
+}
+
+/// A screen bent about an upright axis, its ends towards the viewer.
+fn bent(b: &mut Builder, size: DVec3) {
+    let sag_m = 0.12 * size.y;
+    board(b, [size.y, size.z], -size.x * DVec3::X, |u, v| {
+        let across = 2.0 * u - 1.0;
+        let x = 0.5 * size.x + sag_m * across * across;
+        DVec3::new(x, 0.5 * across * size.y, (v - 0.5) * size.z)
+    });
+}

@@ -1,0 +1,114 @@
+//! Hollow bodies with an open mouth: bowls, cups, vases, shades.
+
+use glam::DVec2;
+
+use super::super::builder::Builder;
+use super::super::sampler::Sampler;
+use super::revolve::{Profile, Section, revolve_twisted};
+
+/// What the side of a vessel is made of.
+#[derive(Clone, Copy, Debug)]
+pub enum Wall {
+    /// One sheet without thickness.
+    Sheet,
+    /// Two sheets this far apart, joined at the mouth.
+    Solid(f64),
+}
+
+impl Wall {
+    /// As CAD draws them: one in three a mere sheet, the rest 2 to 8 % of
+    /// `radius_m` thick.
+    pub fn draw(s: &mut Sampler, radius_m: f64) -> Self {
+        let thickness_m = radius_m * s.uniform(0.02, 0.08);
+        if s.chance(0.35) { Self::Sheet } else { Self::Solid(thickness_m) }
+    }
+}
+
+/// A vessel: its outer profile, from the foot to the mouth, and how it is
+/// carried around the axis.
+#[derive(Clone, Debug)]
+pub struct Vessel {
+    /// The outside; begins on the axis where the vessel has a bottom.
+    pub outside: Profile,
+    /// The side.
+    pub wall: Wall,
+    /// The cross-section.
+    pub section: Section,
+    /// Turn of the section in radians a metre of height.
+    pub twist_rad: f64,
+    /// What lies below this height, a foot or a stem, is not hollow.
+    pub hollow_from_m: f64,
+}
+
+impl Vessel {
+    /// A vessel without twist or foot.
+    pub fn new(outside: Profile, wall: Wall, section: Section) -> Self {
+        Self { outside, wall, section, twist_rad: 0.0, hollow_from_m: f64::NEG_INFINITY }
+    }
+
+    /// Adds the vessel, standing on the height its profile begins at.
+    pub fn build(&self, b: &mut Builder) {
+        let mut profile = self.outside.sample(b);
+        if let Wall::Solid(thickness_m) = self.wall {
+            let floor_m = self.hollow_from_m.max(profile[0].y) + thickness_m;
+            let inside = inside(&profile, thickness_m, floor_m);
+            profile.extend(inside);
+        }
+        revolve_twisted(b, &profile, self.section, self.twist_rad);
+    }
+}
+
+/// The inner face of a wall: `outside` moved inwards, from the mouth down to
+/// the floor at `floor_m`, which is closed. A vessel without a bottom has no
+/// floor either.
+fn inside(outside: &[DVec2], thickness_m: f64, floor_m: f64) -> Vec<DVec2> {
+    let last = outside.len() - 1;
+    let has_bottom = outside[0].x == 0.0;
+    let mut points: Vec<DVec2> = Vec::with_capacity(outside.len());
+    for i in (0..=last).rev() {
+        let along = outside[(i + 1).min(last)] - outside[i.saturating_sub(1)];
+        // A mouth's rim is level.
+        let inwards =
+            if i == last { DVec2::NEG_X } else { along.perp().normalize_or(DVec2::NEG_X) };
+        let point = outside[i] + thickness_m * inwards;
+        if has_bottom && point.y <= floor_m {
+            if let Some(&above) = points.last() {
+                let share = (above.y - floor_m) / (above.y - point.y);
+                points.push(above.lerp(point, share));
+            }
+            break;
+        }
+        // Where the neck is narrower than its walls, there is no hollow.
+        points.push(DVec2::new(point.x.max(0.25 * thickness_m), point.y));
+    }
+    if has_bottom {
+        points.push(DVec2::new(0.0, points.last().map_or(floor_m, |lowest| lowest.y)));
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::measure::{area_m2, volume_m3};
+    use super::*;
+
+    #[test]
+    fn a_thick_wall_holds_the_volume_of_its_material() {
+        let outside = Profile::from(0.0, 0.0).line(1.0, 0.0).line(1.0, 2.0);
+        let pot = Vessel::new(outside, Wall::Solid(0.1), Section::Polygon(4));
+        // A square of area 2 over a height of 2, less one of 2 * 0.9^2 over
+        // 1.9; the inner edge of the floor is cut by at most the thickness.
+        for edge_m in [0.1, f64::INFINITY] {
+            let volume = volume_m3(edge_m, |b| pot.build(b));
+            assert!((volume / 0.922 - 1.0).abs() < 0.12, "{volume}");
+        }
+    }
+
+    #[test]
+    fn a_sheet_has_one_side_only() {
+        let outside = Profile::from(1.0, 0.0).line(1.0, 1.0);
+        let ring = Vessel::new(outside, Wall::Sheet, Section::Polygon(4));
+        let area = area_m2(0.1, |b| ring.build(b));
+        assert!((area - 4.0 * 2f64.sqrt()).abs() < 1e-9, "{area}");
+    }
+}

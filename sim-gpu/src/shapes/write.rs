@@ -1,0 +1,112 @@
+//! Writes a mesh as OFF or OBJ.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use crate::mesh::Mesh;
+
+/// A mesh file that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: cannot be written: {source}")]
+pub struct WriteError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What the operating system says.
+    pub source: io::Error,
+}
+
+/// Writes `mesh` as ASCII OFF, coordinates as they are and with as few digits
+/// as tell them apart, whole or not at all.
+///
+/// # Errors
+/// If the file cannot be written; an earlier file of this name then stays.
+pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), WriteError> {
+    let mut text = format!("OFF\n{} {} 0\n", mesh.vertices.len(), mesh.triangles.len());
+    for DVec3 { x, y, z } in &mesh.vertices {
+        push_line(&mut text, format_args!("{x} {y} {z}"));
+    }
+    for [a, b, c] in &mesh.triangles {
+        push_line(&mut text, format_args!("3 {a} {b} {c}"));
+    }
+    write_whole(path, &text)
+}
+
+/// Writes `mesh` as OBJ, which has y up: (x, y, z) becomes (x, z, -y), an
+/// exact turn. Else as [`write_off`].
+///
+/// # Errors
+/// As [`write_off`].
+pub fn write_obj(mesh: &Mesh, path: &Path) -> Result<(), WriteError> {
+    let mut text = String::new();
+    for DVec3 { x, y, z } in &mesh.vertices {
+        // 0 - y and not -y: there is no need for a negative zero.
+        push_line(&mut text, format_args!("v {x} {z} {}", 0.0 - y));
+    }
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|corner| corner + 1);
+        push_line(&mut text, format_args!("f {a} {b} {c}"));
+    }
+    write_whole(path, &text)
+}
+
+fn push_line(text: &mut String, line: std::fmt::Arguments<'_>) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{line}");
+}
+
+fn write_whole(path: &Path, text: &str) -> Result<(), WriteError> {
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(".part");
+    let temporary = PathBuf::from(temporary);
+    let written = fs::write(&temporary, text).and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|source| {
+        // What is left of a failed attempt is of no use; the cause is reported.
+        let _ = fs::remove_file(&temporary);
+        WriteError { path: path.to_owned(), source }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tetrahedron() -> Mesh {
+        Mesh {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y * 0.1, DVec3::new(0.0, 0.0, 1e-6)],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        }
+    }
+
+    #[test]
+    fn off_holds_every_digit_that_matters_and_no_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.off");
+        write_off(&tetrahedron(), &path).unwrap();
+        let expected = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 0.1 0\n0 0 0.000001\n\
+                        3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
+        assert_eq!(fs::read_to_string(path).unwrap(), expected);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn obj_is_y_up_and_counts_from_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.obj");
+        write_obj(&tetrahedron(), &path).unwrap();
+        let expected = "v 0 0 0\nv 1 0 0\nv 0 0 -0.1\nv 0 0.000001 0\n\
+                        f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+        assert_eq!(fs::read_to_string(path).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named_in_the_error() {
+        let path = Path::new("no_such_folder").join("t.off");
+        let error = write_off(&tetrahedron(), &path).unwrap_err();
+        assert_eq!(error.path, path);
+        assert_eq!(error.source.kind(), io::ErrorKind::NotFound);
+    }
+}

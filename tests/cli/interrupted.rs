@@ -1,0 +1,42 @@
+//! A run that is killed at any moment goes on to the same bytes.
+
+use crate::{assert_same_tree, exits, meshes, said, succeeds, xtask};
+use std::time::Duration;
+
+#[test]
+fn a_killed_run_resumes_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    meshes::write_tree(&folder.path().join("meshes"));
+    succeeds(folder.path(), "gen-dataset meshes --out unbroken --adapter cpu");
+    let words = ["gen-dataset", "meshes", "--out", "broken", "--adapter", "cpu", "--resume"];
+    // Moments from before the first scan to the packing; the last runs through.
+    for milliseconds in [5, 20, 40, 60, 90, 130, 180, 240, 320, 60_000] {
+        let mut child =
+            xtask(folder.path(), &words).stderr(std::process::Stdio::null()).spawn().unwrap();
+        let killed_at = std::time::Instant::now() + Duration::from_millis(milliseconds);
+        while child.try_wait().unwrap().is_none() && std::time::Instant::now() < killed_at {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        // SIGKILL: nothing can be tidied up.
+        let _ = child.kill();
+        child.wait().unwrap();
+    }
+    assert_same_tree(&folder.path().join("unbroken"), &folder.path().join("broken"));
+    let again = succeeds(folder.path(), "gen-dataset meshes --out broken --adapter cpu --resume");
+    assert!(said(&again).contains("complete already"), "{}", said(&again));
+}
+
+#[test]
+fn a_folder_in_use_is_refused_unless_told_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    meshes::write_tree(&folder.path().join("meshes"));
+    succeeds(folder.path(), "gen-dataset meshes --out out --adapter cpu");
+    let refused = exits(1, folder.path(), "gen-dataset meshes --out out --adapter cpu");
+    assert!(refused.contains("--resume") && refused.contains("--overwrite"), "{refused}");
+    let other =
+        exits(1, folder.path(), "gen-dataset meshes --out out --adapter cpu --resume --seed 9");
+    assert!(other.contains("seed was 0, now 9"), "{other}");
+    std::fs::write(folder.path().join("out/mine.txt"), "mine").unwrap();
+    succeeds(folder.path(), "gen-dataset meshes --out out --adapter cpu --overwrite --seed 9");
+    assert!(folder.path().join("out/mine.txt").exists(), "what is not ours stays");
+}

@@ -1,0 +1,320 @@
+//! A finished dataset is complete, the same however often it was finished, and
+//! says what was done to it since.
+
+use formats::Split::{Test, Train};
+use formats::packed::read_packed;
+use sim_gpu::dataset::config::Layout;
+use sim_gpu::dataset::finish::finish;
+use sim_gpu::dataset::journal::Journal;
+use sim_gpu::dataset::manifest::{Manifest, Poses};
+use sim_gpu::dataset::record::Entry;
+use sim_gpu::dataset::verify::verify;
+use sim_gpu::dataset::{DatasetError, MeshFailure, check_layouts, layout};
+use sim_gpu::sensor::{BUILTIN_NAMES, Sensor};
+use std::fs;
+use std::path::Path;
+use tests::written_dataset::{
+    MIN_POINTS, PACKED_POINTS, config, entry, failure, files, terms, write,
+};
+
+/// Eleven meshes of two classes, one name in both splits.
+fn entries() -> Vec<Entry> {
+    let mut entries =
+        vec![entry("cup", Test, "cup_1"), entry("cup", Train, "X"), entry("cup", Train, "cup_x")];
+    for i in 0..4 {
+        entries.push(entry("chair", Train, &format!("chair_{i}")));
+        entries.push(entry("cup", Train, &format!("cup_{i}")));
+    }
+    entries
+}
+
+/// A mesh of a class of its own that failed: its class keeps its label.
+fn failures() -> Vec<MeshFailure> {
+    vec![failure("bowl", Train, "bowl_2"), failure("bowl", Test, "bowl_1")]
+}
+
+fn make(out: &Path) -> Manifest {
+    let terms = terms(config(), None);
+    let records = write(out, &terms, &entries());
+    finish(out, &terms, records, failures()).unwrap()
+}
+
+#[test]
+fn a_finished_dataset_is_what_its_manifest_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let manifest = make(out);
+    assert_eq!(Manifest::read(&layout::manifest(out)).unwrap(), manifest);
+    assert!(manifest.meshes.is_sorted_by_key(|record| &record.entry));
+    assert_eq!(manifest.classes(), ["bowl", "chair", "cup"]);
+    assert_eq!(manifest.terms(), terms(config(), None));
+    assert!(!layout::journal(out).exists());
+
+    let report = verify(out).unwrap();
+    assert!(report.is_sound(), "{report:?}");
+    // Eleven meshes, three views, two variants.
+    assert_eq!(report.scans, 66);
+    let left_out: usize = manifest.packed.iter().map(|packed| packed.left_out.len()).sum();
+    assert_eq!(report.clouds + left_out as u64, 66);
+
+    fs::write(out.join("notes.txt"), "mine").unwrap();
+    assert!(verify(out).unwrap().is_sound(), "beside the manifest files are the user's");
+
+    let lines = fs::read_to_string(layout::failures(out)).unwrap();
+    let first =
+        r#"{"class":"bowl","split":"train","name":"bowl_2","source":"bowl/train/bowl_2.off","#;
+    assert!(lines.starts_with(first) && lines.lines().count() == 2, "{lines}");
+}
+
+#[test]
+fn packed_sets_hold_all_scans_of_enough_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = make(folder.path());
+    let mut all_left_out = 0;
+    // Two sets, two variants, two splits.
+    assert_eq!(manifest.packed.len(), 8);
+    for packed in &manifest.packed {
+        let set = read_packed(&folder.path().join(&packed.file)).unwrap();
+        assert_eq!(set.len() as u64, packed.clouds);
+        assert_eq!(set.n_points, PACKED_POINTS as usize);
+        assert_eq!(set.classes, ["bowl", "chair", "cup"]);
+        assert!(set.n_raw.iter().all(|&n| n >= MIN_POINTS));
+        assert!(packed.left_out.iter().all(|scan| scan.points < MIN_POINTS.into()));
+        all_left_out += packed.left_out.len();
+        for (name, &label) in set.names.iter().zip(&set.labels) {
+            let class = &set.classes[label as usize];
+            assert!(name.starts_with(&format!("{class}/")), "{name}: {class}");
+        }
+        let names: std::collections::BTreeSet<_> = set.names.iter().collect();
+        assert_eq!(names.len(), set.len(), "names are unique");
+        for i in 0..set.len() {
+            let largest = set.cloud(i).iter().map(|p| p[0].hypot(p[1]).hypot(p[2]));
+            // The largest radius is 1 but for the rounding to f32, 2^-24.
+            let largest = largest.fold(0.0, f32::max);
+            assert!((largest - 1.0).abs() <= f32::EPSILON, "{largest}");
+        }
+    }
+    assert!(all_left_out > 0, "the datasets of this test hold small scans");
+}
+
+#[test]
+fn finishing_again_gives_the_same_bytes_wherever_it_was_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let terms = terms(config(), None);
+    let mut records = write(out, &terms, &entries());
+    records.reverse();
+    let again = || finish(out, &terms, records.clone(), failures());
+    again().unwrap();
+    let whole = files(out);
+
+    // Stopped while it packed: no manifest yet, parts of files, a stale file.
+    Journal::of(out).begin(&terms).unwrap();
+    fs::remove_file(layout::manifest(out)).unwrap();
+    fs::write(out.join("packed/.edgepuck-abc.tmp"), "part").unwrap();
+    fs::write(out.join("rotational/clean/cup/.edgepuck-abc.tmp"), "part").unwrap();
+    fs::write(out.join("packed/rotational-clean-train.npz"), "other").unwrap();
+    fs::write(out.join("layouts/stale.txt"), "other").unwrap();
+    again().unwrap();
+    assert!(files(out) == whole);
+
+    // Stopped before the journal was removed.
+    Journal::of(out).begin(&terms).unwrap();
+    assert!(matches!(verify(out), Err(DatasetError::Unfinished { .. })));
+    again().unwrap();
+    assert!(files(out) == whole);
+
+    // A scan is lost: an error, and no manifest of what is not there.
+    Journal::of(out).begin(&terms).unwrap();
+    let lost = out.join("static/clean/chair/train/chair_0_v0.npz");
+    let bytes = fs::read(&lost).unwrap();
+    fs::remove_file(&lost).unwrap();
+    let message = again().map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("chair_0_v0.npz"), "{message}");
+    assert!(!layout::manifest(out).exists() && Journal::of(out).exists());
+    fs::write(&lost, bytes).unwrap();
+    again().unwrap();
+    assert!(files(out) == whole);
+
+    // Nothing failed the second time.
+    finish(out, &terms, records.clone(), Vec::new()).unwrap();
+    assert!(!layout::failures(out).exists());
+    assert!(verify(out).unwrap().is_sound());
+}
+
+#[test]
+fn what_was_done_to_a_dataset_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    make(out);
+    let problem = |file: &str, damage: &dyn Fn(&Path)| {
+        let path = out.join(file);
+        let before = fs::read(&path).ok();
+        damage(&path);
+        let report = verify(out).unwrap();
+        match before {
+            Some(bytes) => fs::write(&path, bytes).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        let [problem] = &report.problems[..] else { panic!("{file}: {:?}", report.problems) };
+        assert_eq!(problem.path, Path::new(file));
+        problem.what.clone()
+    };
+    let flip = |path: &Path| {
+        let mut bytes = fs::read(path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        fs::write(path, bytes).unwrap();
+    };
+    let remove = |path: &Path| fs::remove_file(path).unwrap();
+    let add = |path: &Path| fs::write(path, "new").unwrap();
+    let scan = "rotational/clean/chair/train/chair_0_v1";
+    for (file, damage, said) in [
+        (&format!("{scan}.npz")[..], &flip as &dyn Fn(&Path), "was changed: its SHA-256 is "),
+        (&format!("{scan}.ply"), &flip, "was changed"),
+        (&format!("{scan}.csv"), &remove, "is missing"),
+        ("packed/static-noisy-test.npz", &remove, "is missing"),
+        ("packed/static-noisy-train.npz", &flip, "was changed"),
+        ("layouts/yanx27/static-clean/modelnet40_train.txt", &flip, "was changed"),
+        ("failures.jsonl", &flip, "does not list the manifest's failures"),
+        ("failures.jsonl", &remove, "does not list the manifest's failures"),
+        ("rotational/clean/chair/train/chair_9_v0.npz", &add, "is not in the manifest"),
+        ("packed/.edgepuck-abc.tmp", &add, "is not in the manifest"),
+    ] {
+        let what = problem(file, damage);
+        assert!(what.starts_with(said), "{file}: {what}");
+    }
+    assert!(verify(out).unwrap().is_sound());
+}
+
+#[test]
+fn a_manifest_that_miscounts_is_found_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let mut manifest = make(out);
+    let points = &mut manifest.meshes[0].scans[0].variants[0].tally.points;
+    *points += 1;
+    let expected = format!("holds {} points, not {} as recorded", *points - 1, points);
+    manifest.write(&layout::manifest(out)).unwrap();
+    let problems = verify(out).unwrap().problems;
+    assert!(problems.iter().all(|problem| problem.what == expected), "{problems:?}");
+    assert_eq!(problems.len(), 3, "one for each format");
+}
+
+#[test]
+fn what_is_no_finished_dataset_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    assert!(matches!(verify(out), Err(DatasetError::NoManifest { .. })));
+    let manifest = make(out);
+    let refused = |change: &dyn Fn(&mut Manifest)| {
+        let mut changed = manifest.clone();
+        change(&mut changed);
+        changed.write(&layout::manifest(out)).unwrap();
+        verify(out).unwrap_err().to_string()
+    };
+    let message = refused(&|manifest| manifest.tool = "other".to_owned());
+    assert!(message.ends_with("made by `other`, not by `edgepuck`"), "{message}");
+    for name in ["..", "a/b", "/etc", r"a\b", ""] {
+        let message = refused(&|manifest| manifest.meshes[0].entry.name = name.to_owned());
+        assert!(message.ends_with("is no name of a file or folder"), "{message}");
+        let message = refused(&|manifest| manifest.config.sets[1].name = name.to_owned());
+        assert!(message.ends_with("is no name of a file or folder"), "{message}");
+    }
+}
+
+#[test]
+fn poses_are_in_full_once_where_they_are_equal() {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = make(folder.path());
+    let config = config();
+    let Poses::EveryMesh(poses) = &manifest.poses[0].poses else { panic!("not jittered") };
+    assert_eq!(*poses, config.sets[0].poses(config.seed, "any"));
+    let Poses::EachMesh(meshes) = &manifest.poses[1].poses else { panic!("jittered") };
+    // Eleven meshes, of which cup/cup_1 is in both splits.
+    assert_eq!(meshes.len(), 10);
+    for mesh in meshes {
+        assert_eq!(mesh.poses, config.sets[1].poses(config.seed, &mesh.id));
+    }
+}
+
+#[test]
+fn every_builtin_sensor_comes_back_from_a_manifest() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in BUILTIN_NAMES {
+        let mut config = config();
+        config.sets[0].sensor = Sensor::builtin(name).unwrap();
+        let terms = terms(config, None);
+        let manifest = finish(folder.path(), &terms, Vec::new(), Vec::new()).unwrap();
+        let read = Manifest::read(&layout::manifest(folder.path())).unwrap();
+        assert_eq!(read, manifest, "{name}");
+    }
+    // No mesh at all: sets are empty, but there.
+    assert!(verify(folder.path()).unwrap().is_sound());
+    let set = read_packed(&folder.path().join("packed/static-noisy-test.npz")).unwrap();
+    assert!(set.is_empty());
+}
+
+#[test]
+fn yanx27s_layout_tells_equal_names_apart_and_keeps_normals() {
+    let folder = tempfile::tempdir().unwrap();
+    make(folder.path());
+    let root = folder.path().join("layouts/yanx27/rotational-clean");
+    let names = fs::read_to_string(root.join("modelnet40_shape_names.txt")).unwrap();
+    assert_eq!(names, "bowl\nchair\ncup\n");
+    let list = |split: &str| {
+        let list = fs::read_to_string(root.join(format!("modelnet40_{split}.txt"))).unwrap();
+        list.lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let (train, test) = (list("train"), list("test"));
+    let hashed = |id: &str, stem: &str| {
+        id.strip_prefix(stem).is_some_and(|rest| rest.starts_with('-') && rest.len() == 1 + 12 + 2)
+    };
+    assert!(test.iter().all(|id| hashed(id, "cup_1")), "cup_1 is in train too: {test:?}");
+    assert!(train.iter().any(|id| hashed(id, "cup_1")), "{train:?}");
+    assert!(train.iter().any(|id| hashed(id, "cup_X")), "where case does not count: {train:?}");
+    assert!(train.iter().any(|id| hashed(id, "cup_x")), "{train:?}");
+    assert!(train.iter().any(|id| id == "cup_3v0"), "a name of its own stays: {train:?}");
+    for id in train.iter().chain(&test) {
+        let class = id.split('_').next().unwrap();
+        let text = fs::read_to_string(root.join(class).join(format!("{id}.txt"))).unwrap();
+        let number = |word: &str| word.parse::<f32>().unwrap();
+        let mut points: Vec<(f32, f32)> = text
+            .lines()
+            .map(|line| line.split(',').collect::<Vec<_>>())
+            .map(|words| (number(words[3]), number(words[0])))
+            .collect();
+        assert_eq!(points.len(), PACKED_POINTS as usize);
+        points.sort_by(|p, q| p.0.total_cmp(&q.0));
+        assert!(points.is_sorted_by_key(|point| point.1), "{id}: {points:?}");
+    }
+}
+
+#[test]
+fn a_layout_that_cannot_hold_the_dataset_is_refused_before_the_run() {
+    let mut config = config();
+    config.packed_points = 1;
+    let message = check_layouts(&config, &[]).unwrap_err().to_string();
+    assert_eq!(message, "layout yanx27: a cloud needs two points or more");
+    config.layouts = vec![Layout::ModelnetH5];
+    config.packed_points = PACKED_POINTS;
+    let folder = tempfile::tempdir().unwrap();
+    let terms = terms(config.clone(), None);
+    let records = write(folder.path(), &terms, &entries());
+    let finished = finish(folder.path(), &terms, records, failures());
+    match check_layouts(&config, &[]) {
+        Ok(()) => {
+            let files: Vec<_> =
+                finished.unwrap().layout_files.into_iter().map(|file| file.file).collect();
+            let expected = "layouts/modelnet-h5/static-noisy/ply_data_train0.h5";
+            assert!(files.iter().any(|file| file == expected), "{files:?}");
+            assert!(verify(folder.path()).unwrap().is_sound());
+            let classes: Vec<_> = (0..257).map(|i| format!("class {i}")).collect();
+            assert!(check_layouts(&config, &classes).is_err());
+        }
+        Err(error) => {
+            assert!(error.to_string().ends_with("build with `--features hdf5`"), "{error}");
+            assert!(finished.is_err());
+        }
+    }
+}

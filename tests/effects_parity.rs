@@ -1,0 +1,206 @@
+//! The effects' shaders against their f64 twins:
+//! `shaders/effects/{noise_range,noise_xyz,dropout,intensity}.wgsl`,
+//! `shaders/shared/{stream,normal_deviate}.wgsl` and `sim-gpu/src/cpu/effects`.
+
+use std::sync::Arc;
+
+use formats::rng::StreamKey;
+use glam::{DAffine3, DVec3};
+use sim_gpu::caster::{Cast, CastJob, Culling};
+use sim_gpu::cpu::effects::dropout::dropout;
+use sim_gpu::cpu::effects::intensity::intensity;
+use sim_gpu::cpu::effects::noise_range::noise_range;
+use sim_gpu::cpu::effects::noise_xyz::noise_xyz;
+use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
+use sim_gpu::pose::Pose;
+use sim_gpu::ray::{AMBIGUOUS, MISS, RayFrame};
+use sim_gpu::sensor::BeamPattern;
+use sim_gpu::target::Target;
+use tests::adapter::{adapter, casters};
+use tests::casting::{at, beams, builtin, hits_with, job, target};
+use tests::meshes::{cube, icosphere, soup, torus};
+use tests::random::Random;
+
+/// How far the shader's standard normal deviate may lie from the f64 twin's,
+/// by the accuracy that WGSL promises, with u = 2^-24.
+///
+/// Within 1.44 sigma: q (2u), r (3u), six roundings in either polynomial, of
+/// positive terms alone, and 5u of the division: 22u of 1.44, so 1.9e-6.
+/// Beyond: the tail probability (2u) and 3 units in the last place of its
+/// logarithm, 5.7e-6 at 22.9, halve in the root; the root's own 4.5 units,
+/// 2.1e-6; together 5e-6 of r. Times the slope of at most 1.6, and 17u of 6.3
+/// for the polynomials: 1.5e-5.
+const DEVIATE_TOLERANCE: f64 = 1.5e-5;
+
+fn noise(model: NoiseModel, mean_m: f64, sigma_m: f64) -> Noise {
+    Noise { mean_m, sigma_m, model }
+}
+
+/// Mean and sigma in f32, their product and their sum: 2^-24 each.
+fn noise_tolerance(noise: &Noise) -> f64 {
+    let largest = noise.mean_m.abs() + 7.0 * noise.sigma_m;
+    noise.sigma_m * DEVIATE_TOLERANCE + 4.0 * 2f64.powi(-24) * largest
+}
+
+/// A job of which every ray hits: a sensor in a cube.
+fn all_hit(stream: StreamKey, pattern: &BeamPattern) -> CastJob {
+    let target = target(&cube());
+    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &at(DVec3::new(0.1, 0.2, 0.3)));
+    CastJob::aim(target, frame, pattern, Culling::On, stream, 0.5)
+}
+
+fn streams() -> Vec<StreamKey> {
+    let names = ["", "chair_0001", "chair_0002"];
+    let key = |(i, name): (usize, &&str)| StreamKey::new(i as u64 * 0x1_0000_0001, name, i as u32);
+    names.iter().enumerate().map(key).collect()
+}
+
+fn words(caster: &sim_gpu::caster::Caster, job: &CastJob) -> Cast {
+    let mut casts = caster.cast(std::slice::from_ref(job)).expect("the adapter casts");
+    let cast = casts.remove(0);
+    assert!(cast.codes.iter().all(|&code| code != MISS));
+    cast
+}
+
+#[test]
+fn range_noise_is_the_twins() {
+    let pattern = builtin("vlp32c");
+    for noise in [
+        noise(NoiseModel::Range, 0.0, 1.0),
+        noise(NoiseModel::Range, 0.0, 0.0),
+        noise(NoiseModel::Range, 0.0, 1e-6),
+        noise(NoiseModel::Range, -0.3, 0.01),
+        noise(NoiseModel::Range, 5.0, 1e3),
+    ] {
+        let effects = Effects { noise: Some(noise), ..Effects::default() };
+        let Some(gpu) = adapter(&effects) else { return };
+        for stream in streams() {
+            let job = all_hit(stream, &pattern);
+            let cast = words(gpu, &job);
+            for (&beam, &word) in job.beams.iter().zip(&cast.words) {
+                let error = (f64::from(word) - noise_range(&noise, stream, beam)).abs();
+                assert!(error <= noise_tolerance(&noise), "beam {beam}: {error:.2e} of {noise:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn point_noise_is_the_twins() {
+    let pattern = builtin("vlp32c");
+    for noise in [noise(NoiseModel::Xyz, 0.0, 1.0), noise(NoiseModel::Xyz, 0.25, 0.02)] {
+        let effects = Effects { noise: Some(noise), ..Effects::default() };
+        let Some(gpu) = adapter(&effects) else { return };
+        for stream in streams() {
+            let job = all_hit(stream, &pattern);
+            let cast = words(gpu, &job);
+            for (&beam, word) in job.beams.iter().zip(cast.words.chunks_exact(3)) {
+                let word = DVec3::new(word[0].into(), word[1].into(), word[2].into());
+                let error = (word - noise_xyz(&noise, stream, beam)).abs().max_element();
+                assert!(error <= noise_tolerance(&noise), "beam {beam}: {error:.2e} of {noise:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_same_returns_drop_out_everywhere() {
+    let pattern = builtin("vlp32c");
+    for probability in [0.0, 1e-4, 0.05, 1.0 / 3.0, 0.999, 1.0] {
+        let model = Dropout { probability };
+        let effects = Effects { dropout: Some(model), ..Effects::default() };
+        for caster in casters(&effects) {
+            for stream in streams() {
+                let job = all_hit(stream, &pattern);
+                let cast = words(caster, &job);
+                let mut dropped = 0;
+                for (&beam, &word) in job.beams.iter().zip(&cast.words) {
+                    assert_eq!(word == 1.0, dropout(&model, stream, beam), "beam {beam}");
+                    assert!(word == 0.0 || word == 1.0);
+                    dropped += usize::from(word == 1.0);
+                }
+                let n = job.beams.len() as f64;
+                let deviation = (n * probability * (1.0 - probability)).sqrt();
+                let error = (dropped as f64 - n * probability).abs();
+                assert!(error <= 5.0 * deviation, "{dropped} of {n} at {probability}");
+            }
+        }
+    }
+}
+
+/// f32 corners move the normal by at most twice sqrt(3) 2^-24 over the
+/// triangle's height; a cross product of edges rounds by the sine between
+/// them, at least height over longest edge; the rest is a dot product.
+fn intensity_tolerance(target: &Target, triangle: u32) -> f64 {
+    let [a, b, c] = target.surface.corners(triangle);
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let height = (b - a).cross(c - a).length() / longest;
+    2f64.powi(-24) * (4.0 / height + 8.0 * longest / height + 8.0)
+}
+
+#[test]
+fn intensity_is_the_twins() {
+    let effects = Effects { intensity: Some(Intensity), ..Effects::default() };
+    let pattern = builtin("vlp32c");
+    for caster in casters(&effects) {
+        for mesh in [icosphere(4), torus(40), soup(500, 0.3), cube()] {
+            let target: Arc<Target> = target(&mesh);
+            let pose = Pose::look_at(DVec3::new(2.5, 1.0, 0.7), DVec3::ZERO).unwrap();
+            let job = job(&target, &pose, &pattern);
+            let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
+            let mut n = 0;
+            for ((&code, &beam), &word) in
+                casts[0].codes.iter().zip(&job.beams).zip(&casts[0].words)
+            {
+                if code == MISS {
+                    continue;
+                }
+                let triangle = code & !AMBIGUOUS;
+                let ray = job.frame.ray(pattern.directions[beam as usize]);
+                let truth = intensity(&target, &ray, triangle, 0.75);
+                let error = (f64::from(word) - truth).abs();
+                assert!((0.0..=0.75).contains(&word), "{word}");
+                let tolerance = intensity_tolerance(&target, triangle);
+                assert!(error <= tolerance, "{}: {error:.2e} > {tolerance:.2e}", caster.name());
+                n += 1;
+            }
+            assert!(n > 500, "{n} hits");
+        }
+    }
+}
+
+#[test]
+fn the_words_of_all_effects_stand_side_by_side() {
+    let noise = noise(NoiseModel::Xyz, 0.0, 0.5);
+    let dropout = Dropout { probability: 0.25 };
+    let all = Effects {
+        noise: Some(noise),
+        dropout: Some(dropout),
+        intensity: Some(Intensity),
+        quantum: None,
+    };
+    let singles = [
+        Effects { noise: Some(noise), ..Effects::default() },
+        Effects { dropout: Some(dropout), ..Effects::default() },
+        Effects { intensity: Some(Intensity), ..Effects::default() },
+    ];
+    let mut random = Random::new("directions");
+    let pattern = beams((0..5000).map(|_| random.direction()));
+    let on = |effects: &Effects| -> Vec<Vec<f32>> {
+        let job = all_hit(StreamKey::new(3, "x", 1), &pattern);
+        casters(effects)
+            .iter()
+            .map(|caster| hits_with(caster, &job, &pattern, effects).words)
+            .collect()
+    };
+    let together = on(&all);
+    let [noises, dropouts, intensities] = singles.map(|effects| on(&effects));
+    for (i, words) in together.iter().enumerate() {
+        assert_eq!(words.len(), 5 * pattern.len());
+        for (beam, word) in words.chunks_exact(5).enumerate() {
+            assert_eq!(word[..3], noises[i][3 * beam..3 * beam + 3]);
+            assert_eq!(word[3], dropouts[i][beam]);
+            assert_eq!(word[4], intensities[i][beam]);
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Datasets whose scans were never cast: finishing, checking and merging only
+//! need files and records that agree.
+
+use formats::rng::StreamKey;
+use formats::scan::{Attribute, Scan};
+use formats::scan_file::{ScanFormat, write_scan};
+use formats::{Split, hash};
+use sim_gpu::dataset::config::Layout;
+use sim_gpu::dataset::journal::{Journal, Terms};
+use sim_gpu::dataset::record::{Entry, FileRecord};
+use sim_gpu::dataset::{
+    DatasetConfig, MeshFailure, MeshRecord, ScanRecord, SetConfig, Variant, VariantRecord,
+    Viewpoints, layout,
+};
+use sim_gpu::effects::Effects;
+use sim_gpu::mesh::census::Census;
+use sim_gpu::mesh::frame::{Normalize, Up};
+use sim_gpu::scan::Tally;
+use sim_gpu::sensor::{Sensor, Views};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Points of each packed cloud.
+pub const PACKED_POINTS: u32 = 32;
+/// Fewer points are not packed.
+pub const MIN_POINTS: u32 = 16;
+
+/// What the datasets hold: a rotating sensor with two views and a camera whose
+/// one view is jittered, clean and noisy, in all formats.
+pub fn config() -> DatasetConfig {
+    let set = |name: &str, sensor: &str, views: Views| SetConfig {
+        name: name.to_owned(),
+        sensor: Sensor::builtin(sensor).expect("a built-in sensor"),
+        viewpoints: Viewpoints::Views(views),
+    };
+    DatasetConfig {
+        seed: 7,
+        normalize: Normalize::UnitSphere,
+        up: None,
+        attributes: [Attribute::Normal].into(),
+        formats: ScanFormat::ALL.to_vec(),
+        effects: Effects::default(),
+        variants: vec![Variant::Clean, Variant::Noisy],
+        sets: vec![
+            set("rotational", "vlp32c", Views { count: 2, ..Views::ROTATING }),
+            set("static", "kinect-v2", Views { azimuth_jitter_deg: 10.0, ..Views::STATIC }),
+        ],
+        packed_points: PACKED_POINTS,
+        min_points: MIN_POINTS,
+        layouts: vec![Layout::Yanx27],
+    }
+}
+
+/// The terms of a run on `config`.
+pub fn terms(config: DatasetConfig, shard: Option<(u32, u32)>) -> Terms {
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    Terms { version, config, adapter: "an adapter".to_owned(), shard }
+}
+
+/// A mesh of `class`.
+pub fn entry(class: &str, split: Split, name: &str) -> Entry {
+    Entry { class: class.to_owned(), split, name: name.to_owned() }
+}
+
+/// The failure of a mesh.
+pub fn failure(class: &str, split: Split, name: &str) -> MeshFailure {
+    MeshFailure {
+        entry: entry(class, split, name),
+        source: format!("{class}/{split}/{name}.off"),
+        line: Some(3),
+        cause: "a vertex \"is\" not finite".to_owned(),
+    }
+}
+
+/// Begins a dataset in `out` and writes the scans of `entries`, as a run would
+/// that was killed before it could finish.
+pub fn write(out: &Path, terms: &Terms, entries: &[Entry]) -> Vec<MeshRecord> {
+    Journal::of(out).begin(terms).expect("a journal");
+    entries.iter().map(|entry| write_mesh(out, &terms.config, entry)).collect()
+}
+
+fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
+    let mut scans = Vec::new();
+    for set in &config.sets {
+        for view in 0..set.poses(config.seed, &entry.id()).len() as u32 {
+            let variants = config.variants.iter();
+            let write = |&variant: &Variant| write_variant(out, config, set, entry, view, variant);
+            let variants = variants.map(write).collect();
+            scans.push(ScanRecord { set: set.name.clone(), view, variants });
+        }
+    }
+    MeshRecord {
+        entry: entry.clone(),
+        source: format!("{}/{}/{}.off", entry.class, entry.split, entry.name),
+        sha256: hash::hexadecimal(entry.name.as_bytes()),
+        up: Up::Z,
+        centre: [0.1, -0.2, 1e-7],
+        scale: 1.0 / 3.0,
+        triangles: 12,
+        dropped_faces: 0,
+        census: Census::default(),
+        scans,
+    }
+}
+
+fn write_variant(
+    out: &Path,
+    config: &DatasetConfig,
+    set: &SetConfig,
+    entry: &Entry,
+    view: u32,
+    variant: Variant,
+) -> VariantRecord {
+    let name = format!("{}/{}/{}/{}", set.name, variant.name(), entry.id(), entry.split);
+    let scan = scan(StreamKey::new(config.seed, &name, view));
+    let write = |&format: &ScanFormat| {
+        let path = layout::scan(out, &set.name, variant, entry, view, format);
+        write_scan(&path, format, &scan).expect("a scan");
+        FileRecord { format, sha256: hash::of_file(&path).expect("a hash") }
+    };
+    VariantRecord {
+        variant,
+        tally: Tally { points: scan.len() as u64, ..Tally::default() },
+        files: config.formats.iter().map(write).collect(),
+    }
+}
+
+/// None to 99 points on the x axis, in order, with their x for a normal too:
+/// a cloud that keeps points and normals together rises where they rise.
+fn scan(key: StreamKey) -> Scan {
+    let n = key.below(100, 0);
+    let positions: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, 0.0, 0.0]).collect();
+    Scan { normal: Some(positions.clone()), positions, ..Scan::default() }
+}
+
+/// All files in `folder` and below, by their path from it.
+pub fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop() {
+        for item in fs::read_dir(next).expect("a folder") {
+            let path = item.expect("a file").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let relative = path.strip_prefix(folder).expect("below").to_path_buf();
+                files.insert(relative, fs::read(&path).expect("a file"));
+            }
+        }
+    }
+    files
+}

@@ -1,0 +1,119 @@
+//! Real CAD meshes of `../shared/data`, where present: every caster against
+//! the f64 oracle on a view of each.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use glam::DVec3;
+use sim_gpu::effects::Effects;
+use sim_gpu::mesh::frame::{Normalize, to_world};
+use sim_gpu::mesh::load;
+use sim_gpu::mesh::tree::{MeshEntry, discover};
+use sim_gpu::pose::Pose;
+use sim_gpu::resolve::resolve;
+use sim_gpu::sensor::BeamPattern;
+use tests::adapter::casters;
+use tests::casting::{builtin, job, target};
+use tests::judge::{Verdict, judge};
+use tests::shared_data::shared;
+
+/// What a folder of meshes showed on one caster.
+#[derive(Default)]
+struct Tally {
+    verdict: Verdict,
+    decided_in_f64: usize,
+    /// Meshes by the share of hits that f64 decided, and the seconds it took
+    /// to cast and to resolve.
+    shares: Vec<(f64, String)>,
+    cast_s: f64,
+    resolve_s: f64,
+}
+
+/// The default view of the paper's set: 3 m away, 20 degrees above.
+fn view() -> Pose {
+    Pose::view(3.0, 20f64.to_radians(), 0.0, DVec3::ZERO)
+}
+
+fn survey_folder(root: &Path, every: usize) {
+    let pattern = builtin("vlp32c");
+    let entries: Vec<_> = discover(root, 0)
+        .expect("the shared data can be listed")
+        .into_iter()
+        .step_by(every)
+        .collect();
+    let casters = casters(&Effects::default());
+    let mut tallies: Vec<Tally> = casters.iter().map(|_| Tally::default()).collect();
+    for entry in &entries {
+        let loaded = load(&entry.path).unwrap_or_else(|error| panic!("{error}"));
+        let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::UnitSphere);
+        let target = target(&world.mesh);
+        let job = job(&target, &view(), &pattern);
+        for (caster, tally) in casters.iter().zip(&mut tallies) {
+            tally.add(entry, caster, &job, &pattern);
+        }
+    }
+    for (caster, mut tally) in casters.iter().zip(tallies) {
+        tally.shares.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let Tally { verdict, decided_in_f64, shares, cast_s, resolve_s } = &tally;
+        println!("{} meshes on {}: {verdict}", entries.len(), caster.name());
+        println!(
+            "  {:.2} % decided in f64; cast {cast_s:.2} s, resolve {resolve_s:.2} s",
+            100.0 * *decided_in_f64 as f64 / verdict.hits as f64
+        );
+        for (share, name) in shares.iter().take(5) {
+            println!("  {:5.1} % of {name}", share * 100.0);
+        }
+    }
+}
+
+impl Tally {
+    fn add(
+        &mut self,
+        entry: &MeshEntry,
+        caster: &sim_gpu::caster::Caster,
+        job: &sim_gpu::caster::CastJob,
+        pattern: &BeamPattern,
+    ) {
+        let start = Instant::now();
+        let casts = caster.cast(std::slice::from_ref(job)).expect("the adapter casts");
+        self.cast_s += start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let hits = resolve(job, &casts[0], pattern, &Effects::default());
+        self.resolve_s += start.elapsed().as_secs_f64();
+        let verdict = judge(job, pattern, &hits);
+        verdict.assert_kept(&format!("{} on {}", entry.relative, caster.name()));
+        let share = hits.decided_in_f64 as f64 / hits.hits.len().max(1) as f64;
+        self.shares.push((share, format!("{} ({} hits)", entry.relative, hits.hits.len())));
+        self.decided_in_f64 += hits.decided_in_f64;
+        self.verdict = std::mem::take(&mut self.verdict).and(verdict);
+    }
+}
+
+#[test]
+fn modelnet_agrees_with_the_oracle() {
+    if let Some(root) = shared("meshes/modelnet") {
+        survey_folder(&root, 1);
+    }
+}
+
+#[test]
+fn princeton_agrees_with_the_oracle() {
+    for folder in ["meshes/psb_infomr", "meshes/psb_segbench"] {
+        if let Some(root) = shared(folder) {
+            survey_folder(&root, 1);
+        }
+    }
+}
+
+#[test]
+fn a_sample_of_twenty_classes_agrees_with_the_oracle() {
+    let Some(archive) = shared("meshes20/meshes20.tar.xz") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let status = Command::new("tar").arg("-xJf").arg(archive).arg("-C").arg(folder.path()).status();
+    if !status.is_ok_and(|status| status.success()) {
+        println!("skipped: tar cannot unpack xz here");
+        return;
+    }
+    survey_folder(folder.path(), 12);
+}

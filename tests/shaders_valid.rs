@@ -1,0 +1,211 @@
+//! Every shader variant is valid WGSL, holds what its effects need and nothing
+//! else, and lays its records out as Rust does. No GPU is needed.
+
+use std::collections::BTreeSet;
+use std::mem::offset_of;
+use std::path::{Path, PathBuf};
+
+use naga::TypeInner;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use sim_gpu::bvh::{LeafTriangle, Node};
+use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
+use sim_gpu::gpu::{compose, modules};
+use sim_gpu::ray::TraceRay;
+
+/// What every variant is made of.
+const TRACE: [&str; 5] =
+    ["shared/bvh.wgsl", "shared/ray.wgsl", "intersect.wgsl", "traverse.wgsl", "trace.wgsl"];
+
+/// All combinations of effects, and the files that each must be made of.
+fn variants() -> Vec<(Effects, Vec<&'static str>)> {
+    let mut variants = Vec::new();
+    for noise in [None, Some(NoiseModel::Range), Some(NoiseModel::Xyz)] {
+        for dropout in [false, true] {
+            for intensity in [false, true] {
+                let effects = Effects {
+                    noise: noise.map(|model| Noise { mean_m: 0.5, sigma_m: 0.25, model }),
+                    dropout: dropout.then_some(Dropout { probability: 0.125 }),
+                    intensity: intensity.then_some(Intensity),
+                    quantum: None,
+                };
+                variants.push((effects, files(noise, dropout, intensity)));
+            }
+        }
+    }
+    variants
+}
+
+fn files(noise: Option<NoiseModel>, dropout: bool, intensity: bool) -> Vec<&'static str> {
+    let mut files = TRACE.to_vec();
+    let mut add = |wanted: bool, file| files.extend(wanted.then_some(file));
+    add(noise.is_some() || dropout || intensity, "shared/words.wgsl");
+    add(noise.is_some() || dropout, "shared/stream.wgsl");
+    add(noise.is_some(), "shared/normal_deviate.wgsl");
+    add(noise == Some(NoiseModel::Range), "effects/noise_range.wgsl");
+    add(noise == Some(NoiseModel::Xyz), "effects/noise_xyz.wgsl");
+    add(dropout, "effects/dropout.wgsl");
+    add(intensity, "effects/intensity.wgsl");
+    files
+}
+
+fn parsed(effects: &Effects) -> naga::Module {
+    let wgsl = compose(&modules(effects));
+    let module = naga::front::wgsl::parse_str(&wgsl)
+        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
+    Validator::new(ValidationFlags::all(), Capabilities::default())
+        .validate(&module)
+        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
+    module
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn read(file: &str) -> String {
+    std::fs::read_to_string(root().join("shaders").join(file)).expect("a shader is text")
+}
+
+/// All files under `shaders`, by their path there.
+fn all_files() -> BTreeSet<String> {
+    let mut files = BTreeSet::new();
+    for folder in ["", "shared/", "effects/"] {
+        for entry in std::fs::read_dir(root().join("shaders").join(folder)).expect("a folder") {
+            let entry = entry.expect("a file");
+            if entry.file_type().expect("a file's type").is_file() {
+                files.insert(format!("{folder}{}", entry.file_name().display()));
+            }
+        }
+    }
+    files
+}
+
+/// The functions, overrides and bindings that a file declares: all start a
+/// line.
+fn declared(wgsl: &str) -> BTreeSet<String> {
+    let name_after = |line: &str, keyword: &str| {
+        let rest = line.split_once(keyword)?.1.trim_start();
+        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_')?;
+        Some(rest[..end].to_owned())
+    };
+    let name = |line: &str| {
+        if line.starts_with("@group") {
+            name_after(line, "> ")
+        } else if line.starts_with("override ") {
+            name_after(line, "override ")
+        } else if line.starts_with("fn ") {
+            name_after(line, "fn ")
+        } else {
+            None
+        }
+    };
+    wgsl.lines().filter_map(name).collect()
+}
+
+#[test]
+fn all_variants_validate_and_hold_their_own_code_only() {
+    for (effects, files) in variants() {
+        let module = parsed(&effects);
+        let functions = module.functions.iter().filter_map(|(_, f)| f.name.clone());
+        let overrides = module.overrides.iter().filter_map(|(_, o)| o.name.clone());
+        let globals = module.global_variables.iter().filter_map(|(_, g)| g.name.clone());
+        let entries = module.entry_points.iter().map(|entry| entry.name.clone());
+        let holds: BTreeSet<String> =
+            functions.chain(overrides).chain(globals).chain(entries).collect();
+        let mut expected: BTreeSet<String> = ["finish".to_owned()].into();
+        files.iter().for_each(|file| expected.append(&mut declared(&read(file))));
+        assert_eq!(holds, expected, "{effects:?}");
+    }
+}
+
+#[test]
+fn the_plain_variant_holds_no_code_of_any_effect() {
+    let module = parsed(&Effects::default());
+    assert!(module.overrides.is_empty());
+    for (_, global) in module.global_variables.iter() {
+        assert_eq!(global.binding.as_ref().map(|b| b.group), Some(0), "{:?}", global.name);
+    }
+    let wgsl = compose(&modules(&Effects::default()));
+    for word in ["@group(1)", "noise", "dropout", "intensity", "philox", "deviate", "override"] {
+        assert!(!wgsl.contains(word), "{word}");
+    }
+}
+
+#[test]
+fn every_binding_is_declared_once() {
+    for (effects, _) in variants() {
+        let module = parsed(&effects);
+        let bindings: Vec<_> = module
+            .global_variables
+            .iter()
+            .filter_map(|(_, global)| global.binding.as_ref())
+            .map(|binding| (binding.group, binding.binding))
+            .collect();
+        let distinct: BTreeSet<_> = bindings.iter().collect();
+        assert_eq!(distinct.len(), bindings.len(), "{effects:?}");
+    }
+}
+
+#[test]
+fn every_shader_file_is_part_of_some_variant() {
+    let used: BTreeSet<String> =
+        variants().iter().flat_map(|(_, files)| files).map(|file| (*file).to_owned()).collect();
+    assert_eq!(all_files(), used);
+    for (effects, files) in variants() {
+        let wgsl = compose(&modules(&effects));
+        for file in all_files() {
+            let expected = files.contains(&file.as_str());
+            assert_eq!(wgsl.contains(&read(&file)), expected, "{file} in {effects:?}");
+        }
+    }
+}
+
+#[test]
+fn every_pass_and_effect_has_a_twin_of_its_name() {
+    for file in all_files().iter().filter(|file| !file.starts_with("shared/")) {
+        let twin = root().join("sim-gpu/src/cpu").join(file.replace(".wgsl", ".rs"));
+        assert!(twin.is_file(), "{}", twin.display());
+    }
+    // Shared files name theirs, as do some of the others.
+    for file in all_files() {
+        let wgsl = read(&file);
+        let named = wgsl.split('`').skip(1).step_by(2).filter(|name| name.ends_with(".rs"));
+        for name in named.filter(|name| name.starts_with("sim-gpu") || name.starts_with("formats"))
+        {
+            assert!(root().join(name).is_file(), "{file} names {name}");
+        }
+    }
+}
+
+/// Size and member offsets of a struct of the shader.
+fn layout(module: &naga::Module, name: &str) -> (u32, Vec<(String, u32)>) {
+    let (_, found) = module
+        .types
+        .iter()
+        .find(|(_, t)| t.name.as_deref() == Some(name))
+        .unwrap_or_else(|| panic!("no struct {name}"));
+    let TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is no struct") };
+    (*span, members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect())
+}
+
+macro_rules! assert_same_layout {
+    ($module:expr, $type:ident { $($member:ident),* $(,)? }) => {{
+        let (size, members) = layout($module, stringify!($type));
+        assert_eq!(size as usize, size_of::<$type>(), "size of {}", stringify!($type));
+        let rust = [$((stringify!($member).to_owned(), offset_of!($type, $member) as u32)),*];
+        assert_eq!(members, rust, "{}", stringify!($type));
+    }};
+}
+
+#[test]
+fn records_are_laid_out_alike_in_wgsl_and_rust() {
+    for (effects, _) in variants() {
+        let module = &parsed(&effects);
+        assert_same_layout!(
+            module,
+            Node { left_min, left, left_max, left_count, right_min, right, right_max, right_count }
+        );
+        assert_same_layout!(module, LeafTriangle { a, index, b, _padding_b, c, _padding_c });
+        assert_same_layout!(module, TraceRay { origin, root, direction, skipped });
+    }
+}

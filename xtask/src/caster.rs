@@ -1,0 +1,40 @@
+//! Opens the adapter that a command line asks for.
+
+use anyhow::Context;
+use sim_gpu::caster::{Caster, Culling};
+use sim_gpu::effects::Effects;
+use sim_gpu::gpu::AdapterRequest;
+
+/// What to do where no adapter is found.
+pub const HOW_TO_GET_VULKAN: &str =
+    "on Debian or Ubuntu, `apt-get install mesa-vulkan-drivers` gives software Vulkan";
+
+/// Flags of every command that casts.
+#[derive(clap::Args)]
+pub struct CasterArgs {
+    /// What casts: auto (GPU, then software Vulkan, then CPU), cpu, or part of an adapter's name
+    #[arg(long, default_value = "auto", value_name = "ADAPTER")]
+    pub adapter: AdapterRequest,
+
+    /// Cast every beam, those that cannot hit too; the output is the same
+    #[arg(long)]
+    no_cull: bool,
+}
+
+impl CasterArgs {
+    /// Opens the adapter for `effects` and says which it is.
+    pub fn open(&self, effects: &Effects) -> anyhow::Result<Caster> {
+        let caster = Caster::open(&self.adapter, effects).context("cannot cast")?;
+        if self.adapter == AdapterRequest::Auto && matches!(caster, Caster::Cpu(_)) {
+            eprintln!("No adapter found: the CPU casts; {HOW_TO_GET_VULKAN}.");
+        } else {
+            eprintln!("Casting on {}.", caster.name());
+        }
+        Ok(caster)
+    }
+
+    /// Whether beams that cannot hit are cast.
+    pub fn culling(&self) -> Culling {
+        if self.no_cull { Culling::Off } else { Culling::On }
+    }
+}

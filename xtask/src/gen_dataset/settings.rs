@@ -1,0 +1,207 @@
+//! From flags to a dataset's configuration.
+
+use super::usage;
+use anyhow::Context;
+use formats::scan::{Attribute, AttributeSet};
+use formats::scan_file::ScanFormat;
+use sim_gpu::dataset::config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
+use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
+use sim_gpu::mesh::frame::{Normalize, Up};
+use sim_gpu::pose::load_poses;
+use sim_gpu::sensor::{Layout as BeamLayout, Sensor, Views};
+use std::path::PathBuf;
+
+/// Flags that decide what a dataset holds.
+#[derive(clap::Args)]
+#[command(next_help_heading = "What the dataset holds")]
+pub struct Settings {
+    /// A built-in sensor or a TOML profile [default: vlp32c and generic-static, a set each]
+    #[arg(long, value_name = "NAME|TOML")]
+    sensor: Option<String>,
+
+    /// Places around the mesh from which the sensor looks [default: the sensor's own, or 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    views: Option<u32>,
+
+    /// Metres from the mesh's centre to the sensor [default: the sensor's own, or 3]
+    #[arg(long, value_name = "M")]
+    distance: Option<f64>,
+
+    /// Degrees of the sensor above the mesh [default: the sensor's own, or 20]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    elevation: Option<f64>,
+
+    /// Poses of the sensor, instead of views around the mesh
+    #[arg(long, value_name = "TOML", conflicts_with_all = ["views", "distance", "elevation"])]
+    poses: Option<PathBuf>,
+
+    /// Standard deviation of the noisy scans' error, metres; 0 writes clean scans alone
+    #[arg(long, default_value_t = 0.01, value_name = "M", allow_negative_numbers = true)]
+    noise: f64,
+
+    /// What the noise is added to: range, along the ray, or xyz, each coordinate
+    #[arg(long, default_value = "range", value_name = "MODEL", value_parser = noise_model)]
+    noise_model: NoiseModel,
+
+    /// Mean of the noise, metres
+    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true)]
+    noise_mean: f64,
+
+    /// Probability that a noisy scan loses a return
+    #[arg(long, default_value_t = 0.0, value_name = "P", allow_negative_numbers = true)]
+    dropout: f64,
+
+    /// Round noisy ranges to a quantum in metres, or to the sensor's own
+    #[arg(long, value_name = "M", num_args = 0..=1, default_missing_value = "sensor")]
+    quantise: Option<String>,
+
+    /// Per-point attributes besides positions: range, beam, ring, time, triangle, object,
+    /// intensity, normal
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    attributes: Vec<Attribute>,
+
+    /// Files of each scan; NPZ is always written
+    #[arg(long, value_delimiter = ',', default_value = "npz", value_name = "npz,ply,csv")]
+    format: Vec<ScanFormat>,
+
+    /// How meshes are scaled: unit-sphere, bbox or none [default: unit-sphere or the sensor's own]
+    #[arg(long, value_name = "HOW")]
+    normalize: Option<Normalize>,
+
+    /// The meshes' upward axis: y or z [default: y for OBJ, z for others]
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Up>,
+
+    /// Seed of every random number
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+
+    /// Points in each packed cloud
+    #[arg(long, default_value_t = 1024, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    points: u32,
+
+    /// Scans with fewer points are left out of packed sets
+    #[arg(long, default_value_t = 64, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    min_points: u32,
+
+    /// Layouts of other projects to write besides: yanx27, modelnet-h5
+    #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = layout)]
+    layout: Vec<Layout>,
+}
+
+impl Settings {
+    /// The configuration that the flags ask for.
+    pub fn config(&self) -> anyhow::Result<DatasetConfig> {
+        let sets = self.sets()?;
+        let recommended = sets.iter().find_map(|set| match &set.viewpoints {
+            Viewpoints::Views(views) => views.normalize,
+            Viewpoints::Poses(_) => None,
+        });
+        let mut formats = self.format.clone();
+        formats.push(ScanFormat::Npz);
+        formats.sort_unstable();
+        formats.dedup();
+        let effects = self.effects()?;
+        for set in &sets {
+            effects.for_sensor(&set.sensor).map_err(|error| usage(error.to_string()))?;
+        }
+        let variants =
+            if effects == (Effects { intensity: effects.intensity, ..Effects::default() }) {
+                vec![Variant::Clean]
+            } else {
+                vec![Variant::Clean, Variant::Noisy]
+            };
+        Ok(DatasetConfig {
+            seed: self.seed,
+            normalize: self.normalize.or(recommended).unwrap_or_default(),
+            up: self.up,
+            attributes: self.attributes.iter().copied().collect(),
+            formats,
+            effects,
+            variants,
+            sets,
+            packed_points: self.points,
+            min_points: self.min_points,
+            layouts: self.layout.clone(),
+        })
+    }
+
+    fn effects(&self) -> anyhow::Result<Effects> {
+        let attributes: AttributeSet = self.attributes.iter().copied().collect();
+        let noise = Noise { mean_m: self.noise_mean, sigma_m: self.noise, model: self.noise_model };
+        let step_m = match self.quantise.as_deref() {
+            None => None,
+            Some("sensor") => Some(None),
+            Some(metres) => Some(Some(
+                metres
+                    .parse()
+                    .map_err(|_| usage(format!("--quantise: {metres:?} is no number")))?,
+            )),
+        };
+        let effects = Effects {
+            noise: (self.noise != 0.0 || self.noise_mean != 0.0).then_some(noise),
+            dropout: (self.dropout != 0.0).then_some(Dropout { probability: self.dropout }),
+            quantum: step_m.map(|step_m| Quantum { step_m }),
+            intensity: attributes.contains(&Attribute::Intensity).then_some(Intensity),
+        };
+        effects.validate().map_err(|error| usage(error.to_string()))?;
+        Ok(effects)
+    }
+
+    fn sets(&self) -> anyhow::Result<Vec<SetConfig>> {
+        match &self.sensor {
+            Some(name) => {
+                let sensor = Sensor::resolve(name)?;
+                let set = match sensor.layout {
+                    BeamLayout::Rotating(_) | BeamLayout::Uniform(_) => "rotational",
+                    BeamLayout::Grid(_) => "static",
+                };
+                Ok(vec![self.set(set, sensor, self.views)?])
+            }
+            None => Ok(vec![
+                self.set("rotational", builtin("vlp32c")?, self.views)?,
+                self.set("static", builtin("generic-static")?, None)?,
+            ]),
+        }
+    }
+
+    fn set(&self, name: &str, sensor: Sensor, views: Option<u32>) -> anyhow::Result<SetConfig> {
+        let viewpoints = match &self.poses {
+            Some(file) => Viewpoints::Poses(load_poses(file)?),
+            None => {
+                let defaults = sensor.default_views();
+                let views = Views {
+                    count: views.unwrap_or(defaults.count),
+                    distance_m: self.distance.unwrap_or(defaults.distance_m),
+                    elevation_deg: self.elevation.unwrap_or(defaults.elevation_deg),
+                    ..defaults
+                };
+                views.validate().map_err(|error| usage(error.to_string()))?;
+                Viewpoints::Views(views)
+            }
+        };
+        Ok(SetConfig { name: name.to_owned(), sensor, viewpoints })
+    }
+}
+
+fn builtin(name: &str) -> anyhow::Result<Sensor> {
+    Sensor::builtin(name).with_context(|| format!("no built-in sensor {name}"))
+}
+
+fn noise_model(word: &str) -> Result<NoiseModel, String> {
+    match word {
+        "range" => Ok(NoiseModel::Range),
+        "xyz" => Ok(NoiseModel::Xyz),
+        _ => Err("expected range or xyz".to_owned()),
+    }
+}
+
+fn layout(word: &str) -> Result<Layout, String> {
+    match word {
+        "yanx27" => Ok(Layout::Yanx27),
+        "modelnet-h5" => Ok(Layout::ModelnetH5),
+        _ => Err("expected yanx27 or modelnet-h5".to_owned()),
+    }
+}

@@ -1,0 +1,47 @@
+//! What a run did, in a few lines.
+
+use sim_gpu::dataset::manifest::Manifest;
+use sim_gpu::dataset::progress::{Progress, Stage};
+use std::path::Path;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
+
+/// Prints the closing summary of a run that took `total`, the last `packing`
+/// of it after all scans were there.
+pub fn print(
+    out: &Path,
+    manifest: &Manifest,
+    progress: &Progress,
+    total: Duration,
+    packing: Duration,
+) {
+    progress.notes().iter().for_each(|note| eprintln!("{note}"));
+    let count = |counter: &std::sync::atomic::AtomicU64| counter.load(Relaxed);
+    let seconds = total.as_secs_f64();
+    eprintln!(
+        "{} meshes, {} failed; {} scans, {} points in {seconds:.1} s ({:.1} meshes/s)",
+        manifest.meshes.len(),
+        manifest.failures.len(),
+        count(&progress.scans),
+        count(&progress.points),
+        count(&progress.meshes) as f64 / seconds,
+    );
+    let (cast, culled) = (count(&progress.rays_cast), count(&progress.rays_culled));
+    eprintln!(
+        "{cast} rays cast, {culled} culled, {} decided in f64",
+        count(&progress.rays_decided_in_f64)
+    );
+    let stages: Vec<String> = Stage::ALL
+        .iter()
+        .map(|&stage| format!("{} {:.1}", stage.name(), progress.spent(stage).as_secs_f64()))
+        .collect();
+    eprintln!("seconds over all threads: {}, pack {:.1}", stages.join(", "), packing.as_secs_f64());
+    for packed in &manifest.packed {
+        eprintln!("{}: {} clouds, {} left out", packed.file, packed.clouds, packed.left_out.len());
+    }
+    if !manifest.failures.is_empty() {
+        let file = sim_gpu::dataset::layout::failures(out);
+        eprintln!("Meshes that failed are listed in {}", file.display());
+    }
+    eprintln!("Dataset: {}", out.display());
+}

@@ -1,0 +1,24 @@
+//! `cargo xtask merge-dataset`: shards into one dataset.
+
+use crate::Outcome;
+use sim_gpu::dataset::merge::merge;
+use std::path::PathBuf;
+
+/// Flags of `merge-dataset`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The shards' folders, all of them
+    #[arg(required = true, value_name = "SHARD")]
+    shards: Vec<PathBuf>,
+
+    /// Folder of the whole dataset
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Merges the shards.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let manifest = merge(&args.shards, &args.out)?;
+    eprintln!("{} meshes: {}", manifest.meshes.len(), args.out.display());
+    Ok(Outcome::Success)
+}

@@ -1,0 +1,58 @@
+//! `cargo xtask scan`: one scene, one scan per sensor.
+
+use crate::Outcome;
+use crate::caster::CasterArgs;
+use anyhow::Context;
+use formats::scan_file::{ScanFormat, write_scan};
+use sim_gpu::scene::{Scene, SceneScan, cast};
+use std::path::{Path, PathBuf};
+
+/// Flags of `scan`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The scene, such as assets/scenes/two_chairs.toml
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+
+    /// File to write: .npz, .ply or .csv; with several sensors, one file each, named after it
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+
+    #[command(flatten)]
+    caster: CasterArgs,
+}
+
+/// Scans the scene.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let format = ScanFormat::of(&args.out)?;
+    let scene = Scene::load(&args.scene)?;
+    let caster = args.caster.open(&scene.effects)?;
+    let scans = cast(&scene, &caster, args.caster.culling())
+        .with_context(|| format!("{}", args.scene.display()))?;
+    let several = scans.len() > 1;
+    for SceneScan { sensor, scan, tally } in &scans {
+        let file = if several { beside(&args.out, sensor) } else { args.out.clone() };
+        write_scan(&file, format, scan)?;
+        eprintln!(
+            "{sensor}: {} points ({} out of range, {} dropped, {} with a negative range): {}",
+            tally.points,
+            tally.out_of_range,
+            tally.dropped,
+            tally.negative,
+            file.display()
+        );
+    }
+    Ok(Outcome::Success)
+}
+
+/// `scan.npz` and `left` give `scan_left.npz`.
+fn beside(out: &Path, sensor: &str) -> PathBuf {
+    let part = |part: Option<&std::ffi::OsStr>| {
+        part.map(|part| part.to_string_lossy().into_owned()).unwrap_or_default()
+    };
+    let safe: String = sensor
+        .chars()
+        .map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' })
+        .collect();
+    out.with_file_name(format!("{}_{safe}.{}", part(out.file_stem()), part(out.extension())))
+}
