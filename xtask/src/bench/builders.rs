@@ -111,7 +111,7 @@ fn views(target: &Arc<Target>, pattern: &BeamPattern, rays: usize) -> Vec<Shot> 
     let view = |pose| {
         let mut shot = Shot::sweep(target, pose, pattern, Culling::On);
         let keep_each = shot.rays.len().div_ceil(share).max(1);
-        let thinned = |i: &usize| i % keep_each == 0;
+        let thinned = |i: &usize| i.is_multiple_of(keep_each);
         let chosen: Vec<usize> = (0..shot.rays.len()).filter(thinned).collect();
         shot.rays = chosen.iter().map(|&i| shot.rays[i]).collect();
         shot.job.rays = chosen.iter().map(|&i| shot.job.rays[i]).collect();

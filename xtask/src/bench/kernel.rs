@@ -35,7 +35,7 @@ pub fn measure(
     // 128 MiB of binding, the least that an adapter here was seen to have, show
     // 4.2 million rays: one dispatch of the caster's.
     let bytes = copies * job.rays.len() * size_of::<TraceRay>();
-    if bytes as u64 > u64::from(device.limits().max_storage_buffer_binding_size) {
+    if bytes as u64 > device.limits().max_storage_buffer_binding_size {
         return Ok(None);
     }
     let (trace, n_rays) = Trace::new(&device, job, copies);

@@ -51,7 +51,7 @@ pub fn millions_per_s(count: usize, seconds: f64) -> String {
 /// `x` with three digits.
 pub fn digits(x: f64) -> String {
     match x.abs() {
-        size if size == 0.0 => "0".to_owned(),
+        0.0 => "0".to_owned(),
         size if !(1e-3..1e6).contains(&size) => format!("{x:.2e}"),
         size if size < 10.0 => format!("{x:.3}").trim_end_matches('0').trim_end_matches('.').into(),
         size if size < 100.0 => format!("{x:.1}"),

@@ -206,8 +206,11 @@ fn in_f32(shot: &Shot, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -> Vec
 
 fn resolved(caster: &Caster, shot: &Shot, copies: usize) -> Result<Vec<Option<f64>>> {
     let jobs: Vec<CastJob> = vec![shot.job.clone(); copies];
-    let ranges = caster.cast(&jobs)?.iter().map(|cast| shot.ranges(cast)).last();
-    Ok(ranges.unwrap_or_default())
+    let mut ranges = Vec::new();
+    for cast in caster.cast(&jobs)? {
+        ranges = shot.ranges(&cast);
+    }
+    Ok(ranges)
 }
 
 /// What is left of a revolution when only each second or fourth azimuth step
