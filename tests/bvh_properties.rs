@@ -168,10 +168,13 @@ fn a_tree_is_the_same_on_every_run_and_number_of_threads() {
     };
     for builder in BUILDERS {
         let (one, four) = (build(1, builder), build(4, builder));
-        assert_eq!(bytemuck::cast_slice::<_, u8>(&one.nodes), bytemuck::cast_slice(&four.nodes));
+        assert_eq!(
+            bytemuck::cast_slice::<_, u8>(&one.nodes),
+            bytemuck::cast_slice::<_, u8>(&four.nodes)
+        );
         assert_eq!(
             bytemuck::cast_slice::<_, u8>(&one.triangles),
-            bytemuck::cast_slice(&four.triangles)
+            bytemuck::cast_slice::<_, u8>(&four.triangles)
         );
         assert_well_formed(&one);
     }
