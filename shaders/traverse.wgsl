@@ -17,10 +17,18 @@ fn reciprocal(direction: vec3f) -> vec3f {
     return 1.0 / select(direction, away, abs(direction) < vec3f(LEAST_COMPONENT));
 }
 
+// A ray as slab tests see it: distance to a plane at x is
+// x * per_direction + offset. Rounding the offset moves the plane by 2 * 2^-24
+// at most, for which boxes are padded.
+struct Slabs {
+    per_direction: vec3f,
+    offset: vec3f,
+}
+
 // Where the ray enters the box, or NO_HIT.
-fn enter(low: vec3f, high: vec3f, origin: vec3f, per_direction: vec3f, farthest: f32) -> f32 {
-    let t0 = (low - origin) * per_direction;
-    let t1 = (high - origin) * per_direction;
+fn enter(low: vec3f, high: vec3f, slabs: Slabs, farthest: f32) -> f32 {
+    let t0 = fma(low, slabs.per_direction, slabs.offset);
+    let t1 = fma(high, slabs.per_direction, slabs.offset);
     let nearer = min(t0, t1);
     let farther = max(t0, t1);
     let near = max(max(nearer.x, nearer.y), max(nearer.z, 0.0));
@@ -45,31 +53,31 @@ fn consider(nearest: ptr<function, Nearest>, candidate: Candidate, leaf: u32, in
     }
 }
 
+fn scan_leaf(nearest: ptr<function, Nearest>, first: u32, count: u32, origin: vec3f, shear: Shear) {
+    for (var leaf = first; leaf < first + count; leaf++) {
+        let triangle = triangles[leaf];
+        consider(nearest, intersect(origin, shear, triangle), leaf, triangle.index);
+    }
+}
+
 fn traverse(ray: TraceRay) -> Nearest {
     let shear = shear_of(ray.direction);
     let per_direction = reciprocal(ray.direction);
+    let slabs = Slabs(per_direction, -(ray.origin * per_direction));
     var nearest = Nearest(NO_HIT, 0.0, 0u, MISS, NO_HIT, NO_HIT);
     var stack: array<u32, STACK_SIZE>;
     var height = 0u;
     var at = ray.root;
     loop {
         let node = nodes[at];
-        var left = enter(node.left_min, node.left_max, ray.origin, per_direction, nearest.farthest);
-        var right = enter(node.right_min, node.right_max, ray.origin, per_direction, nearest.farthest);
+        var left = enter(node.left_min, node.left_max, slabs, nearest.farthest);
+        var right = enter(node.right_min, node.right_max, slabs, nearest.farthest);
         if left < NO_HIT && node.left_count > 0u {
-            for (var i = 0u; i < node.left_count; i++) {
-                let leaf = node.left + i;
-                let triangle = triangles[leaf];
-                consider(&nearest, intersect(ray.origin, shear, triangle), leaf, triangle.index);
-            }
+            scan_leaf(&nearest, node.left, node.left_count, ray.origin, shear);
             left = NO_HIT;
         }
         if right < NO_HIT && node.right_count > 0u {
-            for (var i = 0u; i < node.right_count; i++) {
-                let leaf = node.right + i;
-                let triangle = triangles[leaf];
-                consider(&nearest, intersect(ray.origin, shear, triangle), leaf, triangle.index);
-            }
+            scan_leaf(&nearest, node.right, node.right_count, ray.origin, shear);
             right = NO_HIT;
         }
         let left_first = left <= right;

@@ -29,7 +29,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     step("format", &mut cargo(&["fmt", "--all", "--check"]))?;
     let lints = ["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"];
     step("lints", &mut cargo(&lints))?;
-    let mut tests = cargo(&["test", "--workspace"]);
+    let mut tests = cargo(&["test", "--workspace", "--no-fail-fast"]);
     // A machine without any Vulkan adapter tests the CPU alone, and says so.
     if !args.no_install {
         tests.env("EDGEPUCK_REQUIRE_ADAPTER", "1");

@@ -29,8 +29,9 @@ const MAX_LEAF: usize = 4;
 /// coordinate at most 1).
 ///
 /// A triangle test may accept a ray that passes outside the triangle by its
-/// own rounding: 48 units of 2^-24 by the account in `cpu::trace`. The box
-/// must not reject that ray first. 2^-18 is 64 such units.
+/// own rounding: 48 units of 2^-24 by the account in `cpu::intersect`. A slab
+/// test moves the box's planes by 4 more (`cpu::traverse`). The box must not
+/// reject a ray that the triangle takes: 2^-18 is 64 such units.
 const BOX_PADDING: f32 = 1.0 / (1 << 18) as f32;
 
 /// Which algorithm builds the hierarchy.

@@ -47,11 +47,20 @@ fn reciprocal(direction: Vec3) -> Vec3A {
     Vec3A::new(1.0 / away(direction.x), 1.0 / away(direction.y), 1.0 / away(direction.z))
 }
 
+/// A ray as slab tests see it: distance to a plane at x is
+/// x * `per_direction` + `offset`. Rounding moves the plane by 4 * 2^-24 at
+/// most, for which boxes are padded.
+#[derive(Clone, Copy)]
+struct Slabs {
+    per_direction: Vec3A,
+    offset: Vec3A,
+}
+
 /// Where the ray enters the box, or `NO_HIT`.
 #[inline]
-fn enter(low: [f32; 3], high: [f32; 3], origin: Vec3A, per_direction: Vec3A, farthest: f32) -> f32 {
-    let t0 = (Vec3A::from_array(low) - origin) * per_direction;
-    let t1 = (Vec3A::from_array(high) - origin) * per_direction;
+fn enter(low: [f32; 3], high: [f32; 3], slabs: Slabs, farthest: f32) -> f32 {
+    let t0 = Vec3A::from_array(low) * slabs.per_direction + slabs.offset;
+    let t1 = Vec3A::from_array(high) * slabs.per_direction + slabs.offset;
     let near = t0.min(t1).max_element().max(0.0);
     let far = t0.max(t1).min_element().min(farthest) * FAR_SCALE;
     if near <= far { near } else { NO_HIT }
@@ -93,16 +102,15 @@ pub fn traverse(nodes: &[Node], triangles: &[LeafTriangle], ray: &TraceRay) -> N
     let origin = Vec3::from_array(ray.origin);
     let shear = Shear::of(direction);
     let per_direction = reciprocal(direction);
-    let corner = Vec3A::from(origin);
+    let slabs = Slabs { per_direction, offset: -(Vec3A::from(origin) * per_direction) };
     let mut nearest = Nearest::NONE;
     let mut stack = [0u32; MAX_DEPTH];
     let mut height = 0;
     let mut at = ray.root;
     loop {
         let node = &nodes[at as usize];
-        let mut left = enter(node.left_min, node.left_max, corner, per_direction, nearest.farthest);
-        let mut right =
-            enter(node.right_min, node.right_max, corner, per_direction, nearest.farthest);
+        let mut left = enter(node.left_min, node.left_max, slabs, nearest.farthest);
+        let mut right = enter(node.right_min, node.right_max, slabs, nearest.farthest);
         if left < NO_HIT && node.left_count > 0 {
             scan_leaf(&mut nearest, triangles, node.left, node.left_count, origin, &shear);
             left = NO_HIT;

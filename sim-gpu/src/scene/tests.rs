@@ -32,7 +32,7 @@ fn the_two_chairs_show_every_effect() {
     assert_eq!(scene.effects.intensity, Some(Intensity));
     let [near, far] = scene.objects.as_slice() else { panic!("two chairs") };
     assert_eq!((near.name.as_str(), far.name.as_str()), ("near_chair", "far_chair"));
-    assert!(near.mesh.ends_with("assets/scenes/../meshes/chair.obj"), "{:?}", near.mesh);
+    assert!(near.mesh.ends_with("assets/scenes/../meshes/chair/chair_0046.obj"), "{:?}", near.mesh);
     assert_eq!(far.scale, DVec3::new(1.1, 1.0, 1.2));
     assert_eq!(scene.sensors[0].name, "roof");
     assert_eq!(scene.sensors[0].sensor.name, "vlp32c");
