@@ -1,6 +1,8 @@
 //! What a scan makes of hits: range limits, noise, dropout, quantisation,
 //! intensity, normals, recipes. On every caster.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet, Scan};
 use glam::{DAffine3, DVec3};

@@ -8,6 +8,7 @@ use crate::ray::{RayFrame, TraceRay};
 use crate::sensor::BeamPattern;
 use crate::target::Target;
 use formats::rng::StreamKey;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 const _: () = assert!(MAX_DEPTH == 64, "the shader's stack holds 64 nodes");
@@ -143,9 +144,7 @@ impl Caster {
     /// If the device is lost or out of memory.
     pub fn submit(&self, jobs: &[CastJob]) -> Result<Casting, GpuError> {
         match self {
-            Self::Cpu(effects) => {
-                Ok(Casting::Done(jobs.iter().map(|job| cpu::trace::cast(job, effects)).collect()))
-            }
+            Self::Cpu(_) => Ok(Casting::Done(self.cast_on_cpu(jobs))),
             Self::Gpu(gpu) => Ok(Casting::Pending(Box::new(gpu.submit(jobs)?))),
         }
     }
@@ -157,7 +156,7 @@ impl Caster {
             Self::Cpu(effects) => effects,
             Self::Gpu(gpu) => gpu.effects(),
         };
-        jobs.iter().map(|job| cpu::trace::cast(job, effects)).collect()
+        jobs.par_iter().map(|job| cpu::trace::cast(job, effects)).collect()
     }
 
     /// Casts `jobs` and waits.
