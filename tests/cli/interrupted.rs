@@ -10,7 +10,7 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     succeeds(folder.path(), "gen-dataset meshes --out unbroken --adapter cpu");
     let words = ["gen-dataset", "meshes", "--out", "broken", "--adapter", "cpu", "--resume"];
     // Moments from before the first scan to the packing; the last runs through.
-    for milliseconds in [5, 20, 40, 60, 90, 130, 180, 240, 320, 60_000] {
+    for milliseconds in [2, 5, 9, 14, 20, 30, 40, 60, 90, 130, 180, 240, 320, 60_000] {
         let mut child =
             xtask(folder.path(), &words).stderr(std::process::Stdio::null()).spawn().unwrap();
         let killed_at = std::time::Instant::now() + Duration::from_millis(milliseconds);

@@ -5,6 +5,7 @@ use super::error::DatasetError;
 use super::journal::{Journal, Terms};
 use super::layout;
 use super::manifest::Manifest;
+use formats::atomic;
 use std::path::{Component, Path};
 
 /// What to do where the folder holds a dataset already.
@@ -45,11 +46,17 @@ pub fn begin(out: &Path, terms: &Terms, how: Begin) -> Result<Start, DatasetErro
         Begin::Resume if finished => {
             let manifest = Manifest::read(&layout::manifest(out))?;
             same_terms(out, &manifest.terms(), terms)?;
-            // A run killed at its very end leaves parts of its journal.
+            // A run killed at its very end leaves parts of its journal, and of
+            // what it was writing.
             journal.remove()?;
+            atomic::sweep_leftovers(out)?;
             return Ok(Start::Complete(Box::new(manifest)));
         }
-        Begin::Resume => refuse_occupied(out, terms)?,
+        Begin::Resume => {
+            // A run killed at its very beginning leaves a journal without terms.
+            journal.remove()?;
+            refuse_occupied(out, terms)?;
+        }
     }
     journal.begin(terms)?;
     Ok(Start::Go)
