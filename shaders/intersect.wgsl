@@ -52,11 +52,6 @@ struct Candidate {
     rival: f32,
 }
 
-// Rounding moves a triangle by at most this much against the ray, in unit
-// lengths: see `cpu/intersect.rs`.
-const DISPLACEMENT: f32 = 48.0 / 16777216.0;
-const STEEPEST: f32 = 573.0;
-
 fn within(edge: f32, x: f32, y: f32) -> bool {
     return edge * edge <= DISPLACEMENT * DISPLACEMENT * (x * x + y * y);
 }

@@ -6,8 +6,6 @@
 @group(0) @binding(2) var<storage, read> rays: array<TraceRay>;
 @group(0) @binding(3) var<storage, read_write> codes: array<u32>;
 
-const WORKGROUP_SIZE: u32 = 64u;
-
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(
     @builtin(workgroup_id) workgroup: vec3u,

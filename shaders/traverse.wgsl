@@ -1,17 +1,5 @@
 // Finds the nearest triangle along a ray. Twin: `sim-gpu/src/cpu/traverse.rs`.
 
-const STACK_SIZE: u32 = 64u;
-const NO_HIT: f32 = 1e30;
-
-// Directions closer to zero than this count as this: a reciprocal stays finite
-// and boxes are padded by far more than a ray drifts by it.
-const LEAST_COMPONENT: f32 = 1e-20;
-
-// Bounds the rounding of near and far together: Ize, "Robust BVH ray
-// traversal", JCGT 2(2), 2013; twice his 1 + 2 gamma(3), and room for the
-// 2.5 ULP that WGSL allows a division.
-const FAR_SCALE: f32 = 1.0 + 32.0 / 16777216.0;
-
 fn reciprocal(direction: vec3f) -> vec3f {
     let away = select(vec3f(-LEAST_COMPONENT), vec3f(LEAST_COMPONENT), direction >= vec3f(0.0));
     return 1.0 / select(direction, away, abs(direction) < vec3f(LEAST_COMPONENT));
@@ -100,10 +88,8 @@ fn traverse(ray: TraceRay) -> Nearest {
     return nearest;
 }
 
-// Whether another triangle may truly be nearer by more than the promised
+// Says whether another triangle may truly be nearer by more than the promised
 // accuracy.
-const ACCURACY: f32 = 1e-6;
-
 fn code_of(nearest: Nearest, skipped: f32) -> u32 {
     if nearest.index == MISS {
         return MISS;

@@ -5,10 +5,19 @@ set -eu
 
 packages="mesa-vulkan-drivers libvulkan1 g++"
 
+if command -v rustup >/dev/null 2>&1; then
+    cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
+    cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
+fi
+
 missing=""
 for package in $packages; do
     dpkg -s "$package" >/dev/null 2>&1 || missing="$missing $package"
 done
+# Debian 12's own Mesa 22.3 traces at half the speed of its backport 25.0.
+case "$(dpkg-query -W -f '${Version}' mesa-vulkan-drivers 2>/dev/null || true)" in
+    22.3.*deb12*) missing="$missing mesa-vulkan-drivers libvulkan1" ;;
+esac
 if [ -z "$missing" ]; then
     echo "All packages are there: $packages"
     exit 0
@@ -30,7 +39,6 @@ echo "Installing:$missing"
 . /etc/os-release
 release=""
 if [ "${VERSION_CODENAME:-}" = bookworm ]; then
-    # Debian 12's Mesa 22.3 traces at half the speed of its backport 25.0.
     echo "deb http://deb.debian.org/debian bookworm-backports main" |
         $root tee /etc/apt/sources.list.d/edgepuck-backports.list >/dev/null
     release="-t bookworm-backports"

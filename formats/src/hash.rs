@@ -15,6 +15,12 @@ pub fn of_file(path: &Path) -> Result<String, FormatError> {
     digest(path).map_err(|error| FormatError::io(path, error))
 }
 
+/// The SHA-256 of `bytes`, in hexadecimal digits.
+#[must_use]
+pub fn of_bytes(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
 fn digest(path: &Path) -> io::Result<String> {
     let mut file = File::open(path)?;
     let mut hash = Sha256::new();

@@ -8,9 +8,6 @@ struct TraceRay {
     skipped: f32,
 }
 
-const MISS: u32 = 0xFFFFFFFFu;
-const AMBIGUOUS: u32 = 0x80000000u;
-
 struct Nearest {
     t: f32,
     // How far the true distance may be from `t`.

@@ -1,17 +1,14 @@
 //! One interface to every way of casting.
 
-use crate::bvh::MAX_DEPTH;
 use crate::cpu;
 use crate::effects::Effects;
-use crate::gpu::{AdapterError, AdapterRequest, GpuCaster, GpuError, Pending, adapter};
+use crate::gpu::{AdapterRequest, GpuCaster, GpuError, Pending, adapter};
 use crate::ray::{RayFrame, TraceRay};
 use crate::sensor::BeamPattern;
 use crate::target::Target;
 use formats::rng::StreamKey;
 use rayon::prelude::*;
 use std::sync::Arc;
-
-const _: () = assert!(MAX_DEPTH == 64, "the shader's stack holds 64 nodes");
 
 /// The rays of one sensor against one object.
 #[derive(Clone, Debug)]
@@ -107,16 +104,27 @@ impl Caster {
     /// # Errors
     /// If a named adapter is missing or the device cannot be opened.
     pub fn open(request: &AdapterRequest, effects: &Effects) -> Result<Self, GpuError> {
-        let name = match request {
-            AdapterRequest::Cpu => return Ok(Self::Cpu(effects.clone())),
-            AdapterRequest::Auto => None,
-            AdapterRequest::Named(name) => Some(name.as_str()),
-        };
-        match adapter::find_adapter(name) {
-            Ok(adapter) => Ok(Self::Gpu(Box::new(GpuCaster::open(&adapter, effects)?))),
-            Err(AdapterError::None) if name.is_none() => Ok(Self::Cpu(effects.clone())),
-            Err(error) => Err(error.into()),
+        match request {
+            AdapterRequest::Cpu => Ok(Self::Cpu(effects.clone())),
+            AdapterRequest::Auto => Ok(Self::open_best(effects).0),
+            AdapterRequest::Named(name) => {
+                let adapter = adapter::find_adapter(name)?;
+                Ok(Self::Gpu(Box::new(GpuCaster::open(&adapter, effects)?)))
+            }
         }
+    }
+
+    /// The best caster that opens, and why better ones did not.
+    #[must_use]
+    pub fn open_best(effects: &Effects) -> (Self, Vec<GpuError>) {
+        let mut passed_over = Vec::new();
+        for adapter in adapter::adapters() {
+            match GpuCaster::open(&adapter, effects) {
+                Ok(gpu) => return (Self::Gpu(Box::new(gpu)), passed_over),
+                Err(error) => passed_over.push(error),
+            }
+        }
+        (Self::Cpu(effects.clone()), passed_over)
     }
 
     /// The adapter's name, `cpu` for the twin.

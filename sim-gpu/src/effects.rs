@@ -13,8 +13,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{InvalidValue, finite, positive, within};
+use crate::config::{InvalidValue, positive, within};
 use crate::sensor::Sensor;
+
+/// No length of an effect is larger: shaders hold it in f32, with room to
+/// multiply.
+const LARGEST_M: f64 = 1e9;
 
 /// The effects of one scene or run. The default is none: a clean scan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -108,14 +112,15 @@ impl Effects {
     /// On the first number that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
         if let Some(noise) = self.noise {
-            finite("effects.noise.mean_m", noise.mean_m)?;
-            within("effects.noise.sigma_m", noise.sigma_m, 0.0, f64::MAX)?;
+            within("effects.noise.mean_m", noise.mean_m, -LARGEST_M, LARGEST_M)?;
+            within("effects.noise.sigma_m", noise.sigma_m, 0.0, LARGEST_M)?;
         }
         if let Some(dropout) = self.dropout {
             within("effects.dropout.probability", dropout.probability, 0.0, 1.0)?;
         }
         if let Some(Quantum { step_m: Some(step_m) }) = self.quantum {
             positive("effects.quantise_m", step_m)?;
+            within("effects.quantise_m", step_m, 0.0, LARGEST_M)?;
         }
         Ok(())
     }

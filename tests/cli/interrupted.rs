@@ -40,3 +40,14 @@ fn a_folder_in_use_is_refused_unless_told_otherwise() {
     succeeds(folder.path(), "gen-dataset meshes --out out --adapter cpu --overwrite --seed 9");
     assert!(folder.path().join("out/mine.txt").exists(), "what is not ours stays");
 }
+
+#[test]
+fn another_list_of_meshes_is_another_dataset() {
+    let folder = tempfile::tempdir().unwrap();
+    meshes::write_tree(&folder.path().join("meshes"));
+    succeeds(folder.path(), "gen-dataset meshes --out out --adapter cpu");
+    let added = folder.path().join("meshes/ball/train/ball_0009.off");
+    std::fs::write(added, meshes::off(8, 0.5)).unwrap();
+    let said = exits(1, folder.path(), "gen-dataset meshes --out out --adapter cpu --resume");
+    assert!(said.contains("meshes"), "{said}");
+}

@@ -55,7 +55,7 @@ pub fn config() -> DatasetConfig {
 /// The terms of a run on `config`.
 pub fn terms(config: DatasetConfig, shard: Option<(u32, u32)>) -> Terms {
     let version = env!("CARGO_PKG_VERSION").to_owned();
-    Terms { version, config, adapter: "an adapter".to_owned(), shard }
+    Terms { version, config, adapter: "an adapter".to_owned(), meshes: String::new(), shard }
 }
 
 /// A mesh of `class`.

@@ -24,8 +24,16 @@ pub struct CasterArgs {
 impl CasterArgs {
     /// Opens the adapter for `effects` and says which it is.
     pub fn open(&self, effects: &Effects) -> anyhow::Result<Caster> {
-        let caster = Caster::open(&self.adapter, effects).context("cannot cast")?;
-        if self.adapter == AdapterRequest::Auto && matches!(caster, Caster::Cpu(_)) {
+        if self.adapter != AdapterRequest::Auto {
+            let caster = Caster::open(&self.adapter, effects).context("cannot cast")?;
+            eprintln!("Casting on {}.", caster.name());
+            return Ok(caster);
+        }
+        let (caster, passed_over) = Caster::open_best(effects);
+        for error in &passed_over {
+            eprintln!("Passed over: {error}.");
+        }
+        if matches!(caster, Caster::Cpu(_)) {
             eprintln!("No adapter found: the CPU casts; {HOW_TO_GET_VULKAN}.");
         } else {
             eprintln!("Casting on {}.", caster.name());

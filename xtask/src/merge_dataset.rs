@@ -1,6 +1,6 @@
 //! `cargo xtask merge-dataset`: shards into one dataset.
 
-use crate::Outcome;
+use crate::{Outcome, gen_dataset};
 use sim_gpu::dataset::merge::merge;
 use std::path::PathBuf;
 
@@ -20,5 +20,12 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let manifest = merge(&args.shards, &args.out)?;
     eprintln!("{} meshes: {}", manifest.meshes.len(), args.out.display());
-    Ok(Outcome::Success)
+    if manifest.adapters.len() > 1 {
+        eprintln!(
+            "Parts were cast on different adapters ({}): clean scans are what one run gives, \
+             noise differs in its last digits.",
+            manifest.adapters.join(", ")
+        );
+    }
+    gen_dataset::end(&args.out, &manifest)
 }

@@ -29,8 +29,15 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let caster = args.caster.open(&scene.effects)?;
     let scans = cast(&scene, &caster, args.caster.culling())
         .with_context(|| format!("{}", args.scene.display()))?;
+    for (number, object) in scene.objects.iter().enumerate() {
+        let label = object.label.as_ref().map(|label| format!(", a {label}")).unwrap_or_default();
+        eprintln!("object {number}: {}{label}", object.name);
+    }
     let several = scans.len() > 1;
-    for SceneScan { sensor, scan, tally } in &scans {
+    for SceneScan { sensor, scan, tally, too_large_for_adapter } in &scans {
+        if *too_large_for_adapter {
+            eprintln!("{sensor}: a mesh is too large for one binding: the CPU cast it");
+        }
         let file = if several { beside(&args.out, sensor) } else { args.out.clone() };
         write_scan(&file, format, scan)?;
         eprintln!(

@@ -39,7 +39,7 @@ pub const DISPLACEMENT: f32 = 48.0 / 16_777_216.0;
 
 /// The tangent of the steepest incidence at which a range keeps its promised
 /// accuracy: 1 / tan(0.1 degree).
-const STEEPEST: f32 = 573.0;
+pub const STEEPEST: f32 = 573.0;
 
 impl Shear {
     /// The shear of a ray along `direction`.

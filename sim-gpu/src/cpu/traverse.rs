@@ -6,16 +6,20 @@ use crate::ray::{AMBIGUOUS, MISS, TraceRay};
 use glam::{Vec3, Vec3A};
 
 /// Beyond every distance, and finite.
-pub(super) const NO_HIT: f32 = 1e30;
+pub const NO_HIT: f32 = 1e30;
 
 /// Directions closer to zero than this count as this: a reciprocal stays
 /// finite and boxes are padded by far more than a ray drifts by it.
-const LEAST_COMPONENT: f32 = 1e-20;
+pub const LEAST_COMPONENT: f32 = 1e-20;
 
 /// Bounds the rounding of near and far together: Ize, "Robust BVH ray
 /// traversal", JCGT 2(2), 2013; twice his 1 + 2 gamma(3), and room for the
 /// 2.5 ULP that WGSL allows a division.
-const FAR_SCALE: f32 = 1.0 + 32.0 / 16_777_216.0;
+pub const FAR_SCALE: f32 = 1.0 + 32.0 / 16_777_216.0;
+
+/// Relative accuracy that a range found in f32 must allow; where it does not,
+/// f64 decides.
+pub const ACCURACY: f32 = 1e-6;
 
 /// What is known of the nearest surface while a ray is traced.
 #[derive(Clone, Copy, Debug)]
@@ -85,8 +89,6 @@ impl Nearest {
     /// The caster's answer: index, [`MISS`], and whether f64 must decide.
     #[must_use]
     pub fn code(&self, skipped: f32) -> u32 {
-        /// Relative accuracy of a range that the answer must allow.
-        const ACCURACY: f32 = 1e-6;
         if self.index == MISS {
             return MISS;
         }

@@ -104,6 +104,17 @@ impl DatasetConfig {
     }
 }
 
+impl Viewpoints {
+    /// How many places there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Views(views) => views.count as usize,
+            Self::Poses(poses) => poses.len(),
+        }
+    }
+}
+
 impl SetConfig {
     /// The poses around the mesh called `id`, whose jitter, if any, is its own.
     #[must_use]

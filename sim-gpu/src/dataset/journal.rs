@@ -20,8 +20,20 @@ pub struct Terms {
     pub config: DatasetConfig,
     /// The adapter's name.
     pub adapter: String,
+    /// Which meshes: a [`digest`] of their entries and files.
+    pub meshes: String,
     /// Which part of the meshes: (number from 0, of how many).
     pub shard: Option<(u32, u32)>,
+}
+
+/// Says which meshes a run is about, whatever is in their files.
+#[must_use]
+pub fn digest<'a>(meshes: impl Iterator<Item = (Entry, &'a str)>) -> String {
+    let mut lines: Vec<String> = meshes
+        .map(|(Entry { class, split, name }, source)| format!("{class}/{split}/{name} {source}\n"))
+        .collect();
+    lines.sort_unstable();
+    formats::hash::of_bytes(lines.concat().as_bytes())
 }
 
 /// The journal of one folder.

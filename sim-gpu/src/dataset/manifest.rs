@@ -5,7 +5,7 @@
 
 use super::config::{DatasetConfig, SetConfig, Viewpoints};
 use super::error::DatasetError;
-use super::journal::{Terms, read_json, write_json};
+use super::journal::{Terms, digest, read_json, write_json};
 use super::record::{Entry, MeshFailure, MeshRecord};
 use crate::pose::Pose;
 use serde::{Deserialize, Serialize};
@@ -134,6 +134,7 @@ impl Manifest {
             version: self.version.clone(),
             config: self.config.clone(),
             adapter: self.adapters.join(", "),
+            meshes: digest(self.sources()),
             shard: self.shard,
         }
     }
@@ -150,6 +151,12 @@ impl Manifest {
     pub fn entries(&self) -> impl Iterator<Item = &Entry> {
         let failed = self.failures.iter().map(|failure| &failure.entry);
         self.meshes.iter().map(|record| &record.entry).chain(failed)
+    }
+
+    /// Every mesh and its file, scanned or failed.
+    fn sources(&self) -> impl Iterator<Item = (Entry, &str)> {
+        let failed = self.failures.iter().map(|f| (f.entry.clone(), f.source.as_str()));
+        self.meshes.iter().map(|m| (m.entry.clone(), m.source.as_str())).chain(failed)
     }
 
     fn flaw(&self) -> Option<String> {

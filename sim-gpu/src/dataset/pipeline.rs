@@ -24,12 +24,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Bytes that meshes under way may hold together.
 const MEMORY_BUDGET: u64 = 1 << 30;
 
-/// Bytes of memory per byte of a mesh file: 8 is what OFF, OBJ and binary STL
-/// stay under, with trees and rays.
-const BYTES_PER_FILE_BYTE: u64 = 8;
+/// Bytes of memory per byte of a mesh file: binary PLY, the densest, takes 10
+/// with its tree.
+const BYTES_PER_FILE_BYTE: u64 = 12;
 
-/// Bytes for the rays and scans of one mesh whatever its size.
-const BYTES_PER_MESH: u64 = 4 << 20;
+/// Bytes of a ray on its way: its record, beam, code and words.
+const BYTES_PER_RAY: u64 = 44;
 
 /// Batches on their way through the adapter at once: while one is traced, the
 /// next is uploaded.
@@ -110,6 +110,11 @@ pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError
     Ok(scanned)
 }
 
+/// Whether `record` is of the file that `mesh` names, as it is now.
+fn is_of(record: &MeshRecord, mesh: &MeshEntry) -> bool {
+    formats::hash::of_file(&mesh.path).is_ok_and(|sha256| sha256 == record.sha256)
+}
+
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -117,22 +122,26 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Shared<'_> {
     /// Takes meshes from the list until none is left.
     fn prepare_all<'b>(&self, budget: &'b Budget, to_caster: &Sender<Held<'b>>) {
+        let sets = self.run.config.sets.iter().zip(&self.patterns);
+        let rays: u64 =
+            sets.map(|(set, pattern)| set.viewpoints.count() as u64 * pattern.len() as u64).sum();
         while let Some(mesh) = self.meshes.get(self.next.fetch_add(1, SeqCst)) {
             if self.stopped.load(SeqCst) {
                 return;
             }
             match self.journal.find(&Entry::from(mesh)) {
                 Err(error) => return self.stop(error),
-                Ok(Some(record)) => {
+                Ok(Some(record)) if is_of(&record, mesh) => {
                     self.run.progress.meshes.fetch_add(1, Relaxed);
                     lock(&self.scanned).records.push(record);
                     continue;
                 }
-                Ok(None) => {}
+                // A mesh that changed since is scanned anew.
+                Ok(Some(_) | None) => {}
             }
             let file_bytes = std::fs::metadata(&mesh.path).map_or(0, |file| file.len());
             let share = budget.take(
-                file_bytes.saturating_mul(BYTES_PER_FILE_BYTE).saturating_add(BYTES_PER_MESH),
+                file_bytes.saturating_mul(BYTES_PER_FILE_BYTE).saturating_add(rays * BYTES_PER_RAY),
             );
             let Run { config, culling, progress, .. } = self.run;
             match prepare(mesh, config, &self.patterns, *culling, progress) {

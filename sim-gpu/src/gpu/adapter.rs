@@ -71,18 +71,12 @@ pub struct AdapterSummary {
 
 /// No adapter answers the request.
 #[derive(Debug, thiserror::Error)]
-pub enum AdapterError {
-    /// No adapter at all: only the CPU twin is left.
-    #[error("no GPU and no software Vulkan was found")]
-    None,
-    /// No adapter of this name.
-    #[error("no adapter's name holds {wanted:?}; there are: {}", present.join(", "))]
-    Unknown {
-        /// The name asked for.
-        wanted: String,
-        /// The names there are.
-        present: Vec<String>,
-    },
+#[error("no adapter's name holds {wanted:?}; there are: {}", present.join(", "))]
+pub struct AdapterError {
+    /// The name asked for.
+    pub wanted: String,
+    /// The names there are.
+    pub present: Vec<String>,
 }
 
 /// All adapters, best first.
@@ -91,17 +85,14 @@ pub fn list_adapters() -> Vec<AdapterSummary> {
     adapters().iter().map(summary).collect()
 }
 
-/// The best adapter, or the first whose name holds `name`.
-pub(crate) fn find_adapter(name: Option<&str>) -> Result<wgpu::Adapter, AdapterError> {
+/// The first adapter whose name holds `wanted`, best first.
+pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, AdapterError> {
     let mut adapters = adapters();
-    let Some(wanted) = name else {
-        return adapters.drain(..).next().ok_or(AdapterError::None);
-    };
     let holds =
         |a: &wgpu::Adapter| a.get_info().name.to_lowercase().contains(&wanted.to_lowercase());
     match adapters.iter().position(holds) {
         Some(at) => Ok(adapters.swap_remove(at)),
-        None => Err(AdapterError::Unknown {
+        None => Err(AdapterError {
             wanted: wanted.to_owned(),
             present: adapters.iter().map(|a| a.get_info().name).chain(["cpu".to_owned()]).collect(),
         }),
@@ -120,7 +111,8 @@ pub(crate) fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
-fn adapters() -> Vec<wgpu::Adapter> {
+/// All adapters that can compute, best first.
+pub(crate) fn adapters() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let mut adapters: Vec<_> =
         pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY))

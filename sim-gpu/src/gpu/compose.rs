@@ -4,12 +4,41 @@
 //! an effect is adding one file there, one twin in `cpu/effects` and one
 //! [`Module`] here.
 
+use crate::bvh::MAX_DEPTH;
+use crate::cpu::intersect::{DISPLACEMENT, STEEPEST};
+use crate::cpu::traverse::{ACCURACY, FAR_SCALE, LEAST_COMPONENT, NO_HIT};
 use crate::effects::{Effects, NoiseModel};
+use crate::ray::{AMBIGUOUS, MISS};
 
 macro_rules! shader {
     ($path:literal) => {
         include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../shaders/", $path))
     };
+}
+
+/// Rays of one workgroup. Lavapipe and GPUs trace alike from 32 to 256.
+pub(super) const WORKGROUP_SIZE: usize = 64;
+
+/// The constants that shaders share with their twins, which document them.
+fn constants() -> String {
+    let floats = [
+        ("ACCURACY", ACCURACY),
+        ("DISPLACEMENT", DISPLACEMENT),
+        ("FAR_SCALE", FAR_SCALE),
+        ("LEAST_COMPONENT", LEAST_COMPONENT),
+        ("NO_HIT", NO_HIT),
+        ("STEEPEST", STEEPEST),
+    ];
+    let whole = [
+        ("AMBIGUOUS", AMBIGUOUS),
+        ("MISS", MISS),
+        ("STACK_SIZE", MAX_DEPTH as u32),
+        ("WORKGROUP_SIZE", WORKGROUP_SIZE as u32),
+    ];
+    // Debug formatting of f32 is the shortest text that reads back the same.
+    let floats = floats.map(|(name, value)| format!("const {name}: f32 = {value:?};\n"));
+    let whole = whole.map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
+    floats.concat() + &whole.concat()
 }
 
 /// What every variant holds.
@@ -77,7 +106,7 @@ pub fn modules(effects: &Effects) -> Vec<Module> {
 /// The WGSL of the variant that traces and models `modules`.
 #[must_use]
 pub fn compose(modules: &[Module]) -> String {
-    let mut wgsl = TRACE.join("\n");
+    let mut wgsl = constants() + &TRACE.join("\n");
     if modules.is_empty() {
         wgsl.push_str("\nfn finish(i: u32, ray: TraceRay, nearest: Nearest) {}\n");
         return wgsl;

@@ -3,7 +3,7 @@
 
 use super::batch::Batch;
 use super::caster::Core;
-use super::compose::{Input, reads};
+use super::compose::{Input, WORKGROUP_SIZE, reads};
 use std::sync::mpsc::{Receiver, channel};
 
 const INPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST);
@@ -24,7 +24,8 @@ impl Growing {
     ) -> &wgpu::Buffer {
         let too_small = self.0.as_ref().is_none_or(|buffer| buffer.size() < bytes);
         if too_small {
-            let limit = device.limits().max_storage_buffer_binding_size;
+            let limits = device.limits();
+            let limit = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
             let size = bytes.next_power_of_two().max(4096).min(limit).max(bytes);
             self.0 = None;
             self.0 = Some(device.create_buffer(&wgpu::BufferDescriptor {
@@ -51,6 +52,7 @@ pub(super) struct Slot {
     codes_readback: Growing,
     words_readback: Growing,
     answer_bytes: [u64; 2],
+    submission: Option<wgpu::SubmissionIndex>,
     mapped: Option<Receiver<Result<(), wgpu::BufferAsyncError>>>,
 }
 
@@ -107,7 +109,7 @@ impl Slot {
             encoder.copy_buffer_to_buffer(words, 0, readback, 0, words_bytes);
             readback.clone()
         });
-        core.queue.submit([encoder.finish()]);
+        self.submission = Some(core.queue.submit([encoder.finish()]));
         let (send, receive) = channel();
         let map = |buffer: &wgpu::Buffer, bytes| {
             let send = send.clone();
@@ -126,7 +128,10 @@ impl Slot {
     /// The codes and words of the batch, once they are there.
     pub(super) fn wait(&self, core: &Core) -> Result<(Vec<u32>, Vec<f32>), String> {
         let mapped = self.mapped.as_ref().ok_or("nothing was dispatched")?;
-        core.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| e.to_string())?;
+        // This batch alone: the next may be on its way already.
+        let submission_index = self.submission.clone();
+        let poll = wgpu::PollType::Wait { submission_index, timeout: None };
+        core.device.poll(poll).map_err(|e| e.to_string())?;
         // Another thread may be the one that runs the callbacks: this waits for
         // it, until both ends of the channel were dropped.
         for result in mapped {
@@ -177,7 +182,7 @@ fn bind(
 
 /// Workgroups in x and y that cover `rays`.
 fn workgroups(rays: usize, limits: &wgpu::Limits) -> [u32; 2] {
-    let groups = rays.div_ceil(64) as u32;
+    let groups = rays.div_ceil(WORKGROUP_SIZE) as u32;
     let x = groups.min(limits.max_compute_workgroups_per_dimension).max(1);
     [x, groups.div_ceil(x)]
 }

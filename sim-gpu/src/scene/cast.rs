@@ -40,6 +40,8 @@ pub struct SceneScan {
     pub scan: Scan,
     /// What became of the returns.
     pub tally: Tally,
+    /// Whether the CPU cast it because a mesh was too large for the adapter.
+    pub too_large_for_adapter: bool,
 }
 
 /// An object ready to be cast at.
@@ -96,11 +98,9 @@ fn cast_sensor(
         CastJob::aim(Arc::clone(target), frame, &pattern, culling, stream, reflectivity)
     };
     let jobs: Vec<CastJob> = objects.iter().zip(&scene.objects).map(aim).collect();
-    let casts = if jobs.iter().all(|job| caster.fits(&job.target)) {
-        caster.cast(&jobs)?
-    } else {
-        caster.cast_on_cpu(&jobs)
-    };
+    let too_large_for_adapter = !jobs.iter().all(|job| caster.fits(&job.target));
+    let casts =
+        if too_large_for_adapter { caster.cast_on_cpu(&jobs) } else { caster.cast(&jobs)? };
     let hits: Vec<_> = jobs
         .iter()
         .zip(&casts)
@@ -127,5 +127,5 @@ fn cast_sensor(
         stream: StreamKey::new(scene.seed, &sensor.name, number),
     };
     let (scan, tally) = assemble(&view, &seen);
-    Ok(SceneScan { sensor: sensor.name.clone(), scan, tally })
+    Ok(SceneScan { sensor: sensor.name.clone(), scan, tally, too_large_for_adapter })
 }

@@ -8,8 +8,9 @@ use super::table::{Table, digits};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use sim_gpu::caster::{Caster, Culling};
+use sim_gpu::dataset::Entry;
 use sim_gpu::dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
-use sim_gpu::dataset::journal::{Journal, Terms};
+use sim_gpu::dataset::journal::{Journal, Terms, digest};
 use sim_gpu::dataset::pipeline::{Run, scan_all};
 use sim_gpu::dataset::progress::{Progress, Stage};
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
@@ -69,6 +70,7 @@ fn once(config: &DatasetConfig, caster: &Caster, meshes: &[MeshEntry]) -> Result
         version: env!("CARGO_PKG_VERSION").to_owned(),
         config: config.clone(),
         adapter: caster.name().to_owned(),
+        meshes: digest(meshes.iter().map(|mesh| (Entry::from(mesh), mesh.relative.as_str()))),
         shard: None,
     };
     Journal::of(folder.path()).begin(&terms)?;

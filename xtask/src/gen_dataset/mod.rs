@@ -9,9 +9,10 @@ use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, gen_shapes};
 use anyhow::Context;
 use settings::Settings;
+use sim_gpu::dataset::Entry;
 use sim_gpu::dataset::check_layouts;
 use sim_gpu::dataset::finish::finish;
-use sim_gpu::dataset::journal::Terms;
+use sim_gpu::dataset::journal::{Terms, digest};
 use sim_gpu::dataset::manifest::Manifest;
 use sim_gpu::dataset::pipeline::{Run, scan_all};
 use sim_gpu::dataset::progress::Progress;
@@ -20,19 +21,26 @@ use sim_gpu::dataset::verify::verify;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::shapes;
 use std::collections::BTreeSet;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
+
+/// Where the meshes of a run without meshes are written, a seed behind it.
+const DEFAULT_SHAPES: &str = "data/default-shapes";
+
+/// Where the dataset of a run without meshes is written.
+const DEFAULT_OUT: &str = "data/lidar-shapes";
 
 /// Flags of `gen-dataset`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Folder of OBJ, OFF, PLY and STL files, as CLASS/{train,test}/NAME or in any other way;
-    /// default: parametric shapes of our own, written to data/shapes
+    /// default: parametric shapes of our own, written to data/default-shapes-SEED
     #[arg(value_name = "MESHES")]
     meshes: Option<PathBuf>,
 
-    /// Folder of the dataset [default: data/lidar-MESHES]
+    /// Folder of the dataset [default: data/lidar-MESHES, or data/lidar-shapes]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -86,11 +94,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         return check(folder);
     }
     let config = args.settings.config()?;
-    let meshes_folder = match &args.meshes {
-        Some(folder) => folder.clone(),
-        None => write_default_shapes(config.seed)?,
+    let (meshes_folder, default_out) = match &args.meshes {
+        Some(folder) => (folder.clone(), default_out(folder)),
+        None => (write_default_shapes(config.seed)?, PathBuf::from(DEFAULT_OUT)),
     };
-    let out = args.out.clone().unwrap_or_else(|| default_out(&meshes_folder));
+    let out = args.out.clone().unwrap_or(default_out);
     let meshes = shard(discover(&meshes_folder, config.seed)?, args.shard);
     let classes: BTreeSet<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
     check_layouts(&config, &Vec::from_iter(classes))?;
@@ -99,6 +107,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         config,
         adapter: caster.name().to_owned(),
+        meshes: digest(meshes.iter().map(|mesh| (Entry::from(mesh), mesh.relative.as_str()))),
         shard: args.shard.map(|shard| (shard.number, shard.of)),
     };
     let how = match (args.resume, args.overwrite) {
@@ -127,7 +136,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 }
 
 /// Draws the example, which a killed run may lack, and names it.
-fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
+pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
     match example::draw(out, manifest).context("cannot draw the example")? {
         Some(picture) => eprintln!("An example to look at: {}", picture.display()),
         None => eprintln!("No scan holds a point, so there is no example to look at."),
@@ -137,8 +146,9 @@ fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
 
 fn check(folder: &Path) -> anyhow::Result<Outcome> {
     let report = verify(folder)?;
+    let mut out = std::io::stdout().lock();
     for problem in &report.problems {
-        println!("{problem}");
+        writeln!(out, "{problem}")?;
     }
     eprintln!(
         "{}: {} files checked, {} problems.",
@@ -150,7 +160,8 @@ fn check(folder: &Path) -> anyhow::Result<Outcome> {
 }
 
 fn write_default_shapes(seed: u64) -> anyhow::Result<PathBuf> {
-    let folder = PathBuf::from("data/shapes");
+    // A folder of its own for each seed: meshes of another run must not mix in.
+    let folder = PathBuf::from(format!("{DEFAULT_SHAPES}-{seed}"));
     eprintln!("No meshes named: writing shapes of our own to {}.", folder.display());
     shapes::write_tree(&folder, seed, gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS)
         .context("cannot write the shapes")?;
