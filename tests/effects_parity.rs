@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
-use sim_gpu::caster::{Cast, CastJob, Culling};
 use sim_gpu::cpu::effects::dropout::dropout;
 use sim_gpu::cpu::effects::intensity::intensity;
 use sim_gpu::cpu::effects::noise_range::noise_range;
 use sim_gpu::cpu::effects::noise_xyz::noise_xyz;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
+use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{AMBIGUOUS, MISS, RayFrame};
 use sim_gpu::sensor::BeamPattern;

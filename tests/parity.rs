@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use sim_gpu::bvh::Builder;
-use sim_gpu::caster::{CastJob, Culling};
 use sim_gpu::effects::Effects;
+use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::AMBIGUOUS;

@@ -72,7 +72,7 @@ impl Tally {
         &mut self,
         entry: &MeshEntry,
         caster: &sim_gpu::caster::Caster,
-        job: &sim_gpu::caster::CastJob,
+        job: &sim_gpu::job::CastJob,
         pattern: &BeamPattern,
     ) {
         let start = Instant::now();

@@ -6,8 +6,9 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet, Scan};
 use glam::{DAffine3, DVec3};
-use sim_gpu::caster::{CastJob, Caster, Culling};
+use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
+use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::RayFrame;
 use sim_gpu::resolve::resolve;

@@ -3,82 +3,9 @@
 use crate::cpu;
 use crate::effects::Effects;
 use crate::gpu::{AdapterRequest, GpuCaster, GpuError, Pending, adapter};
-use crate::ray::{RayFrame, TraceRay};
-use crate::sensor::BeamPattern;
+use crate::job::{Cast, CastJob};
 use crate::target::Target;
-use formats::rng::StreamKey;
 use rayon::prelude::*;
-use std::sync::Arc;
-
-/// The rays of one sensor against one object.
-#[derive(Clone, Debug)]
-pub struct CastJob {
-    /// The object.
-    pub target: Arc<Target>,
-    /// How the sensor sees it.
-    pub frame: RayFrame,
-    /// The beam of each ray, `[n_rays]`.
-    pub beams: Vec<u32>,
-    /// The rays, `[n_rays]`; roots are relative to the target's tree.
-    pub rays: Vec<TraceRay>,
-    /// Keys the random numbers of this sensor and object.
-    pub stream: StreamKey,
-    /// The object's reflectivity, 0 to 1.
-    pub reflectivity: f32,
-}
-
-/// Whether beams that cannot hit are cast. The answers are the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Culling {
-    /// Only beams that may hit the object's bounding sphere are cast.
-    #[default]
-    On,
-    /// All beams are cast: for tests and measurements.
-    Off,
-}
-
-impl CastJob {
-    /// Aims the beams of `pattern` at `target` through `frame`.
-    #[must_use]
-    pub fn aim(
-        target: Arc<Target>,
-        frame: RayFrame,
-        pattern: &BeamPattern,
-        culling: Culling,
-        stream: StreamKey,
-        reflectivity: f32,
-    ) -> Self {
-        let (beams, rays) = match culling {
-            Culling::On => pattern
-                .within(&frame.cone())
-                .into_iter()
-                .filter_map(|beam| {
-                    let ray = frame.ray(pattern.directions[beam as usize]);
-                    Some((beam, frame.trace_ray(&ray, 0)?))
-                })
-                .unzip(),
-            Culling::Off => pattern
-                .order
-                .iter()
-                .map(|&beam| {
-                    let ray = frame.ray(pattern.directions[beam as usize]);
-                    (beam, frame.trace_ray_unculled(&ray, 0))
-                })
-                .unzip(),
-        };
-        Self { target, frame, beams, rays, stream, reflectivity }
-    }
-}
-
-/// What a caster answers for one job.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Cast {
-    /// Per ray: triangle index, [`crate::ray::MISS`] or
-    /// [`crate::ray::AMBIGUOUS`]; `[n_rays]`.
-    pub codes: Vec<u32>,
-    /// The effects' words where the code is no miss, `[n_rays, words]`.
-    pub words: Vec<f32>,
-}
 
 /// A way of casting.
 pub enum Caster {

@@ -10,6 +10,7 @@ pub mod cpu;
 pub mod dataset;
 pub mod effects;
 pub mod gpu;
+pub mod job;
 pub mod mesh;
 pub mod pose;
 pub mod ray;

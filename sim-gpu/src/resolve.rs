@@ -4,10 +4,10 @@
 //! the same to the last bit on every adapter that finds the same triangle,
 //! and as accurate near grazing as elsewhere.
 
-use crate::caster::{Cast, CastJob};
 use crate::cpu::effects::append_words;
 use crate::cpu::oracle;
 use crate::effects::Effects;
+use crate::job::{Cast, CastJob};
 use crate::ray::{AMBIGUOUS, MISS};
 use crate::sensor::BeamPattern;
 

@@ -1,8 +1,8 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
-use crate::caster::CastJob;
 use crate::cpu::oracle;
 use crate::effects::{Effects, NoiseModel};
+use crate::job::CastJob;
 use crate::pose::Pose;
 use crate::resolve::Hits;
 use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};

@@ -8,8 +8,8 @@ use std::fmt;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::caster::CastJob;
 use sim_gpu::cpu::oracle::{self, Crossing};
+use sim_gpu::job::CastJob;
 use sim_gpu::ray::Ray;
 use sim_gpu::resolve::{Hit, Hits};
 use sim_gpu::sensor::BeamPattern;

@@ -1,9 +1,10 @@
 //! Opens the adapter that a command line asks for.
 
 use anyhow::Context;
-use sim_gpu::caster::{Caster, Culling};
+use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
 use sim_gpu::gpu::AdapterRequest;
+use sim_gpu::job::Culling;
 
 /// What to do where no adapter is found.
 pub const HOW_TO_GET_VULKAN: &str =

@@ -4,9 +4,9 @@
 use super::effects::append_words;
 use super::traverse::traverse;
 use crate::bvh::{LeafTriangle, Node};
-use crate::caster::{Cast, CastJob};
 use crate::effects::Effects;
 use crate::gpu::{modules, words_per_ray};
+use crate::job::{Cast, CastJob};
 use crate::ray::{AMBIGUOUS, MISS, Ray, TraceRay};
 use glam::Vec3;
 use rayon::prelude::*;

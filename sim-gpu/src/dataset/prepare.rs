@@ -4,7 +4,7 @@ use super::config::{DatasetConfig, SetConfig};
 use super::progress::{Progress, Stage};
 use super::record::{Entry, MeshFailure, MeshRecord};
 use crate::bvh::Builder;
-use crate::caster::{CastJob, Culling};
+use crate::job::{CastJob, Culling};
 use crate::mesh::census::survey;
 use crate::mesh::frame::to_world;
 use crate::mesh::tree::MeshEntry;

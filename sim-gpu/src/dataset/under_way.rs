@@ -3,8 +3,9 @@
 use super::budget::Share;
 use super::prepare::Prepared;
 use super::progress::Progress;
-use crate::caster::{Cast, CastJob, Caster, Casting};
+use crate::caster::{Caster, Casting};
 use crate::gpu::GpuError;
+use crate::job::{Cast, CastJob};
 use crossbeam_channel::Receiver;
 
 /// Rays gathered before a batch is sent, unless no mesh is waiting.

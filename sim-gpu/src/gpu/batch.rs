@@ -2,7 +2,7 @@
 
 use super::compose::{Input, Module, reads, words_per_ray};
 use crate::bvh::{LeafTriangle, Node};
-use crate::caster::CastJob;
+use crate::job::CastJob;
 use crate::ray::TraceRay;
 use crate::target::Target;
 use std::collections::HashMap;

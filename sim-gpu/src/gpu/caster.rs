@@ -4,8 +4,8 @@ use super::adapter::{self, AdapterError, AdapterSummary};
 use super::batch::{Batch, BatchLimits};
 use super::compose::{Input, Module, WORKGROUP_SIZE, compose, modules, reads, words_per_ray};
 use super::slot::Slot;
-use crate::caster::{Cast, CastJob};
 use crate::effects::Effects;
+use crate::job::{Cast, CastJob};
 use std::sync::{Arc, Mutex};
 
 /// Rays in one dispatch: enough to fill any adapter, few enough that a display
@@ -277,8 +277,8 @@ fn pipeline(device: &wgpu::Device, modules: &[Module]) -> wgpu::ComputePipeline 
 mod tests {
     use super::*;
     use crate::bvh::Builder;
-    use crate::caster::Culling;
     use crate::effects::{Dropout, Intensity, Noise, NoiseModel};
+    use crate::job::Culling;
     use crate::mesh::Mesh;
     use crate::pose::Pose;
     use crate::ray::RayFrame;

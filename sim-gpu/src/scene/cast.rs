@@ -2,9 +2,10 @@
 
 use super::{Scene, SceneObject, SceneSensor};
 use crate::bvh::Builder;
-use crate::caster::{CastJob, Caster, Culling};
+use crate::caster::Caster;
 use crate::config::InvalidValue;
 use crate::gpu::GpuError;
+use crate::job::{CastJob, Culling};
 use crate::mesh::census::survey;
 use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::{LoadedMesh, MeshError, load};

@@ -3,8 +3,9 @@
 
 use super::lanes::Lane;
 use anyhow::{Context, Result};
-use sim_gpu::caster::{CastJob, Caster};
+use sim_gpu::caster::Caster;
 use sim_gpu::gpu::{Batch, compose};
+use sim_gpu::job::CastJob;
 use sim_gpu::ray::TraceRay;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 

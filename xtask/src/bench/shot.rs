@@ -2,8 +2,8 @@
 
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3};
-use sim_gpu::caster::{Cast, CastJob, Culling};
 use sim_gpu::cpu::oracle;
+use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{AMBIGUOUS, MISS, Ray, RayFrame};
 use sim_gpu::sensor::BeamPattern;

@@ -11,7 +11,7 @@ use anyhow::Result;
 use glam::{DVec3, dvec3};
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
-use sim_gpu::caster::{CastJob, Culling};
+use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::{Mesh, census};
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::{BeamPattern, Sensor};

@@ -6,8 +6,8 @@ pub mod noise_range;
 pub mod noise_xyz;
 pub mod stream;
 
-use crate::caster::CastJob;
 use crate::effects::{Effects, NoiseModel};
+use crate::job::CastJob;
 use crate::ray::Ray;
 
 /// The words of all `effects` for a return of `beam` from triangle `index`,
