@@ -12,8 +12,8 @@ use sim_gpu::pose::Pose;
 use std::path::{Path, PathBuf};
 use xtask::preview;
 
-/// Draws the first mesh that fills a packed cloud, or else the one with the
-/// most points; `None` if no scan holds a point.
+/// Draws a mesh from the middle of the list that fills a packed cloud, or else
+/// the one with the most points; `None` if no scan holds a point.
 pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> {
     let Some(set) = manifest.config.sets.first() else { return Ok(None) };
     let points = |record: &&MeshRecord| -> u64 {
@@ -21,7 +21,8 @@ pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> 
         of_set.filter_map(|scan| scan.variants.first()).map(|v| v.tally.points).sum()
     };
     let enough = u64::from(manifest.config.packed_points);
-    let full = manifest.meshes.iter().find(|record| points(record) >= enough);
+    let (before, after) = manifest.meshes.split_at(manifest.meshes.len() / 2);
+    let full = after.iter().chain(before).find(|record| points(record) >= enough);
     let most = full.or_else(|| manifest.meshes.iter().max_by_key(points));
     let Some(record) = most.filter(|record| points(record) > 0) else { return Ok(None) };
     let poses = set.poses(manifest.config.seed, &record.entry.id());
