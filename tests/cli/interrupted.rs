@@ -1,7 +1,13 @@
 //! A run that is killed at any moment goes on to the same bytes.
 
 use crate::{assert_same_tree, exits, meshes, said, succeeds, xtask};
+use formats::rng::StreamKey;
 use std::time::Duration;
+
+/// Number `n` of this process.
+fn random_below_300(n: u64) -> u64 {
+    StreamKey::new(u64::from(std::process::id()), "kill", 0).below(300, n)
+}
 
 #[test]
 fn a_killed_run_resumes_to_the_same_bytes() {
@@ -9,8 +15,12 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     meshes::write_tree(&folder.path().join("meshes"));
     succeeds(folder.path(), "gen-dataset meshes --out unbroken --adapter cpu");
     let words = ["gen-dataset", "meshes", "--out", "broken", "--adapter", "cpu", "--resume"];
-    // Moments from before the first scan to the packing; the last runs through.
-    for milliseconds in [2, 5, 9, 14, 20, 30, 40, 60, 90, 130, 180, 240, 320, 60_000] {
+    // Moments from before the first scan to the packing, and some that differ
+    // on every run; the last runs through.
+    let random: Vec<u64> = (0..6).map(random_below_300).collect();
+    println!("random moments, ms: {random:?}");
+    let fixed = [2, 5, 9, 14, 20, 30, 40, 60, 90, 130, 180, 240, 320];
+    for milliseconds in fixed.into_iter().chain(random).chain([60_000]) {
         let mut child =
             xtask(folder.path(), &words).stderr(std::process::Stdio::null()).spawn().unwrap();
         let killed_at = std::time::Instant::now() + Duration::from_millis(milliseconds);
