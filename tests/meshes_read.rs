@@ -1,23 +1,14 @@
 //! Reads every real mesh of `../shared/data`, where that is present: none may
 //! be refused and no face lost.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use sim_gpu::mesh::census::survey;
 use sim_gpu::mesh::frame::{Normalize, to_world};
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::mesh::{LoadedMesh, load};
-
-/// The folder of real meshes, or the reason why a test skips.
-fn shared(relative: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(relative);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-    }
-    path.exists().then_some(path)
-}
+use tests::shared_data::{shared, unpacked};
 
 fn load_all(root: &Path) -> Vec<(MeshEntry, LoadedMesh)> {
     let entries = discover(root, 0).expect("the shared data can be listed");
@@ -76,13 +67,7 @@ fn princeton_meshes_are_read_in_full() {
 
 #[test]
 fn the_720_obj_meshes_are_read_in_full() {
-    let Some(archive) = shared("meshes20/meshes20.tar.xz") else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let status = Command::new("tar").arg("-xJf").arg(archive).arg("-C").arg(folder.path()).status();
-    if !status.is_ok_and(|status| status.success()) {
-        println!("skipped: tar cannot unpack xz here");
-        return;
-    }
+    let Some(folder) = unpacked("meshes20/meshes20.tar.xz") else { return };
     let meshes = load_all(folder.path());
     assert_eq!(meshes.len(), 720);
     for (entry, loaded) in &meshes {

@@ -2,7 +2,6 @@
 //! the f64 oracle on a view of each.
 
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -16,7 +15,7 @@ use sim_gpu::sensor::BeamPattern;
 use tests::adapter::casters;
 use tests::casting::{builtin, job, target};
 use tests::judge::{Verdict, judge};
-use tests::shared_data::shared;
+use tests::shared_data::{shared, unpacked};
 
 /// What a folder of meshes showed on one caster.
 #[derive(Default)]
@@ -108,12 +107,6 @@ fn princeton_agrees_with_the_oracle() {
 
 #[test]
 fn a_sample_of_twenty_classes_agrees_with_the_oracle() {
-    let Some(archive) = shared("meshes20/meshes20.tar.xz") else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let status = Command::new("tar").arg("-xJf").arg(archive).arg("-C").arg(folder.path()).status();
-    if !status.is_ok_and(|status| status.success()) {
-        println!("skipped: tar cannot unpack xz here");
-        return;
-    }
+    let Some(folder) = unpacked("meshes20/meshes20.tar.xz") else { return };
     survey_folder(folder.path(), 12);
 }

@@ -79,6 +79,12 @@ pub struct Quantum {
 pub struct Intensity;
 
 impl Effects {
+    /// What is left of them in a clean scan: all that leaves its points alone.
+    #[must_use]
+    pub fn clean(&self) -> Self {
+        Self { intensity: self.intensity, ..Self::default() }
+    }
+
     /// Whether no effect is wanted.
     #[must_use]
     pub fn is_plain(&self) -> bool {

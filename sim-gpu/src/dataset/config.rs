@@ -87,9 +87,7 @@ impl DatasetConfig {
     /// If quantisation is wanted and the set's sensor states no quantum.
     pub fn effects_of(&self, set: &SetConfig, variant: Variant) -> Result<Effects, InvalidValue> {
         match variant {
-            Variant::Clean => {
-                Ok(Effects { intensity: self.effects.intensity, ..Effects::default() })
-            }
+            Variant::Clean => Ok(self.effects.clean()),
             Variant::Noisy => self.effects.for_sensor(&set.sensor),
         }
     }
@@ -100,7 +98,7 @@ impl DatasetConfig {
         if self.variants.contains(&Variant::Noisy) {
             return self.effects.clone();
         }
-        Effects { intensity: self.effects.intensity, ..Effects::default() }
+        self.effects.clean()
     }
 }
 

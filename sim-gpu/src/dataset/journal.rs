@@ -5,6 +5,8 @@ use super::config::DatasetConfig;
 use super::error::DatasetError;
 use super::layout;
 use super::record::{Entry, MeshRecord};
+use crate::caster::Caster;
+use crate::mesh::tree::MeshEntry;
 use formats::atomic;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -20,15 +22,34 @@ pub struct Terms {
     pub config: DatasetConfig,
     /// The adapter's name.
     pub adapter: String,
-    /// Which meshes: a [`digest`] of their entries and files.
+    /// Which meshes: a digest of their entries and the names of their files.
     pub meshes: String,
     /// Which part of the meshes: (number from 0, of how many).
     pub shard: Option<(u32, u32)>,
 }
 
+impl Terms {
+    /// The terms of a run over `meshes`, or over part `shard` of them.
+    #[must_use]
+    pub fn new(
+        config: DatasetConfig,
+        caster: &Caster,
+        meshes: &[MeshEntry],
+        shard: Option<(u32, u32)>,
+    ) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            config,
+            adapter: caster.name().to_owned(),
+            meshes: digest(meshes.iter().map(|mesh| (mesh.into(), mesh.relative.as_str()))),
+            shard,
+        }
+    }
+}
+
 /// Says which meshes a run is about, whatever is in their files.
 #[must_use]
-pub fn digest<'a>(meshes: impl Iterator<Item = (Entry, &'a str)>) -> String {
+pub(super) fn digest<'a>(meshes: impl Iterator<Item = (Entry, &'a str)>) -> String {
     let mut lines: Vec<String> = meshes
         .map(|(Entry { class, split, name }, source)| format!("{class}/{split}/{name} {source}\n"))
         .collect();

@@ -63,9 +63,7 @@ pub struct SceneObject {
 /// A sensor of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneSensor {
-    /// The profile as the scene names it.
-    pub profile: String,
-    /// The sensor it names.
+    /// The sensor, from its profile.
     pub sensor: Sensor,
     /// Default: the sensor's name.
     pub name: String,

@@ -117,7 +117,7 @@ impl SensorTable {
         };
         let pose = orientation.pose(&table, self.position_m)?;
         let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
-        Ok(SceneSensor { profile: self.profile, sensor, name, pose })
+        Ok(SceneSensor { sensor, name, pose })
     }
 }
 

@@ -8,9 +8,8 @@ use super::table::{Table, digits};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use sim_gpu::caster::Caster;
-use sim_gpu::dataset::Entry;
 use sim_gpu::dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
-use sim_gpu::dataset::journal::{Journal, Terms, digest};
+use sim_gpu::dataset::journal::{Journal, Terms};
 use sim_gpu::dataset::pipeline::{Run, scan_all};
 use sim_gpu::dataset::progress::{Progress, Stage};
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
@@ -67,13 +66,7 @@ pub fn measure(root: &Path, limit: usize, lanes: &[Lane], rounds: usize) -> Resu
 
 fn once(config: &DatasetConfig, caster: &Caster, meshes: &[MeshEntry]) -> Result<Dataset> {
     let folder = tempfile::tempdir()?;
-    let terms = Terms {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        config: config.clone(),
-        adapter: caster.name().to_owned(),
-        meshes: digest(meshes.iter().map(|mesh| (Entry::from(mesh), mesh.relative.as_str()))),
-        shard: None,
-    };
+    let terms = Terms::new(config.clone(), caster, meshes, None);
     Journal::of(folder.path()).begin(&terms)?;
     let progress = Progress::default();
     let run = Run { out: folder.path(), config, caster, culling: Culling::On, progress: &progress };

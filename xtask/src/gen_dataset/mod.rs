@@ -9,10 +9,9 @@ use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, gen_shapes};
 use anyhow::Context;
 use settings::Settings;
-use sim_gpu::dataset::Entry;
 use sim_gpu::dataset::check_layouts;
 use sim_gpu::dataset::finish::finish;
-use sim_gpu::dataset::journal::{Terms, digest};
+use sim_gpu::dataset::journal::Terms;
 use sim_gpu::dataset::manifest::Manifest;
 use sim_gpu::dataset::pipeline::{Run, scan_all};
 use sim_gpu::dataset::progress::Progress;
@@ -103,13 +102,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let classes: BTreeSet<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
     check_layouts(&config, &Vec::from_iter(classes))?;
     let caster = args.caster.open(&config.cast_effects())?;
-    let terms = Terms {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        config,
-        adapter: caster.name().to_owned(),
-        meshes: digest(meshes.iter().map(|mesh| (Entry::from(mesh), mesh.relative.as_str()))),
-        shard: args.shard.map(|shard| (shard.number, shard.of)),
-    };
+    let part = args.shard.map(|shard| (shard.number, shard.of));
+    let terms = Terms::new(config, &caster, &meshes, part);
     let how = match (args.resume, args.overwrite) {
         (true, _) => Begin::Resume,
         (_, true) => Begin::Overwrite,

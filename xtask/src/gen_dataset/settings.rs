@@ -107,12 +107,11 @@ impl Settings {
         for set in &sets {
             effects.for_sensor(&set.sensor).map_err(|error| usage(error.to_string()))?;
         }
-        let variants =
-            if effects == (Effects { intensity: effects.intensity, ..Effects::default() }) {
-                vec![Variant::Clean]
-            } else {
-                vec![Variant::Clean, Variant::Noisy]
-            };
+        let variants = if effects == effects.clean() {
+            vec![Variant::Clean]
+        } else {
+            vec![Variant::Clean, Variant::Noisy]
+        };
         Ok(DatasetConfig {
             seed: self.seed,
             normalize: self.normalize.or(recommended).unwrap_or_default(),
