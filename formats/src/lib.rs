@@ -3,7 +3,8 @@
 //!
 //! Without features it holds what a program needs in memory. Feature `dataset`
 //! adds the files ([`scan_file`], [`packed`], [`yanx27`], [`atomic`]), feature
-//! `hdf5` ModelNet40's HDF5 layout (`modelnet_h5`).
+//! `hdf5` ModelNet40's HDF5 layout (`modelnet_h5`), feature `weights` models
+//! (`weights`, `model_card`).
 
 pub mod cloud;
 pub mod error;
@@ -14,10 +15,12 @@ pub mod split;
 
 #[cfg(feature = "dataset")]
 mod archive;
-#[cfg(feature = "dataset")]
+#[cfg(any(feature = "dataset", feature = "weights"))]
 pub mod atomic;
 #[cfg(feature = "dataset")]
 pub mod csv;
+#[cfg(feature = "weights")]
+pub mod model_card;
 #[cfg(feature = "hdf5")]
 pub mod modelnet_h5;
 #[cfg(feature = "dataset")]
@@ -30,6 +33,8 @@ pub mod packed;
 pub mod ply;
 #[cfg(feature = "dataset")]
 pub mod scan_file;
+#[cfg(feature = "weights")]
+pub mod weights;
 #[cfg(feature = "dataset")]
 pub mod yanx27;
 

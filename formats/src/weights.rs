@@ -1,0 +1,236 @@
+//! Weights on disk: safetensors, opened once, read tensor by tensor.
+//!
+//! A model of 13 MiB need not be in memory twice: [`WeightsFile`] holds the
+//! header, and a tensor is read when it is asked for.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use safetensors::tensor::{Dtype, Metadata, TensorInfo};
+
+use crate::atomic;
+use crate::error::FormatError;
+
+/// The header's length comes first, as u64.
+const LENGTH_SIZE: u64 = 8;
+/// What the safetensors crate itself accepts at most.
+const LONGEST_HEADER: u64 = 100_000_000;
+
+/// A tensor of f32 and its shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tensor {
+    /// The size along each axis.
+    pub shape: Vec<usize>,
+    /// The elements in C order; all are finite when read by [`WeightsFile`].
+    pub values: Vec<f32>,
+}
+
+/// A safetensors file that is being read.
+pub struct WeightsFile {
+    path: PathBuf,
+    file: File,
+    /// Where the tensors' bytes begin.
+    data_offset: u64,
+    header: Metadata,
+}
+
+impl WeightsFile {
+    /// Opens the file at `path` and checks its header against its size.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is no safetensors, or is cut short.
+    pub fn open(path: &Path) -> Result<Self, FormatError> {
+        let here = |source| FormatError::io(path, source);
+        let bad = |cause: String| FormatError::malformed(path, "header", cause);
+        let mut file = File::open(path).map_err(here)?;
+        let file_size = file.metadata().map_err(here)?.len();
+        let mut length = [0; LENGTH_SIZE as usize];
+        file.read_exact(&mut length).map_err(|_| bad("too short for safetensors".to_owned()))?;
+        let length = u64::from_le_bytes(length);
+        if length > LONGEST_HEADER || length > file_size - LENGTH_SIZE {
+            return Err(bad(format!(
+                "no safetensors: a header of {length} bytes in a file of {file_size}"
+            )));
+        }
+        let mut json = Vec::new();
+        (&mut file).take(length).read_to_end(&mut json).map_err(here)?;
+        let header: Metadata = serde_json::from_slice(&json)
+            .map_err(|cause| bad(format!("no safetensors: {cause}")))?;
+        let data_offset = LENGTH_SIZE + length;
+        let promised = data_offset + header.data_len() as u64;
+        if promised != file_size {
+            return Err(bad(format!("tensors need {promised} bytes, the file has {file_size}")));
+        }
+        Ok(Self { path: path.to_path_buf(), file, data_offset, header })
+    }
+
+    /// The file's name.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The names and shapes of all tensors, sorted by name.
+    #[must_use]
+    pub fn shapes(&self) -> BTreeMap<String, Vec<usize>> {
+        let tensors = self.header.tensors().into_iter();
+        tensors.map(|(name, info)| (name, info.shape.clone())).collect()
+    }
+
+    /// The file's own remarks, sorted by key.
+    #[must_use]
+    pub fn metadata(&self) -> BTreeMap<String, String> {
+        let metadata = self.header.metadata().iter().flatten();
+        metadata.map(|(key, value)| (key.clone(), value.clone())).collect()
+    }
+
+    /// The shape of tensor `name`, if there is one.
+    #[must_use]
+    pub fn shape(&self, name: &str) -> Option<&[usize]> {
+        self.header.info(name).map(|info| &info.shape[..])
+    }
+
+    /// Reads tensor `name`.
+    ///
+    /// # Errors
+    /// None of that name, not f32, or a value that is not finite.
+    pub fn read(&mut self, name: &str) -> Result<Tensor, FormatError> {
+        let bad = |cause: String| FormatError::malformed(&self.path, tensor_part(name), cause);
+        let info: &TensorInfo = self.header.info(name).ok_or_else(|| bad("missing".to_owned()))?;
+        if info.dtype != Dtype::F32 {
+            return Err(bad(format!("expected f32, found {:?}", info.dtype)));
+        }
+        let (begin, end) = info.data_offsets;
+        let mut bytes = vec![0; end - begin];
+        let start = SeekFrom::Start(self.data_offset + begin as u64);
+        let read = self.file.seek(start).and_then(|_| self.file.read_exact(&mut bytes));
+        read.map_err(|source| FormatError::io(&self.path, source))?;
+        let values = bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+        let values: Vec<f32> = values.collect();
+        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+            return Err(bad(format!("element {at} is {}", values[at])));
+        }
+        Ok(Tensor { shape: info.shape.clone(), values })
+    }
+}
+
+/// How an error names tensor `name`.
+#[must_use]
+pub fn tensor_part(name: &str) -> String {
+    format!("tensor `{name}`")
+}
+
+/// Writes `tensors` and `metadata` to `path`, atomically; the same content
+/// gives the same bytes.
+///
+/// # Errors
+/// A tensor whose shape does not fit its values; what the system reports.
+pub fn write_weights(
+    path: &Path,
+    tensors: &BTreeMap<String, Tensor>,
+    metadata: &BTreeMap<String, String>,
+) -> Result<(), FormatError> {
+    let mut infos = Vec::with_capacity(tensors.len());
+    let mut offset = 0;
+    for (name, Tensor { shape, values }) in tensors {
+        if shape.iter().product::<usize>() != values.len() {
+            let cause = format!("shape {shape:?} for {} values", values.len());
+            return Err(FormatError::malformed(path, tensor_part(name), cause));
+        }
+        let data_offsets = (offset, offset + size_of_val(&values[..]));
+        offset = data_offsets.1;
+        infos.push((
+            name.clone(),
+            TensorInfo { dtype: Dtype::F32, shape: shape.clone(), data_offsets },
+        ));
+    }
+    let json = header_json(infos, metadata)
+        .map_err(|cause| FormatError::malformed(path, "header", cause))?;
+    atomic::write(path, |writer| {
+        writer.write_all(&(json.len() as u64).to_le_bytes())?;
+        writer.write_all(json.as_bytes())?;
+        for value in tensors.values().flat_map(|tensor| &tensor.values) {
+            writer.write_all(&value.to_le_bytes())?;
+        }
+        Ok(())
+    })
+}
+
+/// The header, its keys sorted: safetensors' own writer keeps metadata in a
+/// hash map, whose order changes from run to run. Padded by blanks so that the
+/// tensors begin at a multiple of eight bytes.
+fn header_json(
+    infos: Vec<(String, TensorInfo)>,
+    metadata: &BTreeMap<String, String>,
+) -> Result<String, Box<dyn std::error::Error>> {
+    let mut header = serde_json::to_value(Metadata::new(None, infos)?)?;
+    if !metadata.is_empty() {
+        header["__metadata__"] = serde_json::to_value(metadata)?;
+    }
+    let mut json = header.to_string();
+    json.extend(std::iter::repeat_n(' ', json.len().next_multiple_of(8) - json.len()));
+    Ok(json)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> BTreeMap<String, Tensor> {
+        BTreeMap::from([
+            ("a".to_owned(), Tensor { shape: vec![2, 1], values: vec![1.5, -0.0] }),
+            ("b".to_owned(), Tensor { shape: vec![0], values: vec![] }),
+        ])
+    }
+
+    fn message(path: &Path, name: &str) -> String {
+        let read = WeightsFile::open(path).and_then(|mut file| file.read(name));
+        read.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_written_comes_back_and_safetensors_reads_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.safetensors");
+        let metadata = BTreeMap::from([("z".into(), "1".into()), ("a".into(), "2".into())]);
+        write_weights(&path, &example(), &metadata).unwrap();
+        let mut file = WeightsFile::open(&path).unwrap();
+        assert_eq!(file.metadata(), metadata);
+        for (name, tensor) in example() {
+            assert_eq!(file.read(&name).unwrap(), tensor);
+        }
+        let bytes = std::fs::read(&path).unwrap();
+        let peer = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        assert_eq!(peer.tensor("a").unwrap().shape(), [2, 1]);
+    }
+
+    #[test]
+    fn errors_name_the_tensor() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.safetensors");
+        let mut tensors = example();
+        tensors.insert("c".into(), Tensor { shape: vec![2], values: vec![0.0, f32::NAN] });
+        write_weights(&path, &tensors, &BTreeMap::new()).unwrap();
+        assert!(message(&path, "c").contains("tensor `c`: element 1 is NaN"));
+        assert!(message(&path, "d").contains("tensor `d`: missing"));
+        let view = safetensors::tensor::TensorView::new(Dtype::F64, vec![1], &[0; 8]).unwrap();
+        std::fs::write(&path, safetensors::serialize([("e", view)], None).unwrap()).unwrap();
+        assert!(message(&path, "e").contains("tensor `e`: expected f32, found F64"));
+    }
+
+    #[test]
+    fn a_file_cut_short_or_of_another_kind_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.safetensors");
+        write_weights(&path, &example(), &BTreeMap::new()).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for length in 0..whole.len() {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            assert!(WeightsFile::open(&path).is_err(), "{length}");
+        }
+        std::fs::write(&path, [b"PK\x03\x04", &[0xff; 60][..]].concat()).unwrap();
+        assert!(message(&path, "a").contains("no safetensors"));
+    }
+}
