@@ -1,0 +1,239 @@
+//! The hot loops, written by hand for each instruction set, behind one table
+//! of functions chosen at run time.
+//!
+//! A layer multiplies rows of activations (one row a point) by a matrix packed
+//! into [`Panels`] (one panel a few output channels). A register tile is a few
+//! rows by one panel: vector lanes run along output channels, so that rows need
+//! no packing and the maximum over points is lane by lane. [`scalar`] is the
+//! reference that every other file is held to by [`suite`].
+
+#![expect(unsafe_code, reason = "SIMD intrinsics; every block says why it is sound")]
+
+use std::fmt;
+use std::ops::Range;
+use std::str::FromStr;
+
+use half::f16;
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+#[cfg(target_arch = "aarch64")]
+mod neon_dot;
+#[cfg(target_arch = "aarch64")]
+mod neon_f16;
+mod panels;
+mod scalar;
+#[cfg(test)]
+mod suite;
+
+/// Declares the kernels of one file and, with them, the tests that hold them
+/// to the reference, so that none can exist untested: `runs_here` says whether
+/// this machine has the instructions.
+macro_rules! declare_kernels {
+    ($name:ident, runs_here: $runs_here:expr, $kernels:tt) => {
+        static KERNELS: $crate::kernel::Kernels =
+            $crate::kernel::declare_kernels!(@table $name $kernels);
+
+        /// These kernels, if this machine has their instructions.
+        pub(super) fn kernels() -> Option<&'static $crate::kernel::Kernels> {
+            $runs_here.then_some(&KERNELS)
+        }
+
+        #[cfg(test)]
+        mod suite {
+            $crate::kernel::suite::suite!(super::kernels);
+        }
+    };
+    (@table $name:ident { $($field:tt)* }) => {
+        $crate::kernel::Kernels { name: $crate::kernel::KernelName::$name, $($field)* }
+    };
+}
+use declare_kernels;
+
+pub use panels::{Columns, Panels};
+
+/// Output channels are padded to a multiple of this, so that the rows of one
+/// layer are whole vectors of any kernel for the next.
+pub const WIDTH_STEP: usize = 64;
+
+/// The largest activation of an int8 layer: seven bits, so that kernels for
+/// signed and for unsigned activations take the same bytes.
+pub const I8_LARGEST: u8 = 127;
+
+/// Activations of `n` points, row by row.
+#[derive(Clone, Copy)]
+pub struct Rows<'a, T> {
+    /// `n` rows of `stride` elements; the last may be shorter.
+    pub data: &'a [T],
+    /// From one row to the next.
+    pub stride: usize,
+    /// How many rows.
+    pub n: usize,
+}
+
+impl<T> Rows<'_, T> {
+    /// That `k` elements of every row are there, which unsafe kernels rely on.
+    fn check(&self, k: usize) {
+        let needed = if self.n == 0 { 0 } else { (self.n - 1) * self.stride + k };
+        assert!(self.stride >= k && self.data.len() >= needed, "rows end before their width");
+    }
+}
+
+/// Matrix products of one number format: activations `A`, weights `W`,
+/// accumulators `C`.
+pub struct Gemm<A, W, C> {
+    /// Output channels of a panel; divides [`WIDTH_STEP`].
+    pub nr: usize,
+    /// Panels hold inputs up to a multiple of this; divides [`WIDTH_STEP`].
+    pub k_step: usize,
+    /// `rows` times the panels of a range, scaled, with bias and ReLU as the
+    /// panels say, into rows of `out` that are `out_stride` apart. The column
+    /// of a channel is its number.
+    pub rows: fn(&Rows<'_, A>, &Panels<W>, Range<usize>, out: &mut [f32], out_stride: usize),
+    /// Raises each of `maxima` (a channel of the range each) to the largest
+    /// accumulator over the rows, before scale and bias. NaN raises nothing.
+    pub max: fn(&Rows<'_, A>, &Panels<W>, Range<usize>, maxima: &mut [C]),
+    /// The same, and remembers in `winners` the row (counted from `first_row`)
+    /// that raised each last. Of equal rows the first wins.
+    pub argmax: fn(
+        &Rows<'_, A>,
+        &Panels<W>,
+        Range<usize>,
+        first_row: u32,
+        maxima: &mut [C],
+        winners: &mut [u32],
+    ),
+}
+
+/// Products of a sparse vector and a matrix of weights stored as `W`, in f32
+/// arithmetic.
+///
+/// `nonzero` holds (input, value) in the order of inputs; what is left out
+/// counts as 0 and its column is never read. Writes dot products and biases of
+/// a range of blocks to `out`.
+pub type Gemv<W> = fn(nonzero: &[(u32, f32)], &Columns<W>, Range<usize>, out: &mut [f32]);
+
+/// Cloud coordinates as structure of arrays, for sampling.
+#[derive(Clone, Copy)]
+pub struct Soa<'a> {
+    /// Coordinates along x.
+    pub x: &'a [f32],
+    /// Along y, as many.
+    pub y: &'a [f32],
+    /// Along z, as many.
+    pub z: &'a [f32],
+}
+
+/// The kernels of one instruction set.
+pub struct Kernels {
+    /// Which instruction set.
+    pub name: KernelName,
+    /// fp32.
+    pub f32: Option<Gemm<f32, f32, f32>>,
+    /// fp16 activations and weights.
+    pub f16: Option<Gemm<f16, f16, f32>>,
+    /// Unsigned seven-bit activations, int8 weights.
+    pub i8: Option<Gemm<u8, i8, i32>>,
+    /// fp32 weights.
+    pub gemv_f32: Gemv<f32>,
+    /// fp16 weights, fp32 arithmetic.
+    pub gemv_f16: Gemv<f16>,
+    /// int8 weights, fp32 arithmetic.
+    pub gemv_i8: Gemv<i8>,
+    /// Rounds to fp16 and returns the largest magnitude before rounding.
+    pub narrow_f16: fn(&[f32], &mut [f16]) -> f32,
+    /// Rounds `value * per_unit` to 0..=[`I8_LARGEST`] and returns how many
+    /// values had to be clipped at the top.
+    pub narrow_i8: fn(&[f32], per_unit: f32, &mut [u8]) -> u64,
+    /// One step of farthest point sampling: lowers `distance` (squared, per
+    /// point) to that from `pick` and returns the first of the farthest points.
+    /// Squares are summed as `(dx² + dy²) + dz²`, each rounded, as NumPy does.
+    pub fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
+}
+
+/// An instruction set that kernels are written for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum KernelName {
+    /// Plain Rust, everywhere.
+    Scalar,
+    /// AVX2 with FMA and F16C.
+    Avx2,
+    /// AVX-512 F, BW, VL, and VNNI for int8.
+    Avx512,
+    /// Armv8 NEON, fp32.
+    Neon,
+    /// NEON with FEAT_FP16.
+    NeonF16,
+    /// NEON with FEAT_DotProd.
+    NeonDot,
+}
+
+impl KernelName {
+    /// All, whatever this machine has.
+    pub const ALL: [Self; 6] =
+        [Self::Scalar, Self::Avx2, Self::Avx512, Self::Neon, Self::NeonF16, Self::NeonDot];
+
+    /// Its name on command lines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+            Self::NeonF16 => "neon_f16",
+            Self::NeonDot => "neon_dot",
+        }
+    }
+
+    /// Its kernels, if this machine can run them.
+    #[must_use]
+    pub fn kernels(self) -> Option<&'static Kernels> {
+        match self {
+            Self::Scalar => scalar::kernels(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => avx2::kernels(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::kernels(),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => neon::kernels(),
+            #[cfg(target_arch = "aarch64")]
+            Self::NeonF16 => neon_f16::kernels(),
+            #[cfg(target_arch = "aarch64")]
+            Self::NeonDot => neon_dot::kernels(),
+            #[allow(unreachable_patterns, reason = "each architecture leaves others out")]
+            _ => None,
+        }
+    }
+}
+
+/// All kernels that this machine can run, the fastest first.
+pub fn available() -> impl Iterator<Item = &'static Kernels> {
+    KernelName::ALL.into_iter().rev().filter_map(KernelName::kernels)
+}
+
+impl fmt::Display for KernelName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A word that names no kernel.
+#[derive(Debug, thiserror::Error)]
+#[error("`{0}` is no kernel; choose one of scalar, avx2, avx512, neon, neon_f16, neon_dot")]
+pub struct NoSuchKernel(String);
+
+impl FromStr for KernelName {
+    type Err = NoSuchKernel;
+
+    fn from_str(word: &str) -> Result<Self, NoSuchKernel> {
+        Self::ALL
+            .into_iter()
+            .find(|kernel| kernel.name() == word)
+            .ok_or_else(|| NoSuchKernel(word.to_owned()))
+    }
+}

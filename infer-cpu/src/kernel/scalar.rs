@@ -1,0 +1,197 @@
+//! The reference: plain loops, one rounding after another, in the order of
+//! inputs. Every other kernel is held to this one.
+
+use std::ops::Range;
+
+use half::f16;
+
+use super::{Columns, Gemm, I8_LARGEST, Panels, Rows, Soa, declare_kernels};
+
+/// Products of fp16 are summed in fp16 over this many inputs, then in fp32.
+///
+/// The sum of a chunk of n products is off by at most n · 2⁻¹¹ of the sum of
+/// their magnitudes (Higham 2002, §3.1, with fused multiply-add): 1.6 % at 32
+/// in the worst case, whatever the layer's width.
+pub(super) const F16_CHUNK: usize = 32;
+
+declare_kernels!(Scalar, runs_here: true, {
+    f32: Some(Gemm { nr: 8, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
+    f16: Some(Gemm { nr: 8, k_step: 1, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
+    i8: Some(Gemm { nr: 8, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
+    gemv_f32,
+    gemv_f16,
+    gemv_i8,
+    narrow_f16,
+    narrow_i8,
+    fps_step,
+});
+
+fn dot_f32(row: &[f32], weights: &Panels<f32>, output: usize) -> f32 {
+    let products = row.iter().enumerate();
+    products.fold(0.0, |sum, (k, &a)| a.mul_add(weights.data[weights.index(k, output)], sum))
+}
+
+fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
+    let chunks = row.chunks(F16_CHUNK).enumerate();
+    let chunks = chunks.map(|(chunk, row)| {
+        let products = row.iter().enumerate();
+        let sum = products.fold(f16::ZERO, |sum, (k, &a)| {
+            let weight = weights.data[weights.index(chunk * F16_CHUNK + k, output)];
+            // The product is exact in f64, and the sum but for the rarest
+            // double rounding: a fused multiply-add in fp16.
+            f16::from_f64(a.to_f64().mul_add(weight.to_f64(), sum.to_f64()))
+        });
+        sum.to_f32()
+    });
+    chunks.fold(0.0, |sum, chunk| sum + chunk)
+}
+
+fn dot_i8(row: &[u8], weights: &Panels<i8>, output: usize) -> i32 {
+    let products = row.iter().enumerate();
+    products.map(|(k, &a)| i32::from(a) * i32::from(weights.data[weights.index(k, output)])).sum()
+}
+
+/// Calls `sink(row, output, accumulator)` for every row and every channel of
+/// `panels`.
+fn for_each<A, W: Copy + Default, C>(
+    rows: &Rows<'_, A>,
+    weights: &Panels<W>,
+    panels: Range<usize>,
+    dot: impl Fn(&[A], &Panels<W>, usize) -> C,
+    mut sink: impl FnMut(usize, usize, C),
+) {
+    rows.check(weights.inputs);
+    for row in 0..rows.n {
+        let activations = &rows.data[row * rows.stride..][..weights.inputs];
+        for output in weights.channels(&panels) {
+            sink(row, output, dot(activations, weights, output));
+        }
+    }
+}
+
+fn finish<W: Copy + Default>(weights: &Panels<W>, output: usize, accumulator: f32) -> f32 {
+    let scale = weights.scale.get(output).copied().unwrap_or(1.0);
+    let value = accumulator * scale + weights.bias[output];
+    if weights.relu { value.max(0.0) } else { value }
+}
+
+macro_rules! gemm {
+    ($a:ty, $w:ty, $c:ty, $dot:ident, $rows:ident, $max:ident, $argmax:ident) => {
+        fn $rows(
+            rows: &Rows<'_, $a>,
+            weights: &Panels<$w>,
+            panels: Range<usize>,
+            out: &mut [f32],
+            out_stride: usize,
+        ) {
+            for_each(rows, weights, panels, $dot, |row, output, accumulator| {
+                out[row * out_stride + output] = finish(weights, output, accumulator as f32);
+            });
+        }
+
+        fn $max(
+            rows: &Rows<'_, $a>,
+            weights: &Panels<$w>,
+            panels: Range<usize>,
+            maxima: &mut [$c],
+        ) {
+            let first = weights.channels(&panels).start;
+            for_each(rows, weights, panels, $dot, |_, output, accumulator| {
+                if accumulator > maxima[output - first] {
+                    maxima[output - first] = accumulator;
+                }
+            });
+        }
+
+        fn $argmax(
+            rows: &Rows<'_, $a>,
+            weights: &Panels<$w>,
+            panels: Range<usize>,
+            first_row: u32,
+            maxima: &mut [$c],
+            winners: &mut [u32],
+        ) {
+            let first = weights.channels(&panels).start;
+            for_each(rows, weights, panels, $dot, |row, output, accumulator| {
+                if accumulator > maxima[output - first] {
+                    maxima[output - first] = accumulator;
+                    winners[output - first] = first_row + row as u32;
+                }
+            });
+        }
+    };
+}
+
+gemm!(f32, f32, f32, dot_f32, f32_rows, f32_max, f32_argmax);
+gemm!(f16, f16, f32, dot_f16, f16_rows, f16_max, f16_argmax);
+gemm!(u8, i8, i32, dot_i8, i8_rows, i8_max, i8_argmax);
+
+/// Dot products of a sparse vector and the columns of a range of blocks.
+fn gemv<W: Copy + Default>(
+    nonzero: &[(u32, f32)],
+    weights: &Columns<W>,
+    blocks: Range<usize>,
+    out: &mut [f32],
+    widen: impl Fn(W) -> f32,
+) {
+    const BLOCK: usize = Columns::<f32>::BLOCK;
+    for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
+        let columns = weights.block(block);
+        for (o, out) in out.iter_mut().enumerate() {
+            let products = nonzero.iter();
+            let dot = products.fold(0.0f32, |sum, &(j, value)| {
+                value.mul_add(widen(columns[j as usize * BLOCK + o]), sum)
+            });
+            let scale = weights.scale.get(block * BLOCK + o).copied().unwrap_or(1.0);
+            *out = dot * scale + weights.bias[block * BLOCK + o];
+        }
+    }
+}
+
+fn gemv_f32(nonzero: &[(u32, f32)], w: &Columns<f32>, blocks: Range<usize>, out: &mut [f32]) {
+    gemv(nonzero, w, blocks, out, |weight| weight);
+}
+
+fn gemv_f16(nonzero: &[(u32, f32)], w: &Columns<f16>, blocks: Range<usize>, out: &mut [f32]) {
+    gemv(nonzero, w, blocks, out, f16::to_f32);
+}
+
+fn gemv_i8(nonzero: &[(u32, f32)], w: &Columns<i8>, blocks: Range<usize>, out: &mut [f32]) {
+    gemv(nonzero, w, blocks, out, f32::from);
+}
+
+fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
+    let mut largest = 0.0f32;
+    for (value, out) in values.iter().zip(out) {
+        *out = f16::from_f32(*value);
+        largest = largest.max(value.abs());
+    }
+    largest
+}
+
+fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
+    let mut clipped = 0;
+    for (value, out) in values.iter().zip(out) {
+        let level = (value * per_unit).round_ties_even();
+        clipped += u64::from(level > f32::from(I8_LARGEST));
+        *out = level.clamp(0.0, f32::from(I8_LARGEST)) as u8;
+    }
+    clipped
+}
+
+fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
+    let mut farthest = 0;
+    let mut largest = -1.0;
+    for (i, distance) in distance.iter_mut().enumerate() {
+        let [dx, dy, dz] = [cloud.x[i] - pick[0], cloud.y[i] - pick[1], cloud.z[i] - pick[2]];
+        let squared = (dx * dx + dy * dy) + dz * dz;
+        if squared < *distance {
+            *distance = squared;
+        }
+        if *distance > largest {
+            largest = *distance;
+            farthest = i;
+        }
+    }
+    farthest
+}

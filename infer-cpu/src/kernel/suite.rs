@@ -1,0 +1,487 @@
+//! What every kernel must do: the same as exact arithmetic, to a bound that
+//! follows from the number of inputs and the format, on sizes around every
+//! tile and on values at every extreme.
+//!
+//! [`suite`] makes the tests of one file of kernels; `declare_kernels` calls
+//! it. A machine without the instructions says so and passes.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use formats::rng::StreamKey;
+use half::f16;
+
+use super::scalar::F16_CHUNK;
+use super::{Columns, Gemm, I8_LARGEST, Kernels, Panels, Rows, Soa};
+
+/// Numbers of rows: none, and around every tile height in use (4, 6, 8, 12).
+const ROWS: [usize; 11] = [0, 1, 3, 5, 6, 7, 8, 9, 12, 13, 29];
+/// Numbers of inputs: around every unrolling in use (4, 8, 16, 32).
+const INPUTS: [usize; 13] = [1, 2, 3, 4, 5, 8, 15, 16, 17, 31, 33, 64, 130];
+const OUTPUTS: [usize; 4] = [1, 31, 64, 65];
+
+/// What the numbers of a problem are like.
+#[derive(Clone, Copy, Debug)]
+pub enum Values {
+    /// Uniform in -1..1.
+    Ordinary,
+    /// Large terms that cancel to small sums.
+    Cancelling,
+    /// Denormal weights.
+    Denormal,
+    /// NaN and infinities among them.
+    NotFinite,
+}
+
+pub const VALUES: [Values; 4] =
+    [Values::Ordinary, Values::Cancelling, Values::Denormal, Values::NotFinite];
+
+/// Numbers drawn by rule.
+struct Draw {
+    key: StreamKey,
+    n: u64,
+}
+
+impl Draw {
+    fn new(name: &str) -> Self {
+        Self { key: StreamKey::new(3, name, 0), n: 0 }
+    }
+
+    /// Uniform in -1..1.
+    fn signed(&mut self) -> f32 {
+        self.n += 1;
+        (2.0 * self.key.unit(self.n) - 1.0) as f32
+    }
+
+    fn below(&mut self, bound: u64) -> u64 {
+        self.n += 1;
+        self.key.below(bound, self.n)
+    }
+
+    /// An element of a problem; `smallest` is the format's least normal number.
+    fn element(&mut self, values: Values, at: usize, smallest: f32) -> f32 {
+        let x = self.signed();
+        match values {
+            Values::Ordinary => x,
+            Values::Cancelling if at.is_multiple_of(2) => 30.0 + x * 0.01,
+            Values::Cancelling => -30.0 + x * 0.01,
+            Values::Denormal => x * smallest,
+            Values::NotFinite => match self.below(40) {
+                0 => f32::NAN,
+                1 => f32::INFINITY,
+                2 => f32::NEG_INFINITY,
+                _ => x,
+            },
+        }
+    }
+}
+
+/// A format's numbers, and the bound of its rounding errors.
+pub trait Number: Copy + Default + PartialEq + std::fmt::Debug {
+    /// The nearest number of this format.
+    fn round(value: f32) -> Self;
+    /// The number.
+    fn wide(self) -> f64;
+    /// Least normal magnitude.
+    const SMALLEST: f32;
+    /// How far a dot product of `k` terms whose magnitudes sum to `sum` may be
+    /// off.
+    fn bound(k: usize, sum: f64) -> f64;
+}
+
+/// Unit roundoff of f32.
+const U32: f64 = 1.0 / (1u64 << 24) as f64;
+/// Unit roundoff of f16.
+const U16: f64 = 1.0 / (1u64 << 11) as f64;
+
+impl Number for f32 {
+    fn round(value: f32) -> Self {
+        value
+    }
+
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+
+    const SMALLEST: f32 = f32::MIN_POSITIVE;
+
+    /// Any order of k fused steps, a scale and a bias: (k + 2) u of the sum of
+    /// magnitudes to first order (Higham 2002, §3.1), one more for the second
+    /// order; half a denormal a step where numbers are that small.
+    fn bound(k: usize, sum: f64) -> f64 {
+        (k + 3) as f64 * (U32 * sum + 2f64.powi(-150))
+    }
+}
+
+impl Number for f16 {
+    fn round(value: f32) -> Self {
+        Self::from_f32(value)
+    }
+
+    fn wide(self) -> f64 {
+        self.to_f64()
+    }
+
+    const SMALLEST: f32 = 6.103_515_6e-5;
+
+    /// A chunk's sums round to fp16, the sum of chunks to f32; half a denormal
+    /// of fp16 (2⁻²⁵) a step where numbers are that small.
+    fn bound(k: usize, sum: f64) -> f64 {
+        let chunk = (F16_CHUNK.min(k) + 1) as f64 * U16 * sum;
+        chunk + k as f64 * 2f64.powi(-25) + f32::bound(k / F16_CHUNK + 3, sum)
+    }
+}
+
+/// A matrix product with its exact answers.
+struct Problem<A, W> {
+    activations: Vec<A>,
+    n: usize,
+    stride: usize,
+    weights: Panels<W>,
+    /// Row by row: dot product, sum of magnitudes.
+    exact: Vec<(f64, f64)>,
+}
+
+impl<A: Copy, W> Problem<A, W> {
+    fn rows(&self) -> Rows<'_, A> {
+        Rows { data: &self.activations, stride: self.stride, n: self.n }
+    }
+}
+
+fn float_problem<T: Number>(
+    gemm: &Gemm<T, T, f32>,
+    (n, inputs, outputs): (usize, usize, usize),
+    values: Values,
+) -> Problem<T, T> {
+    let mut draw = Draw::new(&format!("{n} {inputs} {outputs} {values:?}"));
+    let mut weights = Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, 1));
+    let plain: Vec<T> = (0..inputs * outputs)
+        .map(|i| T::round(draw.element(values, i / outputs, T::SMALLEST)))
+        .collect();
+    weights.fill(|input, output| plain[input * outputs + output]);
+    // A stride of its own: padding of the panels' inputs and some more.
+    let stride = weights.padded_inputs + 4;
+    let mut activations = vec![T::default(); n * stride];
+    for row in activations.chunks_exact_mut(stride) {
+        for a in &mut row[..inputs] {
+            // Beside denormal weights, activations of 1: products that stay.
+            let kind = if matches!(values, Values::Denormal) { Values::Ordinary } else { values };
+            *a = T::round(draw.element(kind, 0, 1.0));
+        }
+    }
+    let exact = (0..n * outputs)
+        .map(|i| {
+            let row = &activations[i / outputs * stride..][..inputs];
+            let terms = row.iter().enumerate();
+            let terms = terms.map(|(k, a)| a.wide() * plain[k * outputs + i % outputs].wide());
+            terms.fold((0.0, 0.0), |(dot, sum), term| (dot + term, sum + term.abs()))
+        })
+        .collect();
+    Problem { activations, n, stride, weights, exact }
+}
+
+fn assert_near(found: f32, exact: f64, bound: f64, place: impl std::fmt::Debug) {
+    if exact.is_finite() {
+        assert!((f64::from(found) - exact).abs() <= bound, "{place:?}: {found} for {exact}");
+    } else {
+        let same =
+            found.is_nan() == exact.is_nan() && (exact.is_nan() || f64::from(found) == exact);
+        assert!(same, "{place:?}: {found} for {exact}");
+    }
+}
+
+/// Calls `check` with every size and kind of values.
+fn for_each_problem(mut check: impl FnMut((usize, usize, usize), Values)) {
+    for values in VALUES {
+        for n in ROWS {
+            for inputs in INPUTS {
+                for outputs in OUTPUTS {
+                    check((n, inputs, outputs), values);
+                }
+            }
+        }
+    }
+}
+
+/// That products are exact to the format's bound.
+pub fn float_rows_are_near_exact<T: Number>(gemm: &Gemm<T, T, f32>) {
+    for_each_problem(|size, values| {
+        let problem = float_problem(gemm, size, values);
+        let width = problem.weights.padded_outputs();
+        let mut out = vec![7.0; size.0 * width];
+        let panels = 0..problem.weights.n_panels();
+        (gemm.rows)(&problem.rows(), &problem.weights, panels, &mut out, width);
+        for (i, &(dot, sum)) in problem.exact.iter().enumerate() {
+            let (row, output) = (i / size.2, i % size.2);
+            let place = (size, values, row, output);
+            assert_near(out[row * width + output], dot, T::bound(size.1, sum), place);
+        }
+    });
+}
+
+/// That scale, bias and ReLU are applied in this order, to every channel.
+pub fn float_rows_are_finished<T: Number>(gemm: &Gemm<T, T, f32>) {
+    let size = (13, 17, 65);
+    let mut problem = float_problem(gemm, size, Values::Ordinary);
+    let width = problem.weights.padded_outputs();
+    problem.weights.scale = (0..width).map(|o| 0.5 + o as f32).collect();
+    problem.weights.bias = (0..width).map(|o| 3.0 - o as f32).collect();
+    for relu in [false, true] {
+        problem.weights.relu = relu;
+        let mut out = vec![7.0; size.0 * width];
+        let panels = 0..problem.weights.n_panels();
+        (gemm.rows)(&problem.rows(), &problem.weights, panels, &mut out, width);
+        for (i, &(dot, sum)) in problem.exact.iter().enumerate() {
+            let (row, output) = (i / size.2, i % size.2);
+            let (scale, bias) = (0.5 + output as f64, 3.0 - output as f64);
+            let exact = dot * scale + bias;
+            let exact = if relu { exact.max(0.0) } else { exact };
+            let bound = T::bound(size.1, sum) * scale + f32::bound(3, bias.abs() + sum * scale);
+            assert_near(out[row * width + output], exact, bound, (row, output, relu));
+        }
+    }
+}
+
+/// That maxima and their rows are those of the products, to the bit, of the
+/// first row among equals, whatever the place of a row in its tile.
+pub fn float_maxima_are_those_of_the_rows<T: Number>(gemm: &Gemm<T, T, f32>) {
+    for_each_problem(|size, values| {
+        let mut problem = float_problem(gemm, size, values);
+        // Some rows twice: ties.
+        for row in (2..size.0).step_by(3) {
+            problem.activations.copy_within(0..problem.stride, row * problem.stride);
+        }
+        let width = problem.weights.padded_outputs();
+        let panels = 0..problem.weights.n_panels();
+        let mut out = vec![0.0; size.0 * width];
+        (gemm.rows)(&problem.rows(), &problem.weights, panels.clone(), &mut out, width);
+        let (mut maxima, mut winners) = (vec![f32::NEG_INFINITY; width], vec![u32::MAX; width]);
+        let mut alone = maxima.clone();
+        (gemm.max)(&problem.rows(), &problem.weights, panels.clone(), &mut alone);
+        (gemm.argmax)(&problem.rows(), &problem.weights, panels, 100, &mut maxima, &mut winners);
+        for output in 0..size.2 {
+            let column = (0..size.0).map(|row| out[row * width + output]);
+            let (largest, winner) =
+                column.zip(100u32..).fold((f32::NEG_INFINITY, u32::MAX), |best, next| {
+                    if next.0 > best.0 { next } else { best }
+                });
+            let place = (size, values, output);
+            assert_eq!((maxima[output], winners[output]), (largest, winner), "{place:?}");
+            assert_eq!(alone[output], largest, "{place:?}");
+        }
+    });
+}
+
+/// That a range of panels touches its own channels and no others.
+pub fn a_range_of_panels_is_its_own<T: Number>(gemm: &Gemm<T, T, f32>) {
+    let problem = float_problem(gemm, (13, 17, 65), Values::Ordinary);
+    let width = problem.weights.padded_outputs();
+    let n_panels = problem.weights.n_panels();
+    let mut whole = vec![0.0; 13 * width];
+    (gemm.rows)(&problem.rows(), &problem.weights, 0..n_panels, &mut whole, width);
+    let mut parts = vec![7.0; 13 * width];
+    for panel in (0..n_panels).rev() {
+        (gemm.rows)(&problem.rows(), &problem.weights, panel..panel + 1, &mut parts, width);
+    }
+    assert_eq!(whole, parts);
+    let mut maxima = vec![f32::NEG_INFINITY; width];
+    (gemm.max)(&problem.rows(), &problem.weights, 0..n_panels, &mut maxima);
+    for panel in 0..n_panels {
+        let channels = problem.weights.channels(&(panel..panel + 1));
+        let mut some = vec![f32::NEG_INFINITY; channels.len()];
+        (gemm.max)(&problem.rows(), &problem.weights, panel..panel + 1, &mut some);
+        assert_eq!(some, maxima[channels]);
+    }
+}
+
+/// That integer products are exact, maxima and rows as well.
+pub fn integers_are_exact(gemm: &Gemm<u8, i8, i32>) {
+    for n in ROWS {
+        for inputs in INPUTS {
+            for (outputs, extreme) in [(1, false), (31, true), (64, false), (65, true)] {
+                integer_case(gemm, (n, inputs, outputs), extreme);
+            }
+        }
+    }
+}
+
+fn integer_case(gemm: &Gemm<u8, i8, i32>, size: (usize, usize, usize), extreme: bool) {
+    let (n, inputs, outputs) = size;
+    let mut draw = Draw::new(&format!("i8 {size:?}"));
+    let mut weights = Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, 4));
+    let mut level = |largest: i32| match extreme {
+        true => largest,
+        false => draw.below(largest as u64 + 1) as i32,
+    };
+    let plain: Vec<i8> = (0..inputs * outputs)
+        .map(|i| (level(127) * if i % 3 == 0 { -1 } else { 1 }) as i8)
+        .collect();
+    weights.fill(|input, output| plain[input * outputs + output]);
+    let stride = weights.padded_inputs + 4;
+    let mut activations = vec![0u8; n * stride];
+    for row in activations.chunks_exact_mut(stride) {
+        row[..inputs].fill_with(|| level(i32::from(I8_LARGEST)) as u8);
+    }
+    let rows = Rows { data: &activations, stride, n };
+    let width = weights.padded_outputs();
+    let panels = 0..weights.n_panels();
+    let mut out = vec![7.0; n * width];
+    (gemm.rows)(&rows, &weights, panels.clone(), &mut out, width);
+    let (mut maxima, mut winners) = (vec![i32::MIN; width], vec![u32::MAX; width]);
+    (gemm.argmax)(&rows, &weights, panels.clone(), 5, &mut maxima, &mut winners);
+    let mut alone = vec![i32::MIN; width];
+    (gemm.max)(&rows, &weights, panels, &mut alone);
+    for output in 0..outputs {
+        let mut best = (i32::MIN, u32::MAX);
+        for row in 0..n {
+            let terms = (0..inputs).map(|k| {
+                i32::from(activations[row * stride + k]) * i32::from(plain[k * outputs + output])
+            });
+            let dot: i32 = terms.sum();
+            // Below 2^24, so exact in f32.
+            assert_eq!(out[row * width + output], dot as f32, "{size:?} {row} {output}");
+            if dot > best.0 {
+                best = (dot, 5 + row as u32);
+            }
+        }
+        assert_eq!((maxima[output], winners[output]), best, "{size:?} {output}");
+        assert_eq!(alone[output], best.0, "{size:?} {output}");
+    }
+}
+
+/// That dot products with columns are exact to the bound of f32, and columns
+/// of inputs left out are not read.
+pub fn gemv_is_near_exact(kernels: &Kernels) {
+    for inputs in [0, 1, 2, 3, 7, 64, 257] {
+        for outputs in [1, 9, 63, 64, 65, 200] {
+            let mut draw = Draw::new(&format!("gemv {inputs} {outputs}"));
+            let plain: Vec<i8> =
+                (0..inputs * outputs).map(|_| (draw.signed() * 127.0) as i8).collect();
+            let nonzero: Vec<(u32, f32)> = (0..inputs as u32)
+                .filter(|j| j % 3 != 1)
+                .map(|j| (j, draw.signed() * 10.0))
+                .collect();
+            let mut f32s = Columns::<f32>::zeros(inputs, outputs);
+            let mut f16s = Columns::<f16>::zeros(inputs, outputs);
+            let mut i8s = Columns::<i8>::zeros(inputs, outputs);
+            let weight = |j: usize, o: usize| match j % 3 {
+                1 => f32::NAN,
+                _ => f32::from(plain[j * outputs + o]),
+            };
+            f32s.fill(weight);
+            f16s.fill(|j, o| f16::from_f32(weight(j, o)));
+            i8s.fill(|j, o| plain[j * outputs + o]);
+            let width = f32s.bias.len();
+            let bias: Vec<f32> = (0..width).map(|o| o as f32).collect();
+            (f32s.bias, f16s.bias, i8s.bias) = (bias.clone(), bias.clone(), bias);
+            i8s.scale = vec![0.25; width];
+            let blocks = 0..f32s.n_blocks();
+            let mut found = [vec![7.0; width], vec![7.0; width], vec![7.0; width]];
+            (kernels.gemv_f32)(&nonzero, &f32s, blocks.clone(), &mut found[0]);
+            (kernels.gemv_f16)(&nonzero, &f16s, blocks.clone(), &mut found[1]);
+            (kernels.gemv_i8)(&nonzero, &i8s, blocks, &mut found[2]);
+            for o in 0..outputs {
+                let terms = nonzero.iter();
+                let terms =
+                    terms.map(|&(j, v)| f64::from(v) * f64::from(plain[j as usize * outputs + o]));
+                let (dot, sum) = terms.fold((0.0, 0.0), |(d, s), t| (d + t, s + f64::abs(t)));
+                let bound = f32::bound(inputs, sum + o as f64);
+                for (found, scale) in found.iter().zip([1.0, 1.0, 0.25]) {
+                    assert_near(found[o], dot * scale + o as f64, bound, (inputs, outputs, o));
+                }
+            }
+        }
+    }
+}
+
+/// That narrowing does what the reference does, to the bit.
+pub fn narrowing_is_the_reference(kernels: &Kernels) {
+    let reference = super::scalar::kernels().unwrap();
+    let mut draw = Draw::new("narrow");
+    for n in [0, 1, 7, 8, 15, 16, 17, 64, 100] {
+        let mut values: Vec<f32> = (0..n).map(|_| draw.signed() * 100.0).collect();
+        let extremes = [70000.0, -70000.0, 1e-8, -0.0, 65519.9, 65520.0, 0.5, 1.5, 126.6, 127.6];
+        for (value, extreme) in values.iter_mut().zip(extremes) {
+            *value = extreme;
+        }
+        let (mut found, mut expected) = (vec![f16::ONE; n], vec![f16::ZERO; n]);
+        let largest = (kernels.narrow_f16)(&values, &mut found);
+        assert_eq!(largest, (reference.narrow_f16)(&values, &mut expected));
+        assert_eq!(found, expected, "{n}");
+        let (mut found, mut expected) = (vec![9u8; n], vec![0u8; n]);
+        for per_unit in [1.0, 0.37] {
+            let clipped = (kernels.narrow_i8)(&values, per_unit, &mut found);
+            assert_eq!(clipped, (reference.narrow_i8)(&values, per_unit, &mut expected));
+            assert_eq!(found, expected, "{n}");
+        }
+    }
+}
+
+/// That farthest point sampling picks what the reference picks and leaves the
+/// same distances, to the bit, ties included.
+pub fn fps_is_the_reference(kernels: &Kernels) {
+    let reference = super::scalar::kernels().unwrap();
+    for n in [1, 2, 3, 4, 5, 7, 8, 15, 16, 17, 31, 33, 64, 100, 1000] {
+        let mut draw = Draw::new("fps");
+        // Coordinates on a coarse grid, for ties.
+        let mut axis = || (0..n).map(|_| (draw.signed() * 4.0).round()).collect::<Vec<f32>>();
+        let (x, y, z) = (axis(), axis(), axis());
+        let cloud = Soa { x: &x, y: &y, z: &z };
+        let (mut found, mut expected) = (vec![f32::INFINITY; n], vec![f32::INFINITY; n]);
+        let mut pick = 0;
+        for _ in 0..n.min(20) {
+            let at = [x[pick], y[pick], z[pick]];
+            let next = (kernels.fps_step)(cloud, at, &mut found);
+            pick = (reference.fps_step)(cloud, at, &mut expected);
+            assert_eq!((next, &found), (pick, &expected), "{n}");
+        }
+    }
+}
+
+/// The tests of the kernels that `$kernels()` gives.
+macro_rules! suite {
+    ($kernels:path) => {
+        use $crate::kernel::suite as must;
+
+        /// The kernels, or a message that this machine cannot run them.
+        fn here() -> Option<&'static $crate::kernel::Kernels> {
+            let kernels = $kernels();
+            if kernels.is_none() {
+                eprintln!("skipped: this machine lacks the instructions of {}", module_path!());
+            }
+            kernels
+        }
+
+        #[test]
+        fn f32_products() {
+            let Some(gemm) = here().and_then(|kernels| kernels.f32.as_ref()) else { return };
+            must::float_rows_are_near_exact(gemm);
+            must::float_rows_are_finished(gemm);
+            must::float_maxima_are_those_of_the_rows(gemm);
+            must::a_range_of_panels_is_its_own(gemm);
+        }
+
+        #[test]
+        fn f16_products() {
+            let Some(gemm) = here().and_then(|kernels| kernels.f16.as_ref()) else { return };
+            must::float_rows_are_near_exact(gemm);
+            must::float_rows_are_finished(gemm);
+            must::float_maxima_are_those_of_the_rows(gemm);
+            must::a_range_of_panels_is_its_own(gemm);
+        }
+
+        #[test]
+        fn i8_products() {
+            let Some(gemm) = here().and_then(|kernels| kernels.i8.as_ref()) else { return };
+            must::integers_are_exact(gemm);
+        }
+
+        #[test]
+        fn vectors() {
+            let Some(kernels) = here() else { return };
+            must::gemv_is_near_exact(kernels);
+            must::narrowing_is_the_reference(kernels);
+            must::fps_is_the_reference(kernels);
+        }
+    };
+}
+pub(super) use suite;
