@@ -8,7 +8,7 @@ use formats::model_card::{ModelCard, Normalization};
 
 use crate::engine::Memory;
 use crate::error::Error;
-use crate::forward::{self, Forward, Loaded};
+use crate::forward::{self, Forward, Loaded, Setup};
 use crate::kernel::{self, KernelName, Kernels};
 use crate::normalize;
 use crate::options::Options;
@@ -55,8 +55,8 @@ impl Classifier {
     /// # Errors
     /// A file that is no model, options that it or this machine cannot meet.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
-        let kernels = choose_kernels(options.precision, options.kernel)?;
-        let loaded = forward::load(path, options.precision, kernels, options.threads)?;
+        let setup = setup(options, options.precision)?;
+        let loaded = forward::load(path, &setup)?;
         let spec = sampler_of(path, &loaded.card, options)?;
         let front = front_end(path, &loaded, &spec, options.table_nodes)?;
         let selection = Selection::new(&spec, front)?;
@@ -69,7 +69,7 @@ impl Classifier {
             votes: Votes::new(options, &spec, classes.len())?,
             classes,
             options: options.clone(),
-            kernels,
+            kernels: setup.kernels,
             memory: network.memory(),
             network,
             fallback: None,
@@ -222,10 +222,8 @@ impl Classifier {
             return Err(Error::Overflow);
         }
         if self.fallback.is_none() {
-            let kernels = choose_kernels(Precision::F32, self.options.kernel)?;
-            let threads = self.options.threads;
-            let loaded = forward::load(&self.path, Precision::F32, kernels, threads)?;
-            self.fallback = Some(loaded.network);
+            let setup = setup(&self.options, Precision::F32)?;
+            self.fallback = Some(forward::load(&self.path, &setup)?.network);
         }
         let Some(network) = &self.fallback else { return Err(Error::Overflow) };
         let Self { selection, normalized, kernels, memory, .. } = self;
@@ -299,6 +297,11 @@ fn front_end(
         _ => None,
     };
     Ok(Some(table.map_or(FrontEnd::Pass(pass), FrontEnd::Table)))
+}
+
+fn setup(options: &Options, precision: Precision) -> Result<Setup, Error> {
+    let kernels = choose_kernels(precision, options.kernel)?;
+    Ok(Setup { precision, kernels, threads: options.threads, t_nets: options.t_nets })
 }
 
 /// The kernels `forced`, or the fastest here that have products in `precision`.

@@ -28,6 +28,6 @@ pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_rang
 pub use classifier::Classifier;
 pub use error::Error;
 pub use formats::model_card::{ModelCard, Normalization};
-pub use options::Options;
+pub use options::{Options, TNets};
 pub use precision::Precision;
 pub use prediction::Prediction;
