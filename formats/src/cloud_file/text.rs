@@ -68,7 +68,7 @@ impl Layout {
             return Err(line.error(cause));
         }
         let place = |axis: &str| fields.iter().position(|name| name.eq_ignore_ascii_case(axis));
-        let is_header = fields.iter().all(|field| field.parse::<f64>().is_err());
+        let is_header = fields.iter().all(|field| is_name(field));
         let columns = match AXES.map(place) {
             [Some(x), Some(y), Some(z)] => {
                 return Ok((Self { separator, columns: [x, y, z] }, true));
@@ -100,6 +100,13 @@ impl Layout {
         let found = self.separator.fields(content).count();
         Err(line.error(format!("expected {expected} columns, found {found}")))
     }
+}
+
+/// Whether `field` can be a column's name: neither a number nor an attempt at
+/// one, such as `1,5`.
+fn is_name(field: &str) -> bool {
+    let begins_like_a_number = |letter: char| letter.is_ascii_digit() || "+-.".contains(letter);
+    field.parse::<f64>().is_err() && !field.starts_with(begins_like_a_number)
 }
 
 impl Separator {
