@@ -115,15 +115,17 @@ fn read_as(
 /// Writes `points` to `path`, atomically, in the format that its name tells.
 ///
 /// Coordinates are written as f32 where that loses nothing, that is for clouds
-/// that came as f32, and else as f64; the same points give the same bytes.
-/// KITTI's format holds f32 only, and rounds.
+/// that came as f32, and else as f64; the same points give the same bytes. Two
+/// formats round: KITTI's holds f32 only, and in PCD f64 stands only where f32
+/// would lose more than a millionth of the cloud's extent, since the usual
+/// clouds of PCL and Open3D take no other type from it.
 ///
 /// # Errors
 /// As [`read_cloud`]; LAS, which is only read; raw floats of a number of
 /// columns other than four; a coordinate beyond f32 in KITTI's format; what the
 /// system reports.
 pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
-    let precision = Precision::of(points);
+    let precision = Precision::lossless(points);
     match CloudFormat::of(path)? {
         CloudFormat::Text => atomic::write(path, |writer| text::write(writer, points)),
         CloudFormat::Csv => atomic::write(path, |writer| text::write_csv(writer, points)),
@@ -132,7 +134,10 @@ pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> 
         #[cfg(feature = "ply")]
         CloudFormat::Ply => atomic::write(path, |writer| ply::write(writer, points, precision)),
         #[cfg(feature = "pcd")]
-        CloudFormat::Pcd => atomic::write(path, |writer| pcd::write(writer, points, precision)),
+        CloudFormat::Pcd => {
+            let precision = Precision::tolerable(points);
+            atomic::write(path, |writer| pcd::write(writer, points, precision))
+        }
         #[cfg(feature = "npz")]
         CloudFormat::Npz => atomic::write(path, |writer| npz::write(writer, points, precision)),
         #[cfg(feature = "las")]
