@@ -1,8 +1,6 @@
 //! The same logits as PyTorch, to 1e-5, at every number of points, threads and
 //! kernel. The reference data is `../shared/data/parity`, where it is present.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 mod support;
 
 use formats::model_card::Normalization;

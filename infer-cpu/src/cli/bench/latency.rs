@@ -55,8 +55,17 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         println!("{}", serde_json::to_string(&record)?);
         return Ok(());
     }
-    let header =
-        ["sampler", "T-Nets", "precision", "kernel", "from", "points", "threads", "p50 ms", "p99 ms"];
+    let header = [
+        "sampler",
+        "T-Nets",
+        "precision",
+        "kernel",
+        "from",
+        "points",
+        "threads",
+        "p50 ms",
+        "p99 ms",
+    ];
     let cells = |row: &Row| {
         vec![
             row.sampler.clone(),

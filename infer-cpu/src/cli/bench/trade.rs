@@ -173,8 +173,18 @@ fn mark_front(rows: &mut [Row]) {
 
 fn print(rows: &[Row]) -> anyhow::Result<()> {
     let header = [
-        "sampler", "T-Nets", "precision", "points", "threads", "p50 ms", "p99 ms", "accuracy %",
-        "95 % interval", "as f32 %", "largest error", "front",
+        "sampler",
+        "T-Nets",
+        "precision",
+        "points",
+        "threads",
+        "p50 ms",
+        "p99 ms",
+        "accuracy %",
+        "95 % interval",
+        "as f32 %",
+        "largest error",
+        "front",
     ];
     let cells = |row: &Row| {
         let (low, high) = wilson_interval(row.n_right, row.n);
