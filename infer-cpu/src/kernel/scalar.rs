@@ -14,8 +14,8 @@ pub(super) const F16_CHUNK: usize = 32;
 ///
 /// In a chunk of n products a product is rounded at most n times, in a block of
 /// m chunks then m - 1 times. So a sum is off by at most (n + m - 1) · 2⁻¹¹ of
-/// the sum of magnitudes (Higham 2002, §3.1 and §4.2, with fused
-/// multiply-add): 1.7 % in the worst case, whatever the layer's width.
+/// the sum of magnitudes (Higham 2002, §3.1 and §4.2, each step rounded once):
+/// 1.7 % in the worst case, whatever the layer's width.
 pub(super) const F16_BLOCK: usize = 128;
 
 declare_kernels!(Scalar, runs_here: true, {
@@ -32,7 +32,7 @@ declare_kernels!(Scalar, runs_here: true, {
 
 fn dot_f32(row: &[f32], weights: &Panels<f32>, output: usize) -> f32 {
     let products = row.iter().enumerate();
-    products.fold(0.0, |sum, (k, &a)| a.mul_add(weights.data[weights.index(k, output)], sum))
+    products.fold(0.0, |sum, (k, &a)| sum + a * weights.data[weights.index(k, output)])
 }
 
 fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
@@ -42,7 +42,7 @@ fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
             let weight = weights.data[weights.index(first + k, output)];
             // The product is exact in f64, and the sum but for the rarest
             // double rounding: a fused multiply-add in fp16.
-            f16::from_f64(a.to_f64().mul_add(weight.to_f64(), sum.to_f64()))
+            f16::from_f64(a.to_f64() * weight.to_f64() + sum.to_f64())
         })
     };
     let block_sum = |first: usize, block: &[f16]| {
@@ -147,7 +147,7 @@ fn gemv<W: Copy + Default>(
         for (o, out) in out.iter_mut().enumerate() {
             let products = nonzero.iter();
             let dot = products.fold(0.0f32, |sum, &(j, value)| {
-                value.mul_add(widen(columns[j as usize * BLOCK + o]), sum)
+                sum + value * widen(columns[j as usize * BLOCK + o])
             });
             let scale = weights.scale.get(block * BLOCK + o).copied().unwrap_or(1.0);
             *out = dot * scale + weights.bias[block * BLOCK + o];
@@ -167,7 +167,7 @@ fn gemv_i8(nonzero: &[(u32, f32)], w: &Columns<i8>, blocks: Range<usize>, out: &
     gemv(nonzero, w, blocks, out, f32::from);
 }
 
-fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
+pub(super) fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
     let mut largest = 0.0f32;
     for (value, out) in values.iter().zip(out) {
         *out = f16::from_f32(*value);
@@ -176,7 +176,7 @@ fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
     largest
 }
 
-fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
+pub(super) fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
     let mut clipped = 0;
     for (value, out) in values.iter().zip(out) {
         let level = (value * per_unit).round_ties_even();
