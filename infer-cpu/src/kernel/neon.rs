@@ -23,12 +23,12 @@ use super::{Gemm, declare_kernels};
 
 pub(super) mod fps;
 pub(super) mod gemv;
+pub(super) mod lanes;
 pub(super) mod narrow;
-pub(super) mod sink;
+mod sink;
 pub(super) mod tile;
 
-use sink::Sink;
-use tile::{Operands, Place, Tile};
+use tile::{Operands, Tile};
 
 declare_kernels!(Neon, runs_here: true, {
     f32: Some(GEMM_F32),
@@ -53,26 +53,18 @@ impl Tile<2> for F32 {
     type Sums = float32x4_t;
     const STEP: usize = 4;
 
-    unsafe fn run<S: Sink<float32x4_t, 2>, const R: usize>(
-        operands: &Operands<f32, f32>,
-        place: Place,
-        sink: &mut S,
-    ) {
+    unsafe fn sums<const R: usize>(operands: &Operands<f32, f32>) -> [[float32x4_t; 2]; R] {
         // SAFETY: the caller's; NEON is on every aarch64.
-        unsafe { tile_f32_8x8::<S, R>(operands, place, sink) }
+        unsafe { tile_f32_8x8::<R>(operands) }
     }
 }
 
 /// # Safety
-/// As [`Tile::run`].
+/// As [`Tile::sums`].
 #[inline(never)]
 #[target_feature(enable = "neon")]
-unsafe fn tile_f32_8x8<S: Sink<float32x4_t, 2>, const R: usize>(
-    operands: &Operands<f32, f32>,
-    place: Place,
-    sink: &mut S,
-) {
-    let rows: [*const f32; R] = operands.row_pointers();
+unsafe fn tile_f32_8x8<const R: usize>(operands: &Operands<f32, f32>) -> [[float32x4_t; 2]; R] {
+    let rows: [*const f32; R] = operands.row_pointers(0);
     let mut sums = [[vdupq_n_f32(0.0); 2]; R];
     let mut k = 0;
     while k < operands.inputs {
@@ -88,7 +80,7 @@ unsafe fn tile_f32_8x8<S: Sink<float32x4_t, 2>, const R: usize>(
         }
         k += F32::STEP;
     }
-    sink.take(place, &sums);
+    sums
 }
 
 /// Adds the products of the input that is lane `LANE` of the activations.

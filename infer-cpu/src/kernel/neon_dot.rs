@@ -22,8 +22,7 @@ use std::arch::{asm, is_aarch64_feature_detected};
 use half::f16;
 
 use super::declare_kernels;
-use super::neon::sink::Sink;
-use super::neon::tile::{Operands, Place, Tile, gemm};
+use super::neon::tile::{Operands, Tile, gemm};
 use super::neon::{GEMM_F32, fps, gemv, narrow};
 
 declare_kernels!(NeonDot, runs_here: is_aarch64_feature_detected!("dotprod"), {
@@ -46,26 +45,18 @@ impl Tile<2> for I8 {
     type Sums = int32x4_t;
     const STEP: usize = 16;
 
-    unsafe fn run<S: Sink<int32x4_t, 2>, const R: usize>(
-        operands: &Operands<u8, i8>,
-        place: Place,
-        sink: &mut S,
-    ) {
+    unsafe fn sums<const R: usize>(operands: &Operands<u8, i8>) -> [[int32x4_t; 2]; R] {
         // SAFETY: the caller's.
-        unsafe { tile_i8_8x8::<S, R>(operands, place, sink) }
+        unsafe { tile_i8_8x8::<R>(operands) }
     }
 }
 
 /// # Safety
-/// As [`Tile::run`].
+/// As [`Tile::sums`].
 #[inline(never)]
 #[target_feature(enable = "neon,dotprod")]
-unsafe fn tile_i8_8x8<S: Sink<int32x4_t, 2>, const R: usize>(
-    operands: &Operands<u8, i8>,
-    place: Place,
-    sink: &mut S,
-) {
-    let rows: [*const u8; R] = operands.row_pointers();
+unsafe fn tile_i8_8x8<const R: usize>(operands: &Operands<u8, i8>) -> [[int32x4_t; 2]; R] {
+    let rows: [*const u8; R] = operands.row_pointers(0);
     let mut sums = [[vdupq_n_s32(0); 2]; R];
     let mut k = 0;
     while k < operands.inputs {
@@ -81,7 +72,7 @@ unsafe fn tile_i8_8x8<S: Sink<int32x4_t, 2>, const R: usize>(
         }
         k += I8::STEP;
     }
-    sink.take(place, &sums);
+    sums
 }
 
 /// Adds the products of the four inputs that are lane `LANE` of the

@@ -20,12 +20,12 @@
 
 use std::arch::aarch64::*;
 use std::arch::is_aarch64_feature_detected;
+use std::ops::Range;
 
 use half::f16;
 
 use super::declare_kernels;
-use super::neon::sink::Sink;
-use super::neon::tile::{Operands, Place, Tile, gemm};
+use super::neon::tile::{self, Operands, Tile, gemm};
 use super::neon::{GEMM_F32, fps, gemv, narrow};
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 
@@ -49,72 +49,141 @@ impl Tile<4> for F16 {
     type Sums = float32x4_t;
     const STEP: usize = 8;
 
-    unsafe fn run<S: Sink<float32x4_t, 4>, const R: usize>(
-        operands: &Operands<f16, f16>,
-        place: Place,
-        sink: &mut S,
-    ) {
+    unsafe fn sums<const R: usize>(operands: &Operands<f16, f16>) -> [[float32x4_t; 4]; R] {
+        let block = |first| {
+            let inputs = first..operands.inputs.min(first + F16_BLOCK);
+            // SAFETY: the caller's; blocks are whole STEPs.
+            unsafe { tile_f16_8x16::<R>(operands, inputs) }.map(promoted)
+        };
+        let mut sums = block(0);
+        for first in (F16_BLOCK..operands.inputs).step_by(F16_BLOCK) {
+            for (sum, block) in sums.as_flattened_mut().iter_mut().zip(block(first).as_flattened())
+            {
+                // SAFETY: NEON is on every aarch64.
+                *sum = unsafe { vaddq_f32(*sum, *block) };
+            }
+        }
+        sums
+    }
+
+    unsafe fn largest<const R: usize>(operands: &Operands<f16, f16>) -> [float32x4_t; 4] {
         // SAFETY: the caller's.
-        unsafe { tile_f16_8x16::<S, R>(operands, place, sink) }
+        unsafe {
+            match operands.inputs {
+                inputs @ ..=F16_BLOCK => promoted(largest(tile_f16_8x16::<R>(operands, 0..inputs))),
+                _ => tile::largest(Self::sums::<R>(operands)),
+            }
+        }
+    }
+
+    unsafe fn first_largest<const R: usize>(
+        operands: &Operands<f16, f16>,
+    ) -> ([float32x4_t; 4], [uint32x4_t; 4]) {
+        // SAFETY: the caller's.
+        unsafe {
+            match operands.inputs {
+                inputs @ ..=F16_BLOCK => first_largest(tile_f16_8x16::<R>(operands, 0..inputs)),
+                _ => tile::first_largest(Self::sums::<R>(operands)),
+            }
+        }
     }
 }
 
-/// # Safety
-/// As [`Tile::run`].
-#[inline(never)]
+/// [`tile::largest`] in fp16.
+#[inline]
 #[target_feature(enable = "neon,fp16")]
-unsafe fn tile_f16_8x16<S: Sink<float32x4_t, 4>, const R: usize>(
-    operands: &Operands<f16, f16>,
-    place: Place,
-    sink: &mut S,
-) {
-    let rows: [*const f16; R] = operands.row_pointers();
-    let zero = vreinterpretq_f16_u16(vdupq_n_u16(0));
-    let mut sums = [[vdupq_n_f32(0.0); 4]; R];
-    let mut k = 0;
-    while k < operands.inputs {
-        let block_end = operands.inputs.min(k + F16_BLOCK);
-        let mut block = [[zero; 2]; R];
-        while k < block_end {
-            let chunk_end = block_end.min(k + F16_CHUNK);
-            let mut chunk = [[zero; 2]; R];
-            while k < chunk_end {
-                // SAFETY: the number of inputs is a multiple of STEP, so inputs
-                // k to k + 7 of R rows are there, and 16 weights for each.
-                unsafe { add_inputs(&mut chunk, &rows, operands.weights, k) };
-                k += F16::STEP;
-            }
-            for (block, chunk) in block.iter_mut().zip(chunk) {
-                block[0] = vaddq_f16(block[0], chunk[0]);
-                block[1] = vaddq_f16(block[1], chunk[1]);
-            }
-        }
-        for (sums, block) in sums.iter_mut().zip(block) {
-            sums[0] = vaddq_f32(sums[0], vcvt_f32_f16(vget_low_f16(block[0])));
-            sums[1] = vaddq_f32(sums[1], vcvt_high_f32_f16(block[0]));
-            sums[2] = vaddq_f32(sums[2], vcvt_f32_f16(vget_low_f16(block[1])));
-            sums[3] = vaddq_f32(sums[3], vcvt_high_f32_f16(block[1]));
-        }
-    }
-    sink.take(place, &sums);
+fn largest<const R: usize>(sums: [[float16x8_t; 2]; R]) -> [float16x8_t; 2] {
+    let lowest = vreinterpretq_f16_u16(vdupq_n_u16(f16::NEG_INFINITY.to_bits()));
+    sums.iter().fold([lowest; 2], |largest, sums| {
+        [vmaxnmq_f16(largest[0], sums[0]), vmaxnmq_f16(largest[1], sums[1])]
+    })
 }
 
-/// Adds the products of inputs `k` to `k + 7`.
+/// [`tile::first_largest`] in fp16, and then in fp32.
+#[inline]
+#[target_feature(enable = "neon,fp16")]
+fn first_largest<const R: usize>(
+    sums: [[float16x8_t; 2]; R],
+) -> ([float32x4_t; 4], [uint32x4_t; 4]) {
+    let lowest = vreinterpretq_f16_u16(vdupq_n_u16(f16::NEG_INFINITY.to_bits()));
+    let (mut largest, mut rows) = ([lowest; 2], [vdupq_n_u16(0); 2]);
+    for (row, sums) in (0..).map(|row| vdupq_n_u16(row)).zip(&sums) {
+        for v in 0..2 {
+            let raised = vcgtq_f16(sums[v], largest[v]);
+            largest[v] = vbslq_f16(raised, sums[v], largest[v]);
+            rows[v] = vbslq_u16(raised, row, rows[v]);
+        }
+    }
+    let [left, right] = rows;
+    let rows = [
+        vmovl_u16(vget_low_u16(left)),
+        vmovl_high_u16(left),
+        vmovl_u16(vget_low_u16(right)),
+        vmovl_high_u16(right),
+    ];
+    (promoted(largest), rows)
+}
+
+/// The same numbers in fp32.
+#[inline(always)]
+fn promoted([left, right]: [float16x8_t; 2]) -> [float32x4_t; 4] {
+    // SAFETY: NEON and its conversions of fp16 are on every aarch64.
+    unsafe {
+        [
+            vcvt_f32_f16(vget_low_f16(left)),
+            vcvt_high_f32_f16(left),
+            vcvt_f32_f16(vget_low_f16(right)),
+            vcvt_high_f32_f16(right),
+        ]
+    }
+}
+
+/// The products of a block of inputs, summed chunk by chunk.
 ///
 /// # Safety
-/// They are in every row, and so are 16 weights for each.
+/// As [`Tile::sums`], for a block of whole STEPs among the inputs.
+#[inline(never)]
+#[target_feature(enable = "neon,fp16")]
+unsafe fn tile_f16_8x16<const R: usize>(
+    operands: &Operands<f16, f16>,
+    inputs: Range<usize>,
+) -> [[float16x8_t; 2]; R] {
+    let mut rows: [*const f16; R] = operands.row_pointers(inputs.start);
+    let zero = vreinterpretq_f16_u16(vdupq_n_u16(0));
+    let mut sums = [[zero; 2]; R];
+    let mut k = inputs.start;
+    while k < inputs.end {
+        let chunk_end = inputs.end.min(k + F16_CHUNK);
+        let mut chunk = [[zero; 2]; R];
+        while k < chunk_end {
+            // SAFETY: inputs k to k + 7 of R rows are there, and 16 weights for
+            // each.
+            unsafe { add_inputs(&mut chunk, &mut rows, operands.weights.add(k * 16)) };
+            k += F16::STEP;
+        }
+        for (sums, chunk) in sums.iter_mut().zip(chunk) {
+            sums[0] = vaddq_f16(sums[0], chunk[0]);
+            sums[1] = vaddq_f16(sums[1], chunk[1]);
+        }
+    }
+    sums
+}
+
+/// Adds the products of the next 8 inputs of each row.
+///
+/// # Safety
+/// They are there, and so are 16 weights for each.
 #[inline]
 #[target_feature(enable = "neon,fp16")]
 unsafe fn add_inputs<const R: usize>(
     sums: &mut [[float16x8_t; 2]; R],
-    rows: &[*const f16; R],
+    rows: &mut [*const f16; R],
     weights: *const f16,
-    k: usize,
 ) {
-    // SAFETY: the caller's; an `f16` is its bits.
+    // SAFETY: the caller's.
     unsafe {
-        let a = rows.map(|row| load(row.add(k)));
-        let weights = weights.add(k * 16);
+        let a = rows.map(|row| load(row));
+        *rows = rows.map(|row| row.add(F16::STEP));
         add_input::<0, R>(sums, &a, weights);
         add_input::<1, R>(sums, &a, weights.add(16));
         add_input::<2, R>(sums, &a, weights.add(32));

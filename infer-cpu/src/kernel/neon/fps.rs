@@ -6,7 +6,7 @@
 use std::arch::aarch64::*;
 
 use super::super::Soa;
-use super::sink::{Lanes, Sums};
+use super::lanes::{Lanes, Sums};
 
 /// Points of a block.
 const BLOCK: usize = 64;

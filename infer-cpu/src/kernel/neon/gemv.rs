@@ -13,7 +13,7 @@ use std::ops::Range;
 use half::f16;
 
 use super::super::Columns;
-use super::sink::Lanes;
+use super::lanes::Lanes;
 
 const BLOCK: usize = Columns::<f32>::BLOCK;
 

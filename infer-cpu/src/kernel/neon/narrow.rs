@@ -5,7 +5,7 @@ use std::arch::aarch64::*;
 use half::f16;
 
 use super::super::I8_LARGEST;
-use super::sink::Lanes;
+use super::lanes::Lanes;
 
 /// Numbers rounded at a time.
 const BATCH: usize = 8;

@@ -1,16 +1,24 @@
-//! What becomes of a tile's sums while they are in registers: outputs, or
-//! maxima over rows, so that the widest features are never stored.
+//! What becomes of a tile's sums: outputs, or maxima over rows, so that the
+//! widest features are never stored.
 
 use std::arch::aarch64::*;
 use std::array::from_fn;
 
 use super::super::Panels;
-use super::tile::Place;
+use super::lanes::{Lanes, Sums, load, store};
+use super::tile::{Operands, Place, Sum, Tile};
 
-/// Takes tiles of `V` vectors a row.
-pub trait Sink<L, const V: usize> {
+/// Takes tile by tile.
+pub trait Sink<T: Tile<V>, const V: usize> {
     /// Takes the sums of `R` rows by one panel.
-    fn take<const R: usize>(&mut self, place: Place, sums: &[[L; V]; R]);
+    ///
+    /// # Safety
+    /// As [`Tile::sums`].
+    unsafe fn take<const R: usize>(
+        &mut self,
+        operands: &Operands<T::Activation, T::Weight>,
+        place: Place,
+    );
 }
 
 /// Writes scaled sums with bias and ReLU.
@@ -30,9 +38,14 @@ impl<'a> Finish<'a> {
     }
 }
 
-impl<L: Sums, const V: usize> Sink<L, V> for Finish<'_> {
-    #[inline(always)]
-    fn take<const R: usize>(&mut self, place: Place, sums: &[[L; V]; R]) {
+impl<T: Tile<V>, const V: usize> Sink<T, V> for Finish<'_> {
+    unsafe fn take<const R: usize>(
+        &mut self,
+        operands: &Operands<T::Activation, T::Weight>,
+        place: Place,
+    ) {
+        // SAFETY: the caller's.
+        let sums = unsafe { T::sums::<R>(operands) };
         let channel = place.panel * 4 * V;
         let bias: [float32x4_t; V] = load(&self.bias[channel..]);
         let scale: [float32x4_t; V] = match self.scale {
@@ -58,15 +71,17 @@ pub struct Max<'a, C> {
     pub maxima: &'a mut [C],
 }
 
-impl<L: Sums, const V: usize> Sink<L, V> for Max<'_, L::Element> {
-    #[inline(always)]
-    fn take<const R: usize>(&mut self, place: Place, sums: &[[L; V]; R]) {
+impl<T: Tile<V>, const V: usize> Sink<T, V> for Max<'_, Sum<T, V>> {
+    unsafe fn take<const R: usize>(
+        &mut self,
+        operands: &Operands<T::Activation, T::Weight>,
+        place: Place,
+    ) {
+        // SAFETY: the caller's.
+        let largest = unsafe { T::largest::<R>(operands) };
         let maxima = &mut self.maxima[(place.panel - self.first_panel) * 4 * V..];
-        let mut largest: [L; V] = load(maxima);
-        for sums in sums {
-            largest = from_fn(|v| largest[v].larger(sums[v]));
-        }
-        store(largest, maxima);
+        let before: [T::Sums; V] = load(maxima);
+        store(from_fn::<_, V, _>(|v| before[v].larger(largest[v])), maxima);
     }
 }
 
@@ -80,137 +95,27 @@ pub struct ArgMax<'a, C> {
     pub winners: &'a mut [u32],
 }
 
-impl<L: Sums, const V: usize> Sink<L, V> for ArgMax<'_, L::Element> {
-    #[inline(always)]
-    fn take<const R: usize>(&mut self, place: Place, sums: &[[L; V]; R]) {
+impl<T: Tile<V>, const V: usize> Sink<T, V> for ArgMax<'_, Sum<T, V>> {
+    unsafe fn take<const R: usize>(
+        &mut self,
+        operands: &Operands<T::Activation, T::Weight>,
+        place: Place,
+    ) {
+        // SAFETY: the caller's.
+        let (largest, rows) = unsafe { T::first_largest::<R>(operands) };
         let channel = (place.panel - self.max.first_panel) * 4 * V;
         let (maxima, winners) = (&mut self.max.maxima[channel..], &mut self.winners[channel..]);
-        let mut largest: [L; V] = load(maxima);
+        let mut maximum: [T::Sums; V] = load(maxima);
         let mut winner: [uint32x4_t; V] = load(winners);
-        for (r, sums) in sums.iter().enumerate() {
-            let row = uint32x4_t::splat(self.first_row + (place.row + r) as u32);
-            for v in 0..V {
-                let raised = sums[v].exceeds(largest[v]);
-                largest[v] = largest[v].replaced(raised, sums[v]);
-                winner[v] = winner[v].replaced(raised, row);
-            }
+        let first_row = uint32x4_t::splat(self.first_row + place.row as u32);
+        for v in 0..V {
+            let raised = largest[v].exceeds(maximum[v]);
+            maximum[v] = maximum[v].replaced(raised, largest[v]);
+            // SAFETY: NEON is on every aarch64.
+            let row = unsafe { vaddq_u32(first_row, rows[v]) };
+            winner[v] = winner[v].replaced(raised, row);
         }
-        store(largest, maxima);
+        store(maximum, maxima);
         store(winner, winners);
-    }
-}
-
-/// The first `V` vectors of a slice.
-#[inline(always)]
-fn load<L: Lanes, const V: usize>(from: &[L::Element]) -> [L; V] {
-    let (from, _) = from[..4 * V].as_chunks();
-    from_fn(|v| L::load(&from[v]))
-}
-
-/// Writes `V` vectors to the beginning of a slice.
-#[inline(always)]
-fn store<L: Lanes, const V: usize>(vectors: [L; V], to: &mut [L::Element]) {
-    let (to, _) = to[..4 * V].as_chunks_mut();
-    for (vector, to) in vectors.into_iter().zip(to) {
-        vector.store(to);
-    }
-}
-
-/// Four numbers in a register.
-pub trait Lanes: Copy {
-    /// One of them.
-    type Element: Copy;
-    /// Four times the same.
-    fn splat(value: Self::Element) -> Self;
-    /// Reads four.
-    fn load(from: &[Self::Element; 4]) -> Self;
-    /// Writes four.
-    fn store(self, to: &mut [Self::Element; 4]);
-    /// `other` where `mask` is all ones.
-    fn replaced(self, mask: uint32x4_t, other: Self) -> Self;
-}
-
-/// Four sums in a register.
-pub trait Sums: Lanes {
-    /// Lane by lane the larger number; of a number and NaN the number.
-    fn larger(self, than: Self) -> Self;
-    /// All ones where this is larger than `other`.
-    fn exceeds(self, other: Self) -> uint32x4_t;
-    /// The nearest numbers of fp32.
-    fn to_f32(self) -> float32x4_t;
-}
-
-macro_rules! lanes {
-    ($vector:ty, $element:ty, $splat:ident, $load:ident, $store:ident, $select:ident) => {
-        impl Lanes for $vector {
-            type Element = $element;
-
-            #[inline(always)]
-            fn splat(value: $element) -> Self {
-                // SAFETY: NEON is on every aarch64.
-                unsafe { $splat(value) }
-            }
-
-            #[inline(always)]
-            fn load(from: &[$element; 4]) -> Self {
-                // SAFETY: four elements are there.
-                unsafe { $load(from.as_ptr()) }
-            }
-
-            #[inline(always)]
-            fn store(self, to: &mut [$element; 4]) {
-                // SAFETY: there is room for four elements.
-                unsafe { $store(to.as_mut_ptr(), self) }
-            }
-
-            #[inline(always)]
-            fn replaced(self, mask: uint32x4_t, other: Self) -> Self {
-                // SAFETY: NEON is on every aarch64.
-                unsafe { $select(mask, other, self) }
-            }
-        }
-    };
-}
-
-lanes!(float32x4_t, f32, vdupq_n_f32, vld1q_f32, vst1q_f32, vbslq_f32);
-lanes!(int32x4_t, i32, vdupq_n_s32, vld1q_s32, vst1q_s32, vbslq_s32);
-lanes!(uint32x4_t, u32, vdupq_n_u32, vld1q_u32, vst1q_u32, vbslq_u32);
-
-impl Sums for float32x4_t {
-    #[inline(always)]
-    fn larger(self, than: Self) -> Self {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vmaxnmq_f32(self, than) }
-    }
-
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> uint32x4_t {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vcgtq_f32(self, other) }
-    }
-
-    #[inline(always)]
-    fn to_f32(self) -> float32x4_t {
-        self
-    }
-}
-
-impl Sums for int32x4_t {
-    #[inline(always)]
-    fn larger(self, than: Self) -> Self {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vmaxq_s32(self, than) }
-    }
-
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> uint32x4_t {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vcgtq_s32(self, other) }
-    }
-
-    #[inline(always)]
-    fn to_f32(self) -> float32x4_t {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vcvtq_f32_s32(self) }
     }
 }

@@ -1,11 +1,13 @@
 //! Matrix products by register tiles: what is the same in every number format.
 
+use std::arch::aarch64::uint32x4_t;
 use std::arch::asm;
 use std::array::from_fn;
 use std::ops::Range;
 
 use super::super::{Gemm, Panels, Rows};
-use super::sink::{ArgMax, Finish, Lanes, Max, Sink, Sums};
+use super::lanes::{Lanes, Sums};
+use super::sink::{ArgMax, Finish, Max, Sink};
 
 /// Rows of the tallest tile.
 const TALLEST: usize = 8;
@@ -23,14 +25,14 @@ pub struct Operands<A, W> {
 }
 
 impl<A, W> Operands<A, W> {
-    /// The first activation of each of `R` rows.
+    /// Input `k` of each of `R` rows.
     ///
     /// A compiler that knows that rows are a stride apart goes from one to the
     /// next by additions in the inner loop; an empty instruction hides it.
     #[inline(always)]
-    pub fn row_pointers<const R: usize>(&self) -> [*const A; R] {
+    pub fn row_pointers<const R: usize>(&self, k: usize) -> [*const A; R] {
         from_fn(|r| {
-            let mut row = self.rows.wrapping_add(r * self.stride);
+            let mut row = self.rows.wrapping_add(r * self.stride + k);
             // SAFETY: no instruction.
             unsafe {
                 asm!("/* {0} */", inout(reg) row, options(pure, nomem, nostack, preserves_flags));
@@ -60,22 +62,69 @@ pub trait Tile<const V: usize> {
     /// Inputs of one round of its loop.
     const STEP: usize;
 
-    /// Gives `sink` the products of `R` rows and one panel. The order in which
-    /// a sum is formed does not depend on `R`.
+    /// The products of `R` rows and one panel. The order in which a sum is
+    /// formed does not depend on `R`.
     ///
     /// # Safety
     /// The machine has the tile's instructions; `inputs` is a multiple of
     /// `STEP`; there are so many activations in each of `R` rows, and `4 * V`
     /// times as many weights.
-    unsafe fn run<S: Sink<Self::Sums, V>, const R: usize>(
+    unsafe fn sums<const R: usize>(
         operands: &Operands<Self::Activation, Self::Weight>,
-        place: Place,
-        sink: &mut S,
-    );
+    ) -> [[Self::Sums; V]; R];
+
+    /// The largest of each channel's sums, [`Sums::LOWEST`] of none but NaN.
+    ///
+    /// # Safety
+    /// As [`Tile::sums`].
+    #[inline(always)]
+    unsafe fn largest<const R: usize>(
+        operands: &Operands<Self::Activation, Self::Weight>,
+    ) -> [Self::Sums; V] {
+        // SAFETY: the caller's.
+        largest(unsafe { Self::sums::<R>(operands) })
+    }
+
+    /// The largest of each channel's sums, and the first of its rows, counted
+    /// from the tile's first.
+    ///
+    /// # Safety
+    /// As [`Tile::sums`].
+    #[inline(always)]
+    unsafe fn first_largest<const R: usize>(
+        operands: &Operands<Self::Activation, Self::Weight>,
+    ) -> ([Self::Sums; V], [uint32x4_t; V]) {
+        // SAFETY: the caller's.
+        first_largest(unsafe { Self::sums::<R>(operands) })
+    }
+}
+
+/// The largest sum of each column.
+#[inline(always)]
+pub fn largest<S: Sums, const V: usize, const R: usize>(sums: [[S; V]; R]) -> [S; V] {
+    let lowest = [S::splat(S::LOWEST); V];
+    sums.iter().fold(lowest, |largest, sums| from_fn(|v| largest[v].larger(sums[v])))
+}
+
+/// The largest sum of each column, and the first of its rows.
+#[inline(always)]
+pub fn first_largest<S: Sums, const V: usize, const R: usize>(
+    sums: [[S; V]; R],
+) -> ([S; V], [uint32x4_t; V]) {
+    let mut largest = [S::splat(S::LOWEST); V];
+    let mut rows = [uint32x4_t::splat(0); V];
+    for (row, sums) in (0..).map(uint32x4_t::splat).zip(&sums) {
+        for v in 0..V {
+            let raised = sums[v].exceeds(largest[v]);
+            largest[v] = largest[v].replaced(raised, sums[v]);
+            rows[v] = rows[v].replaced(raised, row);
+        }
+    }
+    (largest, rows)
 }
 
 /// A number of the tile's sums.
-type Sum<T, const V: usize> = <<T as Tile<V>>::Sums as Lanes>::Element;
+pub type Sum<T, const V: usize> = <<T as Tile<V>>::Sums as Lanes>::Element;
 
 /// The products of one format.
 pub const fn gemm<T: Tile<V>, const V: usize>() -> Gemm<T::Activation, T::Weight, Sum<T, V>> {
@@ -122,7 +171,7 @@ fn argmax<T: Tile<V>, const V: usize>(
 
 /// Gives `sink` all products of `rows` and some panels, panel by panel, so that
 /// a panel stays in the first-level cache while the rows pass.
-fn for_each_tile<T: Tile<V>, S: Sink<T::Sums, V>, const V: usize>(
+fn for_each_tile<T: Tile<V>, S: Sink<T, V>, const V: usize>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
     panels: Range<usize>,
@@ -149,14 +198,14 @@ fn for_each_tile<T: Tile<V>, S: Sink<T::Sums, V>, const V: usize>(
             // where its instructions are.
             unsafe {
                 match rows.n - row {
-                    1 => T::run::<S, 1>(&operands, place, &mut sink),
-                    2 => T::run::<S, 2>(&operands, place, &mut sink),
-                    3 => T::run::<S, 3>(&operands, place, &mut sink),
-                    4 => T::run::<S, 4>(&operands, place, &mut sink),
-                    5 => T::run::<S, 5>(&operands, place, &mut sink),
-                    6 => T::run::<S, 6>(&operands, place, &mut sink),
-                    7 => T::run::<S, 7>(&operands, place, &mut sink),
-                    _ => T::run::<S, TALLEST>(&operands, place, &mut sink),
+                    1 => sink.take::<1>(&operands, place),
+                    2 => sink.take::<2>(&operands, place),
+                    3 => sink.take::<3>(&operands, place),
+                    4 => sink.take::<4>(&operands, place),
+                    5 => sink.take::<5>(&operands, place),
+                    6 => sink.take::<6>(&operands, place),
+                    7 => sink.take::<7>(&operands, place),
+                    _ => sink.take::<TALLEST>(&operands, place),
                 }
             }
         }
