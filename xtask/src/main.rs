@@ -6,9 +6,11 @@ mod caster;
 mod gen_dataset;
 mod gen_shapes;
 mod merge_dataset;
+mod pi_target;
 mod preview_scan;
 mod scan;
 mod test;
+mod workspace;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
