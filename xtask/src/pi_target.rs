@@ -2,6 +2,7 @@
 //! programs for it are linked without a C compiler, and how they run here.
 
 use crate::workspace;
+use anyhow::{Context, bail};
 use std::path::Path;
 use std::process::Command;
 
@@ -31,6 +32,25 @@ pub fn has_standard_library() -> anyhow::Result<bool> {
     ask.args(["--print", "target-libdir", "--target", TRIPLE]);
     let folder = workspace::output(&mut ask)?;
     Ok(Path::new(folder.trim()).is_dir())
+}
+
+/// Fetches the target's standard library through rustup unless it is there.
+///
+/// # Errors
+/// If it cannot be had.
+pub fn need_standard_library() -> anyhow::Result<()> {
+    if has_standard_library()? {
+        return Ok(());
+    }
+    eprintln!("fetching Rust's standard library for {TRIPLE}: rustup target add {TRIPLE}");
+    let status = Command::new("rustup").args(["target", "add", TRIPLE]).status();
+    let status = status.with_context(|| {
+        format!("there is no rustup here to fetch it; install {TRIPLE}'s standard library yourself")
+    })?;
+    if !status.success() || !has_standard_library()? {
+        bail!("rustup could not fetch {TRIPLE}; is this machine offline?");
+    }
+    Ok(())
 }
 
 /// Runs a program for the Pi on this machine; `None` where nothing can.

@@ -1,7 +1,7 @@
 //! `cargo xtask test`: everything a change must pass.
 
 use crate::workspace::{cargo, root, step};
-use crate::{Outcome, pi_target};
+use crate::{Outcome, build_pi, pi_target};
 use anyhow::bail;
 use std::process::Command;
 
@@ -41,6 +41,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     check_that_infer_cpu_is_light()?;
     lint_for_the_pi(!args.no_install)?;
     test_on_the_pi(!args.no_install)?;
+    build_for_the_pi(!args.no_install)?;
     if args.fuzz_seconds > 0 {
         fuzz(args.fuzz_seconds)?;
     }
@@ -74,6 +75,16 @@ fn test_on_the_pi(required: bool) -> anyhow::Result<()> {
     }
     let tests = ["test", "--package", "infer-cpu", "--lib", "--bins", "--tests"];
     step(name, &mut pi_target::cargo(&tests))
+}
+
+/// That a binary for the Raspberry Pi can be made, and is as small as promised.
+fn build_for_the_pi(required: bool) -> anyhow::Result<()> {
+    let name = "Raspberry Pi binary";
+    if !pi_target::has_standard_library()? {
+        return go_without(name, pi_target::NO_STANDARD_LIBRARY, required);
+    }
+    eprintln!("== {name}: cargo xtask build-pi");
+    build_pi::run(&build_pi::Args::default()).map(|_| ())
 }
 
 fn go_without(step: &str, lack: &str, required: bool) -> anyhow::Result<()> {
