@@ -1,0 +1,98 @@
+//! The walk over register tiles, the same in every number format.
+
+use std::ops::Range;
+
+use super::super::{Panels, Rows};
+use super::sink::{Sink, Sums};
+
+/// Rows of the tallest tile.
+const TALLEST: usize = 8;
+
+/// Where the operands of one tile are.
+pub struct Operands<A, W> {
+    /// The first activation of its first row.
+    pub rows: *const A,
+    /// From one row to the next.
+    pub stride: usize,
+    /// The weights of its panel.
+    pub weights: *const W,
+    /// Inputs with padding.
+    pub inputs: usize,
+}
+
+/// Where a tile is in the product.
+#[derive(Clone, Copy)]
+pub struct Place {
+    /// Its first row.
+    pub row: usize,
+    /// Its panel.
+    pub panel: usize,
+}
+
+/// A register tile of `V` vectors of four sums by up to [`TALLEST`] rows.
+pub trait Tile<const V: usize> {
+    /// What rows hold.
+    type Activation;
+    /// What panels hold.
+    type Weight: Copy + Default;
+    /// A vector of sums.
+    type Sums: Sums;
+    /// Inputs of one round of its loop.
+    const STEP: usize;
+
+    /// Gives `sink` the products of `R` rows and one panel. The order in which
+    /// a sum is formed does not depend on `R`.
+    ///
+    /// # Safety
+    /// The machine has the tile's instructions; `inputs` is a multiple of
+    /// `STEP`; there are so many activations in each of `R` rows, and `4 * V`
+    /// times as many weights.
+    unsafe fn run<S: Sink<Self::Sums, V>, const R: usize>(
+        operands: Operands<Self::Activation, Self::Weight>,
+        place: Place,
+        sink: &mut S,
+    );
+}
+
+/// Gives `sink` all products of `rows` and some panels, panel by panel, so that
+/// a panel stays in the first-level cache while the rows pass.
+pub fn for_each_tile<T: Tile<V>, S: Sink<T::Sums, V>, const V: usize>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: Range<usize>,
+    mut sink: S,
+) {
+    let inputs = weights.padded_inputs;
+    rows.check(inputs);
+    assert!(
+        weights.nr == 4 * V && inputs.is_multiple_of(T::STEP),
+        "panels packed for another kernel"
+    );
+    for panel in panels {
+        let weights = weights.panel(panel);
+        for row in (0..rows.n).step_by(TALLEST) {
+            let place = Place { row, panel };
+            let operands = Operands {
+                rows: rows.data[row * rows.stride..].as_ptr(),
+                stride: rows.stride,
+                weights: weights.as_ptr(),
+                inputs,
+            };
+            // SAFETY: `check` and `panel` found the operands whole, the
+            // assertion their padding; a table of kernels is only given out
+            // where its instructions are.
+            unsafe {
+                match rows.n - row {
+                    1 => T::run::<S, 1>(operands, place, &mut sink),
+                    2 => T::run::<S, 2>(operands, place, &mut sink),
+                    3 => T::run::<S, 3>(operands, place, &mut sink),
+                    4 => T::run::<S, 4>(operands, place, &mut sink),
+                    5 => T::run::<S, 5>(operands, place, &mut sink),
+                    6 => T::run::<S, 6>(operands, place, &mut sink),
+                    7 => T::run::<S, 7>(operands, place, &mut sink),
+                    _ => T::run::<S, TALLEST>(operands, place, &mut sink),
+                }
+            }
+        }
+    }
+}
