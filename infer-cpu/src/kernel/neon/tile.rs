@@ -1,9 +1,11 @@
-//! The walk over register tiles, the same in every number format.
+//! Matrix products by register tiles: what is the same in every number format.
 
+use std::arch::asm;
+use std::array::from_fn;
 use std::ops::Range;
 
-use super::super::{Panels, Rows};
-use super::sink::{Sink, Sums};
+use super::super::{Gemm, Panels, Rows};
+use super::sink::{ArgMax, Finish, Lanes, Max, Sink, Sums};
 
 /// Rows of the tallest tile.
 const TALLEST: usize = 8;
@@ -18,6 +20,24 @@ pub struct Operands<A, W> {
     pub weights: *const W,
     /// Inputs with padding.
     pub inputs: usize,
+}
+
+impl<A, W> Operands<A, W> {
+    /// The first activation of each of `R` rows.
+    ///
+    /// A compiler that knows that rows are a stride apart goes from one to the
+    /// next by additions in the inner loop; an empty instruction hides it.
+    #[inline(always)]
+    pub fn row_pointers<const R: usize>(&self) -> [*const A; R] {
+        from_fn(|r| {
+            let mut row = self.rows.wrapping_add(r * self.stride);
+            // SAFETY: no instruction.
+            unsafe {
+                asm!("/* {0} */", inout(reg) row, options(pure, nomem, nostack, preserves_flags));
+            }
+            row
+        })
+    }
 }
 
 /// Where a tile is in the product.
@@ -48,15 +68,61 @@ pub trait Tile<const V: usize> {
     /// `STEP`; there are so many activations in each of `R` rows, and `4 * V`
     /// times as many weights.
     unsafe fn run<S: Sink<Self::Sums, V>, const R: usize>(
-        operands: Operands<Self::Activation, Self::Weight>,
+        operands: &Operands<Self::Activation, Self::Weight>,
         place: Place,
         sink: &mut S,
     );
 }
 
+/// A number of the tile's sums.
+type Sum<T, const V: usize> = <<T as Tile<V>>::Sums as Lanes>::Element;
+
+/// The products of one format.
+pub const fn gemm<T: Tile<V>, const V: usize>() -> Gemm<T::Activation, T::Weight, Sum<T, V>> {
+    Gemm {
+        nr: 4 * V,
+        k_step: T::STEP,
+        rows: rows::<T, V>,
+        max: max::<T, V>,
+        argmax: argmax::<T, V>,
+    }
+}
+
+fn rows<T: Tile<V>, const V: usize>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: Range<usize>,
+    out: &mut [f32],
+    out_stride: usize,
+) {
+    for_each_tile::<T, _, V>(rows, weights, panels, Finish::new(weights, out, out_stride));
+}
+
+fn max<T: Tile<V>, const V: usize>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: Range<usize>,
+    maxima: &mut [Sum<T, V>],
+) {
+    let sink = Max { first_panel: panels.start, maxima };
+    for_each_tile::<T, _, V>(rows, weights, panels, sink);
+}
+
+fn argmax<T: Tile<V>, const V: usize>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: Range<usize>,
+    first_row: u32,
+    maxima: &mut [Sum<T, V>],
+    winners: &mut [u32],
+) {
+    let sink = ArgMax { max: Max { first_panel: panels.start, maxima }, first_row, winners };
+    for_each_tile::<T, _, V>(rows, weights, panels, sink);
+}
+
 /// Gives `sink` all products of `rows` and some panels, panel by panel, so that
 /// a panel stays in the first-level cache while the rows pass.
-pub fn for_each_tile<T: Tile<V>, S: Sink<T::Sums, V>, const V: usize>(
+fn for_each_tile<T: Tile<V>, S: Sink<T::Sums, V>, const V: usize>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
     panels: Range<usize>,
@@ -83,14 +149,14 @@ pub fn for_each_tile<T: Tile<V>, S: Sink<T::Sums, V>, const V: usize>(
             // where its instructions are.
             unsafe {
                 match rows.n - row {
-                    1 => T::run::<S, 1>(operands, place, &mut sink),
-                    2 => T::run::<S, 2>(operands, place, &mut sink),
-                    3 => T::run::<S, 3>(operands, place, &mut sink),
-                    4 => T::run::<S, 4>(operands, place, &mut sink),
-                    5 => T::run::<S, 5>(operands, place, &mut sink),
-                    6 => T::run::<S, 6>(operands, place, &mut sink),
-                    7 => T::run::<S, 7>(operands, place, &mut sink),
-                    _ => T::run::<S, TALLEST>(operands, place, &mut sink),
+                    1 => T::run::<S, 1>(&operands, place, &mut sink),
+                    2 => T::run::<S, 2>(&operands, place, &mut sink),
+                    3 => T::run::<S, 3>(&operands, place, &mut sink),
+                    4 => T::run::<S, 4>(&operands, place, &mut sink),
+                    5 => T::run::<S, 5>(&operands, place, &mut sink),
+                    6 => T::run::<S, 6>(&operands, place, &mut sink),
+                    7 => T::run::<S, 7>(&operands, place, &mut sink),
+                    _ => T::run::<S, TALLEST>(&operands, place, &mut sink),
                 }
             }
         }
