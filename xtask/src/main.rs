@@ -2,13 +2,16 @@
 
 mod adapters;
 mod bench;
+mod build_pi;
 mod caster;
 mod gen_dataset;
 mod gen_shapes;
 mod merge_dataset;
+mod pi_target;
 mod preview_scan;
 mod scan;
 mod test;
+mod workspace;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -35,6 +38,8 @@ enum Command {
     Adapters,
     /// Measure speed and accuracy
     Bench(bench::BenchArgs),
+    /// Build infer-cpu as one static file for a Raspberry Pi
+    BuildPi(build_pi::Args),
     /// Make one dataset of the shards of one
     MergeDataset(merge_dataset::Args),
     /// Install what tests need and run all of them
@@ -57,6 +62,7 @@ fn main() -> ExitCode {
         Command::Preview(args) => preview_scan::run(&args),
         Command::Adapters => adapters::run(),
         Command::Bench(args) => bench::run(&args).map(|()| Outcome::Success),
+        Command::BuildPi(args) => build_pi::run(&args),
         Command::MergeDataset(args) => merge_dataset::run(&args),
         Command::Test(args) => test::run(&args),
     };
