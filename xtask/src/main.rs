@@ -5,6 +5,7 @@ mod bench;
 mod caster;
 mod gen_dataset;
 mod gen_shapes;
+mod import_weights;
 mod merge_dataset;
 mod preview_scan;
 mod scan;
@@ -37,6 +38,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Make one dataset of the shards of one
     MergeDataset(merge_dataset::Args),
+    /// Turn a PyTorch checkpoint into a model file for infer-cpu
+    ImportWeights(import_weights::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
         Command::Adapters => adapters::run(),
         Command::Bench(args) => bench::run(&args).map(|()| Outcome::Success),
         Command::MergeDataset(args) => merge_dataset::run(&args),
+        Command::ImportWeights(args) => import_weights::run(&args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {
