@@ -54,7 +54,8 @@ impl CardArgs {
         tensors: &BTreeMap<String, Tensor>,
     ) -> anyhow::Result<ModelCard> {
         let mut card = table.card.clone();
-        card.classes = self.classes(table, *widths(tensors, "fc").last().unwrap_or(&0))?;
+        let n_logits = *widths(tensors, "fc").last().unwrap_or(&0);
+        card.classes = self.classes(path, table, n_logits)?;
         if self.sampler.is_some() && self.sampler != card.sampler {
             card.sampler.clone_from(&self.sampler);
             (card.points, card.fps_start) = (None, None);
@@ -67,7 +68,7 @@ impl CardArgs {
             Accuracy::Stated(text) => Some(text.clone()),
             Accuracy::Silent => card.accuracy,
             Accuracy::Unread(kind) => {
-                eprintln!("its accuracy is a {kind}, which is not read: --accuracy can tell it");
+                eprintln!("{}: its accuracy is a {kind}; --accuracy states it", path.display());
                 card.accuracy
             }
         };
@@ -78,11 +79,17 @@ impl CardArgs {
         Ok(card)
     }
 
-    fn classes(&self, table: &Table, n_logits: usize) -> anyhow::Result<Vec<String>> {
+    fn classes(
+        &self,
+        checkpoint: &Path,
+        table: &Table,
+        n_logits: usize,
+    ) -> anyhow::Result<Vec<String>> {
         let Some(path) = &self.classes else {
             let fits = table.default_classes.len() == n_logits;
             if !fits {
-                eprintln!("its {n_logits} classes go without names: --classes can tell them");
+                let checkpoint = checkpoint.display();
+                eprintln!("{checkpoint}: {n_logits} classes without names; --classes names them");
             }
             return Ok(if fits { table.default_classes.clone() } else { Vec::new() });
         };
