@@ -134,3 +134,81 @@ fn accuracy(root: &PickleValue) -> Accuracy {
         false => Accuracy::Stated(format!("{}, as its checkpoint says", stated.join(", "))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::fs;
+
+    fn golden(name: &str) -> Vec<u8> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/golden/checkpoints");
+        fs::read(folder.join(name)).unwrap()
+    }
+
+    /// Reads everything; a read that fails is an error like any other.
+    fn read_all(bytes: &[u8]) -> anyhow::Result<BTreeMap<String, Tensor>> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), bytes).unwrap();
+        let checkpoint = Checkpoint::open(file.path())?;
+        checkpoint.read(&checkpoint.names().map(|name| (name.into(), name.into())).collect())
+    }
+
+    #[test]
+    fn the_model_is_found_beside_the_optimiser_and_below_data_parallel() {
+        let names = |all: &[&str]| {
+            let all = all.iter().map(|name| ((*name).to_owned(), ())).collect();
+            model_tensors(all).into_keys().collect::<Vec<_>>()
+        };
+        assert_eq!(names(&["fc1.bias", "fc2.bias"]), ["fc1.bias", "fc2.bias"]);
+        assert_eq!(names(&["module.a", "module.b"]), ["a", "b"]);
+        assert_eq!(names(&["module.a", "b"]), ["b", "module.a"]);
+        let beside = ["model_state_dict.module.a", "optimizer_state_dict.state.0.exp_avg"];
+        assert_eq!(names(&beside), ["a"]);
+        assert_eq!(names(&["optimizer.x", "state_dict.a"]), ["a"]);
+    }
+
+    #[test]
+    fn a_number_that_is_no_weight_is_refused() {
+        let bytes = golden("3dcertify_legacy.pth");
+        let error = format!("{:#}", read_all(&bytes).unwrap_err());
+        let cause = "tensor `mlp1.1.num_batches_tracked`: its elements are I64, expected";
+        assert!(error.contains(cause), "{error}");
+    }
+
+    #[test]
+    fn a_view_that_repeats_one_element_without_end_is_refused() {
+        let pickle = b"\x80\x02}X\x01\x00\x00\x00actorch._utils\n_rebuild_tensor_v2\n\
+            ((X\x07\x00\x00\x00storagectorch\nFloatStorage\nX\x01\x00\x00\x000X\x03\x00\x00\x00cpuK\x01tQ\
+            K\x00J\x00\x00\x00\x10\x85K\x00\x85\x89}tRs.";
+        let header = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19.\x80\x02M\xe9\x03.\
+            \x80\x02}X\x0d\x00\x00\x00little_endian\x88s.";
+        let storage =
+            b"\x80\x02]X\x01\x00\x00\x000a.\x01\x00\x00\x00\x00\x00\x00\x00\x00\x00\x80\x3f";
+        let error = read_all(&[&header[..], pickle, storage].concat()).unwrap_err();
+        assert!(
+            format!("{error:#}")
+                .ends_with("tensor `a`: the model has more than 134217728 elements")
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(512))]
+
+        /// No change to a checkpoint makes its reader panic or fill the memory.
+        #[test]
+        fn a_damaged_checkpoint_is_an_error_or_a_checkpoint(
+            is_zip: bool,
+            changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..8),
+            length in prop::option::of(any::<prop::sample::Index>()),
+        ) {
+            let mut bytes = golden(if is_zip { "yanx27.pth" } else { "3dcertify_legacy.pth" });
+            for (at, byte) in changes {
+                let at = at.index(bytes.len());
+                bytes[at] = byte;
+            }
+            let length = length.map_or(bytes.len(), |length| length.index(bytes.len()));
+            let _ = read_all(&bytes[..length]);
+        }
+    }
+}

@@ -167,3 +167,57 @@ fn parse_card(path: &Path, entries: &BTreeMap<String, toml::Value>) -> anyhow::R
         None => Ok(card),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chosen(keys: &[&str]) -> Result<(String, Names), String> {
+        let tables = Table::builtin().unwrap();
+        let (table, names) = choose(&tables, keys.iter().copied()).map_err(|e| e.to_string())?;
+        Ok((table.name.clone(), names))
+    }
+
+    #[test]
+    fn the_table_that_knows_every_name_is_chosen() {
+        let (table, names) = chosen(&["feat.fstn.bn5.bias", "fc12.weight"]).unwrap();
+        assert_eq!(table, "yanx27");
+        assert_eq!(names["fc12.weight"], "fc12.weight");
+        let (table, names) = chosen(&["mlp2.4.running_var", "mlp2.4.num_batches_tracked"]).unwrap();
+        assert_eq!(table, "3dcertify");
+        assert_eq!(
+            names,
+            Names::from([("feat.bn4.running_var".into(), "mlp2.4.running_var".into())])
+        );
+    }
+
+    #[test]
+    fn unknown_names_are_counted_and_the_first_are_listed() {
+        let keys = ["fc1.bias", "x0", "fc.bias", "fc1", "fc-1.bias", "bn1.scale", "mlp1.0.bias"];
+        let error = chosen(&keys).unwrap_err();
+        let listed = "the nearest, `yanx27`, does not know `x0`, `fc.bias`, `fc1`, `fc-1.bias`, \
+                      `bn1.scale` and 1 more. ";
+        assert!(error.contains(listed), "{error}");
+    }
+
+    #[test]
+    fn two_tensors_of_one_name_are_an_error() {
+        let text = "name = \"t\"\n[layers]\n\"a{i}\" = \"fc{i}\"\n\"b\" = \"fc1\"\n";
+        let table = Table::parse(Path::new("t.toml"), text).unwrap();
+        let error = choose(&[table], ["a1.bias", "b.bias"].into_iter()).unwrap_err().to_string();
+        assert_eq!(error, "table `t` makes both `a1.bias` and `b.bias` `fc1.bias`");
+    }
+
+    #[test]
+    fn default_classes_are_those_of_the_data_sets_labels() {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/points/classes.txt");
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            println!("skipped: {} is not there", path.display());
+            return;
+        };
+        for table in Table::builtin().unwrap() {
+            assert!(text.lines().eq(&table.default_classes), "{}", table.name);
+        }
+    }
+}
