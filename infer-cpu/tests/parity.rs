@@ -44,11 +44,8 @@ fn cheaper_precisions_stay_near() {
     let Some(folder) = shared_data("parity") else { return };
     let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();
     for precision in [Precision::F32Fc16, Precision::F16, Precision::I8] {
-        let options = Options {
-            precision,
-            normalization: Some(Normalization::None),
-            ..Options::default()
-        };
+        let options =
+            Options { precision, normalization: Some(Normalization::None), ..Options::default() };
         let model = folder.join("pointnet.safetensors");
         let mut classifier = Classifier::load(&model, &options).unwrap();
         for n in [16, 64, 128, 1024] {

@@ -204,6 +204,49 @@ fn weights_that_make_no_model_are_named() {
         "no importer table knows all of its tensors; the nearest, `yanx27`, does not know \
          `fc1.scale`.",
     );
+    refused(
+        &|tensors| {
+            tensors.remove("feat.bn2.running_mean");
+        },
+        "tensor `feat.bn2.running_mean`: missing",
+    );
+    refused(
+        &|tensors| {
+            tensors.insert("fc4.bias".into(), vector(&[1.0]));
+        },
+        "tensor `bn3.weight`: missing",
+    );
+    refused(
+        &|tensors| {
+            tensors.insert("bn7.bias".into(), vector(&[1.0]));
+        },
+        "tensor `bn7.bias`: extra",
+    );
+    refused(
+        &|tensors| tensors.get_mut("feat.conv2.weight").unwrap().shape = vec![4, 5, 1],
+        "tensor `feat.conv2.weight`: expected shape [4, 4, 1], found [4, 5, 1]",
+    );
+    refused(
+        &|tensors| tensors.retain(|name, _| name.starts_with("fc")),
+        "tensor `feat.conv2.weight`: missing",
+    );
+}
+
+#[test]
+fn a_tensor_that_was_renamed_is_told_by_both_names() {
+    let folder = tempfile::tempdir().unwrap();
+    import(folder.path(), &golden("3dcertify_legacy.pth"), "");
+    let (mut tensors, _) = read(&folder.path().join("m.safetensors"));
+    tensors.get_mut("fc2.bias").unwrap().shape = vec![1, 4];
+    let theirs = tensors.into_iter().map(|(name, tensor)| (format!("net.{name}"), tensor));
+    checkpoints::write(&folder.path().join("c.pth"), &theirs.collect());
+    let table = ["feat.conv", "feat.bn", "fc", "bn"]
+        .map(|layer| format!("\"net.{layer}{{i}}\" = \"{layer}{{i}}\"\n"));
+    let table = format!("name = \"t\"\n[layers]\n{}", table.concat());
+    fs::write(folder.path().join("t.toml"), table).unwrap();
+    let said = exits(1, folder.path(), "import-weights c.pth --table t.toml --out m.safetensors");
+    let message = "error: c.pth: tensor `fc2.bias` (there `net.fc2.bias`): expected shape [4]";
+    assert!(said.contains(message), "{said}");
 }
 
 #[test]

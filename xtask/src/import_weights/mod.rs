@@ -12,9 +12,9 @@ use anyhow::Context;
 use card::CardArgs;
 use checkpoint::Checkpoint;
 use formats::FormatError;
-use formats::model_card::ModelCard;
-use formats::weights::{Tensor, WeightsFile, write_weights};
-use table::Table;
+use formats::weights::{Tensor, tensor_part, write_weights};
+use infer_cpu::{Classifier, Options};
+use table::{Names, Table};
 
 /// Flags of `import-weights`.
 #[derive(clap::Args)]
@@ -49,34 +49,32 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let widths = card::all_widths(&tensors);
     let mut metadata = card.to_metadata();
     metadata.insert("widths".to_owned(), widths.clone());
-    check(&args.checkpoint, &tensors, &metadata)?;
+    check(&args.checkpoint, &names, &tensors, &metadata)?;
     write_weights(&args.out, &tensors, &metadata)?;
     eprintln!("{widths}, named as by {}: {}", table.name, args.out.display());
     Ok(Outcome::Success)
 }
 
-/// That a model file of these tensors can be loaded; errors name the
-/// checkpoint at `source`.
+/// That infer-cpu loads a model file of these tensors. Errors name the
+/// checkpoint at `source`, and tensors by their names there too.
 fn check(
     source: &Path,
+    names: &Names,
     tensors: &BTreeMap<String, Tensor>,
     metadata: &BTreeMap<String, String>,
 ) -> anyhow::Result<()> {
     let folder = tempfile::tempdir().context("no folder for temporary files")?;
     let path = folder.path().join("model.safetensors");
     write_weights(&path, tensors, metadata)?;
-    load(&path).map_err(|error| match error {
-        FormatError::Malformed { part, cause, .. } => FormatError::malformed(source, part, cause),
-        other => other,
-    })?;
-    Ok(())
-}
-
-fn load(path: &Path) -> Result<(), FormatError> {
-    let mut file = WeightsFile::open(path)?;
-    ModelCard::from_metadata(path, &file.metadata())?;
-    for name in file.shapes().into_keys() {
-        file.read(&name)?;
+    match Classifier::load(&path, &Options::default()) {
+        Ok(_) => Ok(()),
+        Err(infer_cpu::Error::Format(FormatError::Malformed { part, cause, .. })) => {
+            let renamed =
+                names.iter().find(|(ours, theirs)| part == tensor_part(ours) && ours != theirs);
+            let there = renamed.map(|(_, theirs)| format!(" (there `{theirs}`)"));
+            let part = part + &there.unwrap_or_default();
+            Err(FormatError::malformed(source, part, cause).into())
+        }
+        Err(other) => Err(other).with_context(|| format!("{}", source.display())),
     }
-    Ok(())
 }
