@@ -6,6 +6,7 @@ use formats::weights::{Tensor, WeightsFile};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use tests::shared_data::shared;
 
 type Tensors = BTreeMap<String, Tensor>;
 
@@ -18,16 +19,6 @@ fn golden_value(name: &str, element: usize) -> f32 {
 
 fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/golden/checkpoints").join(name)
-}
-
-/// A path below `../shared/data`; where it is absent, a line says that the
-/// test skips.
-fn shared(relative: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(relative);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-    }
-    path.exists().then_some(path)
 }
 
 fn import(folder: &Path, checkpoint: &Path, flags: &str) -> String {

@@ -210,12 +210,8 @@ mod tests {
 
     #[test]
     fn default_classes_are_those_of_the_data_sets_labels() {
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/points/classes.txt");
-        let Ok(text) = std::fs::read_to_string(&path) else {
-            println!("skipped: {} is not there", path.display());
-            return;
-        };
+        let Some(path) = ::tests::shared_data::shared("points/classes.txt") else { return };
+        let text = std::fs::read_to_string(path).unwrap();
         for table in Table::builtin().unwrap() {
             assert!(text.lines().eq(&table.default_classes), "{}", table.name);
         }
