@@ -31,6 +31,14 @@ pub fn to_unit_sphere(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.extend(points.iter().map(|point| from_mean(point).map(|x| (x * scale) as f32)));
 }
 
+/// Leaves `points` in `out` as they are, rounded to f32 and no further from 0
+/// than f32 reaches.
+pub fn not_at_all(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
+    out.clear();
+    let largest = f64::from(f32::MAX);
+    out.extend(points.iter().map(|point| point.map(|x| x.clamp(-largest, largest) as f32)));
+}
+
 /// The mean of `values`, all below 1 in magnitude: the same for any order.
 fn exact_mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let largest = values.clone().fold(0.0f64, |most, x| most.max(x.abs()));

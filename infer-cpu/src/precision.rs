@@ -108,8 +108,6 @@ pub trait Format: Send + Sync + 'static {
     /// A stored weight of a vector layer.
     type Stored: Copy + Default + Send + Sync;
 
-    /// The precision's name.
-    const PRECISION: Precision;
     /// Below every sum.
     const LOWEST: Self::Sum;
     /// Inputs that lie side by side in a panel.
@@ -177,7 +175,6 @@ macro_rules! fp32_points {
 
 impl Format for F32 {
     type Stored = f32;
-    const PRECISION: Precision = Precision::F32;
     fp32_points!();
 
     fn gemv(kernels: &Kernels) -> Gemv<f32> {
@@ -191,7 +188,6 @@ impl Format for F32 {
 
 impl Format for F32Fc16 {
     type Stored = f16;
-    const PRECISION: Precision = Precision::F32Fc16;
     fp32_points!();
 
     fn gemv(kernels: &Kernels) -> Gemv<f16> {
@@ -208,7 +204,6 @@ impl Format for F16 {
     type Weight = f16;
     type Sum = f32;
     type Stored = f16;
-    const PRECISION: Precision = Precision::F16;
     const LOWEST: f32 = f32::NEG_INFINITY;
     const GROUP: usize = 1;
     const SIGNED: bool = true;
@@ -243,7 +238,6 @@ impl Format for I8 {
     type Weight = i8;
     type Sum = i32;
     type Stored = i8;
-    const PRECISION: Precision = Precision::I8;
     const LOWEST: i32 = i32::MIN;
     const GROUP: usize = 4;
     const SIGNED: bool = false;
