@@ -6,6 +6,7 @@ mod build_pi;
 mod caster;
 mod gen_dataset;
 mod gen_shapes;
+mod import_weights;
 mod merge_dataset;
 mod pi_target;
 mod preview_scan;
@@ -42,6 +43,8 @@ enum Command {
     BuildPi(build_pi::Args),
     /// Make one dataset of the shards of one
     MergeDataset(merge_dataset::Args),
+    /// Turn a PyTorch checkpoint into a model file for infer-cpu
+    ImportWeights(import_weights::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -64,6 +67,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::run(&args).map(|()| Outcome::Success),
         Command::BuildPi(args) => build_pi::run(&args),
         Command::MergeDataset(args) => merge_dataset::run(&args),
+        Command::ImportWeights(args) => import_weights::run(&args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {
