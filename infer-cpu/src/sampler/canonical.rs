@@ -6,6 +6,15 @@
 use std::cmp::Ordering;
 
 /// Sorts clouds; keeps its memory from call to call.
+///
+/// ```
+/// use infer_cpu::sampler::CanonicalOrder;
+///
+/// let mut order = CanonicalOrder::default();
+/// order.sort(&[[0.5, 0.0, 0.0], [0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]);
+/// assert_eq!(order.points, [[0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]);
+/// assert_eq!(order.index, [1, 0]);
+/// ```
 #[derive(Default)]
 pub struct CanonicalOrder {
     /// The distinct points, ascending by x, then y, then z. A zero has no sign.

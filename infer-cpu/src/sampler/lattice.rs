@@ -36,6 +36,21 @@ pub enum LatticeError {
 }
 
 /// Features of all points of the cube from -1 to 1.
+///
+/// ```
+/// use infer_cpu::sampler::Lattice;
+///
+/// // One channel, the sum of the coordinates, which interpolation meets.
+/// let lattice = Lattice::tabulate(3, 1, |points, features| {
+///     for (feature, [x, y, z]) in features.iter_mut().zip(points) {
+///         *feature = x + y + z;
+///     }
+/// })?;
+/// let (mut maximum, mut winner) = ([f32::NEG_INFINITY], [0]);
+/// lattice.max(&[[0.5, -0.5, 0.0], [0.25, 0.5, 0.5]], &mut maximum, &mut winner, 0..1);
+/// assert_eq!((maximum, winner), ([1.25], [1]));
+/// # Ok::<(), infer_cpu::sampler::LatticeError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
     nodes: usize,

@@ -21,6 +21,16 @@ const EMPTY: u32 = u32::MAX;
 
 /// Thins clouds; keeps its memory from call to call. It grows with the number
 /// of occupied cells, not of points.
+///
+/// ```
+/// use infer_cpu::sampler::VoxelGrid;
+///
+/// let cloud = [[0.9, 0.5, 0.5], [0.6, 0.5, 0.5], [0.1, 0.5, 0.5], [1.5, 0.5, 0.5]];
+/// let mut chosen = vec![];
+/// // The cell from 0 to 1 holds three points; that at 0.6 is nearest their mean.
+/// VoxelGrid::default().select_by_size(&cloud, 1.0, &mut chosen);
+/// assert_eq!(chosen, [1, 3]);
+/// ```
 #[derive(Default)]
 pub struct VoxelGrid {
     cells: Vec<Cell>,
