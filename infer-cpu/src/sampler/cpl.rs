@@ -82,6 +82,16 @@ impl CriticalPoints {
         self.left = left;
     }
 
+    /// Grows all memory to poolings of `channels` channels among `n_rows` rows.
+    pub fn reserve(&mut self, channels: usize, n_rows: usize) {
+        self.rows.reserve(n_rows);
+        self.scores.reserve(n_rows);
+        self.taken.reserve(n_rows);
+        self.left.reserve(n_rows);
+        self.ranking.reserve(channels);
+        self.ranks.reset(channels);
+    }
+
     /// Ranks the winners of one pooling.
     fn pool(&mut self, maxima: &[f32], winners: &[u32]) {
         self.ranks.reset(maxima.len());

@@ -104,6 +104,11 @@ impl Sampler {
         &self.spec
     }
 
+    /// Draws by another seed from now on.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.spec.seed = seed;
+    }
+
     /// The indices of the chosen points, each once, at most as many as there
     /// are. Of no point none are chosen.
     ///
