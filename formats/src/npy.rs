@@ -1,13 +1,19 @@
-//! NumPy's array header, for what `ndarray-npy` leaves open: arrays of text,
-//! arrays that are streamed, and headers that promise more than the file holds.
+//! NumPy's array files: the header, and the elements behind it.
 //!
-//! Format: NumPy enhancement proposal 1, `numpy.lib.format`.
+//! Format: NumPy enhancement proposal 1, `numpy.lib.format`. It is read and
+//! written here and not by `ndarray-npy`, because that crate's parser of Python
+//! literals (`py_literal`, over `pest` and `psm`) needs a C compiler for the
+//! target, which a Raspberry Pi's cross build should do without; and because
+//! arrays of text, streams and headers that lie need this much anyway.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 
-use py_literal::Value;
+use crate::decoding::{excerpt, invalid};
+use crate::number::{ByteOrder, Number, NumberType};
+use crate::records;
 
-const MAGIC: &[u8] = b"\x93NUMPY";
+/// What every array's file begins with.
+pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 /// Data begins at a multiple of this.
 const ALIGNMENT: usize = 64;
 /// No header of an array of ours comes near it; NumPy itself refuses to parse
@@ -15,13 +21,16 @@ const ALIGNMENT: usize = 64;
 const LONGEST_HEADER: u64 = 1 << 20;
 
 /// What an array's header says.
+#[derive(Debug, PartialEq)]
 pub(crate) struct Header {
     /// The type of an element, as in `<f4`; empty for a record.
     pub descr: String,
+    /// Whether the first index, not the last, runs fastest.
+    pub is_fortran_order: bool,
     /// The size along each axis.
     pub shape: Vec<usize>,
-    /// The header itself, from the magic string to the data.
-    pub bytes: Vec<u8>,
+    /// Bytes of the header itself, from the magic string to the data.
+    pub n_bytes: usize,
 }
 
 impl Header {
@@ -33,16 +42,54 @@ impl Header {
         }
         self.shape.iter().try_fold(1usize, |product, &size| product.checked_mul(size))
     }
+
+    /// What an element is, if it is a number.
+    pub fn number(&self) -> Option<(NumberType, ByteOrder)> {
+        let order = match self.descr.get(..1)? {
+            ">" => ByteOrder::Big,
+            "<" | "|" => ByteOrder::Little,
+            _ => return None,
+        };
+        let number = match &self.descr[1..] {
+            "i1" => NumberType::I8,
+            "u1" => NumberType::U8,
+            "i2" => NumberType::I16,
+            "u2" => NumberType::U16,
+            "i4" => NumberType::I32,
+            "u4" => NumberType::U32,
+            "i8" => NumberType::I64,
+            "u8" => NumberType::U64,
+            "f2" => NumberType::F16,
+            "f4" => NumberType::F32,
+            "f8" => NumberType::F64,
+            _ => return None,
+        };
+        Some((number, order))
+    }
+
+    /// As [`Header::number`]; anything else is an error.
+    pub fn number_or_error(&self) -> io::Result<(NumberType, ByteOrder)> {
+        let no_numbers = || match self.descr.as_str() {
+            "|O" => invalid("pickled Python objects"),
+            descr => invalid(format!("elements of type `{}` are no numbers", excerpt(descr))),
+        };
+        self.number().ok_or_else(no_numbers)
+    }
 }
 
-/// The header of an array in C order.
+/// The header of an array in C order, as NumPy writes it.
 pub(crate) fn header_bytes(descr: &str, shape: &[usize]) -> Vec<u8> {
+    header_ending_in(", }", descr, shape)
+}
+
+/// A header whose Python dictionary closes with `ending`.
+fn header_ending_in(ending: &str, descr: &str, shape: &[usize]) -> Vec<u8> {
     let sizes: Vec<_> = shape.iter().map(usize::to_string).collect();
     // Python's tuple of one ends in a comma.
     let comma = if shape.len() == 1 { "," } else { "" };
     let sizes = sizes.join(", ");
     let dictionary =
-        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({sizes}{comma}), }}");
+        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({sizes}{comma}){ending}");
     // Magic, version, length of two bytes; the newline ends the padding.
     let unpadded = MAGIC.len() + 2 + 2 + dictionary.len() + 1;
     let length = dictionary.len() + 1 + unpadded.next_multiple_of(ALIGNMENT) - unpadded;
@@ -53,50 +100,181 @@ pub(crate) fn header_bytes(descr: &str, shape: &[usize]) -> Vec<u8> {
     bytes
 }
 
+/// How NumPy calls what [`write_array`] writes.
+fn descr(number: NumberType) -> &'static str {
+    match number {
+        NumberType::I8 => "|i1",
+        NumberType::U8 => "|u1",
+        NumberType::I16 => "<i2",
+        NumberType::U16 => "<u2",
+        NumberType::I32 => "<i4",
+        NumberType::U32 => "<u4",
+        NumberType::I64 => "<i8",
+        NumberType::U64 => "<u8",
+        NumberType::F16 => "<f2",
+        NumberType::F32 => "<f4",
+        NumberType::F64 => "<f8",
+    }
+}
+
+/// Writes a whole array, of `elements` in C order.
+pub(crate) fn write_array<A: Number>(
+    writer: &mut impl Write,
+    shape: &[usize],
+    elements: impl IntoIterator<Item = A>,
+) -> io::Result<()> {
+    // The hashes of datasets depend on this brace, which NumPy itself would set
+    // apart by a comma.
+    writer.write_all(&header_ending_in("}", descr(A::TYPE), shape))?;
+    elements
+        .into_iter()
+        .try_for_each(|element| writer.write_all(element.to_little_endian().as_ref()))
+}
+
 /// Reads a header and nothing after it.
-pub(crate) fn read_header(reader: &mut impl Read) -> io::Result<Header> {
-    let mut bytes = vec![0; MAGIC.len() + 2];
-    reader.read_exact(&mut bytes)?;
-    if !bytes.starts_with(MAGIC) {
+pub(crate) fn read_header(reader: &mut (impl Read + ?Sized)) -> io::Result<Header> {
+    let mut start = [0; MAGIC.len() + 2];
+    reader.read_exact(&mut start)?;
+    if !start.starts_with(MAGIC) {
         return Err(invalid("not a NumPy array"));
     }
-    let length_size = match bytes[MAGIC.len()] {
+    let length_size = match start[MAGIC.len()] {
         1 => 2,
         2 | 3 => 4,
         version => return Err(invalid(format!("unknown NPY version {version}"))),
     };
     let mut length = [0; 4];
     reader.read_exact(&mut length[..length_size])?;
-    bytes.extend_from_slice(&length[..length_size]);
     let length = u64::from(u32::from_le_bytes(length));
     if length > LONGEST_HEADER {
         return Err(invalid(format!("a header of {length} bytes")));
     }
-    let start = bytes.len();
-    if reader.take(length).read_to_end(&mut bytes)? as u64 != length {
+    let mut text = Vec::new();
+    if reader.take(length).read_to_end(&mut text)? as u64 != length {
         return Err(io::ErrorKind::UnexpectedEof.into());
     }
-    let text = std::str::from_utf8(&bytes[start..]).map_err(invalid)?;
-    let dictionary: Value = text.trim_end().parse().map_err(invalid)?;
-    let (descr, shape) = interpret(&dictionary)
-        .ok_or_else(|| invalid(format!("a header that makes no sense: {dictionary}")))?;
-    Ok(Header { descr, shape, bytes })
+    let n_bytes = start.len() + length_size + text.len();
+    let text = std::str::from_utf8(&text).map_err(invalid)?;
+    interpret(text, n_bytes)
+        .ok_or_else(|| invalid(format!("a header that makes no sense: {}", excerpt(text))))
 }
 
-fn interpret(dictionary: &Value) -> Option<(String, Vec<usize>)> {
-    let entries = dictionary.as_dict()?;
-    let entry = |name: &str| {
-        let found = entries.iter().find(|(key, _)| key.as_string().is_some_and(|key| key == name));
-        found.map(|(_, value)| value)
+fn interpret(text: &str, n_bytes: usize) -> Option<Header> {
+    let entries = dictionary(text)?;
+    let entry = |name: &str| entries.iter().find(|(key, _)| *key == name).map(|(_, value)| *value);
+    let descr = entry("descr")?;
+    let is_fortran_order = match entry("fortran_order")? {
+        "True" => true,
+        "False" => false,
+        _ => return None,
     };
-    let descr = entry("descr")?.as_string().cloned().unwrap_or_default();
-    let shape = entry("shape")?.as_tuple()?;
-    let sizes = shape.iter().map(|size| usize::try_from(size.as_integer()?).ok());
-    Some((descr, sizes.collect::<Option<_>>()?))
+    let shape = shape(entry("shape")?)?;
+    let descr = string(descr).map(|(descr, _)| descr).unwrap_or_default().to_owned();
+    Some(Header { descr, is_fortran_order, shape, n_bytes })
 }
 
-pub(crate) fn invalid(cause: impl ToString) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, cause.to_string())
+/// The keys of a Python dictionary and its values as they are written.
+fn dictionary(text: &str) -> Option<Vec<(&str, &str)>> {
+    let mut rest = text.trim().strip_prefix('{')?.strip_suffix('}')?.trim();
+    let mut entries = Vec::new();
+    while !rest.is_empty() {
+        let (key, after) = string(rest)?;
+        let after = after.trim_start().strip_prefix(':')?;
+        let end = end_of_value(after)?;
+        entries.push((key, after[..end].trim()));
+        rest = after[end..].strip_prefix(',').unwrap_or_default().trim_start();
+    }
+    Some(entries)
+}
+
+/// What stands between the quotes that `text` begins with, and what follows.
+fn string(text: &str) -> Option<(&str, &str)> {
+    let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"'))?;
+    text[1..].split_once(quote)
+}
+
+/// Where the comma after a value is, or the text's end: outside of brackets and
+/// quotes, which must pair.
+fn end_of_value(text: &str) -> Option<usize> {
+    let mut depth = 0usize;
+    let mut quote = None;
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            _ if quote == Some(byte) => quote = None,
+            _ if quote.is_some() => {}
+            b'\'' | b'"' => quote = Some(byte),
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.checked_sub(1)?,
+            b',' if depth == 0 => return Some(at),
+            _ => {}
+        }
+    }
+    (depth == 0 && quote.is_none()).then_some(text.len())
+}
+
+/// A tuple of sizes; Python 2 wrote an `L` behind long ones.
+fn shape(text: &str) -> Option<Vec<usize>> {
+    let sizes = text.strip_prefix('(')?.strip_suffix(')')?.trim();
+    if sizes.is_empty() {
+        return Some(Vec::new());
+    }
+    let sizes = sizes.strip_suffix(',').unwrap_or(sizes);
+    let size = |word: &str| word.trim().trim_end_matches('L').parse().ok();
+    sizes.split(',').map(size).collect()
+}
+
+/// Reads the elements of a whole array in C order, whichever order the file
+/// has them in. They must be of the type asked for.
+pub(crate) fn read_elements<A: Number>(
+    reader: &mut (impl Read + ?Sized),
+    header: &Header,
+) -> io::Result<Vec<A>> {
+    let order = match header.number() {
+        Some((number, order)) if number == A::TYPE => order,
+        _ => {
+            let expected = descr(A::TYPE);
+            return Err(invalid(format!("elements are {}, not {expected}", header.descr)));
+        }
+    };
+    read_in_c_order(reader, header, size_of::<A>(), |bytes| A::from_bytes(bytes, order))
+}
+
+/// Reads the elements of a whole array in C order, numbers of any type, each
+/// through `convert`.
+pub(crate) fn read_numbers<T: Copy>(
+    reader: &mut (impl Read + ?Sized),
+    header: &Header,
+    convert: impl Fn(f64) -> T,
+) -> io::Result<Vec<T>> {
+    let (number, order) = header.number_or_error()?;
+    read_in_c_order(reader, header, number.size(), |bytes| convert(number.decode(bytes, order)))
+}
+
+fn read_in_c_order<T: Copy>(
+    reader: &mut (impl Read + ?Sized),
+    header: &Header,
+    size: usize,
+    decode: impl Fn(&[u8]) -> T,
+) -> io::Result<Vec<T>> {
+    let n = header.n_elements().ok_or_else(|| invalid("elements without end"))?;
+    let mut elements = Vec::new();
+    records::read(reader, size, n as u64, |bytes| elements.push(decode(bytes)))?;
+    if header.is_fortran_order { Ok(to_c_order(&elements, &header.shape)) } else { Ok(elements) }
+}
+
+fn to_c_order<A: Copy>(elements: &[A], shape: &[usize]) -> Vec<A> {
+    let place = |index: usize| {
+        let mut rest = index;
+        let mut strides_left = elements.len();
+        let mut place = 0;
+        for &size in shape.iter().rev() {
+            strides_left /= size;
+            place += rest % size * strides_left;
+            rest /= size;
+        }
+        elements[place]
+    };
+    (0..elements.len()).map(place).collect()
 }
 
 #[cfg(test)]
@@ -120,19 +298,69 @@ mod tests {
     }
 
     #[test]
+    fn a_header_may_be_written_in_any_way_of_pythons() {
+        for (dictionary, descr, is_fortran_order, shape) in [
+            ("{'shape':(),'fortran_order':True,'descr':'|u1'}", "|u1", true, &[][..]),
+            ("{\"descr\": \"<f8\", 'fortran_order': False, 'shape': (7,)}  \n", "<f8", false, &[7]),
+            (
+                "{ 'descr' : '<f4', 'fortran_order': False, 'shape': (3L, 4L) }",
+                "<f4",
+                false,
+                &[3, 4],
+            ),
+            (
+                "{'descr': [('x', '<f4'), ('y,}', '<f4')], 'fortran_order': False, 'shape': (2,), }",
+                "",
+                false,
+                &[2],
+            ),
+        ] {
+            let header = read_header(&mut &with_dictionary(dictionary)[..]).unwrap();
+            let expected = Header {
+                descr: descr.to_owned(),
+                is_fortran_order,
+                shape: shape.to_vec(),
+                n_bytes: 10 + dictionary.len(),
+            };
+            assert_eq!(header, expected);
+        }
+    }
+
+    #[test]
     fn a_header_that_lies_is_an_error() {
         for dictionary in [
             "{",
             "[]",
             "{'descr': '<f4'}",
-            "{'descr': '<f4', 'shape': (-1,)}",
-            "{'descr': '<f4', 'shape': (99999999999999999999,)}",
+            "{'descr': '<f4', 'shape': (1,)}",
+            "{'descr': '<f4', 'fortran_order': 0, 'shape': (1,)}",
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (-1,)}",
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (,)}",
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (1,) 'x': 2}",
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (99999999999999999999,)}",
             &"(".repeat(60_000),
         ] {
             assert!(read_header(&mut &with_dictionary(dictionary)[..]).is_err(), "{dictionary}");
         }
-        let many = with_dictionary("{'descr': '<f4', 'shape': (4294967296, 4294967296)}");
-        assert_eq!(read_header(&mut &many[..]).unwrap().n_elements(), None);
+        let many = "{'descr': '<f4', 'fortran_order': False, 'shape': (4294967296, 4294967296)}";
+        let header = read_header(&mut &with_dictionary(many)[..]).unwrap();
+        assert_eq!(header.n_elements(), None);
+        assert!(read_elements::<f32>(&mut io::empty(), &header).is_err());
+    }
+
+    #[test]
+    fn elements_come_in_c_order() {
+        let header = |is_fortran_order, shape: &[usize]| Header {
+            descr: "|u1".to_owned(),
+            is_fortran_order,
+            shape: shape.to_vec(),
+            n_bytes: 0,
+        };
+        let read = |header| read_elements::<u8>(&mut &[0, 1, 2, 3, 4, 5][..], &header).unwrap();
+        assert_eq!(read(header(false, &[2, 3])), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(read(header(true, &[2, 3])), [0, 2, 4, 1, 3, 5]);
+        assert_eq!(read(header(true, &[3, 1, 2])), [0, 3, 1, 4, 2, 5]);
+        assert_eq!(read(header(true, &[0, usize::MAX, usize::MAX])), []);
     }
 
     proptest! {
@@ -143,12 +371,18 @@ mod tests {
             let header = read_header(&mut &bytes[..]).unwrap();
             prop_assert_eq!(header.descr, "<U12");
             prop_assert_eq!(header.shape, shape);
-            prop_assert_eq!(header.bytes, bytes);
+            prop_assert_eq!(header.n_bytes, bytes.len());
         }
 
         #[test]
         fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let _ = read_header(&mut &[MAGIC, &[1, 0], &bytes].concat()[..]);
+        }
+
+        #[test]
+        fn no_text_makes_the_reader_panic(text in "[{}\\[\\]()'\",: a-zé0-9]{0,60}") {
+            let _ = dictionary(&text);
+            let _ = dictionary(&format!("{{{text}}}"));
         }
     }
 }

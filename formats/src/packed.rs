@@ -16,8 +16,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use ndarray::ArrayView1;
-
 use crate::archive::{NpzReader, NpzWriter, Values};
 use crate::atomic;
 use crate::error::FormatError;
@@ -121,9 +119,9 @@ impl PackedWriter {
                 let entry = npz.begin("points", n_bytes)?;
                 entry.write_all(&header)?;
                 io::copy(&mut points, entry)?;
-                npz.array("labels", ArrayView1::from(&labels))?;
+                npz.array("labels", &[labels.len()], labels.iter().copied())?;
                 npz.text("names", &names)?;
-                npz.array("n_raw", ArrayView1::from(&n_raw))?;
+                npz.array("n_raw", &[n_raw.len()], n_raw.iter().copied())?;
                 npz.text("classes", &classes)
             })
         })

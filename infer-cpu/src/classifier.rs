@@ -299,9 +299,15 @@ fn front_end(
     Ok(Some(table.map_or(FrontEnd::Pass(pass), FrontEnd::Table)))
 }
 
-fn setup(options: &Options, precision: Precision) -> Result<Setup, Error> {
+fn setup(options: &Options, precision: Precision) -> Result<Setup<'_>, Error> {
     let kernels = choose_kernels(precision, options.kernel)?;
-    Ok(Setup { precision, kernels, threads: options.threads, t_nets: options.t_nets })
+    Ok(Setup {
+        precision,
+        kernels,
+        threads: options.threads,
+        t_nets: options.t_nets,
+        activation_ranges: options.activation_ranges.as_ref(),
+    })
 }
 
 /// The kernels `forced`, or the fastest here that have products in `precision`.

@@ -1,5 +1,6 @@
 //! A network of whichever precision, loaded and ready to run.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use formats::FormatError;
@@ -92,7 +93,7 @@ pub struct Loaded {
 
 /// What to load a network for.
 #[derive(Clone, Copy)]
-pub struct Setup {
+pub struct Setup<'a> {
     /// What to compute in.
     pub precision: Precision,
     /// The kernels, which have that precision's products.
@@ -101,15 +102,20 @@ pub struct Setup {
     pub threads: usize,
     /// The T-Nets to run.
     pub t_nets: TNets,
+    /// The largest activation of each layer, in place of the model's own.
+    pub activation_ranges: Option<&'a BTreeMap<String, f32>>,
 }
 
 /// Loads the model at `path` and packs it.
 ///
 /// # Errors
 /// A file that is no model; threads that cannot be started.
-pub fn load(path: &Path, setup: &Setup) -> Result<Loaded, Error> {
+pub fn load(path: &Path, setup: &Setup<'_>) -> Result<Loaded, Error> {
     let mut file = WeightsFile::open(path)?;
     let mut card = ModelCard::from_metadata(path, &file.metadata())?;
+    if let Some(ranges) = setup.activation_ranges {
+        card.activation_ranges.clone_from(ranges);
+    }
     if setup.precision == Precision::I8 && card.activation_ranges.is_empty() {
         card.activation_ranges = calibrate::on_shapes(path)?;
     }
@@ -124,7 +130,7 @@ pub fn load(path: &Path, setup: &Setup) -> Result<Loaded, Error> {
 fn loaded<T: Format>(
     file: &mut WeightsFile,
     card: ModelCard,
-    setup: &Setup,
+    setup: &Setup<'_>,
 ) -> Result<Loaded, Error> {
     let Setup { kernels, threads, t_nets, .. } = *setup;
     let mut layers = layers::pack::<T>(file, &card, kernels)?;

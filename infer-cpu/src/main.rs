@@ -1,17 +1,18 @@
-//! The Raspberry Pi side of Edgepuck. So far it knows its version and says
-//! what it cannot do yet.
+//! Classifies clouds without a GPU.
 
-use std::process::ExitCode;
+mod cli;
 
-fn main() -> ExitCode {
-    match std::env::args().nth(1).as_deref() {
-        Some("--version" | "-V") => {
-            println!("infer-cpu {}", env!("CARGO_PKG_VERSION"));
-            ExitCode::SUCCESS
-        }
-        _ => {
-            eprintln!("infer-cpu: classification is not built yet; only --version works");
-            ExitCode::from(2)
-        }
-    }
+use clap::Parser;
+
+#[derive(Parser)]
+#[command(version)]
+enum Cli {
+    /// Measure this machine
+    Bench(cli::bench::Args),
+}
+
+fn main() -> anyhow::Result<()> {
+    let Cli::Bench(args) = Cli::parse();
+    let model = args.model.clone().unwrap_or_default();
+    cli::bench::run(&args, &model)
 }

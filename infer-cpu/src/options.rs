@@ -1,5 +1,7 @@
 //! How a classifier computes.
 
+use std::collections::BTreeMap;
+
 use formats::FormatError;
 use formats::model_card::Normalization;
 
@@ -82,6 +84,9 @@ pub struct Options {
     /// Replaces the front end of a Critical Points Layer by a look-up table of
     /// this many nodes an axis.
     pub table_nodes: Option<usize>,
+    /// The largest activation of each layer, for int8; the model's own
+    /// calibration if `None`, and shapes made by rule if it has none.
+    pub activation_ranges: Option<BTreeMap<String, f32>>,
     /// How clouds are normalised; as in training if `None`.
     pub normalization: Option<Normalization>,
     /// Drop points that are not finite instead of refusing the cloud.
@@ -105,6 +110,7 @@ impl Default for Options {
             t_nets: TNets::Both,
             sampler: None,
             table_nodes: None,
+            activation_ranges: None,
             normalization: None,
             drop_invalid: false,
             votes: 1,

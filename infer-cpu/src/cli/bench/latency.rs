@@ -1,5 +1,6 @@
 //! How long a classification takes.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -42,7 +43,9 @@ struct Row {
 /// # Errors
 /// A model that cannot be loaded, a cloud that cannot be classified.
 pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
-    let rows = settings(args).iter().map(|setting| measure(args, model, setting));
+    let ranges = super::calibration(args, model)?;
+    let rows = settings(args);
+    let rows = rows.iter().map(|setting| measure(args, model, setting, &ranges));
     let record = Record {
         machine: Machine::here(),
         model: model.display().to_string(),
@@ -52,8 +55,17 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         println!("{}", serde_json::to_string(&record)?);
         return Ok(());
     }
-    let header =
-        ["sampler", "T-Nets", "precision", "kernel", "from", "points", "threads", "p50 ms", "p99 ms"];
+    let header = [
+        "sampler",
+        "T-Nets",
+        "precision",
+        "kernel",
+        "from",
+        "points",
+        "threads",
+        "p50 ms",
+        "p99 ms",
+    ];
     let cells = |row: &Row| {
         vec![
             row.sampler.clone(),
@@ -71,9 +83,15 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn measure(args: &Args, model: &Path, setting: &Setting) -> anyhow::Result<Row> {
+fn measure(
+    args: &Args,
+    model: &Path,
+    setting: &Setting,
+    ranges: &Option<BTreeMap<String, f32>>,
+) -> anyhow::Result<Row> {
     let from = if setting.sampler.takes_all() { setting.points } else { args.from };
-    let options = setting.options(args, from);
+    let mut options = setting.options(args, from);
+    options.activation_ranges.clone_from(ranges);
     let mut classifier = Classifier::load(model, &options)?;
     let cloud = cloud(from);
     // Once for caches, pages and sleeping threads.

@@ -9,8 +9,10 @@ mod table;
 mod trade;
 mod variant;
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
+use formats::labelled::read_labelled;
 use infer_cpu::{Precision, TNets};
 
 use variant::Variant;
@@ -95,10 +97,21 @@ pub struct Args {
     svg: Option<PathBuf>,
 }
 
+/// The largest activations on the clouds of `--calibrate`, if there are any.
+fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
+    /// More clouds change the largest activations little.
+    const CLOUDS: usize = 512;
+    let Some(path) = &args.calibrate else { return Ok(None) };
+    let set = read_labelled(path)?;
+    let step = set.len().div_ceil(CLOUDS).max(1);
+    let clouds = (0..set.len()).step_by(step).map(|i| set.cloud(i));
+    Ok(Some(infer_cpu::activation_ranges(model, clouds)?))
+}
+
 /// Measures what `args` ask for.
 ///
 /// # Errors
 /// A model or a set that cannot be read, a file that cannot be written.
-pub fn run(args: &Args, model: &std::path::Path) -> anyhow::Result<()> {
+pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
     if args.trade { trade::run(args, model) } else { latency::run(args, model) }
 }

@@ -1,6 +1,6 @@
 //! What each shortcut gains in time and costs in accuracy.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -60,10 +60,11 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         bail!("{}: no clouds", data.display());
     }
     let chosen = spread(set.len(), args.limit.unwrap_or(usize::MAX));
+    let ranges = super::calibration(args, model)?;
     let mut references: HashMap<String, Answers> = HashMap::new();
     let mut rows = Vec::new();
     for setting in settings(args) {
-        let (answers, labels) = answer(args, model, &setting, &set, &chosen)
+        let (answers, labels) = answer(args, model, &setting, &ranges, &set, &chosen)
             .with_context(|| format!("{} at {} points", setting.sampler, setting.points))?;
         let same = format!("{} {} {}", setting.sampler, setting.t_nets, setting.points);
         let reference = references.get(&same).unwrap_or(&answers);
@@ -96,11 +97,12 @@ fn answer(
     args: &Args,
     model: &Path,
     setting: &Setting,
+    ranges: &Option<BTreeMap<String, f32>>,
     set: &LabelledSet,
     chosen: &[usize],
 ) -> anyhow::Result<(Answers, Vec<usize>)> {
     let mut options = setting.options(args, set.n_points);
-    options.calibration.clone_from(&args.calibrate);
+    options.activation_ranges.clone_from(ranges);
     let mut classifier = Classifier::load(model, &options)?;
     let labels = labels_by_model(&classifier, set, chosen)?;
     let mut answers = Answers { classes: Vec::new(), logits: Vec::new(), ms: Vec::new() };
@@ -171,8 +173,18 @@ fn mark_front(rows: &mut [Row]) {
 
 fn print(rows: &[Row]) -> anyhow::Result<()> {
     let header = [
-        "sampler", "T-Nets", "precision", "points", "threads", "p50 ms", "p99 ms", "accuracy %",
-        "95 % interval", "as f32 %", "largest error", "front",
+        "sampler",
+        "T-Nets",
+        "precision",
+        "points",
+        "threads",
+        "p50 ms",
+        "p99 ms",
+        "accuracy %",
+        "95 % interval",
+        "as f32 %",
+        "largest error",
+        "front",
     ];
     let cells = |row: &Row| {
         let (low, high) = wilson_interval(row.n_right, row.n);
