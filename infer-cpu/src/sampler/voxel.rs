@@ -328,14 +328,16 @@ mod tests {
     }
 
     #[test]
-    fn ten_million_points_are_thinned_in_few_passes() {
+    fn ten_million_points_take_the_memory_of_their_cells() {
         let cloud = uniform(10_000_000, 5);
         let mut grid = VoxelGrid::default();
         let mut kept = vec![];
-        grid.select_by_count(&cloud, 1000, &mut kept);
-        assert!((750..=1000).contains(&kept.len()), "{}", kept.len());
-        // Memory is that of the cells.
-        assert!(grid.cells.capacity() < 4096 && grid.slots.len() <= 4096);
+        grid.select_by_size(&cloud, 0.2, &mut kept);
+        assert_eq!(kept.len(), 1000);
+        assert!(grid.cells.capacity() <= 1024 && grid.slots.len() <= 2048);
+        grid.select_by_count(&cloud[..1_000_000], 1000, &mut kept);
+        assert!(kept.len() <= 1000);
+        assert!(grid.cells.capacity() <= 1024 && grid.slots.len() <= 2048);
     }
 
     proptest! {
