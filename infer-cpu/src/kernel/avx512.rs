@@ -1,4 +1,207 @@
-//! Under construction.
-pub(super) fn kernels() -> Option<&'static super::Kernels> {
-    None
+//! AVX-512 with VNNI: tiles of 12 rows by 32 channels, 24 of the 32 registers
+//! accumulating. See [`super::x86`] for the loops.
+//!
+//! VNNI is asked for as a whole: machines with AVX-512 but without it (before
+//! Cascade Lake) take AVX2.
+
+use std::arch::x86_64::*;
+use std::ops::Range;
+
+use half::f16;
+
+use super::x86::Lanes;
+use super::{Gemm, declare_kernels};
+
+const NR: usize = 32;
+
+declare_kernels!(
+    Avx512,
+    runs_here: is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512vnni"),
+    {
+        f32: Some(Gemm { nr: NR, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
+        f16: Some(Gemm { nr: NR, k_step: 16, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
+        i8: Some(Gemm { nr: NR, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
+        gemv_f32,
+        gemv_f16,
+        gemv_i8,
+        narrow_f16,
+        narrow_i8,
+        fps_step,
+    }
+);
+
+super::x86::entries!(__m512, 4, "avx512f,avx512bw,avx512vl,avx512vnni");
+
+impl Lanes for __m512 {
+    type Int = __m512i;
+    const N: usize = 16;
+    const ROWS: usize = 12;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_set1_ps(value) }
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_loadu_ps(from) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_f16(from: *const f16) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_cvtph_ps(_mm256_loadu_si256(from.cast())) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_i8(from: *const i8) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(_mm_loadu_si128(from.cast()))) }
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_storeu_ps(to, self) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_f16(self, to: *mut f16) {
+        // SAFETY: as the trait's callers promise.
+        unsafe {
+            _mm256_storeu_si256(to.cast(), _mm512_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn store_u8(self, to: *mut u8) {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm_storeu_si128(to.cast(), _mm512_cvtepi32_epi8(_mm512_cvtps_epi32(self))) }
+    }
+
+    #[inline(always)]
+    unsafe fn fma(self, factor: Self, term: Self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_fmadd_ps(self, factor, term) }
+    }
+
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_mul_ps(self, other) }
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_add_ps(self, other) }
+    }
+
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_sub_ps(self, other) }
+    }
+
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_max_ps(self, other) }
+    }
+
+    #[inline(always)]
+    unsafe fn min(self, other: Self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_min_ps(self, other) }
+    }
+
+    #[inline(always)]
+    unsafe fn abs(self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_abs_ps(self) }
+    }
+
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_roundscale_ps::<_MM_FROUND_TO_NEAREST_INT>(self) }
+    }
+
+    #[inline(always)]
+    unsafe fn count_greater(self, other: Self) -> u32 {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, other).count_ones() }
+    }
+
+    #[inline(always)]
+    unsafe fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) {
+        // SAFETY: as the trait's callers promise.
+        unsafe {
+            let greater = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, *best);
+            *best = _mm512_mask_mov_ps(*best, greater, self);
+            *who = _mm512_mask_mov_epi32(*who, greater, index)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn splat_int(value: i32) -> Self::Int {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_set1_epi32(value) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_int(from: *const i32) -> Self::Int {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_loadu_si512(from.cast()) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_int(int: Self::Int, to: *mut i32) {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_storeu_si512(to.cast(), int) }
+    }
+
+    #[inline(always)]
+    unsafe fn add_int(a: Self::Int, b: Self::Int) -> Self::Int {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_add_epi32(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn max_int(a: Self::Int, b: Self::Int) -> Self::Int {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_max_epi32(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn keep_greater_int(
+        value: Self::Int,
+        best: &mut Self::Int,
+        who: &mut Self::Int,
+        index: Self::Int,
+    ) {
+        // SAFETY: as the trait's callers promise.
+        unsafe {
+            let greater = _mm512_cmpgt_epi32_mask(value, *best);
+            *best = _mm512_mask_mov_epi32(*best, greater, value);
+            *who = _mm512_mask_mov_epi32(*who, greater, index)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_dpbusd_epi32(sum, a, w) }
+    }
+
+    #[inline(always)]
+    unsafe fn to_float(int: Self::Int) -> Self {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_cvtepi32_ps(int) }
+    }
 }

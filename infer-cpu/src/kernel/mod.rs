@@ -29,6 +29,8 @@ mod panels;
 mod scalar;
 #[cfg(test)]
 mod suite;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
 /// Declares the kernels of one file and, with them, the tests that hold them
 /// to the reference, so that none can exist untested: `runs_here` says whether

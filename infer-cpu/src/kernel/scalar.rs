@@ -10,7 +10,7 @@ use super::{Columns, Gemm, I8_LARGEST, Panels, Rows, Soa, declare_kernels};
 /// Products of fp16 are summed in fp16 over this many inputs, then in fp32.
 ///
 /// The sum of a chunk of n products is off by at most n · 2⁻¹¹ of the sum of
-/// their magnitudes (Higham 2002, §3.1, with fused multiply-add): 1.6 % at 32
+/// their magnitudes (Higham 2002, §3.1, each step rounded once): 1.6 % at 32
 /// in the worst case, whatever the layer's width.
 pub(super) const F16_CHUNK: usize = 32;
 
@@ -28,7 +28,7 @@ declare_kernels!(Scalar, runs_here: true, {
 
 fn dot_f32(row: &[f32], weights: &Panels<f32>, output: usize) -> f32 {
     let products = row.iter().enumerate();
-    products.fold(0.0, |sum, (k, &a)| a.mul_add(weights.data[weights.index(k, output)], sum))
+    products.fold(0.0, |sum, (k, &a)| sum + a * weights.data[weights.index(k, output)])
 }
 
 fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
@@ -39,7 +39,7 @@ fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
             let weight = weights.data[weights.index(chunk * F16_CHUNK + k, output)];
             // The product is exact in f64, and the sum but for the rarest
             // double rounding: a fused multiply-add in fp16.
-            f16::from_f64(a.to_f64().mul_add(weight.to_f64(), sum.to_f64()))
+            f16::from_f64(a.to_f64() * weight.to_f64() + sum.to_f64())
         });
         sum.to_f32()
     });
@@ -140,7 +140,7 @@ fn gemv<W: Copy + Default>(
         for (o, out) in out.iter_mut().enumerate() {
             let products = nonzero.iter();
             let dot = products.fold(0.0f32, |sum, &(j, value)| {
-                value.mul_add(widen(columns[j as usize * BLOCK + o]), sum)
+                sum + value * widen(columns[j as usize * BLOCK + o])
             });
             let scale = weights.scale.get(block * BLOCK + o).copied().unwrap_or(1.0);
             *out = dot * scale + weights.bias[block * BLOCK + o];
@@ -160,7 +160,7 @@ fn gemv_i8(nonzero: &[(u32, f32)], w: &Columns<i8>, blocks: Range<usize>, out: &
     gemv(nonzero, w, blocks, out, f32::from);
 }
 
-fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
+pub(super) fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
     let mut largest = 0.0f32;
     for (value, out) in values.iter().zip(out) {
         *out = f16::from_f32(*value);
@@ -169,7 +169,7 @@ fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
     largest
 }
 
-fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
+pub(super) fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
     let mut clipped = 0;
     for (value, out) in values.iter().zip(out) {
         let level = (value * per_unit).round_ties_even();

@@ -104,11 +104,12 @@ impl Number for f32 {
 
     const SMALLEST: f32 = f32::MIN_POSITIVE;
 
-    /// Any order of k fused steps, a scale and a bias: (k + 2) u of the sum of
-    /// magnitudes to first order (Higham 2002, §3.1), one more for the second
-    /// order; half a denormal a step where numbers are that small.
+    /// Any order of k steps, fused or not, a scale and a bias: (k + 2) u of the
+    /// sum of magnitudes to first order (Higham 2002, §3.1), one more for the
+    /// second order; half a denormal a step, once for the product and once for
+    /// the sum, where numbers are that small.
     fn bound(k: usize, sum: f64) -> f64 {
-        (k + 3) as f64 * (U32 * sum + 2f64.powi(-150))
+        (k + 3) as f64 * (U32 * sum + 2f64.powi(-149))
     }
 }
 

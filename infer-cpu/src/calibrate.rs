@@ -1,0 +1,85 @@
+//! The largest activation of each layer, for int8.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use formats::model_card::ModelCard;
+use formats::rng::StreamKey;
+use formats::weights::WeightsFile;
+
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::kernel;
+use crate::layers;
+use crate::normalize;
+use crate::precision::{F32, Precision};
+use crate::team::Team;
+
+/// Points of a cloud that shapes are drawn into.
+const SHAPE_POINTS: usize = 512;
+/// Shapes of each kind.
+const SHAPES: u32 = 12;
+
+/// The largest activation of each layer of the model at `path` on `clouds`,
+/// which are normalised as the network takes them.
+///
+/// # Errors
+/// A file that is no model.
+pub fn on_clouds<'a>(
+    path: &Path,
+    clouds: impl IntoIterator<Item = &'a [[f32; 3]]>,
+) -> Result<BTreeMap<String, f32>, Error> {
+    let mut file = WeightsFile::open(path)?;
+    let card = ModelCard::from_metadata(path, &file.metadata())?;
+    let kernels = kernel::available()
+        .find(|kernels| Precision::F32.runs_on(kernels))
+        .ok_or(Error::KernelMissing(kernel::KernelName::Scalar))?;
+    let layers = layers::pack::<F32>(&mut file, &card, kernels)?;
+    let team = Team::new(Engine::new(layers, kernels, 1, true), 1)
+        .map_err(|source| Error::Threads { threads: 1, source })?;
+    let mut memory = team.work().memory();
+    for cloud in clouds {
+        team.work().set_points(cloud);
+        Engine::observe(&team, &mut memory);
+    }
+    let observed = team.work().observed().into_iter();
+    Ok(observed.filter(|(_, largest)| largest.is_normal()).collect())
+}
+
+/// [`on_clouds`] on spheres, boxes, rods and plates made by rule, for a model
+/// that brings no calibration and a caller without data.
+///
+/// # Errors
+/// A file that is no model.
+pub fn on_shapes(path: &Path) -> Result<BTreeMap<String, f32>, Error> {
+    let clouds: Vec<_> = (0..4 * SHAPES).map(shape).collect();
+    on_clouds(path, clouds.iter().map(Vec::as_slice))
+}
+
+/// A box stretched at random: full, its surface, an ellipsoid's surface, or
+/// two boxes apart.
+fn shape(number: u32) -> Vec<[f32; 3]> {
+    let key = StreamKey::new(0, "calibration shape", number);
+    let unit = |n: usize| 2.0 * key.unit(n as u64) - 1.0;
+    // From rods and plates to cubes.
+    let size = [0, 1, 2].map(|axis| (-3.0 * key.unit(axis)).exp());
+    let points: Vec<[f64; 3]> = (0..SHAPE_POINTS)
+        .map(|i| {
+            let mut p = [0, 1, 2].map(|axis| unit(16 + 4 * i + axis));
+            let face = i % 3;
+            match number % 4 {
+                1 => p[face] = p[face].signum(),
+                2 => {
+                    let radius = p.iter().map(|x| x * x).sum::<f64>().sqrt();
+                    p = p.map(|x| x / radius.max(1e-9));
+                }
+                3 => p[2] = p[2].signum() + 0.2 * p[2],
+                _ => {}
+            }
+            [0, 1, 2].map(|axis| p[axis] * size[axis])
+        })
+        .collect();
+    let mut cloud = Vec::new();
+    normalize::to_unit_sphere(&points, &mut cloud);
+    cloud
+}

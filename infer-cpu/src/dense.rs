@@ -1,0 +1,64 @@
+//! One linear layer as it comes from the file, its batch norm folded.
+
+use formats::weights::Tensor;
+
+/// PyTorch's default epsilon of batch norms, which the baseline keeps.
+const BATCH_NORM_EPSILON: f64 = 1e-5;
+
+/// `y = W x + b`, perhaps with a ReLU.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dense {
+    /// The layer's name in the model file.
+    pub name: String,
+    /// Inputs.
+    pub inputs: usize,
+    /// Outputs.
+    pub outputs: usize,
+    /// W, `[outputs, inputs]` in C order.
+    pub weight: Vec<f32>,
+    /// b, `[outputs]`.
+    pub bias: Vec<f32>,
+    /// Whether negative outputs become 0.
+    pub relu: bool,
+}
+
+/// A batch norm in evaluation mode, `[outputs]` each.
+pub struct BatchNorm {
+    /// γ.
+    pub weight: Tensor,
+    /// β.
+    pub bias: Tensor,
+    /// Mean of the training set.
+    pub mean: Tensor,
+    /// Variance of the training set.
+    pub variance: Tensor,
+}
+
+impl Dense {
+    /// The weight of `input` for `output`.
+    #[must_use]
+    pub fn at(&self, input: usize, output: usize) -> f32 {
+        self.weight[output * self.inputs + input]
+    }
+
+    /// Multiplies a batch norm that follows into weights and biases, in f64.
+    pub fn fold(&mut self, norm: &BatchNorm) {
+        for output in 0..self.outputs {
+            let at = |tensor: &Tensor| f64::from(tensor.values[output]);
+            let scale = at(&norm.weight) / (at(&norm.variance) + BATCH_NORM_EPSILON).sqrt();
+            for weight in &mut self.weight[output * self.inputs..][..self.inputs] {
+                *weight = (f64::from(*weight) * scale) as f32;
+            }
+            let bias = f64::from(self.bias[output]);
+            self.bias[output] = ((bias - at(&norm.mean)) * scale + at(&norm.bias)) as f32;
+        }
+    }
+
+    /// The largest sum of weight magnitudes over the outputs: an activation of
+    /// at most 1 makes no partial sum larger.
+    #[must_use]
+    pub fn gain(&self) -> f32 {
+        let rows = self.weight.chunks_exact(self.inputs.max(1));
+        rows.map(|row| row.iter().map(|w| w.abs()).sum()).fold(0.0, f32::max)
+    }
+}

@@ -1,0 +1,184 @@
+//! The order of passes: T-Nets, trunk, head.
+
+use std::sync::atomic::Ordering;
+
+use super::{
+    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, SMALL_VECTOR, Task, VECTOR_CHUNK, lock, read,
+    write,
+};
+use crate::kernel::{Panels, Rows};
+use crate::layers::Conv;
+use crate::network::Front;
+use crate::precision::{Format, Matrix};
+use crate::team::{Team, Work};
+
+/// The feature transform is multiplied into the layer after it when it takes
+/// fewer products to do so.
+const fn folding_pays(n: usize, outputs: usize) -> bool {
+    n > outputs
+}
+
+/// The caller's own memory of a forward pass.
+#[derive(Default)]
+pub struct Memory {
+    /// The pooled vector, and what follows from it.
+    pub values: Vec<f32>,
+    /// Which point won each channel, after a pass that keeps them.
+    pub winners: Vec<u32>,
+    product: Vec<f32>,
+}
+
+impl<T: Format> Engine<T> {
+    /// Memory that no pass of this engine outgrows.
+    pub fn memory(&self) -> Memory {
+        let pooled = self.groups.len() * GROUP;
+        let vector = self.vector_out.len() * VECTOR_CHUNK * super::VECTOR_BLOCK;
+        let product = read(&self.folded).panels.data.len() * 2;
+        Memory {
+            values: Vec::with_capacity(pooled.max(vector)),
+            winners: Vec::with_capacity(pooled),
+            product: Vec::with_capacity(product),
+        }
+    }
+
+    /// Takes the points through the whole network; the logits are left in
+    /// `memory.values`. Where `memory.values` already holds the pooled vector
+    /// of the coordinates' T-Net, `pooled_stn` says so.
+    pub fn classify(team: &Team<Self>, memory: &mut Memory, pooled_stn: bool) {
+        let engine = team.work();
+        let n_points = read(&engine.points).len() / 4;
+        if engine.layers.stn.is_some() {
+            if !pooled_stn {
+                Self::pool(team, Pass::Stn, memory);
+            }
+            Self::vectors(team, Head::Stn, &mut memory.values);
+            engine.set_input_transform(&memory.values);
+        }
+        if engine.layers.fstn.is_some() {
+            Self::pool(team, Pass::Fstn, memory);
+            Self::vectors(team, Head::Fstn, &mut memory.values);
+            engine.set_feature_transform(memory, n_points);
+        }
+        Self::pool(team, Pass::Trunk, memory);
+        Self::vectors(team, Head::Class, &mut memory.values);
+    }
+
+    /// Takes the points through every layer that there is.
+    pub fn observe(team: &Team<Self>, memory: &mut Memory) {
+        if matches!(team.work().layers.front, Some(Front::Mlp(_))) {
+            Self::pool(team, Pass::Front, memory);
+        }
+        Self::classify(team, memory, false);
+    }
+
+    /// Takes the points through `pass`; the pooled vector is left in
+    /// `memory.values`, and after [`Pass::Front`] or [`Pass::Stn`] the points
+    /// that won in `memory.winners`.
+    pub fn pool(team: &Team<Self>, pass: Pass, memory: &mut Memory) {
+        let engine = team.work();
+        let n_points = read(&engine.points).len() / 4;
+        let n_blocks = n_points.div_ceil(BLOCK);
+        let width = engine.last_width(pass);
+        for first_block in (0..n_blocks).step_by(RUN_BLOCKS) {
+            let n_blocks = RUN_BLOCKS.min(n_blocks - first_block);
+            engine.begin(Task::Hidden { pass, first_block });
+            team.run(n_blocks);
+            engine.begin(Task::Pool { pass, first_block, n_blocks });
+            team.run(width.div_ceil(GROUP));
+        }
+        engine.collect(pass, memory);
+    }
+
+    /// Scales, biases and ReLU, once for the maxima: all of them keep order.
+    fn collect(&self, pass: Pass, memory: &mut Memory) {
+        let (feature, folded) = (read(&self.feature), read(&self.folded));
+        let panels = &self.place(self.last(pass), &feature, &folded).panels;
+        memory.values.clear();
+        memory.winners.clear();
+        for (g, first) in (0..panels.outputs).step_by(GROUP).enumerate() {
+            let group = lock(&self.groups[g]);
+            let channels = first..panels.outputs.min(first + GROUP);
+            for (channel, (&sum, &winner)) in channels.zip(group.maxima.iter().zip(&group.winners))
+            {
+                let scale = panels.scale.get(channel).copied().unwrap_or(1.0);
+                let value = T::widen(sum) * scale + panels.bias[channel];
+                memory.values.push(if panels.relu { value.max(0.0) } else { value });
+                memory.winners.push(winner);
+            }
+        }
+    }
+
+    /// Takes `values` through the layers of `head`, in place.
+    fn vectors(team: &Team<Self>, head: Head, values: &mut Vec<f32>) {
+        let engine = team.work();
+        for (i, layer) in engine.head(head).iter().enumerate() {
+            let nonzero = values.iter().enumerate().filter(|&(_, &value)| value != 0.0);
+            let mut vector = write(&engine.vector);
+            vector.clear();
+            vector.extend(nonzero.map(|(j, &value)| (j as u32, value)));
+            drop(vector);
+            engine.begin(Task::Vector { head, layer: i });
+            let columns = &layer.columns;
+            let n_chunks = columns.n_blocks().div_ceil(VECTOR_CHUNK);
+            if columns.inputs * columns.outputs < SMALL_VECTOR {
+                (0..n_chunks).for_each(|chunk| engine.chunk(0, chunk));
+            } else {
+                team.run(n_chunks);
+            }
+            values.clear();
+            for chunk in 0..n_chunks {
+                let left = columns.outputs - values.len();
+                let out = lock(&engine.vector_out[chunk]);
+                values.extend(out.iter().take(left));
+            }
+            if layer.relu {
+                values.iter_mut().for_each(|value| *value = value.max(0.0));
+            }
+        }
+    }
+
+    fn set_input_transform(&self, transform: &[f32]) {
+        self.layers.trunk[0].first().turn(transform, &mut write(&self.entry));
+    }
+
+    /// Packs the feature transform `[k, k]`, by itself or in the layer after
+    /// it, whichever takes fewer products for `n` points.
+    fn set_feature_transform(&self, memory: &mut Memory, n: usize) {
+        let Memory { values: transform, product, .. } = memory;
+        let Conv::Turned(after, plain) = &self.layers.trunk[self.layers.transform_after] else {
+            unreachable!("invariant: the layer after a feature transform has that role");
+        };
+        let k = plain.inputs;
+        let fold = !T::SIGNED || self.observing || folding_pays(n, after.panels.outputs);
+        self.fold.store(fold, Ordering::Relaxed);
+        let range = self.range_before_transform();
+        if !fold {
+            write(&self.feature).set(&Matrix { data: transform, stride: k }, range);
+            return;
+        }
+        let width = plain.padded_outputs();
+        product.resize(k * width, 0.0);
+        let rows = Rows { data: transform, stride: k, n: k };
+        self.multiply(&rows, plain, product, width);
+        write(&self.folded).set(&Matrix { data: product, stride: width }, range);
+    }
+
+    fn range_before_transform(&self) -> f32 {
+        match &self.layers.trunk[self.layers.transform_after - 1] {
+            Conv::First(first) => first.range,
+            conv => conv.packed().range,
+        }
+    }
+
+    /// `rows` times `panels` in fp32.
+    pub(super) fn multiply(
+        &self,
+        rows: &Rows<'_, f32>,
+        panels: &Panels<f32>,
+        out: &mut [f32],
+        stride: usize,
+    ) {
+        let gemm = self.kernels.f32.as_ref().expect("invariant: every set has fp32 products");
+        (gemm.rows)(rows, panels, 0..panels.n_panels(), out, stride);
+    }
+}

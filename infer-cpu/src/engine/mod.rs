@@ -1,0 +1,282 @@
+//! The forward pass, shared out over a team of threads.
+//!
+//! A *pass* takes all points through point-wise layers and pools them: that of
+//! each T-Net, of the trunk, of a front end. Points go in blocks of
+//! [`BLOCK`]; a few blocks' features before the last layer are kept
+//! ([`RUN_BLOCKS`]), and the last layer's are pooled as they arise, never
+//! stored. The last layer is shared out by output channels, so that a core's
+//! share of its weights stays in that core's cache while points stream by.
+//!
+//! Every output is computed by one thread in a fixed order, so results are the
+//! same for any number of threads. All memory is allocated when the engine is
+//! built, but for points beyond any seen before.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
+
+use crate::kernel::{Columns, Kernels, Panels};
+use crate::layers::{Conv, Layers, Packed, Vector};
+use crate::network::Front;
+use crate::precision::Format;
+
+mod chunks;
+mod forward;
+mod route;
+
+pub use forward::Memory;
+
+/// Points of a block: whole tiles of every kernel, and few enough that their
+/// features stay in a first-level cache.
+const BLOCK: usize = 48;
+/// Blocks whose features are kept: 1,056 points, 540 KiB for 128 features.
+const RUN_BLOCKS: usize = 22;
+/// Output channels of the last layer that a thread pools at a time.
+const GROUP: usize = 128;
+/// Blocks of outputs (64 each) of a vector layer that a thread does at a time.
+const VECTOR_CHUNK: usize = 2;
+/// Outputs of a block of a vector layer.
+const VECTOR_BLOCK: usize = Columns::<f32>::BLOCK;
+/// A vector layer of fewer products than this is not worth sharing out.
+const SMALL_VECTOR: usize = 1 << 15;
+/// What is taken through which layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// The front end of a Critical Points Layer.
+    Front,
+    /// The T-Net of the coordinates.
+    Stn,
+    /// The T-Net of the features.
+    Fstn,
+    /// The trunk.
+    Trunk,
+}
+
+/// Which vector layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Head {
+    Stn,
+    Fstn,
+    Class,
+}
+
+/// The task that the team is at.
+#[derive(Clone, Copy)]
+enum Task {
+    /// Features of blocks of points before a pass's last layer.
+    Hidden { pass: Pass, first_block: usize },
+    /// The last layer and its maxima, of some blocks.
+    Pool { pass: Pass, first_block: usize, n_blocks: usize },
+    /// One vector layer.
+    Vector { head: Head, layer: usize },
+}
+
+/// A network of format `T` and the memory that it works in.
+pub struct Engine<T: Format> {
+    kernels: &'static Kernels,
+    layers: Layers<T>,
+    /// The trunk's first layer, behind the input transform.
+    entry: RwLock<Panels<f32>>,
+    feature: RwLock<Packed<T>>,
+    folded: RwLock<Packed<T>>,
+    fold: AtomicBool,
+    task: RwLock<Task>,
+    /// Rows x, y, z, 0.
+    points: RwLock<Vec<f32>>,
+    /// Features before the last layer, a block each.
+    blocks: Vec<RwLock<Vec<T::Activation>>>,
+    groups: Vec<Mutex<Group<T::Sum>>>,
+    scratch: Vec<Mutex<Scratch<T>>>,
+    /// The input of the vector layer at hand: what is not 0.
+    vector: RwLock<Vec<(u32, f32)>>,
+    vector_out: Vec<Mutex<Vec<f32>>>,
+    clipped: AtomicU64,
+    overflow: AtomicBool,
+    observing: bool,
+}
+
+/// Maxima of [`GROUP`] channels, and the points that gave them.
+struct Group<S> {
+    maxima: Vec<S>,
+    winners: Vec<u32>,
+}
+
+/// A thread's own memory: a block's features, before and after rounding.
+struct Scratch<T: Format> {
+    wide: Vec<f32>,
+    narrow: [Vec<T::Activation>; 2],
+}
+
+/// What a forward pass met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Met {
+    /// Activations above their calibrated range, which were clipped.
+    pub clipped: u64,
+    /// Whether a sum or an activation may have left the range of fp16.
+    pub overflow: bool,
+}
+
+impl<T: Format> Engine<T> {
+    /// An engine for `layers` and a team of `n_threads`. One that observes
+    /// keeps the largest activation of each layer.
+    pub fn new(
+        layers: Layers<T>,
+        kernels: &'static Kernels,
+        n_threads: usize,
+        observing: bool,
+    ) -> Self {
+        let trunk_first = layers.trunk[0].first();
+        let transformed = layers.fstn.as_ref().map(|fstn| {
+            let after = layers.trunk[layers.transform_after].packed();
+            (fstn.k, after)
+        });
+        let (feature, folded) = match transformed {
+            Some((k, after)) => {
+                let mut folded = Packed::zeros(kernels, k, after.panels.outputs);
+                folded.name.clone_from(&after.name);
+                folded.panels.bias.clone_from(&after.panels.bias);
+                folded.panels.relu = after.panels.relu;
+                folded.range = after.range;
+                (Packed::zeros(kernels, k, k), folded)
+            }
+            None => (Packed::zeros(kernels, 1, 1), Packed::zeros(kernels, 1, 1)),
+        };
+        let Widths { hidden, pooled, vector } = Widths::of(&layers);
+        let scratch = || Scratch {
+            wide: vec![0.0; BLOCK * hidden],
+            narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
+        };
+        let group = || Group { maxima: vec![T::LOWEST; GROUP], winners: vec![0; GROUP] };
+        let block = || RwLock::new(vec![T::Activation::default(); BLOCK * hidden]);
+        let chunk = || Mutex::new(vec![0.0; VECTOR_CHUNK * VECTOR_BLOCK]);
+        Self {
+            kernels,
+            entry: RwLock::new(trunk_first.panels.clone()),
+            feature: RwLock::new(feature),
+            folded: RwLock::new(folded),
+            fold: AtomicBool::new(false),
+            task: RwLock::new(Task::Vector { head: Head::Class, layer: 0 }),
+            points: RwLock::new(Vec::new()),
+            blocks: (0..RUN_BLOCKS).map(|_| block()).collect(),
+            groups: (0..pooled.div_ceil(GROUP)).map(|_| Mutex::new(group())).collect(),
+            scratch: (0..n_threads.max(1)).map(|_| Mutex::new(scratch())).collect(),
+            vector: RwLock::new(Vec::with_capacity(vector)),
+            vector_out: (0..vector.div_ceil(VECTOR_CHUNK * VECTOR_BLOCK))
+                .map(|_| chunk())
+                .collect(),
+            clipped: AtomicU64::new(0),
+            overflow: AtomicBool::new(false),
+            observing,
+            layers,
+        }
+    }
+
+    /// The network.
+    pub fn layers(&self) -> &Layers<T> {
+        &self.layers
+    }
+
+    /// Makes room for clouds of `n` points.
+    pub fn reserve(&self, n: usize) {
+        let mut points = write(&self.points);
+        let missing = (n * 4).saturating_sub(points.len());
+        points.reserve(missing);
+    }
+
+    /// Takes `points` for the passes that follow.
+    pub fn set_points(&self, points: &[[f32; 3]]) {
+        let mut rows = write(&self.points);
+        rows.clear();
+        rows.extend(points.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0]));
+        self.clipped.store(0, Ordering::Relaxed);
+        self.overflow.store(false, Ordering::Relaxed);
+    }
+
+    /// What the passes since [`Engine::set_points`] met.
+    pub fn met(&self) -> Met {
+        Met {
+            clipped: self.clipped.load(Ordering::Relaxed),
+            overflow: self.overflow.load(Ordering::Relaxed),
+        }
+    }
+
+    /// The largest activation of each layer that was observed, by its name.
+    pub fn observed(&self) -> Vec<(String, f32)> {
+        let nets = [self.layers.stn.as_ref(), self.layers.fstn.as_ref()];
+        let convs = nets.into_iter().flatten().flat_map(|net| &net.convs);
+        let front = match &self.layers.front {
+            Some(Front::Mlp(front)) => &front[..],
+            _ => &[],
+        };
+        let convs = self.layers.trunk.iter().chain(convs).chain(front);
+        let mut seen: Vec<_> = convs
+            .map(|conv| match conv {
+                Conv::First(first) => (first.dense.name.clone(), first.seen.get()),
+                _ => (conv.packed().name.clone(), conv.packed().seen.get()),
+            })
+            .collect();
+        let folded = read(&self.folded);
+        for (name, largest) in &mut seen {
+            if *name == folded.name {
+                *largest = largest.max(folded.seen.get());
+            }
+        }
+        seen
+    }
+
+    fn begin(&self, task: Task) {
+        *write(&self.task) = task;
+    }
+
+    fn head(&self, head: Head) -> &[Vector<T>] {
+        let net = match head {
+            Head::Class => return &self.layers.head,
+            Head::Stn => self.layers.stn.as_ref(),
+            Head::Fstn => self.layers.fstn.as_ref(),
+        };
+        net.map_or(&[], |net| &net.fcs)
+    }
+}
+
+/// How large an engine's buffers must be, in elements of a row.
+struct Widths {
+    /// Features between point-wise layers.
+    hidden: usize,
+    /// Features that are pooled.
+    pooled: usize,
+    /// Inputs and outputs of vector layers.
+    vector: usize,
+}
+
+impl Widths {
+    fn of<T: Format>(layers: &Layers<T>) -> Self {
+        let nets = [&layers.stn, &layers.fstn].into_iter().flatten();
+        let fcs = nets.clone().flat_map(|net| &net.fcs).chain(&layers.head);
+        let columns = fcs.map(|layer| &layer.columns);
+        let mut convs: Vec<&[Conv<T>]> = nets.map(|net| &net.convs[..]).collect();
+        convs.push(&layers.trunk);
+        if let Some(Front::Mlp(front)) = &layers.front {
+            convs.push(front);
+        }
+        let hidden = convs.iter().flat_map(|net| &net[..net.len() - 1]).map(Conv::width);
+        let pooled = convs.iter().filter_map(|net| net.last()).map(Conv::width);
+        Self {
+            hidden: hidden.max().unwrap_or(0),
+            pooled: pooled.max().unwrap_or(0),
+            vector: columns.map(|c| c.bias.len().max(c.inputs)).max().unwrap_or(0),
+        }
+    }
+}
+
+/// Locks cannot be poisoned but by a panic, which is a defect that a caller
+/// must see.
+fn read<V>(lock: &RwLock<V>) -> std::sync::RwLockReadGuard<'_, V> {
+    lock.read().unwrap_or_else(|_| panic!("a worker panicked"))
+}
+
+fn write<V>(lock: &RwLock<V>) -> std::sync::RwLockWriteGuard<'_, V> {
+    lock.write().unwrap_or_else(|_| panic!("a worker panicked"))
+}
+
+fn lock<V>(lock: &Mutex<V>) -> MutexGuard<'_, V> {
+    lock.lock().unwrap_or_else(|_: PoisonError<_>| panic!("a worker panicked"))
+}

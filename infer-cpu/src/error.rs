@@ -1,0 +1,53 @@
+//! What can go wrong between a model file, a cloud and a class.
+
+use formats::FormatError;
+
+use crate::kernel::KernelName;
+
+/// An error of loading a model or classifying a cloud.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file that cannot be read, or is not what it should be.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// A cloud without points has no class.
+    #[error("the cloud has no points")]
+    NoPoints,
+    /// A coordinate is NaN or infinite.
+    #[error("point {index} is ({x}, {y}, {z})")]
+    NotFinite {
+        /// The point's place in the cloud, from 0.
+        index: usize,
+        /// Its coordinates.
+        x: f64,
+        /// Its coordinates.
+        y: f64,
+        /// Its coordinates.
+        z: f64,
+    },
+    /// More points than their indices can count.
+    #[error("{0} points are more than 4,294,967,295")]
+    TooManyPoints(usize),
+    /// The kernel that was asked for does not run here.
+    #[error("this machine cannot run kernel {0}")]
+    KernelMissing(KernelName),
+    /// The kernel that was asked for has no such precision.
+    #[error("kernel {kernel} has no {precision} products")]
+    KernelPrecision {
+        /// The kernel.
+        kernel: KernelName,
+        /// The precision.
+        precision: crate::Precision,
+    },
+    /// Arithmetic left the range of f32.
+    #[error("the network's arithmetic overflows on this cloud: logits are not finite")]
+    Overflow,
+    /// Workers could not be started.
+    #[error("cannot start {threads} threads: {source}")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,242 @@
+//! The layers of a network, packed for the kernels of one precision.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use formats::FormatError;
+use formats::model_card::ModelCard;
+use formats::weights::WeightsFile;
+
+use crate::dense::Dense;
+use crate::kernel::{Columns, Kernels, Panels};
+use crate::network::{Network, Role, read_network};
+use crate::precision::{Format, Matrix};
+
+/// A network packed for format `T`.
+pub type Layers<T> = Network<Conv<T>, Vector<T>>;
+
+/// A point-wise layer.
+pub enum Conv<T: Format> {
+    /// It takes coordinates, in fp32 whatever the format.
+    First(First),
+    /// It takes features.
+    Inner(Packed<T>),
+    /// It takes features that the feature transform turned: by themselves, or
+    /// in one product with these weights in plain fp32.
+    Turned(Packed<T>, Panels<f32>),
+}
+
+/// A layer that takes coordinates.
+pub struct First {
+    /// Its weights.
+    pub panels: Panels<f32>,
+    /// Its weights before packing, to be multiplied by an input transform.
+    pub dense: Dense,
+    /// Its largest output, where calibrated.
+    pub range: f32,
+    /// Its largest output of those observed.
+    pub seen: Largest,
+}
+
+/// A layer that takes features.
+pub struct Packed<T: Format> {
+    /// The layer's name.
+    pub name: String,
+    /// Its weights.
+    pub panels: Panels<T::Weight>,
+    /// See [`Dense::gain`].
+    pub gain: f32,
+    /// Its largest output, where calibrated.
+    pub range: f32,
+    /// Its largest output of those observed.
+    pub seen: Largest,
+}
+
+/// The largest of some numbers that several threads see.
+#[derive(Default)]
+pub struct Largest(AtomicU32);
+
+impl Largest {
+    /// Counts in `values`; those below 0, and NaN, change nothing.
+    pub fn observe(&self, values: &[f32]) {
+        let largest = values.iter().copied().fold(0.0, f32::max);
+        // Of numbers that are not negative, bits are in the numbers' order.
+        self.0.fetch_max(largest.to_bits(), Ordering::Relaxed);
+    }
+
+    /// The largest so far, or 0.
+    pub fn get(&self) -> f32 {
+        f32::from_bits(self.0.load(Ordering::Relaxed))
+    }
+}
+
+/// A layer after a pooling.
+pub struct Vector<T: Format> {
+    /// Its weights.
+    pub columns: Columns<T::Stored>,
+    /// Whether negative outputs become 0.
+    pub relu: bool,
+}
+
+/// The largest activation by calibration, of a layer that was not calibrated.
+const UNKNOWN_RANGE: f32 = 1.0;
+
+/// Reads and packs the network of `file`. Calibrated ranges come from `card`.
+///
+/// # Errors
+/// As [`read_network`].
+pub fn pack<T: Format>(
+    file: &mut WeightsFile,
+    card: &ModelCard,
+    kernels: &Kernels,
+) -> Result<Layers<T>, FormatError> {
+    let packer = Packer { card, kernels };
+    read_network(
+        file,
+        card,
+        |dense, role| packer.conv::<T>(dense, role),
+        |dense| Vector { columns: T::columns(&dense), relu: dense.relu },
+    )
+}
+
+struct Packer<'a> {
+    card: &'a ModelCard,
+    kernels: &'a Kernels,
+}
+
+impl Packer<'_> {
+    fn conv<T: Format>(&self, dense: Dense, role: Role) -> Conv<T> {
+        match role {
+            Role::First => Conv::First(self.first(dense)),
+            Role::Inner | Role::Last => Conv::Inner(self.packed(&dense)),
+            Role::AfterTransform => {
+                let mut plain = empty::<crate::precision::F32>(self.kernels, &dense);
+                plain.fill(|input, output| dense.at(input, output));
+                // Bias and ReLU are for after the product.
+                (plain.bias, plain.relu) = (vec![0.0; plain.bias.len()], false);
+                Conv::Turned(self.packed(&dense), plain)
+            }
+        }
+    }
+
+    fn first(&self, dense: Dense) -> First {
+        let mut panels = empty::<crate::precision::F32>(self.kernels, &dense);
+        panels.fill(|input, output| dense.at(input, output));
+        First { panels, range: self.range(&dense.name), dense, seen: Largest::default() }
+    }
+
+    fn packed<T: Format>(&self, dense: &Dense) -> Packed<T> {
+        let mut panels = empty::<T>(self.kernels, dense);
+        let input_range = self.range(&self.before(&dense.name));
+        T::fill(&mut panels, input_range, |input, output| dense.at(input, output));
+        Packed {
+            name: dense.name.clone(),
+            panels,
+            gain: dense.gain(),
+            range: self.range(&dense.name),
+            seen: Largest::default(),
+        }
+    }
+
+    fn range(&self, layer: &str) -> f32 {
+        let range = self.card.activation_ranges.get(layer).copied();
+        range.filter(|range| range.is_normal() && *range > 0.0).unwrap_or(UNKNOWN_RANGE)
+    }
+
+    /// The layer whose outputs layer `name` takes.
+    fn before(&self, name: &str) -> String {
+        let stem = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
+        match name[stem.len()..].parse::<usize>() {
+            Ok(number) if number > 1 => format!("{stem}{}", number - 1),
+            // The feature T-Net branches off the trunk.
+            _ => format!("feat.conv{}", self.card.transform_after),
+        }
+    }
+}
+
+/// Panels of zeros for `dense`, with its biases.
+fn empty<T: Format>(kernels: &Kernels, dense: &Dense) -> Panels<T::Weight> {
+    let mut panels = panels::<T>(kernels, dense.inputs, dense.outputs);
+    panels.bias[..dense.outputs].copy_from_slice(&dense.bias);
+    panels.relu = dense.relu;
+    panels
+}
+
+/// Panels of zeros of a size.
+///
+/// # Panics
+/// If `kernels` have no products in this format; whoever chose them checked.
+pub fn panels<T: Format>(kernels: &Kernels, inputs: usize, outputs: usize) -> Panels<T::Weight> {
+    let gemm = T::gemm(kernels).expect("invariant: kernels are chosen for the format");
+    Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, T::GROUP))
+}
+
+impl First {
+    /// Packs the layer behind an input transform `t` `[3, 3]`: a point p, a
+    /// row, comes to it as p t.
+    pub fn turn(&self, t: &[f32], panels: &mut Panels<f32>) {
+        panels.fill(|input, output| {
+            (0..3).map(|j| t[input * 3 + j] * self.dense.at(j, output)).sum()
+        });
+    }
+}
+
+impl<T: Format> Packed<T> {
+    /// A layer of zeros, to be set by [`Packed::set`].
+    pub fn zeros(kernels: &Kernels, inputs: usize, outputs: usize) -> Self {
+        let panels = panels::<T>(kernels, inputs, outputs);
+        Self {
+            name: String::new(),
+            panels,
+            gain: 0.0,
+            range: UNKNOWN_RANGE,
+            seen: Largest::default(),
+        }
+    }
+
+    /// Packs `matrix`, of as many inputs and outputs as this layer has, for
+    /// inputs of at most `range`.
+    pub fn set(&mut self, matrix: &Matrix<'_>, range: f32) {
+        let at = |input: usize, output: usize| matrix.data[input * matrix.stride + output];
+        T::fill(&mut self.panels, range, at);
+        let (inputs, outputs) = (self.panels.inputs, self.panels.outputs);
+        let gain = |output| (0..inputs).map(|input| at(input, output).abs()).sum::<f32>();
+        self.gain = (0..outputs).map(gain).fold(0.0, f32::max);
+    }
+
+    /// Columns of a row of outputs, padding included.
+    pub fn width(&self) -> usize {
+        self.panels.padded_outputs()
+    }
+}
+
+impl<T: Format> Conv<T> {
+    /// The layer as one that takes coordinates.
+    ///
+    /// # Panics
+    /// If it is none; [`read_network`] gives the roles.
+    pub fn first(&self) -> &First {
+        match self {
+            Self::First(first) => first,
+            _ => unreachable!("invariant: the first layer takes coordinates"),
+        }
+    }
+
+    /// The layer as one that takes features.
+    ///
+    /// # Panics
+    /// If it takes coordinates.
+    pub fn packed(&self) -> &Packed<T> {
+        match self {
+            Self::Inner(packed) | Self::Turned(packed, _) => packed,
+            Self::First(_) => unreachable!("invariant: only the first layer takes coordinates"),
+        }
+    }
+
+    /// Columns of a row of outputs, padding included.
+    pub fn width(&self) -> usize {
+        match self {
+            Self::First(first) => first.panels.padded_outputs(),
+            _ => self.packed().width(),
+        }
+    }
+}

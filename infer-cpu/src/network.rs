@@ -1,0 +1,353 @@
+//! The network that a model file holds: PointNet of whatever widths, with
+//! either T-Net or without, and the front end of a Critical Points Layer.
+//!
+//! Names are those of yanx27/Pointnet_Pointnet2_pytorch, for any number of
+//! layers: `feat.conv1…`, `feat.bn1…` the trunk, `feat.stn.*` and `feat.fstn.*`
+//! the T-Nets (`conv`, `fc`, and `bn` counted through both), `fc1…`, `bn1…` the
+//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`, or the tensor
+//! `cpl.table` `[n, n, n, channels]`. Where no layer has a batch norm, all are
+//! taken as folded already.
+
+use std::collections::BTreeSet;
+
+use formats::FormatError;
+use formats::model_card::ModelCard;
+use formats::weights::{Tensor, WeightsFile, tensor_part};
+
+use crate::dense::{BatchNorm, Dense};
+
+/// A network whose point-wise layers are `C` and whose vector layers are `F`.
+pub struct Network<C, F> {
+    /// The T-Net of the coordinates.
+    pub stn: Option<TNet<C, F>>,
+    /// The layers from coordinates to the features that are pooled.
+    pub trunk: Vec<C>,
+    /// The T-Net of the features.
+    pub fstn: Option<TNet<C, F>>,
+    /// Layers of the trunk before the feature transform.
+    pub transform_after: usize,
+    /// The layers from the pooled vector to the logits.
+    pub head: Vec<F>,
+    /// What a Critical Points Layer pools, if the file brings its own.
+    pub front: Option<Front<C>>,
+}
+
+/// A network that predicts a `k` x `k` matrix, row by row; the identity is in
+/// its last biases.
+pub struct TNet<C, F> {
+    /// Rows of the matrix.
+    pub k: usize,
+    /// Layers before the pooling.
+    pub convs: Vec<C>,
+    /// Layers after it.
+    pub fcs: Vec<F>,
+}
+
+/// A front end of a Critical Points Layer.
+pub enum Front<C> {
+    /// A multi-layer perceptron shared by all points.
+    Mlp(Vec<C>),
+    /// A look-up table, `[nodes, nodes, nodes, channels]`.
+    Table(Tensor),
+}
+
+/// Where a point-wise layer stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// It takes coordinates.
+    First,
+    /// It takes and gives features.
+    Inner,
+    /// It takes what the feature transform turned.
+    AfterTransform,
+    /// Its outputs are pooled.
+    Last,
+}
+
+/// Reads the network of `file`. Each layer goes through `conv` or `fc` as soon
+/// as it is read, so that no more than one is in memory twice.
+///
+/// # Errors
+/// Tensors that are missing, left over, of another shape than the network
+/// needs, or not finite.
+pub fn read_network<C, F>(
+    file: &mut WeightsFile,
+    card: &ModelCard,
+    conv: impl FnMut(Dense, Role) -> C,
+    fc: impl FnMut(Dense) -> F,
+) -> Result<Network<C, F>, FormatError> {
+    let names: BTreeSet<String> = file.shapes().into_keys().collect();
+    let has_norms = names.iter().any(|name| name.ends_with("running_var"));
+    let mut reader = Reader { file, names, used: BTreeSet::new(), has_norms, conv, fc };
+    let network = reader.network(card)?;
+    reader.check_that_all_is_used()?;
+    Ok(network)
+}
+
+struct Reader<'a, M, N> {
+    file: &'a mut WeightsFile,
+    names: BTreeSet<String>,
+    used: BTreeSet<String>,
+    has_norms: bool,
+    conv: M,
+    fc: N,
+}
+
+impl<M, N> Reader<'_, M, N> {
+    fn network<C, F>(&mut self, card: &ModelCard) -> Result<Network<C, F>, FormatError>
+    where
+        M: FnMut(Dense, Role) -> C,
+        N: FnMut(Dense) -> F,
+    {
+        let after = card.transform_after;
+        let n_trunk = self.count("feat.conv");
+        if n_trunk < 2 {
+            return Err(self.error("feat.conv2.weight", "missing: a trunk has two layers or more"));
+        }
+        let stn = self.has("feat.stn.").then(|| self.t_net("feat.stn", 3, Role::First, 3));
+        let stn = stn.transpose()?;
+        let has_fstn = self.has("feat.fstn.");
+        if has_fstn && !(1..n_trunk).contains(&after) {
+            let cause = format!("{after}, for a trunk of {n_trunk} layers");
+            return Err(self.file_error("metadata `transform_after`", cause));
+        }
+        let mut width = 3;
+        let mut trunk = Vec::with_capacity(n_trunk);
+        let mut fstn = None;
+        for i in 0..n_trunk {
+            if has_fstn && i == after {
+                fstn = Some(self.t_net("feat.fstn", width, Role::Inner, width)?);
+            }
+            let last = i + 1 == n_trunk;
+            let role = match i {
+                0 => Role::First,
+                _ if has_fstn && i == after => Role::AfterTransform,
+                _ if last => Role::Last,
+                _ => Role::Inner,
+            };
+            let relu = !last || card.pooled_relu;
+            let dense = self.dense("feat", ("conv", i + 1), Some(i + 1), width, relu)?;
+            width = dense.outputs;
+            trunk.push((self.conv)(dense, role));
+        }
+        let head = self.vector_layers("", 0, width, None)?;
+        let front = self.front()?;
+        Ok(Network { stn, trunk, fstn, transform_after: after, head, front })
+    }
+
+    fn t_net<C, F>(
+        &mut self,
+        prefix: &str,
+        inputs: usize,
+        first: Role,
+        k: usize,
+    ) -> Result<TNet<C, F>, FormatError>
+    where
+        M: FnMut(Dense, Role) -> C,
+        N: FnMut(Dense) -> F,
+    {
+        let (convs, width) = self.point_layers(prefix, inputs, first)?;
+        let fcs = self.vector_layers(prefix, convs.len(), width, Some(k))?;
+        Ok(TNet { k, convs, fcs })
+    }
+
+    /// Point-wise layers with a ReLU each, and how wide the last is.
+    fn point_layers<C>(
+        &mut self,
+        prefix: &str,
+        inputs: usize,
+        first: Role,
+    ) -> Result<(Vec<C>, usize), FormatError>
+    where
+        M: FnMut(Dense, Role) -> C,
+    {
+        let n = self.count(&format!("{prefix}.conv"));
+        if n < 2 {
+            let cause = "missing: two layers or more come before a pooling";
+            return Err(self.error(&format!("{prefix}.conv2.weight"), cause));
+        }
+        let mut width = inputs;
+        let mut layers = Vec::with_capacity(n);
+        for i in 0..n {
+            let role = match i {
+                0 => first,
+                _ if i + 1 == n => Role::Last,
+                _ => Role::Inner,
+            };
+            let dense = self.dense(prefix, ("conv", i + 1), Some(i + 1), width, true)?;
+            width = dense.outputs;
+            layers.push((self.conv)(dense, role));
+        }
+        Ok((layers, width))
+    }
+
+    /// The layers after a pooling; `matrix` is the size of the matrix that a
+    /// T-Net ends in. `norms_before` counts the batch norms of point layers.
+    fn vector_layers<F>(
+        &mut self,
+        prefix: &str,
+        norms_before: usize,
+        inputs: usize,
+        matrix: Option<usize>,
+    ) -> Result<Vec<F>, FormatError>
+    where
+        N: FnMut(Dense) -> F,
+    {
+        let n = self.count(&dotted(prefix, "fc")).max(1);
+        let mut width = inputs;
+        let mut layers = Vec::with_capacity(n);
+        for i in 1..=n {
+            let last = i == n;
+            let norm = (!last).then_some(norms_before + i);
+            let mut dense = self.dense(prefix, ("fc", i), norm, width, !last)?;
+            width = dense.outputs;
+            if let Some(k) = matrix.filter(|_| last) {
+                if width != k * k {
+                    let name = format!("{}.weight", dense.name);
+                    let cause = format!(
+                        "expected shape [{}, {}], found [{width}, {}]",
+                        k * k,
+                        dense.inputs,
+                        dense.inputs
+                    );
+                    return Err(self.error(&name, cause));
+                }
+                (0..k).for_each(|i| dense.bias[i * k + i] += 1.0);
+            }
+            layers.push((self.fc)(dense));
+        }
+        Ok(layers)
+    }
+
+    fn front<C>(&mut self) -> Result<Option<Front<C>>, FormatError>
+    where
+        M: FnMut(Dense, Role) -> C,
+    {
+        const TABLE: &str = "cpl.table";
+        if self.names.contains(TABLE) {
+            let table = self.tensor(TABLE)?;
+            return match table.shape[..] {
+                [a, b, c, channels] if a == b && b == c && a >= 2 && channels > 0 => {
+                    Ok(Some(Front::Table(table)))
+                }
+                _ => {
+                    let cause = format!(
+                        "expected shape [n, n, n, channels], n >= 2, found {:?}",
+                        table.shape
+                    );
+                    Err(self.error(TABLE, cause))
+                }
+            };
+        }
+        if !self.has("cpl.") {
+            return Ok(None);
+        }
+        Ok(Some(Front::Mlp(self.point_layers("cpl", 3, Role::First)?.0)))
+    }
+
+    /// Reads one layer of `inputs` inputs and the batch norm that follows it.
+    fn dense(
+        &mut self,
+        prefix: &str,
+        (kind, number): (&str, usize),
+        norm: Option<usize>,
+        inputs: usize,
+        relu: bool,
+    ) -> Result<Dense, FormatError> {
+        let name = dotted(prefix, &format!("{kind}{number}"));
+        let weight_name = format!("{name}.weight");
+        let weight = self.tensor(&weight_name)?;
+        let outputs = match weight.shape[..] {
+            [outputs, found] | [outputs, found, 1] if found == inputs && outputs > 0 => outputs,
+            _ => {
+                let outputs = weight.shape.first().copied().unwrap_or(0).max(1);
+                let expected = match kind {
+                    "conv" => format!("[{outputs}, {inputs}, 1]"),
+                    _ => format!("[{outputs}, {inputs}]"),
+                };
+                let cause = format!("expected shape {expected}, found {:?}", weight.shape);
+                return Err(self.error(&weight_name, cause));
+            }
+        };
+        let bias = self.vector(&format!("{name}.bias"), outputs)?.values;
+        let mut dense = Dense { name, inputs, outputs, weight: weight.values, bias, relu };
+        if let Some(norm) = norm.filter(|_| self.has_norms) {
+            let norm = self.batch_norm(&dotted(prefix, &format!("bn{norm}")), outputs)?;
+            dense.fold(&norm);
+        }
+        let values = dense.weight.iter().chain(&dense.bias);
+        if !values.fold(true, |finite, value| finite & value.is_finite()) {
+            return Err(self.error(&weight_name, "not finite once its batch norm is folded in"));
+        }
+        Ok(dense)
+    }
+
+    fn batch_norm(&mut self, name: &str, width: usize) -> Result<BatchNorm, FormatError> {
+        let mut part = |part: &str| self.vector(&format!("{name}.{part}"), width);
+        let norm = BatchNorm {
+            weight: part("weight")?,
+            bias: part("bias")?,
+            mean: part("running_mean")?,
+            variance: part("running_var")?,
+        };
+        match norm.variance.values.iter().position(|&variance| variance < 0.0) {
+            Some(at) => {
+                let cause = format!("element {at} is {}, a variance", norm.variance.values[at]);
+                Err(self.error(&format!("{name}.running_var"), cause))
+            }
+            None => Ok(norm),
+        }
+    }
+
+    fn vector(&mut self, name: &str, width: usize) -> Result<Tensor, FormatError> {
+        let tensor = self.tensor(name)?;
+        if tensor.shape != [width] {
+            let cause = format!("expected shape [{width}], found {:?}", tensor.shape);
+            return Err(self.error(name, cause));
+        }
+        Ok(tensor)
+    }
+
+    fn tensor(&mut self, name: &str) -> Result<Tensor, FormatError> {
+        self.used.insert(name.to_owned());
+        self.file.read(name)
+    }
+
+    /// The highest number of a layer whose name begins with `stem`; those
+    /// below it that are missing are found when they are read.
+    fn count(&self, stem: &str) -> usize {
+        let numbers = self.names.iter().filter_map(|name| {
+            let (number, _) = name.strip_prefix(stem)?.split_once('.')?;
+            number.parse::<usize>().ok()
+        });
+        // No network has that many layers: such a name is left over.
+        numbers.filter(|&number| number <= 64).max().unwrap_or(0)
+    }
+
+    fn has(&self, prefix: &str) -> bool {
+        self.names.iter().any(|name| name.starts_with(prefix))
+    }
+
+    fn check_that_all_is_used(&self) -> Result<(), FormatError> {
+        let left = self.names.difference(&self.used);
+        match left.into_iter().find(|name| !name.ends_with(".num_batches_tracked")) {
+            Some(name) => {
+                let shape = self.file.shape(name).unwrap_or_default();
+                Err(self.error(name, format!("extra: no layer takes it (shape {shape:?})")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn error(&self, tensor: &str, cause: impl Into<String>) -> FormatError {
+        self.file_error(&tensor_part(tensor), cause.into())
+    }
+
+    fn file_error(&self, part: &str, cause: String) -> FormatError {
+        FormatError::malformed(self.file.path(), part, cause)
+    }
+}
+
+fn dotted(prefix: &str, name: &str) -> String {
+    if prefix.is_empty() { name.to_owned() } else { format!("{prefix}.{name}") }
+}

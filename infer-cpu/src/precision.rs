@@ -1,0 +1,309 @@
+//! Number formats of a forward pass: how weights are packed and activations
+//! rounded in each.
+
+use std::fmt;
+use std::str::FromStr;
+
+use half::f16;
+
+use crate::dense::Dense;
+use crate::kernel::{Columns, Gemm, Gemv, I8_LARGEST, Kernels, Panels};
+
+/// The largest finite number of fp16.
+pub const F16_LARGEST: f32 = 65504.0;
+
+/// What a network computes in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Precision {
+    /// fp32 throughout.
+    #[default]
+    F32,
+    /// fp32 arithmetic throughout; the weights of the layers after a pooling,
+    /// whose cost is their traffic, are stored in fp16.
+    F32Fc16,
+    /// fp16 weights and activations, fp16 sums of short chunks; vector layers
+    /// as in [`Precision::F32Fc16`].
+    F16,
+    /// int8 weights (a scale per channel) and seven-bit activations (a
+    /// calibrated scale per layer); the first layer, of coordinates, in fp32;
+    /// vector layers with int8 weights and fp32 arithmetic.
+    I8,
+}
+
+impl Precision {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::F32, Self::F32Fc16, Self::F16, Self::I8];
+
+    /// Its name on command lines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F32Fc16 => "f32-fc16",
+            Self::F16 => "f16",
+            Self::I8 => "i8",
+        }
+    }
+
+    /// Whether `kernels` have its matrix products.
+    #[must_use]
+    pub fn runs_on(self, kernels: &Kernels) -> bool {
+        let has_products = match self {
+            Self::F32 | Self::F32Fc16 => true,
+            Self::F16 => kernels.f16.is_some(),
+            Self::I8 => kernels.i8.is_some(),
+        };
+        has_products && kernels.f32.is_some()
+    }
+}
+
+impl fmt::Display for Precision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A word that names no precision.
+#[derive(Debug, thiserror::Error)]
+#[error("`{0}` is no precision; choose one of f32, f32-fc16, f16, i8")]
+pub struct NoSuchPrecision(String);
+
+impl FromStr for Precision {
+    type Err = NoSuchPrecision;
+
+    fn from_str(word: &str) -> Result<Self, NoSuchPrecision> {
+        Self::ALL
+            .into_iter()
+            .find(|precision| precision.name() == word)
+            .ok_or_else(|| NoSuchPrecision(word.to_owned()))
+    }
+}
+
+/// What rounding a layer's outputs met.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rounded {
+    /// The largest magnitude before rounding, where the format can overflow.
+    pub largest: f32,
+    /// Values that were above what the format was calibrated for.
+    pub clipped: u64,
+}
+
+/// A matrix `[inputs, outputs]` in C order, to be packed while a cloud is
+/// being classified.
+pub struct Matrix<'a> {
+    /// Elements, rows `stride` apart.
+    pub data: &'a [f32],
+    /// From one row to the next.
+    pub stride: usize,
+}
+
+/// One precision's types and roundings.
+pub trait Format: Send + Sync + 'static {
+    /// An activation between point-wise layers.
+    type Activation: Copy + Default + Send + Sync;
+    /// A weight of a point-wise layer.
+    type Weight: Copy + Default + Send + Sync;
+    /// A sum of their products.
+    type Sum: Copy + PartialOrd + Send + Sync;
+    /// A stored weight of a vector layer.
+    type Stored: Copy + Default + Send + Sync;
+
+    /// The precision's name.
+    const PRECISION: Precision;
+    /// Below every sum.
+    const LOWEST: Self::Sum;
+    /// Inputs that lie side by side in a panel.
+    const GROUP: usize;
+    /// Whether activations may be negative.
+    const SIGNED: bool;
+
+    /// The matrix products of `kernels` in this format.
+    fn gemm(kernels: &Kernels) -> Option<&Gemm<Self::Activation, Self::Weight, Self::Sum>>;
+    /// The matrix-vector products of `kernels` in this format.
+    fn gemv(kernels: &Kernels) -> Gemv<Self::Stored>;
+    /// A sum as f32, before scale and bias.
+    fn widen(sum: Self::Sum) -> f32;
+    /// Rounds outputs of a layer whose largest activation is `range`.
+    fn narrow(
+        kernels: &Kernels,
+        values: &[f32],
+        range: f32,
+        out: &mut [Self::Activation],
+    ) -> Rounded;
+    /// Packs the weights `weight(input, output)` of a layer whose inputs are at
+    /// most `range` into `panels`, and sets its scales.
+    fn fill(panels: &mut Panels<Self::Weight>, range: f32, weight: impl Fn(usize, usize) -> f32);
+    /// Packs a vector layer.
+    fn columns(dense: &Dense) -> Columns<Self::Stored>;
+}
+
+/// [`Precision::F32`].
+pub struct F32;
+/// [`Precision::F32Fc16`].
+pub struct F32Fc16;
+/// [`Precision::F16`].
+pub struct F16;
+/// [`Precision::I8`].
+pub struct I8;
+
+/// What the two fp32 formats share.
+macro_rules! fp32_points {
+    () => {
+        type Activation = f32;
+        type Weight = f32;
+        type Sum = f32;
+        const LOWEST: f32 = f32::NEG_INFINITY;
+        const GROUP: usize = 1;
+        const SIGNED: bool = true;
+
+        fn gemm(kernels: &Kernels) -> Option<&Gemm<f32, f32, f32>> {
+            kernels.f32.as_ref()
+        }
+
+        fn widen(sum: f32) -> f32 {
+            sum
+        }
+
+        fn narrow(_: &Kernels, values: &[f32], _: f32, out: &mut [f32]) -> Rounded {
+            out.copy_from_slice(values);
+            Rounded::default()
+        }
+
+        fn fill(panels: &mut Panels<f32>, _: f32, weight: impl Fn(usize, usize) -> f32) {
+            panels.fill(weight);
+        }
+    };
+}
+
+impl Format for F32 {
+    type Stored = f32;
+    const PRECISION: Precision = Precision::F32;
+    fp32_points!();
+
+    fn gemv(kernels: &Kernels) -> Gemv<f32> {
+        kernels.gemv_f32
+    }
+
+    fn columns(dense: &Dense) -> Columns<f32> {
+        columns(dense, |weight| weight)
+    }
+}
+
+impl Format for F32Fc16 {
+    type Stored = f16;
+    const PRECISION: Precision = Precision::F32Fc16;
+    fp32_points!();
+
+    fn gemv(kernels: &Kernels) -> Gemv<f16> {
+        kernels.gemv_f16
+    }
+
+    fn columns(dense: &Dense) -> Columns<f16> {
+        columns(dense, f16::from_f32)
+    }
+}
+
+impl Format for F16 {
+    type Activation = f16;
+    type Weight = f16;
+    type Sum = f32;
+    type Stored = f16;
+    const PRECISION: Precision = Precision::F16;
+    const LOWEST: f32 = f32::NEG_INFINITY;
+    const GROUP: usize = 1;
+    const SIGNED: bool = true;
+
+    fn gemm(kernels: &Kernels) -> Option<&Gemm<f16, f16, f32>> {
+        kernels.f16.as_ref()
+    }
+
+    fn gemv(kernels: &Kernels) -> Gemv<f16> {
+        kernels.gemv_f16
+    }
+
+    fn widen(sum: f32) -> f32 {
+        sum
+    }
+
+    fn narrow(kernels: &Kernels, values: &[f32], _: f32, out: &mut [f16]) -> Rounded {
+        Rounded { largest: (kernels.narrow_f16)(values, out), clipped: 0 }
+    }
+
+    fn fill(panels: &mut Panels<f16>, _: f32, weight: impl Fn(usize, usize) -> f32) {
+        panels.fill(|input, output| f16::from_f32(weight(input, output)));
+    }
+
+    fn columns(dense: &Dense) -> Columns<f16> {
+        columns(dense, f16::from_f32)
+    }
+}
+
+impl Format for I8 {
+    type Activation = u8;
+    type Weight = i8;
+    type Sum = i32;
+    type Stored = i8;
+    const PRECISION: Precision = Precision::I8;
+    const LOWEST: i32 = i32::MIN;
+    const GROUP: usize = 4;
+    const SIGNED: bool = false;
+
+    fn gemm(kernels: &Kernels) -> Option<&Gemm<u8, i8, i32>> {
+        kernels.i8.as_ref()
+    }
+
+    fn gemv(kernels: &Kernels) -> Gemv<i8> {
+        kernels.gemv_i8
+    }
+
+    fn widen(sum: i32) -> f32 {
+        sum as f32
+    }
+
+    fn narrow(kernels: &Kernels, values: &[f32], range: f32, out: &mut [u8]) -> Rounded {
+        let per_unit = f32::from(I8_LARGEST) / range;
+        Rounded { largest: 0.0, clipped: (kernels.narrow_i8)(values, per_unit, out) }
+    }
+
+    fn fill(panels: &mut Panels<i8>, range: f32, weight: impl Fn(usize, usize) -> f32) {
+        let per_activation = range / f32::from(I8_LARGEST);
+        panels.scale.resize(panels.padded_outputs(), 1.0);
+        for output in 0..panels.outputs {
+            let weights = (0..panels.inputs).map(|input| weight(input, output));
+            let step = step_of(weights);
+            for input in 0..panels.inputs {
+                let at = panels.index(input, output);
+                panels.data[at] = (weight(input, output) / step).round_ties_even() as i8;
+            }
+            panels.scale[output] = step * per_activation;
+        }
+    }
+
+    fn columns(dense: &Dense) -> Columns<i8> {
+        let row = |output: usize| &dense.weight[output * dense.inputs..][..dense.inputs];
+        let steps: Vec<f32> =
+            (0..dense.outputs).map(|output| step_of(row(output).iter().copied())).collect();
+        let mut columns = Columns::zeros(dense.inputs, dense.outputs);
+        columns.fill(|input, output| {
+            (dense.at(input, output) / steps[output]).round_ties_even() as i8
+        });
+        columns.scale = steps;
+        columns.scale.resize(columns.bias.len(), 1.0);
+        columns.bias[..dense.outputs].copy_from_slice(&dense.bias);
+        columns
+    }
+}
+
+/// The step of a channel's int8 weights, which takes the largest to ±127.
+fn step_of(weights: impl Iterator<Item = f32>) -> f32 {
+    let largest = weights.fold(0.0f32, |largest, weight| largest.max(weight.abs()));
+    // Of a channel of zeros, or of denormals, any step does.
+    (largest / 127.0).max(f32::MIN_POSITIVE)
+}
+
+fn columns<W: Copy + Default>(dense: &Dense, store: impl Fn(f32) -> W) -> Columns<W> {
+    let mut columns = Columns::zeros(dense.inputs, dense.outputs);
+    columns.fill(|input, output| store(dense.at(input, output)));
+    columns.bias[..dense.outputs].copy_from_slice(&dense.bias);
+    columns
+}

@@ -1,0 +1,225 @@
+//! A small team of threads that share out the chunks of one task at a time.
+//!
+//! Chunks are claimed one by one, by whichever thread is free, the caller
+//! among them: where another process holds a core, the others do its share,
+//! and the caller never waits for a thread that has claimed nothing. Idle
+//! threads spin for a moment, since the next task of a frame is microseconds
+//! away, and then park, since the next frame is not.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::thread::{self, JoinHandle, Thread};
+use std::time::{Duration, Instant};
+
+/// How long an idle worker spins: some tasks' length, and no more than a
+/// wake-up costs.
+const SPIN: Duration = Duration::from_micros(40);
+
+/// What the chunks of a task are, and how they are done.
+pub trait Work: Send + Sync + 'static {
+    /// Does chunk number `chunk` of the current task. `thread` numbers the
+    /// threads of the team, the caller being 0.
+    fn chunk(&self, thread: usize, chunk: usize);
+}
+
+/// Threads that do chunks of `W`.
+pub struct Team<W: Work> {
+    work: Arc<W>,
+    board: Arc<Board>,
+    workers: Vec<JoinHandle<()>>,
+    threads: Vec<Thread>,
+}
+
+/// Where tasks are announced.
+struct Board {
+    /// Number of the task (32 bits), its chunks (16), the next to claim (16).
+    /// All in one word, so that a claim cannot mix two tasks.
+    ticket: AtomicU64,
+    /// Chunks of the current task that are done.
+    done: AtomicU32,
+    /// Which workers sleep.
+    parked: Vec<AtomicBool>,
+    stop: AtomicBool,
+}
+
+/// The most chunks of one task.
+pub const MOST_CHUNKS: usize = u16::MAX as usize;
+
+impl<W: Work> Team<W> {
+    /// A team of `n_threads`, one of which is whoever calls [`Team::run`].
+    ///
+    /// # Errors
+    /// What the system reports when a thread cannot be started.
+    pub fn new(work: W, n_threads: usize) -> std::io::Result<Self> {
+        let n_workers = n_threads.max(1) - 1;
+        let work = Arc::new(work);
+        let board = Arc::new(Board {
+            ticket: AtomicU64::new(0),
+            done: AtomicU32::new(0),
+            parked: (0..n_workers).map(|_| AtomicBool::new(false)).collect(),
+            stop: AtomicBool::new(false),
+        });
+        // Built first, so that those that did start are stopped if one cannot.
+        let mut team = Self { work, board, workers: Vec::new(), threads: Vec::new() };
+        for worker in 0..n_workers {
+            let (work, board) = (Arc::clone(&team.work), Arc::clone(&team.board));
+            let handle = thread::Builder::new()
+                .name(format!("infer-{}", worker + 1))
+                .spawn(move || board.serve(&*work, worker))?;
+            team.threads.push(handle.thread().clone());
+            team.workers.push(handle);
+        }
+        Ok(team)
+    }
+
+    /// The work that is shared out.
+    #[must_use]
+    pub fn work(&self) -> &W {
+        &self.work
+    }
+
+    /// Does all `n_chunks` (at most [`MOST_CHUNKS`]) of the current task and
+    /// returns when they are done.
+    pub fn run(&self, n_chunks: usize) {
+        assert!(n_chunks <= MOST_CHUNKS, "a task of {n_chunks} chunks");
+        if n_chunks <= 1 || self.workers.is_empty() {
+            (0..n_chunks).for_each(|chunk| self.work.chunk(0, chunk));
+            return;
+        }
+        let board = &*self.board;
+        board.announce(n_chunks);
+        let wanted = self.threads.iter().zip(&board.parked).take(n_chunks - 1);
+        for (thread, parked) in wanted {
+            if parked.swap(false, Ordering::SeqCst) {
+                thread.unpark();
+            }
+        }
+        while let Some(chunk) = board.claim() {
+            board.perform(&*self.work, 0, chunk);
+        }
+        board.wait_until_done(n_chunks);
+    }
+}
+
+impl<W: Work> Drop for Team<W> {
+    fn drop(&mut self) {
+        self.board.stop.store(true, Ordering::SeqCst);
+        self.threads.iter().for_each(Thread::unpark);
+        for worker in self.workers.drain(..) {
+            // A worker that panicked has said so on standard error.
+            let _ = worker.join();
+        }
+    }
+}
+
+impl Board {
+    /// Puts up the next task. All chunks of the one before are done.
+    fn announce(&self, n_chunks: usize) {
+        let number = (self.ticket.load(Ordering::Relaxed) >> 32).wrapping_add(1);
+        self.done.store(0, Ordering::Relaxed);
+        // SeqCst: against `serve`, which says that it sleeps and looks again.
+        self.ticket.store(number << 32 | (n_chunks as u64) << 16, Ordering::SeqCst);
+    }
+
+    /// A chunk of the current task that nobody has claimed yet.
+    fn claim(&self) -> Option<usize> {
+        let claim = self.ticket.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |ticket| {
+            let (n_chunks, next) = (ticket >> 16 & 0xffff, ticket & 0xffff);
+            (next < n_chunks).then_some(ticket + 1)
+        });
+        claim.ok().map(|ticket| (ticket & 0xffff) as usize)
+    }
+
+    fn wait_until_done(&self, n_chunks: usize) {
+        let mut spins = 0u32;
+        while self.done.load(Ordering::Acquire) < n_chunks as u32 {
+            spins += 1;
+            // Whoever holds a chunk may be waiting for this very core.
+            if spins > 1000 { thread::yield_now() } else { std::hint::spin_loop() }
+        }
+    }
+
+    /// A worker's life.
+    fn serve(&self, work: &impl Work, worker: usize) {
+        loop {
+            while let Some(chunk) = self.claim_soon() {
+                self.perform(work, worker + 1, chunk);
+            }
+            if self.stop.load(Ordering::SeqCst) {
+                return;
+            }
+            self.parked[worker].store(true, Ordering::SeqCst);
+            if !self.has_work() && !self.stop.load(Ordering::SeqCst) {
+                thread::park();
+            }
+            self.parked[worker].store(false, Ordering::SeqCst);
+        }
+    }
+
+    /// Does a chunk and counts it as done, even if it panics: the caller must
+    /// not wait for it for ever, and meets the lock that the panic poisoned.
+    fn perform(&self, work: &impl Work, thread: usize, chunk: usize) {
+        struct Count<'a>(&'a AtomicU32);
+        impl Drop for Count<'_> {
+            fn drop(&mut self) {
+                self.0.fetch_add(1, Ordering::Release);
+            }
+        }
+        let _count = Count(&self.done);
+        work.chunk(thread, chunk);
+    }
+
+    /// Spins for a chunk, for [`SPIN`] at most.
+    fn claim_soon(&self) -> Option<usize> {
+        let mut idle_since = None;
+        loop {
+            if let Some(chunk) = self.claim() {
+                return Some(chunk);
+            }
+            let idle_since = idle_since.get_or_insert_with(Instant::now);
+            if idle_since.elapsed() > SPIN || self.stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            std::hint::spin_loop();
+        }
+    }
+
+    fn has_work(&self) -> bool {
+        let ticket = self.ticket.load(Ordering::SeqCst);
+        (ticket & 0xffff) < (ticket >> 16 & 0xffff)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Tally {
+        counts: Vec<AtomicU32>,
+    }
+
+    impl Work for Tally {
+        fn chunk(&self, _: usize, chunk: usize) {
+            self.counts[chunk].fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    #[test]
+    fn every_chunk_of_every_task_is_done_once() {
+        for n_threads in 1..=4 {
+            let counts = (0..100).map(|_| AtomicU32::new(0)).collect();
+            let team = Team::new(Tally { counts }, n_threads).unwrap();
+            for task in 0..3000 {
+                team.run(task % 101);
+                // Now and then let the workers fall asleep.
+                if task % 1000 == 999 {
+                    thread::sleep(10 * SPIN);
+                }
+            }
+            for (chunk, count) in team.work().counts.iter().enumerate() {
+                let tasks = (0..3000).filter(|task| task % 101 > chunk).count();
+                assert_eq!(count.load(Ordering::Relaxed), tasks as u32, "{n_threads} {chunk}");
+            }
+        }
+    }
+}
