@@ -83,13 +83,13 @@ class OpenVino:
 
 
 class Ncnn:
-    def __init__(self, folder, storage="f32"):
+    def __init__(self, folder, suffix="", storage="f32"):
         import ncnn
 
         self.ncnn = ncnn
         self.version = ncnn.__version__
         self.storage = storage
-        self.folder = folder
+        self.stem = f"{folder}/{{form}}{suffix}".format
 
     def load(self, points, threads):
         image = self.ncnn.Mat(numpy.ascontiguousarray(points.T[:, None])).clone()
@@ -109,9 +109,9 @@ class Ncnn:
             options.use_fp16_storage = False
             options.use_fp16_arithmetic = False
         options.use_bf16_storage = self.storage == "bf16"
-        for load, suffix in ((net.load_param, "param"), (net.load_model, "bin")):
-            if load(str(self.folder / f"{form}.{suffix}")) != 0:
-                raise RuntimeError(f"ncnn does not take {form}.{suffix}")
+        for load, part in ((net.load_param, "param"), (net.load_model, "bin")):
+            if load(f"{self.stem(form=form)}.{part}") != 0:
+                raise RuntimeError(f"ncnn does not take {form}.{part}")
 
         def run():
             extractor = net.create_extractor()

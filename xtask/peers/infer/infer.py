@@ -46,6 +46,7 @@ def start(name, model, folder):
             "ncnn": lambda: Ncnn(folder),
             "ncnn-f16": lambda: Ncnn(folder, storage="f16"),
             "ncnn-bf16": lambda: Ncnn(folder, storage="bf16"),
+            "ncnn-i8": lambda: Ncnn(folder, suffix="-i8"),
         }[name]()
     points = load_file(folder / "cloud.safetensors")["points"]
     return OnCloud(engine, points), engine.version

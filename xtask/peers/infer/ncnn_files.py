@@ -2,7 +2,8 @@
 layers, which ncnn runs at half the speed of Convolution.
 
 The forms are those of `graph`: `image` takes the blob x [3, 1, n], `rows`
-takes x [n, 3].
+takes x [n, 3]. With `ranges`, as `pointnet.input_ranges` gives them, layers
+compute in eight bits.
 """
 
 import numpy
@@ -11,12 +12,16 @@ MAGIC = 7767517
 # Before weights: plain f32.
 RAW_F32 = numpy.uint32(0)
 RELU = 1
+# Scales of weights and of inputs follow the bias.
+SCALED = 1
+I8_LARGEST = 127
 
 
 class Net:
-    def __init__(self, layers, form):
+    def __init__(self, layers, form, ranges=None):
         self.layers = layers
         self.form = form
+        self.ranges = ranges
         self.lines = []
         self.weights = []
 
@@ -29,6 +34,11 @@ class Net:
         weights, bias = self.layers[key]
         self.weights += [RAW_F32, weights, bias]
         activation = RELU if relu else 0
+        if self.ranges:
+            largest = numpy.abs(weights).max(1)
+            scales = I8_LARGEST / numpy.append(largest, self.ranges[key])
+            self.weights.append(scales.astype(numpy.float32))
+            parameters["_8"] = SCALED
         return self.layer(kind, [x], key, _0=len(bias), _9=activation, **parameters)
 
     def dense(self, key, x, relu=True):
@@ -64,9 +74,9 @@ class Net:
         return self.layer("Reshape", [x], f"{key}.matrix", _0=side, _1=side)
 
 
-def write(layers, form, stem):
+def write(layers, form, stem, ranges=None):
     """Writes `stem`.param and `stem`.bin; blob `logp` is the answer."""
-    net = Net(layers, form)
+    net = Net(layers, form, ranges)
     x = net.layer("Input", [], "x")
     x = net.turned(x, net.t_net("feat.stn", x, 3), 3, "turned")
     x = net.shared("feat.conv1", x)

@@ -1,4 +1,5 @@
-"""A PointNet's layers, batch norms folded into them in f64.
+"""A PointNet's layers, batch norms folded into them in f64, and a plain forward
+pass to calibrate them.
 
 The keys are those of yanx27's `pointnet_cls`. The identity that a T-Net adds
 to its answer is added to its last bias.
@@ -43,3 +44,29 @@ def fold(tensors, key, norm):
         weights *= scale[:, None]
         bias = (bias - part["running_mean"]) * scale + part["bias"]
     return weights.astype(numpy.float32), bias.astype(numpy.float32)
+
+
+def input_ranges(layers, clouds):
+    """The largest magnitude that reaches each layer over `clouds` [n, 3]."""
+    ranges = dict.fromkeys(layers, 0.0)
+
+    def through(key, x, relu=True):
+        ranges[key] = max(ranges[key], float(numpy.abs(x).max()))
+        weights, bias = layers[key]
+        x = x @ weights.T + bias
+        return numpy.maximum(x, 0) if relu else x
+
+    def t_net(key, x):
+        side = x.shape[1]
+        for layer in ("conv1", "conv2", "conv3"):
+            x = through(f"{key}.{layer}", x)
+        x = through(f"{key}.fc2", through(f"{key}.fc1", x.max(0)))
+        return through(f"{key}.fc3", x, relu=False).reshape(side, side)
+
+    for x in clouds:
+        x = x @ t_net("feat.stn", x)
+        x = through("feat.conv1", x)
+        x = x @ t_net("feat.fstn", x)
+        x = through("feat.conv3", through("feat.conv2", x), relu=False)
+        through("fc3", through("fc2", through("fc1", x.max(0))), relu=False)
+    return ranges

@@ -37,6 +37,11 @@ impl Cloud {
         self.0.slice(s![..n, ..])
     }
 
+    /// All points.
+    pub fn points(&self) -> Vec<[f32; 3]> {
+        self.0.rows().into_iter().map(|point| [point[0], point[1], point[2]]).collect()
+    }
+
     /// Writes the cloud for other programs, as tensor `points`.
     ///
     /// # Errors

@@ -1,9 +1,10 @@
 //! One job, done by all in turns.
 
-use super::super::clock::{Costs, Spread};
+use super::super::clock::{Cost, Costs, Spread};
 use super::entrant::{Arithmetic, Entrant, Job};
 use anyhow::{Result, ensure};
-use serde::Serialize;
+use serde::ser::SerializeMap as _;
+use serde::{Serialize, Serializer};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -12,7 +13,7 @@ use std::time::Duration;
 const TURN_S: f64 = 0.04;
 
 /// Repeats in a turn.
-const REPEATS: [usize; 2] = [3, 200];
+const REPEATS: [usize; 2] = [3, 40];
 
 /// Threads of the pool that ran last may still spin; ncnn's do for 20 ms.
 const PAUSE: Duration = Duration::from_millis(30);
@@ -32,7 +33,18 @@ pub struct Entry {
     /// How far its answer was from the judge's.
     pub error: f64,
     /// Of every repeat of every turn.
+    #[serde(flatten, serialize_with = "in_ns")]
     pub costs: Costs,
+}
+
+fn in_ns<S: Serializer>(costs: &Costs, serializer: S) -> Result<S::Ok, S::Error> {
+    let ns = |of: fn(&Cost) -> f64| -> Vec<u64> {
+        costs.0.iter().map(|cost| (of(cost) * 1e9).round() as u64).collect()
+    };
+    let mut map = serializer.serialize_map(Some(2))?;
+    map.serialize_entry("wall_ns", &ns(|cost| cost.wall_s))?;
+    map.serialize_entry("cpu_ns", &ns(|cost| cost.cpu_s))?;
+    map.end()
 }
 
 /// Lets all `entrants` do `job` in `rounds` rounds of one turn each, their
@@ -47,8 +59,8 @@ pub fn hold(
 ) -> Vec<Entry> {
     let mut fields = Vec::new();
     for entrant in entrants {
-        match Field::enter(entrant, job, &judge, &tolerance) {
-            Ok(field) => fields.push(field),
+        match enter(entrant, job, &judge, &tolerance) {
+            Ok((repeats, entry)) => fields.push(Field { entrant, repeats, is_out: false, entry }),
             Err(cause) => refuse(&entrant.name, job, &cause),
         }
     }
@@ -78,30 +90,32 @@ struct Field<'a> {
     entry: Entry,
 }
 
-impl<'a> Field<'a> {
-    fn enter(
-        entrant: &'a mut Entrant,
-        job: Job,
-        judge: impl Fn(&[f64]) -> Result<f64>,
-        tolerance: impl Fn(Arithmetic) -> f64,
-    ) -> Result<Self> {
-        entrant.lane.load(job)?;
-        let error = judge(&entrant.lane.answer()?)?;
-        let allowed = tolerance(entrant.arithmetic);
-        ensure!(error <= allowed, "its answer is off by {error:.1e}, more than {allowed:.1e}");
-        let trial = entrant.lane.time(REPEATS[0])?;
-        let least_s = Spread::of(trial.iter().map(|cost| cost.wall_s)).min;
-        let entry = Entry {
-            engine: entrant.name.clone(),
-            arithmetic: entrant.arithmetic,
-            ours: entrant.ours,
-            job,
-            error,
-            costs: Costs::default(),
-        };
-        Ok(Self { entrant, repeats: repeats(least_s), is_out: false, entry })
-    }
+/// Lets `entrant` try `job`: repeats that fill a turn, and an entry without
+/// costs.
+fn enter(
+    entrant: &mut Entrant,
+    job: Job,
+    judge: impl Fn(&[f64]) -> Result<f64>,
+    tolerance: impl Fn(Arithmetic) -> f64,
+) -> Result<(usize, Entry)> {
+    entrant.lane.load(job)?;
+    let error = judge(&entrant.lane.answer()?)?;
+    let allowed = tolerance(entrant.arithmetic);
+    ensure!(error <= allowed, "its answer is off by {error:.1e}, more than {allowed:.1e}");
+    let trial = entrant.lane.time(REPEATS[0])?;
+    let least_s = Spread::of(trial.iter().map(|cost| cost.wall_s)).min;
+    let entry = Entry {
+        engine: entrant.name.clone(),
+        arithmetic: entrant.arithmetic,
+        ours: entrant.ours,
+        job,
+        error,
+        costs: Costs::default(),
+    };
+    Ok((repeats(least_s), entry))
+}
 
+impl Field<'_> {
     fn turn(&mut self) -> Result<()> {
         sleep(PAUSE);
         self.entry.costs.0.extend(self.entrant.lane.time(self.repeats)?);
@@ -117,7 +131,6 @@ fn repeats(each_s: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::clock::Cost;
     use super::super::entrant::Lane;
     use super::*;
     use anyhow::bail;
@@ -190,10 +203,19 @@ mod tests {
     }
 
     #[test]
+    fn a_record_holds_every_repeat_in_nanoseconds() {
+        let (_, entries) = play(1, &[('a', 1.0, 99)]);
+        let record = serde_json::to_value(&entries[0]).unwrap();
+        assert_eq!(record["wall_ns"], serde_json::json!([20_000_000, 20_000_000, 20_000_000]));
+        assert_eq!(record["cpu_ns"][2], 10_000_000);
+        assert_eq!(record["points"], 16);
+    }
+
+    #[test]
     fn a_turn_is_filled_within_limits() {
-        assert_eq!(repeats(0.001), 40);
+        assert_eq!(repeats(0.004), 10);
         assert_eq!(repeats(1.0), 3);
-        assert_eq!(repeats(1e-9), 200);
-        assert_eq!(repeats(0.0), 200);
+        assert_eq!(repeats(1e-9), 40);
+        assert_eq!(repeats(0.0), 40);
     }
 }

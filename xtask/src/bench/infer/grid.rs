@@ -58,6 +58,16 @@ impl<'a> Grid<'a> {
         Self { title, entries, jobs, heading }
     }
 
+    /// Prints all tables.
+    pub fn show(&self) {
+        for figure in Figure::ALL {
+            print!("{}", self.milliseconds(figure));
+        }
+        for table in Figure::ALL.into_iter().filter_map(|figure| self.ratios(figure)) {
+            print!("{table}");
+        }
+    }
+
     /// Milliseconds of every engine; a star marks the fastest rival of each
     /// arithmetic.
     pub fn milliseconds(&self, figure: Figure) -> Table {
@@ -70,11 +80,14 @@ impl<'a> Grid<'a> {
             let Entry { engine: name, arithmetic, .. } = engine[0];
             let mut row = vec![name.clone(), arithmetic.to_string(), format!("{error:.0e}")];
             for &job in &self.jobs {
-                row.push(engine.iter().find(|entry| entry.job == job).map_or("-".into(), |entry| {
-                    let best = self.fastest_rival(job, *arithmetic, figure);
-                    let star = best.is_some_and(|best| best.engine == *name);
-                    milliseconds(figure.of(entry)) + if star { "*" } else { "" }
-                }));
+                row.push(engine.iter().find(|entry| entry.job == job).map_or(
+                    "-".into(),
+                    |entry| {
+                        let best = self.fastest_rival(job, *arithmetic, figure);
+                        let star = best.is_some_and(|best| best.engine == *name);
+                        milliseconds(figure.of(entry)) + if star { "*" } else { "" }
+                    },
+                ));
             }
             table.push(row);
         }
@@ -115,9 +128,10 @@ impl<'a> Grid<'a> {
     }
 
     fn fastest_rival(&self, job: Job, arithmetic: Arithmetic, figure: Figure) -> Option<&'a Entry> {
-        let rivals = self.entries.iter().filter(|entry| {
-            !entry.ours && entry.job == job && entry.arithmetic == arithmetic
-        });
+        let rivals = self
+            .entries
+            .iter()
+            .filter(|entry| !entry.ours && entry.job == job && entry.arithmetic == arithmetic);
         rivals.min_by(|a, b| figure.of(a).total_cmp(&figure.of(b)))
     }
 
@@ -196,6 +210,8 @@ mod tests {
 
     #[test]
     fn without_ours_there_are_no_ratios() {
-        assert!(grid(&[entry("a", Arithmetic::F32, 16, &[1.0])]).ratios(Figure::WallLeast).is_none());
+        assert!(
+            grid(&[entry("a", Arithmetic::F32, 16, &[1.0])]).ratios(Figure::WallLeast).is_none()
+        );
     }
 }

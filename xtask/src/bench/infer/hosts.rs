@@ -4,11 +4,8 @@ use super::super::venv::{Environment, programs, succeeds, workshop};
 use std::path::PathBuf;
 use std::process::Command;
 
-const GENERAL: Environment = Environment {
-    name: "infer-venv",
-    requirements: "infer/requirements.txt",
-    size: "some 150 MB",
-};
+const GENERAL: Environment =
+    Environment { name: "infer-venv", requirements: "infer/requirements.txt", size: "some 150 MB" };
 
 const TORCH: Environment = Environment {
     name: "torch-venv",

@@ -56,7 +56,7 @@ impl Judge {
         let side = x.ncols();
         let matrix = self.stack(dense, greatest(&features))?;
         ensure!(matrix.len() == side * side, "{}: not {side}x{side}", t_net[5].key);
-        Ok(matrix.into_shape_with_order((side, side))? + Array2::eye(side))
+        Ok(matrix.into_shape_with_order((side, side))? + Array2::<f64>::eye(side))
     }
 
     /// `layers` with ReLUs between them, but none behind the last.

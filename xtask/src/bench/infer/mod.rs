@@ -1,6 +1,7 @@
-//! `cargo xtask bench infer`: our classifier and samplers against others' on
-//! the same weights and clouds, in one run, taking turns.
+//! `cargo xtask bench infer`: our classifier and sampler and those of others,
+//! on the same weights and clouds, in one run, in turns.
 
+mod classify;
 mod cloud;
 mod contest;
 mod entrant;
@@ -8,7 +9,9 @@ mod grid;
 mod hosts;
 mod judge;
 mod model;
+mod ours;
 mod roster;
+mod sample;
 mod server;
 
 use super::machine::Machine;
@@ -18,20 +21,12 @@ use anyhow::{Context, Result};
 use clap::Args;
 use cloud::Cloud;
 use contest::Entry;
-use entrant::{Arithmetic, Entrant, Job};
-use grid::{Figure, Grid};
-use hosts::{Host, Material};
-use judge::{Judge, shortfall, worst};
-use roster::{CLASSIFIERS, Rival, SAMPLERS};
+use hosts::Material;
+use judge::Judge;
+use roster::{CLASSIFIERS, SAMPLERS};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-
-/// Points of a cloud and how many of them a sampler keeps.
-const SAMPLINGS: [[usize; 2]; 3] = [[1024, 128], [1024, 64], [4096, 128]];
-
-/// What the points of the largest cloud calibrate in eight bits.
-const LEAST_CLOUD: usize = 4096;
+use std::path::PathBuf;
 
 /// What `bench infer` is told.
 #[derive(Args, Debug)]
@@ -46,28 +41,30 @@ pub struct InferArgs {
         value_name = "N,...",
         value_delimiter = ',',
         default_value = "16,32,64,128,256,512,1024,2048,4096",
-        value_parser = clap::value_parser!(u16).range(1..)
+        value_parser = positive
     )]
-    points: Vec<u16>,
+    points: Vec<usize>,
     /// Numbers of threads to classify with.
     #[arg(
         long,
         value_name = "N,...",
         value_delimiter = ',',
         default_value = "1,2",
-        value_parser = clap::value_parser!(u16).range(1..)
+        value_parser = positive
     )]
-    threads: Vec<u16>,
-    /// Turns that each engine has at each job; each holds several repeats.
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..))]
-    rounds: u16,
-    /// Write everything measured, every repeat of it, to this file.
+    threads: Vec<usize>,
+    /// Turns that each engine has at each job, of several repeats each; the
+    /// median of all repeats is shown.
+    #[arg(long, value_name = "N", default_value = "9", value_parser = positive)]
+    rounds: usize,
+    /// Write everything measured, with every repeat, to this file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Measure these engines only; `ncnn` stands for `ncnn-f16` too.
+    /// Measure these engines only; `ncnn` names `ncnn-f16` too, and `ours` all
+    /// of ours [default: all but PyTorch].
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     engines: Vec<String>,
-    /// Measure PyTorch too, from some 3 GB of PyPI.
+    /// Measure PyTorch too: some 3 GB from PyPI.
     #[arg(long)]
     torch: bool,
 }
@@ -88,68 +85,88 @@ struct Report {
 /// # Errors
 /// If an engine is unknown, the model cannot be read or a file not written.
 pub fn run(args: &InferArgs) -> Result<()> {
-    let chosen = |rivals: &[Rival]| -> Vec<Rival> {
-        let with_torch = |rival: &&Rival| args.torch || rival.host != Host::Torch;
-        let named = |rival: &&Rival| is_named(&args.engines, rival.name);
-        rivals.iter().filter(with_torch).filter(named).copied().collect()
+    check(&args.engines)?;
+    let is_wanted = |name: &str| {
+        let by = |wanted: &String| is_named(name, wanted);
+        args.engines.is_empty() || args.engines.iter().any(by)
     };
-    check_names(&args.engines)?;
-    let folder = workshop().join("infer");
-    let model = match &args.model {
-        Some(model) => model.clone(),
-        None => folder.join("random.safetensors"),
-    };
-    if args.model.is_none() {
-        model::write_random(&model)?;
-    }
-    let judge = Judge::open(&model)?;
-    let material = Material { model, folder };
-    let most = args.points.iter().map(|&n| n.into()).fold(LEAST_CLOUD, usize::max);
-    let cloud = Cloud::new(most);
+    let material = Material { model: args.model()?, folder: workshop().join("infer") };
+    let judge = Judge::open(&material.model)?;
+    let cloud = Cloud::new(args.points.iter().copied().fold(sample::MOST_POINTS, usize::max));
     cloud.write(&material.cloud())?;
 
-    let mut classifiers = roster::start(&chosen(&CLASSIFIERS), &material);
-    let mut samplers = roster::start(&chosen(&SAMPLERS), &material);
+    let mut classifiers = ours::classifiers(&material.model, &cloud, is_wanted);
+    classifiers.extend(roster::start(&CLASSIFIERS, is_wanted, args.torch, &material));
+    let mut samplers = roster::start(&SAMPLERS, is_wanted, args.torch, &material);
+    let version = |entrant: &entrant::Entrant| (entrant.name.clone(), entrant.version.clone());
     let mut report = Report {
         machine: Machine::here(),
-        model: material.model.clone(),
-        versions: versions(classifiers.iter().chain(&samplers)),
+        versions: classifiers.iter().chain(&samplers).map(version).collect(),
+        model: material.model,
         classifying: Vec::new(),
         sampling: Vec::new(),
     };
-    report.classifying = classify(&mut classifiers, args, &judge, &cloud)?;
-    report.sampling = sample(&mut samplers, args, &cloud);
+    if !classifiers.is_empty() {
+        let (points, threads) = (&args.points, &args.threads);
+        let judge = (&judge, &cloud);
+        report.classifying =
+            classify::contest(&mut classifiers, points, threads, args.rounds, judge)?;
+    }
+    if !samplers.is_empty() {
+        report.sampling = sample::contest(&mut samplers, args.rounds, &cloud);
+    }
     if let Some(file) = &args.json {
-        write(&report, file)?;
+        let text = serde_json::to_string(&report)?;
+        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
     }
     Ok(())
 }
 
-fn classify(
-    entrants: &mut [Entrant],
-    args: &InferArgs,
-    judge: &Judge,
-    cloud: &Cloud,
-) -> Result<Vec<Entry>> {
-    let mut entries = Vec::new();
-    for &threads in &args.threads {
-        let mut jobs = Vec::new();
-        for &points in &args.points {
-            let job = Job { points: points.into(), setting: threads.into() };
-            eprintln!("{} points, {} threads", job.points, job.setting);
-            let truth = judge.log_probabilities(cloud.first(job.points))?;
-            let spread = Spread::of(truth.iter().copied());
-            entries.extend(contest::hold(
-                entrants,
-                job,
-                args.rounds.into(),
-                |answer| worst(answer, &truth),
-                |arithmetic| tolerance(arithmetic, spread.max - spread.min),
-            ));
-            jobs.push(job);
+impl InferArgs {
+    /// The model given, or the random one, written.
+    fn model(&self) -> Result<PathBuf> {
+        if let Some(model) = &self.model {
+            return Ok(model.clone());
         }
-        let title = format!("PointNet by points, {threads} threads");
-        show(&Grid::new(title, &entries, jobs, |job| job.points.to_string()));
+        let model = workshop().join("infer/random.safetensors");
+        model::write_random(&model)?;
+        Ok(model)
     }
-    Ok(entries)
+}
+
+/// Whether `engine` is what `word` stands for.
+fn is_named(engine: &str, word: &str) -> bool {
+    engine.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+}
+
+fn check(words: &[String]) -> Result<(), Usage> {
+    let rivals = CLASSIFIERS.iter().chain(&SAMPLERS).map(|rival| rival.name.to_owned());
+    let known: Vec<String> = ours::names().into_iter().chain(rivals).collect();
+    let is_unknown = |word: &&String| !known.iter().any(|engine| is_named(engine, word));
+    match words.iter().find(is_unknown) {
+        Some(word) => {
+            Err(Usage(format!("no engine is called {word}; there are {}", known.join(", "))))
+        }
+        None => Ok(()),
+    }
+}
+
+fn positive(word: &str) -> Result<usize, String> {
+    word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "not a positive number".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_names_an_engine_and_its_variants() {
+        assert!(is_named("ncnn-f16", "ncnn"));
+        assert!(is_named("ncnn-f16", "ncnn-f16"));
+        assert!(!is_named("ncnn", "ncnn-f16"));
+        assert!(!is_named("torchscript", "torch"));
+        assert!(check(&["ours".to_owned(), "fpsample".to_owned()]).is_ok());
+        let error = check(&["onnx".to_owned()]).unwrap_err();
+        assert!(error.to_string().starts_with("no engine is called onnx; there are ours-f32,"));
+    }
 }

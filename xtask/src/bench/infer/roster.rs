@@ -22,7 +22,7 @@ const fn rival(name: &'static str, arithmetic: Arithmetic, host: Host) -> Rival 
 }
 
 /// Those that classify.
-pub const CLASSIFIERS: [Rival; 12] = [
+pub const CLASSIFIERS: [Rival; 13] = [
     rival("onnxruntime", F32, Host::Python),
     rival("openvino", F32, Host::Python),
     rival("ncnn", F32, Host::Python),
@@ -35,6 +35,7 @@ pub const CLASSIFIERS: [Rival; 12] = [
     rival("ncnn-bf16", Half, Host::Python),
     rival("onnxruntime-i8", I8, Host::Python),
     rival("openvino-i8", I8, Host::Python),
+    rival("ncnn-i8", I8, Host::Python),
 ];
 
 /// Those that sample farthest points.
@@ -44,8 +45,16 @@ pub const SAMPLERS: [Rival; 3] = [
     rival("fpsample-tree", F32, Host::Sampling),
 ];
 
-/// Starts `rivals`; a message names those that cannot take part, and says why.
-pub fn start(rivals: &[Rival], material: &Material) -> Vec<Entrant> {
+/// Starts those of `rivals` that are wanted by their names; those in PyTorch
+/// only if `torch`. A message names those that cannot take part, and says why.
+pub fn start(
+    rivals: &[Rival],
+    is_wanted: impl Fn(&str) -> bool,
+    torch: bool,
+    material: &Material,
+) -> Vec<Entrant> {
+    let may = |rival: &&Rival| is_wanted(rival.name) && (torch || rival.host != Host::Torch);
+    let rivals: Vec<&Rival> = rivals.iter().filter(may).collect();
     let prepared = LazyCell::new(|| material.prepare());
     let mut entrants = Vec::new();
     for group in rivals.chunk_by(|a, b| a.host == b.host) {

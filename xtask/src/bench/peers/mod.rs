@@ -30,11 +30,8 @@ use std::cell::RefCell;
 use std::hint::black_box;
 use std::sync::Arc;
 
-const OPEN3D: Environment = Environment {
-    name: "venv",
-    requirements: "requirements.txt",
-    size: "some 700 MB",
-};
+const OPEN3D: Environment =
+    Environment { name: "venv", requirements: "requirements.txt", size: "some 700 MB" };
 
 /// Rays in the order in which we cast them: neighbours traverse alike.
 const OURS: &str = "our order";
