@@ -19,6 +19,8 @@
 )]
 
 pub mod cloud;
+#[cfg(feature = "files")]
+pub mod cloud_file;
 pub mod error;
 pub mod hash;
 pub mod rng;
@@ -33,6 +35,8 @@ pub mod atomic;
 pub mod csv;
 #[cfg(feature = "files")]
 mod decoding;
+#[cfg(feature = "npz")]
+pub mod labelled;
 #[cfg(feature = "hdf5")]
 pub mod modelnet_h5;
 #[cfg(feature = "files")]
