@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use formats::FormatError;
 use formats::model_card::{ModelCard, Normalization};
 
 use crate::engine::Memory;
