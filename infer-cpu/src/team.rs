@@ -88,6 +88,8 @@ struct Board {
     ticket: AtomicU64,
     /// Chunks of the current task that are done.
     done: AtomicU32,
+    /// Workers that have started.
+    started: AtomicU32,
     /// Which workers sleep.
     parked: Vec<AtomicBool>,
     stop: AtomicBool,
@@ -107,6 +109,7 @@ impl<W: Work> Team<W> {
         let board = Arc::new(Board {
             ticket: AtomicU64::new(0),
             done: AtomicU32::new(0),
+            started: AtomicU32::new(0),
             parked: (0..n_workers).map(|_| AtomicBool::new(false)).collect(),
             stop: AtomicBool::new(false),
         });
@@ -125,6 +128,10 @@ impl<W: Work> Team<W> {
                 .spawn(move || board.serve(&*work, worker))?;
             team.threads.push(handle.thread().clone());
             team.workers.push(handle);
+        }
+        // A thread that starts allocates; none does so once the team is there.
+        while (team.board.started.load(Ordering::Acquire) as usize) < n_workers {
+            thread::yield_now();
         }
         Ok(team)
     }
@@ -206,6 +213,7 @@ impl Board {
 
     /// A worker's life.
     fn serve(&self, work: &impl Work, worker: usize) {
+        self.started.fetch_add(1, Ordering::Release);
         loop {
             while let Some(chunk) = self.claim_soon() {
                 self.perform(work, worker + 1, chunk);
