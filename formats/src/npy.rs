@@ -108,7 +108,7 @@ mod tests {
         assert_eq!(read(header(false, &[2, 3])), [0, 1, 2, 3, 4, 5]);
         assert_eq!(read(header(true, &[2, 3])), [0, 2, 4, 1, 3, 5]);
         assert_eq!(read(header(true, &[3, 1, 2])), [0, 3, 1, 4, 2, 5]);
-        assert_eq!(read(header(true, &[0, usize::MAX, usize::MAX])), []);
+        assert!(read(header(true, &[0, usize::MAX, usize::MAX])).is_empty());
     }
 
     #[test]
