@@ -77,7 +77,7 @@ named! {
 named! {
     /// Where farthest point sampling begins.
     pub enum FpsStart: "start of farthest point sampling" {
-        /// At the point farthest from the centroid, so that the result does
+        /// At the point farthest from the mean of all points, so that the result does
         /// not depend on the order of the points.
         #[default]
         Farthest = "farthest",
