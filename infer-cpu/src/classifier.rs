@@ -229,11 +229,13 @@ impl Classifier {
         }
         let Some(network) = &self.fallback else { return Err(Error::Overflow) };
         let Self { selection, normalized, kernels, memory, .. } = self;
+        network.reset();
         selection.select(normalized, kernels, &**network, memory)?;
         network.set_points(selection.points());
         network.classify(memory, selection.pooled_stn());
         self.prediction.precision = Precision::F32;
-        if all_finite(&self.memory.values) { Ok(()) } else { Err(Error::Overflow) }
+        let is_sound = !network.met().overflow && all_finite(&memory.values);
+        if is_sound { Ok(()) } else { Err(Error::Overflow) }
     }
 
     /// Averages the log-probabilities of several draws, which take the place of

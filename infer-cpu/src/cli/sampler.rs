@@ -21,7 +21,8 @@ pub struct SamplerArgs {
     #[arg(long, value_name = "WHERE")]
     fps_start: Option<FpsStart>,
 
-    /// Edge of a cell of voxel, in place of --points
+    /// Edge of a cell of voxel, in place of --points: for sample in the cloud's
+    /// own unit, for classify in that of the normalised cloud
     #[arg(long, value_name = "LENGTH", conflicts_with = "points")]
     voxel_size: Option<f64>,
 

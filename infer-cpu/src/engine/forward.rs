@@ -60,11 +60,13 @@ impl<T: Format> Engine<T> {
                 Self::pool(team, Pass::Stn, false, memory);
             }
             Self::vectors(team, Head::Stn, &mut memory.values);
+            engine.note_overflow(&memory.values);
             engine.set_input_transform(&memory.values);
         }
         if engine.layers.fstn.is_some() {
             Self::pool(team, Pass::Fstn, false, memory);
             Self::vectors(team, Head::Fstn, &mut memory.values);
+            engine.note_overflow(&memory.values);
             engine.set_feature_transform(memory, n_points);
         }
         Self::pool(team, Pass::Trunk, false, memory);
@@ -110,7 +112,8 @@ impl<T: Format> Engine<T> {
             {
                 let scale = panels.scale.get(channel).copied().unwrap_or(1.0);
                 let value = T::widen(sum) * scale + panels.bias[channel];
-                memory.values.push(if panels.relu { value.max(0.0) } else { value });
+                let is_cut = panels.relu && value < 0.0;
+                memory.values.push(if is_cut { 0.0 } else { value });
                 memory.winners.push(winner);
             }
         }
@@ -140,8 +143,17 @@ impl<T: Format> Engine<T> {
                 values.extend(out.iter().take(left));
             }
             if layer.relu {
-                values.iter_mut().for_each(|value| *value = value.max(0.0));
+                // NaN is not below 0: an overflow is still seen in the logits.
+                values.iter_mut().filter(|value| **value < 0.0).for_each(|value| *value = 0.0);
             }
+        }
+    }
+
+    /// Notes a transform that is not finite, which the ReLU of the layers that
+    /// it turns would hide: kernels take NaN for 0.
+    fn note_overflow(&self, transform: &[f32]) {
+        if !transform.iter().all(|value| value.is_finite()) {
+            self.overflow.store(true, Ordering::Relaxed);
         }
     }
 

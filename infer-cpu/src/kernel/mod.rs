@@ -4,8 +4,8 @@
 //! A layer multiplies rows of activations (one row a point) by a matrix packed
 //! into [`Panels`] (one panel a few output channels). A register tile is a few
 //! rows by one panel: vector lanes run along output channels, so that rows need
-//! no packing and the maximum over points is lane by lane. [`scalar`] is the
-//! reference that every other file is held to by [`suite`].
+//! no packing and the maximum over points is lane by lane. `scalar` is the
+//! reference that every other file is held to by `suite`.
 
 #![expect(unsafe_code, reason = "SIMD intrinsics; every block says why it is sound")]
 

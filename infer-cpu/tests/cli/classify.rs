@@ -108,7 +108,7 @@ fn every_sampler_and_precision_classifies() {
             assert_eq!(found["precision"], precision, "{line}: {found}");
         }
     }
-    for flags in ["--resize truncate", "--passes 2", "--front stn", "--front trunk", "--table 8"] {
+    for flags in ["--resize truncate", "--passes 2", "--front stn", "--table 8"] {
         let line = format!("--sampler cpl --points 40 {flags} c.xyz");
         assert_eq!(folder.classify(&line).code, 0, "{line}");
     }
@@ -139,6 +139,7 @@ fn what_makes_no_sense_is_a_usage_error() {
         ("--sampler fps --points 0 c.xyz", "error: a sampler is asked for 0 points"),
         ("--sampler voxel --voxel-size=-1 c.xyz", "error: a voxel size of -1"),
         ("--sampler cpl --front own c.xyz", "error: sampler cpl cannot pool front end own"),
+        ("--sampler cpl --front trunk c.xyz", "error: sampler cpl cannot pool front end trunk"),
         ("--threads 0 c.xyz", "error: "),
         ("--files-from list c.xyz", "error: the argument"),
     ] {

@@ -143,14 +143,19 @@ fn what_overflows_f16_is_computed_in_f32() {
 fn what_overflows_f32_has_no_class() {
     let folder = Folder::new();
     folder.cloud("c.xyz", &strip(60));
-    let mut tensors = tiny_model::tensors(4);
-    for layer in ["feat.conv1", "feat.conv2", "feat.conv3", "fc1"] {
-        tiny_model::scale(&mut tensors, &format!("{layer}.weight"), 1e12);
-    }
-    tiny_model::write(&folder.path("m.safetensors"), &tensors, &card());
-    for precision in ["f32", "f32-fc16", "f16"] {
-        let ran = folder.classify(&format!("--precision {precision} c.xyz"));
-        ran.assert_refused(1, "error: c.xyz: the network's arithmetic overflows");
+    // Activations of trunk or T-Net reach 1e48.
+    for net in ["feat", "feat.stn", "feat.fstn"] {
+        let mut tensors = tiny_model::tensors(4);
+        for layer in ["conv1", "conv2", "conv3"] {
+            tiny_model::scale(&mut tensors, &format!("{net}.{layer}.weight"), 1e12);
+        }
+        let first = if net == "feat" { "fc1" } else { &format!("{net}.fc1") };
+        tiny_model::scale(&mut tensors, &format!("{first}.weight"), 1e12);
+        tiny_model::write(&folder.path("m.safetensors"), &tensors, &card());
+        for precision in ["f32", "f32-fc16", "f16"] {
+            let ran = folder.classify(&format!("--precision {precision} c.xyz"));
+            ran.assert_refused(1, "error: c.xyz: the network's arithmetic overflows");
+        }
     }
 }
 
