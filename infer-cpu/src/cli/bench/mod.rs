@@ -3,15 +3,18 @@
 mod grid;
 mod latency;
 mod machine;
+#[cfg(feature = "trade")]
 mod plot;
 mod statistics;
 mod table;
+#[cfg(feature = "trade")]
 mod trade;
 mod variant;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "npz")]
 use formats::labelled::read_labelled;
 use infer_cpu::{Precision, TNets};
 
@@ -71,33 +74,46 @@ pub struct Args {
     #[arg(long)]
     json: bool,
 
+    #[cfg(feature = "trade")]
     /// Measure accuracy beside latency, on the labelled clouds of --data
     #[arg(long, requires = "data")]
     trade: bool,
 
+    #[cfg(feature = "trade")]
     /// Labelled clouds: a packed NPZ
     #[arg(long, value_name = "NPZ", requires = "trade")]
     data: Option<PathBuf>,
 
+    #[cfg(feature = "trade")]
     /// Take every cloud of --data, or this many spread over it
     #[arg(long, value_name = "N", requires = "trade")]
     limit: Option<usize>,
 
+    #[cfg(feature = "npz")]
     /// Clouds to calibrate int8 with, a packed NPZ [default: the model's own
     /// calibration, else shapes made by rule]
     #[arg(long, value_name = "NPZ")]
     calibrate: Option<PathBuf>,
 
+    #[cfg(feature = "trade")]
     /// Write the trade's rows to this file
     #[arg(long, value_name = "FILE", requires = "trade")]
     csv: Option<PathBuf>,
 
+    #[cfg(feature = "trade")]
     /// Draw the trade into this file
     #[arg(long, value_name = "FILE", requires = "trade")]
     svg: Option<PathBuf>,
 }
 
+/// The largest activations on the clouds of `--calibrate`: none can be read.
+#[cfg(not(feature = "npz"))]
+fn calibration(_: &Args, _: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
+    Ok(None)
+}
+
 /// The largest activations on the clouds of `--calibrate`, if there are any.
+#[cfg(feature = "npz")]
 fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
     /// More clouds change the largest activations little.
     const CLOUDS: usize = 512;
@@ -113,5 +129,9 @@ fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<Stri
 /// # Errors
 /// A model or a set that cannot be read, a file that cannot be written.
 pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
-    if args.trade { trade::run(args, model) } else { latency::run(args, model) }
+    #[cfg(feature = "trade")]
+    if args.trade {
+        return trade::run(args, model);
+    }
+    latency::run(args, model)
 }

@@ -8,6 +8,7 @@ pub fn quantile(samples: &[f64], q: f64) -> f64 {
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
+#[cfg(feature = "trade")]
 /// The 95 % interval of a share of `hits` in `n` trials (Wilson 1927).
 pub fn wilson_interval(hits: usize, n: usize) -> (f64, f64) {
     /// The 97.5 % quantile of the normal distribution.
@@ -33,6 +34,7 @@ mod tests {
         assert!(quantile(&[], 0.5).is_nan());
     }
 
+    #[cfg(feature = "trade")]
     /// Brown, Cai and DasGupta 2001, table of Wilson intervals: 0 of 10 gives
     /// (0, 0.2775), 5 of 10 (0.2366, 0.7634).
     #[test]
