@@ -3,12 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use formats::FormatError;
 use formats::model_card::{ModelCard, Normalization};
 
 use crate::engine::Memory;
 use crate::error::Error;
-use crate::forward::{self, Forward, Loaded};
+use crate::forward::{self, Forward, Loaded, Setup};
 use crate::kernel::{self, KernelName, Kernels};
 use crate::normalize;
 use crate::options::Options;
@@ -55,9 +54,12 @@ impl Classifier {
     /// # Errors
     /// A file that is no model, options that it or this machine cannot meet.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
-        let kernels = choose_kernels(options.precision, options.kernel)?;
-        let loaded = forward::load(path, options.precision, kernels, options.threads)?;
-        let spec = sampler_of(path, &loaded.card, options)?;
+        let setup = setup(options, options.precision)?;
+        let loaded = forward::load(path, &setup)?;
+        let spec = match &options.sampler {
+            Some(spec) => spec.clone(),
+            None => SamplerSpec::as_trained(path, &loaded.card)?,
+        };
         let front = front_end(path, &loaded, &spec, options.table_nodes)?;
         let selection = Selection::new(&spec, front)?;
         let Loaded { card, network, .. } = loaded;
@@ -69,7 +71,7 @@ impl Classifier {
             votes: Votes::new(options, &spec, classes.len())?,
             classes,
             options: options.clone(),
-            kernels,
+            kernels: setup.kernels,
             memory: network.memory(),
             network,
             fallback: None,
@@ -222,10 +224,8 @@ impl Classifier {
             return Err(Error::Overflow);
         }
         if self.fallback.is_none() {
-            let kernels = choose_kernels(Precision::F32, self.options.kernel)?;
-            let threads = self.options.threads;
-            let loaded = forward::load(&self.path, Precision::F32, kernels, threads)?;
-            self.fallback = Some(loaded.network);
+            let setup = setup(&self.options, Precision::F32)?;
+            self.fallback = Some(forward::load(&self.path, &setup)?.network);
         }
         let Some(network) = &self.fallback else { return Err(Error::Overflow) };
         let Self { selection, normalized, kernels, memory, .. } = self;
@@ -262,26 +262,6 @@ fn class_names(card: &ModelCard, n_classes: usize) -> Vec<Arc<str>> {
     }
 }
 
-/// The sampler that `options` ask for, or that the model was trained behind.
-fn sampler_of(path: &Path, card: &ModelCard, options: &Options) -> Result<SamplerSpec, Error> {
-    if let Some(spec) = &options.sampler {
-        return Ok(spec.clone());
-    }
-    let bad = |key: &str| {
-        let part = format!("metadata `{key}`");
-        move |cause: FormatError| FormatError::malformed(path, part, cause)
-    };
-    let mut spec = SamplerSpec::default();
-    if let Some(kind) = &card.sampler {
-        spec.kind = kind.parse().map_err(bad("sampler"))?;
-    }
-    if let Some(start) = &card.fps_start {
-        spec.fps_start = start.parse().map_err(bad("fps_start"))?;
-    }
-    spec.points = card.points.unwrap_or(spec.points);
-    Ok(spec)
-}
-
 /// What computes the features that `spec` pools, if it pools any.
 fn front_end(
     path: &Path,
@@ -299,6 +279,17 @@ fn front_end(
         _ => None,
     };
     Ok(Some(table.map_or(FrontEnd::Pass(pass), FrontEnd::Table)))
+}
+
+fn setup(options: &Options, precision: Precision) -> Result<Setup<'_>, Error> {
+    let kernels = choose_kernels(precision, options.kernel)?;
+    Ok(Setup {
+        precision,
+        kernels,
+        threads: options.threads,
+        t_nets: options.t_nets,
+        activation_ranges: options.activation_ranges.as_ref(),
+    })
 }
 
 /// The kernels `forced`, or the fastest here that have products in `precision`.

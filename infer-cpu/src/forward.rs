@@ -1,5 +1,6 @@
 //! A network of whichever precision, loaded and ready to run.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use formats::FormatError;
@@ -12,6 +13,7 @@ use crate::error::Error;
 use crate::kernel::Kernels;
 use crate::layers;
 use crate::network::{Front, TABLE};
+use crate::options::TNets;
 use crate::precision::{F16, F32, F32Fc16, Format, I8, Precision};
 use crate::sampler::Lattice;
 use crate::selection::Parts;
@@ -89,36 +91,51 @@ pub struct Loaded {
     pub table: Option<Lattice>,
 }
 
-/// Loads the model at `path` and packs it for `precision` and `kernels`.
+/// What to load a network for.
+#[derive(Clone, Copy)]
+pub struct Setup<'a> {
+    /// What to compute in.
+    pub precision: Precision,
+    /// The kernels, which have that precision's products.
+    pub kernels: &'static Kernels,
+    /// Threads, the caller's among them.
+    pub threads: usize,
+    /// The T-Nets to run.
+    pub t_nets: TNets,
+    /// The largest activation of each layer, in place of the model's own.
+    pub activation_ranges: Option<&'a BTreeMap<String, f32>>,
+}
+
+/// Loads the model at `path` and packs it.
 ///
 /// # Errors
 /// A file that is no model; threads that cannot be started.
-pub fn load(
-    path: &Path,
-    precision: Precision,
-    kernels: &'static Kernels,
-    threads: usize,
-) -> Result<Loaded, Error> {
+pub fn load(path: &Path, setup: &Setup<'_>) -> Result<Loaded, Error> {
     let mut file = WeightsFile::open(path)?;
     let mut card = ModelCard::from_metadata(path, &file.metadata())?;
-    if precision == Precision::I8 && card.activation_ranges.is_empty() {
+    if let Some(ranges) = setup.activation_ranges {
+        card.activation_ranges.clone_from(ranges);
+    }
+    if setup.precision == Precision::I8 && card.activation_ranges.is_empty() {
         card.activation_ranges = calibrate::on_shapes(path)?;
     }
-    match precision {
-        Precision::F32 => loaded::<F32>(&mut file, card, kernels, threads),
-        Precision::F32Fc16 => loaded::<F32Fc16>(&mut file, card, kernels, threads),
-        Precision::F16 => loaded::<F16>(&mut file, card, kernels, threads),
-        Precision::I8 => loaded::<I8>(&mut file, card, kernels, threads),
+    match setup.precision {
+        Precision::F32 => loaded::<F32>(&mut file, card, setup),
+        Precision::F32Fc16 => loaded::<F32Fc16>(&mut file, card, setup),
+        Precision::F16 => loaded::<F16>(&mut file, card, setup),
+        Precision::I8 => loaded::<I8>(&mut file, card, setup),
     }
 }
 
 fn loaded<T: Format>(
     file: &mut WeightsFile,
     card: ModelCard,
-    kernels: &'static Kernels,
-    threads: usize,
+    setup: &Setup<'_>,
 ) -> Result<Loaded, Error> {
+    let Setup { kernels, threads, t_nets, .. } = *setup;
     let mut layers = layers::pack::<T>(file, &card, kernels)?;
+    layers.stn.take_if(|_| !t_nets.runs_input());
+    layers.fstn.take_if(|_| !t_nets.runs_feature());
     let parts = Parts {
         stn: layers.stn.is_some(),
         fstn: layers.fstn.is_some(),
@@ -126,7 +143,7 @@ fn loaded<T: Format>(
     };
     let table = match layers.front.take_if(|front| matches!(front, Front::Table(_))) {
         Some(Front::Table(Tensor { shape, values })) => Some(
-            Lattice::new(shape[0], shape[3], values)
+            Lattice::new(shape[0], shape[3], &values)
                 .map_err(|cause| FormatError::malformed(file.path(), tensor_part(TABLE), cause))?,
         ),
         _ => None,

@@ -1,7 +1,5 @@
 //! Clouds for the tests of samplers.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
-
 use std::path::Path;
 
 use formats::rng::StreamKey;
