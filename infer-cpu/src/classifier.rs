@@ -23,11 +23,16 @@ use crate::votes::Votes;
 /// Nothing is allocated once it is loaded, but for clouds of more points than
 /// [`Options::capacity`] and for the first that overflows a short precision.
 ///
-/// ```no_run
+/// ```
+/// use std::path::Path;
+///
 /// use infer_cpu::{Classifier, Options};
 ///
-/// let mut classifier = Classifier::load("model.safetensors".as_ref(), &Options::default())?;
+/// let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
+/// let model = Path::new(weights).join("untrained-test.safetensors");
+/// let mut classifier = Classifier::load(&model, &Options::default())?;
 /// let prediction = classifier.classify(&[[0.0, 0.0, 0.1], [0.3, 0.0, 0.1], [0.3, 0.2, 0.0]])?;
+/// assert_eq!(prediction.n_used, 3);
 /// println!("{} ({:.1} %)", prediction.label, 100.0 * prediction.confidence());
 /// # Ok::<(), infer_cpu::Error>(())
 /// ```

@@ -102,6 +102,11 @@ typedef struct EdgepuckOptions {
    */
   size_t threads;
   /**
+   * Which T-Nets are run: "both", "input", "feature" or "none"; one that is
+   * left out counts as the identity. Null: all that the model has.
+   */
+  const char *t_nets;
+  /**
    * Which points the network sees: "all", "first", "random", "fps", "voxel"
    * or "cpl". Null: as in training; the next seven fields are then left at
    * their defaults.

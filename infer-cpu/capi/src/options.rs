@@ -24,6 +24,9 @@ pub struct EdgepuckOptions {
     pub kernel: *const c_char,
     /// Threads, the caller's among them; 0 counts as 1.
     pub threads: usize,
+    /// Which T-Nets are run: "both", "input", "feature" or "none"; one that is
+    /// left out counts as the identity. Null: all that the model has.
+    pub t_nets: *const c_char,
     /// Which points the network sees: "all", "first", "random", "fps", "voxel"
     /// or "cpl". Null: as in training; the next seven fields are then left at
     /// their defaults.
@@ -72,6 +75,7 @@ pub extern "C" fn edgepuck_options_default() -> EdgepuckOptions {
         precision: null(),
         kernel: null(),
         threads: options.threads,
+        t_nets: null(),
         sampler: null(),
         points: 0,
         seed: 0,
@@ -105,8 +109,10 @@ impl EdgepuckOptions {
                 precision: word("precision", self.precision)?.unwrap_or_default(),
                 kernel: word("kernel", self.kernel)?,
                 threads: self.threads.max(1),
+                t_nets: word("t_nets", self.t_nets)?.unwrap_or_default(),
                 sampler: self.sampler()?,
                 table_nodes: (self.table_nodes != 0).then_some(self.table_nodes),
+                activation_ranges: None,
                 normalization: word("normalization", self.normalization)?,
                 drop_invalid: self.drop_invalid,
                 votes: self.votes,

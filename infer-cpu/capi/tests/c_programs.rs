@@ -2,6 +2,8 @@
 //! gives, and `tests/c/contract.c` finds what the header promises. Skipped with
 //! a message where there is no C compiler.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 mod support;
 
 use std::path::Path;
