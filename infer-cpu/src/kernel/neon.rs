@@ -29,7 +29,7 @@ pub(super) mod sink;
 pub(super) mod tile;
 
 use sink::Sink;
-use tile::{Feed, Strip, Tile, VECTOR_BYTES, opaque};
+use tile::{Feed, Strip, Tile, VECTOR_BYTES};
 
 declare_kernels!(Neon, runs_here: true, {
     f32: Some(GEMM_F32),
@@ -83,7 +83,7 @@ unsafe fn tile_f32_8x8<S: Sink<float32x4_t, 2>, const R: usize>(
                 add_input::<3, R>(&mut sums, &a, weights.add(24));
                 weights = weights.add(32);
             }
-            at = opaque(at + VECTOR_BYTES);
+            at += VECTOR_BYTES;
         }
         // SAFETY: the caller's.
         unsafe { sink.take(sums) };

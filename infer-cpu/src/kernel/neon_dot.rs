@@ -23,7 +23,7 @@ use half::f16;
 
 use super::declare_kernels;
 use super::neon::sink::Sink;
-use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm, opaque};
+use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
 use super::neon::{GEMM_F32, fps, gemv, narrow};
 
 declare_kernels!(NeonDot, runs_here: is_aarch64_feature_detected!("dotprod"), {
@@ -72,7 +72,7 @@ unsafe fn tile_i8_8x8<S: Sink<int32x4_t, 2>, const R: usize>(strip: &Strip<u8, i
                 add_group::<3, R>(&mut sums, &a, weights.add(96));
                 weights = weights.add(128);
             }
-            at = opaque(at + VECTOR_BYTES);
+            at += VECTOR_BYTES;
         }
         // SAFETY: the caller's.
         unsafe { sink.take(sums) };

@@ -27,7 +27,7 @@ use half::f16;
 use super::declare_kernels;
 use super::neon::lanes::Lanes;
 use super::neon::sink::{ArgMax, Finish, Max, Sink};
-use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm, opaque};
+use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
 use super::neon::{GEMM_F32, fps, gemv, narrow};
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 
@@ -114,7 +114,7 @@ unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, si
                     add_inputs(&mut sums, &a, weights);
                     weights = weights.add(128);
                 }
-                at = opaque(at + VECTOR_BYTES);
+                at += VECTOR_BYTES;
             }
             if !is_first {
                 for (sums, before) in sums.iter_mut().zip(black_box(&mut memory)) {

@@ -59,9 +59,21 @@ impl<A, W> Strip<A, W> {
     }
 
     /// The first `R` rows.
+    ///
+    /// In inner loops an activation is at its row's pointer plus an offset that
+    /// all rows share, which costs nothing but the load. A compiler that knew
+    /// the rows to be a stride apart would go from one to the next by
+    /// additions; an empty instruction hides it.
     #[inline(always)]
     pub fn first_rows<const R: usize>(&self) -> [*const A; R] {
-        from_fn(|r| self.rows.wrapping_add(opaque(r * self.stride)))
+        from_fn(|r| {
+            let mut row = self.rows.wrapping_add(r * self.stride);
+            // SAFETY: no instruction.
+            unsafe {
+                asm!("/* {0} */", inout(reg) row, options(pure, nomem, nostack, preserves_flags));
+            }
+            row
+        })
     }
 
     /// The `R` rows after `rows`.
@@ -69,21 +81,6 @@ impl<A, W> Strip<A, W> {
     pub fn next_rows<const R: usize>(&self, rows: [*const A; R]) -> [*const A; R] {
         rows.map(|row| row.wrapping_add(R * self.stride))
     }
-}
-
-/// The same number, of which the compiler does not know that it is the same.
-///
-/// In inner loops an activation is at its row's pointer plus an offset that all
-/// rows share, which costs nothing but the load. A compiler that knew how
-/// pointers and offset come about would replace them by more of them, to be
-/// kept up one by one.
-#[inline(always)]
-pub fn opaque(mut number: usize) -> usize {
-    // SAFETY: no instruction.
-    unsafe {
-        asm!("/* {0} */", inout(reg) number, options(pure, nomem, nostack, preserves_flags));
-    }
-    number
 }
 
 /// A tile's vector of sums.
