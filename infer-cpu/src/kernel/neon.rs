@@ -25,10 +25,11 @@ pub(super) mod fps;
 pub(super) mod gemv;
 pub(super) mod lanes;
 pub(super) mod narrow;
-mod sink;
+pub(super) mod sink;
 pub(super) mod tile;
 
-use tile::{Operands, Tile};
+use sink::Sink;
+use tile::{Feed, Strip, Tile, VECTOR_BYTES};
 
 declare_kernels!(Neon, runs_here: true, {
     f32: Some(GEMM_F32),
@@ -51,36 +52,43 @@ impl Tile<2> for F32 {
     type Activation = f32;
     type Weight = f32;
     type Sums = float32x4_t;
-    const STEP: usize = 4;
+}
 
-    unsafe fn sums<const R: usize>(operands: &Operands<f32, f32>) -> [[float32x4_t; 2]; R] {
+impl<S: Sink<float32x4_t, 2>> Feed<S, 2> for F32 {
+    unsafe fn feed<const R: usize>(strip: &Strip<f32, f32>, sink: &mut S) {
         // SAFETY: the caller's; NEON is on every aarch64.
-        unsafe { tile_f32_8x8::<R>(operands) }
+        unsafe { tile_f32_8x8::<S, R>(strip, sink) }
     }
 }
 
 /// # Safety
-/// As [`Tile::sums`].
+/// As [`Feed::feed`].
 #[inline(never)]
 #[target_feature(enable = "neon")]
-unsafe fn tile_f32_8x8<const R: usize>(operands: &Operands<f32, f32>) -> [[float32x4_t; 2]; R] {
-    let rows: [*const f32; R] = operands.row_pointers(0);
-    let mut sums = [[vdupq_n_f32(0.0); 2]; R];
-    let mut k = 0;
-    while k < operands.inputs {
-        // SAFETY: the number of inputs is a multiple of STEP, so inputs k to
-        // k + 3 of R rows are there, and 8 weights for each.
-        unsafe {
-            let a = rows.map(|row| vld1q_f32(row.add(k)));
-            let weights = operands.weights.add(k * 8);
-            add_input::<0, R>(&mut sums, &a, weights);
-            add_input::<1, R>(&mut sums, &a, weights.add(8));
-            add_input::<2, R>(&mut sums, &a, weights.add(16));
-            add_input::<3, R>(&mut sums, &a, weights.add(24));
+unsafe fn tile_f32_8x8<S: Sink<float32x4_t, 2>, const R: usize>(
+    strip: &Strip<f32, f32>,
+    sink: &mut S,
+) {
+    let mut rows: [*const f32; R] = strip.first_rows();
+    for _ in 0..strip.n_tiles {
+        let mut sums = [[vdupq_n_f32(0.0); 2]; R];
+        let (mut weights, mut at) = (strip.weights, 0);
+        while at < strip.row_bytes() {
+            // SAFETY: 4 inputs of R rows are there, and 8 weights for each.
+            unsafe {
+                let a = rows.map(|row| vld1q_f32(row.byte_add(at)));
+                add_input::<0, R>(&mut sums, &a, weights);
+                add_input::<1, R>(&mut sums, &a, weights.add(8));
+                add_input::<2, R>(&mut sums, &a, weights.add(16));
+                add_input::<3, R>(&mut sums, &a, weights.add(24));
+                weights = weights.add(32);
+            }
+            at += VECTOR_BYTES;
         }
-        k += F32::STEP;
+        // SAFETY: the caller's.
+        unsafe { sink.take(sums) };
+        rows = strip.next_rows(rows);
     }
-    sums
 }
 
 /// Adds the products of the input that is lane `LANE` of the activations.

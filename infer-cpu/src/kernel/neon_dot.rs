@@ -22,7 +22,8 @@ use std::arch::{asm, is_aarch64_feature_detected};
 use half::f16;
 
 use super::declare_kernels;
-use super::neon::tile::{Operands, Tile, gemm};
+use super::neon::sink::Sink;
+use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
 use super::neon::{GEMM_F32, fps, gemv, narrow};
 
 declare_kernels!(NeonDot, runs_here: is_aarch64_feature_detected!("dotprod"), {
@@ -43,36 +44,40 @@ impl Tile<2> for I8 {
     type Activation = u8;
     type Weight = i8;
     type Sums = int32x4_t;
-    const STEP: usize = 16;
+}
 
-    unsafe fn sums<const R: usize>(operands: &Operands<u8, i8>) -> [[int32x4_t; 2]; R] {
+impl<S: Sink<int32x4_t, 2>> Feed<S, 2> for I8 {
+    unsafe fn feed<const R: usize>(strip: &Strip<u8, i8>, sink: &mut S) {
         // SAFETY: the caller's.
-        unsafe { tile_i8_8x8::<R>(operands) }
+        unsafe { tile_i8_8x8::<S, R>(strip, sink) }
     }
 }
 
 /// # Safety
-/// As [`Tile::sums`].
+/// As [`Feed::feed`].
 #[inline(never)]
 #[target_feature(enable = "neon,dotprod")]
-unsafe fn tile_i8_8x8<const R: usize>(operands: &Operands<u8, i8>) -> [[int32x4_t; 2]; R] {
-    let rows: [*const u8; R] = operands.row_pointers(0);
-    let mut sums = [[vdupq_n_s32(0); 2]; R];
-    let mut k = 0;
-    while k < operands.inputs {
-        // SAFETY: the number of inputs is a multiple of STEP, so inputs k to
-        // k + 15 of R rows are there, and 8 weights for each.
-        unsafe {
-            let a = rows.map(|row| vreinterpretq_s8_u8(vld1q_u8(row.add(k))));
-            let weights = operands.weights.add(k * 8);
-            add_group::<0, R>(&mut sums, &a, weights);
-            add_group::<1, R>(&mut sums, &a, weights.add(32));
-            add_group::<2, R>(&mut sums, &a, weights.add(64));
-            add_group::<3, R>(&mut sums, &a, weights.add(96));
+unsafe fn tile_i8_8x8<S: Sink<int32x4_t, 2>, const R: usize>(strip: &Strip<u8, i8>, sink: &mut S) {
+    let mut rows: [*const u8; R] = strip.first_rows();
+    for _ in 0..strip.n_tiles {
+        let mut sums = [[vdupq_n_s32(0); 2]; R];
+        let (mut weights, mut at) = (strip.weights, 0);
+        while at < strip.row_bytes() {
+            // SAFETY: 16 inputs of R rows are there, and 8 weights for each.
+            unsafe {
+                let a = rows.map(|row| vreinterpretq_s8_u8(vld1q_u8(row.byte_add(at))));
+                add_group::<0, R>(&mut sums, &a, weights);
+                add_group::<1, R>(&mut sums, &a, weights.add(32));
+                add_group::<2, R>(&mut sums, &a, weights.add(64));
+                add_group::<3, R>(&mut sums, &a, weights.add(96));
+                weights = weights.add(128);
+            }
+            at += VECTOR_BYTES;
         }
-        k += I8::STEP;
+        // SAFETY: the caller's.
+        unsafe { sink.take(sums) };
+        rows = strip.next_rows(rows);
     }
-    sums
 }
 
 /// Adds the products of the four inputs that are lane `LANE` of the

@@ -20,12 +20,14 @@
 
 use std::arch::aarch64::*;
 use std::arch::is_aarch64_feature_detected;
-use std::ops::Range;
+use std::hint::black_box;
 
 use half::f16;
 
 use super::declare_kernels;
-use super::neon::tile::{self, Operands, Tile, gemm};
+use super::neon::lanes::Lanes;
+use super::neon::sink::{ArgMax, Finish, Max, Sink};
+use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
 use super::neon::{GEMM_F32, fps, gemv, narrow};
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 
@@ -47,151 +49,111 @@ impl Tile<4> for F16 {
     type Activation = f16;
     type Weight = f16;
     type Sums = float32x4_t;
-    const STEP: usize = 8;
+}
 
-    unsafe fn sums<const R: usize>(operands: &Operands<f16, f16>) -> [[float32x4_t; 4]; R] {
-        let block = |first| {
-            let inputs = first..operands.inputs.min(first + F16_BLOCK);
-            // SAFETY: the caller's; blocks are whole STEPs.
-            unsafe { tile_f16_8x16::<R>(operands, inputs) }.map(promoted)
-        };
-        let mut sums = block(0);
-        for first in (F16_BLOCK..operands.inputs).step_by(F16_BLOCK) {
-            for (sum, block) in sums.as_flattened_mut().iter_mut().zip(block(first).as_flattened())
-            {
-                // SAFETY: NEON is on every aarch64.
-                *sum = unsafe { vaddq_f32(*sum, *block) };
-            }
-        }
-        sums
-    }
-
-    unsafe fn largest<const R: usize>(operands: &Operands<f16, f16>) -> [float32x4_t; 4] {
+impl<S: HalfSink + Sink<float32x4_t, 4>> Feed<S, 4> for F16 {
+    unsafe fn feed<const R: usize>(strip: &Strip<f16, f16>, sink: &mut S) {
         // SAFETY: the caller's.
         unsafe {
-            match operands.inputs {
-                inputs @ ..=F16_BLOCK => promoted(largest(tile_f16_8x16::<R>(operands, 0..inputs))),
-                _ => tile::largest(Self::sums::<R>(operands)),
-            }
-        }
-    }
-
-    unsafe fn first_largest<const R: usize>(
-        operands: &Operands<f16, f16>,
-    ) -> ([float32x4_t; 4], [uint32x4_t; 4]) {
-        // SAFETY: the caller's.
-        unsafe {
-            match operands.inputs {
-                inputs @ ..=F16_BLOCK => first_largest(tile_f16_8x16::<R>(operands, 0..inputs)),
-                _ => tile::first_largest(Self::sums::<R>(operands)),
+            match strip.inputs {
+                ..=F16_BLOCK => tile_f16_8x16::<S, R>(strip, sink),
+                _ => feed_blocks::<S, R>(strip, sink),
             }
         }
     }
 }
 
-/// [`tile::largest`] in fp16.
-#[inline]
-#[target_feature(enable = "neon,fp16")]
-fn largest<const R: usize>(sums: [[float16x8_t; 2]; R]) -> [float16x8_t; 2] {
-    let lowest = vreinterpretq_f16_u16(vdupq_n_u16(f16::NEG_INFINITY.to_bits()));
-    sums.iter().fold([lowest; 2], |largest, sums| {
-        [vmaxnmq_f16(largest[0], sums[0]), vmaxnmq_f16(largest[1], sums[1])]
-    })
-}
-
-/// [`tile::first_largest`] in fp16, and then in fp32.
-#[inline]
-#[target_feature(enable = "neon,fp16")]
-fn first_largest<const R: usize>(
-    sums: [[float16x8_t; 2]; R],
-) -> ([float32x4_t; 4], [uint32x4_t; 4]) {
-    let lowest = vreinterpretq_f16_u16(vdupq_n_u16(f16::NEG_INFINITY.to_bits()));
-    let (mut largest, mut rows) = ([lowest; 2], [vdupq_n_u16(0); 2]);
-    for (row, sums) in (0..).map(|row| vdupq_n_u16(row)).zip(&sums) {
-        for v in 0..2 {
-            let raised = vcgtq_f16(sums[v], largest[v]);
-            largest[v] = vbslq_f16(raised, sums[v], largest[v]);
-            rows[v] = vbslq_u16(raised, row, rows[v]);
-        }
-    }
-    let [left, right] = rows;
-    let rows = [
-        vmovl_u16(vget_low_u16(left)),
-        vmovl_high_u16(left),
-        vmovl_u16(vget_low_u16(right)),
-        vmovl_high_u16(right),
-    ];
-    (promoted(largest), rows)
-}
-
-/// The same numbers in fp32.
-#[inline(always)]
-fn promoted([left, right]: [float16x8_t; 2]) -> [float32x4_t; 4] {
-    // SAFETY: NEON and its conversions of fp16 are on every aarch64.
-    unsafe {
-        [
-            vcvt_f32_f16(vget_low_f16(left)),
-            vcvt_high_f32_f16(left),
-            vcvt_f32_f16(vget_low_f16(right)),
-            vcvt_high_f32_f16(right),
-        ]
-    }
-}
-
-/// The products of a block of inputs, summed chunk by chunk.
+/// Sums of several blocks, in fp32.
 ///
 /// # Safety
-/// As [`Tile::sums`], for a block of whole STEPs among the inputs.
+/// As [`Feed::feed`].
+unsafe fn feed_blocks<S: Sink<float32x4_t, 4>, const R: usize>(
+    strip: &Strip<f16, f16>,
+    sink: &mut S,
+) {
+    for tile in 0..strip.n_tiles {
+        let mut blocks = Blocks::<R> { sums: [[Lanes::splat(0.0); 4]; R] };
+        for first in (0..strip.inputs).step_by(F16_BLOCK) {
+            let block = Strip {
+                rows: strip.rows.wrapping_add(tile * R * strip.stride + first),
+                weights: strip.weights.wrapping_add(first * 16),
+                inputs: F16_BLOCK.min(strip.inputs - first),
+                n_tiles: 1,
+                ..*strip
+            };
+            // SAFETY: part of what the caller vouches for; whole STEPs.
+            unsafe { tile_f16_8x16::<_, R>(&block, &mut blocks) };
+        }
+        // SAFETY: the caller's.
+        unsafe { sink.take(blocks.sums) };
+    }
+}
+
+/// Sums of one block.
+///
+/// # Safety
+/// As [`Feed::feed`].
 #[inline(never)]
 #[target_feature(enable = "neon,fp16")]
-unsafe fn tile_f16_8x16<const R: usize>(
-    operands: &Operands<f16, f16>,
-    inputs: Range<usize>,
-) -> [[float16x8_t; 2]; R] {
-    let mut rows: [*const f16; R] = operands.row_pointers(inputs.start);
+unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, sink: &mut S) {
     let zero = vreinterpretq_f16_u16(vdupq_n_u16(0));
-    let mut sums = [[zero; 2]; R];
-    let mut k = inputs.start;
-    while k < inputs.end {
-        let chunk_end = inputs.end.min(k + F16_CHUNK);
-        let mut chunk = [[zero; 2]; R];
-        while k < chunk_end {
-            // SAFETY: inputs k to k + 7 of R rows are there, and 16 weights for
-            // each.
-            unsafe { add_inputs(&mut chunk, &mut rows, operands.weights.add(k * 16)) };
-            k += F16::STEP;
+    let mut rows: [*const f16; R] = strip.first_rows();
+    // Sums of earlier chunks wait in memory: the registers are for the chunk.
+    let mut memory = [[zero; 2]; R];
+    for _ in 0..strip.n_tiles {
+        let (mut weights, mut at) = (strip.weights, 0);
+        loop {
+            let is_first = at == 0;
+            let chunk_end = strip.row_bytes().min(at + F16_CHUNK * size_of::<f16>());
+            let mut sums = [[zero; 2]; R];
+            while at < chunk_end {
+                // SAFETY: 8 inputs of R rows are there, and 16 weights for
+                // each.
+                unsafe {
+                    let a = rows.map(|row| load(row.byte_add(at)));
+                    add_inputs(&mut sums, &a, weights);
+                    weights = weights.add(128);
+                }
+                at += VECTOR_BYTES;
+            }
+            if !is_first {
+                for (sums, before) in sums.iter_mut().zip(black_box(&mut memory)) {
+                    sums[0] = vaddq_f16(sums[0], before[0]);
+                    sums[1] = vaddq_f16(sums[1], before[1]);
+                }
+            }
+            if at >= strip.row_bytes() {
+                // SAFETY: the caller's.
+                unsafe { sink.take_half(&sums) };
+                break;
+            }
+            *black_box(&mut memory) = sums;
         }
-        for (sums, chunk) in sums.iter_mut().zip(chunk) {
-            sums[0] = vaddq_f16(sums[0], chunk[0]);
-            sums[1] = vaddq_f16(sums[1], chunk[1]);
-        }
+        rows = strip.next_rows(rows);
     }
-    sums
 }
 
-/// Adds the products of the next 8 inputs of each row.
+/// Adds the products of 8 inputs of each row.
 ///
 /// # Safety
-/// They are there, and so are 16 weights for each.
+/// There are 16 weights for each.
 #[inline]
 #[target_feature(enable = "neon,fp16")]
 unsafe fn add_inputs<const R: usize>(
     sums: &mut [[float16x8_t; 2]; R],
-    rows: &mut [*const f16; R],
+    a: &[float16x8_t; R],
     weights: *const f16,
 ) {
     // SAFETY: the caller's.
     unsafe {
-        let a = rows.map(|row| load(row));
-        *rows = rows.map(|row| row.add(F16::STEP));
-        add_input::<0, R>(sums, &a, weights);
-        add_input::<1, R>(sums, &a, weights.add(16));
-        add_input::<2, R>(sums, &a, weights.add(32));
-        add_input::<3, R>(sums, &a, weights.add(48));
-        add_input::<4, R>(sums, &a, weights.add(64));
-        add_input::<5, R>(sums, &a, weights.add(80));
-        add_input::<6, R>(sums, &a, weights.add(96));
-        add_input::<7, R>(sums, &a, weights.add(112));
+        add_input::<0, R>(sums, a, weights);
+        add_input::<1, R>(sums, a, weights.add(16));
+        add_input::<2, R>(sums, a, weights.add(32));
+        add_input::<3, R>(sums, a, weights.add(48));
+        add_input::<4, R>(sums, a, weights.add(64));
+        add_input::<5, R>(sums, a, weights.add(80));
+        add_input::<6, R>(sums, a, weights.add(96));
+        add_input::<7, R>(sums, a, weights.add(112));
     }
 }
 
@@ -221,4 +183,98 @@ unsafe fn add_input<const LANE: i32, const R: usize>(
 unsafe fn load(from: *const f16) -> float16x8_t {
     // SAFETY: the caller's; an `f16` is its bits.
     vreinterpretq_f16_u16(unsafe { vld1q_u16(from.cast()) })
+}
+
+/// The largest of each column, NaN of none but NaN.
+#[inline]
+#[target_feature(enable = "neon,fp16")]
+fn largest<const R: usize>(sums: &[[float16x8_t; 2]; R]) -> [float16x8_t; 2] {
+    let mut largest = sums[0];
+    for sums in &sums[1..] {
+        largest[0] = vmaxnmq_f16(largest[0], sums[0]);
+        largest[1] = vmaxnmq_f16(largest[1], sums[1]);
+    }
+    largest
+}
+
+/// The same numbers in fp32.
+#[inline]
+#[target_feature(enable = "neon")]
+fn promoted([left, right]: &[float16x8_t; 2]) -> [float32x4_t; 4] {
+    [
+        vcvt_f32_f16(vget_low_f16(*left)),
+        vcvt_high_f32_f16(*left),
+        vcvt_f32_f16(vget_low_f16(*right)),
+        vcvt_high_f32_f16(*right),
+    ]
+}
+
+/// Takes sums that are still fp16: of several rows the largest goes on alone.
+trait HalfSink {
+    /// As [`Sink::take`].
+    ///
+    /// # Safety
+    /// As [`Sink::take`]; the machine has FEAT_FP16.
+    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]);
+}
+
+impl HalfSink for Finish<4> {
+    #[inline]
+    #[target_feature(enable = "neon,fp16")]
+    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
+        for sums in sums {
+            // SAFETY: the caller's.
+            unsafe { self.take([promoted(sums)]) };
+        }
+    }
+}
+
+impl HalfSink for Max<float32x4_t, 4> {
+    #[inline]
+    #[target_feature(enable = "neon,fp16")]
+    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
+        // SAFETY: the caller's.
+        unsafe { self.take([promoted(&largest(sums))]) }
+    }
+}
+
+impl HalfSink for ArgMax<float32x4_t, 4> {
+    #[inline]
+    #[target_feature(enable = "neon,fp16")]
+    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
+        let largest = largest(sums);
+        let mut rows = [vdupq_n_u16(0); 2];
+        for (row, sums) in sums.iter().enumerate().rev() {
+            for v in 0..2 {
+                let equal = vceqq_f16(sums[v], largest[v]);
+                rows[v] = vbslq_u16(equal, vdupq_n_u16(row as u16), rows[v]);
+            }
+        }
+        let [left, right] = rows;
+        let rows = [
+            vmovl_u16(vget_low_u16(left)),
+            vmovl_high_u16(left),
+            vmovl_u16(vget_low_u16(right)),
+            vmovl_high_u16(right),
+        ];
+        self.merge(promoted(&largest), rows, R);
+    }
+}
+
+/// Sums of a tile's blocks.
+struct Blocks<const ROWS: usize> {
+    sums: [[float32x4_t; 4]; ROWS],
+}
+
+impl<const ROWS: usize> HalfSink for Blocks<ROWS> {
+    #[inline]
+    #[target_feature(enable = "neon,fp16")]
+    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
+        for (sums, block) in self.sums.iter_mut().zip(sums) {
+            let block = promoted(block);
+            for (sum, block) in sums.iter_mut().zip(block) {
+                *sum = vaddq_f32(*sum, block);
+            }
+        }
+    }
 }

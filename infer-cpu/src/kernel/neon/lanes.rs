@@ -20,8 +20,6 @@ pub trait Lanes: Copy {
 
 /// Four sums in a register.
 pub trait Sums: Lanes {
-    /// What every other sum but NaN exceeds.
-    const LOWEST: Self::Element;
     /// Lane by lane the larger number; of a number and NaN the number.
     fn larger(self, than: Self) -> Self;
     /// All ones where this is larger than `other`.
@@ -67,8 +65,6 @@ lanes!(int32x4_t, i32, vdupq_n_s32, vld1q_s32, vst1q_s32, vbslq_s32);
 lanes!(uint32x4_t, u32, vdupq_n_u32, vld1q_u32, vst1q_u32, vbslq_u32);
 
 impl Sums for float32x4_t {
-    const LOWEST: f32 = f32::NEG_INFINITY;
-
     #[inline(always)]
     fn larger(self, than: Self) -> Self {
         // SAFETY: NEON is on every aarch64.
@@ -88,8 +84,6 @@ impl Sums for float32x4_t {
 }
 
 impl Sums for int32x4_t {
-    const LOWEST: i32 = i32::MIN;
-
     #[inline(always)]
     fn larger(self, than: Self) -> Self {
         // SAFETY: NEON is on every aarch64.

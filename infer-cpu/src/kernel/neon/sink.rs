@@ -1,121 +1,125 @@
-//! What becomes of a tile's sums: outputs, or maxima over rows, so that the
-//! widest features are never stored.
+//! What becomes of a tile's sums while they are in registers: outputs, or
+//! maxima over rows, so that the widest features are never stored.
 
 use std::arch::aarch64::*;
 use std::array::from_fn;
 
 use super::super::Panels;
-use super::lanes::{Lanes, Sums, load, store};
-use super::tile::{Operands, Place, Sum, Tile};
+use super::lanes::{Lanes, Sums, load};
 
-/// Takes tile by tile.
-pub trait Sink<T: Tile<V>, const V: usize> {
-    /// Takes the sums of `R` rows by one panel.
+/// Takes the sums of one panel's channels, from the first row to the last.
+pub trait Sink<L, const V: usize> {
+    /// Takes the next `R` rows.
     ///
     /// # Safety
-    /// As [`Tile::sums`].
-    unsafe fn take<const R: usize>(
-        &mut self,
-        operands: &Operands<T::Activation, T::Weight>,
-        place: Place,
-    );
+    /// They are no more than the sink was made for.
+    unsafe fn take<const R: usize>(&mut self, sums: [[L; V]; R]);
 }
 
 /// Writes scaled sums with bias and ReLU.
-pub struct Finish<'a> {
-    scale: &'a [f32],
-    bias: &'a [f32],
+pub struct Finish<const V: usize> {
+    scale: [float32x4_t; V],
+    bias: [float32x4_t; V],
     /// What outputs are raised to: 0, or NaN, which FMAXNM ignores.
-    floor: f32,
-    out: &'a mut [f32],
+    floor: float32x4_t,
+    /// Where the next row goes.
+    out: *mut f32,
     out_stride: usize,
 }
 
-impl<'a> Finish<'a> {
-    pub fn new<W>(weights: &'a Panels<W>, out: &'a mut [f32], out_stride: usize) -> Self {
-        let floor = if weights.relu { 0.0 } else { f32::NAN };
-        Self { scale: &weights.scale, bias: &weights.bias, floor, out, out_stride }
-    }
-}
-
-impl<T: Tile<V>, const V: usize> Sink<T, V> for Finish<'_> {
-    unsafe fn take<const R: usize>(
-        &mut self,
-        operands: &Operands<T::Activation, T::Weight>,
-        place: Place,
-    ) {
-        // SAFETY: the caller's.
-        let sums = unsafe { T::sums::<R>(operands) };
-        let channel = place.panel * 4 * V;
-        let bias: [float32x4_t; V] = load(&self.bias[channel..]);
-        let scale: [float32x4_t; V] = match self.scale {
-            [] => [float32x4_t::splat(1.0); V],
-            scale => load(&scale[channel..]),
-        };
-        let floor = float32x4_t::splat(self.floor);
-        for (r, sums) in sums.iter().enumerate() {
-            let outputs: [float32x4_t; V] = from_fn(|v| {
-                // SAFETY: NEON is on every aarch64.
-                unsafe { vmaxnmq_f32(vfmaq_f32(bias[v], sums[v].to_f32(), scale[v]), floor) }
-            });
-            store(outputs, &mut self.out[(place.row + r) * self.out_stride + channel..]);
+impl<const V: usize> Finish<V> {
+    /// For so many rows.
+    pub fn new<W: Copy + Default>(
+        weights: &Panels<W>,
+        panel: usize,
+        n_rows: usize,
+        out: &mut [f32],
+        out_stride: usize,
+    ) -> Self {
+        let channels = weights.channels(&(panel..panel + 1));
+        assert!(
+            n_rows == 0 || out.len() >= (n_rows - 1) * out_stride + channels.end,
+            "no room for the outputs"
+        );
+        Self {
+            scale: match &weights.scale[..] {
+                [] => [Lanes::splat(1.0); V],
+                scale => load(&scale[channels.clone()]),
+            },
+            bias: load(&weights.bias[channels.clone()]),
+            floor: Lanes::splat(if weights.relu { 0.0 } else { f32::NAN }),
+            out: out.as_mut_ptr().wrapping_add(channels.start),
+            out_stride,
         }
     }
 }
 
-/// Raises maxima to the largest sums.
-pub struct Max<'a, C> {
-    /// The panel of the first maximum.
-    pub first_panel: usize,
-    /// One a channel.
-    pub maxima: &'a mut [C],
-}
-
-impl<T: Tile<V>, const V: usize> Sink<T, V> for Max<'_, Sum<T, V>> {
-    unsafe fn take<const R: usize>(
-        &mut self,
-        operands: &Operands<T::Activation, T::Weight>,
-        place: Place,
-    ) {
-        // SAFETY: the caller's.
-        let largest = unsafe { T::largest::<R>(operands) };
-        let maxima = &mut self.maxima[(place.panel - self.first_panel) * 4 * V..];
-        let before: [T::Sums; V] = load(maxima);
-        store(from_fn::<_, V, _>(|v| before[v].larger(largest[v])), maxima);
+impl<L: Sums, const V: usize> Sink<L, V> for Finish<V> {
+    #[inline(always)]
+    unsafe fn take<const R: usize>(&mut self, sums: [[L; V]; R]) {
+        for sums in sums {
+            for (v, sums) in sums.into_iter().enumerate() {
+                // SAFETY: `new` found room for all rows.
+                unsafe {
+                    let finished = vfmaq_f32(self.bias[v], sums.to_f32(), self.scale[v]);
+                    vst1q_f32(self.out.add(4 * v), vmaxnmq_f32(finished, self.floor));
+                }
+            }
+            self.out = self.out.wrapping_add(self.out_stride);
+        }
     }
 }
 
-/// Raises maxima to the largest sums and remembers whose they are.
-pub struct ArgMax<'a, C> {
-    /// The maxima.
-    pub max: Max<'a, C>,
-    /// What the first row counts as.
-    pub first_row: u32,
+/// Keeps the largest sums.
+pub struct Max<L, const V: usize> {
     /// One a channel.
-    pub winners: &'a mut [u32],
+    pub largest: [L; V],
 }
 
-impl<T: Tile<V>, const V: usize> Sink<T, V> for ArgMax<'_, Sum<T, V>> {
-    unsafe fn take<const R: usize>(
-        &mut self,
-        operands: &Operands<T::Activation, T::Weight>,
-        place: Place,
-    ) {
-        // SAFETY: the caller's.
-        let (largest, rows) = unsafe { T::first_largest::<R>(operands) };
-        let channel = (place.panel - self.max.first_panel) * 4 * V;
-        let (maxima, winners) = (&mut self.max.maxima[channel..], &mut self.winners[channel..]);
-        let mut maximum: [T::Sums; V] = load(maxima);
-        let mut winner: [uint32x4_t; V] = load(winners);
-        let first_row = uint32x4_t::splat(self.first_row + place.row as u32);
+impl<L: Sums, const V: usize> Sink<L, V> for Max<L, V> {
+    #[inline(always)]
+    unsafe fn take<const R: usize>(&mut self, sums: [[L; V]; R]) {
+        for sums in sums {
+            self.largest = from_fn(|v| self.largest[v].larger(sums[v]));
+        }
+    }
+}
+
+/// Keeps the largest sums and whose they are.
+pub struct ArgMax<L, const V: usize> {
+    /// One a channel.
+    pub largest: [L; V],
+    /// The first row that has it.
+    pub winners: [uint32x4_t; V],
+    /// What the next row counts as.
+    pub next_row: uint32x4_t,
+}
+
+impl<L: Sums, const V: usize> ArgMax<L, V> {
+    /// Takes the largest sums of `n_rows` rows and the first rows that have
+    /// them, counted from `next_row`.
+    #[inline(always)]
+    pub fn merge(&mut self, sums: [L; V], rows: [uint32x4_t; V], n_rows: usize) {
         for v in 0..V {
-            let raised = largest[v].exceeds(maximum[v]);
-            maximum[v] = maximum[v].replaced(raised, largest[v]);
-            // SAFETY: NEON is on every aarch64.
-            let row = unsafe { vaddq_u32(first_row, rows[v]) };
-            winner[v] = winner[v].replaced(raised, row);
+            let raised = sums[v].exceeds(self.largest[v]);
+            self.largest[v] = self.largest[v].replaced(raised, sums[v]);
+            self.winners[v] = self.winners[v].replaced(raised, plus(self.next_row, rows[v]));
         }
-        store(maximum, maxima);
-        store(winner, winners);
+        self.next_row = plus(self.next_row, Lanes::splat(n_rows as u32));
     }
+}
+
+impl<L: Sums, const V: usize> Sink<L, V> for ArgMax<L, V> {
+    #[inline(always)]
+    unsafe fn take<const R: usize>(&mut self, sums: [[L; V]; R]) {
+        for sums in sums {
+            self.merge(sums, [Lanes::splat(0); V], 1);
+        }
+    }
+}
+
+#[inline(always)]
+fn plus(a: uint32x4_t, b: uint32x4_t) -> uint32x4_t {
+    // SAFETY: NEON is on every aarch64.
+    unsafe { vaddq_u32(a, b) }
 }

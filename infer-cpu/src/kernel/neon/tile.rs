@@ -1,57 +1,20 @@
 //! Matrix products by register tiles: what is the same in every number format.
 
-use std::arch::aarch64::uint32x4_t;
 use std::arch::asm;
 use std::array::from_fn;
 use std::ops::Range;
 
 use super::super::{Gemm, Panels, Rows};
-use super::lanes::{Lanes, Sums};
-use super::sink::{ArgMax, Finish, Max, Sink};
+use super::lanes::{Lanes, Sums, load, store};
+use super::sink::{ArgMax, Finish, Max};
 
 /// Rows of the tallest tile.
 const TALLEST: usize = 8;
 
-/// Where the operands of one tile are.
-pub struct Operands<A, W> {
-    /// The first activation of its first row.
-    pub rows: *const A,
-    /// From one row to the next.
-    pub stride: usize,
-    /// The weights of its panel.
-    pub weights: *const W,
-    /// Inputs with padding.
-    pub inputs: usize,
-}
+/// How far an inner loop goes along rows at a time.
+pub const VECTOR_BYTES: usize = 16;
 
-impl<A, W> Operands<A, W> {
-    /// Input `k` of each of `R` rows.
-    ///
-    /// A compiler that knows that rows are a stride apart goes from one to the
-    /// next by additions in the inner loop; an empty instruction hides it.
-    #[inline(always)]
-    pub fn row_pointers<const R: usize>(&self, k: usize) -> [*const A; R] {
-        from_fn(|r| {
-            let mut row = self.rows.wrapping_add(r * self.stride + k);
-            // SAFETY: no instruction.
-            unsafe {
-                asm!("/* {0} */", inout(reg) row, options(pure, nomem, nostack, preserves_flags));
-            }
-            row
-        })
-    }
-}
-
-/// Where a tile is in the product.
-#[derive(Clone, Copy)]
-pub struct Place {
-    /// Its first row.
-    pub row: usize,
-    /// Its panel.
-    pub panel: usize,
-}
-
-/// A register tile of `V` vectors of four sums by up to [`TALLEST`] rows.
+/// A register tile of rows by `V` vectors of four sums, in one number format.
 pub trait Tile<const V: usize> {
     /// What rows hold.
     type Activation;
@@ -59,75 +22,78 @@ pub trait Tile<const V: usize> {
     type Weight: Copy + Default;
     /// A vector of sums.
     type Sums: Sums;
-    /// Inputs of one round of its loop.
-    const STEP: usize;
+    /// Inputs of one round of its inner loop.
+    const STEP: usize = VECTOR_BYTES / size_of::<Self::Activation>();
+}
 
-    /// The products of `R` rows and one panel. The order in which a sum is
-    /// formed does not depend on `R`.
+/// A tile whose sums go to `S`.
+pub trait Feed<S, const V: usize>: Tile<V> {
+    /// Gives `sink` the products of a strip by tiles of `R` rows. The order in
+    /// which a sum is formed does not depend on `R`.
     ///
     /// # Safety
-    /// The machine has the tile's instructions; `inputs` is a multiple of
-    /// `STEP`; there are so many activations in each of `R` rows, and `4 * V`
-    /// times as many weights.
-    unsafe fn sums<const R: usize>(
-        operands: &Operands<Self::Activation, Self::Weight>,
-    ) -> [[Self::Sums; V]; R];
+    /// The machine has the tile's instructions, the strip is as it says, and
+    /// `sink` has room for its rows.
+    unsafe fn feed<const R: usize>(strip: &Strip<Self::Activation, Self::Weight>, sink: &mut S);
+}
 
-    /// The largest of each channel's sums, [`Sums::LOWEST`] of none but NaN.
-    ///
-    /// # Safety
-    /// As [`Tile::sums`].
+/// Rows by one panel.
+pub struct Strip<A, W> {
+    /// The first activation of the first row.
+    pub rows: *const A,
+    /// From one row to the next.
+    pub stride: usize,
+    /// How often the rows of a tile are there.
+    pub n_tiles: usize,
+    /// `4 * V` weights for each input.
+    pub weights: *const W,
+    /// Inputs of every row, a multiple of the tile's step.
+    pub inputs: usize,
+}
+
+impl<A, W> Strip<A, W> {
+    /// Bytes of a row's inputs.
     #[inline(always)]
-    unsafe fn largest<const R: usize>(
-        operands: &Operands<Self::Activation, Self::Weight>,
-    ) -> [Self::Sums; V] {
-        // SAFETY: the caller's.
-        largest(unsafe { Self::sums::<R>(operands) })
+    pub fn row_bytes(&self) -> usize {
+        self.inputs * size_of::<A>()
     }
 
-    /// The largest of each channel's sums, and the first of its rows, counted
-    /// from the tile's first.
+    /// The first `R` rows.
     ///
-    /// # Safety
-    /// As [`Tile::sums`].
+    /// In inner loops an activation is at its row's pointer plus an offset that
+    /// all rows share, which costs nothing but the load. A compiler that knew
+    /// the rows to be a stride apart would go from one to the next by
+    /// additions; an empty instruction hides it.
     #[inline(always)]
-    unsafe fn first_largest<const R: usize>(
-        operands: &Operands<Self::Activation, Self::Weight>,
-    ) -> ([Self::Sums; V], [uint32x4_t; V]) {
-        // SAFETY: the caller's.
-        first_largest(unsafe { Self::sums::<R>(operands) })
+    pub fn first_rows<const R: usize>(&self) -> [*const A; R] {
+        from_fn(|r| {
+            let mut row = self.rows.wrapping_add(r * self.stride);
+            // SAFETY: no instruction.
+            unsafe {
+                asm!("/* {0} */", inout(reg) row, options(pure, nomem, nostack, preserves_flags));
+            }
+            row
+        })
+    }
+
+    /// The `R` rows after `rows`.
+    #[inline(always)]
+    pub fn next_rows<const R: usize>(&self, rows: [*const A; R]) -> [*const A; R] {
+        rows.map(|row| row.wrapping_add(R * self.stride))
     }
 }
 
-/// The largest sum of each column.
-#[inline(always)]
-pub fn largest<S: Sums, const V: usize, const R: usize>(sums: [[S; V]; R]) -> [S; V] {
-    let lowest = [S::splat(S::LOWEST); V];
-    sums.iter().fold(lowest, |largest, sums| from_fn(|v| largest[v].larger(sums[v])))
-}
+/// A tile's vector of sums.
+type Four<T, const V: usize> = <T as Tile<V>>::Sums;
 
-/// The largest sum of each column, and the first of its rows.
-#[inline(always)]
-pub fn first_largest<S: Sums, const V: usize, const R: usize>(
-    sums: [[S; V]; R],
-) -> ([S; V], [uint32x4_t; V]) {
-    let mut largest = [S::splat(S::LOWEST); V];
-    let mut rows = [uint32x4_t::splat(0); V];
-    for (row, sums) in (0..).map(uint32x4_t::splat).zip(&sums) {
-        for v in 0..V {
-            let raised = sums[v].exceeds(largest[v]);
-            largest[v] = largest[v].replaced(raised, sums[v]);
-            rows[v] = rows[v].replaced(raised, row);
-        }
-    }
-    (largest, rows)
-}
-
-/// A number of the tile's sums.
-pub type Sum<T, const V: usize> = <<T as Tile<V>>::Sums as Lanes>::Element;
+/// One of them.
+type Sum<T, const V: usize> = <Four<T, V> as Lanes>::Element;
 
 /// The products of one format.
-pub const fn gemm<T: Tile<V>, const V: usize>() -> Gemm<T::Activation, T::Weight, Sum<T, V>> {
+pub const fn gemm<T, const V: usize>() -> Gemm<T::Activation, T::Weight, Sum<T, V>>
+where
+    T: Tile<V> + Feed<Finish<V>, V> + Feed<Max<Four<T, V>, V>, V> + Feed<ArgMax<Four<T, V>, V>, V>,
+{
     Gemm {
         nr: 4 * V,
         k_step: T::STEP,
@@ -137,27 +103,33 @@ pub const fn gemm<T: Tile<V>, const V: usize>() -> Gemm<T::Activation, T::Weight
     }
 }
 
-fn rows<T: Tile<V>, const V: usize>(
+fn rows<T: Feed<Finish<V>, V>, const V: usize>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
     panels: Range<usize>,
     out: &mut [f32],
     out_stride: usize,
 ) {
-    for_each_tile::<T, _, V>(rows, weights, panels, Finish::new(weights, out, out_stride));
+    for panel in panels {
+        let mut sink = Finish::new(weights, panel, rows.n, out, out_stride);
+        multiply::<T, _, V>(rows, weights, panel, &mut sink);
+    }
 }
 
-fn max<T: Tile<V>, const V: usize>(
+fn max<T: Tile<V> + Feed<Max<Four<T, V>, V>, V>, const V: usize>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
     panels: Range<usize>,
     maxima: &mut [Sum<T, V>],
 ) {
-    let sink = Max { first_panel: panels.start, maxima };
-    for_each_tile::<T, _, V>(rows, weights, panels, sink);
+    for (panel, maxima) in panels.zip(maxima.chunks_exact_mut(4 * V)) {
+        let mut sink = Max { largest: load(maxima) };
+        multiply::<T, _, V>(rows, weights, panel, &mut sink);
+        store(sink.largest, maxima);
+    }
 }
 
-fn argmax<T: Tile<V>, const V: usize>(
+fn argmax<T: Tile<V> + Feed<ArgMax<Four<T, V>, V>, V>, const V: usize>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
     panels: Range<usize>,
@@ -165,17 +137,26 @@ fn argmax<T: Tile<V>, const V: usize>(
     maxima: &mut [Sum<T, V>],
     winners: &mut [u32],
 ) {
-    let sink = ArgMax { max: Max { first_panel: panels.start, maxima }, first_row, winners };
-    for_each_tile::<T, _, V>(rows, weights, panels, sink);
+    let channels = maxima.chunks_exact_mut(4 * V).zip(winners.chunks_exact_mut(4 * V));
+    for (panel, (maxima, winners)) in panels.zip(channels) {
+        let mut sink = ArgMax {
+            largest: load(maxima),
+            winners: load(winners),
+            next_row: Lanes::splat(first_row),
+        };
+        multiply::<T, _, V>(rows, weights, panel, &mut sink);
+        store(sink.largest, maxima);
+        store(sink.winners, winners);
+    }
 }
 
-/// Gives `sink` all products of `rows` and some panels, panel by panel, so that
-/// a panel stays in the first-level cache while the rows pass.
-fn for_each_tile<T: Tile<V>, S: Sink<T, V>, const V: usize>(
+/// Gives `sink` the products of `rows` and one panel, which stays in the
+/// first-level cache while the rows pass.
+fn multiply<T: Feed<S, V>, S, const V: usize>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
-    panels: Range<usize>,
-    mut sink: S,
+    panel: usize,
+    sink: &mut S,
 ) {
     let inputs = weights.padded_inputs;
     rows.check(inputs);
@@ -183,31 +164,32 @@ fn for_each_tile<T: Tile<V>, S: Sink<T, V>, const V: usize>(
         weights.nr == 4 * V && inputs.is_multiple_of(T::STEP),
         "panels packed for another kernel"
     );
-    for panel in panels {
-        let weights = weights.panel(panel);
-        for row in (0..rows.n).step_by(TALLEST) {
-            let place = Place { row, panel };
-            let operands = Operands {
-                rows: rows.data[row * rows.stride..].as_ptr(),
-                stride: rows.stride,
-                weights: weights.as_ptr(),
-                inputs,
-            };
-            // SAFETY: `check` and `panel` found the operands whole, the
-            // assertion their padding; a table of kernels is only given out
-            // where its instructions are.
-            unsafe {
-                match rows.n - row {
-                    1 => sink.take::<1>(&operands, place),
-                    2 => sink.take::<2>(&operands, place),
-                    3 => sink.take::<3>(&operands, place),
-                    4 => sink.take::<4>(&operands, place),
-                    5 => sink.take::<5>(&operands, place),
-                    6 => sink.take::<6>(&operands, place),
-                    7 => sink.take::<7>(&operands, place),
-                    _ => sink.take::<TALLEST>(&operands, place),
-                }
-            }
+    let weights = weights.panel(panel).as_ptr();
+    let strip = |first_row, n_tiles| Strip {
+        rows: rows.data[first_row * rows.stride..].as_ptr(),
+        stride: rows.stride,
+        n_tiles,
+        weights,
+        inputs,
+    };
+    let n_tiles = rows.n / TALLEST;
+    // SAFETY: a table of kernels is only given out where its instructions are;
+    // `check` and `panel` found the operands whole; sinks are made for `rows.n`
+    // rows.
+    unsafe {
+        T::feed::<TALLEST>(&strip(0, n_tiles), sink);
+        if rows.n.is_multiple_of(TALLEST) {
+            return;
+        }
+        let rest = strip(n_tiles * TALLEST, 1);
+        match rows.n % TALLEST {
+            1 => T::feed::<1>(&rest, sink),
+            2 => T::feed::<2>(&rest, sink),
+            3 => T::feed::<3>(&rest, sink),
+            4 => T::feed::<4>(&rest, sink),
+            5 => T::feed::<5>(&rest, sink),
+            6 => T::feed::<6>(&rest, sink),
+            _ => T::feed::<7>(&rest, sink),
         }
     }
 }
