@@ -1,4 +1,103 @@
-//! Under construction.
-pub(super) fn kernels() -> Option<&'static super::Kernels> {
-    None
+//! NEON in fp32, and what all three NEON files share.
+//!
+//! The register tile, 8 rows by 8 channels:
+//!
+//! ```text
+//!                       w[0] channels 0-3   w[1] channels 4-7
+//!
+//! a[0]  inputs k..k+4   sums[0][0]          sums[0][1]
+//! a[1]                  sums[1][0]          sums[1][1]
+//! ...                   ...                 ...
+//! a[7]                  sums[7][0]          sums[7][1]
+//! ```
+//!
+//! 16 sums are twice what two pipes of latency 4 need. 8 registers hold 4
+//! inputs of each row, which FMLA reads by element, 2 the weights of the input
+//! at hand; 6 of the 32 are left for weights under way. 4 inputs take 16
+//! vectors loaded for 64 FMLA. A taller tile would leave no room for its
+//! activations, or need them packed.
+
+use std::arch::aarch64::*;
+
+use super::{Gemm, declare_kernels};
+
+pub(super) mod fps;
+pub(super) mod gemv;
+pub(super) mod lanes;
+pub(super) mod narrow;
+mod sink;
+pub(super) mod tile;
+
+use tile::{Operands, Tile};
+
+declare_kernels!(Neon, runs_here: true, {
+    f32: Some(GEMM_F32),
+    f16: None,
+    i8: None,
+    gemv_f32: gemv::gemv::<f32>,
+    gemv_f16: gemv::gemv::<half::f16>,
+    gemv_i8: gemv::gemv::<i8>,
+    narrow_f16: narrow::to_f16,
+    narrow_i8: narrow::to_i8,
+    fps_step: fps::step,
+});
+
+/// The products that all NEON files offer in fp32.
+pub(super) const GEMM_F32: Gemm<f32, f32, f32> = tile::gemm::<F32, 2>();
+
+struct F32;
+
+impl Tile<2> for F32 {
+    type Activation = f32;
+    type Weight = f32;
+    type Sums = float32x4_t;
+    const STEP: usize = 4;
+
+    unsafe fn sums<const R: usize>(operands: &Operands<f32, f32>) -> [[float32x4_t; 2]; R] {
+        // SAFETY: the caller's; NEON is on every aarch64.
+        unsafe { tile_f32_8x8::<R>(operands) }
+    }
+}
+
+/// # Safety
+/// As [`Tile::sums`].
+#[inline(never)]
+#[target_feature(enable = "neon")]
+unsafe fn tile_f32_8x8<const R: usize>(operands: &Operands<f32, f32>) -> [[float32x4_t; 2]; R] {
+    let rows: [*const f32; R] = operands.row_pointers(0);
+    let mut sums = [[vdupq_n_f32(0.0); 2]; R];
+    let mut k = 0;
+    while k < operands.inputs {
+        // SAFETY: the number of inputs is a multiple of STEP, so inputs k to
+        // k + 3 of R rows are there, and 8 weights for each.
+        unsafe {
+            let a = rows.map(|row| vld1q_f32(row.add(k)));
+            let weights = operands.weights.add(k * 8);
+            add_input::<0, R>(&mut sums, &a, weights);
+            add_input::<1, R>(&mut sums, &a, weights.add(8));
+            add_input::<2, R>(&mut sums, &a, weights.add(16));
+            add_input::<3, R>(&mut sums, &a, weights.add(24));
+        }
+        k += F32::STEP;
+    }
+    sums
+}
+
+/// Adds the products of the input that is lane `LANE` of the activations.
+///
+/// # Safety
+/// There are 8 weights.
+#[inline]
+#[target_feature(enable = "neon")]
+unsafe fn add_input<const LANE: i32, const R: usize>(
+    sums: &mut [[float32x4_t; 2]; R],
+    a: &[float32x4_t; R],
+    weights: *const f32,
+) {
+    // SAFETY: the caller's.
+    let w = unsafe { [vld1q_f32(weights), vld1q_f32(weights.add(4))] };
+    for (sums, &a) in sums.iter_mut().zip(a) {
+        sums[0] = vfmaq_laneq_f32::<LANE>(sums[0], w[0], a);
+        sums[1] = vfmaq_laneq_f32::<LANE>(sums[1], w[1], a);
+    }
 }

@@ -5,12 +5,10 @@
 //! [`suite`] makes the tests of one file of kernels; `declare_kernels` calls
 //! it. A machine without the instructions says so and passes.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 use formats::rng::StreamKey;
 use half::f16;
 
-use super::scalar::F16_CHUNK;
+use super::scalar::{F16_BLOCK, F16_CHUNK};
 use super::{Columns, Gemm, I8_LARGEST, Kernels, Panels, Rows, Soa};
 
 /// Numbers of rows: none, and around every tile height in use (4, 6, 8, 12).
@@ -124,11 +122,13 @@ impl Number for f16 {
 
     const SMALLEST: f32 = 6.103_515_6e-5;
 
-    /// A chunk's sums round to fp16, the sum of chunks to f32; half a denormal
-    /// of fp16 (2⁻²⁵) a step where numbers are that small.
+    /// The bound of [`F16_BLOCK`], one more for the second order; half a
+    /// denormal of fp16 (2⁻²⁵) a step where numbers are that small; the sum of
+    /// blocks in f32.
     fn bound(k: usize, sum: f64) -> f64 {
-        let chunk = (F16_CHUNK.min(k) + 1) as f64 * U16 * sum;
-        chunk + k as f64 * 2f64.powi(-25) + f32::bound(k / F16_CHUNK + 3, sum)
+        let roundings = F16_CHUNK.min(k) + F16_BLOCK.min(k).div_ceil(F16_CHUNK);
+        let block = roundings as f64 * U16 * sum;
+        block + k as f64 * 2f64.powi(-25) + f32::bound(k / F16_BLOCK + 3, sum)
     }
 }
 

@@ -12,6 +12,8 @@
 //!   ...
 //! ```
 
+#![expect(clippy::needless_range_loop, reason = "vectors and points go by their number")]
+
 use std::ops::Range;
 
 use half::f16;

@@ -1,0 +1,126 @@
+//! Vectors of four, so that what is not arithmetic of one format is written
+//! once and without `unsafe`.
+
+use std::arch::aarch64::*;
+use std::array::from_fn;
+
+/// Four numbers in a register.
+pub trait Lanes: Copy {
+    /// One of them.
+    type Element: Copy;
+    /// Four times the same.
+    fn splat(value: Self::Element) -> Self;
+    /// Reads four.
+    fn load(from: &[Self::Element; 4]) -> Self;
+    /// Writes four.
+    fn store(self, to: &mut [Self::Element; 4]);
+    /// `other` where `mask` is all ones.
+    fn replaced(self, mask: uint32x4_t, other: Self) -> Self;
+}
+
+/// Four sums in a register.
+pub trait Sums: Lanes {
+    /// What every other sum but NaN exceeds.
+    const LOWEST: Self::Element;
+    /// Lane by lane the larger number; of a number and NaN the number.
+    fn larger(self, than: Self) -> Self;
+    /// All ones where this is larger than `other`.
+    fn exceeds(self, other: Self) -> uint32x4_t;
+    /// The nearest numbers of fp32.
+    fn to_f32(self) -> float32x4_t;
+}
+
+macro_rules! lanes {
+    ($vector:ty, $element:ty, $splat:ident, $load:ident, $store:ident, $select:ident) => {
+        impl Lanes for $vector {
+            type Element = $element;
+
+            #[inline(always)]
+            fn splat(value: $element) -> Self {
+                // SAFETY: NEON is on every aarch64.
+                unsafe { $splat(value) }
+            }
+
+            #[inline(always)]
+            fn load(from: &[$element; 4]) -> Self {
+                // SAFETY: four elements are there.
+                unsafe { $load(from.as_ptr()) }
+            }
+
+            #[inline(always)]
+            fn store(self, to: &mut [$element; 4]) {
+                // SAFETY: there is room for four elements.
+                unsafe { $store(to.as_mut_ptr(), self) }
+            }
+
+            #[inline(always)]
+            fn replaced(self, mask: uint32x4_t, other: Self) -> Self {
+                // SAFETY: NEON is on every aarch64.
+                unsafe { $select(mask, other, self) }
+            }
+        }
+    };
+}
+
+lanes!(float32x4_t, f32, vdupq_n_f32, vld1q_f32, vst1q_f32, vbslq_f32);
+lanes!(int32x4_t, i32, vdupq_n_s32, vld1q_s32, vst1q_s32, vbslq_s32);
+lanes!(uint32x4_t, u32, vdupq_n_u32, vld1q_u32, vst1q_u32, vbslq_u32);
+
+impl Sums for float32x4_t {
+    const LOWEST: f32 = f32::NEG_INFINITY;
+
+    #[inline(always)]
+    fn larger(self, than: Self) -> Self {
+        // SAFETY: NEON is on every aarch64.
+        unsafe { vmaxnmq_f32(self, than) }
+    }
+
+    #[inline(always)]
+    fn exceeds(self, other: Self) -> uint32x4_t {
+        // SAFETY: NEON is on every aarch64.
+        unsafe { vcgtq_f32(self, other) }
+    }
+
+    #[inline(always)]
+    fn to_f32(self) -> float32x4_t {
+        self
+    }
+}
+
+impl Sums for int32x4_t {
+    const LOWEST: i32 = i32::MIN;
+
+    #[inline(always)]
+    fn larger(self, than: Self) -> Self {
+        // SAFETY: NEON is on every aarch64.
+        unsafe { vmaxq_s32(self, than) }
+    }
+
+    #[inline(always)]
+    fn exceeds(self, other: Self) -> uint32x4_t {
+        // SAFETY: NEON is on every aarch64.
+        unsafe { vcgtq_s32(self, other) }
+    }
+
+    #[inline(always)]
+    fn to_f32(self) -> float32x4_t {
+        // SAFETY: NEON is on every aarch64.
+        unsafe { vcvtq_f32_s32(self) }
+    }
+}
+
+/// The first `V` vectors of a slice.
+#[inline(always)]
+pub fn load<L: Lanes, const V: usize>(from: &[L::Element]) -> [L; V] {
+    let (from, _) = from[..4 * V].as_chunks();
+    from_fn(|v| L::load(&from[v]))
+}
+
+/// Writes `V` vectors to the beginning of a slice.
+#[inline(always)]
+pub fn store<L: Lanes, const V: usize>(vectors: [L; V], to: &mut [L::Element]) {
+    let (to, _) = to[..4 * V].as_chunks_mut();
+    for (vector, to) in vectors.into_iter().zip(to) {
+        vector.store(to);
+    }
+}
