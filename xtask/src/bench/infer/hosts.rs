@@ -13,6 +13,9 @@ const TORCH: Environment = Environment {
     size: "some 3 GB",
 };
 
+/// Keeps Python from writing compiled files beside its programs.
+const NO_CACHE: &str = "-B";
+
 /// What runs a rival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Host {
@@ -52,7 +55,7 @@ impl Material {
     /// Why that cannot be, in words for the user.
     pub fn prepare(&self) -> Result<(), String> {
         let mut command = Command::new(GENERAL.interpreter()?);
-        command.arg(programs().join("infer/prepare.py"));
+        command.arg(NO_CACHE).arg(programs().join("infer/prepare.py"));
         succeeds(command.arg(&self.model).arg(self.cloud()).arg(&self.folder))
     }
 }
@@ -69,7 +72,7 @@ impl Host {
     /// Why there can be none, in words for the user.
     pub fn program(self, material: &Material) -> Result<Program, String> {
         let python = |environment: Environment, script: &str, arguments: &[&PathBuf]| {
-            let words = vec![environment.interpreter()?, programs().join(script)];
+            let words = vec![environment.interpreter()?, NO_CACHE.into(), programs().join(script)];
             let arguments = arguments.iter().map(|&path| path.clone()).collect();
             Ok(Program { words, arguments })
         };
