@@ -2,7 +2,8 @@
 //!
 //! One file per question asked: [`speed`] of building and tracing, [`trade`]
 //! of speed against accuracy, which [`builders`] pays when, the share of each
-//! stage of the [`pipeline`], and how [`peers`] compare.
+//! stage of the [`pipeline`], how [`peers`] compare, and what a Raspberry Pi
+//! would take ([`pi_model`]).
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
@@ -19,6 +20,7 @@ mod lanes;
 mod machine;
 mod moller_trumbore;
 mod peers;
+mod pi_model;
 mod pipeline;
 mod scenes;
 mod shot;
@@ -39,6 +41,8 @@ pub struct BenchArgs {
 enum Benchmark {
     /// Measure the simulator: building, casting, the whole way to disk.
     Sim(SimArgs),
+    /// Model infer-cpu on a Raspberry Pi 5 without having one.
+    PiModel(pi_model::PiModelArgs),
 }
 
 #[derive(Args, Debug)]
@@ -97,7 +101,13 @@ struct Report {
 /// # Errors
 /// If no mesh can be read, an adapter fails or the report cannot be written.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let Benchmark::Sim(args) = &args.what;
+    match &args.what {
+        Benchmark::Sim(args) => run_sim(args),
+        Benchmark::PiModel(args) => pi_model::run(args),
+    }
+}
+
+fn run_sim(args: &SimArgs) -> Result<()> {
     let request: Option<AdapterRequest> = match &args.adapter {
         Some(name) => Some(name.parse()?),
         None => None,
