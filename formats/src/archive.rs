@@ -10,6 +10,7 @@ use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 use crate::decoding::invalid;
 use crate::error::FormatError;
 use crate::npy;
+use crate::npy_header::{self, Header};
 use crate::number::Number;
 
 /// An archive that is being written: uncompressed, and with the same bytes
@@ -64,7 +65,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     pub fn text(&mut self, key: &str, lines: &[String]) -> io::Result<()> {
         // NumPy knows no text of width 0.
         let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0).max(1);
-        let header = npy::header_bytes(&format!("<U{width}"), &[lines.len()]);
+        let header = npy_header::header_bytes(&format!("<U{width}"), &[lines.len()]);
         let n_bytes = header.len() as u64 + (lines.len() * width * 4) as u64;
         let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
         writer.write_all(&header)?;
@@ -159,7 +160,7 @@ impl<R: Read + Seek> NpzReader<R> {
     pub fn entry<T>(
         &mut self,
         key: &str,
-        read: impl FnOnce(npy::Header, u64, &mut dyn Read) -> io::Result<T>,
+        read: impl FnOnce(Header, u64, &mut dyn Read) -> io::Result<T>,
     ) -> Result<T, FormatError> {
         let Self { path, file_size, zip } = self;
         let here = |cause: String| FormatError::malformed(path, key, cause);
@@ -173,7 +174,8 @@ impl<R: Read + Seek> NpzReader<R> {
             return Err(here(format!("{} bytes in a file of {file_size}", entry.size())));
         }
         let size = entry.size();
-        let header = npy::read_header(&mut entry).map_err(|error| here(error.to_string()))?;
+        let header =
+            npy_header::read_header(&mut entry).map_err(|error| here(error.to_string()))?;
         let size = size.saturating_sub(header.n_bytes as u64);
         let value = read(header, size, &mut entry.by_ref().take(size));
         let value = value.map_err(|error| here(error.to_string()))?;
@@ -187,7 +189,7 @@ impl<R: Read + Seek> NpzReader<R> {
 
 type Decode = fn(&[u8]) -> io::Result<String>;
 
-fn check_size(header: &npy::Header, element_size: usize, found: u64) -> io::Result<()> {
+fn check_size(header: &Header, element_size: usize, found: u64) -> io::Result<()> {
     let promised = header.n_elements().and_then(|n| n.checked_mul(element_size));
     if promised.is_some_and(|promised| promised as u64 == found) {
         return Ok(());

@@ -9,7 +9,7 @@
 //! | `names`, may be absent | text | `[m]` | instances |
 //! | `classes`, may be absent | text | `[k]` | class names in the order of the labels |
 //!
-//! [`crate::packed`] writes the first; other keys are passed over.
+//! `formats::packed` writes the first; other keys are passed over.
 
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -17,7 +17,8 @@ use std::path::Path;
 use crate::archive::NpzReader;
 use crate::decoding::invalid;
 use crate::error::FormatError;
-use crate::npy::{self, Header};
+use crate::npy;
+use crate::npy_header::Header;
 use crate::number::NumberType;
 
 /// What 1.0 is in `points_i16`.

@@ -44,6 +44,8 @@ pub mod model_card;
 pub mod modelnet_h5;
 #[cfg(feature = "files")]
 mod npy;
+#[cfg(feature = "files")]
+mod npy_header;
 #[cfg(feature = "dataset")]
 pub mod npz;
 #[cfg(feature = "files")]
@@ -52,6 +54,8 @@ mod number;
 pub mod packed;
 #[cfg(feature = "dataset")]
 pub mod ply;
+#[cfg(feature = "files")]
+mod python_literal;
 #[cfg(feature = "files")]
 mod records;
 #[cfg(feature = "dataset")]

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use crate::archive::{NpzReader, NpzWriter, Values};
 use crate::atomic;
 use crate::error::FormatError;
-use crate::npy;
+use crate::npy_header;
 
 /// A packed set that is being written.
 ///
@@ -114,7 +114,7 @@ impl PackedWriter {
         points.rewind().map_err(here)?;
         atomic::write(&path, |writer| {
             NpzWriter::write(writer, |npz| {
-                let header = npy::header_bytes("<f4", &[labels.len(), n_points, 3]);
+                let header = npy_header::header_bytes("<f4", &[labels.len(), n_points, 3]);
                 let n_bytes = header.len() as u64 + points.metadata()?.len();
                 let entry = npz.begin("points", n_bytes)?;
                 entry.write_all(&header)?;

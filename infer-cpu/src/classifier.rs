@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use formats::FormatError;
 use formats::model_card::{ModelCard, Normalization};
 
 use crate::engine::Memory;
@@ -57,7 +56,10 @@ impl Classifier {
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
         let setup = setup(options, options.precision)?;
         let loaded = forward::load(path, &setup)?;
-        let spec = sampler_of(path, &loaded.card, options)?;
+        let spec = match &options.sampler {
+            Some(spec) => spec.clone(),
+            None => SamplerSpec::as_trained(path, &loaded.card)?,
+        };
         let front = front_end(path, &loaded, &spec, options.table_nodes)?;
         let selection = Selection::new(&spec, front)?;
         let Loaded { card, network, .. } = loaded;
@@ -258,26 +260,6 @@ fn class_names(card: &ModelCard, n_classes: usize) -> Vec<Arc<str>> {
         true => (0..n_classes).map(|class| format!("class {class}").into()).collect(),
         false => card.classes.iter().map(|name| name.as_str().into()).collect(),
     }
-}
-
-/// The sampler that `options` ask for, or that the model was trained behind.
-fn sampler_of(path: &Path, card: &ModelCard, options: &Options) -> Result<SamplerSpec, Error> {
-    if let Some(spec) = &options.sampler {
-        return Ok(spec.clone());
-    }
-    let bad = |key: &str| {
-        let part = format!("metadata `{key}`");
-        move |cause: FormatError| FormatError::malformed(path, part, cause)
-    };
-    let mut spec = SamplerSpec::default();
-    if let Some(kind) = &card.sampler {
-        spec.kind = kind.parse().map_err(bad("sampler"))?;
-    }
-    if let Some(start) = &card.fps_start {
-        spec.fps_start = start.parse().map_err(bad("fps_start"))?;
-    }
-    spec.points = card.points.unwrap_or(spec.points);
-    Ok(spec)
 }
 
 /// What computes the features that `spec` pools, if it pools any.

@@ -143,7 +143,7 @@ fn loaded<T: Format>(
     };
     let table = match layers.front.take_if(|front| matches!(front, Front::Table(_))) {
         Some(Front::Table(Tensor { shape, values })) => Some(
-            Lattice::new(shape[0], shape[3], values)
+            Lattice::new(shape[0], shape[3], &values)
                 .map_err(|cause| FormatError::malformed(file.path(), tensor_part(TABLE), cause))?,
         ),
         _ => None,

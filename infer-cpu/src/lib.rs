@@ -6,6 +6,7 @@
 #![deny(unsafe_code)]
 
 mod calibrate;
+mod choose;
 mod classifier;
 mod dense;
 mod engine;
@@ -20,6 +21,7 @@ mod precision;
 mod prediction;
 pub mod sampler;
 mod selection;
+mod summary;
 mod tabulate;
 mod team;
 mod votes;
@@ -32,9 +34,11 @@ pub mod sharing {
 }
 
 pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};
+pub use choose::choose;
 pub use classifier::Classifier;
 pub use error::Error;
 pub use formats::model_card::{ModelCard, Normalization};
 pub use options::{Options, TNets};
 pub use precision::Precision;
 pub use prediction::Prediction;
+pub use summary::{FrontSummary, LayerShape, NetShape, Summary, inspect};

@@ -1,18 +1,22 @@
-//! Classifies clouds without a GPU.
+//! Classifies clouds of points without a GPU.
 
 mod cli;
 
+use std::process::ExitCode;
+
 use clap::Parser;
 
-#[derive(Parser)]
-#[command(version)]
-enum Cli {
-    /// Measure this machine
-    Bench(cli::bench::Args),
-}
+use cli::{Cli, Outcome, Usage};
 
-fn main() -> anyhow::Result<()> {
-    let Cli::Bench(args) = Cli::parse();
-    let model = args.model.clone().unwrap_or_default();
-    cli::bench::run(&args, &model)
+fn main() -> ExitCode {
+    match cli::run(&Cli::parse()) {
+        Ok(Outcome::Success) => ExitCode::SUCCESS,
+        Ok(Outcome::SomeFailed) => ExitCode::from(1),
+        // Whoever read our output has gone, which is no failure of ours.
+        Err(error) if cli::is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            cli::say(&format!("error: {}", cli::told_once(&error)));
+            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+        }
+    }
 }

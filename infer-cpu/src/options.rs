@@ -69,6 +69,20 @@ impl std::str::FromStr for TNets {
 }
 
 /// How a [`crate::Classifier`] computes.
+///
+/// ```
+/// use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+/// use infer_cpu::{Options, Precision};
+///
+/// let sampler = SamplerSpec { kind: SamplerKind::Cpl, points: 64, ..SamplerSpec::default() };
+/// let options = Options {
+///     precision: Precision::F16,
+///     threads: 4,
+///     sampler: Some(sampler),
+///     ..Options::default()
+/// };
+/// assert!(!options.drop_invalid);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Options {
     /// What to compute in.

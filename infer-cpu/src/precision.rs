@@ -13,6 +13,14 @@ use crate::kernel::{Columns, Gemm, Gemv, I8_LARGEST, Kernels, Panels};
 pub const F16_LARGEST: f32 = 65504.0;
 
 /// What a network computes in.
+///
+/// ```
+/// use infer_cpu::{Precision, kernel};
+///
+/// let precision: Precision = "f32-fc16".parse()?;
+/// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Precision {
     /// fp32 throughout.

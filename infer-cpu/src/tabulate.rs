@@ -27,7 +27,7 @@ pub fn front_end(path: &Path, pass: Pass, nodes: usize) -> Result<Lattice, Error
     let layers = match layers_of(network, pass) {
         Ok(layers) => layers,
         Err(Tensor { shape, values }) => {
-            return Ok(Lattice::new(shape[0], shape[3], values).map_err(bad)?);
+            return Ok(Lattice::new(shape[0], shape[3], &values).map_err(bad)?);
         }
     };
     let channels = layers.last().map_or(0, |layer| layer.outputs);

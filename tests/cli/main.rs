@@ -8,6 +8,7 @@ mod datasets;
 mod import_weights;
 mod interrupted;
 mod meshes;
+mod reference;
 mod scenes;
 
 use std::collections::BTreeMap;

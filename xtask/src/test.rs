@@ -122,7 +122,7 @@ fn fuzz(seconds: u32) -> anyhow::Result<()> {
         return Ok(());
     }
     let limit = format!("-max_total_time={seconds}");
-    for target in ["off", "mesh"] {
+    for target in ["off", "mesh", "clouds"] {
         let build = ["run", "--release", "--target", "x86_64-unknown-linux-gnu", "--bin", target];
         let mut command = cargo(&build);
         command.args(["--", &limit]).current_dir(root().join("tests/fuzz"));

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use crate::error::FormatError;
-use crate::npy;
+use crate::npy_header;
 
 /// How many first bytes [`CloudFormat::of_content`] looks at.
 pub(super) const SNIFFED_SIZE: usize = 512;
@@ -87,7 +87,7 @@ impl CloudFormat {
             () if begins(b"ply\n") || begins(b"ply\r") => Ok(Self::Ply),
             // An archive without entries begins with the end of its contents.
             () if begins(b"PK\x03\x04") || begins(b"PK\x05\x06") => Ok(Self::Npz),
-            () if begins(npy::MAGIC) => Ok(Self::Npy),
+            () if begins(npy_header::MAGIC) => Ok(Self::Npy),
             () if begins(b"# .PCD") || begins(b"VERSION") => Ok(Self::Pcd),
             () if begins(b"LASF") => Ok(Self::Las),
             () if begins(b"OFF") || begins(b"solid ") => refuse(MESH),

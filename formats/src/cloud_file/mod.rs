@@ -12,8 +12,8 @@
 //! | LAS | 1.0 to 1.4 | no |
 //!
 //! NaN and infinities are coordinates like others; whoever reads decides what
-//! to do with them. Memory grows with the bytes that are there, never with what
-//! a header promises.
+//! to do with them. Memory grows with the bytes that are there, unpacked where
+//! they are compressed, never with what a header promises.
 
 mod format;
 mod kitti;

@@ -51,7 +51,10 @@ fn read_ascii<R: BufRead>(
         for (axis, coordinate) in axes.iter().enumerate() {
             let word = line.text.split_ascii_whitespace().nth(coordinate.column as usize);
             let word = word.ok_or_else(|| {
-                line.error(format!("expected a number in column {}", coordinate.column + 1))
+                line.error(format!(
+                    "expected a number in column {}",
+                    coordinate.column.saturating_add(1)
+                ))
             })?;
             point[axis] = line.number(word)?;
         }

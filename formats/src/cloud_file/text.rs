@@ -68,20 +68,20 @@ impl Layout {
             return Err(line.error(cause));
         }
         let place = |axis: &str| fields.iter().position(|name| name.eq_ignore_ascii_case(axis));
+        let places = AXES.map(place);
+        if let [Some(x), Some(y), Some(z)] = places {
+            return Ok((Self { separator, columns: [x, y, z] }, true));
+        }
         let is_header = fields.iter().all(|field| is_name(field));
-        let columns = match AXES.map(place) {
-            [Some(x), Some(y), Some(z)] => {
-                return Ok((Self { separator, columns: [x, y, z] }, true));
-            }
-            [None, None, None] => [0, 1, 2],
-            places if is_header => {
-                let missing = places.iter().zip(AXES).find(|(place, _)| place.is_none());
-                let (_, axis) = missing.unwrap_or((&None, ""));
-                return Err(line.error(format!("column names without {axis}")));
-            }
-            _ => [0, 1, 2],
-        };
-        Ok((Self { separator, columns }, is_header))
+        let mut missing = AXES.into_iter().zip(places).filter(|(_, place)| place.is_none());
+        let is_named = places.iter().any(Option::is_some);
+        if is_header
+            && is_named
+            && let Some((axis, _)) = missing.next()
+        {
+            return Err(line.error(format!("column names without {axis}")));
+        }
+        Ok((Self { separator, columns: [0, 1, 2] }, is_header))
     }
 
     fn point(&self, line: &Line<'_>, content: &str) -> Result<[f64; 3], FormatError> {
@@ -117,13 +117,13 @@ impl Separator {
 
     /// The columns of a line, without the blanks and quotes around them.
     fn fields(self, content: &str) -> impl Iterator<Item = &str> {
-        let (mut by_letter, mut by_blanks) = (None, None);
-        match self {
-            Self::Letter(letter) => by_letter = Some(content.split(letter)),
-            Self::Blanks => by_blanks = Some(content.split_whitespace()),
-        }
-        let fields = by_letter.into_iter().flatten().chain(by_blanks.into_iter().flatten());
-        fields.map(|field| field.trim().trim_matches('"'))
+        let separates = move |letter: char| match self {
+            Self::Letter(own) => letter == own,
+            Self::Blanks => letter.is_ascii_whitespace(),
+        };
+        let fields = content.split(separates).map(|field| field.trim().trim_matches('"'));
+        // Several blanks separate as one does.
+        fields.filter(move |field| !field.is_empty() || self != Self::Blanks)
     }
 }
 

@@ -2,11 +2,14 @@
 //! that they do not justify.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use formats::cloud_file::{CloudFormat, read_cloud_from, write_cloud};
 use proptest::prelude::*;
 
 /// Files to be damaged: some of ours, and some with more in them.
+static WHOLE_FILES: LazyLock<Vec<(CloudFormat, Vec<u8>)>> = LazyLock::new(whole_files);
+
 fn whole_files() -> Vec<(CloudFormat, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let points: Vec<_> = (0..20).map(|i| [f64::from(i) * 0.1, -1e-30, 1e30]).collect();
@@ -42,8 +45,8 @@ fn whole_files() -> Vec<(CloudFormat, Vec<u8>)> {
 
 #[test]
 fn the_files_are_whole_before_they_are_damaged() {
-    for (format, bytes) in whole_files() {
-        let read = read_cloud_from(&bytes[..], Some(format), Path::new("a"));
+    for (format, bytes) in &*WHOLE_FILES {
+        let read = read_cloud_from(&bytes[..], Some(*format), Path::new("a"));
         // The binary PLY and the text of PCD need not make sense.
         if !matches!(format, CloudFormat::Ply | CloudFormat::Pcd) {
             assert!(read.is_ok_and(|points| !points.is_empty()), "{format}");
@@ -53,9 +56,9 @@ fn the_files_are_whole_before_they_are_damaged() {
 
 #[test]
 fn a_file_may_be_cut_anywhere() {
-    for (format, bytes) in whole_files() {
+    for (format, bytes) in &*WHOLE_FILES {
         for end in 0..bytes.len() {
-            let _ = read_cloud_from(&bytes[..end], Some(format), Path::new("a"));
+            let _ = read_cloud_from(&bytes[..end], Some(*format), Path::new("a"));
             let _ = read_cloud_from(&bytes[..end], None, Path::new("a"));
         }
     }
@@ -69,8 +72,7 @@ proptest! {
         which in any::<prop::sample::Index>(),
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
-        let files = whole_files();
-        let (format, mut bytes) = files[which.index(files.len())].clone();
+        let (format, mut bytes) = which.get(&WHOLE_FILES[..]).clone();
         for (at, value) in changes {
             let at = at.index(bytes.len());
             bytes[at] = value;

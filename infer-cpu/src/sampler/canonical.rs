@@ -6,6 +6,15 @@
 use std::cmp::Ordering;
 
 /// Sorts clouds; keeps its memory from call to call.
+///
+/// ```
+/// use infer_cpu::sampler::CanonicalOrder;
+///
+/// let mut order = CanonicalOrder::default();
+/// order.sort(&[[0.5, 0.0, 0.0], [0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]);
+/// assert_eq!(order.points, [[0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]);
+/// assert_eq!(order.index, [1, 0]);
+/// ```
 #[derive(Default)]
 pub struct CanonicalOrder {
     /// The distinct points, ascending by x, then y, then z. A zero has no sign.
@@ -23,7 +32,7 @@ impl CanonicalOrder {
     pub fn sort(&mut self, cloud: &[[f32; 3]]) {
         self.keys.clear();
         self.keys.extend((0..cloud.len() as u32).map(u64::from));
-        sort_from_axis(&mut self.keys, cloud, 0);
+        sort_by_geometry(&mut self.keys, cloud);
 
         self.points.clear();
         self.index.clear();
@@ -35,6 +44,12 @@ impl CanonicalOrder {
             }
         }
     }
+}
+
+/// Sorts the indices in the lower halves of `keys` by the points that they are
+/// of: by x, then y, then z, then themselves. Upper halves are overwritten.
+pub(super) fn sort_by_geometry(keys: &mut [u64], cloud: &[[f32; 3]]) {
+    sort_from_axis(keys, cloud, 0);
 }
 
 /// Sorts the indices in the lower halves of `keys` by the coordinates of their

@@ -9,6 +9,19 @@ use super::SamplerSpec;
 use super::index_map::IndexMap;
 
 /// Ranks critical points; keeps its memory from cloud to cloud.
+///
+/// ```
+/// use infer_cpu::sampler::{CriticalPoints, Resize};
+///
+/// // Of four channels row 7 wins two, row 2 one, and nobody the last.
+/// let mut critical = CriticalPoints::default();
+/// critical.rank(&[1.0, 4.0, 3.5, 0.0], &[7, 2, 7, 5]);
+/// assert_eq!((&critical.rows[..], &critical.scores[..]), (&[7, 2][..], &[4.5, 4.0][..]));
+///
+/// let mut rows = vec![];
+/// Resize::Cyclic.apply(&critical.rows, &critical.scores, 3, &mut rows);
+/// assert_eq!(rows, [7, 2, 7]);
+/// ```
 #[derive(Default)]
 pub struct CriticalPoints {
     /// The rows chosen, each once: pass by pass, the best of a pass first.

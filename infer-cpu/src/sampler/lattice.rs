@@ -2,12 +2,14 @@
 //! sampled at the nodes of a lattice and interpolated between them (Sekikawa
 //! and Suzuki, "Tabulated MLP for fast point feature embedding", 2019).
 
-use std::array::{from_mut, from_ref};
-use std::iter::zip;
 use std::ops::Range;
 
-/// Channels that are interpolated at a time: vectors of any kernel divide it.
+/// Channels that are interpolated at a time: of a lattice of 8 nodes an axis,
+/// they fit into the first cache.
 const BLOCK: usize = 16;
+
+/// Points whose cells are found at a time, to be used for all channels.
+const POINTS: usize = 256;
 
 /// What is wrong with a table.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -15,6 +17,14 @@ pub enum LatticeError {
     /// There is nothing to interpolate.
     #[error("a lattice of {nodes} nodes an axis and {channels} channels: it needs 2 and 1")]
     TooSmall {
+        /// Nodes along an axis.
+        nodes: usize,
+        /// Channels of a node.
+        channels: usize,
+    },
+    /// No memory can hold the table.
+    #[error("a lattice of {nodes} nodes an axis and {channels} channels is too large")]
+    TooLarge {
         /// Nodes along an axis.
         nodes: usize,
         /// Channels of a node.
@@ -36,32 +46,62 @@ pub enum LatticeError {
 }
 
 /// Features of all points of the cube from -1 to 1.
+///
+/// ```
+/// use infer_cpu::sampler::Lattice;
+///
+/// // One channel, the sum of the coordinates, which interpolation meets.
+/// let lattice = Lattice::tabulate(3, 1, |points, features| {
+///     for (feature, [x, y, z]) in features.iter_mut().zip(points) {
+///         *feature = x + y + z;
+///     }
+/// })?;
+/// let (mut maximum, mut winner) = ([f32::NEG_INFINITY], [0]);
+/// lattice.max(&[[0.5, -0.5, 0.0], [0.25, 0.5, 0.5]], &mut maximum, &mut winner, 0..1);
+/// assert_eq!((maximum, winner), ([1.25], [1]));
+/// # Ok::<(), infer_cpu::sampler::LatticeError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
     nodes: usize,
     channels: usize,
-    /// `[nodes, nodes, nodes, channels]`: along x, y, z.
-    table: Vec<f32>,
+    /// `[blocks of channels, nodes, nodes, nodes, BLOCK]`, nodes along x, y, z;
+    /// zero where the last block has no channel.
+    table: Vec<[f32; BLOCK]>,
+}
+
+/// Where a point lies.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    /// The node at the cell's low corner.
+    low: usize,
+    /// How much each of its eight nodes weighs.
+    weights: [f32; 8],
 }
 
 impl Lattice {
-    /// A lattice of `nodes` nodes an axis, both ends of the cube among them.
+    /// A lattice of `nodes` nodes an axis, both ends of the cube among them,
+    /// from a table `[nodes, nodes, nodes, channels]` along x, y, z.
     ///
     /// # Errors
     /// Fewer than 2 nodes, no channel, a table of another length than its
     /// shape's, a value that is not finite.
-    pub fn new(nodes: usize, channels: usize, table: Vec<f32>) -> Result<Self, LatticeError> {
-        if nodes < 2 || channels == 0 {
-            return Err(LatticeError::TooSmall { nodes, channels });
-        }
-        let length = nodes.checked_pow(3).and_then(|n| n.checked_mul(channels));
-        if length != Some(table.len()) {
+    pub fn new(nodes: usize, channels: usize, table: &[f32]) -> Result<Self, LatticeError> {
+        let length = table_length(nodes, channels)?;
+        if length != table.len() {
             return Err(LatticeError::Length { nodes, channels, found: table.len() });
         }
-        match table.iter().position(|value| !value.is_finite()) {
-            Some(element) => Err(LatticeError::NotFinite(element)),
-            None => Ok(Self { nodes, channels, table }),
+        if let Some(element) = table.iter().position(|value| !value.is_finite()) {
+            return Err(LatticeError::NotFinite(element));
         }
+        let n_nodes = length / channels;
+        let mut blocks = vec![[0.0; BLOCK]; channels.div_ceil(BLOCK) * n_nodes];
+        for (node, values) in table.chunks_exact(channels).enumerate() {
+            for (block, values) in values.chunks(BLOCK).enumerate() {
+                blocks[block * n_nodes + node][..values.len()].copy_from_slice(values);
+            }
+        }
+        Ok(Self { nodes, channels, table: blocks })
     }
 
     /// Samples `mlp` at the nodes. It is given points, `[n, 3]`, and writes
@@ -74,20 +114,15 @@ impl Lattice {
         channels: usize,
         mut mlp: impl FnMut(&[[f32; 3]], &mut [f32]),
     ) -> Result<Self, LatticeError> {
-        if nodes < 2 || channels == 0 {
-            return Err(LatticeError::TooSmall { nodes, channels });
-        }
-        let length = nodes.checked_pow(3).and_then(|n| n.checked_mul(channels));
-        let length = length.ok_or(LatticeError::Length { nodes, channels, found: 0 })?;
+        let mut table = vec![0.0; table_length(nodes, channels)?];
         let at = |node: usize| (node as f64 / (nodes - 1) as f64 * 2.0 - 1.0) as f32;
-        let mut table = vec![0.0; length];
         let mut points = Vec::with_capacity(nodes * nodes);
         for (x, slab) in table.chunks_exact_mut(nodes * nodes * channels).enumerate() {
             points.clear();
             points.extend((0..nodes * nodes).map(|i| [at(x), at(i / nodes), at(i % nodes)]));
             mlp(&points, slab);
         }
-        Self::new(nodes, channels, table)
+        Self::new(nodes, channels, &table)
     }
 
     /// Nodes along an axis.
@@ -121,65 +156,110 @@ impl Lattice {
     ) {
         assert!(channels.end <= self.channels, "the lattice has fewer channels");
         assert_eq!((maxima.len(), winners.len()), (channels.len(), channels.len()));
-        let (maxima, last_maxima) = maxima.as_chunks_mut::<BLOCK>();
-        let (winners, last_winners) = winners.as_chunks_mut::<BLOCK>();
-        let n_blocks = maxima.len();
-        for (row, point) in points.iter().enumerate() {
-            let row = row as u32;
-            let (corners, weights) = self.cell(point);
-            let corners =
-                corners.map(|corner| self.table[corner..][channels.clone()].as_chunks::<BLOCK>());
-            // All of one length, so that no index below is checked.
-            let blocks = corners.map(|(blocks, _)| &blocks[..n_blocks]);
-            for i in 0..n_blocks {
-                let values = blocks.map(|blocks| &blocks[i]);
-                raise(&mut maxima[i], &mut winners[i], values, &weights, row);
-            }
-            for (i, (maximum, winner)) in zip(&mut *last_maxima, &mut *last_winners).enumerate() {
-                let values = corners.map(|(_, last)| from_ref(&last[i]));
-                raise(from_mut(maximum), from_mut(winner), values, &weights, row);
+        let mut cells = [Cell::default(); POINTS];
+        for (chunk, points) in points.chunks(POINTS).enumerate() {
+            let cells = &mut cells[..points.len()];
+            cells.iter_mut().zip(points).for_each(|(cell, point)| *cell = self.cell(point));
+            let mut channel = channels.start;
+            while channel < channels.end {
+                let end = (channel / BLOCK + 1) * BLOCK;
+                let part = channel - channels.start..end.min(channels.end) - channels.start;
+                let first_row = (chunk * POINTS) as u32;
+                self.raise(
+                    cells,
+                    first_row,
+                    channel,
+                    &mut maxima[part.clone()],
+                    &mut winners[part],
+                );
+                channel = end;
             }
         }
     }
 
-    /// Where the eight nodes around a point begin in the table, and how much
-    /// they weigh.
-    fn cell(&self, point: &[f32; 3]) -> ([usize; 8], [f32; 8]) {
+    /// Raises maxima of the channels from `channel` on, all of one block.
+    fn raise(
+        &self,
+        cells: &[Cell],
+        first_row: u32,
+        channel: usize,
+        maxima: &mut [f32],
+        winners: &mut [u32],
+    ) {
+        let n_nodes = self.nodes.pow(3);
+        let block = &self.table[channel / BLOCK * n_nodes..][..n_nodes];
+        let lanes = channel % BLOCK..channel % BLOCK + maxima.len();
+        let (mut largest, mut rows) = ([f32::INFINITY; BLOCK], [0; BLOCK]);
+        largest[lanes.clone()].copy_from_slice(maxima);
+        rows[lanes.clone()].copy_from_slice(winners);
+        for (cell, row) in cells.iter().zip(first_row..) {
+            let values = self.interpolate(block, cell);
+            for lane in 0..BLOCK {
+                // Without a branch, so that it is vectorised.
+                let wins = values[lane] > largest[lane];
+                largest[lane] = if wins { values[lane] } else { largest[lane] };
+                rows[lane] = if wins { row } else { rows[lane] };
+            }
+        }
+        maxima.copy_from_slice(&largest[lanes.clone()]);
+        winners.copy_from_slice(&rows[lanes]);
+    }
+
+    /// The values of one block of channels.
+    fn interpolate(&self, block: &[[f32; BLOCK]], cell: &Cell) -> [f32; BLOCK] {
+        let nodes = [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| &block[cell.low + self.offset(corner)]);
+        let [a, b, c, d, e, f, g, h] = cell.weights;
+        let mut values = [0.0; BLOCK];
+        for (lane, value) in values.iter_mut().enumerate() {
+            let [p, q, r, s, t, u, v, w] = nodes.map(|node| node[lane]);
+            let low = multiply_add(d, s, multiply_add(c, r, multiply_add(b, q, a * p)));
+            let high = multiply_add(h, w, multiply_add(g, v, multiply_add(f, u, e * t)));
+            *value = low + high;
+        }
+        values
+    }
+
+    /// How far a cell's node is from its low one: bits of `corner` are the
+    /// steps along x, y, z.
+    fn offset(&self, corner: usize) -> usize {
+        ((corner >> 2) * self.nodes + (corner >> 1 & 1)) * self.nodes + (corner & 1)
+    }
+
+    fn cell(&self, point: &[f32; 3]) -> Cell {
         let n_cells = self.nodes - 1;
-        let from_low = point.map(|x| (x.clamp(-1.0, 1.0) + 1.0) * 0.5 * n_cells as f32);
-        let low = from_low.map(|edges| (edges as usize).min(n_cells - 1));
-        let weights = [0, 1, 2].map(|axis| {
-            let high = from_low[axis] - low[axis] as f32;
+        let edges = point.map(|x| (x.clamp(-1.0, 1.0) + 1.0) * 0.5 * n_cells as f32);
+        let low = edges.map(|edges| (edges as usize).min(n_cells - 1));
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let high = edges[axis] - low[axis] as f32;
             [1.0 - high, high]
         });
-        let (mut corners, mut corner_weights) = ([0; 8], [0.0; 8]);
-        for corner in 0..8 {
-            let [x, y, z] = [corner >> 2, corner >> 1 & 1, corner & 1];
-            let node = ((low[0] + x) * self.nodes + low[1] + y) * self.nodes + low[2] + z;
-            corners[corner] = node * self.channels;
-            corner_weights[corner] = weights[0][x] * weights[1][y] * weights[2][z];
+        let weight = |corner: usize| x[corner >> 2] * y[corner >> 1 & 1] * z[corner & 1];
+        Cell {
+            low: (low[0] * self.nodes + low[1]) * self.nodes + low[2],
+            weights: [0, 1, 2, 3, 4, 5, 6, 7].map(weight),
         }
-        (corners, corner_weights)
     }
 }
 
-/// Raises the maxima of `N` channels to their interpolated values.
-fn raise<const N: usize>(
-    maxima: &mut [f32; N],
-    winners: &mut [u32; N],
-    values: [&[f32; N]; 8],
-    weights: &[f32; 8],
-    row: u32,
-) {
-    for channel in 0..N {
-        let pair =
-            |i: usize| weights[i] * values[i][channel] + weights[i + 1] * values[i + 1][channel];
-        let value = (pair(0) + pair(2)) + (pair(4) + pair(6));
-        // Without a branch, so that it is vectorised.
-        let wins = value > maxima[channel];
-        maxima[channel] = if wins { value } else { maxima[channel] };
-        winners[channel] = if wins { row } else { winners[channel] };
+/// `a * b + c`, in one step where all machines of the target have it.
+fn multiply_add(a: f32, b: f32, c: f32) -> f32 {
+    if cfg!(any(target_arch = "aarch64", target_feature = "fma")) {
+        a.mul_add(b, c)
+    } else {
+        a * b + c
     }
+}
+
+/// The elements of a table `[nodes, nodes, nodes, channels]`.
+fn table_length(nodes: usize, channels: usize) -> Result<usize, LatticeError> {
+    if nodes < 2 || channels == 0 {
+        return Err(LatticeError::TooSmall { nodes, channels });
+    }
+    let n_nodes = nodes.checked_pow(3);
+    let length = n_nodes.and_then(|n_nodes| n_nodes.checked_mul(channels));
+    length
+        .filter(|&length| length < isize::MAX as usize / size_of::<f32>())
+        .ok_or(LatticeError::TooLarge { nodes, channels })
 }
 
 #[cfg(test)]
@@ -193,8 +273,8 @@ mod tests {
     fn random(nodes: usize, channels: usize, seed: u32) -> Lattice {
         let key = StreamKey::new(0, "lattice", seed);
         let length = nodes.pow(3) * channels;
-        let table = (0..length as u64).map(|i| (key.unit(i) * 8.0 - 4.0) as f32).collect();
-        Lattice::new(nodes, channels, table).unwrap()
+        let table = (0..length as u64).map(|i| (key.unit(i) * 8.0 - 4.0) as f32);
+        Lattice::new(nodes, channels, &table.collect::<Vec<_>>()).unwrap()
     }
 
     fn pool(lattice: &Lattice, points: &[[f32; 3]]) -> (Vec<f32>, Vec<u32>) {
@@ -213,9 +293,10 @@ mod tests {
             let high = edges[axis] - low[axis] as f64;
             a * (1.0 - high) + b * high
         };
-        let at = |x, y, z| {
+        let at = |x: usize, y: usize, z: usize| {
             let node = ((low[0] + x) * n + low[1] + y) * n + low[2] + z;
-            f64::from(lattice.table[node * lattice.channels + channel])
+            let block: &[f32; BLOCK] = &lattice.table[channel / BLOCK * n.pow(3) + node];
+            f64::from(block[channel % BLOCK])
         };
         let along_z = |x, y| mix(2, at(x, y, 0), at(x, y, 1));
         let along_y = |x| mix(1, along_z(x, 0), along_z(x, 1));
@@ -225,10 +306,10 @@ mod tests {
     /// With u = 2^-24 and values of at most T: edges from the low end, up to
     /// n - 1, are rounded twice, so off by 2u(n - 1), and so is the share of
     /// two nodes that differ by at most 2T, along three axes. A weight is
-    /// rounded three times, its product once, the sum three times; one u more
+    /// rounded three times, its product once, the sum four times; one u more
     /// for terms of higher order.
     fn tolerance(lattice: &Lattice, largest: f64) -> f64 {
-        (12.0 * (lattice.nodes - 1) as f64 + 8.0) * 2f64.powi(-24) * largest
+        (12.0 * (lattice.nodes - 1) as f64 + 9.0) * 2f64.powi(-24) * largest
     }
 
     #[test]
@@ -272,7 +353,7 @@ mod tests {
 
     #[test]
     fn nodes_lie_along_x_then_y_then_z() {
-        let lattice = Lattice::new(2, 1, (0..8u8).map(f32::from).collect()).unwrap();
+        let lattice = Lattice::new(2, 1, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]).unwrap();
         for (point, value) in [([-1.0; 3], 0.0), ([-1.0, -1.0, 1.0], 1.0), ([1.0, -1.0, -1.0], 4.0)]
         {
             assert_eq!(pool(&lattice, &[point]).0, [value]);
@@ -305,23 +386,26 @@ mod tests {
 
     #[test]
     fn a_table_that_cannot_be_one_is_an_error() {
-        let error = |nodes, channels, table| Lattice::new(nodes, channels, table).unwrap_err();
-        assert_eq!(error(1, 3, vec![0.0; 3]), LatticeError::TooSmall { nodes: 1, channels: 3 });
-        assert_eq!(error(2, 0, vec![]), LatticeError::TooSmall { nodes: 2, channels: 0 });
+        let error =
+            |nodes, channels, table: &[f32]| Lattice::new(nodes, channels, table).unwrap_err();
+        assert_eq!(error(1, 3, &[0.0; 3]), LatticeError::TooSmall { nodes: 1, channels: 3 });
+        assert_eq!(error(2, 0, &[]), LatticeError::TooSmall { nodes: 2, channels: 0 });
         let length = LatticeError::Length { nodes: 2, channels: 2, found: 15 };
-        assert_eq!(error(2, 2, vec![0.0; 15]), length);
-        let length = LatticeError::Length { nodes: usize::MAX, channels: 2, found: 0 };
-        assert_eq!(error(usize::MAX, 2, vec![]), length);
-        assert_eq!(Lattice::tabulate(usize::MAX, 2, |_, _| {}), Err(length));
+        assert_eq!(error(2, 2, &[0.0; 15]), length);
+        for nodes in [usize::MAX, 1 << 20] {
+            let too_large = LatticeError::TooLarge { nodes, channels: 2 };
+            assert_eq!(error(nodes, 2, &[]), too_large);
+            assert_eq!(Lattice::tabulate(nodes, 2, |_, _| {}), Err(too_large));
+        }
         let mut table = vec![0.0; 16];
         table[5] = f32::NAN;
-        assert_eq!(error(2, 2, table), LatticeError::NotFinite(5));
+        assert_eq!(error(2, 2, &table), LatticeError::NotFinite(5));
     }
 
     proptest! {
         #[test]
         fn a_range_of_channels_is_that_part_of_all(
-            begin in 0usize..40, end in 0usize..40, n in 0usize..20,
+            begin in 0usize..=40, end in 0usize..=40, n in 0usize..20,
         ) {
             let lattice = random(3, 40, 7);
             let range = begin.min(end)..begin.max(end);

@@ -1,6 +1,9 @@
 //! What a caller can ask of a sampler.
 
+use std::path::Path;
+
 use formats::FormatError;
+use formats::model_card::ModelCard;
 
 use super::SamplerError;
 
@@ -74,7 +77,7 @@ named! {
 named! {
     /// Where farthest point sampling begins.
     pub enum FpsStart: "start of farthest point sampling" {
-        /// At the point farthest from the centroid, so that the result does
+        /// At the point farthest from the mean of all points, so that the result does
         /// not depend on the order of the points.
         #[default]
         Farthest = "farthest",
@@ -156,6 +159,26 @@ impl Default for SamplerSpec {
 }
 
 impl SamplerSpec {
+    /// The sampler that the model at `path` was trained behind, by its `card`.
+    ///
+    /// # Errors
+    /// A card that names no sampler of ours.
+    pub fn as_trained(path: &Path, card: &ModelCard) -> Result<Self, FormatError> {
+        let bad = |key: &str| {
+            let part = format!("metadata `{key}`");
+            move |cause: FormatError| FormatError::malformed(path, part, cause)
+        };
+        let mut spec = Self::default();
+        if let Some(kind) = &card.sampler {
+            spec.kind = kind.parse().map_err(bad("sampler"))?;
+        }
+        if let Some(start) = &card.fps_start {
+            spec.fps_start = start.parse().map_err(bad("fps_start"))?;
+        }
+        spec.points = card.points.unwrap_or(spec.points);
+        Ok(spec)
+    }
+
     /// That the specification can be met.
     ///
     /// # Errors

@@ -2,8 +2,9 @@
 //!
 //! One file per question asked: [`speed`] of building and tracing, [`trade`]
 //! of speed against accuracy, which [`builders`] pays when, the share of each
-//! stage of the [`pipeline`], how [`peers`] compare, and what a Raspberry Pi
-//! would take ([`pi_model`]).
+//! stage of the [`pipeline`], and how [`peers`] compare. [`infer`] is about
+//! classifying and sampling, [`pi_model`] about both on a Raspberry Pi, the
+//! others about scanning.
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
@@ -15,6 +16,7 @@ mod accuracy;
 mod bins;
 mod builders;
 mod clock;
+mod infer;
 mod kernel;
 mod lanes;
 mod machine;
@@ -29,6 +31,7 @@ mod subject;
 mod table;
 mod to_disk;
 mod trade;
+mod venv;
 
 /// What to measure.
 #[derive(Args, Debug)]
@@ -41,7 +44,16 @@ pub struct BenchArgs {
 enum Benchmark {
     /// Measure the simulator: building, casting, the whole way to disk.
     Sim(SimArgs),
-    /// Model infer-cpu on a Raspberry Pi 5 without having one.
+    /// Measure the classifier and the sampler against other engines, in turns.
+    ///
+    /// The others are Python packages, installed from PyPI under `target/peers`,
+    /// and Rust crates, built there. Who cannot be had is skipped with a
+    /// message; who does not give what the weights do is not timed.
+    Infer(infer::InferArgs),
+    /// Model the classifier on a Raspberry Pi 5 without having one.
+    ///
+    /// Its inner loops, as compiled, go through llvm-mca; what is outside them
+    /// is counted under QEMU; memory and threads are reckoned.
     PiModel(pi_model::PiModelArgs),
 }
 
@@ -102,12 +114,13 @@ struct Report {
 /// If no mesh can be read, an adapter fails or the report cannot be written.
 pub fn run(args: &BenchArgs) -> Result<()> {
     match &args.what {
-        Benchmark::Sim(args) => run_sim(args),
+        Benchmark::Sim(args) => sim(args),
+        Benchmark::Infer(args) => infer::run(args),
         Benchmark::PiModel(args) => pi_model::run(args),
     }
 }
 
-fn run_sim(args: &SimArgs) -> Result<()> {
+fn sim(args: &SimArgs) -> Result<()> {
     let request: Option<AdapterRequest> = match &args.adapter {
         Some(name) => Some(name.parse()?),
         None => None,
