@@ -26,6 +26,13 @@ mod tabulate;
 mod team;
 mod votes;
 
+/// How a team of threads shares out a cloud, for models of its speed.
+pub mod sharing {
+    pub use crate::engine::{
+        BLOCK, GROUP, RUN_BLOCKS, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK, folding_pays,
+    };
+}
+
 pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};
 pub use choose::choose;
 pub use classifier::Classifier;

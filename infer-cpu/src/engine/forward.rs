@@ -13,8 +13,9 @@ use crate::precision::{Format, Matrix};
 use crate::team::{Team, Work};
 
 /// The feature transform is multiplied into the layer after it when it takes
-/// fewer products to do so.
-const fn folding_pays(n: usize, outputs: usize) -> bool {
+/// fewer products to do so: for `n` points and a layer of so many `outputs`.
+#[must_use]
+pub const fn folding_pays(n: usize, outputs: usize) -> bool {
     n > outputs
 }
 

@@ -23,21 +23,22 @@ mod chunks;
 mod forward;
 mod route;
 
-pub use forward::Memory;
+pub use forward::{Memory, folding_pays};
 
 /// Points of a block: whole tiles of every kernel, and few enough that their
 /// features stay in a first-level cache.
-const BLOCK: usize = 48;
+pub const BLOCK: usize = 48;
 /// Blocks whose features are kept: 1,056 points, 540 KiB for 128 features.
-const RUN_BLOCKS: usize = 22;
+pub const RUN_BLOCKS: usize = 22;
 /// Output channels of the last layer that a thread pools at a time.
-const GROUP: usize = 128;
+pub const GROUP: usize = 128;
 /// Blocks of outputs (64 each) of a vector layer that a thread does at a time.
-const VECTOR_CHUNK: usize = 2;
+pub const VECTOR_CHUNK: usize = 2;
 /// Outputs of a block of a vector layer.
-const VECTOR_BLOCK: usize = Columns::<f32>::BLOCK;
+pub const VECTOR_BLOCK: usize = Columns::<f32>::BLOCK;
 /// A vector layer of fewer products than this is not worth sharing out.
-const SMALL_VECTOR: usize = 1 << 15;
+pub const SMALL_VECTOR: usize = 1 << 15;
+
 /// What is taken through which layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pass {

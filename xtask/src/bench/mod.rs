@@ -3,7 +3,8 @@
 //! One file per question asked: [`speed`] of building and tracing, [`trade`]
 //! of speed against accuracy, which [`builders`] pays when, the share of each
 //! stage of the [`pipeline`], and how [`peers`] compare. [`infer`] is about
-//! classifying and sampling, the others about scanning.
+//! classifying and sampling, [`pi_model`] about both on a Raspberry Pi, the
+//! others about scanning.
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
@@ -21,6 +22,7 @@ mod lanes;
 mod machine;
 mod moller_trumbore;
 mod peers;
+mod pi_model;
 mod pipeline;
 mod scenes;
 mod shot;
@@ -48,6 +50,11 @@ enum Benchmark {
     /// and Rust crates, built there. Who cannot be had is skipped with a
     /// message; who does not give what the weights do is not timed.
     Infer(infer::InferArgs),
+    /// Model the classifier on a Raspberry Pi 5 without having one.
+    ///
+    /// Its inner loops, as compiled, go through llvm-mca; what is outside them
+    /// is counted under QEMU; memory and threads are reckoned.
+    PiModel(pi_model::PiModelArgs),
 }
 
 #[derive(Args, Debug)]
@@ -109,6 +116,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     match &args.what {
         Benchmark::Sim(args) => sim(args),
         Benchmark::Infer(args) => infer::run(args),
+        Benchmark::PiModel(args) => pi_model::run(args),
     }
 }
 

@@ -6,7 +6,7 @@ use crate::{Outcome, pi_target, workspace};
 use anyhow::{Context, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 /// What the binary may weigh at most, so that it suits the smallest boards.
 const MOST_BYTES: u64 = 4 << 20;
@@ -22,7 +22,7 @@ pub struct Args {
 /// Builds, checks and, where QEMU is there, tries the binary.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     pi_target::need_standard_library()?;
-    let built = build(&mut pi_target::cargo(&BUILD))?;
+    let built = build(&[])?;
     let binary = match &args.out {
         Some(out) => copy(&built, out)?,
         None => built.as_path(),
@@ -51,17 +51,17 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Cargo's words for the binary, without the target.
-const BUILD: [&str; 7] =
-    ["build", "--package", "infer-cpu", "--bin", "infer-cpu", "--profile", "pi"];
-
-/// Runs Cargo and returns where it put the executable.
+/// Builds infer-cpu for the Pi, with these words for rustc besides, and returns
+/// where Cargo put it.
 ///
 /// # Errors
-/// If it fails; it has said why on the terminal.
-pub fn build(cargo: &mut Command) -> anyhow::Result<PathBuf> {
-    cargo.args(["--message-format", "json-render-diagnostics"]).stderr(Stdio::inherit());
-    executable(&workspace::output(cargo)?).context("Cargo names no executable")
+/// If it fails; Cargo has said why on the terminal.
+pub fn build(for_rustc: &[&str]) -> anyhow::Result<PathBuf> {
+    let words = ["rustc", "--package", "infer-cpu", "--bin", "infer-cpu", "--profile", "pi"];
+    let mut cargo = pi_target::cargo(&words);
+    cargo.args(["--message-format", "json-render-diagnostics", "--"]).args(for_rustc);
+    let messages = workspace::output(cargo.stderr(Stdio::inherit()))?;
+    executable(&messages).context("Cargo names no executable")
 }
 
 /// The last executable that Cargo's messages name, one JSON object a line.

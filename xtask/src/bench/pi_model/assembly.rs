@@ -1,0 +1,187 @@
+//! Functions and their loops in an assembly listing of LLVM, for ELF.
+
+/// One function of a listing.
+#[derive(Debug)]
+pub struct Function<'a> {
+    /// Its symbol, mangled.
+    pub symbol: &'a str,
+    /// Labels and instructions; directives and comments are left out.
+    lines: Vec<Line<'a>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Line<'a> {
+    Label(&'a str),
+    Instruction(&'a str),
+}
+
+/// The functions of `listing`.
+pub fn functions(listing: &str) -> impl Iterator<Item = Function<'_>> {
+    // `.type SYMBOL,@function`, `SYMBOL:`, the body, `.size SYMBOL, …`.
+    let mut lines = listing.lines();
+    std::iter::from_fn(move || {
+        let symbol = lines.find_map(|line| {
+            line.trim().strip_prefix(".type")?.trim().strip_suffix(",@function")
+        })?;
+        let head = |line: &&str| line.strip_suffix(':').is_some_and(|label| label == symbol);
+        lines.by_ref().find(head)?;
+        let body = lines.by_ref().take_while(|line| !line.trim_start().starts_with(".size"));
+        Some(Function { symbol, lines: body.filter_map(line).collect() })
+    })
+}
+
+/// What one line of a body says, if anything.
+fn line(text: &str) -> Option<Line<'_>> {
+    let text = text.split("//").next().unwrap_or_default().trim();
+    if let Some(label) = text.strip_suffix(':') {
+        return Some(Line::Label(label));
+    }
+    let silent = text.is_empty() || text.starts_with('.') || text.starts_with("/*");
+    (!silent).then_some(Line::Instruction(text))
+}
+
+impl<'a> Function<'a> {
+    /// The loops that hold no other loop, by their instructions. A loop is
+    /// what lies between a label and the last branch back to it.
+    pub fn innermost_loops(&self) -> Vec<Loop<'a>> {
+        let mut ranges: Vec<(usize, usize)> = Vec::new();
+        for (end, line) in self.lines.iter().enumerate() {
+            let Line::Instruction(text) = line else { continue };
+            let Some(target) = branch_target(text) else { continue };
+            let Some(start) = self.lines[..end].iter().position(|l| *l == Line::Label(target))
+            else {
+                continue;
+            };
+            match ranges.iter_mut().find(|range| range.0 == start) {
+                Some(range) => range.1 = end,
+                None => ranges.push((start, end)),
+            }
+        }
+        let inner = |&&(start, end): &&(usize, usize)| {
+            !ranges.iter().any(|&other| other != (start, end) && start <= other.0 && other.1 <= end)
+        };
+        let lines = |&(start, end): &(usize, usize)| Loop(self.lines[start..=end].to_vec());
+        ranges.iter().filter(inner).map(lines).collect()
+    }
+}
+
+/// Where a branch goes; `None` for other instructions, calls among them.
+fn branch_target(instruction: &str) -> Option<&str> {
+    let (mnemonic, operands) = instruction.split_once(char::is_whitespace)?;
+    let branches = matches!(mnemonic, "b" | "cbz" | "cbnz" | "tbz" | "tbnz");
+    (branches || mnemonic.starts_with("b.")).then(|| operands.rsplit(',').next())?.map(str::trim)
+}
+
+/// A loop, from its label to the branch back.
+#[derive(Clone, Debug)]
+pub struct Loop<'a>(Vec<Line<'a>>);
+
+impl<'a> Loop<'a> {
+    /// Its instructions.
+    pub fn instructions(&self) -> impl Iterator<Item = &'a str> {
+        self.0.iter().filter_map(|line| match line {
+            Line::Instruction(text) => Some(*text),
+            Line::Label(_) => None,
+        })
+    }
+
+    /// How many of its instructions have this mnemonic and, in their first
+    /// operand, vectors of this arrangement (`4s`).
+    pub fn count(&self, mnemonic: &str, arrangement: &str) -> usize {
+        let counts = |text: &&str| {
+            let Some((name, operands)) = text.split_once(char::is_whitespace) else { return false };
+            let first = operands.split(',').next().unwrap_or_default().trim();
+            name == mnemonic && first.split_once('.').is_some_and(|(_, lanes)| lanes == arrangement)
+        };
+        self.instructions().filter(counts).count()
+    }
+
+    /// Whether any of its instructions has this mnemonic.
+    pub fn has(&self, mnemonic: &str) -> bool {
+        self.instructions().any(|text| text.split_whitespace().next() == Some(mnemonic))
+    }
+
+    /// Its text, for an assembler.
+    pub fn text(&self) -> String {
+        let lines = self.0.iter().map(|line| match line {
+            Line::Label(label) => format!("{label}:\n"),
+            Line::Instruction(text) => format!("\t{text}\n"),
+        });
+        lines.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LISTING: &str = "\t.text
+	.type	_ZN4tileE,@function
+_ZN4tileE:
+.Lfunc_begin0:
+	.cfi_startproc
+	cbz	x8, .LBB0_5
+	//APP
+	// x12
+	//NO_APP
+.LBB0_1:
+	mov	x9, xzr
+.LBB0_2:
+	ldr	q0, [x1], #16
+	cbz	x4, .LBB0_3
+	prfm	pldl1keep, [x4]
+.LBB0_3:
+	fmla	v2.4s, v0.4s, v1.s[0]	// a comment
+	fmla	v3.8h, v0.8h, v1.h[0]
+	cmp	x9, x8
+	b.lo	.LBB0_2
+	bl	_ZN4tileE
+	subs	x7, x7, #1
+	b.ne	.LBB0_1
+.LBB0_5:
+	ret
+.Lfunc_end0:
+	.size	_ZN4tileE, .Lfunc_end0-_ZN4tileE
+	.type	_ZN5otherE,@function
+_ZN5otherE:
+	ret
+	.size	_ZN5otherE, 4
+	.type	.L__unnamed_1,@object
+";
+
+    #[test]
+    fn finds_functions() {
+        let symbols: Vec<&str> = functions(LISTING).map(|function| function.symbol).collect();
+        assert_eq!(symbols, ["_ZN4tileE", "_ZN5otherE"]);
+    }
+
+    #[test]
+    fn finds_the_innermost_loop_by_its_branch_back() {
+        let tile = functions(LISTING).next().unwrap();
+        let loops = tile.innermost_loops();
+        assert_eq!(loops.len(), 1);
+        let text = loops[0].text();
+        assert!(text.starts_with(".LBB0_2:\n\tldr\tq0"), "{text}");
+        assert!(text.ends_with("\tb.lo\t.LBB0_2\n"), "{text}");
+        assert_eq!(loops[0].instructions().count(), 7);
+    }
+
+    #[test]
+    fn counts_instructions_by_their_lanes() {
+        let tile = functions(LISTING).next().unwrap();
+        let inner = &tile.innermost_loops()[0];
+        assert_eq!(inner.count("fmla", "4s"), 1);
+        assert_eq!(inner.count("fmla", "8h"), 1);
+        assert_eq!(inner.count("fmla", "2d"), 0);
+        assert!(inner.has("prfm") && !inner.has("subs"));
+    }
+
+    #[test]
+    fn branches_name_their_target_last() {
+        assert_eq!(branch_target("tbnz\tw3, #0, .LBB1_7"), Some(".LBB1_7"));
+        assert_eq!(branch_target("b\t.LBB1_7"), Some(".LBB1_7"));
+        assert_eq!(branch_target("bl\tmemcpy"), None);
+        assert_eq!(branch_target("bsl\tv0.16b, v1.16b, v2.16b"), None);
+        assert_eq!(branch_target("ret"), None);
+    }
+}

@@ -1,0 +1,204 @@
+//! The inner loop of each NEON kernel, as compiled, and what it costs.
+
+use super::assembly::{Function, Loop, functions};
+use super::mca::{Cost, Mca};
+use super::number::Number;
+use anyhow::{Context, ensure};
+use serde::Serialize;
+
+/// FMA and dot-product pipes of a Cortex-A76.
+const PIPES: usize = 2;
+
+/// One round of a kernel's inner loop.
+#[derive(Clone, Debug, Serialize)]
+pub struct Kernel {
+    /// The function's name.
+    pub name: String,
+    /// Products of a round; of farthest point sampling, points.
+    pub work: usize,
+    /// Cycles of a round, by llvm-mca.
+    pub cycles: f64,
+    /// Instructions of a round.
+    pub instructions: f64,
+    /// The core's most products a cycle in the format computed in.
+    pub peak: Option<usize>,
+}
+
+impl Kernel {
+    /// Products a cycle over the core's most.
+    pub fn share_of_peak(&self) -> Option<f64> {
+        self.peak.map(|peak| self.work as f64 / self.cycles / peak as f64)
+    }
+}
+
+/// A register tile.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    /// Its loop over inputs.
+    pub kernel: Kernel,
+    /// Rows of the tile.
+    pub rows: usize,
+    /// Output channels of the tile.
+    pub channels: usize,
+    /// Inputs of a round.
+    pub inputs: usize,
+}
+
+/// All kernels that the model of the Raspberry Pi knows.
+pub struct Kernels {
+    /// In the order of [`Number::ALL`].
+    tiles: Vec<Tile>,
+    /// In the order of [`Number::ALL`]; a round is one input of one block.
+    gemv: Vec<Kernel>,
+    /// A step of farthest point sampling.
+    pub farthest: Kernel,
+}
+
+impl Kernels {
+    /// Finds the kernels in an assembly listing and has their loops analysed.
+    ///
+    /// # Errors
+    /// A kernel that is not there, or has no such loop.
+    pub fn of(listing: &str, mca: &Mca) -> anyhow::Result<Self> {
+        let functions: Vec<(String, Function<'_>)> = functions(listing)
+            .map(|function| (demangled(function.symbol), function))
+            .filter(|(name, _)| name.contains("kernel::neon"))
+            .collect();
+        let tiles = Number::ALL.map(|number| tile(&functions, number, mca));
+        let gemv = Number::ALL.map(|number| {
+            let products = |inner: &Loop<'_>| match number.widens(inner) {
+                true => 4 * inner.count("fmla", "4s"),
+                false => 0,
+            };
+            let kernel = slowest(&functions, "gemv::gemv", products, mca)?;
+            let name = format!("gemv, {number:?} weights").to_lowercase();
+            Ok(Kernel { name, peak: None, ..kernel })
+        });
+        // FMINNM lowers the distances of four points.
+        let points = |inner: &Loop<'_>| 4 * inner.count("fminnm", "4s");
+        let farthest = slowest(&functions, "fps::step", points, mca)?;
+        Ok(Self {
+            tiles: tiles.into_iter().collect::<anyhow::Result<_>>()?,
+            gemv: gemv.into_iter().collect::<anyhow::Result<_>>()?,
+            farthest: Kernel { name: "farthest point step".into(), peak: None, ..farthest },
+        })
+    }
+
+    /// The tile that multiplies in a format.
+    pub fn tile(&self, number: Number) -> &Tile {
+        &self.tiles[number as usize]
+    }
+
+    /// The matrix-vector product whose weights are stored in a format.
+    pub fn gemv(&self, number: Number) -> &Kernel {
+        &self.gemv[number as usize]
+    }
+
+    /// Every loop.
+    pub fn all(&self) -> impl Iterator<Item = &Kernel> {
+        let tiles = self.tiles.iter().map(|tile| &tile.kernel);
+        tiles.chain(&self.gemv).chain([&self.farthest])
+    }
+}
+
+/// A symbol as Rust writes it, without hashes.
+pub fn demangled(symbol: &str) -> String {
+    format!("{:#}", rustc_demangle::demangle(symbol))
+}
+
+fn tile(functions: &[(String, Function<'_>)], number: Number, mca: &Mca) -> anyhow::Result<Tile> {
+    let (mnemonic, arrangement, products) = number.multiplier();
+    let prefix = number.tile_prefix();
+    let work = |inner: &Loop<'_>| products * inner.count(mnemonic, arrangement);
+    let kernel = slowest(functions, prefix, work, mca)?;
+    let (rows, channels) = shape(&kernel.name, prefix)
+        .with_context(|| format!("`{}` does not say its rows x channels", kernel.name))?;
+    let name = format!("{prefix}{rows}x{channels}");
+    ensure!(
+        kernel.work.is_multiple_of(rows * channels),
+        "the inner loop of {name} has {} products, which are no whole inputs",
+        kernel.work
+    );
+    let inputs = kernel.work / (rows * channels);
+    let kernel = Kernel { name, peak: Some(PIPES * products), ..kernel };
+    Ok(Tile { kernel, rows, channels, inputs })
+}
+
+/// (8, 16) of a path that ends in `tile_f16_8x16`, perhaps with generics.
+fn shape(name: &str, prefix: &str) -> Option<(usize, usize)> {
+    let (_, shape) = name.split_once(prefix)?;
+    let (rows, channels) = shape.split_once('x')?;
+    let end = channels.find(|c: char| !c.is_ascii_digit()).unwrap_or(channels.len());
+    Some((rows.parse().ok()?, channels[..end].parse().ok()?))
+}
+
+/// Of the loops in functions whose name contains `part`, those of most `work`;
+/// of these, which differ in what follows the loop, the slowest.
+fn slowest(
+    functions: &[(String, Function<'_>)],
+    part: &str,
+    work: impl Fn(&Loop<'_>) -> usize,
+    mca: &Mca,
+) -> anyhow::Result<Kernel> {
+    let named = functions.iter().filter(|(name, _)| name.contains(part));
+    let loops: Vec<(&str, Loop<'_>, usize)> = named
+        .flat_map(|(name, function)| {
+            let loops = function.innermost_loops().into_iter();
+            loops.map(|inner| (name.as_str(), work(&inner), inner))
+        })
+        .map(|(name, work, inner)| (name, inner, work))
+        .collect();
+    let most = loops.iter().map(|(.., work)| *work).max().unwrap_or(0);
+    ensure!(most > 0, "no inner loop of `{part}` is among the binary's NEON kernels");
+    let mut slowest: Option<Kernel> = None;
+    for (name, inner, work) in loops.into_iter().filter(|(.., work)| *work == most) {
+        let Cost { cycles, instructions } =
+            mca.cost(&inner.text()).with_context(|| format!("the inner loop of {name}"))?;
+        if slowest.as_ref().is_none_or(|kernel| cycles > kernel.cycles) {
+            let name = name.to_owned();
+            slowest = Some(Kernel { name, work, cycles, instructions, peak: None });
+        }
+    }
+    slowest.context("invariant: one loop has most work")
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// Kernels of round figures: tiles of 8 rows by 8 channels, and a cycle
+    /// and two instructions for each input of a tile, each input of a block
+    /// and each four points.
+    pub fn round_kernels() -> Kernels {
+        let kernel =
+            |work| Kernel { name: String::new(), work, cycles: 1.0, instructions: 2.0, peak: None };
+        let tile = || Tile { kernel: kernel(64), rows: 8, channels: 8, inputs: 1 };
+        Kernels {
+            tiles: Number::ALL.map(|_| tile()).to_vec(),
+            gemv: Number::ALL.map(|_| kernel(64)).to_vec(),
+            farthest: kernel(4),
+        }
+    }
+
+    #[test]
+    fn a_tile_s_name_says_its_shape() {
+        assert_eq!(shape("a::kernel::neon_f16::tile_f16_8x16", "tile_f16_"), Some((8, 16)));
+        assert_eq!(shape("tile_f32_12x8::<Max, 8>", "tile_f32_"), Some((12, 8)));
+        assert_eq!(shape("tile_f32_8", "tile_f32_"), None);
+        assert_eq!(shape("gemv", "tile_f32_"), None);
+    }
+
+    #[test]
+    fn symbols_lose_their_hashes() {
+        let symbol = "_ZN9infer_cpu6kernel4neon12tile_f32_8x817h8fbc176e95428d3bE";
+        assert_eq!(demangled(symbol), "infer_cpu::kernel::neon::tile_f32_8x8");
+        assert_eq!(demangled("memcpy"), "memcpy");
+    }
+
+    #[test]
+    fn shares_of_peak_are_of_products_a_cycle() {
+        let name = String::new();
+        let kernel = Kernel { name, work: 256, cycles: 40.0, instructions: 80.0, peak: Some(8) };
+        assert_eq!(kernel.share_of_peak(), Some(0.8));
+    }
+}

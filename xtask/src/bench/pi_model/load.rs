@@ -1,0 +1,191 @@
+//! What a stage of infer-cpu asks of the machine, as its threads share it out.
+
+use super::kernels::Kernels;
+use super::number::Number;
+use super::plan::{Product, Stage};
+use infer_cpu::kernel::WIDTH_STEP;
+use infer_cpu::sharing::{BLOCK, GROUP, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK};
+
+/// What a stage asks of the machine in its inner loops.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Cycles of all threads together.
+    pub cycles: f64,
+    /// Cycles until the last thread is done.
+    pub span: f64,
+    /// Instructions of all threads together.
+    pub instructions: f64,
+    /// Bytes of weights, each read once from main memory.
+    pub bytes: f64,
+}
+
+/// What `stage` asks for when `threads` share it out as infer-cpu does.
+pub fn load(stage: &Stage, kernels: &Kernels, threads: usize) -> Load {
+    match stage {
+        Stage::Hidden { rows, products } => {
+            let blocks = (0..*rows).step_by(BLOCK).map(|first| BLOCK.min(rows - first));
+            let block = |rows: usize| products.iter().map(|p| tiles(p, rows, kernels)).sum();
+            let mut load = shared(blocks.map(block), threads);
+            load.bytes = products.iter().map(weight_bytes).sum();
+            load
+        }
+        Stage::Pool { rows, product } => {
+            let width = product.layer.outputs.next_multiple_of(WIDTH_STEP);
+            let whole = tiles(product, *rows, kernels);
+            let group = |first: usize| whole * (GROUP.min(width - first) as f64 / width as f64);
+            let mut load = shared((0..width).step_by(GROUP).map(group), threads);
+            load.bytes = weight_bytes(product);
+            load
+        }
+        Stage::Alone { rows, product } => {
+            let mut load = shared([tiles(product, *rows, kernels)], 1);
+            load.bytes = weight_bytes(product);
+            load
+        }
+        Stage::Vector { layer, stored } => {
+            let n_blocks = layer.outputs.div_ceil(VECTOR_BLOCK);
+            let kernel = kernels.gemv(*stored);
+            let rounds = layer.inputs as f64 * (VECTOR_BLOCK as f64 / kernel.work as f64);
+            let block =
+                Rounds { cycles: kernel.cycles, instructions: kernel.instructions } * rounds;
+            let chunks = (0..n_blocks).step_by(VECTOR_CHUNK);
+            let chunks = chunks.map(|first| block * VECTOR_CHUNK.min(n_blocks - first) as f64);
+            let is_small = layer.inputs * layer.outputs < SMALL_VECTOR;
+            let mut load = shared(chunks, if is_small { 1 } else { threads });
+            load.bytes = (layer.inputs * n_blocks * VECTOR_BLOCK * stored.bytes()) as f64;
+            load
+        }
+        Stage::Farthest { points, picks } => {
+            let kernel = &kernels.farthest;
+            // One pass a pick: the first is farthest from the centroid.
+            let rounds = (points * picks) as f64 / kernel.work as f64;
+            let rounds =
+                Rounds { cycles: kernel.cycles, instructions: kernel.instructions } * rounds;
+            shared([rounds], 1)
+        }
+    }
+}
+
+/// Some rounds of an inner loop.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rounds {
+    cycles: f64,
+    instructions: f64,
+}
+
+impl std::ops::Mul<f64> for Rounds {
+    type Output = Self;
+
+    fn mul(self, n: f64) -> Self {
+        Self { cycles: self.cycles * n, instructions: self.instructions * n }
+    }
+}
+
+impl std::iter::Sum for Rounds {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |a, b| Self {
+            cycles: a.cycles + b.cycles,
+            instructions: a.instructions + b.instructions,
+        })
+    }
+}
+
+/// The rounds of taking `rows` through `product`, by whole tiles.
+fn tiles(product: &Product, rows: usize, kernels: &Kernels) -> Rounds {
+    let tile = kernels.tile(product.number);
+    let panels = product.layer.outputs.next_multiple_of(WIDTH_STEP) / tile.channels;
+    let n_tiles = rows.div_ceil(tile.rows) * panels;
+    let rounds = n_tiles * product.layer.inputs.div_ceil(tile.inputs);
+    let kernel = &tile.kernel;
+    Rounds { cycles: kernel.cycles, instructions: kernel.instructions } * rounds as f64
+}
+
+fn weight_bytes(product: &Product) -> f64 {
+    let width = product.layer.outputs.next_multiple_of(WIDTH_STEP);
+    (product.layer.inputs * width * product.number.bytes()) as f64
+}
+
+/// Chunks that threads claim one after the other, each whichever is free.
+fn shared(chunks: impl IntoIterator<Item = Rounds>, threads: usize) -> Load {
+    let mut load = Load::default();
+    let mut busy_until = vec![0.0; threads.max(1)];
+    for chunk in chunks {
+        load.cycles += chunk.cycles;
+        load.instructions += chunk.instructions;
+        let free = busy_until.iter_mut().min_by(|a: &&mut f64, b: &&mut f64| a.total_cmp(b));
+        free.into_iter().for_each(|until| *until += chunk.cycles);
+    }
+    load.span = busy_until.into_iter().fold(0.0, f64::max);
+    load
+}
+
+/// Instructions of the inner loops of tiles that compute in `number`.
+pub fn tile_instructions(stages: &[Stage], kernels: &Kernels, number: Number) -> f64 {
+    let of = |product: &Product, rows: usize| match product.number == number {
+        true => tiles(product, rows, kernels).instructions,
+        false => 0.0,
+    };
+    let stages = stages.iter().map(|stage| match stage {
+        Stage::Hidden { rows, products } => products.iter().map(|product| of(product, *rows)).sum(),
+        Stage::Pool { rows, product } | Stage::Alone { rows, product } => of(product, *rows),
+        _ => 0.0,
+    });
+    stages.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::kernels::tests::round_kernels;
+    use super::super::network::Layer;
+    use super::*;
+
+    fn product(inputs: usize, outputs: usize) -> Product {
+        Product { layer: Layer { inputs, outputs }, number: Number::F32 }
+    }
+
+    #[test]
+    fn one_block_of_points_keeps_one_thread_busy() {
+        let kernels = round_kernels();
+        let hidden = |rows| Stage::Hidden { rows, products: vec![product(64, 128)] };
+        // 6 tiles of 8 rows, 16 panels of 8 channels, 64 inputs.
+        let block = 6.0 * 16.0 * 64.0;
+        let one = load(&hidden(48), &kernels, 4);
+        assert_eq!((one.cycles, one.span), (block, block));
+        assert_eq!(one.bytes, 64.0 * 128.0 * 4.0);
+        let five = load(&hidden(5 * 48), &kernels, 4);
+        assert_eq!((five.cycles, five.span), (5.0 * block, 2.0 * block));
+    }
+
+    #[test]
+    fn tiles_are_whole() {
+        let kernels = round_kernels();
+        let alone = |rows, inputs| {
+            load(&Stage::Alone { rows, product: product(inputs, 9) }, &kernels, 4).cycles
+        };
+        // Nine channels are padded to 64, eight panels.
+        assert_eq!(alone(8, 4), 8.0 * 4.0);
+        assert_eq!(alone(9, 4), 2.0 * alone(8, 4));
+    }
+
+    #[test]
+    fn small_vectors_stay_on_one_thread() {
+        let kernels = round_kernels();
+        let vector = |outputs| {
+            let layer = Layer { inputs: 256, outputs };
+            load(&Stage::Vector { layer, stored: Number::F32 }, &kernels, 4)
+        };
+        assert_eq!(vector(40).span, vector(40).cycles);
+        assert_eq!(vector(4096).span * 4.0, vector(4096).cycles);
+        // One block of 64 is read for 40 outputs.
+        assert_eq!(vector(40).bytes, 256.0 * 64.0 * 4.0);
+    }
+
+    #[test]
+    fn instructions_are_told_apart_by_format() {
+        let kernels = round_kernels();
+        let stages = [Stage::Pool { rows: 8, product: product(4, 64) }];
+        let of = |number| tile_instructions(&stages, &kernels, number);
+        assert_eq!(of(Number::F32), 8.0 * 4.0 * 2.0);
+        assert_eq!(of(Number::I8), 0.0);
+    }
+}

@@ -1,0 +1,248 @@
+//! What infer-cpu does to classify one cloud, stage by stage.
+
+use super::network::{Layer, Net, Network};
+use super::number::Number;
+use infer_cpu::Precision;
+use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays};
+use serde::Serialize;
+
+/// Where the points that a network sees come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampler {
+    /// All points of the cloud.
+    All,
+    /// Farthest point sampling.
+    Fps,
+    /// A Critical Points Layer with a front end of its own.
+    Cpl,
+    /// A Critical Points Layer that pools the trunk of the coordinates' T-Net.
+    CplStn,
+}
+
+impl Sampler {
+    /// As `infer-cpu bench --sampler` takes it. No point twice: the network
+    /// would see it once in any case.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Fps => "fps",
+            Self::Cpl => "cpl:own:truncate",
+            Self::CplStn => "cpl:stn:truncate",
+        }
+    }
+}
+
+/// A layer as it is multiplied: point-wise, in a format.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Product {
+    /// The layer.
+    pub layer: Layer,
+    /// The format of its activations and weights.
+    pub number: Number,
+}
+
+/// Work between two points at which threads wait for each other.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stage {
+    /// Rows through some layers; threads share out blocks of rows.
+    Hidden { rows: usize, products: Vec<Product> },
+    /// Rows through a layer whose outputs are pooled; threads share out groups
+    /// of outputs.
+    Pool { rows: usize, product: Product },
+    /// Rows through a layer on one thread.
+    Alone { rows: usize, product: Product },
+    /// One vector through a layer.
+    Vector { layer: Layer, stored: Number },
+    /// Farthest point sampling, on one thread.
+    Farthest { points: usize, picks: usize },
+}
+
+impl Stage {
+    /// Multiplications with an addition, padding left out.
+    pub fn macs(&self) -> usize {
+        let of = |layer: &Layer| layer.inputs * layer.outputs;
+        match self {
+            Self::Hidden { rows, products } => {
+                rows * products.iter().map(|product| of(&product.layer)).sum::<usize>()
+            }
+            Self::Pool { rows, product } | Self::Alone { rows, product } => {
+                rows * of(&product.layer)
+            }
+            Self::Vector { layer, .. } => of(layer),
+            Self::Farthest { .. } => 0,
+        }
+    }
+}
+
+/// The stages of classifying a cloud of `from` points by `points` of them;
+/// `None` if the network lacks what the sampler pools.
+pub fn stages(
+    network: &Network,
+    sampler: Sampler,
+    (from, points): (usize, usize),
+    precision: Precision,
+) -> Option<Vec<Stage>> {
+    let formats = Formats::of(precision);
+    let mut stages = Vec::new();
+    match sampler {
+        Sampler::All => {}
+        Sampler::Fps => stages.push(Stage::Farthest { points: from, picks: points }),
+        Sampler::Cpl | Sampler::CplStn => {
+            let front = if sampler == Sampler::Cpl { &network.front } else { &network.stn };
+            formats.pass(&mut stages, from, &[], &front.convs)?;
+        }
+    }
+    if !network.stn.convs.is_empty() {
+        // A point that is critical for the cloud is so for what is kept of it.
+        if sampler != Sampler::CplStn {
+            formats.pass(&mut stages, points, &[], &network.stn.convs)?;
+        }
+        formats.vectors(&mut stages, &network.stn);
+    }
+    let Net { convs: trunk, fcs: _ } = &network.trunk;
+    let (stem, rest) = trunk.split_at_checked(network.transform_after)?;
+    if network.fstn.convs.is_empty() {
+        formats.pass(&mut stages, points, &[], trunk)?;
+    } else {
+        formats.pass(&mut stages, points, stem, &network.fstn.convs)?;
+        formats.vectors(&mut stages, &network.fstn);
+        let after = *rest.first()?;
+        let transform = Layer { inputs: after.inputs, outputs: after.inputs };
+        // Activations of int8 have no sign, and a transform's have.
+        if formats.points == Number::I8 || folding_pays(points, after.outputs) {
+            let product = Product { layer: after, number: Number::F32 };
+            stages.push(Stage::Alone { rows: transform.outputs, product });
+            formats.pass(&mut stages, points, stem, rest)?;
+        } else {
+            let through: Vec<Layer> = stem.iter().copied().chain([transform]).collect();
+            formats.pass(&mut stages, points, &through, rest)?;
+        }
+    }
+    formats.vectors(&mut stages, &network.trunk);
+    Some(stages)
+}
+
+/// What a precision computes and stores in.
+struct Formats {
+    /// Point-wise layers but for the first.
+    points: Number,
+    /// Weights of vector layers.
+    stored: Number,
+}
+
+impl Formats {
+    fn of(precision: Precision) -> Self {
+        let (points, stored) = match precision {
+            Precision::F32 => (Number::F32, Number::F32),
+            Precision::F32Fc16 => (Number::F32, Number::F16),
+            Precision::F16 => (Number::F16, Number::F16),
+            Precision::I8 => (Number::I8, Number::I8),
+        };
+        Self { points, stored }
+    }
+
+    /// `rows` points through `stem` and then `layers`, the last of which is
+    /// pooled, in runs of blocks; `None` without a last layer.
+    fn pass(
+        &self,
+        stages: &mut Vec<Stage>,
+        rows: usize,
+        stem: &[Layer],
+        layers: &[Layer],
+    ) -> Option<()> {
+        let (&last, hidden) = layers.split_last()?;
+        let layers = stem.iter().chain(hidden).enumerate();
+        let products: Vec<Product> = layers
+            .map(|(i, &layer)| Product {
+                layer,
+                // Coordinates are multiplied in fp32 whatever the precision.
+                number: if i == 0 { Number::F32 } else { self.points },
+            })
+            .collect();
+        let product = Product { layer: last, number: self.points };
+        for first in (0..rows).step_by(BLOCK * RUN_BLOCKS) {
+            let rows = (rows - first).min(BLOCK * RUN_BLOCKS);
+            stages.push(Stage::Hidden { rows, products: products.clone() });
+            stages.push(Stage::Pool { rows, product });
+        }
+        Some(())
+    }
+
+    fn vectors(&self, stages: &mut Vec<Stage>, net: &Net) {
+        let stored = self.stored;
+        stages.extend(net.fcs.iter().map(|&layer| Stage::Vector { layer, stored }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn net(convs: &[usize], fcs: &[usize]) -> Net {
+        let layers = |widths: &[usize]| {
+            widths.windows(2).map(|pair| Layer { inputs: pair[0], outputs: pair[1] }).collect()
+        };
+        Net { convs: layers(convs), fcs: layers(fcs) }
+    }
+
+    fn baseline() -> Network {
+        Network {
+            stn: net(&[3, 64, 128, 1024], &[1024, 512, 256, 9]),
+            fstn: net(&[64, 64, 128, 1024], &[1024, 512, 256, 4096]),
+            trunk: net(&[3, 64, 128, 1024], &[1024, 512, 256, 40]),
+            transform_after: 1,
+            front: net(&[3, 64, 128, 1024], &[]),
+        }
+    }
+
+    fn macs(sampler: Sampler, from: usize, points: usize) -> usize {
+        let stages = stages(&baseline(), sampler, (from, points), Precision::F32).unwrap();
+        stages.iter().map(Stage::macs).sum()
+    }
+
+    /// The network's own count: 426,368 a point (its 3x3 transform is folded,
+    /// which is another 9, and the first layer of the trunk is computed twice,
+    /// once for the T-Net of the features) and 3,027,200 of vector layers.
+    #[test]
+    fn products_are_those_of_the_network() {
+        assert_eq!(macs(Sampler::All, 64, 64), 64 * (426_368 + 192) + 3_027_200);
+        // Past 128 points the feature transform costs 64 x 64 x 128 once.
+        let folded = 1024 * (426_368 + 192 - 4096) + 64 * 64 * 128 + 3_027_200;
+        assert_eq!(macs(Sampler::All, 1024, 1024), folded);
+    }
+
+    #[test]
+    fn a_critical_points_layer_costs_its_front_end_or_nothing_twice() {
+        let all = macs(Sampler::All, 64, 64);
+        let front_end = 3 * 64 + 64 * 128 + 128 * 1024;
+        assert_eq!(macs(Sampler::Cpl, 1024, 64), all + 1024 * front_end);
+        assert_eq!(macs(Sampler::CplStn, 1024, 64), all + (1024 - 64) * front_end);
+        let mut plain = baseline();
+        plain.front = Net::default();
+        assert_eq!(stages(&plain, Sampler::Cpl, (1024, 64), Precision::F32), None);
+    }
+
+    #[test]
+    fn coordinates_stay_in_fp32_and_int8_folds_its_transform() {
+        let stages = stages(&baseline(), Sampler::All, (64, 64), Precision::I8).unwrap();
+        let numbers = stages.iter().filter_map(|stage| match stage {
+            Stage::Hidden { products, .. } => Some(products.iter().map(|p| p.number).collect()),
+            _ => None,
+        });
+        let numbers: Vec<Vec<Number>> = numbers.collect();
+        use Number::{F32, I8};
+        assert_eq!(numbers, [vec![F32, I8], vec![F32, I8, I8], vec![F32, I8]]);
+        assert!(stages.iter().any(|stage| matches!(stage, Stage::Alone { rows: 64, .. })));
+    }
+
+    #[test]
+    fn long_clouds_go_in_runs() {
+        let stages = stages(&baseline(), Sampler::All, (2048, 2048), Precision::F32).unwrap();
+        let rows = stages.iter().filter_map(|stage| match stage {
+            Stage::Pool { rows, .. } => Some(*rows),
+            _ => None,
+        });
+        assert_eq!(rows.collect::<Vec<_>>(), [1056, 992, 1056, 992, 1056, 992]);
+    }
+}
