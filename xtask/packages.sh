@@ -1,25 +1,49 @@
 #!/bin/sh
-# Installs what tests need beyond Rust: software Vulkan, and a C++ compiler for
-# the fuzz targets. Both the README and CI run this, through `cargo xtask test`.
+# Installs what tests need beyond Rust: software Vulkan, a C++ compiler for the
+# fuzz targets, and for the Raspberry Pi its target's standard library, an
+# emulator and a model of its core. Both the README and CI run this, through
+# `cargo xtask test`.
 set -eu
 
-packages="mesa-vulkan-drivers libvulkan1 g++"
+backported="mesa-vulkan-drivers libvulkan1"
+plain="g++ qemu-user"
+pi_target="aarch64-unknown-linux-musl"
+# The releases of LLVM whose llvm-mca knows Neoverse N1, the newest first.
+llvms="22 21 20 19"
 
 if command -v rustup >/dev/null 2>&1; then
     cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
     cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
+    rustup target list --installed | grep -qx "$pi_target" ||
+        rustup target add "$pi_target" ||
+        echo "Cannot fetch Rust's standard library for $pi_target:" \
+            "tests of the Raspberry Pi's code need it." >&2
+else
+    echo "No rustup here: install Rust's standard library for $pi_target yourself." >&2
 fi
 
-missing=""
-for package in $packages; do
-    dpkg -s "$package" >/dev/null 2>&1 || missing="$missing $package"
-done
+missing_of() {
+    for package in $1; do
+        dpkg -s "$package" >/dev/null 2>&1 || printf ' %s' "$package"
+    done
+}
+has_llvm_mca() {
+    for llvm in $llvms; do
+        ! command -v "llvm-mca-$llvm" >/dev/null 2>&1 || return 0
+    done
+    return 1
+}
+
+missing_backported="$(missing_of "$backported")"
+missing_plain="$(missing_of "$plain")"
 # Debian 12's own Mesa 22.3 traces at half the speed of its backport 25.0.
 case "$(dpkg-query -W -f '${Version}' mesa-vulkan-drivers 2>/dev/null || true)" in
-    22.3.*deb12*) missing="$missing mesa-vulkan-drivers libvulkan1" ;;
+    22.3.*deb12*) missing_backported=" $backported" ;;
 esac
+missing="$missing_backported$missing_plain"
+has_llvm_mca || missing="$missing llvm"
 if [ -z "$missing" ]; then
-    echo "All packages are there: $packages"
+    echo "All packages are there: $backported $plain llvm"
     exit 0
 fi
 if ! command -v apt-get >/dev/null 2>&1; then
@@ -44,5 +68,17 @@ if [ "${VERSION_CODENAME:-}" = bookworm ]; then
     release="-t bookworm-backports"
 fi
 $root apt-get update -qq
+if ! has_llvm_mca; then
+    for llvm in $llvms; do
+        if apt-cache show "llvm-$llvm" >/dev/null 2>&1; then
+            missing_plain="$missing_plain llvm-$llvm"
+            break
+        fi
+    done
+fi
+# The backport of qemu-user is left out: it cannot load plugins.
+install="$root apt-get install -y -qq --no-install-recommends"
 # shellcheck disable=SC2086
-$root apt-get install -y -qq --no-install-recommends $release $missing
+[ -z "$missing_plain" ] || $install $missing_plain
+# shellcheck disable=SC2086
+[ -z "$missing_backported" ] || $install $release $missing_backported

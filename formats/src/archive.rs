@@ -1,17 +1,17 @@
 //! NPZ archives: NumPy arrays under names, in a zip file.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek, Write};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use ndarray::{ArrayD, ArrayView, Dimension};
-use ndarray_npy::{ReadNpyExt, ReadableElement, WritableElement, WriteNpyError, WriteNpyExt};
-use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 
+use crate::decoding::invalid;
 use crate::error::FormatError;
-use crate::npy::{self, invalid};
+use crate::npy;
+use crate::npy_header::{self, Header};
+use crate::number::Number;
 
 /// An archive that is being written: uncompressed, and with the same bytes
 /// whenever and wherever it is written.
@@ -45,20 +45,18 @@ impl<W: Write + Seek> NpzWriter<W> {
         Ok(&mut self.zip)
     }
 
-    /// Writes the array `key`.
-    pub fn array<A, D>(&mut self, key: &str, array: ArrayView<'_, A, D>) -> io::Result<()>
-    where
-        A: WritableElement,
-        D: Dimension,
-    {
+    /// Writes the array `key`, of `n` elements in C order.
+    pub fn array<A: Number>(
+        &mut self,
+        key: &str,
+        shape: &[usize],
+        elements: impl ExactSizeIterator<Item = A>,
+    ) -> io::Result<()> {
         // The header of an array of ours takes at most 128 bytes.
-        let n_bytes = (size_of::<A>() * array.len()) as u64 + 128;
-        // `ndarray-npy` writes element by element; zip sums up each write.
+        let n_bytes = (size_of::<A>() * elements.len()) as u64 + 128;
+        // Elements are written one by one; zip sums up each write.
         let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
-        array.write_npy(&mut writer).map_err(|error| match error {
-            WriteNpyError::Io(error) => error,
-            other => io::Error::other(other),
-        })?;
+        npy::write_array(&mut writer, shape, elements)?;
         writer.flush()
     }
 
@@ -67,7 +65,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     pub fn text(&mut self, key: &str, lines: &[String]) -> io::Result<()> {
         // NumPy knows no text of width 0.
         let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0).max(1);
-        let header = npy::header_bytes(&format!("<U{width}"), &[lines.len()]);
+        let header = npy_header::header_bytes(&format!("<U{width}"), &[lines.len()]);
         let n_bytes = header.len() as u64 + (lines.len() * width * 4) as u64;
         let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
         writer.write_all(&header)?;
@@ -81,10 +79,10 @@ impl<W: Write + Seek> NpzWriter<W> {
 }
 
 /// An archive that is being read. Its errors name the file and the key.
-pub(crate) struct NpzReader {
+pub(crate) struct NpzReader<R: Read + Seek = BufReader<File>> {
     path: PathBuf,
     file_size: u64,
-    zip: ZipArchive<BufReader<File>>,
+    zip: ZipArchive<R>,
 }
 
 /// An array's shape and its elements in C order.
@@ -95,10 +93,17 @@ pub(crate) struct Values<A> {
 
 impl NpzReader {
     pub fn open(path: &Path) -> Result<Self, FormatError> {
-        let here = |source| FormatError::io(path, source);
-        let file = File::open(path).map_err(here)?;
-        let file_size = file.metadata().map_err(here)?.len();
-        let zip = ZipArchive::new(BufReader::new(file))
+        let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
+        Self::new(BufReader::new(file), path)
+    }
+}
+
+impl<R: Read + Seek> NpzReader<R> {
+    /// Reads an archive that its errors call `path`.
+    pub fn new(mut reader: R, path: &Path) -> Result<Self, FormatError> {
+        let file_size =
+            reader.seek(SeekFrom::End(0)).map_err(|source| FormatError::io(path, source))?;
+        let zip = ZipArchive::new(reader)
             .map_err(|cause| FormatError::malformed(path, "archive", cause))?;
         Ok(Self { path: path.to_path_buf(), file_size, zip })
     }
@@ -111,40 +116,51 @@ impl NpzReader {
         self.zip.index_for_name(&format!("{key}.npy")).is_some()
     }
 
+    /// The keys of all arrays, in the order of the archive.
+    pub fn keys(&self) -> Vec<String> {
+        let names = self.zip.file_names().filter_map(Result::ok);
+        names.filter_map(|name| name.strip_suffix(".npy").map(str::to_owned)).collect()
+    }
+
     /// The array `key`.
-    pub fn array<A: ReadableElement + Clone>(
-        &mut self,
-        key: &str,
-    ) -> Result<Values<A>, FormatError> {
+    pub fn array<A: Number>(&mut self, key: &str) -> Result<Values<A>, FormatError> {
         self.entry(key, |header, size, entry| {
             check_size(&header, size_of::<A>(), size)?;
-            let shape = header.shape;
-            let array = ArrayD::<A>::read_npy(Cursor::new(header.bytes).chain(entry));
-            let array = array.map_err(invalid)?;
-            let array = array.as_standard_layout().into_owned();
-            Ok(Values { shape, elements: array.into_raw_vec_and_offset().0 })
+            let elements = npy::read_elements(entry, &header)?;
+            Ok(Values { shape: header.shape, elements })
         })
     }
 
-    /// The array `key` of text.
+    /// The array `key` of text, of either kind that NumPy keeps without pickle:
+    /// letters (`<U`) or bytes (`S`).
     pub fn text(&mut self, key: &str) -> Result<Vec<String>, FormatError> {
         self.entry(key, |header, size, entry| {
-            let width = header.descr.strip_prefix("<U").and_then(|width| width.parse().ok());
-            let width: usize = width
-                .filter(|&width| width > 0 && header.shape.len() == 1)
-                .ok_or_else(|| invalid(format!("{} is no list of text", header.descr)))?;
-            let line_size = width.checked_mul(4).ok_or_else(|| invalid("lines without end"))?;
+            let no_text = || invalid(format!("{} is no list of text", header.descr));
+            let (kind, width) = header.descr.split_at_checked(2).ok_or_else(no_text)?;
+            let width: usize = width.parse().map_err(|_| no_text())?;
+            let (letter_size, decode): (usize, Decode) = match kind {
+                "<U" => (4, decode_letters),
+                "|S" => (1, decode_bytes),
+                _ => return Err(no_text()),
+            };
+            if width == 0 || header.shape.len() != 1 {
+                return Err(no_text());
+            }
+            let line_size = width.checked_mul(letter_size);
+            let line_size = line_size.ok_or_else(|| invalid("lines without end"))?;
             check_size(&header, line_size, size)?;
             let mut bytes = Vec::new();
             entry.read_to_end(&mut bytes)?;
-            bytes.chunks_exact(line_size).map(decode_line).collect()
+            bytes.chunks_exact(line_size).map(decode).collect()
         })
     }
 
-    fn entry<T>(
+    /// Hands the array `key` to `read`: its header, the bytes of its elements,
+    /// and a reader of these.
+    pub fn entry<T>(
         &mut self,
         key: &str,
-        read: impl FnOnce(npy::Header, u64, &mut ZipFile<'_, BufReader<File>>) -> io::Result<T>,
+        read: impl FnOnce(Header, u64, &mut dyn Read) -> io::Result<T>,
     ) -> Result<T, FormatError> {
         let Self { path, file_size, zip } = self;
         let here = |cause: String| FormatError::malformed(path, key, cause);
@@ -157,13 +173,23 @@ impl NpzReader {
         if entry.size() / 1032 > *file_size {
             return Err(here(format!("{} bytes in a file of {file_size}", entry.size())));
         }
-        let header = npy::read_header(&mut entry).map_err(|error| here(error.to_string()))?;
-        let size = entry.size().saturating_sub(header.bytes.len() as u64);
-        read(header, size, &mut entry).map_err(|error| here(error.to_string()))
+        let size = entry.size();
+        let header =
+            npy_header::read_header(&mut entry).map_err(|error| here(error.to_string()))?;
+        let size = size.saturating_sub(header.n_bytes as u64);
+        let value = read(header, size, &mut entry.by_ref().take(size));
+        let value = value.map_err(|error| here(error.to_string()))?;
+        // The checksum is compared when the entry's end is read.
+        match io::copy(&mut entry, &mut io::sink()) {
+            Ok(_) => Ok(value),
+            Err(error) => Err(here(error.to_string())),
+        }
     }
 }
 
-fn check_size(header: &npy::Header, element_size: usize, found: u64) -> io::Result<()> {
+type Decode = fn(&[u8]) -> io::Result<String>;
+
+fn check_size(header: &Header, element_size: usize, found: u64) -> io::Result<()> {
     let promised = header.n_elements().and_then(|n| n.checked_mul(element_size));
     if promised.is_some_and(|promised| promised as u64 == found) {
         return Ok(());
@@ -175,9 +201,14 @@ fn check_size(header: &npy::Header, element_size: usize, found: u64) -> io::Resu
     Err(invalid(cause))
 }
 
-fn decode_line(bytes: &[u8]) -> io::Result<String> {
+fn decode_letters(bytes: &[u8]) -> io::Result<String> {
     let letters = bytes.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes));
     let line: Option<String> = letters.map(char::from_u32).collect();
     let line = line.ok_or_else(|| invalid("text that is not Unicode"))?;
+    Ok(line.trim_end_matches('\0').to_owned())
+}
+
+fn decode_bytes(bytes: &[u8]) -> io::Result<String> {
+    let line = std::str::from_utf8(bytes).map_err(|_| invalid("text that is not UTF-8"))?;
     Ok(line.trim_end_matches('\0').to_owned())
 }

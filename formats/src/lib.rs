@@ -1,36 +1,63 @@
 //! The one crate that every other crate of Edgepuck shares: counter-based
 //! random numbers, scans, clouds and packed datasets, and atomic writes.
 //!
-//! Without features it holds what a program needs in memory. Feature `dataset`
-//! adds the files ([`scan_file`], [`packed`], [`yanx27`], [`atomic`]), feature
-//! `hdf5` ModelNet40's HDF5 layout (`modelnet_h5`), feature `weights` models
-//! (`weights`, `model_card`).
+//! Without features it holds what a program needs in memory. Features add files:
+//!
+//! | feature | what |
+//! | --- | --- |
+//! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY and KITTI's `.bin` |
+//! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` labelled sets too |
+//! | `cloud-files` | all of these |
+//! | `dataset` | scans, packed sets and yanx27's layout, written and read |
+//! | `weights` | models (`weights`) and what they say about themselves (`model_card`) |
+//! | `hdf5` | ModelNet40's HDF5 layout |
+//!
+//! None of them needs a C compiler for its target.
+
+#![cfg_attr(
+    not(all(feature = "dataset", feature = "cloud-files")),
+    allow(dead_code, reason = "formats that are left out leave helpers that others share")
+)]
 
 pub mod cloud;
+#[cfg(feature = "files")]
+pub mod cloud_file;
 pub mod error;
 pub mod hash;
 pub mod rng;
 pub mod scan;
 pub mod split;
 
-#[cfg(feature = "dataset")]
+#[cfg(feature = "npz")]
 mod archive;
-#[cfg(any(feature = "dataset", feature = "weights"))]
+#[cfg(feature = "files")]
 pub mod atomic;
 #[cfg(feature = "dataset")]
 pub mod csv;
+#[cfg(feature = "files")]
+mod decoding;
+#[cfg(feature = "npz")]
+pub mod labelled;
 #[cfg(feature = "weights")]
 pub mod model_card;
 #[cfg(feature = "hdf5")]
 pub mod modelnet_h5;
-#[cfg(feature = "dataset")]
+#[cfg(feature = "files")]
 mod npy;
+#[cfg(feature = "files")]
+mod npy_header;
 #[cfg(feature = "dataset")]
 pub mod npz;
+#[cfg(feature = "files")]
+mod number;
 #[cfg(feature = "dataset")]
 pub mod packed;
 #[cfg(feature = "dataset")]
 pub mod ply;
+#[cfg(feature = "files")]
+mod python_literal;
+#[cfg(feature = "files")]
+mod records;
 #[cfg(feature = "dataset")]
 pub mod scan_file;
 #[cfg(feature = "weights")]

@@ -18,6 +18,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::FormatError;
+use crate::weights::WeightsFile;
 
 /// A model's remarks about itself. See the module for the keys.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,6 +108,14 @@ impl Default for ModelCard {
 }
 
 impl ModelCard {
+    /// Reads the card of the model file at `path`, and none of its weights.
+    ///
+    /// # Errors
+    /// A file that is no safetensors; as [`ModelCard::from_metadata`].
+    pub fn read(path: &Path) -> Result<Self, FormatError> {
+        Self::from_metadata(path, &WeightsFile::open(path)?.metadata())
+    }
+
     /// Interprets `metadata` of the model file at `path`. Keys of other names
     /// are passed over.
     ///

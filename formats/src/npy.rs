@@ -1,154 +1,127 @@
-//! NumPy's array header, for what `ndarray-npy` leaves open: arrays of text,
-//! arrays that are streamed, and headers that promise more than the file holds.
-//!
-//! Format: NumPy enhancement proposal 1, `numpy.lib.format`.
+//! NumPy's array files: the elements behind the header.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 
-use py_literal::Value;
+use crate::decoding::invalid;
+use crate::npy_header::{Header, header_ending_in};
+use crate::number::{Number, NumberType};
+use crate::records;
 
-const MAGIC: &[u8] = b"\x93NUMPY";
-/// Data begins at a multiple of this.
-const ALIGNMENT: usize = 64;
-/// No header of an array of ours comes near it; NumPy itself refuses to parse
-/// more than 10,000 bytes.
-const LONGEST_HEADER: u64 = 1 << 20;
-
-/// What an array's header says.
-pub(crate) struct Header {
-    /// The type of an element, as in `<f4`; empty for a record.
-    pub descr: String,
-    /// The size along each axis.
-    pub shape: Vec<usize>,
-    /// The header itself, from the magic string to the data.
-    pub bytes: Vec<u8>,
+/// How NumPy calls what [`write_array`] writes.
+fn descr(number: NumberType) -> &'static str {
+    match number {
+        NumberType::I8 => "|i1",
+        NumberType::U8 => "|u1",
+        NumberType::I16 => "<i2",
+        NumberType::U16 => "<u2",
+        NumberType::I32 => "<i4",
+        NumberType::U32 => "<u4",
+        NumberType::I64 => "<i8",
+        NumberType::U64 => "<u8",
+        NumberType::F16 => "<f2",
+        NumberType::F32 => "<f4",
+        NumberType::F64 => "<f8",
+    }
 }
 
-impl Header {
-    /// How many elements the header promises, if that many can be counted.
-    pub fn n_elements(&self) -> Option<usize> {
-        // A zero makes the product 0 whatever the others are.
-        if self.shape.contains(&0) {
-            return Some(0);
+/// Writes a whole array, of `elements` in C order.
+pub(crate) fn write_array<A: Number>(
+    writer: &mut impl Write,
+    shape: &[usize],
+    elements: impl IntoIterator<Item = A>,
+) -> io::Result<()> {
+    // The hashes of datasets depend on this brace, which NumPy itself would set
+    // apart by a comma.
+    writer.write_all(&header_ending_in("}", descr(A::TYPE), shape))?;
+    elements
+        .into_iter()
+        .try_for_each(|element| writer.write_all(element.to_little_endian().as_ref()))
+}
+
+/// Reads the elements of a whole array in C order, whichever order the file
+/// has them in. They must be of the type asked for.
+pub(crate) fn read_elements<A: Number>(
+    reader: &mut (impl Read + ?Sized),
+    header: &Header,
+) -> io::Result<Vec<A>> {
+    let order = match header.number() {
+        Some((number, order)) if number == A::TYPE => order,
+        _ => {
+            let expected = descr(A::TYPE);
+            return Err(invalid(format!("elements are {}, not {expected}", header.descr)));
         }
-        self.shape.iter().try_fold(1usize, |product, &size| product.checked_mul(size))
-    }
-}
-
-/// The header of an array in C order.
-pub(crate) fn header_bytes(descr: &str, shape: &[usize]) -> Vec<u8> {
-    let sizes: Vec<_> = shape.iter().map(usize::to_string).collect();
-    // Python's tuple of one ends in a comma.
-    let comma = if shape.len() == 1 { "," } else { "" };
-    let sizes = sizes.join(", ");
-    let dictionary =
-        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({sizes}{comma}), }}");
-    // Magic, version, length of two bytes; the newline ends the padding.
-    let unpadded = MAGIC.len() + 2 + 2 + dictionary.len() + 1;
-    let length = dictionary.len() + 1 + unpadded.next_multiple_of(ALIGNMENT) - unpadded;
-    let mut bytes = [MAGIC, &[1, 0], &(length as u16).to_le_bytes()].concat();
-    bytes.extend_from_slice(dictionary.as_bytes());
-    bytes.resize(unpadded.next_multiple_of(ALIGNMENT) - 1, b' ');
-    bytes.push(b'\n');
-    bytes
-}
-
-/// Reads a header and nothing after it.
-pub(crate) fn read_header(reader: &mut impl Read) -> io::Result<Header> {
-    let mut bytes = vec![0; MAGIC.len() + 2];
-    reader.read_exact(&mut bytes)?;
-    if !bytes.starts_with(MAGIC) {
-        return Err(invalid("not a NumPy array"));
-    }
-    let length_size = match bytes[MAGIC.len()] {
-        1 => 2,
-        2 | 3 => 4,
-        version => return Err(invalid(format!("unknown NPY version {version}"))),
     };
-    let mut length = [0; 4];
-    reader.read_exact(&mut length[..length_size])?;
-    bytes.extend_from_slice(&length[..length_size]);
-    let length = u64::from(u32::from_le_bytes(length));
-    if length > LONGEST_HEADER {
-        return Err(invalid(format!("a header of {length} bytes")));
-    }
-    let start = bytes.len();
-    if reader.take(length).read_to_end(&mut bytes)? as u64 != length {
-        return Err(io::ErrorKind::UnexpectedEof.into());
-    }
-    let text = std::str::from_utf8(&bytes[start..]).map_err(invalid)?;
-    let dictionary: Value = text.trim_end().parse().map_err(invalid)?;
-    let (descr, shape) = interpret(&dictionary)
-        .ok_or_else(|| invalid(format!("a header that makes no sense: {dictionary}")))?;
-    Ok(Header { descr, shape, bytes })
+    read_in_c_order(reader, header, size_of::<A>(), |bytes| A::from_bytes(bytes, order))
 }
 
-fn interpret(dictionary: &Value) -> Option<(String, Vec<usize>)> {
-    let entries = dictionary.as_dict()?;
-    let entry = |name: &str| {
-        let found = entries.iter().find(|(key, _)| key.as_string().is_some_and(|key| key == name));
-        found.map(|(_, value)| value)
+/// Reads the elements of a whole array in C order, numbers of any type, each
+/// through `convert`.
+pub(crate) fn read_numbers<T: Copy>(
+    reader: &mut (impl Read + ?Sized),
+    header: &Header,
+    convert: impl Fn(f64) -> T,
+) -> io::Result<Vec<T>> {
+    let (number, order) = header.number_or_error()?;
+    read_in_c_order(reader, header, number.size(), |bytes| convert(number.decode(bytes, order)))
+}
+
+fn read_in_c_order<T: Copy>(
+    reader: &mut (impl Read + ?Sized),
+    header: &Header,
+    size: usize,
+    decode: impl Fn(&[u8]) -> T,
+) -> io::Result<Vec<T>> {
+    let n = header.n_elements().ok_or_else(|| invalid("elements without end"))?;
+    let mut elements = Vec::new();
+    records::read(reader, size, n as u64, |bytes| elements.push(decode(bytes)))?;
+    if header.is_fortran_order { Ok(to_c_order(&elements, &header.shape)) } else { Ok(elements) }
+}
+
+fn to_c_order<A: Copy>(elements: &[A], shape: &[usize]) -> Vec<A> {
+    let place = |index: usize| {
+        let mut rest = index;
+        let mut strides_left = elements.len();
+        let mut place = 0;
+        for &size in shape.iter().rev() {
+            strides_left /= size;
+            place += rest % size * strides_left;
+            rest /= size;
+        }
+        elements[place]
     };
-    let descr = entry("descr")?.as_string().cloned().unwrap_or_default();
-    let shape = entry("shape")?.as_tuple()?;
-    let sizes = shape.iter().map(|size| usize::try_from(size.as_integer()?).ok());
-    Some((descr, sizes.collect::<Option<_>>()?))
-}
-
-pub(crate) fn invalid(cause: impl ToString) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, cause.to_string())
+    (0..elements.len()).map(place).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
-    fn with_dictionary(dictionary: &str) -> Vec<u8> {
-        let length = (dictionary.len() as u16).to_le_bytes();
-        [MAGIC, &[1, 0], &length, dictionary.as_bytes()].concat()
+    #[test]
+    fn elements_come_in_c_order() {
+        let header = |is_fortran_order, shape: &[usize]| Header {
+            descr: "|u1".to_owned(),
+            is_fortran_order,
+            shape: shape.to_vec(),
+            n_bytes: 0,
+        };
+        let read = |header| read_elements::<u8>(&mut &[0, 1, 2, 3, 4, 5][..], &header).unwrap();
+        assert_eq!(read(header(false, &[2, 3])), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(read(header(true, &[2, 3])), [0, 2, 4, 1, 3, 5]);
+        assert_eq!(read(header(true, &[3, 1, 2])), [0, 3, 1, 4, 2, 5]);
+        assert!(read(header(true, &[0, usize::MAX, usize::MAX])).is_empty());
     }
 
     #[test]
-    fn what_is_written_is_what_numpy_writes() {
-        let bytes = header_bytes("<f4", &[5, 3]);
-        assert_eq!(bytes.len(), 128);
-        let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (5, 3), }";
-        assert_eq!(&bytes[..10], b"\x93NUMPY\x01\0\x76\0");
-        assert!(bytes[10..].starts_with(text.as_bytes()));
-        assert!(bytes.ends_with(b" \n"));
-    }
-
-    #[test]
-    fn a_header_that_lies_is_an_error() {
-        for dictionary in [
-            "{",
-            "[]",
-            "{'descr': '<f4'}",
-            "{'descr': '<f4', 'shape': (-1,)}",
-            "{'descr': '<f4', 'shape': (99999999999999999999,)}",
-            &"(".repeat(60_000),
-        ] {
-            assert!(read_header(&mut &with_dictionary(dictionary)[..]).is_err(), "{dictionary}");
-        }
-        let many = with_dictionary("{'descr': '<f4', 'shape': (4294967296, 4294967296)}");
-        assert_eq!(read_header(&mut &many[..]).unwrap().n_elements(), None);
-    }
-
-    proptest! {
-        #[test]
-        fn a_header_comes_back(shape in prop::collection::vec(any::<usize>(), 0..5)) {
-            let bytes = header_bytes("<U12", &shape);
-            prop_assert_eq!(bytes.len() % ALIGNMENT, 0);
-            let header = read_header(&mut &bytes[..]).unwrap();
-            prop_assert_eq!(header.descr, "<U12");
-            prop_assert_eq!(header.shape, shape);
-            prop_assert_eq!(header.bytes, bytes);
-        }
-
-        #[test]
-        fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-            let _ = read_header(&mut &[MAGIC, &[1, 0], &bytes].concat()[..]);
-        }
+    fn elements_that_cannot_be_counted_are_an_error() {
+        let header = Header {
+            descr: "<f4".to_owned(),
+            is_fortran_order: false,
+            shape: vec![usize::MAX, usize::MAX],
+            n_bytes: 0,
+        };
+        let error = read_elements::<f32>(&mut io::empty(), &header).unwrap_err();
+        assert_eq!(error.to_string(), "elements without end");
+        let error = read_elements::<f64>(&mut io::empty(), &header).unwrap_err();
+        assert_eq!(error.to_string(), "elements are <f4, not <f8");
     }
 }

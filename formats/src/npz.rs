@@ -16,12 +16,10 @@
 use std::io;
 use std::path::Path;
 
-use ndarray::{ArrayView1, ArrayView2, ShapeError};
-use ndarray_npy::{ReadableElement, WritableElement};
-
 use crate::archive::{NpzReader, NpzWriter, Values};
 use crate::atomic;
 use crate::error::FormatError;
+use crate::number::Number;
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 
 /// Writes `scan` to `path`, atomically; the same scan gives the same bytes.
@@ -45,21 +43,18 @@ fn write_arrays<W: io::Write + io::Seek>(npz: &mut NpzWriter<W>, scan: &Scan) ->
         }
     }
     if scan.origin != [0.0; 3] {
-        npz.array("origin", ArrayView1::from(&scan.origin))?;
+        npz.array("origin", &[3], scan.origin.into_iter())?;
     }
     Ok(())
 }
 
-fn write_columns<W: io::Write + io::Seek, A: WritableElement>(
+fn write_columns<W: io::Write + io::Seek, A: Number>(
     npz: &mut NpzWriter<W>,
     key: &str,
     values: &[A],
     width: usize,
 ) -> io::Result<()> {
-    let shape = (values.len() / width, width);
-    let view = ArrayView2::from_shape(shape, values)
-        .map_err(|error: ShapeError| io::Error::other(error))?;
-    npz.array(key, view)
+    npz.array(key, &[values.len() / width, width], values.iter().copied())
 }
 
 /// Reads a scan. Attributes may be columns or vectors, compressed or not, and
@@ -96,7 +91,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
 }
 
 /// The elements of an array of shape `[n, width]`, or `[n]` if `width` is 1.
-fn read_columns<A: ReadableElement + Clone>(
+fn read_columns<A: Number>(
     npz: &mut NpzReader,
     key: &str,
     width: usize,

@@ -16,12 +16,10 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use ndarray::ArrayView1;
-
 use crate::archive::{NpzReader, NpzWriter, Values};
 use crate::atomic;
 use crate::error::FormatError;
-use crate::npy;
+use crate::npy_header;
 
 /// A packed set that is being written.
 ///
@@ -116,14 +114,14 @@ impl PackedWriter {
         points.rewind().map_err(here)?;
         atomic::write(&path, |writer| {
             NpzWriter::write(writer, |npz| {
-                let header = npy::header_bytes("<f4", &[labels.len(), n_points, 3]);
+                let header = npy_header::header_bytes("<f4", &[labels.len(), n_points, 3]);
                 let n_bytes = header.len() as u64 + points.metadata()?.len();
                 let entry = npz.begin("points", n_bytes)?;
                 entry.write_all(&header)?;
                 io::copy(&mut points, entry)?;
-                npz.array("labels", ArrayView1::from(&labels))?;
+                npz.array("labels", &[labels.len()], labels.iter().copied())?;
                 npz.text("names", &names)?;
-                npz.array("n_raw", ArrayView1::from(&n_raw))?;
+                npz.array("n_raw", &[n_raw.len()], n_raw.iter().copied())?;
                 npz.text("classes", &classes)
             })
         })

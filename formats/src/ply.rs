@@ -85,6 +85,10 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     let origin = origin(&header).map_err(|cause| bad("comment origin", cause))?;
     let mut vertices = None;
     for element in header.elements.values() {
+        // They take no bytes, so that a header alone could promise any number.
+        if element.properties.is_empty() {
+            continue;
+        }
         let read = parser
             .read_payload_for_element(&mut reader, element, &header)
             .map_err(|error| bad(&format!("element {}", element.name), error.to_string()))?;

@@ -146,6 +146,8 @@ fn errors_name_the_file_and_the_part() {
     assert!(error_of("a.ply", format!("{header}end_header\n").as_bytes()).contains("end of file"));
     let short = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n";
     assert_eq!(error_of("a.ply", short.as_bytes()), ": element vertex: no property y");
+    let empty = "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\nend_header\n";
+    assert_eq!(error_of("a.ply", empty.as_bytes()), ": element vertex: missing");
     let ring = "ply\nformat ascii 1.0\nelement vertex 1\nproperty int ring\nend_header\n65536\n";
     assert!(error_of("a.ply", ring.as_bytes()).starts_with(": element vertex: "));
 }

@@ -7,43 +7,35 @@ use formats::model_card::{ModelCard, Normalization};
 
 use crate::engine::Memory;
 use crate::error::Error;
-use crate::forward::{self, Forward};
+use crate::forward::{self, Forward, Loaded, Setup};
 use crate::kernel::{self, KernelName, Kernels};
 use crate::normalize;
+use crate::options::Options;
 use crate::precision::Precision;
 use crate::prediction::{Prediction, argmax};
-
-/// How a [`Classifier`] computes.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// What to compute in.
-    pub precision: Precision,
-    /// The kernels to use; the fastest that this machine runs if `None`.
-    pub kernel: Option<KernelName>,
-    /// Threads, the caller's among them.
-    pub threads: usize,
-    /// How clouds are normalised; as in training if `None`.
-    pub normalization: Option<Normalization>,
-    /// Drop points that are not finite instead of refusing the cloud.
-    pub drop_invalid: bool,
-    /// Points to make room for at once; larger clouds allocate when they come.
-    pub capacity: usize,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            precision: Precision::F32,
-            kernel: None,
-            threads: 1,
-            normalization: None,
-            drop_invalid: false,
-            capacity: 4096,
-        }
-    }
-}
+use crate::sampler::{SamplerKind, SamplerSpec};
+use crate::selection::{FrontEnd, Selection};
+use crate::tabulate;
+use crate::votes::Votes;
 
 /// A network ready to classify clouds.
+///
+/// Nothing is allocated once it is loaded, but for clouds of more points than
+/// [`Options::capacity`] and for the first that overflows a short precision.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use infer_cpu::{Classifier, Options};
+///
+/// let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
+/// let model = Path::new(weights).join("untrained-test.safetensors");
+/// let mut classifier = Classifier::load(&model, &Options::default())?;
+/// let prediction = classifier.classify(&[[0.0, 0.0, 0.1], [0.3, 0.0, 0.1], [0.3, 0.2, 0.0]])?;
+/// assert_eq!(prediction.n_used, 3);
+/// println!("{} ({:.1} %)", prediction.label, 100.0 * prediction.confidence());
+/// # Ok::<(), infer_cpu::Error>(())
+/// ```
 pub struct Classifier {
     path: PathBuf,
     card: ModelCard,
@@ -54,6 +46,8 @@ pub struct Classifier {
     /// fp32, once a cloud overflowed the precision asked for.
     fallback: Option<Box<dyn Forward>>,
     memory: Memory,
+    selection: Selection,
+    votes: Votes,
     finite: Vec<[f64; 3]>,
     normalized: Vec<[f32; 3]>,
     prediction: Prediction,
@@ -63,44 +57,48 @@ impl Classifier {
     /// Loads the model file at `path` and packs it as `options` ask.
     ///
     /// # Errors
-    /// A file that is no model, or kernels that this machine lacks.
+    /// A file that is no model, options that it or this machine cannot meet.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
-        let kernels = choose_kernels(options.precision, options.kernel)?;
-        let (card, network) = forward::load(path, options.precision, kernels, options.threads)?;
-        let classes = class_names(&card, network.n_classes());
-        let prediction = Prediction {
-            class: 0,
-            label: Arc::clone(&classes[0]),
-            logits: Vec::with_capacity(classes.len()),
-            n_points: 0,
-            n_dropped: 0,
-            n_used: 0,
-            precision: options.precision,
-            n_clipped: 0,
+        let setup = setup(options, options.precision)?;
+        let loaded = forward::load(path, &setup)?;
+        let spec = match &options.sampler {
+            Some(spec) => spec.clone(),
+            None => SamplerSpec::as_trained(path, &loaded.card)?,
         };
-        let memory = network.memory();
+        let front = front_end(path, &loaded, &spec, options.table_nodes)?;
+        let selection = Selection::new(&spec, front)?;
+        let Loaded { card, network, .. } = loaded;
+        let classes = class_names(&card, network.n_classes());
+        let prediction = Prediction::empty(&classes, options.precision);
         let mut classifier = Self {
             path: path.to_path_buf(),
             card,
+            votes: Votes::new(options, &spec, classes.len())?,
             classes,
             options: options.clone(),
-            kernels,
+            kernels: setup.kernels,
+            memory: network.memory(),
             network,
             fallback: None,
-            memory,
+            selection,
             finite: Vec::new(),
             normalized: Vec::new(),
             prediction,
         };
-        classifier.reserve(options.capacity);
+        classifier.reserve(options.capacity)?;
         Ok(classifier)
     }
 
     /// Makes room for clouds of `n` points, so that none of them allocates.
-    pub fn reserve(&mut self, n: usize) {
+    ///
+    /// # Errors
+    /// More points than can be counted.
+    pub fn reserve(&mut self, n: usize) -> Result<(), Error> {
         self.network.reserve(n);
         self.finite.reserve(n);
         self.normalized.reserve(n);
+        self.votes.reserve(n);
+        self.selection.reserve(n, self.kernels, &*self.network, &mut self.memory)
     }
 
     /// Class names in the order of the logits.
@@ -121,8 +119,14 @@ impl Classifier {
         self.kernels.name
     }
 
-    /// Classifies a cloud of points in metres, or whatever the unit: only
-    /// shape counts.
+    /// The sampler in use.
+    #[must_use]
+    pub fn sampler(&self) -> &SamplerSpec {
+        self.selection.spec()
+    }
+
+    /// Classifies a cloud of points, `[n, 3]`, in metres or whatever the unit:
+    /// only shape counts where clouds are normalised.
     ///
     /// # Errors
     /// A cloud without points; one with a coordinate that is not finite, unless
@@ -139,6 +143,23 @@ impl Classifier {
     pub fn classify_f64(&mut self, points: &[[f64; 3]]) -> Result<&Prediction, Error> {
         self.take(points.iter().copied())?;
         self.predict()
+    }
+
+    /// The points that the sampler keeps of a cloud, as indices into it:
+    /// repetitions included, where the sampler makes them. The cloud is
+    /// normalised for the choice, and must be finite.
+    ///
+    /// # Errors
+    /// A cloud without points, or with a coordinate that is not finite.
+    pub fn sample(&mut self, points: &[[f64; 3]]) -> Result<&[u32], Error> {
+        if let Some(index) = points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
+            let [x, y, z] = points[index];
+            return Err(Error::NotFinite { index, x, y, z });
+        }
+        self.take(points.iter().copied())?;
+        self.normalize();
+        let Self { selection, normalized, kernels, network, memory, .. } = self;
+        selection.select(normalized, kernels, &**network, memory)
     }
 
     /// Keeps what is finite of `points`.
@@ -163,46 +184,77 @@ impl Classifier {
         }
     }
 
-    fn predict(&mut self) -> Result<&Prediction, Error> {
+    fn normalize(&mut self) {
         match self.options.normalization.unwrap_or(self.card.normalization) {
             Normalization::UnitSphere => {
                 normalize::to_unit_sphere(&self.finite, &mut self.normalized);
             }
-            Normalization::None => {
-                self.normalized.clear();
-                self.normalized.extend(self.finite.iter().map(|point| point.map(|x| x as f32)));
-            }
+            Normalization::None => normalize::not_at_all(&self.finite, &mut self.normalized),
         }
-        self.network.set_points(&self.normalized);
-        self.network.classify(&mut self.memory, false);
-        let met = self.network.met();
+    }
+
+    fn predict(&mut self) -> Result<&Prediction, Error> {
+        self.normalize();
+        self.network.reset();
         self.prediction.precision = self.options.precision;
-        if met.overflow || !all_finite(&self.memory.values) {
-            self.predict_in_f32()?;
+        if self.votes.n() <= 1 {
+            self.forward_whole()?;
+            self.prediction.logits.clone_from(&self.memory.values);
+        } else {
+            self.vote()?;
         }
-        self.prediction.n_used = self.normalized.len();
-        self.prediction.n_clipped = met.clipped;
-        self.prediction.logits.clone_from(&self.memory.values);
+        self.prediction.n_used = self.selection.points().len();
+        self.prediction.n_clipped = self.network.met().clipped;
         self.prediction.class = argmax(&self.prediction.logits);
         self.prediction.label = Arc::clone(&self.classes[self.prediction.class]);
         Ok(&self.prediction)
     }
 
+    /// Takes the normalised cloud through sampler and network; logits are left
+    /// in memory.
+    fn forward_whole(&mut self) -> Result<(), Error> {
+        let Self { selection, normalized, kernels, network, memory, .. } = self;
+        selection.select(normalized, kernels, &**network, memory)?;
+        network.set_points(selection.points());
+        network.classify(memory, selection.pooled_stn());
+        if network.met().overflow || !all_finite(&memory.values) {
+            self.forward_in_f32()?;
+        }
+        Ok(())
+    }
+
     /// The way out when the precision asked for overflows.
-    fn predict_in_f32(&mut self) -> Result<(), Error> {
+    fn forward_in_f32(&mut self) -> Result<(), Error> {
         if self.options.precision == Precision::F32 {
             return Err(Error::Overflow);
         }
         if self.fallback.is_none() {
-            let kernels = choose_kernels(Precision::F32, self.options.kernel)?;
-            let loaded = forward::load(&self.path, Precision::F32, kernels, self.options.threads)?;
-            self.fallback = Some(loaded.1);
+            let setup = setup(&self.options, Precision::F32)?;
+            self.fallback = Some(forward::load(&self.path, &setup)?.network);
         }
         let Some(network) = &self.fallback else { return Err(Error::Overflow) };
-        network.set_points(&self.normalized);
-        network.classify(&mut self.memory, false);
+        let Self { selection, normalized, kernels, memory, .. } = self;
+        network.reset();
+        selection.select(normalized, kernels, &**network, memory)?;
+        network.set_points(selection.points());
+        network.classify(memory, selection.pooled_stn());
         self.prediction.precision = Precision::F32;
-        if all_finite(&self.memory.values) { Ok(()) } else { Err(Error::Overflow) }
+        let is_sound = !network.met().overflow && all_finite(&memory.values);
+        if is_sound { Ok(()) } else { Err(Error::Overflow) }
+    }
+
+    /// Averages the log-probabilities of several draws, which take the place of
+    /// logits.
+    fn vote(&mut self) -> Result<(), Error> {
+        self.votes.begin(&self.normalized);
+        for vote in 0..self.votes.n() {
+            self.selection.set_seed(self.votes.seed(vote));
+            self.votes.turn(vote, &mut self.normalized);
+            self.forward_whole()?;
+            self.votes.count(&self.memory.values);
+        }
+        self.votes.result(&mut self.prediction.logits);
+        Ok(())
     }
 }
 
@@ -215,6 +267,36 @@ fn class_names(card: &ModelCard, n_classes: usize) -> Vec<Arc<str>> {
         true => (0..n_classes).map(|class| format!("class {class}").into()).collect(),
         false => card.classes.iter().map(|name| name.as_str().into()).collect(),
     }
+}
+
+/// What computes the features that `spec` pools, if it pools any.
+fn front_end(
+    path: &Path,
+    loaded: &Loaded,
+    spec: &SamplerSpec,
+    table_nodes: Option<usize>,
+) -> Result<Option<FrontEnd>, Error> {
+    if spec.kind != SamplerKind::Cpl {
+        return Ok(None);
+    }
+    let pass = FrontEnd::choose(spec.front, &loaded.parts)?;
+    let table = match (table_nodes, &loaded.table) {
+        (Some(nodes), _) => Some(tabulate::front_end(path, pass, nodes)?),
+        (None, Some(table)) if pass == crate::engine::Pass::Front => Some(table.clone()),
+        _ => None,
+    };
+    Ok(Some(table.map_or(FrontEnd::Pass(pass), FrontEnd::Table)))
+}
+
+fn setup(options: &Options, precision: Precision) -> Result<Setup<'_>, Error> {
+    let kernels = choose_kernels(precision, options.kernel)?;
+    Ok(Setup {
+        precision,
+        kernels,
+        threads: options.threads,
+        t_nets: options.t_nets,
+        activation_ranges: options.activation_ranges.as_ref(),
+    })
 }
 
 /// The kernels `forced`, or the fastest here that have products in `precision`.

@@ -42,6 +42,20 @@ pub enum Error {
     /// Arithmetic left the range of f32.
     #[error("the network's arithmetic overflows on this cloud: logits are not finite")]
     Overflow,
+    /// Points cannot be chosen as asked.
+    #[error(transparent)]
+    Sampler(#[from] crate::sampler::SamplerError),
+    /// The model lacks the front end that a Critical Points Layer was to pool.
+    #[error("sampler cpl cannot pool front end {choice}: the model has {what}")]
+    FrontMissing {
+        /// What was asked for.
+        choice: crate::sampler::FrontChoice,
+        /// What the model has or lacks.
+        what: &'static str,
+    },
+    /// Votes draw random subsets; another sampler has one opinion only.
+    #[error("votes draw random subsets: sampler {0} would repeat itself")]
+    VotesWithoutDraws(crate::sampler::SamplerKind),
     /// Workers could not be started.
     #[error("cannot start {threads} threads: {source}")]
     Threads {

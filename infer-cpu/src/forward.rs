@@ -1,17 +1,22 @@
 //! A network of whichever precision, loaded and ready to run.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use formats::FormatError;
 use formats::model_card::ModelCard;
-use formats::weights::{WeightsFile, tensor_part};
+use formats::weights::{Tensor, WeightsFile, tensor_part};
 
 use crate::calibrate;
 use crate::engine::{Engine, Memory, Met, Pass};
 use crate::error::Error;
 use crate::kernel::Kernels;
 use crate::layers;
+use crate::network::{Front, TABLE};
+use crate::options::TNets;
 use crate::precision::{F16, F32, F32Fc16, Format, I8, Precision};
+use crate::sampler::Lattice;
+use crate::selection::Parts;
 use crate::team::Team;
 
 /// A network behind whichever format.
@@ -20,11 +25,15 @@ pub trait Forward: Send + Sync {
     fn reserve(&self, n: usize);
     /// Takes the points of the passes that follow.
     fn set_points(&self, points: &[[f32; 3]]);
-    /// Pools the points of `pass` into `memory`.
-    fn pool(&self, pass: Pass, memory: &mut Memory);
+    /// Forgets what earlier passes met.
+    fn reset(&self);
+    /// Pools the points of `pass` into `memory`, with the points that won.
+    fn pool_winners(&self, pass: Pass, memory: &mut Memory);
+    /// How many features `pass` pools.
+    fn channels(&self, pass: Pass) -> usize;
     /// Leaves the logits in `memory.values`; see [`Engine::classify`].
     fn classify(&self, memory: &mut Memory, pooled_stn: bool);
-    /// What happened since the points were set.
+    /// What passes met since [`Forward::reset`].
     fn met(&self) -> Met;
     /// Memory that no pass outgrows.
     fn memory(&self) -> Memory;
@@ -41,8 +50,16 @@ impl<T: Format> Forward for Team<Engine<T>> {
         self.work().set_points(points);
     }
 
-    fn pool(&self, pass: Pass, memory: &mut Memory) {
-        Engine::pool(self, pass, memory);
+    fn reset(&self) {
+        self.work().reset();
+    }
+
+    fn pool_winners(&self, pass: Pass, memory: &mut Memory) {
+        Engine::pool(self, pass, true, memory);
+    }
+
+    fn channels(&self, pass: Pass) -> usize {
+        self.work().channels(pass)
     }
 
     fn classify(&self, memory: &mut Memory, pooled_stn: bool) {
@@ -62,42 +79,81 @@ impl<T: Format> Forward for Team<Engine<T>> {
     }
 }
 
-/// Loads the model at `path` and packs it for `precision` and `kernels`.
+/// A model file, packed and ready.
+pub struct Loaded {
+    /// What it says about itself.
+    pub card: ModelCard,
+    /// Its network.
+    pub network: Box<dyn Forward>,
+    /// What the network consists of.
+    pub parts: Parts,
+    /// The look-up table that the file brings as its front end.
+    pub table: Option<Lattice>,
+}
+
+/// What to load a network for.
+#[derive(Clone, Copy)]
+pub struct Setup<'a> {
+    /// What to compute in.
+    pub precision: Precision,
+    /// The kernels, which have that precision's products.
+    pub kernels: &'static Kernels,
+    /// Threads, the caller's among them.
+    pub threads: usize,
+    /// The T-Nets to run.
+    pub t_nets: TNets,
+    /// The largest activation of each layer, in place of the model's own.
+    pub activation_ranges: Option<&'a BTreeMap<String, f32>>,
+}
+
+/// Loads the model at `path` and packs it.
 ///
 /// # Errors
 /// A file that is no model; threads that cannot be started.
-pub fn load(
-    path: &Path,
-    precision: Precision,
-    kernels: &'static Kernels,
-    threads: usize,
-) -> Result<(ModelCard, Box<dyn Forward>), Error> {
+pub fn load(path: &Path, setup: &Setup<'_>) -> Result<Loaded, Error> {
     let mut file = WeightsFile::open(path)?;
     let mut card = ModelCard::from_metadata(path, &file.metadata())?;
-    if precision == Precision::I8 && card.activation_ranges.is_empty() {
+    if let Some(ranges) = setup.activation_ranges {
+        card.activation_ranges.clone_from(ranges);
+    }
+    if setup.precision == Precision::I8 && card.activation_ranges.is_empty() {
         card.activation_ranges = calibrate::on_shapes(path)?;
     }
-    let network: Box<dyn Forward> = match precision {
-        Precision::F32 => Box::new(team::<F32>(&mut file, &card, kernels, threads)?),
-        Precision::F32Fc16 => Box::new(team::<F32Fc16>(&mut file, &card, kernels, threads)?),
-        Precision::F16 => Box::new(team::<F16>(&mut file, &card, kernels, threads)?),
-        Precision::I8 => Box::new(team::<I8>(&mut file, &card, kernels, threads)?),
-    };
-    let (n_names, n_classes) = (card.classes.len(), network.n_classes());
-    if n_names != 0 && n_names != n_classes {
-        let cause = format!("{n_classes} logits, but `classes` names {n_names}");
-        return Err(FormatError::malformed(path, tensor_part("last layer"), cause).into());
+    match setup.precision {
+        Precision::F32 => loaded::<F32>(&mut file, card, setup),
+        Precision::F32Fc16 => loaded::<F32Fc16>(&mut file, card, setup),
+        Precision::F16 => loaded::<F16>(&mut file, card, setup),
+        Precision::I8 => loaded::<I8>(&mut file, card, setup),
     }
-    Ok((card, network))
 }
 
-fn team<T: Format>(
+fn loaded<T: Format>(
     file: &mut WeightsFile,
-    card: &ModelCard,
-    kernels: &'static Kernels,
-    threads: usize,
-) -> Result<Team<Engine<T>>, Error> {
-    let layers = layers::pack::<T>(file, card, kernels)?;
+    card: ModelCard,
+    setup: &Setup<'_>,
+) -> Result<Loaded, Error> {
+    let Setup { kernels, threads, t_nets, .. } = *setup;
+    let mut layers = layers::pack::<T>(file, &card, kernels)?;
+    layers.stn.take_if(|_| !t_nets.runs_input());
+    layers.fstn.take_if(|_| !t_nets.runs_feature());
+    let parts = Parts {
+        stn: layers.stn.is_some(),
+        fstn: layers.fstn.is_some(),
+        front: layers.front.is_some(),
+    };
+    let table = match layers.front.take_if(|front| matches!(front, Front::Table(_))) {
+        Some(Front::Table(Tensor { shape, values })) => Some(
+            Lattice::new(shape[0], shape[3], &values)
+                .map_err(|cause| FormatError::malformed(file.path(), tensor_part(TABLE), cause))?,
+        ),
+        _ => None,
+    };
     let engine = Engine::new(layers, kernels, threads, false);
-    Team::new(engine, threads).map_err(|source| Error::Threads { threads, source })
+    let team = Team::new(engine, threads).map_err(|source| Error::Threads { threads, source })?;
+    let (n_names, n_classes) = (card.classes.len(), team.n_classes());
+    if n_names != 0 && n_names != n_classes {
+        let cause = format!("names {n_names} for {n_classes} logits");
+        return Err(FormatError::malformed(file.path(), "metadata `classes`", cause).into());
+    }
+    Ok(Loaded { card, network: Box::new(team), parts, table })
 }

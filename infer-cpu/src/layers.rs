@@ -183,7 +183,9 @@ impl First {
 impl<T: Format> Packed<T> {
     /// A layer of zeros, to be set by [`Packed::set`].
     pub fn zeros(kernels: &Kernels, inputs: usize, outputs: usize) -> Self {
-        let panels = panels::<T>(kernels, inputs, outputs);
+        let mut panels = panels::<T>(kernels, inputs, outputs);
+        // Scales too, where the format has them, so that setting allocates nothing.
+        T::fill(&mut panels, UNKNOWN_RANGE, |_, _| 0.0);
         Self {
             name: String::new(),
             panels,

@@ -1,8 +1,12 @@
 //! PointNet behind a Critical Points Layer, without a GPU.
+//!
+//! [`Classifier`] goes from a cloud to a class; [`sampler`] chooses points,
+//! [`kernel`] multiplies.
 
 #![deny(unsafe_code)]
 
 mod calibrate;
+mod choose;
 mod classifier;
 mod dense;
 mod engine;
@@ -12,12 +16,22 @@ pub mod kernel;
 mod layers;
 mod network;
 mod normalize;
+mod options;
 mod precision;
 mod prediction;
+pub mod sampler;
+mod selection;
+mod summary;
+mod tabulate;
 mod team;
+mod votes;
 
-pub use classifier::{Classifier, Options};
+pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};
+pub use choose::choose;
+pub use classifier::Classifier;
 pub use error::Error;
 pub use formats::model_card::{ModelCard, Normalization};
+pub use options::{Options, TNets};
 pub use precision::Precision;
 pub use prediction::Prediction;
+pub use summary::{FrontSummary, LayerShape, NetShape, Summary, inspect};

@@ -1,17 +1,22 @@
-//! The Raspberry Pi side of Edgepuck. So far it knows its version and says
-//! what it cannot do yet.
+//! Classifies clouds of points without a GPU.
+
+mod cli;
 
 use std::process::ExitCode;
 
+use clap::Parser;
+
+use cli::{Cli, Outcome, Usage};
+
 fn main() -> ExitCode {
-    match std::env::args().nth(1).as_deref() {
-        Some("--version" | "-V") => {
-            println!("infer-cpu {}", env!("CARGO_PKG_VERSION"));
-            ExitCode::SUCCESS
-        }
-        _ => {
-            eprintln!("infer-cpu: classification is not built yet; only --version works");
-            ExitCode::from(2)
+    match cli::run(&Cli::parse()) {
+        Ok(Outcome::Success) => ExitCode::SUCCESS,
+        Ok(Outcome::SomeFailed) => ExitCode::from(1),
+        // Whoever read our output has gone, which is no failure of ours.
+        Err(error) if cli::is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            cli::say(&format!("error: {}", cli::told_once(&error)));
+            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }
     }
 }

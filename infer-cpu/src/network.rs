@@ -16,6 +16,9 @@ use formats::weights::{Tensor, WeightsFile, tensor_part};
 
 use crate::dense::{BatchNorm, Dense};
 
+/// The tensor that holds a tabulated front end.
+pub const TABLE: &str = "cpl.table";
+
 /// A network whose point-wise layers are `C` and whose vector layers are `F`.
 pub struct Network<C, F> {
     /// The T-Net of the coordinates.
@@ -223,7 +226,6 @@ impl<M, N> Reader<'_, M, N> {
     where
         M: FnMut(Dense, Role) -> C,
     {
-        const TABLE: &str = "cpl.table";
         if self.names.contains(TABLE) {
             let table = self.tensor(TABLE)?;
             return match table.shape[..] {

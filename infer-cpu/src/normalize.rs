@@ -31,6 +31,14 @@ pub fn to_unit_sphere(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.extend(points.iter().map(|point| from_mean(point).map(|x| (x * scale) as f32)));
 }
 
+/// Leaves `points` in `out` as they are, rounded to f32 and no further from 0
+/// than f32 reaches.
+pub fn not_at_all(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
+    out.clear();
+    let largest = f64::from(f32::MAX);
+    out.extend(points.iter().map(|point| point.map(|x| x.clamp(-largest, largest) as f32)));
+}
+
 /// The mean of `values`, all below 1 in magnitude: the same for any order.
 fn exact_mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let largest = values.clone().fold(0.0f64, |most, x| most.max(x.abs()));
@@ -43,10 +51,71 @@ fn exact_mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     sum as f64 / n as f64 / one * unit
 }
 
+/// Moves `points` by whole voxels of edge `size`, so that they lie about 0, and
+/// scales the largest coordinate to at most 1; leaves the result in `out` and
+/// returns the edge in its units. Cells that begin at coordinate 0 hold the
+/// same points before and after, whatever the offset of the cloud, but for
+/// points within f32's rounding of a cell's face.
+///
+/// All coordinates must be finite, and `size` a positive length.
+pub fn to_voxels_about_zero(points: &[[f64; 3]], size: f64, out: &mut Vec<[f32; 3]>) -> f64 {
+    let magnitude = |points: &mut dyn Iterator<Item = [f64; 3]>| {
+        points.flatten().fold(0.0f64, |most, x| most.max(x.abs()))
+    };
+    // Scaled by a power of two, so that no difference overflows.
+    let unit = power_of_two_above(magnitude(&mut points.iter().copied()));
+    let edge = size / unit;
+    let origin = [0, 1, 2].map(|axis| {
+        let along = points.iter().map(|point| point[axis] / unit);
+        let (low, high) = along
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let whole = (low.midpoint(high) / edge).floor() * edge;
+        // An edge that is nothing beside the coordinates leaves no cell whole.
+        if whole.is_finite() { whole } else { 0.0 }
+    });
+    let moved = |point: &[f64; 3]| [0, 1, 2].map(|axis| point[axis] / unit - origin[axis]);
+    let scale = power_of_two_above(magnitude(&mut points.iter().map(moved)));
+    out.clear();
+    out.extend(points.iter().map(|point| moved(point).map(|x| (x / scale) as f32)));
+    (edge / scale).clamp(f64::MIN_POSITIVE, f64::MAX)
+}
+
 /// A power of two not below `x`, at least the least normal number.
 fn power_of_two_above(x: f64) -> f64 {
     let bits = x.max(f64::MIN_POSITIVE).to_bits();
     let exponent = bits >> 52;
     let next = if bits & ((1 << 52) - 1) == 0 { exponent } else { exponent + 1 };
     f64::from_bits(next.min(2046) << 52)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn voxels_keep_their_points_far_from_zero_and_at_any_scale() {
+        // Whole numbers of quarters: exact in f64 at every offset and scale.
+        let near: Vec<[f64; 3]> =
+            (0..64).map(|i| [f64::from(i) * 0.25 - 3.0, f64::from(i % 5), 0.25]).collect();
+        let cells = |points: &[[f64; 3]], size: f64| {
+            let mut out = Vec::new();
+            let edge = to_voxels_about_zero(points, size, &mut out);
+            let cell = |point: &[f32; 3]| point.map(|x| (f64::from(x) / edge).floor());
+            let first = cell(&out[0]);
+            let from_first = |point| {
+                let cell: [f64; 3] = cell(point);
+                [0, 1, 2].map(|axis| cell[axis] - first[axis])
+            };
+            out.iter().map(from_first).collect::<Vec<_>>()
+        };
+        let expected = cells(&near, 0.5);
+        assert_eq!(expected[63], [31.0, 6.0, 0.0]);
+        // A UTM northing, of whole metres, and powers of two.
+        let far: Vec<_> = near.iter().map(|p| [p[0] + 5_500_000.0, p[1], p[2]]).collect();
+        assert_eq!(cells(&far, 0.5), expected);
+        for scale in [2f64.powi(-1000), 2f64.powi(1000)] {
+            let scaled: Vec<_> = near.iter().map(|point| point.map(|x| x * scale)).collect();
+            assert_eq!(cells(&scaled, 0.5 * scale), expected, "{scale:e}");
+        }
+    }
 }

@@ -13,6 +13,14 @@ use crate::kernel::{Columns, Gemm, Gemv, I8_LARGEST, Kernels, Panels};
 pub const F16_LARGEST: f32 = 65504.0;
 
 /// What a network computes in.
+///
+/// ```
+/// use infer_cpu::{Precision, kernel};
+///
+/// let precision: Precision = "f32-fc16".parse()?;
+/// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Precision {
     /// fp32 throughout.
@@ -108,8 +116,6 @@ pub trait Format: Send + Sync + 'static {
     /// A stored weight of a vector layer.
     type Stored: Copy + Default + Send + Sync;
 
-    /// The precision's name.
-    const PRECISION: Precision;
     /// Below every sum.
     const LOWEST: Self::Sum;
     /// Inputs that lie side by side in a panel.
@@ -177,7 +183,6 @@ macro_rules! fp32_points {
 
 impl Format for F32 {
     type Stored = f32;
-    const PRECISION: Precision = Precision::F32;
     fp32_points!();
 
     fn gemv(kernels: &Kernels) -> Gemv<f32> {
@@ -191,7 +196,6 @@ impl Format for F32 {
 
 impl Format for F32Fc16 {
     type Stored = f16;
-    const PRECISION: Precision = Precision::F32Fc16;
     fp32_points!();
 
     fn gemv(kernels: &Kernels) -> Gemv<f16> {
@@ -208,7 +212,6 @@ impl Format for F16 {
     type Weight = f16;
     type Sum = f32;
     type Stored = f16;
-    const PRECISION: Precision = Precision::F16;
     const LOWEST: f32 = f32::NEG_INFINITY;
     const GROUP: usize = 1;
     const SIGNED: bool = true;
@@ -243,7 +246,6 @@ impl Format for I8 {
     type Weight = i8;
     type Sum = i32;
     type Stored = i8;
-    const PRECISION: Precision = Precision::I8;
     const LOWEST: i32 = i32::MIN;
     const GROUP: usize = 4;
     const SIGNED: bool = false;

@@ -28,6 +28,20 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// None yet, with room for a logit of each of `classes`.
+    pub(crate) fn empty(classes: &[Arc<str>], precision: Precision) -> Self {
+        Self {
+            class: 0,
+            label: classes.first().map_or_else(|| "".into(), Arc::clone),
+            logits: Vec::with_capacity(classes.len()),
+            n_points: 0,
+            n_dropped: 0,
+            n_used: 0,
+            precision,
+            n_clipped: 0,
+        }
+    }
+
     /// The probability of the predicted class by the network's softmax.
     #[must_use]
     pub fn confidence(&self) -> f64 {

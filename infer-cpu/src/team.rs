@@ -2,18 +2,27 @@
 //!
 //! Chunks are claimed one by one, by whichever thread is free, the caller
 //! among them: where another process holds a core, the others do its share,
-//! and the caller never waits for a thread that has claimed nothing. Idle
-//! threads spin for a moment, since the next task of a frame is microseconds
-//! away, and then park, since the next frame is not.
+//! and the caller never waits for a thread that has claimed nothing. Where the
+//! caller had to wait long for a chunk that was claimed, its worker was driven
+//! off its core: the caller then works alone for a while ([`Pause`]), so that a
+//! busy neighbour costs no more than the team gains. Idle threads spin for a
+//! moment, since the next task of a frame is microseconds away, and then park,
+//! since the next frame is not.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle, Thread};
 use std::time::{Duration, Instant};
 
 /// How long an idle worker spins: some tasks' length, and no more than a
 /// wake-up costs.
 const SPIN: Duration = Duration::from_micros(40);
+
+/// A wait for a worker of this many times a chunk's own time, and
+/// [`LONG_WAIT`] more, is no longer one for its work.
+const LONG_WAIT_CHUNKS: u32 = 3;
+/// A wake-up's time, with room to spare.
+const LONG_WAIT: Duration = Duration::from_micros(200);
 
 /// What the chunks of a task are, and how they are done.
 pub trait Work: Send + Sync + 'static {
@@ -28,6 +37,48 @@ pub struct Team<W: Work> {
     board: Arc<Board>,
     workers: Vec<JoinHandle<()>>,
     threads: Vec<Thread>,
+    pause: Mutex<Pause>,
+}
+
+/// When the caller works alone: for a while after a long wait, twice as long
+/// after each that follows, and half as long after many tasks without.
+struct Pause {
+    until: Option<Instant>,
+    length: Duration,
+    good_tasks: u32,
+}
+
+impl Pause {
+    const SHORTEST: Duration = Duration::from_millis(20);
+    const LONGEST: Duration = Duration::from_secs(1);
+    /// About ten frames' worth.
+    const GOOD_TASKS: u32 = 200;
+
+    fn new() -> Self {
+        Self { until: None, length: Self::SHORTEST, good_tasks: 0 }
+    }
+
+    fn is_on(&mut self, now: Instant) -> bool {
+        let is_on = self.until.is_some_and(|until| now < until);
+        if !is_on {
+            self.until = None;
+        }
+        is_on
+    }
+
+    fn note(&mut self, long_wait: bool, now: Instant) {
+        if long_wait {
+            self.until = Some(now + self.length);
+            self.length = (self.length * 2).min(Self::LONGEST);
+            self.good_tasks = 0;
+            return;
+        }
+        self.good_tasks += 1;
+        if self.good_tasks == Self::GOOD_TASKS {
+            self.length = (self.length / 2).max(Self::SHORTEST);
+            self.good_tasks = 0;
+        }
+    }
 }
 
 /// Where tasks are announced.
@@ -37,6 +88,8 @@ struct Board {
     ticket: AtomicU64,
     /// Chunks of the current task that are done.
     done: AtomicU32,
+    /// Workers that have started.
+    started: AtomicU32,
     /// Which workers sleep.
     parked: Vec<AtomicBool>,
     stop: AtomicBool,
@@ -56,11 +109,18 @@ impl<W: Work> Team<W> {
         let board = Arc::new(Board {
             ticket: AtomicU64::new(0),
             done: AtomicU32::new(0),
+            started: AtomicU32::new(0),
             parked: (0..n_workers).map(|_| AtomicBool::new(false)).collect(),
             stop: AtomicBool::new(false),
         });
         // Built first, so that those that did start are stopped if one cannot.
-        let mut team = Self { work, board, workers: Vec::new(), threads: Vec::new() };
+        let mut team = Self {
+            work,
+            board,
+            workers: Vec::new(),
+            threads: Vec::new(),
+            pause: Mutex::new(Pause::new()),
+        };
         for worker in 0..n_workers {
             let (work, board) = (Arc::clone(&team.work), Arc::clone(&team.board));
             let handle = thread::Builder::new()
@@ -68,6 +128,10 @@ impl<W: Work> Team<W> {
                 .spawn(move || board.serve(&*work, worker))?;
             team.threads.push(handle.thread().clone());
             team.workers.push(handle);
+        }
+        // A thread that starts allocates; none does so once the team is there.
+        while (team.board.started.load(Ordering::Acquire) as usize) < n_workers {
+            thread::yield_now();
         }
         Ok(team)
     }
@@ -82,7 +146,9 @@ impl<W: Work> Team<W> {
     /// returns when they are done.
     pub fn run(&self, n_chunks: usize) {
         assert!(n_chunks <= MOST_CHUNKS, "a task of {n_chunks} chunks");
-        if n_chunks <= 1 || self.workers.is_empty() {
+        let start = Instant::now();
+        let mut pause = self.pause.lock().unwrap_or_else(PoisonError::into_inner);
+        if n_chunks <= 1 || self.workers.is_empty() || pause.is_on(start) {
             (0..n_chunks).for_each(|chunk| self.work.chunk(0, chunk));
             return;
         }
@@ -94,10 +160,16 @@ impl<W: Work> Team<W> {
                 thread.unpark();
             }
         }
+        let mut n_own = 0;
         while let Some(chunk) = board.claim() {
             board.perform(&*self.work, 0, chunk);
+            n_own += 1;
         }
+        let done = Instant::now();
         board.wait_until_done(n_chunks);
+        let end = Instant::now();
+        let usual = (done - start) / n_own.max(1) * LONG_WAIT_CHUNKS + LONG_WAIT;
+        pause.note(end - done > usual, end);
     }
 }
 
@@ -141,6 +213,7 @@ impl Board {
 
     /// A worker's life.
     fn serve(&self, work: &impl Work, worker: usize) {
+        self.started.fetch_add(1, Ordering::Release);
         loop {
             while let Some(chunk) = self.claim_soon() {
                 self.perform(work, worker + 1, chunk);
@@ -221,5 +294,50 @@ mod tests {
                 assert_eq!(count.load(Ordering::Relaxed), tasks as u32, "{n_threads} {chunk}");
             }
         }
+    }
+
+    /// Its worker is held up in its first chunk, as by another process.
+    struct HeldUp {
+        began: AtomicBool,
+        by_workers: AtomicU32,
+    }
+
+    impl Work for HeldUp {
+        fn chunk(&self, thread: usize, _: usize) {
+            if thread > 0 {
+                self.by_workers.fetch_add(1, Ordering::SeqCst);
+                if !self.began.swap(true, Ordering::SeqCst) {
+                    thread::sleep(Duration::from_millis(50));
+                }
+            }
+            while !self.began.load(Ordering::SeqCst) {
+                thread::yield_now();
+            }
+        }
+    }
+
+    #[test]
+    fn after_a_worker_was_held_up_the_caller_works_alone_for_a_while() {
+        let work = HeldUp { began: AtomicBool::new(false), by_workers: AtomicU32::new(0) };
+        let team = Team::new(work, 2).unwrap();
+        team.run(2);
+        let before = team.work().by_workers.load(Ordering::SeqCst);
+        // Well within the shortest pause, unless this thread is held up itself.
+        let start = Instant::now();
+        team.run(1000);
+        let after = team.work().by_workers.load(Ordering::SeqCst);
+        assert!(before == after || start.elapsed() > Pause::SHORTEST, "{before} {after}");
+    }
+
+    #[test]
+    fn pauses_lengthen_while_waits_are_long_and_shorten_once_they_are_not() {
+        let (mut pause, now) = (Pause::new(), Instant::now());
+        assert!(!pause.is_on(now));
+        pause.note(true, now);
+        assert!(pause.is_on(now) && !pause.is_on(now + Pause::SHORTEST));
+        (0..20).for_each(|_| pause.note(true, now));
+        assert_eq!(pause.length, Pause::LONGEST);
+        (0..20 * Pause::GOOD_TASKS).for_each(|_| pause.note(false, now));
+        assert_eq!(pause.length, Pause::SHORTEST);
     }
 }

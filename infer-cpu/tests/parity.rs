@@ -1,9 +1,9 @@
 //! The same logits as PyTorch, to 1e-5, at every number of points, threads and
 //! kernel. The reference data is `../shared/data/parity`, where it is present.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 mod support;
+
+use std::path::Path;
 
 use formats::model_card::Normalization;
 use formats::weights::WeightsFile;
@@ -58,6 +58,58 @@ fn cheaper_precisions_stay_near() {
             let error = error.fold(0.0, f64::max);
             eprintln!("{precision} {n}: {error:.2e}, clipped {}", prediction.n_clipped);
             assert!(error < 0.1, "{precision} {n}: {error}");
+        }
+    }
+}
+
+/// Point `i` of the golden clouds: coordinates by rule, exact in f32.
+fn golden_point(i: usize) -> [f32; 3] {
+    let axis = |a: usize, b: usize, m: usize| ((i * a + b) % m) as f32 / (m as f32 / 2.0) - 1.0;
+    [axis(73, 11, 1024), axis(149, 5, 2048), axis(331, 77, 512)]
+}
+
+/// Golden files: `golden/make.py`, by PyTorch. Logits are near 1, and an error
+/// of 1e-5 is some 80 roundings of f32 there.
+#[test]
+fn narrow_networks_give_pytorch_s_logits_with_and_without_t_nets() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
+    for name in ["tiny", "plain"] {
+        let mut golden =
+            WeightsFile::open(&folder.join(format!("{name}_logits.safetensors"))).unwrap();
+        let expected = golden.read("logits").unwrap();
+        let sizes = golden.read("sizes").unwrap().values;
+        for kernel in kernel::available().map(|kernels| kernels.name) {
+            for threads in [1, 2, 4] {
+                let options = Options { kernel: Some(kernel), threads, ..Options::default() };
+                let model = folder.join(format!("{name}.safetensors"));
+                let mut classifier = Classifier::load(&model, &options).unwrap();
+                let width = expected.shape[1];
+                for (&n, expected) in sizes.iter().zip(expected.values.chunks_exact(width)) {
+                    let cloud: Vec<_> = (0..n as usize).map(golden_point).collect();
+                    let prediction = classifier.classify(&cloud).unwrap();
+                    for (found, expected) in prediction.logits.iter().zip(expected) {
+                        let error = (found - expected).abs();
+                        assert!(error < 1e-5, "{name} {kernel} {threads} {n}: {error}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Whatever the number of threads, to the bit.
+#[test]
+fn threads_change_nothing() {
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/tiny.safetensors");
+    for precision in Precision::ALL {
+        for n in [1, 49, 1057, 3000] {
+            let cloud: Vec<_> = (0..n).map(golden_point).collect();
+            let logits = [1, 2, 3, 8].map(|threads| {
+                let options = Options { precision, threads, ..Options::default() };
+                let mut classifier = Classifier::load(&model, &options).unwrap();
+                classifier.classify(&cloud).unwrap().logits.clone()
+            });
+            assert!(logits.iter().all(|other| *other == logits[0]), "{precision} {n}");
         }
     }
 }

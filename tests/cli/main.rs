@@ -3,9 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
 mod bad_input;
+mod checkpoints;
 mod datasets;
+mod import_weights;
 mod interrupted;
 mod meshes;
+mod reference;
 mod scenes;
 
 use std::collections::BTreeMap;

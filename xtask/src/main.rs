@@ -2,13 +2,17 @@
 
 mod adapters;
 mod bench;
+mod build_pi;
 mod caster;
 mod gen_dataset;
 mod gen_shapes;
+mod import_weights;
 mod merge_dataset;
+mod pi_target;
 mod preview_scan;
 mod scan;
 mod test;
+mod workspace;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -35,8 +39,12 @@ enum Command {
     Adapters,
     /// Measure speed and accuracy
     Bench(bench::BenchArgs),
+    /// Build infer-cpu as one static file for a Raspberry Pi
+    BuildPi(build_pi::Args),
     /// Make one dataset of the shards of one
     MergeDataset(merge_dataset::Args),
+    /// Turn a PyTorch checkpoint into a model file for infer-cpu
+    ImportWeights(import_weights::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -57,7 +65,9 @@ fn main() -> ExitCode {
         Command::Preview(args) => preview_scan::run(&args),
         Command::Adapters => adapters::run(),
         Command::Bench(args) => bench::run(&args).map(|()| Outcome::Success),
+        Command::BuildPi(args) => build_pi::run(&args),
         Command::MergeDataset(args) => merge_dataset::run(&args),
+        Command::ImportWeights(args) => import_weights::run(&args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {

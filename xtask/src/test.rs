@@ -1,9 +1,8 @@
 //! `cargo xtask test`: everything a change must pass.
 
-use crate::Outcome;
-use anyhow::{Context, bail};
-use std::ffi::OsStr;
-use std::path::Path;
+use crate::workspace::{cargo, root, step};
+use crate::{Outcome, build_pi, pi_target};
+use anyhow::bail;
 use std::process::Command;
 
 /// The script that lists and installs the packages that tests need.
@@ -12,7 +11,7 @@ const PACKAGES: &str = "xtask/packages.sh";
 /// Flags of `test`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Install nothing
+    /// Install nothing; checks whose needs are missing are skipped, and named
     #[arg(long)]
     no_install: bool,
 
@@ -40,6 +39,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut documentation = cargo(&["doc", "--workspace", "--no-deps"]);
     step("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"))?;
     check_that_infer_cpu_is_light()?;
+    lint_for_the_pi(!args.no_install)?;
+    test_on_the_pi(!args.no_install)?;
+    build_for_the_pi(!args.no_install)?;
     if args.fuzz_seconds > 0 {
         fuzz(args.fuzz_seconds)?;
     }
@@ -47,15 +49,49 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Runs one check; its output goes to the terminal.
-fn step(name: &str, command: &mut Command) -> anyhow::Result<()> {
-    let words = std::iter::once(command.get_program()).chain(command.get_args());
-    let shown = words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ");
-    eprintln!("== {name}: {shown}");
-    let status = command.status().with_context(|| format!("cannot run {shown}"))?;
-    if !status.success() {
-        bail!("{name} failed ({status}): {shown}");
+/// Lints the code that is compiled for the Raspberry Pi alone.
+fn lint_for_the_pi(required: bool) -> anyhow::Result<()> {
+    let name = "Raspberry Pi lints";
+    if !pi_target::has_standard_library()? {
+        return go_without(name, pi_target::NO_STANDARD_LIBRARY, required);
     }
+    let mut lints = pi_target::cargo(&["clippy", "--package", "infer-cpu", "--all-targets"]);
+    step(name, lints.args(["--", "--deny", "warnings"]))
+}
+
+/// Tests infer-cpu with the Raspberry Pi's instructions.
+fn test_on_the_pi(required: bool) -> anyhow::Result<()> {
+    let name = "Raspberry Pi tests";
+    if cfg!(target_arch = "aarch64") {
+        eprintln!("== {name}: the tests above were, on a processor of its kind");
+        return Ok(());
+    }
+    if !pi_target::has_standard_library()? {
+        return go_without(name, pi_target::NO_STANDARD_LIBRARY, required);
+    }
+    if pi_target::emulator().is_none() {
+        // QEMU emulates single programs on Linux only.
+        return go_without(name, pi_target::NO_EMULATOR, required && cfg!(target_os = "linux"));
+    }
+    let tests = ["test", "--package", "infer-cpu", "--lib", "--bins", "--tests"];
+    step(name, &mut pi_target::cargo(&tests))
+}
+
+/// That a binary for the Raspberry Pi can be made, and is as small as promised.
+fn build_for_the_pi(required: bool) -> anyhow::Result<()> {
+    let name = "Raspberry Pi binary";
+    if !pi_target::has_standard_library()? {
+        return go_without(name, pi_target::NO_STANDARD_LIBRARY, required);
+    }
+    eprintln!("== {name}: cargo xtask build-pi");
+    build_pi::run(&build_pi::Args::default()).map(|_| ())
+}
+
+fn go_without(step: &str, lack: &str, required: bool) -> anyhow::Result<()> {
+    if required {
+        bail!("{step} cannot run: {lack}");
+    }
+    eprintln!("== {step}: SKIPPED, {lack}");
     Ok(())
 }
 
@@ -86,21 +122,11 @@ fn fuzz(seconds: u32) -> anyhow::Result<()> {
         return Ok(());
     }
     let limit = format!("-max_total_time={seconds}");
-    for target in ["off", "mesh"] {
+    for target in ["off", "mesh", "clouds"] {
         let build = ["run", "--release", "--target", "x86_64-unknown-linux-gnu", "--bin", target];
         let mut command = cargo(&build);
         command.args(["--", &limit]).current_dir(root().join("tests/fuzz"));
         step(&format!("fuzzing {target}"), command.env("RUSTFLAGS", COVERAGE))?;
     }
     Ok(())
-}
-
-fn cargo(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO"));
-    command.args(args).current_dir(root());
-    command
-}
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }

@@ -2,7 +2,9 @@
 
 use std::sync::atomic::Ordering;
 
-use super::{BLOCK, Engine, GROUP, Group, Head, Pass, Scratch, Task, VECTOR_BLOCK, VECTOR_CHUNK};
+use super::{
+    BLOCK, Engine, GROUP, Group, Head, Pass, Run, Scratch, Task, VECTOR_BLOCK, VECTOR_CHUNK,
+};
 use super::{lock, read, write};
 use crate::kernel::Rows;
 use crate::layers::Packed;
@@ -14,9 +16,7 @@ impl<T: Format> Work for Engine<T> {
         let task = *read(&self.task);
         match task {
             Task::Hidden { pass, first_block } => self.hidden(thread, pass, first_block, chunk),
-            Task::Pool { pass, first_block, n_blocks } => {
-                self.pool_group(pass, first_block, n_blocks, chunk);
-            }
+            Task::Pool { pass, run } => self.pool_group(pass, run, chunk),
             Task::Vector { head, layer } => self.vector_chunk(head, layer, chunk),
         }
     }
@@ -75,7 +75,8 @@ impl<T: Format> Engine<T> {
     }
 
     /// Pools group `group` of a pass's last channels over some blocks.
-    fn pool_group(&self, pass: Pass, first_block: usize, n_blocks: usize, group: usize) {
+    fn pool_group(&self, pass: Pass, run: Run, group: usize) {
+        let Run { first_block, n_blocks, winners: wants_winners } = run;
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let last = self.place(self.last(pass), &feature, &folded);
         let gemm = T::gemm(self.kernels).expect("invariant: kernels fit the format");
@@ -95,7 +96,7 @@ impl<T: Format> Engine<T> {
             let first_row = (first_block + slot) * BLOCK;
             let block = read(&self.blocks[slot]);
             let rows = Rows { data: &block[..], stride, n: BLOCK.min(n_points - first_row) };
-            if pass == Pass::Front || pass == Pass::Stn {
+            if wants_winners {
                 let first_row = first_row as u32;
                 (gemm.argmax)(&rows, &last.panels, panels.clone(), first_row, maxima, winners);
             } else {

@@ -3,8 +3,8 @@
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, SMALL_VECTOR, Task, VECTOR_CHUNK, lock, read,
-    write,
+    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, Run, SMALL_VECTOR, Task, VECTOR_CHUNK, lock,
+    read, write,
 };
 use crate::kernel::{Panels, Rows};
 use crate::layers::Conv;
@@ -28,6 +28,14 @@ pub struct Memory {
     product: Vec<f32>,
 }
 
+impl Memory {
+    /// Makes room for a pooling of `channels`.
+    pub fn reserve(&mut self, channels: usize) {
+        self.values.reserve(channels.saturating_sub(self.values.len()));
+        self.winners.reserve(channels.saturating_sub(self.winners.len()));
+    }
+}
+
 impl<T: Format> Engine<T> {
     /// Memory that no pass of this engine outgrows.
     pub fn memory(&self) -> Memory {
@@ -49,32 +57,34 @@ impl<T: Format> Engine<T> {
         let n_points = read(&engine.points).len() / 4;
         if engine.layers.stn.is_some() {
             if !pooled_stn {
-                Self::pool(team, Pass::Stn, memory);
+                Self::pool(team, Pass::Stn, false, memory);
             }
             Self::vectors(team, Head::Stn, &mut memory.values);
+            engine.note_overflow(&memory.values);
             engine.set_input_transform(&memory.values);
         }
         if engine.layers.fstn.is_some() {
-            Self::pool(team, Pass::Fstn, memory);
+            Self::pool(team, Pass::Fstn, false, memory);
             Self::vectors(team, Head::Fstn, &mut memory.values);
+            engine.note_overflow(&memory.values);
             engine.set_feature_transform(memory, n_points);
         }
-        Self::pool(team, Pass::Trunk, memory);
+        Self::pool(team, Pass::Trunk, false, memory);
         Self::vectors(team, Head::Class, &mut memory.values);
     }
 
     /// Takes the points through every layer that there is.
     pub fn observe(team: &Team<Self>, memory: &mut Memory) {
         if matches!(team.work().layers.front, Some(Front::Mlp(_))) {
-            Self::pool(team, Pass::Front, memory);
+            Self::pool(team, Pass::Front, false, memory);
         }
         Self::classify(team, memory, false);
     }
 
     /// Takes the points through `pass`; the pooled vector is left in
-    /// `memory.values`, and after [`Pass::Front`] or [`Pass::Stn`] the points
-    /// that won in `memory.winners`.
-    pub fn pool(team: &Team<Self>, pass: Pass, memory: &mut Memory) {
+    /// `memory.values`, and, if they are asked for, the points that won in
+    /// `memory.winners`.
+    pub fn pool(team: &Team<Self>, pass: Pass, winners: bool, memory: &mut Memory) {
         let engine = team.work();
         let n_points = read(&engine.points).len() / 4;
         let n_blocks = n_points.div_ceil(BLOCK);
@@ -83,7 +93,7 @@ impl<T: Format> Engine<T> {
             let n_blocks = RUN_BLOCKS.min(n_blocks - first_block);
             engine.begin(Task::Hidden { pass, first_block });
             team.run(n_blocks);
-            engine.begin(Task::Pool { pass, first_block, n_blocks });
+            engine.begin(Task::Pool { pass, run: Run { first_block, n_blocks, winners } });
             team.run(width.div_ceil(GROUP));
         }
         engine.collect(pass, memory);
@@ -102,7 +112,8 @@ impl<T: Format> Engine<T> {
             {
                 let scale = panels.scale.get(channel).copied().unwrap_or(1.0);
                 let value = T::widen(sum) * scale + panels.bias[channel];
-                memory.values.push(if panels.relu { value.max(0.0) } else { value });
+                let is_cut = panels.relu && value < 0.0;
+                memory.values.push(if is_cut { 0.0 } else { value });
                 memory.winners.push(winner);
             }
         }
@@ -132,8 +143,17 @@ impl<T: Format> Engine<T> {
                 values.extend(out.iter().take(left));
             }
             if layer.relu {
-                values.iter_mut().for_each(|value| *value = value.max(0.0));
+                // NaN is not below 0: an overflow is still seen in the logits.
+                values.iter_mut().filter(|value| **value < 0.0).for_each(|value| *value = 0.0);
             }
+        }
+    }
+
+    /// Notes a transform that is not finite, which the ReLU of the layers that
+    /// it turns would hide: kernels take NaN for 0.
+    fn note_overflow(&self, transform: &[f32]) {
+        if !transform.iter().all(|value| value.is_finite()) {
+            self.overflow.store(true, Ordering::Relaxed);
         }
     }
 

@@ -65,9 +65,17 @@ enum Task {
     /// Features of blocks of points before a pass's last layer.
     Hidden { pass: Pass, first_block: usize },
     /// The last layer and its maxima, of some blocks.
-    Pool { pass: Pass, first_block: usize, n_blocks: usize },
+    Pool { pass: Pass, run: Run },
     /// One vector layer.
     Vector { head: Head, layer: usize },
+}
+
+/// Blocks whose features are at hand, and whether to keep the points that win.
+#[derive(Clone, Copy)]
+struct Run {
+    first_block: usize,
+    n_blocks: usize,
+    winners: bool,
 }
 
 /// A network of format `T` and the memory that it works in.
@@ -187,11 +195,21 @@ impl<T: Format> Engine<T> {
         let mut rows = write(&self.points);
         rows.clear();
         rows.extend(points.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0]));
+    }
+
+    /// Forgets what earlier passes met.
+    pub fn reset(&self) {
         self.clipped.store(0, Ordering::Relaxed);
         self.overflow.store(false, Ordering::Relaxed);
     }
 
-    /// What the passes since [`Engine::set_points`] met.
+    /// How many features `pass` pools.
+    pub fn channels(&self, pass: Pass) -> usize {
+        let (feature, folded) = (read(&self.feature), read(&self.folded));
+        self.place(self.last(pass), &feature, &folded).panels.outputs
+    }
+
+    /// What the passes since [`Engine::reset`] met.
     pub fn met(&self) -> Met {
         Met {
             clipped: self.clipped.load(Ordering::Relaxed),

@@ -4,8 +4,8 @@
 //! A layer multiplies rows of activations (one row a point) by a matrix packed
 //! into [`Panels`] (one panel a few output channels). A register tile is a few
 //! rows by one panel: vector lanes run along output channels, so that rows need
-//! no packing and the maximum over points is lane by lane. [`scalar`] is the
-//! reference that every other file is held to by [`suite`].
+//! no packing and the maximum over points is lane by lane. `scalar` is the
+//! reference that every other file is held to by `suite`.
 
 #![expect(unsafe_code, reason = "SIMD intrinsics; every block says why it is sound")]
 
@@ -85,6 +85,27 @@ impl<T> Rows<'_, T> {
     }
 }
 
+/// `rows` times the panels of a range, scaled, with bias and ReLU as the panels
+/// say, into rows of `out` that are `out_stride` apart. The column of a channel
+/// is its number.
+pub type RowsKernel<A, W> =
+    fn(&Rows<'_, A>, &Panels<W>, Range<usize>, out: &mut [f32], out_stride: usize);
+
+/// Raises each of `maxima` (a channel of the range each) to the largest
+/// accumulator over the rows, before scale and bias. NaN raises nothing.
+pub type MaxKernel<A, W, C> = fn(&Rows<'_, A>, &Panels<W>, Range<usize>, maxima: &mut [C]);
+
+/// The same, and remembers in `winners` the row (counted from `first_row`) that
+/// raised each last. Of equal rows the first wins.
+pub type ArgmaxKernel<A, W, C> = fn(
+    &Rows<'_, A>,
+    &Panels<W>,
+    Range<usize>,
+    first_row: u32,
+    maxima: &mut [C],
+    winners: &mut [u32],
+);
+
 /// Matrix products of one number format: activations `A`, weights `W`,
 /// accumulators `C`.
 pub struct Gemm<A, W, C> {
@@ -92,23 +113,12 @@ pub struct Gemm<A, W, C> {
     pub nr: usize,
     /// Panels hold inputs up to a multiple of this; divides [`WIDTH_STEP`].
     pub k_step: usize,
-    /// `rows` times the panels of a range, scaled, with bias and ReLU as the
-    /// panels say, into rows of `out` that are `out_stride` apart. The column
-    /// of a channel is its number.
-    pub rows: fn(&Rows<'_, A>, &Panels<W>, Range<usize>, out: &mut [f32], out_stride: usize),
-    /// Raises each of `maxima` (a channel of the range each) to the largest
-    /// accumulator over the rows, before scale and bias. NaN raises nothing.
-    pub max: fn(&Rows<'_, A>, &Panels<W>, Range<usize>, maxima: &mut [C]),
-    /// The same, and remembers in `winners` the row (counted from `first_row`)
-    /// that raised each last. Of equal rows the first wins.
-    pub argmax: fn(
-        &Rows<'_, A>,
-        &Panels<W>,
-        Range<usize>,
-        first_row: u32,
-        maxima: &mut [C],
-        winners: &mut [u32],
-    ),
+    /// Products that are kept.
+    pub rows: RowsKernel<A, W>,
+    /// Products that are pooled.
+    pub max: MaxKernel<A, W, C>,
+    /// Products that are pooled, with the rows that won.
+    pub argmax: ArgmaxKernel<A, W, C>,
 }
 
 /// Products of a sparse vector and a matrix of weights stored as `W`, in f32

@@ -5,8 +5,6 @@
 //! [`suite`] makes the tests of one file of kernels; `declare_kernels` calls
 //! it. A machine without the instructions says so and passes.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 use formats::rng::StreamKey;
 use half::f16;
 

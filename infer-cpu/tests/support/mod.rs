@@ -1,7 +1,5 @@
 //! What several tests of infer-cpu need.
 
-#![expect(dead_code, reason = "each test uses some of it")]
-
 use std::path::{Path, PathBuf};
 
 use formats::weights::Tensor;

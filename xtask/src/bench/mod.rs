@@ -2,7 +2,8 @@
 //!
 //! One file per question asked: [`speed`] of building and tracing, [`trade`]
 //! of speed against accuracy, which [`builders`] pays when, the share of each
-//! stage of the [`pipeline`], and how [`peers`] compare.
+//! stage of the [`pipeline`], and how [`peers`] compare. [`infer`] is about
+//! classifying and sampling, the others about scanning.
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
@@ -14,6 +15,7 @@ mod accuracy;
 mod bins;
 mod builders;
 mod clock;
+mod infer;
 mod kernel;
 mod lanes;
 mod machine;
@@ -27,6 +29,7 @@ mod subject;
 mod table;
 mod to_disk;
 mod trade;
+mod venv;
 
 /// What to measure.
 #[derive(Args, Debug)]
@@ -39,6 +42,12 @@ pub struct BenchArgs {
 enum Benchmark {
     /// Measure the simulator: building, casting, the whole way to disk.
     Sim(SimArgs),
+    /// Measure the classifier and the sampler against other engines, in turns.
+    ///
+    /// The others are Python packages, installed from PyPI under `target/peers`,
+    /// and Rust crates, built there. Who cannot be had is skipped with a
+    /// message; who does not give what the weights do is not timed.
+    Infer(infer::InferArgs),
 }
 
 #[derive(Args, Debug)]
@@ -97,7 +106,13 @@ struct Report {
 /// # Errors
 /// If no mesh can be read, an adapter fails or the report cannot be written.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let Benchmark::Sim(args) = &args.what;
+    match &args.what {
+        Benchmark::Sim(args) => sim(args),
+        Benchmark::Infer(args) => infer::run(args),
+    }
+}
+
+fn sim(args: &SimArgs) -> Result<()> {
     let request: Option<AdapterRequest> = match &args.adapter {
         Some(name) => Some(name.parse()?),
         None => None,

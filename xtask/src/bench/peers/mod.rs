@@ -1,7 +1,6 @@
 //! How others do on the same meshes and rays, in the same run.
 
 mod embree;
-mod venv;
 
 use super::accuracy::Accuracy;
 use super::clock::{Contestant, Costs, interleave, measured};
@@ -11,6 +10,7 @@ use super::shot::Shot;
 use super::speed::{casting, short, sweep_pose, target, vlp32c};
 use super::subject::Subject;
 use super::table::{Table, digits, millions_per_s, milliseconds};
+use super::venv::Environment;
 use anyhow::Result;
 use embree::Embree;
 use glam::DAffine3;
@@ -29,6 +29,9 @@ use sim_gpu::target::Target;
 use std::cell::RefCell;
 use std::hint::black_box;
 use std::sync::Arc;
+
+const OPEN3D: Environment =
+    Environment { name: "venv", requirements: "requirements.txt", size: "some 700 MB" };
 
 /// Rays in the order in which we cast them: neighbours traverse alike.
 const OURS: &str = "our order";
@@ -62,7 +65,7 @@ pub struct Comparison {
 /// # Errors
 /// If an adapter or the peer fails on the way.
 pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Option<Comparison>> {
-    let embree = match venv::interpreter() {
+    let embree = match OPEN3D.interpreter() {
         Ok(python) => Embree::start(&python).map_err(|error| format!("{error:#}")),
         Err(cause) => Err(cause),
     };

@@ -1,0 +1,104 @@
+//! Raw little-endian f32, as KITTI keeps its scans: x, y, z and intensity of
+//! one point after the other, without a header.
+//!
+//! Names tell of other numbers of columns: `NAME.f32x5.bin` has five, and so
+//! has nuScenes's `NAME.pcd.bin` (x, y, z, intensity, ring).
+
+use std::io::{BufRead, Write};
+use std::path::Path;
+
+use crate::atomic;
+use crate::error::FormatError;
+use crate::number::{ByteOrder, NumberType};
+use crate::records;
+
+/// x, y, z, intensity.
+const KITTI_COLUMNS: usize = 4;
+const NUSCENES_COLUMNS: usize = 5;
+const COLUMN_SIZE: usize = size_of::<f32>();
+
+/// Reads every point up to the end.
+pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+    let start = reader.fill_buf().map_err(|source| FormatError::io(name, source))?;
+    if is_velodyne_packets(start) {
+        let cause = "raw Velodyne packets, not points: decode them first";
+        return Err(FormatError::malformed(name, "format", cause));
+    }
+    let columns = columns(name);
+    let mut points = Vec::new();
+    let rest =
+        records::read_to_end(reader, columns * COLUMN_SIZE, |record| {
+            points.push([0, 1, 2].map(|axis| {
+                NumberType::F32.decode(&record[axis * COLUMN_SIZE..], ByteOrder::Little)
+            }));
+        });
+    match rest.map_err(|source| FormatError::io(name, source))? {
+        0 => Ok(points),
+        rest => {
+            let part = format!("point {}", points.len());
+            let cause = format!("{rest} of the {} bytes of {columns} f32", columns * COLUMN_SIZE);
+            Err(FormatError::malformed(name, part, cause))
+        }
+    }
+}
+
+/// How many numbers a point has, by the file's name: at least three.
+fn columns(name: &Path) -> usize {
+    let name = name.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let stem = name.strip_suffix(".bin").unwrap_or(&name);
+    let told = stem.rsplit_once(".f32x").and_then(|(_, columns)| columns.parse().ok());
+    match told {
+        Some(columns @ 3..=64) => columns,
+        _ if stem.ends_with(".pcd") => NUSCENES_COLUMNS,
+        _ => KITTI_COLUMNS,
+    }
+}
+
+/// Whether `start` begins with two blocks of a Velodyne data packet: each has
+/// 100 bytes and begins with the flag 0xFFEE (VLP-16 user manual, 9.3). The
+/// packets of some scans would pass for whole points.
+fn is_velodyne_packets(start: &[u8]) -> bool {
+    const FLAG: &[u8] = &[0xff, 0xee];
+    start.starts_with(FLAG) && start.get(100..102) == Some(FLAG)
+}
+
+/// Writes `points` with intensity 0.
+pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
+    let columns = columns(path);
+    if columns != KITTI_COLUMNS {
+        let cause = format!("{columns} columns are read but not written");
+        return Err(FormatError::malformed(path, "extension", cause));
+    }
+    let fits = |x: &f64| !x.is_finite() || (*x as f32).is_finite();
+    if let Some(i) = points.iter().position(|point| !point.iter().all(fits)) {
+        let cause = format!("{:?} does not fit f32, all that the format holds", points[i]);
+        return Err(FormatError::malformed(path, format!("point {i}"), cause));
+    }
+    atomic::write(path, |writer| {
+        points.iter().try_for_each(|&[x, y, z]| {
+            let record = [x, y, z, 0.0].map(|number| (number as f32).to_le_bytes());
+            writer.write_all(record.as_flattened())
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_tells_the_columns() {
+        for (name, expected) in [
+            ("000000.bin", 4),
+            ("a/frame.f32x5.bin", 5),
+            ("frame.F32X3.BIN", 3),
+            ("frame.f32x2.bin", 4),
+            ("frame.f32x99999999999999999999.bin", 4),
+            ("n015__LIDAR_TOP__1533.pcd.bin", 5),
+            ("-", 4),
+            ("", 4),
+        ] {
+            assert_eq!(columns(Path::new(name)), expected, "{name}");
+        }
+    }
+}

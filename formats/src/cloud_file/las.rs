@@ -1,0 +1,78 @@
+//! LAS, the ASPRS's format of airborne scans.
+//!
+//! Crate `las` reads the header and knows the point formats. Its own reader of
+//! points is not used: it believes the sizes that records after the points
+//! claim, so that a file of a hundred bytes can ask for all memory there is.
+
+use std::io::{self, BufRead, Read};
+use std::path::Path;
+
+use las::Transform;
+use las::point::Format;
+use las::raw::Header;
+
+use super::format::COMPRESSED_LAS;
+use crate::decoding::{error_in, invalid};
+use crate::error::FormatError;
+use crate::number::{ByteOrder, NumberType};
+use crate::records;
+
+/// Reads every point, with the header's scale and offset applied.
+pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+    let (header, n_bytes) = read_header(reader).map_err(|error| error_in(name, "header", error))?;
+    let gap = u64::from(header.offset_to_point_data).checked_sub(n_bytes);
+    let gap = gap.ok_or_else(|| {
+        FormatError::malformed(name, "header", "the points begin before the header ends")
+    })?;
+    records::skip(reader, gap).map_err(|error| error_in(name, "header", error))?;
+    let mut points = Vec::new();
+    let transforms = transforms(&header);
+    let size = usize::from(header.point_data_record_length);
+    records::read(reader, size, n_points(&header), |record| {
+        points.push([0, 1, 2].map(|axis| coordinate(transforms[axis], &record[4 * axis..])));
+    })
+    .map_err(|error| error_in(name, "points", error))?;
+    Ok(points)
+}
+
+/// The header and how many bytes it takes.
+fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
+    let wrong = |error| match error {
+        las::Error::Io(error) => error,
+        other => invalid(other),
+    };
+    let header = Header::read_from(&mut *reader).map_err(wrong)?;
+    let format = Format::new(header.point_data_record_format).map_err(wrong)?;
+    if format.is_compressed {
+        return Err(invalid(COMPRESSED_LAS));
+    }
+    let (found, least) = (header.point_data_record_length, format.len());
+    if found < least {
+        let format = header.point_data_record_format;
+        return Err(invalid(format!("points of {found} bytes, format {format} has {least}")));
+    }
+    let n_bytes = header.header_size.max(header.version.header_size());
+    Ok((header, n_bytes.into()))
+}
+
+/// How many points follow. Where the field of LAS 1.3 and before says
+/// something, it holds (LAS 1.4 R15, 2.4).
+fn n_points(header: &Header) -> u64 {
+    match (header.number_of_point_records, header.large_file) {
+        (0, Some(large)) => large.number_of_point_records,
+        (n, _) => n.into(),
+    }
+}
+
+fn transforms(header: &Header) -> [Transform; 3] {
+    [
+        Transform { scale: header.x_scale_factor, offset: header.x_offset },
+        Transform { scale: header.y_scale_factor, offset: header.y_offset },
+        Transform { scale: header.z_scale_factor, offset: header.z_offset },
+    ]
+}
+
+/// Every point format begins with x, y and z as i32.
+fn coordinate(transform: Transform, bytes: &[u8]) -> f64 {
+    transform.scale * NumberType::I32.decode(bytes, ByteOrder::Little) + transform.offset
+}

@@ -1,0 +1,87 @@
+//! Lines of text, with their numbers.
+
+use std::borrow::Cow;
+use std::io::{BufRead, Read};
+use std::path::Path;
+
+use crate::decoding::excerpt;
+use crate::error::FormatError;
+
+/// The longest line that is believed. A point takes some hundred bytes; this
+/// keeps a file without line ends from filling the memory.
+const LONGEST_LINE: u64 = 1 << 20;
+
+/// The lines of a text, one by one.
+pub(super) struct Lines<'a, R> {
+    /// What follows the last line that was read.
+    pub reader: &'a mut R,
+    name: &'a Path,
+    number: u64,
+    bytes: Vec<u8>,
+}
+
+/// One line, without blanks at its ends.
+pub(super) struct Line<'a> {
+    /// The line itself; bytes that are no UTF-8 are replaced.
+    pub text: Cow<'a, str>,
+    name: &'a Path,
+    number: u64,
+}
+
+impl<'a, R: BufRead> Lines<'a, R> {
+    /// The lines of `reader`, which errors call `name`.
+    pub fn new(reader: &'a mut R, name: &'a Path) -> Self {
+        Self { reader, name, number: 0, bytes: Vec::new() }
+    }
+
+    /// The next line, or none at the end.
+    pub fn next(&mut self) -> Result<Option<Line<'_>>, FormatError> {
+        Ok(if self.advance()? { Some(self.line()) } else { None })
+    }
+
+    /// The next line that is not blank, of `n` of which `found` came so far.
+    pub fn next_of(&mut self, found: u64, n: u64) -> Result<Line<'_>, FormatError> {
+        loop {
+            if !self.advance()? {
+                return Err(self.line().error(format!("the file ends after {found} of {n}")));
+            }
+            if !self.bytes.trim_ascii().is_empty() {
+                return Ok(self.line());
+            }
+        }
+    }
+
+    fn advance(&mut self) -> Result<bool, FormatError> {
+        self.bytes.clear();
+        self.number += 1;
+        let mut limited = self.reader.by_ref().take(LONGEST_LINE);
+        let read = limited.read_until(b'\n', &mut self.bytes);
+        let n = read.map_err(|source| FormatError::io(self.name, source))? as u64;
+        if n == LONGEST_LINE && !self.bytes.ends_with(b"\n") {
+            return Err(self.line().error(format!("longer than {LONGEST_LINE} bytes")));
+        }
+        Ok(n > 0)
+    }
+
+    fn line(&self) -> Line<'_> {
+        let text = String::from_utf8_lossy(self.bytes.trim_ascii());
+        Line { text, name: self.name, number: self.number }
+    }
+}
+
+impl Line<'_> {
+    /// The error of this line.
+    pub fn error(&self, cause: impl ToString) -> FormatError {
+        FormatError::malformed(self.name, format!("line {}", self.number), cause)
+    }
+
+    /// The number that `word` spells: NaN and infinities too.
+    pub fn number(&self, word: &str) -> Result<f64, FormatError> {
+        word.parse().map_err(|_| self.error(format!("`{}` is no number", excerpt(word))))
+    }
+
+    /// The whole number that `word` spells.
+    pub fn count(&self, word: &str) -> Result<u64, FormatError> {
+        word.parse().map_err(|_| self.error(format!("`{}` is no count", excerpt(word))))
+    }
+}

@@ -1,0 +1,68 @@
+//! LZF, the compression of PCD files.
+//!
+//! Marc Lehmann's format: a control byte below 32 announces so many literal
+//! bytes and one; any other a copy of earlier output, whose length stands in its
+//! upper three bits (7: and in the next byte), whose distance in the lower five
+//! and the next byte.
+
+use std::io;
+
+use crate::decoding::invalid;
+
+/// What `compressed` unfolds to, `n` bytes. Memory grows with the output, of
+/// which one byte of input makes at most 88.
+pub(super) fn decompress(compressed: &[u8], n: u64) -> io::Result<Vec<u8>> {
+    let mut output = Vec::new();
+    let mut input = compressed.iter().copied();
+    let mut next = || input.next().ok_or_else(|| invalid("LZF data that end too early"));
+    while (output.len() as u64) < n {
+        let control = usize::from(next()?);
+        if control < 32 {
+            for _ in 0..=control {
+                output.push(next()?);
+            }
+            continue;
+        }
+        let length = match control >> 5 {
+            7 => 7 + usize::from(next()?),
+            length => length,
+        };
+        let distance = ((control & 0x1f) << 8) + usize::from(next()?) + 1;
+        let start = output.len().checked_sub(distance);
+        let start = start.ok_or_else(|| invalid("an LZF copy from before the start"))?;
+        // The copy may overlap what it makes.
+        for i in start..start + length + 2 {
+            output.push(output[i]);
+        }
+    }
+    if output.len() as u64 > n {
+        return Err(invalid(format!("LZF data of more than {n} bytes")));
+    }
+    Ok(output)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn copies_reach_back_and_into_themselves() {
+        // Literals `ab`; 2 + 1 bytes from 2 back; 2 + 7 + 3 from 1 back.
+        let compressed = [1, b'a', b'b', 1 << 5, 1, 7 << 5, 3, 0];
+        assert_eq!(decompress(&compressed, 17).unwrap(), b"ababaaaaaaaaaaaaa");
+        assert!(decompress(&compressed, 16).is_err());
+        assert!(decompress(&compressed, 18).is_err());
+        assert!(decompress(&[1 << 5, 0], 3).is_err());
+        assert_eq!(decompress(&[], 0).unwrap(), b"");
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_make_it_panic(
+            bytes in prop::collection::vec(any::<u8>(), 0..100), n in any::<u64>(),
+        ) {
+            let _ = decompress(&bytes, n);
+        }
+    }
+}

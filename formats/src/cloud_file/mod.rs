@@ -1,0 +1,155 @@
+//! Clouds of points, in the formats in which sensors, tools and datasets keep
+//! them: coordinates alone, in f64, whatever the file's own type.
+//!
+//! | format | read | written |
+//! | --- | --- | --- |
+//! | PLY | ASCII, binary of either byte order | binary, little-endian |
+//! | NPZ | `positions` (plus `origin`), else `points`, else the only array of points | `positions` |
+//! | NPY | `[n, 3]` or wider, any numbers, C or Fortran order | `[n, 3]` |
+//! | PCD | ASCII, binary, LZF-compressed | binary |
+//! | XYZ, TXT, ASC, TSV, CSV | separated by blanks, tabs, commas or semicolons | blanks, in CSV commas |
+//! | KITTI `.bin` | f32, four to a point or as many as the name says | f32, intensity 0 |
+//! | LAS | 1.0 to 1.4 | no |
+//!
+//! NaN and infinities are coordinates like others; whoever reads decides what
+//! to do with them. Memory grows with the bytes that are there, unpacked where
+//! they are compressed, never with what a header promises.
+
+mod format;
+mod kitti;
+#[cfg(feature = "las")]
+mod las;
+mod lines;
+#[cfg(feature = "pcd")]
+mod lzf;
+mod npy;
+#[cfg(feature = "npz")]
+mod npz;
+#[cfg(feature = "pcd")]
+mod pcd;
+#[cfg(feature = "pcd")]
+mod pcd_header;
+#[cfg(feature = "ply")]
+mod ply;
+#[cfg(feature = "ply")]
+mod ply_header;
+mod precision;
+mod text;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+use crate::atomic;
+use crate::error::FormatError;
+use crate::records;
+pub use format::CloudFormat;
+use precision::Precision;
+
+/// Reads the cloud at `path`, in the format that its name tells.
+///
+/// # Errors
+/// A name without a known format, a format that this build leaves out, a mesh,
+/// a file that cannot be read or is not what its name says. The error names the
+/// file and the line, element or key at fault.
+pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+    let format = CloudFormat::of(path)?;
+    let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
+    #[cfg(feature = "npz")]
+    if format == CloudFormat::Npz {
+        return npz::read(BufReader::new(file), path);
+    }
+    read_as(&mut BufReader::new(file), format, path)
+}
+
+/// Reads a cloud from `reader`, which errors call `name`.
+///
+/// Without a `format` the first bytes tell it; raw floats (KITTI) have nothing
+/// to be told by, and must be named. An NPZ archive is held in memory, since
+/// its table of contents comes last.
+///
+/// # Errors
+/// As [`read_cloud`]; and bytes that begin like no format.
+pub fn read_cloud_from(
+    mut reader: impl Read,
+    format: Option<CloudFormat>,
+    name: &Path,
+) -> Result<Vec<[f64; 3]>, FormatError> {
+    let mut start = [0; format::SNIFFED_SIZE];
+    let n = records::fill(&mut reader, &mut start);
+    let start = &start[..n.map_err(|source| FormatError::io(name, source))?];
+    let format = match format {
+        Some(format) => format,
+        None => CloudFormat::of_content(start, name)?,
+    };
+    read_as(&mut BufReader::new(start.chain(reader)), format, name)
+}
+
+fn read_as(
+    reader: &mut impl BufRead,
+    format: CloudFormat,
+    name: &Path,
+) -> Result<Vec<[f64; 3]>, FormatError> {
+    match format {
+        CloudFormat::Text | CloudFormat::Csv => text::read(reader, name),
+        CloudFormat::Npy => npy::read(reader, name),
+        CloudFormat::Kitti => kitti::read(reader, name),
+        #[cfg(feature = "ply")]
+        CloudFormat::Ply => ply::read(reader, name),
+        #[cfg(feature = "pcd")]
+        CloudFormat::Pcd => pcd::read(reader, name),
+        #[cfg(feature = "las")]
+        CloudFormat::Las => las::read(reader, name),
+        #[cfg(feature = "npz")]
+        CloudFormat::Npz => {
+            let mut archive = Vec::new();
+            let read = reader.read_to_end(&mut archive);
+            read.map_err(|source| FormatError::io(name, source))?;
+            npz::read(std::io::Cursor::new(archive), name)
+        }
+        #[allow(unreachable_patterns, reason = "a build may leave no format out")]
+        left_out => Err(not_in_this_build(left_out, name)),
+    }
+}
+
+/// Writes `points` to `path`, atomically, in the format that its name tells.
+///
+/// Coordinates are written as f32 where that loses nothing, that is for clouds
+/// that came as f32, and else as f64; the same points give the same bytes. Two
+/// formats round: KITTI's holds f32 only, and in PCD f64 stands only where f32
+/// would lose more than a millionth of the cloud's extent, since the usual
+/// clouds of PCL and Open3D take no other type from it.
+///
+/// # Errors
+/// As [`read_cloud`]; LAS, which is only read; raw floats of a number of
+/// columns other than four; a coordinate beyond f32 in KITTI's format; what the
+/// system reports.
+pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
+    let precision = Precision::lossless(points);
+    match CloudFormat::of(path)? {
+        CloudFormat::Text => atomic::write(path, |writer| text::write(writer, points)),
+        CloudFormat::Csv => atomic::write(path, |writer| text::write_csv(writer, points)),
+        CloudFormat::Npy => atomic::write(path, |writer| npy::write(writer, points, precision)),
+        CloudFormat::Kitti => kitti::write(path, points),
+        #[cfg(feature = "ply")]
+        CloudFormat::Ply => atomic::write(path, |writer| ply::write(writer, points, precision)),
+        #[cfg(feature = "pcd")]
+        CloudFormat::Pcd => {
+            let precision = Precision::tolerable(points);
+            atomic::write(path, |writer| pcd::write(writer, points, precision))
+        }
+        #[cfg(feature = "npz")]
+        CloudFormat::Npz => atomic::write(path, |writer| npz::write(writer, points, precision)),
+        #[cfg(feature = "las")]
+        CloudFormat::Las => {
+            Err(FormatError::malformed(path, "extension", "LAS is read but not written"))
+        }
+        #[allow(unreachable_patterns, reason = "a build may leave no format out")]
+        left_out => Err(not_in_this_build(left_out, path)),
+    }
+}
+
+#[allow(dead_code, reason = "a build may leave no format out")]
+fn not_in_this_build(format: CloudFormat, name: &Path) -> FormatError {
+    FormatError::malformed(name, "format", format!("{format} is left out of this build"))
+}

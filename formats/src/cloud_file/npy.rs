@@ -1,0 +1,79 @@
+//! NumPy's arrays as clouds: a row a point, its first three columns x, y, z.
+
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use super::precision::Precision;
+use crate::decoding::{error_in, invalid};
+use crate::error::FormatError;
+use crate::npy;
+use crate::npy_header::{self, Header};
+use crate::number::{ByteOrder, NumberType};
+use crate::records;
+
+/// Reads the array that `reader` holds.
+pub(super) fn read(reader: &mut impl Read, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+    let header =
+        npy_header::read_header(reader).map_err(|error| error_in(name, "header", error))?;
+    read_points(&header, reader).map_err(|error| error_in(name, "array", error))
+}
+
+/// Whether an array of this header holds points.
+pub(super) fn holds_points(header: &Header) -> bool {
+    matches!(header.shape[..], [_, columns] if columns >= 3) && header.number().is_some()
+}
+
+/// Reads the points that follow `header`: numbers of any type.
+pub(super) fn read_points(
+    header: &Header,
+    reader: &mut (impl Read + ?Sized),
+) -> io::Result<Vec<[f64; 3]>> {
+    let (n, columns) = match header.shape[..] {
+        [n, columns] if columns >= 3 => (n, columns),
+        _ => return Err(invalid(format!("expected shape [n, 3], found {:?}", header.shape))),
+    };
+    let (number, order) = header.number_or_error()?;
+    if header.is_fortran_order {
+        return read_columns(reader, n as u64, number, order);
+    }
+    let mut points = Vec::new();
+    let size = number.size();
+    records::read(reader, columns.saturating_mul(size), n as u64, |row| {
+        points.push([0, 1, 2].map(|axis| number.decode(&row[axis * size..], order)));
+    })?;
+    Ok(points)
+}
+
+/// Reads x, y and z that each lie together.
+fn read_columns(
+    reader: &mut (impl Read + ?Sized),
+    n: u64,
+    number: NumberType,
+    order: ByteOrder,
+) -> io::Result<Vec<[f64; 3]>> {
+    let mut points = Vec::new();
+    records::read(reader, number.size(), n, |x| points.push([number.decode(x, order), 0.0, 0.0]))?;
+    for axis in [1, 2] {
+        let mut rest = points.iter_mut();
+        records::read(reader, number.size(), n, |bytes| {
+            if let Some(point) = rest.next() {
+                point[axis] = number.decode(bytes, order);
+            }
+        })?;
+    }
+    Ok(points)
+}
+
+/// Writes `points` as an array of shape `[n, 3]`.
+pub(super) fn write(
+    writer: &mut impl Write,
+    points: &[[f64; 3]],
+    precision: Precision,
+) -> io::Result<()> {
+    let shape = [points.len(), 3];
+    let coordinates = points.as_flattened().iter();
+    match precision {
+        Precision::Single => npy::write_array(writer, &shape, coordinates.map(|&x| x as f32)),
+        Precision::Double => npy::write_array(writer, &shape, coordinates.copied()),
+    }
+}

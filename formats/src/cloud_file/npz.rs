@@ -1,0 +1,78 @@
+//! NumPy's archives as clouds.
+
+use std::io::{self, Read, Seek, Write};
+use std::path::Path;
+
+use super::npy;
+use super::precision::Precision;
+use crate::archive::{NpzReader, NpzWriter};
+use crate::error::FormatError;
+
+/// The key under which scans keep their points, and under which they are
+/// written here; `origin` is to be added to them.
+const POSITIONS: &str = "positions";
+const ORIGIN: &str = "origin";
+/// The key under which most others keep them.
+const POINTS: &str = "points";
+
+/// Reads the cloud that the archive holds.
+pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+    let mut npz = NpzReader::new(reader, name)?;
+    let key = match [POSITIONS, POINTS].into_iter().find(|key| npz.has(key)) {
+        Some(key) => key.to_owned(),
+        None => only_array_of_points(&mut npz)?,
+    };
+    let mut points = npz.entry(&key, |header, _, elements| {
+        let points = npy::read_points(&header, elements)?;
+        // An array in Fortran order may have more columns.
+        io::copy(elements, &mut io::sink())?;
+        Ok(points)
+    })?;
+    if key == POSITIONS && npz.has(ORIGIN) {
+        let origin = npz.array::<f64>(ORIGIN)?.elements;
+        let &[x, y, z] = &origin[..] else {
+            return Err(npz.error(ORIGIN, "expected three numbers"));
+        };
+        points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
+    }
+    Ok(points)
+}
+
+fn only_array_of_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<String, FormatError> {
+    let mut found = Vec::new();
+    let keys = npz.keys();
+    for key in &keys {
+        let holds_points = npz.entry(key, |header, _, elements| {
+            io::copy(elements, &mut io::sink())?;
+            Ok(npy::holds_points(&header))
+        })?;
+        if holds_points {
+            found.push(key.clone());
+        }
+    }
+    match &found[..] {
+        [key] => Ok(key.clone()),
+        [] => Err(npz.error(
+            "archive",
+            format!("no array of shape [n, 3] among its keys [{}]", keys.join(", ")),
+        )),
+        several => Err(npz.error(
+            "archive",
+            format!("which of {} holds the points? name it `{POINTS}`", several.join(", ")),
+        )),
+    }
+}
+
+/// Writes `points` under the key `positions`.
+pub(super) fn write(
+    writer: impl Write + Seek,
+    points: &[[f64; 3]],
+    precision: Precision,
+) -> io::Result<()> {
+    let shape = [points.len(), 3];
+    let coordinates = points.as_flattened().iter();
+    NpzWriter::write(writer, |npz| match precision {
+        Precision::Single => npz.array(POSITIONS, &shape, coordinates.map(|&x| x as f32)),
+        Precision::Double => npz.array(POSITIONS, &shape, coordinates.copied()),
+    })
+}

@@ -1,0 +1,109 @@
+//! PCD, the Point Cloud Library's format: text, binary or LZF-compressed.
+//!
+//! Read here and not by crate `pcd-rs`: that one indexes beyond its buffers
+//! where a compressed file holds less than its header promises, and makes a
+//! vector of every field of every point.
+
+use std::io::{self, BufRead, Read, Write};
+use std::path::Path;
+
+use super::lines::Lines;
+use super::lzf;
+use super::pcd_header::{Coordinate, Encoding, Header, read_header};
+use super::precision::Precision;
+use crate::decoding::{error_in, invalid};
+use crate::error::FormatError;
+use crate::number::{ByteOrder, NumberType};
+use crate::records;
+
+/// Reads every point.
+pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+    let mut lines = Lines::new(reader, name);
+    let header = read_header(&mut lines, name)?;
+    let axes = ["x", "y", "z"].map(|axis| header.coordinate(axis));
+    let axes = axes.map(|axis| axis.map_err(|cause| FormatError::malformed(name, "FIELDS", cause)));
+    let [x, y, z] = axes;
+    let axes = [x?, y?, z?];
+    match header.encoding {
+        Encoding::Ascii => read_ascii(&mut lines, header.n, axes),
+        Encoding::Binary => {
+            let size = usize::try_from(header.point_size()).unwrap_or(usize::MAX);
+            let mut points = Vec::new();
+            let read = records::read(lines.reader, size, header.n, |point| {
+                points.push(axes.map(|axis| axis.decode(&point[axis.offset as usize..])));
+            });
+            read.map(|()| points).map_err(|error| error_in(name, "points", error))
+        }
+        Encoding::Compressed => read_compressed(lines.reader, &header, axes)
+            .map_err(|error| error_in(name, "points", error)),
+    }
+}
+
+fn read_ascii<R: BufRead>(
+    lines: &mut Lines<'_, R>,
+    n: u64,
+    axes: [Coordinate; 3],
+) -> Result<Vec<[f64; 3]>, FormatError> {
+    let mut points = Vec::new();
+    for i in 0..n {
+        let line = lines.next_of(i, n)?;
+        let mut point = [0.0; 3];
+        for (axis, coordinate) in axes.iter().enumerate() {
+            let word = line.text.split_ascii_whitespace().nth(coordinate.column as usize);
+            let word = word.ok_or_else(|| {
+                line.error(format!(
+                    "expected a number in column {}",
+                    coordinate.column.saturating_add(1)
+                ))
+            })?;
+            point[axis] = line.number(word)?;
+        }
+        points.push(point);
+    }
+    Ok(points)
+}
+
+/// Reads compressed points: each field's numbers lie together.
+fn read_compressed(
+    reader: &mut impl Read,
+    header: &Header,
+    axes: [Coordinate; 3],
+) -> io::Result<Vec<[f64; 3]>> {
+    let mut sizes = [0; 8];
+    reader.read_exact(&mut sizes)?;
+    let [compressed, uncompressed] =
+        [0, 4].map(|at| NumberType::U32.decode(&sizes[at..], ByteOrder::Little) as u64);
+    let promised = header.n.checked_mul(header.point_size());
+    if promised != Some(uncompressed) {
+        let (n, size) = (header.n, header.point_size());
+        return Err(invalid(format!("{uncompressed} bytes for {n} points of {size}")));
+    }
+    let mut bytes = Vec::new();
+    if reader.take(compressed).read_to_end(&mut bytes)? as u64 != compressed {
+        return Err(records::truncated(bytes.len() as u64, compressed));
+    }
+    let bytes = lzf::decompress(&bytes, uncompressed)?;
+    let point = |i: u64| {
+        axes.map(|axis| {
+            let at = axis.offset * header.n + i * axis.number.size() as u64;
+            axis.decode(&bytes[at as usize..])
+        })
+    };
+    Ok((0..header.n).map(point).collect())
+}
+
+/// Writes `points` as binary PCD 0.7.
+pub(super) fn write(
+    writer: &mut impl Write,
+    points: &[[f64; 3]],
+    precision: Precision,
+) -> io::Result<()> {
+    let (n, size) = (points.len(), precision.size());
+    write!(
+        writer,
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\n\
+         SIZE {size} {size} {size}\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {n}\nHEIGHT 1\n\
+         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {n}\nDATA binary\n"
+    )?;
+    precision.write(writer, points)
+}

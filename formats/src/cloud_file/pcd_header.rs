@@ -1,0 +1,172 @@
+//! The header of PCD files: lines of key words.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use super::lines::{Line, Lines};
+use crate::decoding::excerpt;
+use crate::error::FormatError;
+use crate::number::{ByteOrder, NumberType};
+
+/// What a header says of the points.
+pub(super) struct Header {
+    /// How many points there are.
+    pub n: u64,
+    /// How they follow.
+    pub encoding: Encoding,
+    fields: Vec<Field>,
+}
+
+/// One field: `count` numbers of `size` bytes.
+struct Field {
+    name: String,
+    size: u64,
+    kind: char,
+    count: u64,
+}
+
+/// How points follow the header.
+#[derive(Clone, Copy)]
+pub(super) enum Encoding {
+    /// A line a point.
+    Ascii,
+    /// Point after point.
+    Binary,
+    /// LZF-compressed, field after field.
+    Compressed,
+}
+
+/// One coordinate of every point.
+#[derive(Clone, Copy)]
+pub(super) struct Coordinate {
+    /// Its type.
+    pub number: NumberType,
+    /// How many bytes of a point precede it.
+    pub offset: u64,
+    /// How many numbers of a point precede it.
+    pub column: u64,
+}
+
+/// Reads a header up to its last line, `DATA`.
+pub(super) fn read_header<R: BufRead>(
+    lines: &mut Lines<'_, R>,
+    name: &Path,
+) -> Result<Header, FormatError> {
+    let missing = |key: &str| FormatError::malformed(name, "header", format!("no line {key}"));
+    let mut fields: Vec<Field> = Vec::new();
+    let (mut points, mut width, mut height) = (None, None, None);
+    while let Some(line) = lines.next()? {
+        let content = line.text.split('#').next().unwrap_or_default();
+        let mut words = content.split_ascii_whitespace();
+        let Some(key) = words.next() else { continue };
+        match key.to_ascii_uppercase().as_str() {
+            "FIELDS" => fields = words.map(Field::named).collect(),
+            "SIZE" => each(&line, &mut fields, words, |field, word| {
+                field.size = line.count(word)?;
+                Ok(())
+            })?,
+            "COUNT" => each(&line, &mut fields, words, |field, word| {
+                // The library takes 0 for 1.
+                field.count = line.count(word)?.max(1);
+                Ok(())
+            })?,
+            "TYPE" => each(&line, &mut fields, words, |field, word| {
+                field.kind = word.chars().next().unwrap_or_default();
+                Ok(())
+            })?,
+            "POINTS" => points = Some(line.count(words.next().unwrap_or_default())?),
+            "WIDTH" => width = Some(line.count(words.next().unwrap_or_default())?),
+            "HEIGHT" => height = Some(line.count(words.next().unwrap_or_default())?),
+            "DATA" => {
+                let encoding = Encoding::named(&line, words.next().unwrap_or_default())?;
+                let n = points.or_else(|| width?.checked_mul(height?));
+                let n = n.ok_or_else(|| missing("POINTS"))?;
+                return Ok(Header { n, fields, encoding });
+            }
+            _ => {}
+        }
+    }
+    Err(missing("DATA"))
+}
+
+/// Sets one thing of each field by its word on `line`.
+fn each<'a>(
+    line: &Line<'_>,
+    fields: &mut [Field],
+    words: impl Iterator<Item = &'a str>,
+    mut set: impl FnMut(&mut Field, &str) -> Result<(), FormatError>,
+) -> Result<(), FormatError> {
+    let words: Vec<_> = words.collect();
+    if words.len() != fields.len() {
+        return Err(line.error(format!("{} words for {} FIELDS", words.len(), fields.len())));
+    }
+    fields.iter_mut().zip(words).try_for_each(|(field, word)| set(field, word))
+}
+
+impl Header {
+    /// Bytes of a binary point; more than any file has if it cannot be counted.
+    pub fn point_size(&self) -> u64 {
+        self.fields.iter().fold(0, |sum: u64, field| sum.saturating_add(field.n_bytes()))
+    }
+
+    /// Where the coordinate called `axis` is, or what is wrong with it.
+    pub fn coordinate(&self, axis: &str) -> Result<Coordinate, String> {
+        let at = self.fields.iter().position(|field| field.name.eq_ignore_ascii_case(axis));
+        let at = at.ok_or_else(|| {
+            let names: Vec<_> = self.fields.iter().map(|field| field.name.as_str()).collect();
+            format!("no {axis} in `{}`", excerpt(&names.join(" ")))
+        })?;
+        let field = &self.fields[at];
+        let before = &self.fields[..at];
+        let number = field.number().filter(|_| field.count == 1).ok_or_else(|| {
+            format!("{axis} is {} number(s) of type {}{}", field.count, field.kind, field.size)
+        })?;
+        let offset = before.iter().fold(0, |sum: u64, field| sum.saturating_add(field.n_bytes()));
+        let column = before.iter().fold(0, |sum: u64, field| sum.saturating_add(field.count));
+        Ok(Coordinate { number, offset, column })
+    }
+}
+
+impl Field {
+    fn named(name: &str) -> Self {
+        Self { name: name.to_owned(), size: 0, kind: '?', count: 1 }
+    }
+
+    fn n_bytes(&self) -> u64 {
+        self.size.saturating_mul(self.count)
+    }
+
+    fn number(&self) -> Option<NumberType> {
+        Some(match (self.kind.to_ascii_uppercase(), self.size) {
+            ('F', 4) => NumberType::F32,
+            ('F', 8) => NumberType::F64,
+            ('I', 1) => NumberType::I8,
+            ('I', 2) => NumberType::I16,
+            ('I', 4) => NumberType::I32,
+            ('I', 8) => NumberType::I64,
+            ('U', 1) => NumberType::U8,
+            ('U', 2) => NumberType::U16,
+            ('U', 4) => NumberType::U32,
+            ('U', 8) => NumberType::U64,
+            _ => return None,
+        })
+    }
+}
+
+impl Encoding {
+    fn named(line: &Line<'_>, word: &str) -> Result<Self, FormatError> {
+        match word.to_ascii_lowercase().as_str() {
+            "ascii" => Ok(Self::Ascii),
+            "binary" => Ok(Self::Binary),
+            "binary_compressed" => Ok(Self::Compressed),
+            other => Err(line.error(format!("`{}` is no kind of data", excerpt(other)))),
+        }
+    }
+}
+
+impl Coordinate {
+    /// The coordinate at the start of `bytes`.
+    pub fn decode(self, bytes: &[u8]) -> f64 {
+        self.number.decode(bytes, ByteOrder::Little)
+    }
+}

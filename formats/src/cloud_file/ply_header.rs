@@ -1,0 +1,135 @@
+//! The header of PLY files.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use super::lines::{Line, Lines};
+use crate::decoding::excerpt;
+use crate::error::FormatError;
+use crate::number::{ByteOrder, NumberType};
+
+/// What a header says.
+pub(super) struct Header {
+    /// How the elements follow: as text, or in which byte order.
+    pub encoding: Encoding,
+    /// What to add to every point, from the comment `origin X Y Z` of scans.
+    pub origin: Option<[f64; 3]>,
+    /// The elements in the order in which they follow.
+    pub elements: Vec<Element>,
+}
+
+/// How elements follow the header.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Encoding {
+    /// A line each.
+    Ascii,
+    /// Number after number.
+    Binary(ByteOrder),
+}
+
+/// A kind of element, of which the file has `n`.
+pub(super) struct Element {
+    pub name: String,
+    pub n: u64,
+    pub properties: Vec<Property>,
+}
+
+/// A property that each element of a kind has.
+pub(super) struct Property {
+    pub name: String,
+    /// The type of its number, or of its list's numbers.
+    pub number: NumberType,
+    /// The type of the length, if it is a list.
+    pub length: Option<NumberType>,
+}
+
+impl Element {
+    /// Bytes of a binary element; none if it has a list.
+    pub fn size(&self) -> Option<usize> {
+        let size = |property: &Property| match property.length {
+            Some(_) => None,
+            None => Some(property.number.size()),
+        };
+        self.properties.iter().try_fold(0, |sum: usize, property| Some(sum + size(property)?))
+    }
+}
+
+/// Reads a header up to its last line, `end_header`.
+pub(super) fn read_header<R: BufRead>(
+    lines: &mut Lines<'_, R>,
+    name: &Path,
+) -> Result<Header, FormatError> {
+    let wrong = |cause: &str| FormatError::malformed(name, "header", cause);
+    match lines.next()? {
+        Some(line) if line.text == "ply" => {}
+        _ => return Err(wrong("the first line is not `ply`")),
+    }
+    let (mut encoding, mut origin, mut elements) = (None, None, Vec::new());
+    while let Some(line) = lines.next()? {
+        let mut words = line.text.split_ascii_whitespace();
+        let keyword = words.next().unwrap_or_default();
+        let words: Vec<_> = words.collect();
+        match (keyword, &words[..]) {
+            ("" | "obj_info", _) => {}
+            ("comment", ["origin", numbers @ ..]) => origin = origin.or(three(numbers)),
+            ("comment", _) => {}
+            ("format", [word, ..]) => encoding = Some(encoding_named(&line, word)?),
+            ("element", [name, n]) => elements.push(Element {
+                name: (*name).to_owned(),
+                n: line.count(n)?,
+                properties: Vec::new(),
+            }),
+            ("property", words) => {
+                let element = elements.last_mut();
+                let element = element.ok_or_else(|| line.error("a property of no element"))?;
+                element.properties.push(property(&line, words)?);
+            }
+            ("end_header", []) => {
+                let encoding = encoding.ok_or_else(|| wrong("no line `format`"))?;
+                return Ok(Header { encoding, origin, elements });
+            }
+            _ => return Err(line.error(format!("what is `{}`?", excerpt(&line.text)))),
+        }
+    }
+    Err(wrong("the file ends before `end_header`"))
+}
+
+fn three(words: &[&str]) -> Option<[f64; 3]> {
+    let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
+    numbers?.try_into().ok()
+}
+
+fn encoding_named(line: &Line<'_>, word: &str) -> Result<Encoding, FormatError> {
+    match word {
+        "ascii" => Ok(Encoding::Ascii),
+        "binary_little_endian" => Ok(Encoding::Binary(ByteOrder::Little)),
+        "binary_big_endian" => Ok(Encoding::Binary(ByteOrder::Big)),
+        other => Err(line.error(format!("`{}` is no format of PLY's", excerpt(other)))),
+    }
+}
+
+fn property(line: &Line<'_>, words: &[&str]) -> Result<Property, FormatError> {
+    let (length, number, name) = match words {
+        ["list", length, number, name] => (Some(number_named(line, length)?), number, name),
+        [number, name] => (None, number, name),
+        _ => return Err(line.error("expected `property TYPE NAME`")),
+    };
+    if let Some(NumberType::F32 | NumberType::F64) = length {
+        return Err(line.error("a length that is no whole number"));
+    }
+    Ok(Property { name: (*name).to_owned(), number: number_named(line, number)?, length })
+}
+
+fn number_named(line: &Line<'_>, word: &str) -> Result<NumberType, FormatError> {
+    Ok(match word {
+        "char" | "int8" => NumberType::I8,
+        "uchar" | "uint8" => NumberType::U8,
+        "short" | "int16" => NumberType::I16,
+        "ushort" | "uint16" => NumberType::U16,
+        "int" | "int32" => NumberType::I32,
+        "uint" | "uint32" => NumberType::U32,
+        "float" | "float32" => NumberType::F32,
+        "double" | "float64" => NumberType::F64,
+        other => return Err(line.error(format!("`{}` is no type of PLY's", excerpt(other)))),
+    })
+}

@@ -1,0 +1,65 @@
+//! What type coordinates are written in.
+
+use std::io::{self, Write};
+
+use crate::number::NumberType;
+
+/// The type of the coordinates of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Precision {
+    /// Every coordinate is an f32.
+    Single,
+    /// Some are not.
+    Double,
+}
+
+/// What rounding may cost, as a part of a cloud's extent. No sensor comes near
+/// it: a micrometre in a metre.
+const TOLERABLE: f64 = 1e-6;
+
+impl Precision {
+    /// What holds `points` without loss.
+    pub fn lossless(points: &[[f64; 3]]) -> Self {
+        let is_single = |x: &f64| f64::from(*x as f32) == *x || x.is_nan();
+        if points.as_flattened().iter().all(is_single) { Self::Single } else { Self::Double }
+    }
+
+    /// What holds `points` to a millionth of the longest side of their box.
+    pub fn tolerable(points: &[[f64; 3]]) -> Self {
+        let finite = || points.as_flattened().iter().filter(|x| x.is_finite());
+        let loss = finite().map(|&x| (f64::from(x as f32) - x).abs()).fold(0.0, f64::max);
+        // An infinite loss, of a number beyond f32, is never tolerable.
+        if loss < f64::INFINITY && loss <= TOLERABLE * extent(points) {
+            Self::Single
+        } else {
+            Self::Double
+        }
+    }
+
+    /// Bytes of a coordinate.
+    pub fn size(self) -> usize {
+        match self {
+            Self::Single => NumberType::F32.size(),
+            Self::Double => NumberType::F64.size(),
+        }
+    }
+
+    /// Writes `points` as x, y, z, little-endian.
+    pub fn write(self, writer: &mut impl Write, points: &[[f64; 3]]) -> io::Result<()> {
+        points.as_flattened().iter().try_for_each(|&coordinate| match self {
+            Self::Single => writer.write_all(&(coordinate as f32).to_le_bytes()),
+            Self::Double => writer.write_all(&coordinate.to_le_bytes()),
+        })
+    }
+}
+
+/// The longest side of the box around the coordinates that are finite.
+fn extent(points: &[[f64; 3]]) -> f64 {
+    let side = |axis: usize| {
+        let along = || points.iter().map(|point| point[axis]).filter(|x| x.is_finite());
+        let (low, high) =
+            (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
+        high - low
+    };
+    [0, 1, 2].map(side).into_iter().fold(0.0, f64::max)
+}

@@ -1,0 +1,87 @@
+//! What little of Python's literals a NumPy header is written in.
+
+/// The keys of a Python dictionary and its values as they are written.
+pub(crate) fn dictionary(text: &str) -> Option<Vec<(&str, &str)>> {
+    let mut rest = text.trim().strip_prefix('{')?.strip_suffix('}')?.trim();
+    let mut entries = Vec::new();
+    while !rest.is_empty() {
+        let (key, after) = string(rest)?;
+        let after = after.trim_start().strip_prefix(':')?;
+        let end = end_of_value(after)?;
+        entries.push((key, after[..end].trim()));
+        rest = after[end..].strip_prefix(',').unwrap_or_default().trim_start();
+    }
+    Some(entries)
+}
+
+/// What stands between the quotes that `text` begins with, and what follows.
+pub(crate) fn string(text: &str) -> Option<(&str, &str)> {
+    let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"'))?;
+    text[1..].split_once(quote)
+}
+
+/// Where the comma after a value is, or the text's end: outside of brackets and
+/// quotes, which must pair.
+fn end_of_value(text: &str) -> Option<usize> {
+    let mut depth = 0usize;
+    let mut quote = None;
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            _ if quote == Some(byte) => quote = None,
+            _ if quote.is_some() => {}
+            b'\'' | b'"' => quote = Some(byte),
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.checked_sub(1)?,
+            b',' if depth == 0 => return Some(at),
+            _ => {}
+        }
+    }
+    (depth == 0 && quote.is_none()).then_some(text.len())
+}
+
+/// A tuple of whole numbers; Python 2 wrote an `L` behind long ones.
+pub(crate) fn tuple(text: &str) -> Option<Vec<usize>> {
+    let numbers = text.strip_prefix('(')?.strip_suffix(')')?.trim();
+    if numbers.is_empty() {
+        return Some(Vec::new());
+    }
+    let numbers = numbers.strip_suffix(',').unwrap_or(numbers);
+    let number = |word: &str| word.trim().trim_end_matches('L').parse().ok();
+    numbers.split(',').map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn values_end_at_their_own_comma() {
+        let entries = dictionary("{'a': [(1, 'b,]'), {}], \"c\" : 'd', }").unwrap();
+        assert_eq!(entries, [("a", "[(1, 'b,]'), {}]"), ("c", "'d'")]);
+        assert_eq!(dictionary(" {} "), Some(vec![]));
+        for text in ["", "{", "{a: 1}", "{'a' 1}", "{'a': )}", "{'a': (}", "{'a': '}"] {
+            assert_eq!(dictionary(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_tuple_of_one_ends_in_a_comma() {
+        assert_eq!(tuple("()"), Some(vec![]));
+        assert_eq!(tuple("(7,)"), Some(vec![7]));
+        assert_eq!(tuple("( 3L, 4 )"), Some(vec![3, 4]));
+        assert_eq!(
+            [tuple("(,)"), tuple("(1,,)"), tuple("(-1,)"), tuple("7")],
+            [None, None, None, None]
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_makes_it_panic(text in "[{}\\[\\]()'\",: a-zé0-9]{0,60}") {
+            for text in [format!("{{{text}}}"), text] {
+                let _ = (dictionary(&text), string(&text), tuple(&text));
+            }
+        }
+    }
+}

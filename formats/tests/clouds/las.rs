@@ -1,0 +1,84 @@
+//! LAS: scale and offset in f64, every version, and headers that lie.
+
+use std::io::Cursor;
+
+use las::{Builder, Point, Transform, Vector, Version, Writer};
+
+use crate::{error, read};
+
+/// Where fields of the header lie (LAS 1.4 R15, table 3).
+const OFFSET_TO_POINTS: usize = 96;
+const POINT_FORMAT: usize = 104;
+const POINT_SIZE: usize = 105;
+const N_POINTS: usize = 107;
+const N_EVLRS: usize = 243;
+const N_POINTS_1_4: usize = 247;
+
+/// Three points of UTM, written by crate `las`.
+fn utm(version: (u8, u8), format: u8) -> Vec<u8> {
+    let mut builder = Builder::from(version);
+    builder.point_format = las::point::Format::new(format).unwrap();
+    let transform = |offset| Transform { scale: 0.001, offset };
+    builder.transforms = Vector { x: transform(4.5e5), y: transform(5.4e6), z: transform(0.0) };
+    let header = builder.into_header().unwrap();
+    let mut writer = Writer::new(Cursor::new(Vec::new()), header).unwrap();
+    for i in 0..3 {
+        let x = 450_000.123 + f64::from(i);
+        let mut point = Point { x, y: 5_400_000.456, z: -0.001, ..Point::default() };
+        let format = las::point::Format::new(format).unwrap();
+        point.gps_time = format.has_gps_time.then_some(0.0);
+        point.color = format.has_color.then(las::Color::default);
+        point.nir = format.has_nir.then_some(0);
+        writer.write_point(point).unwrap();
+    }
+    writer.into_inner().unwrap().into_inner()
+}
+
+#[test]
+fn every_version_and_format_is_read() {
+    for (version, format) in [((1, 0), 0), ((1, 1), 1), ((1, 2), 3), ((1, 4), 6), ((1, 4), 8)] {
+        let points = read("a.las", utm(version, format));
+        assert_eq!(points.len(), 3, "{version:?}");
+        for (i, [x, y, z]) in points.into_iter().enumerate() {
+            // The scale and each of the two operations round once: at 5.4e6 a
+            // unit in the last place is 9.3e-10.
+            assert!((x - (450_000.123 + i as f64)).abs() < 2e-9, "{x}");
+            assert!((y - 5_400_000.456).abs() < 2e-9, "{y}");
+            assert_eq!(z, -0.001);
+        }
+    }
+    assert_eq!(Version::new(1, 4).header_size(), 375);
+}
+
+fn changed(mut bytes: Vec<u8>, at: usize, value: &[u8]) -> Vec<u8> {
+    bytes[at..at + value.len()].copy_from_slice(value);
+    bytes
+}
+
+#[test]
+fn what_is_no_cloud_is_refused() {
+    let whole = || utm((1, 2), 1);
+    assert!(error("a.las", "LASF").starts_with("header: "));
+    assert!(error("a.las", "no las file at all").starts_with("header: "));
+    let compressed = error("a.las", changed(whole(), POINT_FORMAT, &[0x81]));
+    assert!(compressed.starts_with("header: LAZ is compressed LAS: decompress"), "{compressed}");
+    let short = error("a.las", changed(whole(), POINT_SIZE, &[27, 0]));
+    assert_eq!(short, "header: points of 27 bytes, format 1 has 28");
+    let early = error("a.las", changed(whole(), OFFSET_TO_POINTS, &[100, 0, 0, 0]));
+    assert_eq!(early, "header: the points begin before the header ends");
+    let late = error("a.las", changed(whole(), OFFSET_TO_POINTS, &[0xff; 4]));
+    assert_eq!(late, "header: unexpected end of file");
+    let many = error("a.las", changed(whole(), N_POINTS, &[0xff; 4]));
+    assert_eq!(many, "points: the file ends after 3 of 4294967295");
+}
+
+#[test]
+fn a_promise_beyond_all_memory_is_an_error() {
+    let legacy_empty = changed(utm((1, 4), 6), N_POINTS, &[0; 4]);
+    let many = changed(legacy_empty, N_POINTS_1_4, &[0xff; 8]);
+    let message = error("a.las", many);
+    assert_eq!(message, format!("points: the file ends after 3 of {}", u64::MAX));
+    // Records after the points, which are not needed, may claim what they like.
+    let records = changed(utm((1, 4), 6), N_EVLRS, &[0xff; 4]);
+    assert_eq!(read("a.las", records).len(), 3);
+}

@@ -1,0 +1,35 @@
+//! Clouds as files: what is read, what is written, what is refused.
+#![cfg(feature = "cloud-files")]
+#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod damaged;
+mod kitti;
+mod las;
+mod npy;
+mod npz;
+mod pcd;
+mod ply;
+mod real_scans;
+mod text;
+mod written;
+
+use std::path::Path;
+
+use formats::cloud_file::{CloudFormat, read_cloud_from};
+
+/// The points that `bytes` hold, taken for a file called `name`.
+fn read(name: &str, bytes: impl AsRef<[u8]>) -> Vec<[f64; 3]> {
+    let name = Path::new(name);
+    read_cloud_from(bytes.as_ref(), Some(CloudFormat::of(name).unwrap()), name).unwrap()
+}
+
+/// What is wrong with `bytes`, taken for a file called `name`, after that name.
+fn error(name: &str, bytes: impl AsRef<[u8]>) -> String {
+    let path = Path::new(name);
+    let read = read_cloud_from(bytes.as_ref(), Some(CloudFormat::of(path).unwrap()), path);
+    let message = read.unwrap_err().to_string();
+    message.strip_prefix(&format!("{name}: ")).unwrap_or(&message).to_owned()
+}
+
+/// A header that promises more points than any memory holds.
+const MANY: &str = "1000000000000000000";

@@ -1,0 +1,100 @@
+//! NumPy's arrays: every type of number, either order, and headers that lie.
+
+use crate::{MANY, error, read};
+use proptest::prelude::*;
+
+/// An NPY file whose header is the dictionary `{'descr': ..., ...}`.
+pub(crate) fn npy(descr: &str, is_fortran_order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let dictionary = format!(
+        "{{'descr': '{descr}', 'fortran_order': {is_fortran_order}, 'shape': {shape}, }}\n"
+    );
+    let length = (dictionary.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\0", &length[..], dictionary.as_bytes(), data].concat()
+}
+
+fn c_order(descr: &str, shape: &str, data: &[u8]) -> Vec<[f64; 3]> {
+    read("a.npy", npy(descr, "False", shape, data))
+}
+
+/// The bytes of 1, 2, 3 as every type of number that NumPy has.
+#[test]
+fn numbers_of_every_type_are_read() {
+    let one_two_three = |bytes: [&[u8]; 3]| bytes.concat();
+    macro_rules! of {
+        ($number:ty, $order:ident) => {
+            one_two_three([1, 2, 3].map(|i| (i as $number).$order()).each_ref().map(|b| &b[..]))
+        };
+    }
+    for (descr, data) in [
+        ("|i1", of!(i8, to_le_bytes)),
+        ("|u1", of!(u8, to_le_bytes)),
+        ("<i2", of!(i16, to_le_bytes)),
+        (">i2", of!(i16, to_be_bytes)),
+        ("<u2", of!(u16, to_le_bytes)),
+        ("<i4", of!(i32, to_le_bytes)),
+        (">u4", of!(u32, to_be_bytes)),
+        ("<i8", of!(i64, to_le_bytes)),
+        ("<u8", of!(u64, to_le_bytes)),
+        ("<f2", vec![0, 0x3c, 0, 0x40, 0, 0x42]),
+        (">f2", vec![0x3c, 0, 0x40, 0, 0x42, 0]),
+        ("<f4", of!(f32, to_le_bytes)),
+        (">f4", of!(f32, to_be_bytes)),
+        ("<f8", of!(f64, to_le_bytes)),
+        (">f8", of!(f64, to_be_bytes)),
+    ] {
+        assert_eq!(c_order(descr, "(1, 3)", &data), [[1.0, 2.0, 3.0]], "{descr}");
+    }
+}
+
+#[test]
+fn columns_beyond_the_third_are_passed_over() {
+    let data = [1, 2, 3, 9, 4, 5, 6, 9];
+    assert_eq!(c_order("|u1", "(2, 4)", &data), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    let data = [1, 4, 2, 5, 3, 6, 9, 9];
+    let points = read("a.npy", npy("|u1", "True", "(2, 4)", &data));
+    assert_eq!(points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    assert!(c_order("<f4", "(0, 3)", &[]).is_empty());
+}
+
+#[test]
+fn what_is_no_cloud_is_refused() {
+    let wrong = |descr, shape: &str, data: &[u8]| error("a.npy", npy(descr, "False", shape, data));
+    let shape = |found: &str| format!("array: expected shape [n, 3], found {found}");
+    assert_eq!(wrong("<f4", "(3,)", &[0; 12]), shape("[3]"));
+    assert_eq!(wrong("<f4", "(4, 2)", &[0; 32]), shape("[4, 2]"));
+    assert_eq!(wrong("<f4", "(2, 1, 3)", &[0; 24]), shape("[2, 1, 3]"));
+    assert_eq!(wrong("<c8", "(1, 3)", &[0; 24]), "array: elements of type `<c8` are no numbers");
+    assert_eq!(wrong("|O", "(1, 3)", &[0; 24]), "array: pickled Python objects");
+    assert_eq!(wrong("<f4", "(3, 3)", &[0; 35]), "array: the file ends after 2 of 3");
+    assert_eq!(error("a.npy", ""), "header: failed to fill whole buffer");
+    assert_eq!(error("a.npy", "no array"), "header: not a NumPy array");
+    let negative = npy("<f4", "False", "(-1, 3)", &[]);
+    assert!(error("a.npy", negative).starts_with("header: a header that makes no sense: {'descr'"));
+}
+
+#[test]
+fn a_promise_beyond_all_memory_is_an_error() {
+    for (order, shape) in [("False", format!("({MANY}, 3)")), ("True", format!("({MANY}, 3)"))] {
+        let message = error("a.npy", npy("<f8", order, &shape, &[0; 48]));
+        assert!(message.starts_with("array: the file ends after "), "{message}");
+    }
+    let wide = npy("<f8", "False", &format!("(1, {MANY})"), &[0; 48]);
+    assert_eq!(error("a.npy", wide), "array: points of 8000000000000000000 bytes");
+}
+
+proptest! {
+    /// Whichever order an array lies in, its points are the same.
+    #[test]
+    fn either_order_gives_the_same_points(
+        points in prop::collection::vec(prop::array::uniform3(-1e9f64..1e9), 0..50),
+    ) {
+        let shape = format!("({}, 3)", points.len());
+        let bytes = |at: &dyn Fn(usize) -> f64| -> Vec<u8> {
+            (0..points.len() * 3).flat_map(|i| at(i).to_le_bytes()).collect()
+        };
+        let rows = bytes(&|i| points[i / 3][i % 3]);
+        let columns = bytes(&|i| points[i % points.len()][i / points.len()]);
+        prop_assert_eq!(&c_order("<f8", &shape, &rows), &points);
+        prop_assert_eq!(&read("a.npy", npy("<f8", "True", &shape, &columns)), &points);
+    }
+}

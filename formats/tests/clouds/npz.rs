@@ -1,0 +1,118 @@
+//! NumPy's archives: which array holds the points, and what is added to them.
+
+use std::io::{Cursor, Write};
+use std::path::Path;
+
+use formats::cloud_file::read_cloud_from;
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+use crate::npy::npy;
+use crate::{MANY, error, read};
+
+/// An archive of arrays, deflated as `np.savez_compressed` does.
+fn npz(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    for (key, bytes) in arrays {
+        zip.start_file(format!("{key}.npy"), SimpleFileOptions::default()).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap().into_inner()
+}
+
+fn bytes_of(shape: &str, data: &[u8]) -> Vec<u8> {
+    npy("|u1", "False", shape, data)
+}
+
+#[cfg(feature = "dataset")]
+#[test]
+fn a_scan_of_ours_is_read_with_its_origin() {
+    use formats::Scan;
+    use formats::cloud_file::read_cloud;
+    use formats::scan_file::{ScanFormat, write_scan};
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.npz");
+    let scan = Scan {
+        origin: [1e7, -0.25, 0.0],
+        positions: vec![[0.5, 0.25, -1.0], [1e-3, 0.0, 3.0]],
+        range_m: Some(vec![1.0, 2.0]),
+        normal: Some(vec![[0.0, 0.0, 1.0]; 2]),
+        ..Scan::default()
+    };
+    let expected = [[1e7 + 0.5, 0.0, -1.0], [1e7 + f64::from(1e-3f32), -0.25, 3.0]];
+    write_scan(&path, ScanFormat::Npz, &scan).unwrap();
+    assert_eq!(read_cloud(&path).unwrap(), expected);
+    let path = path.with_extension("ply");
+    write_scan(&path, ScanFormat::Ply, &scan).unwrap();
+    assert_eq!(read_cloud(&path).unwrap(), expected);
+    let path = path.with_extension("csv");
+    write_scan(&path, ScanFormat::Csv, &scan).unwrap();
+    assert_eq!(read_cloud(&path).unwrap(), expected);
+}
+
+#[test]
+fn positions_come_before_points_and_points_before_the_only_array() {
+    let [one, two, three] = [1, 2, 3].map(|i| bytes_of("(1, 3)", &[i; 3]));
+    let labels = bytes_of("(4,)", &[0; 4]);
+    let all = [("x", one.clone()), ("points", two.clone()), ("positions", three)];
+    assert_eq!(read("a.npz", npz(&all)), [[3.0; 3]]);
+    assert_eq!(read("a.npz", npz(&all[..2])), [[2.0; 3]]);
+    assert_eq!(read("a.npz", npz(&[("labels", labels), ("x", one)])), [[1.0; 3]]);
+    let wide = npy("|u1", "True", "(1, 5)", &[1, 2, 3, 4, 5]);
+    assert_eq!(read("a.npz", npz(&[("arr_0", wide)])), [[1.0, 2.0, 3.0]]);
+}
+
+#[test]
+fn standard_input_tells_an_archive_by_its_first_bytes() {
+    let archive = npz(&[("points", bytes_of("(1, 3)", &[7; 3]))]);
+    assert_eq!(read_cloud_from(&archive[..], None, Path::new("-")).unwrap(), [[7.0; 3]]);
+}
+
+#[test]
+fn what_is_no_cloud_is_refused_with_its_key() {
+    let cloud = || bytes_of("(1, 3)", &[1; 3]);
+    let flat = || bytes_of("(3,)", &[1; 3]);
+    assert_eq!(
+        error("a.npz", npz(&[("a", flat()), ("b", flat())])),
+        "archive: no array of shape [n, 3] among its keys [a, b]"
+    );
+    assert_eq!(
+        error("a.npz", npz(&[("a", cloud()), ("b", cloud())])),
+        "archive: which of a, b holds the points? name it `points`"
+    );
+    let set = bytes_of("(2, 1, 3)", &[1; 6]);
+    assert_eq!(
+        error("a.npz", npz(&[("points", set)])),
+        "points: expected shape [n, 3], found [2, 1, 3]"
+    );
+    assert_eq!(
+        error("a.npz", npz(&[("positions", cloud()), ("origin", flat())])),
+        "origin: |u1 of shape [3] in 3 bytes, expected 8 bytes an element"
+    );
+    let short = npy("<f8", "False", "(2,)", &[0; 16]);
+    assert_eq!(
+        error("a.npz", npz(&[("positions", cloud()), ("origin", short)])),
+        "origin: expected three numbers"
+    );
+    let promise = bytes_of(&format!("({MANY}, 3)"), &[1; 6]);
+    assert_eq!(
+        error("a.npz", npz(&[("points", promise)])),
+        format!("points: the file ends after 2 of {MANY}")
+    );
+    assert!(error("a.npz", "PK no archive").starts_with("archive: "));
+}
+
+#[test]
+fn a_byte_that_changed_on_the_way_is_noticed() {
+    let mut archive = npz(&[("points", bytes_of("(1, 3)", &[7; 3]))]);
+    let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    zip.start_file("points.npy", options).unwrap();
+    zip.write_all(&bytes_of("(1, 3)", &[7; 3])).unwrap();
+    let stored = zip.finish().unwrap().into_inner();
+    archive.clone_from(&stored);
+    let at = stored.windows(3).position(|window| window == [7; 3]).unwrap();
+    archive[at] = 8;
+    assert_eq!(error("a.npz", archive), "points: Invalid checksum");
+}

@@ -1,0 +1,112 @@
+//! PCD: text, binary and compressed, fields in any order and of any type.
+
+use crate::{MANY, error, read};
+
+const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n";
+
+fn pcd(header: &str, data: &[u8]) -> Vec<u8> {
+    [HEADER.as_bytes(), header.as_bytes(), data].concat()
+}
+
+#[test]
+fn text_is_read_by_its_columns() {
+    let header = "FIELDS normal intensity x y z\nSIZE 4 4 4 8 4\nTYPE F U F F F\n\
+                  COUNT 3 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\n\
+                  DATA ascii\n";
+    let data = b"0 0 1 7 1.5 0.1 -3\n\n0 0 1 7 nan 1e400 6\n";
+    let points = read("a.pcd", pcd(header, data));
+    assert_eq!(points[0], [1.5, 0.1, -3.0]);
+    assert!(points[1][0].is_nan());
+    assert_eq!(points[1][1..], [f64::INFINITY, 6.0]);
+}
+
+#[test]
+fn binary_points_are_read_whatever_lies_between() {
+    let header = "FIELDS _ z label y x\nSIZE 1 8 2 2 4\nTYPE U F U I F\nCOUNT 3 1 1 1 1\n\
+                  WIDTH 1\nHEIGHT 2\nDATA binary\n";
+    let point = |z: f64, y: i16, x: f32| {
+        [&[9; 3], &z.to_le_bytes()[..], &[9; 2], &y.to_le_bytes(), &x.to_le_bytes()].concat()
+    };
+    let data = [point(1e-300, -2, 0.5), point(4.0, 5, 6.0)].concat();
+    assert_eq!(read("a.pcd", pcd(header, &data)), [[0.5, -2.0, 1e-300], [6.0, 5.0, 4.0]]);
+}
+
+fn compressed(n: &str, compressed: &[u8], uncompressed: u32) -> Vec<u8> {
+    let header = format!(
+        "FIELDS x y rgb z\nSIZE 1 1 2 2\nTYPE U I U U\nCOUNT 1 1 1 1\nWIDTH {n}\nHEIGHT 1\n\
+         POINTS {n}\nDATA binary_compressed\n"
+    );
+    let sizes = [compressed.len() as u32, uncompressed].map(u32::to_le_bytes);
+    pcd(&header, &[sizes.as_flattened(), compressed].concat())
+}
+
+/// Two points, field after field, as one run of 12 literal bytes.
+const FIELDS: [u8; 13] = [11, 1, 4, 0xfe, 5, 9, 9, 9, 9, 3, 0, 6, 1];
+
+#[test]
+fn compressed_points_lie_field_after_field() {
+    let points = read("a.pcd", compressed("2", &FIELDS, 12));
+    assert_eq!(points, [[1.0, -2.0, 3.0], [4.0, 5.0, 262.0]]);
+    assert!(read("a.pcd", compressed("0", &[], 0)).is_empty());
+}
+
+#[test]
+fn what_is_no_cloud_is_refused() {
+    let refuse = |header: &str, data: &[u8]| error("a.pcd", pcd(header, data));
+    let xyz = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n";
+    for (header, message) in [
+        ("", "header: no line DATA"),
+        ("FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n", "FIELDS: no z in `x y`"),
+        ("FIELDS x y z\nSIZE 4 4\n", "line 4: 2 words for 3 FIELDS"),
+        ("FIELDS x y z\nSIZE 4 4 -4\n", "line 4: `-4` is no count"),
+        (
+            "FIELDS x y z\nSIZE 4 4 3\nTYPE F F F\nPOINTS 1\nDATA ascii\n",
+            "FIELDS: z is 1 number(s) of type F3",
+        ),
+        (
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 2 1\nPOINTS 1\nDATA ascii\n",
+            "FIELDS: y is 2 number(s) of type F4",
+        ),
+    ] {
+        assert_eq!(refuse(header, b""), message);
+    }
+    let with = |rest: &str| format!("{xyz}{rest}");
+    assert_eq!(refuse(&with("DATA ascii\n"), b""), "header: no line POINTS");
+    assert_eq!(refuse(&with("POINTS 1\nDATA zip\n"), b""), "line 8: `zip` is no kind of data");
+    let ascii = with("POINTS 2\nDATA ascii\n");
+    assert_eq!(refuse(&ascii, b"1 2 3\n4 5\n"), "line 10: expected a number in column 3");
+    assert_eq!(refuse(&ascii, b"1 2 3\n4 5 x\n"), "line 10: `x` is no number");
+    assert_eq!(refuse(&ascii, b"1 2 3\n"), "line 10: the file ends after 1 of 2");
+    let binary = with("POINTS 2\nDATA binary\n");
+    assert_eq!(refuse(&binary, &[0; 23]), "points: the file ends after 1 of 2");
+}
+
+#[test]
+fn compressed_points_that_lie_are_refused() {
+    let refuse = |bytes: Vec<u8>| error("a.pcd", bytes);
+    assert_eq!(refuse(compressed("2", &FIELDS, 11)), "points: 11 bytes for 2 points of 6");
+    assert_eq!(
+        refuse(compressed("715827882", &FIELDS, 4_294_967_292)),
+        "points: LZF data that end too early"
+    );
+    assert_eq!(
+        refuse(compressed(MANY, &FIELDS, 12)),
+        format!("points: 12 bytes for {MANY} points of 6")
+    );
+    let mut cut = compressed("2", &FIELDS, 12);
+    cut.truncate(cut.len() - 1);
+    assert_eq!(refuse(cut), "points: the file ends after 12 of 13");
+}
+
+#[test]
+fn a_promise_beyond_all_memory_is_an_error() {
+    let xyz = format!("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS {MANY}\nDATA ");
+    let binary = error("a.pcd", pcd(&format!("{xyz}binary\n"), &[0; 36]));
+    assert_eq!(binary, format!("points: the file ends after 3 of {MANY}"));
+    let ascii = error("a.pcd", pcd(&format!("{xyz}ascii\n"), b"1 2 3\n"));
+    assert_eq!(ascii, format!("line 9: the file ends after 1 of {MANY}"));
+    let wide = format!(
+        "FIELDS a x y z\nSIZE {MANY} 4 4 4\nTYPE F F F F\nCOUNT {MANY} 1 1 1\nPOINTS 1\nDATA binary\n"
+    );
+    assert!(error("a.pcd", pcd(&wide, &[0; 36])).starts_with("points: points of 1844674407370955"));
+}

@@ -1,0 +1,82 @@
+//! Text: separators, column names, comments, and what is no number.
+
+use crate::{error, read};
+
+const POINTS: [[f64; 3]; 2] = [[1.0, -2.5, 3e-7], [4.0, 5.0, 6.0]];
+
+#[test]
+fn columns_may_be_separated_in_any_usual_way() {
+    for text in [
+        "1 -2.5 3e-7\n4 5 6\n",
+        "  1   -2.5 3e-7  \r\n\r\n4 5 6",
+        "1,-2.5,3e-7\n4,5,6\n",
+        "1, -2.5, 3e-7, 0.1, 0.2, 0.3\n4 , 5 , 6 , 0 , 0 , 1\n",
+        "1;-2.5;3e-7\n4;5;6\n",
+        "1\t-2.5\t3e-7\n4\t5\t6\n",
+        "\"1\",\"-2.5\",\"3e-7\"\n\"4\",\"5\",\"6\"\n",
+        "\u{feff}1 -2.5 3e-7\n4 5 6\n",
+    ] {
+        assert_eq!(read("a.txt", text), POINTS, "{text}");
+    }
+}
+
+#[test]
+fn a_line_of_names_says_which_columns_are_meant() {
+    for text in [
+        "x,y,z\n1,-2.5,3e-7\n4,5,6\n",
+        "time,Z,intensity,Y,X\n9,3e-7,9,-2.5,1\n9,6,9,5,4\n",
+        "\"x\";\"y\";\"z\"\n1;-2.5;3e-7\n4;5;6\n",
+        "easting northing height\n1 -2.5 3e-7\n4 5 6\n",
+    ] {
+        assert_eq!(read("a.csv", text), POINTS, "{text}");
+    }
+}
+
+#[test]
+fn comments_are_passed_over() {
+    let text = "# x y z\n//X Y Z\n\n1 -2.5 3e-7 # the first\n   # another\n4 5 6\n";
+    assert_eq!(read("a.xyz", text), POINTS);
+    assert_eq!(read("a.xyz", b"# caf\xe9\n1 -2.5 3e-7\n4 5 6\n"), POINTS);
+}
+
+#[test]
+fn no_points_are_a_cloud() {
+    for text in ["", "\n\n", "# nothing\n", "x,y,z\n"] {
+        assert!(read("a.csv", text).is_empty());
+    }
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_passed_on() {
+    let points = read("a.xyz", "nan inf -inf\n1e400 NaN -Infinity\n");
+    assert!(points[0][0].is_nan() && points[1][1].is_nan());
+    assert_eq!(points[0][1..], [f64::INFINITY, f64::NEG_INFINITY]);
+    assert_eq!(points[1][0], f64::INFINITY);
+}
+
+#[test]
+fn every_digit_of_f64_counts() {
+    assert_eq!(read("a.xyz", "4500000.000000001 0.1 5e-324\n"), [[4500000.000000001, 0.1, 5e-324]]);
+}
+
+#[test]
+fn what_is_no_cloud_is_refused_with_its_line() {
+    for (text, message) in [
+        ("1 2 3\n4 five 6\n", "line 2: `five` is no number"),
+        ("1 2 3\n\n# c\n4 5\n", "line 4: expected 3 columns, found 2"),
+        ("1 2 three\n", "line 1: `three` is no number"),
+        ("1,5;2,5;3,5\n", "line 1: `1,5` is no number"),
+        ("1\t2\t\t3\n", "line 1: `` is no number"),
+        ("x,y,intensity\n1,2,3\n", "line 1: column names without z"),
+        ("a,x,y,z\n1,2,3\n", "line 2: expected 4 columns, found 3"),
+        ("OFF\n8 6 12\n", "line 1: expected x, y and z, found 1 column(s)"),
+        ("v 1 2 3\n", "line 1: `v` is no number"),
+    ] {
+        assert_eq!(error("a.txt", text), message);
+    }
+    let long = format!("1 2 3\n{}", "1 ".repeat(600_000));
+    assert_eq!(error("a.txt", long), "line 2: longer than 1048576 bytes");
+    let word = format!("1 2 {}\x07", "9z".repeat(100));
+    let message = error("a.txt", word);
+    assert!(message.ends_with("…` is no number") && message.len() < 100, "{message}");
+}

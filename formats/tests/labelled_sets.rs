@@ -1,0 +1,115 @@
+//! Labelled sets under either convention of keys, and what is wrong with others.
+#![cfg(all(feature = "npz", feature = "dataset"))]
+#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+use formats::labelled::{LabelledSet, read_labelled};
+use formats::packed::PackedWriter;
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+/// An array as NumPy writes it: key, type, shape, data.
+type Array<'a> = (&'a str, &'a str, &'a str, &'a [u8]);
+
+fn write(path: &Path, arrays: &[Array<'_>]) {
+    let mut zip = ZipWriter::new(File::create(path).unwrap());
+    for (key, descr, shape, data) in arrays {
+        zip.start_file(format!("{key}.npy"), SimpleFileOptions::default()).unwrap();
+        let dictionary =
+            format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let length = (dictionary.len() as u16).to_le_bytes();
+        let header = [b"\x93NUMPY\x01\0", &length[..], dictionary.as_bytes()].concat();
+        zip.write_all(&[&header, *data].concat()).unwrap();
+    }
+    zip.finish().unwrap();
+}
+
+fn read(arrays: &[Array<'_>]) -> Result<LabelledSet, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.npz");
+    write(&path, arrays);
+    read_labelled(&path).map_err(|error| {
+        let message = error.to_string();
+        message.split_once("set.npz: ").unwrap().1.to_owned()
+    })
+}
+
+/// Two clouds of one point: 32767, 0, -32767 and 1, 2, 3.
+const I16: Array<'_> =
+    ("points_i16", "<i2", "(2, 1, 3)", &[0xff, 0x7f, 0, 0, 1, 0x80, 1, 0, 2, 0, 3, 0]);
+/// The same in f16, unscaled.
+const F16: Array<'_> =
+    ("points", "<f2", "(2, 1, 3)", &[0, 0x3c, 0, 0, 0, 0xbc, 0, 0x3c, 0, 0x40, 0, 0x42]);
+const LABELS: Array<'_> = ("labels", "|u1", "(2,)", &[1, 0]);
+
+#[test]
+fn scaled_whole_numbers_are_read_as_numpy_divides_them() {
+    let names = ("names", "|S3", "(2,)", &b"cupjar"[..]);
+    let classes = ("classes", "<U1", "(2,)", &b"a\0\0\0\xe9\0\0\0"[..]);
+    let set = read(&[I16, LABELS, names, classes]).unwrap();
+    assert_eq!((set.len(), set.n_points), (2, 1));
+    assert_eq!(set.cloud(0), [[1.0, 0.0, -1.0]]);
+    assert_eq!(set.cloud(1), [[1.0 / 32767.0, 2.0 / 32767.0, 3.0 / 32767.0]]);
+    assert_eq!(set.labels, [1, 0]);
+    assert_eq!(set.names.unwrap(), ["cup", "jar"]);
+    assert_eq!(set.classes.unwrap(), ["a", "é"]);
+}
+
+#[test]
+fn names_and_classes_may_be_absent_and_labels_of_any_type() {
+    for labels in [
+        LABELS,
+        ("labels", "<i8", "(2, 1)", &[1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
+        ("labels", ">u2", "(2,)", &[0, 1, 0, 0]),
+    ] {
+        let set = read(&[F16, labels]).unwrap();
+        assert_eq!(set.cloud(0), [[1.0, 0.0, -1.0]]);
+        assert_eq!(set.labels, [1, 0]);
+        assert_eq!((set.names, set.classes), (None, None));
+    }
+}
+
+#[test]
+fn a_packed_set_is_a_labelled_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.npz");
+    let mut writer = PackedWriter::create(&path, 2, vec!["bowl".into(), "cup".into()]).unwrap();
+    writer.push(&[[0.5, 0.25, 1.0], [-1.0, 1e-30, 0.0]], 1, "cup_7", 900).unwrap();
+    writer.finish().unwrap();
+    let set = read_labelled(&path).unwrap();
+    assert_eq!(set.cloud(0), [[0.5, 0.25, 1.0], [-1.0, 1e-30, 0.0]]);
+    assert_eq!((set.labels, set.names.unwrap()), (vec![1], vec!["cup_7".to_owned()]));
+}
+
+#[test]
+fn what_is_no_labelled_set_is_refused_with_its_key() {
+    let classes = ("classes", "|S1", "(1,)", &b"a"[..]);
+    for (arrays, message) in [
+        (vec![LABELS], "points: missing"),
+        (vec![I16], "labels: missing"),
+        (vec![("points", "<i2", "(2, 1, 3)", I16.3), LABELS], "points: elements of type `<i2`"),
+        (
+            vec![("points", "<f2", "(2, 3)", F16.3), LABELS],
+            "points: expected shape [m, n, 3], found [2, 3]",
+        ),
+        (vec![F16, ("labels", "|u1", "(3,)", &[0; 3])], "labels: 3 values for 2 clouds"),
+        (vec![F16, ("labels", "|i1", "(2,)", &[0, 0xff])], "labels: -1 is no label"),
+        (vec![F16, ("labels", "<f2", "(2,)", &[0, 0x38, 0, 0])], "labels: 0.5 is no label"),
+        (
+            vec![F16, ("labels", "|u1", "(1, 2)", &[0; 2])],
+            "labels: expected shape [m], found [1, 2]",
+        ),
+        (vec![F16, LABELS, ("names", "|S1", "(1,)", b"a")], "names: 1 values for 2 clouds"),
+        (vec![F16, LABELS, ("names", "|O", "(2,)", b"ab")], "names: |O is no list of text"),
+        (vec![F16, LABELS, classes], "labels: 1 of 1 classes"),
+        (
+            vec![("points", "<f2", "(1000000000000000000, 1, 3)", F16.3), LABELS],
+            "points: the file ends after 6 of 3000000000000000000",
+        ),
+    ] {
+        assert_eq!(read(&arrays).unwrap_err(), message);
+    }
+}

@@ -1,0 +1,203 @@
+//! A classifier that C holds by its address.
+
+use std::ffi::{CString, c_char};
+use std::path::Path;
+use std::ptr::{null, null_mut};
+
+use infer_cpu::{Classifier, Options, Precision};
+
+use crate::failure::{Failure, guard, guard_status};
+use crate::options::EdgepuckOptions;
+use crate::pointers;
+use crate::prediction::EdgepuckPrediction;
+use crate::status::EdgepuckStatus;
+
+/// A network ready to classify clouds: made by edgepuck_load, unmade by
+/// edgepuck_free.
+pub struct EdgepuckClassifier {
+    classifier: Classifier,
+    precision: Precision,
+    class_names: Vec<CString>,
+    /// Of the last cloud; empty if it could not be classified.
+    logits: Vec<f32>,
+}
+
+impl EdgepuckClassifier {
+    fn load(path: &Path, options: &Options) -> Result<Self, Failure> {
+        let classifier = Classifier::load(path, options)?;
+        let names = classifier.classes().iter().map(|name| {
+            CString::new(name.as_bytes()).map_err(|_| Failure::ClassName(name.to_string()))
+        });
+        let class_names: Vec<CString> = names.collect::<Result<_, _>>()?;
+        let logits = Vec::with_capacity(class_names.len());
+        Ok(Self { classifier, precision: options.precision, class_names, logits })
+    }
+
+    fn classify(&mut self, cloud: &[[f32; 3]]) -> Result<EdgepuckPrediction, Failure> {
+        self.logits.clear();
+        let found = self.classifier.classify(cloud)?;
+        self.logits.extend_from_slice(&found.logits);
+        Ok(EdgepuckPrediction::new(found, self.precision))
+    }
+}
+
+/// C may take a classifier from one thread to another.
+const _: () = {
+    const fn is_send<T: Send>() {}
+    is_send::<EdgepuckClassifier>();
+};
+
+/// The library's version, such as "0.1.0".
+#[unsafe(no_mangle)]
+pub extern "C" fn edgepuck_version() -> *const c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
+
+/// Loads the model file at path (UTF-8 on Windows) and packs it as options ask;
+/// null options are the defaults. Writes the classifier to out, or null when it
+/// fails. Pass it to edgepuck_free in the end.
+///
+/// # Safety
+///
+/// path is null or a NUL-terminated string, as is every word of options;
+/// options is null or valid; out is null or may be written to.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn edgepuck_load(
+    path: *const c_char,
+    options: *const EdgepuckOptions,
+    out: *mut *mut EdgepuckClassifier,
+) -> EdgepuckStatus {
+    guard_status(|| {
+        pointers::check(out, "out")?;
+        // SAFETY: not null and aligned; the rest is the caller's promise.
+        unsafe { out.write(null_mut()) };
+        // SAFETY: the caller's promise.
+        let path = unsafe { pointers::path(path) }?;
+        let options = match options.is_null() {
+            true => Options::default(),
+            // SAFETY: the caller's promise.
+            false => unsafe { pointers::shared(options, "options")?.read() }?,
+        };
+        let classifier = Box::new(EdgepuckClassifier::load(&path, &options)?);
+        // SAFETY: as above.
+        unsafe { out.write(Box::into_raw(classifier)) };
+        Ok(())
+    })
+}
+
+/// Classifies a cloud of n_points points, x y z after x y z, in metres or
+/// whatever the unit: only shape counts where clouds are normalised. Writes to
+/// out if it succeeds. Allocates nothing for clouds of up to capacity points
+/// (see EdgepuckOptions).
+///
+/// # Safety
+///
+/// classifier is null or comes from edgepuck_load, is not freed, and no other
+/// thread uses it now; xyz is null or 3 * n_points floats can be read there;
+/// out is null or may be written to.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn edgepuck_classify(
+    classifier: *mut EdgepuckClassifier,
+    xyz: *const f32,
+    n_points: usize,
+    out: *mut EdgepuckPrediction,
+) -> EdgepuckStatus {
+    guard_status(|| {
+        pointers::check(out, "out")?;
+        // SAFETY: the caller's promise.
+        let classifier = unsafe { pointers::exclusive(classifier, "classifier") }?;
+        // SAFETY: the caller's promise.
+        let cloud = unsafe { pointers::cloud(xyz, n_points) }?;
+        let prediction = classifier.classify(cloud)?;
+        // SAFETY: not null and aligned; the rest is the caller's promise.
+        unsafe { out.write(prediction) };
+        Ok(())
+    })
+}
+
+/// Copies the logits of the last cloud, one a class, to a buffer of length
+/// floats. After votes they are mean log-probabilities.
+///
+/// # Safety
+///
+/// classifier is null or comes from edgepuck_load, is not freed, and no other
+/// thread classifies with it now; out is null or length floats may be written
+/// there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn edgepuck_logits(
+    classifier: *const EdgepuckClassifier,
+    out: *mut f32,
+    length: usize,
+) -> EdgepuckStatus {
+    guard_status(|| {
+        pointers::check(out, "out")?;
+        // SAFETY: the caller's promise.
+        let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
+        let (logits, n_classes) = (&classifier.logits, classifier.class_names.len());
+        if logits.is_empty() {
+            return Err(Failure::NoPrediction);
+        }
+        if length < n_classes {
+            return Err(Failure::BufferTooSmall { n_classes, length });
+        }
+        // SAFETY: out is not null, aligned, and as long as is checked above; it
+        // is the caller's, so that it does not overlap with ours.
+        unsafe { out.copy_from_nonoverlapping(logits.as_ptr(), logits.len()) };
+        Ok(())
+    })
+}
+
+/// How many classes the network tells apart; 0 for a null classifier.
+///
+/// # Safety
+///
+/// classifier is null or comes from edgepuck_load and is not freed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn edgepuck_n_classes(classifier: *const EdgepuckClassifier) -> usize {
+    let n_classes = guard(|| {
+        // SAFETY: the caller's promise.
+        let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
+        Ok(classifier.class_names.len())
+    });
+    n_classes.unwrap_or(0)
+}
+
+/// The name of class index, UTF-8, for as long as the classifier lives; null
+/// for a null classifier or a class that it does not have.
+///
+/// # Safety
+///
+/// classifier is null or comes from edgepuck_load and is not freed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn edgepuck_class_name(
+    classifier: *const EdgepuckClassifier,
+    index: usize,
+) -> *const c_char {
+    let name = guard(|| {
+        // SAFETY: the caller's promise.
+        let names = unsafe { &pointers::shared(classifier, "classifier")?.class_names };
+        let missing = Failure::NoSuchClass { index, n_classes: names.len() };
+        names.get(index).map(|name| name.as_ptr()).ok_or(missing)
+    });
+    name.unwrap_or(null())
+}
+
+/// Frees a classifier; null is none.
+///
+/// # Safety
+///
+/// classifier is null or comes from edgepuck_load; nobody uses it, or a name
+/// that it gave, now or later.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn edgepuck_free(classifier: *mut EdgepuckClassifier) {
+    if classifier.is_null() {
+        return;
+    }
+    // SAFETY: edgepuck_load made it by Box::into_raw; the caller gives it up.
+    let classifier = unsafe { Box::from_raw(classifier) };
+    // There is no status to answer by; a panic has left its message.
+    let _ = guard_status(|| {
+        drop(classifier);
+        Ok(())
+    });
+}

@@ -1,0 +1,176 @@
+//! What went wrong, kept for the thread that asks, and the border that no
+//! panic passes.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::ffi::{CString, c_char};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use infer_cpu::Error;
+use infer_cpu::sampler::SamplerError;
+
+use crate::status::EdgepuckStatus;
+
+thread_local! {
+    static LAST_ERROR: RefCell<CString> = RefCell::default();
+}
+
+/// Why a call failed.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// A pointer is null or not aligned.
+    #[error("`{0}` is null or not aligned")]
+    BadPointer(&'static str),
+    /// An option makes no sense.
+    #[error("option `{option}`: {cause}")]
+    BadOption {
+        /// The field's name.
+        option: &'static str,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// A class name that C cannot take.
+    #[error("class name {0:?} holds a NUL")]
+    ClassName(String),
+    /// A class that there is none of.
+    #[error("class {index} of {n_classes}")]
+    NoSuchClass {
+        /// What was asked for.
+        index: usize,
+        /// How many there are.
+        n_classes: usize,
+    },
+    /// More points than an address space holds.
+    #[error("{0} points are more than memory can hold")]
+    TooManyPoints(usize),
+    /// A buffer is too short for the logits.
+    #[error("{n_classes} logits do not fit in a buffer of {length}")]
+    BufferTooSmall {
+        /// How many logits there are.
+        n_classes: usize,
+        /// How long the buffer is.
+        length: usize,
+    },
+    /// There are no logits.
+    #[error("no cloud was classified by the last call, if there was one")]
+    NoPrediction,
+    /// Loading or classifying failed.
+    #[error(transparent)]
+    Infer(#[from] Error),
+    /// A panic, which is a defect.
+    #[error("a defect in edgepuck: {0}")]
+    Panic(String),
+}
+
+impl Failure {
+    fn status(&self) -> EdgepuckStatus {
+        match self {
+            Self::BadPointer(_) => EdgepuckStatus::BadPointer,
+            Self::BadOption { .. } | Self::NoSuchClass { .. } => EdgepuckStatus::BadOption,
+            Self::ClassName(_) => EdgepuckStatus::BadModel,
+            Self::TooManyPoints(_) => EdgepuckStatus::BadCloud,
+            Self::BufferTooSmall { .. } => EdgepuckStatus::BufferTooSmall,
+            Self::NoPrediction => EdgepuckStatus::NoPrediction,
+            Self::Infer(error) => status_of(error),
+            Self::Panic(_) => EdgepuckStatus::Internal,
+        }
+    }
+}
+
+fn status_of(error: &Error) -> EdgepuckStatus {
+    match error {
+        Error::Format(_) => EdgepuckStatus::BadModel,
+        Error::NoPoints | Error::NotFinite { .. } | Error::TooManyPoints(_) => {
+            EdgepuckStatus::BadCloud
+        }
+        Error::KernelMissing(_) | Error::KernelPrecision { .. } | Error::Threads { .. } => {
+            EdgepuckStatus::Unsupported
+        }
+        Error::Overflow => EdgepuckStatus::Overflow,
+        Error::Sampler(SamplerError::NotFinite { .. } | SamplerError::TooManyPoints(_)) => {
+            EdgepuckStatus::BadCloud
+        }
+        Error::Sampler(_) | Error::FrontMissing { .. } | Error::VotesWithoutDraws(_) => {
+            EdgepuckStatus::BadOption
+        }
+    }
+}
+
+/// What `call` gives, or a status; what went wrong is kept for
+/// [`edgepuck_last_error`]. A panic goes no further.
+///
+/// Safe Rust may leave values half-changed when it panics, but never unsound:
+/// a classifier that met a panic can still be freed.
+pub fn guard<T>(call: impl FnOnce() -> Result<T, Failure>) -> Result<T, EdgepuckStatus> {
+    let failure = match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(Ok(value)) => return Ok(value),
+        Ok(Err(failure)) => failure,
+        Err(payload) => Failure::Panic(message_of(&*payload).to_owned()),
+    };
+    remember(&failure);
+    Err(failure.status())
+}
+
+/// The same for a call that gives nothing but its status.
+pub fn guard_status(call: impl FnOnce() -> Result<(), Failure>) -> EdgepuckStatus {
+    guard(call).err().unwrap_or(EdgepuckStatus::Ok)
+}
+
+/// What went wrong in the last call of this thread that failed; empty if none
+/// did. A call that succeeds leaves it as it is.
+///
+/// The text is UTF-8 and this thread's: it is gone when another call fails.
+#[unsafe(no_mangle)]
+pub extern "C" fn edgepuck_last_error() -> *const c_char {
+    // A thread that is ending has no message left.
+    LAST_ERROR.try_with(|last| last.borrow().as_ptr()).unwrap_or(c"".as_ptr())
+}
+
+fn remember(failure: &Failure) {
+    let text = failure.to_string().replace('\0', "\u{fffd}");
+    let text = CString::new(text).unwrap_or_default();
+    // A thread that is ending has nobody left to ask for the message.
+    let _ = LAST_ERROR.try_with(|last| last.replace(text));
+}
+
+fn message_of(payload: &(dyn Any + Send)) -> &str {
+    let literal = payload.downcast_ref::<&str>().copied();
+    literal.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::CStr;
+
+    use super::*;
+
+    fn last_error() -> String {
+        // SAFETY: the message is NUL-terminated and no call comes in between.
+        let text = unsafe { CStr::from_ptr(edgepuck_last_error()) };
+        text.to_str().unwrap().to_owned()
+    }
+
+    #[test]
+    fn a_panic_becomes_a_status_and_a_message() {
+        for text in ["broken", "broken too"] {
+            let status = guard_status(|| panic!("{text}"));
+            assert_eq!(status, EdgepuckStatus::Internal);
+            assert_eq!(last_error(), format!("a defect in edgepuck: {text}"));
+        }
+    }
+
+    #[test]
+    fn the_last_error_is_that_of_the_thread_and_outlives_success() {
+        assert_eq!(last_error(), "");
+        guard_status(|| Err(Failure::BadPointer("here")));
+        assert_eq!(guard_status(|| Ok(())), EdgepuckStatus::Ok);
+        assert_eq!(last_error(), "`here` is null or not aligned");
+        std::thread::spawn(|| assert_eq!(last_error(), "")).join().unwrap();
+    }
+
+    #[test]
+    fn a_message_keeps_what_follows_a_nul() {
+        guard_status(|| Err(Failure::Panic("a\0b".to_owned())));
+        assert_eq!(last_error(), "a defect in edgepuck: a\u{fffd}b");
+    }
+}

@@ -1,0 +1,21 @@
+//! The C interface of `infer-cpu`, `include/edgepuck.h`: functions that take
+//! raw pointers, check them, and answer by a status.
+//!
+//! Doc comments here speak to the readers of that header, which is made of
+//! them.
+
+mod classifier;
+mod failure;
+mod options;
+mod pointers;
+mod prediction;
+mod status;
+
+pub use classifier::{
+    EdgepuckClassifier, edgepuck_class_name, edgepuck_classify, edgepuck_free, edgepuck_load,
+    edgepuck_logits, edgepuck_n_classes, edgepuck_version,
+};
+pub use failure::edgepuck_last_error;
+pub use options::{EdgepuckOptions, edgepuck_options_default};
+pub use prediction::EdgepuckPrediction;
+pub use status::EdgepuckStatus;

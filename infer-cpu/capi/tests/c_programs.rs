@@ -1,0 +1,95 @@
+//! The library from C: the example gives the class that the Rust library
+//! gives, and `tests/c/contract.c` finds what the header promises. Skipped with
+//! a message where there is no C compiler.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod support;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use infer_cpu::{Classifier, Options};
+use support::Compiler;
+
+/// Long in y, and no longer anywhere without its last line.
+const CLOUD: &str = "0 0 0\n0.5 0.25 0.125\n0.1 0.75 0.2\n\n  1e-1\t0.9 .3\n";
+
+fn run(program: &Path, arguments: &[&Path]) -> Output {
+    Command::new(program).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+#[test]
+fn the_example_gives_what_the_rust_library_gives() {
+    let Some(compiler) = Compiler::c() else { return };
+    let example = compiler.compile("examples/classify.c", &support::static_link());
+    let model = compiler.folder().join("model.safetensors");
+    support::write_longest_axis_model(&model);
+
+    let numbers: Vec<f32> = CLOUD.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    let mut classifier = Classifier::load(&model, &Options::default()).unwrap();
+    let expected = classifier.classify(numbers.as_chunks().0).unwrap();
+    assert_eq!(&*expected.label, "y");
+    let expected = format!(
+        "y ({:.1} %), {} of {} points used\n",
+        100.0 * expected.confidence(),
+        expected.n_used,
+        expected.n_points,
+    );
+
+    let cloud = compiler.folder().join("cloud.xyz");
+    std::fs::write(&cloud, CLOUD).unwrap();
+    let output = run(&example, &[&model, &cloud]);
+    assert_eq!(text(&output.stderr), "");
+    assert_eq!(text(&output.stdout), expected);
+
+    let rod = run(&example, &[&model]);
+    assert!(text(&rod.stdout).starts_with("z ("), "{}", text(&rod.stdout));
+}
+
+#[test]
+fn the_example_says_what_is_wrong() {
+    let Some(compiler) = Compiler::c() else { return };
+    let example = compiler.compile("examples/classify.c", &support::static_link());
+    let model = compiler.folder().join("model.safetensors");
+    support::write_longest_axis_model(&model);
+    let cloud = compiler.folder().join("cloud.xyz");
+    let missing = compiler.folder().join("missing");
+
+    let complaint = |arguments: &[&Path]| {
+        let output = run(&example, arguments);
+        assert_eq!((output.status.code(), text(&output.stdout)), (Some(1), ""));
+        text(&output.stderr).to_owned()
+    };
+    assert!(complaint(&[&missing]).starts_with(missing.to_str().unwrap()));
+    assert!(complaint(&[&model, &missing]).starts_with(missing.to_str().unwrap()));
+    std::fs::write(&cloud, "0 0 0\n1 one 1\n").unwrap();
+    assert!(complaint(&[&model, &cloud]).contains("point 1 is not three numbers"));
+    std::fs::write(&cloud, "").unwrap();
+    assert_eq!(complaint(&[&model, &cloud]), "the cloud has no points\n");
+    assert_eq!(run(&example, &[]).status.code(), Some(2));
+}
+
+#[test]
+fn the_header_s_promises_hold_in_c() {
+    let Some(compiler) = Compiler::c() else { return };
+    let model = compiler.folder().join("model.safetensors");
+    support::write_longest_axis_model(&model);
+    for link in [support::static_link(), support::dynamic_link()] {
+        let contract = compiler.compile("tests/c/contract.c", &link);
+        let output = run(&contract, &[&model]);
+        assert!(output.status.success(), "{link:?}\n{}", text(&output.stderr));
+        assert_eq!(text(&output.stdout), concat!(env!("CARGO_PKG_VERSION"), "\n"));
+    }
+}
+
+#[test]
+fn the_header_is_c_plus_plus_too() {
+    let Some(compiler) = Compiler::c_plus_plus() else { return };
+    let program = compiler.compile("tests/c/version.cpp", &support::static_link());
+    assert!(run(&program, &[]).status.success());
+}

@@ -1,0 +1,82 @@
+//! Points of a cloud chosen by their coordinates, without a network.
+
+use crate::error::Error;
+use crate::kernel::{self, KernelName};
+use crate::normalize;
+use crate::sampler::{Sampler, SamplerKind, SamplerSpec};
+
+/// The indices of the points that `spec` chooses of `points`, `[n, 3]`, in
+/// whatever unit.
+///
+/// Samplers work in f32, of which a cloud far from 0 would leave little: the
+/// cloud is moved and scaled to the unit sphere first, or, where a voxel size
+/// is given in the cloud's own unit, moved by whole voxels. A critical points
+/// layer needs a model: [`crate::Classifier::sample`].
+///
+/// ```
+/// use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+///
+/// let cloud = [[5e6, 0.0, 0.0], [5e6 + 0.1, 0.0, 0.0], [5e6 + 1.0, 0.0, 0.0]];
+/// let spec = SamplerSpec { kind: SamplerKind::Fps, points: 2, ..SamplerSpec::default() };
+/// assert_eq!(infer_cpu::choose(&cloud, &spec)?, [2, 0]);
+/// # Ok::<(), infer_cpu::Error>(())
+/// ```
+///
+/// # Errors
+/// A specification that cannot be met; a cloud without points, or with a
+/// coordinate that is not finite; sampler `cpl`.
+pub fn choose(points: &[[f64; 3]], spec: &SamplerSpec) -> Result<Vec<u32>, Error> {
+    spec.check()?;
+    if points.is_empty() {
+        return Err(Error::NoPoints);
+    }
+    if let Some(index) = points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
+        let [x, y, z] = points[index];
+        return Err(Error::NotFinite { index, x, y, z });
+    }
+    let mut spec = spec.clone();
+    let mut normalized = Vec::new();
+    match spec.voxel_size.filter(|_| spec.kind == SamplerKind::Voxel) {
+        Some(size) => {
+            let size = normalize::to_voxels_about_zero(points, size, &mut normalized);
+            spec.voxel_size = Some(size);
+        }
+        None => normalize::to_unit_sphere(points, &mut normalized),
+    }
+    let kernels = kernel::available().next().ok_or(Error::KernelMissing(KernelName::Scalar))?;
+    Ok(Sampler::new(spec)?.select(&normalized, kernels)?.to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spec(kind: SamplerKind, points: usize) -> SamplerSpec {
+        SamplerSpec { kind, points, ..SamplerSpec::default() }
+    }
+
+    #[test]
+    fn what_cannot_be_chosen_from_is_an_error() {
+        let fps = spec(SamplerKind::Fps, 2);
+        assert!(matches!(choose(&[], &fps), Err(Error::NoPoints)));
+        let cloud = [[0.0; 3], [0.0, f64::NAN, 1.0]];
+        assert!(matches!(choose(&cloud, &fps), Err(Error::NotFinite { index: 1, .. })));
+        assert!(matches!(choose(&[[0.0; 3]], &spec(SamplerKind::Cpl, 2)), Err(Error::Sampler(_))));
+    }
+
+    #[test]
+    fn a_voxel_size_is_in_the_unit_of_the_cloud() {
+        let cloud: Vec<[f64; 3]> = (0..1000).map(|mm| [f64::from(mm), 0.0, 0.0]).collect();
+        let size = SamplerSpec { voxel_size: Some(100.0), ..spec(SamplerKind::Voxel, 0) };
+        assert_eq!(choose(&cloud, &size).unwrap().len(), 10);
+    }
+
+    #[test]
+    fn no_magnitude_is_too_large_or_too_small() {
+        for scale in [1e-300, 1e-30, 1e30, 1e300] {
+            let cloud: Vec<[f64; 3]> = (0..9).map(|i| [f64::from(i) * scale, 0.0, 0.0]).collect();
+            let ends = choose(&cloud, &spec(SamplerKind::Fps, 2)).unwrap();
+            assert_eq!(ends, [0, 8], "{scale:e}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! `infer-cpu bench`: how fast this machine is, and what each shortcut costs.
+
+mod grid;
+mod latency;
+mod machine;
+#[cfg(feature = "trade")]
+mod plot;
+mod statistics;
+mod table;
+#[cfg(feature = "trade")]
+mod trade;
+mod variant;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+#[cfg(feature = "npz")]
+use formats::labelled::read_labelled;
+use infer_cpu::{Precision, TNets};
+
+use variant::Variant;
+
+/// Flags of `bench`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  infer-cpu bench --json > pi5.json
+  infer-cpu bench --points 64,1024 --precision f32,f16 --threads 1,4
+  infer-cpu bench --trade --data test.npz --csv trade.csv --svg trade.svg
+
+Latency is that of a whole classification, from coordinates to class. A sampler
+is a name, perhaps with more behind colons: `fps`, `cpl`, `cpl:stn`,
+`cpl:trunk`, `cpl:table8` (a look-up table of 8 nodes an axis), `random:votes5`,
+`random:votes5:turned`.")]
+pub struct Args {
+    /// Model file [default: the bundled weights]
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+
+    /// Points that the network sees
+    #[arg(long, value_delimiter = ',', default_value = "16,32,64,128,256,512,1024,2048,4096")]
+    points: Vec<usize>,
+
+    /// Precisions
+    #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
+    precision: Vec<Precision>,
+
+    /// Samplers; `all` takes clouds of as many points as the network is to see
+    #[arg(long, value_delimiter = ',', default_value = "all")]
+    sampler: Vec<Variant>,
+
+    /// T-Nets: both, input, feature, none
+    #[arg(long, value_delimiter = ',', default_value = "both")]
+    t_nets: Vec<TNets>,
+
+    /// Threads
+    #[arg(long, value_delimiter = ',', default_value = "1,2,4")]
+    threads: Vec<usize>,
+
+    /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot
+    /// [default: the fastest]
+    #[arg(long)]
+    kernel: Option<infer_cpu::kernel::KernelName>,
+
+    /// Points of the clouds that samplers choose from
+    #[arg(long, default_value_t = 1024, value_name = "N")]
+    from: usize,
+
+    /// Classifications of each setting
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
+
+    /// Print one JSON object with all samples instead of a table
+    #[arg(long)]
+    json: bool,
+
+    #[cfg(feature = "trade")]
+    /// Measure accuracy beside latency, on the labelled clouds of --data
+    #[arg(long, requires = "data")]
+    trade: bool,
+
+    #[cfg(feature = "trade")]
+    /// Labelled clouds: a packed NPZ
+    #[arg(long, value_name = "NPZ", requires = "trade")]
+    data: Option<PathBuf>,
+
+    #[cfg(feature = "trade")]
+    /// Take every cloud of --data, or this many spread over it
+    #[arg(long, value_name = "N", requires = "trade")]
+    limit: Option<usize>,
+
+    #[cfg(feature = "npz")]
+    /// Clouds to calibrate int8 with, a packed NPZ [default: the model's own
+    /// calibration, else shapes made by rule]
+    #[arg(long, value_name = "NPZ")]
+    calibrate: Option<PathBuf>,
+
+    #[cfg(feature = "trade")]
+    /// Write the trade's rows to this file
+    #[arg(long, value_name = "FILE", requires = "trade")]
+    csv: Option<PathBuf>,
+
+    #[cfg(feature = "trade")]
+    /// Draw the trade into this file
+    #[arg(long, value_name = "FILE", requires = "trade")]
+    svg: Option<PathBuf>,
+}
+
+/// The largest activations on the clouds of `--calibrate`: none can be read.
+#[cfg(not(feature = "npz"))]
+fn calibration(_: &Args, _: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
+    Ok(None)
+}
+
+/// The largest activations on the clouds of `--calibrate`, if there are any.
+#[cfg(feature = "npz")]
+fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
+    /// More clouds change the largest activations little.
+    const CLOUDS: usize = 512;
+    let Some(path) = &args.calibrate else { return Ok(None) };
+    let set = read_labelled(path)?;
+    let step = set.len().div_ceil(CLOUDS).max(1);
+    let clouds = (0..set.len()).step_by(step).map(|i| set.cloud(i));
+    Ok(Some(infer_cpu::activation_ranges(model, clouds)?))
+}
+
+/// Measures what `args` ask for.
+///
+/// # Errors
+/// A model or a set that cannot be read, a file that cannot be written.
+pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
+    #[cfg(feature = "trade")]
+    if args.trade {
+        return trade::run(args, model);
+    }
+    latency::run(args, model)
+}

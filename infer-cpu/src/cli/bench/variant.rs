@@ -1,0 +1,107 @@
+//! Samplers as benchmarks name them: `cpl:stn`, `random:votes5`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use infer_cpu::Options;
+use infer_cpu::sampler::{FrontChoice, Resize, SamplerKind, SamplerSpec};
+
+/// A sampler and how it is used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    name: String,
+    kind: SamplerKind,
+    front: FrontChoice,
+    resize: Resize,
+    table_nodes: Option<usize>,
+    votes: u32,
+    rotations: bool,
+}
+
+impl Variant {
+    /// Whether the network sees every point of a cloud.
+    pub fn takes_all(&self) -> bool {
+        self.kind == SamplerKind::All
+    }
+
+    /// Sets this sampler in `options`, to keep `points`.
+    pub fn set(&self, options: &mut Options, points: usize) {
+        options.sampler = Some(SamplerSpec {
+            kind: self.kind,
+            points,
+            front: self.front,
+            resize: self.resize,
+            ..SamplerSpec::default()
+        });
+        options.table_nodes = self.table_nodes;
+        options.votes = self.votes;
+        options.vote_rotations = self.rotations;
+    }
+}
+
+impl FromStr for Variant {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut words = text.split(':');
+        let kind = words.next().unwrap_or_default();
+        let kind: SamplerKind =
+            kind.parse().map_err(|error: formats::FormatError| error.to_string())?;
+        let mut variant = Self {
+            name: text.to_owned(),
+            kind,
+            front: FrontChoice::Auto,
+            resize: Resize::default(),
+            table_nodes: None,
+            votes: 1,
+            rotations: false,
+        };
+        for word in words {
+            if let Ok(front) = word.parse() {
+                variant.front = front;
+            } else if let Ok(resize) = word.parse() {
+                variant.resize = resize;
+            } else if let Some(nodes) = number_after(word, "table") {
+                variant.table_nodes = Some(nodes);
+            } else if let Some(votes) = number_after(word, "votes") {
+                variant.votes = u32::try_from(votes).unwrap_or(u32::MAX);
+            } else if word == "turned" {
+                variant.rotations = true;
+            } else {
+                return Err(format!(
+                    "`{word}` says nothing of a sampler; a front end, a rule of resizing, \
+                     tableN, votesN or turned does"
+                ));
+            }
+        }
+        Ok(variant)
+    }
+}
+
+impl fmt::Display for Variant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.name)
+    }
+}
+
+fn number_after(word: &str, prefix: &str) -> Option<usize> {
+    word.strip_prefix(prefix)?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variant_says_what_follows_the_sampler() {
+        let variant: Variant = "cpl:stn:truncate:table8".parse().unwrap();
+        assert_eq!(variant.kind, SamplerKind::Cpl);
+        assert_eq!(variant.front, FrontChoice::Stn);
+        assert_eq!(variant.resize, Resize::Truncate);
+        assert_eq!(variant.table_nodes, Some(8));
+        let variant: Variant = "random:votes5:turned".parse().unwrap();
+        assert_eq!((variant.votes, variant.rotations), (5, true));
+        assert!("fps:votes".parse::<Variant>().unwrap_err().contains("`votes` says nothing"));
+        assert!("fsp".parse::<Variant>().is_err());
+    }
+}

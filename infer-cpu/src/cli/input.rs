@@ -1,0 +1,54 @@
+//! Clouds from files and from standard input.
+
+use std::fs::File;
+use std::io::stdin;
+use std::path::Path;
+
+use formats::FormatError;
+use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from};
+
+use super::failure::Usage;
+
+/// What stands for standard input among names of files.
+const STANDARD_INPUT: &str = "-";
+
+/// Reads the cloud that an argument names: a file, or standard input. Without
+/// a `format`, a file's name tells it, or the first bytes of standard input.
+///
+/// # Errors
+/// What cannot be read, or is no cloud.
+pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
+    if name.as_os_str() == STANDARD_INPUT {
+        return read_cloud_from(stdin().lock(), format, Path::new("standard input"));
+    }
+    read_file(name, format)
+}
+
+/// Reads the cloud in the file at `path`.
+///
+/// # Errors
+/// What cannot be read, or is no cloud.
+pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
+    if path.is_dir() {
+        return Err(FormatError::malformed(path, "name", "a folder; name the files in it"));
+    }
+    match format {
+        None => read_cloud(path),
+        Some(_) => {
+            let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
+            read_cloud_from(file, format, path)
+        }
+    }
+}
+
+/// That standard input is named once at most: it holds one cloud.
+///
+/// # Errors
+/// It is named more often.
+pub fn check_names<'a>(names: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
+    let n = names.into_iter().filter(|name| name.as_os_str() == STANDARD_INPUT).count();
+    match n {
+        0 | 1 => Ok(()),
+        _ => Err(Usage(format!("`-` is named {n} times: standard input holds one cloud"))),
+    }
+}

@@ -1,0 +1,62 @@
+//! The commands.
+
+mod bench;
+mod classify;
+mod failure;
+mod input;
+mod inspect;
+mod model;
+mod names;
+mod report;
+mod sample;
+mod sampler;
+
+use clap::{Parser, Subcommand};
+
+pub use failure::{Usage, is_broken_pipe, say, told_once};
+
+/// Classify point clouds on a CPU: PointNet behind a Critical Points Layer.
+#[derive(Parser)]
+#[command(name = "infer-cpu", version, max_term_width = 100)]
+#[command(after_help = "\
+Exit codes: 0 all went well, 1 some inputs failed and were named, 2 the command
+line asks for something that cannot be.")]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Tell the class of clouds
+    Classify(Box<classify::Args>),
+    /// Write the points of a cloud that a sampler chooses
+    Sample(Box<sample::Args>),
+    /// Show what a model file holds, and what it costs
+    Inspect(inspect::Args),
+    /// Measure this machine
+    Bench(Box<bench::Args>),
+}
+
+/// How a command that ran to its end ended.
+pub enum Outcome {
+    /// All inputs were fine.
+    Success,
+    /// Some inputs failed and were named.
+    SomeFailed,
+}
+
+/// Does what the command line asks for.
+///
+/// # Errors
+/// Whatever ends a command: a [`Usage`] if it is the command line's fault.
+pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
+    match &cli.command {
+        Command::Classify(args) => classify::run(args),
+        Command::Sample(args) => sample::run(args),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Bench(args) => {
+            bench::run(args, &model::find(args.model.as_deref())?).map(|()| Outcome::Success)
+        }
+    }
+}

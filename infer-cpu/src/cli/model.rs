@@ -1,0 +1,84 @@
+//! Which model a command uses.
+
+use std::env;
+use std::path::{Path, PathBuf};
+
+use formats::model_card::ModelCard;
+
+use super::failure::Usage;
+
+/// Names a model file where `--model` does not.
+const VARIABLE: &str = "EDGEPUCK_MODEL";
+
+/// Bundled weights: the trained ones wherever they lie, else those of chance.
+const NAMES: [&str; 2] = ["pointnet.safetensors", "untrained-test.safetensors"];
+
+/// Flags that name a model.
+#[derive(clap::Args)]
+pub struct ModelArgs {
+    /// Model file, safetensors [default: $EDGEPUCK_MODEL, else the bundled
+    /// weights: pointnet.safetensors in weights/ beside this program, or in
+    /// ./assets/weights]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+
+    /// Use a model of random weights all the same, as the bundled test model is
+    #[arg(long)]
+    allow_untrained: bool,
+}
+
+impl ModelArgs {
+    /// The model's file and card.
+    ///
+    /// # Errors
+    /// None is found; it cannot be read; it is untrained, and that is not
+    /// allowed.
+    pub fn open(&self) -> anyhow::Result<(PathBuf, ModelCard)> {
+        let path = find(self.model.as_deref())?;
+        let card = ModelCard::read(&path)?;
+        if !card.trained && !self.allow_untrained {
+            return Err(Usage(format!(
+                "{} is untrained: its weights are random, and so are its answers; name a \
+                 trained model by --model, or use this one by --allow-untrained",
+                path.display()
+            ))
+            .into());
+        }
+        Ok((path, card))
+    }
+}
+
+/// The model `named`, or that of [`VARIABLE`], or the bundled one.
+///
+/// # Errors
+/// None is found.
+pub fn find(named: Option<&Path>) -> Result<PathBuf, Usage> {
+    if let Some(path) = named {
+        return Ok(path.to_path_buf());
+    }
+    if let Some(path) = env::var_os(VARIABLE).filter(|path| !path.is_empty()) {
+        return Ok(path.into());
+    }
+    let folders = folders();
+    let candidates = NAMES.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
+    candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+        let folders: Vec<_> = folders.iter().map(|folder| folder.display().to_string()).collect();
+        Usage(format!(
+            "no model: name one by --model or ${VARIABLE}, or put {} into one of {}",
+            NAMES[0],
+            folders.join(", ")
+        ))
+    })
+}
+
+/// Where bundled weights may lie.
+fn folders() -> Vec<PathBuf> {
+    let program = env::current_exe().ok();
+    let beside = program.as_deref().and_then(Path::parent).map(|folder| folder.join("weights"));
+    let mut folders: Vec<PathBuf> = beside.into_iter().collect();
+    folders.push(Path::new("assets").join("weights"));
+    // A developer's build finds the weights of its own workspace.
+    #[cfg(debug_assertions)]
+    folders.push(Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/weights"));
+    folders
+}

@@ -1,0 +1,96 @@
+//! Names of files, one a line.
+
+use std::borrow::Cow;
+use std::io::{self, BufRead};
+use std::path::Path;
+
+/// No system has longer paths; a line without end must not fill the memory.
+const LONGEST: usize = 1 << 16;
+
+/// Calls `take` with each name in `list`, as soon as its line is there. Empty
+/// lines are passed over, as is a carriage return at a line's end; a line that
+/// is too long for a name is cut.
+///
+/// # Errors
+/// Of reading, and of `take`.
+pub fn for_each<E: From<io::Error>>(
+    mut list: impl BufRead,
+    mut take: impl FnMut(&Path) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut line = Vec::new();
+    while read_line(&mut list, &mut line)? {
+        let name = line.strip_suffix(b"\r").unwrap_or(&line);
+        if !name.is_empty() {
+            take(Path::new(&*os_str(name)))?;
+        }
+    }
+    Ok(())
+}
+
+/// Reads a line into `line`, without its end and without what is too long.
+/// There was none if this is false.
+fn read_line(list: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
+    line.clear();
+    let mut is_any = false;
+    loop {
+        let bytes = match list.fill_buf() {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) => return Err(error),
+        };
+        if bytes.is_empty() {
+            return Ok(is_any);
+        }
+        is_any = true;
+        let end = bytes.iter().position(|&byte| byte == b'\n');
+        let part = &bytes[..end.unwrap_or(bytes.len())];
+        line.extend(&part[..part.len().min(LONGEST - line.len())]);
+        let n_used = part.len() + usize::from(end.is_some());
+        list.consume(n_used);
+        if end.is_some() {
+            return Ok(true);
+        }
+    }
+}
+
+#[cfg(unix)]
+fn os_str(bytes: &[u8]) -> Cow<'_, std::ffi::OsStr> {
+    use std::os::unix::ffi::OsStrExt;
+    Cow::Borrowed(std::ffi::OsStr::from_bytes(bytes))
+}
+
+#[cfg(not(unix))]
+fn os_str(bytes: &[u8]) -> Cow<'_, std::ffi::OsStr> {
+    match String::from_utf8_lossy(bytes) {
+        Cow::Borrowed(name) => Cow::Borrowed(name.as_ref()),
+        Cow::Owned(name) => Cow::Owned(name.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(list: &[u8]) -> Vec<String> {
+        let mut names = vec![];
+        for_each(io::BufReader::with_capacity(3, list), |name| {
+            names.push(name.display().to_string());
+            io::Result::Ok(())
+        })
+        .unwrap();
+        names
+    }
+
+    #[test]
+    fn a_line_is_a_name_blanks_and_all() {
+        assert_eq!(names(b"a.ply\n\nb c.npz\r\n d"), ["a.ply", "b c.npz", " d"]);
+        assert!(names(b"").is_empty() && names(b"\n\r\n").is_empty());
+    }
+
+    #[test]
+    fn a_line_without_end_is_cut() {
+        let names = names(&[&[b'x'; 3 * LONGEST][..], b"\nlast\n"].concat());
+        assert_eq!(names[0].len(), LONGEST);
+        assert_eq!(names[1..], ["last"]);
+    }
+}

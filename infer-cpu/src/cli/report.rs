@@ -1,0 +1,120 @@
+//! What `classify` says of a cloud: a line each, for people or for programs.
+
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use infer_cpu::{Precision, Prediction};
+use serde::Serialize;
+
+use super::failure::say;
+
+/// How lines are written.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// Name, class and confidence between tabs; all else on standard error.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// A prediction as a line of JSON.
+#[derive(Serialize)]
+struct Classified<'a> {
+    file: &'a str,
+    class: usize,
+    label: &'a str,
+    confidence: f64,
+    logits: &'a [f32],
+    points: usize,
+    used: usize,
+    dropped: usize,
+    clipped: u64,
+    precision: &'a str,
+    ms: f64,
+}
+
+/// A cloud without one.
+#[derive(Serialize)]
+struct Failed<'a> {
+    file: &'a str,
+    error: &'a str,
+}
+
+impl Style {
+    /// Writes what was found of the cloud `name`, in `precision` if it could
+    /// be, and within `time`; the line is flushed.
+    ///
+    /// # Errors
+    /// Standard output cannot be written to.
+    pub fn classified(
+        self,
+        name: &Path,
+        prediction: &Prediction,
+        precision: Precision,
+        time: Duration,
+    ) -> io::Result<()> {
+        if self == Self::Text {
+            warn(name, prediction, precision);
+            let percent = 100.0 * prediction.confidence();
+            return line(&format!("{}\t{}\t{percent:.1} %", name.display(), prediction.label));
+        }
+        json_line(&Classified {
+            file: &name.to_string_lossy(),
+            class: prediction.class,
+            label: &prediction.label,
+            confidence: prediction.confidence(),
+            logits: &prediction.logits,
+            points: prediction.n_points,
+            used: prediction.n_used,
+            dropped: prediction.n_dropped,
+            clipped: prediction.n_clipped,
+            precision: prediction.precision.name(),
+            ms: time.as_secs_f64() * 1e3,
+        })
+    }
+
+    /// Says that the cloud `name` failed by `error`.
+    ///
+    /// # Errors
+    /// Standard output cannot be written to.
+    pub fn failed(self, name: &Path, error: &str) -> io::Result<()> {
+        match self {
+            Self::Json => json_line(&Failed { file: &name.to_string_lossy(), error }),
+            Self::Text => {
+                say(&format!("error: {error}"));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Says on standard error what a line of text has no place for.
+fn warn(name: &Path, prediction: &Prediction, precision: Precision) {
+    let warn = |what: &str| say(&format!("warning: {}: {what}", name.display()));
+    match prediction.n_dropped {
+        0 => {}
+        1 => warn("1 point that is not finite was dropped"),
+        n => warn(&format!("{n} points that are not finite were dropped")),
+    }
+    if prediction.precision != precision {
+        let used = prediction.precision;
+        warn(&format!("{precision} overflows on this cloud; computed in {used}"));
+    }
+    if prediction.n_clipped > 0 {
+        let n = prediction.n_clipped;
+        warn(&format!(
+            "{n} activations were clipped to the range that {precision} is calibrated for"
+        ));
+    }
+}
+
+fn json_line(record: &impl Serialize) -> io::Result<()> {
+    line(&serde_json::to_string(record)?)
+}
+
+fn line(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{text}")?;
+    out.flush()
+}

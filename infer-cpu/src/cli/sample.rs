@@ -1,0 +1,101 @@
+//! `infer-cpu sample`: some of a cloud's points, as a cloud.
+
+use std::collections::BTreeSet;
+use std::io::{Write, stdout};
+use std::path::PathBuf;
+
+use anyhow::Context;
+use formats::cloud_file::{CloudFormat, write_cloud};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+use infer_cpu::{Classifier, Options};
+
+use super::Outcome;
+use super::failure::{of_setup, say};
+use super::input;
+use super::model::ModelArgs;
+use super::sampler::SamplerArgs;
+
+/// Flags of `sample`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  infer-cpu sample --sampler fps --points 128 in.ply out.ply
+  infer-cpu sample --sampler voxel --voxel-size 0.05 in.las thinned.npz
+  infer-cpu sample --sampler cpl --points 64 --model model.safetensors in.npz out.xyz
+
+Points are written as they are read, in f64: samplers only choose. A voxel size
+is in the cloud's own unit. cpl chooses as the model does, of the cloud as the
+model was trained to see it; where it repeats points to come to M, so does the
+output. The output's name tells its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin.")]
+pub struct Args {
+    /// Which points to keep: all, first, random, fps, voxel, cpl
+    #[arg(long, value_name = "NAME")]
+    sampler: SamplerKind,
+
+    #[command(flatten)]
+    how: SamplerArgs,
+
+    /// Drop points that are not finite instead of refusing the cloud
+    #[arg(long)]
+    drop_invalid: bool,
+
+    /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, las [default:
+    /// as its name tells, or the first bytes of standard input]
+    #[arg(long)]
+    format: Option<CloudFormat>,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// The cloud; `-` reads standard input
+    input: PathBuf,
+
+    /// The file to write
+    output: PathBuf,
+}
+
+/// Writes the points that are chosen.
+///
+/// # Errors
+/// A cloud or a model that cannot be read, a sampler that cannot be met, a file
+/// that cannot be written.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    // What cannot be written should be known before a long choice.
+    CloudFormat::of(&args.output)?;
+    let mut points = input::read(&args.input, args.format)?;
+    if args.drop_invalid {
+        let n = points.len();
+        points.retain(|point| point.iter().all(|x| x.is_finite()));
+        if points.len() < n {
+            let n_dropped = n - points.len();
+            say(&format!("{}: dropped {n_dropped} of {n} points", args.input.display()));
+        }
+    }
+    let indices = choose(args, &points)?;
+    let chosen: Vec<[f64; 3]> = indices.iter().map(|&index| points[index as usize]).collect();
+    write_cloud(&args.output, &chosen)?;
+    let n_distinct = indices.iter().collect::<BTreeSet<_>>().len();
+    let repeated = match n_distinct < chosen.len() {
+        true => format!(" ({n_distinct} distinct)"),
+        false => String::new(),
+    };
+    let (n, of) = (chosen.len(), points.len());
+    writeln!(stdout(), "{}: {n} of {of} points{repeated}", args.output.display())?;
+    Ok(Outcome::Success)
+}
+
+/// The indices of the points to keep.
+fn choose(args: &Args, points: &[[f64; 3]]) -> anyhow::Result<Vec<u32>> {
+    let here = || args.input.display().to_string();
+    if args.sampler != SamplerKind::Cpl {
+        let spec = args.how.apply(Some(args.sampler), SamplerSpec::default())?;
+        spec.check().map_err(|error| of_setup(error.into()))?;
+        return infer_cpu::choose(points, &spec).with_context(here);
+    }
+    let (model, card) = args.model.open()?;
+    let spec = args.how.apply(Some(args.sampler), SamplerSpec::as_trained(&model, &card)?)?;
+    let options =
+        Options { sampler: Some(spec), table_nodes: args.how.table_nodes(), ..Options::default() };
+    let mut classifier = Classifier::load(&model, &options).map_err(of_setup)?;
+    Ok(classifier.sample(points).with_context(here)?.to_vec())
+}

@@ -1,0 +1,147 @@
+//! Flags that say how points are chosen.
+
+use infer_cpu::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
+
+use super::failure::Usage;
+
+/// Flags beside the sampler's name.
+#[derive(clap::Args)]
+pub struct SamplerArgs {
+    /// Points to keep [default: as many as the model was trained behind, else 1024]
+    #[arg(long, value_name = "M")]
+    points: Option<usize>,
+
+    /// What random draws depend on [default: 0]
+    #[arg(long)]
+    seed: Option<u64>,
+
+    /// Where fps begins: at the point farthest from the centroid (farthest),
+    /// whatever the order of the points, or at the first one (first) [default:
+    /// as the model was trained, else farthest]
+    #[arg(long, value_name = "WHERE")]
+    fps_start: Option<FpsStart>,
+
+    /// Edge of a cell of voxel, in place of --points: for sample in the cloud's
+    /// own unit, for classify in that of the normalised cloud
+    #[arg(long, value_name = "LENGTH", conflicts_with = "points")]
+    voxel_size: Option<f64>,
+
+    /// How cpl comes to M points: truncate, cyclic, nearest, weighted [default:
+    /// cyclic]
+    #[arg(long, value_name = "RULE")]
+    resize: Option<Resize>,
+
+    /// Secondary poolings of cpl among the points not yet chosen [default: 0]
+    #[arg(long, value_name = "K")]
+    passes: Option<usize>,
+
+    /// What cpl pools: the model's own front end (own), the trunk of its input
+    /// T-Net (stn), its trunk (trunk), or the first of these that there is (auto)
+    /// [default: auto]
+    #[arg(long, value_name = "NET")]
+    front: Option<FrontChoice>,
+
+    /// Replace cpl's front end by a look-up table of so many nodes an axis
+    #[arg(long, value_name = "NODES", value_parser = clap::value_parser!(u16).range(2..=256))]
+    table: Option<u16>,
+}
+
+impl SamplerArgs {
+    /// The sampler `kind` or that of `trained`, with these flags in place of
+    /// what `trained` has.
+    ///
+    /// # Errors
+    /// A flag that says nothing to the sampler.
+    pub fn apply(
+        &self,
+        kind: Option<SamplerKind>,
+        trained: SamplerSpec,
+    ) -> Result<SamplerSpec, Usage> {
+        let kind = kind.unwrap_or(trained.kind);
+        self.check_flags(kind)?;
+        Ok(SamplerSpec {
+            kind,
+            points: self.points.unwrap_or(trained.points),
+            seed: self.seed.unwrap_or(trained.seed),
+            fps_start: self.fps_start.unwrap_or(trained.fps_start),
+            voxel_size: self.voxel_size.or(trained.voxel_size),
+            resize: self.resize.unwrap_or(trained.resize),
+            passes: self.passes.unwrap_or(trained.passes),
+            front: self.front.unwrap_or(trained.front),
+        })
+    }
+
+    /// Nodes an axis of the table that is to replace a front end.
+    pub fn table_nodes(&self) -> Option<usize> {
+        self.table.map(usize::from)
+    }
+
+    fn check_flags(&self, kind: SamplerKind) -> Result<(), Usage> {
+        use SamplerKind::{Cpl, First, Fps, Random, Voxel};
+        let flags: [(_, _, &[SamplerKind]); 7] = [
+            ("--points", self.points.is_some(), &[First, Random, Fps, Voxel, Cpl]),
+            ("--fps-start", self.fps_start.is_some(), &[Fps]),
+            ("--voxel-size", self.voxel_size.is_some(), &[Voxel]),
+            ("--resize", self.resize.is_some(), &[Cpl]),
+            ("--passes", self.passes.is_some(), &[Cpl]),
+            ("--front", self.front.is_some(), &[Cpl]),
+            ("--table", self.table.is_some(), &[Cpl]),
+        ];
+        match flags.iter().find(|(_, is_given, kinds)| *is_given && !kinds.contains(&kind)) {
+            Some((flag, _, kinds)) => {
+                let kinds: Vec<_> = kinds.iter().map(|kind| kind.name()).collect();
+                Err(Usage(format!(
+                    "{flag} means nothing to sampler {kind}; --sampler may be {}",
+                    kinds.join(", ")
+                )))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn none() -> SamplerArgs {
+        SamplerArgs {
+            points: None,
+            seed: None,
+            fps_start: None,
+            voxel_size: None,
+            resize: None,
+            passes: None,
+            front: None,
+            table: None,
+        }
+    }
+
+    #[test]
+    fn flags_replace_what_the_model_was_trained_behind_and_leave_the_rest() {
+        let trained = SamplerSpec {
+            kind: SamplerKind::Fps,
+            points: 64,
+            fps_start: FpsStart::First,
+            ..SamplerSpec::default()
+        };
+        assert_eq!(none().apply(None, trained.clone()).unwrap(), trained);
+        let fewer = SamplerArgs { points: Some(32), ..none() }.apply(None, trained.clone());
+        assert_eq!(fewer.unwrap(), SamplerSpec { points: 32, ..trained.clone() });
+        let random = none().apply(Some(SamplerKind::Random), trained.clone()).unwrap();
+        assert_eq!(random, SamplerSpec { kind: SamplerKind::Random, ..trained });
+    }
+
+    #[test]
+    fn a_flag_that_says_nothing_to_the_sampler_is_an_error() {
+        let points = SamplerArgs { points: Some(32), ..none() };
+        let error = points.apply(None, SamplerSpec::default()).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "--points means nothing to sampler all; --sampler may be first, random, fps, voxel, cpl"
+        );
+        let table = SamplerArgs { table: Some(8), ..none() };
+        assert!(table.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());
+        assert!(table.apply(Some(SamplerKind::Cpl), SamplerSpec::default()).is_ok());
+    }
+}

@@ -1,0 +1,88 @@
+//! What the loops need of an instruction set's vectors.
+
+use half::f16;
+
+/// A vector of f32 and one of i32 of as many lanes.
+///
+/// # Safety
+/// Every function needs the instruction set of its implementor; those that
+/// take a pointer need [`Lanes::N`] elements there.
+pub(in crate::kernel) trait Lanes: Copy {
+    /// As many lanes of i32.
+    type Int: Copy;
+    /// How many lanes.
+    const N: usize;
+    /// Rows of a tile.
+    const ROWS: usize;
+
+    unsafe fn splat(value: f32) -> Self;
+    unsafe fn load(from: *const f32) -> Self;
+    unsafe fn load_f16(from: *const f16) -> Self;
+    unsafe fn load_i8(from: *const i8) -> Self;
+    unsafe fn store(self, to: *mut f32);
+    unsafe fn store_f16(self, to: *mut f16);
+    /// Stores integers in 0..=127 as bytes.
+    unsafe fn store_u8(self, to: *mut u8);
+    /// `self * factor + term`, rounded once.
+    unsafe fn fma(self, factor: Self, term: Self) -> Self;
+    unsafe fn mul(self, other: Self) -> Self;
+    unsafe fn add(self, other: Self) -> Self;
+    unsafe fn sub(self, other: Self) -> Self;
+    /// The larger; `other` if either is NaN.
+    unsafe fn max(self, other: Self) -> Self;
+    /// The smaller; `other` if either is NaN.
+    unsafe fn min(self, other: Self) -> Self;
+    unsafe fn abs(self) -> Self;
+    /// To the nearest integer, ties to even.
+    unsafe fn round(self) -> Self;
+    /// How many lanes are greater than those of `other`.
+    unsafe fn count_greater(self, other: Self) -> u32;
+    /// Where `self` is greater than `best`: puts it there, and `index` into
+    /// `who`.
+    unsafe fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int);
+
+    unsafe fn splat_int(value: i32) -> Self::Int;
+    unsafe fn load_int(from: *const i32) -> Self::Int;
+    unsafe fn store_int(int: Self::Int, to: *mut i32);
+    unsafe fn add_int(a: Self::Int, b: Self::Int) -> Self::Int;
+    unsafe fn max_int(a: Self::Int, b: Self::Int) -> Self::Int;
+    unsafe fn keep_greater_int(
+        value: Self::Int,
+        best: &mut Self::Int,
+        who: &mut Self::Int,
+        index: Self::Int,
+    );
+    /// Adds to each lane of `sum` the products of four unsigned bytes (at most
+    /// 127) and four signed ones.
+    unsafe fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int;
+    unsafe fn to_float(int: Self::Int) -> Self;
+}
+
+/// A weight that a kernel reads as f32.
+pub(in crate::kernel) trait Weight: Copy + Default {
+    unsafe fn lanes<L: Lanes>(from: *const Self) -> L;
+}
+
+impl Weight for f32 {
+    #[inline(always)]
+    unsafe fn lanes<L: Lanes>(from: *const f32) -> L {
+        // SAFETY: as the caller promises.
+        unsafe { L::load(from) }
+    }
+}
+
+impl Weight for f16 {
+    #[inline(always)]
+    unsafe fn lanes<L: Lanes>(from: *const f16) -> L {
+        // SAFETY: as the caller promises.
+        unsafe { L::load_f16(from) }
+    }
+}
+
+impl Weight for i8 {
+    #[inline(always)]
+    unsafe fn lanes<L: Lanes>(from: *const i8) -> L {
+        // SAFETY: as the caller promises.
+        unsafe { L::load_i8(from) }
+    }
+}

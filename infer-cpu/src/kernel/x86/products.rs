@@ -1,0 +1,173 @@
+//! Matrix products, kept or pooled.
+
+#![expect(clippy::needless_range_loop, reason = "vectors and points go by their number")]
+
+use std::ops::Range;
+
+use super::tile::Tile;
+use super::{Lanes, V};
+use crate::kernel::{Panels, Rows};
+
+/// Runs `$body` with `$r` rows known when compiling: a full tile, or what is
+/// left.
+macro_rules! for_tiles {
+    ($lanes:ty, $n:expr, |$row:ident, $r:ident| $body:expr) => {{
+        let mut $row = 0;
+        while $row < $n {
+            let left = ($n - $row).min(<$lanes>::ROWS);
+            macro_rules! rows {
+                ($count:literal) => {{
+                    const $r: usize = $count;
+                    $body
+                }};
+            }
+            match left {
+                1 => rows!(1),
+                2 => rows!(2),
+                3 => rows!(3),
+                4 => rows!(4),
+                5 => rows!(5),
+                6 => rows!(6),
+                7 => rows!(7),
+                8 => rows!(8),
+                9 => rows!(9),
+                10 => rows!(10),
+                11 => rows!(11),
+                _ => rows!(12),
+            }
+            $row += left;
+        }
+    }};
+}
+
+/// [`crate::kernel::Gemm::rows`].
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn rows<L: Lanes, T: Tile<L>>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: Range<usize>,
+    out: &mut [f32],
+    out_stride: usize,
+) {
+    rows.check(weights.padded_inputs);
+    if rows.n == 0 {
+        return;
+    }
+    assert!(weights.nr == V * L::N && panels.end <= weights.n_panels());
+    assert!(panels.end * weights.nr <= out_stride);
+    assert!((rows.n - 1) * out_stride + panels.end * weights.nr <= out.len());
+    for panel in panels {
+        let first = panel * weights.nr;
+        let data = weights.panel(panel);
+        for_tiles!(L, rows.n, |row, R| {
+            // SAFETY: rows and outputs were checked above.
+            unsafe {
+                let from = rows.data.as_ptr().add(row * rows.stride);
+                let sums = T::sums::<R>(from, rows.stride, data);
+                for (r, sums) in sums.into_iter().enumerate() {
+                    for (v, sums) in sums.into_iter().enumerate() {
+                        let channel = first + v * L::N;
+                        let value = finish::<L, _>(T::float(sums), weights, channel);
+                        value.store(out.as_mut_ptr().add((row + r) * out_stride + channel));
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// Scale, bias and ReLU of the channels from `channel`.
+#[inline(always)]
+unsafe fn finish<L: Lanes, W>(value: L, weights: &Panels<W>, channel: usize) -> L {
+    // SAFETY: scales and biases are padded to whole panels.
+    unsafe {
+        let bias = L::load(weights.bias.as_ptr().add(channel));
+        let value = if weights.scale.is_empty() {
+            value.add(bias)
+        } else {
+            value.fma(L::load(weights.scale.as_ptr().add(channel)), bias)
+        };
+        if weights.relu { value.max(L::splat(0.0)) } else { value }
+    }
+}
+
+/// [`crate::kernel::Gemm::max`].
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn max<L: Lanes, T: Tile<L>>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: Range<usize>,
+    maxima: &mut [T::Sum],
+) {
+    rows.check(weights.padded_inputs);
+    assert!(weights.nr == V * L::N && panels.end <= weights.n_panels());
+    assert!(maxima.len() == panels.len() * weights.nr);
+    for (panel, maxima) in panels.zip(maxima.chunks_exact_mut(V * L::N)) {
+        let data = weights.panel(panel);
+        // SAFETY: a chunk has V vectors; rows were checked above.
+        unsafe {
+            let mut best: [T::Sums; V] =
+                std::array::from_fn(|v| T::load(maxima.as_ptr().add(v * L::N)));
+            for_tiles!(L, rows.n, |row, R| {
+                let from = rows.data.as_ptr().add(row * rows.stride);
+                for sums in T::sums::<R>(from, rows.stride, data) {
+                    for v in 0..V {
+                        best[v] = T::max(sums[v], best[v]);
+                    }
+                }
+            });
+            for (v, best) in best.into_iter().enumerate() {
+                T::store(best, maxima.as_mut_ptr().add(v * L::N));
+            }
+        }
+    }
+}
+
+/// [`crate::kernel::Gemm::argmax`].
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn argmax<L: Lanes, T: Tile<L>>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: Range<usize>,
+    first_row: u32,
+    maxima: &mut [T::Sum],
+    winners: &mut [u32],
+) {
+    rows.check(weights.padded_inputs);
+    assert!(weights.nr == V * L::N && panels.end <= weights.n_panels());
+    assert!(maxima.len() == panels.len() * weights.nr && winners.len() == maxima.len());
+    let chunks = maxima.chunks_exact_mut(V * L::N).zip(winners.chunks_exact_mut(V * L::N));
+    for (panel, (maxima, winners)) in panels.zip(chunks) {
+        let data = weights.panel(panel);
+        let winners = winners.as_mut_ptr().cast::<i32>();
+        // SAFETY: a chunk has V vectors; rows were checked above.
+        unsafe {
+            let mut best: [T::Sums; V] =
+                std::array::from_fn(|v| T::load(maxima.as_ptr().add(v * L::N)));
+            let mut who: [L::Int; V] = std::array::from_fn(|v| L::load_int(winners.add(v * L::N)));
+            for_tiles!(L, rows.n, |row, R| {
+                let from = rows.data.as_ptr().add(row * rows.stride);
+                let sums = T::sums::<R>(from, rows.stride, data);
+                for (r, sums) in sums.into_iter().enumerate() {
+                    let index = L::splat_int((first_row + (row + r) as u32) as i32);
+                    for v in 0..V {
+                        T::keep_greater(sums[v], &mut best[v], &mut who[v], index);
+                    }
+                }
+            });
+            for v in 0..V {
+                T::store(best[v], maxima.as_mut_ptr().add(v * L::N));
+                L::store_int(who[v], winners.add(v * L::N));
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! What works on vectors: products with columns, rounding, distances.
+
+#![expect(clippy::needless_range_loop, reason = "vectors and points go by their number")]
+
+use std::ops::Range;
+
+use half::f16;
+
+use super::{Lanes, Weight};
+use crate::kernel::{Columns, I8_LARGEST, Soa};
+
+/// [`crate::kernel::Gemv`]: a block's sums stay in `B` vectors while its columns
+/// stream by, even and odd inputs apart for the sake of latency.
+///
+/// # Safety
+/// The instruction set of `L`; `B` vectors are a block.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn gemv<L: Lanes, W: Weight, const B: usize>(
+    nonzero: &[(u32, f32)],
+    weights: &Columns<W>,
+    blocks: Range<usize>,
+    out: &mut [f32],
+) {
+    const BLOCK: usize = Columns::<f32>::BLOCK;
+    assert!(B * L::N == BLOCK && blocks.end <= weights.n_blocks());
+    assert!(nonzero.iter().all(|&(j, _)| (j as usize) < weights.inputs));
+    for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
+        let columns = weights.block(block).as_ptr();
+        // SAFETY: every input has a column of B vectors, and the block its
+        // scales and biases.
+        unsafe {
+            let mut sums = [[L::splat(0.0); B]; 2];
+            let pairs = nonzero.chunks_exact(2);
+            let last = pairs.remainder();
+            for pair in pairs {
+                for (sums, &(j, value)) in sums.iter_mut().zip(pair) {
+                    add_column(sums, columns.add(j as usize * BLOCK), value);
+                }
+            }
+            for &(j, value) in last {
+                add_column(&mut sums[0], columns.add(j as usize * BLOCK), value);
+            }
+            for v in 0..B {
+                let channel = block * BLOCK + v * L::N;
+                let bias = L::load(weights.bias.as_ptr().add(channel));
+                let sum = sums[0][v].add(sums[1][v]);
+                let value = if weights.scale.is_empty() {
+                    sum.add(bias)
+                } else {
+                    sum.fma(L::load(weights.scale.as_ptr().add(channel)), bias)
+                };
+                value.store(out.as_mut_ptr().add(v * L::N));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn add_column<L: Lanes, W: Weight, const B: usize>(
+    sums: &mut [L; B],
+    column: *const W,
+    value: f32,
+) {
+    for (v, sum) in sums.iter_mut().enumerate() {
+        // SAFETY: as the caller promises.
+        unsafe { *sum = W::lanes::<L>(column.add(v * L::N)).fma(L::splat(value), *sum) };
+    }
+}
+
+/// [`crate::kernel::Kernels::narrow_f16`] of whole vectors; returns how many values
+/// that were, and the largest magnitude.
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn narrow_f16<L: Lanes>(
+    values: &[f32],
+    out: &mut [f16],
+) -> (usize, f32) {
+    let whole = values.len().min(out.len()) / L::N * L::N;
+    // SAFETY: whole vectors of both.
+    unsafe {
+        let mut largest = L::splat(0.0);
+        for at in (0..whole).step_by(L::N) {
+            let value = L::load(values.as_ptr().add(at));
+            value.store_f16(out.as_mut_ptr().add(at));
+            largest = value.abs().max(largest);
+        }
+        let mut lanes = [0.0f32; 16];
+        largest.store(lanes.as_mut_ptr());
+        (whole, lanes.into_iter().fold(0.0, f32::max))
+    }
+}
+
+/// [`crate::kernel::Kernels::narrow_i8`] of whole vectors; returns how many values
+/// that were, and how many were clipped.
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn narrow_i8<L: Lanes>(
+    values: &[f32],
+    per_unit: f32,
+    out: &mut [u8],
+) -> (usize, u64) {
+    let whole = values.len().min(out.len()) / L::N * L::N;
+    // SAFETY: whole vectors of both.
+    unsafe {
+        let most = L::splat(f32::from(I8_LARGEST));
+        let mut clipped = 0;
+        for at in (0..whole).step_by(L::N) {
+            let level = L::load(values.as_ptr().add(at)).mul(L::splat(per_unit)).round();
+            clipped += u64::from(level.count_greater(most));
+            level.max(L::splat(0.0)).min(most).store_u8(out.as_mut_ptr().add(at));
+        }
+        (whole, clipped)
+    }
+}
+
+/// [`crate::kernel::Kernels::fps_step`].
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn fps_step<L: Lanes>(
+    cloud: Soa<'_>,
+    pick: [f32; 3],
+    distance: &mut [f32],
+) -> usize {
+    let n = distance.len();
+    assert!(cloud.x.len() >= n && cloud.y.len() >= n && cloud.z.len() >= n);
+    let whole = n / L::N * L::N;
+    let mut best = [-1.0f32; 16];
+    let mut who = [i32::MAX; 16];
+    // SAFETY: whole vectors of all; 16 lanes at most.
+    unsafe {
+        let (mut most, mut at_most) = (L::splat(-1.0), L::splat_int(0));
+        let mut index =
+            L::load_int([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15].as_ptr());
+        let from = |axis: &[f32], at, pick| L::load(axis.as_ptr().add(at)).sub(L::splat(pick));
+        for at in (0..whole).step_by(L::N) {
+            let (dx, dy, dz) = (
+                from(cloud.x, at, pick[0]),
+                from(cloud.y, at, pick[1]),
+                from(cloud.z, at, pick[2]),
+            );
+            let squared = dx.mul(dx).add(dy.mul(dy)).add(dz.mul(dz));
+            let nearest = squared.min(L::load(distance.as_ptr().add(at)));
+            nearest.store(distance.as_mut_ptr().add(at));
+            nearest.keep_greater(&mut most, &mut at_most, index);
+            index = L::add_int(index, L::splat_int(L::N as i32));
+        }
+        most.store(best.as_mut_ptr());
+        L::store_int(at_most, who.as_mut_ptr());
+    }
+    let lanes = best.into_iter().zip(who);
+    let (mut largest, first) = lanes.fold((-1.0, i32::MAX), |found, lane| {
+        let better = lane.0 > found.0 || (lane.0 == found.0 && lane.1 < found.1);
+        if better { lane } else { found }
+    });
+    let mut farthest = if whole == 0 { 0 } else { first as usize };
+    for i in whole..n {
+        let [dx, dy, dz] = [cloud.x[i] - pick[0], cloud.y[i] - pick[1], cloud.z[i] - pick[2]];
+        let squared = (dx * dx + dy * dy) + dz * dz;
+        distance[i] = if squared < distance[i] { squared } else { distance[i] };
+        if distance[i] > largest {
+            (largest, farthest) = (distance[i], i);
+        }
+    }
+    farthest
+}

@@ -1,0 +1,136 @@
+//! How a classifier computes.
+
+use std::collections::BTreeMap;
+
+use formats::FormatError;
+use formats::model_card::Normalization;
+
+use crate::kernel::KernelName;
+use crate::precision::Precision;
+use crate::sampler::SamplerSpec;
+
+/// Which of a model's T-Nets are run; one that is left out counts as the
+/// identity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TNets {
+    /// All that the model has.
+    #[default]
+    Both,
+    /// That of the coordinates alone.
+    Input,
+    /// That of the features alone.
+    Feature,
+    /// None.
+    Neither,
+}
+
+impl TNets {
+    /// All choices.
+    pub const ALL: [Self; 4] = [Self::Both, Self::Input, Self::Feature, Self::Neither];
+
+    /// Its name on command lines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Both => "both",
+            Self::Input => "input",
+            Self::Feature => "feature",
+            Self::Neither => "none",
+        }
+    }
+
+    pub(crate) fn runs_input(self) -> bool {
+        matches!(self, Self::Both | Self::Input)
+    }
+
+    pub(crate) fn runs_feature(self) -> bool {
+        matches!(self, Self::Both | Self::Feature)
+    }
+}
+
+impl std::fmt::Display for TNets {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl std::str::FromStr for TNets {
+    type Err = FormatError;
+
+    fn from_str(word: &str) -> Result<Self, FormatError> {
+        Self::ALL.into_iter().find(|one| one.name() == word).ok_or_else(|| {
+            FormatError::UnknownName {
+                word: word.to_owned(),
+                what: "choice of T-Nets",
+                choices: Self::ALL.map(Self::name).join(", "),
+            }
+        })
+    }
+}
+
+/// How a [`crate::Classifier`] computes.
+///
+/// ```
+/// use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+/// use infer_cpu::{Options, Precision};
+///
+/// let sampler = SamplerSpec { kind: SamplerKind::Cpl, points: 64, ..SamplerSpec::default() };
+/// let options = Options {
+///     precision: Precision::F16,
+///     threads: 4,
+///     sampler: Some(sampler),
+///     ..Options::default()
+/// };
+/// assert!(!options.drop_invalid);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// What to compute in.
+    pub precision: Precision,
+    /// The kernels to use; the fastest that this machine runs if `None`.
+    pub kernel: Option<KernelName>,
+    /// Threads, the caller's among them.
+    pub threads: usize,
+    /// Which T-Nets to run.
+    pub t_nets: TNets,
+    /// Which points the network sees; as in training if `None`.
+    pub sampler: Option<SamplerSpec>,
+    /// Replaces the front end of a Critical Points Layer by a look-up table of
+    /// this many nodes an axis.
+    pub table_nodes: Option<usize>,
+    /// The largest activation of each layer, for int8; the model's own
+    /// calibration if `None`, and shapes made by rule if it has none.
+    pub activation_ranges: Option<BTreeMap<String, f32>>,
+    /// How clouds are normalised; as in training if `None`.
+    pub normalization: Option<Normalization>,
+    /// Drop points that are not finite instead of refusing the cloud.
+    pub drop_invalid: bool,
+    /// Draws of a random subset whose log-probabilities are averaged.
+    pub votes: u32,
+    /// Turn the cloud about its up axis between votes, evenly spread.
+    pub vote_rotations: bool,
+    /// The axis that points up: 0 for x, 1 for y, 2 for z.
+    pub up: usize,
+    /// Points to make room for at once; larger clouds allocate when they come.
+    pub capacity: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            precision: Precision::F32,
+            kernel: None,
+            threads: 1,
+            t_nets: TNets::Both,
+            sampler: None,
+            table_nodes: None,
+            activation_ranges: None,
+            normalization: None,
+            drop_invalid: false,
+            votes: 1,
+            vote_rotations: false,
+            up: 2,
+            capacity: 4096,
+        }
+    }
+}

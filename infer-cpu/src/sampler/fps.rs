@@ -1,0 +1,240 @@
+//! Farthest point sampling: each point taken is the one farthest from all
+//! those taken before.
+
+use super::FpsStart;
+use super::canonical::compare;
+use crate::kernel::{Kernels, Soa};
+
+/// Samples clouds; keeps its memory from call to call.
+#[derive(Default)]
+pub struct FarthestPoints {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+    /// Squared distance of each point to the nearest one taken.
+    distance: Vec<f32>,
+}
+
+impl FarthestPoints {
+    /// Writes the indices of up to `m` points to `out`, in the order in which
+    /// they are taken.
+    ///
+    /// Exact: no point is left out of any comparison. Distances are squared,
+    /// in f32, of coordinates scaled by a power of two so that the largest is
+    /// between 1/2 and 1: the order is that of the unscaled ones, but nothing
+    /// overflows. A point at distance 0 from those taken is a duplicate and
+    /// never taken, so that a cloud of fewer than `m` distinct points gives as
+    /// many as it has. (Points closer than 2⁻⁷⁵ of the largest coordinate are
+    /// at distance 0 too: its square is less than f32 holds.)
+    ///
+    /// From [`FpsStart::First`], the lowest index wins a tie, as in NumPy.
+    /// From [`FpsStart::Farthest`], the least point by x, y, z does, and the
+    /// points taken are the same in any order of the input. Of equal points,
+    /// the first is taken.
+    pub fn select(
+        &mut self,
+        points: &[[f32; 3]],
+        m: usize,
+        start: FpsStart,
+        kernels: &Kernels,
+        out: &mut Vec<u32>,
+    ) {
+        out.clear();
+        if points.is_empty() || m == 0 {
+            return;
+        }
+        self.load(points);
+        let mut pick = match start {
+            FpsStart::First => 0,
+            FpsStart::Farthest => {
+                let farthest = self.step(self.centroid(), kernels);
+                let pick = self.least_as_far(farthest, points);
+                self.distance.fill(f32::INFINITY);
+                pick
+            }
+        };
+        out.push(pick as u32);
+        while out.len() < m {
+            pick = self.step([self.x[pick], self.y[pick], self.z[pick]], kernels);
+            if self.distance[pick] == 0.0 {
+                break;
+            }
+            if start == FpsStart::Farthest {
+                pick = self.least_as_far(pick, points);
+            }
+            out.push(pick as u32);
+        }
+    }
+
+    /// Scales the coordinates and forgets all distances.
+    fn load(&mut self, points: &[[f32; 3]]) {
+        let largest = points.as_flattened().iter().fold(0.0f32, |max, x| max.max(x.abs()));
+        let scale = power_that_halves(largest);
+        for (axis, column) in [&mut self.x, &mut self.y, &mut self.z].into_iter().enumerate() {
+            column.clear();
+            column.extend(points.iter().map(|point| point[axis] * scale));
+        }
+        self.distance.clear();
+        self.distance.resize(points.len(), f32::INFINITY);
+    }
+
+    /// Takes the point at `pick` and returns the first of those farthest.
+    fn step(&mut self, pick: [f32; 3], kernels: &Kernels) -> usize {
+        let cloud = Soa { x: &self.x, y: &self.y, z: &self.z };
+        (kernels.fps_step)(cloud, pick, &mut self.distance)
+    }
+
+    /// Of the points as far as `farthest`, the first of them, the least.
+    fn least_as_far(&self, farthest: usize, points: &[[f32; 3]]) -> usize {
+        /// Few enough to look through where there is a tie, which is rare.
+        const CHUNK: usize = 64;
+        let largest = self.distance[farthest];
+        let mut least = farthest;
+        let mut first = farthest + 1;
+        for chunk in self.distance[first..].chunks(CHUNK) {
+            // Without a branch, so that it is vectorised.
+            if chunk.iter().fold(false, |any, &distance| any | (distance == largest)) {
+                for i in first..first + chunk.len() {
+                    if self.distance[i] == largest && compare(&points[i], &points[least]).is_lt() {
+                        least = i;
+                    }
+                }
+            }
+            first += chunk.len();
+        }
+        least
+    }
+
+    /// The mean of the points, summed exactly, so in any order.
+    fn centroid(&self) -> [f32; 3] {
+        let n = self.x.len();
+        // Coordinates in units of 2^-bits, of which n sum to at most 2^62.
+        let bits = 50.min(62 - n.next_power_of_two().ilog2());
+        // In f64, the last place of numbers around this one is that unit: to
+        // add it rounds a coordinate, which then stands in the bits.
+        let rounder = 1.5 * (1u64 << (52 - bits)) as f64;
+        let unit = 1.0 / (1u64 << bits) as f64;
+        [&self.x, &self.y, &self.z].map(|column| {
+            let units = |x: f32| (f64::from(x) + rounder).to_bits().wrapping_sub(rounder.to_bits());
+            let sum = column.iter().fold(0u64, |sum, &x| sum.wrapping_add(units(x)));
+            (sum as i64 as f64 * unit / n as f64) as f32
+        })
+    }
+}
+
+/// The power of two that brings `largest` to between 1/2 and 1; of subnormal
+/// numbers, that of the least normal one.
+fn power_that_halves(largest: f32) -> f32 {
+    let exponent = u64::from(largest.to_bits() >> 23);
+    // Both formats' exponents are biased, by 127 and 1023.
+    f64::from_bits((1023 + 126 - exponent) << 52) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{any_cloud, extremes, gather, shared_array, shuffled, uniform};
+    use super::*;
+    use crate::kernel::{KernelName, available};
+    use proptest::prelude::*;
+
+    fn select(points: &[[f32; 3]], m: usize, start: FpsStart) -> Vec<u32> {
+        let kernels = KernelName::Scalar.kernels().unwrap();
+        let mut out = vec![];
+        FarthestPoints::default().select(points, m, start, kernels, &mut out);
+        out
+    }
+
+    /// Indices that NumPy took of half of ModelNet40's test clouds, from index
+    /// 0, with squared distances in f32.
+    #[test]
+    fn indices_are_those_of_numpy() {
+        const N: usize = 1024;
+        const M: usize = 64;
+        let clouds = shared_array("modelnet40-clouds/dev.npz", "<i2");
+        let expected = shared_array("reference/3dcertify_64p/fps64_idx.npy", "<u2");
+        let (Some(clouds), Some(expected)) = (clouds, expected) else { return };
+        let expected = expected.as_chunks::<2>().0;
+        assert_eq!(expected.len(), 1234 * M);
+
+        let coordinate = |&bytes: &[u8; 2]| f32::from(i16::from_le_bytes(bytes)) / 32767.0;
+        let coordinates: Vec<f32> = clouds.as_chunks().0.iter().map(coordinate).collect();
+        let points = coordinates.as_chunks::<3>().0;
+        let mut sampler = FarthestPoints::default();
+        let mut found = vec![];
+        for kernels in available() {
+            for (cloud, expected) in points.chunks(N).zip(expected.chunks(M)) {
+                sampler.select(cloud, M, FpsStart::First, kernels, &mut found);
+                let expected = expected.iter().map(|&bytes| u32::from(u16::from_le_bytes(bytes)));
+                assert!(found.iter().copied().eq(expected), "{}", kernels.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_corners_of_a_square_come_before_its_middle() {
+        let cloud = [[0.5, 0.5, 0.0], [0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+        // All corners are as far from the centroid: the least by x, then y.
+        assert_eq!(select(&cloud, 5, FpsStart::Farthest), [1, 4, 3, 2, 0]);
+        // From the middle they are too: the first, and so on.
+        assert_eq!(select(&cloud, 5, FpsStart::First), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn distinct_points_are_taken_once_whatever_their_magnitude() {
+        for (what, cloud, n_distinct) in extremes() {
+            for start in [FpsStart::First, FpsStart::Farthest] {
+                let taken = select(&cloud, 1000, start);
+                assert_eq!(taken.len(), n_distinct, "{what}, {start}");
+                assert!(select(&cloud, 2, start).iter().eq(taken.iter().take(2)), "{what}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_outlier_is_taken_first() {
+        let cloud = [uniform(99, 1), vec![[1e9, 0.0, 0.0]]].concat();
+        assert_eq!(select(&cloud, 1, FpsStart::Farthest), [99]);
+    }
+
+    #[test]
+    fn scale_does_not_matter() {
+        let cloud = uniform(200, 3);
+        let taken = select(&cloud, 50, FpsStart::Farthest);
+        for exponent in [-100, -60, 60, 126] {
+            let scale = 2f32.powi(exponent);
+            let scaled: Vec<_> = cloud.iter().map(|point| point.map(|x| x * scale)).collect();
+            assert_eq!(select(&scaled, 50, FpsStart::Farthest), taken, "2^{exponent}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn each_point_is_a_farthest_one(cloud in any_cloud()) {
+            let taken = select(&cloud, 10, FpsStart::First);
+            // A power of two, so that the products below are those of f32.
+            let largest = cloud.as_flattened().iter().fold(0.0f32, |max, x| max.max(x.abs()));
+            let scale = power_that_halves(largest);
+            let scaled: Vec<_> = cloud.iter().map(|point| point.map(|x| x * scale)).collect();
+            for i in 1..taken.len() {
+                let to_taken = |point: &[f32; 3]| {
+                    let squares = taken[..i].iter().map(|&other| {
+                        let other = scaled[other as usize];
+                        let [dx, dy, dz] = [0, 1, 2].map(|axis| point[axis] - other[axis]);
+                        (dx * dx + dy * dy) + dz * dz
+                    });
+                    squares.fold(f32::INFINITY, f32::min)
+                };
+                let farthest = scaled.iter().map(to_taken).fold(0.0, f32::max);
+                prop_assert_eq!(to_taken(&scaled[taken[i] as usize]), farthest);
+            }
+        }
+
+        #[test]
+        fn the_order_of_the_input_does_not_matter(cloud in any_cloud(), seed in any::<u32>()) {
+            let shuffled = shuffled(&cloud, seed);
+            let straight = select(&cloud, 20, FpsStart::Farthest);
+            let permuted = select(&shuffled, 20, FpsStart::Farthest);
+            prop_assert_eq!(gather(&cloud, &straight), gather(&shuffled, &permuted));
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! What a caller can ask of a sampler.
+
+use std::path::Path;
+
+use formats::FormatError;
+use formats::model_card::ModelCard;
+
+use super::SamplerError;
+
+/// Declares an enum whose variants have names on command lines.
+macro_rules! named {
+    (
+        $(#[$meta:meta])*
+        pub enum $name:ident: $what:literal {
+            $($(#[$variant_meta:meta])* $variant:ident = $word:literal,)+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub enum $name {
+            $($(#[$variant_meta])* $variant,)+
+        }
+
+        impl $name {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$variant,)+];
+
+            /// Its name on command lines.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = FormatError;
+
+            fn from_str(word: &str) -> Result<Self, FormatError> {
+                let named = Self::ALL.iter().find(|one| one.name() == word);
+                named.copied().ok_or_else(|| FormatError::UnknownName {
+                    word: word.to_owned(),
+                    what: $what,
+                    choices: [$($word,)+].join(", "),
+                })
+            }
+        }
+    };
+}
+
+named! {
+    /// A way to choose points of a cloud.
+    pub enum SamplerKind: "sampler" {
+        /// Every point.
+        #[default]
+        All = "all",
+        /// The first M.
+        First = "first",
+        /// M drawn at random.
+        Random = "random",
+        /// M by farthest point sampling.
+        Fps = "fps",
+        /// One a cell of a grid.
+        Voxel = "voxel",
+        /// A Critical Points Layer.
+        Cpl = "cpl",
+    }
+}
+
+named! {
+    /// Where farthest point sampling begins.
+    pub enum FpsStart: "start of farthest point sampling" {
+        /// At the point farthest from the mean of all points, so that the result does
+        /// not depend on the order of the points.
+        #[default]
+        Farthest = "farthest",
+        /// At the first point, as reference implementations do.
+        First = "first",
+    }
+}
+
+named! {
+    /// How a Critical Points Layer turns its ranked points into M.
+    pub enum Resize: "rule of resizing" {
+        /// The M best; fewer, if there are fewer.
+        Truncate = "truncate",
+        /// The M best; all in turn, over and over, if there are fewer.
+        #[default]
+        Cyclic = "cyclic",
+        /// The ranking stretched or shrunk to M by nearest neighbours, as the
+        /// layer's authors do.
+        Nearest = "nearest",
+        /// The same, once each point is repeated in proportion to its score:
+        /// the weighted layer (WCPL) of the same authors.
+        Weighted = "weighted",
+    }
+}
+
+named! {
+    /// The network whose features a Critical Points Layer pools.
+    pub enum FrontChoice: "front end" {
+        /// The model's own front end if it brings one, else the trunk of its
+        /// input transform, else its trunk.
+        #[default]
+        Auto = "auto",
+        /// The front end that the model file brings.
+        Own = "own",
+        /// The trunk of the input transform (STN3d), whose features the
+        /// classifier needs in any case.
+        Stn = "stn",
+        /// The trunk itself.
+        Trunk = "trunk",
+    }
+}
+
+/// Which points of a cloud to keep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SamplerSpec {
+    /// The way to choose.
+    pub kind: SamplerKind,
+    /// How many points to keep, M; `all` and a given voxel size disregard it.
+    pub points: usize,
+    /// What random draws depend on.
+    pub seed: u64,
+    /// Where `fps` begins.
+    pub fps_start: FpsStart,
+    /// Edge of a voxel, in the units of the cloud; without it, the grid is as
+    /// fine as M allows.
+    pub voxel_size: Option<f64>,
+    /// How `cpl` comes to M points.
+    pub resize: Resize,
+    /// How often `cpl` may pool again among the points not yet chosen while
+    /// it has fewer than M; 0 is the plain layer.
+    pub passes: usize,
+    /// What `cpl` pools.
+    pub front: FrontChoice,
+}
+
+impl Default for SamplerSpec {
+    fn default() -> Self {
+        Self {
+            kind: SamplerKind::default(),
+            points: 1024,
+            seed: 0,
+            fps_start: FpsStart::default(),
+            voxel_size: None,
+            resize: Resize::default(),
+            passes: 0,
+            front: FrontChoice::default(),
+        }
+    }
+}
+
+impl SamplerSpec {
+    /// The sampler that the model at `path` was trained behind, by its `card`.
+    ///
+    /// # Errors
+    /// A card that names no sampler of ours.
+    pub fn as_trained(path: &Path, card: &ModelCard) -> Result<Self, FormatError> {
+        let bad = |key: &str| {
+            let part = format!("metadata `{key}`");
+            move |cause: FormatError| FormatError::malformed(path, part, cause)
+        };
+        let mut spec = Self::default();
+        if let Some(kind) = &card.sampler {
+            spec.kind = kind.parse().map_err(bad("sampler"))?;
+        }
+        if let Some(start) = &card.fps_start {
+            spec.fps_start = start.parse().map_err(bad("fps_start"))?;
+        }
+        spec.points = card.points.unwrap_or(spec.points);
+        Ok(spec)
+    }
+
+    /// That the specification can be met.
+    ///
+    /// # Errors
+    /// M is needed but 0; a voxel size that is no positive length.
+    pub fn check(&self) -> Result<(), SamplerError> {
+        let voxel_size = self.voxel_size.filter(|_| self.kind == SamplerKind::Voxel);
+        match (self.kind, voxel_size) {
+            (_, Some(size)) if size > 0.0 && size.is_finite() => Ok(()),
+            (_, Some(size)) => Err(SamplerError::VoxelSize(size)),
+            (SamplerKind::All, None) => Ok(()),
+            (_, None) if self.points == 0 => Err(SamplerError::NoPointsWanted),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_come_back_and_others_are_refused() {
+        let words = ["all", "first", "random", "fps", "voxel", "cpl"];
+        let kinds: Vec<SamplerKind> = words.iter().map(|word| word.parse().unwrap()).collect();
+        assert_eq!(kinds, SamplerKind::ALL);
+        assert_eq!(kinds.iter().map(ToString::to_string).collect::<Vec<_>>(), words);
+        assert_eq!(
+            "fsp".parse::<SamplerKind>().unwrap_err().to_string(),
+            "`fsp` is no sampler; choose one of all, first, random, fps, voxel, cpl"
+        );
+    }
+
+    #[test]
+    fn a_specification_that_cannot_be_met_is_an_error() {
+        for &kind in SamplerKind::ALL {
+            let spec = SamplerSpec { kind, points: 0, ..SamplerSpec::default() };
+            assert_eq!(spec.check().is_ok(), kind == SamplerKind::All, "{kind}");
+            assert_eq!(SamplerSpec { points: 1, ..spec }.check(), Ok(()));
+        }
+        for size in [0.0, -0.5, f64::NAN, f64::INFINITY] {
+            let kind = SamplerKind::Voxel;
+            let spec = SamplerSpec { kind, voxel_size: Some(size), ..SamplerSpec::default() };
+            assert!(matches!(spec.check(), Err(SamplerError::VoxelSize(_))), "{size}");
+        }
+    }
+
+    #[test]
+    fn a_given_voxel_size_needs_no_number_of_points() {
+        let kind = SamplerKind::Voxel;
+        let spec = SamplerSpec { kind, points: 0, voxel_size: Some(0.1), ..SamplerSpec::default() };
+        assert_eq!(spec.check(), Ok(()));
+    }
+}

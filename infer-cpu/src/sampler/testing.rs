@@ -1,0 +1,80 @@
+//! Clouds for the tests of samplers.
+
+use std::path::Path;
+
+use formats::rng::StreamKey;
+use proptest::prelude::*;
+
+use super::random::RandomSubset;
+
+/// A cloud in another order.
+pub fn shuffled(cloud: &[[f32; 3]], seed: u32) -> Vec<[f32; 3]> {
+    // One point more than are drawn: the drawn order is a random one.
+    let mut order = vec![];
+    let key = StreamKey::new(0, "shuffled", seed);
+    RandomSubset::default().draw(cloud.len() + 1, cloud.len(), key, &mut order);
+    let last = cloud.len() as u32;
+    let missing = (0..last).find(|index| !order.contains(index));
+    let order = order.into_iter().map(|index| if index == last { missing } else { Some(index) });
+    order.flatten().map(|index| cloud[index as usize]).collect()
+}
+
+/// `n` points, uniform in the cube from -1 to 1.
+pub fn uniform(n: usize, seed: u32) -> Vec<[f32; 3]> {
+    let key = StreamKey::new(0, "uniform", seed);
+    let coordinate = |i: usize| key.unit(i as u64) as f32 * 2.0 - 1.0;
+    (0..n).map(|i| [0, 1, 2].map(|axis| coordinate(3 * i + axis))).collect()
+}
+
+/// The points at `indices`.
+pub fn gather(cloud: &[[f32; 3]], indices: &[u32]) -> Vec<[f32; 3]> {
+    indices.iter().map(|&index| cloud[index as usize]).collect()
+}
+
+/// Clouds full of ties and duplicates, on a coarse grid with zeros of both
+/// signs, and clouds of any finite numbers.
+pub fn any_cloud() -> impl Strategy<Value = Vec<[f32; 3]>> {
+    let grid = (-2i8..=2).prop_map(|x| f32::from(x) * 0.5);
+    let grid = prop_oneof![grid, Just(-0.0f32)];
+    let finite = prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO;
+    prop_oneof![
+        prop::collection::vec(prop::array::uniform3(grid), 0..80),
+        prop::collection::vec(prop::array::uniform3(-1.0f32..1.0), 0..80),
+        prop::collection::vec(prop::array::uniform3(finite), 0..40),
+    ]
+}
+
+/// Clouds that break careless arithmetic, with the number of their distinct
+/// points.
+pub fn extremes() -> Vec<(&'static str, Vec<[f32; 3]>, usize)> {
+    let outlier = [uniform(99, 1), vec![[1e9, 0.0, 0.0]]].concat();
+    let scaled = |by: f32| uniform(100, 2).into_iter().map(|p| p.map(|x| x * by)).collect();
+    vec![
+        ("no point", vec![], 0),
+        ("one point", vec![[0.3, 0.2, 0.1]], 1),
+        ("all points equal", vec![[0.3, 0.2, 0.1]; 100], 1),
+        ("all points at 0, with either sign", [[[0.0; 3]; 9], [[-0.0; 3]; 9]].concat(), 1),
+        ("coordinates at 1e30", scaled(1e30), 100),
+        ("coordinates at 1e-30", scaled(1e-30), 100),
+        ("the ends of f32", vec![[f32::MAX; 3], [f32::MIN; 3], [0.0; 3]], 3),
+        ("the least of f32", vec![[1e-45; 3], [-1e-45; 3], [0.0; 3]], 3),
+        ("one outlier", outlier, 100),
+    ]
+}
+
+/// What follows the header of the first NumPy array in the file at `relative`
+/// below `../shared/data`, an array or an uncompressed archive of some. Where
+/// it is absent, a line says that the test skips.
+pub fn shared_array(relative: &str, descr: &str) -> Option<Vec<u8>> {
+    const MAGIC: &[u8] = b"\x93NUMPY\x01\0";
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(relative);
+    let Ok(bytes) = std::fs::read(&path) else {
+        println!("skipped: {} is not there", path.display());
+        return None;
+    };
+    let array = bytes.windows(MAGIC.len()).position(|window| window == MAGIC).unwrap();
+    let (length, header) = bytes[array + MAGIC.len()..].split_first_chunk().unwrap();
+    let (header, data) = header.split_at(u16::from_le_bytes(*length).into());
+    assert!(String::from_utf8_lossy(header).contains(&format!("'descr': '{descr}'")));
+    Some(data.to_vec())
+}

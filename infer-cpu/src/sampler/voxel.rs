@@ -1,0 +1,385 @@
+//! One point a cell of a grid of cubes.
+
+use super::canonical::{compare, sort_by_geometry};
+
+/// No cell is finer: each number that f32 holds has a cell of its own.
+const FINEST: f64 = f32::from_bits(1) as f64;
+
+/// Sizes that are tried in search of a grid: each octave is divided into so
+/// many equal steps.
+const STEPS_AN_OCTAVE: u32 = 32;
+
+/// From twice the cloud's extent down, beyond what f64 tells apart in it.
+const OCTAVES: u32 = 63;
+
+/// Parts of a cell's edge in which points are placed for their centroid:
+/// `u32::MAX` of them sum to less than 2^64.
+const PARTS: f64 = 4_294_967_296.0;
+
+/// No cell.
+const EMPTY: u32 = u32::MAX;
+
+/// Thins clouds; keeps its memory from call to call. It grows with the number
+/// of occupied cells, not of points.
+///
+/// ```
+/// use infer_cpu::sampler::VoxelGrid;
+///
+/// let cloud = [[0.9, 0.5, 0.5], [0.6, 0.5, 0.5], [0.1, 0.5, 0.5], [1.5, 0.5, 0.5]];
+/// let mut chosen = vec![];
+/// // The cell from 0 to 1 holds three points; that at 0.6 is nearest their mean.
+/// VoxelGrid::default().select_by_size(&cloud, 1.0, &mut chosen);
+/// assert_eq!(chosen, [1, 3]);
+/// ```
+#[derive(Default)]
+pub struct VoxelGrid {
+    cells: Vec<Cell>,
+    /// Indices into `cells`, by hash; the first `1 << bits` are in use, at
+    /// most half of them.
+    slots: Vec<u32>,
+    bits: u32,
+    /// The points kept, as they are sorted.
+    keys: Vec<u64>,
+}
+
+/// Cubes of edge `size`, one of which has its low corner at `origin`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Grid {
+    origin: [f64; 3],
+    size: f64,
+}
+
+/// An occupied cell.
+struct Cell {
+    /// Which one: its low corner from the origin, in edges.
+    place: [f64; 3],
+    /// How many points it holds.
+    n: u32,
+    /// The sum of their offsets from the low corner, in parts of the edge.
+    sum: [u64; 3],
+    /// The point nearest to the centroid so far.
+    nearest: u32,
+    /// Its squared distance from the centroid, in parts of the edge.
+    distance: f64,
+}
+
+impl VoxelGrid {
+    /// Writes one point of each cell of edge `size` (positive and finite, in
+    /// the units of the cloud) to `out`: the one nearest to the centroid of
+    /// the cell's points. Cells begin at coordinate 0, as in every cloud.
+    ///
+    /// Points are ascending by x, y, z. They are the same in any order of the
+    /// input: offsets are summed as integers, in 2⁻³² of the edge, the least
+    /// point wins a tie, and of equal points the first is taken.
+    pub fn select_by_size(&mut self, points: &[[f32; 3]], size: f64, out: &mut Vec<u32>) {
+        self.select(points, &Grid { origin: [0.0; 3], size: size.max(FINEST) }, out);
+    }
+
+    /// The same for the finest grid that has at most `m` (at least 1) occupied
+    /// cells. Cells begin at the cloud's least coordinates, in f64.
+    ///
+    /// A cloud of up to `m` distinct points keeps them all. For others, cells'
+    /// edges in steps of 1.6 to 3.1 % are searched by bisection, from twice
+    /// the cloud's extent down to 2⁻⁶³ of it: the edge found leaves at most
+    /// `m` cells and the next finer one more. (A much finer one may leave
+    /// fewer again, since grids of different edges are not nested.)
+    pub fn select_by_count(&mut self, points: &[[f32; 3]], m: usize, out: &mut Vec<u32>) {
+        let grid = self.finest(points, m);
+        self.select(points, &grid, out);
+    }
+
+    fn finest(&mut self, points: &[[f32; 3]], m: usize) -> Grid {
+        let every_point = Grid { origin: [0.0; 3], size: FINEST };
+        if self.occupies_at_most(m, points, &every_point) {
+            return every_point;
+        }
+        let (low, extent) = bounds(points);
+        let grid = |step| Grid { origin: low, size: extent * edge(step) };
+        let mut fits = 0;
+        let mut too_fine = OCTAVES * STEPS_AN_OCTAVE;
+        while too_fine - fits > 1 {
+            let middle = fits.midpoint(too_fine);
+            if self.occupies_at_most(m, points, &grid(middle)) {
+                fits = middle;
+            } else {
+                too_fine = middle;
+            }
+        }
+        grid(fits)
+    }
+
+    /// Whether points lie in at most `m` cells; ends with the first beyond.
+    fn occupies_at_most(&mut self, m: usize, points: &[[f32; 3]], grid: &Grid) -> bool {
+        self.clear();
+        points.iter().all(|point| {
+            self.cell(grid.place(point));
+            self.cells.len() <= m
+        })
+    }
+
+    fn select(&mut self, points: &[[f32; 3]], grid: &Grid, out: &mut Vec<u32>) {
+        self.clear();
+        for point in points {
+            let place = grid.place(point);
+            let offset = grid.offset(point, place);
+            let cell = self.cell(place);
+            cell.n += 1;
+            (0..3).for_each(|axis| cell.sum[axis] += offset[axis]);
+        }
+        for (i, point) in points.iter().enumerate() {
+            let place = grid.place(point);
+            let offset = grid.offset(point, place);
+            let cell = self.cell(place);
+            let distance = cell.distance_from_centroid(offset);
+            let is_nearer = distance < cell.distance
+                || distance == cell.distance
+                    && compare(point, &points[cell.nearest as usize]).is_lt();
+            if is_nearer {
+                cell.distance = distance;
+                cell.nearest = i as u32;
+            }
+        }
+        self.keys.clear();
+        self.keys.extend(self.cells.iter().map(|cell| u64::from(cell.nearest)));
+        sort_by_geometry(&mut self.keys, points);
+        out.clear();
+        out.extend(self.keys.iter().map(|&key| key as u32));
+    }
+
+    fn clear(&mut self) {
+        const BITS: u32 = 8;
+        self.cells.clear();
+        self.resize_slots(BITS);
+    }
+
+    /// The cell at `place`, which becomes occupied.
+    fn cell(&mut self, place: [f64; 3]) -> &mut Cell {
+        let mut slot = self.slot(place);
+        if self.slots[slot] == EMPTY {
+            if 2 * self.cells.len() >= 1 << self.bits {
+                self.resize_slots(self.bits + 1);
+                slot = self.slot(place);
+            }
+            self.slots[slot] = self.cells.len() as u32;
+            self.cells.push(Cell { place, n: 0, sum: [0; 3], nearest: 0, distance: f64::INFINITY });
+        }
+        &mut self.cells[self.slots[slot] as usize]
+    }
+
+    /// Where the index of the cell at `place` is or would be.
+    fn slot(&self, place: [f64; 3]) -> usize {
+        let last = (1 << self.bits) - 1;
+        let mut slot = (hash(place) >> (u64::BITS - self.bits)) as usize;
+        while self.slots[slot] != EMPTY && self.cells[self.slots[slot] as usize].place != place {
+            slot = (slot + 1) & last;
+        }
+        slot
+    }
+
+    fn resize_slots(&mut self, bits: u32) {
+        self.bits = bits;
+        let n_slots = 1 << bits;
+        if self.slots.len() < n_slots {
+            self.slots.resize(n_slots, EMPTY);
+        }
+        self.slots[..n_slots].fill(EMPTY);
+        for i in 0..self.cells.len() {
+            let slot = self.slot(self.cells[i].place);
+            self.slots[slot] = i as u32;
+        }
+    }
+}
+
+impl Grid {
+    /// The cell of a point. Without the sign of zeros, which is hashed.
+    fn place(&self, point: &[f32; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.edges(point, axis).floor() + 0.0)
+    }
+
+    /// How far a point is from its cell's low corner, in parts of the edge.
+    fn offset(&self, point: &[f32; 3], place: [f64; 3]) -> [u64; 3] {
+        [0, 1, 2].map(|axis| ((self.edges(point, axis) - place[axis]) * PARTS) as u64)
+    }
+
+    fn edges(&self, point: &[f32; 3], axis: usize) -> f64 {
+        (f64::from(point[axis]) - self.origin[axis]) / self.size
+    }
+}
+
+impl Cell {
+    fn distance_from_centroid(&self, offset: [u64; 3]) -> f64 {
+        let from_mean =
+            |axis: usize| offset[axis] as f64 - self.sum[axis] as f64 / f64::from(self.n);
+        let [dx, dy, dz] = [0, 1, 2].map(from_mean);
+        (dx * dx + dy * dy) + dz * dz
+    }
+}
+
+/// The cloud's least coordinates and its longest side.
+fn bounds(points: &[[f32; 3]]) -> ([f64; 3], f64) {
+    let mut low = [f32::INFINITY; 3];
+    let mut high = [f32::NEG_INFINITY; 3];
+    for point in points {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(point[axis]);
+            high[axis] = high[axis].max(point[axis]);
+        }
+    }
+    let low = low.map(f64::from);
+    let sides = [0, 1, 2].map(|axis| f64::from(high[axis]) - low[axis]);
+    (low, sides.into_iter().fold(0.0, f64::max))
+}
+
+/// The edge at one step of the search, in extents of the cloud: 2 at step 0.
+/// Powers of two and their integer fractions, so the same on any machine.
+fn edge(step: u32) -> f64 {
+    let octave = 2.0 / (1u64 << (step / STEPS_AN_OCTAVE)) as f64;
+    octave * f64::from(2 * STEPS_AN_OCTAVE - step % STEPS_AN_OCTAVE)
+        / f64::from(2 * STEPS_AN_OCTAVE)
+}
+
+fn hash(place: [f64; 3]) -> u64 {
+    // The product's halves, folded: every bit of the input reaches the top
+    // (the multiplier is 2^64 over the golden ratio).
+    place.iter().fold(0, |hash, edges| {
+        let product = u128::from(hash ^ edges.to_bits()) * 0x9E37_79B9_7F4A_7C15;
+        (product >> 64) as u64 ^ product as u64
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{any_cloud, extremes, gather, shuffled, uniform};
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashSet;
+
+    fn by_size(points: &[[f32; 3]], size: f64) -> Vec<u32> {
+        let mut out = vec![];
+        VoxelGrid::default().select_by_size(points, size, &mut out);
+        out
+    }
+
+    fn by_count(points: &[[f32; 3]], m: usize) -> Vec<u32> {
+        let mut out = vec![];
+        VoxelGrid::default().select_by_count(points, m, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_cell_keeps_the_point_nearest_to_its_centroid() {
+        // Centroids at 0.4 and -0.55; cells begin at 0.
+        let along_x = [0.1, 0.3, 0.8, -0.1, -0.6, -0.95];
+        let cloud = along_x.map(|x| [x, 0.5, 0.5]);
+        assert_eq!(by_size(&cloud, 1.0), [4, 1]);
+        // Of points as near, the lesser.
+        let cloud = [0.75, 0.25].map(|x| [x, 0.5, 0.5]);
+        assert_eq!(by_size(&cloud, 1.0), [1]);
+    }
+
+    /// How many cells of `grid` hold points.
+    fn n_occupied(points: &[[f32; 3]], grid: &Grid) -> usize {
+        let cells = points.iter().map(|point| grid.place(point).map(f64::to_bits));
+        cells.collect::<HashSet<_>>().len()
+    }
+
+    #[test]
+    fn a_grid_by_count_is_the_last_of_the_search_that_fits() {
+        let square: Vec<_> = (0..16u8).map(|i| [f32::from(i / 4), f32::from(i % 4), 0.0]).collect();
+        for cloud in [square, uniform(1024, 4)] {
+            let (low, extent) = bounds(&cloud);
+            for m in 1..cloud.len().min(200) {
+                let found = VoxelGrid::default().finest(&cloud, m);
+                let mut steps = 0..OCTAVES * STEPS_AN_OCTAVE;
+                let step = steps.find(|&step| extent * edge(step) == found.size).unwrap();
+                let next = Grid { origin: low, size: extent * edge(step + 1) };
+                let (n, n_next) = (n_occupied(&cloud, &found), n_occupied(&cloud, &next));
+                assert!(n <= m && n_next > m, "{n} and {n_next} for {m}");
+                assert_eq!(by_count(&cloud, m).len(), n);
+            }
+        }
+    }
+
+    #[test]
+    fn extremes_keep_every_distinct_point_that_they_may() {
+        for (what, cloud, n_distinct) in extremes() {
+            assert_eq!(by_count(&cloud, 1000).len(), n_distinct, "{what}");
+            assert_eq!(by_size(&cloud, 1e-300).len(), n_distinct, "{what}");
+            assert_eq!(by_count(&cloud, 1).len(), n_distinct.min(1), "{what}");
+            // Octants, however large the cells.
+            assert!(by_size(&cloud, 1e300).len() <= 8, "{what}");
+        }
+    }
+
+    #[test]
+    fn an_outlier_leaves_the_others_their_cells() {
+        let cloud = [uniform(999, 1), vec![[1e9, 0.0, 0.0]]].concat();
+        let kept = by_size(&cloud, 0.5);
+        assert_eq!(kept.len(), 4 * 4 * 4 + 1);
+        assert_eq!(kept.last(), Some(&999));
+        let n = by_count(&cloud, 64).len();
+        assert!((48..=64).contains(&n), "{n}");
+    }
+
+    #[test]
+    fn edges_of_the_search_descend_in_small_steps() {
+        for step in 0..OCTAVES * STEPS_AN_OCTAVE {
+            let ratio = edge(step + 1) / edge(step);
+            assert!((1.0 - 1.0 / 32.0..=1.0 - 1.0 / 64.0).contains(&ratio), "{step}: {ratio}");
+        }
+        assert_eq!(edge(0), 2.0);
+        assert_eq!(edge(OCTAVES * STEPS_AN_OCTAVE), 2f64.powi(-62));
+    }
+
+    #[test]
+    fn ten_million_points_take_the_memory_of_their_cells() {
+        let cloud = uniform(10_000_000, 5);
+        let mut grid = VoxelGrid::default();
+        let mut kept = vec![];
+        grid.select_by_size(&cloud, 0.2, &mut kept);
+        assert_eq!(kept.len(), 1000);
+        assert!(grid.cells.capacity() <= 1024 && grid.slots.len() <= 2048);
+        grid.select_by_count(&cloud[..1_000_000], 1000, &mut kept);
+        assert!(kept.len() <= 1000);
+        assert!(grid.cells.capacity() <= 1024 && grid.slots.len() <= 2048);
+    }
+
+    proptest! {
+        #[test]
+        fn each_occupied_cell_keeps_one_point(cloud in any_cloud(), size in 0.05f64..3.0) {
+            let cell = |point: &[f32; 3]| point.map(|x| ((f64::from(x) / size).floor() + 0.0).to_bits());
+            let occupied: HashSet<_> = cloud.iter().map(cell).collect();
+            let kept = by_size(&cloud, size);
+            let cells: HashSet<_> = gather(&cloud, &kept).iter().map(cell).collect();
+            prop_assert_eq!(kept.len(), cells.len());
+            prop_assert_eq!(cells, occupied);
+        }
+
+        #[test]
+        fn at_most_m_points_are_kept_and_all_if_no_more_are_there(
+            cloud in any_cloud(), m in 1usize..100,
+        ) {
+            let kept = by_count(&cloud, m);
+            prop_assert!(kept.len() <= m);
+            let distinct: HashSet<_> = cloud.iter().map(|p| p.map(|x| (x + 0.0).to_bits())).collect();
+            if distinct.len() <= m {
+                prop_assert_eq!(kept.len(), distinct.len());
+            }
+        }
+
+        #[test]
+        fn the_order_of_the_input_does_not_matter(
+            cloud in any_cloud(), seed in any::<u32>(), m in 1usize..30, size in 0.05f64..3.0,
+        ) {
+            let shuffled = shuffled(&cloud, seed);
+            prop_assert_eq!(
+                gather(&cloud, &by_count(&cloud, m)),
+                gather(&shuffled, &by_count(&shuffled, m))
+            );
+            prop_assert_eq!(
+                gather(&cloud, &by_size(&cloud, size)),
+                gather(&shuffled, &by_size(&shuffled, size))
+            );
+        }
+    }
+}

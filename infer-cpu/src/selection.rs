@@ -1,0 +1,218 @@
+//! The points that a network gets to see: what a sampler keeps, each once.
+
+use crate::engine::{Memory, Pass};
+use crate::error::Error;
+use crate::forward::Forward;
+use crate::kernel::Kernels;
+use crate::sampler::{
+    CanonicalOrder, CriticalPoints, FrontChoice, Lattice, Sampler, SamplerKind, SamplerSpec,
+};
+
+/// What computes the features that a Critical Points Layer pools.
+pub enum FrontEnd {
+    /// Layers of the network, in its own precision.
+    Pass(Pass),
+    /// A look-up table, in fp32.
+    Table(Lattice),
+}
+
+/// A sampler and its memory.
+pub struct Selection {
+    spec: SamplerSpec,
+    sampler: Sampler,
+    front: Option<FrontEnd>,
+    /// All points, sorted by geometry, each once.
+    cloud: CanonicalOrder,
+    critical: CriticalPoints,
+    /// Rows of the cloud that a secondary pass pools.
+    left: Vec<[f32; 3]>,
+    rows: Vec<u32>,
+    kept: Vec<[f32; 3]>,
+    /// What the network sees: the kept points, sorted by geometry, each once.
+    distinct: CanonicalOrder,
+    /// Whether the kept points' T-Net pooling is that of the whole cloud and
+    /// is already known.
+    pooled_stn: bool,
+}
+
+impl Selection {
+    /// A selection by `spec`; `front` for one that needs features.
+    ///
+    /// # Errors
+    /// A specification that cannot be met.
+    pub fn new(spec: &SamplerSpec, front: Option<FrontEnd>) -> Result<Self, Error> {
+        let coordinates_alone = match spec.kind {
+            SamplerKind::Cpl => SamplerSpec { kind: SamplerKind::All, ..spec.clone() },
+            _ => spec.clone(),
+        };
+        spec.check()?;
+        Ok(Self {
+            spec: spec.clone(),
+            sampler: Sampler::new(coordinates_alone)?,
+            front,
+            cloud: CanonicalOrder::default(),
+            critical: CriticalPoints::default(),
+            left: Vec::new(),
+            rows: Vec::new(),
+            kept: Vec::new(),
+            distinct: CanonicalOrder::default(),
+            pooled_stn: false,
+        })
+    }
+
+    /// What is selected by.
+    pub fn spec(&self) -> &SamplerSpec {
+        &self.spec
+    }
+
+    /// The distinct points that the last selection kept.
+    pub fn points(&self) -> &[[f32; 3]] {
+        &self.distinct.points
+    }
+
+    /// Whether the last selection left the pooled vector of the coordinates'
+    /// T-Net in memory.
+    pub fn pooled_stn(&self) -> bool {
+        self.pooled_stn
+    }
+
+    /// Draws other points from now on, where the sampler draws.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.spec.seed = seed;
+        self.sampler.set_seed(seed);
+    }
+
+    /// Chooses among `points` and returns the indices chosen: M of them, or as
+    /// many as the sampler can make, repetitions included.
+    ///
+    /// # Errors
+    /// Of the sampler.
+    pub fn select(
+        &mut self,
+        points: &[[f32; 3]],
+        kernels: &'static Kernels,
+        network: &dyn Forward,
+        memory: &mut Memory,
+    ) -> Result<&[u32], Error> {
+        self.pooled_stn = false;
+        self.rows.clear();
+        if self.spec.kind == SamplerKind::Cpl {
+            self.cloud.sort(points);
+            self.select_critical(network, memory);
+            // Rows of the sorted cloud, from here on places in the given one.
+            for row in &mut self.rows {
+                *row = self.cloud.index[*row as usize];
+            }
+        } else {
+            self.rows.extend(self.sampler.select(points, kernels)?);
+        }
+        self.kept.clear();
+        self.kept.extend(self.rows.iter().map(|&row| points[row as usize]));
+        self.distinct.sort(&self.kept);
+        Ok(&self.rows)
+    }
+
+    fn select_critical(&mut self, network: &dyn Forward, memory: &mut Memory) {
+        let Some(front) = &self.front else {
+            unreachable!("invariant: a classifier gives critical points a front end");
+        };
+        front.pool(&self.cloud.points, network, memory);
+        self.pooled_stn = matches!(front, FrontEnd::Pass(Pass::Stn));
+        self.critical.rank(&memory.values, &memory.winners);
+        // The T-Net wants the whole cloud's pooling, which a second one ends.
+        while let Some(rows) = self.critical.next_pass(self.cloud.points.len(), &self.spec) {
+            self.pooled_stn = false;
+            self.left.clear();
+            self.left.extend(rows.iter().map(|&row| self.cloud.points[row as usize]));
+            front.pool(&self.left, network, memory);
+            self.critical.rank_next(&memory.values, &memory.winners);
+        }
+        let CriticalPoints { rows, scores, .. } = &self.critical;
+        self.spec.resize.apply(rows, scores, self.spec.points, &mut self.rows);
+    }
+
+    /// Grows all memory to clouds of `n` points.
+    ///
+    /// # Errors
+    /// Of the sampler.
+    pub fn reserve(
+        &mut self,
+        n: usize,
+        kernels: &'static Kernels,
+        network: &dyn Forward,
+        memory: &mut Memory,
+    ) -> Result<(), Error> {
+        // A cloud that no rule finds easier than another: all points differ.
+        let cloud: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, (i % 7) as f32, 0.0]).collect();
+        self.cloud.sort(&cloud);
+        self.distinct.sort(&cloud);
+        self.kept.reserve(n.max(self.spec.points));
+        self.left.reserve(n);
+        self.rows.reserve(n.max(self.spec.points));
+        self.sampler.select(&cloud, kernels)?;
+        if let Some(front) = &self.front {
+            let channels = front.channels(network);
+            self.critical.reserve(channels, n);
+            memory.reserve(channels);
+        }
+        Ok(())
+    }
+}
+
+impl FrontEnd {
+    /// The front end that `choice` names, for a network that has these parts.
+    ///
+    /// # Errors
+    /// A network that lacks it.
+    pub fn choose(choice: FrontChoice, parts: &Parts) -> Result<Pass, Error> {
+        let lacks = |what: &'static str| Err(Error::FrontMissing { choice, what });
+        match choice {
+            FrontChoice::Own if parts.front => Ok(Pass::Front),
+            FrontChoice::Stn if parts.stn => Ok(Pass::Stn),
+            FrontChoice::Trunk if !parts.stn && !parts.fstn => Ok(Pass::Trunk),
+            FrontChoice::Auto if parts.front => Ok(Pass::Front),
+            FrontChoice::Auto if parts.stn => Ok(Pass::Stn),
+            FrontChoice::Auto if !parts.fstn => Ok(Pass::Trunk),
+            FrontChoice::Own => lacks("no front end of its own"),
+            FrontChoice::Stn => lacks("no T-Net of coordinates"),
+            FrontChoice::Trunk => lacks("T-Nets, on which its trunk's features depend"),
+            FrontChoice::Auto => lacks("neither a front end nor a T-Net of coordinates"),
+        }
+    }
+
+    /// How many features a point has.
+    pub fn channels(&self, network: &dyn Forward) -> usize {
+        match self {
+            Self::Pass(pass) => network.channels(*pass),
+            Self::Table(lattice) => lattice.channels(),
+        }
+    }
+
+    fn pool(&self, points: &[[f32; 3]], network: &dyn Forward, memory: &mut Memory) {
+        match self {
+            Self::Pass(pass) => {
+                network.set_points(points);
+                network.pool_winners(*pass, memory);
+            }
+            Self::Table(lattice) => {
+                let channels = lattice.channels();
+                memory.values.clear();
+                memory.values.resize(channels, f32::NEG_INFINITY);
+                memory.winners.clear();
+                memory.winners.resize(channels, 0);
+                lattice.max(points, &mut memory.values, &mut memory.winners, 0..channels);
+            }
+        }
+    }
+}
+
+/// What a network consists of, as far as front ends go.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts {
+    /// A T-Net of coordinates.
+    pub stn: bool,
+    /// A T-Net of features.
+    pub fstn: bool,
+    /// A front end of its own.
+    pub front: bool,
+}

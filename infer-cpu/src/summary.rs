@@ -1,0 +1,189 @@
+//! What a model file holds, and what it costs to run.
+
+use std::path::Path;
+
+use formats::model_card::ModelCard;
+use formats::weights::WeightsFile;
+
+use crate::dense::Dense;
+use crate::error::Error;
+use crate::network::{Front, Network, read_network};
+use crate::precision::Precision;
+
+/// A model file's network, layer by layer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// What the file says about itself.
+    pub card: ModelCard,
+    /// The T-Net of the coordinates, if there is one.
+    pub stn: Option<NetShape>,
+    /// The T-Net of the features, if there is one.
+    pub fstn: Option<NetShape>,
+    /// The trunk, and the layers from the pooled vector to the logits.
+    pub trunk: NetShape,
+    /// The front end of a critical points layer, if the file brings its own.
+    pub front: Option<FrontSummary>,
+    /// Elements of all tensors in the file.
+    pub n_stored: usize,
+}
+
+/// Layers before and after a pooling.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NetShape {
+    /// Layers that each point goes through.
+    pub convs: Vec<LayerShape>,
+    /// Layers that the pooled vector goes through.
+    pub fcs: Vec<LayerShape>,
+}
+
+/// A linear layer, its batch norm folded in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LayerShape {
+    /// Its name in the file.
+    pub name: String,
+    /// Inputs.
+    pub inputs: usize,
+    /// Outputs.
+    pub outputs: usize,
+}
+
+/// A front end of a critical points layer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FrontSummary {
+    /// Layers that each point goes through.
+    Layers(Vec<LayerShape>),
+    /// A look-up table.
+    Table {
+        /// Nodes an axis.
+        nodes: usize,
+        /// Features of a point.
+        channels: usize,
+    },
+}
+
+/// Reads the model file at `path`, every tensor of it.
+///
+/// # Errors
+/// A file that is no model: what [`crate::Classifier::load`] refuses.
+pub fn inspect(path: &Path) -> Result<Summary, Error> {
+    let mut file = WeightsFile::open(path)?;
+    let card = ModelCard::from_metadata(path, &file.metadata())?;
+    let n_stored = file.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
+    let network = read_network(&mut file, &card, |dense, _| shape_of(dense), shape_of)?;
+    let Network { stn, trunk, fstn, head, front, .. } = network;
+    Ok(Summary {
+        card,
+        stn: stn.map(|net| NetShape { convs: net.convs, fcs: net.fcs }),
+        fstn: fstn.map(|net| NetShape { convs: net.convs, fcs: net.fcs }),
+        trunk: NetShape { convs: trunk, fcs: head },
+        front: front.map(|front| match front {
+            Front::Mlp(layers) => FrontSummary::Layers(layers),
+            Front::Table(table) => {
+                FrontSummary::Table { nodes: table.shape[0], channels: table.shape[3] }
+            }
+        }),
+        n_stored,
+    })
+}
+
+fn shape_of(dense: Dense) -> LayerShape {
+    LayerShape { name: dense.name, inputs: dense.inputs, outputs: dense.outputs }
+}
+
+impl LayerShape {
+    /// Multiplications of one pass.
+    #[must_use]
+    pub fn macs(&self) -> usize {
+        self.inputs * self.outputs
+    }
+
+    /// Weights and biases.
+    #[must_use]
+    pub fn parameters(&self) -> usize {
+        self.macs() + self.outputs
+    }
+}
+
+impl Summary {
+    /// How many classes the network tells apart.
+    #[must_use]
+    pub fn n_classes(&self) -> usize {
+        self.trunk.fcs.last().map_or(0, |layer| layer.outputs)
+    }
+
+    /// Multiplications that each point costs, those by the transforms' matrices
+    /// among them, the front end's not.
+    #[must_use]
+    pub fn macs_per_point(&self) -> usize {
+        // Row by row, a T-Net's last outputs are the matrix.
+        let transform = |net: &NetShape| net.fcs.last().map_or(0, |layer| layer.outputs);
+        let transforms: usize = self.t_nets().map(transform).sum();
+        self.nets().flat_map(|net| &net.convs).map(LayerShape::macs).sum::<usize>() + transforms
+    }
+
+    /// Multiplications that each cloud costs besides.
+    #[must_use]
+    pub fn macs_per_cloud(&self) -> usize {
+        self.nets().flat_map(|net| &net.fcs).map(LayerShape::macs).sum()
+    }
+
+    /// Multiplications that a front end of the model's own costs each point
+    /// that it chooses from. A table interpolates between eight nodes.
+    #[must_use]
+    pub fn front_macs_per_point(&self) -> Option<usize> {
+        Some(match self.front.as_ref()? {
+            FrontSummary::Layers(layers) => layers.iter().map(LayerShape::macs).sum(),
+            FrontSummary::Table { channels, .. } => 8 * channels,
+        })
+    }
+
+    /// Weights and biases once batch norms are folded in.
+    #[must_use]
+    pub fn parameters(&self) -> usize {
+        let front = match &self.front {
+            Some(FrontSummary::Layers(layers)) => layers.iter().map(LayerShape::parameters).sum(),
+            Some(FrontSummary::Table { nodes, channels }) => nodes.pow(3) * channels,
+            None => 0,
+        };
+        let layers = self.nets().flat_map(|net| net.convs.iter().chain(&net.fcs));
+        layers.map(LayerShape::parameters).sum::<usize>() + front
+    }
+
+    /// Bytes of the weights in `precision`, their biases (fp32) and scales
+    /// (fp32, of int8) among them, without what fills up tiles.
+    #[must_use]
+    pub fn bytes(&self, precision: Precision) -> usize {
+        let (point_bytes, vector_bytes, scale_bytes) = match precision {
+            Precision::F32 => (4, 4, 0),
+            Precision::F32Fc16 => (4, 2, 0),
+            Precision::F16 => (2, 2, 0),
+            Precision::I8 => (1, 1, 4),
+        };
+        let layer = |layer: &LayerShape, weight_bytes: usize| {
+            layer.macs() * weight_bytes + layer.outputs * (4 + scale_bytes)
+        };
+        // The layer that takes coordinates is fp32 in any precision.
+        let convs = |convs: &[LayerShape]| -> usize {
+            let bytes = |conv: &LayerShape| match conv.inputs {
+                3 => 4 * conv.parameters(),
+                _ => layer(conv, point_bytes),
+            };
+            convs.iter().map(bytes).sum()
+        };
+        let front = match &self.front {
+            Some(FrontSummary::Layers(layers)) => convs(layers),
+            Some(FrontSummary::Table { nodes, channels }) => 4 * nodes.pow(3) * channels,
+            None => 0,
+        };
+        let fcs = self.nets().flat_map(|net| &net.fcs).map(|fc| layer(fc, vector_bytes));
+        self.nets().map(|net| convs(&net.convs)).sum::<usize>() + fcs.sum::<usize>() + front
+    }
+
+    fn nets(&self) -> impl Iterator<Item = &NetShape> {
+        self.t_nets().chain([&self.trunk])
+    }
+
+    fn t_nets(&self) -> impl Iterator<Item = &NetShape> {
+        [&self.stn, &self.fstn].into_iter().flatten()
+    }
+}

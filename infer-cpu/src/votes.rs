@@ -1,0 +1,102 @@
+//! Several opinions on one cloud: random subsets, perhaps turned, whose
+//! log-probabilities are averaged.
+
+use formats::rng::StreamKey;
+
+use crate::error::Error;
+use crate::options::Options;
+use crate::sampler::{SamplerKind, SamplerSpec};
+
+/// Collects votes; keeps its memory from cloud to cloud.
+pub struct Votes {
+    n: u32,
+    rotations: bool,
+    up: usize,
+    seed: u64,
+    cloud: Vec<[f32; 3]>,
+    sums: Vec<f64>,
+}
+
+impl Votes {
+    /// As `options` ask, of a network of `n_classes` behind sampler `spec`.
+    ///
+    /// # Errors
+    /// Several votes of a sampler that does not draw, without rotations.
+    pub fn new(options: &Options, spec: &SamplerSpec, n_classes: usize) -> Result<Self, Error> {
+        let n = options.votes.max(1);
+        if n > 1 && spec.kind != SamplerKind::Random && !options.vote_rotations {
+            return Err(Error::VotesWithoutDraws(spec.kind));
+        }
+        Ok(Self {
+            n,
+            rotations: options.vote_rotations,
+            up: options.up.min(2),
+            seed: spec.seed,
+            cloud: Vec::new(),
+            sums: vec![0.0; n_classes],
+        })
+    }
+
+    /// How many votes there are.
+    pub fn n(&self) -> u32 {
+        self.n
+    }
+
+    /// Makes room for clouds of `n_points`.
+    pub fn reserve(&mut self, n_points: usize) {
+        if self.n > 1 {
+            self.cloud.reserve(n_points);
+        }
+    }
+
+    /// Begins with `cloud`.
+    pub fn begin(&mut self, cloud: &[[f32; 3]]) {
+        self.cloud.clear();
+        self.cloud.extend(cloud);
+        self.sums.fill(0.0);
+    }
+
+    /// The seed of vote `vote`; the first is the sampler's own.
+    pub fn seed(&self, vote: u32) -> u64 {
+        if vote == 0 {
+            return self.seed;
+        }
+        let [low, high, ..] = StreamKey::new(self.seed, "vote", vote).words([0; 4]);
+        u64::from(high) << 32 | u64::from(low)
+    }
+
+    /// Leaves the cloud of vote `vote` in `out`: turned by `vote` of `n` parts
+    /// of a full turn about the up axis, if that was asked for.
+    pub fn turn(&self, vote: u32, out: &mut [[f32; 3]]) {
+        let angle = match self.rotations {
+            true => f64::from(vote) / f64::from(self.n) * std::f64::consts::TAU,
+            false => 0.0,
+        };
+        let (sin, cos) = angle.sin_cos();
+        let (a, b) = ((self.up + 1) % 3, (self.up + 2) % 3);
+        for (out, point) in out.iter_mut().zip(&self.cloud) {
+            *out = *point;
+            if angle != 0.0 {
+                let (x, y) = (f64::from(point[a]), f64::from(point[b]));
+                out[a] = (x * cos - y * sin) as f32;
+                out[b] = (x * sin + y * cos) as f32;
+            }
+        }
+    }
+
+    /// Adds the log-probabilities of `logits`.
+    pub fn count(&mut self, logits: &[f32]) {
+        let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let shifted = |logit: f32| f64::from(logit) - f64::from(largest);
+        let log_sum = logits.iter().map(|&logit| shifted(logit).exp()).sum::<f64>().ln();
+        for (sum, &logit) in self.sums.iter_mut().zip(logits) {
+            *sum += shifted(logit) - log_sum;
+        }
+    }
+
+    /// Leaves the mean log-probabilities in `out`.
+    pub fn result(&self, out: &mut Vec<f32>) {
+        out.clear();
+        out.extend(self.sums.iter().map(|sum| (sum / f64::from(self.n)) as f32));
+    }
+}

@@ -1,0 +1,14 @@
+//! The program itself, by its command line: what it prints, what it refuses
+//! and how, and which exit code it ends with.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod classify;
+mod extremes;
+mod inspect;
+mod models;
+mod program;
+mod sample;
+mod streams;
+#[path = "../support/tiny_model.rs"]
+mod tiny_model;

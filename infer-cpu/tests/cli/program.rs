@@ -1,0 +1,119 @@
+//! A folder with a model and clouds, and the program run in it.
+
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+use formats::model_card::ModelCard;
+use tempfile::TempDir;
+
+use crate::tiny_model;
+
+/// A folder to run the program in.
+pub struct Folder {
+    folder: TempDir,
+}
+
+impl Folder {
+    /// One with a model `m.safetensors` of classes a, b, c, d.
+    pub fn new() -> Self {
+        let folder = Self { folder: tempfile::tempdir().unwrap() };
+        tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), &card());
+        folder
+    }
+
+    /// The path of `name` in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).unwrap();
+    }
+
+    /// Writes a cloud as text.
+    pub fn cloud(&self, name: &str, points: &[[f64; 3]]) {
+        let lines = points.iter().map(|[x, y, z]| format!("{x:e} {y:e} {z:e}\n"));
+        self.write(name, lines.collect::<String>());
+    }
+
+    /// The program with the arguments in `line`, separated by blanks.
+    pub fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_infer-cpu"));
+        command.args(line.split_whitespace()).current_dir(self.folder.path());
+        command.env_remove("EDGEPUCK_MODEL");
+        command
+    }
+
+    /// Runs the program to its end.
+    pub fn run(&self, line: &str) -> Ran {
+        Ran::of(self.command(line).output().unwrap())
+    }
+
+    /// The same with `input` as standard input.
+    pub fn run_with(&self, line: &str, input: &[u8]) -> Ran {
+        let mut command = self.command(line);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut pipe = child.stdin.take().unwrap();
+        // A program that refuses its arguments reads nothing.
+        let _ = pipe.write_all(input);
+        drop(pipe);
+        Ran::of(child.wait_with_output().unwrap())
+    }
+
+    /// `classify` with the folder's model and one thread.
+    pub fn classify(&self, line: &str) -> Ran {
+        self.run(&format!("classify --model m.safetensors --threads 1 {line}"))
+    }
+
+    /// The same as JSON: an object a line.
+    pub fn classify_json(&self, line: &str) -> Vec<serde_json::Value> {
+        self.classify(&format!("--json {line}")).json()
+    }
+}
+
+/// What a program left.
+pub struct Ran {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+impl Ran {
+    fn of(output: Output) -> Self {
+        Self {
+            code: output.status.code().unwrap(),
+            out: String::from_utf8(output.stdout).unwrap(),
+            err: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    /// Standard output as an object a line.
+    pub fn json(&self) -> Vec<serde_json::Value> {
+        self.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
+    /// That it ended with `code`, having said nothing but errors, the first of
+    /// which begins with `start`.
+    pub fn assert_refused(&self, code: i32, start: &str) {
+        assert_eq!((self.code, self.out.as_str()), (code, ""), "{}", self.err);
+        assert!(self.err.starts_with(start), "{}", self.err);
+    }
+}
+
+/// The card of the folder's model.
+pub fn card() -> ModelCard {
+    ModelCard { classes: ["a", "b", "c", "d"].map(str::to_owned).to_vec(), ..ModelCard::default() }
+}
+
+/// A cloud of `n` points on a twisted strip.
+pub fn strip(n: usize) -> Vec<[f64; 3]> {
+    let point = |i: usize| {
+        let t = i as f64 / n as f64 * 6.0;
+        [t.cos(), t.sin() * (i % 3) as f64, t / 6.0]
+    };
+    (0..n).map(point).collect()
+}

@@ -1,0 +1,131 @@
+//! Once loaded, a classifier allocates nothing, whatever the cloud up to its
+//! capacity: a million classifications grow memory by nothing.
+//!
+//! One test alone: the count is the whole process's, its threads' included.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[path = "support/tiny_model.rs"]
+mod tiny_model;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use formats::model_card::ModelCard;
+use formats::rng::StreamKey;
+use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
+use infer_cpu::{Classifier, Options, Precision};
+
+/// The system's allocator, its calls counted.
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call goes to the system's allocator as it is.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is the system's condition.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is the system's condition.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is the system's condition.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+const CAPACITY: usize = 300;
+
+/// Clouds of all sizes, distinct, repeated and lying in one point.
+fn clouds() -> Vec<Vec<[f32; 3]>> {
+    let key = StreamKey::new(0, "no allocation", 0);
+    let point = |i: usize| [0, 1, 2].map(|axis| key.unit((3 * i + axis) as u64) as f32);
+    let sizes = [1, 2, 47, 48, 49, 97, 150, 200, CAPACITY];
+    let distinct = sizes.iter().map(|&n| (0..n).map(point).collect());
+    let repeated = sizes.iter().map(|&n| (0..n).map(|i| point(i % 5)).collect());
+    let equal = sizes.iter().map(|&n| vec![[0.5; 3]; n]);
+    distinct.chain(repeated).chain(equal).collect()
+}
+
+/// How often `n` classifications allocate.
+fn allocations(model: &Path, options: &Options, clouds: &[Vec<[f32; 3]>], n: usize) -> usize {
+    let mut classifier = Classifier::load(model, options).unwrap();
+    let mut total = 0.0;
+    let before = ALLOCATIONS.load(Ordering::SeqCst);
+    for cloud in clouds.iter().cycle().take(n) {
+        total += classifier.classify(cloud).unwrap().confidence();
+    }
+    let n_allocations = ALLOCATIONS.load(Ordering::SeqCst) - before;
+    assert!(total > 0.0);
+    n_allocations
+}
+
+#[test]
+fn a_loaded_classifier_allocates_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.safetensors");
+    let model = tiny_model::write(&path, &tiny_model::tensors(4), &ModelCard::default());
+    let clouds = clouds();
+    let spec = |kind| SamplerSpec { kind, points: 32, ..SamplerSpec::default() };
+    let mut specs: Vec<_> = SamplerKind::ALL.iter().map(|&kind| spec(kind)).collect();
+    specs.push(SamplerSpec { voxel_size: Some(0.1), ..spec(SamplerKind::Voxel) });
+    specs.extend(Resize::ALL.iter().map(|&resize| SamplerSpec {
+        resize,
+        passes: 2,
+        // More than there are points, at times.
+        points: 64,
+        ..spec(SamplerKind::Cpl)
+    }));
+    let mut found = Vec::new();
+    for precision in Precision::ALL {
+        for threads in [1, 3] {
+            for spec in &specs {
+                let options = Options {
+                    precision,
+                    threads,
+                    sampler: Some(spec.clone()),
+                    capacity: CAPACITY,
+                    ..Options::default()
+                };
+                let n = allocations(&model, &options, &clouds, 2 * clouds.len());
+                if n > 0 {
+                    found.push(format!("{precision}, {threads} threads, {spec:?}: {n}"));
+                }
+            }
+        }
+    }
+    let votes = Options {
+        sampler: Some(spec(SamplerKind::Random)),
+        votes: 3,
+        vote_rotations: true,
+        capacity: CAPACITY,
+        ..Options::default()
+    };
+    let table = Options {
+        sampler: Some(spec(SamplerKind::Cpl)),
+        table_nodes: Some(4),
+        capacity: CAPACITY,
+        ..Options::default()
+    };
+    for (what, options) in [("votes", votes), ("table", table)] {
+        let n = allocations(&model, &options, &clouds, 2 * clouds.len());
+        if n > 0 {
+            found.push(format!("{what}: {n}"));
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    // What grows by something a cloud shows in many.
+    let many = Options { capacity: CAPACITY, ..Options::default() };
+    assert_eq!(allocations(&model, &many, &clouds, 20_000), 0);
+}

@@ -1,0 +1,35 @@
+//! Farthest point sampling, one thread.
+
+use super::cloud::Cloud;
+use super::contest::{Entry, hold};
+use super::entrant::{Entrant, Job};
+use super::grid::Grid;
+use super::judge::shortfall;
+
+/// From so many points to so many.
+const JOBS: [Job; 3] = [
+    Job { points: 1024, setting: 128 },
+    Job { points: 1024, setting: 64 },
+    Job { points: 4096, setting: 128 },
+];
+
+/// Points that the jobs need.
+pub const MOST_POINTS: usize = 4096;
+
+/// By how much squared distances may fall short: those of f32 coordinates in
+/// the unit sphere, subtracted and summed in f32, are off by some 1e-7 of the
+/// squared diameter, and the least distance kept here is a hundredth of that.
+const TOLERANCE: f64 = 1e-4;
+
+/// Lets `entrants` sample parts of `cloud`, and shows how they did.
+pub fn contest(entrants: &mut [Entrant], rounds: usize, cloud: &Cloud) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    for job in JOBS {
+        eprintln!("sampling {} of {} points", job.setting, job.points);
+        let judge = |kept: &[f64]| shortfall(cloud.first(job.points), kept, job.setting);
+        entries.extend(hold(entrants, job, rounds, judge, |_| TOLERANCE));
+    }
+    let heading = |job: &Job| format!("{}->{}", job.points, job.setting);
+    Grid::new("Farthest point sampling".to_owned(), &entries, JOBS.into(), heading).show();
+    entries
+}

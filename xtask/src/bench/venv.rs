@@ -1,0 +1,70 @@
+//! The Python environments that peers live in, made from PyPI on first use.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Tried in this order.
+const PYTHONS: [&str; 3] = ["python3", "python", "py"];
+
+/// The folder of the peers' programs and their pinned packages.
+pub fn programs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("peers")
+}
+
+/// The folder of what is made for the peers.
+pub fn workshop() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/peers")
+}
+
+/// A Python environment.
+pub struct Environment {
+    /// Its folder's name.
+    pub name: &'static str,
+    /// The pinned packages, a file below [`programs`].
+    pub requirements: &'static str,
+    /// What comes from PyPI, in words for the user.
+    pub size: &'static str,
+}
+
+impl Environment {
+    /// The interpreter of the environment, made under [`workshop`] unless it
+    /// is there.
+    ///
+    /// # Errors
+    /// Why there can be none, in words for the user.
+    pub fn interpreter(&self) -> Result<PathBuf, String> {
+        let folder = workshop().join(self.name);
+        let interpreter =
+            folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+        let requirements = programs().join(self.requirements);
+        let pinned = std::fs::read_to_string(&requirements).map_err(|e| e.to_string())?;
+        let done = folder.join("edgepuck-requirements.txt");
+        if std::fs::read_to_string(&done).is_ok_and(|installed| installed == pinned) {
+            return Ok(interpreter);
+        }
+        let python = PYTHONS
+            .into_iter()
+            .find(|python| succeeds(Command::new(python).arg("--version")).is_ok())
+            .ok_or("there is no Python here")?;
+        eprintln!("making {} ({} from PyPI)", folder.display(), self.size);
+        succeeds(Command::new(python).args(["-m", "venv"]).arg(&folder))?;
+        let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
+        succeeds(Command::new(&interpreter).args(install).arg(&requirements))?;
+        std::fs::write(&done, pinned).map_err(|e| e.to_string())?;
+        Ok(interpreter)
+    }
+}
+
+/// Runs `command` to its end.
+///
+/// # Errors
+/// The last line that it said, if it fails.
+pub fn succeeds(command: &mut Command) -> Result<(), String> {
+    let output = command.output().map_err(|error| error.to_string())?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no reason given");
+    Err(last.trim().to_owned())
+}

@@ -1,0 +1,97 @@
+//! What an ELF file's headers tell about how it runs.
+//!
+//! Offsets and constants: System V ABI, chapters 4 and 5 (64-bit, little
+//! endian), and `e_machine` of the ELF for the Arm 64-bit Architecture.
+
+use anyhow::{Context, bail, ensure};
+
+const MACHINE_AARCH64: u16 = 183;
+const SEGMENT_INTERPRETER: u32 = 3;
+const SECTION_SYMBOLS: u32 = 2;
+
+/// A table of headers within the file: where, an entry's size, how many.
+struct Headers {
+    at: usize,
+    size: usize,
+    count: usize,
+}
+
+/// That `file` is a program for 64-bit Arm which needs no library of the
+/// system it runs on and carries no symbols.
+///
+/// # Errors
+/// Which of these it is not.
+pub fn check_static_stripped_aarch64(file: &[u8]) -> anyhow::Result<()> {
+    // Class 2 is 64-bit, data 1 is little endian.
+    ensure!(file.starts_with(b"\x7fELF\x02\x01"), "it is no 64-bit little-endian ELF file");
+    let machine = u16_at(file, 18)?;
+    ensure!(machine == MACHINE_AARCH64, "it is for ELF machine {machine}, not for aarch64");
+    let segments = Headers::read(file, 32, 54)?;
+    if segments.types(file, 0)?.contains(&SEGMENT_INTERPRETER) {
+        bail!("it is linked dynamically: it asks for an interpreter");
+    }
+    let sections = Headers::read(file, 40, 58)?;
+    if sections.types(file, 4)?.contains(&SECTION_SYMBOLS) {
+        bail!("it is not stripped: it has a table of symbols");
+    }
+    Ok(())
+}
+
+impl Headers {
+    /// `at`: where the file header says where the table starts; `size_at`:
+    /// where it says how large entries are, the count behind.
+    fn read(file: &[u8], at: usize, size_at: usize) -> anyhow::Result<Self> {
+        Ok(Self {
+            at: usize::try_from(u64::from_le_bytes(bytes_at(file, at)?))?,
+            size: u16_at(file, size_at)?.into(),
+            count: u16_at(file, size_at + 2)?.into(),
+        })
+    }
+
+    /// Each entry's type, which is `offset` bytes into it.
+    fn types(&self, file: &[u8], offset: usize) -> anyhow::Result<Vec<u32>> {
+        let entry = |i| self.at.checked_add(i * self.size + offset).context(CUT_SHORT);
+        (0..self.count).map(|i| Ok(u32::from_le_bytes(bytes_at(file, entry(i)?)?))).collect()
+    }
+}
+
+const CUT_SHORT: &str = "its headers are cut short";
+
+fn u16_at(file: &[u8], at: usize) -> anyhow::Result<u16> {
+    Ok(u16::from_le_bytes(bytes_at(file, at)?))
+}
+
+fn bytes_at<const N: usize>(file: &[u8], at: usize) -> anyhow::Result<[u8; N]> {
+    file.get(at..).and_then(<[u8]>::first_chunk).copied().context(CUT_SHORT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file header, one segment of this type and one section of that.
+    fn elf(machine: u8, segment: u8, section: u8) -> Vec<u8> {
+        let mut file = vec![0; 64 + 56 + 64];
+        file[..6].copy_from_slice(b"\x7fELF\x02\x01");
+        file[18] = machine;
+        (file[32], file[54], file[56]) = (64, 56, 1);
+        (file[40], file[58], file[60]) = (64 + 56, 64, 1);
+        (file[64], file[64 + 56 + 4]) = (segment, section);
+        file
+    }
+
+    #[test]
+    fn tells_what_a_program_is_not() {
+        let verdict =
+            |file: &[u8]| check_static_stripped_aarch64(file).map_err(|error| error.to_string());
+        assert_eq!(verdict(&elf(183, 1, 1)), Ok(()));
+        assert!(verdict(&elf(62, 1, 1)).unwrap_err().contains("machine 62"));
+        assert!(verdict(&elf(183, 3, 1)).unwrap_err().contains("dynamically"));
+        assert!(verdict(&elf(183, 1, 2)).unwrap_err().contains("not stripped"));
+        assert!(verdict(b"MZ").unwrap_err().contains("no 64-bit"));
+        assert!(verdict(&elf(183, 1, 1)[..100]).unwrap_err().contains("cut short"));
+        let mut astray = elf(183, 1, 1);
+        astray[32..40].fill(0xff);
+        assert!(verdict(&astray).unwrap_err().contains("cut short"));
+    }
+}

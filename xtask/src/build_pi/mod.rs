@@ -1,0 +1,97 @@
+//! `cargo xtask build-pi`: infer-cpu as one file to copy to a Raspberry Pi.
+
+mod elf;
+
+use crate::{Outcome, pi_target, workspace};
+use anyhow::{Context, bail};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What the binary may weigh at most, so that it suits the smallest boards.
+const MOST_BYTES: u64 = 4 << 20;
+
+/// Flags of `build-pi`.
+#[derive(clap::Args, Default)]
+pub struct Args {
+    /// Copy the binary there [default: leave it under target/]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Builds, checks and, where QEMU is there, tries the binary.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    pi_target::need_standard_library()?;
+    let built = build(&mut pi_target::cargo(&BUILD))?;
+    let binary = match &args.out {
+        Some(out) => copy(&built, out)?,
+        None => built.as_path(),
+    };
+    let shown = binary.display();
+    let file = fs::read(binary).with_context(|| format!("cannot read {shown}"))?;
+    elf::check_static_stripped_aarch64(&file)
+        .with_context(|| format!("{shown} is not as meant"))?;
+    let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    let (size, limit) = (mebibytes(file.len() as u64), mebibytes(MOST_BYTES));
+    if file.len() as u64 > MOST_BYTES {
+        bail!("{shown} has {size:.2} MiB; the limit is {limit} MiB");
+    }
+    println!("{shown}");
+    println!("{size:.2} MiB of at most {limit}, static and stripped, for 64-bit Arm");
+    match pi_target::emulator() {
+        Some(mut emulator) => {
+            let version = workspace::output(emulator.arg(binary).arg("--version"))?;
+            println!("on an emulated Cortex-A76 it says: {}", version.trim());
+        }
+        None => println!("not tried: {}", pi_target::NO_EMULATOR),
+    }
+    println!("Copy it to a Raspberry Pi (64-bit system) and measure there:");
+    println!("    scp {shown} pi@raspberrypi.local:infer-cpu");
+    println!("    ssh pi@raspberrypi.local ./infer-cpu bench");
+    Ok(Outcome::Success)
+}
+
+/// Cargo's words for the binary, without the target.
+const BUILD: [&str; 7] =
+    ["build", "--package", "infer-cpu", "--bin", "infer-cpu", "--profile", "pi"];
+
+/// Runs Cargo and returns where it put the executable.
+///
+/// # Errors
+/// If it fails; it has said why on the terminal.
+pub fn build(cargo: &mut Command) -> anyhow::Result<PathBuf> {
+    cargo.args(["--message-format", "json-render-diagnostics"]).stderr(Stdio::inherit());
+    executable(&workspace::output(cargo)?).context("Cargo names no executable")
+}
+
+/// The last executable that Cargo's messages name, one JSON object a line.
+fn executable(messages: &str) -> Option<PathBuf> {
+    let messages = messages.lines().rev();
+    let mut messages = messages.filter_map(|m| serde_json::from_str::<serde_json::Value>(m).ok());
+    messages.find_map(|message| Some(message["executable"].as_str()?.into()))
+}
+
+/// Copies the program, its permissions as well; appears whole or not at all.
+fn copy<'a>(from: &Path, to: &'a Path) -> anyhow::Result<&'a Path> {
+    let mut source =
+        fs::File::open(from).with_context(|| format!("cannot read {}", from.display()))?;
+    let permissions = source.metadata()?.permissions();
+    formats::atomic::write(to, |file| std::io::copy(&mut source, file).map(|_| ()))?;
+    fs::set_permissions(to, permissions)
+        .with_context(|| format!("cannot make {} executable", to.display()))?;
+    Ok(to)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_the_executable_among_cargos_messages() {
+        let messages = "{\"reason\":\"compiler-artifact\",\"executable\":null}\n\
+             {\"reason\":\"compiler-artifact\",\"executable\":\"/t/pi/infer-cpu\"}\n\
+             {\"reason\":\"build-finished\",\"success\":true}\n";
+        assert_eq!(executable(messages), Some("/t/pi/infer-cpu".into()));
+        assert_eq!(executable("not json\n"), None);
+    }
+}

@@ -1,0 +1,124 @@
+//! What an imported model says about itself.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use formats::hash;
+use formats::model_card::{ModelCard, Normalization};
+use formats::weights::Tensor;
+
+use super::checkpoint::{Accuracy, Checkpoint};
+use super::table::Table;
+
+/// Flags that say what neither the checkpoint nor the table does, or correct
+/// the table.
+#[derive(clap::Args)]
+pub struct CardArgs {
+    /// Class names, one a line, in the order of the logits [default: ModelNet40's for 40 logits]
+    #[arg(long, value_name = "FILE")]
+    classes: Option<PathBuf>,
+
+    /// Sampler that the model was trained behind, as infer-cpu names it [default: the table's]
+    #[arg(long, value_name = "NAME")]
+    sampler: Option<String>,
+
+    /// Points that the sampler keeps [default: the table's]
+    #[arg(long, value_name = "N")]
+    points: Option<usize>,
+
+    /// How clouds were normalised: unit-sphere or none [default: the table's]
+    #[arg(long, value_name = "NAME")]
+    normalization: Option<Normalization>,
+
+    /// What the model was trained on
+    #[arg(long, value_name = "TEXT")]
+    training_set: Option<String>,
+
+    /// What the model reached, and on what [default: what the checkpoint says]
+    #[arg(long, value_name = "TEXT")]
+    accuracy: Option<String>,
+
+    /// Where the weights come from [default: the checkpoint's name and SHA-256]
+    #[arg(long, value_name = "TEXT")]
+    provenance: Option<String>,
+}
+
+impl CardArgs {
+    /// The card of the model in the checkpoint at `path` that became `tensors`.
+    pub fn card(
+        &self,
+        path: &Path,
+        checkpoint: &Checkpoint,
+        table: &Table,
+        tensors: &BTreeMap<String, Tensor>,
+    ) -> anyhow::Result<ModelCard> {
+        let mut card = table.card.clone();
+        let n_logits = *widths(tensors, "fc").last().unwrap_or(&0);
+        card.classes = self.classes(path, table, n_logits)?;
+        if self.sampler.is_some() && self.sampler != card.sampler {
+            card.sampler.clone_from(&self.sampler);
+            (card.points, card.fps_start) = (None, None);
+        }
+        card.points = self.points.or(card.points);
+        card.normalization = self.normalization.unwrap_or(card.normalization);
+        card.training_set = self.training_set.clone().or(card.training_set);
+        card.accuracy = match checkpoint.accuracy() {
+            _ if self.accuracy.is_some() => self.accuracy.clone(),
+            Accuracy::Stated(text) => Some(text.clone()),
+            Accuracy::Silent => card.accuracy,
+            Accuracy::Unread(kind) => {
+                eprintln!("{}: its accuracy is a {kind}; --accuracy states it", path.display());
+                card.accuracy
+            }
+        };
+        card.provenance = match &self.provenance {
+            Some(text) => Some(text.clone()),
+            None => Some(source(path)?),
+        };
+        Ok(card)
+    }
+
+    fn classes(
+        &self,
+        checkpoint: &Path,
+        table: &Table,
+        n_logits: usize,
+    ) -> anyhow::Result<Vec<String>> {
+        let Some(path) = &self.classes else {
+            let fits = table.default_classes.len() == n_logits;
+            if !fits {
+                let checkpoint = checkpoint.display();
+                eprintln!("{checkpoint}: {n_logits} classes without names; --classes names them");
+            }
+            return Ok(if fits { table.default_classes.clone() } else { Vec::new() });
+        };
+        let text = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
+        let names = text.lines().map(str::trim).filter(|name| !name.is_empty());
+        let names: Vec<String> = names.map(str::to_owned).collect();
+        if names.len() != n_logits {
+            bail!("{}: {} class names for {n_logits} logits", path.display(), names.len());
+        }
+        Ok(names)
+    }
+}
+
+/// The widths of trunk and head, such as `3-64-128-1024 | 1024-512-256-40`.
+pub fn all_widths(tensors: &BTreeMap<String, Tensor>) -> String {
+    let joined =
+        |stem| widths(tensors, stem).iter().map(ToString::to_string).collect::<Vec<_>>().join("-");
+    format!("{} | {}", joined("feat.conv"), joined("fc"))
+}
+
+/// What the layers `stem1`, `stem2`, … take and give.
+fn widths(tensors: &BTreeMap<String, Tensor>, stem: &str) -> Vec<usize> {
+    let shape = |i: usize| Some(&tensors.get(&format!("{stem}{i}.weight"))?.shape[..]);
+    let inputs = shape(1).and_then(|shape| shape.get(1)).copied();
+    let outputs = (1..).map_while(|i| shape(i)?.first().copied());
+    inputs.into_iter().chain(outputs).collect()
+}
+
+fn source(path: &Path) -> anyhow::Result<String> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Ok(format!("{name}, SHA-256 {}", hash::of_file(path)?))
+}

@@ -1,0 +1,105 @@
+//! `cargo xtask import-weights`: a PyTorch checkpoint into a model file.
+
+mod card;
+mod checkpoint;
+mod table;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::Outcome;
+use anyhow::Context;
+use card::CardArgs;
+use checkpoint::Checkpoint;
+use formats::FormatError;
+use formats::labelled::read_labelled;
+use formats::model_card::ModelCard;
+use formats::weights::{Tensor, tensor_part, write_weights};
+use infer_cpu::{Classifier, Options};
+use table::{Names, Table};
+
+/// Flags of `import-weights`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The checkpoint, as torch.save wrote it
+    #[arg(value_name = "CHECKPOINT")]
+    checkpoint: PathBuf,
+
+    /// Model file to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+
+    /// Importer table for a model whose layers bear names of their own
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+
+    /// Clouds to calibrate int8 with, a packed NPZ; best of the training set
+    #[arg(long, value_name = "NPZ")]
+    calibrate: Option<PathBuf>,
+
+    #[command(flatten)]
+    card: CardArgs,
+}
+
+/// Imports the checkpoint.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let checkpoint = Checkpoint::open(&args.checkpoint)?;
+    let tables = match &args.table {
+        Some(path) => vec![Table::read(path)?],
+        None => Table::builtin()?,
+    };
+    let (table, names) = table::choose(&tables, checkpoint.names())
+        .with_context(|| format!("{}", args.checkpoint.display()))?;
+    let tensors = checkpoint.read(&names)?;
+    let card = args.card.card(&args.checkpoint, &checkpoint, table, &tensors)?;
+    let widths = card::all_widths(&tensors);
+    let mut metadata = card.to_metadata();
+    metadata.insert("widths".to_owned(), widths.clone());
+    let ranges = check(args, &names, &tensors, &metadata)?;
+    metadata.extend(ranges);
+    write_weights(&args.out, &tensors, &metadata)?;
+    eprintln!("{widths}, named as by {}: {}", table.name, args.out.display());
+    Ok(Outcome::Success)
+}
+
+/// Metadata that only the loaded network can give: the ranges of `--calibrate`.
+type Ranges = Option<(String, String)>;
+
+/// That infer-cpu loads a model file of these tensors, and what calibration
+/// finds then. Errors name the checkpoint, and tensors by their names there
+/// too.
+fn check(
+    args: &Args,
+    names: &Names,
+    tensors: &BTreeMap<String, Tensor>,
+    metadata: &BTreeMap<String, String>,
+) -> anyhow::Result<Ranges> {
+    let source = &args.checkpoint;
+    let folder = tempfile::tempdir().context("no folder for temporary files")?;
+    let path = folder.path().join("model.safetensors");
+    write_weights(&path, tensors, metadata)?;
+    match Classifier::load(&path, &Options::default()) {
+        Ok(_) => args.calibrate.as_deref().map(|clouds| calibrate(&path, clouds)).transpose(),
+        Err(infer_cpu::Error::Format(FormatError::Malformed { part, cause, .. })) => {
+            let renamed =
+                names.iter().find(|(ours, theirs)| part == tensor_part(ours) && ours != theirs);
+            let there = renamed.map(|(_, theirs)| format!(" (there `{theirs}`)"));
+            let part = part + &there.unwrap_or_default();
+            Err(FormatError::malformed(source, part, cause).into())
+        }
+        Err(other) => Err(other).with_context(|| format!("{}", source.display())),
+    }
+}
+
+/// The largest activations of the model on clouds spread over the set.
+fn calibrate(model: &Path, clouds: &Path) -> anyhow::Result<(String, String)> {
+    /// More of them change the largest activations little.
+    const CLOUDS: usize = 512;
+    let set = read_labelled(clouds)?;
+    let step = set.len().div_ceil(CLOUDS).max(1);
+    let clouds = (0..set.len()).step_by(step).map(|i| set.cloud(i));
+    let activation_ranges = infer_cpu::activation_ranges(model, clouds)?;
+    let card = ModelCard { activation_ranges, ..ModelCard::default() };
+    let ranges = card.to_metadata().remove_entry("activation_ranges");
+    ranges.context("the model has no activations to calibrate")
+}

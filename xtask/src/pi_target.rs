@@ -1,0 +1,79 @@
+//! The Raspberry Pi as a compilation target: its standard library, how
+//! programs for it are linked without a C compiler, and how they run here.
+
+use crate::workspace;
+use anyhow::{Context, bail};
+use std::path::Path;
+use std::process::Command;
+
+/// Static binaries that run on any 64-bit Raspberry Pi, whatever its system.
+pub const TRIPLE: &str = "aarch64-unknown-linux-musl";
+
+/// What to do about a missing standard library.
+pub const NO_STANDARD_LIBRARY: &str = "Rust's standard library for the Raspberry Pi is missing: \
+     rustup target add aarch64-unknown-linux-musl";
+/// What to do about a missing emulator.
+pub const NO_EMULATOR: &str =
+    "no qemu-aarch64 here knows the Cortex-A76: install qemu-user, QEMU 7.1 or newer";
+
+/// QEMU for one program.
+const EMULATOR: &str = "qemu-aarch64";
+/// The core of a Raspberry Pi 5. It has fp16 and dot products and no newer
+/// extension, so that a kernel which strays beyond traps.
+const CORE: &str = "cortex-a76";
+
+/// Whether this toolchain has the target's standard library.
+///
+/// # Errors
+/// If there is no rustc to ask.
+pub fn has_standard_library() -> anyhow::Result<bool> {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let mut ask = Command::new(rustc);
+    ask.args(["--print", "target-libdir", "--target", TRIPLE]);
+    let folder = workspace::output(&mut ask)?;
+    Ok(Path::new(folder.trim()).is_dir())
+}
+
+/// Fetches the target's standard library through rustup unless it is there.
+///
+/// # Errors
+/// If it cannot be had.
+pub fn need_standard_library() -> anyhow::Result<()> {
+    if has_standard_library()? {
+        return Ok(());
+    }
+    eprintln!("fetching Rust's standard library for {TRIPLE}: rustup target add {TRIPLE}");
+    let status = Command::new("rustup").args(["target", "add", TRIPLE]).status();
+    let status = status.with_context(|| {
+        format!("there is no rustup here to fetch it; install {TRIPLE}'s standard library yourself")
+    })?;
+    if !status.success() || !has_standard_library()? {
+        bail!("rustup could not fetch {TRIPLE}; is this machine offline?");
+    }
+    Ok(())
+}
+
+/// Runs a program for the Pi on this machine; `None` where nothing can.
+pub fn emulator() -> Option<Command> {
+    let mut emulator = Command::new(EMULATOR);
+    emulator.args(["-cpu", CORE]);
+    let cores = Command::new(EMULATOR).args(["-cpu", "help"]).output().ok()?;
+    String::from_utf8_lossy(&cores.stdout).contains(CORE).then_some(emulator)
+}
+
+/// Cargo, which links for the Pi with the linker that comes with Rust and
+/// tests under the emulator, unless the environment says otherwise.
+pub fn cargo(args: &[&str]) -> Command {
+    let mut command = workspace::cargo(args);
+    command.args(["--target", TRIPLE]);
+    let prefix = format!("CARGO_TARGET_{}", TRIPLE.replace('-', "_").to_uppercase());
+    let defaults =
+        [("LINKER", "rust-lld".to_owned()), ("RUNNER", format!("{EMULATOR} -cpu {CORE}"))];
+    for (what, value) in defaults {
+        let key = format!("{prefix}_{what}");
+        if std::env::var_os(&key).is_none() {
+            command.env(key, value);
+        }
+    }
+    command
+}

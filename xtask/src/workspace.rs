@@ -1,0 +1,50 @@
+//! The workspace that this program is part of, and commands run in it.
+
+use anyhow::{Context, bail};
+use std::ffi::OsStr;
+use std::path::Path;
+use std::process::Command;
+
+/// The workspace's root.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+}
+
+/// Cargo, at the root.
+pub fn cargo(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO"));
+    command.args(args).current_dir(root());
+    command
+}
+
+/// Runs one command after naming it; its output goes to the terminal.
+///
+/// # Errors
+/// If it cannot be started or fails.
+pub fn step(name: &str, command: &mut Command) -> anyhow::Result<()> {
+    let shown = words(command);
+    eprintln!("== {name}: {shown}");
+    let status = command.status().with_context(|| format!("cannot run {shown}"))?;
+    if !status.success() {
+        bail!("{name} failed ({status}): {shown}");
+    }
+    Ok(())
+}
+
+/// What a command prints.
+///
+/// # Errors
+/// If it cannot be started or fails; then with what it said.
+pub fn output(command: &mut Command) -> anyhow::Result<String> {
+    let output = command.output().with_context(|| format!("cannot run {}", words(command)))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        bail!("{} failed ({}): {}", words(command), output.status, said.trim());
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+fn words(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")
+}
