@@ -5,18 +5,18 @@
 //! ```text
 //!                       w[0] channels 0-7   w[1] channels 8-15
 //!
-//! a[0]  inputs k..k+8   chunk[0][0]         chunk[0][1]
-//! a[1]                  chunk[1][0]         chunk[1][1]
+//! a[0]  inputs k..k+8   sums[0][0]          sums[0][1]
+//! a[1]                  sums[1][0]          sums[1][1]
 //! ...                   ...                 ...
-//! a[7]                  chunk[7][0]         chunk[7][1]
+//! a[7]                  sums[7][0]          sums[7][1]
 //! ```
 //!
 //! As in fp32, 16 sums and 8 registers of activations, which must be among the
-//! first 16 for FMLA to read them by element. Sums of [`F16_CHUNK`] inputs are
-//! all that rounds often. They are added in fp16 to those of a block, and
-//! blocks to sums in fp32; both lie in memory, out of the inner loop's way.
-//! Conversion to fp32 is slow, so there is one a block, which is all of
-//! PointNet's layers.
+//! first 16 for FMLA to read them by element. The sums of [`F16_CHUNK`] inputs
+//! are added in fp16 to those of the chunks before, which wait in memory. Only
+//! a block of [`F16_BLOCK`] inputs, more than PointNet's layers have, is
+//! promoted to fp32, since conversions are slow; of maxima only the largest of
+//! eight rows is.
 
 use std::arch::aarch64::*;
 use std::arch::is_aarch64_feature_detected;
@@ -26,10 +26,14 @@ use half::f16;
 
 use super::declare_kernels;
 use super::neon::lanes::Lanes;
-use super::neon::sink::{ArgMax, Finish, Max, Sink};
+use super::neon::sink::Sink;
 use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
 use super::neon::{GEMM_F32, fps, gemv, narrow};
 use super::scalar::{F16_BLOCK, F16_CHUNK};
+
+mod half_sink;
+
+use half_sink::{Blocks, HalfSink};
 
 declare_kernels!(NeonF16, runs_here: is_aarch64_feature_detected!("fp16"), {
     f32: Some(GEMM_F32),
@@ -98,7 +102,8 @@ unsafe fn feed_blocks<S: Sink<float32x4_t, 4>, const R: usize>(
 unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, sink: &mut S) {
     let zero = vreinterpretq_f16_u16(vdupq_n_u16(0));
     let mut rows: [*const f16; R] = strip.first_rows();
-    // Sums of earlier chunks wait in memory: the registers are for the chunk.
+    // Where `black_box` keeps sums of earlier chunks: in the compiler's hands
+    // they would take registers from the inner loop.
     let mut memory = [[zero; 2]; R];
     for _ in 0..strip.n_tiles {
         let (mut weights, mut at) = (strip.weights, 0);
@@ -183,98 +188,4 @@ unsafe fn add_input<const LANE: i32, const R: usize>(
 unsafe fn load(from: *const f16) -> float16x8_t {
     // SAFETY: the caller's; an `f16` is its bits.
     vreinterpretq_f16_u16(unsafe { vld1q_u16(from.cast()) })
-}
-
-/// The largest of each column, NaN of none but NaN.
-#[inline]
-#[target_feature(enable = "neon,fp16")]
-fn largest<const R: usize>(sums: &[[float16x8_t; 2]; R]) -> [float16x8_t; 2] {
-    let mut largest = sums[0];
-    for sums in &sums[1..] {
-        largest[0] = vmaxnmq_f16(largest[0], sums[0]);
-        largest[1] = vmaxnmq_f16(largest[1], sums[1]);
-    }
-    largest
-}
-
-/// The same numbers in fp32.
-#[inline]
-#[target_feature(enable = "neon")]
-fn promoted([left, right]: &[float16x8_t; 2]) -> [float32x4_t; 4] {
-    [
-        vcvt_f32_f16(vget_low_f16(*left)),
-        vcvt_high_f32_f16(*left),
-        vcvt_f32_f16(vget_low_f16(*right)),
-        vcvt_high_f32_f16(*right),
-    ]
-}
-
-/// Takes sums that are still fp16: of several rows the largest goes on alone.
-trait HalfSink {
-    /// As [`Sink::take`].
-    ///
-    /// # Safety
-    /// As [`Sink::take`]; the machine has FEAT_FP16.
-    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]);
-}
-
-impl HalfSink for Finish<4> {
-    #[inline]
-    #[target_feature(enable = "neon,fp16")]
-    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
-        for sums in sums {
-            // SAFETY: the caller's.
-            unsafe { self.take([promoted(sums)]) };
-        }
-    }
-}
-
-impl HalfSink for Max<float32x4_t, 4> {
-    #[inline]
-    #[target_feature(enable = "neon,fp16")]
-    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
-        // SAFETY: the caller's.
-        unsafe { self.take([promoted(&largest(sums))]) }
-    }
-}
-
-impl HalfSink for ArgMax<float32x4_t, 4> {
-    #[inline]
-    #[target_feature(enable = "neon,fp16")]
-    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
-        let largest = largest(sums);
-        let mut rows = [vdupq_n_u16(0); 2];
-        for (row, sums) in sums.iter().enumerate().rev() {
-            for v in 0..2 {
-                let equal = vceqq_f16(sums[v], largest[v]);
-                rows[v] = vbslq_u16(equal, vdupq_n_u16(row as u16), rows[v]);
-            }
-        }
-        let [left, right] = rows;
-        let rows = [
-            vmovl_u16(vget_low_u16(left)),
-            vmovl_high_u16(left),
-            vmovl_u16(vget_low_u16(right)),
-            vmovl_high_u16(right),
-        ];
-        self.merge(promoted(&largest), rows, R);
-    }
-}
-
-/// Sums of a tile's blocks.
-struct Blocks<const ROWS: usize> {
-    sums: [[float32x4_t; 4]; ROWS],
-}
-
-impl<const ROWS: usize> HalfSink for Blocks<ROWS> {
-    #[inline]
-    #[target_feature(enable = "neon,fp16")]
-    unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
-        for (sums, block) in self.sums.iter_mut().zip(sums) {
-            let block = promoted(block);
-            for (sum, block) in sums.iter_mut().zip(block) {
-                *sum = vaddq_f32(*sum, block);
-            }
-        }
-    }
 }

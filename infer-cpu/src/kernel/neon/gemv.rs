@@ -13,7 +13,7 @@ use std::ops::Range;
 use half::f16;
 
 use super::super::Columns;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, load, store};
 
 const BLOCK: usize = Columns::<f32>::BLOCK;
 
@@ -32,32 +32,32 @@ pub fn gemv<W: Weight>(
 ) {
     for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
         let sums = dot_products(nonzero, weights.block(block));
-        let (bias, _) = weights.bias[block * BLOCK..][..BLOCK].as_chunks();
-        let (out, _) = out.as_chunks_mut();
-        for (v, sum) in sums.as_flattened().iter().enumerate() {
-            let scale = match weights.scale[..] {
-                [] => float32x4_t::splat(1.0),
-                ref scale => Lanes::load(&scale[block * BLOCK..].as_chunks().0[v]),
-            };
-            // SAFETY: NEON is on every aarch64.
-            unsafe { vfmaq_f32(Lanes::load(&bias[v]), *sum, scale) }.store(&mut out[v]);
-        }
+        let bias: [float32x4_t; 16] = load(&weights.bias[block * BLOCK..]);
+        let scale = match &weights.scale[..] {
+            [] => [float32x4_t::splat(1.0); 16],
+            scale => load(&scale[block * BLOCK..]),
+        };
+        let sums = sums.as_flattened();
+        // SAFETY: NEON is on every aarch64.
+        let finished = from_fn(|v| unsafe { vfmaq_f32(bias[v], sums[v], scale[v]) });
+        store::<float32x4_t, 16>(finished, out);
     }
 }
 
 fn dot_products<W: Weight>(nonzero: &[(u32, f32)], columns: &[W]) -> [[float32x4_t; 4]; 4] {
-    let ahead = AHEAD_BYTES / (BLOCK * size_of::<W>());
+    let (columns, _) = columns.as_chunks::<BLOCK>();
+    let ahead = AHEAD_BYTES / size_of::<[W; BLOCK]>();
     let mut sums = [[float32x4_t::splat(0.0); 4]; 4];
     for (i, &(input, value)) in nonzero.iter().enumerate() {
         if let Some(&(later, _)) = nonzero.get(i + ahead) {
-            prefetch(columns.as_ptr().wrapping_add(later as usize * BLOCK));
+            prefetch(columns.as_ptr().wrapping_add(later as usize));
         }
-        let (column, _) = columns[input as usize * BLOCK..][..BLOCK].as_chunks();
-        for (sums, part) in sums.iter_mut().zip(column) {
-            let wide = W::widen(part);
-            for (sum, wide) in sums.iter_mut().zip(wide) {
+        let (column, _) = columns[input as usize].as_chunks();
+        for part in 0..4 {
+            let wide = W::widen(&column[part]);
+            for v in 0..4 {
                 // SAFETY: NEON is on every aarch64.
-                *sum = unsafe { vfmaq_n_f32(*sum, wide, value) };
+                sums[part][v] = unsafe { vfmaq_n_f32(sums[part][v], wide[v], value) };
             }
         }
     }
@@ -66,9 +66,9 @@ fn dot_products<W: Weight>(nonzero: &[(u32, f32)], columns: &[W]) -> [[float32x4
 
 /// Asks for one column to be brought into the first-level cache.
 #[inline(always)]
-fn prefetch<W>(column: *const W) {
-    for line in 0..(BLOCK * size_of::<W>()).div_ceil(CACHE_LINE_BYTES) {
-        let address = column.wrapping_byte_add(line * CACHE_LINE_BYTES);
+fn prefetch<C>(column: *const C) {
+    for line in (0..size_of::<C>()).step_by(CACHE_LINE_BYTES) {
+        let address = column.wrapping_byte_add(line);
         // SAFETY: a hint; no address can make it fault.
         unsafe {
             asm!("prfm pldl1keep, [{}]", in(reg) address, options(nostack, preserves_flags, readonly));
@@ -110,29 +110,23 @@ impl Weight for f16 {
 }
 
 impl Weight for i8 {
-    /// A table look-up moves four bytes to the tops of four lanes; the
-    /// conversion then divides by 2²⁴.
+    /// Bytes are brought to the tops of lanes by zipping with zeros, for which
+    /// there are two pipes, and the conversion divides by 2²⁴.
     #[inline(always)]
     fn widen(weights: &[i8; 16]) -> [float32x4_t; 4] {
-        // SAFETY: 16 bytes are there. NEON is on every aarch64.
+        // SAFETY: 16 numbers are there. NEON is on every aarch64.
         unsafe {
-            let bytes = vreinterpretq_u8_s8(vld1q_s8(weights.as_ptr()));
-            LANE_TOPS.map(|tops| {
-                let tops = vld1q_u8(tops.as_ptr());
-                vcvtq_n_f32_s32::<24>(vreinterpretq_s32_u8(vqtbl1q_u8(bytes, tops)))
-            })
+            let bytes = vld1q_s8(weights.as_ptr());
+            let (zeros, zero_halves) = (vdupq_n_s8(0), vdupq_n_s16(0));
+            let low = vreinterpretq_s16_s8(vzip1q_s8(zeros, bytes));
+            let high = vreinterpretq_s16_s8(vzip2q_s8(zeros, bytes));
+            [
+                vzip1q_s16(zero_halves, low),
+                vzip2q_s16(zero_halves, low),
+                vzip1q_s16(zero_halves, high),
+                vzip2q_s16(zero_halves, high),
+            ]
+            .map(|tops| vcvtq_n_f32_s32::<24>(vreinterpretq_s32_s16(tops)))
         }
     }
 }
-
-/// For each quarter of a register, the bytes that go to the four lanes; what
-/// is out of range becomes 0.
-const LANE_TOPS: [[u8; 16]; 4] = {
-    let mut tops = [[u8::MAX; 16]; 4];
-    let mut byte = 0;
-    while byte < 16 {
-        tops[byte / 4][byte % 4 * 4 + 3] = byte as u8;
-        byte += 1;
-    }
-    tops
-};
