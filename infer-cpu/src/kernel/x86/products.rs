@@ -1,7 +1,5 @@
 //! Matrix products, kept or pooled.
 
-#![expect(clippy::needless_range_loop, reason = "vectors and points go by their number")]
-
 use std::ops::Range;
 
 use super::tile::Tile;

@@ -8,8 +8,6 @@
 //!   ...
 //! ```
 
-#![expect(clippy::needless_range_loop, reason = "vectors and points go by their number")]
-
 use half::f16;
 
 use super::{Lanes, V, Weight};
