@@ -41,7 +41,7 @@ impl Folder {
 
     /// The program with the arguments in `line`, separated by blanks.
     pub fn command(&self, line: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_infer-cpu"));
+        let mut command = program();
         command.args(line.split_whitespace()).current_dir(self.folder.path());
         command.env_remove("EDGEPUCK_MODEL");
         command
@@ -116,4 +116,19 @@ pub fn strip(n: usize) -> Vec<[f64; 3]> {
         [t.cos(), t.sin() * (i % 3) as f64, t / 6.0]
     };
     (0..n).map(point).collect()
+}
+
+/// The program, by the emulator that these tests run by if they do.
+fn program() -> Command {
+    const PROGRAM: &str = env!("CARGO_BIN_EXE_infer-cpu");
+    let runner = std::env::var("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_RUNNER");
+    match runner {
+        Ok(runner) if cfg!(all(target_arch = "aarch64", target_env = "musl")) => {
+            let mut words = runner.split_whitespace();
+            let mut command = Command::new(words.next().unwrap());
+            command.args(words).arg(PROGRAM);
+            command
+        }
+        _ => Command::new(PROGRAM),
+    }
 }
