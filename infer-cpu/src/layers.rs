@@ -7,9 +7,11 @@ use formats::model_card::ModelCard;
 use formats::weights::WeightsFile;
 
 use crate::dense::Dense;
+use crate::engine::GROUP;
 use crate::kernel::{Columns, Kernels, Panels};
 use crate::network::{Network, Role, read_network};
 use crate::precision::{Format, Matrix};
+use crate::screen::Screen;
 
 /// A network packed for format `T`.
 pub type Layers<T> = Network<Conv<T>, Vector<T>>;
@@ -43,6 +45,8 @@ pub struct Packed<T: Format> {
     pub name: String,
     /// Its weights.
     pub panels: Panels<T::Weight>,
+    /// What its pooling is screened by, where that pays.
+    pub screen: Option<Screen>,
     /// See [`Dense::gain`].
     pub gain: f32,
     /// Its largest output, where calibrated.
@@ -107,7 +111,12 @@ impl Packer<'_> {
     fn conv<T: Format>(&self, dense: Dense, role: Role) -> Conv<T> {
         match role {
             Role::First => Conv::First(self.first(dense)),
-            Role::Inner | Role::Last => Conv::Inner(self.packed(&dense)),
+            Role::Inner => Conv::Inner(self.packed(&dense)),
+            Role::Last => {
+                let is_f32 = T::as_f32(&[], &mut []).is_some();
+                let screen = is_f32.then(|| Screen::new(&dense, GROUP, self.kernels)).flatten();
+                Conv::Inner(Packed { screen, ..self.packed(&dense) })
+            }
             Role::AfterTransform => {
                 let mut plain = empty::<crate::precision::F32>(self.kernels, &dense);
                 plain.fill(|input, output| dense.at(input, output));
@@ -131,6 +140,7 @@ impl Packer<'_> {
         Packed {
             name: dense.name.clone(),
             panels,
+            screen: None,
             gain: dense.gain(),
             range: self.range(&dense.name),
             seen: Largest::default(),
@@ -189,6 +199,7 @@ impl<T: Format> Packed<T> {
         Self {
             name: String::new(),
             panels,
+            screen: None,
             gain: 0.0,
             range: UNKNOWN_RANGE,
             seen: Largest::default(),

@@ -20,6 +20,7 @@ mod options;
 mod precision;
 mod prediction;
 pub mod sampler;
+mod screen;
 mod selection;
 mod summary;
 mod tabulate;

@@ -141,6 +141,15 @@ pub trait Format: Send + Sync + 'static {
     fn fill(panels: &mut Panels<Self::Weight>, range: f32, weight: impl Fn(usize, usize) -> f32);
     /// Packs a vector layer.
     fn columns(dense: &Dense) -> Columns<Self::Stored>;
+
+    /// Activations and maxima as fp32 where they are, so that a
+    /// [`Screen`](crate::screen::Screen) can tell the latter from the former.
+    fn as_f32<'a>(
+        _: &'a [Self::Activation],
+        _: &'a mut [Self::Sum],
+    ) -> Option<(&'a [f32], &'a mut [f32])> {
+        None
+    }
 }
 
 /// [`Precision::F32`].
@@ -177,6 +186,13 @@ macro_rules! fp32_points {
 
         fn fill(panels: &mut Panels<f32>, _: f32, weight: impl Fn(usize, usize) -> f32) {
             panels.fill(weight);
+        }
+
+        fn as_f32<'a>(
+            activations: &'a [f32],
+            maxima: &'a mut [f32],
+        ) -> Option<(&'a [f32], &'a mut [f32])> {
+            Some((activations, maxima))
         }
     };
 }

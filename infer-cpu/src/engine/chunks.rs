@@ -3,12 +3,13 @@
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Engine, GROUP, Group, Head, Pass, Run, Scratch, Task, VECTOR_BLOCK, VECTOR_CHUNK,
+    BLOCK, Block, Engine, GROUP, Group, Head, Pass, Run, Scratch, Task, VECTOR_BLOCK, VECTOR_CHUNK,
 };
 use super::{lock, read, write};
-use crate::kernel::Rows;
+use crate::kernel::{Kernels, Rows};
 use crate::layers::Packed;
 use crate::precision::{F16_LARGEST, Format};
+use crate::screen::{Best, Levels, Sieve};
 use crate::team::Work;
 
 impl<T: Format> Work for Engine<T> {
@@ -16,7 +17,7 @@ impl<T: Format> Work for Engine<T> {
         let task = *read(&self.task);
         match task {
             Task::Hidden { pass, first_block } => self.hidden(thread, pass, first_block, chunk),
-            Task::Pool { pass, run } => self.pool_group(pass, run, chunk),
+            Task::Pool { pass, run } => self.pool_group(thread, pass, run, chunk),
             Task::Vector { head, layer } => self.vector_chunk(head, layer, chunk),
         }
     }
@@ -28,7 +29,7 @@ impl<T: Format> Engine<T> {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let points = read(&self.points);
         let mut scratch = lock(&self.scratch[thread]);
-        let Scratch { wide, narrow: [from, to] } = &mut *scratch;
+        let Scratch { wide, narrow: [from, to], .. } = &mut *scratch;
         let rows = block_rows(&points, first_block + slot);
         let n = rows.n;
         let first = self.first(pass);
@@ -58,7 +59,8 @@ impl<T: Format> Engine<T> {
             self.round(&wide[..n * width], layer.range, next, to);
             std::mem::swap(from, to);
         }
-        write(&self.blocks[slot])[..n * width].copy_from_slice(&from[..n * width]);
+        let last = self.place(self.last(pass), &feature, &folded);
+        write(&self.blocks[slot]).set(self.kernels, &Rows { data: from, stride: width, n }, last);
     }
 
     /// Rounds a layer's outputs for the layer `next`, and notes what is lost.
@@ -75,32 +77,35 @@ impl<T: Format> Engine<T> {
     }
 
     /// Pools group `group` of a pass's last channels over some blocks.
-    fn pool_group(&self, pass: Pass, run: Run, group: usize) {
-        let Run { first_block, n_blocks, winners: wants_winners } = run;
+    fn pool_group(&self, thread: usize, pass: Pass, run: Run, group: usize) {
+        let Run { first_block, n_blocks, winners } = run;
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let last = self.place(self.last(pass), &feature, &folded);
-        let gemm = T::gemm(self.kernels).expect("invariant: kernels fit the format");
-        let per_group = GROUP / gemm.nr;
-        let panels = group * per_group..last.panels.n_panels().min((group + 1) * per_group);
-        let n_channels = panels.len() * gemm.nr;
         let n_points = read(&self.points).len() / 4;
-        let mut group = lock(&self.groups[group]);
-        let Group { maxima, winners } = &mut *group;
-        let (maxima, winners) = (&mut maxima[..n_channels], &mut winners[..n_channels]);
-        if first_block == 0 {
-            maxima.fill(T::LOWEST);
-            winners.fill(0);
-        }
         let stride = self.width_before_last(pass, &feature, &folded);
+        let mut pool = lock(&self.groups[group]);
+        if first_block == 0 {
+            pool.begin::<T>(last, group, winners);
+        }
         for slot in 0..n_blocks {
             let first_row = (first_block + slot) * BLOCK;
             let block = read(&self.blocks[slot]);
-            let rows = Rows { data: &block[..], stride, n: BLOCK.min(n_points - first_row) };
-            if wants_winners {
-                let first_row = first_row as u32;
-                (gemm.argmax)(&rows, &last.panels, panels.clone(), first_row, maxima, winners);
-            } else {
-                (gemm.max)(&rows, &last.panels, panels.clone(), maxima);
+            let rows =
+                Rows { data: &block.features[..], stride, n: BLOCK.min(n_points - first_row) };
+            let is_pooled = pool.screens && block.has_levels && {
+                let sieve = &mut lock(&self.scratch[thread]).sieve;
+                pool.screen::<T>(
+                    self.kernels,
+                    (last, group),
+                    (&rows, &block.levels),
+                    sieve,
+                    first_row,
+                )
+            };
+            if !is_pooled {
+                pool.screens &= !block.has_levels;
+                let first_row = winners.then_some(first_row as u32);
+                pool.multiply::<T>(self.kernels, (last, group), &rows, first_row);
             }
         }
     }
@@ -120,6 +125,75 @@ impl<T: Format> Engine<T> {
         let out = &mut out[..blocks.len() * VECTOR_BLOCK];
         T::gemv(self.kernels)(&read(&self.vector), columns, blocks, out);
     }
+}
+
+impl<T: Format> Block<T> {
+    /// Keeps `rows` for the layer `next`.
+    fn set(&mut self, kernels: &Kernels, rows: &Rows<'_, T::Activation>, next: &Packed<T>) {
+        let n = rows.n * rows.stride;
+        self.features[..n].copy_from_slice(&rows.data[..n]);
+        let plain = next.screen.as_ref().and_then(|_| T::as_f32(rows.data, &mut []));
+        self.has_levels = plain.is_some_and(|(data, _)| {
+            self.levels.take(kernels, &Rows { data, stride: rows.stride, n: rows.n })
+        });
+    }
+}
+
+impl<S: Copy> Group<S> {
+    fn begin<T: Format<Sum = S>>(&mut self, last: &Packed<T>, group: usize, wants_winners: bool) {
+        self.maxima.fill(T::LOWEST);
+        self.winners.fill(0);
+        self.screens = last.screen.is_some();
+        let channels = n_channels(last, group);
+        if let Some(screen) = &last.screen
+            && let Some((_, maxima)) = T::as_f32(&[], &mut self.maxima[..channels])
+        {
+            screen.begin(group, wants_winners, maxima);
+        }
+    }
+
+    /// Pools rows whose levels are known; returns whether it did.
+    fn screen<T: Format<Sum = S>>(
+        &mut self,
+        kernels: &Kernels,
+        (last, group): (&Packed<T>, usize),
+        (rows, levels): (&Rows<'_, T::Activation>, &Levels),
+        sieve: &mut Sieve,
+        first_row: usize,
+    ) -> bool {
+        let channels = n_channels(last, group);
+        let plain = T::as_f32(rows.data, &mut self.maxima[..channels]);
+        let (Some(screen), Some((data, maxima))) = (&last.screen, plain) else { return false };
+        let rows = Rows { data, stride: rows.stride, n: rows.n };
+        let winners = &mut self.winners[..channels];
+        let mut best = Best { maxima, winners, first_row: first_row as u32 };
+        screen.pool(kernels, group, (&rows, levels), sieve, &mut best)
+    }
+
+    /// Pools rows by all of their products, and keeps winners if their first
+    /// row is given.
+    fn multiply<T: Format<Sum = S>>(
+        &mut self,
+        kernels: &Kernels,
+        (last, group): (&Packed<T>, usize),
+        rows: &Rows<'_, T::Activation>,
+        first_row: Option<u32>,
+    ) {
+        let gemm = T::gemm(kernels).expect("invariant: kernels fit the format");
+        let first = group * GROUP / gemm.nr;
+        let channels = n_channels(last, group);
+        let panels = first..first + channels / gemm.nr;
+        let (maxima, winners) = (&mut self.maxima[..channels], &mut self.winners[..channels]);
+        match first_row {
+            Some(row) => (gemm.argmax)(rows, &last.panels, panels, row, maxima, winners),
+            None => (gemm.max)(rows, &last.panels, panels, maxima),
+        }
+    }
+}
+
+/// Channels of a group, padding included.
+fn n_channels<T: Format>(last: &Packed<T>, group: usize) -> usize {
+    GROUP.min(last.width() - group * GROUP)
 }
 
 /// The rows of block `block` of `points`.

@@ -3,8 +3,8 @@
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, Run, SMALL_VECTOR, Task, VECTOR_CHUNK, lock,
-    read, write,
+    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, Run, SMALL_VECTOR, Spread, Task, VECTOR_CHUNK,
+    lock, read, write,
 };
 use crate::kernel::{Panels, Rows};
 use crate::layers::Conv;
@@ -104,6 +104,7 @@ impl<T: Format> Engine<T> {
     fn collect(&self, pass: Pass, memory: &mut Memory) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let panels = &self.place(self.last(pass), &feature, &folded).panels;
+        let spread = Spread::new(read(&self.points).len() / 4);
         memory.values.clear();
         memory.winners.clear();
         for (g, first) in (0..panels.outputs).step_by(GROUP).enumerate() {
@@ -115,7 +116,7 @@ impl<T: Format> Engine<T> {
                 let value = T::widen(sum) * scale + panels.bias[channel];
                 let is_cut = panels.relu && value < 0.0;
                 memory.values.push(if is_cut { 0.0 } else { value });
-                memory.winners.push(winner);
+                memory.winners.push(spread.point(winner as usize) as u32);
             }
         }
     }

@@ -18,12 +18,15 @@ use crate::kernel::{Columns, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
 use crate::network::Front;
 use crate::precision::Format;
+use crate::screen::{Levels, Sieve};
 
 mod chunks;
 mod forward;
 mod route;
+mod spread;
 
 pub use forward::{Memory, folding_pays};
+use spread::Spread;
 
 /// Points of a block: whole tiles of every kernel, and few enough that their
 /// features stay in a first-level cache.
@@ -89,10 +92,9 @@ pub struct Engine<T: Format> {
     folded: RwLock<Packed<T>>,
     fold: AtomicBool,
     task: RwLock<Task>,
-    /// Rows x, y, z, 0.
+    /// Rows x, y, z, 0, in the order of [`Spread`].
     points: RwLock<Vec<f32>>,
-    /// Features before the last layer, a block each.
-    blocks: Vec<RwLock<Vec<T::Activation>>>,
+    blocks: Vec<RwLock<Block<T>>>,
     groups: Vec<Mutex<Group<T::Sum>>>,
     scratch: Vec<Mutex<Scratch<T>>>,
     /// The input of the vector layer at hand: what is not 0.
@@ -103,16 +105,27 @@ pub struct Engine<T: Format> {
     observing: bool,
 }
 
+/// Features of [`BLOCK`] points before the last layer.
+struct Block<T: Format> {
+    features: Vec<T::Activation>,
+    /// The same in levels, if they have any.
+    levels: Levels,
+    has_levels: bool,
+}
+
 /// Maxima of [`GROUP`] channels, and the points that gave them.
 struct Group<S> {
     maxima: Vec<S>,
     winners: Vec<u32>,
+    /// Whether screening has paid so far.
+    screens: bool,
 }
 
 /// A thread's own memory: a block's features, before and after rounding.
 struct Scratch<T: Format> {
     wide: Vec<f32>,
     narrow: [Vec<T::Activation>; 2],
+    sieve: Sieve,
 }
 
 /// What a forward pass met.
@@ -150,12 +163,21 @@ impl<T: Format> Engine<T> {
             None => (Packed::zeros(kernels, 1, 1), Packed::zeros(kernels, 1, 1)),
         };
         let Widths { hidden, pooled, vector } = Widths::of(&layers);
+        let screens = pooled_layers(&layers).any(|layer| layer.screen.is_some());
         let scratch = || Scratch {
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
+            sieve: if screens { Sieve::new(BLOCK, GROUP) } else { Sieve::new(0, 0) },
         };
-        let group = || Group { maxima: vec![T::LOWEST; GROUP], winners: vec![0; GROUP] };
-        let block = || RwLock::new(vec![T::Activation::default(); BLOCK * hidden]);
+        let group =
+            || Group { maxima: vec![T::LOWEST; GROUP], winners: vec![0; GROUP], screens: false };
+        let block = || {
+            RwLock::new(Block {
+                features: vec![T::Activation::default(); BLOCK * hidden],
+                levels: Levels::with_room(if screens { BLOCK * hidden } else { 0 }),
+                has_levels: false,
+            })
+        };
         let chunk = || Mutex::new(vec![0.0; VECTOR_CHUNK * VECTOR_BLOCK]);
         Self {
             kernels,
@@ -195,7 +217,9 @@ impl<T: Format> Engine<T> {
     pub fn set_points(&self, points: &[[f32; 3]]) {
         let mut rows = write(&self.points);
         rows.clear();
-        rows.extend(points.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0]));
+        let spread = Spread::new(points.len());
+        let in_order = (0..points.len()).map(|row| points[spread.point(row)]);
+        rows.extend(in_order.flat_map(|[x, y, z]| [x, y, z, 0.0]));
     }
 
     /// Forgets what earlier passes met.
@@ -277,13 +301,24 @@ impl Widths {
             convs.push(front);
         }
         let hidden = convs.iter().flat_map(|net| &net[..net.len() - 1]).map(Conv::width);
-        let pooled = convs.iter().filter_map(|net| net.last()).map(Conv::width);
+        let pooled = pooled_layers(layers).map(Packed::width);
         Self {
             hidden: hidden.max().unwrap_or(0),
             pooled: pooled.max().unwrap_or(0),
             vector: columns.map(|c| c.bias.len().max(c.inputs)).max().unwrap_or(0),
         }
     }
+}
+
+/// The layers whose outputs are pooled.
+fn pooled_layers<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &Packed<T>> {
+    let nets = [&layers.stn, &layers.fstn].into_iter().flatten().map(|net| &net.convs[..]);
+    let front = match &layers.front {
+        Some(Front::Mlp(front)) => Some(&front[..]),
+        _ => None,
+    };
+    let nets = nets.chain([&layers.trunk[..]]).chain(front);
+    nets.filter_map(|net| net.last()).map(Conv::packed)
 }
 
 /// Locks cannot be poisoned but by a panic, which is a defect that a caller

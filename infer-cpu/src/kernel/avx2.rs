@@ -7,7 +7,7 @@ use std::ops::Range;
 use half::f16;
 
 use super::x86::Lanes;
-use super::{Gemm, declare_kernels};
+use super::{Gemm, Screening, declare_kernels};
 
 const NR: usize = 16;
 
@@ -20,6 +20,8 @@ declare_kernels!(
         f32: Some(Gemm { nr: NR, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
         f16: Some(Gemm { nr: NR, k_step: 8, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
         i8: Some(Gemm { nr: NR, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
+        screens: false,
+        screening: Screening { levels, peaks, sift, dots },
         gemv_f32,
         gemv_f16,
         gemv_i8,
@@ -132,9 +134,19 @@ impl Lanes for __m256 {
     }
 
     #[inline(always)]
-    unsafe fn count_greater(self, other: Self) -> u32 {
+    unsafe fn greater(self, other: Self) -> u32 {
         // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self, other)).count_ones() }
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self, other)) as u32 }
+    }
+
+    #[inline(always)]
+    unsafe fn total(self) -> f32 {
+        // SAFETY: as the trait's callers promise.
+        unsafe {
+            let four = _mm_add_ps(_mm256_castps256_ps128(self), _mm256_extractf128_ps::<1>(self));
+            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
+        }
     }
 
     #[inline(always)]

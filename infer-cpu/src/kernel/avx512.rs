@@ -10,7 +10,7 @@ use std::ops::Range;
 use half::f16;
 
 use super::x86::Lanes;
-use super::{Gemm, declare_kernels};
+use super::{Gemm, Screening, declare_kernels};
 
 const NR: usize = 32;
 
@@ -24,6 +24,8 @@ declare_kernels!(
         f32: Some(Gemm { nr: NR, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
         f16: Some(Gemm { nr: NR, k_step: 16, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
         i8: Some(Gemm { nr: NR, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
+        screens: true,
+        screening: Screening { levels, peaks, sift, dots },
         gemv_f32,
         gemv_f16,
         gemv_i8,
@@ -133,9 +135,15 @@ impl Lanes for __m512 {
     }
 
     #[inline(always)]
-    unsafe fn count_greater(self, other: Self) -> u32 {
+    unsafe fn greater(self, other: Self) -> u32 {
         // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, other).count_ones() }
+        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, other).into() }
+    }
+
+    #[inline(always)]
+    unsafe fn total(self) -> f32 {
+        // SAFETY: as the trait's callers promise.
+        unsafe { _mm512_reduce_add_ps(self) }
     }
 
     #[inline(always)]

@@ -129,6 +129,50 @@ pub struct Gemm<A, W, C> {
 /// a range of blocks to `out`.
 pub type Gemv<W> = fn(nonzero: &[(u32, f32)], &Columns<W>, Range<usize>, out: &mut [f32]);
 
+/// What rounding a row to levels lost and left, in levels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LevelSums {
+    /// The sum of the squares of what rounding took.
+    pub lost: f32,
+    /// The sum of the squares of the levels.
+    pub squares: f32,
+}
+
+/// A product that a screening could not rule out to be the largest of its
+/// channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Candidate {
+    /// Its row.
+    pub row: u16,
+    /// Its channel.
+    pub channel: u16,
+}
+
+/// What tells the largest products from estimates of all of them, and from few
+/// in fp32. Rows are whole vectors: multiples of [`WIDTH_STEP`].
+pub struct Screening {
+    /// Rounds a row of `value * per_unit`, 0 to [`I8_LARGEST`] (clipped there),
+    /// to levels.
+    pub levels: fn(&[f32], per_unit: f32, out: &mut [u8]) -> LevelSums,
+    /// Finds each column's largest value and the first row that has it. Values
+    /// are no NaN.
+    pub peaks: fn(values: &[f32], peaks: &mut [f32], rows: &mut [u32]),
+    /// Finds what is above the floors.
+    pub sift: Sift,
+    /// Products of candidates.
+    pub dots: Dots,
+}
+
+/// Puts every value above the floor of its column into `found`, row by row.
+/// Returns how many there are, or `None` if there is no room for them.
+pub type Sift = fn(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize>;
+
+/// Products of `candidates`: rows by `weights`, which has as many elements for
+/// each channel as `rows` has from one row to the next, a multiple of
+/// [`WIDTH_STEP`]. One product's roundings do not depend on the others.
+pub type Dots =
+    fn(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &mut [f32]);
+
 /// Cloud coordinates as structure of arrays, for sampling.
 #[derive(Clone, Copy)]
 pub struct Soa<'a> {
@@ -150,6 +194,11 @@ pub struct Kernels {
     pub f16: Option<Gemm<f16, f16, f32>>,
     /// Unsigned seven-bit activations, int8 weights.
     pub i8: Option<Gemm<u8, i8, i32>>,
+    /// Whether int8 products cost so much less than those of fp32 that most of
+    /// the latter are worth ruling out by the former.
+    pub screens: bool,
+    /// What it takes to do so.
+    pub screening: Screening,
     /// fp32 weights.
     pub gemv_f32: Gemv<f32>,
     /// fp16 weights, fp32 arithmetic.

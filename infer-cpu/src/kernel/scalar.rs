@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use half::f16;
 
-use super::{Columns, Gemm, I8_LARGEST, Panels, Rows, Soa, declare_kernels};
+use super::{
+    Candidate, Columns, Gemm, I8_LARGEST, LevelSums, Panels, Rows, Screening, Soa, declare_kernels,
+};
 
 /// Products of fp16 are summed in fp16 over this many inputs.
 pub(super) const F16_CHUNK: usize = 32;
@@ -22,6 +24,8 @@ declare_kernels!(Scalar, runs_here: true, {
     f32: Some(Gemm { nr: 8, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
     f16: Some(Gemm { nr: 8, k_step: 1, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
     i8: Some(Gemm { nr: 8, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
+    screens: false,
+    screening: Screening { levels, peaks, sift, dots },
     gemv_f32,
     gemv_f16,
     gemv_i8,
@@ -132,6 +136,49 @@ macro_rules! gemm {
 gemm!(f32, f32, f32, dot_f32, f32_rows, f32_max, f32_argmax);
 gemm!(f16, f16, f32, dot_f16, f16_rows, f16_max, f16_argmax);
 gemm!(u8, i8, i32, dot_i8, i8_rows, i8_max, i8_argmax);
+
+fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
+    let mut sums = LevelSums::default();
+    for (value, out) in row.iter().zip(out) {
+        let exact = value * per_unit;
+        let level = exact.round_ties_even().clamp(0.0, f32::from(I8_LARGEST));
+        sums.lost += (exact - level) * (exact - level);
+        sums.squares += level * level;
+        *out = level as u8;
+    }
+    sums
+}
+
+fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
+    peaks.fill(f32::NEG_INFINITY);
+    rows.fill(0);
+    for (row, values) in (0..).zip(values.chunks_exact(peaks.len())) {
+        for (channel, &value) in values.iter().enumerate() {
+            if value > peaks[channel] {
+                (peaks[channel], rows[channel]) = (value, row);
+            }
+        }
+    }
+}
+
+fn sift(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
+    let mut n = 0;
+    for (row, values) in values.chunks_exact(floors.len()).enumerate() {
+        for (channel, _) in values.iter().enumerate().filter(|&(c, value)| *value > floors[c]) {
+            *found.get_mut(n)? = Candidate { row: row as u16, channel: channel as u16 };
+            n += 1;
+        }
+    }
+    Some(n)
+}
+
+fn dots(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &mut [f32]) {
+    for (candidate, out) in candidates.iter().zip(out) {
+        let row = &rows.data[usize::from(candidate.row) * rows.stride..][..rows.stride];
+        let weights = &weights[usize::from(candidate.channel) * rows.stride..][..rows.stride];
+        *out = row.iter().zip(weights).fold(0.0, |sum, (a, w)| sum + a * w);
+    }
+}
 
 /// Dot products of a sparse vector and the columns of a range of blocks.
 fn gemv<W: Copy + Default>(

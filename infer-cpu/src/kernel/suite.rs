@@ -9,10 +9,10 @@ use formats::rng::StreamKey;
 use half::f16;
 
 use super::scalar::{F16_BLOCK, F16_CHUNK};
-use super::{Columns, Gemm, I8_LARGEST, Kernels, Panels, Rows, Soa};
+use super::{Candidate, Columns, Gemm, I8_LARGEST, Kernels, Panels, Rows, Soa, WIDTH_STEP};
 
 /// Numbers of rows: none, and around every tile height in use (4, 6, 8, 12).
-const ROWS: [usize; 11] = [0, 1, 3, 5, 6, 7, 8, 9, 12, 13, 29];
+const ROWS: [usize; 12] = [0, 1, 3, 5, 6, 7, 8, 9, 10, 12, 13, 29];
 /// Numbers of inputs: around every unrolling in use (4, 8, 16, 32).
 const INPUTS: [usize; 13] = [1, 2, 3, 4, 5, 8, 15, 16, 17, 31, 33, 64, 130];
 const OUTPUTS: [usize; 4] = [1, 31, 64, 65];
@@ -417,6 +417,83 @@ pub fn narrowing_is_the_reference(kernels: &Kernels) {
     }
 }
 
+/// That levels are those of the reference, and sums of squares near them: of `n`
+/// steps each, fused or not (Higham 2002, §3.1).
+pub fn levels_are_the_reference(kernels: &Kernels) {
+    let reference = super::scalar::kernels().unwrap();
+    let mut draw = Draw::new("levels");
+    for n in [WIDTH_STEP, 2 * WIDTH_STEP, 5 * WIDTH_STEP] {
+        let mut row: Vec<f32> = (0..n).map(|_| draw.signed().max(0.0) * 130.0).collect();
+        row[..6].copy_from_slice(&[0.0, -0.0, 0.5, 1.5, 127.5, 1e9]);
+        for per_unit in [1.0, 0.37, 0.0] {
+            let (mut found, mut expected) = (vec![9u8; n], vec![0u8; n]);
+            let sums = (kernels.screening.levels)(&row, per_unit, &mut found);
+            let exact = (reference.screening.levels)(&row, per_unit, &mut expected);
+            assert_eq!(found, expected, "{n}");
+            let near = |a: f32, b: f32| (a - b).abs() <= n as f32 * f32::EPSILON * b;
+            assert!(near(sums.lost, exact.lost), "{sums:?}, {exact:?}");
+            assert!(near(sums.squares, exact.squares), "{sums:?}, {exact:?}");
+        }
+    }
+}
+
+/// That peaks are those of the reference, first rows among equals, and that
+/// what is above a floor is found, in order, or nothing where room is short.
+pub fn sifting_is_the_reference(kernels: &Kernels) {
+    let reference = super::scalar::kernels().unwrap();
+    let mut draw = Draw::new("sift");
+    for (n, width) in [(0, 64), (1, 64), (7, 128), (48, 128)] {
+        // A coarse grid, for ties.
+        let mut values: Vec<f32> = (0..n * width).map(|_| (draw.signed() * 9.0).round()).collect();
+        values.iter_mut().step_by(17).for_each(|value| *value = f32::NEG_INFINITY);
+        let (mut peaks, mut rows) = (vec![7.0; width], vec![7; width]);
+        let (mut expected_peaks, mut expected_rows) = (vec![0.0; width], vec![0; width]);
+        (kernels.screening.peaks)(&values, &mut peaks, &mut rows);
+        (reference.screening.peaks)(&values, &mut expected_peaks, &mut expected_rows);
+        assert_eq!((&peaks, &rows), (&expected_peaks, &expected_rows));
+        let mut floors: Vec<f32> = (0..width).map(|_| (draw.signed() * 9.0).round()).collect();
+        floors[..3].copy_from_slice(&[f32::NAN, f32::INFINITY, f32::NEG_INFINITY]);
+        let mut expected = vec![Candidate::default(); n * width];
+        let count = (reference.screening.sift)(&values, &floors, &mut expected).unwrap();
+        let mut found = vec![Candidate::default(); count];
+        assert_eq!((kernels.screening.sift)(&values, &floors, &mut found), Some(count));
+        assert_eq!(found, expected[..count]);
+        if count > 0 {
+            let short = &mut found[..count - 1];
+            assert_eq!((kernels.screening.sift)(&values, &floors, short), None);
+        }
+    }
+}
+
+/// That single products are exact to the bound of fp32, wherever they are.
+pub fn dots_are_near_exact(kernels: &Kernels) {
+    let mut draw = Draw::new("dots");
+    for values in [Values::Ordinary, Values::Cancelling, Values::Denormal, Values::NotFinite] {
+        for width in [WIDTH_STEP, 3 * WIDTH_STEP] {
+            let (n, channels) = (5, 7);
+            let kind = if matches!(values, Values::Denormal) { Values::Ordinary } else { values };
+            let data: Vec<f32> = (0..n * width).map(|_| draw.element(kind, 0, 1.0)).collect();
+            let weights: Vec<f32> =
+                (0..channels * width).map(|i| draw.element(values, i, f32::MIN_POSITIVE)).collect();
+            let all = (0..n * channels).rev();
+            let candidates: Vec<Candidate> = all
+                .map(|i| Candidate { row: (i / channels) as u16, channel: (i % channels) as u16 })
+                .collect();
+            let mut out = vec![7.0; candidates.len()];
+            let rows = Rows { data: &data, stride: width, n };
+            (kernels.screening.dots)(&rows, &weights, &candidates, &mut out);
+            for (candidate, out) in candidates.iter().zip(out) {
+                let of = |data: &[f32], at: u16| data[usize::from(at) * width..][..width].to_vec();
+                let (row, weights) = (of(&data, candidate.row), of(&weights, candidate.channel));
+                let terms = row.iter().zip(&weights).map(|(a, w)| a.wide() * w.wide());
+                let (dot, sum) =
+                    terms.fold((0.0, 0.0), |(dot, sum), term| (dot + term, sum + term.abs()));
+                assert_near(out, dot, f32::bound(width, sum), (values, width, candidate));
+            }
+        }
+    }
+}
+
 /// That farthest point sampling picks what the reference picks and leaves the
 /// same distances, to the bit, ties included.
 pub fn fps_is_the_reference(kernels: &Kernels) {
@@ -482,6 +559,14 @@ macro_rules! suite {
             must::gemv_is_near_exact(kernels);
             must::narrowing_is_the_reference(kernels);
             must::fps_is_the_reference(kernels);
+        }
+
+        #[test]
+        fn screening() {
+            let Some(kernels) = here() else { return };
+            must::levels_are_the_reference(kernels);
+            must::sifting_is_the_reference(kernels);
+            must::dots_are_near_exact(kernels);
         }
     };
 }

@@ -65,15 +65,14 @@ impl<A, W> Strip<A, W> {
     /// the rows to be a stride apart would go from one to the next by
     /// additions; an empty instruction hides it.
     #[inline(always)]
-    #[expect(clippy::pointers_in_nomem_asm_block, reason = "nothing is read through them")]
     pub fn first_rows<const R: usize>(&self) -> [*const A; R] {
         from_fn(|r| {
-            let mut row = self.rows.wrapping_add(r * self.stride);
+            let mut offset = r * self.stride;
             // SAFETY: no instruction.
             unsafe {
-                asm!("/* {0} */", inout(reg) row, options(pure, nomem, nostack, preserves_flags));
+                asm!("/* {0} */", inout(reg) offset, options(pure, nomem, nostack, preserves_flags));
             }
-            row
+            self.rows.wrapping_add(offset)
         })
     }
 

@@ -35,8 +35,10 @@ pub(in crate::kernel) trait Lanes: Copy {
     unsafe fn abs(self) -> Self;
     /// To the nearest integer, ties to even.
     unsafe fn round(self) -> Self;
-    /// How many lanes are greater than those of `other`.
-    unsafe fn count_greater(self, other: Self) -> u32;
+    /// Which lanes are greater than those of `other`, a bit each.
+    unsafe fn greater(self, other: Self) -> u32;
+    /// The sum of all lanes, in a fixed order.
+    unsafe fn total(self) -> f32;
     /// Where `self` is greater than `best`: puts it there, and `index` into
     /// `who`.
     unsafe fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int);

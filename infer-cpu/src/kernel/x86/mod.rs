@@ -10,7 +10,7 @@ mod vectors;
 pub(super) use lanes::{Lanes, Weight};
 pub(super) use products::{argmax, max, rows};
 pub(super) use tile::{Byte, Half, Single};
-pub(super) use vectors::{fps_step, gemv, narrow_f16, narrow_i8};
+pub(super) use vectors::{dots, fps_step, gemv, levels, narrow_f16, narrow_i8, peaks, sift};
 
 /// Vectors of channels in a tile.
 const V: usize = 2;
@@ -23,7 +23,7 @@ const V: usize = 2;
 macro_rules! entries {
     ($lanes:ty, $b:literal, $features:literal) => {
         use $crate::kernel::x86::{self, Byte, Half, Single};
-        use $crate::kernel::{Columns, Panels, Rows, Soa};
+        use $crate::kernel::{Candidate, Columns, LevelSums, Panels, Rows, Soa};
 
         $crate::kernel::x86::entries!(@gemm $lanes, $features, Single, f32, f32, f32,
             f32_rows, f32_max, f32_argmax);
@@ -56,6 +56,60 @@ macro_rules! entries {
             let (whole, clipped) = unsafe { run(values, per_unit, out) };
             let (values, out) = (&values[whole..], &mut out[whole..]);
             clipped + $crate::kernel::scalar::narrow_i8(values, per_unit, out)
+        }
+
+        fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
+            #[target_feature(enable = $features)]
+            unsafe fn run(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
+                // SAFETY: the features are enabled.
+                unsafe { x86::levels::<$lanes>(row, per_unit, out) }
+            }
+            // SAFETY: the table of these functions is given out after detection.
+            unsafe { run(row, per_unit, out) }
+        }
+
+        fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
+            #[target_feature(enable = $features)]
+            unsafe fn run(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
+                // SAFETY: the features are enabled.
+                unsafe { x86::peaks::<$lanes>(values, peaks, rows) }
+            }
+            // SAFETY: the table of these functions is given out after detection.
+            unsafe { run(values, peaks, rows) }
+        }
+
+        fn sift(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
+            #[target_feature(enable = $features)]
+            unsafe fn run(
+                values: &[f32],
+                floors: &[f32],
+                found: &mut [Candidate],
+            ) -> Option<usize> {
+                // SAFETY: the features are enabled.
+                unsafe { x86::sift::<$lanes>(values, floors, found) }
+            }
+            // SAFETY: the table of these functions is given out after detection.
+            unsafe { run(values, floors, found) }
+        }
+
+        fn dots(
+            rows: &Rows<'_, f32>,
+            weights: &[f32],
+            candidates: &[Candidate],
+            out: &mut [f32],
+        ) {
+            #[target_feature(enable = $features)]
+            unsafe fn run(
+                rows: &Rows<'_, f32>,
+                weights: &[f32],
+                candidates: &[Candidate],
+                out: &mut [f32],
+            ) {
+                // SAFETY: the features are enabled.
+                unsafe { x86::dots::<$lanes>(rows, weights, candidates, out) }
+            }
+            // SAFETY: the table of these functions is given out after detection.
+            unsafe { run(rows, weights, candidates, out) }
         }
 
         fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {

@@ -7,7 +7,7 @@ use std::ops::Range;
 use half::f16;
 
 use super::{Lanes, Weight};
-use crate::kernel::{Columns, I8_LARGEST, Soa};
+use crate::kernel::{Candidate, Columns, I8_LARGEST, LevelSums, Rows, Soa, WIDTH_STEP};
 
 /// [`crate::kernel::Gemv`]: a block's sums stay in `B` vectors while its columns
 /// stream by, even and odd inputs apart for the sake of latency.
@@ -110,10 +110,125 @@ pub(in crate::kernel) unsafe fn narrow_i8<L: Lanes>(
         let mut clipped = 0;
         for at in (0..whole).step_by(L::N) {
             let level = L::load(values.as_ptr().add(at)).mul(L::splat(per_unit)).round();
-            clipped += u64::from(level.count_greater(most));
+            clipped += u64::from(level.greater(most).count_ones());
             level.max(L::splat(0.0)).min(most).store_u8(out.as_mut_ptr().add(at));
         }
         (whole, clipped)
+    }
+}
+
+/// [`crate::kernel::Screening::levels`].
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn levels<L: Lanes>(
+    row: &[f32],
+    per_unit: f32,
+    out: &mut [u8],
+) -> LevelSums {
+    assert!(row.len().is_multiple_of(WIDTH_STEP) && out.len() == row.len());
+    // SAFETY: whole vectors of both.
+    unsafe {
+        let most = L::splat(f32::from(I8_LARGEST));
+        let (mut lost, mut squares) = (L::splat(0.0), L::splat(0.0));
+        for at in (0..row.len()).step_by(L::N) {
+            let exact = L::load(row.as_ptr().add(at)).mul(L::splat(per_unit));
+            let level = exact.round().max(L::splat(0.0)).min(most);
+            let rest = exact.sub(level);
+            lost = rest.fma(rest, lost);
+            squares = level.fma(level, squares);
+            level.store_u8(out.as_mut_ptr().add(at));
+        }
+        LevelSums { lost: lost.total(), squares: squares.total() }
+    }
+}
+
+/// [`crate::kernel::Screening::peaks`].
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn peaks<L: Lanes>(
+    values: &[f32],
+    peaks: &mut [f32],
+    rows: &mut [u32],
+) {
+    let width = peaks.len();
+    assert!(rows.len() == width && width.is_multiple_of(WIDTH_STEP));
+    // SAFETY: rows and results are `width` long, whole vectors.
+    unsafe {
+        for at in (0..width).step_by(L::N) {
+            let (mut peak, mut who) = (L::splat(f32::NEG_INFINITY), L::splat_int(0));
+            for (row, values) in values.chunks_exact(width).enumerate() {
+                let value = L::load(values.as_ptr().add(at));
+                value.keep_greater(&mut peak, &mut who, L::splat_int(row as i32));
+            }
+            peak.store(peaks.as_mut_ptr().add(at));
+            L::store_int(who, rows.as_mut_ptr().add(at).cast());
+        }
+    }
+}
+
+/// [`crate::kernel::Screening::sift`].
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn sift<L: Lanes>(
+    values: &[f32],
+    floors: &[f32],
+    found: &mut [Candidate],
+) -> Option<usize> {
+    let width = floors.len();
+    assert!(width.is_multiple_of(WIDTH_STEP));
+    let mut n = 0;
+    for (row, values) in values.chunks_exact(width).enumerate() {
+        for at in (0..width).step_by(L::N) {
+            // SAFETY: rows and floors are `width` long, whole vectors.
+            let mut above = unsafe {
+                L::load(values.as_ptr().add(at)).greater(L::load(floors.as_ptr().add(at)))
+            };
+            while above != 0 {
+                let channel = (at + above.trailing_zeros() as usize) as u16;
+                *found.get_mut(n)? = Candidate { row: row as u16, channel };
+                n += 1;
+                above &= above - 1;
+            }
+        }
+    }
+    Some(n)
+}
+
+/// [`crate::kernel::Screening::dots`]: four sums of every fourth vector each,
+/// for the sake of latency.
+///
+/// # Safety
+/// The instruction set of `L`.
+#[inline(always)]
+pub(in crate::kernel) unsafe fn dots<L: Lanes>(
+    rows: &Rows<'_, f32>,
+    weights: &[f32],
+    candidates: &[Candidate],
+    out: &mut [f32],
+) {
+    const SUMS: usize = 4;
+    let width = rows.stride;
+    assert!(width.is_multiple_of(WIDTH_STEP));
+    for (candidate, out) in candidates.iter().zip(out) {
+        let row = &rows.data[usize::from(candidate.row) * width..][..width];
+        let weights = &weights[usize::from(candidate.channel) * width..][..width];
+        // SAFETY: both are `width` long, a multiple of `SUMS` vectors.
+        unsafe {
+            let mut sums = [L::splat(0.0); SUMS];
+            for at in (0..width).step_by(SUMS * L::N) {
+                for (s, sum) in sums.iter_mut().enumerate() {
+                    let a = L::load(row.as_ptr().add(at + s * L::N));
+                    *sum = a.fma(L::load(weights.as_ptr().add(at + s * L::N)), *sum);
+                }
+            }
+            *out = sums[0].add(sums[1]).add(sums[2].add(sums[3])).total();
+        }
     }
 }
 

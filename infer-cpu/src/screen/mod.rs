@@ -1,0 +1,282 @@
+//! Maxima in fp32 at little more than the cost of int8 products.
+//!
+//! Pooling wants one product of each channel only, the largest. An int8
+//! estimate of every product, four times as fast, comes with a bound of its
+//! error; a product whose estimate lies two bounds below another's cannot be
+//! the largest. What is left, a few products in a hundred, is computed in fp32.
+//! So the maxima are those of fp32, and no accuracy is traded.
+//!
+//! Of a block's rows, the one with a channel's largest estimate is computed
+//! first: it is nearly always the winner, and its product, which is certain,
+//! takes the place of its estimate in the comparison with the others.
+//!
+//! # The bound
+//! Activations `x >= 0` of a block of points are `s (p + d)`, levels `p` from 0
+//! to 127; a channel's weights are `w = t q + e`, `|q| <= 127`. Then
+//!
+//! ```text
+//! sum(w x) / s  =  t sum(q p)  +  sum(e p)  +  sum(w d)
+//! |sum(w x) / s - t sum(q p)|  <=  |e| |p|  +  |w| |d|
+//! ```
+//!
+//! by Cauchy and Schwarz, with the norms |e|, |w| of the channel and the
+//! largest |p|, |d| of the block's rows. Rounding in fp32 adds at most
+//! `(K + 64) u 127 sum|w|`, u = 2⁻²⁴: K + 1 steps for the product that is
+//! compared with the maximum (Higham 2002, §3.1), and less than 30 for each of
+//! the levels' quotients, the estimate, the maximum's quotient and its sum with
+//! the bound, all of them of magnitudes below `127 sum|w|`.
+
+mod levels;
+
+use std::ops::Range;
+
+pub use levels::Levels;
+
+use crate::dense::Dense;
+use crate::kernel::{Candidate, I8_LARGEST, Kernels, Panels, Rows, Screening, WIDTH_STEP};
+use crate::precision::{Format, I8};
+
+/// Fewer inputs than this make products too cheap to be ruled out.
+const FEWEST_INPUTS: usize = 32;
+
+/// A product alone costs some three times its share of a tile; with more of
+/// them than one in so many, the tile is the better choice.
+const ONE_IN: usize = 4;
+
+/// Channels whose weights sum to magnitudes outside of this, where fp32 has
+/// fewer digits or none, are not screened.
+const ORDINARY: Range<f64> = 1e-30..1e30;
+
+/// Norms are rounded up, by more than fp32 may have lost of them.
+const NORM_SLACK: f64 = 1.0001;
+
+/// What a pooled layer is screened by.
+pub struct Screen {
+    channels: Vec<Channels>,
+    /// `[outputs, inputs]`, inputs padded to whole vectors.
+    weights: Vec<f32>,
+    /// From one channel's weights to the next.
+    stride: usize,
+}
+
+/// Channels that are pooled together.
+struct Channels {
+    /// The first of them.
+    first: usize,
+    panels: Panels<i8>,
+    bounds: Vec<Bound>,
+    /// A maximum of less than this need not be found, in search of winners.
+    least: Vec<f32>,
+    /// The same, in search of what comes out of a ReLU.
+    least_seen: Vec<f32>,
+}
+
+/// A channel's part in the bound of its estimates' errors.
+#[derive(Clone, Copy, Default)]
+struct Bound {
+    /// |e|.
+    of_levels: f32,
+    /// |w|.
+    of_lost: f32,
+    rounding: f32,
+}
+
+/// A thread's own memory of screening a block of rows.
+pub struct Sieve {
+    estimates: Vec<f32>,
+    bounds: Vec<f32>,
+    /// The largest estimate of each channel, later what others must exceed.
+    floors: Vec<f32>,
+    peak_rows: Vec<u32>,
+    found: Vec<Candidate>,
+    products: Vec<f32>,
+}
+
+impl Sieve {
+    /// Memory for `rows` by `channels`.
+    pub fn new(rows: usize, channels: usize) -> Self {
+        let most = (channels + 1).max(rows * channels / ONE_IN);
+        Self {
+            estimates: vec![0.0; rows * channels],
+            bounds: vec![0.0; channels],
+            floors: vec![0.0; channels],
+            peak_rows: vec![0; channels],
+            found: vec![Candidate::default(); most],
+            products: vec![0.0; most],
+        }
+    }
+}
+
+/// The best products of a group's channels so far.
+pub struct Best<'a> {
+    /// A product for each channel.
+    pub maxima: &'a mut [f32],
+    /// Their rows.
+    pub winners: &'a mut [u32],
+    /// What rows at hand are counted from.
+    pub first_row: u32,
+}
+
+impl Best<'_> {
+    fn raise(&mut self, candidates: &[Candidate], products: &[f32]) {
+        for (candidate, &product) in candidates.iter().zip(products) {
+            let channel = usize::from(candidate.channel);
+            let row = self.first_row + u32::from(candidate.row);
+            let best = self.maxima[channel];
+            // A peak may come before a row that is its equal and its earlier.
+            if product > best || (product == best && row < self.winners[channel]) {
+                self.maxima[channel] = product;
+                self.winners[channel] = row;
+            }
+        }
+    }
+}
+
+impl Screen {
+    /// A screen of `layer`, whose channels are pooled `group` at a time; none
+    /// where it would not pay.
+    pub fn new(layer: &Dense, group: usize, kernels: &Kernels) -> Option<Self> {
+        if !kernels.screens || layer.inputs < FEWEST_INPUTS {
+            return None;
+        }
+        let groups = (0..layer.outputs).step_by(group);
+        let stride = layer.inputs.next_multiple_of(WIDTH_STEP);
+        let mut weights = vec![0.0; layer.outputs * stride];
+        for (row, from) in
+            weights.chunks_exact_mut(stride).zip(layer.weight.chunks_exact(layer.inputs))
+        {
+            row[..layer.inputs].copy_from_slice(from);
+        }
+        let channels = groups
+            .map(|first| Channels::new(layer, first..layer.outputs.min(first + group), kernels))
+            .collect();
+        Some(Self { channels, weights, stride })
+    }
+
+    /// Raises `maxima` of a group to what makes it pointless to look for less.
+    pub fn begin(&self, group: usize, wants_winners: bool, maxima: &mut [f32]) {
+        let Channels { least, least_seen, .. } = &self.channels[group];
+        maxima.copy_from_slice(if wants_winners { least } else { least_seen });
+    }
+
+    /// Raises the best of a group to the products of `rows`, whose `levels` are
+    /// known. Of equal rows the first wins.
+    ///
+    /// Returns false if too many products come into question; what was raised
+    /// until then is a product all the same.
+    pub fn pool(
+        &self,
+        kernels: &Kernels,
+        group: usize,
+        (rows, levels): (&Rows<'_, f32>, &Levels),
+        sieve: &mut Sieve,
+        best: &mut Best<'_>,
+    ) -> bool {
+        let Screening { peaks, sift, dots, .. } = kernels.screening;
+        let channels = &self.channels[group];
+        let width = best.maxima.len();
+        channels.estimate(kernels, rows, levels, sieve);
+        let Sieve { estimates, bounds, floors, peak_rows, found, products } = sieve;
+        let (estimates, bounds) = (&mut estimates[..rows.n * width], &bounds[..width]);
+        let (floors, peak_rows) = (&mut floors[..width], &mut peak_rows[..width]);
+        peaks(estimates, floors, peak_rows);
+        let per_step = 1.0 / levels.step;
+        let mut n = 0;
+        for channel in 0..width {
+            // Written in any case, counted if need be: no branch to mispredict.
+            found[n] = Candidate { row: peak_rows[channel] as u16, channel: channel as u16 };
+            let peak = floors[channel] + bounds[channel];
+            n += usize::from(peak > best.maxima[channel] * per_step);
+        }
+        for peak in &found[..n] {
+            // Once is enough.
+            estimates[usize::from(peak.row) * width + usize::from(peak.channel)] =
+                f32::NEG_INFINITY;
+        }
+        let weights = &self.weights[channels.first * self.stride..];
+        dots(rows, weights, &found[..n], &mut products[..n]);
+        best.raise(&found[..n], &products[..n]);
+        for channel in 0..width {
+            floors[channel] = best.maxima[channel] * per_step - bounds[channel];
+        }
+        let most = rows.n * width / ONE_IN;
+        let Some(n) = sift(estimates, floors, &mut found[..most]) else { return false };
+        dots(rows, weights, &found[..n], &mut products[..n]);
+        best.raise(&found[..n], &products[..n]);
+        true
+    }
+}
+
+impl Channels {
+    fn new(layer: &Dense, range: Range<usize>, kernels: &Kernels) -> Self {
+        let gemm = I8::gemm(kernels).expect("invariant: kernels that screen have int8 products");
+        let (inputs, n) = (layer.inputs, range.len());
+        let mut panels = Panels::zeros(inputs, n, (gemm.nr, gemm.k_step, I8::GROUP));
+        // A range of as many units as there are levels: sums come out in levels.
+        I8::fill(&mut panels, f32::from(I8_LARGEST), |input, output| {
+            layer.at(input, range.start + output)
+        });
+        let width = panels.padded_outputs();
+        // Padding is never looked for.
+        let mut channels = Self {
+            first: range.start,
+            bounds: vec![Bound::default(); width],
+            least: vec![f32::INFINITY; width],
+            least_seen: vec![f32::INFINITY; width],
+            panels,
+        };
+        for (channel, output) in range.enumerate() {
+            channels.bound(channel, layer, output);
+        }
+        channels
+    }
+
+    fn bound(&mut self, channel: usize, layer: &Dense, output: usize) {
+        let weights = &layer.weight[output * layer.inputs..][..layer.inputs];
+        let sum: f64 = weights.iter().map(|w| f64::from(w.abs())).sum();
+        // Products with weights of 0 are 0, of every row.
+        self.least[channel] = if sum == 0.0 { 0.0 } else { f32::NEG_INFINITY };
+        let cut = if layer.relu { -layer.bias[output] } else { f32::NEG_INFINITY };
+        self.least_seen[channel] = self.least[channel].max(cut);
+        self.bounds[channel] = match sum {
+            0.0 => Bound::default(),
+            sum if ORDINARY.contains(&sum) => self.ordinary_bound(channel, weights, sum),
+            _ => Bound { rounding: f32::INFINITY, ..Bound::default() },
+        };
+    }
+
+    fn ordinary_bound(&self, channel: usize, weights: &[f32], sum: f64) -> Bound {
+        let step = f64::from(self.panels.scale[channel]);
+        let rest = |(input, &w): (usize, &f32)| {
+            f64::from(w) - step * f64::from(self.panels.data[self.panels.index(input, channel)])
+        };
+        let norm = |squares: f64| (squares.sqrt() * NORM_SLACK) as f32;
+        Bound {
+            of_levels: norm(weights.iter().enumerate().map(|w| rest(w).powi(2)).sum()),
+            of_lost: norm(weights.iter().map(|&w| f64::from(w).powi(2)).sum()),
+            rounding: ((weights.len() + 64) as f64 * 127.0 * 2f64.powi(-24) * sum) as f32,
+        }
+    }
+
+    /// Leaves an estimate of every product in `sieve`, in steps of the levels,
+    /// and its bound.
+    fn estimate(
+        &self,
+        kernels: &Kernels,
+        rows: &Rows<'_, f32>,
+        levels: &Levels,
+        sieve: &mut Sieve,
+    ) {
+        let gemm = I8::gemm(kernels).expect("invariant: kernels that screen have int8 products");
+        let width = self.panels.padded_outputs();
+        let bytes = Rows { data: &levels.bytes[..], stride: rows.stride, n: rows.n };
+        let out = &mut sieve.estimates[..rows.n * width];
+        (gemm.rows)(&bytes, &self.panels, 0..self.panels.n_panels(), out, width);
+        for (out, bound) in sieve.bounds.iter_mut().zip(&self.bounds) {
+            *out = bound.of_levels * levels.norm + bound.of_lost * levels.lost + bound.rounding;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
