@@ -32,6 +32,7 @@ pub mod sharing {
     pub use crate::engine::{
         BLOCK, GROUP, RUN_BLOCKS, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK, folding_pays,
     };
+    pub use crate::screen::screening_pays;
 }
 
 pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};

@@ -36,8 +36,12 @@ use crate::dense::Dense;
 use crate::kernel::{Candidate, I8_LARGEST, Kernels, Panels, Rows, Screening, WIDTH_STEP};
 use crate::precision::{Format, I8};
 
-/// Fewer inputs than this make products too cheap to be ruled out.
-const FEWEST_INPUTS: usize = 32;
+/// Whether products of so many inputs are worth ruling out, where kernels
+/// screen at all.
+#[must_use]
+pub const fn screening_pays(inputs: usize) -> bool {
+    inputs >= 32
+}
 
 /// A product alone costs some three times its share of a tile; with more of
 /// them than one in so many, the tile is the better choice.
@@ -136,7 +140,7 @@ impl Screen {
     /// A screen of `layer`, whose channels are pooled `group` at a time; none
     /// where it would not pay.
     pub fn new(layer: &Dense, group: usize, kernels: &Kernels) -> Option<Self> {
-        if !kernels.screens || layer.inputs < FEWEST_INPUTS {
+        if !kernels.screens || !screening_pays(layer.inputs) {
             return None;
         }
         let groups = (0..layer.outputs).step_by(group);

@@ -210,7 +210,7 @@ mod tests {
         let product = Product { layer, number: Number::F32 };
         let vector = Layer { inputs: 64, outputs: 10 };
         let stages = [
-            Stage::Pool { rows: 8, product },
+            Stage::Pool { rows: 8, product, screened: false },
             Stage::Vector { layer: vector, stored: Number::F16 },
         ];
         let mut lines = vec![

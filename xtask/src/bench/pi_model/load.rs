@@ -29,12 +29,16 @@ pub fn load(stage: &Stage, kernels: &Kernels, threads: usize) -> Load {
             load.bytes = products.iter().map(weight_bytes).sum();
             load
         }
-        Stage::Pool { rows, product } => {
+        Stage::Pool { rows, product, screened } => {
             let width = product.layer.outputs.next_multiple_of(WIDTH_STEP);
             let whole = tiles(product, *rows, kernels);
             let group = |first: usize| whole * (GROUP.min(width - first) as f64 / width as f64);
             let mut load = shared((0..width).step_by(GROUP).map(group), threads);
             load.bytes = weight_bytes(product);
+            if *screened {
+                // Nearly every channel has a product to be computed in fp32.
+                load.bytes += weight_bytes(&Product { number: Number::F32, ..*product });
+            }
             load
         }
         Stage::Alone { rows, product } => {
@@ -127,7 +131,7 @@ pub fn tile_instructions(stages: &[Stage], kernels: &Kernels, number: Number) ->
     };
     let stages = stages.iter().map(|stage| match stage {
         Stage::Hidden { rows, products } => products.iter().map(|product| of(product, *rows)).sum(),
-        Stage::Pool { rows, product } | Stage::Alone { rows, product } => of(product, *rows),
+        Stage::Pool { rows, product, .. } | Stage::Alone { rows, product } => of(product, *rows),
         _ => 0.0,
     });
     stages.sum()
@@ -183,7 +187,7 @@ mod tests {
     #[test]
     fn instructions_are_told_apart_by_format() {
         let kernels = round_kernels();
-        let stages = [Stage::Pool { rows: 8, product: product(4, 64) }];
+        let stages = [Stage::Pool { rows: 8, product: product(4, 64), screened: false }];
         let of = |number| tile_instructions(&stages, &kernels, number);
         assert_eq!(of(Number::F32), 8.0 * 4.0 * 2.0);
         assert_eq!(of(Number::I8), 0.0);

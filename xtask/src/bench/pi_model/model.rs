@@ -92,7 +92,7 @@ mod tests {
 
     fn pool(inputs: usize) -> Stage {
         let layer = Layer { inputs, outputs: 1024 };
-        Stage::Pool { rows: 48, product: Product { layer, number: Number::F32 } }
+        Stage::Pool { rows: 48, product: Product { layer, number: Number::F32 }, screened: false }
     }
 
     #[test]

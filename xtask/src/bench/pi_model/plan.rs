@@ -3,7 +3,7 @@
 use super::network::{Layer, Net, Network};
 use super::number::Number;
 use infer_cpu::Precision;
-use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays};
+use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays, screening_pays};
 use serde::Serialize;
 
 /// Where the points that a network sees come from.
@@ -48,8 +48,9 @@ pub enum Stage {
     /// Rows through some layers; threads share out blocks of rows.
     Hidden { rows: usize, products: Vec<Product> },
     /// Rows through a layer whose outputs are pooled; threads share out groups
-    /// of outputs.
-    Pool { rows: usize, product: Product },
+    /// of outputs. Where int8 products screen those of fp32, `product` is of
+    /// the former; the few of the latter are not in it.
+    Pool { rows: usize, product: Product, screened: bool },
     /// Rows through a layer on one thread.
     Alone { rows: usize, product: Product },
     /// One vector through a layer.
@@ -66,7 +67,7 @@ impl Stage {
             Self::Hidden { rows, products } => {
                 rows * products.iter().map(|product| of(&product.layer)).sum::<usize>()
             }
-            Self::Pool { rows, product } | Self::Alone { rows, product } => {
+            Self::Pool { rows, product, .. } | Self::Alone { rows, product } => {
                 rows * of(&product.layer)
             }
             Self::Vector { layer, .. } => of(layer),
@@ -160,11 +161,13 @@ impl Formats {
                 number: if i == 0 { Number::F32 } else { self.points },
             })
             .collect();
-        let product = Product { layer: last, number: self.points };
+        let screened = self.points == Number::F32 && screening_pays(last.inputs);
+        let number = if screened { Number::I8 } else { self.points };
+        let product = Product { layer: last, number };
         for first in (0..rows).step_by(BLOCK * RUN_BLOCKS) {
             let rows = (rows - first).min(BLOCK * RUN_BLOCKS);
             stages.push(Stage::Hidden { rows, products: products.clone() });
-            stages.push(Stage::Pool { rows, product });
+            stages.push(Stage::Pool { rows, product, screened });
         }
         Some(())
     }
@@ -234,6 +237,21 @@ mod tests {
         use Number::{F32, I8};
         assert_eq!(numbers, [vec![F32, I8], vec![F32, I8, I8], vec![F32, I8]]);
         assert!(stages.iter().any(|stage| matches!(stage, Stage::Alone { rows: 64, .. })));
+    }
+
+    #[test]
+    fn poolings_of_fp32_are_screened_by_int8() {
+        let pooled = |precision| {
+            let stages = stages(&baseline(), Sampler::All, (64, 64), precision).unwrap();
+            let pools = stages.into_iter().filter_map(|stage| match stage {
+                Stage::Pool { product, screened, .. } => Some((product.number, screened)),
+                _ => None,
+            });
+            pools.collect::<Vec<_>>()
+        };
+        assert_eq!(pooled(Precision::F32), [(Number::I8, true); 3]);
+        assert_eq!(pooled(Precision::F16), [(Number::F16, false); 3]);
+        assert_eq!(pooled(Precision::I8), [(Number::I8, false); 3]);
     }
 
     #[test]

@@ -20,9 +20,11 @@ when its refresh or a screen is busy. Work outside inner loops runs at a flat \
 number of instructions a cycle, and overlaps with nothing. Threads wake, meet \
 and share out in no time, the clock never drops, and nothing else runs. Page \
 and TLB misses, mispredicted branches and the first classification after \
-loading are not there. Counted weights are those of the model file: of an \
-untrained one, other inputs of vector layers are 0, and skipped, than of a \
-trained one. Measure a real board with `infer-cpu bench --json`.";
+loading are not there. Cycles are those of inner loops: a whole tile, with the \
+start and the end of its sums, takes some 5 to 10 % more, of which the \
+instructions are counted among the others. What depends on the data is that of \
+the model file and of the clouds of `infer-cpu bench`: inputs of vector layers \
+that are 0, and skipped, and products in fp32 that int8 could not rule out. Measure a real board with `infer-cpu bench --json`.";
 
 /// Everything modelled.
 #[derive(Serialize)]
