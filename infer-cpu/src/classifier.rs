@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::forward::{self, Forward, Loaded, Setup};
 use crate::kernel::{self, KernelName, Kernels};
 use crate::normalize;
-use crate::options::Options;
+use crate::options::{MOST_POINTS, Options};
 use crate::precision::Precision;
 use crate::prediction::{Prediction, argmax};
 use crate::sampler::{SamplerKind, SamplerSpec};
@@ -59,6 +59,7 @@ impl Classifier {
     /// # Errors
     /// A file that is no model, options that it or this machine cannot meet.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
+        options.check()?;
         let setup = setup(options, options.precision)?;
         let loaded = forward::load(path, &setup)?;
         let spec = match &options.sampler {
@@ -94,6 +95,9 @@ impl Classifier {
     /// # Errors
     /// More points than can be counted.
     pub fn reserve(&mut self, n: usize) -> Result<(), Error> {
+        if n > MOST_POINTS {
+            return Err(Error::TooMuchRoom(n));
+        }
         self.network.reserve(n);
         self.finite.reserve(n);
         self.normalized.reserve(n);

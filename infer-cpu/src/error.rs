@@ -3,6 +3,7 @@
 use formats::FormatError;
 
 use crate::kernel::KernelName;
+use crate::options::{MOST_POINTS, MOST_THREADS};
 
 /// An error of loading a model or classifying a cloud.
 #[derive(Debug, thiserror::Error)]
@@ -54,8 +55,14 @@ pub enum Error {
         what: &'static str,
     },
     /// Votes draw random subsets; another sampler has one opinion only.
-    #[error("votes draw random subsets: sampler {0} would repeat itself")]
+    #[error("votes need random subsets or rotations: sampler {0} would repeat itself")]
     VotesWithoutDraws(crate::sampler::SamplerKind),
+    /// Room for more points than memory could hold.
+    #[error("room for {0} points is asked for; at most {MOST_POINTS} can be made at once")]
+    TooMuchRoom(usize),
+    /// More threads than any machine has cores.
+    #[error("{0} threads are asked for; at most {MOST_THREADS} make sense")]
+    TooManyThreads(usize),
     /// Workers could not be started.
     #[error("cannot start {threads} threads: {source}")]
     Threads {

@@ -150,10 +150,5 @@ fn loaded<T: Format>(
     };
     let engine = Engine::new(layers, kernels, threads, false);
     let team = Team::new(engine, threads).map_err(|source| Error::Threads { threads, source })?;
-    let (n_names, n_classes) = (card.classes.len(), team.n_classes());
-    if n_names != 0 && n_names != n_classes {
-        let cause = format!("names {n_names} for {n_classes} logits");
-        return Err(FormatError::malformed(file.path(), "metadata `classes`", cause).into());
-    }
     Ok(Loaded { card, network: Box::new(team), parts, table })
 }

@@ -67,6 +67,9 @@ pub enum Role {
     Last,
 }
 
+/// The widest layer: a sum of int8 products of as many inputs fits 32 bits.
+const WIDEST: usize = 1 << 16;
+
 /// Reads the network of `file`. Each layer goes through `conv` or `fc` as soon
 /// as it is read, so that no more than one is in memory twice.
 ///
@@ -134,8 +137,20 @@ impl<M, N> Reader<'_, M, N> {
             trunk.push((self.conv)(dense, role));
         }
         let head = self.vector_layers("", 0, width, None)?;
+        self.check_class_names(card, head.len())?;
         let front = self.front()?;
         Ok(Network { stn, trunk, fstn, transform_after: after, head, front })
+    }
+
+    fn check_class_names(&self, card: &ModelCard, n_layers: usize) -> Result<(), FormatError> {
+        let last = self.file.shape(&format!("fc{n_layers}.weight"));
+        let n_classes = last.and_then(|shape| shape.first()).copied().unwrap_or(0);
+        let n_names = card.classes.len();
+        if n_names != 0 && n_names != n_classes {
+            let cause = format!("names {n_names} for {n_classes} logits");
+            return Err(self.file_error("metadata `classes`", cause));
+        }
+        Ok(())
     }
 
     fn t_net<C, F>(
@@ -258,6 +273,10 @@ impl<M, N> Reader<'_, M, N> {
     ) -> Result<Dense, FormatError> {
         let name = dotted(prefix, &format!("{kind}{number}"));
         let weight_name = format!("{name}.weight");
+        if let Some(width) = self.too_wide(&weight_name) {
+            let cause = format!("{width} wide; at most {WIDEST} can be computed");
+            return Err(self.error(&weight_name, cause));
+        }
         let weight = self.tensor(&weight_name)?;
         let outputs = match weight.shape[..] {
             [outputs, found] | [outputs, found, 1] if found == inputs && outputs > 0 => outputs,
@@ -339,6 +358,11 @@ impl<M, N> Reader<'_, M, N> {
             }
             None => Ok(()),
         }
+    }
+
+    fn too_wide(&self, weight: &str) -> Option<usize> {
+        let shape = self.file.shape(weight)?;
+        shape.iter().copied().find(|&width| width > WIDEST)
     }
 
     fn error(&self, tensor: &str, cause: impl Into<String>) -> FormatError {

@@ -146,9 +146,11 @@ impl Selection {
         let cloud: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, (i % 7) as f32, 0.0]).collect();
         self.cloud.sort(&cloud);
         self.distinct.sort(&cloud);
-        self.kept.reserve(n.max(self.spec.points));
+        // Only critical points are ever repeated.
+        let most = if self.spec.kind == SamplerKind::Cpl { n.max(self.spec.points) } else { n };
+        self.kept.reserve(most);
         self.left.reserve(n);
-        self.rows.reserve(n.max(self.spec.points));
+        self.rows.reserve(most);
         self.sampler.select(&cloud, kernels)?;
         if let Some(front) = &self.front {
             let channels = front.channels(network);

@@ -159,7 +159,7 @@ typedef struct EdgepuckOptions {
   bool drop_invalid;
   /**
    * Draws of a random subset whose log-probabilities are averaged; more than
-   * 1 needs the sampler "random".
+   * 1 needs the sampler "random", or vote_rotations.
    */
   uint32_t votes;
   /**

@@ -90,9 +90,11 @@ fn status_of(error: &Error) -> EdgepuckStatus {
         Error::Sampler(SamplerError::NotFinite { .. } | SamplerError::TooManyPoints(_)) => {
             EdgepuckStatus::BadCloud
         }
-        Error::Sampler(_) | Error::FrontMissing { .. } | Error::VotesWithoutDraws(_) => {
-            EdgepuckStatus::BadOption
-        }
+        Error::Sampler(_)
+        | Error::FrontMissing { .. }
+        | Error::VotesWithoutDraws(_)
+        | Error::TooManyThreads(_)
+        | Error::TooMuchRoom(_) => EdgepuckStatus::BadOption,
     }
 }
 

@@ -57,7 +57,7 @@ pub struct EdgepuckOptions {
     /// Drop points that are not finite instead of refusing the cloud.
     pub drop_invalid: bool,
     /// Draws of a random subset whose log-probabilities are averaged; more than
-    /// 1 needs the sampler "random".
+    /// 1 needs the sampler "random", or vote_rotations.
     pub votes: u32,
     /// Turn the cloud about its up axis between votes, evenly spread.
     pub vote_rotations: bool,

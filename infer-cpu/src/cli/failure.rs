@@ -17,6 +17,7 @@ pub fn of_setup(error: infer_cpu::Error) -> anyhow::Error {
         | Error::Sampler(_)
         | Error::FrontMissing { .. }
         | Error::VotesWithoutDraws(_)
+        | Error::TooManyThreads(_)
         | Error::Threads { .. } => Usage(error.to_string()).into(),
         _ => error.into(),
     }

@@ -25,7 +25,7 @@ impl Spread {
 
     /// Which point comes at row `row`.
     pub fn point(self, row: usize) -> usize {
-        (row as u64 * self.step % self.n) as usize
+        (row as u64 * self.step % self.n.max(1)) as usize
     }
 }
 

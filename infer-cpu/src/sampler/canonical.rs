@@ -1,7 +1,7 @@
 //! The distinct points of a cloud in an order that only geometry decides.
 //!
-//! What works on this order, and breaks its ties by the lower row, does not
-//! depend on the order of the input.
+//! What works on this order, and breaks its ties by rows in any fixed way, does
+//! not depend on the order of the input.
 
 use std::cmp::Ordering;
 

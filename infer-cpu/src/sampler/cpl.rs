@@ -43,7 +43,8 @@ pub struct CriticalPoints {
 
 impl CriticalPoints {
     /// Begins with the pooling of all points: `winners` holds the row that
-    /// attains each of `maxima`, the lower of equals.
+    /// attains each of `maxima`; which of several that attain it is up to the
+    /// pooling, as long as geometry decides it and not the order of the input.
     ///
     /// A point's score is the sum of the maxima that it wins, in f64, in the
     /// order of channels. The ranking descends by score; the lower row, which

@@ -29,6 +29,7 @@ pub use cpl::CriticalPoints;
 pub use fps::FarthestPoints;
 pub use lattice::{Lattice, LatticeError};
 pub use random::RandomSubset;
+use spec::MOST_CRITICAL;
 pub use spec::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
 pub use voxel::VoxelGrid;
 
@@ -38,6 +39,9 @@ pub enum SamplerError {
     /// M is 0.
     #[error("a sampler is asked for 0 points; it keeps 1 or more")]
     NoPointsWanted,
+    /// M is so large that its repetitions would fill memory.
+    #[error("a Critical Points Layer is asked for {0} points; it gives at most {MOST_CRITICAL}")]
+    TooManyCritical(usize),
     /// A voxel has no such edge.
     #[error("a voxel size of {0} is not a positive length")]
     VoxelSize(f64),

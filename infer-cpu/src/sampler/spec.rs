@@ -7,6 +7,9 @@ use formats::model_card::ModelCard;
 
 use super::SamplerError;
 
+/// The largest M of a Critical Points Layer, which repeats points to reach it.
+pub const MOST_CRITICAL: usize = 1 << 24;
+
 /// Declares an enum whose variants have names on command lines.
 macro_rules! named {
     (
@@ -190,6 +193,9 @@ impl SamplerSpec {
             (_, Some(size)) => Err(SamplerError::VoxelSize(size)),
             (SamplerKind::All, None) => Ok(()),
             (_, None) if self.points == 0 => Err(SamplerError::NoPointsWanted),
+            (SamplerKind::Cpl, None) if self.points > MOST_CRITICAL => {
+                Err(SamplerError::TooManyCritical(self.points))
+            }
             _ => Ok(()),
         }
     }
@@ -218,6 +224,9 @@ mod tests {
             assert_eq!(spec.check().is_ok(), kind == SamplerKind::All, "{kind}");
             assert_eq!(SamplerSpec { points: 1, ..spec }.check(), Ok(()));
         }
+        let spec =
+            SamplerSpec { kind: SamplerKind::Cpl, points: 1 << 40, ..SamplerSpec::default() };
+        assert_eq!(spec.check(), Err(SamplerError::TooManyCritical(1 << 40)));
         for size in [0.0, -0.5, f64::NAN, f64::INFINITY] {
             let kind = SamplerKind::Voxel;
             let spec = SamplerSpec { kind, voxel_size: Some(size), ..SamplerSpec::default() };

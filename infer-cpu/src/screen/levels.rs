@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use crate::kernel::{I8_LARGEST, Kernels, LevelSums, Rows};
 
 /// Largest activations that divisions by their step leave finite and normal.
-const ORDINARY: RangeInclusive<f32> = 1e-30..=1e30;
+const ORDINARY: RangeInclusive<f32> = 1e-15..=1e15;
 
 /// Levels of some rows.
 #[derive(Default)]

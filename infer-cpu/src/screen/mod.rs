@@ -22,9 +22,12 @@
 //! by Cauchy and Schwarz, with the norms |e|, |w| of the channel and the
 //! largest |p|, |d| of the block's rows. Rounding in fp32 adds at most
 //! `(K + 64) u 127 sum|w|`, u = 2⁻²⁴: K + 1 steps for the product that is
-//! compared with the maximum (Higham 2002, §3.1), and less than 30 for each of
-//! the levels' quotients, the estimate, the maximum's quotient and its sum with
-//! the bound, all of them of magnitudes below `127 sum|w|`.
+//! compared with the maximum (Higham 2002, §3.1), of magnitudes of at most `127
+//! sum|w|`; the other 63 for some ten steps of magnitudes of at most twice that
+//! (weights rounded up), in the levels' quotients, the estimate, the maximum's
+//! quotient and its sum with the bound. Norms are rounded up by 10⁻⁴, more than
+//! their sums of squares lose below 10³ inputs a lane. Weights and steps are
+//! kept where nothing overflows or loses digits.
 
 mod levels;
 
@@ -37,7 +40,7 @@ use crate::kernel::{Candidate, I8_LARGEST, Kernels, Panels, Rows, Screening, WID
 use crate::precision::{Format, I8};
 
 /// Whether products of so many inputs are worth ruling out, where kernels
-/// screen at all.
+/// screen at all: not of so few that they are cheap.
 #[must_use]
 pub const fn screening_pays(inputs: usize) -> bool {
     inputs >= 32
@@ -47,9 +50,9 @@ pub const fn screening_pays(inputs: usize) -> bool {
 /// them than one in so many, the tile is the better choice.
 const ONE_IN: usize = 4;
 
-/// Channels whose weights sum to magnitudes outside of this, where fp32 has
-/// fewer digits or none, are not screened.
-const ORDINARY: Range<f64> = 1e-30..1e30;
+/// Of channels whose weights sum to magnitudes outside of this, where estimates
+/// might overflow and products lose digits, no product is ruled out.
+const ORDINARY: Range<f64> = 1e-15..1e15;
 
 /// Norms are rounded up, by more than fp32 may have lost of them.
 const NORM_SLACK: f64 = 1.0001;
@@ -164,7 +167,7 @@ impl Screen {
     }
 
     /// Raises the best of a group to the products of `rows`, whose `levels` are
-    /// known. Of equal rows the first wins.
+    /// known. Of equal products the first wins.
     ///
     /// Returns false if too many products come into question; what was raised
     /// until then is a product all the same.
@@ -201,7 +204,9 @@ impl Screen {
         dots(rows, weights, &found[..n], &mut products[..n]);
         best.raise(&found[..n], &products[..n]);
         for channel in 0..width {
-            floors[channel] = best.maxima[channel] * per_step - bounds[channel];
+            let floor = best.maxima[channel] * per_step - bounds[channel];
+            // An infinite bound rules out nothing, not even beside an infinity.
+            floors[channel] = if floor.is_nan() { f32::NEG_INFINITY } else { floor };
         }
         let most = rows.n * width / ONE_IN;
         let Some(n) = sift(estimates, floors, &mut found[..most]) else { return false };
@@ -245,7 +250,11 @@ impl Channels {
         self.bounds[channel] = match sum {
             0.0 => Bound::default(),
             sum if ORDINARY.contains(&sum) => self.ordinary_bound(channel, weights, sum),
-            _ => Bound { rounding: f32::INFINITY, ..Bound::default() },
+            _ => {
+                // Estimates of 0 for all: none can be ruled out.
+                self.panels.scale[channel] = 0.0;
+                Bound { rounding: f32::INFINITY, ..Bound::default() }
+            }
         };
     }
 

@@ -1,6 +1,7 @@
 //! How long a classification takes.
 
 use std::collections::BTreeMap;
+use std::io::{Write, stdout};
 use std::path::Path;
 use std::time::Instant;
 
@@ -52,7 +53,7 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         rows: rows.collect::<anyhow::Result<_>>()?,
     };
     if args.json {
-        println!("{}", serde_json::to_string(&record)?);
+        writeln!(stdout(), "{}", serde_json::to_string(&record)?)?;
         return Ok(());
     }
     let header = [

@@ -87,7 +87,7 @@ pub struct Args {
     #[cfg(feature = "trade")]
     /// Take every cloud of --data, or this many spread over it
     #[arg(long, value_name = "N", requires = "trade")]
-    limit: Option<usize>,
+    limit: Option<std::num::NonZeroUsize>,
 
     #[cfg(feature = "npz")]
     /// Clouds to calibrate int8 with, a packed NPZ [default: the model's own

@@ -1,7 +1,8 @@
 //! What each shortcut gains in time and costs in accuracy.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::Write;
+use std::io::{Write, stderr};
+use std::num::NonZeroUsize;
 use std::path::Path;
 use std::time::Instant;
 
@@ -59,7 +60,7 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
     if set.is_empty() {
         bail!("{}: no clouds", data.display());
     }
-    let chosen = spread(set.len(), args.limit.unwrap_or(usize::MAX));
+    let chosen = spread(set.len(), args.limit.map_or(usize::MAX, NonZeroUsize::get));
     let ranges = super::calibration(args, model)?;
     let mut references: HashMap<String, Answers> = HashMap::new();
     let mut rows = Vec::new();
@@ -72,9 +73,10 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         if setting.precision == Precision::F32 {
             references.entry(same).or_insert(answers);
         }
-        eprint!("\r{} settings", rows.len());
+        // Nobody may be reading; what was measured is worth more.
+        let _ = write!(stderr(), "\r{} settings", rows.len());
     }
-    eprintln!();
+    let _ = writeln!(stderr());
     mark_front(&mut rows);
     print(&rows)?;
     if let Some(path) = &args.csv {
