@@ -124,8 +124,11 @@ fn votes_are_seeded_and_need_a_sampler_that_draws() {
     };
     assert_eq!(votes(1), votes(1));
     assert_ne!(votes(1), votes(2));
-    folder.classify("--votes 5 c.xyz").assert_refused(2, "error: votes draw random subsets");
+    folder.classify("--votes 5 c.xyz").assert_refused(2, "error: votes need random subsets");
     assert_eq!(folder.classify("--votes 5 --vote-rotations --up y c.xyz").code, 0);
+    // More points than there are are all of them.
+    let most = "--sampler random --points 2000000000000000000 c.xyz";
+    assert_eq!(folder.classify(most).code, 0);
 }
 
 #[test]
@@ -141,6 +144,7 @@ fn what_makes_no_sense_is_a_usage_error() {
         ("--sampler cpl --front own c.xyz", "error: sampler cpl cannot pool front end own"),
         ("--sampler cpl --front trunk c.xyz", "error: sampler cpl cannot pool front end trunk"),
         ("--threads 0 c.xyz", "error: "),
+        ("--threads 5000 c.xyz", "error: invalid value '5000' for '--threads"),
         ("--files-from list c.xyz", "error: the argument"),
     ] {
         let ran = folder.run(&format!("classify --model m.safetensors {flags}"));
