@@ -1,0 +1,62 @@
+//! Adam with L2 in the gradient, as PyTorch's `Adam(weight_decay)` (Kingma and
+//! Ba 2015, algorithm 1).
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::layer::Learns;
+use crate::parameter::Parameter;
+
+/// Elements that one thread takes at a time.
+const CHUNK: usize = 1 << 14;
+
+/// Adam's constants.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Adam {
+    /// Learning rate before any schedule.
+    pub rate: f64,
+    /// Decay of the running mean of gradients.
+    pub beta1: f64,
+    /// Decay of that of their squares.
+    pub beta2: f64,
+    /// Added to the root of the latter.
+    pub epsilon: f64,
+    /// Share of each weight added to its gradient.
+    pub l2: f64,
+}
+
+impl Default for Adam {
+    /// The baseline's (yanx27, `train_classification.py`).
+    fn default() -> Self {
+        Self { rate: 1e-3, beta1: 0.9, beta2: 0.999, epsilon: 1e-8, l2: 1e-4 }
+    }
+}
+
+impl Adam {
+    /// Takes step number `step` (the first is 1) by a `rate`.
+    pub fn step(&self, network: &mut dyn Learns, step: u64, rate: f64) {
+        network.parameters(&mut |parameter| self.update(parameter, step, rate));
+    }
+
+    fn update(&self, parameter: &mut Parameter, step: u64, rate: f64) {
+        let Self { beta1, beta2, epsilon, l2, .. } = *self;
+        let correction = |beta: f64| 1.0 - beta.powf(step as f64);
+        let size = (rate / correction(beta1)) as f32;
+        let root = (1.0 / correction(beta2).sqrt()) as f32;
+        let [beta1, beta2, epsilon, l2] = [beta1, beta2, epsilon, l2].map(|x| x as f32);
+        let Parameter { value, gradient, mean, square, .. } = parameter;
+        value
+            .par_chunks_mut(CHUNK)
+            .zip(gradient.par_chunks(CHUNK))
+            .zip(mean.par_chunks_mut(CHUNK).zip(square.par_chunks_mut(CHUNK)))
+            .for_each(|((value, gradient), (mean, square))| {
+                for i in 0..value.len() {
+                    let g = gradient[i] + l2 * value[i];
+                    mean[i] += (1.0 - beta1) * (g - mean[i]);
+                    square[i] = beta2 * square[i] + (1.0 - beta2) * g * g;
+                    value[i] -= size * mean[i] / (square[i].sqrt() * root + epsilon);
+                }
+            });
+    }
+}

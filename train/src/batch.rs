@@ -1,0 +1,48 @@
+//! Clouds as a network learns from them.
+
+use ndarray::ArrayView2;
+
+use crate::layer::Rows;
+use crate::matrix::Matrix;
+
+/// Some clouds and what they should be called.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Batch {
+    /// Points of all clouds, `[rows, 3]`, distinct ones only.
+    pub coordinates: Vec<[f32; 3]>,
+    /// How often each counts.
+    pub weights: Vec<f32>,
+    /// Where each cloud's rows begin, and where the last one's end.
+    pub starts: Vec<usize>,
+    /// The share of each class, `[clouds, classes]`.
+    pub targets: Matrix,
+}
+
+impl Batch {
+    /// How many clouds there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The points as a matrix.
+    #[must_use]
+    pub fn points(&self) -> ArrayView2<'_, f32> {
+        let flat = self.coordinates.as_flattened();
+        ArrayView2::from_shape((self.coordinates.len(), 3), flat)
+            .expect("invariant: three coordinates a point")
+    }
+
+    /// Their rows.
+    #[must_use]
+    pub fn rows(&self) -> Rows<'_> {
+        let total = self.weights.iter().map(|&w| f64::from(w)).sum::<f64>() as f32;
+        Rows { weights: &self.weights, starts: &self.starts, total }
+    }
+}

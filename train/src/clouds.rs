@@ -1,0 +1,142 @@
+//! Labelled clouds, checked and normalised.
+
+mod yanx27;
+
+use std::path::Path;
+
+use formats::labelled::{LabelledSet, read_labelled};
+use formats::rng::StreamKey;
+use formats::split::Split;
+
+use crate::error::Error;
+
+/// Clouds of one size, with their classes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clouds {
+    /// Coordinates, normalised to the unit sphere.
+    pub set: LabelledSet,
+    /// Class names in the order of the labels.
+    pub classes: Vec<String>,
+}
+
+impl Clouds {
+    /// Reads the `split` of the data at `path`: a packed NPZ, a folder with
+    /// `train.npz` and `test.npz` as gen-dataset packs them, or a folder of
+    /// text files as yanx27/Pointnet_Pointnet2_pytorch trains on, of which
+    /// `most_points` points a cloud are read.
+    ///
+    /// # Errors
+    /// What cannot be read, no cloud, a coordinate that is not finite.
+    pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
+        let packed = path.join(format!("{split}.npz"));
+        let set = if path.is_file() {
+            read_labelled(path)?
+        } else if packed.is_file() {
+            read_labelled(&packed)?
+        } else if yanx27::is_one(path) {
+            yanx27::read(path, split, most_points)?
+        } else {
+            let cause = format!(
+                "neither a packed NPZ, nor a folder with {split}.npz, nor one with \
+                 modelnet40_shape_names.txt"
+            );
+            return Err(Error::Data { path: path.to_path_buf(), cause });
+        };
+        Self::checked(set, path)
+    }
+
+    fn checked(mut set: LabelledSet, path: &Path) -> Result<Self, Error> {
+        let refuse = |cause: String| Err(Error::Data { path: path.to_path_buf(), cause });
+        if set.is_empty() || set.n_points == 0 {
+            return refuse("no clouds".to_owned());
+        }
+        if let Some(at) = set.points.iter().position(|x| !x.is_finite()) {
+            let (cloud, point) = (at / 3 / set.n_points, at / 3 % set.n_points);
+            let name =
+                set.names.as_ref().map_or(String::new(), |names| format!(" ({})", names[cloud]));
+            return refuse(format!("point {point} of cloud {cloud}{name} is not finite"));
+        }
+        let most = set.labels.iter().max().map_or(0, |label| label + 1);
+        let classes = match set.classes.take() {
+            Some(classes) => classes,
+            None => (0..most).map(|class| format!("class {class}")).collect(),
+        };
+        let n_points = set.n_points;
+        for cloud in set.points.chunks_exact_mut(3 * n_points) {
+            formats::cloud::normalize_unit_sphere(cloud.as_chunks_mut::<3>().0);
+        }
+        Ok(Self { set, classes })
+    }
+
+    /// How many clouds there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.set.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.set.is_empty()
+    }
+
+    /// The clouds at `indices`.
+    #[must_use]
+    pub fn some(&self, indices: &[usize]) -> Self {
+        let mut points = Vec::with_capacity(indices.len() * self.set.n_points * 3);
+        indices.iter().for_each(|&i| points.extend_from_slice(self.set.cloud(i).as_flattened()));
+        let names = self.set.names.as_ref();
+        let set = LabelledSet {
+            points,
+            n_points: self.set.n_points,
+            labels: indices.iter().map(|&i| self.set.labels[i]).collect(),
+            names: names.map(|names| indices.iter().map(|&i| names[i].clone()).collect()),
+            classes: None,
+        };
+        Self { set, classes: self.classes.clone() }
+    }
+
+    /// Parts the set in two by instance: what is learnt from, and a `share` by
+    /// which checkpoints are chosen. Views of one mesh stay together, and every
+    /// class has its share.
+    #[must_use]
+    pub fn split_validation(&self, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
+        let stream = StreamKey::new(seed, "validation", 0);
+        let mut instances: Vec<(usize, String, Vec<usize>)> = Vec::new();
+        let mut places = std::collections::BTreeMap::new();
+        for i in 0..self.len() {
+            let key = (self.set.labels[i], self.instance(i));
+            let place = *places.entry(key.clone()).or_insert_with(|| {
+                instances.push((key.0, key.1, Vec::new()));
+                instances.len() - 1
+            });
+            instances[place].2.push(i);
+        }
+        let (mut learnt, mut held) = (Vec::new(), Vec::new());
+        for class in 0..self.classes.len() {
+            let mut of_class: Vec<_> =
+                (0..instances.len()).filter(|&i| instances[i].0 == class).collect();
+            of_class.sort_by(|&a, &b| {
+                stream.unit(a as u64).total_cmp(&stream.unit(b as u64)).then(a.cmp(&b))
+            });
+            let n_held = (of_class.len() as f64 * share).round() as usize;
+            for (rank, instance) in of_class.into_iter().enumerate() {
+                let part = if rank < n_held { &mut held } else { &mut learnt };
+                part.extend(&instances[instance].2);
+            }
+        }
+        learnt.sort_unstable();
+        held.sort_unstable();
+        (learnt, held)
+    }
+
+    /// The mesh that cloud `i` is of: its name without the view's number, which
+    /// gen-dataset puts after the last `_v`.
+    fn instance(&self, i: usize) -> String {
+        let Some(names) = &self.set.names else { return i.to_string() };
+        match names[i].rsplit_once("_v") {
+            Some((mesh, view)) if view.bytes().all(|b| b.is_ascii_digit()) => mesh.to_owned(),
+            _ => names[i].clone(),
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! `z = W x + b`.
+
+use formats::rng::StreamKey;
+use ndarray::ArrayView2;
+
+use super::Learns;
+use crate::matrix::{self, Matrix};
+use crate::parameter::Parameter;
+
+/// A linear layer.
+#[derive(Clone, Debug)]
+pub struct Linear {
+    /// W, `[outputs, inputs]`.
+    pub weight: Parameter,
+    /// b, `[outputs]`.
+    pub bias: Parameter,
+}
+
+impl Linear {
+    /// A layer of random weights, named `name`. Weights and biases are uniform
+    /// in ±1/√inputs, as PyTorch's `Linear` and `Conv1d` draw them.
+    #[must_use]
+    pub fn new(name: &str, inputs: usize, outputs: usize, seed: u64) -> Self {
+        let limit = 1.0 / (inputs as f64).sqrt();
+        let draw = |part: &str, n: usize| {
+            let stream = StreamKey::new(seed, &format!("{name}.{part}"), 0);
+            (0..n as u64).map(|i| ((2.0 * stream.unit(i) - 1.0) * limit) as f32).collect()
+        };
+        let parameter = |part: &str, shape: Vec<usize>| {
+            let n = shape.iter().product();
+            Parameter::new(format!("{name}.{part}"), shape, draw(part, n))
+        };
+        Self {
+            weight: parameter("weight", vec![outputs, inputs]),
+            bias: parameter("bias", vec![outputs]),
+        }
+    }
+
+    /// How many inputs and outputs it has.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        (self.weight.shape[1], self.weight.shape[0])
+    }
+
+    /// `z` without the bias, for a batch norm that takes it away again.
+    #[must_use]
+    pub fn products(&self, x: ArrayView2<'_, f32>) -> Matrix {
+        matrix::forward(x, self.weight.matrix())
+    }
+
+    /// `z`.
+    #[must_use]
+    pub fn forward(&self, x: ArrayView2<'_, f32>) -> Matrix {
+        self.products(x) + ndarray::aview1(&self.bias.value)
+    }
+
+    /// Sets the gradients, and returns that of `x`.
+    pub fn backward(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) -> Matrix {
+        let bias = dz.sum_axis(ndarray::Axis(0));
+        self.bias.gradient.copy_from_slice(bias.as_slice().expect("invariant: contiguous"));
+        self.backward_products(x, dz);
+        matrix::backward(dz, self.weight.matrix())
+    }
+
+    /// Sets the weights' gradient alone. In front of a batch norm that of the
+    /// bias is 0.
+    pub fn backward_products(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) {
+        matrix::gradient(dz, x, &mut self.weight.gradient);
+    }
+}
+
+impl Learns for Linear {
+    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
+        visit(&mut self.weight);
+        visit(&mut self.bias);
+    }
+
+    fn statistics(&mut self, _: &mut dyn FnMut(&str, &mut Vec<f32>)) {}
+}

@@ -1,0 +1,72 @@
+//! Layers with their gradients, by hand: what PointNet needs, and no more.
+//!
+//! # Rows with weights
+//! The baseline's augmentation drops points by moving them onto the cloud's
+//! first point. A network that pools by maximum cannot tell such a duplicate
+//! from the original, but for one thing: batch norms count it in mean and
+//! variance. So dropped points are removed here, and the first point's row is
+//! given the weight of all its duplicates. Forward, every layer's statistics
+//! and so its outputs are the same. Backward, a duplicate's gradient is that
+//! of its original: the row's gradient is their sum, in which the batch norm's
+//! share counts once for each. Seven sixteenths of the work are saved on
+//! average, and no result changes but by rounding.
+
+mod linear;
+mod norm;
+mod point;
+mod pooled;
+mod transform;
+mod vector;
+
+pub use linear::Linear;
+pub use norm::Norm;
+pub use point::PointLayer;
+pub use pooled::PooledLayer;
+pub use transform::{Transforms, orthogonality};
+pub use vector::VectorLayer;
+
+use ndarray::{ArrayViewMut2, Axis};
+
+use crate::matrix::Matrix;
+use crate::parameter::Parameter;
+
+/// The points of a batch.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<'a> {
+    /// How often each row counts in statistics.
+    pub weights: &'a [f32],
+    /// Where each cloud's rows begin, and where the last one's end.
+    pub starts: &'a [usize],
+    /// The sum of all weights.
+    pub total: f32,
+}
+
+impl Rows<'_> {
+    /// How many clouds there are.
+    #[must_use]
+    pub fn n_clouds(&self) -> usize {
+        self.starts.len() - 1
+    }
+}
+
+/// The rows of each cloud.
+fn by_cloud<'a>(matrix: &'a mut Matrix, rows: Rows<'_>) -> Vec<ArrayViewMut2<'a, f32>> {
+    let mut clouds = Vec::with_capacity(rows.n_clouds());
+    let mut rest = matrix.view_mut();
+    for pair in rows.starts.windows(2) {
+        let (cloud, after) = rest.split_at(Axis(0), pair[1] - pair[0]);
+        clouds.push(cloud);
+        rest = after;
+    }
+    clouds
+}
+
+/// What owns parameters.
+pub trait Learns {
+    /// Calls `visit` with each parameter, always in the same order.
+    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter));
+
+    /// Calls `visit` with the name, shape and values of what is not learnt by
+    /// gradients but kept with the parameters.
+    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>));
+}

@@ -1,0 +1,191 @@
+//! Batch norm in training.
+
+use ndarray::Axis;
+use ndarray::parallel::prelude::*;
+use rayon::slice::ParallelSlice;
+
+use super::Learns;
+use crate::matrix::{Matrix, ROWS};
+use crate::parameter::Parameter;
+
+/// PyTorch's default, which the baseline keeps.
+pub const EPSILON: f32 = 1e-5;
+
+/// A batch norm with its running statistics.
+#[derive(Clone, Debug)]
+pub struct Norm {
+    name: String,
+    /// γ.
+    pub scale: Parameter,
+    /// β.
+    pub shift: Parameter,
+    /// Running mean of `W x + b`.
+    pub mean: Vec<f32>,
+    /// Running variance.
+    pub variance: Vec<f32>,
+}
+
+/// What backward needs of a forward pass.
+#[derive(Clone, Debug, Default)]
+pub struct Saved {
+    /// Values with mean 0 and variance 1.
+    pub normalised: Matrix,
+    /// 1 / standard deviation, of each channel.
+    pub inverse: Vec<f32>,
+}
+
+impl Norm {
+    /// A batch norm of `channels`.
+    #[must_use]
+    pub fn new(name: &str, channels: usize) -> Self {
+        let parameter = |part: &str, value| {
+            Parameter::new(format!("{name}.{part}"), vec![channels], vec![value; channels])
+        };
+        Self {
+            name: name.to_owned(),
+            scale: parameter("weight", 1.0),
+            shift: parameter("bias", 0.0),
+            mean: vec![0.0; channels],
+            variance: vec![1.0; channels],
+        }
+    }
+
+    /// Counts a batch's statistics in the running ones: `mean` without `bias`,
+    /// variance over `total` values, with PyTorch's `momentum` share.
+    pub fn remember(
+        &mut self,
+        (mean, variance): (&[f32], &[f32]),
+        bias: &[f32],
+        total: f32,
+        momentum: f32,
+    ) {
+        let unbiased = total / (total - 1.0).max(1.0);
+        for (channel, running) in self.mean.iter_mut().enumerate() {
+            *running += momentum * (mean[channel] + bias[channel] - *running);
+        }
+        for (running, variance) in self.variance.iter_mut().zip(variance) {
+            *running += momentum * (variance * unbiased - *running);
+        }
+    }
+
+    /// Normalises `z`, of which row i counts `weights[i]` times, scales and
+    /// shifts it; with `relu` negative results become 0. `z` lacks the bias,
+    /// which changes nothing but the running mean.
+    pub fn forward(
+        &mut self,
+        mut z: Matrix,
+        (weights, total): (&[f32], f32),
+        bias: &[f32],
+        (momentum, relu): (f32, bool),
+    ) -> (Matrix, Saved) {
+        let mean = column_sums(&z, weights, |z, _| z, total);
+        let variance = {
+            let centre = &mean;
+            column_sums(&z, weights, |z, c| (z - centre[c]) * (z - centre[c]), total)
+        };
+        self.remember((&mean, &variance), bias, total, momentum);
+        let inverse: Vec<f32> = variance.iter().map(|v| 1.0 / (v + EPSILON).sqrt()).collect();
+        let (scale, shift) = (&self.scale.value, &self.shift.value);
+        let mut out = Matrix::zeros(z.dim());
+        z.axis_chunks_iter_mut(Axis(0), ROWS)
+            .into_par_iter()
+            .zip(out.axis_chunks_iter_mut(Axis(0), ROWS))
+            .for_each(|(mut z, mut out)| {
+                for (mut z, mut out) in z.rows_mut().into_iter().zip(out.rows_mut()) {
+                    let (z, out) = (slice(&mut z), slice(&mut out));
+                    for c in 0..z.len() {
+                        z[c] = (z[c] - mean[c]) * inverse[c];
+                        let y = z[c] * scale[c] + shift[c];
+                        out[c] = if relu { y.max(0.0) } else { y };
+                    }
+                }
+            });
+        (out, Saved { normalised: z, inverse })
+    }
+
+    /// Turns the gradient of the outputs into that of `z`, and sets those of
+    /// scale and shift. `y` are the outputs if a ReLU made them.
+    pub fn backward(
+        &mut self,
+        mut dy: Matrix,
+        y: Option<&Matrix>,
+        saved: &Saved,
+        (weights, total): (&[f32], f32),
+    ) -> Matrix {
+        if let Some(y) = y {
+            dy.zip_mut_with(y, |dy, &y| {
+                if y <= 0.0 {
+                    *dy = 0.0;
+                }
+            });
+        }
+        let ones = vec![1.0; dy.nrows()];
+        let sum = column_sums(&dy, &ones, |dy, _| dy, 1.0);
+        let product = &dy * &saved.normalised;
+        let with_normalised = column_sums(&product, &ones, |p, _| p, 1.0);
+        let Saved { normalised, inverse } = saved;
+        let scale = &self.scale.value;
+        dy.axis_chunks_iter_mut(Axis(0), ROWS)
+            .into_par_iter()
+            .zip(normalised.axis_chunks_iter(Axis(0), ROWS))
+            .zip(weights.par_chunks(ROWS))
+            .for_each(|((mut dy, normalised), weights)| {
+                let rows = dy.rows_mut().into_iter().zip(normalised.rows());
+                for ((mut dy, normalised), weight) in rows.zip(weights) {
+                    let share = weight / total;
+                    let dy = slice(&mut dy);
+                    for (c, normalised) in normalised.iter().enumerate() {
+                        let common = share * (sum[c] + normalised * with_normalised[c]);
+                        dy[c] = scale[c] * inverse[c] * (dy[c] - common);
+                    }
+                }
+            });
+        self.scale.gradient.copy_from_slice(&with_normalised);
+        self.shift.gradient.copy_from_slice(&sum);
+        dy
+    }
+}
+
+fn slice<'a>(row: &'a mut ndarray::ArrayViewMut1<'_, f32>) -> &'a mut [f32] {
+    row.as_slice_mut().expect("invariant: rows are contiguous")
+}
+
+/// Sums `term(z, channel)` times its row's weight over rows, over `total`:
+/// chunks in f32, their sums in f64.
+pub fn column_sums(
+    z: &Matrix,
+    weights: &[f32],
+    term: impl Fn(f32, usize) -> f32 + Sync,
+    total: f32,
+) -> Vec<f32> {
+    let channels = z.ncols();
+    let chunk_sums: Vec<Vec<f32>> = z
+        .axis_chunks_iter(Axis(0), ROWS)
+        .into_par_iter()
+        .zip(weights.par_chunks(ROWS))
+        .map(|(z, weights)| {
+            let mut sums = vec![0.0f32; channels];
+            for (z, &weight) in z.rows().into_iter().zip(weights) {
+                let z = z.to_slice().expect("invariant: rows are contiguous");
+                for c in 0..channels {
+                    sums[c] += weight * term(z[c], c);
+                }
+            }
+            sums
+        })
+        .collect();
+    let of = |c: usize| chunk_sums.iter().map(|sums| f64::from(sums[c])).sum::<f64>();
+    (0..channels).map(|c| (of(c) / f64::from(total)) as f32).collect()
+}
+
+impl Learns for Norm {
+    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
+        visit(&mut self.scale);
+        visit(&mut self.shift);
+    }
+
+    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
+        visit(&format!("{}.running_mean", self.name), &mut self.mean);
+        visit(&format!("{}.running_var", self.name), &mut self.variance);
+    }
+}

@@ -1,0 +1,281 @@
+//! Linear, batch norm and the maximum over each cloud's points, in one.
+//!
+//! The products z = W x, a thousand a point, are never kept:
+//!
+//! - A maximum wants one of each channel and cloud, which infer-cpu's fused
+//!   kernel finds. A batch norm with a scale of at least 0 keeps the order of
+//!   its values, one below 0 turns it: then the sign goes into the weights.
+//! - Mean and variance of z follow from those of x: mean(z) = W mean(x), and
+//!   var(z) = w cov(x) wᵀ for each channel's w.
+//! - Backward, a channel's gradient G comes to one point of each cloud, and
+//!   through the batch norm's statistics to all points. With σ, γ of a
+//!   channel, n points in all, S = ΣG over clouds and P = ΣG ẑ:
+//!
+//! ```text
+//! dW  =  γ/σ (Σ G x_winner  -  S mean(x)  -  P cov(x) w / σ)
+//! dx  =  Σ_channels γ/σ w (G at its winners)  -  v  -  A (x - mean(x))
+//! v   =  Σ_channels γ/σ S/n w,      A  =  Σ_channels γ P / (n σ²) w wᵀ
+//! ```
+//!
+//! so all points together cost a product with a matrix of inputs by inputs.
+
+use infer_cpu::kernel::{self, Panels};
+use ndarray::parallel::prelude::*;
+use ndarray::{ArrayView2, Axis};
+use rayon::slice::ParallelSliceMut;
+
+use super::norm::{EPSILON, column_sums};
+use super::{Learns, Linear, Norm, Rows, by_cloud};
+use crate::matrix::{self, Matrix};
+use crate::parameter::Parameter;
+
+/// The last point-wise layer before a pooling, and the pooling.
+#[derive(Clone, Debug)]
+pub struct PooledLayer {
+    linear: Linear,
+    norm: Norm,
+    relu: bool,
+    saved: Saved,
+    output: Matrix,
+}
+
+/// What backward needs of a forward pass.
+#[derive(Clone, Debug, Default)]
+struct Saved {
+    /// The row that won, by cloud and channel.
+    winners: Vec<u32>,
+    /// Its product with mean 0 and variance 1.
+    normalised: Matrix,
+    /// Mean of the inputs.
+    mean: Vec<f32>,
+    /// Inputs less their mean.
+    centred: Matrix,
+    /// W cov(x).
+    covariant: Matrix,
+    inverse: Vec<f32>,
+}
+
+impl PooledLayer {
+    /// A layer whose parts are named `linear` and `norm`; with `relu` what is
+    /// pooled is at least 0.
+    #[must_use]
+    pub fn new(
+        linear: &str,
+        norm: &str,
+        (inputs, outputs): (usize, usize),
+        relu: bool,
+        seed: u64,
+    ) -> Self {
+        Self {
+            linear: Linear::new(linear, inputs, outputs, seed),
+            norm: Norm::new(norm, outputs),
+            relu,
+            saved: Saved::default(),
+            output: Matrix::default((0, outputs)),
+        }
+    }
+
+    /// The pooled features `[clouds, outputs]`.
+    #[must_use]
+    pub fn output(&self) -> ArrayView2<'_, f32> {
+        self.output.view()
+    }
+
+    /// The row that won each channel of cloud `cloud`.
+    #[must_use]
+    pub fn winners(&self, cloud: usize) -> &[u32] {
+        let n = self.output.ncols();
+        &self.saved.winners[cloud * n..][..n]
+    }
+
+    /// Takes `x` `[rows, inputs]` through the layer.
+    pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
+        let x = x.to_owned();
+        let mean = column_sums(&x, rows.weights, |x, _| x, rows.total);
+        let centred = &x - &ndarray::aview1(&mean);
+        let covariance = covariance(&centred, rows);
+        let weights = self.linear.weight.matrix();
+        // [outputs, inputs]; a covariance is its own transpose.
+        let covariant = matrix::forward(weights, covariance.view());
+        let products = |row: usize| {
+            let (a, w) = (covariant.row(row), weights.row(row));
+            a.iter().zip(w).map(|(a, w)| f64::from(*a) * f64::from(*w)).sum::<f64>()
+        };
+        let variance: Vec<f32> =
+            (0..weights.nrows()).map(|row| products(row).max(0.0) as f32).collect();
+        let mean_product = weights.dot(&ndarray::aview1(&mean)).to_vec();
+        let inverse: Vec<f32> = variance.iter().map(|v| 1.0 / (v + EPSILON).sqrt()).collect();
+        let bias = &self.linear.bias.value;
+        self.norm.remember((&mean_product, &variance), bias, rows.total, momentum);
+
+        let (mut normalised, winners) = self.largest(&x, rows);
+        self.output = Matrix::zeros(normalised.dim());
+        let (scale, shift) = (&self.norm.scale.value, &self.norm.shift.value);
+        for (mut z, mut out) in normalised.rows_mut().into_iter().zip(self.output.rows_mut()) {
+            for c in 0..z.len() {
+                z[c] = (z[c] - mean_product[c]) * inverse[c];
+                let y = z[c] * scale[c] + shift[c];
+                out[c] = if self.relu { y.max(0.0) } else { y };
+            }
+        }
+        self.saved = Saved { winners, normalised, mean, centred, covariant, inverse };
+    }
+
+    /// The products that the batch norm makes largest, and their rows.
+    fn largest(&self, x: &Matrix, rows: Rows<'_>) -> (Matrix, Vec<u32>) {
+        let (inputs, outputs) = self.linear.size();
+        let scale = &self.norm.scale.value;
+        let sign = |c: usize| if scale[c] < 0.0 { -1.0 } else { 1.0 };
+        let gemm = kernel::available()
+            .find_map(|kernels| kernels.f32.as_ref())
+            .expect("invariant: the scalar kernels run everywhere");
+        let mut panels = Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, 1));
+        let weights = self.linear.weight.matrix();
+        panels.fill(|input, output| sign(output) * weights[(output, input)]);
+        let stride = panels.padded_inputs;
+        let padded = panels.padded_outputs();
+        let n_clouds = rows.n_clouds();
+        let mut products = Matrix::zeros((n_clouds, outputs));
+        let mut winners = vec![0; n_clouds * outputs];
+        products
+            .axis_iter_mut(Axis(0))
+            .into_par_iter()
+            .zip(winners.par_chunks_mut(outputs))
+            .enumerate()
+            .for_each(|(cloud, (mut products, winners))| {
+                let (first, last) = (rows.starts[cloud], rows.starts[cloud + 1]);
+                let points = x.slice(ndarray::s![first..last, ..]);
+                let data = padded_rows(points, stride);
+                let points = kernel::Rows { data: &data, stride, n: last - first };
+                let (mut maxima, mut who) = (vec![f32::NEG_INFINITY; padded], vec![0; padded]);
+                let all = 0..panels.n_panels();
+                (gemm.argmax)(&points, &panels, all, first as u32, &mut maxima, &mut who);
+                for c in 0..outputs {
+                    products[c] = sign(c) * maxima[c];
+                }
+                winners.copy_from_slice(&who[..outputs]);
+            });
+        (products, winners)
+    }
+
+    /// Sets gradients from that of the output; returns that of `x`.
+    pub fn backward(&mut self, mut dy: Matrix, x: ArrayView2<'_, f32>, rows: Rows<'_>) -> Matrix {
+        if self.relu {
+            dy.zip_mut_with(&self.output, |dy, &y| {
+                if y <= 0.0 {
+                    *dy = 0.0;
+                }
+            });
+        }
+        let sum = dy.sum_axis(Axis(0)).to_vec();
+        let with_normalised = (&dy * &self.saved.normalised).sum_axis(Axis(0)).to_vec();
+        let slope: Vec<f32> =
+            self.norm.scale.value.iter().zip(&self.saved.inverse).map(|(s, i)| s * i).collect();
+        self.weight_gradient(&dy, x, (&sum, &with_normalised), &slope);
+        let dx = self.input_gradient(&dy, rows, (&sum, &with_normalised), &slope);
+        self.norm.scale.gradient.copy_from_slice(&with_normalised);
+        self.norm.shift.gradient.copy_from_slice(&sum);
+        dx
+    }
+
+    fn weight_gradient(
+        &mut self,
+        dy: &Matrix,
+        x: ArrayView2<'_, f32>,
+        (sum, with_normalised): (&[f32], &[f32]),
+        slope: &[f32],
+    ) {
+        let Saved { winners, mean, covariant, inverse, .. } = &self.saved;
+        let (inputs, outputs) = self.linear.size();
+        let gradients = self.linear.weight.gradient.par_chunks_mut(inputs).enumerate();
+        gradients.for_each(|(c, gradient)| {
+            let share = with_normalised[c] * inverse[c];
+            for k in 0..inputs {
+                gradient[k] = -sum[c] * mean[k] - share * covariant[(c, k)];
+            }
+            for (dy, winners) in dy.rows().into_iter().zip(winners.chunks_exact(outputs)) {
+                add(gradient, dy[c], x.row(winners[c] as usize));
+            }
+            gradient.iter_mut().for_each(|gradient| *gradient *= slope[c]);
+        });
+    }
+
+    fn input_gradient(
+        &self,
+        dy: &Matrix,
+        rows: Rows<'_>,
+        (sum, with_normalised): (&[f32], &[f32]),
+        slope: &[f32],
+    ) -> Matrix {
+        let Saved { winners, centred, inverse, .. } = &self.saved;
+        let (inputs, outputs) = self.linear.size();
+        let weights = self.linear.weight.matrix();
+        // A = Wᵀ (D W), D = γ P / (n σ²), and v = Wᵀ (γ/σ S/n).
+        let scaled = |factor: &dyn Fn(usize) -> f32| {
+            let mut scaled = weights.to_owned();
+            for (c, mut row) in scaled.rows_mut().into_iter().enumerate() {
+                row *= factor(c);
+            }
+            scaled
+        };
+        let curved = scaled(&|c| slope[c] * inverse[c] * with_normalised[c] / rows.total);
+        let mut a = vec![0.0; inputs * inputs];
+        matrix::gradient(curved.view(), weights, &mut a);
+        let a = Matrix::from_shape_vec((inputs, inputs), a).expect("invariant: square");
+        let shares: Vec<f32> = (0..outputs).map(|c| slope[c] * sum[c] / rows.total).collect();
+        let v = weights.t().dot(&ndarray::aview1(&shares));
+        let mut dx = matrix::forward(centred.view(), a.view());
+        for (mut dx, weight) in dx.rows_mut().into_iter().zip(rows.weights) {
+            dx.zip_mut_with(&v, |dx, v| *dx = -weight * (*dx + v));
+        }
+        by_cloud(&mut dx, rows).into_par_iter().enumerate().for_each(|(cloud, mut dx)| {
+            for c in (0..outputs).filter(|&c| dy[(cloud, c)] != 0.0) {
+                let row = winners[cloud * outputs + c] as usize - rows.starts[cloud];
+                let mut row = dx.row_mut(row);
+                let row = row.as_slice_mut().expect("invariant: rows are contiguous");
+                add(row, dy[(cloud, c)] * slope[c], weights.row(c));
+            }
+        });
+        dx
+    }
+}
+
+/// `out += factor * row`.
+fn add(out: &mut [f32], factor: f32, row: ndarray::ArrayView1<'_, f32>) {
+    let row = row.to_slice().expect("invariant: rows are contiguous");
+    for (out, x) in out.iter_mut().zip(row) {
+        *out += factor * x;
+    }
+}
+
+/// The weighted covariance of `centred` inputs, `[inputs, inputs]`.
+fn covariance(centred: &Matrix, rows: Rows<'_>) -> Matrix {
+    let mut weighted = centred.clone();
+    for (mut row, weight) in weighted.rows_mut().into_iter().zip(rows.weights) {
+        row *= weight / rows.total;
+    }
+    let n = centred.ncols();
+    let mut out = vec![0.0; n * n];
+    matrix::gradient(weighted.view(), centred.view(), &mut out);
+    Matrix::from_shape_vec((n, n), out).expect("invariant: square")
+}
+
+/// `rows` with zeros up to `stride`.
+fn padded_rows(rows: ArrayView2<'_, f32>, stride: usize) -> Vec<f32> {
+    let mut data = vec![0.0; rows.nrows() * stride];
+    for (data, row) in data.chunks_exact_mut(stride).zip(rows.rows()) {
+        data[..row.len()].copy_from_slice(row.to_slice().expect("invariant: contiguous"));
+    }
+    data
+}
+
+impl Learns for PooledLayer {
+    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
+        self.linear.parameters(visit);
+        self.norm.parameters(visit);
+    }
+
+    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
+        self.norm.statistics(visit);
+    }
+}

@@ -1,0 +1,52 @@
+//! Cross entropy, with its gradient by the logits.
+
+use ndarray::parallel::prelude::*;
+
+use crate::matrix::Matrix;
+
+/// What a batch cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Loss {
+    /// What is minimised.
+    pub total: f64,
+    /// Mean of ‖T Tᵀ - 1‖ of feature transforms, before its weight.
+    pub orthogonality: f64,
+    /// Clouds whose most probable class has the largest share of the target.
+    pub correct: usize,
+}
+
+/// The mean cross entropy of `logits` `[clouds, classes]` with `targets` (rows
+/// that sum to 1), and its gradient, in which the logits' memory is used.
+#[must_use]
+pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
+    let n = logits.nrows() as f64;
+    let rows: Vec<(f64, bool)> = logits
+        .axis_iter_mut(ndarray::Axis(0))
+        .into_par_iter()
+        .zip(targets.axis_iter(ndarray::Axis(0)))
+        .map(|(mut logits, target)| {
+            let logits = logits.as_slice_mut().expect("invariant: rows are contiguous");
+            let target = target.to_slice().expect("invariant: rows are contiguous");
+            let right = argmax(logits) == argmax(target);
+            let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            let sum: f64 = logits.iter().map(|&x| f64::from(x - largest).exp()).sum();
+            let log_sum = sum.ln();
+            let mut cost = 0.0;
+            for (x, &t) in logits.iter_mut().zip(target) {
+                let log_p = f64::from(*x - largest) - log_sum;
+                cost -= f64::from(t) * log_p;
+                *x = ((log_p.exp() - f64::from(t)) / n) as f32;
+            }
+            (cost, right)
+        })
+        .collect();
+    let total = rows.iter().map(|(cost, _)| cost).sum::<f64>() / n;
+    let correct = rows.iter().filter(|(_, right)| *right).count();
+    (Loss { total, correct, ..Loss::default() }, logits)
+}
+
+/// The place of the largest of `values`, the first among equals.
+fn argmax(values: &[f32]) -> usize {
+    let largest = |best: usize, i: usize| if values[i] > values[best] { i } else { best };
+    (0..values.len()).fold(0, largest)
+}

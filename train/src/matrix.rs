@@ -1,0 +1,52 @@
+//! Products of matrices, shared out over threads so that no sum's order depends
+//! on how many there are.
+
+use ndarray::linalg::general_mat_mul;
+use ndarray::parallel::prelude::*;
+use ndarray::{Array2, ArrayView2, Axis, s};
+use rayon::slice::ParallelSliceMut;
+
+/// A matrix, row by row in memory.
+pub type Matrix = Array2<f32>;
+
+/// Rows that one thread takes at a time.
+pub const ROWS: usize = 192;
+
+/// Outputs whose gradients one thread takes at a time.
+const COLUMNS: usize = 64;
+
+/// `x` `[n, inputs]` times the transpose of `weights` `[outputs, inputs]`.
+#[must_use]
+pub fn forward(x: ArrayView2<'_, f32>, weights: ArrayView2<'_, f32>) -> Matrix {
+    let mut out = Matrix::zeros((x.nrows(), weights.nrows()));
+    out.axis_chunks_iter_mut(Axis(0), ROWS)
+        .into_par_iter()
+        .zip(x.axis_chunks_iter(Axis(0), ROWS))
+        .for_each(|(mut out, x)| general_mat_mul(1.0, &x, &weights.t(), 0.0, &mut out));
+    out
+}
+
+/// `dz` `[n, outputs]` times `weights` `[outputs, inputs]`: the gradient of the
+/// inputs.
+#[must_use]
+pub fn backward(dz: ArrayView2<'_, f32>, weights: ArrayView2<'_, f32>) -> Matrix {
+    let mut out = Matrix::zeros((dz.nrows(), weights.ncols()));
+    out.axis_chunks_iter_mut(Axis(0), ROWS)
+        .into_par_iter()
+        .zip(dz.axis_chunks_iter(Axis(0), ROWS))
+        .for_each(|(mut out, dz)| general_mat_mul(1.0, &dz, &weights, 0.0, &mut out));
+    out
+}
+
+/// The transpose of `dz` `[n, outputs]` times `x` `[n, inputs]`: the gradient of
+/// the weights, written to `out` `[outputs, inputs]` in C order.
+pub fn gradient(dz: ArrayView2<'_, f32>, x: ArrayView2<'_, f32>, out: &mut [f32]) {
+    let inputs = x.ncols();
+    out.par_chunks_mut(COLUMNS * inputs).enumerate().for_each(|(chunk, out)| {
+        let n = out.len() / inputs;
+        let columns = dz.slice(s![.., chunk * COLUMNS..chunk * COLUMNS + n]);
+        let mut out = ndarray::ArrayViewMut2::from_shape((n, inputs), out)
+            .expect("invariant: a chunk is whole rows");
+        general_mat_mul(1.0, &columns.t(), &x, 0.0, &mut out);
+    });
+}

@@ -1,0 +1,41 @@
+//! What is learnt.
+
+use ndarray::ArrayView2;
+
+/// An array that is learnt, with its gradient and the optimiser's moments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name in model files and checkpoints.
+    pub name: String,
+    /// Its shape there.
+    pub shape: Vec<usize>,
+    /// Its elements in C order.
+    pub value: Vec<f32>,
+    /// The loss's derivative by each.
+    pub gradient: Vec<f32>,
+    /// Adam's running mean of gradients.
+    pub mean: Vec<f32>,
+    /// Adam's running mean of their squares.
+    pub square: Vec<f32>,
+}
+
+impl Parameter {
+    /// A parameter of a `value`.
+    #[must_use]
+    pub fn new(name: String, shape: Vec<usize>, value: Vec<f32>) -> Self {
+        let zeros = vec![0.0; value.len()];
+        let (gradient, mean, square) = (zeros.clone(), zeros.clone(), zeros);
+        Self { name, shape, value, gradient, mean, square }
+    }
+
+    /// A matrix of weights `[outputs, inputs]`.
+    ///
+    /// # Panics
+    /// If the parameter is no matrix.
+    #[must_use]
+    pub fn matrix(&self) -> ArrayView2<'_, f32> {
+        let (outputs, inputs) = (self.shape[0], self.shape[1]);
+        ArrayView2::from_shape((outputs, inputs), &self.value)
+            .expect("invariant: shape and elements agree")
+    }
+}

@@ -1,0 +1,238 @@
+//! What a run does, as a TOML file says it. Every key has a default: the
+//! baseline's (yanx27/Pointnet_Pointnet2_pytorch, `train_classification.py`,
+//! `provider.py`).
+
+use std::path::Path;
+
+use formats::FormatError;
+use serde::{Deserialize, Serialize};
+
+use crate::adam::Adam;
+use crate::error::Error;
+use crate::network::Shape;
+
+/// A run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Recipe {
+    /// What all random draws depend on.
+    pub seed: u64,
+    /// Passes over the training set.
+    pub epochs: u32,
+    /// Clouds of a batch; a rest of fewer at an epoch's end is left out.
+    pub batch: usize,
+    /// Points that the network sees.
+    pub points: usize,
+    /// How they are drawn from a cloud that has more.
+    pub sampling: Sampling,
+    /// Share of the training set's instances that checkpoints are chosen by;
+    /// with 0 the last is taken.
+    pub validation: f64,
+    /// The network's layers.
+    pub network: Shape,
+    /// Share of the last hidden layer's features that are dropped.
+    pub dropout: f64,
+    /// Weight of the feature transform's regulariser.
+    pub orthogonality: f64,
+    /// Share of the target that is spread over all classes.
+    pub label_smoothing: f64,
+    /// The optimiser.
+    pub adam: Adam,
+    /// How the learning rate falls.
+    pub schedule: Schedule,
+    /// What is done to clouds.
+    pub augment: Augment,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            epochs: 200,
+            batch: 24,
+            points: 1024,
+            sampling: Sampling::First,
+            validation: 0.1,
+            network: Shape::default(),
+            dropout: 0.4,
+            orthogonality: 0.001,
+            label_smoothing: 0.0,
+            adam: Adam::default(),
+            schedule: Schedule::default(),
+            augment: Augment::default(),
+        }
+    }
+}
+
+/// Which of a cloud's points are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// The first, as the baseline's loader.
+    First,
+    /// Others in each epoch, drawn without replacement.
+    Random,
+    /// Farthest point sampling among a random half or more of the cloud: the
+    /// start and the choice differ from epoch to epoch.
+    Fps,
+}
+
+/// How the learning rate falls.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
+pub enum Schedule {
+    /// By a factor every so many epochs (PyTorch's `StepLR`).
+    Step {
+        /// Epochs between.
+        every: u32,
+        /// The factor.
+        factor: f64,
+    },
+    /// Along half a cosine to `last` of the first rate, after epochs of linear
+    /// growth (Loshchilov and Hutter 2017).
+    Cosine {
+        /// Epochs of growth.
+        warm_up: f64,
+        /// The last rate over the first.
+        last: f64,
+    },
+}
+
+impl Default for Schedule {
+    fn default() -> Self {
+        Self::Step { every: 20, factor: 0.7 }
+    }
+}
+
+impl Schedule {
+    /// The rate over the first, `progress` epochs into a run of `epochs`.
+    #[must_use]
+    pub fn factor(self, progress: f64, epochs: u32) -> f64 {
+        match self {
+            // The baseline steps its scheduler before its first epoch, so that
+            // the rate falls a whole epoch early.
+            Self::Step { every, factor } => {
+                factor.powi(((progress.floor() as u32 + 1) / every.max(1)) as i32)
+            }
+            Self::Cosine { warm_up, .. } if progress < warm_up => (progress + 0.01) / warm_up,
+            Self::Cosine { warm_up, last } => {
+                let done = (progress - warm_up) / (f64::from(epochs) - warm_up).max(1e-9);
+                let half = 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos());
+                last + (1.0 - last) * half
+            }
+        }
+    }
+}
+
+/// What is done to clouds in training; what is 0 or absent is not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Augment {
+    /// The largest share of points that are dropped; each cloud's is uniform
+    /// below it.
+    pub drop: f64,
+    /// Scale, uniform between.
+    pub scale: [f64; 2],
+    /// The largest shift along each axis.
+    pub shift: f64,
+    /// Standard deviation of a normal shift of each point.
+    pub jitter: f64,
+    /// Where jitter is clipped.
+    pub jitter_clip: f64,
+    /// The largest angle about the up axis, degrees; 180 is any.
+    pub rotate_degrees: f64,
+    /// The up axis: x, y or z.
+    pub up: Axis,
+    /// Factors of their own for each axis, uniform in 1 ± this.
+    pub stretch: f64,
+    /// Share of clouds of which a part is replaced by another cloud's
+    /// (PointCutMix-R: Zhang et al. 2022).
+    pub cut_mix: f64,
+}
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[allow(missing_docs, reason = "they are what they are called")]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Default for Augment {
+    fn default() -> Self {
+        Self {
+            drop: 0.875,
+            scale: [0.8, 1.25],
+            shift: 0.1,
+            jitter: 0.0,
+            jitter_clip: 0.05,
+            rotate_degrees: 0.0,
+            up: Axis::Z,
+            stretch: 0.0,
+            cut_mix: 0.0,
+        }
+    }
+}
+
+impl Recipe {
+    /// Reads the recipe at `path`.
+    ///
+    /// # Errors
+    /// A file that is no TOML or has unknown keys; as [`Recipe::check`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
+        let recipe: Self = toml::from_str(&text)
+            .map_err(|error| FormatError::malformed(path, "recipe", error.to_string().trim()))?;
+        recipe.check()?;
+        Ok(recipe)
+    }
+
+    /// That its values make sense.
+    ///
+    /// # Errors
+    /// [`Error::Recipe`] with the key.
+    pub fn check(&self) -> Result<(), Error> {
+        let refuse = |key, cause: &str| Err(Error::Recipe { key, cause: cause.to_owned() });
+        let share = |x: f64| (0.0..1.0).contains(&x);
+        let finite = |x: f64| x.is_finite() && x >= 0.0;
+        let Self { network, augment, .. } = self;
+        match self {
+            _ if self.epochs == 0 => refuse("epochs", "at least 1"),
+            _ if self.batch < 2 => refuse("batch", "a batch norm needs 2 clouds or more"),
+            _ if self.points == 0 => refuse("points", "at least 1"),
+            _ if !share(self.validation) => refuse("validation", "0 or more, below 1"),
+            _ if !share(self.dropout) => refuse("dropout", "0 or more, below 1"),
+            _ if !share(self.label_smoothing) => refuse("label_smoothing", "0 or more, below 1"),
+            _ if !finite(self.orthogonality) => refuse("orthogonality", "finite, 0 or more"),
+            _ if !(self.adam.rate.is_finite() && self.adam.rate > 0.0) => {
+                refuse("adam.rate", "finite and above 0")
+            }
+            _ if network.trunk.len() < 2 => refuse("network.trunk", "2 layers or more"),
+            _ if network.t_net.len() < 2 => refuse("network.t_net", "2 layers or more"),
+            _ if network.t_net_head.is_empty() => refuse("network.t_net_head", "1 layer or more"),
+            _ if network.head.is_empty() => refuse("network.head", "1 layer or more"),
+            _ if network.widths().any(|width| width == 0 || width > WIDEST) => {
+                refuse("network", "widths between 1 and 8192")
+            }
+            _ if !(share(augment.drop)) => refuse("augment.drop", "0 or more, below 1"),
+            _ if !augment.scale.iter().all(|x| x.is_finite() && *x > 0.0) => {
+                refuse("augment.scale", "two factors above 0")
+            }
+            _ if !finite(augment.shift) => refuse("augment.shift", "finite, 0 or more"),
+            _ if !finite(augment.jitter) => refuse("augment.jitter", "finite, 0 or more"),
+            _ if !share(augment.stretch) => refuse("augment.stretch", "0 or more, below 1"),
+            _ if !(0.0..=1.0).contains(&augment.cut_mix) => {
+                refuse("augment.cut_mix", "between 0 and 1")
+            }
+            _ if !(0.0..=180.0).contains(&augment.rotate_degrees) => {
+                refuse("augment.rotate_degrees", "between 0 and 180")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Layers wider than this are taken for a mistake.
+const WIDEST: usize = 8192;

@@ -1,0 +1,251 @@
+//! A run from recipe to model, in a folder that it can be resumed from.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use formats::atomic;
+use formats::model_card::ModelCard;
+use formats::split::Split;
+use indicatif::{ProgressBar, ProgressStyle};
+use infer_cpu::Options;
+use train::checkpoint;
+use train::clouds::Clouds;
+use train::evaluate::{Confusion, confusion};
+use train::recipe::{Recipe, Sampling};
+use train::trainer::{Learnt, Trainer};
+use train::{batches, model};
+
+mod metrics;
+
+use metrics::{Metrics, Row};
+
+/// Trains a network.
+#[derive(clap::Parser, Debug)]
+pub struct Args {
+    /// What to learn from: a packed NPZ, a folder with train.npz and test.npz,
+    /// or one of text files as yanx27/Pointnet_Pointnet2_pytorch has them
+    #[arg(long, value_name = "PATH")]
+    data: PathBuf,
+    /// What to report accuracy on, once, at the end [default: the test half of
+    /// --data, where it is a folder]
+    #[arg(long, value_name = "PATH")]
+    test: Option<PathBuf>,
+    /// The run as TOML; flags below go before it [default: the baseline's]
+    #[arg(long, value_name = "TOML")]
+    recipe: Option<PathBuf>,
+    /// Points that the network sees
+    #[arg(long, value_name = "N")]
+    points: Option<usize>,
+    /// Passes over the training set
+    #[arg(long, value_name = "N")]
+    epochs: Option<u32>,
+    /// What all random draws depend on
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Where the model goes; the run's folder is beside it, with `.run` for an
+    /// ending
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Does what `args` ask for, from wherever an earlier run was interrupted.
+///
+/// # Errors
+/// Data, recipe or checkpoint that cannot be used, a loss that is not finite,
+/// what the system reports.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let recipe = recipe(args)?;
+    let all = Clouds::read(&args.data, Split::Train, recipe.points)?;
+    check(&all, &recipe, &args.data)?;
+    let (learnt, held) = all.split_validation(recipe.validation, recipe.seed);
+    let (clouds, held) = (all.some(&learnt), all.some(&held));
+    ensure!(
+        batches::count(clouds.len(), &recipe) > 0,
+        "{}: {} clouds to learn from, fewer than a batch of {}",
+        args.data.display(),
+        clouds.len(),
+        recipe.batch
+    );
+    let folder = args.out.with_extension("run");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let mut run = Run::open(folder, recipe, &all.classes, &args.data)?;
+    while run.trainer.epoch < run.trainer.recipe.epochs {
+        run.epoch(&clouds, &held)?;
+    }
+    run.finish(args)
+}
+
+fn recipe(args: &Args) -> anyhow::Result<Recipe> {
+    let mut recipe = match &args.recipe {
+        Some(path) => Recipe::read(path)?,
+        None => Recipe::default(),
+    };
+    recipe.points = args.points.unwrap_or(recipe.points);
+    recipe.epochs = args.epochs.unwrap_or(recipe.epochs);
+    recipe.seed = args.seed.unwrap_or(recipe.seed);
+    recipe.check()?;
+    Ok(recipe)
+}
+
+fn check(clouds: &Clouds, recipe: &Recipe, path: &Path) -> anyhow::Result<()> {
+    let n_points = clouds.set.n_points;
+    ensure!(
+        n_points >= recipe.points,
+        "{}: clouds of {n_points} points; the recipe wants {}",
+        path.display(),
+        recipe.points
+    );
+    ensure!(clouds.classes.len() > 1, "{}: one class only", path.display());
+    for (class, name) in clouds.classes.iter().enumerate() {
+        ensure!(
+            clouds.set.labels.contains(&class),
+            "{}: no cloud of class {class} ({name}) to learn from",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// A run and its folder.
+struct Run {
+    folder: PathBuf,
+    trainer: Trainer,
+    metrics: Metrics,
+    classes: Vec<String>,
+    training_set: String,
+}
+
+impl Run {
+    fn open(
+        folder: PathBuf,
+        recipe: Recipe,
+        classes: &[String],
+        data: &Path,
+    ) -> anyhow::Result<Self> {
+        let mut trainer = Trainer::new(recipe, classes.len());
+        let checkpoint = folder.join("checkpoint.safetensors");
+        let metrics = if checkpoint.is_file() {
+            let notes = checkpoint::read(&checkpoint, &mut trainer)?;
+            eprintln!("going on after epoch {} of {}", trainer.epoch, trainer.recipe.epochs);
+            Metrics::from_notes(&notes)?
+        } else {
+            Metrics::default()
+        };
+        let text = toml::to_string(&trainer.recipe)?;
+        atomic::write(&folder.join("recipe.toml"), |file| {
+            std::io::Write::write_all(file, text.as_bytes())
+        })?;
+        let training_set = data.display().to_string();
+        Ok(Self { folder, trainer, metrics, classes: classes.to_vec(), training_set })
+    }
+
+    fn epoch(&mut self, clouds: &Clouds, held: &Clouds) -> anyhow::Result<()> {
+        let (epoch, epochs) = (self.trainer.epoch + 1, self.trainer.recipe.epochs);
+        let bar = ProgressBar::new(batches::count(clouds.len(), &self.trainer.recipe) as u64);
+        let template = "epoch {prefix} {bar:30} {pos}/{len} {msg} {eta} left";
+        bar.set_style(ProgressStyle::with_template(template)?);
+        bar.set_prefix(format!("{epoch}/{epochs}"));
+        let learnt = self.trainer.learn(clouds, |progress| {
+            bar.set_position(progress.step as u64);
+            bar.set_message(format!(
+                "loss {:.3}, {:.1} %",
+                progress.loss,
+                100.0 * progress.accuracy
+            ));
+        })?;
+        bar.finish_and_clear();
+        let current = self.folder.join("current.safetensors");
+        let card = self.card(None);
+        model::write(&current, &mut self.trainer.network, &card)?;
+        let validated = if held.is_empty() {
+            None
+        } else {
+            Some(confusion(&current, held, &Options::default())?)
+        };
+        self.note(epoch, &learnt, validated.as_ref());
+        // With nothing to choose by, the last is the best.
+        if validated.is_none() || self.metrics.is_best(epoch) {
+            fs::copy(&current, self.folder.join("best.safetensors.part"))?;
+            fs::rename(
+                self.folder.join("best.safetensors.part"),
+                self.folder.join("best.safetensors"),
+            )?;
+        }
+        self.metrics.write(&self.folder)?;
+        let notes = self.metrics.to_notes()?;
+        let path = self.folder.join("checkpoint.safetensors");
+        Ok(checkpoint::write(&path, &mut self.trainer, &notes)?)
+    }
+
+    fn note(&mut self, epoch: u32, learnt: &Learnt, validated: Option<&Confusion>) {
+        let recipe = &self.trainer.recipe;
+        let factor = recipe.schedule.factor(f64::from(epoch - 1), recipe.epochs);
+        let row = Row {
+            epoch,
+            rate: recipe.adam.rate * factor,
+            loss: learnt.loss,
+            accuracy: learnt.accuracy,
+            validation_instance: validated.map(Confusion::instance_accuracy),
+            validation_class: validated.map(Confusion::class_accuracy),
+            seconds: learnt.time.as_secs_f64(),
+            clouds_per_second: learnt.clouds as f64 / learnt.time.as_secs_f64(),
+        };
+        eprintln!("{row}");
+        self.metrics.rows.push(row);
+    }
+
+    fn card(&self, accuracy: Option<String>) -> ModelCard {
+        let recipe = &self.trainer.recipe;
+        let sampler = match recipe.sampling {
+            Sampling::First => "first",
+            Sampling::Random => "random",
+            Sampling::Fps => "fps",
+        };
+        ModelCard {
+            classes: self.classes.clone(),
+            sampler: Some(sampler.to_owned()),
+            points: Some(recipe.points),
+            training_set: Some(self.training_set.clone()),
+            accuracy,
+            provenance: Some(format!("edgepuck train, seed {}", recipe.seed)),
+            ..ModelCard::default()
+        }
+    }
+
+    /// Reads the test half, once, and writes the model.
+    fn finish(&mut self, args: &Args) -> anyhow::Result<()> {
+        let best = self.folder.join("best.safetensors");
+        let test = match (&args.test, args.data.is_dir()) {
+            (Some(test), _) => Some(test.clone()),
+            (None, true) => Some(args.data.clone()),
+            (None, false) => None,
+        };
+        let accuracy = match test {
+            Some(path) => {
+                let clouds = Clouds::read(&path, Split::Test, self.trainer.recipe.points)?;
+                ensure!(
+                    clouds.classes == self.classes,
+                    "{}: its classes are not those of {}",
+                    path.display(),
+                    args.data.display()
+                );
+                let found = confusion(&best, &clouds, &Options::default())?;
+                let report = metrics::report(&found, &path);
+                println!("{report}");
+                Some(report)
+            }
+            None => None,
+        };
+        // The best weights again, with what they reached.
+        let mut file = formats::weights::WeightsFile::open(&best)?;
+        let mut tensors = std::collections::BTreeMap::new();
+        for name in file.shapes().into_keys() {
+            let tensor = file.read(&name)?;
+            tensors.insert(name, tensor);
+        }
+        formats::weights::write_weights(&args.out, &tensors, &self.card(accuracy).to_metadata())?;
+        println!("{}", args.out.display());
+        Ok(())
+    }
+}

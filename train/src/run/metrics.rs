@@ -1,0 +1,168 @@
+//! What each epoch came to, as CSV and as a curve.
+
+use std::fmt::{self, Write as _};
+use std::io::Write as _;
+use std::path::Path;
+
+use formats::atomic;
+use serde::{Deserialize, Serialize};
+use svg::Document;
+use svg::node::element::{Polyline, Text};
+use train::evaluate::Confusion;
+
+/// One epoch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Counted from 1.
+    pub epoch: u32,
+    /// Learning rate at its beginning.
+    pub rate: f64,
+    /// Mean loss.
+    pub loss: f64,
+    /// Share of augmented training clouds recognised.
+    pub accuracy: f64,
+    /// Share of validation clouds recognised.
+    pub validation_instance: Option<f64>,
+    /// Mean over classes of the same.
+    pub validation_class: Option<f64>,
+    /// Wall clock of learning.
+    pub seconds: f64,
+    /// Speed of learning.
+    pub clouds_per_second: f64,
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "epoch {}: loss {:.4}, {:.2} %", self.epoch, self.loss, 100.0 * self.accuracy)?;
+        if let (Some(instance), Some(class)) = (self.validation_instance, self.validation_class) {
+            write!(f, "; validation {:.2} %, class {:.2} %", 100.0 * instance, 100.0 * class)?;
+        }
+        write!(f, "; {:.0} s, {:.0} clouds/s", self.seconds, self.clouds_per_second)
+    }
+}
+
+/// All epochs so far.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// In order.
+    pub rows: Vec<Row>,
+}
+
+impl Metrics {
+    /// As a checkpoint keeps them.
+    pub fn to_notes(&self) -> anyhow::Result<String> {
+        Ok(serde_json::to_string(self)?)
+    }
+
+    /// From a checkpoint.
+    pub fn from_notes(notes: &str) -> anyhow::Result<Self> {
+        Ok(serde_json::from_str(notes)?)
+    }
+
+    /// Whether no earlier epoch was as good on the validation set.
+    pub fn is_best(&self, epoch: u32) -> bool {
+        let of = |row: &Row| row.validation_instance.unwrap_or(0.0);
+        let this = self.rows.iter().find(|row| row.epoch == epoch).map_or(0.0, of);
+        self.rows.iter().filter(|row| row.epoch < epoch).all(|row| of(row) < this)
+    }
+
+    /// Writes `metrics.csv` and `curve.svg` to `folder`.
+    pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
+        let mut csv = String::from(
+            "epoch,rate,loss,accuracy,validation_instance,validation_class,seconds,\
+             clouds_per_second\n",
+        );
+        for row in &self.rows {
+            let optional = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+            writeln!(
+                csv,
+                "{},{},{},{},{},{},{:.3},{:.1}",
+                row.epoch,
+                row.rate,
+                row.loss,
+                row.accuracy,
+                optional(row.validation_instance),
+                optional(row.validation_class),
+                row.seconds,
+                row.clouds_per_second
+            )?;
+        }
+        atomic::write(&folder.join("metrics.csv"), |file| file.write_all(csv.as_bytes()))?;
+        let curve = self.curve().to_string();
+        atomic::write(&folder.join("curve.svg"), |file| file.write_all(curve.as_bytes()))?;
+        Ok(())
+    }
+
+    /// Accuracy by epoch: of training and of validation.
+    fn curve(&self) -> Document {
+        let (width, height) = (640.0, 360.0);
+        let last = self.rows.last().map_or(1, |row| row.epoch).max(2);
+        let x = |epoch: u32| 50.0 + (width - 70.0) * f64::from(epoch - 1) / f64::from(last - 1);
+        let y = |share: f64| height - 40.0 - (height - 60.0) * share;
+        let line = |of: &dyn Fn(&Row) -> Option<f64>, colour: &str| {
+            let points = self.rows.iter().filter_map(|row| Some((x(row.epoch), y(of(row)?))));
+            let points: Vec<String> = points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+            Polyline::new()
+                .set("points", points.join(" "))
+                .set("fill", "none")
+                .set("stroke", colour.to_owned())
+                .set("stroke-width", 1.5)
+        };
+        let text = |words: String, x: f64, y: f64, colour: &str| {
+            Text::new(words)
+                .set("x", x)
+                .set("y", y)
+                .set("font-family", "sans-serif")
+                .set("font-size", 12)
+                .set("fill", colour.to_owned())
+        };
+        let mut document = Document::new().set("viewBox", (0, 0, width, height)).add(
+            svg::node::element::Rectangle::new()
+                .set("width", "100%")
+                .set("height", "100%")
+                .set("fill", "white"),
+        );
+        for percent in [0, 25, 50, 75, 100] {
+            let at = y(f64::from(percent) / 100.0);
+            let grid = Polyline::new()
+                .set("points", format!("50,{at} {},{at}", width - 20.0))
+                .set("stroke", "#ddd");
+            document = document.add(grid).add(text(format!("{percent} %"), 8.0, at + 4.0, "#444"));
+        }
+        document
+            .add(line(&|row| Some(row.accuracy), "#888"))
+            .add(line(&|row| row.validation_instance, "#06c"))
+            .add(text("training, augmented".to_owned(), 60.0, 16.0, "#888"))
+            .add(text("validation".to_owned(), 200.0, 16.0, "#06c"))
+            .add(text(format!("epoch {last}"), width - 80.0, height - 20.0, "#444"))
+    }
+}
+
+/// What a test came to, in words.
+pub fn report(found: &Confusion, data: &Path) -> String {
+    let (n, correct) = (found.total(), found.correct());
+    let (low, high) = wilson(correct, n);
+    let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();
+    format!(
+        "{correct} of {n} ({:.2} %, 95 % interval {:.2} to {:.2} %), mean over classes {:.2} %, \
+         on {name}",
+        100.0 * found.instance_accuracy(),
+        100.0 * low,
+        100.0 * high,
+        100.0 * found.class_accuracy(),
+    )
+}
+
+/// The 95 % interval of a share of `hits` in `n` trials (Wilson 1927).
+fn wilson(hits: usize, n: usize) -> (f64, f64) {
+    /// The 97.5 % quantile of the normal distribution.
+    const Z: f64 = 1.959_963_984_540_054;
+    if n == 0 {
+        return (0.0, 1.0);
+    }
+    let (n, share) = (n as f64, hits as f64 / n as f64);
+    let centre = share + Z * Z / (2.0 * n);
+    let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + Z * Z / n;
+    ((centre - half) / scale, (centre + half) / scale)
+}

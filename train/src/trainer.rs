@@ -1,0 +1,138 @@
+//! A network, its optimiser, and an epoch of learning.
+
+use std::time::{Duration, Instant};
+
+use formats::rng::StreamKey;
+
+use crate::batches;
+use crate::clouds::Clouds;
+use crate::error::Error;
+use crate::layer::Learns;
+use crate::matrix::Matrix;
+use crate::network::{PointNet, Rates};
+use crate::recipe::Recipe;
+
+/// PyTorch's default share of a batch in running statistics.
+const MOMENTUM: f32 = 0.1;
+
+/// What is being learnt.
+#[derive(Clone, Debug)]
+pub struct Trainer {
+    /// The run's recipe.
+    pub recipe: Recipe,
+    /// The network.
+    pub network: PointNet,
+    /// Steps taken.
+    pub step: u64,
+    /// Epochs finished.
+    pub epoch: u32,
+}
+
+/// What an epoch came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Learnt {
+    /// Mean loss of its batches.
+    pub loss: f64,
+    /// Share of its clouds, as augmented, that were recognised.
+    pub accuracy: f64,
+    /// Clouds learnt from.
+    pub clouds: usize,
+    /// Wall clock.
+    pub time: Duration,
+}
+
+/// How far an epoch has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Steps of this epoch.
+    pub step: usize,
+    /// Of so many.
+    pub steps: usize,
+    /// Mean loss so far.
+    pub loss: f64,
+    /// Share recognised so far.
+    pub accuracy: f64,
+}
+
+impl Trainer {
+    /// A network of random weights for `n_classes`.
+    #[must_use]
+    pub fn new(recipe: Recipe, n_classes: usize) -> Self {
+        let network = PointNet::new(&recipe.network, n_classes, recipe.seed);
+        Self { recipe, network, step: 0, epoch: 0 }
+    }
+
+    /// Learns from every cloud once, but for an incomplete last batch.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`].
+    pub fn learn(
+        &mut self,
+        clouds: &Clouds,
+        mut report: impl FnMut(Progress),
+    ) -> Result<Learnt, Error> {
+        let begun = Instant::now();
+        let recipe = self.recipe.clone();
+        let steps = batches::count(clouds.len(), &recipe);
+        let (mut loss, mut correct) = (0.0, 0);
+        std::thread::scope(|scope| {
+            let batches = batches::start(scope, clouds, &recipe, self.epoch);
+            for (batch, step) in batches.iter().zip(1..) {
+                let rates =
+                    Rates { momentum: MOMENTUM, orthogonality: recipe.orthogonality as f32 };
+                let kept = self.dropout(recipe.batch);
+                let cost = self.network.learn(&batch, kept, rates);
+                if !cost.total.is_finite() {
+                    return Err(self.not_finite(cost.total, step as u64));
+                }
+                self.step += 1;
+                let progress = f64::from(self.epoch) + (step - 1) as f64 / steps as f64;
+                let factor = recipe.schedule.factor(progress, recipe.epochs);
+                recipe.adam.step(&mut self.network, self.step, recipe.adam.rate * factor);
+                loss += cost.total;
+                correct += cost.correct;
+                let n = step as f64;
+                let accuracy = correct as f64 / (n * recipe.batch as f64);
+                report(Progress { step, steps, loss: loss / n, accuracy });
+            }
+            Ok(())
+        })?;
+        self.epoch += 1;
+        let clouds = steps * recipe.batch;
+        Ok(Learnt {
+            loss: loss / steps as f64,
+            accuracy: correct as f64 / clouds as f64,
+            clouds,
+            time: begun.elapsed(),
+        })
+    }
+
+    /// Which of the last hidden features are kept in the step to come.
+    fn dropout(&self, clouds: usize) -> Option<Matrix> {
+        let width = self.network.dropout_width()?;
+        let dropped = self.recipe.dropout;
+        if dropped == 0.0 {
+            return None;
+        }
+        let stream = StreamKey::new(self.recipe.seed, "dropout", 0);
+        let first = self.step * (clouds * width) as u64;
+        let scale = (1.0 / (1.0 - dropped)) as f32;
+        let mut n = first;
+        Some(Matrix::from_shape_simple_fn((clouds, width), || {
+            n += 1;
+            if stream.unit(n) < dropped { 0.0 } else { scale }
+        }))
+    }
+
+    fn not_finite(&mut self, loss: f64, step: u64) -> Error {
+        let mut layer = None;
+        self.network.parameters(&mut |parameter| {
+            let is_finite = |values: &[f32]| values.iter().all(|x| x.is_finite());
+            if !(is_finite(&parameter.value) && is_finite(&parameter.gradient)) {
+                layer.get_or_insert_with(|| parameter.name.clone());
+            }
+        });
+        let layer = layer.unwrap_or_else(|| "none: the logits themselves overflow".to_owned());
+        Error::NotFinite { loss, step, epoch: self.epoch + 1, layer }
+    }
+}
