@@ -11,6 +11,9 @@ use crate::error::Error;
 /// Clouds that one classifier takes.
 const CHUNK: usize = 128;
 
+/// The 97.5 % quantile of the normal distribution.
+pub const Z: f64 = 1.959_963_984_540_054;
+
 /// Right and wrong answers by class: `[class][answer]`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Confusion(pub Vec<Vec<usize>>);
@@ -34,15 +37,25 @@ impl Confusion {
         self.correct() as f64 / self.total().max(1) as f64
     }
 
-    /// The mean over classes that have clouds of the share recognised.
+    /// The mean over classes that have clouds of the share recognised, and the
+    /// half width of its 95 % interval: each class's share is one of
+    /// independent trials, Agresti and Coull's (1998) two of each outcome
+    /// added, so that a class without errors is not taken for one that never
+    /// errs.
     #[must_use]
-    pub fn class_accuracy(&self) -> f64 {
-        let shares = self.0.iter().enumerate().filter_map(|(class, answers)| {
+    pub fn class_accuracy(&self) -> (f64, f64) {
+        let classes = self.0.iter().enumerate().filter_map(|(class, answers)| {
             let n: usize = answers.iter().sum();
-            (n > 0).then(|| answers[class] as f64 / n as f64)
+            (n > 0).then(|| (answers[class] as f64, n as f64))
         });
-        let shares: Vec<f64> = shares.collect();
-        shares.iter().sum::<f64>() / shares.len().max(1) as f64
+        let classes: Vec<(f64, f64)> = classes.collect();
+        let count = classes.len().max(1) as f64;
+        let mean = classes.iter().map(|(right, n)| right / n).sum::<f64>() / count;
+        let variance = classes.iter().map(|(right, n)| {
+            let share = (right + 2.0) / (n + 4.0);
+            share * (1.0 - share) / (n + 4.0)
+        });
+        (mean, Z * variance.sum::<f64>().sqrt() / count)
     }
 }
 

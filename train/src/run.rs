@@ -20,8 +20,10 @@ mod metrics;
 
 use metrics::{Metrics, Row};
 
-/// Trains a network.
-#[derive(clap::Parser, Debug)]
+use crate::report;
+
+/// Flags of `train`.
+#[derive(clap::Args, Debug)]
 pub struct Args {
     /// What to learn from: a packed NPZ, a folder with train.npz and test.npz,
     /// or one of text files as yanx27/Pointnet_Pointnet2_pytorch has them
@@ -187,7 +189,7 @@ impl Run {
             loss: learnt.loss,
             accuracy: learnt.accuracy,
             validation_instance: validated.map(Confusion::instance_accuracy),
-            validation_class: validated.map(Confusion::class_accuracy),
+            validation_class: validated.map(|found| found.class_accuracy().0),
             seconds: learnt.time.as_secs_f64(),
             clouds_per_second: learnt.clouds as f64 / learnt.time.as_secs_f64(),
         };
@@ -231,7 +233,7 @@ impl Run {
                     args.data.display()
                 );
                 let found = confusion(&best, &clouds, &Options::default())?;
-                let report = metrics::report(&found, &path);
+                let report = report::line(&found, &path);
                 println!("{report}");
                 Some(report)
             }

@@ -12,6 +12,7 @@ mod pi_target;
 mod preview_scan;
 mod scan;
 mod test;
+mod train;
 mod workspace;
 
 use clap::{Parser, Subcommand};
@@ -45,6 +46,12 @@ enum Command {
     MergeDataset(merge_dataset::Args),
     /// Turn a PyTorch checkpoint into a model file for infer-cpu
     ImportWeights(import_weights::Args),
+    /// Train a network: `cargo xtask train --help`
+    #[command(disable_help_flag = true)]
+    Train(train::Args),
+    /// Measure a model's accuracy on labelled clouds: `cargo xtask eval --help`
+    #[command(disable_help_flag = true)]
+    Eval(train::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -68,6 +75,8 @@ fn main() -> ExitCode {
         Command::BuildPi(args) => build_pi::run(&args),
         Command::MergeDataset(args) => merge_dataset::run(&args),
         Command::ImportWeights(args) => import_weights::run(&args),
+        Command::Train(args) => train::run("train", &args),
+        Command::Eval(args) => train::run("eval", &args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {

@@ -96,7 +96,8 @@ impl Norm {
                     for c in 0..z.len() {
                         z[c] = (z[c] - mean[c]) * inverse[c];
                         let y = z[c] * scale[c] + shift[c];
-                        out[c] = if relu { y.max(0.0) } else { y };
+                        // NaN stays, and is found in the loss.
+                        out[c] = if relu && y < 0.0 { 0.0 } else { y };
                     }
                 }
             });

@@ -115,7 +115,7 @@ impl PooledLayer {
             for c in 0..z.len() {
                 z[c] = (z[c] - mean_product[c]) * inverse[c];
                 let y = z[c] * scale[c] + shift[c];
-                out[c] = if self.relu { y.max(0.0) } else { y };
+                out[c] = if self.relu && y < 0.0 { 0.0 } else { y };
             }
         }
         self.saved = Saved { winners, normalised, mean, centred, covariant, inverse };

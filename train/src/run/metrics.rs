@@ -8,7 +8,6 @@ use formats::atomic;
 use serde::{Deserialize, Serialize};
 use svg::Document;
 use svg::node::element::{Polyline, Text};
-use train::evaluate::Confusion;
 
 /// One epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -136,33 +135,4 @@ impl Metrics {
             .add(text("validation".to_owned(), 200.0, 16.0, "#06c"))
             .add(text(format!("epoch {last}"), width - 80.0, height - 20.0, "#444"))
     }
-}
-
-/// What a test came to, in words.
-pub fn report(found: &Confusion, data: &Path) -> String {
-    let (n, correct) = (found.total(), found.correct());
-    let (low, high) = wilson(correct, n);
-    let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();
-    format!(
-        "{correct} of {n} ({:.2} %, 95 % interval {:.2} to {:.2} %), mean over classes {:.2} %, \
-         on {name}",
-        100.0 * found.instance_accuracy(),
-        100.0 * low,
-        100.0 * high,
-        100.0 * found.class_accuracy(),
-    )
-}
-
-/// The 95 % interval of a share of `hits` in `n` trials (Wilson 1927).
-fn wilson(hits: usize, n: usize) -> (f64, f64) {
-    /// The 97.5 % quantile of the normal distribution.
-    const Z: f64 = 1.959_963_984_540_054;
-    if n == 0 {
-        return (0.0, 1.0);
-    }
-    let (n, share) = (n as f64, hits as f64 / n as f64);
-    let centre = share + Z * Z / (2.0 * n);
-    let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
-    let scale = 1.0 + Z * Z / n;
-    ((centre - half) / scale, (centre + half) / scale)
 }

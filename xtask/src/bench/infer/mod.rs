@@ -97,7 +97,8 @@ pub fn run(args: &InferArgs) -> Result<()> {
 
     let mut classifiers = ours::classifiers(&material.model, &cloud, is_wanted);
     classifiers.extend(roster::start(&CLASSIFIERS, is_wanted, args.torch, &material));
-    let mut samplers = roster::start(&SAMPLERS, is_wanted, args.torch, &material);
+    let mut samplers: Vec<_> = ours::sampler(&cloud, is_wanted).into_iter().collect();
+    samplers.extend(roster::start(&SAMPLERS, is_wanted, args.torch, &material));
     let version = |entrant: &entrant::Entrant| (entrant.name.clone(), entrant.version.clone());
     let mut report = Report {
         machine: Machine::here(),

@@ -4,6 +4,8 @@ use super::super::clock::{Cost, measured};
 use super::cloud::Cloud;
 use super::entrant::{Arithmetic, Entrant, Job, Lane};
 use anyhow::{Context, Result};
+use infer_cpu::kernel::{self, Kernels};
+use infer_cpu::sampler::{FarthestPoints, FpsStart};
 use infer_cpu::{Classifier, Normalization, Options, Precision};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -16,9 +18,69 @@ fn name(precision: Precision) -> String {
     format!("ours-{precision}")
 }
 
+/// Our sampler's name.
+const SAMPLER: &str = "ours";
+
 /// What `--engines` can call us.
 pub fn names() -> Vec<String> {
-    Precision::ALL.map(name).into()
+    Precision::ALL.map(name).into_iter().chain([SAMPLER.to_owned()]).collect()
+}
+
+/// Our farthest point sampling, if it `is_wanted`.
+pub fn sampler(cloud: &Cloud, is_wanted: impl Fn(&str) -> bool) -> Option<Entrant> {
+    let kernels = kernel::available().next().filter(|_| is_wanted(SAMPLER))?;
+    let lane = Sampling {
+        kernels,
+        sampler: FarthestPoints::default(),
+        cloud: cloud.points(),
+        job: Job { points: 0, setting: 0 },
+        picked: Vec::new(),
+    };
+    Some(Entrant {
+        name: SAMPLER.to_owned(),
+        arithmetic: Arithmetic::F32,
+        ours: true,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        lane: Box::new(lane),
+    })
+}
+
+struct Sampling {
+    kernels: &'static Kernels,
+    sampler: FarthestPoints,
+    cloud: Vec<[f32; 3]>,
+    job: Job,
+    picked: Vec<u32>,
+}
+
+impl Sampling {
+    fn sample(&mut self) {
+        let points = &self.cloud[..self.job.points];
+        let (n, start) = (self.job.setting, FpsStart::First);
+        self.sampler.select(points, n, start, self.kernels, &mut self.picked);
+    }
+}
+
+impl Lane for Sampling {
+    fn load(&mut self, job: Job) -> Result<()> {
+        self.job = job;
+        Ok(())
+    }
+
+    fn answer(&mut self) -> Result<Vec<f64>> {
+        self.sample();
+        Ok(self.picked.iter().map(|&i| f64::from(i)).collect())
+    }
+
+    fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
+        (0..UNCOUNTED).for_each(|_| self.sample());
+        let once = |_| {
+            let ((), cost) = measured(|| self.sample());
+            black_box(&self.picked);
+            cost
+        };
+        Ok((0..repeats).map(once).collect())
+    }
 }
 
 /// Our classifier in each precision that `is_wanted` by its name.

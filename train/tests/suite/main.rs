@@ -1,0 +1,35 @@
+//! Training, held to plain twins and to what users do with it.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod augment;
+mod export;
+mod gradients;
+mod program;
+mod resume;
+mod twin;
+
+use formats::labelled::LabelledSet;
+use formats::rng::StreamKey;
+use train::clouds::Clouds;
+
+/// `n` clouds of 32 points in three classes: a ball, a disc, a rod.
+fn clouds(n: usize) -> Clouds {
+    let mut points = Vec::new();
+    for cloud in 0..n {
+        let key = StreamKey::new(5, "clouds", cloud as u32);
+        for point in 0..32 {
+            let unit = |axis| (2.0 * key.unit(3 * point + axis) - 1.0) as f32;
+            let flat = [[1.0, 1.0, 1.0], [1.0, 1.0, 0.05], [1.0, 0.05, 0.05]][cloud % 3];
+            points.extend([0, 1, 2].map(|axis| unit(axis as u64) * flat[axis]));
+        }
+    }
+    let set = LabelledSet {
+        points,
+        n_points: 32,
+        labels: (0..n).map(|cloud| cloud % 3).collect(),
+        names: None,
+        classes: None,
+    };
+    Clouds { set, classes: ["ball", "disc", "rod"].map(str::to_owned).to_vec() }
+}

@@ -1,0 +1,90 @@
+//! A run that is broken off goes on as if it had not been.
+
+use train::checkpoint;
+use train::error::Error;
+use train::layer::Learns;
+use train::network::Shape;
+use train::recipe::{Recipe, Sampling};
+use train::trainer::Trainer;
+
+fn recipe() -> Recipe {
+    let network = Shape {
+        trunk: vec![8, 16],
+        t_net: vec![8, 12],
+        t_net_head: vec![8],
+        head: vec![12],
+        ..Shape::default()
+    };
+    Recipe {
+        network,
+        points: 24,
+        batch: 8,
+        epochs: 4,
+        sampling: Sampling::Random,
+        ..Recipe::default()
+    }
+}
+
+fn parameters(trainer: &mut Trainer) -> Vec<u32> {
+    let mut bits = Vec::new();
+    trainer.network.parameters(&mut |parameter| {
+        bits.extend(parameter.value.iter().chain(&parameter.square).map(|x| x.to_bits()));
+    });
+    trainer.network.statistics(&mut |_, values| bits.extend(values.iter().map(|x| x.to_bits())));
+    bits
+}
+
+#[test]
+fn a_resumed_run_is_the_unbroken_one_to_the_bit() {
+    let clouds = crate::clouds(50);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint.safetensors");
+    let mut unbroken = Trainer::new(recipe(), 3);
+    let losses: Vec<f64> = (0..4).map(|_| unbroken.learn(&clouds, |_| {}).unwrap().loss).collect();
+    let mut broken = Trainer::new(recipe(), 3);
+    for (epoch, loss) in losses.iter().enumerate() {
+        assert_eq!(broken.learn(&clouds, |_| {}).unwrap().loss, *loss, "epoch {epoch}");
+        checkpoint::write(&path, &mut broken, "a note").unwrap();
+        broken = Trainer::new(recipe(), 3);
+        assert_eq!(checkpoint::read(&path, &mut broken).unwrap(), "a note");
+    }
+    assert_eq!(parameters(&mut broken), parameters(&mut unbroken));
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let clouds = crate::clouds(50);
+    let learn = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut trainer = Trainer::new(recipe(), 3);
+            trainer.learn(&clouds, |_| {}).unwrap();
+            parameters(&mut trainer)
+        })
+    };
+    let one = learn(1);
+    assert_eq!(one, learn(3));
+}
+
+#[test]
+fn a_checkpoint_of_another_recipe_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint.safetensors");
+    checkpoint::write(&path, &mut Trainer::new(recipe(), 3), "").unwrap();
+    let mut longer = Trainer::new(Recipe { epochs: 9, ..recipe() }, 3);
+    checkpoint::read(&path, &mut longer).unwrap();
+    let mut other = Trainer::new(Recipe { batch: 9, ..recipe() }, 3);
+    let error = checkpoint::read(&path, &mut other).unwrap_err();
+    assert!(matches!(error, Error::OtherRun { .. }), "{error}");
+    std::fs::write(&path, b"no checkpoint").unwrap();
+    assert!(checkpoint::read(&path, &mut longer).is_err());
+}
+
+#[test]
+fn a_loss_that_is_not_finite_names_step_and_layer() {
+    let mut clouds = crate::clouds(20);
+    clouds.set.points[0] = f32::NAN;
+    clouds.set.points.iter_mut().skip(1).step_by(2).for_each(|x| *x *= 1e38);
+    let error = Trainer::new(recipe(), 3).learn(&clouds, |_| {}).unwrap_err();
+    assert!(error.to_string().contains("at step 1 of epoch 1"), "{error}");
+}

@@ -1,0 +1,24 @@
+//! `cargo xtask train`, `eval`: commands of the program `train`, built when first
+//! asked for, so that nobody waits for it who trains nothing.
+
+use crate::{Outcome, workspace};
+use anyhow::Context;
+use std::ffi::OsString;
+use std::process::Command;
+
+/// Flags of the command, which `train` itself understands.
+#[derive(clap::Args)]
+pub struct Args {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    flags: Vec<OsString>,
+}
+
+/// Runs `command` of `train`, in the folder that the caller is in.
+pub fn run(command: &str, args: &Args) -> anyhow::Result<Outcome> {
+    let manifest = workspace::root().join("Cargo.toml");
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["run", "--quiet", "--release", "--package", "train", "--manifest-path"]);
+    cargo.arg(manifest).args(["--", command]).args(&args.flags);
+    let status = cargo.status().context("cannot start cargo")?;
+    Ok(if status.success() { Outcome::Success } else { Outcome::SomeFailed })
+}
