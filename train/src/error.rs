@@ -28,8 +28,8 @@ pub enum Error {
     },
     /// A loss that is not finite any more.
     #[error(
-        "the loss is {loss} at step {step} of epoch {epoch}; the first layer that is not finite \
-         is {layer}. Lower `adam.rate`, or look for extreme clouds in that batch"
+        "the loss is {loss} at step {step} of epoch {epoch}; the first layer whose output is not \
+         finite is {layer}. Lower `adam.rate`, or look for extreme clouds in that batch"
     )]
     NotFinite {
         /// The loss.
@@ -38,7 +38,7 @@ pub enum Error {
         step: u64,
         /// Counted from 1.
         epoch: u32,
-        /// The parameter.
+        /// The layer.
         layer: String,
     },
     /// A checkpoint of other training.

@@ -121,6 +121,13 @@ impl Points {
     }
 }
 
+impl Points {
+    fn not_finite(&self) -> Option<&str> {
+        let hidden = self.hidden.iter().find_map(PointLayer::not_finite);
+        hidden.or_else(|| self.pooled.not_finite())
+    }
+}
+
 impl Learns for Points {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
         self.hidden.iter_mut().for_each(|layer| layer.parameters(visit));
@@ -182,6 +189,12 @@ impl Vectors {
     }
 }
 
+impl Vectors {
+    fn not_finite(&self) -> Option<&str> {
+        self.hidden.iter().find_map(VectorLayer::not_finite)
+    }
+}
+
 impl Learns for Vectors {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
         self.hidden.iter_mut().for_each(|layer| layer.parameters(visit));
@@ -239,6 +252,12 @@ impl TNet {
         let dy = self.vectors.backward(pooled.view(), elements.view());
         let around = self.points.backward(x, dy, rows, wants_input)?;
         Some(through + around)
+    }
+}
+
+impl TNet {
+    fn not_finite(&self) -> Option<&str> {
+        self.points.not_finite().or_else(|| self.vectors.not_finite())
     }
 }
 
@@ -312,6 +331,18 @@ impl PointNet {
             stn.backward(x, &dentry, None, rows, false);
         }
         loss
+    }
+
+    /// The first layer whose last output was not finite; the last of all if no
+    /// other.
+    #[must_use]
+    pub fn not_finite(&self) -> &str {
+        let stn = self.stn.as_ref().and_then(TNet::not_finite);
+        stn.or_else(|| self.stem.not_finite())
+            .or_else(|| self.fstn.as_ref().and_then(TNet::not_finite))
+            .or_else(|| self.trunk.not_finite())
+            .or_else(|| self.head.not_finite())
+            .unwrap_or("the last")
     }
 
     /// How wide dropout's mask is; none without a hidden layer after the

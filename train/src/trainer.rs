@@ -7,7 +7,6 @@ use formats::rng::StreamKey;
 use crate::batches;
 use crate::clouds::Clouds;
 use crate::error::Error;
-use crate::layer::Learns;
 use crate::matrix::Matrix;
 use crate::network::{PointNet, Rates};
 use crate::recipe::Recipe;
@@ -124,15 +123,8 @@ impl Trainer {
         }))
     }
 
-    fn not_finite(&mut self, loss: f64, step: u64) -> Error {
-        let mut layer = None;
-        self.network.parameters(&mut |parameter| {
-            let is_finite = |values: &[f32]| values.iter().all(|x| x.is_finite());
-            if !(is_finite(&parameter.value) && is_finite(&parameter.gradient)) {
-                layer.get_or_insert_with(|| parameter.name.clone());
-            }
-        });
-        let layer = layer.unwrap_or_else(|| "none: the logits themselves overflow".to_owned());
+    fn not_finite(&self, loss: f64, step: u64) -> Error {
+        let layer = self.network.not_finite().to_owned();
         Error::NotFinite { loss, step, epoch: self.epoch + 1, layer }
     }
 }

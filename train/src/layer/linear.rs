@@ -36,6 +36,13 @@ impl Linear {
         }
     }
 
+    /// The layer's name, if its `output` is not finite.
+    #[must_use]
+    pub fn not_finite(&self, output: &Matrix) -> Option<&str> {
+        let name = self.weight.name.trim_end_matches(".weight");
+        (!output.iter().all(|x| x.is_finite())).then_some(name)
+    }
+
     /// How many inputs and outputs it has.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {

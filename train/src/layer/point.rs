@@ -34,6 +34,12 @@ impl PointLayer {
         self.output.view()
     }
 
+    /// The layer's name, if its last output is not finite.
+    #[must_use]
+    pub fn not_finite(&self) -> Option<&str> {
+        self.linear.not_finite(&self.output)
+    }
+
     /// Takes `x` `[rows, inputs]` through the layer.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
         let z = self.linear.products(x);

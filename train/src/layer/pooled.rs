@@ -88,6 +88,12 @@ impl PooledLayer {
         &self.saved.winners[cloud * n..][..n]
     }
 
+    /// The layer's name, if its last output is not finite.
+    #[must_use]
+    pub fn not_finite(&self) -> Option<&str> {
+        self.linear.not_finite(&self.output)
+    }
+
     /// Takes `x` `[rows, inputs]` through the layer.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
         let x = x.to_owned();
@@ -147,7 +153,9 @@ impl PooledLayer {
                 let points = x.slice(ndarray::s![first..last, ..]);
                 let data = padded_rows(points, stride);
                 let points = kernel::Rows { data: &data, stride, n: last - first };
-                let (mut maxima, mut who) = (vec![f32::NEG_INFINITY; padded], vec![0; padded]);
+                let mut maxima = vec![f32::NEG_INFINITY; padded];
+                // NaN wins nothing: then the first row counts as the winner.
+                let mut who = vec![first as u32; padded];
                 let all = 0..panels.n_panels();
                 (gemm.argmax)(&points, &panels, all, first as u32, &mut maxima, &mut who);
                 for c in 0..outputs {

@@ -36,6 +36,12 @@ impl VectorLayer {
         self.output.view()
     }
 
+    /// The layer's name, if its last output is not finite.
+    #[must_use]
+    pub fn not_finite(&self) -> Option<&str> {
+        self.linear.not_finite(&self.output)
+    }
+
     /// Takes `x` `[clouds, inputs]` through the layer. `kept` is dropout's mask
     /// between product and batch norm, scaled by 1 / share kept.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, kept: Option<Matrix>, momentum: f32) {

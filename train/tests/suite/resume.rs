@@ -83,8 +83,9 @@ fn a_checkpoint_of_another_recipe_is_refused() {
 #[test]
 fn a_loss_that_is_not_finite_names_step_and_layer() {
     let mut clouds = crate::clouds(20);
-    clouds.set.points[0] = f32::NAN;
-    clouds.set.points.iter_mut().skip(1).step_by(2).for_each(|x| *x *= 1e38);
+    clouds.set.points.iter_mut().for_each(|x| *x *= 1e38);
     let error = Trainer::new(recipe(), 3).learn(&clouds, |_| {}).unwrap_err();
-    assert!(error.to_string().contains("at step 1 of epoch 1"), "{error}");
+    let message = error.to_string();
+    assert!(message.contains("at step 1 of epoch 1"), "{message}");
+    assert!(message.contains("is feat.stn.conv1."), "{message}");
 }
