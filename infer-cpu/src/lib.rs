@@ -40,6 +40,7 @@ pub use choose::choose;
 pub use classifier::Classifier;
 pub use error::Error;
 pub use formats::model_card::{ModelCard, Normalization};
+pub use normalize::to_unit_sphere;
 pub use options::{Options, TNets};
 pub use precision::Precision;
 pub use prediction::Prediction;

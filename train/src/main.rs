@@ -1,6 +1,8 @@
 //! `train`: the program that `cargo xtask train` and `eval` start.
 
+mod compare_points;
 mod eval;
+mod explain;
 mod report;
 mod run;
 
@@ -22,12 +24,18 @@ enum Command {
     Train(run::Args),
     /// Measure a model's accuracy
     Eval(eval::Args),
+    /// Show what a model's answer rests on
+    Explain(explain::Args),
+    /// Tell how far two clouds are apart
+    ComparePoints(compare_points::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Train(args) => run::run(&args),
         Command::Eval(args) => eval::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::ComparePoints(args) => compare_points::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -52,6 +52,12 @@ enum Command {
     /// Measure a model's accuracy on labelled clouds: `cargo xtask eval --help`
     #[command(disable_help_flag = true)]
     Eval(train::Args),
+    /// Show what a model's answer rests on: `cargo xtask explain --help`
+    #[command(disable_help_flag = true)]
+    Explain(train::Args),
+    /// Tell how far two clouds are apart: `cargo xtask compare-points A B`
+    #[command(disable_help_flag = true)]
+    ComparePoints(train::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -77,6 +83,8 @@ fn main() -> ExitCode {
         Command::ImportWeights(args) => import_weights::run(&args),
         Command::Train(args) => train::run("train", &args),
         Command::Eval(args) => train::run("eval", &args),
+        Command::Explain(args) => train::run("explain", &args),
+        Command::ComparePoints(args) => train::run("compare-points", &args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {

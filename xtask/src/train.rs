@@ -1,4 +1,4 @@
-//! `cargo xtask train`, `eval`: commands of the program `train`, built when first
+//! `cargo xtask train`, `eval`, `explain`, `compare-points`: commands of the program `train`, built when first
 //! asked for, so that nobody waits for it who trains nothing.
 
 use crate::{Outcome, workspace};

@@ -1,0 +1,221 @@
+//! LIME-3D: which parts of a cloud a network's answer rests on (Tan and
+//! Kotthaus, arXiv 2107.13459; their code, commit of 2021-08-17).
+//!
+//! Parts are taken away at random, and a linear model of what is left tells
+//! how much each part adds to the log-probability of the class.
+
+use formats::rng::StreamKey;
+use infer_cpu::Classifier;
+use infer_cpu::kernel;
+use infer_cpu::sampler::{FarthestPoints, FpsStart};
+use nalgebra::{DMatrix, DVector};
+
+use crate::error::Error;
+
+/// How a cloud is explained.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lime {
+    /// Parts of the cloud.
+    pub clusters: usize,
+    /// Clouds with parts taken away, the whole one among them.
+    pub samples: usize,
+    /// Width of the kernel that weighs them.
+    pub sigma: f64,
+    /// What all draws depend on.
+    pub seed: u64,
+}
+
+impl Default for Lime {
+    /// The authors' (`lime_3d`): LIME's default number of samples.
+    fn default() -> Self {
+        Self { clusters: 20, samples: 1000, sigma: 0.25, seed: 0 }
+    }
+}
+
+/// Rounds of k-means.
+const ROUNDS: usize = 10;
+
+/// Weight of the ridge.
+const ALPHA: f64 = 1.0;
+
+/// What each part of a cloud adds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explanation {
+    /// The class that is explained, the most probable of the whole cloud.
+    pub class: usize,
+    /// The part that each point is of.
+    pub cluster: Vec<usize>,
+    /// What each part adds to the class's log-probability.
+    pub attribution: Vec<f64>,
+    /// The weighted share of variance that the linear model explains.
+    pub r_squared: f64,
+}
+
+impl Explanation {
+    /// The `n` points of the parts that add most, the greatest first.
+    #[must_use]
+    pub fn strongest(&self, n: usize) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.cluster.len()).collect();
+        let of = |i: usize| self.attribution[self.cluster[i]];
+        order.sort_by(|&a, &b| of(b).total_cmp(&of(a)).then(a.cmp(&b)));
+        order.truncate(n);
+        order
+    }
+}
+
+/// Explains what `classifier` calls `points`.
+///
+/// # Errors
+/// What the classifier refuses.
+pub fn explain(
+    classifier: &mut Classifier,
+    points: &[[f32; 3]],
+    lime: &Lime,
+) -> Result<Explanation, Error> {
+    let class = classifier.classify(points)?.class;
+    let cluster = clusters(points, lime.clusters);
+    let k = cluster.iter().max().map_or(0, |last| last + 1);
+    let masks = masks(k, lime);
+    let mut answers = Vec::with_capacity(masks.len());
+    for mask in &masks {
+        let left = points.iter().zip(&cluster).filter(|(_, part)| mask[**part]);
+        let left: Vec<[f32; 3]> = left.map(|(point, _)| *point).collect();
+        answers.push(classifier.classify(&left)?.log_probability(class));
+    }
+    let weights: Vec<f64> = masks.iter().map(|mask| weight(mask, lime.sigma)).collect();
+    let (attribution, r_squared) = ridge(&masks, &answers, &weights);
+    Ok(Explanation { class, cluster, attribution, r_squared })
+}
+
+/// k-means whose centres are points of the cloud: farthest points at first,
+/// then the one nearest to its cluster's mean.
+fn clusters(points: &[[f32; 3]], k: usize) -> Vec<usize> {
+    let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
+    let mut centres = Vec::new();
+    FarthestPoints::default().select(points, k, FpsStart::Farthest, kernels, &mut centres);
+    let mut centres: Vec<[f32; 3]> = centres.iter().map(|&i| points[i as usize]).collect();
+    let mut cluster = nearest(points, &centres);
+    for _ in 0..ROUNDS {
+        for (part, centre) in centres.iter_mut().enumerate() {
+            let own = || points.iter().zip(&cluster).filter(|(_, c)| **c == part).map(|(p, _)| p);
+            let n = own().count();
+            if n == 0 {
+                continue;
+            }
+            let mean = [0, 1, 2].map(|k| own().map(|p| p[k]).sum::<f32>() / n as f32);
+            let medoid = own().min_by(|a, b| squared(a, &mean).total_cmp(&squared(b, &mean)));
+            *centre = *medoid.expect("invariant: it has points");
+        }
+        cluster = nearest(points, &centres);
+    }
+    cluster
+}
+
+fn nearest(points: &[[f32; 3]], centres: &[[f32; 3]]) -> Vec<usize> {
+    let of = |point: &[f32; 3]| {
+        let distance = |&c: &usize| squared(point, &centres[c]);
+        (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    };
+    points.iter().map(of).collect()
+}
+
+fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+/// Which parts are there: all at first, then each with a chance of one half.
+/// None at all leaves no cloud: then it is drawn again.
+fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
+    let stream = StreamKey::new(lime.seed, "lime", 0);
+    let mut n = 0;
+    let mut masks = vec![vec![true; k]];
+    while masks.len() < lime.samples {
+        let mask: Vec<bool> = (0..k)
+            .map(|_| {
+                n += 1;
+                stream.unit(n) < 0.5
+            })
+            .collect();
+        if mask.contains(&true) || k == 0 {
+            masks.push(mask);
+        }
+    }
+    masks
+}
+
+/// √exp(-d²/σ²) of the cosine distance d from the whole cloud.
+fn weight(mask: &[bool], sigma: f64) -> f64 {
+    let there = mask.iter().filter(|there| **there).count() as f64;
+    let distance = 1.0 - (there / mask.len() as f64).sqrt();
+    (-(distance / sigma).powi(2)).exp().sqrt()
+}
+
+/// Weighted ridge regression with an intercept that is not penalised:
+/// coefficients, and R².
+fn ridge(masks: &[Vec<bool>], answers: &[f64], weights: &[f64]) -> (Vec<f64>, f64) {
+    let k = masks[0].len();
+    let total: f64 = weights.iter().sum();
+    let mean_of = |value: &dyn Fn(usize) -> f64| {
+        weights.iter().enumerate().map(|(i, w)| w * value(i)).sum::<f64>() / total
+    };
+    let part = |i: usize, c: usize| f64::from(u8::from(masks[i][c]));
+    let centre: Vec<f64> = (0..k).map(|c| mean_of(&|i| part(i, c))).collect();
+    let level = mean_of(&|i| answers[i]);
+    let x = DMatrix::from_fn(masks.len(), k, |i, c| (part(i, c) - centre[c]) * weights[i].sqrt());
+    let y = DVector::from_fn(masks.len(), |i, _| (answers[i] - level) * weights[i].sqrt());
+    let normal = x.tr_mul(&x) + DMatrix::identity(k, k) * ALPHA;
+    let solved = normal.cholesky().map(|factor| factor.solve(&x.tr_mul(&y)));
+    let coefficients = solved.expect("invariant: a ridge makes it positive definite");
+    let rest = (&y - &x * &coefficients).norm_squared();
+    let r_squared = 1.0 - rest / y.norm_squared().max(f64::MIN_POSITIVE);
+    (coefficients.iter().copied().collect(), r_squared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_linear_answer_is_explained_by_its_own_coefficients() {
+        let lime = Lime { samples: 4000, ..Lime::default() };
+        let masks = masks(6, &lime);
+        let truth = [3.0, -2.0, 0.0, 1.0, 0.5, -0.25];
+        let answers: Vec<f64> = masks
+            .iter()
+            .map(|mask| {
+                7.0 + mask.iter().zip(truth).map(|(&m, t)| f64::from(u8::from(m)) * t).sum::<f64>()
+            })
+            .collect();
+        let weights: Vec<f64> = masks.iter().map(|mask| weight(mask, 10.0)).collect();
+        let (found, r_squared) = ridge(&masks, &answers, &weights);
+        for (found, truth) in found.iter().zip(truth) {
+            // The ridge shrinks by alpha over the 1,000 of a column's squares.
+            assert!((found - truth).abs() < 2e-3 * truth.abs().max(1.0), "{found}, {truth}");
+        }
+        assert!(r_squared > 0.999);
+    }
+
+    #[test]
+    fn every_point_is_of_the_nearest_centre() {
+        let mut points = Vec::new();
+        for i in 0..90u8 {
+            let corner = f32::from(i % 3) * 10.0;
+            points.push([corner, f32::from(i) * 0.01, -corner]);
+        }
+        let cluster = clusters(&points, 3);
+        for (i, part) in cluster.iter().enumerate() {
+            assert_eq!(*part, cluster[i % 3]);
+        }
+        assert_eq!(clusters(&points[..2], 20).len(), 2);
+    }
+
+    #[test]
+    fn whole_clouds_weigh_most_and_none_is_empty() {
+        let masks = masks(3, &Lime::default());
+        assert_eq!(masks.len(), 1000);
+        assert!(masks.iter().all(|mask| mask.contains(&true)));
+        assert_eq!(weight(&[true; 4], 0.25), 1.0);
+        // A quarter: d = 1/2, exp(-4)^(1/2).
+        assert!((weight(&[true, false, false, false], 0.25) - (-2f64).exp()).abs() < 1e-12);
+    }
+}
