@@ -5,6 +5,7 @@ mod eval;
 mod explain;
 mod report;
 mod run;
+mod serve;
 
 use std::process::ExitCode;
 
@@ -28,6 +29,9 @@ enum Command {
     Explain(explain::Args),
     /// Tell how far two clouds are apart
     ComparePoints(compare_points::Args),
+    /// Take part in `bench train`
+    #[command(hide = true)]
+    Serve(serve::Args),
 }
 
 fn main() -> ExitCode {
@@ -36,6 +40,7 @@ fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::ComparePoints(args) => compare_points::run(&args),
+        Command::Serve(args) => serve::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -3,7 +3,7 @@
 //! One file per question asked: [`speed`] of building and tracing, [`trade`]
 //! of speed against accuracy, which [`builders`] pays when, the share of each
 //! stage of the [`pipeline`], and how [`peers`] compare. [`infer`] is about
-//! classifying and sampling, [`pi_model`] about both on a Raspberry Pi, the
+//! classifying, sampling and learning, [`pi_model`] about both on a Raspberry Pi, the
 //! others about scanning.
 
 use anyhow::{Context, Result};
@@ -50,6 +50,8 @@ enum Benchmark {
     /// and Rust crates, built there. Who cannot be had is skipped with a
     /// message; who does not give what the weights do is not timed.
     Infer(infer::InferArgs),
+    /// Measure a step of training against PyTorch's, in turns.
+    Train(infer::learn::TrainArgs),
     /// Model the classifier on a Raspberry Pi 5 without having one.
     ///
     /// Its inner loops, as compiled, go through llvm-mca; what is outside them
@@ -116,6 +118,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     match &args.what {
         Benchmark::Sim(args) => sim(args),
         Benchmark::Infer(args) => infer::run(args),
+        Benchmark::Train(args) => infer::learn::run(args),
         Benchmark::PiModel(args) => pi_model::run(args),
     }
 }

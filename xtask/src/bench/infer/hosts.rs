@@ -1,7 +1,7 @@
 //! The programs that rivals live in, and what must be made before they start.
 
 use super::super::venv::{Environment, programs, succeeds, workshop};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const GENERAL: Environment =
@@ -84,6 +84,18 @@ impl Host {
             Self::Rust => Ok(Program { words: vec![build()?], arguments: vec![folder.clone()] }),
         }
     }
+}
+
+/// The command that trains in PyTorch, beginning with `model`, on the clouds in
+/// `folder`.
+///
+/// # Errors
+/// Why there can be none, in words for the user.
+pub fn trainer(model: &Path, folder: &Path) -> Result<Command, String> {
+    let mut command = Command::new(TORCH.interpreter()?);
+    command.arg(NO_CACHE).arg(programs().join("train/train.py")).arg("torch");
+    command.arg(model).arg(folder);
+    Ok(command)
 }
 
 impl Program {

@@ -8,6 +8,7 @@ mod entrant;
 mod grid;
 mod hosts;
 mod judge;
+pub mod learn;
 mod model;
 mod ours;
 mod roster;
