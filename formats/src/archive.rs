@@ -103,8 +103,10 @@ impl<R: Read + Seek> NpzReader<R> {
     pub fn new(mut reader: R, path: &Path) -> Result<Self, FormatError> {
         let file_size =
             reader.seek(SeekFrom::End(0)).map_err(|source| FormatError::io(path, source))?;
-        let zip = ZipArchive::new(reader)
-            .map_err(|cause| FormatError::malformed(path, "archive", cause))?;
+        let zip = ZipArchive::new(reader).map_err(|cause| {
+            let cause = format!("no NPZ, or one that is cut short ({file_size} bytes): {cause}");
+            FormatError::malformed(path, "archive", cause)
+        })?;
         Ok(Self { path: path.to_path_buf(), file_size, zip })
     }
 

@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use half::f16;
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 
 use crate::atomic;
@@ -44,10 +45,17 @@ impl WeightsFile {
     pub fn open(path: &Path) -> Result<Self, FormatError> {
         let here = |source| FormatError::io(path, source);
         let bad = |cause: String| FormatError::malformed(path, "header", cause);
+        if path.is_dir() {
+            return Err(FormatError::malformed(path, "file", "a folder, no safetensors"));
+        }
         let mut file = File::open(path).map_err(here)?;
         let file_size = file.metadata().map_err(here)?.len();
         let mut length = [0; LENGTH_SIZE as usize];
         file.read_exact(&mut length).map_err(|_| bad("too short for safetensors".to_owned()))?;
+        // Zip archives, and pickles of protocol 2 from before PyTorch 1.6.
+        if length.starts_with(b"PK\x03\x04") || length.starts_with(b"\x80\x02") {
+            return Err(bad("a PyTorch checkpoint, no safetensors: import its weights".to_owned()));
+        }
         let length = u64::from_le_bytes(length);
         if length > LONGEST_HEADER || length > file_size - LENGTH_SIZE {
             return Err(bad(format!(
@@ -95,20 +103,24 @@ impl WeightsFile {
     /// Reads tensor `name`.
     ///
     /// # Errors
-    /// None of that name, not f32, or a value that is not finite.
+    /// None of that name, neither f32 nor f16, or a value that is not finite.
     pub fn read(&mut self, name: &str) -> Result<Tensor, FormatError> {
         let bad = |cause: String| FormatError::malformed(&self.path, tensor_part(name), cause);
         let info: &TensorInfo = self.header.info(name).ok_or_else(|| bad("missing".to_owned()))?;
-        if info.dtype != Dtype::F32 {
-            return Err(bad(format!("expected f32, found {:?}", info.dtype)));
+        if ![Dtype::F32, Dtype::F16].contains(&info.dtype) {
+            return Err(bad(format!("expected f32 or f16, found {:?}", info.dtype)));
         }
         let (begin, end) = info.data_offsets;
         let mut bytes = vec![0; end - begin];
         let start = SeekFrom::Start(self.data_offset + begin as u64);
         let read = self.file.seek(start).and_then(|_| self.file.read_exact(&mut bytes));
         read.map_err(|source| FormatError::io(&self.path, source))?;
-        let values = bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
-        let values: Vec<f32> = values.collect();
+        let values: Vec<f32> = if info.dtype == Dtype::F16 {
+            let (halves, _) = bytes.as_chunks::<2>();
+            halves.iter().map(|bytes| f16::from_le_bytes(*bytes).to_f32()).collect()
+        } else {
+            bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+        };
         if let Some(at) = values.iter().position(|value| !value.is_finite()) {
             return Err(bad(format!("element {at} is {}", values[at])));
         }
@@ -122,8 +134,8 @@ pub fn tensor_part(name: &str) -> String {
     format!("tensor `{name}`")
 }
 
-/// Writes `tensors` and `metadata` to `path`, atomically; the same content
-/// gives the same bytes.
+/// Writes `tensors` and `metadata` to `path` in f32, atomically; the same
+/// content gives the same bytes.
 ///
 /// # Errors
 /// A tensor whose shape does not fit its values; what the system reports.
@@ -132,6 +144,34 @@ pub fn write_weights(
     tensors: &BTreeMap<String, Tensor>,
     metadata: &BTreeMap<String, String>,
 ) -> Result<(), FormatError> {
+    write(path, tensors, metadata, Dtype::F32)
+}
+
+/// The same, rounded to f16.
+///
+/// # Errors
+/// As [`write_weights`]; a value that f16 cannot hold.
+pub fn write_half_weights(
+    path: &Path,
+    tensors: &BTreeMap<String, Tensor>,
+    metadata: &BTreeMap<String, String>,
+) -> Result<(), FormatError> {
+    for (name, Tensor { values, .. }) in tensors {
+        if let Some(at) = values.iter().position(|&x| !f16::from_f32(x).is_finite()) {
+            let cause = format!("element {at}, {}, is too large for f16", values[at]);
+            return Err(FormatError::malformed(path, tensor_part(name), cause));
+        }
+    }
+    write(path, tensors, metadata, Dtype::F16)
+}
+
+fn write(
+    path: &Path,
+    tensors: &BTreeMap<String, Tensor>,
+    metadata: &BTreeMap<String, String>,
+    dtype: Dtype,
+) -> Result<(), FormatError> {
+    let size = if dtype == Dtype::F16 { size_of::<f16>() } else { size_of::<f32>() };
     let mut infos = Vec::with_capacity(tensors.len());
     let mut offset = 0;
     for (name, Tensor { shape, values }) in tensors {
@@ -139,12 +179,9 @@ pub fn write_weights(
             let cause = format!("shape {shape:?} for {} values", values.len());
             return Err(FormatError::malformed(path, tensor_part(name), cause));
         }
-        let data_offsets = (offset, offset + size_of_val(&values[..]));
+        let data_offsets = (offset, offset + size * values.len());
         offset = data_offsets.1;
-        infos.push((
-            name.clone(),
-            TensorInfo { dtype: Dtype::F32, shape: shape.clone(), data_offsets },
-        ));
+        infos.push((name.clone(), TensorInfo { dtype, shape: shape.clone(), data_offsets }));
     }
     let json = header_json(infos, metadata)
         .map_err(|cause| FormatError::malformed(path, "header", cause))?;
@@ -152,7 +189,11 @@ pub fn write_weights(
         writer.write_all(&(json.len() as u64).to_le_bytes())?;
         writer.write_all(json.as_bytes())?;
         for value in tensors.values().flat_map(|tensor| &tensor.values) {
-            writer.write_all(&value.to_le_bytes())?;
+            if dtype == Dtype::F16 {
+                writer.write_all(&f16::from_f32(*value).to_le_bytes())?;
+            } else {
+                writer.write_all(&value.to_le_bytes())?;
+            }
         }
         Ok(())
     })
@@ -207,6 +248,32 @@ mod tests {
     }
 
     #[test]
+    fn half_weights_come_back_rounded() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("half.safetensors");
+        let tensor = |values: Vec<f32>| Tensor { shape: vec![values.len()], values };
+        let tensors = BTreeMap::from([("a".to_owned(), tensor(vec![0.1, -2.0, 65504.0, 1e-9]))]);
+        write_half_weights(&path, &tensors, &BTreeMap::new()).unwrap();
+        let read = WeightsFile::open(&path).unwrap().read("a").unwrap();
+        // The nearest halves (IEEE 754 binary16).
+        assert_eq!(read.values, [0.099_975_586, -2.0, 65504.0, 0.0]);
+        let large = BTreeMap::from([("b".to_owned(), tensor(vec![1.0, 7e4]))]);
+        let error = write_half_weights(&path, &large, &BTreeMap::new()).unwrap_err();
+        assert!(error.to_string().contains("tensor `b`: element 1, 70000"), "{error}");
+    }
+
+    #[test]
+    fn a_checkpoint_of_pytorch_s_is_named_as_such() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("best_model.pth");
+        std::fs::write(&path, b"PK\x03\x04 and more that follows").unwrap();
+        let error = WeightsFile::open(&path).err().unwrap().to_string();
+        assert!(error.contains("a PyTorch checkpoint"), "{error}");
+        let error = WeightsFile::open(folder.path()).err().unwrap().to_string();
+        assert!(error.contains("a folder"), "{error}");
+    }
+
+    #[test]
     fn errors_name_the_tensor() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.safetensors");
@@ -217,7 +284,7 @@ mod tests {
         assert!(message(&path, "d").contains("tensor `d`: missing"));
         let view = safetensors::tensor::TensorView::new(Dtype::F64, vec![1], &[0; 8]).unwrap();
         std::fs::write(&path, safetensors::serialize([("e", view)], None).unwrap()).unwrap();
-        assert!(message(&path, "e").contains("tensor `e`: expected f32, found F64"));
+        assert!(message(&path, "e").contains("tensor `e`: expected f32 or f16, found F64"));
     }
 
     #[test]

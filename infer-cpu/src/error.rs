@@ -30,7 +30,7 @@ pub enum Error {
     #[error("{0} points are more than 4,294,967,295")]
     TooManyPoints(usize),
     /// The kernel that was asked for does not run here.
-    #[error("this machine cannot run kernel {0}")]
+    #[error("this machine cannot run kernel {0}; it has {here}", here = names_here())]
     KernelMissing(KernelName),
     /// The kernel that was asked for has no such precision.
     #[error("kernel {kernel} has no {precision} products")]
@@ -71,4 +71,10 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+}
+
+/// The kernels that this machine runs.
+fn names_here() -> String {
+    let names: Vec<&str> = crate::kernel::available().map(|kernels| kernels.name.name()).collect();
+    names.join(", ")
 }

@@ -13,7 +13,7 @@ use clap::{Parser, Subcommand};
 
 /// Trains and measures PointNets.
 #[derive(Parser)]
-#[command(name = "cargo xtask", version, max_term_width = 100)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

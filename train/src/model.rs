@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use formats::FormatError;
 use formats::model_card::ModelCard;
-use formats::weights::{Tensor, write_weights};
+use formats::weights::{Tensor, WeightsFile, tensor_part, write_half_weights, write_weights};
 
 use crate::error::Error;
 use crate::layer::Learns;
@@ -25,10 +26,46 @@ pub fn tensors(network: &mut PointNet) -> BTreeMap<String, Tensor> {
     tensors
 }
 
-/// Writes `network` to `path`, atomically.
+/// Writes `network` to `path` as it is learnt, atomically.
 ///
 /// # Errors
 /// What the system reports.
 pub fn write(path: &Path, network: &mut PointNet, card: &ModelCard) -> Result<(), Error> {
     Ok(write_weights(path, &tensors(network), &card.to_metadata())?)
+}
+
+/// Takes `network` to what [`write`] wrote to `path`.
+///
+/// # Errors
+/// A file that is none, or of a network of another shape.
+pub fn read(path: &Path, network: &mut PointNet) -> Result<(), Error> {
+    let mut file = WeightsFile::open(path)?;
+    let mut failed = None;
+    let mut take = |name: &str, into: &mut Vec<f32>| match file.read(name) {
+        Ok(tensor) if tensor.values.len() == into.len() => *into = tensor.values,
+        Ok(tensor) => {
+            let cause = format!("of shape {:?}, in a network of another", tensor.shape);
+            failed = Some(FormatError::malformed(path, tensor_part(name), cause));
+        }
+        Err(error) => failed = Some(error),
+    };
+    network.parameters(&mut |parameter| take(&parameter.name, &mut parameter.value));
+    network.statistics(&mut |name, values| take(name, values));
+    failed.map_or(Ok(()), |error| Err(error.into()))
+}
+
+/// Writes `network` to `path` as it is shipped, atomically: batch norms folded,
+/// in f16, half the size.
+///
+/// # Errors
+/// A weight that f16 cannot hold; what the system reports.
+pub fn ship(path: &Path, network: &PointNet, card: &ModelCard) -> Result<(), Error> {
+    let mut tensors = BTreeMap::new();
+    network.folded(&mut |layer| {
+        let bias = Tensor { shape: vec![layer.bias.len()], values: layer.bias };
+        let weight = Tensor { shape: layer.shape.to_vec(), values: layer.weight };
+        tensors.insert(format!("{}.bias", layer.name), bias);
+        tensors.insert(format!("{}.weight", layer.name), weight);
+    });
+    Ok(write_half_weights(path, &tensors, &card.to_metadata())?)
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::batch::Batch;
 use crate::layer::{
-    Learns, Linear, PointLayer, PooledLayer, Rows, Transforms, VectorLayer, orthogonality,
+    Folded, Learns, Linear, PointLayer, PooledLayer, Rows, Transforms, VectorLayer, orthogonality,
 };
 use crate::loss::{self, Loss};
 use crate::matrix::Matrix;
@@ -138,6 +138,11 @@ impl Learns for Points {
         self.hidden.iter_mut().for_each(|layer| layer.statistics(visit));
         self.pooled.statistics(visit);
     }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        self.hidden.iter().for_each(|layer| layer.folded(visit));
+        self.pooled.folded(visit);
+    }
 }
 
 /// Layers after a pooling.
@@ -203,6 +208,11 @@ impl Learns for Vectors {
 
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
         self.hidden.iter_mut().for_each(|layer| layer.statistics(visit));
+    }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        self.hidden.iter().for_each(|layer| layer.folded(visit));
+        self.last.folded(visit);
     }
 }
 
@@ -270,6 +280,11 @@ impl Learns for TNet {
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
         self.points.statistics(visit);
         self.vectors.statistics(visit);
+    }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        self.points.folded(visit);
+        self.vectors.folded(visit);
     }
 }
 
@@ -376,6 +391,18 @@ impl Learns for PointNet {
         }
         self.trunk.statistics(visit);
         self.head.statistics(visit);
+    }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        if let Some(stn) = &self.stn {
+            stn.folded(visit);
+        }
+        self.stem.folded(visit);
+        if let Some(fstn) = &self.fstn {
+            fstn.folded(visit);
+        }
+        self.trunk.folded(visit);
+        self.head.folded(visit);
     }
 }
 

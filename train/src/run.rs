@@ -1,5 +1,6 @@
 //! A run from recipe to model, in a folder that it can be resumed from.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -75,7 +76,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     while run.trainer.epoch < run.trainer.recipe.epochs {
         run.epoch(&clouds, &held)?;
     }
-    run.finish(args)
+    run.finish(args, &clouds)
 }
 
 fn recipe(args: &Args) -> anyhow::Result<Recipe> {
@@ -215,39 +216,49 @@ impl Run {
         }
     }
 
-    /// Reads the test half, once, and writes the model.
-    fn finish(&mut self, args: &Args) -> anyhow::Result<()> {
-        let best = self.folder.join("best.safetensors");
+    /// Writes the best weights as they are shipped, and reads the test half,
+    /// once, with those.
+    fn finish(&mut self, args: &Args, clouds: &Clouds) -> anyhow::Result<()> {
+        model::read(&self.folder.join("best.safetensors"), &mut self.trainer.network)?;
+        let shipped = self.folder.join("shipped.safetensors");
+        model::ship(&shipped, &self.trainer.network, &self.card(None))?;
         let test = match (&args.test, args.data.is_dir()) {
             (Some(test), _) => Some(test.clone()),
             (None, true) => Some(args.data.clone()),
             (None, false) => None,
         };
         let accuracy = match test {
-            Some(path) => {
-                let clouds = Clouds::read(&path, Split::Test, self.trainer.recipe.points)?;
-                ensure!(
-                    clouds.classes == self.classes,
-                    "{}: its classes are not those of {}",
-                    path.display(),
-                    args.data.display()
-                );
-                let found = confusion(&best, &clouds, &Options::default())?;
-                let report = report::line(&found, &path);
-                println!("{report}");
-                Some(report)
-            }
+            Some(path) => Some(self.test(&shipped, &path, &args.data)?),
             None => None,
         };
-        // The best weights again, with what they reached.
-        let mut file = formats::weights::WeightsFile::open(&best)?;
-        let mut tensors = std::collections::BTreeMap::new();
-        for name in file.shapes().into_keys() {
-            let tensor = file.read(&name)?;
-            tensors.insert(name, tensor);
-        }
-        formats::weights::write_weights(&args.out, &tensors, &self.card(accuracy).to_metadata())?;
+        let activation_ranges = self.ranges(&shipped, clouds)?;
+        let card = ModelCard { activation_ranges, ..self.card(accuracy) };
+        model::ship(&args.out, &self.trainer.network, &card)?;
+        fs::remove_file(&shipped)?;
         println!("{}", args.out.display());
         Ok(())
+    }
+
+    fn test(&self, model: &Path, test: &Path, data: &Path) -> anyhow::Result<String> {
+        let clouds = Clouds::read(test, Split::Test, self.trainer.recipe.points)?;
+        ensure!(
+            clouds.classes == self.classes,
+            "{}: its classes are not those of {}",
+            test.display(),
+            data.display()
+        );
+        let found = confusion(model, &clouds, &Options::default())?;
+        let line = report::line(&found, test);
+        println!("{line}");
+        Ok(line)
+    }
+
+    /// The largest activations of each layer, for int8, on some of `clouds`.
+    fn ranges(&self, model: &Path, clouds: &Clouds) -> anyhow::Result<BTreeMap<String, f32>> {
+        /// More change them little.
+        const CLOUDS: usize = 512;
+        let step = clouds.len().div_ceil(CLOUDS).max(1);
+        let some = (0..clouds.len()).step_by(step).map(|i| clouds.set.cloud(i));
+        Ok(infer_cpu::activation_ranges(model, some)?)
     }
 }

@@ -23,13 +23,22 @@ pub(super) fn holds_points(header: &Header) -> bool {
     matches!(header.shape[..], [_, columns] if columns >= 3) && header.number().is_some()
 }
 
+/// More values a point than sensors give: then the array is transposed.
+const WIDEST_POINT: usize = 64;
+
 /// Reads the points that follow `header`: numbers of any type.
 pub(super) fn read_points(
     header: &Header,
     reader: &mut (impl Read + ?Sized),
 ) -> io::Result<Vec<[f64; 3]>> {
     let (n, columns) = match header.shape[..] {
+        [3, n] if n > WIDEST_POINT => {
+            return Err(invalid(format!("expected shape [n, 3], found [3, {n}]: transpose it")));
+        }
         [n, columns] if columns >= 3 => (n, columns),
+        [m, n, 3] => {
+            return Err(invalid(format!("expected shape [n, 3], found {m} clouds of {n} points")));
+        }
         _ => return Err(invalid(format!("expected shape [n, 3], found {:?}", header.shape))),
     };
     let (number, order) = header.number_or_error()?;

@@ -90,7 +90,7 @@ pub struct Args {
     /// Average the log-probabilities of so many random subsets (of sampler
     /// random, or with --vote-rotations)
     #[arg(long, value_name = "K", default_value_t = 1)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
     votes: u32,
 
     /// Turn the cloud about its up axis from vote to vote

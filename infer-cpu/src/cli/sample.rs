@@ -23,7 +23,7 @@ Examples:
   infer-cpu sample --sampler voxel --voxel-size 0.05 in.las thinned.npz
   infer-cpu sample --sampler cpl --points 64 --model model.safetensors in.npz out.xyz
 
-Points are written as they are read, in f64: samplers only choose. A voxel size
+Points are written as they are read: samplers only choose. A voxel size
 is in the cloud's own unit. cpl chooses as the model does, of the cloud as the
 model was trained to see it; where it repeats points to come to M, so does the
 output. The output's name tells its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin.")]

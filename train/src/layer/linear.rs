@@ -3,7 +3,7 @@
 use formats::rng::StreamKey;
 use ndarray::ArrayView2;
 
-use super::Learns;
+use super::{Folded, Learns};
 use crate::matrix::{self, Matrix};
 use crate::parameter::Parameter;
 
@@ -83,4 +83,13 @@ impl Learns for Linear {
     }
 
     fn statistics(&mut self, _: &mut dyn FnMut(&str, &mut Vec<f32>)) {}
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        visit(Folded {
+            name: self.weight.name.trim_end_matches(".weight").to_owned(),
+            shape: [self.weight.shape[0], self.weight.shape[1]],
+            weight: self.weight.value.clone(),
+            bias: self.bias.value.clone(),
+        });
+    }
 }

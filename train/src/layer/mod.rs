@@ -61,6 +61,19 @@ fn by_cloud<'a>(matrix: &'a mut Matrix, rows: Rows<'_>) -> Vec<ArrayViewMut2<'a,
     clouds
 }
 
+/// A linear layer with its batch norm folded in, for a model file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Folded {
+    /// The linear layer's name.
+    pub name: String,
+    /// `[outputs, inputs]`.
+    pub shape: [usize; 2],
+    /// W.
+    pub weight: Vec<f32>,
+    /// b.
+    pub bias: Vec<f32>,
+}
+
 /// What owns parameters.
 pub trait Learns {
     /// Calls `visit` with each parameter, always in the same order.
@@ -69,4 +82,7 @@ pub trait Learns {
     /// Calls `visit` with the name, shape and values of what is not learnt by
     /// gradients but kept with the parameters.
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>));
+
+    /// Calls `visit` with each linear layer as it computes when not learning.
+    fn folded(&self, visit: &mut dyn FnMut(Folded));
 }

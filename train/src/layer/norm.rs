@@ -4,7 +4,7 @@ use ndarray::Axis;
 use ndarray::parallel::prelude::*;
 use rayon::slice::ParallelSlice;
 
-use super::Learns;
+use super::{Folded, Learns, Linear};
 use crate::matrix::{Matrix, ROWS};
 use crate::parameter::Parameter;
 
@@ -47,6 +47,28 @@ impl Norm {
             shift: parameter("bias", 0.0),
             mean: vec![0.0; channels],
             variance: vec![1.0; channels],
+        }
+    }
+
+    /// `linear` with this batch norm, as it is when not learning, multiplied
+    /// into weights and biases in f64.
+    #[must_use]
+    pub fn folded_into(&self, linear: &Linear) -> Folded {
+        let (inputs, outputs) = linear.size();
+        let scale = |c: usize| {
+            let variance = f64::from(self.variance[c]) + f64::from(EPSILON);
+            f64::from(self.scale.value[c]) / variance.sqrt()
+        };
+        let weight = |i: usize| f64::from(linear.weight.value[i]) * scale(i / inputs);
+        let bias = |c: usize| {
+            let from_mean = f64::from(linear.bias.value[c]) - f64::from(self.mean[c]);
+            from_mean * scale(c) + f64::from(self.shift.value[c])
+        };
+        Folded {
+            name: linear.weight.name.trim_end_matches(".weight").to_owned(),
+            shape: [outputs, inputs],
+            weight: (0..outputs * inputs).map(|i| weight(i) as f32).collect(),
+            bias: (0..outputs).map(|c| bias(c) as f32).collect(),
         }
     }
 
@@ -189,4 +211,7 @@ impl Learns for Norm {
         visit(&format!("{}.running_mean", self.name), &mut self.mean);
         visit(&format!("{}.running_var", self.name), &mut self.variance);
     }
+
+    /// It has no linear layer of its own.
+    fn folded(&self, _: &mut dyn FnMut(Folded)) {}
 }

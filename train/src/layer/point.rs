@@ -3,7 +3,7 @@
 use ndarray::ArrayView2;
 
 use super::norm::Saved;
-use super::{Learns, Linear, Norm, Rows};
+use super::{Folded, Learns, Linear, Norm, Rows};
 use crate::matrix::{self, Matrix};
 use crate::parameter::Parameter;
 
@@ -72,5 +72,9 @@ impl Learns for PointLayer {
 
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
         self.norm.statistics(visit);
+    }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        visit(self.norm.folded_into(&self.linear));
     }
 }

@@ -25,7 +25,7 @@ use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
 
 use super::norm::{EPSILON, column_sums};
-use super::{Learns, Linear, Norm, Rows, by_cloud};
+use super::{Folded, Learns, Linear, Norm, Rows, by_cloud};
 use crate::matrix::{self, Matrix};
 use crate::parameter::Parameter;
 
@@ -285,5 +285,9 @@ impl Learns for PooledLayer {
 
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
         self.norm.statistics(visit);
+    }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        visit(self.norm.folded_into(&self.linear));
     }
 }

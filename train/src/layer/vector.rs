@@ -3,7 +3,7 @@
 use ndarray::ArrayView2;
 
 use super::norm::Saved;
-use super::{Learns, Linear, Norm};
+use super::{Folded, Learns, Linear, Norm};
 use crate::matrix::{self, Matrix};
 use crate::parameter::Parameter;
 
@@ -82,5 +82,9 @@ impl Learns for VectorLayer {
 
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
         self.norm.statistics(visit);
+    }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        visit(self.norm.folded_into(&self.linear));
     }
 }

@@ -62,6 +62,36 @@ fn logits_are_those_of_infer_cpu() {
     }
 }
 
+/// What is shipped, folded and in f16, answers as what was learnt does.
+#[test]
+fn shipped_weights_are_those_that_were_learnt() {
+    let clouds = crate::clouds(60);
+    let mut trainer = Trainer::new(recipe(true, true), clouds.classes.len());
+    trainer.learn(&clouds, |_| {}).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let [learnt, shipped] = ["learnt", "shipped"].map(|name| folder.path().join(name));
+    let card = ModelCard { classes: clouds.classes.clone(), ..ModelCard::default() };
+    model::write(&learnt, &mut trainer.network, &card).unwrap();
+    model::ship(&shipped, &trainer.network, &card).unwrap();
+    let size = |path: &std::path::Path| std::fs::metadata(path).unwrap().len();
+    assert!(size(&shipped) < size(&learnt) * 6 / 10);
+    let mut again = Trainer::new(recipe(true, true), clouds.classes.len());
+    model::read(&learnt, &mut again.network).unwrap();
+    assert_eq!(model::tensors(&mut again.network), model::tensors(&mut trainer.network));
+    let [mut a, mut b] =
+        [&learnt, &shipped].map(|path| Classifier::load(path, &Options::default()).unwrap());
+    for cloud in 0..clouds.len() {
+        let points = clouds.set.cloud(cloud);
+        let expected = a.classify(points).unwrap().logits.clone();
+        let found = &b.classify(points).unwrap().logits;
+        let largest = expected.iter().fold(1.0f32, |most, x| most.max(x.abs()));
+        for (found, expected) in found.iter().zip(&expected) {
+            // Ten layers of weights rounded by 2^-12, relatively.
+            assert!((found - expected).abs() < 0.01 * largest, "{found} for {expected}");
+        }
+    }
+}
+
 /// That something is learnt at all: three plain shapes are told apart.
 #[test]
 fn plain_shapes_are_told_apart() {

@@ -47,7 +47,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     println!("Copy it to a Raspberry Pi (64-bit system) and measure there:");
     println!("    scp {shown} pi@raspberrypi.local:infer-cpu");
-    println!("    ssh pi@raspberrypi.local ./infer-cpu bench");
+    println!("    scp MODEL.safetensors pi@raspberrypi.local:");
+    println!("    ssh pi@raspberrypi.local ./infer-cpu bench --model MODEL.safetensors");
     Ok(Outcome::Success)
 }
 

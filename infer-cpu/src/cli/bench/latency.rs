@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use formats::rng::StreamKey;
-use infer_cpu::Classifier;
+use infer_cpu::{Classifier, ModelCard};
 use serde::Serialize;
 
 use super::grid::{Setting, settings};
@@ -80,6 +80,9 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
             format!("{:.3}", row.p99_ms),
         ]
     };
+    let card = ModelCard::read(model)?;
+    let untrained = if card.trained { "" } else { ", untrained: its weights are random" };
+    writeln!(stdout(), "{}{untrained}", record.model)?;
     table::print(&header, 4, &record.rows.iter().map(cells).collect::<Vec<_>>())?;
     Ok(())
 }

@@ -38,7 +38,8 @@ pub struct Args {
     pub model: Option<PathBuf>,
 
     /// Points that the network sees
-    #[arg(long, value_delimiter = ',', default_value = "16,32,64,128,256,512,1024,2048,4096")]
+    #[arg(long, value_delimiter = ',', value_parser = at_least_one,
+          default_value = "16,32,64,128,256,512,1024,2048,4096")]
     points: Vec<usize>,
 
     /// Precisions
@@ -71,7 +72,8 @@ pub struct Args {
     repeats: u32,
 
     /// Print one JSON object with all samples instead of a table
-    #[arg(long)]
+    #[cfg_attr(feature = "trade", arg(long, conflicts_with = "trade"))]
+    #[cfg_attr(not(feature = "trade"), arg(long))]
     json: bool,
 
     #[cfg(feature = "trade")]
@@ -122,6 +124,10 @@ fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<Stri
     let step = set.len().div_ceil(CLOUDS).max(1);
     let clouds = (0..set.len()).step_by(step).map(|i| set.cloud(i));
     Ok(Some(infer_cpu::activation_ranges(model, clouds)?))
+}
+
+fn at_least_one(word: &str) -> Result<usize, String> {
+    word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "not a number above 0".to_owned())
 }
 
 /// Measures what `args` ask for.

@@ -89,7 +89,7 @@ fn picture(rows: &[Row]) -> Document {
         .set("style", "background: white")
         .add(text("Accuracy over latency", WIDTH / 2.0, 28.0).set("font-size", 18))
         .add(text("median latency, ms", WIDTH / 2.0, HEIGHT - 16.0))
-        .add(text("accuracy, %", 36.0, MARGIN - 16.0));
+        .add(text("accuracy, %", 8.0, MARGIN - 16.0).set("text-anchor", "start"));
     for ms in axes.ticks_ms() {
         let x = axes.x(ms);
         picture = picture.add(line((x, MARGIN), (x, HEIGHT - MARGIN))).add(text(

@@ -64,17 +64,24 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
     let ranges = super::calibration(args, model)?;
     let mut references: HashMap<String, Answers> = HashMap::new();
     let mut rows = Vec::new();
-    for setting in settings(args) {
-        let (answers, labels) = answer(args, model, &setting, &ranges, &set, &chosen)
+    let settings: Vec<Setting> =
+        settings(args).into_iter().filter(|setting| fits(setting, set.n_points)).collect();
+    // What cannot be had is found before hours are spent on the rest.
+    for setting in &settings {
+        Classifier::load(model, &setting.options(args, set.n_points))
+            .with_context(|| setting.sampler.to_string())?;
+    }
+    for setting in &settings {
+        let (answers, labels) = answer(args, model, setting, &ranges, &set, &chosen)
             .with_context(|| format!("{} at {} points", setting.sampler, setting.points))?;
         let same = format!("{} {} {}", setting.sampler, setting.t_nets, setting.points);
         let reference = references.get(&same).unwrap_or(&answers);
-        rows.push(row(&setting, &answers, reference, &labels));
+        rows.push(row(setting, &answers, reference, &labels));
         if setting.precision == Precision::F32 {
             references.entry(same).or_insert(answers);
         }
         // Nobody may be reading; what was measured is worth more.
-        let _ = write!(stderr(), "\r{} settings", rows.len());
+        let _ = write!(stderr(), "\r{} of {} settings", rows.len(), settings.len());
     }
     let _ = writeln!(stderr());
     mark_front(&mut rows);
@@ -86,6 +93,17 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         plot::write(path, &rows)?;
     }
     Ok(())
+}
+
+/// Whether clouds of `n_points` hold what `setting` asks for; if not, that is
+/// said.
+fn fits(setting: &Setting, n_points: usize) -> bool {
+    let fits = setting.points <= n_points;
+    if !fits {
+        let Setting { sampler, points, .. } = setting;
+        let _ = writeln!(stderr(), "left out {sampler} {points}: clouds of {n_points} points");
+    }
+    fits
 }
 
 /// `limit` of `n` indices, spread over all.
