@@ -2,7 +2,7 @@
 
 mod yanx27;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use formats::labelled::{LabelledSet, read_labelled};
 use formats::rng::StreamKey;
@@ -19,26 +19,33 @@ pub struct Clouds {
     pub classes: Vec<String>,
 }
 
+/// The packed NPZ of `split` that `path` stands for.
+fn packed(path: &Path, split: Split) -> Option<PathBuf> {
+    let mut beginning = path.as_os_str().to_owned();
+    beginning.push(format!("-{split}.npz"));
+    let candidates = [path.to_path_buf(), path.join(format!("{split}.npz")), beginning.into()];
+    candidates.into_iter().find(|path| path.is_file())
+}
+
 impl Clouds {
-    /// Reads the `split` of the data at `path`: a packed NPZ, a folder with
-    /// `train.npz` and `test.npz` as gen-dataset packs them, or a folder of
-    /// text files as yanx27/Pointnet_Pointnet2_pytorch trains on, of which
-    /// `most_points` points a cloud are read.
+    /// Reads the `split` of the data at `path`: a packed NPZ; the beginning of
+    /// the names of two, as gen-dataset packs them (`rotational-noisy` for
+    /// `rotational-noisy-train.npz` and `rotational-noisy-test.npz`); a folder
+    /// with `train.npz` and `test.npz`; or a folder of text files as
+    /// yanx27/Pointnet_Pointnet2_pytorch trains on, of which `most_points`
+    /// points a cloud are read.
     ///
     /// # Errors
     /// What cannot be read, no cloud, a coordinate that is not finite.
     pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
-        let packed = path.join(format!("{split}.npz"));
-        let set = if path.is_file() {
-            read_labelled(path)?
-        } else if packed.is_file() {
+        let set = if let Some(packed) = packed(path, split) {
             read_labelled(&packed)?
         } else if yanx27::is_one(path) {
             yanx27::read(path, split, most_points)?
         } else {
             let cause = format!(
-                "neither a packed NPZ, nor a folder with {split}.npz, nor one with \
-                 modelnet40_shape_names.txt"
+                "neither a packed NPZ, nor what {split}.npz or -{split}.npz follows, nor a \
+                 folder with modelnet40_shape_names.txt"
             );
             return Err(Error::Data { path: path.to_path_buf(), cause });
         };

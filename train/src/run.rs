@@ -26,12 +26,14 @@ use crate::report;
 /// Flags of `train`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// What to learn from: a packed NPZ, a folder with train.npz and test.npz,
-    /// or one of text files as yanx27/Pointnet_Pointnet2_pytorch has them
+    /// What to learn from: a packed NPZ; the beginning of the names of two, as
+    /// `rotational-noisy` of rotational-noisy-train.npz and -test.npz; a folder
+    /// with train.npz and test.npz, or one of text files as
+    /// yanx27/Pointnet_Pointnet2_pytorch has them
     #[arg(long, value_name = "PATH")]
     data: PathBuf,
     /// What to report accuracy on, once, at the end [default: the test half of
-    /// --data, where it is a folder]
+    /// --data, where it has two]
     #[arg(long, value_name = "PATH")]
     test: Option<PathBuf>,
     /// The run as TOML; flags below go before it [default: the baseline's]
@@ -222,11 +224,9 @@ impl Run {
         model::read(&self.folder.join("best.safetensors"), &mut self.trainer.network)?;
         let shipped = self.folder.join("shipped.safetensors");
         model::ship(&shipped, &self.trainer.network, &self.card(None))?;
-        let test = match (&args.test, args.data.is_dir()) {
-            (Some(test), _) => Some(test.clone()),
-            (None, true) => Some(args.data.clone()),
-            (None, false) => None,
-        };
+        // One file is no two halves.
+        let halves = (!args.data.is_file()).then(|| args.data.clone());
+        let test = args.test.clone().or(halves);
         let accuracy = match test {
             Some(path) => Some(self.test(&shipped, &path, &args.data)?),
             None => None,
