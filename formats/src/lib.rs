@@ -24,6 +24,7 @@ pub mod cloud;
 pub mod cloud_file;
 pub mod error;
 pub mod hash;
+pub mod interval;
 pub mod rng;
 pub mod scan;
 pub mod split;

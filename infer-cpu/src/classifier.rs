@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::forward::{self, Forward, Loaded, Setup};
 use crate::kernel::{self, KernelName, Kernels};
 use crate::normalize;
-use crate::options::{MOST_POINTS, Options};
+use crate::options::{MOST_POINTS, MOST_THREADS, Options};
 use crate::precision::Precision;
 use crate::prediction::{Prediction, argmax};
 use crate::sampler::{SamplerKind, SamplerSpec};
@@ -59,7 +59,9 @@ impl Classifier {
     /// # Errors
     /// A file that is no model, options that it or this machine cannot meet.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
-        options.check()?;
+        if options.threads > MOST_THREADS {
+            return Err(Error::TooManyThreads(options.threads));
+        }
         let setup = setup(options, options.precision)?;
         let loaded = forward::load(path, &setup)?;
         let spec = match &options.sampler {

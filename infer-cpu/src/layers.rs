@@ -7,7 +7,6 @@ use formats::model_card::ModelCard;
 use formats::weights::WeightsFile;
 
 use crate::dense::Dense;
-use crate::engine::GROUP;
 use crate::kernel::{Columns, Kernels, Panels};
 use crate::network::{Network, Role, read_network};
 use crate::precision::{Format, Matrix};
@@ -114,7 +113,7 @@ impl Packer<'_> {
             Role::Inner => Conv::Inner(self.packed(&dense)),
             Role::Last => {
                 let is_f32 = T::as_f32(&[], &mut []).is_some();
-                let screen = is_f32.then(|| Screen::new(&dense, GROUP, self.kernels)).flatten();
+                let screen = is_f32.then(|| Screen::new(&dense, self.kernels)).flatten();
                 Conv::Inner(Packed { screen, ..self.packed(&dense) })
             }
             Role::AfterTransform => {

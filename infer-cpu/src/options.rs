@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use formats::FormatError;
 use formats::model_card::Normalization;
 
-use crate::error::Error;
 use crate::kernel::KernelName;
 use crate::precision::Precision;
 use crate::sampler::SamplerSpec;
@@ -121,16 +120,6 @@ pub const MOST_POINTS: usize = 1 << 28;
 
 /// Most threads of a team.
 pub const MOST_THREADS: usize = 1024;
-
-impl Options {
-    /// That they can be met by some machine.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        if self.threads > MOST_THREADS {
-            return Err(Error::TooManyThreads(self.threads));
-        }
-        Ok(())
-    }
-}
 
 impl Default for Options {
     fn default() -> Self {

@@ -5,6 +5,7 @@
 mod bad_input;
 mod checkpoints;
 mod datasets;
+mod end_to_end;
 mod import_weights;
 mod interrupted;
 mod meshes;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use formats::interval::Z;
 use infer_cpu::{Classifier, Options};
 use rayon::prelude::*;
 
@@ -10,9 +11,6 @@ use crate::error::Error;
 
 /// Clouds that one classifier takes.
 const CHUNK: usize = 128;
-
-/// The 97.5 % quantile of the normal distribution.
-pub const Z: f64 = 1.959_963_984_540_054;
 
 /// Right and wrong answers by class: `[class][answer]`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -3,14 +3,15 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use formats::interval::wilson;
 use svg::Document;
 use svg::node::element::{Rectangle, Text};
-use train::evaluate::{Confusion, Z};
+use train::evaluate::Confusion;
 
 /// Accuracies with their intervals, in one line.
 pub fn line(found: &Confusion, data: &Path) -> String {
     let (n, correct) = (found.total(), found.correct());
-    let (low, high) = wilson_interval(correct, n);
+    let (low, high) = wilson(correct, n);
     let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();
     let (class, half) = found.class_accuracy();
     format!(
@@ -74,31 +75,9 @@ pub fn drawing(found: &Confusion, classes: &[String]) -> Document {
     document
 }
 
-/// The 95 % interval of a share of `hits` in `n` trials (Wilson 1927).
-pub fn wilson_interval(hits: usize, n: usize) -> (f64, f64) {
-    if n == 0 {
-        return (0.0, 1.0);
-    }
-    let (n, share) = (n as f64, hits as f64 / n as f64);
-    let centre = share + Z * Z / (2.0 * n);
-    let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
-    let scale = 1.0 + Z * Z / n;
-    ((centre - half) / scale, (centre + half) / scale)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Brown, Cai and DasGupta 2001, table of Wilson intervals.
-    #[test]
-    fn intervals_are_wilson_s() {
-        let near = |(low, high): (f64, f64), expected: (f64, f64)| {
-            (low - expected.0).abs() < 5e-5 && (high - expected.1).abs() < 5e-5
-        };
-        assert!(near(wilson_interval(0, 10), (0.0, 0.2775)));
-        assert!(near(wilson_interval(5, 10), (0.2366, 0.7634)));
-    }
 
     #[test]
     fn a_matrix_has_a_row_for_each_true_class() {

@@ -97,7 +97,7 @@ fn go_without(step: &str, lack: &str, required: bool) -> anyhow::Result<()> {
 
 /// That the Raspberry Pi's crate drags in nothing of GPUs or training.
 fn check_that_infer_cpu_is_light() -> anyhow::Result<()> {
-    const TOO_HEAVY: [&str; 5] = ["wgpu", "naga", "tokio", "burn", "sim-gpu"];
+    const TOO_HEAVY: [&str; 7] = ["wgpu", "naga", "tokio", "ndarray", "rayon", "sim-gpu", "train"];
     let tree = cargo(&["tree", "--package", "infer-cpu", "--prefix", "none"]).output()?;
     if !tree.status.success() {
         bail!("cargo tree failed: {}", String::from_utf8_lossy(&tree.stderr));

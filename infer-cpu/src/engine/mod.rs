@@ -18,6 +18,7 @@ use crate::kernel::{Columns, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
 use crate::network::Front;
 use crate::precision::Format;
+pub use crate::screen::GROUP;
 use crate::screen::{Levels, Sieve};
 
 mod chunks;
@@ -33,8 +34,6 @@ use spread::Spread;
 pub const BLOCK: usize = 48;
 /// Blocks whose features are kept: 1,056 points, 540 KiB for 128 features.
 pub const RUN_BLOCKS: usize = 22;
-/// Output channels of the last layer that a thread pools at a time.
-pub const GROUP: usize = 128;
 /// Blocks of outputs (64 each) of a vector layer that a thread does at a time.
 pub const VECTOR_CHUNK: usize = 2;
 /// Outputs of a block of a vector layer.
@@ -167,7 +166,7 @@ impl<T: Format> Engine<T> {
         let scratch = || Scratch {
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
-            sieve: if screens { Sieve::new(BLOCK, GROUP) } else { Sieve::new(0, 0) },
+            sieve: if screens { Sieve::new(BLOCK) } else { Sieve::new(0) },
         };
         let group =
             || Group { maxima: vec![T::LOWEST; GROUP], winners: vec![0; GROUP], screens: false };

@@ -39,6 +39,9 @@ use crate::dense::Dense;
 use crate::kernel::{Candidate, I8_LARGEST, Kernels, Panels, Rows, Screening, WIDTH_STEP};
 use crate::precision::{Format, I8};
 
+/// Output channels that a thread pools at a time.
+pub const GROUP: usize = 128;
+
 /// Whether products of so many inputs are worth ruling out, where kernels
 /// screen at all: not of so few that they are cheap.
 #[must_use]
@@ -100,8 +103,9 @@ pub struct Sieve {
 }
 
 impl Sieve {
-    /// Memory for `rows` by `channels`.
-    pub fn new(rows: usize, channels: usize) -> Self {
+    /// Memory for so many rows.
+    pub fn new(rows: usize) -> Self {
+        let channels = GROUP;
         let most = (channels + 1).max(rows * channels / ONE_IN);
         Self {
             estimates: vec![0.0; rows * channels],
@@ -140,13 +144,12 @@ impl Best<'_> {
 }
 
 impl Screen {
-    /// A screen of `layer`, whose channels are pooled `group` at a time; none
-    /// where it would not pay.
-    pub fn new(layer: &Dense, group: usize, kernels: &Kernels) -> Option<Self> {
+    /// A screen of `layer`; none where it would not pay.
+    pub fn new(layer: &Dense, kernels: &Kernels) -> Option<Self> {
         if !kernels.screens || !screening_pays(layer.inputs) {
             return None;
         }
-        let groups = (0..layer.outputs).step_by(group);
+        let groups = (0..layer.outputs).step_by(GROUP);
         let stride = layer.inputs.next_multiple_of(WIDTH_STEP);
         let mut weights = vec![0.0; layer.outputs * stride];
         for (row, from) in
@@ -155,7 +158,7 @@ impl Screen {
             row[..layer.inputs].copy_from_slice(from);
         }
         let channels = groups
-            .map(|first| Channels::new(layer, first..layer.outputs.min(first + group), kernels))
+            .map(|first| Channels::new(layer, first..layer.outputs.min(first + GROUP), kernels))
             .collect();
         Some(Self { channels, weights, stride })
     }

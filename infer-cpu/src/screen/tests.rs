@@ -4,7 +4,6 @@ use super::*;
 use crate::kernel::available;
 
 const ROWS: usize = 48;
-const GROUP: usize = 128;
 
 /// Kernels that screen, or a message that this machine has none.
 fn screening_kernels() -> Option<&'static Kernels> {
@@ -94,8 +93,8 @@ fn exact_maximum(case: &Case, output: usize) -> (f64, f64) {
 
 /// Pools a case; `None` where screening gave up.
 fn pool(case: &Case, kernels: &Kernels, wants_winners: bool) -> Option<(Vec<f32>, Vec<u32>)> {
-    let screen = Screen::new(&case.layer, GROUP, kernels).unwrap();
-    let mut sieve = Sieve::new(ROWS, GROUP);
+    let screen = Screen::new(&case.layer, kernels).unwrap();
+    let mut sieve = Sieve::new(ROWS);
     let (mut all_maxima, mut all_winners) = (Vec::new(), Vec::new());
     for group in 0..OUTPUTS.div_ceil(GROUP) {
         let width = GROUP.min(OUTPUTS.next_multiple_of(WIDTH_STEP) - group * GROUP);
@@ -183,8 +182,8 @@ fn of_equal_rows_the_first_wins() {
 fn few_products_are_left() {
     let Some(kernels) = screening_kernels() else { return };
     let case = case("ordinary");
-    let screen = Screen::new(&case.layer, GROUP, kernels).unwrap();
-    let mut sieve = Sieve::new(ROWS, GROUP);
+    let screen = Screen::new(&case.layer, kernels).unwrap();
+    let mut sieve = Sieve::new(ROWS);
     let (mut maxima, mut winners) = (vec![0.0; GROUP], vec![0; GROUP]);
     screen.begin(0, true, &mut maxima);
     let rows = Rows { data: &case.blocks[0], stride: STRIDE, n: ROWS };

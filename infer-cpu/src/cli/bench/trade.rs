@@ -8,11 +8,12 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use formats::atomic;
+use formats::interval::wilson;
 use formats::labelled::{LabelledSet, read_labelled};
 use infer_cpu::{Classifier, Precision};
 
 use super::grid::{Setting, settings};
-use super::statistics::{quantile, wilson_interval};
+use super::statistics::quantile;
 use super::{Args, plot, table};
 
 /// One setting's figures on the whole set.
@@ -207,7 +208,7 @@ fn print(rows: &[Row]) -> anyhow::Result<()> {
         "front",
     ];
     let cells = |row: &Row| {
-        let (low, high) = wilson_interval(row.n_right, row.n);
+        let (low, high) = wilson(row.n_right, row.n);
         vec![
             row.setting.sampler.to_string(),
             row.setting.t_nets.to_string(),
@@ -236,7 +237,7 @@ fn write_csv(path: &Path, rows: &[Row]) -> anyhow::Result<()> {
         )?;
         for row in rows {
             let Setting { sampler, t_nets, precision, points, threads } = &row.setting;
-            let (low, high) = wilson_interval(row.n_right, row.n);
+            let (low, high) = wilson(row.n_right, row.n);
             writeln!(
                 out,
                 "{sampler},{t_nets},{precision},{points},{threads},{:.4},{:.4},{},{},{:.5},{low:.5},\
