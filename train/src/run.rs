@@ -48,6 +48,9 @@ pub struct Args {
     /// What all random draws depend on
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// What the model's card calls the training set [default: the path]
+    #[arg(long, value_name = "TEXT")]
+    data_name: Option<String>,
     /// Where the model goes; the run's folder is beside it, with `.run` for an
     /// ending
     #[arg(long, value_name = "FILE")]
@@ -74,7 +77,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     );
     let folder = args.out.with_extension("run");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    let mut run = Run::open(folder, recipe, &all.classes, &args.data)?;
+    let mut run = Run::open(folder, recipe, &all.classes, args)?;
     while run.trainer.epoch < run.trainer.recipe.epochs {
         run.epoch(&clouds, &held)?;
     }
@@ -126,7 +129,7 @@ impl Run {
         folder: PathBuf,
         recipe: Recipe,
         classes: &[String],
-        data: &Path,
+        args: &Args,
     ) -> anyhow::Result<Self> {
         let mut trainer = Trainer::new(recipe, classes.len());
         let checkpoint = folder.join("checkpoint.safetensors");
@@ -141,7 +144,8 @@ impl Run {
         atomic::write(&folder.join("recipe.toml"), |file| {
             std::io::Write::write_all(file, text.as_bytes())
         })?;
-        let training_set = data.display().to_string();
+        let path = args.data.display().to_string();
+        let training_set = args.data_name.clone().unwrap_or(path);
         Ok(Self { folder, trainer, metrics, classes: classes.to_vec(), training_set })
     }
 
