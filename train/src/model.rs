@@ -34,7 +34,7 @@ pub fn write(path: &Path, network: &mut PointNet, card: &ModelCard) -> Result<()
     Ok(write_weights(path, &tensors(network), &card.to_metadata())?)
 }
 
-/// Takes `network` to what [`write`] wrote to `path`.
+/// Takes `network` to what [`write()`] wrote to `path`.
 ///
 /// # Errors
 /// A file that is none, or of a network of another shape.
