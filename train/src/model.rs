@@ -8,12 +8,12 @@ use formats::model_card::ModelCard;
 use formats::weights::{Tensor, WeightsFile, tensor_part, write_half_weights, write_weights};
 
 use crate::error::Error;
+use crate::front::LEFT_BEHIND;
 use crate::layer::Learns;
-use crate::network::PointNet;
 
 /// Parameters and running statistics by name.
 #[must_use]
-pub fn tensors(network: &mut PointNet) -> BTreeMap<String, Tensor> {
+pub fn tensors(network: &mut dyn Learns) -> BTreeMap<String, Tensor> {
     let mut tensors = BTreeMap::new();
     network.parameters(&mut |parameter| {
         let tensor = Tensor { shape: parameter.shape.clone(), values: parameter.value.clone() };
@@ -30,15 +30,18 @@ pub fn tensors(network: &mut PointNet) -> BTreeMap<String, Tensor> {
 ///
 /// # Errors
 /// What the system reports.
-pub fn write(path: &Path, network: &mut PointNet, card: &ModelCard) -> Result<(), Error> {
-    Ok(write_weights(path, &tensors(network), &card.to_metadata())?)
+pub fn write(path: &Path, network: &mut dyn Learns, card: &ModelCard) -> Result<(), Error> {
+    let mut tensors = tensors(network);
+    tensors.retain(|name, _| !name.starts_with(LEFT_BEHIND));
+    Ok(write_weights(path, &tensors, &card.to_metadata())?)
 }
 
-/// Takes `network` to what [`write()`] wrote to `path`.
+/// Takes `network` to what [`write()`] wrote to `path`; what that left behind is
+/// left as it is.
 ///
 /// # Errors
 /// A file that is none, or of a network of another shape.
-pub fn read(path: &Path, network: &mut PointNet) -> Result<(), Error> {
+pub fn read(path: &Path, network: &mut dyn Learns) -> Result<(), Error> {
     let mut file = WeightsFile::open(path)?;
     let mut failed = None;
     let mut take = |name: &str, into: &mut Vec<f32>| match file.read(name) {
@@ -49,7 +52,11 @@ pub fn read(path: &Path, network: &mut PointNet) -> Result<(), Error> {
         }
         Err(error) => failed = Some(error),
     };
-    network.parameters(&mut |parameter| take(&parameter.name, &mut parameter.value));
+    network.parameters(&mut |parameter| {
+        if !parameter.name.starts_with(LEFT_BEHIND) {
+            take(&parameter.name, &mut parameter.value);
+        }
+    });
     network.statistics(&mut |name, values| take(name, values));
     failed.map_or(Ok(()), |error| Err(error.into()))
 }
@@ -59,7 +66,7 @@ pub fn read(path: &Path, network: &mut PointNet) -> Result<(), Error> {
 ///
 /// # Errors
 /// A weight that f16 cannot hold; what the system reports.
-pub fn ship(path: &Path, network: &PointNet, card: &ModelCard) -> Result<(), Error> {
+pub fn ship(path: &Path, network: &dyn Learns, card: &ModelCard) -> Result<(), Error> {
     let mut tensors = BTreeMap::new();
     network.folded(&mut |layer| {
         let bias = Tensor { shape: vec![layer.bias.len()], values: layer.bias };

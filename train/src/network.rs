@@ -3,16 +3,15 @@
 //! Names of parameters are those of yanx27's `pointnet_cls`, which infer-cpu
 //! reads: `feat.stn.conv1.weight`, `feat.fstn.bn4.bias`, `fc3.weight`, ….
 
-use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use crate::batch::Batch;
-use crate::layer::{
-    Folded, Learns, Linear, PointLayer, PooledLayer, Rows, Transforms, VectorLayer, orthogonality,
-};
+use crate::layer::{Folded, Learns, PointLayer, orthogonality};
 use crate::loss::{self, Loss};
 use crate::matrix::Matrix;
 use crate::parameter::Parameter;
+use crate::stack::{Points, Vectors};
+use crate::t_net::TNet;
 
 /// Which layers a network has, and how wide they are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,231 +62,6 @@ pub struct Rates {
     pub orthogonality: f32,
 }
 
-/// Point-wise layers and a pooling.
-#[derive(Clone, Debug)]
-struct Points {
-    hidden: Vec<PointLayer>,
-    pooled: PooledLayer,
-}
-
-impl Points {
-    /// `widths` with the inputs first. Layers are named from number `first`.
-    fn new(prefix: &str, widths: &[usize], first: usize, relu: bool, seed: u64) -> Self {
-        let pairs: Vec<_> = widths.windows(2).map(|pair| (pair[0], pair[1])).collect();
-        let names = |i: usize| {
-            let number = first + i;
-            (format!("{prefix}conv{number}"), format!("{prefix}bn{number}"))
-        };
-        let last = pairs.len() - 1;
-        let hidden = pairs[..last].iter().enumerate().map(|(i, &size)| {
-            let (linear, norm) = names(i);
-            PointLayer::new(&linear, &norm, size, seed)
-        });
-        let (linear, norm) = names(last);
-        let pooled = PooledLayer::new(&linear, &norm, pairs[last], relu, seed);
-        Self { hidden: hidden.collect(), pooled }
-    }
-
-    fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
-        for i in 0..self.hidden.len() {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let x = before.last().map_or(x.view(), PointLayer::output);
-            layer[0].forward(x, rows, momentum);
-        }
-        let x = self.hidden.last().map_or(x, PointLayer::output);
-        self.pooled.forward(x, rows, momentum);
-    }
-
-    /// Returns the gradient of `x` where it is wanted.
-    fn backward(
-        &mut self,
-        x: ArrayView2<'_, f32>,
-        dy: Matrix,
-        rows: Rows<'_>,
-        wants_input: bool,
-    ) -> Option<Matrix> {
-        let input = self.hidden.last().map_or(x.view(), PointLayer::output);
-        let mut dy = self.pooled.backward(dy, input, rows);
-        for i in (0..self.hidden.len()).rev() {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let input = before.last().map_or(x.view(), PointLayer::output);
-            let dz = layer[0].backward(input, dy, rows);
-            if i == 0 && !wants_input {
-                return None;
-            }
-            dy = layer[0].input_gradient(&dz);
-        }
-        Some(dy)
-    }
-}
-
-impl Points {
-    fn not_finite(&self) -> Option<&str> {
-        let hidden = self.hidden.iter().find_map(PointLayer::not_finite);
-        hidden.or_else(|| self.pooled.not_finite())
-    }
-}
-
-impl Learns for Points {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.hidden.iter_mut().for_each(|layer| layer.parameters(visit));
-        self.pooled.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.hidden.iter_mut().for_each(|layer| layer.statistics(visit));
-        self.pooled.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.hidden.iter().for_each(|layer| layer.folded(visit));
-        self.pooled.folded(visit);
-    }
-}
-
-/// Layers after a pooling.
-#[derive(Clone, Debug)]
-struct Vectors {
-    hidden: Vec<VectorLayer>,
-    last: Linear,
-}
-
-impl Vectors {
-    /// `widths` with inputs first and outputs last. Batch norms are numbered
-    /// after those of `n_points` point-wise layers.
-    fn new(prefix: &str, widths: &[usize], n_points: usize, seed: u64) -> Self {
-        let n = widths.len() - 1;
-        let hidden = widths.windows(2).take(n - 1).zip(1..).map(|(pair, i)| {
-            let (linear, norm) = (format!("{prefix}fc{i}"), format!("{prefix}bn{}", n_points + i));
-            VectorLayer::new(&linear, &norm, (pair[0], pair[1]), seed)
-        });
-        let last = Linear::new(&format!("{prefix}fc{n}"), widths[n - 1], widths[n], seed);
-        Self { hidden: hidden.collect(), last }
-    }
-
-    /// `kept` is dropout's mask of the last layer but one.
-    fn forward(
-        &mut self,
-        x: ArrayView2<'_, f32>,
-        mut kept: Option<Matrix>,
-        momentum: f32,
-    ) -> Matrix {
-        let n = self.hidden.len();
-        for i in 0..n {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let x = before.last().map_or(x.view(), VectorLayer::output);
-            let kept = if i + 1 == n { kept.take() } else { None };
-            layer[0].forward(x, kept, momentum);
-        }
-        self.last.forward(self.hidden.last().map_or(x, VectorLayer::output))
-    }
-
-    fn backward(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) -> Matrix {
-        let input = self.hidden.last().map_or(x.view(), VectorLayer::output);
-        let mut dy = self.last.backward(input, dz);
-        for i in (0..self.hidden.len()).rev() {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let input = before.last().map_or(x.view(), VectorLayer::output);
-            dy = layer[0].backward(input, dy);
-        }
-        dy
-    }
-}
-
-impl Vectors {
-    fn not_finite(&self) -> Option<&str> {
-        self.hidden.iter().find_map(VectorLayer::not_finite)
-    }
-}
-
-impl Learns for Vectors {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.hidden.iter_mut().for_each(|layer| layer.parameters(visit));
-        self.last.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.hidden.iter_mut().for_each(|layer| layer.statistics(visit));
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.hidden.iter().for_each(|layer| layer.folded(visit));
-        self.last.folded(visit);
-    }
-}
-
-/// What predicts a transform.
-#[derive(Clone, Debug)]
-struct TNet {
-    points: Points,
-    vectors: Vectors,
-    transforms: Transforms,
-}
-
-impl TNet {
-    fn new(prefix: &str, k: usize, shape: &Shape, seed: u64) -> Self {
-        let widths = joined(&[k], &shape.t_net, &[]);
-        let n_points = shape.t_net.len();
-        let head = joined(&[widths[n_points]], &shape.t_net_head, &[k * k]);
-        Self {
-            points: Points::new(prefix, &widths, 1, true, seed),
-            vectors: Vectors::new(prefix, &head, n_points, seed),
-            transforms: Transforms { k, ..Transforms::default() },
-        }
-    }
-
-    /// Returns the rows behind the transforms.
-    fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) -> Matrix {
-        self.points.forward(x.view(), rows, momentum);
-        let elements = self.vectors.forward(self.points.pooled.output(), None, momentum);
-        self.transforms = Transforms::around_identity(elements, self.transforms.k);
-        self.transforms.forward(x, rows)
-    }
-
-    /// From the gradient of the rows behind the transforms, and one of the
-    /// transforms' own; returns that of `x` where it is wanted.
-    fn backward(
-        &mut self,
-        x: ArrayView2<'_, f32>,
-        dy: &Matrix,
-        own: Option<Matrix>,
-        rows: Rows<'_>,
-        wants_input: bool,
-    ) -> Option<Matrix> {
-        let (mut elements, through) = self.transforms.backward(x.view(), dy.view(), rows);
-        if let Some(own) = own {
-            elements += &own;
-        }
-        let pooled = self.points.pooled.output().to_owned();
-        let dy = self.vectors.backward(pooled.view(), elements.view());
-        let around = self.points.backward(x, dy, rows, wants_input)?;
-        Some(through + around)
-    }
-}
-
-impl TNet {
-    fn not_finite(&self) -> Option<&str> {
-        self.points.not_finite().or_else(|| self.vectors.not_finite())
-    }
-}
-
-impl Learns for TNet {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.points.parameters(visit);
-        self.vectors.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.points.statistics(visit);
-        self.vectors.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.points.folded(visit);
-        self.vectors.folded(visit);
-    }
-}
-
 /// A PointNet in training.
 #[derive(Clone, Debug)]
 pub struct PointNet {
@@ -310,7 +84,7 @@ impl PointNet {
         let stn = input_transform.then(|| TNet::new("feat.stn.", 3, shape, seed));
         let fstn = feature_transform.then(|| TNet::new("feat.fstn.", trunk[0], shape, seed));
         let pooled = trunk[trunk.len() - 1];
-        let head = Vectors::new("", &joined(&[pooled], &shape.head, &[n_classes]), 0, seed);
+        let head = Vectors::new("", &[&[pooled], &shape.head[..], &[n_classes]].concat(), 0, seed);
         Self { stn, stem, fstn, trunk: Points::new("feat.", trunk, 2, false, seed), head }
     }
 
@@ -404,8 +178,4 @@ impl Learns for PointNet {
         self.trunk.folded(visit);
         self.head.folded(visit);
     }
-}
-
-fn joined(a: &[usize], b: &[usize], c: &[usize]) -> Vec<usize> {
-    [a, b, c].concat()
 }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::adam::Adam;
 use crate::error::Error;
+use crate::front::Cpl;
 use crate::network::Shape;
 
 /// A run.
@@ -30,6 +31,9 @@ pub struct Recipe {
     pub validation: f64,
     /// The network's layers.
     pub network: Shape,
+    /// A Critical Points Layer in front, which sees `points`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpl: Option<Cpl>,
     /// Share of the last hidden layer's features that are dropped.
     pub dropout: f64,
     /// Weight of the feature transform's regulariser.
@@ -54,6 +58,7 @@ impl Default for Recipe {
             sampling: Sampling::First,
             validation: 0.1,
             network: Shape::default(),
+            cpl: None,
             dropout: 0.4,
             orthogonality: 0.001,
             label_smoothing: 0.0,
@@ -215,6 +220,18 @@ impl Recipe {
             _ if network.head.is_empty() => refuse("network.head", "1 layer or more"),
             _ if network.widths().any(|width| width == 0 || width > WIDEST) => {
                 refuse("network", "widths between 1 and 8192")
+            }
+            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.front.len() < 2) => {
+                refuse("cpl.front", "2 layers or more")
+            }
+            _ if self.cpl.iter().flat_map(|cpl| &cpl.front).any(|w| *w == 0 || *w > WIDEST) => {
+                refuse("cpl.front", "widths between 1 and 8192")
+            }
+            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.keep == 0 || cpl.keep > self.points) => {
+                refuse("cpl.keep", "between 1 and `points`")
+            }
+            _ if self.cpl.as_ref().is_some_and(|cpl| !finite(cpl.weight)) => {
+                refuse("cpl.weight", "finite, 0 or more")
             }
             _ if !(share(augment.drop)) => refuse("augment.drop", "0 or more, below 1"),
             _ if !augment.scale.iter().all(|x| x.is_finite() && *x > 0.0) => {

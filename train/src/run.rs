@@ -39,9 +39,18 @@ pub struct Args {
     /// The run as TOML; flags below go before it [default: the baseline's]
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
-    /// Points that the network sees
+    /// pointnet, or cpl: behind a Critical Points Layer [default: the recipe's]
+    #[arg(long, value_name = "NAME", value_parser = ["pointnet", "cpl"])]
+    arch: Option<String>,
+    /// Points that the network sees, or its Critical Points Layer
     #[arg(long, value_name = "N")]
     points: Option<usize>,
+    /// Widths of the Critical Points Layer's own front end, coordinates first
+    #[arg(long, value_name = "3-W-W", value_parser = front_of)]
+    front: Option<Front>,
+    /// Points that it keeps
+    #[arg(long, value_name = "M")]
+    keep: Option<usize>,
     /// Passes over the training set
     #[arg(long, value_name = "N")]
     epochs: Option<u32>,
@@ -55,6 +64,19 @@ pub struct Args {
     /// ending
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+}
+
+/// Widths of a front end, without the coordinates'.
+#[derive(Clone, Debug)]
+struct Front(Vec<usize>);
+
+fn front_of(word: &str) -> Result<Front, String> {
+    let widths: Vec<usize> =
+        word.split('-').map(str::parse).collect::<Result<_, _>>().map_err(|_| "no widths")?;
+    match widths.split_first() {
+        Some((3, widths)) if widths.len() >= 2 => Ok(Front(widths.to_vec())),
+        _ => Err("widths like 3-64-128-1024 are meant, with 3 coordinates first".to_owned()),
+    }
 }
 
 /// Does what `args` ask for, from wherever an earlier run was interrupted.
@@ -89,6 +111,22 @@ fn recipe(args: &Args) -> anyhow::Result<Recipe> {
         Some(path) => Recipe::read(path)?,
         None => Recipe::default(),
     };
+    match args.arch.as_deref() {
+        Some("pointnet") => recipe.cpl = None,
+        Some(_) => recipe.cpl = Some(recipe.cpl.unwrap_or_default()),
+        None => {}
+    }
+    if let Some(cpl) = &mut recipe.cpl {
+        if let Some(Front(widths)) = &args.front {
+            cpl.front.clone_from(widths);
+        }
+        cpl.keep = args.keep.unwrap_or(cpl.keep);
+    } else {
+        ensure!(
+            args.front.is_none() && args.keep.is_none(),
+            "--front and --keep are for --arch cpl"
+        );
+    }
     recipe.points = args.points.unwrap_or(recipe.points);
     recipe.epochs = args.epochs.unwrap_or(recipe.epochs);
     recipe.seed = args.seed.unwrap_or(recipe.seed);
@@ -131,7 +169,7 @@ impl Run {
         classes: &[String],
         args: &Args,
     ) -> anyhow::Result<Self> {
-        let mut trainer = Trainer::new(recipe, classes.len());
+        let mut trainer = Trainer::new(recipe, classes.len())?;
         let checkpoint = folder.join("checkpoint.safetensors");
         let metrics = if checkpoint.is_file() {
             let notes = checkpoint::read(&checkpoint, &mut trainer)?;
@@ -206,15 +244,16 @@ impl Run {
 
     fn card(&self, accuracy: Option<String>) -> ModelCard {
         let recipe = &self.trainer.recipe;
-        let sampler = match recipe.sampling {
-            Sampling::First => "first",
-            Sampling::Random => "random",
-            Sampling::Fps => "fps",
+        let (sampler, points) = match (&recipe.cpl, recipe.sampling) {
+            (Some(cpl), _) => ("cpl", cpl.keep),
+            (None, Sampling::First) => ("first", recipe.points),
+            (None, Sampling::Random) => ("random", recipe.points),
+            (None, Sampling::Fps) => ("fps", recipe.points),
         };
         ModelCard {
             classes: self.classes.clone(),
             sampler: Some(sampler.to_owned()),
-            points: Some(recipe.points),
+            points: Some(points),
             training_set: Some(self.training_set.clone()),
             accuracy,
             provenance: Some(format!("edgepuck train, seed {}", recipe.seed)),

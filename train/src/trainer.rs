@@ -7,6 +7,7 @@ use formats::rng::StreamKey;
 use crate::batches;
 use crate::clouds::Clouds;
 use crate::error::Error;
+use crate::front::{Front, Model};
 use crate::matrix::Matrix;
 use crate::network::{PointNet, Rates};
 use crate::recipe::Recipe;
@@ -20,7 +21,7 @@ pub struct Trainer {
     /// The run's recipe.
     pub recipe: Recipe,
     /// The network.
-    pub network: PointNet,
+    pub network: Model,
     /// Steps taken.
     pub step: u64,
     /// Epochs finished.
@@ -55,10 +56,15 @@ pub struct Progress {
 
 impl Trainer {
     /// A network of random weights for `n_classes`.
-    #[must_use]
-    pub fn new(recipe: Recipe, n_classes: usize) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Recipe`] of a rule of resizing that there is none of.
+    pub fn new(recipe: Recipe, n_classes: usize) -> Result<Self, Error> {
+        let front = recipe.cpl.as_ref().map(|cpl| Front::new(cpl, n_classes, recipe.seed));
+        let front =
+            front.transpose().map_err(|cause| Error::Recipe { key: "cpl.resize", cause })?;
         let network = PointNet::new(&recipe.network, n_classes, recipe.seed);
-        Self { recipe, network, step: 0, epoch: 0 }
+        Ok(Self { recipe, network: Model { front, network }, step: 0, epoch: 0 })
     }
 
     /// Learns from every cloud once, but for an incomplete last batch.
@@ -108,7 +114,7 @@ impl Trainer {
 
     /// Which of the last hidden features are kept in the step to come.
     fn dropout(&self, clouds: usize) -> Option<Matrix> {
-        let width = self.network.dropout_width()?;
+        let width = self.network.network.dropout_width()?;
         let dropped = self.recipe.dropout;
         if dropped == 0.0 {
             return None;

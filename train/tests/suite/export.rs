@@ -2,6 +2,7 @@
 
 use formats::model_card::ModelCard;
 use infer_cpu::{Classifier, Options};
+use train::front::Cpl;
 use train::model;
 use train::network::Shape;
 use train::recipe::{Recipe, Sampling};
@@ -34,7 +35,7 @@ fn logits_are_those_of_infer_cpu() {
     let clouds = crate::clouds(100);
     for (input_transform, feature_transform) in [(true, true), (false, false)] {
         let recipe = recipe(input_transform, feature_transform);
-        let mut trainer = Trainer::new(recipe.clone(), clouds.classes.len());
+        let mut trainer = Trainer::new(recipe.clone(), clouds.classes.len()).unwrap();
         for _ in 0..recipe.epochs {
             trainer.learn(&clouds, |_| {}).unwrap();
         }
@@ -66,7 +67,7 @@ fn logits_are_those_of_infer_cpu() {
 #[test]
 fn shipped_weights_are_those_that_were_learnt() {
     let clouds = crate::clouds(60);
-    let mut trainer = Trainer::new(recipe(true, true), clouds.classes.len());
+    let mut trainer = Trainer::new(recipe(true, true), clouds.classes.len()).unwrap();
     trainer.learn(&clouds, |_| {}).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let [learnt, shipped] = ["learnt", "shipped"].map(|name| folder.path().join(name));
@@ -75,7 +76,7 @@ fn shipped_weights_are_those_that_were_learnt() {
     model::ship(&shipped, &trainer.network, &card).unwrap();
     let size = |path: &std::path::Path| std::fs::metadata(path).unwrap().len();
     assert!(size(&shipped) < size(&learnt) * 6 / 10);
-    let mut again = Trainer::new(recipe(true, true), clouds.classes.len());
+    let mut again = Trainer::new(recipe(true, true), clouds.classes.len()).unwrap();
     model::read(&learnt, &mut again.network).unwrap();
     assert_eq!(model::tensors(&mut again.network), model::tensors(&mut trainer.network));
     let [mut a, mut b] =
@@ -96,7 +97,7 @@ fn shipped_weights_are_those_that_were_learnt() {
 #[test]
 fn plain_shapes_are_told_apart() {
     let (clouds, test) = (crate::clouds(120), crate::clouds(150));
-    let mut trainer = Trainer::new(Recipe { epochs: 12, ..recipe(false, false) }, 3);
+    let mut trainer = Trainer::new(Recipe { epochs: 12, ..recipe(false, false) }, 3).unwrap();
     let first = trainer.learn(&clouds, |_| {}).unwrap();
     let last = (1..12).map(|_| trainer.learn(&clouds, |_| {}).unwrap()).last().unwrap();
     assert!(last.loss < 0.5 * first.loss, "{first:?}, {last:?}");
@@ -107,4 +108,30 @@ fn plain_shapes_are_told_apart() {
     let found = train::evaluate::confusion(&path, &test, &Options::default()).unwrap();
     assert_eq!(found.total(), 150);
     assert!(found.instance_accuracy() > 0.95, "{found:?}");
+}
+
+/// A front end is learnt with the network behind it, and infer-cpu finds both:
+/// it chooses as many points as were asked for, and knows plain shapes by them.
+#[test]
+fn a_front_end_and_its_network_tell_plain_shapes_by_few_points() {
+    let (clouds, test) = (crate::clouds(120), crate::clouds(150));
+    let cpl = Cpl { front: vec![16, 32], keep: 8, ..Cpl::default() };
+    let recipe = Recipe { epochs: 12, cpl: Some(cpl), ..recipe(false, false) };
+    let mut trainer = Trainer::new(recipe, 3).unwrap();
+    let first = trainer.learn(&clouds, |_| {}).unwrap();
+    let last = (1..12).map(|_| trainer.learn(&clouds, |_| {}).unwrap()).last().unwrap();
+    assert!(last.loss < 0.7 * first.loss, "{first:?}, {last:?}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.safetensors");
+    let card = ModelCard {
+        classes: clouds.classes.clone(),
+        sampler: Some("cpl".to_owned()),
+        points: Some(8),
+        ..ModelCard::default()
+    };
+    model::ship(&path, &trainer.network, &card).unwrap();
+    let mut classifier = Classifier::load(&path, &Options::default()).unwrap();
+    assert!(classifier.classify(test.set.cloud(0)).unwrap().n_used <= 8);
+    let found = train::evaluate::confusion(&path, &test, &Options::default()).unwrap();
+    assert!(found.instance_accuracy() > 0.9, "{found:?}");
 }

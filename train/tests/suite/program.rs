@@ -83,6 +83,9 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
         ("--data . --points 33", "clouds of 32 points; the recipe wants 33"),
         ("--data . --recipe bad.toml", "unknown field `epoch`"),
         ("--data . --recipe zero.toml", "`epochs`: at least 1"),
+        ("--data . --keep 9", "--front and --keep are for --arch cpl"),
+        ("--data . --arch cpl --keep 33", "`cpl.keep`: between 1 and `points`"),
+        ("--data . --arch cpl --front 64-128", "widths like 3-64-128-1024 are meant"),
     ] {
         let recipe = if words.contains("--recipe") { "" } else { "--recipe small.toml" };
         let ran = train(folder.path(), &format!("train {recipe} {words} --out m.safetensors"));

@@ -39,13 +39,13 @@ fn a_resumed_run_is_the_unbroken_one_to_the_bit() {
     let clouds = crate::clouds(50);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint.safetensors");
-    let mut unbroken = Trainer::new(recipe(), 3);
+    let mut unbroken = Trainer::new(recipe(), 3).unwrap();
     let losses: Vec<f64> = (0..4).map(|_| unbroken.learn(&clouds, |_| {}).unwrap().loss).collect();
-    let mut broken = Trainer::new(recipe(), 3);
+    let mut broken = Trainer::new(recipe(), 3).unwrap();
     for (epoch, loss) in losses.iter().enumerate() {
         assert_eq!(broken.learn(&clouds, |_| {}).unwrap().loss, *loss, "epoch {epoch}");
         checkpoint::write(&path, &mut broken, "a note").unwrap();
-        broken = Trainer::new(recipe(), 3);
+        broken = Trainer::new(recipe(), 3).unwrap();
         assert_eq!(checkpoint::read(&path, &mut broken).unwrap(), "a note");
     }
     assert_eq!(parameters(&mut broken), parameters(&mut unbroken));
@@ -57,7 +57,7 @@ fn the_number_of_threads_changes_nothing() {
     let learn = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut trainer = Trainer::new(recipe(), 3);
+            let mut trainer = Trainer::new(recipe(), 3).unwrap();
             trainer.learn(&clouds, |_| {}).unwrap();
             parameters(&mut trainer)
         })
@@ -70,10 +70,10 @@ fn the_number_of_threads_changes_nothing() {
 fn a_checkpoint_of_another_recipe_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint.safetensors");
-    checkpoint::write(&path, &mut Trainer::new(recipe(), 3), "").unwrap();
-    let mut longer = Trainer::new(Recipe { epochs: 9, ..recipe() }, 3);
+    checkpoint::write(&path, &mut Trainer::new(recipe(), 3).unwrap(), "").unwrap();
+    let mut longer = Trainer::new(Recipe { epochs: 9, ..recipe() }, 3).unwrap();
     checkpoint::read(&path, &mut longer).unwrap();
-    let mut other = Trainer::new(Recipe { batch: 9, ..recipe() }, 3);
+    let mut other = Trainer::new(Recipe { batch: 9, ..recipe() }, 3).unwrap();
     let error = checkpoint::read(&path, &mut other).unwrap_err();
     assert!(matches!(error, Error::OtherRun { .. }), "{error}");
     std::fs::write(&path, b"no checkpoint").unwrap();
@@ -84,7 +84,7 @@ fn a_checkpoint_of_another_recipe_is_refused() {
 fn a_loss_that_is_not_finite_names_step_and_layer() {
     let mut clouds = crate::clouds(20);
     clouds.set.points.iter_mut().for_each(|x| *x *= 1e38);
-    let error = Trainer::new(recipe(), 3).learn(&clouds, |_| {}).unwrap_err();
+    let error = Trainer::new(recipe(), 3).unwrap().learn(&clouds, |_| {}).unwrap_err();
     let message = error.to_string();
     assert!(message.contains("at step 1 of epoch 1"), "{message}");
     assert!(message.contains("is feat.stn.conv1."), "{message}");

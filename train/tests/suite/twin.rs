@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use train::layer::Learns;
 use train::matrix::Matrix;
-use train::network::{PointNet, Shape};
+use train::network::Shape;
 
 /// Values by a parameter's name, with its shape.
 pub type Values = BTreeMap<String, (Vec<usize>, Vec<f64>)>;
@@ -149,7 +149,7 @@ impl Twin<'_> {
 }
 
 /// A network's parameters and running statistics.
-pub fn values(network: &mut PointNet) -> Values {
+pub fn values(network: &mut dyn Learns) -> Values {
     let wide = |values: &[f32]| values.iter().map(|&x| f64::from(x)).collect();
     let mut all = Values::new();
     network.parameters(&mut |parameter| {
