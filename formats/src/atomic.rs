@@ -37,6 +37,14 @@ pub fn write(
     temporary.persist(path).map_err(|error| here(error.error))
 }
 
+/// [`write()`] of bytes that are at hand.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FormatError> {
+    write(path, |writer| writer.write_all(bytes.as_ref()))
+}
+
 /// The folder that holds `path`, made if it is missing.
 pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
     let folder = match path.parent() {

@@ -25,6 +25,7 @@ pub mod cloud_file;
 pub mod error;
 pub mod hash;
 pub mod interval;
+pub mod modelnet_h5_list;
 pub mod rng;
 pub mod scan;
 pub mod split;

@@ -9,6 +9,7 @@
 //! | `fps_start` | `farthest` or `first` | `farthest` |
 //! | `transform_after` | layer of the trunk whose features the feature transform turns | `1` |
 //! | `pooled` | `relu` if the trunk's last layer has a ReLU, else `linear` | `linear` |
+//! | `edge_radii` | JSON list: how far each layer `edge.conv1…` looks around a point | none |
 //! | `activation_ranges` | JSON object: layer to its largest activation, for int8 | calibrated at load |
 //! | `trained` | `false` for a model of random weights | `true` |
 //! | `training_set`, `accuracy`, `provenance` | free text | |
@@ -37,6 +38,8 @@ pub struct ModelCard {
     pub transform_after: usize,
     /// Whether the trunk's last layer has a ReLU.
     pub pooled_relu: bool,
+    /// How far each layer of surroundings looks, in the normalised cloud's unit.
+    pub edge_radii: Vec<f32>,
     /// The largest activation of each layer, by the layer's name.
     pub activation_ranges: BTreeMap<String, f32>,
     /// Whether the weights were trained at all.
@@ -98,6 +101,7 @@ impl Default for ModelCard {
             fps_start: None,
             transform_after: 1,
             pooled_relu: false,
+            edge_radii: Vec::new(),
             activation_ranges: BTreeMap::new(),
             trained: true,
             training_set: None,
@@ -144,6 +148,7 @@ impl ModelCard {
         let default = Self::default();
         let classes = text("classes").map(|value| serde_json::from_str(&value)).transpose();
         let ranges = text("activation_ranges").map(|value| serde_json::from_str(&value));
+        let radii = text("edge_radii").map(|value| serde_json::from_str(&value)).transpose();
         let normalization = text("normalization").map(|value| value.parse()).transpose();
         Ok(Self {
             classes: classes.map_err(|e| bad("classes", e.to_string()))?.unwrap_or_default(),
@@ -155,6 +160,7 @@ impl ModelCard {
             fps_start: text("fps_start"),
             transform_after: number("transform_after")?.unwrap_or(default.transform_after),
             pooled_relu: choice("pooled", "relu", "linear")?.unwrap_or(default.pooled_relu),
+            edge_radii: radii.map_err(|e| bad("edge_radii", e.to_string()))?.unwrap_or_default(),
             activation_ranges: ranges
                 .transpose()
                 .map_err(|e| bad("activation_ranges", e.to_string()))?
@@ -183,6 +189,7 @@ impl ModelCard {
             ("fps_start", self.fps_start.clone()),
             ("transform_after", Some(self.transform_after.to_string())),
             ("pooled", Some(if self.pooled_relu { "relu" } else { "linear" }.to_owned())),
+            ("edge_radii", (!self.edge_radii.is_empty()).then(|| format!("{:?}", self.edge_radii))),
             (
                 "activation_ranges",
                 (!ranges.is_empty()).then(|| serde_json::Value::from(ranges).to_string()),
@@ -211,6 +218,7 @@ mod tests {
             fps_start: Some("first".into()),
             transform_after: 2,
             pooled_relu: true,
+            edge_radii: vec![0.1, 0.4],
             activation_ranges: BTreeMap::from([("feat.conv1".into(), 1.1)]),
             trained: false,
             training_set: Some("t".into()),
@@ -225,7 +233,16 @@ mod tests {
 
     #[test]
     fn a_value_that_makes_no_sense_is_an_error_that_names_the_key() {
-        for key in ["classes", "normalization", "points", "transform_after", "pooled", "trained"] {
+        let keys = [
+            "classes",
+            "normalization",
+            "points",
+            "transform_after",
+            "pooled",
+            "edge_radii",
+            "trained",
+        ];
+        for key in keys {
             let metadata = BTreeMap::from([(key.to_owned(), "-1".to_owned())]);
             let error = ModelCard::from_metadata(Path::new("m"), &metadata).unwrap_err();
             assert!(error.to_string().contains(&format!("`{key}`")), "{error}");

@@ -6,13 +6,17 @@
 //! original does, from the folder that holds `data/modelnet40_ply_hdf5_2048`;
 //! `shape_names.txt` has the class names in the order of the labels.
 
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use hdf5_pure::FileBuilder;
+use hdf5_pure::{File, FileBuilder};
 
 use crate::atomic;
 use crate::error::FormatError;
+use crate::labelled::LabelledSet;
+pub use crate::modelnet_h5_list::is_one;
+use crate::modelnet_h5_list::list;
 use crate::split::Split;
 
 /// Clouds in a file, as in the original.
@@ -86,7 +90,7 @@ impl ModelNetH5Writer {
         atomic::write(&self.folder.join("shape_names.txt"), |writer| {
             self.classes.iter().try_for_each(|class| writeln!(writer, "{class}"))
         })?;
-        atomic::write(&self.folder.join(format!("{}_files.txt", self.split)), |writer| {
+        atomic::write(&list(&self.folder, self.split), |writer| {
             (0..self.n_files)
                 .try_for_each(|k| writeln!(writer, "{LISTED_FOLDER}/{}", file_name(self.split, k)))
         })
@@ -114,4 +118,75 @@ impl ModelNetH5Writer {
 
 fn file_name(split: Split, k: usize) -> String {
     format!("ply_data_{split}{k}.h5")
+}
+
+/// Reads one half of the dataset in `folder`. Files are looked for there,
+/// whatever folder the list names.
+///
+/// # Errors
+/// A list, a file or a dataset that is missing or of another type or shape,
+/// clouds of two sizes, a label without a class.
+pub fn read(folder: &Path, split: Split) -> Result<LabelledSet, FormatError> {
+    let list = list(folder, split);
+    let names = fs::read_to_string(&list).map_err(|source| FormatError::io(&list, source))?;
+    let mut set = LabelledSet {
+        points: Vec::new(),
+        n_points: 0,
+        labels: Vec::new(),
+        names: None,
+        classes: class_names(folder)?,
+    };
+    for line in names.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        let name = Path::new(line).file_name().unwrap_or(line.as_ref());
+        read_file(&folder.join(name), &mut set)?;
+    }
+    Ok(set)
+}
+
+fn class_names(folder: &Path) -> Result<Option<Vec<String>>, FormatError> {
+    let path = folder.join("shape_names.txt");
+    match fs::read_to_string(&path) {
+        Ok(text) => {
+            let names = text.lines().map(str::trim).filter(|line| !line.is_empty());
+            Ok(Some(names.map(str::to_owned).collect()))
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(FormatError::io(&path, source)),
+    }
+}
+
+/// Appends the clouds of one file.
+fn read_file(path: &Path, set: &mut LabelledSet) -> Result<(), FormatError> {
+    let bad = |part: &str, cause: String| FormatError::malformed(path, part, cause);
+    // Its own errors do not name the file.
+    let bytes = fs::read(path).map_err(|source| FormatError::io(path, source))?;
+    let file = File::from_bytes(bytes).map_err(|error| bad("HDF5", error.to_string()))?;
+    let dataset = |name: &str| {
+        let part = format!("dataset `{name}`");
+        let dataset = file.dataset(name).map_err(|error| bad(&part, error.to_string()))?;
+        let shape = dataset.shape().map_err(|error| bad(&part, error.to_string()))?;
+        Ok((part, dataset, shape))
+    };
+    let (part, data, shape) = dataset("data")?;
+    let [m, n_points, 3] = shape[..] else {
+        return Err(bad(&part, format!("expected shape [m, n, 3], found {shape:?}")));
+    };
+    let points = data.read_f32().map_err(|error| bad(&part, error.to_string()))?;
+    let (label_part, label, shape) = dataset("label")?;
+    if shape.iter().product::<u64>() != m {
+        return Err(bad(&label_part, format!("shape {shape:?} for {m} clouds")));
+    }
+    let labels = label.read_u8().map_err(|error| bad(&label_part, error.to_string()))?;
+    if !set.labels.is_empty() && set.n_points as u64 != n_points {
+        return Err(bad(&part, format!("clouds of {n_points} points after {}", set.n_points)));
+    }
+    let n_classes = set.classes.as_ref().map_or(usize::MAX, Vec::len);
+    if let Some(cloud) = labels.iter().position(|&label| usize::from(label) >= n_classes) {
+        let cause = format!("{} of {n_classes} classes in shape_names.txt", labels[cloud]);
+        return Err(bad(&label_part, format!("cloud {cloud}: label {cause}")));
+    }
+    set.n_points = n_points as usize;
+    set.points.extend(points);
+    set.labels.extend(labels.into_iter().map(usize::from));
+    Ok(())
 }

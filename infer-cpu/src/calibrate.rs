@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+#[cfg(feature = "npz")]
+use formats::labelled::LabelledSet;
 use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
 use formats::weights::WeightsFile;
@@ -19,6 +21,21 @@ use crate::team::Team;
 const SHAPE_POINTS: usize = 512;
 /// Shapes of each kind.
 const SHAPES: u32 = 12;
+
+/// Clouds of a set that are looked at: more change the largest activations
+/// little.
+#[cfg(feature = "npz")]
+const CLOUDS_OF_SET: usize = 512;
+
+/// [`on_clouds`], on some spread over `set`.
+///
+/// # Errors
+/// A file that is no model.
+#[cfg(feature = "npz")]
+pub fn on_set(path: &Path, set: &LabelledSet) -> Result<BTreeMap<String, f32>, Error> {
+    let step = set.len().div_ceil(CLOUDS_OF_SET).max(1);
+    on_clouds(path, (0..set.len()).step_by(step).map(|i| set.cloud(i)))
+}
 
 /// The largest activation of each layer of the model at `path` on `clouds`,
 /// which are normalised as the network takes them.
@@ -40,6 +57,7 @@ pub fn on_clouds<'a>(
     let mut memory = team.work().memory();
     for cloud in clouds {
         team.work().set_points(cloud);
+        team.work().set_surroundings(cloud);
         Engine::observe(&team, &mut memory);
     }
     let observed = team.work().observed().into_iter();

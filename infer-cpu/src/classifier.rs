@@ -222,6 +222,7 @@ impl Classifier {
         let Self { selection, normalized, kernels, network, memory, .. } = self;
         selection.select(normalized, kernels, &**network, memory)?;
         network.set_points(selection.points());
+        network.set_surroundings(normalized);
         network.classify(memory, selection.pooled_stn());
         if network.met().overflow || !all_finite(&memory.values) {
             self.forward_in_f32()?;
@@ -243,6 +244,7 @@ impl Classifier {
         network.reset();
         selection.select(normalized, kernels, &**network, memory)?;
         network.set_points(selection.points());
+        network.set_surroundings(normalized);
         network.classify(memory, selection.pooled_stn());
         self.prediction.precision = Precision::F32;
         let is_sound = !network.met().overflow && all_finite(&memory.values);
@@ -287,6 +289,10 @@ fn front_end(
     }
     let pass = FrontEnd::choose(spec.front, &loaded.parts)?;
     let table = match (table_nodes, &loaded.table) {
+        (Some(_), _) if pass == crate::engine::Pass::Trunk && loaded.parts.edges => {
+            let what = "a trunk that looks around points, which no table of coordinates holds";
+            return Err(Error::FrontMissing { choice: spec.front, what });
+        }
         (Some(nodes), _) => Some(tabulate::front_end(path, pass, nodes)?),
         (None, Some(table)) if pass == crate::engine::Pass::Front => Some(table.clone()),
         _ => None,

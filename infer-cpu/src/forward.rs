@@ -25,6 +25,9 @@ pub trait Forward: Send + Sync {
     fn reserve(&self, n: usize);
     /// Takes the points of the passes that follow.
     fn set_points(&self, points: &[[f32; 3]]);
+    /// Takes `cloud` for what surrounds those points, where the network looks
+    /// at it.
+    fn set_surroundings(&self, cloud: &[[f32; 3]]);
     /// Forgets what earlier passes met.
     fn reset(&self);
     /// Pools the points of `pass` into `memory`, with the points that won.
@@ -48,6 +51,10 @@ impl<T: Format> Forward for Team<Engine<T>> {
 
     fn set_points(&self, points: &[[f32; 3]]) {
         self.work().set_points(points);
+    }
+
+    fn set_surroundings(&self, cloud: &[[f32; 3]]) {
+        self.work().set_surroundings(cloud);
     }
 
     fn reset(&self) {
@@ -140,6 +147,7 @@ fn loaded<T: Format>(
         stn: layers.stn.is_some(),
         fstn: layers.fstn.is_some(),
         front: layers.front.is_some(),
+        edges: !layers.edges.is_empty(),
     };
     let table = match layers.front.take_if(|front| matches!(front, Front::Table(_))) {
         Some(Front::Table(Tensor { shape, values })) => Some(

@@ -181,10 +181,11 @@ pub fn panels<T: Format>(kernels: &Kernels, inputs: usize, outputs: usize) -> Pa
 
 impl First {
     /// Packs the layer behind an input transform `t` `[3, 3]`: a point p, a
-    /// row, comes to it as p t.
+    /// row, comes to it as p t. What is known of its surroundings stays.
     pub fn turn(&self, t: &[f32], panels: &mut Panels<f32>) {
-        panels.fill(|input, output| {
-            (0..3).map(|j| t[input * 3 + j] * self.dense.at(j, output)).sum()
+        panels.fill(|input, output| match input {
+            0..3 => (0..3).map(|j| t[input * 3 + j] * self.dense.at(j, output)).sum(),
+            _ => self.dense.at(input, output),
         });
     }
 }

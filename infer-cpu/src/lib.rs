@@ -9,6 +9,7 @@ mod calibrate;
 mod choose;
 mod classifier;
 mod dense;
+mod edge;
 mod engine;
 mod error;
 mod forward;
@@ -35,6 +36,8 @@ pub mod sharing {
     pub use crate::screen::screening_pays;
 }
 
+#[cfg(feature = "npz")]
+pub use calibrate::on_set as activation_ranges_of_set;
 pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};
 pub use choose::choose;
 pub use classifier::Classifier;

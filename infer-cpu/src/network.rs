@@ -5,7 +5,9 @@
 //! layers: `feat.conv1…`, `feat.bn1…` the trunk, `feat.stn.*` and `feat.fstn.*`
 //! the T-Nets (`conv`, `fc`, and `bn` counted through both), `fc1…`, `bn1…` the
 //! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`, or the tensor
-//! `cpl.table` `[n, n, n, channels]`. Where no layer has a batch norm, all are
+//! `cpl.table` `[n, n, n, channels]`. What a point's surroundings add to its
+//! coordinates comes from `edge.conv1…`, one layer for each of the card's
+//! `edge_radii`. Where no layer has a batch norm, all are
 //! taken as folded already.
 
 use std::collections::BTreeSet;
@@ -23,7 +25,10 @@ pub const TABLE: &str = "cpl.table";
 pub struct Network<C, F> {
     /// The T-Net of the coordinates.
     pub stn: Option<TNet<C, F>>,
-    /// The layers from coordinates to the features that are pooled.
+    /// What surrounds a point, by radius, where the network looks at it.
+    pub edges: Vec<(f32, Dense)>,
+    /// The layers from coordinates, and features of their surroundings, to the
+    /// features that are pooled.
     pub trunk: Vec<C>,
     /// The T-Net of the features.
     pub fstn: Option<TNet<C, F>>,
@@ -117,7 +122,8 @@ impl<M, N> Reader<'_, M, N> {
             let cause = format!("{after}, for a trunk of {n_trunk} layers");
             return Err(self.file_error("metadata `transform_after`", cause));
         }
-        let mut width = 3;
+        let edges = self.edges(card)?;
+        let mut width = 3 + edges.iter().map(|(_, dense)| dense.outputs).sum::<usize>();
         let mut trunk = Vec::with_capacity(n_trunk);
         let mut fstn = None;
         for i in 0..n_trunk {
@@ -139,7 +145,7 @@ impl<M, N> Reader<'_, M, N> {
         let head = self.vector_layers("", 0, width, None)?;
         self.check_class_names(card, head.len())?;
         let front = self.front()?;
-        Ok(Network { stn, trunk, fstn, transform_after: after, head, front })
+        Ok(Network { stn, edges, trunk, fstn, transform_after: after, head, front })
     }
 
     fn check_class_names(&self, card: &ModelCard, n_layers: usize) -> Result<(), FormatError> {
@@ -167,6 +173,23 @@ impl<M, N> Reader<'_, M, N> {
         let (convs, width) = self.point_layers(prefix, inputs, first)?;
         let fcs = self.vector_layers(prefix, convs.len(), width, Some(k))?;
         Ok(TNet { k, convs, fcs })
+    }
+
+    /// The layers that look at a point's surroundings.
+    fn edges(&mut self, card: &ModelCard) -> Result<Vec<(f32, Dense)>, FormatError> {
+        let (n, radii) = (self.count("edge.conv"), &card.edge_radii);
+        if radii.len() != n {
+            let cause = format!("names {} for {n} layers `edge.conv`", radii.len());
+            return Err(self.file_error("metadata `edge_radii`", cause));
+        }
+        if let Some(radius) = radii.iter().find(|r| !(r.is_normal() && **r > 0.0)) {
+            let cause = format!("{radius} is no radius");
+            return Err(self.file_error("metadata `edge_radii`", cause));
+        }
+        let numbered = radii.iter().zip(1..);
+        numbered
+            .map(|(&radius, i)| Ok((radius, self.dense("edge", ("conv", i), Some(i), 3, true)?)))
+            .collect()
     }
 
     /// Point-wise layers with a ReLU each, and how wide the last is.

@@ -116,6 +116,7 @@ impl Selection {
         let Some(front) = &self.front else {
             unreachable!("invariant: a classifier gives critical points a front end");
         };
+        network.set_surroundings(&self.cloud.points);
         front.pool(&self.cloud.points, network, memory);
         self.pooled_stn = matches!(front, FrontEnd::Pass(Pass::Stn));
         self.critical.rank(&memory.values, &memory.winners);
@@ -217,4 +218,6 @@ pub struct Parts {
     pub fstn: bool,
     /// A front end of its own.
     pub front: bool,
+    /// Layers that look at a point's surroundings.
+    pub edges: bool,
 }

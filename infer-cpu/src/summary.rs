@@ -19,6 +19,8 @@ pub struct Summary {
     pub stn: Option<NetShape>,
     /// The T-Net of the features, if there is one.
     pub fstn: Option<NetShape>,
+    /// What looks at a point's surroundings, with its radius.
+    pub edges: Vec<(f32, LayerShape)>,
     /// The trunk, and the layers from the pooled vector to the logits.
     pub trunk: NetShape,
     /// The front end of a critical points layer, if the file brings its own.
@@ -70,11 +72,12 @@ pub fn inspect(path: &Path) -> Result<Summary, Error> {
     let card = ModelCard::from_metadata(path, &file.metadata())?;
     let n_stored = file.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
     let network = read_network(&mut file, &card, |dense, _| shape_of(dense), shape_of)?;
-    let Network { stn, trunk, fstn, head, front, .. } = network;
+    let Network { stn, edges, trunk, fstn, head, front, .. } = network;
     Ok(Summary {
         card,
         stn: stn.map(|net| NetShape { convs: net.convs, fcs: net.fcs }),
         fstn: fstn.map(|net| NetShape { convs: net.convs, fcs: net.fcs }),
+        edges: edges.into_iter().map(|(radius, dense)| (radius, shape_of(dense))).collect(),
         trunk: NetShape { convs: trunk, fcs: head },
         front: front.map(|front| match front {
             Front::Mlp(layers) => FrontSummary::Layers(layers),
@@ -146,7 +149,8 @@ impl Summary {
             None => 0,
         };
         let layers = self.nets().flat_map(|net| net.convs.iter().chain(&net.fcs));
-        layers.map(LayerShape::parameters).sum::<usize>() + front
+        let edges = self.edges.iter().map(|(_, layer)| layer);
+        layers.chain(edges).map(LayerShape::parameters).sum::<usize>() + front
     }
 
     /// Bytes of the weights in `precision`, their biases (fp32) and scales
@@ -162,21 +166,25 @@ impl Summary {
         let layer = |layer: &LayerShape, weight_bytes: usize| {
             layer.macs() * weight_bytes + layer.outputs * (4 + scale_bytes)
         };
-        // The layer that takes coordinates is fp32 in any precision.
-        let convs = |convs: &[LayerShape]| -> usize {
-            let bytes = |conv: &LayerShape| match conv.inputs {
-                3 => 4 * conv.parameters(),
-                _ => layer(conv, point_bytes),
-            };
-            convs.iter().map(bytes).sum()
+        let inner = |convs: &[LayerShape]| -> usize {
+            convs.iter().map(|conv| layer(conv, point_bytes)).sum()
         };
+        // What takes coordinates is fp32 in any precision.
+        let outer = |convs: &[LayerShape]| match convs.split_first() {
+            Some((first, rest)) => 4 * first.parameters() + inner(rest),
+            None => 0,
+        };
+        let nets = [self.stn.as_ref(), Some(&self.trunk)].into_iter().flatten();
+        let convs = nets.map(|net| outer(&net.convs)).sum::<usize>()
+            + self.fstn.as_ref().map_or(0, |fstn| inner(&fstn.convs))
+            + self.edges.iter().map(|(_, edge)| 4 * edge.parameters()).sum::<usize>();
         let front = match &self.front {
-            Some(FrontSummary::Layers(layers)) => convs(layers),
+            Some(FrontSummary::Layers(layers)) => outer(layers),
             Some(FrontSummary::Table { nodes, channels }) => 4 * nodes.pow(3) * channels,
             None => 0,
         };
         let fcs = self.nets().flat_map(|net| &net.fcs).map(|fc| layer(fc, vector_bytes));
-        self.nets().map(|net| convs(&net.convs)).sum::<usize>() + fcs.sum::<usize>() + front
+        convs + fcs.sum::<usize>() + front
     }
 
     fn nets(&self) -> impl Iterator<Item = &NetShape> {

@@ -19,4 +19,5 @@ pub mod scan;
 pub mod scene;
 pub mod sensor;
 pub mod shapes;
+pub mod surface_points;
 pub mod target;

@@ -96,6 +96,12 @@ impl Surface {
         self.triangles[index as usize].map(|v| self.vertices[v as usize])
     }
 
+    /// The indices of the triangles that a ray can meet, ascending.
+    #[must_use]
+    pub fn kept(&self) -> &[u32] {
+        &self.kept
+    }
+
     /// How many triangles a ray can meet.
     #[must_use]
     pub fn len(&self) -> usize {

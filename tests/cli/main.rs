@@ -11,6 +11,7 @@ mod interrupted;
 mod meshes;
 mod reference;
 mod scenes;
+mod surfaces;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

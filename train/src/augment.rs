@@ -3,6 +3,8 @@
 //! Every draw is keyed by the run's seed, the epoch and the cloud, so that a
 //! cloud is the same whichever thread makes it, and in whichever batch it is.
 
+use std::borrow::Cow;
+
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{FarthestPoints, FpsStart};
 
@@ -14,6 +16,9 @@ use crate::recipe::{Augment, Axis, Recipe, Sampling};
 pub struct Drawn {
     /// Its points.
     pub points: Vec<[f32; 3]>,
+    /// All points that it was chosen from, moved as they were, where the
+    /// network looks around; else none.
+    pub around: Vec<[f32; 3]>,
     /// How often the first counts: once, and once for each that was dropped.
     pub first_weight: f32,
     /// The share of each class.
@@ -53,13 +58,14 @@ impl Draws {
 pub fn draw(clouds: &Clouds, i: usize, epoch: u32, recipe: &Recipe) -> Drawn {
     let stream = StreamKey::new(recipe.seed, &format!("augment {i}"), epoch);
     let mut draws = Draws { stream, n: 0 };
-    let mut points = chosen(clouds.set.cloud(i), recipe, &mut draws);
+    let Chosen { mut points, mut around, mut places } =
+        chosen(clouds.set.cloud(i), recipe, &mut draws);
     let n_classes = clouds.classes.len();
     let mut target = one_hot(clouds.set.labels[i], n_classes);
     if recipe.augment.cut_mix > 0.0 && draws.unit() < recipe.augment.cut_mix {
         let other = draws.below(clouds.len());
-        let replaced =
-            mix(&mut points, &chosen(clouds.set.cloud(other), recipe, &mut draws), &mut draws);
+        let other_points = chosen(clouds.set.cloud(other), recipe, &mut draws).points;
+        let replaced = mix(&mut points, &other_points, &mut draws);
         for (share, other) in target.iter_mut().zip(one_hot(clouds.set.labels[other], n_classes)) {
             *share += replaced * (other - *share);
         }
@@ -69,42 +75,64 @@ pub fn draw(clouds: &Clouds, i: usize, epoch: u32, recipe: &Recipe) -> Drawn {
         *share = *share * (1.0 - smoothing) + smoothing / n_classes as f32;
     }
     let n = points.len();
-    drop_points(&mut points, recipe.augment.drop, &mut draws);
+    if around.is_empty() {
+        drop_points(&mut points, recipe.augment.drop, &mut draws);
+        transform(&mut points, &recipe.augment, &mut draws);
+    } else {
+        // All are moved once, so that a chosen one is where it is among them.
+        drop_points(&mut places, recipe.augment.drop, &mut draws);
+        transform(&mut around, &recipe.augment, &mut draws);
+        points = places.iter().map(|&place| around[place]).collect();
+    }
     let first_weight = (n - points.len() + 1) as f32;
-    transform(&mut points, &recipe.augment, &mut draws);
-    Drawn { points, first_weight, target }
+    Drawn { points, around, first_weight, target }
+}
+
+/// Points of a cloud that the network sees.
+struct Chosen {
+    points: Vec<[f32; 3]>,
+    /// All points, where the network looks around; else none.
+    around: Vec<[f32; 3]>,
+    /// Where each of `points` is in `around`.
+    places: Vec<usize>,
 }
 
 fn one_hot(label: usize, n_classes: usize) -> Vec<f32> {
     (0..n_classes).map(|class| f32::from(u8::from(class == label))).collect()
 }
 
-/// As many points of `cloud` as the network sees.
-fn chosen(cloud: &[[f32; 3]], recipe: &Recipe, draws: &mut Draws) -> Vec<[f32; 3]> {
+/// As many points of `cloud` as the network sees, and those around them, where
+/// it looks at them.
+fn chosen(cloud: &[[f32; 3]], recipe: &Recipe, draws: &mut Draws) -> Chosen {
     let n = recipe.points.min(cloud.len());
-    match recipe.sampling {
-        Sampling::First => cloud[..n].to_vec(),
-        Sampling::Random => shuffled(cloud, n, draws),
+    let (candidates, places): (Cow<'_, [[f32; 3]]>, Vec<usize>) = match recipe.sampling {
+        Sampling::First => (cloud.into(), (0..n).collect()),
+        Sampling::Random => (shuffled(cloud, n, draws).into(), (0..n).collect()),
         Sampling::Fps => {
             let some = draws.between(0.5 * cloud.len() as f64, cloud.len() as f64) as usize;
-            let candidates = shuffled(cloud, some.max(n), draws);
+            let some = some.max(n);
+            let mut candidates = shuffled(cloud, some, draws);
+            candidates.truncate(some);
             let kernels = infer_cpu::kernel::available().next();
             let kernels = kernels.expect("invariant: the scalar kernels run everywhere");
             let mut picked = Vec::with_capacity(n);
             FarthestPoints::default().select(&candidates, n, FpsStart::First, kernels, &mut picked);
-            picked.iter().map(|&i| candidates[i as usize]).collect()
+            (candidates.into(), picked.iter().map(|&i| i as usize).collect())
         }
-    }
+    };
+    let points = places.iter().map(|&place| candidates[place]).collect();
+    let looks = !recipe.network.edges.is_empty();
+    Chosen { points, around: if looks { candidates.into_owned() } else { Vec::new() }, places }
 }
 
-/// `n` different points of `cloud` in random order (Fisher and Yates).
+/// The points of `cloud`, of which the first `n` are a random choice in random
+/// order (Fisher and Yates).
 fn shuffled(cloud: &[[f32; 3]], n: usize, draws: &mut Draws) -> Vec<[f32; 3]> {
     let mut points = cloud.to_vec();
     for i in 0..n {
         let j = i + draws.below(points.len() - i);
         points.swap(i, j);
     }
-    points.truncate(n);
     points
 }
 
@@ -122,7 +150,7 @@ fn mix(points: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
 
 /// Drops each point with a chance that is uniform below `most`. The first
 /// stays: the baseline moves what it drops onto it.
-fn drop_points(points: &mut Vec<[f32; 3]>, most: f64, draws: &mut Draws) {
+fn drop_points<T>(points: &mut Vec<T>, most: f64, draws: &mut Draws) {
     let chance = most * draws.unit();
     let mut is_first = true;
     points.retain(|_| {
@@ -138,19 +166,47 @@ fn transform(points: &mut [[f32; 3]], augment: &Augment, draws: &mut Draws) {
     let shifts = [(); 3].map(|()| draws.between(-shift, shift));
     let factors = [(); 3].map(|()| scale * draws.between(1.0 - stretch, 1.0 + stretch));
     let angle = draws.between(-rotate_degrees, rotate_degrees).to_radians();
-    let (a, b) = match augment.up {
-        Axis::X => (1, 2),
-        Axis::Y => (2, 0),
-        Axis::Z => (0, 1),
-    };
+    let [a, b, _] = axes(augment.up);
     let (sin, cos) = angle.sin_cos();
+    let sensor = (augment.sensor_noise > 0.0).then(|| sensor(augment.up, draws));
     for point in points {
         let mut p = point.map(f64::from);
         if augment.jitter > 0.0 {
             let clip = augment.jitter_clip;
             p = p.map(|x| x + (augment.jitter * draws.normal()).clamp(-clip, clip));
         }
+        if let Some(sensor) = sensor {
+            p = along_ray(p, sensor, augment.sensor_noise * draws.normal());
+        }
         (p[a], p[b]) = (cos * p[a] - sin * p[b], sin * p[a] + cos * p[b]);
         *point = [0, 1, 2].map(|k| (p[k] * factors[k] + shifts[k]) as f32);
     }
+}
+
+/// The two axes across `up`, and `up`.
+fn axes(up: Axis) -> [usize; 3] {
+    match up {
+        Axis::X => [1, 2, 0],
+        Axis::Y => [2, 0, 1],
+        Axis::Z => [0, 1, 2],
+    }
+}
+
+/// Where gen-dataset's sensors stand by default, but from any side.
+fn sensor(up: Axis, draws: &mut Draws) -> [f64; 3] {
+    const DISTANCE: f64 = 3.0;
+    let (elevation, azimuth) = (20f64.to_radians(), draws.between(0.0, std::f64::consts::TAU));
+    let [a, b, up] = axes(up);
+    let mut sensor = [0.0; 3];
+    sensor[a] = DISTANCE * elevation.cos() * azimuth.cos();
+    sensor[b] = DISTANCE * elevation.cos() * azimuth.sin();
+    sensor[up] = DISTANCE * elevation.sin();
+    sensor
+}
+
+/// `point` moved away from `sensor` by `error`.
+fn along_ray(point: [f64; 3], sensor: [f64; 3], error: f64) -> [f64; 3] {
+    let ray = [0, 1, 2].map(|k| point[k] - sensor[k]);
+    let range = ray.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    [0, 1, 2].map(|k| point[k] + error * ray[k] / range)
 }

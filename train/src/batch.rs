@@ -14,6 +14,11 @@ pub struct Batch {
     pub weights: Vec<f32>,
     /// Where each cloud's rows begin, and where the last one's end.
     pub starts: Vec<usize>,
+    /// All points of the clouds, where the network looks around those above;
+    /// else nothing.
+    pub around: Vec<[f32; 3]>,
+    /// Where each cloud's begin in `around`, and where the last one's end.
+    pub around_starts: Vec<usize>,
     /// The share of each class, `[clouds, classes]`.
     pub targets: Matrix,
 }
@@ -29,6 +34,15 @@ impl Batch {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// All points of cloud `cloud`.
+    #[must_use]
+    pub fn surroundings(&self, cloud: usize) -> &[[f32; 3]] {
+        match self.around_starts.get(cloud..cloud + 2) {
+            Some(&[first, last]) => &self.around[first..last],
+            _ => &[],
+        }
     }
 
     /// The points as a matrix.

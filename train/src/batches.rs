@@ -57,12 +57,14 @@ fn order(n: usize, epoch: u32, recipe: &Recipe) -> Vec<usize> {
 #[must_use]
 pub fn joined(drawn: &[Drawn]) -> Batch {
     let n_classes = drawn.first().map_or(0, |cloud| cloud.target.len());
-    let mut batch = Batch { starts: vec![0], ..Batch::default() };
+    let mut batch = Batch { starts: vec![0], around_starts: vec![0], ..Batch::default() };
     for cloud in drawn {
         batch.coordinates.extend(&cloud.points);
         batch.weights.push(cloud.first_weight);
         batch.weights.resize(batch.coordinates.len(), 1.0);
         batch.starts.push(batch.coordinates.len());
+        batch.around.extend(&cloud.around);
+        batch.around_starts.push(batch.around.len());
     }
     let targets = drawn.iter().flat_map(|cloud| cloud.target.iter().copied()).collect();
     batch.targets = Matrix::from_shape_vec((drawn.len(), n_classes), targets)

@@ -21,8 +21,8 @@ const SQUARE: &str = ".adam_square";
 /// # Errors
 /// What the system reports.
 pub fn write(path: &Path, trainer: &mut Trainer, notes: &str) -> Result<(), Error> {
-    let mut tensors = model::tensors(&mut trainer.network);
-    trainer.network.parameters(&mut |parameter| {
+    let mut tensors = model::tensors(&mut trainer.model);
+    trainer.model.parameters(&mut |parameter| {
         for (suffix, values) in [(MEAN, &parameter.mean), (SQUARE, &parameter.square)] {
             let tensor = Tensor { shape: parameter.shape.clone(), values: values.clone() };
             tensors.insert(format!("{}{suffix}", parameter.name), tensor);
@@ -68,12 +68,12 @@ pub fn read(path: &Path, trainer: &mut Trainer) -> Result<String, Error> {
         Some(tensor) if tensor.values.len() == into.len() => *into = tensor.values,
         _ => missing = Some(name),
     };
-    trainer.network.parameters(&mut |parameter| {
+    trainer.model.parameters(&mut |parameter| {
         take(parameter.name.clone(), &mut parameter.value);
         take(format!("{}{MEAN}", parameter.name), &mut parameter.mean);
         take(format!("{}{SQUARE}", parameter.name), &mut parameter.square);
     });
-    trainer.network.statistics(&mut |name, values| take(name.to_owned(), values));
+    trainer.model.statistics(&mut |name, values| take(name.to_owned(), values));
     if let Some(name) = missing {
         let cause = "missing, or of another shape";
         return Err(FormatError::malformed(path, format!("tensor `{name}`"), cause).into());

@@ -5,6 +5,7 @@ mod yanx27;
 use std::path::{Path, PathBuf};
 
 use formats::labelled::{LabelledSet, read_labelled};
+use formats::modelnet_h5_list;
 use formats::rng::StreamKey;
 use formats::split::Split;
 
@@ -27,11 +28,23 @@ fn packed(path: &Path, split: Split) -> Option<PathBuf> {
     candidates.into_iter().find(|path| path.is_file())
 }
 
+#[cfg(feature = "hdf5")]
+fn read_hdf5(path: &Path, split: Split) -> Result<LabelledSet, Error> {
+    Ok(formats::modelnet_h5::read(path, split)?)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn read_hdf5(path: &Path, _: Split) -> Result<LabelledSet, Error> {
+    let cause = "HDF5, which this program was built without: build with --features hdf5";
+    Err(Error::Data { path: path.to_path_buf(), cause: cause.to_owned() })
+}
+
 impl Clouds {
     /// Reads the `split` of the data at `path`: a packed NPZ; the beginning of
     /// the names of two, as gen-dataset packs them (`rotational-noisy` for
     /// `rotational-noisy-train.npz` and `rotational-noisy-test.npz`); a folder
-    /// with `train.npz` and `test.npz`; or a folder of text files as
+    /// with `train.npz` and `test.npz`; one of HDF5 files as ModelNet40 comes in
+    /// (`modelnet40_ply_hdf5_2048`), with feature `hdf5`; or one of text files as
     /// yanx27/Pointnet_Pointnet2_pytorch trains on, of which `most_points`
     /// points a cloud are read.
     ///
@@ -40,16 +53,38 @@ impl Clouds {
     pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
         let set = if let Some(packed) = packed(path, split) {
             read_labelled(&packed)?
+        } else if modelnet_h5_list::list(path, split).is_file() {
+            read_hdf5(path, split)?
         } else if yanx27::is_one(path) {
             yanx27::read(path, split, most_points)?
         } else {
             let cause = format!(
                 "neither a packed NPZ, nor what {split}.npz or -{split}.npz follows, nor a \
-                 folder with modelnet40_shape_names.txt"
+                 folder with {split}_files.txt or modelnet40_shape_names.txt"
             );
             return Err(Error::Data { path: path.to_path_buf(), cause });
         };
-        Self::checked(set, path)
+        let mut clouds = Self::checked(set, path)?;
+        clouds.normalize();
+        Ok(clouds)
+    }
+
+    /// Moves every cloud's mean to 0 and scales its largest radius to 1.
+    pub fn normalize(&mut self) {
+        let n_points = self.set.n_points;
+        for cloud in self.set.points.chunks_exact_mut(3 * n_points) {
+            formats::cloud::normalize_unit_sphere(cloud.as_chunks_mut::<3>().0);
+        }
+    }
+
+    /// Reads the `split` of the packed data at `path` as it is, neither moved
+    /// nor scaled.
+    ///
+    /// # Errors
+    /// As [`Clouds::read`].
+    pub fn read_unmoved(path: &Path, split: Split) -> Result<Self, Error> {
+        let file = packed(path, split).unwrap_or_else(|| path.to_path_buf());
+        Self::checked(read_labelled(&file)?, path)
     }
 
     fn checked(mut set: LabelledSet, path: &Path) -> Result<Self, Error> {
@@ -68,10 +103,6 @@ impl Clouds {
             Some(classes) => classes,
             None => (0..most).map(|class| format!("class {class}")).collect(),
         };
-        let n_points = set.n_points;
-        for cloud in set.points.chunks_exact_mut(3 * n_points) {
-            formats::cloud::normalize_unit_sphere(cloud.as_chunks_mut::<3>().0);
-        }
         Ok(Self { set, classes })
     }
 
@@ -101,6 +132,41 @@ impl Clouds {
             classes: None,
         };
         Self { set, classes: self.classes.clone() }
+    }
+
+    /// These clouds and then `others`.
+    ///
+    /// # Errors
+    /// Clouds of another size or other classes.
+    pub fn and(&self, others: &Self) -> Result<Self, String> {
+        let sizes = [self.set.n_points, others.set.n_points];
+        if sizes[0] != sizes[1] {
+            return Err(format!("clouds of {} and of {} points", sizes[0], sizes[1]));
+        }
+        if self.classes != others.classes {
+            return Err(format!("classes {:?} and {:?}", self.classes, others.classes));
+        }
+        let join = |a: &Vec<String>, b: &Vec<String>| [&a[..], &b[..]].concat();
+        let names = self.set.names.as_ref().zip(others.set.names.as_ref());
+        let set = LabelledSet {
+            points: [&self.set.points[..], &others.set.points[..]].concat(),
+            n_points: self.set.n_points,
+            labels: [&self.set.labels[..], &others.set.labels[..]].concat(),
+            names: names.map(|(a, b)| join(a, b)),
+            classes: None,
+        };
+        Ok(Self { set, classes: self.classes.clone() })
+    }
+
+    /// The first `most` clouds of every class.
+    #[must_use]
+    pub fn of_each_class(&self, most: usize) -> Self {
+        let mut seen = vec![0; self.classes.len()];
+        let is_wanted = |i: &usize| {
+            seen[self.set.labels[*i]] += 1;
+            seen[self.set.labels[*i]] <= most
+        };
+        self.some(&(0..self.len()).filter(is_wanted).collect::<Vec<_>>())
     }
 
     /// Parts the set in two by instance: what is learnt from, and a `share` by

@@ -1,6 +1,5 @@
 //! `cargo xtask eval`: a model's accuracy on labelled clouds.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::ensure;
@@ -34,7 +33,7 @@ pub struct Args {
 }
 
 /// Points of a text file that are read: as many as the baseline's files have.
-const MOST_POINTS: usize = 10_000;
+pub const MOST_POINTS: usize = 10_000;
 
 /// Measures what `args` ask for.
 ///
@@ -65,11 +64,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!("{}", report::line(&found, &args.data));
     if let Some(path) = &args.csv {
         let csv = report::csv(&found, &names);
-        atomic::write(path, |file| file.write_all(csv.as_bytes()))?;
+        atomic::write_bytes(path, &csv)?;
     }
     if let Some(path) = &args.svg {
         let drawing = report::drawing(&found, &names).to_string();
-        atomic::write(path, |file| file.write_all(drawing.as_bytes()))?;
+        atomic::write_bytes(path, &drawing)?;
     }
     Ok(())
 }

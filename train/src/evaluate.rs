@@ -72,6 +72,10 @@ pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Conf
         })
         .collect::<Result<_, Error>>()?;
     let n = clouds.classes.len();
+    if let Some(answer) = answers.iter().flatten().find(|&&answer| answer >= n) {
+        let cause = format!("answers class {answer}, the clouds have {n}");
+        return Err(Error::Data { path: path.to_path_buf(), cause });
+    }
     let mut confusion = vec![vec![0; n]; n];
     for (label, answer) in clouds.set.labels.iter().zip(answers.into_iter().flatten()) {
         confusion[*label][answer] += 1;

@@ -1,17 +1,16 @@
 //! `cargo xtask explain`: what a network's answer rests on, by LIME-3D and by
 //! its critical points, side by side.
 
-mod drawing;
+pub mod drawing;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{bail, ensure};
+use formats::atomic;
 use formats::cloud_file::read_cloud;
-use formats::{atomic, rng::StreamKey};
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
-use train::chamfer::chamfer;
+use train::beside_random::BesideRandom;
 use train::lime::{Explanation, Lime, explain};
 
 /// Flags of `explain`.
@@ -78,7 +77,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     report(&points, &found, &critical, &strongest, args.seed);
     if let Some(path) = &args.svg {
         let drawing = drawing::of(&points, &found, &critical).to_string();
-        atomic::write(path, |file| file.write_all(drawing.as_bytes()))?;
+        atomic::write_bytes(path, &drawing)?;
     }
     Ok(())
 }
@@ -99,18 +98,9 @@ fn report(
     strongest: &[usize],
     seed: u64,
 ) {
-    let some = |indices: &[usize]| -> Vec<[f64; 3]> {
-        indices.iter().map(|&i| points[i].map(f64::from)).collect()
-    };
     let n = critical.len();
-    let reference = some(strongest);
-    let ours = chamfer(&some(critical), &reference);
-    let stream = StreamKey::new(seed, "random subsets", 0);
-    let mut random: Vec<_> = (0..DRAWS)
-        .map(|draw| chamfer(&some(&subset(points.len(), n, stream, draw)), &reference))
-        .collect();
-    random.sort_by(|a, b| a.squared.total_cmp(&b.squared));
-    let nearer = random.iter().filter(|one| one.squared < ours.squared).count();
+    let beside = BesideRandom::of(points, (critical, strongest), DRAWS, seed);
+    let BesideRandom { ours, random } = &beside;
     println!("LIME-3D: {} parts, R² {:.3}", found.attribution.len(), found.r_squared);
     println!("Chamfer distance to the {n} points that LIME finds strongest:");
     println!("  critical points  squared {:.5}, plain {:.5}", ours.squared, ours.plain);
@@ -120,17 +110,8 @@ fn report(
         "  random points    squared {:.5} (95 % of {DRAWS} draws: {:.5} to {:.5}), plain {:.5}",
         middle.squared, low.squared, high.squared, middle.plain
     );
-    println!("  of the random draws, {:.1} % are nearer", 100.0 * nearer as f64 / f64::from(DRAWS));
-}
-
-/// `n` of `all` indices (Fisher and Yates), number `draw`.
-fn subset(all: usize, n: usize, stream: StreamKey, draw: u32) -> Vec<usize> {
-    let mut indices: Vec<usize> = (0..all).collect();
-    for i in 0..n.min(all) {
-        let number = u64::from(draw) << 32 | i as u64;
-        let j = i + stream.below((all - i) as u64, number) as usize;
-        indices.swap(i, j);
-    }
-    indices.truncate(n);
-    indices
+    println!(
+        "  of the random draws, {:.1} % are nearer",
+        100.0 * beside.nearer() as f64 / f64::from(DRAWS)
+    );
 }

@@ -2,17 +2,18 @@
 //! behind it.
 //!
 //! Which points are chosen has no derivative: no gradient of the network's loss
-//! comes to the front end. So it has a loss of its own: its pooled features go
-//! through one linear layer to the classes, which is left behind after training.
+//! comes to the front end, unless the choice is relaxed ([`crate::gumbel`]). So
+//! it has a loss of its own: its pooled features go through one linear layer to
+//! the classes, which is left behind after training.
 //! Its gradient comes back, through the maximum, to the points that won
 //! channels, and those are the points that are chosen. A front end of its own
 //! can be trained so and taken out as a sampler; points are ranked and resized
 //! by infer-cpu's own code.
 
-use infer_cpu::sampler::{CriticalPoints, Resize};
 use serde::{Deserialize, Serialize};
 
 use crate::batch::Batch;
+use crate::chooser::{Chooser, Chosen};
 use crate::layer::{Folded, Learns, Linear};
 use crate::loss::{self, Loss};
 use crate::matrix::Matrix;
@@ -35,12 +36,21 @@ pub struct Cpl {
     pub resize: String,
     /// The weight of its own loss.
     pub weight: f64,
+    /// The network's T-Net of coordinates is the front end, in place of one of
+    /// its own: its pooling of all points chooses those that the rest sees, and
+    /// predicts their transform. `front` and `weight` have no say then.
+    pub shared: bool,
+    /// Chooses by chance, in proportion to scores, and lets the network's loss
+    /// teach the front end by a straight-through estimator.
+    pub gumbel: bool,
 }
 
 impl Default for Cpl {
     /// The paper's front end (Meyer and Reitmann 2026), and its 64 points.
     fn default() -> Self {
-        Self { front: vec![64, 128, 1024], keep: 64, resize: "truncate".to_owned(), weight: 1.0 }
+        let resize = "truncate".to_owned();
+        let front = vec![64, 128, 1024];
+        Self { front, keep: 64, resize, weight: 1.0, shared: false, gumbel: false }
     }
 }
 
@@ -49,8 +59,7 @@ impl Default for Cpl {
 pub struct Front {
     points: Points,
     classes: Linear,
-    keep: usize,
-    resize: Resize,
+    chooser: Chooser,
     weight: f32,
 }
 
@@ -65,43 +74,30 @@ impl Front {
         Ok(Self {
             points: Points::new("cpl.", &widths, 1, true, seed),
             classes: Linear::new(LEFT_BEHIND, pooled, n_classes, seed),
-            keep: cpl.keep,
-            resize: cpl.resize.parse().map_err(|error| format!("{error}"))?,
+            chooser: Chooser::new(cpl, seed)?,
             weight: cpl.weight as f32,
         })
     }
 
-    /// Learns from `batch` and returns its critical points, and its own loss.
-    fn learn(&mut self, batch: &Batch, rates: Rates) -> (Batch, f64) {
-        let (x, rows) = (batch.points(), batch.rows());
-        self.points.forward(x.view(), rows, rates.momentum);
-        let pooled = self.points.pooled.output().to_owned();
-        let chosen = self.choose(batch);
+    /// The critical points of `batch`.
+    fn forward(&mut self, batch: &Batch, rates: Rates) -> Chosen {
+        self.points.forward(batch.points(), batch.rows(), rates.momentum);
+        self.chooser.choose(&self.points.pooled, batch, rates.step)
+    }
+
+    /// Learns from its own loss, which is returned, and from the gradient of
+    /// the chosen points, where the choice has one.
+    fn backward(&mut self, batch: &Batch, chosen: &Chosen, dpoints: Option<&Matrix>) -> f64 {
+        let pooled = self.points.pooled.base.output().to_owned();
         let logits = self.classes.forward(pooled.view());
         let (loss, dlogits) = loss::cross_entropy(logits, &batch.targets);
         let dlogits = dlogits * self.weight;
-        let dpooled = self.classes.backward(pooled.view(), dlogits.view());
-        self.points.backward(x, dpooled, rows, false);
-        (chosen, f64::from(self.weight) * loss.total)
-    }
-
-    fn choose(&self, batch: &Batch) -> Batch {
-        let mut chosen = Batch { starts: vec![0], ..Batch::default() };
-        let mut critical = CriticalPoints::default();
-        let mut rows = Vec::new();
-        for (cloud, maxima) in self.points.pooled.output().rows().into_iter().enumerate() {
-            let maxima = maxima.to_slice().expect("invariant: rows are contiguous");
-            critical.rank(maxima, self.points.pooled.winners(cloud));
-            self.resize.apply(&critical.rows, &critical.scores, self.keep, &mut rows);
-            rows.sort_unstable();
-            for same in rows.chunk_by(|a, b| a == b) {
-                chosen.coordinates.push(batch.coordinates[same[0] as usize]);
-                chosen.weights.push(same.len() as f32);
-            }
-            chosen.starts.push(chosen.coordinates.len());
+        let mut dpooled = self.classes.backward(pooled.view(), dlogits.view());
+        if let Some(dpoints) = dpoints {
+            self.chooser.add_gradient(&self.points.pooled, chosen, dpoints, &mut dpooled);
         }
-        chosen.targets.clone_from(&batch.targets);
-        chosen
+        self.points.backward(batch.points(), dpooled, batch.rows(), false);
+        f64::from(self.weight) * loss.total
     }
 }
 
@@ -121,9 +117,10 @@ impl Model {
         let Some(front) = &mut self.front else {
             return self.network.learn(batch, kept, rates);
         };
-        let (chosen, own) = front.learn(batch, rates);
-        let mut loss = self.network.learn(&chosen, kept, rates);
-        loss.total += own;
+        let chosen = front.forward(batch, rates);
+        let wanted = front.chooser.is_relaxed();
+        let (mut loss, dpoints) = self.network.learn_points(&chosen.batch, kept, rates, wanted);
+        loss.total += front.backward(batch, &chosen, dpoints.as_ref());
         loss
     }
 

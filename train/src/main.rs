@@ -4,6 +4,7 @@ mod compare_points;
 mod eval;
 mod explain;
 mod report;
+mod reproduce;
 mod run;
 mod serve;
 
@@ -29,6 +30,9 @@ enum Command {
     Explain(explain::Args),
     /// Tell how far two clouds are apart
     ComparePoints(compare_points::Args),
+    /// Run the paper's experiments
+    #[command(hide = true)]
+    Reproduce(reproduce::Args),
     /// Take part in `bench train`
     #[command(hide = true)]
     Serve(serve::Args),
@@ -40,6 +44,7 @@ fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::ComparePoints(args) => compare_points::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Serve(args) => serve::run(&args),
     };
     match done {

@@ -18,23 +18,22 @@ const COLUMNS: usize = 64;
 /// `x` `[n, inputs]` times the transpose of `weights` `[outputs, inputs]`.
 #[must_use]
 pub fn forward(x: ArrayView2<'_, f32>, weights: ArrayView2<'_, f32>) -> Matrix {
-    let mut out = Matrix::zeros((x.nrows(), weights.nrows()));
-    out.axis_chunks_iter_mut(Axis(0), ROWS)
-        .into_par_iter()
-        .zip(x.axis_chunks_iter(Axis(0), ROWS))
-        .for_each(|(mut out, x)| general_mat_mul(1.0, &x, &weights.t(), 0.0, &mut out));
-    out
+    by_rows(x, weights.t())
 }
 
 /// `dz` `[n, outputs]` times `weights` `[outputs, inputs]`: the gradient of the
 /// inputs.
 #[must_use]
 pub fn backward(dz: ArrayView2<'_, f32>, weights: ArrayView2<'_, f32>) -> Matrix {
-    let mut out = Matrix::zeros((dz.nrows(), weights.ncols()));
+    by_rows(dz, weights)
+}
+
+fn by_rows(x: ArrayView2<'_, f32>, right: ArrayView2<'_, f32>) -> Matrix {
+    let mut out = Matrix::zeros((x.nrows(), right.ncols()));
     out.axis_chunks_iter_mut(Axis(0), ROWS)
         .into_par_iter()
-        .zip(dz.axis_chunks_iter(Axis(0), ROWS))
-        .for_each(|(mut out, dz)| general_mat_mul(1.0, &dz, &weights, 0.0, &mut out));
+        .zip(x.axis_chunks_iter(Axis(0), ROWS))
+        .for_each(|(mut out, x)| general_mat_mul(1.0, &x, &right, 0.0, &mut out));
     out
 }
 

@@ -144,6 +144,9 @@ pub struct Augment {
     pub jitter: f64,
     /// Where jitter is clipped.
     pub jitter_clip: f64,
+    /// Standard deviation of a sensor's error, along the ray to each point, for
+    /// a sensor 3 radii away and 20 degrees above, from any side.
+    pub sensor_noise: f64,
     /// The largest angle about the up axis, degrees; 180 is any.
     pub rotate_degrees: f64,
     /// The up axis: x, y or z.
@@ -173,6 +176,7 @@ impl Default for Augment {
             shift: 0.1,
             jitter: 0.0,
             jitter_clip: 0.05,
+            sensor_noise: 0.0,
             rotate_degrees: 0.0,
             up: Axis::Z,
             stretch: 0.0,
@@ -221,6 +225,16 @@ impl Recipe {
             _ if network.widths().any(|width| width == 0 || width > WIDEST) => {
                 refuse("network", "widths between 1 and 8192")
             }
+            _ if network
+                .edges
+                .iter()
+                .any(|edge| !(edge.radius.is_normal() && edge.radius > 0.0)) =>
+            {
+                refuse("network.edges.radius", "finite, above 0")
+            }
+            _ if !network.edges.is_empty() && augment.cut_mix > 0.0 => {
+                refuse("augment.cut_mix", "parts of two clouds have no surroundings: no edges then")
+            }
             _ if self.cpl.as_ref().is_some_and(|cpl| cpl.front.len() < 2) => {
                 refuse("cpl.front", "2 layers or more")
             }
@@ -229,6 +243,15 @@ impl Recipe {
             }
             _ if self.cpl.as_ref().is_some_and(|cpl| cpl.keep == 0 || cpl.keep > self.points) => {
                 refuse("cpl.keep", "between 1 and `points`")
+            }
+            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.shared) && !network.input_transform => {
+                refuse("cpl.shared", "there is no T-Net of coordinates to share")
+            }
+            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.gumbel && cpl.shared) => {
+                refuse("cpl.gumbel", "for a front end of its own, not a shared one")
+            }
+            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.gumbel && cpl.resize != "truncate") => {
+                refuse("cpl.gumbel", "points are drawn once each: resize is to be truncate")
             }
             _ if self.cpl.as_ref().is_some_and(|cpl| !finite(cpl.weight)) => {
                 refuse("cpl.weight", "finite, 0 or more")
@@ -239,6 +262,9 @@ impl Recipe {
             }
             _ if !finite(augment.shift) => refuse("augment.shift", "finite, 0 or more"),
             _ if !finite(augment.jitter) => refuse("augment.jitter", "finite, 0 or more"),
+            _ if !finite(augment.sensor_noise) => {
+                refuse("augment.sensor_noise", "finite, 0 or more")
+            }
             _ if !share(augment.stretch) => refuse("augment.stretch", "0 or more, below 1"),
             _ if !(0.0..=1.0).contains(&augment.cut_mix) => {
                 refuse("augment.cut_mix", "between 0 and 1")

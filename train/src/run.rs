@@ -1,6 +1,5 @@
 //! A run from recipe to model, in a folder that it can be resumed from.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -21,6 +20,7 @@ mod metrics;
 
 use metrics::{Metrics, Row};
 
+use crate::eval::MOST_POINTS;
 use crate::report;
 
 /// Flags of `train`.
@@ -28,7 +28,8 @@ use crate::report;
 pub struct Args {
     /// What to learn from: a packed NPZ; the beginning of the names of two, as
     /// `rotational-noisy` of rotational-noisy-train.npz and -test.npz; a folder
-    /// with train.npz and test.npz, or one of text files as
+    /// with train.npz and test.npz, one of ModelNet40's HDF5 files, or one of
+    /// text files as
     /// yanx27/Pointnet_Pointnet2_pytorch has them
     #[arg(long, value_name = "PATH")]
     data: PathBuf,
@@ -86,24 +87,59 @@ fn front_of(word: &str) -> Result<Front, String> {
 /// what the system reports.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let recipe = recipe(args)?;
-    let all = Clouds::read(&args.data, Split::Train, recipe.points)?;
-    check(&all, &recipe, &args.data)?;
-    let (learnt, held) = all.split_validation(recipe.validation, recipe.seed);
-    let (clouds, held) = (all.some(&learnt), all.some(&held));
-    ensure!(
-        batches::count(clouds.len(), &recipe) > 0,
-        "{}: {} clouds to learn from, fewer than a batch of {}",
-        args.data.display(),
-        clouds.len(),
-        recipe.batch
-    );
-    let folder = args.out.with_extension("run");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    let mut run = Run::open(folder, recipe, &all.classes, args)?;
-    while run.trainer.epoch < run.trainer.recipe.epochs {
-        run.epoch(&clouds, &held)?;
+    let clouds = Clouds::read(&args.data, Split::Train, points_to_read(&recipe))?;
+    // One file is no two halves.
+    let halves = (!args.data.is_file()).then(|| args.data.clone());
+    let name = args.data.display().to_string();
+    let data_name = args.data_name.as_ref().unwrap_or(&name);
+    let test = args.test.clone().or(halves);
+    let job = Job { recipe, clouds: &clouds, data: &name, data_name, out: &args.out };
+    job.run(test.as_deref())?;
+    println!("{}", args.out.display());
+    Ok(())
+}
+
+/// What is to be learnt from what.
+pub struct Job<'a> {
+    /// How.
+    pub recipe: Recipe,
+    /// From what.
+    pub clouds: &'a Clouds,
+    /// Where that comes from, for errors.
+    pub data: &'a str,
+    /// What the model's card calls it.
+    pub data_name: &'a str,
+    /// Where the model goes; the run's folder is beside it.
+    pub out: &'a Path,
+}
+
+impl Job<'_> {
+    /// Learns, from wherever an earlier run was interrupted, and writes the
+    /// model; `test` is read once, at the end.
+    ///
+    /// # Errors
+    /// As [`run`].
+    pub fn run(self, test: Option<&Path>) -> anyhow::Result<()> {
+        let Job { recipe, clouds: all, data, out, .. } = &self;
+        recipe.check()?;
+        check(all, recipe, data)?;
+        let (learnt, held) = all.split_validation(recipe.validation, recipe.seed);
+        let (clouds, held) = (all.some(&learnt), all.some(&held));
+        ensure!(
+            batches::count(clouds.len(), recipe) > 0,
+            "{data}: {} clouds to learn from, fewer than a batch of {}",
+            clouds.len(),
+            recipe.batch
+        );
+        let folder = out.with_extension("run");
+        fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        atomic::sweep_leftovers(&folder)?;
+        let mut run = Run::open(folder, &self)?;
+        while run.trainer.epoch < run.trainer.recipe.epochs {
+            run.epoch(&clouds, &held)?;
+        }
+        run.finish(&self, test, &clouds)
     }
-    run.finish(args, &clouds)
 }
 
 fn recipe(args: &Args) -> anyhow::Result<Recipe> {
@@ -134,20 +170,25 @@ fn recipe(args: &Args) -> anyhow::Result<Recipe> {
     Ok(recipe)
 }
 
-fn check(clouds: &Clouds, recipe: &Recipe, path: &Path) -> anyhow::Result<()> {
+/// Points of a text file that are read: the baseline's loader takes the first
+/// of them, other samplers and surroundings want all that there are.
+fn points_to_read(recipe: &Recipe) -> usize {
+    let is_baseline = recipe.sampling == Sampling::First && recipe.network.edges.is_empty();
+    if is_baseline { recipe.points } else { MOST_POINTS }
+}
+
+fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> anyhow::Result<()> {
     let n_points = clouds.set.n_points;
     ensure!(
         n_points >= recipe.points,
-        "{}: clouds of {n_points} points; the recipe wants {}",
-        path.display(),
+        "{data}: clouds of {n_points} points; the recipe wants {}",
         recipe.points
     );
-    ensure!(clouds.classes.len() > 1, "{}: one class only", path.display());
+    ensure!(clouds.classes.len() > 1, "{data}: one class only");
     for (class, name) in clouds.classes.iter().enumerate() {
         ensure!(
             clouds.set.labels.contains(&class),
-            "{}: no cloud of class {class} ({name}) to learn from",
-            path.display()
+            "{data}: no cloud of class {class} ({name}) to learn from"
         );
     }
     Ok(())
@@ -163,13 +204,9 @@ struct Run {
 }
 
 impl Run {
-    fn open(
-        folder: PathBuf,
-        recipe: Recipe,
-        classes: &[String],
-        args: &Args,
-    ) -> anyhow::Result<Self> {
-        let mut trainer = Trainer::new(recipe, classes.len())?;
+    fn open(folder: PathBuf, job: &Job<'_>) -> anyhow::Result<Self> {
+        let classes = job.clouds.classes.clone();
+        let mut trainer = Trainer::new(job.recipe.clone(), classes.len())?;
         let checkpoint = folder.join("checkpoint.safetensors");
         let metrics = if checkpoint.is_file() {
             let notes = checkpoint::read(&checkpoint, &mut trainer)?;
@@ -179,12 +216,9 @@ impl Run {
             Metrics::default()
         };
         let text = toml::to_string(&trainer.recipe)?;
-        atomic::write(&folder.join("recipe.toml"), |file| {
-            std::io::Write::write_all(file, text.as_bytes())
-        })?;
-        let path = args.data.display().to_string();
-        let training_set = args.data_name.clone().unwrap_or(path);
-        Ok(Self { folder, trainer, metrics, classes: classes.to_vec(), training_set })
+        atomic::write_bytes(&folder.join("recipe.toml"), &text)?;
+        let training_set = job.data_name.to_owned();
+        Ok(Self { folder, trainer, metrics, classes, training_set })
     }
 
     fn epoch(&mut self, clouds: &Clouds, held: &Clouds) -> anyhow::Result<()> {
@@ -204,7 +238,7 @@ impl Run {
         bar.finish_and_clear();
         let current = self.folder.join("current.safetensors");
         let card = self.card(None);
-        model::write(&current, &mut self.trainer.network, &card)?;
+        model::write(&current, &mut self.trainer.model, &card)?;
         let validated = if held.is_empty() {
             None
         } else {
@@ -213,11 +247,7 @@ impl Run {
         self.note(epoch, &learnt, validated.as_ref());
         // With nothing to choose by, the last is the best.
         if validated.is_none() || self.metrics.is_best(epoch) {
-            fs::copy(&current, self.folder.join("best.safetensors.part"))?;
-            fs::rename(
-                self.folder.join("best.safetensors.part"),
-                self.folder.join("best.safetensors"),
-            )?;
+            model::write(&self.folder.join("best.safetensors"), &mut self.trainer.model, &card)?;
         }
         self.metrics.write(&self.folder)?;
         let notes = self.metrics.to_notes()?;
@@ -254,6 +284,7 @@ impl Run {
             classes: self.classes.clone(),
             sampler: Some(sampler.to_owned()),
             points: Some(points),
+            edge_radii: recipe.network.edges.iter().map(|edge| edge.radius).collect(),
             training_set: Some(self.training_set.clone()),
             accuracy,
             provenance: Some(format!("edgepuck train, seed {}", recipe.seed)),
@@ -263,45 +294,34 @@ impl Run {
 
     /// Writes the best weights as they are shipped, and reads the test half,
     /// once, with those.
-    fn finish(&mut self, args: &Args, clouds: &Clouds) -> anyhow::Result<()> {
-        model::read(&self.folder.join("best.safetensors"), &mut self.trainer.network)?;
+    fn finish(
+        &mut self,
+        job: &Job<'_>,
+        test: Option<&Path>,
+        clouds: &Clouds,
+    ) -> anyhow::Result<()> {
+        model::read(&self.folder.join("best.safetensors"), &mut self.trainer.model)?;
         let shipped = self.folder.join("shipped.safetensors");
-        model::ship(&shipped, &self.trainer.network, &self.card(None))?;
-        // One file is no two halves.
-        let halves = (!args.data.is_file()).then(|| args.data.clone());
-        let test = args.test.clone().or(halves);
-        let accuracy = match test {
-            Some(path) => Some(self.test(&shipped, &path, &args.data)?),
-            None => None,
-        };
-        let activation_ranges = self.ranges(&shipped, clouds)?;
+        model::ship(&shipped, &self.trainer.model, &self.card(None))?;
+        let accuracy = test.map(|path| self.test(&shipped, path, job.data)).transpose()?;
+        let activation_ranges = infer_cpu::activation_ranges_of_set(&shipped, &clouds.set)?;
         let card = ModelCard { activation_ranges, ..self.card(accuracy) };
-        model::ship(&args.out, &self.trainer.network, &card)?;
-        fs::remove_file(&shipped)?;
-        println!("{}", args.out.display());
-        Ok(())
+        model::ship(&shipped, &self.trainer.model, &card)?;
+        // Whatever a kill leaves half-written lies in the run's folder, which
+        // the next run sweeps.
+        fs::rename(&shipped, job.out).with_context(|| format!("cannot write {}", job.out.display()))
     }
 
-    fn test(&self, model: &Path, test: &Path, data: &Path) -> anyhow::Result<String> {
-        let clouds = Clouds::read(test, Split::Test, self.trainer.recipe.points)?;
+    fn test(&self, model: &Path, test: &Path, data: &str) -> anyhow::Result<String> {
+        let clouds = Clouds::read(test, Split::Test, points_to_read(&self.trainer.recipe))?;
         ensure!(
             clouds.classes == self.classes,
-            "{}: its classes are not those of {}",
-            test.display(),
-            data.display()
+            "{}: its classes are not those of {data}",
+            test.display()
         );
         let found = confusion(model, &clouds, &Options::default())?;
         let line = report::line(&found, test);
         println!("{line}");
         Ok(line)
-    }
-
-    /// The largest activations of each layer, for int8, on some of `clouds`.
-    fn ranges(&self, model: &Path, clouds: &Clouds) -> anyhow::Result<BTreeMap<String, f32>> {
-        /// More change them little.
-        const CLOUDS: usize = 512;
-        let step = clouds.len().div_ceil(CLOUDS).max(1);
-        let some = (0..clouds.len()).step_by(step).map(|i| clouds.set.cloud(i));
-        Ok(infer_cpu::activation_ranges(model, some)?)
     }
 }

@@ -27,7 +27,7 @@ pub struct Args {
 /// Steps before those that count.
 const UNCOUNTED: usize = 3;
 
-const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.001 };
+const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.001, step: 0 };
 
 /// Answers requests until its input ends.
 ///
@@ -99,6 +99,7 @@ impl Served {
             coordinates,
             starts: (0..=clouds).map(|cloud| cloud * points).collect(),
             targets: Matrix::from_shape_fn((clouds, self.n_classes), targets),
+            ..Batch::default()
         };
         self.begin();
     }

@@ -35,10 +35,10 @@ impl Points {
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
         for i in 0..self.hidden.len() {
             let (before, layer) = self.hidden.split_at_mut(i);
-            let x = before.last().map_or(x.view(), PointLayer::output);
+            let x = before.last().map_or(x.view(), |layer| layer.base.output());
             layer[0].forward(x, rows, momentum);
         }
-        let x = self.hidden.last().map_or(x, PointLayer::output);
+        let x = self.hidden.last().map_or(x, |layer| layer.base.output());
         self.pooled.forward(x, rows, momentum);
     }
 
@@ -50,11 +50,12 @@ impl Points {
         rows: Rows<'_>,
         wants_input: bool,
     ) -> Option<Matrix> {
-        let input = self.hidden.last().map_or(x.view(), PointLayer::output);
-        let mut dy = self.pooled.backward(dy, input, rows);
+        let input = self.hidden.last().map_or(x.view(), |layer| layer.base.output());
+        let wanted = wants_input || !self.hidden.is_empty();
+        let mut dy = self.pooled.backward(dy, input, rows, wanted)?;
         for i in (0..self.hidden.len()).rev() {
             let (before, layer) = self.hidden.split_at_mut(i);
-            let input = before.last().map_or(x.view(), PointLayer::output);
+            let input = before.last().map_or(x.view(), |layer| layer.base.output());
             let dz = layer[0].backward(input, dy, rows);
             if i == 0 && !wants_input {
                 return None;
@@ -63,29 +64,28 @@ impl Points {
         }
         Some(dy)
     }
-}
 
-impl Points {
+    /// The first layer whose last output is not finite.
     pub fn not_finite(&self) -> Option<&str> {
-        let hidden = self.hidden.iter().find_map(PointLayer::not_finite);
-        hidden.or_else(|| self.pooled.not_finite())
+        let hidden = self.hidden.iter().find_map(|layer| layer.base.not_finite());
+        hidden.or_else(|| self.pooled.base.not_finite())
     }
 }
 
 impl Learns for Points {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.hidden.iter_mut().for_each(|layer| layer.parameters(visit));
-        self.pooled.parameters(visit);
+        self.hidden.iter_mut().for_each(|layer| layer.base.parameters(visit));
+        self.pooled.base.parameters(visit);
     }
 
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.hidden.iter_mut().for_each(|layer| layer.statistics(visit));
-        self.pooled.statistics(visit);
+        self.hidden.iter_mut().for_each(|layer| layer.base.statistics(visit));
+        self.pooled.base.statistics(visit);
     }
 
     fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.hidden.iter().for_each(|layer| layer.folded(visit));
-        self.pooled.folded(visit);
+        self.hidden.iter().for_each(|layer| layer.base.folded(visit));
+        self.pooled.base.folded(visit);
     }
 }
 
@@ -120,43 +120,42 @@ impl Vectors {
         let n = self.hidden.len();
         for i in 0..n {
             let (before, layer) = self.hidden.split_at_mut(i);
-            let x = before.last().map_or(x.view(), VectorLayer::output);
+            let x = before.last().map_or(x.view(), |layer| layer.base.output());
             let kept = if i + 1 == n { kept.take() } else { None };
             layer[0].forward(x, kept, momentum);
         }
-        self.last.forward(self.hidden.last().map_or(x, VectorLayer::output))
+        self.last.forward(self.hidden.last().map_or(x, |layer| layer.base.output()))
     }
 
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) -> Matrix {
-        let input = self.hidden.last().map_or(x.view(), VectorLayer::output);
+        let input = self.hidden.last().map_or(x.view(), |layer| layer.base.output());
         let mut dy = self.last.backward(input, dz);
         for i in (0..self.hidden.len()).rev() {
             let (before, layer) = self.hidden.split_at_mut(i);
-            let input = before.last().map_or(x.view(), VectorLayer::output);
+            let input = before.last().map_or(x.view(), |layer| layer.base.output());
             dy = layer[0].backward(input, dy);
         }
         dy
     }
-}
 
-impl Vectors {
+    /// The first layer whose last output is not finite.
     pub fn not_finite(&self) -> Option<&str> {
-        self.hidden.iter().find_map(VectorLayer::not_finite)
+        self.hidden.iter().find_map(|layer| layer.base.not_finite())
     }
 }
 
 impl Learns for Vectors {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.hidden.iter_mut().for_each(|layer| layer.parameters(visit));
+        self.hidden.iter_mut().for_each(|layer| layer.base.parameters(visit));
         self.last.parameters(visit);
     }
 
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.hidden.iter_mut().for_each(|layer| layer.statistics(visit));
+        self.hidden.iter_mut().for_each(|layer| layer.base.statistics(visit));
     }
 
     fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.hidden.iter().for_each(|layer| layer.folded(visit));
+        self.hidden.iter().for_each(|layer| layer.base.folded(visit));
         self.last.folded(visit);
     }
 }

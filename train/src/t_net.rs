@@ -11,7 +11,8 @@ use crate::stack::{Points, Vectors};
 /// What predicts a transform.
 #[derive(Clone, Debug)]
 pub struct TNet {
-    points: Points,
+    /// What is pooled.
+    pub points: Points,
     vectors: Vectors,
     /// What it predicted.
     pub transforms: Transforms,
@@ -31,10 +32,15 @@ impl TNet {
 
     /// Returns the rows behind the transforms.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) -> Matrix {
-        self.points.forward(x.view(), rows, momentum);
-        let elements = self.vectors.forward(self.points.pooled.output(), None, momentum);
-        self.transforms = Transforms::around_identity(elements, self.transforms.k);
+        self.predict(x.view(), rows, momentum);
         self.transforms.forward(x, rows)
+    }
+
+    /// Predicts the transforms, and transforms nothing.
+    pub fn predict(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
+        self.points.forward(x.view(), rows, momentum);
+        let elements = self.vectors.forward(self.points.pooled.base.output(), None, momentum);
+        self.transforms = Transforms::around_identity(elements, self.transforms.k);
     }
 
     /// From the gradient of the rows behind the transforms, and one of the
@@ -51,14 +57,25 @@ impl TNet {
         if let Some(own) = own {
             elements += &own;
         }
-        let pooled = self.points.pooled.output().to_owned();
-        let dy = self.vectors.backward(pooled.view(), elements.view());
-        let around = self.points.backward(x, dy, rows, wants_input)?;
+        let around = self.backward_prediction(x, &elements, rows, wants_input)?;
         Some(through + around)
     }
-}
 
-impl TNet {
+    /// From the gradient of the transforms' elements; returns that of `x`, as
+    /// far as it comes through the prediction, where it is wanted.
+    pub fn backward_prediction(
+        &mut self,
+        x: ArrayView2<'_, f32>,
+        elements: &Matrix,
+        rows: Rows<'_>,
+        wants_input: bool,
+    ) -> Option<Matrix> {
+        let pooled = self.points.pooled.base.output().to_owned();
+        let dy = self.vectors.backward(pooled.view(), elements.view());
+        self.points.backward(x, dy, rows, wants_input)
+    }
+
+    /// The first layer whose last output is not finite.
     pub fn not_finite(&self) -> Option<&str> {
         self.points.not_finite().or_else(|| self.vectors.not_finite())
     }

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use formats::rng::StreamKey;
 
 use crate::batches;
+use crate::chooser::Chooser;
 use crate::clouds::Clouds;
 use crate::error::Error;
 use crate::front::{Front, Model};
@@ -20,8 +21,8 @@ const MOMENTUM: f32 = 0.1;
 pub struct Trainer {
     /// The run's recipe.
     pub recipe: Recipe,
-    /// The network.
-    pub network: Model,
+    /// The network, and its front end.
+    pub model: Model,
     /// Steps taken.
     pub step: u64,
     /// Epochs finished.
@@ -60,11 +61,17 @@ impl Trainer {
     /// # Errors
     /// [`Error::Recipe`] of a rule of resizing that there is none of.
     pub fn new(recipe: Recipe, n_classes: usize) -> Result<Self, Error> {
-        let front = recipe.cpl.as_ref().map(|cpl| Front::new(cpl, n_classes, recipe.seed));
-        let front =
-            front.transpose().map_err(|cause| Error::Recipe { key: "cpl.resize", cause })?;
-        let network = PointNet::new(&recipe.network, n_classes, recipe.seed);
-        Ok(Self { recipe, network: Model { front, network }, step: 0, epoch: 0 })
+        let refuse = |cause| Error::Recipe { key: "cpl.resize", cause };
+        let mut network = PointNet::new(&recipe.network, n_classes, recipe.seed);
+        let front = match &recipe.cpl {
+            Some(cpl) if cpl.shared => {
+                network.choose_by_t_net(Chooser::new(cpl, recipe.seed).map_err(refuse)?);
+                None
+            }
+            Some(cpl) => Some(Front::new(cpl, n_classes, recipe.seed).map_err(refuse)?),
+            None => None,
+        };
+        Ok(Self { recipe, model: Model { front, network }, step: 0, epoch: 0 })
     }
 
     /// Learns from every cloud once, but for an incomplete last batch.
@@ -83,17 +90,17 @@ impl Trainer {
         std::thread::scope(|scope| {
             let batches = batches::start(scope, clouds, &recipe, self.epoch);
             for (batch, step) in batches.iter().zip(1..) {
-                let rates =
-                    Rates { momentum: MOMENTUM, orthogonality: recipe.orthogonality as f32 };
+                let orthogonality = recipe.orthogonality as f32;
+                let rates = Rates { momentum: MOMENTUM, orthogonality, step: self.step };
                 let kept = self.dropout(recipe.batch);
-                let cost = self.network.learn(&batch, kept, rates);
+                let cost = self.model.learn(&batch, kept, rates);
                 if !cost.total.is_finite() {
                     return Err(self.not_finite(cost.total, step as u64));
                 }
                 self.step += 1;
                 let progress = f64::from(self.epoch) + (step - 1) as f64 / steps as f64;
                 let factor = recipe.schedule.factor(progress, recipe.epochs);
-                recipe.adam.step(&mut self.network, self.step, recipe.adam.rate * factor);
+                recipe.adam.step(&mut self.model, self.step, recipe.adam.rate * factor);
                 loss += cost.total;
                 correct += cost.correct;
                 let n = step as f64;
@@ -114,7 +121,7 @@ impl Trainer {
 
     /// Which of the last hidden features are kept in the step to come.
     fn dropout(&self, clouds: usize) -> Option<Matrix> {
-        let width = self.network.network.dropout_width()?;
+        let width = self.model.network.dropout_width()?;
         let dropped = self.recipe.dropout;
         if dropped == 0.0 {
             return None;
@@ -130,7 +137,7 @@ impl Trainer {
     }
 
     fn not_finite(&self, loss: f64, step: u64) -> Error {
-        let layer = self.network.not_finite().to_owned();
+        let layer = self.model.not_finite().to_owned();
         Error::NotFinite { loss, step, epoch: self.epoch + 1, layer }
     }
 }

@@ -10,6 +10,8 @@ mod import_weights;
 mod merge_dataset;
 mod pi_target;
 mod preview_scan;
+mod reproduce;
+mod sample_surfaces;
 mod scan;
 mod test;
 mod train;
@@ -32,6 +34,8 @@ enum Command {
     GenDataset(Box<gen_dataset::Args>),
     /// Write the parametric shapes that gen-dataset uses by default as OFF files
     GenShapes(gen_shapes::Args),
+    /// Spread points evenly over meshes, as ModelNet40's clouds are
+    SampleSurfaces(sample_surfaces::Args),
     /// Scan one scene
     Scan(scan::Args),
     /// Draw a scan from the side, from above and from the front
@@ -58,6 +62,8 @@ enum Command {
     /// Tell how far two clouds are apart: `cargo xtask compare-points A B`
     #[command(disable_help_flag = true)]
     ComparePoints(train::Args),
+    /// Run the paper's experiments again, and write one report
+    Reproduce(reproduce::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -74,6 +80,7 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::GenDataset(args) => gen_dataset::run(&args),
         Command::GenShapes(args) => gen_shapes::run(&args),
+        Command::SampleSurfaces(args) => sample_surfaces::run(&args),
         Command::Scan(args) => scan::run(&args),
         Command::Preview(args) => preview_scan::run(&args),
         Command::Adapters => adapters::run(),
@@ -85,6 +92,7 @@ fn main() -> ExitCode {
         Command::Eval(args) => train::run("eval", &args),
         Command::Explain(args) => train::run("explain", &args),
         Command::ComparePoints(args) => train::run("compare-points", &args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {

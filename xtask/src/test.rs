@@ -34,7 +34,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         tests.env("EDGEPUCK_REQUIRE_ADAPTER", "1");
     }
     step("tests", &mut tests)?;
-    let hdf5 = ["test", "--package", "formats", "--features", "hdf5", "--test", "modelnet_h5"];
+    let packages = ["test", "--package", "formats", "--package", "train"];
+    let hdf5 = [&packages[..], &["--features", "hdf5", "--test", "modelnet_h5"]].concat();
     step("HDF5 layout", &mut cargo(&hdf5))?;
     let mut documentation = cargo(&["doc", "--workspace", "--no-deps"]);
     step("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"))?;

@@ -79,6 +79,11 @@ fn as_json(path: &Path, summary: &Summary, sampler: &SamplerSpec) -> Value {
         "input_t_net": summary.stn.as_ref().map(net),
         "feature_t_net": summary.fstn.as_ref().map(net),
         "transform_after": card.transform_after,
+        "edges": summary.edges.iter().map(|(radius, layer)| json!({
+            "name": layer.name,
+            "radius": radius,
+            "channels": layer.outputs,
+        })).collect::<Vec<_>>(),
         "trunk": layers(&summary.trunk.convs),
         "pooled": if card.pooled_relu { "relu" } else { "linear" },
         "head": layers(&summary.trunk.fcs),
@@ -121,6 +126,11 @@ fn as_text(
     match summary.fstn {
         Some(_) => row("feature T-Net", format!("{feature}, after conv{}", card.transform_after))?,
         None => row("feature T-Net", feature)?,
+    }
+    if !summary.edges.is_empty() {
+        let edges = summary.edges.iter();
+        let edges = edges.map(|(radius, layer)| format!("{} within {radius}", layer.outputs));
+        row("surroundings", edges.collect::<Vec<_>>().join(", "))?;
     }
     let pooled = if card.pooled_relu { ", ReLU" } else { "" };
     row("trunk", format!("{}{pooled}, max", chain(&summary.trunk.convs)))?;

@@ -11,13 +11,13 @@ use super::failure::Usage;
 const VARIABLE: &str = "EDGEPUCK_MODEL";
 
 /// Bundled weights: the trained ones wherever they lie, else those of chance.
-const NAMES: [&str; 2] = ["pointnet-64.safetensors", "untrained-test.safetensors"];
+const NAMES: [&str; 2] = ["edge-64.safetensors", "untrained-test.safetensors"];
 
 /// Flags that name a model.
 #[derive(clap::Args)]
 pub struct ModelArgs {
     /// Model file, safetensors [default: $EDGEPUCK_MODEL, else
-    /// pointnet-64.safetensors, for whole objects of ModelNet40, in weights/
+    /// edge-64.safetensors, for whole objects of ModelNet40, in weights/
     /// beside this program or in ./assets/weights]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,

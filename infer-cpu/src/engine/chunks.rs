@@ -29,14 +29,17 @@ impl<T: Format> Engine<T> {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let points = read(&self.points);
         let mut scratch = lock(&self.scratch[thread]);
-        let Scratch { wide, narrow: [from, to], .. } = &mut *scratch;
+        let Scratch { edged, wide, narrow: [from, to], .. } = &mut *scratch;
         let rows = block_rows(&points, first_block + slot);
         let n = rows.n;
         let first = self.first(pass);
         let mut width = first.panels.padded_outputs();
         match pass {
             Pass::Front | Pass::Stn => self.multiply(&rows, &first.panels, wide, width),
-            Pass::Fstn | Pass::Trunk => self.multiply(&rows, &read(&self.entry), wide, width),
+            Pass::Fstn | Pass::Trunk => {
+                let rows = self.with_surroundings(&rows, edged);
+                self.multiply(&rows, &read(&self.entry), wide, width);
+            }
         }
         if self.observing {
             first.seen.observe(&wide[..n * width]);
@@ -61,6 +64,23 @@ impl<T: Format> Engine<T> {
         }
         let last = self.place(self.last(pass), &feature, &folded);
         write(&self.blocks[slot]).set(self.kernels, &Rows { data: from, stride: width, n }, last);
+    }
+
+    /// `rows` of coordinates, each followed by what surrounds the point.
+    fn with_surroundings<'a>(&self, rows: &Rows<'a, f32>, edged: &'a mut [f32]) -> Rows<'a, f32> {
+        if self.edges.is_empty() {
+            return Rows { data: rows.data, stride: rows.stride, n: rows.n };
+        }
+        let cloud = read(&self.surroundings);
+        let first = self.layers.trunk[0].first();
+        let (inputs, stride) = (first.panels.inputs, first.panels.padded_inputs);
+        let points = rows.data.chunks_exact(rows.stride);
+        for (point, row) in points.zip(edged.chunks_exact_mut(stride)) {
+            let (centre, features) = row[..inputs].split_at_mut(3);
+            centre.copy_from_slice(&point[..3]);
+            self.edges.features([point[0], point[1], point[2]], &cloud, features);
+        }
+        Rows { data: &edged[..rows.n * stride], stride, n: rows.n }
     }
 
     /// Rounds a layer's outputs for the layer `next`, and notes what is lost.

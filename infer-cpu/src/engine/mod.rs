@@ -14,6 +14,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
+use crate::edge::{Edges, Surroundings};
 use crate::kernel::{Columns, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
 use crate::network::Front;
@@ -93,6 +94,9 @@ pub struct Engine<T: Format> {
     task: RwLock<Task>,
     /// Rows x, y, z, 0, in the order of [`Spread`].
     points: RwLock<Vec<f32>>,
+    edges: Edges,
+    /// All points among which `edges` looks for neighbours.
+    surroundings: RwLock<Surroundings>,
     blocks: Vec<RwLock<Block<T>>>,
     groups: Vec<Mutex<Group<T::Sum>>>,
     scratch: Vec<Mutex<Scratch<T>>>,
@@ -122,6 +126,8 @@ struct Group<S> {
 
 /// A thread's own memory: a block's features, before and after rounding.
 struct Scratch<T: Format> {
+    /// Points with what is known of their surroundings.
+    edged: Vec<f32>,
     wide: Vec<f32>,
     narrow: [Vec<T::Activation>; 2],
     sieve: Sieve,
@@ -163,7 +169,10 @@ impl<T: Format> Engine<T> {
         };
         let Widths { hidden, pooled, vector } = Widths::of(&layers);
         let screens = pooled_layers(&layers).any(|layer| layer.screen.is_some());
+        let edges = Edges::new(&layers.edges);
+        let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs };
         let scratch = || Scratch {
+            edged: vec![0.0; edged],
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
             sieve: if screens { Sieve::new(BLOCK) } else { Sieve::new(0) },
@@ -186,6 +195,8 @@ impl<T: Format> Engine<T> {
             fold: AtomicBool::new(false),
             task: RwLock::new(Task::Vector { head: Head::Class, layer: 0 }),
             points: RwLock::new(Vec::new()),
+            edges,
+            surroundings: RwLock::default(),
             blocks: (0..RUN_BLOCKS).map(|_| block()).collect(),
             groups: (0..pooled.div_ceil(GROUP)).map(|_| Mutex::new(group())).collect(),
             scratch: (0..n_threads.max(1)).map(|_| Mutex::new(scratch())).collect(),
@@ -210,6 +221,9 @@ impl<T: Format> Engine<T> {
         let mut points = write(&self.points);
         let missing = (n * 4).saturating_sub(points.len());
         points.reserve(missing);
+        if !self.edges.is_empty() {
+            write(&self.surroundings).reserve(n);
+        }
     }
 
     /// Takes `points` for the passes that follow.
@@ -219,6 +233,13 @@ impl<T: Format> Engine<T> {
         let spread = Spread::new(points.len());
         let in_order = (0..points.len()).map(|row| points[spread.point(row)]);
         rows.extend(in_order.flat_map(|[x, y, z]| [x, y, z, 0.0]));
+    }
+
+    /// Takes `cloud` for what surrounds the points of the passes that follow.
+    pub fn set_surroundings(&self, cloud: &[[f32; 3]]) {
+        if !self.edges.is_empty() {
+            write(&self.surroundings).set(cloud);
+        }
     }
 
     /// Forgets what earlier passes met.

@@ -47,12 +47,12 @@ impl Levels {
     }
 }
 
-/// The smallest and the largest of `values`, or 0. NaN is passed over.
+/// The smallest and the largest of `values`, whole rows, or 0. NaN is passed over.
 fn extremes(values: &[f32]) -> (f32, f32) {
     const LANES: usize = 16;
-    let (chunks, rest) = values.as_chunks::<LANES>();
     let (mut least, mut largest) = ([0.0f32; LANES], [0.0f32; LANES]);
-    for chunk in chunks.iter().chain(std::iter::once(&padded(rest))) {
+    // Rows are multiples of a vector's width: nothing is left over.
+    for chunk in values.as_chunks::<LANES>().0 {
         for lane in 0..LANES {
             let value = chunk[lane];
             least[lane] = if value < least[lane] { value } else { least[lane] };
@@ -60,10 +60,4 @@ fn extremes(values: &[f32]) -> (f32, f32) {
         }
     }
     (least.into_iter().fold(0.0, f32::min), largest.into_iter().fold(0.0, f32::max))
-}
-
-fn padded<const N: usize>(rest: &[f32]) -> [f32; N] {
-    let mut chunk = [0.0; N];
-    chunk[..rest.len()].copy_from_slice(rest);
-    chunk
 }

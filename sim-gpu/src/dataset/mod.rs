@@ -3,7 +3,7 @@
 //! [`config`] says what is wanted, [`pipeline`] makes the scans and keeps a
 //! [`journal`] so that a killed run can go on, [`finish`] packs them and
 //! writes the manifest, which [`verify`] checks a dataset against. [`merge`]
-//! makes one dataset of parts.
+//! makes one dataset of parts. [`surfaces`] draws what scans are compared with.
 
 mod budget;
 mod clouds;
@@ -22,6 +22,7 @@ mod prepare;
 pub mod progress;
 pub mod record;
 pub mod start;
+pub mod surfaces;
 mod under_way;
 pub mod verify;
 mod write;

@@ -6,7 +6,7 @@ use super::record::{Entry, MeshFailure, MeshRecord};
 use crate::bvh::Builder;
 use crate::job::{CastJob, Culling};
 use crate::mesh::census::survey;
-use crate::mesh::frame::to_world;
+use crate::mesh::frame::{Normalize, Up, to_world};
 use crate::mesh::tree::MeshEntry;
 use crate::mesh::{LoadedMesh, MeshError, load};
 use crate::pose::Pose;
@@ -49,7 +49,7 @@ pub fn prepare(
     progress: &Progress,
 ) -> Result<Prepared, MeshFailure> {
     let (record, surface) = progress
-        .time(Stage::Read, || read(entry, config))
+        .time(Stage::Read, || read(entry, config.up, config.normalize))
         .map_err(|error| failure(entry, &error))?;
     let id = record.entry.id();
     let views = plan(config, &id);
@@ -87,10 +87,14 @@ fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
     views
 }
 
-fn read(entry: &MeshEntry, config: &DatasetConfig) -> Result<(MeshRecord, Surface), MeshError> {
+pub(super) fn read(
+    entry: &MeshEntry,
+    up: Option<Up>,
+    normalize: Normalize,
+) -> Result<(MeshRecord, Surface), MeshError> {
     let LoadedMesh { mesh, format, sha256, dropped_faces } = load(&entry.path)?;
-    let up = config.up.unwrap_or(format.default_up());
-    let world = to_world(&mesh, up, config.normalize);
+    let up = up.unwrap_or(format.default_up());
+    let world = to_world(&mesh, up, normalize);
     let survey = survey(&world.mesh);
     let record = MeshRecord {
         entry: entry.into(),
@@ -107,7 +111,7 @@ fn read(entry: &MeshEntry, config: &DatasetConfig) -> Result<(MeshRecord, Surfac
     Ok((record, Surface::new(world.mesh, survey.kept)))
 }
 
-fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {
+pub(super) fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {
     let (line, cause) = match error {
         MeshError::Malformed { line, cause, .. } => {
             (line.map(|line| line as u64), cause.to_string())

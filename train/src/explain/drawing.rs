@@ -34,7 +34,7 @@ fn dot(point: &[f32; 3], left: f64, radius: f64, colour: &str, opacity: f64) -> 
     let (azimuth, elevation) = (30f64.to_radians(), 20f64.to_radians());
     let across = x * azimuth.cos() + y * azimuth.sin();
     let along = y * azimuth.cos() - x * azimuth.sin();
-    let up = z * elevation.cos() - along * elevation.sin();
+    let up = z * elevation.cos() + along * elevation.sin();
     let scale = 0.42 * SIDE;
     Circle::new()
         .set("cx", format!("{:.1}", left + SIDE / 2.0 + scale * across))

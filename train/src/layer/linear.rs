@@ -36,11 +36,10 @@ impl Linear {
         }
     }
 
-    /// The layer's name, if its `output` is not finite.
+    /// The layer's name in model files.
     #[must_use]
-    pub fn not_finite(&self, output: &Matrix) -> Option<&str> {
-        let name = self.weight.name.trim_end_matches(".weight");
-        (!output.iter().all(|x| x.is_finite())).then_some(name)
+    pub fn name(&self) -> &str {
+        self.weight.name.trim_end_matches(".weight")
     }
 
     /// How many inputs and outputs it has.
@@ -86,7 +85,7 @@ impl Learns for Linear {
 
     fn folded(&self, visit: &mut dyn FnMut(Folded)) {
         visit(Folded {
-            name: self.weight.name.trim_end_matches(".weight").to_owned(),
+            name: self.name().to_owned(),
             shape: [self.weight.shape[0], self.weight.shape[1]],
             weight: self.weight.value.clone(),
             bias: self.bias.value.clone(),

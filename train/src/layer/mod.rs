@@ -11,15 +11,19 @@
 //! share counts once for each. Seven sixteenths of the work are saved on
 //! average, and no result changes but by rounding.
 
+mod edge;
 mod linear;
 mod norm;
+mod normed;
 mod point;
 mod pooled;
 mod transform;
 mod vector;
 
+pub use edge::EdgeLayer;
 pub use linear::Linear;
 pub use norm::Norm;
+pub use normed::Normed;
 pub use point::PointLayer;
 pub use pooled::PooledLayer;
 pub use transform::{Transforms, orthogonality};

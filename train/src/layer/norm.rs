@@ -4,7 +4,7 @@ use ndarray::Axis;
 use ndarray::parallel::prelude::*;
 use rayon::slice::ParallelSlice;
 
-use super::{Folded, Learns, Linear};
+use super::{Folded, Linear};
 use crate::matrix::{Matrix, ROWS};
 use crate::parameter::Parameter;
 
@@ -14,7 +14,8 @@ pub const EPSILON: f32 = 1e-5;
 /// A batch norm with its running statistics.
 #[derive(Clone, Debug)]
 pub struct Norm {
-    name: String,
+    /// Its name in model files.
+    pub name: String,
     /// γ.
     pub scale: Parameter,
     /// β.
@@ -65,7 +66,7 @@ impl Norm {
             from_mean * scale(c) + f64::from(self.shift.value[c])
         };
         Folded {
-            name: linear.weight.name.trim_end_matches(".weight").to_owned(),
+            name: linear.name().to_owned(),
             shape: [outputs, inputs],
             weight: (0..outputs * inputs).map(|i| weight(i) as f32).collect(),
             bias: (0..outputs).map(|c| bias(c) as f32).collect(),
@@ -199,19 +200,4 @@ pub fn column_sums(
         .collect();
     let of = |c: usize| chunk_sums.iter().map(|sums| f64::from(sums[c])).sum::<f64>();
     (0..channels).map(|c| (of(c) / f64::from(total)) as f32).collect()
-}
-
-impl Learns for Norm {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        visit(&mut self.scale);
-        visit(&mut self.shift);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        visit(&format!("{}.running_mean", self.name), &mut self.mean);
-        visit(&format!("{}.running_var", self.name), &mut self.variance);
-    }
-
-    /// It has no linear layer of its own.
-    fn folded(&self, _: &mut dyn FnMut(Folded)) {}
 }

@@ -25,18 +25,16 @@ use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
 
 use super::norm::{EPSILON, column_sums};
-use super::{Folded, Learns, Linear, Norm, Rows, by_cloud};
+use super::{Normed, Rows, by_cloud};
 use crate::matrix::{self, Matrix};
-use crate::parameter::Parameter;
 
 /// The last point-wise layer before a pooling, and the pooling.
 #[derive(Clone, Debug)]
 pub struct PooledLayer {
-    linear: Linear,
-    norm: Norm,
+    /// What it learns, and its last output.
+    pub base: Normed,
     relu: bool,
     saved: Saved,
-    output: Matrix,
 }
 
 /// What backward needs of a forward pass.
@@ -59,39 +57,15 @@ impl PooledLayer {
     /// A layer whose parts are named `linear` and `norm`; with `relu` what is
     /// pooled is at least 0.
     #[must_use]
-    pub fn new(
-        linear: &str,
-        norm: &str,
-        (inputs, outputs): (usize, usize),
-        relu: bool,
-        seed: u64,
-    ) -> Self {
-        Self {
-            linear: Linear::new(linear, inputs, outputs, seed),
-            norm: Norm::new(norm, outputs),
-            relu,
-            saved: Saved::default(),
-            output: Matrix::default((0, outputs)),
-        }
-    }
-
-    /// The pooled features `[clouds, outputs]`.
-    #[must_use]
-    pub fn output(&self) -> ArrayView2<'_, f32> {
-        self.output.view()
+    pub fn new(linear: &str, norm: &str, size: (usize, usize), relu: bool, seed: u64) -> Self {
+        Self { base: Normed::new(linear, norm, size, seed), relu, saved: Saved::default() }
     }
 
     /// The row that won each channel of cloud `cloud`.
     #[must_use]
     pub fn winners(&self, cloud: usize) -> &[u32] {
-        let n = self.output.ncols();
+        let n = self.base.output.ncols();
         &self.saved.winners[cloud * n..][..n]
-    }
-
-    /// The layer's name, if its last output is not finite.
-    #[must_use]
-    pub fn not_finite(&self) -> Option<&str> {
-        self.linear.not_finite(&self.output)
     }
 
     /// Takes `x` `[rows, inputs]` through the layer.
@@ -100,7 +74,7 @@ impl PooledLayer {
         let mean = column_sums(&x, rows.weights, |x, _| x, rows.total);
         let centred = &x - &ndarray::aview1(&mean);
         let covariance = covariance(&centred, rows);
-        let weights = self.linear.weight.matrix();
+        let weights = self.base.linear.weight.matrix();
         // [outputs, inputs]; a covariance is its own transpose.
         let covariant = matrix::forward(weights, covariance.view());
         let products = |row: usize| {
@@ -111,13 +85,13 @@ impl PooledLayer {
             (0..weights.nrows()).map(|row| products(row).max(0.0) as f32).collect();
         let mean_product = weights.dot(&ndarray::aview1(&mean)).to_vec();
         let inverse: Vec<f32> = variance.iter().map(|v| 1.0 / (v + EPSILON).sqrt()).collect();
-        let bias = &self.linear.bias.value;
-        self.norm.remember((&mean_product, &variance), bias, rows.total, momentum);
+        let bias = &self.base.linear.bias.value;
+        self.base.norm.remember((&mean_product, &variance), bias, rows.total, momentum);
 
         let (mut normalised, winners) = self.largest(&x, rows);
-        self.output = Matrix::zeros(normalised.dim());
-        let (scale, shift) = (&self.norm.scale.value, &self.norm.shift.value);
-        for (mut z, mut out) in normalised.rows_mut().into_iter().zip(self.output.rows_mut()) {
+        self.base.output = Matrix::zeros(normalised.dim());
+        let (scale, shift) = (&self.base.norm.scale.value, &self.base.norm.shift.value);
+        for (mut z, mut out) in normalised.rows_mut().into_iter().zip(self.base.output.rows_mut()) {
             for c in 0..z.len() {
                 z[c] = (z[c] - mean_product[c]) * inverse[c];
                 let y = z[c] * scale[c] + shift[c];
@@ -129,14 +103,14 @@ impl PooledLayer {
 
     /// The products that the batch norm makes largest, and their rows.
     fn largest(&self, x: &Matrix, rows: Rows<'_>) -> (Matrix, Vec<u32>) {
-        let (inputs, outputs) = self.linear.size();
-        let scale = &self.norm.scale.value;
+        let (inputs, outputs) = self.base.linear.size();
+        let scale = &self.base.norm.scale.value;
         let sign = |c: usize| if scale[c] < 0.0 { -1.0 } else { 1.0 };
         let gemm = kernel::available()
             .find_map(|kernels| kernels.f32.as_ref())
             .expect("invariant: the scalar kernels run everywhere");
         let mut panels = Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, 1));
-        let weights = self.linear.weight.matrix();
+        let weights = self.base.linear.weight.matrix();
         panels.fill(|input, output| sign(output) * weights[(output, input)]);
         let stride = panels.padded_inputs;
         let padded = panels.padded_outputs();
@@ -166,10 +140,17 @@ impl PooledLayer {
         (products, winners)
     }
 
-    /// Sets gradients from that of the output; returns that of `x`.
-    pub fn backward(&mut self, mut dy: Matrix, x: ArrayView2<'_, f32>, rows: Rows<'_>) -> Matrix {
+    /// Sets gradients from that of the output; returns that of `x` where it is
+    /// wanted.
+    pub fn backward(
+        &mut self,
+        mut dy: Matrix,
+        x: ArrayView2<'_, f32>,
+        rows: Rows<'_>,
+        wants_input: bool,
+    ) -> Option<Matrix> {
         if self.relu {
-            dy.zip_mut_with(&self.output, |dy, &y| {
+            dy.zip_mut_with(&self.base.output, |dy, &y| {
                 if y <= 0.0 {
                     *dy = 0.0;
                 }
@@ -177,12 +158,20 @@ impl PooledLayer {
         }
         let sum = dy.sum_axis(Axis(0)).to_vec();
         let with_normalised = (&dy * &self.saved.normalised).sum_axis(Axis(0)).to_vec();
-        let slope: Vec<f32> =
-            self.norm.scale.value.iter().zip(&self.saved.inverse).map(|(s, i)| s * i).collect();
+        let slope: Vec<f32> = self
+            .base
+            .norm
+            .scale
+            .value
+            .iter()
+            .zip(&self.saved.inverse)
+            .map(|(s, i)| s * i)
+            .collect();
         self.weight_gradient(&dy, x, (&sum, &with_normalised), &slope);
-        let dx = self.input_gradient(&dy, rows, (&sum, &with_normalised), &slope);
-        self.norm.scale.gradient.copy_from_slice(&with_normalised);
-        self.norm.shift.gradient.copy_from_slice(&sum);
+        let dx =
+            wants_input.then(|| self.input_gradient(&dy, rows, (&sum, &with_normalised), &slope));
+        self.base.norm.scale.gradient.copy_from_slice(&with_normalised);
+        self.base.norm.shift.gradient.copy_from_slice(&sum);
         dx
     }
 
@@ -194,8 +183,8 @@ impl PooledLayer {
         slope: &[f32],
     ) {
         let Saved { winners, mean, covariant, inverse, .. } = &self.saved;
-        let (inputs, outputs) = self.linear.size();
-        let gradients = self.linear.weight.gradient.par_chunks_mut(inputs).enumerate();
+        let (inputs, outputs) = self.base.linear.size();
+        let gradients = self.base.linear.weight.gradient.par_chunks_mut(inputs).enumerate();
         gradients.for_each(|(c, gradient)| {
             let share = with_normalised[c] * inverse[c];
             for k in 0..inputs {
@@ -216,8 +205,8 @@ impl PooledLayer {
         slope: &[f32],
     ) -> Matrix {
         let Saved { winners, centred, inverse, .. } = &self.saved;
-        let (inputs, outputs) = self.linear.size();
-        let weights = self.linear.weight.matrix();
+        let (inputs, outputs) = self.base.linear.size();
+        let weights = self.base.linear.weight.matrix();
         // A = Wᵀ (D W), D = γ P / (n σ²), and v = Wᵀ (γ/σ S/n).
         let scaled = |factor: &dyn Fn(usize) -> f32| {
             let mut scaled = weights.to_owned();
@@ -275,19 +264,4 @@ fn padded_rows(rows: ArrayView2<'_, f32>, stride: usize) -> Vec<f32> {
         data[..row.len()].copy_from_slice(row.to_slice().expect("invariant: contiguous"));
     }
     data
-}
-
-impl Learns for PooledLayer {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.linear.parameters(visit);
-        self.norm.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.norm.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        visit(self.norm.folded_into(&self.linear));
-    }
 }

@@ -1,7 +1,6 @@
 //! What each epoch came to, as CSV and as a curve.
 
 use std::fmt::{self, Write as _};
-use std::io::Write as _;
 use std::path::Path;
 
 use formats::atomic;
@@ -86,9 +85,9 @@ impl Metrics {
                 row.clouds_per_second
             )?;
         }
-        atomic::write(&folder.join("metrics.csv"), |file| file.write_all(csv.as_bytes()))?;
+        atomic::write_bytes(&folder.join("metrics.csv"), &csv)?;
         let curve = self.curve().to_string();
-        atomic::write(&folder.join("curve.svg"), |file| file.write_all(curve.as_bytes()))?;
+        atomic::write_bytes(&folder.join("curve.svg"), &curve)?;
         Ok(())
     }
 

@@ -1,10 +1,15 @@
 //! What is trained is what infer-cpu runs.
 
+use std::path::Path;
+
 use formats::model_card::ModelCard;
+use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options};
+use train::clouds::Clouds;
+use train::evaluate::Confusion;
 use train::front::Cpl;
 use train::model;
-use train::network::Shape;
+use train::network::{Edge, Shape};
 use train::recipe::{Recipe, Sampling};
 use train::trainer::Trainer;
 
@@ -14,6 +19,7 @@ fn recipe(input_transform: bool, feature_transform: bool) -> Recipe {
     let network = Shape {
         input_transform,
         feature_transform,
+        edges: Vec::new(),
         trunk: vec![16, 24, 40],
         t_net: vec![16, 40],
         t_net_head: vec![24],
@@ -33,25 +39,31 @@ fn recipe(input_transform: bool, feature_transform: bool) -> Recipe {
 #[test]
 fn logits_are_those_of_infer_cpu() {
     let clouds = crate::clouds(100);
-    for (input_transform, feature_transform) in [(true, true), (false, false)] {
-        let recipe = recipe(input_transform, feature_transform);
+    let edges = vec![Edge { radius: 0.25, channels: 12 }, Edge { radius: 0.6, channels: 7 }];
+    for (t_nets, edges) in [(true, vec![]), (false, vec![]), (false, edges.clone()), (true, edges)]
+    {
+        let mut recipe = recipe(t_nets, t_nets);
+        recipe.network.edges = edges;
         let mut trainer = Trainer::new(recipe.clone(), clouds.classes.len()).unwrap();
         for _ in 0..recipe.epochs {
             trainer.learn(&clouds, |_| {}).unwrap();
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("model.safetensors");
-        let card = ModelCard { classes: clouds.classes.clone(), ..ModelCard::default() };
-        model::write(&path, &mut trainer.network, &card).unwrap();
+        let edge_radii = recipe.network.edges.iter().map(|edge| edge.radius).collect();
+        let classes = clouds.classes.clone();
+        let card = ModelCard { classes, edge_radii, ..ModelCard::default() };
+        model::write(&path, &mut trainer.model, &card).unwrap();
 
         let options =
             Options { normalization: Some("none".parse().unwrap()), ..Options::default() };
         let mut classifier = Classifier::load(&path, &options).unwrap();
-        let values = twin::values(&mut trainer.network);
+        let values = twin::values(&mut trainer.model);
         for cloud in 0..clouds.len() {
             let points = clouds.set.cloud(cloud);
-            let wide = points.iter().map(|p| p.map(f64::from).to_vec()).collect();
-            let twin = Twin { values: &values, clouds: vec![wide], kept: None };
+            let wide: Vec<_> = points.iter().map(|p| p.map(f64::from).to_vec()).collect();
+            let (clouds, around) = (vec![wide.clone()], vec![wide]);
+            let twin = Twin { values: &values, clouds, around, kept: None };
             let (expected, _) = twin.logits(&recipe.network);
             let found = &classifier.classify(points).unwrap().logits;
             for (found, expected) in found.iter().zip(&expected[0]) {
@@ -72,13 +84,13 @@ fn shipped_weights_are_those_that_were_learnt() {
     let folder = tempfile::tempdir().unwrap();
     let [learnt, shipped] = ["learnt", "shipped"].map(|name| folder.path().join(name));
     let card = ModelCard { classes: clouds.classes.clone(), ..ModelCard::default() };
-    model::write(&learnt, &mut trainer.network, &card).unwrap();
-    model::ship(&shipped, &trainer.network, &card).unwrap();
-    let size = |path: &std::path::Path| std::fs::metadata(path).unwrap().len();
+    model::write(&learnt, &mut trainer.model, &card).unwrap();
+    model::ship(&shipped, &trainer.model, &card).unwrap();
+    let size = |path: &Path| std::fs::metadata(path).unwrap().len();
     assert!(size(&shipped) < size(&learnt) * 6 / 10);
     let mut again = Trainer::new(recipe(true, true), clouds.classes.len()).unwrap();
-    model::read(&learnt, &mut again.network).unwrap();
-    assert_eq!(model::tensors(&mut again.network), model::tensors(&mut trainer.network));
+    model::read(&learnt, &mut again.model).unwrap();
+    assert_eq!(model::tensors(&mut again.model), model::tensors(&mut trainer.model));
     let [mut a, mut b] =
         [&learnt, &shipped].map(|path| Classifier::load(path, &Options::default()).unwrap());
     for cloud in 0..clouds.len() {
@@ -96,7 +108,7 @@ fn shipped_weights_are_those_that_were_learnt() {
 /// That something is learnt at all: three plain shapes are told apart.
 #[test]
 fn plain_shapes_are_told_apart() {
-    let (clouds, test) = (crate::clouds(120), crate::clouds(150));
+    let (clouds, test) = (crate::clouds(120), crate::test_clouds(150));
     let mut trainer = Trainer::new(Recipe { epochs: 12, ..recipe(false, false) }, 3).unwrap();
     let first = trainer.learn(&clouds, |_| {}).unwrap();
     let last = (1..12).map(|_| trainer.learn(&clouds, |_| {}).unwrap()).last().unwrap();
@@ -104,7 +116,7 @@ fn plain_shapes_are_told_apart() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.safetensors");
     let card = ModelCard { classes: clouds.classes.clone(), ..ModelCard::default() };
-    model::write(&path, &mut trainer.network, &card).unwrap();
+    model::write(&path, &mut trainer.model, &card).unwrap();
     let found = train::evaluate::confusion(&path, &test, &Options::default()).unwrap();
     assert_eq!(found.total(), 150);
     assert!(found.instance_accuracy() > 0.95, "{found:?}");
@@ -114,24 +126,119 @@ fn plain_shapes_are_told_apart() {
 /// it chooses as many points as were asked for, and knows plain shapes by them.
 #[test]
 fn a_front_end_and_its_network_tell_plain_shapes_by_few_points() {
-    let (clouds, test) = (crate::clouds(120), crate::clouds(150));
-    let cpl = Cpl { front: vec![16, 32], keep: 8, ..Cpl::default() };
+    for gumbel in [false, true] {
+        learns_by_few_points(Cpl { front: vec![16, 32], keep: 8, gumbel, ..Cpl::default() });
+    }
+}
+
+/// What a model that `write` writes answers on `test` by eight critical points.
+fn by_eight_points(test: &Clouds, write: impl FnOnce(&Path, &ModelCard)) -> Confusion {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.safetensors");
+    let card = ModelCard {
+        classes: test.classes.clone(),
+        sampler: Some("cpl".to_owned()),
+        points: Some(8),
+        ..ModelCard::default()
+    };
+    write(&path, &card);
+    let mut classifier = Classifier::load(&path, &Options::default()).unwrap();
+    assert!(classifier.classify(test.set.cloud(0)).unwrap().n_used <= 8);
+    train::evaluate::confusion(&path, test, &Options::default()).unwrap()
+}
+
+fn learns_by_few_points(cpl: Cpl) {
+    let (clouds, test) = (crate::clouds(120), crate::test_clouds(150));
     let recipe = Recipe { epochs: 12, cpl: Some(cpl), ..recipe(false, false) };
     let mut trainer = Trainer::new(recipe, 3).unwrap();
     let first = trainer.learn(&clouds, |_| {}).unwrap();
     let last = (1..12).map(|_| trainer.learn(&clouds, |_| {}).unwrap()).last().unwrap();
     assert!(last.loss < 0.7 * first.loss, "{first:?}, {last:?}");
+    let found =
+        by_eight_points(&test, |path, card| model::ship(path, &trainer.model, card).unwrap());
+    assert!(found.instance_accuracy() > 0.9, "{found:?}");
+}
+
+/// The coordinates' T-Net is the front end of its own network: what it pools
+/// chooses the points, in training as in infer-cpu.
+#[test]
+fn a_shared_t_net_chooses_and_turns() {
+    let (clouds, test) = (crate::clouds(120), crate::test_clouds(150));
+    let cpl = Cpl { keep: 8, shared: true, ..Cpl::default() };
+    let recipe = Recipe { epochs: 14, cpl: Some(cpl), ..recipe(true, false) };
+    let mut trainer = Trainer::new(recipe, 3).unwrap();
+    let before = model::tensors(&mut trainer.model)["feat.stn.conv1.weight"].clone();
+    for _ in 0..14 {
+        trainer.learn(&clouds, |_| {}).unwrap();
+    }
+    let tensors = model::tensors(&mut trainer.model);
+    assert_ne!(tensors["feat.stn.conv1.weight"], before, "the T-Net learns");
+    assert!(tensors.keys().all(|name| !name.starts_with("cpl.")), "and nothing else is added");
+    let found =
+        by_eight_points(&test, |path, card| model::write(path, &mut trainer.model, card).unwrap());
+    assert!(found.instance_accuracy() > 0.85, "{found:?}");
+}
+
+/// With no loss of its own, a front end learns by the relaxed choice alone.
+#[test]
+fn a_relaxed_choice_teaches_the_front_end() {
+    let clouds = crate::clouds(60);
+    let learnt = |gumbel| {
+        let cpl = Cpl { front: vec![16, 32], keep: 8, weight: 0.0, gumbel, ..Cpl::default() };
+        let mut recipe = Recipe { cpl: Some(cpl), ..recipe(false, false) };
+        recipe.adam.l2 = 0.0;
+        let mut trainer = Trainer::new(recipe, 3).unwrap();
+        let before = model::tensors(&mut trainer.model)["cpl.conv1.weight"].clone();
+        trainer.learn(&clouds, |_| {}).unwrap();
+        model::tensors(&mut trainer.model)["cpl.conv1.weight"] != before
+    };
+    assert!(learnt(true) && !learnt(false));
+}
+
+/// A network that looks around 8 of 32 points, against its twin: neighbours are
+/// all 32, whoever chose the 8, however many threads there are.
+#[test]
+fn points_look_around_among_all_whatever_the_sampler_kept() {
+    let clouds = crate::clouds(30);
+    let mut recipe = recipe(false, false);
+    recipe.network.edges = vec![Edge { radius: 0.5, channels: 9 }];
+    let mut trainer = Trainer::new(recipe.clone(), 3).unwrap();
+    trainer.learn(&clouds, |_| {}).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.safetensors");
-    let card = ModelCard {
-        classes: clouds.classes.clone(),
-        sampler: Some("cpl".to_owned()),
-        points: Some(8),
-        ..ModelCard::default()
-    };
-    model::ship(&path, &trainer.network, &card).unwrap();
-    let mut classifier = Classifier::load(&path, &Options::default()).unwrap();
-    assert!(classifier.classify(test.set.cloud(0)).unwrap().n_used <= 8);
-    let found = train::evaluate::confusion(&path, &test, &Options::default()).unwrap();
-    assert!(found.instance_accuracy() > 0.9, "{found:?}");
+    let card = ModelCard { edge_radii: vec![0.5], ..ModelCard::default() };
+    model::write(&path, &mut trainer.model, &card).unwrap();
+    let values = twin::values(&mut trainer.model);
+    for (kind, threads) in [
+        (SamplerKind::Fps, 1),
+        (SamplerKind::Fps, 3),
+        (SamplerKind::Random, 1),
+        (SamplerKind::Cpl, 3),
+    ] {
+        let resize = Resize::Truncate;
+        let sampler = Some(SamplerSpec { kind, points: 8, resize, ..SamplerSpec::default() });
+        let normalization = Some("none".parse().unwrap());
+        let options = Options { sampler, threads, normalization, ..Options::default() };
+        let mut classifier = Classifier::load(&path, &options).unwrap();
+        for cloud in 0..clouds.len() {
+            let points = clouds.set.cloud(cloud);
+            let wide: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
+            let chosen = classifier.sample(&wide).unwrap();
+            let chosen = chosen.iter().map(|&i| wide[i as usize].to_vec()).collect();
+            let around = vec![wide.iter().map(|p| p.to_vec()).collect()];
+            let twin = Twin { values: &values, clouds: vec![chosen], around, kept: None };
+            let (expected, _) = twin.logits(&recipe.network);
+            let found = &classifier.classify(points).unwrap().logits;
+            for (found, expected) in found.iter().zip(&expected[0]) {
+                // As `logits_are_those_of_infer_cpu`.
+                let near = (f64::from(*found) - expected).abs() <= 1e-4 * expected.abs().max(1.0);
+                assert!(near, "{kind}, cloud {cloud}: {found} for {expected}");
+            }
+        }
+    }
+    // No table of coordinates holds what surrounds a point.
+    let sampler = Some(SamplerSpec { kind: SamplerKind::Cpl, points: 8, ..SamplerSpec::default() });
+    let options = Options { sampler, table_nodes: Some(5), ..Options::default() };
+    let error = Classifier::load(&path, &options).err().unwrap().to_string();
+    assert!(error.contains("a trunk that looks around points"), "{error}");
 }

@@ -4,18 +4,21 @@ use std::collections::BTreeMap;
 
 use formats::rng::StreamKey;
 use train::batch::Batch;
+use train::chooser::Chooser;
+use train::front::Cpl;
 use train::layer::Learns;
 use train::matrix::Matrix;
-use train::network::{PointNet, Rates, Shape};
+use train::network::{Edge, PointNet, Rates, Shape};
 
 use crate::twin::{self, Table, Twin};
 
-const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.02 };
+const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.02, step: 0 };
 
 fn shape(input_transform: bool, feature_transform: bool) -> Shape {
     Shape {
         input_transform,
         feature_transform,
+        edges: Vec::new(),
         trunk: vec![5, 7, 11],
         t_net: vec![6, 9],
         t_net_head: vec![8],
@@ -42,6 +45,13 @@ fn batch() -> Batch {
             batch.weights.push(if stands_for_more { 4.0 } else { 1.0 });
         }
         batch.starts.push(batch.coordinates.len());
+    }
+    // Around each cloud, its own points and some more.
+    batch.around_starts.push(0);
+    for cloud in 0..sizes.len() {
+        batch.around.extend(&batch.coordinates[batch.starts[cloud]..batch.starts[cloud + 1]]);
+        batch.around.extend((0..8).map(|_| [(); 3].map(|()| 2.0 * unit() - 1.0)));
+        batch.around_starts.push(batch.around.len());
     }
     batch.targets = Matrix::from_shape_fn((sizes.len(), CLASSES), |(cloud, class)| {
         // One cloud's target is shared between classes.
@@ -95,8 +105,11 @@ fn check(shape: &Shape) {
         gradients.insert(parameter.name.clone(), parameter.gradient.clone());
     });
     let clouds = duplicated(&batch);
+    let wide = |cloud| batch.surroundings(cloud).iter().map(|p| p.map(f64::from).to_vec());
+    let around: Vec<Table> = (0..batch.len()).map(|cloud| wide(cloud).collect()).collect();
     let twin = |values: &twin::Values| {
-        let twin = Twin { values, clouds: clouds.clone(), kept: Some(kept()) };
+        let around = around.clone();
+        let twin = Twin { values, clouds: clouds.clone(), around, kept: Some(kept()) };
         twin.loss(shape, &batch.targets, RATES.orthogonality)
     };
     // Some 30 layers deep, each of fewer than 100 roundings of relative size
@@ -126,6 +139,57 @@ fn check(shape: &Shape) {
 #[test]
 fn gradients_of_the_baseline_are_those_of_its_twin() {
     check(&shape(true, true));
+}
+
+#[test]
+fn gradients_of_what_looks_around_are_those_of_the_twin() {
+    let edge = |radius, channels| Edge { radius, channels };
+    for input_transform in [false, true] {
+        let edges = vec![edge(1.2, 5), edge(0.7, 3)];
+        check(&Shape { edges, ..shape(input_transform, false) });
+    }
+}
+
+/// The loss of what a T-Net chose, by differences of the network's own losses:
+/// the choice itself, a step function, is the same on both sides.
+#[test]
+fn gradients_of_a_shared_t_net_are_its_losses_differences() {
+    let shape = shape(true, false);
+    let cpl = Cpl { keep: 3, shared: true, ..Cpl::default() };
+    let mut network = PointNet::new(&shape, CLASSES, 11);
+    network.choose_by_t_net(Chooser::new(&cpl, 0).unwrap());
+    let batch = batch();
+    network.learn(&batch, Some(kept()), RATES);
+    let mut gradients = BTreeMap::new();
+    network.parameters(&mut |parameter| {
+        gradients.insert(parameter.name.clone(), parameter.gradient.clone());
+    });
+    for name in
+        ["feat.stn.conv1.weight", "feat.stn.bn2.weight", "feat.stn.fc2.weight", "feat.conv1.weight"]
+    {
+        let gradient = &gradients[name];
+        let i =
+            (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
+        let i = i.unwrap();
+        let at = |by: f32| {
+            let mut moved = network.clone();
+            moved.parameters(&mut |parameter| {
+                if parameter.name == name {
+                    parameter.value[i] += by;
+                }
+            });
+            moved.learn(&batch, Some(kept()), RATES).total
+        };
+        // f32 losses of about 2 are off by some 2e-7, over 2e-4: 1e-3. Larger
+        // steps meet the curvature of batch norms over four vectors.
+        let h = 1e-4;
+        let expected = (at(h) - at(-h)) / f64::from(2.0 * h);
+        let found = f64::from(gradient[i]);
+        assert!(
+            (found - expected).abs() < 0.02 * expected.abs() + 2e-3,
+            "{name}: {found}, {expected}"
+        );
+    }
 }
 
 #[test]

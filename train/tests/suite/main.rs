@@ -5,7 +5,9 @@
 mod augment;
 mod export;
 mod gradients;
+mod killed;
 mod program;
+mod reproduce;
 mod resume;
 mod twin;
 
@@ -15,9 +17,18 @@ use train::clouds::Clouds;
 
 /// `n` clouds of 32 points in three classes: a ball, a disc, a rod.
 fn clouds(n: usize) -> Clouds {
+    clouds_of(5, n)
+}
+
+/// Others of the same classes.
+fn test_clouds(n: usize) -> Clouds {
+    clouds_of(6, n)
+}
+
+fn clouds_of(seed: u64, n: usize) -> Clouds {
     let mut points = Vec::new();
     for cloud in 0..n {
-        let key = StreamKey::new(5, "clouds", cloud as u32);
+        let key = StreamKey::new(seed, "clouds", cloud as u32);
         for point in 0..32 {
             let unit = |axis| (2.0 * key.unit(3 * point + axis) - 1.0) as f32;
             let flat = [[1.0, 1.0, 1.0], [1.0, 1.0, 0.05], [1.0, 0.05, 0.05]][cloud % 3];

@@ -18,7 +18,7 @@ fn said(output: &Output) -> String {
 }
 
 /// A folder with `train.npz`, `test.npz` and a recipe for a small network.
-fn folder() -> tempfile::TempDir {
+pub fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, n) in [("train", 60), ("test", 30)] {
         write(&folder.path().join(format!("{name}.npz")), &crate::clouds(n));

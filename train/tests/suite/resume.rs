@@ -27,10 +27,10 @@ fn recipe() -> Recipe {
 
 fn parameters(trainer: &mut Trainer) -> Vec<u32> {
     let mut bits = Vec::new();
-    trainer.network.parameters(&mut |parameter| {
+    trainer.model.parameters(&mut |parameter| {
         bits.extend(parameter.value.iter().chain(&parameter.square).map(|x| x.to_bits()));
     });
-    trainer.network.statistics(&mut |_, values| bits.extend(values.iter().map(|x| x.to_bits())));
+    trainer.model.statistics(&mut |_, values| bits.extend(values.iter().map(|x| x.to_bits())));
     bits
 }
 

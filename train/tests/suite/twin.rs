@@ -21,6 +21,9 @@ pub struct Twin<'a> {
     pub values: &'a Values,
     /// The clouds' points, duplicates and all.
     pub clouds: Vec<Table>,
+    /// All points among which each cloud's look for neighbours, where the
+    /// network has edges.
+    pub around: Vec<Table>,
     /// Dropout's mask; none when not learning, when batch norms take running
     /// statistics.
     pub kept: Option<Matrix>,
@@ -110,12 +113,45 @@ impl Twin<'_> {
         (out, mean)
     }
 
+    /// What surrounds each point within `radius`.
+    fn edges(&self, number: usize, radius: f32) -> Table {
+        let mut offsets = Table::new();
+        let mut counts = Vec::new();
+        for (cloud, around) in self.clouds.iter().zip(&self.around) {
+            for p in cloud {
+                let offset = |q: &Vec<f64>| -> Vec<f64> {
+                    q.iter().zip(p).map(|(q, p)| (q - p) / f64::from(radius)).collect()
+                };
+                let near = |offset: &Vec<f64>| {
+                    let squared: f64 = offset.iter().map(|x| x * x).sum();
+                    squared > 0.0 && squared <= 1.0
+                };
+                let before = offsets.len();
+                offsets.push(vec![0.0; 3]);
+                offsets.extend(around.iter().map(offset).filter(near));
+                counts.push(offsets.len() - before);
+            }
+        }
+        let z = self.linear(&format!("edge.conv{number}"), &offsets);
+        let mut rows = self.norm(&format!("edge.bn{number}"), z, true).into_iter();
+        let largest = |&n: &usize| {
+            let some: Table = rows.by_ref().take(n).collect();
+            (0..some[0].len()).map(|c| some.iter().map(|r| r[c]).fold(f64::MIN, f64::max)).collect()
+        };
+        counts.iter().map(largest).collect()
+    }
+
     /// Logits, and the regulariser.
     pub fn logits(&self, shape: &Shape) -> (Table, f64) {
         let mut x: Table = self.clouds.iter().flatten().cloned().collect();
         let mut regulariser = 0.0;
         if shape.input_transform {
             x = self.turned("feat.stn.", &x, shape).0;
+        }
+        for (edge, number) in shape.edges.iter().zip(1..) {
+            for (x, features) in x.iter_mut().zip(self.edges(number, edge.radius)) {
+                x.extend(features);
+            }
         }
         let z = self.linear("feat.conv1", &x);
         x = self.norm("feat.bn1", z, true);

@@ -9,6 +9,7 @@ use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, gen_shapes};
 use anyhow::Context;
 use settings::Settings;
+use sim_gpu::dataset::MeshFailure;
 use sim_gpu::dataset::check_layouts;
 use sim_gpu::dataset::finish::finish;
 use sim_gpu::dataset::journal::Terms;
@@ -119,14 +120,19 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let (config, culling) = (&terms.config, args.caster.culling());
     let run = Run { out: &out, config, caster: &caster, culling, progress: &progress };
     let scanned = bar::beside(&progress, meshes.len(), || scan_all(&run, &meshes))?;
-    for failure in &scanned.failures {
-        let line = failure.line.map(|line| format!(":{line}")).unwrap_or_default();
-        eprintln!("failed: {}{line}: {}", failure.source, failure.cause);
-    }
+    report_failures(&scanned.failures);
     let packing = Instant::now();
     let manifest = finish(&out, &terms, scanned.records, scanned.failures)?;
     summary::print(&out, &manifest, &progress, started.elapsed(), packing.elapsed());
     end(&out, &manifest)
+}
+
+/// Names the meshes that were left out, and why.
+pub fn report_failures(failures: &[MeshFailure]) {
+    for failure in failures {
+        let line = failure.line.map(|line| format!(":{line}")).unwrap_or_default();
+        eprintln!("failed: {}{line}: {}", failure.source, failure.cause);
+    }
 }
 
 /// Draws the example, which a killed run may lack, and names it.

@@ -93,12 +93,8 @@ fn check(
 
 /// The largest activations of the model on clouds spread over the set.
 fn calibrate(model: &Path, clouds: &Path) -> anyhow::Result<(String, String)> {
-    /// More of them change the largest activations little.
-    const CLOUDS: usize = 512;
     let set = read_labelled(clouds)?;
-    let step = set.len().div_ceil(CLOUDS).max(1);
-    let clouds = (0..set.len()).step_by(step).map(|i| set.cloud(i));
-    let activation_ranges = infer_cpu::activation_ranges(model, clouds)?;
+    let activation_ranges = infer_cpu::activation_ranges_of_set(model, &set)?;
     let card = ModelCard { activation_ranges, ..ModelCard::default() };
     let ranges = card.to_metadata().remove_entry("activation_ranges");
     ranges.context("the model has no activations to calibrate")

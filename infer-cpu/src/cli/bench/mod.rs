@@ -117,13 +117,8 @@ fn calibration(_: &Args, _: &Path) -> anyhow::Result<Option<BTreeMap<String, f32
 /// The largest activations on the clouds of `--calibrate`, if there are any.
 #[cfg(feature = "npz")]
 fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
-    /// More clouds change the largest activations little.
-    const CLOUDS: usize = 512;
     let Some(path) = &args.calibrate else { return Ok(None) };
-    let set = read_labelled(path)?;
-    let step = set.len().div_ceil(CLOUDS).max(1);
-    let clouds = (0..set.len()).step_by(step).map(|i| set.cloud(i));
-    Ok(Some(infer_cpu::activation_ranges(model, clouds)?))
+    Ok(Some(infer_cpu::activation_ranges_of_set(model, &read_labelled(path)?)?))
 }
 
 fn at_least_one(word: &str) -> Result<usize, String> {

@@ -20,7 +20,7 @@ const MARGIN: f64 = 60.0;
 /// A file that cannot be written.
 pub fn write(path: &Path, rows: &[Row]) -> anyhow::Result<()> {
     let picture = picture(rows).to_string();
-    atomic::write(path, |out| std::io::Write::write_all(out, picture.as_bytes()))?;
+    atomic::write_bytes(path, &picture)?;
     Ok(())
 }
 

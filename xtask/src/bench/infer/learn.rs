@@ -94,8 +94,6 @@ pub fn run(args: &TrainArgs) -> Result<()> {
 
 /// Our own program, built if need be.
 fn ours(model: &Path, folder: &Path) -> Result<Entrant> {
-    let mut build = workspace::cargo(&["build", "--release", "--package", "train"]);
-    workspace::output(&mut build)?;
     let mut command = workspace::cargo(&["run", "--quiet", "--release", "--package", "train"]);
     command.args(["--", "serve"]).arg(model).arg(folder);
     Ok(entrant("ours", true, Server::start(&mut command)?))

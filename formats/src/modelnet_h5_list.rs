@@ -1,0 +1,18 @@
+//! The lists by which a folder of ModelNet40's HDF5 files is known, without the
+//! library that reads those.
+
+use std::path::{Path, PathBuf};
+
+use crate::split::Split;
+
+/// The list of the files of one half.
+#[must_use]
+pub fn list(folder: &Path, split: Split) -> PathBuf {
+    folder.join(format!("{split}_files.txt"))
+}
+
+/// Whether `folder` lists files of this layout.
+#[must_use]
+pub fn is_one(folder: &Path) -> bool {
+    Split::ALL.iter().any(|split| list(folder, *split).is_file())
+}

@@ -1,0 +1,57 @@
+//! `cargo xtask sample-surfaces`: points spread evenly over each mesh.
+
+use crate::Outcome;
+use crate::gen_dataset::report_failures;
+use sim_gpu::dataset::surfaces::{SurfaceConfig, write_surfaces};
+use sim_gpu::mesh::frame::{Normalize, Up};
+use sim_gpu::mesh::tree::discover;
+use sim_gpu::sensor::Views;
+use std::path::PathBuf;
+
+/// Flags of `sample-surfaces`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder of meshes, as for gen-dataset
+    #[arg(value_name = "MESHES")]
+    meshes: PathBuf,
+
+    /// Folder for surface-{train,test}.npz, points of whole meshes, and seen-{train,test}.npz,
+    /// what of such points lies open to a sensor at each of gen-dataset's default places
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+
+    /// Points of each cloud
+    #[arg(long, default_value_t = 1024, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    points: u32,
+
+    /// Views that see fewer of six times as many points are left out
+    #[arg(long, default_value_t = 64, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    min_points: u32,
+
+    /// The meshes' upward axis: y or z [default: y for OBJ, z for others]
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Up>,
+
+    /// Seed of every random number
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+/// Samples the meshes.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let meshes = discover(&args.meshes, args.seed)?;
+    let config = SurfaceConfig {
+        seed: args.seed,
+        normalize: Normalize::default(),
+        up: args.up,
+        points: args.points,
+        min_points: args.min_points,
+        views: Views::ROTATING,
+    };
+    let failures = write_surfaces(&args.out, &config, &meshes)?;
+    report_failures(&failures);
+    eprintln!("{} meshes: {}", meshes.len() - failures.len(), args.out.display());
+    Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+}
