@@ -19,6 +19,8 @@
     allow(dead_code, reason = "formats that are left out leave helpers that others share")
 )]
 
+#[cfg(feature = "chamfer")]
+pub mod chamfer;
 pub mod cloud;
 #[cfg(feature = "files")]
 pub mod cloud_file;

@@ -3,7 +3,7 @@
 use formats::rng::StreamKey;
 use infer_cpu::sampler::RandomSubset;
 
-use crate::chamfer::{Chamfer, chamfer};
+use formats::chamfer::{Chamfer, chamfer};
 
 /// Distances to the same points.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::ensure;
+use formats::chamfer::chamfer;
 use formats::cloud_file::read_cloud;
-use train::chamfer::chamfer;
 
 /// Flags of `compare-points`.
 #[derive(clap::Args, Debug)]

@@ -10,7 +10,6 @@ pub mod augment;
 pub mod batch;
 pub mod batches;
 pub mod beside_random;
-pub mod chamfer;
 pub mod checkpoint;
 pub mod chooser;
 pub mod clouds;

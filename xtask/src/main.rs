@@ -1,6 +1,7 @@
 //! The one command line of an Edgepuck workstation.
 
 mod adapters;
+mod advise;
 mod bench;
 mod build_pi;
 mod caster;
@@ -8,12 +9,15 @@ mod gen_dataset;
 mod gen_shapes;
 mod import_weights;
 mod merge_dataset;
+mod page;
 mod pi_target;
 mod preview_scan;
+mod report;
 mod reproduce;
 mod sample_surfaces;
 mod scan;
 mod test;
+mod trade;
 mod train;
 mod workspace;
 
@@ -64,6 +68,12 @@ enum Command {
     ComparePoints(train::Args),
     /// Run the paper's experiments again, and write one report
     Reproduce(reproduce::Args),
+    /// Measure what each knob, from mesh to class, costs and what it is worth
+    Trade(trade::Args),
+    /// Name one configuration for a device, out of what trade measured
+    Advise(advise::Args),
+    /// Gather everything that was measured into one page
+    Report(report::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -93,6 +103,9 @@ fn main() -> ExitCode {
         Command::Explain(args) => train::run("explain", &args),
         Command::ComparePoints(args) => train::run("compare-points", &args),
         Command::Reproduce(args) => reproduce::run(&args),
+        Command::Trade(args) => trade::run(&args),
+        Command::Advise(args) => advise::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {

@@ -12,26 +12,27 @@ use serde::Serialize;
 use sim_gpu::gpu::AdapterRequest;
 use std::path::PathBuf;
 
-mod accuracy;
+pub mod accuracy;
 mod bins;
 mod builders;
-mod clock;
+pub mod clock;
 mod infer;
 mod kernel;
-mod lanes;
-mod machine;
+pub mod lanes;
+pub mod machine;
 mod moller_trumbore;
 mod peers;
-mod pi_model;
+pub mod pi_model;
 mod pipeline;
 mod scenes;
-mod shot;
-mod speed;
+pub mod shot;
+pub mod speed;
 mod subject;
-mod table;
+pub mod table;
 mod to_disk;
 mod trade;
 mod venv;
+pub mod ways;
 
 /// What to measure.
 #[derive(Args, Debug)]

@@ -3,25 +3,21 @@
 use super::accuracy::Accuracy;
 use super::clock::{Contestant, Costs, interleave, measured};
 use super::lanes::Lane;
-use super::moller_trumbore;
 use super::scenes::{closed_sphere, edge_midpoints, in_a_room, rippled_plate, torus};
 use super::shot::Shot;
 use super::speed::{short, sweep_pose, target, vlp32c};
 use super::table::{Table, digits, millions_per_s, milliseconds};
+use super::ways;
 use anyhow::Result;
 use formats::rng::StreamKey;
 use glam::DVec3;
-use rayon::prelude::*;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle;
-use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::{MISS, TraceRay};
 use sim_gpu::sensor::Sensor;
 use std::hint::black_box;
 use std::num::NonZeroU32;
@@ -119,8 +115,8 @@ fn on(
 ) -> Result<Vec<Setting>> {
     let shot = aim(&target(mesh.clone(), Builder::Sah));
     let by_morton = shot.at(&target(mesh, Builder::Morton));
-    let ways = ways(&shot, &by_morton, lanes);
-    let truth = oracle_ranges(&shot);
+    let ways = every_way(&shot, &by_morton, lanes);
+    let truth = ways::in_f64(&shot);
     let mut settings = Vec::new();
     let mut contestants: Vec<Contestant<'_>> = Vec::new();
     for (knobs, fill, way) in &ways {
@@ -146,7 +142,7 @@ fn on(
 }
 
 /// Each setting of the knobs, with the rays that it takes to measure it.
-fn ways<'a>(
+fn every_way<'a>(
     shot: &'a Shot,
     by_morton: &'a Shot,
     lanes: &'a [Lane],
@@ -158,27 +154,16 @@ fn ways<'a>(
         })
     };
     let mut ways = vec![
-        ("cpu f64 oracle".to_owned(), RAYS, repeated(Box::new(|| oracle_ranges(shot)))),
+        ("cpu f64 oracle".to_owned(), RAYS, repeated(Box::new(|| ways::in_f64(shot)))),
         (
             "cpu f32 Möller-Trumbore, f32 range".to_owned(),
             RAYS,
-            repeated(Box::new(|| {
-                in_f32(shot, |ray| {
-                    let t = moller_trumbore::nearest(&shot.job.target.bvh, ray);
-                    t.is_finite().then_some(t)
-                })
-            })),
+            repeated(Box::new(|| ways::moller_trumbore(shot))),
         ),
         (
             "cpu f32 watertight, f32 range".to_owned(),
             RAYS,
-            repeated(Box::new(|| {
-                let bvh = &shot.job.target.bvh;
-                in_f32(shot, |ray| {
-                    let nearest = traverse(&bvh.nodes, &bvh.triangles, ray);
-                    (nearest.index != MISS).then_some(nearest.t)
-                })
-            })),
+            repeated(Box::new(|| ways::watertight_in_f32(shot))),
         ),
     ];
     for lane in lanes {
@@ -191,18 +176,6 @@ fn ways<'a>(
         ways.push((format!("{name} the same, Morton"), fill, way(by_morton)));
     }
     ways
-}
-
-fn oracle_ranges(shot: &Shot) -> Vec<Option<f64>> {
-    let target = &shot.job.target;
-    shot.rays.par_iter().map(|ray| oracle::nearest(target, ray).map(|c| c.range_m)).collect()
-}
-
-/// Ranges as f32 leaves them: the distance skipped and the one traced.
-fn in_f32(shot: &Shot, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -> Vec<Option<f64>> {
-    let scale = shot.job.target.surface.frame.scale;
-    let range = |ray: &TraceRay| nearest(ray).map(|t| f64::from(ray.skipped + t) * scale);
-    shot.job.rays.par_iter().map(range).collect()
 }
 
 fn resolved(caster: &Caster, shot: &Shot, copies: usize) -> Result<Vec<Option<f64>>> {

@@ -24,6 +24,8 @@ mod plan;
 mod report;
 mod rows;
 
+pub use plan::Sampler;
+
 /// Flags of `bench pi-model`.
 #[derive(Args, Debug)]
 pub struct PiModelArgs {
@@ -80,24 +82,15 @@ pub struct PiModelArgs {
 /// loop that is looked for or below the share of peak asked for, a file that
 /// cannot be read or written.
 pub fn run(args: &PiModelArgs) -> Result<()> {
-    let mca = mca::Mca::find(args.llvm_mca.as_deref())?;
-    pi_target::need_standard_library()?;
-    let folder = crate::workspace::root().join("target/pi-model");
-    std::fs::create_dir_all(&folder)?;
-    let listing = folder.join("infer-cpu.s");
-    let emit = format!("asm={}", listing.display());
-    let binary = build_pi::build(&["-C", "strip=none", "--emit", &emit])?;
-    let text = std::fs::read_to_string(&listing)
-        .with_context(|| format!("cannot read {}; remove target and retry", listing.display()))?;
-    let kernels = kernels::Kernels::of(&text, &mca)?;
-    print!("{}", report::kernels(&kernels, &mca.version));
-    check_peaks(&kernels, args.least_peak)?;
+    let board = Board::open(args.llvm_mca.as_deref())?;
+    print!("{}", report::kernels(&board.kernels, &board.llvm_mca));
+    check_peaks(&board.kernels, args.least_peak)?;
 
-    let model = model_file(args, &folder)?;
+    let model = model_file(args, &board.folder)?;
     let network = network::Network::read(&model)?;
-    let counter = counter(args, &folder, &binary, &model);
-    let rows = rows::rows(args, &network, &kernels, counter.as_ref())?;
-    let report = report::Report::new(args, &mca.version, &kernels, rows);
+    let counter = if args.no_counts { None } else { board.counter(&model) };
+    let rows = rows::rows(args, &network, &board.kernels, counter.as_ref())?;
+    let report = report::Report::new(args, &board.llvm_mca, &board.kernels, rows);
     print!("{report}");
     if let Some(file) = &args.json {
         let text = serde_json::to_string_pretty(&report)? + "\n";
@@ -108,6 +101,89 @@ pub fn run(args: &PiModelArgs) -> Result<()> {
         std::fs::write(file, text).with_context(|| format!("writing {}", file.display()))?;
     }
     Ok(())
+}
+
+/// The Raspberry Pi's build of infer-cpu, looked into.
+struct Board {
+    llvm_mca: String,
+    folder: PathBuf,
+    binary: PathBuf,
+    kernels: kernels::Kernels,
+}
+
+impl Board {
+    fn open(llvm_mca: Option<&str>) -> Result<Self> {
+        let mca = mca::Mca::find(llvm_mca)?;
+        pi_target::need_standard_library()?;
+        let folder = crate::workspace::root().join("target/pi-model");
+        std::fs::create_dir_all(&folder)?;
+        let listing = folder.join("infer-cpu.s");
+        let emit = format!("asm={}", listing.display());
+        let binary = build_pi::build(&["-C", "strip=none", "--emit", &emit])?;
+        let text = std::fs::read_to_string(&listing).with_context(|| {
+            format!("cannot read {}; remove target and retry", listing.display())
+        })?;
+        let kernels = kernels::Kernels::of(&text, &mca)?;
+        Ok(Self { llvm_mca: mca.version, folder, binary, kernels })
+    }
+
+    /// Counts instructions, where that is possible.
+    fn counter(&self, model: &Path) -> Option<count::Counter> {
+        match count::Counter::new(&self.folder, &self.binary, model) {
+            Ok(counter) => Some(counter),
+            Err(error) => {
+                eprintln!("instructions outside inner loops are not counted: {error:#}");
+                None
+            }
+        }
+    }
+}
+
+/// Modelled times of one model file on a Raspberry Pi 5 at work with all its
+/// cores.
+pub struct Modelled {
+    board: Board,
+    machine: model::Machine,
+    network: network::Network,
+    counter: count::Counter,
+}
+
+impl Modelled {
+    /// Looks into the build and the model file at `model`.
+    ///
+    /// # Errors
+    /// What [`run`] reports, and an emulator that cannot count: times without
+    /// what is outside the inner loops would be too good.
+    pub fn open(model: &Path) -> Result<Self> {
+        let board = Board::open(None)?;
+        let counter = count::Counter::new(&board.folder, &board.binary, model)?;
+        let network = network::Network::read(model)?;
+        Ok(Self { board, machine: model::Machine::PI_5, network, counter })
+    }
+
+    /// Milliseconds to a class of `points` of a cloud of `from`, by threads;
+    /// `None` if the network lacks what the sampler needs.
+    ///
+    /// # Errors
+    /// A binary that cannot be counted.
+    pub fn total_ms(
+        &self,
+        sampler: Sampler,
+        (from, points): (usize, usize),
+        precision: Precision,
+        threads: &[usize],
+    ) -> Result<Option<Vec<f64>>> {
+        let setting = rows::Setting { sampler, from, points, precision };
+        let Some(stages) = setting.stages(&self.network) else { return Ok(None) };
+        let (network, kernels) = (&self.network, &self.board.kernels);
+        let counted = rows::count(&self.counter, network, kernels, setting)?;
+        let of = |&threads: &usize| {
+            let machine = model::Machine { threads, ..self.machine };
+            let other = Some(counted.other);
+            model::time(&machine, kernels, &stages, counted.columns_read, other).total_ms
+        };
+        Ok(Some(threads.iter().map(of).collect()))
+    }
 }
 
 fn check_peaks(kernels: &kernels::Kernels, least_percent: Option<f64>) -> Result<()> {
@@ -129,25 +205,6 @@ fn model_file(args: &PiModelArgs, folder: &Path) -> Result<PathBuf> {
     let path = folder.join("untrained-baseline.safetensors");
     network::write_stand_in(&path)?;
     Ok(path)
-}
-
-/// Counts instructions, where that is asked for and possible.
-fn counter(
-    args: &PiModelArgs,
-    folder: &Path,
-    binary: &Path,
-    model: &Path,
-) -> Option<count::Counter> {
-    if args.no_counts {
-        return None;
-    }
-    match count::Counter::new(folder, binary, model) {
-        Ok(counter) => Some(counter),
-        Err(error) => {
-            eprintln!("instructions outside inner loops are not counted: {error:#}");
-            None
-        }
-    }
 }
 
 fn eights(word: &str) -> Result<usize, String> {

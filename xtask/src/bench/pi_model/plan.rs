@@ -12,6 +12,10 @@ use serde::Serialize;
 pub enum Sampler {
     /// All points of the cloud.
     All,
+    /// Points drawn at random.
+    Random,
+    /// One point a cell of a grid.
+    Voxel,
     /// Farthest point sampling.
     Fps,
     /// A Critical Points Layer with a front end of its own.
@@ -26,6 +30,8 @@ impl Sampler {
     pub fn word(self) -> &'static str {
         match self {
             Self::All => "all",
+            Self::Random => "random",
+            Self::Voxel => "voxel",
             Self::Fps => "fps",
             Self::Cpl => "cpl:own:truncate",
             Self::CplStn => "cpl:stn:truncate",
@@ -87,7 +93,8 @@ pub fn stages(
     let formats = Formats::of(precision);
     let mut stages = Vec::new();
     match sampler {
-        Sampler::All => {}
+        // What these do is all outside the inner loops.
+        Sampler::All | Sampler::Random | Sampler::Voxel => {}
         Sampler::Fps => stages.push(Stage::Farthest { points: from, picks: points }),
         Sampler::Cpl | Sampler::CplStn => {
             let front = if sampler == Sampler::Cpl { &network.front } else { &network.stn };

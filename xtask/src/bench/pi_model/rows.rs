@@ -40,6 +40,26 @@ pub struct Row {
     pub functions: Vec<(String, f64)>,
 }
 
+/// What is modelled: `points` of a cloud of `from` points to a class.
+#[derive(Clone, Copy)]
+pub struct Setting {
+    /// Where the points come from.
+    pub sampler: Sampler,
+    /// Points of the cloud.
+    pub from: usize,
+    /// Points that the network sees.
+    pub points: usize,
+    /// What it computes in.
+    pub precision: Precision,
+}
+
+impl Setting {
+    /// What infer-cpu does; `None` if the network lacks what the sampler pools.
+    pub fn stages(self, network: &Network) -> Option<Vec<Stage>> {
+        stages(network, self.sampler, (self.from, self.points), self.precision)
+    }
+}
+
 /// All rows that `args` ask for.
 ///
 /// # Errors
@@ -50,43 +70,42 @@ pub fn rows(
     kernels: &Kernels,
     counter: Option<&Counter>,
 ) -> Result<Vec<Row>> {
-    let setting = |sampler, from, points| (sampler, (from, points));
-    let all = args.points.iter().map(|&n| setting(Sampler::All, n, n));
-    let fewer = args.points.iter().filter(|&&points| points < args.from);
-    let fps = fewer.map(|&points| setting(Sampler::Fps, args.from, points));
-    let critical = args.critical.min(args.from);
-    let cpl = [Sampler::Cpl, Sampler::CplStn].map(|kind| setting(kind, args.from, critical));
     let mut rows = Vec::new();
-    for (sampler, sizes) in all.chain(fps).chain(cpl) {
-        for &precision in &args.precision {
-            let Some(stages) = stages(network, sampler, sizes, precision) else { continue };
-            let macs = stages.iter().map(Stage::macs).sum();
-            let counted = match counter {
-                Some(counter) => {
-                    Some(count(counter, network, kernels, (sampler, sizes, precision))?)
-                }
-                None => None,
-            };
-            let columns_read = counted.as_ref().map(|counted| counted.columns_read);
-            let other = counted.as_ref().map(|counted| counted.other);
-            let share = columns_read.unwrap_or(1.0);
-            let time = time(&machine(args), kernels, &stages, share, other);
-            let functions = counted.map_or_else(Vec::new, |counted| counted.functions);
-            let ((from, points), precision) = (sizes, precision.name());
-            rows.push(Row {
-                sampler,
-                from,
-                points,
-                precision,
-                macs,
-                time,
-                columns_read,
-                other,
-                functions,
-            });
-        }
+    for setting in settings(args) {
+        let Some(stages) = setting.stages(network) else { continue };
+        let counted = match counter {
+            Some(counter) => Some(count(counter, network, kernels, setting)?),
+            None => None,
+        };
+        let columns_read = counted.as_ref().map(|counted| counted.columns_read);
+        let other = counted.as_ref().map(|counted| counted.other);
+        let share = columns_read.unwrap_or(1.0);
+        rows.push(Row {
+            sampler: setting.sampler,
+            from: setting.from,
+            points: setting.points,
+            precision: setting.precision.name(),
+            macs: stages.iter().map(Stage::macs).sum(),
+            time: time(&machine(args), kernels, &stages, share, other),
+            columns_read,
+            other,
+            functions: counted.map_or_else(Vec::new, |counted| counted.functions),
+        });
     }
     Ok(rows)
+}
+
+fn settings(args: &PiModelArgs) -> impl Iterator<Item = Setting> {
+    let from = args.from;
+    let all = args.points.iter().map(|&n| (Sampler::All, n, n));
+    let fewer = args.points.iter().filter(move |&&points| points < from);
+    let fps = fewer.map(move |&points| (Sampler::Fps, from, points));
+    let critical = args.critical.min(from);
+    let cpl = [Sampler::Cpl, Sampler::CplStn].map(|kind| (kind, from, critical));
+    all.chain(fps).chain(cpl).flat_map(|(sampler, from, points)| {
+        let precisions = args.precision.iter();
+        precisions.map(move |&precision| Setting { sampler, from, points, precision })
+    })
 }
 
 /// The machine that `args` describe.
@@ -100,33 +119,39 @@ pub fn machine(args: &PiModelArgs) -> Machine {
 }
 
 /// What counting gave.
-struct Counted {
-    other: Other,
-    columns_read: f64,
+pub struct Counted {
+    /// Instructions outside the inner loops.
+    pub other: Other,
+    /// Share of the vector layers' columns that were read.
+    pub columns_read: f64,
     functions: Vec<(String, f64)>,
 }
 
 /// Counts one setting; one that is too large for QEMU is extrapolated from two
 /// that are not.
-fn count(
+///
+/// # Errors
+/// A binary that cannot be counted, or that does not do what is planned.
+pub fn count(
     counter: &Counter,
     network: &Network,
     kernels: &Kernels,
-    (sampler, (from, points), precision): (Sampler, (usize, usize), Precision),
+    setting: Setting,
 ) -> Result<Counted> {
-    let measure = |sizes: (usize, usize)| -> Result<Counted> {
-        let name = precision.name();
-        eprintln!("counting {} {} of {} in {name}", sampler.word(), sizes.1, sizes.0);
-        let counts = counter.classification(sampler, sizes, precision)?;
-        let stages = stages(network, sampler, sizes, precision).unwrap_or_default();
+    let Setting { sampler, from, points, .. } = setting;
+    let measure = |setting: Setting| -> Result<Counted> {
+        let Setting { sampler, from, points, precision } = setting;
+        eprintln!("counting {} {points} of {from} in {}", sampler.word(), precision.name());
+        let counts = counter.classification(sampler, (from, points), precision)?;
+        let stages = setting.stages(network).unwrap_or_default();
         let (other, columns_read) = counts.outside_loops(&stages, kernels)?;
         Ok(Counted { other, columns_read, functions: counts.largest(NAMED_FUNCTIONS) })
     };
     if from <= MOST_COUNTED || sampler != Sampler::All {
-        return measure((from, points));
+        return measure(setting);
     }
-    let (half, whole) =
-        (measure((MOST_COUNTED / 2, MOST_COUNTED / 2))?, measure((MOST_COUNTED, MOST_COUNTED))?);
+    let all = |n: usize| measure(Setting { from: n, points: n, ..setting });
+    let (half, whole) = (all(MOST_COUNTED / 2)?, all(MOST_COUNTED)?);
     let steps = (points - MOST_COUNTED) as f64 / (MOST_COUNTED / 2) as f64;
     let beyond = |half: f64, whole: f64| whole + steps * (whole - half);
     let other = Other {

@@ -1,0 +1,158 @@
+//! What finds the hits, and whether beams that cannot hit are left out.
+
+use super::objects::{Object, Place, places};
+use super::row::{Part, Row};
+use super::scans::Cloud;
+use super::sensors::Scanning;
+use crate::bench::accuracy::Accuracy;
+use crate::bench::clock::{Contestant, interleave, measured};
+use crate::bench::lanes::Lane;
+use crate::bench::shot::Shot;
+use crate::bench::ways;
+use anyhow::Result;
+use glam::DVec3;
+use rayon::prelude::*;
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::Effects;
+use sim_gpu::job::{CastJob, Culling};
+use std::hint::black_box;
+
+/// The ranges of one shot's rays, metres.
+type Ranges = Vec<Option<f64>>;
+
+/// How rays become ranges.
+enum Way<'a> {
+    /// Everything in f64: the oracle.
+    Oracle,
+    /// Möller and Trumbore's test in f32.
+    MollerTrumbore,
+    /// The watertight test, and ranges in f32.
+    F32,
+    /// The product: the watertight test in f32, ranges in f64.
+    Product(&'a Caster),
+}
+
+/// One way's rows, but for the accuracy of classes, and the clouds that it finds.
+pub struct Cast {
+    /// Costs and errors.
+    pub row: Row,
+    /// One cloud a place.
+    pub clouds: Vec<Cloud>,
+}
+
+/// Casts the clean reference scans in every way there is, in turns.
+///
+/// # Errors
+/// An adapter that fails.
+pub fn cast_all(
+    objects: &[Object],
+    lanes: &[Lane],
+    rounds: usize,
+    test_set: &str,
+) -> Result<Vec<Cast>> {
+    let cpu = Caster::Cpu(Effects::default());
+    let mut ways = vec![
+        ("cpu f64".to_owned(), Way::Oracle),
+        ("cpu f32 Möller-Trumbore, f32 range".to_owned(), Way::MollerTrumbore),
+        ("cpu f32 watertight, f32 range".to_owned(), Way::F32),
+        ("cpu f32 watertight, f64 range".to_owned(), Way::Product(&cpu)),
+    ];
+    let adapters = lanes.iter().filter(|lane| lane.name() != "cpu");
+    ways.extend(adapters.map(|lane| {
+        let name = format!("{} f32 watertight, f64 range", crate::bench::speed::short(lane.name()));
+        (name, Way::Product(&lane.caster))
+    }));
+    let settings: Vec<(&String, &Way<'_>, Culling)> = [Culling::On, Culling::Off]
+        .into_iter()
+        .flat_map(|culling| ways.iter().map(move |(name, way)| (name, way, culling)))
+        .collect();
+    let mut contestants: Vec<Contestant<'_>> = Vec::new();
+    for &(_, way, culling) in &settings {
+        contestants.push(Box::new(move || {
+            let (ranges, cost) = measured(|| way.cast(&shots(objects, culling)));
+            black_box(ranges?);
+            Ok(cost)
+        }));
+    }
+    let costs = interleave(rounds, &mut contestants)?;
+    drop(contestants);
+    let mut all = Vec::new();
+    for ((name, way, culling), costs) in settings.into_iter().zip(costs) {
+        eprintln!("caster: {name}, culling {}", word(culling));
+        let mut cast = judged(objects, way, culling)?;
+        let cpu_s = costs.cpu_s().median / cast.clouds.len() as f64;
+        let rays = Scanning::reference().sensor.pattern().len() as f64;
+        cast.row = Row {
+            test_set: test_set.to_owned(),
+            caster: name.clone(),
+            culling: word(culling).to_owned(),
+            rays_per_cpu_s: Some(rays / cpu_s),
+            scans_per_cpu_s: Some(1.0 / cpu_s),
+            ms_here: Some(cpu_s * 1e3),
+            ..cast.row
+        };
+        all.push(cast);
+    }
+    Ok(all)
+}
+
+fn word(culling: Culling) -> &'static str {
+    match culling {
+        Culling::On => "on",
+        Culling::Off => "off",
+    }
+}
+
+fn shots(objects: &[Object], culling: Culling) -> Vec<Shot> {
+    let clean = Scanning::clean(Scanning::reference().distance_m);
+    let pattern = clean.sensor.pattern();
+    let aim = |place: &Place<'_>| Shot::sweep(&place.object.target, &place.pose, &pattern, culling);
+    places(objects, clean.distance_m).par_iter().map(aim).collect()
+}
+
+impl Way<'_> {
+    fn cast(&self, shots: &[Shot]) -> Result<Vec<Ranges>> {
+        Ok(match self {
+            Self::Oracle => shots.iter().map(ways::in_f64).collect(),
+            Self::MollerTrumbore => shots.iter().map(ways::moller_trumbore).collect(),
+            Self::F32 => shots.iter().map(ways::watertight_in_f32).collect(),
+            Self::Product(caster) => {
+                let jobs: Vec<CastJob> = shots.iter().map(|shot| shot.job.clone()).collect();
+                let casts = caster.cast(&jobs)?;
+                shots.par_iter().zip(&casts).map(|(shot, cast)| shot.ranges(cast)).collect()
+            }
+        })
+    }
+}
+
+fn judged(objects: &[Object], way: &Way<'_>, culling: Culling) -> Result<Cast> {
+    let shots = shots(objects, culling);
+    let ranges = way.cast(&shots)?;
+    let truth: Vec<Ranges> = shots.par_iter().map(ways::in_f64).collect();
+    let accuracy = Accuracy::of(&ranges.concat(), &truth.concat());
+    let wrong = accuracy.false_hits_per_million() + accuracy.misses_per_million();
+    let clouds: Vec<Cloud> = shots.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
+    let points: usize = clouds.iter().map(Vec::len).sum();
+    let row = Row {
+        part: Part::Caster,
+        knob: "caster".to_owned(),
+        sensor: Scanning::reference().name,
+        points_per_scan: Some(points as f64 / clouds.len() as f64),
+        range_rms_m: Some(accuracy.rms_m),
+        range_worst_m: Some(accuracy.worst_m),
+        wrong_rays_per_million: Some(wrong),
+        ..Row::default()
+    };
+    Ok(Cast { row, clouds })
+}
+
+/// The points that a shot's rays hit, in the order of its beams.
+fn cloud(shot: &Shot, ranges: &Ranges) -> Cloud {
+    let rays = shot.job.beams.iter().zip(shot.in_world()).zip(ranges);
+    let hit = |((&beam, (origin, direction)), range): ((&u32, (DVec3, DVec3)), &Option<f64>)| {
+        range.map(|range_m| (beam, (origin + range_m * direction).as_vec3().to_array()))
+    };
+    let mut points: Vec<(u32, [f32; 3])> = rays.filter_map(hit).collect();
+    points.sort_unstable_by_key(|(beam, _)| *beam);
+    points.into_iter().map(|(_, point)| point).collect()
+}

@@ -1,0 +1,253 @@
+//! What a classifier says of some clouds, and how long it takes.
+
+use super::energy::Energy;
+use super::row::{Part, Row};
+use crate::bench::clock::Spread;
+use anyhow::{Context, Result, ensure};
+use formats::labelled::read_labelled;
+use infer_cpu::sampler::{FrontChoice, SamplerKind, SamplerSpec};
+use infer_cpu::{Classifier, Options, Precision, TNets, inspect};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Labelled clouds.
+pub struct TestSet {
+    /// Its name in the rows.
+    pub name: String,
+    /// The clouds.
+    pub clouds: Vec<Vec<[f32; 3]>>,
+    /// Each one's class, by name.
+    pub labels: Vec<String>,
+}
+
+/// A way to choose points, as `infer-cpu bench --sampler` names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chooser {
+    /// Its name.
+    pub name: &'static str,
+    kind: SamplerKind,
+    front: FrontChoice,
+    table_nodes: Option<usize>,
+}
+
+impl Chooser {
+    /// Points drawn at random.
+    pub const RANDOM: Self = Self::by("random", SamplerKind::Random, FrontChoice::Auto, None);
+    /// Farthest point sampling.
+    pub const FPS: Self = Self::by("fps", SamplerKind::Fps, FrontChoice::Auto, None);
+    /// One point a cell of a grid.
+    pub const VOXEL: Self = Self::by("voxel", SamplerKind::Voxel, FrontChoice::Auto, None);
+    /// Critical points by a front end of the model's own.
+    pub const CPL: Self = Self::by("cpl:own", SamplerKind::Cpl, FrontChoice::Own, None);
+    /// The same by a look-up table of 8 nodes an axis.
+    pub const CPL_TABLE: Self =
+        Self::by("cpl:own:table8", SamplerKind::Cpl, FrontChoice::Own, Some(8));
+    /// Critical points of the trunk of the coordinates' T-Net.
+    pub const CPL_STN: Self = Self::by("cpl:stn", SamplerKind::Cpl, FrontChoice::Stn, None);
+    /// Critical points of the network's own trunk.
+    pub const CPL_TRUNK: Self = Self::by("cpl:trunk", SamplerKind::Cpl, FrontChoice::Trunk, None);
+
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::RANDOM,
+        Self::FPS,
+        Self::VOXEL,
+        Self::CPL,
+        Self::CPL_TABLE,
+        Self::CPL_STN,
+        Self::CPL_TRUNK,
+    ];
+
+    const fn by(
+        name: &'static str,
+        kind: SamplerKind,
+        front: FrontChoice,
+        table_nodes: Option<usize>,
+    ) -> Self {
+        Self { name, kind, front, table_nodes }
+    }
+
+    /// The first of its kind.
+    pub fn of(kind: SamplerKind) -> Self {
+        Self::ALL.into_iter().find(|chooser| chooser.kind == kind).unwrap_or(Self::RANDOM)
+    }
+}
+
+/// A way to classify.
+#[derive(Clone, Debug)]
+pub struct Classifying {
+    /// The model file.
+    pub model: PathBuf,
+    /// How points are chosen.
+    pub sampler: Chooser,
+    /// How many.
+    pub points: usize,
+    /// What to compute in.
+    pub precision: Precision,
+    /// The T-Nets to run.
+    pub t_nets: TNets,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// What was said of each cloud, and in which time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Answers {
+    /// The class of each cloud; `None` where there was no point to judge by.
+    pub classes: Vec<Option<String>>,
+    /// All logits, one cloud after another.
+    pub logits: Vec<f32>,
+    /// The median, milliseconds.
+    pub median_ms: f64,
+    /// Of one classification, where the machine tells.
+    pub joules: Option<f64>,
+}
+
+impl TestSet {
+    /// Clouds from a packed NPZ with class names, at most `limit` spread over it.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or without clouds or names.
+    pub fn read(path: &Path, limit: usize) -> Result<Self> {
+        let set = read_labelled(path)?;
+        ensure!(!set.is_empty(), "{}: no clouds", path.display());
+        let names = set.classes.as_ref();
+        let names = names.with_context(|| format!("{}: no key `classes`", path.display()))?;
+        let kept = limit.min(set.len());
+        let chosen: Vec<usize> = (0..kept).map(|i| i * set.len() / kept).collect();
+        let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        Ok(Self {
+            name,
+            clouds: chosen.iter().map(|&i| set.cloud(i).to_vec()).collect(),
+            labels: chosen.iter().map(|&i| names[set.labels[i]].clone()).collect(),
+        })
+    }
+
+    /// Points of its largest cloud.
+    pub fn most_points(&self) -> usize {
+        self.clouds.iter().map(Vec::len).max().unwrap_or_default()
+    }
+
+    /// How many are answered as labelled.
+    pub fn right(&self, answers: &Answers) -> usize {
+        let pairs = self.labels.iter().zip(&answers.classes);
+        pairs.filter(|(label, class)| class.as_ref() == Some(label)).count()
+    }
+
+    /// Fails if `model` does not know one of the classes.
+    ///
+    /// # Errors
+    /// Names model and class.
+    pub fn fits(&self, model: &Path) -> Result<()> {
+        let classifier = Classifier::load(model, &Options::default())?;
+        let known = classifier.classes();
+        let stranger =
+            self.labels.iter().find(|label| !known.iter().any(|name| **name == ***label));
+        match stranger {
+            None => Ok(()),
+            Some(class) => anyhow::bail!(
+                "{} knows no class `{class}`, which {} has; name another by --model",
+                model.display(),
+                self.name
+            ),
+        }
+    }
+}
+
+impl Classifying {
+    fn options(&self, capacity: usize) -> Options {
+        let Chooser { kind, front, table_nodes, .. } = self.sampler;
+        let sampler = SamplerSpec { kind, front, points: self.points, ..SamplerSpec::default() };
+        Options {
+            precision: self.precision,
+            threads: self.threads,
+            t_nets: self.t_nets,
+            sampler: Some(sampler),
+            table_nodes,
+            capacity,
+            ..Options::default()
+        }
+    }
+
+    /// Loads the model as asked for.
+    ///
+    /// # Errors
+    /// A model that cannot be read, or that lacks what the sampler needs.
+    pub fn load(&self, capacity: usize) -> Result<Classifier> {
+        Ok(Classifier::load(&self.model, &self.options(capacity))?)
+    }
+
+    /// Classifies `clouds` one after another.
+    ///
+    /// # Errors
+    /// As [`Self::load`]; a cloud that is no cloud.
+    pub fn answers(&self, clouds: &[Vec<[f32; 3]>]) -> Result<Answers> {
+        let capacity = clouds.iter().map(Vec::len).max().unwrap_or_default();
+        let mut classifier = self.load(capacity)?;
+        let mut answers = Answers::default();
+        let mut ms = Vec::new();
+        if let Some(cloud) = clouds.iter().find(|cloud| !cloud.is_empty()) {
+            classifier.classify(cloud)?;
+        }
+        let energy = Energy::here();
+        let before = energy.as_ref().map(Energy::now);
+        for cloud in clouds {
+            if cloud.is_empty() {
+                answers.classes.push(None);
+                continue;
+            }
+            let start = Instant::now();
+            let prediction = classifier.classify(cloud)?;
+            ms.push(start.elapsed().as_secs_f64() * 1e3);
+            answers.classes.push(Some(prediction.label.to_string()));
+            answers.logits.extend(&prediction.logits);
+        }
+        let joules = |(energy, before): (&Energy, Vec<u64>)| energy.joules_since(&before);
+        answers.joules = energy.as_ref().zip(before).map(joules).map(|all| all / ms.len() as f64);
+        answers.median_ms = Spread::of(ms).median;
+        Ok(answers)
+    }
+
+    /// The row of `answers` on `set`, compared with `reference`'s.
+    ///
+    /// # Errors
+    /// A model that cannot be read.
+    pub fn row(&self, set: &TestSet, answers: &Answers, reference: &Answers) -> Result<Row> {
+        let row = Row {
+            part: Part::Classifier,
+            test_set: set.name.clone(),
+            model: self.model_name(),
+            sampler: self.sampler.name.to_owned(),
+            points: Some(self.points),
+            precision: self.precision.to_string(),
+            t_nets: self.t_nets.to_string(),
+            threads: Some(self.threads),
+            ms_here: Some(answers.median_ms),
+            joules: answers.joules,
+            megabytes: Some(inspect(&self.model)?.bytes(self.precision) as f64 * 1e-6),
+            agreement: Some(answers.agreement(reference)),
+            logit_error: Some(answers.largest_error(reference)),
+            ..Row::default()
+        };
+        Ok(row.with_accuracy(set.right(answers), set.clouds.len()))
+    }
+
+    /// The model's name, without folder and extension.
+    pub fn model_name(&self) -> String {
+        self.model.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+    }
+}
+
+impl Answers {
+    /// Share of clouds of which both say the same.
+    pub fn agreement(&self, other: &Self) -> f64 {
+        let pairs = self.classes.iter().zip(&other.classes);
+        pairs.filter(|(a, b)| a == b).count() as f64 / self.classes.len().max(1) as f64
+    }
+
+    /// The largest difference of two logits.
+    fn largest_error(&self, other: &Self) -> f64 {
+        let pairs = self.logits.iter().zip(&other.logits);
+        pairs.map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs()).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,218 @@
+//! Models, samplers, points, precisions, T-Nets and threads on one test set.
+
+use super::classes::{Answers, Chooser, Classifying, TestSet};
+use super::row::Row;
+use crate::bench::pi_model::{Modelled, Sampler};
+use anyhow::{Context, Result};
+use infer_cpu::sampler::SamplerKind;
+use infer_cpu::{Precision, TNets, inspect};
+use std::path::{Path, PathBuf};
+
+/// Points of the baseline's clouds.
+const AS_THE_BASELINE: usize = 1024;
+
+/// Threads whose times on a Raspberry Pi 5 are modelled: it has four cores.
+const PI_THREADS: [usize; 3] = [1, 2, 4];
+
+/// How far the grid reaches.
+pub struct Grid {
+    /// Points that networks see.
+    pub points: Vec<usize>,
+    /// Ways to choose them.
+    pub samplers: Vec<Chooser>,
+    /// What to compute in, fp32 first.
+    pub precisions: Vec<Precision>,
+    /// Threads of the network as its card has it, besides one.
+    pub threads: Vec<usize>,
+}
+
+impl Grid {
+    /// Everything that a user can choose.
+    pub fn whole() -> Self {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        Self {
+            points: vec![16, 32, 64, 128, 256, 512, 1024],
+            samplers: Chooser::ALL.to_vec(),
+            precisions: vec![Precision::F32, Precision::F32Fc16, Precision::F16, Precision::I8],
+            threads: (2..=threads.min(4)).collect(),
+        }
+    }
+
+    /// A corner of it.
+    pub fn quick() -> Self {
+        Self {
+            points: vec![16, 64],
+            samplers: vec![Chooser::RANDOM, Chooser::FPS],
+            precisions: vec![Precision::F32, Precision::I8],
+            threads: Vec::new(),
+        }
+    }
+}
+
+/// The sampler and the points that a model was trained with, in fp32.
+///
+/// # Errors
+/// A model that cannot be read.
+pub fn as_trained(model: &Path) -> Result<Classifying> {
+    let card = inspect(model)?.card;
+    let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
+    Ok(Classifying {
+        model: model.to_owned(),
+        sampler: Chooser::of(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
+        points: card.points.unwrap_or(AS_THE_BASELINE),
+        precision: Precision::F32,
+        t_nets: TNets::Both,
+        threads: 1,
+    })
+}
+
+/// Every setting of the grid for `model`, on `set`; those that the model or
+/// the clouds cannot have are left out.
+///
+/// # Errors
+/// A model that cannot be read or does not know the classes; a set that does
+/// not fit.
+pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> Result<Vec<Row>> {
+    set.fits(model)?;
+    let trained = as_trained(model)?;
+    let mut rows = Vec::new();
+    for samples in sampled(&trained, set, grid) {
+        let mut reference: Option<Answers> = None;
+        for setting in with_precisions(&samples, &trained, grid) {
+            let answers = setting.answers(&set.clouds).with_context(|| {
+                format!("{} by {}", setting.model.display(), setting.sampler.name)
+            })?;
+            let compared = match setting.t_nets {
+                TNets::Both => reference.get_or_insert_with(|| answers.clone()),
+                _ => &answers,
+            };
+            let mut row = setting.row(set, &answers, compared)?;
+            row.knob = knob(&setting, &trained);
+            eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
+            rows.extend(with_pi(row, &setting, set.most_points(), pi)?);
+        }
+    }
+    Ok(rows)
+}
+
+/// The row with its modelled time on a Raspberry Pi 5, and rows for the board's
+/// other numbers of threads: answers do not depend on them.
+fn with_pi(
+    row: Row,
+    setting: &Classifying,
+    from: usize,
+    pi: Option<&Modelled>,
+) -> Result<Vec<Row>> {
+    let Some(ms) = pi_ms(setting, from, pi)? else { return Ok(vec![row]) };
+    if setting.threads != 1 {
+        return Ok(vec![row]);
+    }
+    let on_board = |(&threads, ms): (&usize, f64)| {
+        let here = threads == setting.threads;
+        Row {
+            threads: Some(threads),
+            ms_here: row.ms_here.filter(|_| here),
+            joules: row.joules.filter(|_| here),
+            ms_pi5: Some(ms),
+            ..row.clone()
+        }
+    };
+    Ok(PI_THREADS.iter().zip(ms).map(on_board).collect())
+}
+
+/// The ways to choose points, in fp32 on one thread.
+fn sampled(trained: &Classifying, set: &TestSet, grid: &Grid) -> Vec<Classifying> {
+    let most = set.most_points();
+    let mut all = Vec::new();
+    for &sampler in &grid.samplers {
+        let points = grid.points.iter().copied().filter(|&points| points <= most);
+        all.extend(points.map(|points| Classifying { sampler, points, ..trained.clone() }));
+    }
+    // All points of a cloud are the same whoever chooses them.
+    all.retain(|setting| setting.points < most || setting.sampler == Chooser::RANDOM);
+    all.retain(|setting| setting.load(most).is_ok());
+    all
+}
+
+/// One way to choose points in every precision; as trained, also with other
+/// threads and without T-Nets.
+fn with_precisions(samples: &Classifying, trained: &Classifying, grid: &Grid) -> Vec<Classifying> {
+    let precise = |precision| Classifying { precision, ..samples.clone() };
+    let mut all: Vec<Classifying> = grid.precisions.iter().map(|&p| precise(p)).collect();
+    if (samples.sampler, samples.points) == (trained.sampler, trained.points) {
+        let threads = grid.threads.iter();
+        all.extend(threads.map(|&threads| Classifying { threads, ..samples.clone() }));
+        if has_t_nets(&samples.model) {
+            all.push(Classifying { t_nets: TNets::Neither, ..samples.clone() });
+        }
+    }
+    all
+}
+
+fn has_t_nets(model: &Path) -> bool {
+    inspect(model).is_ok_and(|summary| summary.stn.is_some() || summary.fstn.is_some())
+}
+
+fn knob(setting: &Classifying, trained: &Classifying) -> String {
+    let turned = [
+        ("sampler", setting.sampler != trained.sampler),
+        ("points", setting.points != trained.points),
+        ("precision", setting.precision != trained.precision),
+        ("T-Nets", setting.t_nets != trained.t_nets),
+        ("threads", setting.threads != trained.threads),
+    ];
+    let turned: Vec<&str> = turned.iter().filter(|(_, is)| *is).map(|(name, _)| *name).collect();
+    if turned.is_empty() { "reference".to_owned() } else { turned.join(" and ") }
+}
+
+/// Modelled milliseconds for each of [`PI_THREADS`]; `None` for what is not
+/// modelled.
+fn pi_ms(setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Result<Option<Vec<f64>>> {
+    let (Some(pi), TNets::Both) = (pi, setting.t_nets) else { return Ok(None) };
+    // Tiles of the model are of eight rows.
+    if !setting.points.is_multiple_of(8) || !from.is_multiple_of(8) {
+        return Ok(None);
+    }
+    let sampler = match setting.sampler {
+        _ if setting.points == from => Sampler::All,
+        Chooser::RANDOM => Sampler::Random,
+        Chooser::FPS => Sampler::Fps,
+        Chooser::VOXEL => Sampler::Voxel,
+        Chooser::CPL => Sampler::Cpl,
+        Chooser::CPL_STN => Sampler::CplStn,
+        _ => return Ok(None),
+    };
+    pi.total_ms(sampler, (from, setting.points), setting.precision, &PI_THREADS)
+}
+
+/// The Raspberry Pi's model of a model file, or why there is none.
+pub fn on_a_pi(model: &Path) -> Option<Modelled> {
+    match Modelled::open(model) {
+        Ok(modelled) => Some(modelled),
+        Err(error) => {
+            eprintln!("No modelled times of a Raspberry Pi: {error:#}");
+            None
+        }
+    }
+}
+
+/// Bundled models that tell the classes of `set`, and as few others as any.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn bundled(set: &TestSet) -> Result<Vec<PathBuf>> {
+    let folder = crate::workspace::root().join("assets/weights");
+    let entries =
+        std::fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let files = entries.flatten().map(|entry| entry.path());
+    let with_classes = |path: PathBuf| {
+        let card = inspect(&path).ok()?.card;
+        (card.trained && set.fits(&path).is_ok()).then(|| (card.classes.len(), path))
+    };
+    let is_model = |path: &PathBuf| path.extension().is_some_and(|end| end == "safetensors");
+    let mut models: Vec<(usize, PathBuf)> =
+        files.filter(is_model).filter_map(with_classes).collect();
+    models.sort();
+    let fewest = models.first().map_or(0, |(classes, _)| *classes);
+    Ok(models.into_iter().filter(|(n, _)| *n == fewest).map(|(_, path)| path).collect())
+}

@@ -1,0 +1,99 @@
+//! Which settings no other makes pointless.
+
+use super::row::{Part, Row};
+use std::collections::BTreeMap;
+
+/// Marks the rows on the front of their part and test set: no other costs at
+/// most as much and errs at most as much, and one of both less.
+pub fn mark(rows: &mut [Row]) {
+    let figures: Vec<Option<[f64; 3]>> = rows.iter().map(figures).collect();
+    let kin: Vec<(Part, String, Option<u64>)> = rows.iter().map(kin).collect();
+    for (i, row) in rows.iter_mut().enumerate() {
+        let Some(own) = figures[i] else { continue };
+        let beats = |other: &[f64; 3]| {
+            *other != own && other.iter().zip(own).all(|(other, own)| *other <= own)
+        };
+        let rivals = figures.iter().zip(&kin).filter(|(_, other)| **other == kin[i]);
+        row.on_front = !rivals.filter_map(|(figures, _)| figures.as_ref()).any(beats);
+    }
+}
+
+/// Rows that are compared. A distance is no choice: scans from 3 m and from
+/// 20 m are compared among themselves.
+fn kin(row: &Row) -> (Part, String, Option<u64>) {
+    (row.part, row.test_set.clone(), row.distance_m.map(f64::to_bits))
+}
+
+/// Cost and errors. Ranges tell casters apart, classes everything else.
+fn figures(row: &Row) -> Option<[f64; 3]> {
+    let [first, second] = match row.part {
+        Part::Caster => [row.range_rms_m?, row.wrong_rays_per_million?],
+        Part::Scan | Part::Classifier => [1.0 - row.accuracy, 0.0],
+    };
+    let figures = [row.cost_ms()?, first, second];
+    figures.iter().all(|figure| figure.is_finite()).then_some(figures)
+}
+
+/// A knob's value, such as the sampler `voxel`.
+pub type Choice = (&'static str, String);
+
+/// The choices that a user has and that are on no front of the rows in which
+/// they occur.
+pub fn dominated_everywhere(rows: &[Row]) -> Vec<Choice> {
+    let mut choices: BTreeMap<Choice, bool> = BTreeMap::new();
+    for row in rows {
+        let of_part: &[(&'static str, &String)] = match row.part {
+            Part::Scan => &[("sensor", &row.sensor)],
+            Part::Caster => &[("caster", &row.caster), ("culling", &row.culling)],
+            Part::Classifier => &[
+                ("model", &row.model),
+                ("sampler", &row.sampler),
+                ("precision", &row.precision),
+                ("T-Nets", &row.t_nets),
+            ],
+        };
+        for (knob, value) in of_part {
+            *choices.entry((knob, (*value).clone())).or_default() |= row.on_front;
+        }
+    }
+    choices.into_iter().filter(|(_, on_front)| !on_front).map(|(choice, _)| choice).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(model: &str, ms: f64, right: usize) -> Row {
+        let row = Row { part: Part::Classifier, model: model.to_owned(), ..Row::default() };
+        Row { ms_pi5: Some(ms), ..row }.with_accuracy(right, 100)
+    }
+
+    #[test]
+    fn a_row_is_on_the_front_unless_another_is_as_cheap_and_as_good() {
+        let mut rows = [row("a", 1.0, 80), row("b", 2.0, 90), row("c", 2.0, 85), row("d", 3.0, 90)];
+        mark(&mut rows);
+        assert_eq!(rows.each_ref().map(|row| row.on_front), [true, true, false, false]);
+        assert_eq!(
+            dominated_everywhere(&rows)[..2],
+            [("model", "c".to_owned()), ("model", "d".to_owned())]
+        );
+    }
+
+    #[test]
+    fn equals_stay_side_by_side_and_what_has_no_cost_is_nowhere() {
+        let mut rows = [row("a", 1.0, 80), row("b", 1.0, 80), row("c", f64::NAN, 99)];
+        mark(&mut rows);
+        assert_eq!(rows.each_ref().map(|row| row.on_front), [true, true, false]);
+    }
+
+    #[test]
+    fn far_scans_do_not_compete_with_near_ones() {
+        let scan = |distance_m, right| {
+            let row = Row { distance_m: Some(distance_m), ms_here: Some(1.0), ..Row::default() };
+            row.with_accuracy(right, 100)
+        };
+        let mut rows = [scan(3.0, 90), scan(20.0, 50), scan(20.0, 40)];
+        mark(&mut rows);
+        assert_eq!(rows.each_ref().map(|row| row.on_front), [true, true, false]);
+    }
+}

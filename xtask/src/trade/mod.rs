@@ -1,0 +1,235 @@
+//! `cargo xtask trade`: what each knob of the chain, from mesh to class, costs
+//! and what it is worth.
+//!
+//! [`objects`] are scanned in the ways of [`sensors`] ([`scans`]) and by all
+//! [`casters`]; [`classifiers`] go through models, samplers, points and
+//! precisions. Everything becomes a [`row::Row`] of one CSV file, of which
+//! [`front`] marks what no other row makes pointless and [`page`] draws a page.
+//! `cargo xtask advise` reads the same file.
+
+mod casters;
+mod classes;
+mod classifiers;
+mod energy;
+pub mod front;
+mod objects;
+pub mod page;
+pub mod row;
+mod scans;
+mod sensors;
+
+use crate::bench::lanes;
+use crate::bench::table::{Table, digits};
+use crate::{Outcome, Usage, gen_shapes, workspace};
+use anyhow::{Context, Result};
+use classes::TestSet;
+use classifiers::{Grid, as_trained, bundled, on_a_pi};
+use formats::cloud::resample;
+use formats::rng::StreamKey;
+use objects::Object;
+use row::Row;
+use scans::Cloud;
+use sensors::Scanning;
+use sim_gpu::shapes;
+use std::path::PathBuf;
+
+/// Flags of `trade`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder of meshes, as gen-dataset takes it; the test meshes are scanned [default: shapes
+    /// of our own]
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+
+    /// What the record calls them [default: the folder's name]
+    #[arg(long, value_name = "TEXT", requires = "meshes")]
+    meshes_name: Option<String>,
+
+    /// Classifies the scans; it must know the meshes' classes [default: the bundled weights
+    /// that do]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+
+    /// Labelled clouds for models, samplers, points and precisions, a packed NPZ [default: the
+    /// scans themselves]
+    #[arg(long, value_name = "NPZ")]
+    clouds: Option<PathBuf>,
+
+    /// What the record calls them [default: the file's name]
+    #[arg(long, value_name = "TEXT", requires = "clouds")]
+    clouds_name: Option<String>,
+
+    /// Few meshes, few settings, no model of a Raspberry Pi: in two minutes
+    #[arg(long)]
+    quick: bool,
+
+    /// Counted repeats of each scan; the median is taken
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+
+    /// Where trade.csv, trade.html and the drawings go
+    #[arg(long, value_name = "DIR", default_value = "data/trade")]
+    out: PathBuf,
+}
+
+/// Meshes of a class that a whole run scans at most.
+const MOST_PER_CLASS: usize = 10;
+
+/// The same of a quick run.
+const FEW_PER_CLASS: usize = 2;
+
+/// Clouds of a quick run.
+const FEW_CLOUDS: usize = 100;
+
+/// Measures and writes the record.
+pub fn run(args: &Args) -> Result<Outcome> {
+    if let Some(folder) = args.meshes.as_ref().filter(|folder| !folder.is_dir()) {
+        return Err(Usage(format!("--meshes: {} is no folder", folder.display())).into());
+    }
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("cannot make {}", args.out.display()))?;
+    let per_class = if args.quick { FEW_PER_CLASS } else { MOST_PER_CLASS };
+    let objects = objects::read(&meshes(args)?, per_class)?;
+    let mut rows = scan_rows(args, &objects)?;
+    rows.extend(classifier_rows(args, &objects)?);
+    front::mark(&mut rows);
+    row::write(&rows, &args.out.join("trade.csv"))?;
+    page::write(&rows, &args.out)?;
+    print(&rows);
+    eprintln!("A page to look at: {}", args.out.join("trade.html").display());
+    Ok(Outcome::Success)
+}
+
+/// The meshes asked for, or shapes of our own.
+fn meshes(args: &Args) -> Result<PathBuf> {
+    if let Some(folder) = &args.meshes {
+        return Ok(folder.clone());
+    }
+    let folder = args.out.join("shapes");
+    let (train, test) = (gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS);
+    shapes::write_tree(&folder, objects::SEED, train, test).context("cannot write the shapes")?;
+    Ok(folder)
+}
+
+fn name_of_meshes(args: &Args) -> String {
+    let of = |folder: &PathBuf| {
+        folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    };
+    let named = args.meshes_name.clone().or_else(|| args.meshes.as_ref().map(of));
+    format!("scans of {}", named.as_deref().unwrap_or("shapes of our own"))
+}
+
+/// The model that classifies `set`'s scans.
+fn model_for(args: &Args, set: &TestSet) -> Result<PathBuf> {
+    if let Some(model) = &args.model {
+        set.fits(model)?;
+        return Ok(model.clone());
+    }
+    let known = bundled(set)?;
+    known.into_iter().next().with_context(|| {
+        format!("no bundled model knows the classes of the {}: name one by --model", set.name)
+    })
+}
+
+/// Rows of sensors and of casters.
+fn scan_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
+    let (name, rounds) = (name_of_meshes(args), usize::from(args.rounds));
+    let mut ways = sensors::one_at_a_time();
+    if !args.quick {
+        ways.extend(sensors::combinations());
+    }
+    let scanned = scans::scan_all(objects, &ways, rounds, &name)?;
+    let cast = casters::cast_all(objects, &lanes::open(None)?, rounds, &name)?;
+    let reference = scan_set(objects, &name, &scanned[0].clouds);
+    let model = model_for(args, &reference)?;
+    let classifying = as_trained(&model)?;
+    let answers = classifying.answers(&reference.clouds)?;
+    let all = scanned.into_iter().map(|scanned| (scanned.row, scanned.clouds));
+    let all = all.chain(cast.into_iter().map(|cast| (cast.row, cast.clouds)));
+    all.map(|(row, clouds)| {
+        let set = scan_set(objects, &name, &clouds);
+        let found = classifying.answers(&set.clouds)?;
+        let row = Row {
+            model: classifying.model_name(),
+            sampler: classifying.sampler.name.to_owned(),
+            points: Some(classifying.points),
+            precision: classifying.precision.to_string(),
+            t_nets: classifying.t_nets.to_string(),
+            threads: Some(classifying.threads),
+            agreement: Some(found.agreement(&answers)),
+            ..row
+        };
+        Ok(row.with_accuracy(set.right(&found), set.clouds.len()))
+    })
+    .collect()
+}
+
+/// Clouds of [`objects::places`], labelled.
+fn scan_set(objects: &[Object], name: &str, clouds: &[Cloud]) -> TestSet {
+    let views = clouds.len() / objects.len().max(1);
+    let label = |object: &Object| vec![object.class.clone(); views];
+    let labels = objects.iter().flat_map(label).collect();
+    TestSet { name: name.to_owned(), clouds: clouds.to_vec(), labels }
+}
+
+/// Rows of classifiers, on the clouds given or else on the reference scans.
+fn classifier_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
+    let set = match &args.clouds {
+        Some(path) => {
+            let limit = if args.quick { FEW_CLOUDS } else { usize::MAX };
+            let mut set = TestSet::read(path, limit)?;
+            set.name = args.clouds_name.clone().unwrap_or(set.name);
+            set
+        }
+        None => {
+            let ways = [Scanning::reference()];
+            let scanned = scans::scan_all(objects, &ways, 1, "")?.swap_remove(0);
+            let clouds: Vec<Cloud> = scanned.clouds.iter().map(|cloud| packed(cloud)).collect();
+            scan_set(objects, &name_of_meshes(args), &clouds)
+        }
+    };
+    let models = match (&args.clouds, &args.model) {
+        (None, Some(model)) => vec![model.clone()],
+        _ => bundled(&set)?,
+    };
+    let grid = if args.quick { Grid::quick() } else { Grid::whole() };
+    let mut rows = Vec::new();
+    for model in &models {
+        let pi = if args.quick { None } else { on_a_pi(model) };
+        rows.extend(classifiers::rows(model, &set, &grid, pi.as_ref())?);
+    }
+    Ok(rows)
+}
+
+/// As many points as gen-dataset packs: the Raspberry Pi's model wants one size.
+fn packed(cloud: &[[f32; 3]]) -> Cloud {
+    const POINTS: usize = 1024;
+    resample(cloud, POINTS, StreamKey::new(objects::SEED, "trade", 0)).unwrap_or_default()
+}
+
+/// The fronts, and what is on none.
+fn print(rows: &[Row]) {
+    let heading = ["on a front", "ms", "accuracy %", "95 % interval", "as reference %"];
+    let mut table = Table::new("Settings that no other makes pointless", &heading);
+    for row in rows.iter().filter(|row| row.on_front) {
+        let percent = |share: f64| format!("{:.1}", 100.0 * share);
+        table.push(vec![
+            row.to_string(),
+            row.cost_ms().map(digits).unwrap_or_default(),
+            percent(row.accuracy),
+            format!("{} to {}", percent(row.accuracy_low), percent(row.accuracy_high)),
+            row.agreement.map(percent).unwrap_or_default(),
+        ]);
+    }
+    print!("{table}");
+    let mut dominated = Table::new("On no front", &["knob", "setting"]);
+    for (knob, setting) in front::dominated_everywhere(rows) {
+        dominated.push(vec![knob.to_owned(), setting]);
+    }
+    print!("{dominated}");
+}
+
+/// The record that ships, which `advise` and `report` read.
+pub fn bundled_record() -> PathBuf {
+    workspace::root().join("assets/reports/trade/trade.csv")
+}

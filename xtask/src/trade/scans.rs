@@ -1,0 +1,199 @@
+//! Scans of all objects in one way, what they cost, and how true they are.
+
+use super::energy::Energy;
+use super::objects::{Object, Place, places};
+use super::row::{Part, Row};
+use super::sensors::Scanning;
+use crate::bench::clock::{Contestant, Cost, interleave, measured};
+use anyhow::Result;
+use formats::chamfer::chamfer;
+use formats::scan::{Attribute, AttributeSet, Scan};
+use formats::scan_file::{ScanFormat, write_scan};
+use glam::DAffine3;
+use rayon::prelude::*;
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::Effects;
+use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::ray::RayFrame;
+use sim_gpu::resolve::{Hits, resolve};
+use sim_gpu::scan::{Seen, View, assemble};
+use sim_gpu::sensor::BeamPattern;
+use std::hint::black_box;
+
+/// A cloud as the classifier takes it.
+pub type Cloud = Vec<[f32; 3]>;
+
+/// The mean over one in so many scans is that of all to some percent.
+const CHAMFER_EACH: usize = 8;
+
+/// A scan and its ranges without any effect.
+struct Made {
+    scan: Scan,
+    /// Of each point of the scan.
+    exact_m: Vec<f64>,
+}
+
+/// Everything about one way of scanning.
+pub struct Scanned {
+    /// Costs and geometric errors, without accuracy.
+    pub row: Row,
+    /// One cloud a place.
+    pub clouds: Vec<Cloud>,
+}
+
+/// Scans `objects` in all of `ways`, in turns, `rounds` times each.
+///
+/// # Errors
+/// A scan that cannot be written, an adapter that fails.
+pub fn scan_all(
+    objects: &[Object],
+    ways: &[Scanning],
+    rounds: usize,
+    test_set: &str,
+) -> Result<Vec<Scanned>> {
+    let patterns: Vec<BeamPattern> = ways.iter().map(|way| way.sensor.pattern()).collect();
+    let energy = Energy::here();
+    let mut joules: Vec<f64> = vec![0.0; ways.len()];
+    let mut contestants: Vec<Contestant<'_>> = Vec::new();
+    for ((way, pattern), joules) in ways.iter().zip(&patterns).zip(&mut joules) {
+        let (energy, places) = (energy.as_ref(), places(objects, way.distance_m));
+        contestants.push(Box::new(move || {
+            let before = energy.map(Energy::now);
+            let (scans, cost): (Result<Vec<Made>>, Cost) =
+                measured(|| scan(&places, way, pattern, &AttributeSet::default()));
+            if let (Some(energy), Some(before)) = (energy, before) {
+                *joules = energy.joules_since(&before) / places.len() as f64;
+            }
+            black_box(scans?);
+            Ok(cost)
+        }));
+    }
+    let costs = interleave(rounds, &mut contestants)?;
+    drop(contestants);
+    let mut all = Vec::new();
+    for (i, (way, pattern)) in ways.iter().zip(&patterns).enumerate() {
+        eprintln!("{}: {}, {} m", way.knob, way.name, way.distance_m);
+        let (mut row, clouds) = judged(objects, way, pattern)?;
+        let cpu_s = costs[i].cpu_s().median / clouds.len() as f64;
+        row.test_set = test_set.to_owned();
+        row.rays_per_cpu_s = Some(pattern.len() as f64 / cpu_s);
+        row.scans_per_cpu_s = Some(1.0 / cpu_s);
+        row.ms_here = Some(cpu_s * 1e3);
+        row.joules = energy.is_some().then_some(joules[i]);
+        all.push(Scanned { row, clouds });
+    }
+    Ok(all)
+}
+
+/// What `way` makes of the ranges, and its clouds.
+fn judged(objects: &[Object], way: &Scanning, pattern: &BeamPattern) -> Result<(Row, Vec<Cloud>)> {
+    let places = places(objects, way.distance_m);
+    let columns = AttributeSet::from([Attribute::Range, Attribute::Beam]);
+    let made = scan(&places, way, pattern, &columns)?;
+    let (mut sum, mut worst, mut n) = (0.0, 0.0f64, 0usize);
+    for made in &made {
+        let ranges = made.scan.range_m.iter().flatten();
+        for (range_m, exact_m) in ranges.zip(&made.exact_m) {
+            let error = (f64::from(*range_m) - exact_m).abs();
+            (sum, worst, n) = (sum + error * error, worst.max(error), n + 1);
+        }
+    }
+    let clouds: Vec<Cloud> = made.into_iter().map(|made| made.scan.positions).collect();
+    let row = Row {
+        part: Part::Scan,
+        knob: way.knob.to_owned(),
+        sensor: way.name.clone(),
+        beams: Some(way.beams),
+        azimuth_step_deg: way.azimuth_step_deg,
+        range_quantum_m: Some(way.range_quantum_m),
+        distance_m: Some(way.distance_m),
+        noise_m: Some(way.noise_m),
+        caster: "cpu f32 watertight, f64 range".to_owned(),
+        culling: "on".to_owned(),
+        megabytes: Some(file_bytes(&clouds)? * 1e-6),
+        points_per_scan: Some(n as f64 / clouds.len().max(1) as f64),
+        range_rms_m: (n > 0).then(|| (sum / n as f64).sqrt()),
+        range_worst_m: (n > 0).then_some(worst),
+        chamfer_m: mean_chamfer(objects, way, &clouds)?,
+        ..Row::default()
+    };
+    Ok((row, clouds))
+}
+
+/// One scan a place, on the CPU, without files.
+fn scan(
+    places: &[Place<'_>],
+    way: &Scanning,
+    pattern: &BeamPattern,
+    attributes: &AttributeSet,
+) -> Result<Vec<Made>> {
+    let effects = way.effects();
+    let caster = Caster::Cpu(effects.clone());
+    let of = |place: &Place<'_>| {
+        let target = &place.object.target;
+        let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &place.pose);
+        let target = target.clone();
+        let job = CastJob::aim(target, frame, pattern, Culling::On, place.stream, 1.0);
+        let cast = caster.cast(std::slice::from_ref(&job))?.swap_remove(0);
+        let hits = resolve(&job, &cast, pattern, &effects);
+        Ok(made(place, way, (pattern, &effects), attributes, (&job, &hits)))
+    };
+    places.par_iter().map(of).collect()
+}
+
+fn made(
+    place: &Place<'_>,
+    way: &Scanning,
+    (pattern, effects): (&BeamPattern, &Effects),
+    attributes: &AttributeSet,
+    (job, hits): (&CastJob, &Hits),
+) -> Made {
+    let view = View {
+        sensor: &way.sensor,
+        pattern,
+        pose: &place.pose,
+        cast_effects: effects,
+        effects,
+        attributes,
+        stream: place.stream,
+    };
+    let seen = [Seen { object: 0, world_from_object: &DAffine3::IDENTITY, job, hits }];
+    let (scan, _) = assemble(&view, &seen);
+    let exact = |beam: &u32| {
+        let at = hits.hits.binary_search_by_key(beam, |hit| hit.beam);
+        at.map_or(f64::NAN, |at| hits.hits[at].range_m)
+    };
+    let exact_m = scan.beam.iter().flatten().map(exact).collect();
+    Made { scan, exact_m }
+}
+
+/// Mean bytes of an NPZ file of a scan.
+fn file_bytes(clouds: &[Cloud]) -> Result<f64> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("scan.npz");
+    let mut bytes = 0;
+    for cloud in clouds {
+        let scan = Scan { positions: cloud.clone(), ..Scan::default() };
+        write_scan(&path, ScanFormat::Npz, &scan)?;
+        bytes += path.metadata()?.len();
+    }
+    Ok(bytes as f64 / clouds.len().max(1) as f64)
+}
+
+/// The mean distance of some clouds to the clean scans of the VLP-32C from the
+/// same places; `None` if there are none with points.
+fn mean_chamfer(objects: &[Object], way: &Scanning, clouds: &[Cloud]) -> Result<Option<f64>> {
+    let clean = Scanning::clean(way.distance_m);
+    let some: Vec<Place<'_>> =
+        places(objects, way.distance_m).into_iter().step_by(CHAMFER_EACH).collect();
+    let truth = scan(&some, &clean, &clean.sensor.pattern(), &AttributeSet::default())?;
+    let pairs: Vec<_> = truth.iter().zip(clouds.iter().step_by(CHAMFER_EACH)).collect();
+    let distance = |(truth, cloud): &(&Made, &Cloud)| {
+        let wide =
+            |points: &[[f32; 3]]| points.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
+        chamfer(&wide(&truth.scan.positions), &wide(cloud)).plain
+    };
+    let distances: Vec<f64> = pairs.par_iter().map(distance).collect();
+    let known: Vec<f64> = distances.into_iter().filter(|distance| distance.is_finite()).collect();
+    Ok((!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64))
+}
