@@ -7,8 +7,12 @@ use anyhow::{Context, Result, ensure};
 use formats::labelled::read_labelled;
 use infer_cpu::sampler::{FrontChoice, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, Precision, TNets, inspect};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Clouds whose classification is timed.
+const TIMED: usize = 200;
 
 /// Labelled clouds.
 pub struct TestSet {
@@ -177,35 +181,45 @@ impl Classifying {
         Ok(Classifier::load(&self.model, &self.options(capacity))?)
     }
 
-    /// Classifies `clouds` one after another.
+    /// Classifies `clouds`, all for the answers and some for the time.
     ///
     /// # Errors
     /// As [`Self::load`]; a cloud that is no cloud.
     pub fn answers(&self, clouds: &[Vec<[f32; 3]>]) -> Result<Answers> {
         let capacity = clouds.iter().map(Vec::len).max().unwrap_or_default();
-        let mut classifier = self.load(capacity)?;
+        // Answers do not depend on the number of threads.
+        let alone = Self { threads: 1, ..self.clone() };
+        let some = clouds.len().div_ceil(rayon::current_num_threads()).max(1);
+        let parts: Result<Vec<Answers>> = clouds
+            .par_chunks(some)
+            .map(|some| classified(&mut alone.load(capacity)?, some))
+            .collect();
         let mut answers = Answers::default();
-        let mut ms = Vec::new();
-        if let Some(cloud) = clouds.iter().find(|cloud| !cloud.is_empty()) {
-            classifier.classify(cloud)?;
+        for part in parts? {
+            answers.classes.extend(part.classes);
+            answers.logits.extend(part.logits);
         }
+        self.time(clouds, capacity, &mut answers)?;
+        Ok(answers)
+    }
+
+    /// Times some of `clouds`, spread over all, one after another.
+    fn time(&self, clouds: &[Vec<[f32; 3]>], capacity: usize, answers: &mut Answers) -> Result<()> {
+        let mut classifier = self.load(capacity)?;
+        let each = clouds.len().div_ceil(TIMED).max(1);
+        let timed: Vec<_> = clouds.iter().step_by(each).filter(|cloud| !cloud.is_empty()).collect();
+        let mut ms = Vec::new();
         let energy = Energy::here();
         let before = energy.as_ref().map(Energy::now);
-        for cloud in clouds {
-            if cloud.is_empty() {
-                answers.classes.push(None);
-                continue;
-            }
+        for cloud in timed {
             let start = Instant::now();
-            let prediction = classifier.classify(cloud)?;
+            classifier.classify(cloud)?;
             ms.push(start.elapsed().as_secs_f64() * 1e3);
-            answers.classes.push(Some(prediction.label.to_string()));
-            answers.logits.extend(&prediction.logits);
         }
         let joules = |(energy, before): (&Energy, Vec<u64>)| energy.joules_since(&before);
         answers.joules = energy.as_ref().zip(before).map(joules).map(|all| all / ms.len() as f64);
         answers.median_ms = Spread::of(ms).median;
-        Ok(answers)
+        Ok(())
     }
 
     /// The row of `answers` on `set`, compared with `reference`'s.
@@ -236,6 +250,20 @@ impl Classifying {
     pub fn model_name(&self) -> String {
         self.model.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
     }
+}
+
+fn classified(classifier: &mut Classifier, clouds: &[Vec<[f32; 3]>]) -> Result<Answers> {
+    let mut answers = Answers::default();
+    for cloud in clouds {
+        if cloud.is_empty() {
+            answers.classes.push(None);
+            continue;
+        }
+        let prediction = classifier.classify(cloud)?;
+        answers.classes.push(Some(prediction.label.to_string()));
+        answers.logits.extend(&prediction.logits);
+    }
+    Ok(answers)
 }
 
 impl Answers {

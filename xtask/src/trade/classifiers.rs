@@ -6,6 +6,7 @@ use crate::bench::pi_model::{Modelled, Sampler};
 use anyhow::{Context, Result};
 use infer_cpu::sampler::SamplerKind;
 use infer_cpu::{Precision, TNets, inspect};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Points of the baseline's clouds.
@@ -75,7 +76,7 @@ pub fn as_trained(model: &Path) -> Result<Classifying> {
 pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> Result<Vec<Row>> {
     set.fits(model)?;
     let trained = as_trained(model)?;
-    let mut rows = Vec::new();
+    let mut measured: Vec<(Classifying, Row)> = Vec::new();
     for samples in sampled(&trained, set, grid) {
         let mut reference: Option<Answers> = None;
         for setting in with_precisions(&samples, &trained, grid) {
@@ -89,10 +90,13 @@ pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> 
             let mut row = setting.row(set, &answers, compared)?;
             row.knob = knob(&setting, &trained);
             eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
-            rows.extend(with_pi(row, &setting, set.most_points(), pi)?);
+            measured.push((setting, row));
         }
     }
-    Ok(rows)
+    let from = set.most_points();
+    let rows: Result<Vec<Vec<Row>>> =
+        measured.into_par_iter().map(|(setting, row)| with_pi(row, &setting, from, pi)).collect();
+    Ok(rows?.concat())
 }
 
 /// The row with its modelled time on a Raspberry Pi 5, and rows for the board's

@@ -18,7 +18,7 @@ const SOURCE: &str = "xtask/peers/insn_count.c";
 /// Counts under QEMU.
 pub struct Counter {
     plugin: PathBuf,
-    log: PathBuf,
+    folder: PathBuf,
     binary: PathBuf,
     model: PathBuf,
 }
@@ -38,7 +38,7 @@ impl Counter {
         cc.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&plugin).arg(workspace::root().join(SOURCE));
         workspace::output(&mut cc).context("the plugin that counts needs a C compiler")?;
         let (binary, model) = (binary.to_owned(), model.to_owned());
-        let counter = Self { plugin, log: folder.join("counts.txt"), binary, model };
+        let counter = Self { plugin, folder: folder.to_owned(), binary, model };
         counter.run(&["--version"]).context("this QEMU takes no plugins (7.2 does)")?;
         Ok(counter)
     }
@@ -80,10 +80,11 @@ impl Counter {
 
     fn run(&self, words: &[&str]) -> anyhow::Result<Counts> {
         let mut qemu = pi_target::emulator().context(pi_target::NO_EMULATOR)?;
-        qemu.arg("-plugin").arg(&self.plugin).args(["-d", "plugin", "-D"]).arg(&self.log);
+        let log = tempfile::NamedTempFile::new_in(&self.folder)?;
+        qemu.arg("-plugin").arg(&self.plugin).args(["-d", "plugin", "-D"]).arg(log.path());
         workspace::output(qemu.arg(&self.binary).args(words))?;
-        let log = std::fs::read_to_string(&self.log)
-            .with_context(|| format!("cannot read {}", self.log.display()))?;
+        let log = std::fs::read_to_string(log.path())
+            .with_context(|| format!("cannot read {}", log.path().display()))?;
         let counts = Counts::parse(&log);
         ensure!(!counts.0.is_empty(), "QEMU's plugin counted nothing");
         Ok(counts)
