@@ -31,8 +31,10 @@ RANGE_M = 0.002 + 5e-6
 # turning: 0.0057 degree, 0.0063 with both returns. Points 0.5 m from the axis
 # are off by 1e-6 m, or 1.2e-4 degree. The promise is:
 AZIMUTH_DEG = 0.01
-# Packets have whole microseconds; f32 holds 0.2 s to 1.5e-8 s.
-TIME_S = 0.5e-6 + 3e-8
+# Packets have whole microseconds; the decoder takes the difference of two Unix
+# times, which f64 holds to 1.2e-7 s, half of that off each; f32 holds 0.2 s to
+# 1.5e-8 s.
+TIME_S = 0.5e-6 + 1.2e-7 + 3e-8
 
 # The decoder subtracts this times tan(elevation) from z.
 CROSSING_M = 0.0424
@@ -42,6 +44,13 @@ ELEVATIONS_DEG = numpy.array([
     -2.333, -2, -1.667, -1.333, -1, -0.667, -0.333, 0, 0.333, 0.667, 1, 1.333, 1.667, 2.333,
     3.333, 4.667, 7, 10.333, 15,
 ])
+
+# What the decoder calls the return of a beam.
+KINDS = {
+    "strongest": velodyne_decoder.ReturnMode.STRONGEST.value,
+    "last": velodyne_decoder.ReturnMode.LAST.value,
+    "dual": velodyne_decoder.ReturnMode.BOTH.value,
+}
 
 ATTRIBUTES = ["range", "ring", "time", "intensity"]
 
@@ -87,25 +96,24 @@ def rotation(quaternion_xyzw):
 
 def decode(pcap):
     """The points of a capture, f64 [n, 8], and the number of scans in it."""
-    scans = [points for _, points in velodyne_decoder.read_pcap(pcap)]
+    # Times from the first packet on, not back from the last.
+    config = velodyne_decoder.Config(timestamp_first_packet=True)
+    scans = [points for _, points in velodyne_decoder.read_pcap(pcap, config)]
     assert scans, f"{pcap}: the decoder finds no scan"
     return numpy.concatenate(scans).astype(float), len(scans)
 
 
 def compare(pcap, npz, pose, returns):
-    """That `pcap` decodes to the points of `npz`, once or twice each."""
+    """That `pcap` decodes to the points of `npz`."""
     points, scans = decode(pcap)
     scan = numpy.load(npz)
     n = len(scan["positions"])
     assert scans == 1, f"{pcap}: {scans} scans in one revolution"
-    assert len(points) == returns * n, f"{pcap}: {len(points)} points of {returns} x {n}"
-    kinds = numpy.unique(points[:, 7])
-    assert n == 0 or len(kinds) == returns, f"{pcap}: kinds of return {kinds}"
-    worst = numpy.zeros(4)
-    for kind in kinds:
-        worst = numpy.maximum(worst, differences(points[points[:, 7] == kind], scan, pose))
-    range_m, azimuth_deg, time_s, apart_m = worst
-    print(f"{Path(pcap).name}: {returns} x {n} points; largest differences: range "
+    assert len(points) == n, f"{pcap}: {len(points)} points of {n}"
+    # The decoder makes one point of two returns that are the same.
+    assert (points[:, 7] == KINDS[returns]).all(), f"{pcap}: kinds {numpy.unique(points[:, 7])}"
+    range_m, azimuth_deg, time_s, apart_m = differences(points, scan, pose)
+    print(f"{Path(pcap).name}, {returns}: {n} points; largest differences: range "
           f"{range_m * 1e3:.4f} mm, azimuth {azimuth_deg:.5f} deg, time {time_s * 1e6:.3f} us, "
           f"position {apart_m * 1e3:.2f} mm")
     assert range_m <= RANGE_M and azimuth_deg <= AZIMUTH_DEG and time_s <= TIME_S
@@ -116,7 +124,9 @@ def differences(points, scan, pose):
     """The largest of range, azimuth, time and position; the rest is equal."""
     ring = points[:, 6].astype(int)
     assert (ring == scan["ring"][:, 0]).all(), "rings differ"
-    reflectivity = numpy.floor(scan["intensity"][:, 0].astype(float) * 100 + 0.5)
+    # In percent, multiplied in f32 as we do: 0.5 is at stake.
+    percent = scan["intensity"][:, 0] * numpy.float32(100)
+    reflectivity = numpy.floor(percent.astype(float) + 0.5)
     assert (points[:, 3] == reflectivity).all(), "intensities differ"
     position_m, world_from_sensor = pose
     expected = (scan["positions"].astype(float) - position_m) @ world_from_sensor
@@ -139,7 +149,7 @@ def datasets():
     meshes = OUT / "meshes/torus/train"
     meshes.mkdir(parents=True)
     (meshes / "torus_0001.off").write_text(torus(64, 0.3))
-    for returns, copies in [("strongest", 1), ("last", 1), ("dual", 2)]:
+    for returns in KINDS:
         out = OUT / f"set-{returns}"
         run(XTASK, "gen-dataset", OUT / "meshes", "--out", out, "--sensor", "vlp32c", "--format",
             "pcap", "--returns", returns, "--views", 3, "--distance", 2.5, "--noise", 0.02,
@@ -151,7 +161,7 @@ def datasets():
             for variant in ["clean", "noisy"]:
                 npz = out / f"rotational/{variant}/torus/train/torus_0001_v{view}.npz"
                 where = numpy.array(pose["position_m"]), rotation(pose["quaternion_xyzw"])
-                n = compare(str(npz.with_suffix(".pcap")), npz, where, copies)
+                n = compare(str(npz.with_suffix(".pcap")), npz, where, returns)
                 assert n > 1000, f"{npz}: {n} points prove little"
 
 
@@ -180,7 +190,7 @@ def scenes():
     where = numpy.array([0.4, -0.2, 0.3]), rotation(numpy.array(turned) / numpy.linalg.norm(turned))
     # 300 and 1200 revolutions a minute: the slowest and fastest there are.
     for rpm, beams in [(300.0, 115_740), (600.0, 57_870), (1200.0, 28_935)]:
-        n = compare(*scene(f"room-{rpm:.0f}", room(6.0), keys, rpm), where, 1)
+        n = compare(*scene(f"room-{rpm:.0f}", room(6.0), keys, rpm), where, "strongest")
         assert n == beams, f"every one of {beams} beams sees a wall, not {n}"
     keys = "position_m = [0, 0, 50]\nquaternion_xyzw = [0, 0, 0, 1]"
     pcap, npz = scene("nothing", torus(8, 0.3), keys, 600.0)

@@ -76,7 +76,10 @@ impl Axis {
     }
 
     fn steps(&self, x: f64) -> i32 {
-        ((x - self.offset) / self.step).round() as i32
+        let steps = ((x - self.offset) / self.step).round();
+        // Half a step beyond the largest f64 there is infinity.
+        let is_finite = (steps * self.step + self.offset).is_finite();
+        (if is_finite { steps } else { steps - steps.signum() }) as i32
     }
 }
 
