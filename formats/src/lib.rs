@@ -9,6 +9,7 @@
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` labelled sets too |
 //! | `cloud-files` | all of these |
 //! | `dataset` | scans, packed sets and yanx27's layout, written and read |
+//! | `pcap` | a VLP-32C's packets (`vlp32c`) |
 //! | `weights` | models (`weights`) and what they say about themselves (`model_card`) |
 //! | `hdf5` | ModelNet40's HDF5 layout |
 //!
@@ -56,6 +57,8 @@ pub mod npz;
 mod number;
 #[cfg(feature = "dataset")]
 pub mod packed;
+#[cfg(feature = "pcap")]
+mod pcap;
 #[cfg(feature = "dataset")]
 pub mod ply;
 #[cfg(feature = "files")]
@@ -64,6 +67,8 @@ mod python_literal;
 mod records;
 #[cfg(feature = "dataset")]
 pub mod scan_file;
+#[cfg(feature = "pcap")]
+pub mod vlp32c;
 #[cfg(feature = "weights")]
 pub mod weights;
 #[cfg(feature = "dataset")]

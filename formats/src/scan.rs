@@ -19,7 +19,8 @@ pub struct Scan {
     pub origin: [f64; 3],
     /// Where the beams ended: metres, in the world's frame, from `origin`.
     pub positions: Vec<[f32; 3]>,
-    /// Distance from the sensor in metres.
+    /// Distance from where the beam starts, which is the sensor or near it, in
+    /// metres.
     pub range_m: Option<Vec<f32>>,
     /// Number of the beam in the sensor's firing order.
     pub beam: Option<Vec<u32>>,

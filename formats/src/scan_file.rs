@@ -20,11 +20,17 @@ pub enum ScanFormat {
     Ply,
     /// Text: see [`csv`]. It is written, not read.
     Csv,
+    /// A sensor's packets: see `vlp32c`. They hold ranges along beams, not
+    /// points, so that writing them takes the sensor, too.
+    Pcap,
 }
 
 impl ScanFormat {
     /// All formats.
-    pub const ALL: [Self; 3] = [Self::Npz, Self::Ply, Self::Csv];
+    pub const ALL: [Self; 4] = [Self::Npz, Self::Ply, Self::Csv, Self::Pcap];
+
+    /// The formats of points, which [`write_scan`] writes.
+    pub const POINTS: [Self; 3] = [Self::Npz, Self::Ply, Self::Csv];
 
     /// The file name's extension, without the dot.
     #[must_use]
@@ -33,6 +39,7 @@ impl ScanFormat {
             Self::Npz => "npz",
             Self::Ply => "ply",
             Self::Csv => "csv",
+            Self::Pcap => "pcap",
         }
     }
 
@@ -66,15 +73,20 @@ impl FromStr for ScanFormat {
     }
 }
 
+/// What is said to whoever takes packets for points.
+const PACKETS: &str = "packets hold a sensor's ranges, not points";
+
 /// Writes `scan` to `path`, atomically. The name is taken as it is.
 ///
 /// # Errors
-/// An attribute of another length than the positions; what the system reports.
+/// An attribute of another length than the positions; packets, which are no
+/// points; what the system reports.
 pub fn write_scan(path: &Path, format: ScanFormat, scan: &Scan) -> Result<(), FormatError> {
     match format {
         ScanFormat::Npz => npz::write_scan(path, scan),
         ScanFormat::Ply => ply::write_scan(path, scan),
         ScanFormat::Csv => csv::write_scan(path, scan),
+        ScanFormat::Pcap => Err(FormatError::malformed(path, "extension", PACKETS)),
     }
 }
 
@@ -89,5 +101,6 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
         ScanFormat::Csv => {
             Err(FormatError::malformed(path, "extension", "CSV is written but not read"))
         }
+        ScanFormat::Pcap => Err(FormatError::malformed(path, "extension", PACKETS)),
     }
 }

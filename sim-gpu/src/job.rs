@@ -47,10 +47,10 @@ impl CastJob {
     ) -> Self {
         let (beams, rays) = match culling {
             Culling::On => pattern
-                .within(&frame.cone())
+                .within(&frame.cone(pattern))
                 .into_iter()
                 .filter_map(|beam| {
-                    let ray = frame.ray(pattern.directions[beam as usize]);
+                    let ray = frame.beam(pattern, beam);
                     Some((beam, frame.trace_ray(&ray, 0)?))
                 })
                 .unzip(),
@@ -58,7 +58,7 @@ impl CastJob {
                 .order
                 .iter()
                 .map(|&beam| {
-                    let ray = frame.ray(pattern.directions[beam as usize]);
+                    let ray = frame.beam(pattern, beam);
                     (beam, frame.trace_ray_unculled(&ray, 0))
                 })
                 .unzip(),

@@ -1,7 +1,8 @@
 //! Casts LiDAR beams against triangle meshes.
 //!
 //! The modules stand in the order in which data flows through them: mesh,
-//! BVH, target, sensor and scene, casting (on a GPU or on the CPU), scan.
+//! BVH, target, sensor and scene, casting (on a GPU or on the CPU), scan,
+//! packets.
 
 pub mod bvh;
 pub mod caster;
@@ -12,6 +13,7 @@ pub mod effects;
 pub mod gpu;
 pub mod job;
 pub mod mesh;
+pub mod packets;
 pub mod pose;
 pub mod ray;
 pub mod resolve;

@@ -1,7 +1,7 @@
 //! Rays in an object's own frame.
 
 use crate::pose::Pose;
-use crate::sensor::Cone;
+use crate::sensor::{BeamPattern, Cone};
 use crate::target::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec3};
@@ -29,10 +29,10 @@ pub const MISS: u32 = u32::MAX;
 /// more than the promised accuracy, and f64 must decide.
 pub const AMBIGUOUS: u32 = 1 << 31;
 
-/// A ray in f64. `origin + t * direction` is `t` metres from the sensor.
+/// A ray in f64. `origin + t * direction` is `t` metres from the ray's start.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// The sensor, in the unit frame.
+    /// Where the ray starts, in the unit frame: the sensor, or near it.
     pub origin: DVec3,
     /// One metre along the beam, in the unit frame.
     pub direction: DVec3,
@@ -71,9 +71,30 @@ impl RayFrame {
         Ray { origin: self.origin, direction: self.unit_from_sensor * direction }
     }
 
-    /// The cone of directions that may hit the object's bounding sphere.
+    /// The ray of `pattern`'s beam of this number, from where that beam starts.
     #[must_use]
-    pub fn cone(&self) -> Cone {
+    pub fn beam(&self, pattern: &BeamPattern, beam: u32) -> Ray {
+        let from_sensor = self.ray(pattern.directions[beam as usize]);
+        match pattern.start(beam) {
+            None => from_sensor,
+            Some(start) => {
+                Ray { origin: self.origin + self.unit_from_sensor * start, ..from_sensor }
+            }
+        }
+    }
+
+    /// The cone of directions in which `pattern`'s beams may hit the object's
+    /// bounding sphere.
+    ///
+    /// A beam that starts beside the sensor hits the sphere if one from the
+    /// sensor, in the same direction, hits the sphere moved as far the other
+    /// way. A sphere that is larger by the farthest start holds all of these.
+    #[must_use]
+    pub fn cone(&self, pattern: &BeamPattern) -> Cone {
+        let radius = match pattern.farthest_start_m() {
+            0.0 => self.radius,
+            along_z_m => self.radius + self.unit_from_sensor.z_axis.length() * along_z_m,
+        };
         let everything = Cone { axis: DVec3::X, half_angle_rad: std::f64::consts::PI };
         let distance = self.origin.length();
         let sensor_from_unit = self.unit_from_sensor.inverse();
@@ -81,7 +102,7 @@ impl RayFrame {
         let Some(axis) = (sensor_from_unit * -self.origin).try_normalize() else {
             return everything;
         };
-        let sine = self.radius / distance * stretch;
+        let sine = radius / distance * stretch;
         if sine.is_nan() || sine >= 1.0 {
             return everything;
         }

@@ -18,7 +18,7 @@ pub struct Hit {
     pub beam: u32,
     /// The triangle, as an index into its mesh.
     pub triangle: u32,
-    /// Distance from the sensor, metres, without any effect.
+    /// Distance from where the beam starts, metres, without any effect.
     pub range_m: f64,
 }
 
@@ -42,7 +42,7 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
     let mut resolved = Hits { hits: Vec::with_capacity(order.len()), ..Hits::default() };
     for i in order {
         let beam = job.beams[i];
-        let ray = job.frame.ray(pattern.directions[beam as usize]);
+        let ray = job.frame.beam(pattern, beam);
         let found = cast.codes[i] & !AMBIGUOUS;
         let mut triangle = found;
         if cast.codes[i] & AMBIGUOUS != 0 {

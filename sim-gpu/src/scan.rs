@@ -162,7 +162,15 @@ fn measure(
     }
     let beam = view.pose.world_from_sensor * view.pattern.directions[nearest.beam as usize];
     let sideways = if noise == Some(NoiseModel::Xyz) { words.noise } else { DVec3::ZERO };
-    Some(Return { object, hit, from_sensor: beam * range_m + sideways })
+    let from_start = beam * range_m + sideways;
+    let from_sensor = start(view, nearest.beam).map_or(from_start, |start| from_start + start);
+    Some(Return { object, hit, from_sensor })
+}
+
+/// Where a beam starts, from the sensor, in world axes; `None` where that is
+/// the sensor itself.
+fn start(view: &View, beam: u32) -> Option<DVec3> {
+    view.pattern.start(beam).map(|start| view.pose.world_from_sensor * start)
 }
 
 /// One hit's words, by meaning.
@@ -216,10 +224,12 @@ fn post_process(view: &View, returns: &mut Vec<Return>) {
 fn with_attributes(mut scan: Scan, view: &View, seen: &[Seen], returns: &[Return]) -> Scan {
     let hit = |r: &Return| &seen[r.object].hits.hits[r.hit];
     let beam = |r: &Return| hit(r).beam as usize;
+    let from_start =
+        |r: &Return| start(view, hit(r).beam).map_or(r.from_sensor, |start| r.from_sensor - start);
     for attribute in view.attributes {
         match attribute {
             Attribute::Range => {
-                scan.range_m = column(returns, |r| r.from_sensor.length() as f32);
+                scan.range_m = column(returns, |r| from_start(r).length() as f32);
             }
             Attribute::Beam => scan.beam = column(returns, |r| hit(r).beam),
             Attribute::Ring => scan.ring = column(returns, |r| view.pattern.ring[beam(r)]),
@@ -234,7 +244,8 @@ fn with_attributes(mut scan: Scan, view: &View, seen: &[Seen], returns: &[Return
                 });
             }
             Attribute::Normal => {
-                scan.normal = column(returns, |r| normal(&seen[r.object], hit(r).triangle, r));
+                scan.normal =
+                    column(returns, |r| normal(&seen[r.object], hit(r).triangle, from_start(r)));
             }
         }
     }
@@ -245,10 +256,10 @@ fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>>
     Some(returns.iter().map(value).collect())
 }
 
-/// The surface's unit normal in world axes, towards the sensor.
-fn normal(seen: &Seen, triangle: u32, point: &Return) -> [f32; 3] {
+/// The surface's unit normal in world axes, against the `beam` that hit it.
+fn normal(seen: &Seen, triangle: u32, beam: DVec3) -> [f32; 3] {
     let in_object = oracle::normal(&seen.job.target, triangle);
     let turned = seen.world_from_object.matrix3.inverse().transpose() * in_object;
     let normal = turned.normalize_or_zero();
-    f32x3(if normal.dot(point.from_sensor) > 0.0 { -normal } else { normal })
+    f32x3(if normal.dot(beam) > 0.0 { -normal } else { normal })
 }

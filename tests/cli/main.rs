@@ -9,6 +9,7 @@ mod end_to_end;
 mod import_weights;
 mod interrupted;
 mod meshes;
+mod packets;
 mod reference;
 mod scenes;
 mod surfaces;

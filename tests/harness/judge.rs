@@ -51,7 +51,7 @@ pub fn judge(job: &CastJob, pattern: &BeamPattern, hits: &Hits) -> Verdict {
         .par_iter()
         .enumerate()
         .map(|(beam, hit)| {
-            let ray = job.frame.ray(pattern.directions[beam]);
+            let ray = job.frame.beam(pattern, beam as u32);
             judge_beam(&job.target, &ray, *hit).named(beam)
         })
         .reduce(Verdict::default, Verdict::and)

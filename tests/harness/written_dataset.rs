@@ -4,6 +4,7 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
+use formats::vlp32c::Returns;
 use formats::{Split, hash};
 use sim_gpu::dataset::config::Layout;
 use sim_gpu::dataset::journal::{Journal, Terms};
@@ -39,7 +40,7 @@ pub fn config() -> DatasetConfig {
         normalize: Normalize::UnitSphere,
         up: None,
         attributes: [Attribute::Normal].into(),
-        formats: ScanFormat::ALL.to_vec(),
+        formats: ScanFormat::POINTS.to_vec(),
         effects: Effects::default(),
         variants: vec![Variant::Clean, Variant::Noisy],
         sets: vec![
@@ -49,6 +50,7 @@ pub fn config() -> DatasetConfig {
         packed_points: PACKED_POINTS,
         min_points: MIN_POINTS,
         layouts: vec![Layout::Yanx27],
+        returns: Returns::default(),
     }
 }
 

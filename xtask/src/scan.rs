@@ -1,9 +1,11 @@
 //! `cargo xtask scan`: one scene, one scan per sensor.
 
-use crate::Outcome;
 use crate::caster::CasterArgs;
+use crate::{Outcome, Usage};
 use anyhow::Context;
 use formats::scan_file::{ScanFormat, write_scan};
+use formats::vlp32c::{self, Returns};
+use sim_gpu::packets;
 use sim_gpu::scene::{Scene, SceneScan, cast};
 use std::path::{Path, PathBuf};
 
@@ -14,9 +16,14 @@ pub struct Args {
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
 
-    /// File to write: .npz, .ply or .csv; with several sensors, one file each, named after it
+    /// File to write: .npz, .ply, .csv or .pcap; with several sensors, one file each, named
+    /// after it. .pcap, a VLP-32C's packets, takes that sensor alone
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+
+    /// Returns of each beam in packets: strongest, last or dual, which is both
+    #[arg(long, value_name = "WHICH")]
+    returns: Option<Returns>,
 
     #[command(flatten)]
     caster: CasterArgs,
@@ -25,7 +32,13 @@ pub struct Args {
 /// Scans the scene.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of(&args.out)?;
-    let scene = Scene::load(&args.scene)?;
+    let mut scene = Scene::load(&args.scene)?;
+    if format == ScanFormat::Pcap {
+        cast_as_packets_tell(&mut scene).with_context(|| format!("{}", args.scene.display()))?;
+    } else if args.returns.is_some() {
+        let cause = "--returns says what packets hold: name a .pcap file to write";
+        return Err(Usage(cause.to_owned()).into());
+    }
     let caster = args.caster.open(&scene.effects)?;
     let scans = cast(&scene, &caster, args.caster.culling())
         .with_context(|| format!("{}", args.scene.display()))?;
@@ -34,12 +47,20 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         eprintln!("object {number}: {}{label}", object.name);
     }
     let several = scans.len() > 1;
-    for SceneScan { sensor, scan, tally, too_large_for_adapter } in &scans {
+    for (SceneScan { sensor, scan, tally, too_large_for_adapter }, asked) in
+        scans.iter().zip(&scene.sensors)
+    {
         if *too_large_for_adapter {
             eprintln!("{sensor}: a mesh is too large for one binding: the CPU cast it");
         }
         let file = if several { beside(&args.out, sensor) } else { args.out.clone() };
-        write_scan(&file, format, scan)?;
+        match format {
+            ScanFormat::Pcap => {
+                let revolution = packets::revolution(&asked.sensor)?;
+                vlp32c::write(&file, &revolution, args.returns.unwrap_or_default(), scan)?;
+            }
+            _ => write_scan(&file, format, scan)?,
+        }
         eprintln!(
             "{sensor}: {} points ({} out of range, {} dropped, {} with a negative range): {}",
             tally.points,
@@ -50,6 +71,18 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         );
     }
     Ok(Outcome::Success)
+}
+
+/// Has the sensors' beams cast as their packets tell them, and the scans hold
+/// what packets are made of.
+fn cast_as_packets_tell(scene: &mut Scene) -> anyhow::Result<()> {
+    packets::check_effects(&scene.effects)?;
+    for (i, sensor) in scene.sensors.iter_mut().enumerate() {
+        sensor.sensor = packets::as_packets_tell(&sensor.sensor)
+            .with_context(|| format!("sensor[{i}]: no packets of \"{}\"", sensor.sensor.name))?;
+    }
+    scene.attributes = packets::attributes(&scene.effects);
+    Ok(())
 }
 
 /// `scan.npz` and `left` give `scan_left.npz`.

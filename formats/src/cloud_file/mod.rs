@@ -9,7 +9,7 @@
 //! | PCD | ASCII, binary, LZF-compressed | binary |
 //! | XYZ, TXT, ASC, TSV, CSV | separated by blanks, tabs, commas or semicolons | blanks, in CSV commas |
 //! | KITTI `.bin` | f32, four to a point or as many as the name says | f32, intensity 0 |
-//! | LAS | 1.0 to 1.4 | no |
+//! | LAS | 1.0 to 1.4 | 1.2, in steps of 1 nm or more |
 //!
 //! NaN and infinities are coordinates like others; whoever reads decides what
 //! to do with them. Memory grows with the bytes that are there, unpacked where
@@ -19,6 +19,8 @@ mod format;
 mod kitti;
 #[cfg(feature = "las")]
 mod las;
+#[cfg(feature = "las")]
+mod las_write;
 mod lines;
 #[cfg(feature = "pcd")]
 mod lzf;
@@ -115,14 +117,16 @@ fn read_as(
 /// Writes `points` to `path`, atomically, in the format that its name tells.
 ///
 /// Coordinates are written as f32 where that loses nothing, that is for clouds
-/// that came as f32, and else as f64; the same points give the same bytes. Two
-/// formats round: KITTI's holds f32 only, and in PCD f64 stands only where f32
+/// that came as f32, and else as f64; the same points give the same bytes. Three
+/// formats round: KITTI's holds f32 only, in PCD f64 stands only where f32
 /// would lose more than a millionth of the cloud's extent, since the usual
-/// clouds of PCL and Open3D take no other type from it.
+/// clouds of PCL and Open3D take no other type from it, and LAS holds whole
+/// steps: 1 nm in clouds of up to 4 m, ten times as much in those ten times as
+/// large.
 ///
 /// # Errors
-/// As [`read_cloud`]; LAS, which is only read; raw floats of a number of
-/// columns other than four; a coordinate beyond f32 in KITTI's format; what the
+/// As [`read_cloud`]; raw floats of a number of columns other than four; a
+/// coordinate beyond f32 in KITTI's format, or not finite in LAS; what the
 /// system reports.
 pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let precision = Precision::lossless(points);
@@ -141,9 +145,7 @@ pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> 
         #[cfg(feature = "npz")]
         CloudFormat::Npz => atomic::write(path, |writer| npz::write(writer, points, precision)),
         #[cfg(feature = "las")]
-        CloudFormat::Las => {
-            Err(FormatError::malformed(path, "extension", "LAS is read but not written"))
-        }
+        CloudFormat::Las => las_write::write(path, points),
         #[allow(unreachable_patterns, reason = "a build may leave no format out")]
         left_out => Err(not_in_this_build(left_out, path)),
     }

@@ -7,7 +7,8 @@ use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from, write_cloud}
 use proptest::prelude::*;
 
 const LOSSLESS: [&str; 5] = ["ply", "npz", "npy", "xyz", "csv"];
-const ALL: [&str; 7] = ["ply", "npz", "npy", "xyz", "csv", "pcd", "bin"];
+const SINGLE: [&str; 7] = ["ply", "npz", "npy", "xyz", "csv", "pcd", "bin"];
+const ALL: [&str; 8] = ["ply", "npz", "npy", "xyz", "csv", "pcd", "bin", "las"];
 
 /// Coordinates as bits, so that NaN is itself and -0 is not 0.
 fn bits(points: &[[f64; 3]]) -> Vec<u64> {
@@ -55,13 +56,59 @@ proptest! {
     }
 
     #[test]
+    fn las_keeps_half_a_step(
+        points in prop::collection::vec(prop::array::uniform3(0.0f64..1.0), 0..40),
+        exponent in -20i32..300, distance in -1.0f64..1.0,
+    ) {
+        let extent = 10f64.powi(exponent);
+        let corners = [[0.0; 3], [1.0; 3]];
+        let points: Vec<_> = corners
+            .iter()
+            .chain(&points)
+            .map(|point| point.map(|x| extent * (x + 1e3 * distance)))
+            .collect();
+        let read = there_and_back("las", &points);
+        // 2e9 steps are half the extent or more, and no step is below 1 nm. The
+        // offset and two operations round to f64.
+        let half_step = (extent / 4e9 * 10.0).max(1e-9) / 2.0;
+        let rounding = 4.0 * f64::EPSILON * extent * 1e3;
+        for (read, point) in read.as_flattened().iter().zip(points.as_flattened()) {
+            prop_assert!((read - point).abs() <= half_step * 1.001 + rounding, "{read} {point}");
+        }
+    }
+
+    #[test]
     fn a_cloud_of_f32_comes_back(
         points in prop::collection::vec(prop::array::uniform3(any::<f32>()), 0..40),
     ) {
         let points: Vec<_> = points.into_iter().map(|point| point.map(f64::from)).collect();
-        for extension in ALL {
+        for extension in SINGLE {
             prop_assert_eq!(bits(&there_and_back(extension, &points)), bits(&points), "{}", extension);
         }
+    }
+}
+
+#[test]
+fn las_takes_every_finite_cloud() {
+    for points in [
+        vec![],
+        vec![[0.0, -0.0, f64::MIN_POSITIVE]],
+        vec![[f64::MAX; 3], [-f64::MAX; 3]],
+        vec![[1e300; 3]; 2],
+    ] {
+        let read = there_and_back("las", &points);
+        assert_eq!(read.len(), points.len());
+        for (read, point) in read.as_flattened().iter().zip(points.as_flattened()) {
+            let off = (read / 2.0 - point / 2.0).abs();
+            assert!(off <= 1e-9 + point.abs() * 1e-9, "{read} {point}");
+        }
+    }
+    let digits = [[450_000.123, 5_400_000.456, -0.001], [450_001.5, 5_400_003.25, 12.0]];
+    for (read, point) in
+        there_and_back("las", &digits).as_flattened().iter().zip(digits.as_flattened())
+    {
+        // Three digits are whole steps: a unit in the last place of 5.4e6 is 9.3e-10.
+        assert!((read - point).abs() <= 2e-9, "{read} {point}");
     }
 }
 
@@ -134,7 +181,10 @@ fn what_cannot_be_written_leaves_nothing() {
         let message = write_cloud(&path, &[[0.0; 3], [0.0, x, 0.0]]).unwrap_err().to_string();
         message.split_once(&format!("{name}: ")).unwrap().1.to_owned()
     };
-    assert_eq!(refusal("a.las", 0.0), "extension: LAS is read but not written");
+    assert_eq!(
+        refusal("a.las", f64::INFINITY),
+        "point 1: [0.0, inf, 0.0] is not finite, and LAS holds whole numbers"
+    );
     assert_eq!(refusal("a.f32x5.bin", 0.0), "extension: 5 columns are read but not written");
     assert_eq!(
         refusal("a.bin", 1e39),

@@ -8,6 +8,7 @@ use crate::sensor::{Sensor, Views};
 use formats::rng::StreamKey;
 use formats::scan::AttributeSet;
 use formats::scan_file::ScanFormat;
+use formats::vlp32c::Returns;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,13 @@ pub struct DatasetConfig {
     pub min_points: u32,
     /// Layouts of other projects, besides ours.
     pub layouts: Vec<Layout>,
+    /// Which returns packets hold, where they are among the formats.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub returns: Returns,
+}
+
+fn is_default(returns: &Returns) -> bool {
+    *returns == Returns::default()
 }
 
 /// One sensor and where it stands.

@@ -55,8 +55,14 @@ pub fn prepare(
     let views = plan(config, &id);
     let frames: Vec<RayFrame> =
         views.iter().map(|v| RayFrame::new(&surface, &DAffine3::IDENTITY, &v.pose)).collect();
-    let rays =
-        views.iter().zip(&frames).map(|(v, f)| patterns[v.set].within(&f.cone()).len()).sum();
+    let rays = views
+        .iter()
+        .zip(&frames)
+        .map(|(view, frame)| {
+            let pattern = &patterns[view.set];
+            pattern.within(&frame.cone(pattern)).len()
+        })
+        .sum();
     let builder = Builder::for_rays(surface.len(), rays);
     let target = Arc::new(progress.time(Stage::Build, || Target::new(surface, builder)));
     let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {

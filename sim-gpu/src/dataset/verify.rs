@@ -7,7 +7,7 @@ use super::layout;
 use super::manifest::Manifest;
 use formats::packed::read_packed;
 use formats::scan_file::{ScanFormat, read_scan};
-use formats::{FormatError, hash};
+use formats::{FormatError, hash, vlp32c};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -141,6 +141,14 @@ impl Expected<'_> {
         }
         let (found, expected, what) = match self.holds {
             Holds::Points(ScanFormat::Csv, points) => (csv_points(path), points, "points"),
+            Holds::Points(ScanFormat::Pcap, points) => {
+                return match vlp32c::count_returns(path) {
+                    Err(error) => Some(error.to_string()),
+                    // Of a range that no packet can tell there is no return.
+                    Ok(returns) => (returns > points)
+                        .then(|| format!("holds {returns} returns of {points} points")),
+                };
+            }
             Holds::Points(_, points) => {
                 (read_scan(path).map(|scan| scan.len() as u64), points, "points")
             }

@@ -8,11 +8,12 @@ use super::progress::{Progress, Stage};
 use super::record::{FileRecord, MeshRecord, ScanRecord, VariantRecord};
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
+use crate::packets;
 use crate::resolve::{Hits, resolve};
 use crate::scan::{Seen, View, assemble};
 use crate::sensor::BeamPattern;
-use formats::Scan;
-use formats::scan_file::write_scan;
+use formats::scan_file::{ScanFormat, write_scan};
+use formats::vlp32c::{self, Returns};
 use glam::DAffine3;
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
@@ -78,21 +79,34 @@ fn write_view(
         output.progress.scans.fetch_add(1, Relaxed);
         output.progress.points.fetch_add(tally.points, Relaxed);
         let files: Result<_, DatasetError> = output.progress.time(Stage::Write, || {
-            let path = |format| {
-                layout::scan(output.out, &set.name, variant, &record.entry, planned.view, format)
-            };
-            config.formats.iter().map(|&format| write(&path(format), format, &scan)).collect()
+            config
+                .formats
+                .iter()
+                .map(|&format| {
+                    let (out, entry) = (output.out, &record.entry);
+                    let path = layout::scan(out, &set.name, variant, entry, planned.view, format);
+                    match format {
+                        ScanFormat::Pcap => write_packets(&path, &view, &seen, config.returns)?,
+                        _ => write_scan(&path, format, &scan)?,
+                    }
+                    Ok(FileRecord { format, sha256: formats::hash::of_file(&path)? })
+                })
+                .collect()
         });
         variants.push(VariantRecord { variant, tally, files: files? });
     }
     Ok(ScanRecord { set: set.name.clone(), view: planned.view, variants })
 }
 
-fn write(
+/// Writes the packets of one view, whatever attributes its points have.
+fn write_packets(
     path: &Path,
-    format: formats::scan_file::ScanFormat,
-    scan: &Scan,
-) -> Result<FileRecord, DatasetError> {
-    write_scan(path, format, scan)?;
-    Ok(FileRecord { format, sha256: formats::hash::of_file(path)? })
+    view: &View,
+    seen: &[Seen],
+    returns: Returns,
+) -> Result<(), DatasetError> {
+    let revolution = packets::revolution(view.sensor)?;
+    let attributes = packets::attributes(view.effects);
+    let (scan, _) = assemble(&View { attributes: &attributes, ..*view }, seen);
+    Ok(vlp32c::write(path, &revolution, returns, &scan)?)
 }

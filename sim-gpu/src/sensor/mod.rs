@@ -183,7 +183,7 @@ impl Sensor {
             Layout::Uniform(uniform) => uniform.rays(keep_each),
             Layout::Grid(grid) => grid.rays(keep_each),
         };
-        BeamPattern::new(rays.directions, rays.ring, rays.time_s)
+        BeamPattern::new(rays.directions, rays.ring, rays.time_s).starting_at(rays.start_z_m)
     }
 
     /// The same sensor with only each `k`-th azimuth step, or column of
@@ -210,6 +210,8 @@ struct Rays {
     directions: Vec<glam::DVec3>,
     ring: Vec<u16>,
     time_s: Vec<f64>,
+    /// As [`BeamPattern::start_z_m`].
+    start_z_m: Vec<f64>,
 }
 
 impl Rays {
@@ -218,6 +220,7 @@ impl Rays {
             directions: Vec::with_capacity(n_rays),
             ring: Vec::with_capacity(n_rays),
             time_s: Vec::with_capacity(n_rays),
+            start_z_m: Vec::new(),
         }
     }
 

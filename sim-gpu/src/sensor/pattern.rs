@@ -20,6 +20,9 @@ pub struct BeamPattern {
     pub ring: Vec<u16>,
     /// Time since the start of the revolution, `[n_rays]`.
     pub time_s: Vec<f64>,
+    /// How far above the sensor each ray starts, metres along its z axis,
+    /// `[n_rays]`; empty where all start at the sensor itself.
+    pub start_z_m: Vec<f64>,
     /// All ray indices once, `[n_rays]`; neighbours in this list point in
     /// neighbouring directions and so traverse a tree together.
     pub order: Vec<u32>,
@@ -39,7 +42,28 @@ impl BeamPattern {
         let bound = |rays: &[u32]| BlockCone::around(rays.iter().map(|&i| directions[i as usize]));
         let blocks = order.chunks(BLOCK_RAYS).map(bound).collect();
         let groups = order.chunks(BLOCK_RAYS * GROUP_BLOCKS).map(bound).collect();
-        Self { directions, ring, time_s, order, blocks, groups }
+        Self { directions, ring, time_s, start_z_m: Vec::new(), order, blocks, groups }
+    }
+
+    /// The same rays, started as far above the sensor as `start_z_m` says:
+    /// metres, `[n_rays]`, or empty.
+    #[must_use]
+    pub fn starting_at(self, start_z_m: Vec<f64>) -> Self {
+        debug_assert!(start_z_m.is_empty() || start_z_m.len() == self.len());
+        Self { start_z_m, ..self }
+    }
+
+    /// Where ray `beam` starts, in the sensor frame, metres; `None` where that
+    /// is the sensor itself.
+    #[must_use]
+    pub fn start(&self, beam: u32) -> Option<DVec3> {
+        self.start_z_m.get(beam as usize).map(|&z_m| DVec3::new(0.0, 0.0, z_m))
+    }
+
+    /// How far from the sensor a ray starts at most, metres.
+    #[must_use]
+    pub fn farthest_start_m(&self) -> f64 {
+        self.start_z_m.iter().fold(0.0, |farthest, z_m| z_m.abs().max(farthest))
     }
 
     /// Number of rays.

@@ -64,13 +64,21 @@ impl TryFrom<Profile> for Sensor {
         if let Some(views) = &profile.views {
             views.validate()?;
         }
+        let layout = layout(profile.rotating, profile.uniform, profile.grid)?;
+        if let (Layout::Rotating(rotating), Some(_)) = (&layout, &profile.rings)
+            && rotating.beam_crossing_m.is_some()
+        {
+            // Rings are cones around one point, which such beams lack.
+            let cause = "excludes [rings]";
+            return Err(InvalidValue::new("rotating.beam_crossing_m", cause));
+        }
         Ok(Self {
             name: profile.name,
             description: profile.description,
             sources: profile.sources,
             range: profile.range,
             noise: profile.noise,
-            layout: layout(profile.rotating, profile.uniform, profile.grid)?,
+            layout,
             decimation: profile.decimation,
             rings: profile.rings,
             sample: profile.sample,

@@ -20,6 +20,17 @@ pub struct Rotating {
     /// where absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub azimuth_quantum_deg: Option<f64>,
+    /// The encoder is read when a sequence starts, as a multiple of this in
+    /// degrees, and the head turns on from what was read: how packets tell
+    /// azimuths. Excludes `azimuth_quantum_deg`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequence_quantum_deg: Option<f64>,
+    /// All beams cross this far in front of the axis, metres, so that a beam
+    /// at elevation e leaves the axis `beam_crossing_m * tan(e)` below the
+    /// sensor, and its range counts from there. Beams start at the sensor
+    /// where this is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam_crossing_m: Option<f64>,
     /// The beams, in any order; those that fire at one time keep theirs.
     pub beam: Vec<Beam>,
 }
@@ -51,11 +62,29 @@ impl Rotating {
         60.0 / self.rpm
     }
 
+    /// Places in `beam`, in the order in which the lasers fire.
+    #[must_use]
+    pub fn firing_order(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.beam.len()).collect();
+        order.sort_by(|&a, &b| self.beam[a].firing_us.total_cmp(&self.beam[b].firing_us));
+        order
+    }
+
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
         positive("rotating.rpm", self.rpm)?;
         positive("rotating.sequence_us", self.sequence_us)?;
         if let Some(quantum_deg) = self.azimuth_quantum_deg {
             positive("rotating.azimuth_quantum_deg", quantum_deg)?;
+        }
+        if let Some(quantum_deg) = self.sequence_quantum_deg {
+            positive("rotating.sequence_quantum_deg", quantum_deg)?;
+            if self.azimuth_quantum_deg.is_some() {
+                let cause = "excludes rotating.azimuth_quantum_deg";
+                return Err(InvalidValue::new("rotating.sequence_quantum_deg", cause));
+            }
+        }
+        if let Some(crossing_m) = self.beam_crossing_m {
+            within("rotating.beam_crossing_m", crossing_m, 0.0, 1.0)?;
         }
         if self.beam.is_empty() {
             return Err(InvalidValue::new("rotating.beam", "is empty"));
@@ -66,7 +95,9 @@ impl Rotating {
         for (i, beam) in self.beam.iter().enumerate() {
             let key = |field: &str| format!("rotating.beam[{i}].{field}");
             within(&key("azimuth_offset_deg"), beam.azimuth_offset_deg, -360.0, 360.0)?;
-            within(&key("elevation_deg"), beam.elevation_deg, -90.0, 90.0)?;
+            // A beam along the axis would cross nothing in front of it.
+            let steepest_deg = if self.beam_crossing_m.is_some() { 89.0 } else { 90.0 };
+            within(&key("elevation_deg"), beam.elevation_deg, -steepest_deg, steepest_deg)?;
             finite(&key("firing_us"), beam.firing_us)?;
             if !(0.0..self.sequence_us).contains(&beam.firing_us) {
                 let cause = format!("{} is not in 0..{}", beam.firing_us, self.sequence_us);
@@ -79,8 +110,7 @@ impl Rotating {
     /// The rays of one revolution, of which only each `keep_each`-th firing
     /// sequence is kept.
     pub(super) fn rays(&self, keep_each: u32) -> Rays {
-        let mut firing_order: Vec<usize> = (0..self.beam.len()).collect();
-        firing_order.sort_by(|&a, &b| self.beam[a].firing_us.total_cmp(&self.beam[b].firing_us));
+        let firing_order = self.firing_order();
         let rings = self.rings();
         let n_rays = self.rays_per_revolution();
         let n_beams = self.beam.len() as u64;
@@ -90,24 +120,34 @@ impl Rotating {
         for sequence in (0..sequences).step_by(keep_each as usize) {
             let fired = (n_rays - sequence * n_beams).min(n_beams) as usize;
             for &beam in &firing_order[..fired] {
-                let time_us = sequence as f64 * self.sequence_us + self.beam[beam].firing_us;
-                let time_s = time_us * 1e-6;
-                rays.push(self.direction(&self.beam[beam], time_s), rings[beam], time_s);
+                let laser = &self.beam[beam];
+                let start_us = sequence as f64 * self.sequence_us;
+                let time_s = (start_us + laser.firing_us) * 1e-6;
+                let encoder_rad = self.encoder_rad(start_us * 1e-6, time_s);
+                rays.push(direction(laser, encoder_rad), rings[beam], time_s);
+                if let Some(crossing_m) = self.beam_crossing_m {
+                    rays.start_z_m.push(-crossing_m * laser.elevation_deg.to_radians().tan());
+                }
             }
         }
         rays
     }
 
-    fn direction(&self, beam: &Beam, time_s: f64) -> DVec3 {
-        let turned_rad = TAU * time_s / self.period_s();
-        let encoder_rad = self.azimuth_quantum_deg.map_or(turned_rad, |quantum_deg| {
+    /// How far the head has turned at `time_s`, in a sequence that started at
+    /// `start_s`.
+    fn encoder_rad(&self, start_s: f64, time_s: f64) -> f64 {
+        let turned_rad = |time_s| TAU * time_s / self.period_s();
+        let rounded_rad = |angle_rad: f64, quantum_deg: f64| {
             let quantum_rad = quantum_deg.to_radians();
-            (turned_rad / quantum_rad).round() * quantum_rad
-        });
-        let clockwise_rad = encoder_rad - beam.azimuth_offset_deg.to_radians();
-        let (sin_azimuth, cos_azimuth) = clockwise_rad.sin_cos();
-        let (sin_elevation, cos_elevation) = beam.elevation_deg.to_radians().sin_cos();
-        DVec3::new(cos_elevation * cos_azimuth, -cos_elevation * sin_azimuth, sin_elevation)
+            (angle_rad / quantum_rad).round() * quantum_rad
+        };
+        match (self.azimuth_quantum_deg, self.sequence_quantum_deg) {
+            (Some(quantum_deg), _) => rounded_rad(turned_rad(time_s), quantum_deg),
+            (None, Some(quantum_deg)) => {
+                rounded_rad(turned_rad(start_s), quantum_deg) + turned_rad(time_s - start_s)
+            }
+            (None, None) => turned_rad(time_s),
+        }
     }
 
     /// For each beam its rank by elevation, from below.
@@ -121,4 +161,12 @@ impl Rotating {
         }
         rings
     }
+}
+
+/// Where `laser` points while the encoder reads `encoder_rad`.
+fn direction(laser: &Beam, encoder_rad: f64) -> DVec3 {
+    let clockwise_rad = encoder_rad - laser.azimuth_offset_deg.to_radians();
+    let (sin_azimuth, cos_azimuth) = clockwise_rad.sin_cos();
+    let (sin_elevation, cos_elevation) = laser.elevation_deg.to_radians().sin_cos();
+    DVec3::new(cos_elevation * cos_azimuth, -cos_elevation * sin_azimuth, sin_elevation)
 }

@@ -140,7 +140,8 @@ fn each<A, B>(items: impl IntoIterator<Item = A>, stage: impl Fn(A) -> B) -> (Ve
 fn count_rays(surface: &Surface, sets: &[Set]) -> usize {
     let frame = |pose: &Pose| RayFrame::new(surface, &DAffine3::IDENTITY, pose);
     let of_set = |set: &Set| -> usize {
-        set.poses.iter().map(|pose| set.pattern.within(&frame(pose).cone()).len()).sum()
+        let cones = set.poses.iter().map(|pose| frame(pose).cone(&set.pattern));
+        cones.map(|cone| set.pattern.within(&cone).len()).sum()
     };
     sets.iter().map(of_set).sum()
 }

@@ -34,8 +34,7 @@ impl Shot {
         let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
         let stream = StreamKey::new(SEED, "sweep", 0);
         let job = CastJob::aim(Arc::clone(target), frame, pattern, culling, stream, 1.0);
-        let rays =
-            job.beams.iter().map(|&beam| frame.ray(pattern.directions[beam as usize])).collect();
+        let rays = job.beams.iter().map(|&beam| frame.beam(pattern, beam)).collect();
         Self { job, rays }
     }
 

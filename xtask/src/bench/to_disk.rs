@@ -104,6 +104,7 @@ fn default_config() -> DatasetConfig {
         packed_points: 1024,
         min_points: 64,
         layouts: vec![],
+        returns: Default::default(),
     }
 }
 

@@ -4,9 +4,11 @@ use super::usage;
 use anyhow::Context;
 use formats::scan::{Attribute, AttributeSet};
 use formats::scan_file::ScanFormat;
+use formats::vlp32c::Returns;
 use sim_gpu::dataset::config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::mesh::frame::{Normalize, Up};
+use sim_gpu::packets;
 use sim_gpu::pose::load_poses;
 use sim_gpu::sensor::{Layout as BeamLayout, Sensor, Views};
 use std::path::PathBuf;
@@ -60,9 +62,14 @@ pub struct Settings {
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 
-    /// Files of each scan; NPZ is always written
-    #[arg(long, value_delimiter = ',', default_value = "npz", value_name = "npz,ply,csv")]
+    /// Files of each scan; NPZ is always written. pcap, a VLP-32C's packets, takes that sensor
+    /// alone and casts its beams as packets tell them, for all files
+    #[arg(long, value_delimiter = ',', default_value = "npz", value_name = "npz,ply,csv,pcap")]
     format: Vec<ScanFormat>,
+
+    /// Returns of each beam in packets: strongest, last or dual, which is both
+    #[arg(long, value_name = "WHICH")]
+    returns: Option<Returns>,
 
     /// How meshes are scaled: unit-sphere, bbox or none [default: unit-sphere or the sensor's own]
     #[arg(long, value_name = "HOW")]
@@ -94,7 +101,7 @@ pub struct Settings {
 impl Settings {
     /// The configuration that the flags ask for.
     pub fn config(&self) -> anyhow::Result<DatasetConfig> {
-        let sets = self.sets()?;
+        let mut sets = self.sets()?;
         let recommended = sets.iter().find_map(|set| match &set.viewpoints {
             Viewpoints::Views(views) => views.normalize,
             Viewpoints::Poses(_) => None,
@@ -104,6 +111,11 @@ impl Settings {
         formats.sort_unstable();
         formats.dedup();
         let effects = self.effects()?;
+        if formats.contains(&ScanFormat::Pcap) {
+            cast_as_packets_tell(&mut sets, &effects)?;
+        } else if self.returns.is_some() {
+            return Err(usage("--returns says what packets hold: add --format pcap"));
+        }
         for set in &sets {
             effects.for_sensor(&set.sensor).map_err(|error| usage(error.to_string()))?;
         }
@@ -124,6 +136,7 @@ impl Settings {
             packed_points: self.points,
             min_points: self.min_points,
             layouts: self.layout.clone(),
+            returns: self.returns.unwrap_or_default(),
         })
     }
 
@@ -183,6 +196,18 @@ impl Settings {
         };
         Ok(SetConfig { name: name.to_owned(), sensor, viewpoints })
     }
+}
+
+/// Has the sensors' beams cast as their packets tell them.
+fn cast_as_packets_tell(sets: &mut [SetConfig], effects: &Effects) -> anyhow::Result<()> {
+    let refuse = |error| usage(format!("--format pcap: {error}"));
+    packets::check_effects(effects).map_err(refuse)?;
+    for set in sets {
+        let name = &set.sensor.name;
+        let refuse = |error| usage(format!("--format pcap: sensor \"{name}\": {error}"));
+        set.sensor = packets::as_packets_tell(&set.sensor).map_err(refuse)?;
+    }
+    Ok(())
 }
 
 fn builtin(name: &str) -> anyhow::Result<Sensor> {

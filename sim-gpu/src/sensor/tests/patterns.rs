@@ -115,6 +115,33 @@ fn an_azimuth_quantum_moves_beams_to_its_multiples() {
 }
 
 #[test]
+fn a_sequence_quantum_rounds_the_start_of_each_sequence_alone() {
+    let mut coarse = sensor("vlp32c");
+    let Layout::Rotating(rotating) = &mut coarse.layout else { panic!("it rotates") };
+    rotating.sequence_quantum_deg = Some(0.01);
+    let pattern = coarse.pattern();
+    // 0.1990656 degrees become 0.20, and the head turns on at 3600 degrees/s.
+    assert_near(pattern.directions[32], at(-25.0, -1.6));
+    assert_near(pattern.directions[34], at(-1.667, -1.4 - 0.2 - 3600.0 * 2.304e-6));
+}
+
+#[test]
+fn beams_that_cross_before_the_axis_leave_it_below_or_above_the_sensor() {
+    let mut real = sensor("vlp32c");
+    let Layout::Rotating(rotating) = &mut real.layout else { panic!("it rotates") };
+    rotating.beam_crossing_m = Some(0.0424);
+    let (pattern, ideal) = (real.pattern(), sensor("vlp32c").pattern());
+    assert_eq!(pattern.directions, ideal.directions);
+    assert!((0..32).all(|beam| ideal.start(beam).is_none()));
+    for beam in 0..pattern.len() as u32 {
+        let direction = pattern.directions[beam as usize];
+        let start = pattern.start(beam).unwrap();
+        let crossing = start + direction * (0.0424 / direction.x.hypot(direction.y));
+        assert!(crossing.z.abs() < TOLERANCE, "{beam} passes at {crossing}");
+    }
+}
+
+#[test]
 fn the_blainder_grid_has_its_corners_and_its_seam_twice() {
     let pattern = sensor("blainder-ultrapuck").pattern();
     let [first, last] = [pattern.directions[0], pattern.directions[219_599]];

@@ -51,6 +51,7 @@ fn bad_profiles_are_named() {
     let uniform = BUILTIN_PROFILES[1];
     let grid = BUILTIN_PROFILES[2];
     let recipe = BUILTIN_PROFILES[6];
+    let crossing = &TINY.replace("rpm = 60", "rpm = 60\nbeam_crossing_m = 0.04");
     for (profile, from, to, part) in [
         (TINY, "name = \"tiny\"", "name = \"\"", "name: is empty"),
         (TINY, "name = \"tiny\"", "", "name"),
@@ -69,6 +70,27 @@ fn bad_profiles_are_named() {
         (TINY, "rpm = 60", "rpm = 1e300", "rotating: gives not a single ray"),
         (TINY, "rpm = 60", "rpm = 1e-300", "more than 67108864"),
         (TINY, "rpm = 60", "rpm = 60\nazimuth_quantum_deg = -0.01", "azimuth_quantum_deg"),
+        (TINY, "rpm = 60", "rpm = 60\nsequence_quantum_deg = 0", "sequence_quantum_deg"),
+        (
+            TINY,
+            "rpm = 60",
+            "rpm = 60\nsequence_quantum_deg = 1\nazimuth_quantum_deg = 1",
+            "rotating.sequence_quantum_deg: excludes rotating.azimuth_quantum_deg",
+        ),
+        (TINY, "rpm = 60", "rpm = 60\nbeam_crossing_m = -0.1", "rotating.beam_crossing_m"),
+        (TINY, "rpm = 60", "rpm = 60\nbeam_crossing_m = nan", "rotating.beam_crossing_m"),
+        (
+            crossing.as_str(),
+            "elevation_deg = -5",
+            "elevation_deg = -89.5",
+            "rotating.beam[1].elevation_deg",
+        ),
+        (
+            crossing.as_str(),
+            "[rotating]",
+            "rings = { step_deg = 1, keep_from = 0, keep_to = 1 }\n[rotating]",
+            "rotating.beam_crossing_m: excludes [rings]",
+        ),
         (TINY, "sequence_us = 400_000", "sequence_us = nan", "rotating.sequence_us"),
         (TINY, "firing_us = 100_000", "firing_us = 400_000", "rotating.beam[0].firing_us"),
         (TINY, "firing_us = 0", "firing_us = -1", "rotating.beam[1].firing_us"),

@@ -1,0 +1,238 @@
+//! Scans as a Velodyne VLP-32C sends them: data packets in a capture, which any
+//! driver of the sensor decodes. They are written, and counted, not read.
+//!
+//! Layout and timing: VLP-32C User Manual 63-9325, chapter 9. A packet's 1206
+//! bytes, little-endian, are sent to UDP port 2368:
+//!
+//! | bytes | what |
+//! | --- | --- |
+//! | 12 x 100 | blocks: `FF EE`, azimuth u16 in 0.01 degree, then for each laser distance u16 in 4 mm and reflectivity u8 |
+//! | 4 | microseconds past the hour at which the first block was fired |
+//! | 1 | returns: `37` strongest, `38` last, `39` both |
+//! | 1 | `28`, the model |
+//!
+//! A block is one firing sequence of 55.296 us: lasers 0 to 31, two at a time,
+//! 2.304 us apart. With both returns each sequence has two blocks, of the last
+//! and of the strongest return; where there is but one, as in every scan here,
+//! they are identical (p. 57). A beam that saw nothing has distance 0. Sequences
+//! are written whether or not they saw something, from the one at azimuth 0 to
+//! the end of the revolution, and on to the end of the last packet without
+//! returns.
+//!
+//! # What a decoder makes of it
+//!
+//! Laser l, at azimuth offset a and elevation e, with distance r in a block of
+//! azimuth A, that fires t after the block's start while the head turns at w:
+//!
+//! ```text
+//! azimuth = A + w t - a                    clockwise from x
+//! x =  r cos(e) cos(azimuth)
+//! y = -r cos(e) sin(azimuth)
+//! z =  r sin(e) - 0.0424 m x tan(e)        beams cross 42.4 mm off the axis
+//! ```
+//!
+//! So distance counts from (0, 0, -0.0424 m x tan(e)) on the axis, and a scan
+//! whose beams were cast from there, at azimuths that are A + w t - a for a
+//! whole A, comes back but for the roundings:
+//!
+//! - range: half a unit, 2 mm;
+//! - azimuth: a decoder rounds A + w t to 0.01 degree, which is off by half of
+//!   that, and takes w from the azimuths of the packet's first and last block,
+//!   each off by half a unit, as well. Over t, 34.56 us at most, of the 11 (5 with
+//!   both returns) sequences between them that is 0.057 (0.125) unit. Together
+//!   0.0056 (0.0063) degree.
+//!
+//! A scan that was cast from one point could not come back: no range along a
+//! line that starts 20 mm lower ends at the same point.
+
+mod count;
+mod packet;
+
+use std::io::Write;
+use std::path::Path;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::atomic;
+use crate::error::FormatError;
+use crate::pcap::{self, Sender};
+use crate::scan::{Attribute, Scan};
+pub use count::count_returns;
+use packet::{BLOCKS, LASERS, Measurement};
+
+/// From one firing sequence to the next, microseconds.
+pub const SEQUENCE_US: f64 = 55.296;
+
+/// The unit of distances, metres.
+pub const DISTANCE_UNIT_M: f64 = 0.004;
+
+/// The farthest distance that a packet can tell, metres.
+pub const FARTHEST_M: f64 = u16::MAX as f64 * DISTANCE_UNIT_M;
+
+/// The unit of azimuths, degrees.
+pub const AZIMUTH_UNIT_DEG: f64 = 0.01;
+
+/// All beams cross this far in front of the axis, metres: what velodyne-decoder
+/// 3.1.0 takes off its points' z.
+pub const BEAM_CROSSING_M: f64 = 0.0424;
+
+/// When every revolution starts: 2000-01-01, 00:00:00 UTC, in Unix time, so
+/// that the same scan gives the same bytes.
+pub const START_S: u32 = 946_684_800;
+
+/// The reflectivity of every return of a scan without intensity: a white
+/// surface that scatters all light.
+pub const WHITE: u8 = 100;
+
+/// A sensor as it leaves the factory: its address, and a MAC of its maker's.
+const SENSOR: Sender =
+    Sender { mac: [0x60, 0x76, 0x88, 0, 0, 0], ip: [192, 168, 1, 201], port: 2368 };
+
+/// One turn of the sensor's head.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Revolution {
+    /// Revolutions per minute, above 0.
+    pub rpm: f64,
+    /// Beams that were fired; the last sequence may be cut short.
+    pub n_beams: u32,
+}
+
+/// Which returns of a beam a sensor sends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Returns {
+    /// The strongest, as sensors do by default.
+    #[default]
+    Strongest,
+    /// The last.
+    Last,
+    /// The last and the strongest: two blocks of each sequence. A scan has one
+    /// return of each beam, so they are identical.
+    Dual,
+}
+
+impl Revolution {
+    /// Firing sequences, the last of which may be cut short.
+    #[must_use]
+    pub fn sequences(&self) -> u32 {
+        self.n_beams.div_ceil(LASERS as u32)
+    }
+
+    /// What the encoder reads when `sequence` starts, units of 0.01 degree.
+    #[must_use]
+    pub fn azimuth(&self, sequence: u32) -> u16 {
+        let turned = f64::from(sequence) * SEQUENCE_US * 1e-6 * self.rpm / 60.0;
+        let units_per_turn = 360.0 / AZIMUTH_UNIT_DEG;
+        (turned * units_per_turn).round().rem_euclid(units_per_turn) as u16
+    }
+}
+
+impl Returns {
+    /// All modes.
+    pub const ALL: [Self; 3] = [Self::Strongest, Self::Last, Self::Dual];
+
+    /// The mode's name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Strongest => "strongest",
+            Self::Last => "last",
+            Self::Dual => "dual",
+        }
+    }
+
+    /// Blocks of each firing sequence.
+    fn blocks_per_sequence(self) -> usize {
+        if self == Self::Dual { 2 } else { 1 }
+    }
+
+    fn byte(self) -> u8 {
+        match self {
+            Self::Strongest => 0x37,
+            Self::Last => 0x38,
+            Self::Dual => 0x39,
+        }
+    }
+
+    fn of_byte(byte: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|returns| returns.byte() == byte)
+    }
+}
+
+impl FromStr for Returns {
+    type Err = FormatError;
+
+    fn from_str(word: &str) -> Result<Self, FormatError> {
+        Self::ALL.into_iter().find(|returns| returns.name() == word).ok_or_else(|| {
+            FormatError::UnknownName {
+                word: word.to_owned(),
+                what: "choice of returns",
+                choices: Self::ALL.map(Self::name).join(", "),
+            }
+        })
+    }
+}
+
+/// Writes the packets of one `revolution` to `path`, atomically.
+///
+/// `scan` has the beam and the range of each point, beam b being laser b % 32
+/// of sequence b / 32; positions are not looked at. An intensity becomes a
+/// reflectivity of 0 to 100, Velodyne's scale for surfaces that scatter 0 to
+/// 100 % of the light (101 to 255 are retro-reflectors: HDL-32E User Manual,
+/// intensity data); without one, it is [`WHITE`]. A range that is not finite, below half a unit or beyond [`FARTHEST_M`] is no
+/// return.
+///
+/// # Errors
+/// A scan without beams or ranges, or with a beam beyond the revolution's; an
+/// attribute of another length than the positions; what the system reports.
+pub fn write(
+    path: &Path,
+    revolution: &Revolution,
+    returns: Returns,
+    scan: &Scan,
+) -> Result<(), FormatError> {
+    let sequences_per_packet = BLOCKS / returns.blocks_per_sequence();
+    let fired = measurements(path, revolution, scan)?;
+    atomic::write(path, |writer| {
+        pcap::write_header(writer)?;
+        for (number, fired) in fired.chunks(sequences_per_packet).enumerate() {
+            let first = number * sequences_per_packet;
+            // Below an hour by far: a revolution takes a fraction of a second.
+            let time_us = (first as f64 * SEQUENCE_US).round() as u32;
+            let azimuth = |i: usize| revolution.azimuth((first + i) as u32);
+            let payload = packet::payload(returns, time_us, azimuth, fired);
+            let stamp = [START_S + time_us / 1_000_000, time_us % 1_000_000];
+            pcap::write_packet(writer, &SENSOR, stamp, &payload)?;
+        }
+        writer.flush()
+    })
+}
+
+/// What each sequence measured.
+fn measurements(
+    path: &Path,
+    revolution: &Revolution,
+    scan: &Scan,
+) -> Result<Vec<[Measurement; LASERS]>, FormatError> {
+    scan.check_lengths()?;
+    let missing = |attribute| FormatError::Length { attribute, expected: scan.len(), found: 0 };
+    let beams = scan.beam.as_ref().ok_or_else(|| missing(Attribute::Beam))?;
+    let ranges_m = scan.range_m.as_ref().ok_or_else(|| missing(Attribute::Range))?;
+    let mut fired = vec![[Measurement::NONE; LASERS]; revolution.sequences() as usize];
+    for (i, (&beam, &range_m)) in beams.iter().zip(ranges_m).enumerate() {
+        if beam >= revolution.n_beams {
+            let cause = format!("{beam} of {} in a revolution", revolution.n_beams);
+            return Err(FormatError::malformed(path, "beam", cause));
+        }
+        let reflectivity = scan.intensity.as_ref().map_or(WHITE, |values| percent(values[i]));
+        let (sequence, laser) = (beam as usize / LASERS, beam as usize % LASERS);
+        fired[sequence][laser] = Measurement::new(range_m, reflectivity);
+    }
+    Ok(fired)
+}
+
+/// An intensity of 0 to 1 as a reflectivity of 0 to 100; NaN is 0.
+fn percent(intensity: f32) -> u8 {
+    (intensity.clamp(0.0, 1.0) * f32::from(WHITE)).round() as u8
+}

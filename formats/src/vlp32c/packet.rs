@@ -1,0 +1,71 @@
+//! The bytes of one data packet.
+
+use super::{DISTANCE_UNIT_M, Returns};
+
+/// Lasers of the sensor, and measurements of a block.
+pub(super) const LASERS: usize = 32;
+/// Blocks of a packet.
+pub(super) const BLOCKS: usize = 12;
+
+/// Bytes of a block's flag and azimuth.
+pub(super) const BLOCK_HEADER_SIZE: usize = 4;
+/// Bytes of a distance and a reflectivity.
+pub(super) const MEASUREMENT_SIZE: usize = 3;
+/// Bytes of a block.
+pub(super) const BLOCK_SIZE: usize = BLOCK_HEADER_SIZE + LASERS * MEASUREMENT_SIZE;
+/// Bytes of a packet.
+pub(super) const PAYLOAD_SIZE: usize = BLOCKS * BLOCK_SIZE + 6;
+
+/// What each block begins with.
+pub(super) const FLAG: [u8; 2] = [0xff, 0xee];
+/// What a packet of a VLP-32C ends with.
+pub(super) const MODEL: u8 = 0x28;
+
+/// What one laser measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Measurement {
+    /// Units of [`DISTANCE_UNIT_M`]; 0 where nothing came back.
+    distance: u16,
+    reflectivity: u8,
+}
+
+impl Measurement {
+    /// Nothing came back.
+    pub const NONE: Self = Self { distance: 0, reflectivity: 0 };
+
+    /// A return, unless a packet cannot tell its range.
+    pub fn new(range_m: f32, reflectivity: u8) -> Self {
+        let units = (f64::from(range_m) / DISTANCE_UNIT_M).round();
+        // NaN is in no range.
+        if (1.0..=f64::from(u16::MAX)).contains(&units) {
+            Self { distance: units as u16, reflectivity }
+        } else {
+            Self::NONE
+        }
+    }
+}
+
+/// A packet that begins at `time_us` past the hour. `azimuth` tells what the
+/// encoder reads as the packet's i-th sequence starts; sequences beyond those
+/// that were `fired` saw nothing.
+pub(super) fn payload(
+    returns: Returns,
+    time_us: u32,
+    azimuth: impl Fn(usize) -> u16,
+    fired: &[[Measurement; LASERS]],
+) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(PAYLOAD_SIZE);
+    for block in 0..BLOCKS {
+        let sequence = block / returns.blocks_per_sequence();
+        let measured = fired.get(sequence).unwrap_or(&[Measurement::NONE; LASERS]);
+        bytes.extend(FLAG);
+        bytes.extend(azimuth(sequence).to_le_bytes());
+        for measurement in measured {
+            bytes.extend(measurement.distance.to_le_bytes());
+            bytes.push(measurement.reflectivity);
+        }
+    }
+    bytes.extend(time_us.to_le_bytes());
+    bytes.extend([returns.byte(), MODEL]);
+    bytes
+}

@@ -1,0 +1,112 @@
+//! Scans as a VLP-32C's packets: which sensors have them, and what they ask of
+//! a scan. [`formats::vlp32c`] writes them and says how they decode.
+
+use formats::scan::{Attribute, AttributeSet};
+use formats::vlp32c::{AZIMUTH_UNIT_DEG, BEAM_CROSSING_M, FARTHEST_M, Revolution, SEQUENCE_US};
+
+use crate::config::{InvalidValue, within};
+use crate::effects::{Effects, NoiseModel};
+use crate::sensor::{Layout, Rotating, Sensor};
+
+/// What [`formats::vlp32c`] needs of each point.
+#[must_use]
+pub fn attributes(effects: &Effects) -> AttributeSet {
+    let intensity = effects.intensity.map(|_| Attribute::Intensity);
+    [Attribute::Beam, Attribute::Range].into_iter().chain(intensity).collect()
+}
+
+/// `sensor` with its beams cast as its packets tell them: from where they leave
+/// the axis, at azimuths that are whole units when a sequence starts.
+///
+/// # Errors
+/// A sensor that is no VLP-32C, or whose scans its packets cannot tell.
+pub fn as_packets_tell(sensor: &Sensor) -> Result<Sensor, InvalidValue> {
+    let mut sensor = sensor.clone();
+    if let Layout::Rotating(rotating) = &mut sensor.layout {
+        rotating.beam_crossing_m.get_or_insert(BEAM_CROSSING_M);
+        rotating.sequence_quantum_deg.get_or_insert(AZIMUTH_UNIT_DEG);
+    }
+    revolution(&sensor)?;
+    Ok(sensor)
+}
+
+/// One turn of `sensor`, whose scans are what its packets tell.
+///
+/// # Errors
+/// As [`as_packets_tell`]; beams that are not cast as packets tell them.
+pub fn revolution(sensor: &Sensor) -> Result<Revolution, InvalidValue> {
+    let Layout::Rotating(rotating) = &sensor.layout else {
+        return Err(no_packets("rotating", "missing"));
+    };
+    check_head(rotating)?;
+    check_aim(rotating)?;
+    if sensor.decimation.get() != 1 {
+        return Err(no_packets("decimation", "leaves out firing sequences"));
+    }
+    if sensor.rings.is_some() {
+        return Err(no_packets("rings", "moves points off their beams"));
+    }
+    if sensor.sample.is_some() {
+        return Err(no_packets("sample", "draws from the beams"));
+    }
+    within("range.max_m", sensor.range.max_m, 0.0, FARTHEST_M)?;
+    // Fewer than the patterns' limit of 2^26.
+    Ok(Revolution { rpm: rotating.rpm, n_beams: rotating.rays_per_revolution() as u32 })
+}
+
+/// That `effects` leave points on their beams.
+///
+/// # Errors
+/// Noise of another model than [`NoiseModel::Range`].
+pub fn check_effects(effects: &Effects) -> Result<(), InvalidValue> {
+    match effects.noise {
+        Some(noise) if noise.model != NoiseModel::Range => {
+            Err(no_packets("effects.noise.model", "moves points off their beams; take \"range\""))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// That the head is a VLP-32C's: packets name lasers, drivers have the table.
+fn check_head(rotating: &Rotating) -> Result<(), InvalidValue> {
+    let Some(Sensor { layout: Layout::Rotating(vlp32c), .. }) = Sensor::builtin("vlp32c") else {
+        unreachable!("invariant: the built-in vlp32c rotates");
+    };
+    if rotating.sequence_us != SEQUENCE_US {
+        let cause = format!("{} is not its {SEQUENCE_US}", rotating.sequence_us);
+        return Err(no_packets("rotating.sequence_us", cause));
+    }
+    let (found, expected) = (rotating.firing_order(), vlp32c.firing_order());
+    if found.len() != expected.len() {
+        let cause = format!("{} beams, not its {}", found.len(), expected.len());
+        return Err(no_packets("rotating.beam", cause));
+    }
+    let differs =
+        |&(&found, &expected): &(&usize, &usize)| rotating.beam[found] != vlp32c.beam[expected];
+    if let Some((found, expected)) = found.iter().zip(&expected).find(differs) {
+        let cause = format!("is not its laser {expected}, which decoders take it for");
+        return Err(no_packets(format!("rotating.beam[{found}]"), cause));
+    }
+    // VLP-32C User Manual 63-9325, 8.3.
+    within("rotating.rpm", rotating.rpm, 300.0, 1200.0)?;
+    Ok(())
+}
+
+/// That beams start and point as packets tell.
+fn check_aim(rotating: &Rotating) -> Result<(), InvalidValue> {
+    let expect = |key: &str, found: Option<f64>, expected: Option<f64>| {
+        if found == expected {
+            return Ok(());
+        }
+        let said = |value: Option<f64>| value.map_or("none".to_owned(), |value| value.to_string());
+        Err(no_packets(key, format!("{} is not its {}", said(found), said(expected))))
+    };
+    expect("rotating.beam_crossing_m", rotating.beam_crossing_m, Some(BEAM_CROSSING_M))?;
+    expect("rotating.azimuth_quantum_deg", rotating.azimuth_quantum_deg, None)?;
+    let quantum_deg = rotating.sequence_quantum_deg;
+    expect("rotating.sequence_quantum_deg", quantum_deg, Some(AZIMUTH_UNIT_DEG))
+}
+
+fn no_packets(key: impl Into<String>, cause: impl std::fmt::Display) -> InvalidValue {
+    InvalidValue::new(key, format!("{cause}; packets are written for Velodyne's VLP-32C alone"))
+}

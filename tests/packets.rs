@@ -1,0 +1,258 @@
+//! A scan's packets decode to its points. On every caster.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+use std::num::NonZeroU32;
+
+use formats::Scan;
+use formats::rng::StreamKey;
+use formats::scan::Attribute;
+use formats::vlp32c::{BEAM_CROSSING_M, Returns, Revolution, write};
+use glam::{DAffine3, DQuat, DVec3};
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::{Effects, Noise, NoiseModel};
+use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::mesh::Mesh;
+use sim_gpu::packets::{as_packets_tell, check_effects, revolution};
+use sim_gpu::pose::Pose;
+use sim_gpu::ray::RayFrame;
+use sim_gpu::resolve::resolve;
+use sim_gpu::scan::{Seen, View, assemble};
+use sim_gpu::sensor::{Layout, Rotating, Sensor};
+use tests::{adapter, casting, judge, meshes};
+
+const STREAM: StreamKey = StreamKey([3, 5]);
+
+fn vlp32c() -> Sensor {
+    Sensor::builtin("vlp32c").unwrap()
+}
+
+fn head(sensor: &Sensor) -> &Rotating {
+    let Layout::Rotating(rotating) = &sensor.layout else { panic!("it turns") };
+    rotating
+}
+
+fn head_of(sensor: &mut Sensor) -> &mut Rotating {
+    let Layout::Rotating(rotating) = &mut sensor.layout else { panic!("it turns") };
+    rotating
+}
+
+/// A VLP-32C of packets, at this many revolutions a minute.
+fn turning(rpm: f64) -> Sensor {
+    let mut sensor = vlp32c();
+    head_of(&mut sensor).rpm = rpm;
+    as_packets_tell(&sensor).unwrap()
+}
+
+/// A sensor that sees the world's origin some 16 degrees below its plane, where
+/// beams start beside it, and across azimuth 0.
+fn pose(distance_m: f64) -> Pose {
+    let looking = Pose::look_at(DVec3::new(distance_m, 0.3, 0.2), DVec3::ZERO).unwrap();
+    let tilted = DQuat::from_rotation_y(-0.3) * DQuat::from_rotation_x(0.2);
+    Pose { world_from_sensor: looking.world_from_sensor * tilted, ..looking }
+}
+
+/// What `sensor` sees of `mesh`, with all that packets and this test need.
+fn scan(caster: &Caster, sensor: &Sensor, mesh: &Mesh, pose: &Pose, culling: Culling) -> Scan {
+    let pattern = sensor.pattern();
+    let target = casting::target(mesh);
+    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
+    let job = CastJob::aim(target, frame, &pattern, culling, STREAM, 1.0);
+    let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
+    let effects = Effects::default();
+    let hits = resolve(&job, &casts[0], &pattern, &effects);
+    let view = View {
+        sensor,
+        pattern: &pattern,
+        pose,
+        cast_effects: &effects,
+        effects: &effects,
+        attributes: &[Attribute::Range, Attribute::Beam].into(),
+        stream: STREAM,
+    };
+    let seen = [Seen { object: 0, world_from_object: &DAffine3::IDENTITY, job: &job, hits: &hits }];
+    assemble(&view, &seen).0
+}
+
+/// A point from a packet: azimuth clockwise and elevation in degrees, range in
+/// metres from where the beam starts.
+struct Decoded {
+    beam: usize,
+    azimuth_deg: f64,
+    range_m: f64,
+    point: DVec3,
+}
+
+/// Decodes a capture by the formulas of `formats::vlp32c`, as drivers do: with
+/// the rate of turning from the packet's own azimuths, rounded to 0.01 degree.
+fn decode(capture: &[u8], returns: Returns, head: &Rotating) -> Vec<Decoded> {
+    let copies = if returns == Returns::Dual { 2 } else { 1 };
+    let mut decoded = Vec::new();
+    for (number, record) in capture[24..].chunks_exact(16 + 1248).enumerate() {
+        let blocks: Vec<&[u8]> = record[16 + 42..].chunks_exact(100).take(12).collect();
+        let azimuth = |block: &[u8]| f64::from(u16::from_le_bytes([block[2], block[3]]));
+        let turned = (azimuth(blocks[11]) - azimuth(blocks[0])).rem_euclid(36_000.0);
+        let rate = turned / (55.296 * (12 / copies - 1) as f64);
+        for (i, block) in blocks.iter().enumerate().step_by(copies) {
+            for (laser, measured) in block[4..].chunks_exact(3).enumerate() {
+                let distance = u16::from_le_bytes([measured[0], measured[1]]);
+                if distance == 0 {
+                    continue;
+                }
+                let at_us = 2.304 * (laser / 2) as f64;
+                let units = (azimuth(block) + rate * at_us).round();
+                let beam = (number * 12 / copies + i / copies) * 32 + laser;
+                let azimuth_deg = units * 0.01 - head.beam[laser].azimuth_offset_deg;
+                let range_m = f64::from(distance) * 0.004;
+                let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+                let elevation_rad = head.beam[laser].elevation_deg.to_radians();
+                let across = range_m * elevation_rad.cos();
+                let z = range_m * elevation_rad.sin() - BEAM_CROSSING_M * elevation_rad.tan();
+                let point = DVec3::new(across * cos, -across * sin, z);
+                decoded.push(Decoded { beam, azimuth_deg, range_m, point });
+            }
+        }
+    }
+    decoded
+}
+
+fn packets_of(sensor: &Sensor, returns: Returns, scan: &Scan) -> Vec<Decoded> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.pcap");
+    write(&path, &revolution(sensor).unwrap(), returns, scan).unwrap();
+    decode(&std::fs::read(&path).unwrap(), returns, head(sensor))
+}
+
+/// The scan's points in the sensor's frame.
+fn in_sensor<'a>(scan: &'a Scan, pose: &'a Pose) -> impl Iterator<Item = DVec3> + 'a {
+    let sensor_from_world = pose.world_from_sensor.inverse();
+    scan.positions
+        .iter()
+        .map(move |p| sensor_from_world * (DVec3::from_array(p.map(f64::from)) - pose.position_m))
+}
+
+fn degrees_apart(a: f64, b: f64) -> f64 {
+    let apart = (a - b).rem_euclid(360.0);
+    apart.min(360.0 - apart)
+}
+
+#[test]
+fn packets_decode_to_the_points_of_the_scan() {
+    let mesh = meshes::icosphere(3);
+    for caster in adapter::casters(&Effects::default()) {
+        for (rpm, returns) in
+            [(300.0, Returns::Dual), (600.0, Returns::Strongest), (1200.0, Returns::Last)]
+        {
+            let (sensor, pose) = (turning(rpm), pose(3.0));
+            let scan = scan(caster, &sensor, &mesh, &pose, Culling::On);
+            let decoded = packets_of(&sensor, returns, &scan);
+            assert!(scan.len() > 1000, "{}", scan.len());
+            assert_eq!(decoded.len(), scan.len());
+            let points = in_sensor(&scan, &pose);
+            for (i, (point, decoded)) in points.zip(&decoded).enumerate() {
+                assert_eq!(decoded.beam, scan.beam.as_ref().unwrap()[i] as usize);
+                let range_m = f64::from(scan.range_m.as_ref().unwrap()[i]);
+                // Half a unit; f32 holds 4 m to 2.4e-7 m.
+                assert!((decoded.range_m - range_m).abs() <= 0.002 + 3e-7);
+                // Half a unit and an eighth of one (`formats::vlp32c`); positions of
+                // 2.4e-7 m at 1 m from the axis and more are 3e-5 degrees.
+                let azimuth_deg = -point.y.atan2(point.x).to_degrees();
+                let off_deg = degrees_apart(decoded.azimuth_deg, azimuth_deg);
+                assert!(off_deg <= 0.00625 + 3e-5, "{off_deg}");
+                // Both together: along the beam and across it.
+                let across_m = 0.00628f64.to_radians() * range_m;
+                assert!(decoded.point.distance(point) <= 0.002f64.hypot(across_m) + 1e-6);
+            }
+        }
+    }
+}
+
+#[test]
+fn around_a_sensor_inside_a_box_every_beam_comes_back() {
+    let mesh = meshes::cuboid(DVec3::splat(-6.0), DVec3::splat(6.0));
+    let (sensor, pose) = (turning(600.0), pose(1.5));
+    let scan = scan(&Caster::Cpu(Effects::default()), &sensor, &mesh, &pose, Culling::On);
+    assert_eq!(scan.len(), 57_870);
+    let decoded = packets_of(&sensor, Returns::Strongest, &scan);
+    assert_eq!(decoded.len(), 57_870);
+    for (point, decoded) in in_sensor(&scan, &pose).zip(&decoded) {
+        // 2 mm along the beam, 0.0057 degree across it at 16 m or less.
+        assert!(decoded.point.distance(point) < 0.003);
+    }
+}
+
+/// Beams that start beside the sensor hit what those from it would miss.
+#[test]
+fn culling_loses_no_beam_that_starts_beside_the_sensor() {
+    let sensor = turning(600.0);
+    let pattern = sensor.pattern();
+    let steepest_m = BEAM_CROSSING_M * 25f64.to_radians().tan();
+    assert!((pattern.farthest_start_m() - steepest_m).abs() < 1e-15);
+    for distance_m in [1.05, 2.0, 20.0] {
+        // Small, so that 12 mm are much of it when it is near.
+        let mut mesh = meshes::icosphere(2);
+        mesh.vertices.iter_mut().for_each(|v| *v *= 0.05 * distance_m);
+        let pose = pose(distance_m);
+        let caster = Caster::Cpu(Effects::default());
+        let culled = scan(&caster, &sensor, &mesh, &pose, Culling::On);
+        assert!(culled.len() > 50, "{}", culled.len());
+        assert_eq!(culled, scan(&caster, &sensor, &mesh, &pose, Culling::Off));
+    }
+}
+
+#[test]
+fn the_oracle_agrees_on_beams_that_start_beside_the_sensor() {
+    let (sensor, pose) = (turning(600.0), pose(3.0));
+    let pattern = sensor.pattern();
+    let target = casting::target(&meshes::icosphere(3));
+    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
+    for caster in adapter::casters(&Effects::default()) {
+        let job = CastJob::aim(target.clone(), frame, &pattern, Culling::On, STREAM, 1.0);
+        let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
+        let hits = resolve(&job, &casts[0], &pattern, &Effects::default());
+        let verdict = judge::judge(&job, &pattern, &hits);
+        assert!(verdict.hits > 1000 && verdict.broken.is_empty(), "{verdict:?}");
+    }
+}
+
+#[test]
+fn a_sensor_that_packets_cannot_tell_is_refused() {
+    let changed = |change: &dyn Fn(&mut Sensor)| {
+        let mut sensor = vlp32c();
+        change(&mut sensor);
+        as_packets_tell(&sensor).unwrap_err().to_string()
+    };
+    for name in ["kinect-v2", "generic-static", "blainder-ultrapuck", "vlp16", "hdl64e"] {
+        let error = as_packets_tell(&Sensor::builtin(name).unwrap()).unwrap_err().to_string();
+        assert!(error.contains("VLP-32C alone"), "{name}: {error}");
+    }
+    for (error, key) in [
+        (changed(&|s| head_of(s).beam[7].elevation_deg += 0.001), "rotating.beam[7]: is not its"),
+        (changed(&|s| head_of(s).beam[7].azimuth_offset_deg = 0.0), "rotating.beam[7]: is not its"),
+        (changed(&|s| head_of(s).beam.swap(0, 1)), "rotating.beam[1]: is not its laser 0"),
+        (changed(&|s| drop(head_of(s).beam.pop())), "rotating.beam: 31 beams"),
+        (changed(&|s| head_of(s).sequence_us = 60.0), "rotating.sequence_us: 60 is not"),
+        (changed(&|s| head_of(s).rpm = 299.0), "rotating.rpm: 299 is not within 300..=1200"),
+        (changed(&|s| head_of(s).azimuth_quantum_deg = Some(0.01)), "rotating.azimuth_quantum_deg"),
+        (changed(&|s| head_of(s).beam_crossing_m = Some(0.0)), "rotating.beam_crossing_m: 0 is"),
+        (changed(&|s| head_of(s).sequence_quantum_deg = Some(0.1)), "sequence_quantum_deg: 0.1"),
+        (changed(&|s| s.decimation = NonZeroU32::new(2).unwrap()), "decimation"),
+        (changed(&|s| s.range.max_m = 263.0), "range.max_m: 263 is not within 0..=262.14"),
+        (revolution(&vlp32c()).unwrap_err().to_string(), "rotating.beam_crossing_m: none is"),
+    ] {
+        assert!(error.starts_with(key) || error.contains(key), "{error}");
+    }
+    let noise = Noise { mean_m: 0.0, sigma_m: 0.01, model: NoiseModel::Xyz };
+    let error = check_effects(&Effects { noise: Some(noise), ..Effects::default() }).unwrap_err();
+    assert!(error.to_string().starts_with("effects.noise.model: "), "{error}");
+}
+
+#[test]
+fn beams_may_stand_in_any_order_that_fires_alike() {
+    let mut sensor = vlp32c();
+    head_of(&mut sensor).beam.rotate_left(8);
+    let sensor = as_packets_tell(&sensor).unwrap();
+    let expected = Revolution { rpm: 600.0, n_beams: 57_870 };
+    assert_eq!(revolution(&sensor).unwrap(), expected);
+    assert_eq!(sensor.pattern(), turning(600.0).pattern());
+}
