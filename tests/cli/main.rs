@@ -13,6 +13,7 @@ mod packets;
 mod reference;
 mod scenes;
 mod surfaces;
+mod trade;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

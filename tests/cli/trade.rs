@@ -1,0 +1,96 @@
+//! `trade`, `advise` and `report`: what was measured, one configuration out of
+//! it, one page of everything.
+
+use crate::{exits, said, succeeds};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+type Row = BTreeMap<String, String>;
+
+fn rows(path: &Path) -> Vec<Row> {
+    let mut csv = csv::Reader::from_path(path).unwrap();
+    csv.deserialize().map(|row| row.unwrap()).collect()
+}
+
+fn number(row: &Row, column: &str) -> f64 {
+    row[column].parse().unwrap_or_else(|_| panic!("{column}: `{}`", row[column]))
+}
+
+fn the<'a>(rows: &'a [Row], wanted: &[(&str, &str)]) -> &'a Row {
+    let is_wanted = |row: &&Row| wanted.iter().all(|(column, value)| row[*column] == *value);
+    rows.iter().find(is_wanted).unwrap_or_else(|| panic!("no row with {wanted:?}"))
+}
+
+/// One run for all that follows from it: it casts some million rays.
+#[test]
+fn the_chain_is_measured_advised_and_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeds(at, "gen-shapes --out shapes --train 1 --test 1");
+    succeeds(at, "trade --quick --rounds 1 --meshes shapes --out assets/reports/trade");
+    let record = at.join("assets/reports/trade/trade.csv");
+    let rows = rows(&record);
+    scans_are_as_true_as_they_claim(&rows);
+    casters_differ_as_they_should(&rows);
+    fp32_is_the_reference(&rows);
+
+    let advice = "advise --record assets/reports/trade/trade.csv --device";
+    let advised = said(&succeeds(at, &format!("{advice} here --max-ms 1000")));
+    assert!(advised.contains("infer-cpu classify --model"), "{advised}");
+    let refused = exits(1, at, &format!("{advice} here --max-ms 1e-9"));
+    assert!(refused.contains("the fastest:"), "{refused}");
+    // A quick run does not model a Raspberry Pi.
+    let refused = exits(1, at, &format!("{advice} pi5 --max-ms 1000"));
+    assert!(refused.contains("only what was measured"), "{refused}");
+
+    succeeds(at, "report --assets assets --out page/report.html");
+    let page = fs::read_to_string(at.join("page/report.html")).unwrap();
+    assert!(page.contains("shapes-rotational-64") && page.contains("data-tip"));
+    assert!(page.contains("cargo xtask ablate"), "what is missing is said");
+}
+
+fn scans_are_as_true_as_they_claim(rows: &[Row]) {
+    let reference = the(rows, &[("part", "scan"), ("knob", "reference")]);
+    assert_eq!(reference["agreement"], "1.0");
+    let points = |row| number(row, "points_per_scan");
+    let eight = the(rows, &[("sensor", "vlp32c, 8 beams")]);
+    assert!((0.15..0.35).contains(&(points(eight) / points(reference))), "a fourth of the beams");
+    let noise = |noise_m| the(rows, &[("part", "scan"), ("knob", "noise"), ("noise_m", noise_m)]);
+    // Without noise what is left is f32's rounding of 2 to 4 m: 2^-23 m.
+    assert!(number(noise("0.0"), "range_worst_m") < 2f64.powi(-22));
+    // Of n > 10^4 draws the sample's sigma is off by 1/sqrt(2n) < 0.7 %; four of those.
+    assert!((number(noise("0.1"), "range_rms_m") / 0.1 - 1.0).abs() < 0.03);
+}
+
+fn casters_differ_as_they_should(rows: &[Row]) {
+    let cpu = the(rows, &[("caster", "cpu f32 watertight, f64 range"), ("part", "caster")]);
+    // The triangle is the oracle's, and so is the formula of the range.
+    assert_eq!((number(cpu, "range_worst_m"), number(cpu, "wrong_rays_per_million")), (0.0, 0.0));
+    let f32 = the(rows, &[("caster", "cpu f32 watertight, f32 range"), ("culling", "on")]);
+    assert!(number(f32, "range_worst_m") > 0.0);
+}
+
+fn fp32_is_the_reference(rows: &[Row]) {
+    let of = |precision| the(rows, &[("part", "classifier"), ("precision", precision)]);
+    assert_eq!((number(of("f32"), "logit_error"), number(of("f32"), "agreement")), (0.0, 1.0));
+    assert!(number(of("i8"), "logit_error") > 0.0);
+    assert!(number(of("i8"), "megabytes") < 0.5 * number(of("f32"), "megabytes"));
+}
+
+#[test]
+fn bad_input_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert!(exits(2, at, "trade --meshes nowhere").contains("nowhere is no folder"));
+    fs::write(at.join("a.csv"), "part,points\nscan,1\n").unwrap();
+    let said = exits(1, at, "advise --device pi5 --max-ms 5 --record a.csv");
+    assert!(said.contains("a.csv holds no measurements"), "{said}");
+    let said = exits(1, at, "advise --device pi5 --max-ms 5 --record no.csv");
+    assert!(said.contains("no.csv"), "{said}");
+    exits(2, at, "advise --device pi5");
+    exits(2, at, "advise --device pi5 --max-ms NaN");
+    exits(2, at, "advise --device toaster --max-ms 5");
+    fs::create_dir(at.join("empty")).unwrap();
+    assert!(exits(1, at, "trade --meshes empty").contains("empty"));
+}
