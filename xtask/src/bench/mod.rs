@@ -31,7 +31,6 @@ mod subject;
 mod table;
 mod to_disk;
 mod trade;
-mod venv;
 
 /// What to measure.
 #[derive(Args, Debug)]

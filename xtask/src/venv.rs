@@ -1,32 +1,33 @@
 //! The Python environments that peers live in, made from PyPI on first use.
 
-use std::path::{Path, PathBuf};
+use crate::workspace::root;
+use std::path::PathBuf;
 use std::process::Command;
 
 /// Tried in this order.
 const PYTHONS: [&str; 3] = ["python3", "python", "py"];
 
-/// The folder of the peers' programs and their pinned packages.
+/// The folder of the programs that `bench` runs, and their pinned packages.
 pub fn programs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("peers")
+    root().join("xtask/peers")
 }
 
 /// The folder of what is made for the peers.
 pub fn workshop() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/peers")
+    root().join("target/peers")
 }
 
 /// A Python environment.
-pub struct Environment {
+pub struct Environment<'a> {
     /// Its folder's name.
-    pub name: &'static str,
-    /// The pinned packages, a file below [`programs`].
-    pub requirements: &'static str,
+    pub name: &'a str,
+    /// The pinned packages, a file of the workspace.
+    pub requirements: &'a str,
     /// What comes from PyPI, in words for the user.
-    pub size: &'static str,
+    pub size: &'a str,
 }
 
-impl Environment {
+impl Environment<'_> {
     /// The interpreter of the environment, made under [`workshop`] unless it
     /// is there.
     ///
@@ -36,7 +37,7 @@ impl Environment {
         let folder = workshop().join(self.name);
         let interpreter =
             folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
-        let requirements = programs().join(self.requirements);
+        let requirements = root().join(self.requirements);
         let pinned = std::fs::read_to_string(&requirements).map_err(|e| e.to_string())?;
         let done = folder.join("edgepuck-requirements.txt");
         if std::fs::read_to_string(&done).is_ok_and(|installed| installed == pinned) {
