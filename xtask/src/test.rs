@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     lint_for_the_pi(!args.no_install)?;
     test_on_the_pi(!args.no_install)?;
     build_for_the_pi(!args.no_install)?;
-    peers::run(args.peers)?;
+    peers::run(args.peers, !args.no_install)?;
     if args.fuzz_seconds > 0 {
         fuzz(args.fuzz_seconds)?;
     }

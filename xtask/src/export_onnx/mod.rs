@@ -46,7 +46,8 @@ Inputs, f32, normalised as the model's card says (unit-sphere: mean to 0, larges
 radius to 1; infer-cpu does it by itself, a graph does not):
   points [batch, points, 3]  what the network sees, chosen by any sampler
   cloud  [batch, all, 3]     all points, for networks that look around theirs
-With --critical-points `cloud` is the only input: the graph chooses.
+With --critical-points `cloud` is the only input: the graph chooses. Surroundings
+take up points x all x 64 channels x 4 bytes at a time: 16 MB for 64 of 1,024.
 Outputs:
   logits [batch, classes]    before any softmax, as infer-cpu's --json has them
   kept   [batch, M], int64   with --critical-points: the points chosen, by index

@@ -87,7 +87,7 @@ pub struct AttributeProto {
     pub r#type: i32,
 }
 
-/// Values of [`AttributeProto::type`].
+/// Values of an attribute's `type`.
 pub mod attribute_type {
     pub const INT: i32 = 2;
     pub const STRING: i32 = 3;

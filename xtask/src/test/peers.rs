@@ -10,6 +10,7 @@
 use crate::venv::{Environment, workshop};
 use crate::workspace::{executable, output, root};
 use anyhow::{Context, bail};
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -39,20 +40,25 @@ pub enum Which {
     All,
 }
 
-/// Runs the scripts.
+/// Runs the scripts; `install` lets packages be fetched.
 ///
 /// # Errors
 /// One that fails; one that cannot be run is named and passed over.
-pub fn run(which: Which) -> anyhow::Result<()> {
+pub fn run(which: Which, install: bool) -> anyhow::Result<()> {
     if which == Which::None {
         eprintln!("== peers: SKIPPED, as --peers none asks for");
         return Ok(());
     }
     let infer = infer_cpu()?;
     let (start, mut failed) = (Instant::now(), Vec::new());
+    let pythons = Pythons { which, install, shared: OnceCell::new() };
     for script in scripts()? {
         let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        match check(&name, &script, &infer, which)? {
+        let ending = match pythons.of(&name) {
+            Ok(python) => check(&name, &script, &python, &infer)?,
+            Err(cause) => Ending::Skipped(cause),
+        };
+        match ending {
             Ending::Passed => {}
             Ending::Skipped(cause) => eprintln!("== peer {name}: SKIPPED, {cause}"),
             Ending::Failed => failed.push(name),
@@ -72,18 +78,39 @@ enum Ending {
     Failed,
 }
 
-fn check(name: &str, script: &Path, infer: &Path, which: Which) -> anyhow::Result<Ending> {
-    let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
-    let own_name = format!("tests-{name}-venv");
-    let own = Environment { name: &own_name, requirements: &requirements, size: "some 5 GB" };
-    let has_own = root().join(&requirements).exists();
-    if has_own && which != Which::All {
-        return Ok(Ending::Skipped("its packages are large; --peers all runs it".to_owned()));
+/// Who runs scripts.
+struct Pythons {
+    which: Which,
+    /// Whether packages may be fetched.
+    install: bool,
+    /// Tried once: without a network, giving up takes a while.
+    shared: OnceCell<Result<PathBuf, String>>,
+}
+
+impl Pythons {
+    /// The interpreter that has what script `name` imports, or why there is none.
+    fn of(&self, name: &str) -> Result<PathBuf, String> {
+        let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
+        if !root().join(&requirements).exists() {
+            return self.shared.get_or_init(|| self.interpreter(&SHARED)).clone();
+        }
+        if self.which != Which::All {
+            return Err("its packages are large; --peers all runs it".to_owned());
+        }
+        let folder = format!("tests-{name}-venv");
+        let size = "some 5 GB";
+        self.interpreter(&Environment { name: &folder, requirements: &requirements, size })
     }
-    let python = match if has_own { own.interpreter() } else { SHARED.interpreter() } {
-        Ok(python) => python,
-        Err(cause) => return Ok(Ending::Skipped(cause)),
-    };
+
+    fn interpreter(&self, environment: &Environment<'_>) -> Result<PathBuf, String> {
+        match self.install {
+            true => environment.interpreter(),
+            false => environment.made()?.ok_or_else(|| "its packages are missing".to_owned()),
+        }
+    }
+}
+
+fn check(name: &str, script: &Path, python: &Path, infer: &Path) -> anyhow::Result<Ending> {
     let out = workshop().join("tests").join(name);
     empty(&out)?;
     eprintln!("== peer {name}: {SCRIPTS}/{name}.py");
