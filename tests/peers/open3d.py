@@ -11,7 +11,8 @@ import sys
 from pathlib import Path
 
 # This file's own name is that of the package: it must not import itself.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+HERE = Path(__file__).resolve().parent
+sys.path = [entry for entry in sys.path if Path(entry).resolve() != HERE]
 
 try:
     import tomllib

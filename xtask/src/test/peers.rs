@@ -117,6 +117,8 @@ fn check(name: &str, script: &Path, python: &Path, infer: &Path) -> anyhow::Resu
     // -B keeps compiled files from lying beside the scripts.
     let mut command = Command::new(python);
     command.arg("-B").arg(script).current_dir(&out);
+    // Scripts are named after packages, which must not be taken for them.
+    command.env("PYTHONSAFEPATH", "1");
     command.env("EDGEPUCK_XTASK", env::current_exe()?).env("EDGEPUCK_INFER", infer);
     command.env("EDGEPUCK_ROOT", root()).env("EDGEPUCK_OUT", &out);
     let status = command.status().with_context(|| format!("cannot run {}", script.display()))?;
