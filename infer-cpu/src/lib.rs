@@ -36,6 +36,13 @@ pub mod sharing {
     pub use crate::screen::screening_pays;
 }
 
+/// What a model file holds, layer by layer, for programs that write it in
+/// another form.
+pub mod model_file {
+    pub use crate::dense::Dense;
+    pub use crate::network::{Front, Network, TNet, read};
+}
+
 #[cfg(feature = "npz")]
 pub use calibrate::on_set as activation_ranges_of_set;
 pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};

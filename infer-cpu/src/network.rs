@@ -11,6 +11,7 @@
 //! taken as folded already.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use formats::FormatError;
 use formats::model_card::ModelCard;
@@ -74,6 +75,18 @@ pub enum Role {
 
 /// The widest layer: a sum of int8 products of as many inputs fits 32 bits.
 const WIDEST: usize = 1 << 16;
+
+/// Reads the card and the network of the model file at `path`, in f32, batch
+/// norms folded in.
+///
+/// # Errors
+/// A file that is no model: what [`crate::Classifier::load`] refuses.
+pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
+    let mut file = WeightsFile::open(path)?;
+    let card = ModelCard::from_metadata(path, &file.metadata())?;
+    let network = read_network(&mut file, &card, |dense, _| dense, |dense| dense)?;
+    Ok((card, network))
+}
 
 /// Reads the network of `file`. Each layer goes through `conv` or `fc` as soon
 /// as it is read, so that no more than one is in memory twice.

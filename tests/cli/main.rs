@@ -6,6 +6,7 @@ mod bad_input;
 mod checkpoints;
 mod datasets;
 mod end_to_end;
+mod export_onnx;
 mod import_weights;
 mod interrupted;
 mod meshes;

@@ -5,6 +5,7 @@ mod advise;
 mod bench;
 mod build_pi;
 mod caster;
+mod export_onnx;
 mod gen_dataset;
 mod gen_shapes;
 mod import_weights;
@@ -19,6 +20,7 @@ mod scan;
 mod test;
 mod trade;
 mod train;
+mod venv;
 mod workspace;
 
 use clap::{Parser, Subcommand};
@@ -54,6 +56,8 @@ enum Command {
     MergeDataset(merge_dataset::Args),
     /// Turn a PyTorch checkpoint into a model file for infer-cpu
     ImportWeights(import_weights::Args),
+    /// Write a model file as ONNX, for other engines
+    ExportOnnx(export_onnx::Args),
     /// Train a network: `cargo xtask train --help`
     #[command(disable_help_flag = true)]
     Train(train::Args),
@@ -98,6 +102,7 @@ fn main() -> ExitCode {
         Command::BuildPi(args) => build_pi::run(&args),
         Command::MergeDataset(args) => merge_dataset::run(&args),
         Command::ImportWeights(args) => import_weights::run(&args),
+        Command::ExportOnnx(args) => export_onnx::run(&args),
         Command::Train(args) => train::run("train", &args),
         Command::Eval(args) => train::run("eval", &args),
         Command::Explain(args) => train::run("explain", &args),

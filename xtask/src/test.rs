@@ -1,5 +1,7 @@
 //! `cargo xtask test`: everything a change must pass.
 
+mod peers;
+
 use crate::workspace::{cargo, root, step};
 use crate::{Outcome, build_pi, pi_target};
 use anyhow::bail;
@@ -18,6 +20,10 @@ pub struct Args {
     /// Seconds to fuzz each hand-written parser
     #[arg(long, default_value_t = 10, value_name = "SECONDS")]
     fuzz_seconds: u32,
+
+    /// Which of tests/peers to run: none, light, or all, PyTorch too (5 GB from PyPI)
+    #[arg(long, value_enum, default_value_t = peers::Which::Light, value_name = "WHICH")]
+    peers: peers::Which,
 }
 
 /// Installs what is missing and runs every check.
@@ -43,6 +49,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     lint_for_the_pi(!args.no_install)?;
     test_on_the_pi(!args.no_install)?;
     build_for_the_pi(!args.no_install)?;
+    peers::run(args.peers, !args.no_install)?;
     if args.fuzz_seconds > 0 {
         fuzz(args.fuzz_seconds)?;
     }

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail};
 use std::ffi::OsStr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The workspace's root.
@@ -48,4 +48,29 @@ pub fn output(command: &mut Command) -> anyhow::Result<String> {
 pub fn words(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")
+}
+
+/// The last executable that Cargo's `messages` name, one JSON object a line.
+///
+/// # Errors
+/// There is none.
+pub fn executable(messages: &str) -> anyhow::Result<PathBuf> {
+    let messages = messages.lines().rev();
+    let mut messages = messages.filter_map(|m| serde_json::from_str::<serde_json::Value>(m).ok());
+    let last = messages.find_map(|message| Some(message["executable"].as_str()?.into()));
+    last.context("Cargo names no executable")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_the_executable_among_cargos_messages() {
+        let messages = "{\"reason\":\"compiler-artifact\",\"executable\":null}\n\
+             {\"reason\":\"compiler-artifact\",\"executable\":\"/t/pi/infer-cpu\"}\n\
+             {\"reason\":\"build-finished\",\"success\":true}\n";
+        assert_eq!(executable(messages).unwrap(), Path::new("/t/pi/infer-cpu"));
+        assert!(executable("not json\n").is_err());
+    }
 }

@@ -31,7 +31,6 @@ mod subject;
 pub mod table;
 mod to_disk;
 mod trade;
-mod venv;
 pub mod ways;
 
 /// What to measure.

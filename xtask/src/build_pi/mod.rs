@@ -62,14 +62,7 @@ pub fn build(for_rustc: &[&str]) -> anyhow::Result<PathBuf> {
     let mut cargo = pi_target::cargo(&words);
     cargo.args(["--message-format", "json-render-diagnostics", "--"]).args(for_rustc);
     let messages = workspace::output(cargo.stderr(Stdio::inherit()))?;
-    executable(&messages).context("Cargo names no executable")
-}
-
-/// The last executable that Cargo's messages name, one JSON object a line.
-fn executable(messages: &str) -> Option<PathBuf> {
-    let messages = messages.lines().rev();
-    let mut messages = messages.filter_map(|m| serde_json::from_str::<serde_json::Value>(m).ok());
-    messages.find_map(|message| Some(message["executable"].as_str()?.into()))
+    workspace::executable(&messages)
 }
 
 /// Copies the program, its permissions as well; appears whole or not at all.
@@ -81,18 +74,4 @@ fn copy<'a>(from: &Path, to: &'a Path) -> anyhow::Result<&'a Path> {
     fs::set_permissions(to, permissions)
         .with_context(|| format!("cannot make {} executable", to.display()))?;
     Ok(to)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn finds_the_executable_among_cargos_messages() {
-        let messages = "{\"reason\":\"compiler-artifact\",\"executable\":null}\n\
-             {\"reason\":\"compiler-artifact\",\"executable\":\"/t/pi/infer-cpu\"}\n\
-             {\"reason\":\"build-finished\",\"success\":true}\n";
-        assert_eq!(executable(messages), Some("/t/pi/infer-cpu".into()));
-        assert_eq!(executable("not json\n"), None);
-    }
 }

@@ -1,15 +1,18 @@
 //! The programs that rivals live in, and what must be made before they start.
 
-use super::super::venv::{Environment, programs, succeeds, workshop};
+use crate::venv::{Environment, programs, succeeds, workshop};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const GENERAL: Environment =
-    Environment { name: "infer-venv", requirements: "infer/requirements.txt", size: "some 150 MB" };
+const GENERAL: Environment<'_> = Environment {
+    name: "infer-venv",
+    requirements: "xtask/peers/infer/requirements.txt",
+    size: "some 150 MB",
+};
 
-const TORCH: Environment = Environment {
+const TORCH: Environment<'_> = Environment {
     name: "torch-venv",
-    requirements: "infer/torch-requirements.txt",
+    requirements: "xtask/peers/infer/torch-requirements.txt",
     size: "some 3 GB",
 };
 

@@ -9,7 +9,7 @@ use super::grid::Grid;
 use super::hosts;
 use super::model;
 use super::server::Server;
-use crate::bench::venv::workshop;
+use crate::venv::workshop;
 use crate::workspace;
 use anyhow::{Context, Result, ensure};
 use clap::Args;

@@ -16,8 +16,8 @@ mod sample;
 mod server;
 
 use super::machine::Machine;
-use super::venv::workshop;
 use crate::Usage;
+use crate::venv::workshop;
 use anyhow::{Context, Result};
 use clap::Args;
 use cloud::Cloud;

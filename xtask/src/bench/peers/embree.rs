@@ -2,7 +2,7 @@
 
 use super::super::clock::Cost;
 use super::super::shot::Shot;
-use super::super::venv;
+use crate::venv;
 use anyhow::{Context, Result};
 use ndarray::{Array1, Array2};
 use serde::de::DeserializeOwned;

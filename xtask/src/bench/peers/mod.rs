@@ -10,7 +10,7 @@ use super::shot::Shot;
 use super::speed::{casting, short, sweep_pose, target, vlp32c};
 use super::subject::Subject;
 use super::table::{Table, digits, millions_per_s, milliseconds};
-use super::venv::Environment;
+use crate::venv::Environment;
 use anyhow::Result;
 use embree::Embree;
 use glam::DAffine3;
@@ -30,8 +30,8 @@ use std::cell::RefCell;
 use std::hint::black_box;
 use std::sync::Arc;
 
-const OPEN3D: Environment =
-    Environment { name: "venv", requirements: "requirements.txt", size: "some 700 MB" };
+const OPEN3D: Environment<'_> =
+    Environment { name: "venv", requirements: "xtask/peers/requirements.txt", size: "some 700 MB" };
 
 /// Rays in the order in which we cast them: neighbours traverse alike.
 const OURS: &str = "our order";

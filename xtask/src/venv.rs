@@ -1,47 +1,43 @@
 //! The Python environments that peers live in, made from PyPI on first use.
 
-use std::path::{Path, PathBuf};
+use crate::workspace::root;
+use std::path::PathBuf;
 use std::process::Command;
 
 /// Tried in this order.
 const PYTHONS: [&str; 3] = ["python3", "python", "py"];
 
-/// The folder of the peers' programs and their pinned packages.
+/// The folder of the programs that `bench` runs, and their pinned packages.
 pub fn programs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("peers")
+    root().join("xtask/peers")
 }
 
 /// The folder of what is made for the peers.
 pub fn workshop() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/peers")
+    root().join("target/peers")
 }
 
 /// A Python environment.
-pub struct Environment {
+pub struct Environment<'a> {
     /// Its folder's name.
-    pub name: &'static str,
-    /// The pinned packages, a file below [`programs`].
-    pub requirements: &'static str,
+    pub name: &'a str,
+    /// The pinned packages, a file of the workspace.
+    pub requirements: &'a str,
     /// What comes from PyPI, in words for the user.
-    pub size: &'static str,
+    pub size: &'a str,
 }
 
-impl Environment {
+impl Environment<'_> {
     /// The interpreter of the environment, made under [`workshop`] unless it
     /// is there.
     ///
     /// # Errors
     /// Why there can be none, in words for the user.
     pub fn interpreter(&self) -> Result<PathBuf, String> {
-        let folder = workshop().join(self.name);
-        let interpreter =
-            folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
-        let requirements = programs().join(self.requirements);
-        let pinned = std::fs::read_to_string(&requirements).map_err(|e| e.to_string())?;
-        let done = folder.join("edgepuck-requirements.txt");
-        if std::fs::read_to_string(&done).is_ok_and(|installed| installed == pinned) {
+        if let Some(interpreter) = self.made()? {
             return Ok(interpreter);
         }
+        let folder = self.folder();
         let python = PYTHONS
             .into_iter()
             .find(|python| succeeds(Command::new(python).arg("--version")).is_ok())
@@ -49,9 +45,39 @@ impl Environment {
         eprintln!("making {} ({} from PyPI)", folder.display(), self.size);
         succeeds(Command::new(python).args(["-m", "venv"]).arg(&folder))?;
         let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
+        let interpreter = self.python();
+        let requirements = root().join(self.requirements);
         succeeds(Command::new(&interpreter).args(install).arg(&requirements))?;
-        std::fs::write(&done, pinned).map_err(|e| e.to_string())?;
+        std::fs::write(self.done(), self.pinned()?).map_err(|e| e.to_string())?;
         Ok(interpreter)
+    }
+
+    /// The interpreter, if the environment is there with these packages.
+    ///
+    /// # Errors
+    /// The list of packages cannot be read.
+    pub fn made(&self) -> Result<Option<PathBuf>, String> {
+        let pinned = self.pinned()?;
+        let is_made = std::fs::read_to_string(self.done()).is_ok_and(|found| found == pinned);
+        Ok(is_made.then(|| self.python()))
+    }
+
+    fn folder(&self) -> PathBuf {
+        workshop().join(self.name)
+    }
+
+    fn python(&self) -> PathBuf {
+        self.folder().join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" })
+    }
+
+    /// What is written last, once all packages are there.
+    fn done(&self) -> PathBuf {
+        self.folder().join("edgepuck-requirements.txt")
+    }
+
+    fn pinned(&self) -> Result<String, String> {
+        let file = root().join(self.requirements);
+        std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))
     }
 }
 

@@ -1,0 +1,98 @@
+//! A Critical Points Layer before the network: from all points of a cloud to
+//! the M that win most of a max-pooling, as `infer-cpu --sampler cpl` chooses.
+//!
+//! Scores are summed in f32 where infer-cpu has f64, and ties are broken by a
+//! point's index where it has geometry. Clouds whose points all differ, sorted
+//! by x, y, z, have the same ties.
+
+use anyhow::bail;
+use infer_cpu::model_file::Front;
+
+use super::graph::{Graph, int, word};
+use super::pointnet::{Net, Seen, convolutions, pool, transposed, trunk};
+
+/// The points of a cloud's input that were chosen, an output.
+pub const KEPT: &str = "kept";
+
+/// Adds the choice of `n_points` points of `cloud` `[batch, all, 3]`; what the
+/// network sees then. Value [`KEPT`] holds their indices.
+///
+/// # Errors
+/// A network without a front end, or with a look-up table for one.
+pub fn add(graph: &mut Graph, net: &Net, cloud: &str, n_points: usize) -> anyhow::Result<Seen> {
+    let (features, is_stn) = front(graph, net, cloud)?;
+    let pooled = pool(graph, "cpl.pool", &features);
+    let score = scores(graph, cloud, &features, &pooled);
+    best(graph, cloud, &score, n_points);
+    let points = gathered(graph, cloud);
+    // The coordinates' T-Net pools all points where it is the front end.
+    Ok(Seen { points, cloud: Some(cloud.to_owned()), pooled_stn: is_stn.then_some(pooled) })
+}
+
+/// The features that are pooled `[batch, features, all]`, as infer-cpu chooses
+/// a front end, and whether they are those of the coordinates' T-Net.
+fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, bool)> {
+    let mut entry = || transposed(graph, "cpl.entry", cloud);
+    match (&net.front, &net.stn, &net.fstn) {
+        (Some(Front::Table(_)), ..) => {
+            bail!("its front end is a look-up table, which no operator of ONNX interpolates in")
+        }
+        (Some(Front::Mlp(layers)), ..) => {
+            let entry = entry();
+            Ok((convolutions(graph, layers, &entry, "cpl"), false))
+        }
+        (None, Some(stn), _) => {
+            let entry = entry();
+            Ok((convolutions(graph, &stn.convs, &entry, "feat.stn"), true))
+        }
+        (None, None, None) => {
+            let all =
+                Seen { points: cloud.to_owned(), cloud: Some(cloud.to_owned()), pooled_stn: None };
+            Ok((trunk(graph, net, &all, "cpl"), false))
+        }
+        (None, None, Some(_)) => {
+            bail!("it has neither a front end of its own nor a T-Net of coordinates")
+        }
+    }
+}
+
+/// What each point wins, `[batch, all]`: the sum of the maxima above 0.
+fn scores(graph: &mut Graph, cloud: &str, features: &str, pooled: &str) -> String {
+    let winners = vec![int("axis", 2), int("keepdims", 0)];
+    let winners = graph.add("ArgMax", "cpl.winners", &[features], winners);
+    let worth = graph.add("Relu", "cpl.worth", &[pooled], vec![]);
+    let shape = vec![int("start", 0), int("end", 2)];
+    let shape = graph.add("Shape", "cpl.batch_and_all", &[cloud], shape);
+    let none = graph.add("ConstantOfShape", "cpl.no_score", &[&shape], vec![]);
+    let sum = vec![int("axis", 1), word("reduction", "add")];
+    graph.add("ScatterElements", "cpl.score", &[&none, &winners, &worth], sum)
+}
+
+/// The indices of the `n_points` best, `[batch, M]`; where fewer points have a
+/// score, the best one takes the places left, which changes no maximum.
+fn best(graph: &mut Graph, cloud: &str, score: &str, n_points: usize) {
+    let all = vec![int("start", 1), int("end", 2)];
+    let all = graph.add("Shape", "cpl.all", &[cloud], all);
+    let wanted = graph.whole(&[n_points as i64]);
+    let k = graph.add("Min", "cpl.k", &[&wanted, &all], vec![]);
+    graph.add_of_many(
+        "TopK",
+        &["cpl.best_score", "cpl.best"],
+        &[score, &k],
+        vec![int("axis", 1), int("largest", 1), int("sorted", 1)],
+    );
+    let zero = graph.reals("cpl.zero", &[1], &[0.0]);
+    let is_critical = graph.add("Greater", "cpl.is_critical", &["cpl.best_score", &zero], vec![]);
+    let (from, to, axis) = (graph.whole(&[0]), graph.whole(&[1]), graph.whole(&[1]));
+    let first = graph.add("Slice", "cpl.first", &["cpl.best", &from, &to, &axis], vec![]);
+    graph.add("Where", KEPT, &[&is_critical, "cpl.best", &first], vec![]);
+}
+
+/// The points [`KEPT`] of `cloud`, `[batch, M, 3]`.
+fn gathered(graph: &mut Graph, cloud: &str) -> String {
+    let axis = graph.whole(&[2]);
+    let column = graph.add("Unsqueeze", "cpl.kept_column", &[KEPT, &axis], vec![]);
+    let width = graph.whole(&[1, 1, 3]);
+    let index = graph.add("Expand", "cpl.kept_index", &[&column, &width], vec![]);
+    graph.add("GatherElements", "points", &[cloud, &index], vec![int("axis", 1)])
+}

@@ -1,0 +1,140 @@
+//! A graph as it grows: each node bears the name of its first output.
+
+use std::collections::BTreeMap;
+
+use super::proto::{
+    AttributeProto, Dimension, GraphProto, NodeProto, TensorProto, TensorShapeProto,
+    TensorTypeProto, TypeProto, ValueInfoProto, attribute_type, data_type,
+};
+
+/// Nodes in the order in which they were added, and their constants by name.
+#[derive(Default)]
+pub struct Graph {
+    nodes: Vec<NodeProto>,
+    constants: BTreeMap<String, TensorProto>,
+    inputs: Vec<ValueInfoProto>,
+    outputs: Vec<ValueInfoProto>,
+}
+
+/// The size of an axis.
+#[derive(Clone, Copy)]
+pub enum Size<'a> {
+    /// Known now.
+    Fixed(usize),
+    /// Known when the model runs.
+    Named(&'a str),
+}
+
+impl Graph {
+    /// Adds an input of f32 and returns its name.
+    pub fn input(&mut self, name: &str, shape: &[Size<'_>]) -> String {
+        self.inputs.push(value(name, data_type::FLOAT, shape));
+        name.to_owned()
+    }
+
+    /// Declares value `name` an output, of this kind of elements.
+    pub fn output(&mut self, name: &str, elements: i32, shape: &[Size<'_>]) {
+        self.outputs.push(value(name, elements, shape));
+    }
+
+    /// Adds a node of one output, `name`, and returns that.
+    pub fn add(
+        &mut self,
+        operator: &str,
+        name: &str,
+        inputs: &[&str],
+        attributes: Vec<AttributeProto>,
+    ) -> String {
+        self.add_of_many(operator, &[name], inputs, attributes);
+        name.to_owned()
+    }
+
+    /// Adds a node of several outputs.
+    pub fn add_of_many(
+        &mut self,
+        operator: &str,
+        outputs: &[&str],
+        inputs: &[&str],
+        attribute: Vec<AttributeProto>,
+    ) {
+        self.nodes.push(NodeProto {
+            input: inputs.iter().map(ToString::to_string).collect(),
+            output: outputs.iter().map(ToString::to_string).collect(),
+            name: outputs[0].to_owned(),
+            op_type: operator.to_owned(),
+            attribute,
+        });
+    }
+
+    /// A constant of f32 and the name that it was given.
+    pub fn reals(&mut self, name: &str, shape: &[usize], values: &[f32]) -> String {
+        let raw_data = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        self.constant(name, data_type::FLOAT, shape, raw_data)
+    }
+
+    /// A list of whole numbers; equal lists are one constant.
+    pub fn whole(&mut self, values: &[i64]) -> String {
+        let words: Vec<String> = values.iter().map(ToString::to_string).collect();
+        let raw_data = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let name = format!("int64.{}", words.join("."));
+        self.constant(&name, data_type::INT64, &[values.len()], raw_data)
+    }
+
+    fn constant(&mut self, name: &str, kind: i32, shape: &[usize], raw_data: Vec<u8>) -> String {
+        let dims = shape.iter().map(|&size| size as i64).collect();
+        let tensor = TensorProto { dims, data_type: kind, name: name.to_owned(), raw_data };
+        self.constants.insert(name.to_owned(), tensor);
+        name.to_owned()
+    }
+
+    /// The graph as a message.
+    pub fn finish(self, name: &str) -> GraphProto {
+        GraphProto {
+            node: self.nodes,
+            name: name.to_owned(),
+            initializer: self.constants.into_values().collect(),
+            input: self.inputs,
+            output: self.outputs,
+        }
+    }
+}
+
+fn value(name: &str, elem_type: i32, shape: &[Size<'_>]) -> ValueInfoProto {
+    let dim = shape
+        .iter()
+        .map(|size| match size {
+            Size::Fixed(n) => Dimension { dim_value: Some(*n as i64), dim_param: None },
+            Size::Named(name) => Dimension { dim_value: None, dim_param: Some((*name).to_owned()) },
+        })
+        .collect();
+    let tensor_type = TensorTypeProto { elem_type, shape: Some(TensorShapeProto { dim }) };
+    ValueInfoProto {
+        name: name.to_owned(),
+        r#type: Some(TypeProto { tensor_type: Some(tensor_type) }),
+    }
+}
+
+/// An attribute that is one whole number.
+pub fn int(name: &str, i: i64) -> AttributeProto {
+    AttributeProto { name: name.to_owned(), i, r#type: attribute_type::INT, ..Default::default() }
+}
+
+/// An attribute that is a list of whole numbers.
+pub fn ints(name: &str, ints: &[i64]) -> AttributeProto {
+    AttributeProto {
+        name: name.to_owned(),
+        ints: ints.to_vec(),
+        r#type: attribute_type::INTS,
+        ..Default::default()
+    }
+}
+
+/// An attribute that is a word.
+pub fn word(name: &str, word: &str) -> AttributeProto {
+    AttributeProto {
+        name: name.to_owned(),
+        s: word.as_bytes().to_vec(),
+        r#type: attribute_type::STRING,
+        ..Default::default()
+    }
+}

@@ -1,0 +1,147 @@
+//! PointNet, with either T-Net or without: from points to logits.
+//!
+//! Weights keep the names and shapes that PyTorch gives them: a layer that all
+//! points share is a convolution `[outputs, inputs, 1]`, one behind a pooling a
+//! `Gemm` `[outputs, inputs]`. Batch norms are folded in, and so is the
+//! identity that a T-Net adds to its matrix.
+
+use infer_cpu::model_file::{Dense, Network, TNet};
+
+use super::edges;
+use super::graph::{Graph, int, ints};
+
+/// A model file's network, in f32, batch norms folded in.
+pub type Net = Network<Dense, Dense>;
+
+/// What a network sees, as values of the graph.
+pub struct Seen {
+    /// The points, `[batch, points, 3]`.
+    pub points: String,
+    /// All points of the cloud, `[batch, all, 3]`, for networks that look around.
+    pub cloud: Option<String>,
+    /// The pooled vector of the coordinates' T-Net, `[batch, features]`, where
+    /// it is known already.
+    pub pooled_stn: Option<String>,
+}
+
+/// Adds `net` on what it sees; the logits are value `logits`.
+pub fn add(graph: &mut Graph, net: &Net, seen: &Seen) {
+    let features = trunk(graph, net, seen, "feat");
+    let mut x = pool(graph, "feat.pool", &features);
+    for (i, dense) in net.head.iter().enumerate() {
+        x = match i + 1 == net.head.len() {
+            true => gemm(graph, dense, "logits", &x),
+            false => fully_connected(graph, dense, &x),
+        };
+    }
+}
+
+/// The features that the trunk gives each point, `[batch, features, points]`;
+/// values besides those of layers are named after `prefix`.
+pub fn trunk(graph: &mut Graph, net: &Net, seen: &Seen, prefix: &str) -> String {
+    let mut x = entry(graph, net, seen, prefix);
+    for (i, dense) in net.trunk.iter().enumerate() {
+        if let Some(fstn) = net.fstn.as_ref().filter(|_| i == net.transform_after) {
+            let matrix = t_net(graph, fstn, "feat.fstn", &x, None);
+            let rows = transposed(graph, "feat.fstn.rows", &x);
+            let turned = graph.add("MatMul", "feat.fstn.turned", &[&rows, &matrix], vec![]);
+            x = transposed(graph, "feat.fstn.features", &turned);
+        }
+        x = convolution(graph, dense, &x, prefix);
+    }
+    x
+}
+
+/// What the trunk's first layer takes, channels first: turned coordinates, and
+/// features of what surrounds the points as they come.
+fn entry(graph: &mut Graph, net: &Net, seen: &Seen, prefix: &str) -> String {
+    let mut points = seen.points.clone();
+    if let Some(stn) = &net.stn {
+        let x = transposed(graph, "feat.stn.points", &points);
+        let matrix = t_net(graph, stn, "feat.stn", &x, seen.pooled_stn.as_deref());
+        points = graph.add("MatMul", "feat.stn.turned", &[&points, &matrix], vec![]);
+    }
+    if let Some(cloud) = seen.cloud.as_ref().filter(|_| !net.edges.is_empty()) {
+        let around = edges::add(graph, &net.edges, &seen.points, cloud, prefix);
+        let values: Vec<&str> =
+            std::iter::once(&points).chain(&around).map(String::as_str).collect();
+        points = graph.add("Concat", &format!("{prefix}.edged"), &values, vec![int("axis", 2)]);
+    }
+    transposed(graph, &format!("{prefix}.entry"), &points)
+}
+
+/// The matrix that a T-Net predicts of `x` `[batch, channels, points]`.
+fn t_net(
+    graph: &mut Graph,
+    net: &TNet<Dense, Dense>,
+    name: &str,
+    x: &str,
+    pooled: Option<&str>,
+) -> String {
+    let mut x = match pooled {
+        Some(pooled) => pooled.to_owned(),
+        None => {
+            let features = convolutions(graph, &net.convs, x, name);
+            pool(graph, &format!("{name}.pool"), &features)
+        }
+    };
+    for dense in &net.fcs {
+        x = fully_connected(graph, dense, &x);
+    }
+    let k = net.k as i64;
+    // 0 keeps the batch's size.
+    let shape = graph.whole(&[0, k, k]);
+    graph.add("Reshape", &format!("{name}.matrix"), &[&x, &shape], vec![])
+}
+
+/// Layers that all points share, one after the other.
+pub fn convolutions(graph: &mut Graph, layers: &[Dense], x: &str, prefix: &str) -> String {
+    layers.iter().fold(x.to_owned(), |x, dense| convolution(graph, dense, &x, prefix))
+}
+
+/// One layer that all points share. A trunk that runs twice, before and behind
+/// a Critical Points Layer, has one set of weights and two sets of `prefix`es.
+fn convolution(graph: &mut Graph, dense: &Dense, x: &str, prefix: &str) -> String {
+    let Dense { name, inputs, outputs, .. } = dense;
+    let kernel = graph.reals(&format!("{name}.weight"), &[*outputs, *inputs, 1], &dense.weight);
+    let bias = graph.reals(&format!("{name}.bias"), &[*outputs], &dense.bias);
+    // Converters of other engines ask for all that ONNX would assume.
+    let attributes = vec![
+        ints("kernel_shape", &[1]),
+        ints("strides", &[1]),
+        ints("pads", &[0, 0]),
+        ints("dilations", &[1]),
+        int("group", 1),
+    ];
+    let own = name.rsplit('.').next().unwrap_or(name);
+    let out = format!("{prefix}.{own}");
+    let y = graph.add("Conv", &out, &[x, &kernel, &bias], attributes);
+    relu(graph, dense, y)
+}
+
+fn fully_connected(graph: &mut Graph, dense: &Dense, x: &str) -> String {
+    let y = gemm(graph, dense, &dense.name, x);
+    relu(graph, dense, y)
+}
+
+fn gemm(graph: &mut Graph, dense: &Dense, out: &str, x: &str) -> String {
+    let Dense { name, inputs, outputs, .. } = dense;
+    let weight = graph.reals(&format!("{name}.weight"), &[*outputs, *inputs], &dense.weight);
+    let bias = graph.reals(&format!("{name}.bias"), &[*outputs], &dense.bias);
+    graph.add("Gemm", out, &[x, &weight, &bias], vec![int("transB", 1)])
+}
+
+fn relu(graph: &mut Graph, dense: &Dense, y: String) -> String {
+    if dense.relu { graph.add("Relu", &format!("{y}.relu"), &[&y], vec![]) } else { y }
+}
+
+/// The largest of each feature `[batch, features]`.
+pub fn pool(graph: &mut Graph, name: &str, x: &str) -> String {
+    let axes = graph.whole(&[2]);
+    graph.add("ReduceMax", name, &[x, &axes], vec![int("keepdims", 0)])
+}
+
+/// The last two axes exchanged.
+pub fn transposed(graph: &mut Graph, name: &str, x: &str) -> String {
+    graph.add("Transpose", name, &[x], vec![ints("perm", &[0, 2, 1])])
+}
