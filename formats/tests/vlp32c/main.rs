@@ -6,7 +6,6 @@ mod capture;
 mod damaged;
 
 use std::fs;
-use std::path::PathBuf;
 
 use capture::{Block, Packet};
 use formats::vlp32c::{FARTHEST_M, Returns, Revolution, START_S, count_returns, write};
