@@ -27,9 +27,7 @@ impl Cloud {
         match self {
             Self::Points { points } => points.clone(),
             Self::Repeated { point, n } => vec![*point; *n],
-            Self::Strip { n, outlier } => {
-                (0..*n).map(|i| strip(i, *n)).chain(*outlier).collect()
-            }
+            Self::Strip { n, outlier } => (0..*n).map(|i| strip(i, *n)).chain(*outlier).collect(),
             Self::Vase { n } => (0..*n).map(|i| vase(i, *n)).collect(),
             Self::Streamed { n } => stream::read(*n),
         }

@@ -11,6 +11,8 @@
 //! `EDGEPUCK_HEAVY=1`, and are named as skipped where not. What no table says
 //! plainly, a relation between several scans, is in [`rules`].
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 mod case;
 mod chain;
 mod classify;

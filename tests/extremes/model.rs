@@ -90,9 +90,8 @@ fn add_norms(tensors: &mut BTreeMap<String, Tensor>, variance: f32) {
     for layer in &all {
         let Some((prefix, kind, number)) = parts(layer) else { continue };
         let last = |kind: &str| {
-            let count = |name: &&String| {
-                parts(name).is_some_and(|(p, k, _)| p == prefix && k == kind)
-            };
+            let count =
+                |name: &&String| parts(name).is_some_and(|(p, k, _)| p == prefix && k == kind);
             all.iter().filter(count).count()
         };
         if kind == "fc" && number == last("fc") {

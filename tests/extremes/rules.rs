@@ -26,10 +26,19 @@ use tests::random::Random;
 /// A test for each relation.
 pub fn trials() -> Vec<Trial> {
     let rules: [(&str, fn()); 5] = [
-        ("a_sensor_on_a_surface_is_blind_or_looks_past_it", a_sensor_on_a_surface_is_blind_or_looks_past_it),
+        (
+            "a_sensor_on_a_surface_is_blind_or_looks_past_it",
+            a_sensor_on_a_surface_is_blind_or_looks_past_it,
+        ),
         ("an_empty_object_in_a_batch_has_no_hits", an_empty_object_in_a_batch_has_no_hits),
-        ("of_coincident_triangles_the_lowest_index_is_hit", of_coincident_triangles_the_lowest_index_is_hit),
-        ("a_squeezed_object_is_seen_as_its_squeezed_mesh", a_squeezed_object_is_seen_as_its_squeezed_mesh),
+        (
+            "of_coincident_triangles_the_lowest_index_is_hit",
+            of_coincident_triangles_the_lowest_index_is_hit,
+        ),
+        (
+            "a_squeezed_object_is_seen_as_its_squeezed_mesh",
+            a_squeezed_object_is_seen_as_its_squeezed_mesh,
+        ),
         ("an_object_flattened_to_nothing_is_not_seen", an_object_flattened_to_nothing_is_not_seen),
     ];
     let trial = |(name, rule): (&str, fn())| {

@@ -301,9 +301,7 @@ impl Knob {
     fn settings(&self) -> Vec<Setting> {
         let plain = Setting { scale: 1.0, offset: DVec3::ZERO, distance: None };
         match self {
-            Self::Scale(values) => {
-                values.iter().map(|&scale| Setting { scale, ..plain }).collect()
-            }
+            Self::Scale(values) => values.iter().map(|&scale| Setting { scale, ..plain }).collect(),
             Self::OffsetM(values) => {
                 let at = |&offset| Setting { offset: DVec3::from_array(offset), ..plain };
                 values.iter().map(at).collect()
@@ -327,12 +325,7 @@ impl Setting {
 }
 
 impl Ranges {
-    fn of(
-        &self,
-        sensor: DVec3,
-        pattern: &BeamPattern,
-        aims: Option<&[DVec3]>,
-    ) -> Vec<Option<f64>> {
+    fn of(&self, sensor: DVec3, pattern: &BeamPattern, aims: Option<&[DVec3]>) -> Vec<Option<f64>> {
         let rule = match self {
             Self::Each(list) => {
                 assert_eq!(list.len(), pattern.len(), "`expect.ranges`: one a beam");

@@ -48,7 +48,8 @@ fn completed(header: &[u8], seed: u8) -> Vec<u8> {
     let promised = serde_json::from_slice::<safetensors::tensor::Metadata>(header)
         .map_or(0, |metadata| metadata.data_len());
     let value = |i: usize| ((i * 37 + usize::from(seed)) % 64) as f32 / 64.0 - 0.5;
-    let values = (0..promised.min(4 * MOST_VALUES).div_ceil(4)).flat_map(|i| value(i).to_le_bytes());
+    let values =
+        (0..promised.min(4 * MOST_VALUES).div_ceil(4)).flat_map(|i| value(i).to_le_bytes());
     file.extend(values.take(promised));
     file
 }

@@ -151,7 +151,9 @@ impl Affine {
             .value
             .par_chunks_exact(self.inputs)
             .zip(rows.bound.par_chunks_exact(self.inputs))
-            .flat_map_iter(|(x, e)| (0..self.outputs).map(move |o| self.output(o, x, e, part, least)))
+            .flat_map_iter(|(x, e)| {
+                (0..self.outputs).map(move |o| self.output(o, x, e, part, least))
+            })
             .collect();
         let (value, bound) = outputs.into_iter().unzip();
         let out = Rows { width: self.outputs, value, bound };
@@ -194,10 +196,12 @@ impl Affine {
             for i in 0..k {
                 let (mut sum, mut off) = (0.0, 0.0);
                 for j in 0..k {
-                    let (w, dw) = (self.w[output * self.inputs + j], self.dw[output * self.inputs + j]);
+                    let (w, dw) =
+                        (self.w[output * self.inputs + j], self.dw[output * self.inputs + j]);
                     let (t, e) = (t.value[i * k + j], t.bound[i * k + j]);
                     sum += t * w;
-                    off += (t.abs() + e) * dw + e * w.abs() + gamma(k + 2) * (t.abs() + e) * w.abs();
+                    off +=
+                        (t.abs() + e) * dw + e * w.abs() + gamma(k + 2) * (t.abs() + e) * w.abs();
                 }
                 folded.w[output * self.inputs + i] = sum;
                 folded.dw[output * self.inputs + i] = off;

@@ -114,9 +114,8 @@ impl GrowthArgs {
 }
 
 fn csv(rows: &[Row]) -> String {
-    let mut text = String::from(
-        "quantity,layer,precision,knob,value,median_error,largest_error,bound,unit\n",
-    );
+    let mut text =
+        String::from("quantity,layer,precision,knob,value,median_error,largest_error,bound,unit\n");
     for row in rows {
         let (median, largest) = row.summary();
         let Row { quantity, layer, precision, knob, value, bound, unit, .. } = row;

@@ -87,9 +87,8 @@ impl Setting {
         for hit in &hits {
             let ray = at_home.frame.ray(pattern.directions[hit.beam as usize]);
             let Some(truth) = oracle::nearest(&at_home.target, &ray) else { continue };
-            let incidence = oracle::normal(&at_home.target, truth.index)
-                .dot(ray.direction.normalize())
-                .abs();
+            let incidence =
+                oracle::normal(&at_home.target, truth.index).dot(ray.direction.normalize()).abs();
             // At a silhouette another triangle is another range.
             if truth.index != hit.triangle || incidence * GRAZING_TANGENT < 1.0 {
                 continue;
