@@ -24,7 +24,7 @@ use sim_gpu::pose::Pose;
 use sim_gpu::ray::{Ray, RayFrame};
 use sim_gpu::resolve::{Hits, resolve};
 use sim_gpu::sensor::{BeamPattern, Sensor};
-use sim_gpu::shapes::{CLASSES, generate};
+use sim_gpu::shapes::{ShapeClass, generate};
 use sim_gpu::target::{Surface, Target};
 
 use super::lanes::{self, Lane};
@@ -82,7 +82,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     let mut classifier = Classifier::load(&model, &Options::default())?;
     let meshes = args.meshes.clone().unwrap_or_else(|| root().join("assets/meshes"));
     let mut subjects = subject::real(&meshes, usize::MAX)?;
-    subjects.extend(CLASSES.into_iter().map(shape));
+    subjects.extend(ShapeClass::ALL.into_iter().map(shape));
     let lanes = lanes::open(None)?;
     let [cpu, others @ ..] = &lanes[..] else { bail!("the CPU is always there") };
     if others.is_empty() {
@@ -111,7 +111,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
 }
 
 /// The first of the parametric shapes of `class`.
-fn shape(class: sim_gpu::shapes::ShapeClass) -> Subject {
+fn shape(class: ShapeClass) -> Subject {
     let mesh = to_world(&generate(class, 0, 0), Up::Z, Normalize::UnitSphere).mesh;
     Subject { name: format!("shape {class}"), mesh }
 }

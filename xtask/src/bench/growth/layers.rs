@@ -18,7 +18,7 @@ const N: usize = 64;
 const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
 /// One value of one knob.
-struct Setting {
+pub(super) struct Setting {
     knob: &'static str,
     value: f64,
     n: usize,
@@ -59,7 +59,7 @@ pub(super) fn measure_chain(
     name: &str,
     chain: &Chain,
     gives_logits: bool,
-    settings: &[impl std::borrow::Borrow<Setting>],
+    settings: &[Setting],
     n_clouds: u32,
 ) -> Result<Vec<Row>> {
     let parts: Vec<Part> = (1..=chain.convs.len())
@@ -79,7 +79,6 @@ pub(super) fn measure_chain(
         };
         let mut probes = files.iter().map(load).collect::<Result<Vec<_>>>()?;
         for setting in settings {
-            let setting = setting.borrow();
             let mut found: Vec<Met> = parts.iter().map(|_| Met::default()).collect();
             for number in 0..n_clouds {
                 let (input, points) = setting.clouds(number);
@@ -179,6 +178,6 @@ fn normalized(points: &[[f64; 3]]) -> (Vec<f64>, f64) {
 }
 
 /// A setting for a measurement where another thing is turned.
-pub(super) fn of_knob(knob: &'static str, value: f64) -> impl std::borrow::Borrow<Setting> {
+pub(super) fn of_knob(knob: &'static str, value: f64) -> Setting {
     Setting { knob, value, n: N, scale: 1.0, offset: 0.0 }
 }
