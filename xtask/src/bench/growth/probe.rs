@@ -60,6 +60,7 @@ pub fn write(net: &Net, chain: &Chain, part: Part, path: &Path) -> Result<()> {
         pooled_relu: !whole || chain.pooled_relu,
         edge_radii: if chain.edges { net.card.edge_radii.clone() } else { Vec::new() },
         activation_ranges: model.ranges,
+        provenance: Some("a part of a network, to be measured".to_owned()),
         ..ModelCard::default()
     };
     Ok(write_weights(path, &model.tensors, &card.to_metadata())?)
