@@ -52,12 +52,15 @@ impl WeightsFile {
         let file_size = file.metadata().map_err(here)?.len();
         let mut length = [0; LENGTH_SIZE as usize];
         file.read_exact(&mut length).map_err(|_| bad("too short for safetensors".to_owned()))?;
-        // Zip archives, and pickles of protocol 2 from before PyTorch 1.6.
-        if length.starts_with(b"PK\x03\x04") || length.starts_with(b"\x80\x02") {
-            return Err(bad("a PyTorch checkpoint, no safetensors: import its weights".to_owned()));
-        }
+        let start = length;
         let length = u64::from_le_bytes(length);
         if length > LONGEST_HEADER || length > file_size - LENGTH_SIZE {
+            // Zip archives, and pickles of protocol 2 from before PyTorch 1.6. Only of
+            // what is no length: a header of 640 bytes begins with 80 02, too.
+            if start.starts_with(b"PK\x03\x04") || start.starts_with(b"\x80\x02") {
+                let cause = "a PyTorch checkpoint, no safetensors: import its weights";
+                return Err(bad(cause.to_owned()));
+            }
             return Err(bad(format!(
                 "no safetensors: a header of {length} bytes in a file of {file_size}"
             )));
@@ -269,8 +272,27 @@ mod tests {
         std::fs::write(&path, b"PK\x03\x04 and more that follows").unwrap();
         let error = WeightsFile::open(&path).err().unwrap().to_string();
         assert!(error.contains("a PyTorch checkpoint"), "{error}");
+        std::fs::write(&path, b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46 and more").unwrap();
+        let error = WeightsFile::open(&path).err().unwrap().to_string();
+        assert!(error.contains("a PyTorch checkpoint"), "{error}");
         let error = WeightsFile::open(folder.path()).err().unwrap().to_string();
         assert!(error.contains("a folder"), "{error}");
+    }
+
+    /// The length 640 is written 80 02 and zeros; 80 02 is also how old pickles begin.
+    #[test]
+    fn a_header_as_long_as_a_pickle_s_first_bytes_is_a_header() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.safetensors");
+        let with_note = |n: usize| BTreeMap::from([("note".to_owned(), "x".repeat(n))]);
+        write_weights(&path, &example(), &with_note(0)).unwrap();
+        let length = |path: &Path| {
+            let bytes = std::fs::read(path).unwrap();
+            u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize
+        };
+        write_weights(&path, &example(), &with_note(640 - length(&path))).unwrap();
+        assert_eq!(length(&path), 640);
+        assert_eq!(WeightsFile::open(&path).unwrap().read("a").unwrap(), example()["a"]);
     }
 
     #[test]

@@ -9,6 +9,10 @@ const FRACTION_BITS: i32 = 62;
 /// The mean is summed in integers, 62 bits a coordinate, so that it does not
 /// depend on the order of the points by a single bit; everything else is f64.
 /// All coordinates must be finite.
+///
+/// Shape alone is promised to count for clouds whose largest coordinate is a normal
+/// number, 2.3e-308 or more. Smaller ones keep what bits they have, unless the
+/// caller's thread flushes subnormal numbers to 0: then they are points at 0.
 pub fn to_unit_sphere(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.clear();
     let Some(first) = points.first() else { return };

@@ -18,7 +18,7 @@ pub struct Args {
     no_install: bool,
 
     /// Seconds to fuzz each hand-written parser
-    #[arg(long, default_value_t = 10, value_name = "SECONDS")]
+    #[arg(long, default_value_t = 30, value_name = "SECONDS")]
     fuzz_seconds: u32,
 
     /// Which of tests/peers to run: none, light, or all, PyTorch too (5 GB from PyPI)
@@ -130,10 +130,16 @@ fn fuzz(seconds: u32) -> anyhow::Result<()> {
         return Ok(());
     }
     let limit = format!("-max_total_time={seconds}");
-    for target in ["off", "mesh", "clouds"] {
+    for target in ["off", "mesh", "clouds", "model"] {
         let build = ["run", "--release", "--target", "x86_64-unknown-linux-gnu", "--bin", target];
         let mut command = cargo(&build);
-        command.args(["--", &limit]).current_dir(root().join("tests/fuzz"));
+        let folder = root().join("tests/fuzz");
+        command.args(["--", &limit]).current_dir(&folder);
+        // What is found goes to the first folder; the second is where it starts.
+        if folder.join("seeds").join(target).is_dir() {
+            std::fs::create_dir_all(folder.join("corpus").join(target))?;
+            command.args([format!("corpus/{target}"), format!("seeds/{target}")]);
+        }
         step(&format!("fuzzing {target}"), command.env("RUSTFLAGS", COVERAGE))?;
     }
     Ok(())

@@ -6,6 +6,12 @@
 //! rows by one panel: vector lanes run along output channels, so that rows need
 //! no packing and the maximum over points is lane by lane. `scalar` is the
 //! reference that every other file is held to by `suite`.
+//!
+//! Subnormal numbers are treated as the caller's thread has them treated: kernels
+//! leave the processor's mode alone. Flushed to 0 or not, a sum of K products moves
+//! by at most K times 1.2e-38 (f32's least normal number), which is nothing beside
+//! activations that a class depends on. So logits are promised to be the same to
+//! 1e-33 in either mode, and to the bit in the same one; `flushed` tests it.
 
 #![expect(unsafe_code, reason = "SIMD intrinsics; every block says why it is sound")]
 
@@ -19,6 +25,8 @@ use half::f16;
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
+mod flushed;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 #[cfg(target_arch = "aarch64")]

@@ -1,35 +1,8 @@
-//! Clouds and weights at the ends of what there can be: each has an outcome.
-
-use serde_json::Value;
+//! What the program says of clouds and weights at the ends of what there can be.
+//! What they come to is in `tests/extremes`, case by case.
 
 use crate::program::{Folder, card, strip};
 use crate::tiny_model;
-
-const SAMPLERS: [&str; 6] = [
-    "--sampler all",
-    "--sampler first --points 16",
-    "--sampler random --points 16",
-    "--sampler fps --points 16",
-    "--sampler voxel --points 16",
-    "--sampler cpl --points 16",
-];
-
-/// Classifies `cloud` behind every sampler; all must end well, with a
-/// confidence that is a probability.
-fn classified(cloud: &[[f64; 3]]) -> Vec<Value> {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", cloud);
-    SAMPLERS
-        .iter()
-        .map(|sampler| {
-            let found = folder.classify_json(&format!("{sampler} c.xyz")).remove(0);
-            let confidence = found["confidence"].as_f64();
-            let is_probability = confidence.is_some_and(|p| (0.25..=1.0).contains(&p));
-            assert!(is_probability, "{sampler}: {found}");
-            found
-        })
-        .collect()
-}
 
 #[test]
 fn no_point_has_no_class() {
@@ -41,61 +14,6 @@ fn no_point_has_no_class() {
     let found = &folder.classify_json("c.npy")[0];
     assert_eq!(found["error"], "c.npy: the cloud has no points");
     assert_eq!(found["file"], "c.npy");
-}
-
-#[test]
-fn one_point_is_a_cloud() {
-    for found in classified(&[[3.0, -2.0, 1.0]]) {
-        assert_eq!((&found["points"], &found["used"]), (&1.into(), &1.into()));
-    }
-}
-
-#[test]
-fn equal_points_are_one_at_the_origin() {
-    let origin = classified(&[[0.0; 3]]);
-    for (found, one) in classified(&[[7.0, 8.0, 9.0]; 40]).iter().zip(origin) {
-        assert_eq!((&found["points"], &found["used"]), (&40.into(), &1.into()));
-        assert_eq!(found["logits"], one["logits"]);
-    }
-}
-
-#[test]
-fn fewer_points_than_are_wanted_are_all_used() {
-    let found = classified(&strip(9));
-    // A critical points layer uses those that win a channel.
-    for found in &found[..5] {
-        assert_eq!(found["used"], 9);
-        assert_eq!(found["logits"], found["logits"]);
-    }
-    assert!(found[5]["used"].as_u64().is_some_and(|used| (1..=9).contains(&used)));
-}
-
-#[test]
-fn only_shape_counts_not_magnitude() {
-    let cloud = strip(60);
-    let plain = classified(&cloud);
-    for exponent in [-100, 100] {
-        // By a power of two near 1e-30 and 1e30, so that not a bit changes.
-        let scale = 2f64.powi(exponent);
-        let scaled: Vec<_> = cloud.iter().map(|point| point.map(|x| x * scale)).collect();
-        for (found, plain) in classified(&scaled).iter().zip(&plain) {
-            assert_eq!(found["logits"], plain["logits"], "2^{exponent}");
-        }
-    }
-    for scale in [1e-30, 1e30] {
-        let scaled: Vec<_> = cloud.iter().map(|point| point.map(|x| x * scale)).collect();
-        classified(&scaled);
-    }
-}
-
-#[test]
-fn an_outlier_leaves_the_others_in_one_place() {
-    let mut cloud = strip(60);
-    cloud.push([1e9, 0.0, 0.0]);
-    for found in classified(&cloud) {
-        assert_eq!(found["points"], 61);
-        assert!(found["used"].as_u64().unwrap() >= 1);
-    }
 }
 
 #[test]
@@ -175,28 +93,4 @@ fn int8_counts_what_its_calibration_clips() {
         "warning: c.xyz: {n} activations were clipped to the range that i8 is calibrated for\n"
     );
     assert_eq!(ran.err, expected);
-}
-
-#[test]
-fn huge_logits_are_probabilities_all_the_same() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(60));
-    scaled_model(&folder, "fc3.weight", 1e30);
-    let found = &folder.classify_json("c.xyz")[0];
-    assert!(found["logits"][0].as_f64().unwrap().abs() > 1e20, "{found}");
-    assert_eq!(found["confidence"], 1.0);
-}
-
-#[test]
-fn of_equal_logits_the_first_class_wins() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(60));
-    let mut tensors = tiny_model::tensors(4);
-    tiny_model::scale(&mut tensors, "fc3.weight", 0.0);
-    tiny_model::scale(&mut tensors, "fc3.bias", 0.0);
-    tiny_model::write(&folder.path("m.safetensors"), &tensors, &card());
-    for precision in ["f32", "f32-fc16", "f16", "i8"] {
-        let found = &folder.classify_json(&format!("--precision {precision} c.xyz"))[0];
-        assert_eq!((&found["label"], &found["confidence"]), (&"a".into(), &0.25.into()));
-    }
 }

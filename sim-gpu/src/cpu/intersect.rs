@@ -1,6 +1,14 @@
 //! Watertight ray-triangle test: Woop, Benthin, Wald, "Watertight
 //! ray/triangle intersection", JCGT 2(1), 2013. Twin of
 //! `shaders/intersect.wgsl`.
+//!
+//! Subnormal numbers: WGSL lets an adapter flush them to 0 or not, as it likes, and
+//! the CPU does not. Promised is what does not depend on it. In the unit frame a
+//! flushed coordinate moves by less than 1.2e-38, nothing beside [`DISPLACEMENT`].
+//! Edge functions multiply two lengths: those of a triangle whose sides are below
+//! 1e-19 of the object's longest may vanish on one adapter and not on another, so
+//! that a beam hits it on the one and what lies behind it on the other. Such a
+//! triangle is smaller than the rounding of any vertex that is not next to 0.
 
 use super::traverse::NO_HIT;
 use crate::bvh::LeafTriangle;

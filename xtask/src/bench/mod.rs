@@ -3,8 +3,9 @@
 //! One file per question asked: [`speed`] of building and tracing, [`trade`]
 //! of speed against accuracy, which [`builders`] pays when, the share of each
 //! stage of the [`pipeline`], and how [`peers`] compare. [`infer`] is about
-//! classifying, sampling and learning, [`pi_model`] about both on a Raspberry Pi, the
-//! others about scanning.
+//! classifying, sampling and learning, [`pi_model`] about both on a Raspberry Pi,
+//! [`growth`] about errors, [`devices`] about adapters beside the CPU, the others
+//! about scanning.
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
@@ -16,6 +17,8 @@ pub mod accuracy;
 mod bins;
 mod builders;
 pub mod clock;
+mod devices;
+mod growth;
 mod infer;
 mod kernel;
 pub mod lanes;
@@ -57,6 +60,10 @@ enum Benchmark {
     /// Its inner loops, as compiled, go through llvm-mca; what is outside them
     /// is counted under QEMU; memory and threads are reckoned.
     PiModel(pi_model::PiModelArgs),
+    /// Measure how errors grow with scale, offset, N and K, beside derived bounds.
+    Growth(growth::GrowthArgs),
+    /// Compare every adapter with the CPU on the same meshes.
+    Devices(devices::DevicesArgs),
 }
 
 #[derive(Args, Debug)]
@@ -120,6 +127,8 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         Benchmark::Infer(args) => infer::run(args),
         Benchmark::Train(args) => infer::learn::run(args),
         Benchmark::PiModel(args) => pi_model::run(args),
+        Benchmark::Growth(args) => growth::run(args),
+        Benchmark::Devices(args) => devices::run(args),
     }
 }
 

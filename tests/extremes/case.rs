@@ -1,0 +1,121 @@
+//! The files of cases: found, read, checked.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use libtest_mimic::Trial;
+use serde::Deserialize;
+
+use crate::chain::Chain;
+use crate::classify::Classify;
+use crate::sample::Sample;
+use crate::scan::Scan;
+use crate::scene::ManyObjects;
+
+/// Set to 1, heavy cases run.
+const HEAVY: &str = "EDGEPUCK_HEAVY";
+
+/// A file of a case: one of the kinds, and why its outcome must be.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    /// Why the outcome is what it must be.
+    derivation: String,
+    /// Whether it takes gigabytes or minutes.
+    #[serde(default)]
+    heavy: bool,
+    scan: Option<Scan>,
+    classify: Option<Classify>,
+    sample: Option<Sample>,
+    chain: Option<Chain>,
+    scene: Option<ManyObjects>,
+}
+
+/// A case of whichever kind, as the test that it is.
+type Check = Box<dyn FnOnce() + Send>;
+
+/// A test for each file; a file that cannot be read is a test that fails.
+pub fn trials() -> Vec<Trial> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("extremes/cases");
+    let mut trials = vec![Trial::test("what_is_misspelt_is_named", what_is_misspelt_is_named)];
+    for path in files(&root) {
+        let place = path.strip_prefix(&root).unwrap_or(&path);
+        let name = place.with_extension("").to_string_lossy().replace('\\', "/");
+        let (heavy, test) = match read(&path) {
+            Ok((heavy, check)) => (heavy, Ok(check)),
+            Err(error) => (false, Err(error)),
+        };
+        let skipped = heavy && !std::env::var(HEAVY).is_ok_and(|value| value == "1");
+        if skipped {
+            eprintln!("SKIPPED: {name} takes gigabytes or minutes; {HEAVY}=1 runs it");
+        }
+        let trial = Trial::test(name, move || Ok(test.map(|check| check())?));
+        trials.push(trial.with_ignored_flag(skipped));
+    }
+    trials
+}
+
+/// Every file below `folder`, whatever its name: none is passed over.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let items = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut paths: Vec<PathBuf> = items.map(|item| item.expect("an entry").path()).collect();
+    paths.sort();
+    let below = |path: PathBuf| if path.is_dir() { files(&path) } else { vec![path] };
+    paths.into_iter().flat_map(below).collect()
+}
+
+fn read(path: &Path) -> Result<(bool, Check), String> {
+    let text = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    parse(&text, path).map_err(|cause| format!("{}: {cause}", path.display()))
+}
+
+fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
+    if path.extension() != Some(OsStr::new("toml")) {
+        return Err("a case's name ends in .toml".to_owned());
+    }
+    let file: File = toml::from_str(text).map_err(|e| e.to_string())?;
+    if file.derivation.trim().is_empty() {
+        return Err("`derivation` is empty".to_owned());
+    }
+    let kinds: [(&str, Option<Check>); 5] = [
+        ("scan", file.scan.map(|case| Box::new(move || case.check()) as Check)),
+        ("classify", file.classify.map(|case| Box::new(move || case.check()) as Check)),
+        ("sample", file.sample.map(|case| Box::new(move || case.check()) as Check)),
+        ("chain", file.chain.map(|case| Box::new(move || case.check()) as Check)),
+        ("scene", file.scene.map(|case| Box::new(move || case.check()) as Check)),
+    ];
+    let mut named = kinds.into_iter().filter_map(|(kind, check)| Some((kind, check?)));
+    let (Some((kind, check)), None) = (named.next(), named.next()) else {
+        return Err("a case is one table: scan, classify, sample, chain or scene".to_owned());
+    };
+    match path.parent().and_then(Path::file_name) {
+        Some(folder) if folder == kind => Ok((file.heavy, check)),
+        _ => Err(format!("a case of `{kind}` belongs into the folder {kind}")),
+    }
+}
+
+/// A case that says nothing, or something else than it seems to, is no test.
+fn what_is_misspelt_is_named() -> Result<(), libtest_mimic::Failed> {
+    let sample = "[sample]\npoints = [[0, 0, 0]]\nsampler = \"voxel\"\nvoxel_size = 1\n";
+    let whole = format!("derivation = \"one\"\n{sample}kept = [0]\n");
+    let message = |text: &str, name: &str| parse(text, Path::new(name)).err().unwrap_or_default();
+    assert_eq!(message(&whole, "sample/a.toml"), "");
+    for (text, name, expected) in [
+        (whole.replace("kept", "keeps"), "sample/a.toml", "unknown field `keeps`"),
+        (whole.replace("derivation", "derived"), "sample/a.toml", "unknown field `derived`"),
+        (whole.replace("[sample]", "[samples]"), "sample/a.toml", "unknown field `samples`"),
+        (whole.replace("voxel\"", "voxels\""), "sample/a.toml", "unknown variant `voxels`"),
+        (whole.replace("\"one\"", "\" \""), "sample/a.toml", "`derivation` is empty"),
+        ("derivation = \"one\"".to_owned(), "sample/a.toml", "a case is one table"),
+        (sample.to_owned() + "kept = [0]", "sample/a.toml", "missing field `derivation`"),
+        (whole.clone(), "scan/a.toml", "belongs into the folder sample"),
+        (whole.clone(), "sample/a.tml", "ends in .toml"),
+    ] {
+        let found = message(&text, name);
+        assert!(found.contains(expected), "{expected}: {found}");
+    }
+    let missing = Path::new("no/such/case.toml");
+    assert!(read(missing).err().is_some_and(|told| told.starts_with("no/such/case.toml: ")));
+    Ok(())
+}

@@ -1,0 +1,186 @@
+//! Cases of one cloud and one model, in every precision and on every kernel.
+
+use infer_cpu::kernel::{self, KernelName};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+use infer_cpu::{Classifier, Error, Options, Precision, Prediction};
+use serde::Deserialize;
+
+use crate::cloud::Cloud;
+use crate::model::{Model, ModelFile};
+
+/// A cloud, a model, and what comes of them.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Classify {
+    model: Model,
+    cloud: Cloud,
+    /// Another cloud, for `expect.same`.
+    other: Option<Cloud>,
+    /// By their names on the command line; as the model was trained, if absent.
+    samplers: Option<Vec<String>>,
+    /// How many points samplers keep.
+    points: Option<usize>,
+    /// By their names on the command line; all, if absent.
+    precisions: Option<Vec<String>>,
+    knob: Option<Knob>,
+    expect: Expect,
+}
+
+/// What is turned, and to which values; each must give what `expect` says.
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Knob {
+    /// Coordinates are so many times as large.
+    Scale(Vec<f64>),
+    /// Coordinates lie elsewhere.
+    Offset(Vec<[f64; 3]>),
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Expect {
+    /// The cloud is refused, and the error holds this.
+    refused: Option<String>,
+    points: Option<usize>,
+    used: Option<usize>,
+    /// At least 1 of them and at most so many.
+    used_at_most: Option<usize>,
+    label: Option<String>,
+    confidence: Option<f64>,
+    /// What the network computed in, where another precision overflowed.
+    computed_in: Option<String>,
+    /// Whether int8 clips activations.
+    clipped: Option<bool>,
+    /// The largest logit's magnitude is above this.
+    logits_above: Option<f64>,
+    /// The logits of the other cloud, and of each value of the knob, are those of
+    /// the cloud to within this part of the largest; 0 is to the bit.
+    same: Option<f64>,
+}
+
+/// One way to compute.
+#[derive(Clone)]
+struct Way {
+    precision: Precision,
+    kernel: KernelName,
+    sampler: Option<SamplerKind>,
+}
+
+impl Classify {
+    /// Classifies in every way.
+    pub fn check(&self) {
+        let model = self.model.file();
+        let cloud = self.cloud.points();
+        let turned = self.turned(&cloud);
+        for way in self.ways() {
+            let mut classifier = self.classifier(&way, &model);
+            let what = way.name();
+            let plain = self.expect.check(&what, classifier.classify_f64(&cloud));
+            for (name, cloud) in &turned {
+                let what = format!("{what}, {name}");
+                let found = self.expect.check(&what, classifier.classify_f64(cloud));
+                if let (Some(part), Some(plain), Some(found)) = (self.expect.same, &plain, &found) {
+                    assert_same(&what, part, plain, found);
+                }
+            }
+        }
+    }
+
+    /// The other cloud, and the cloud at each value of the knob.
+    fn turned(&self, cloud: &[[f64; 3]]) -> Vec<(String, Vec<[f64; 3]>)> {
+        let mapped = |map: &dyn Fn([f64; 3]) -> [f64; 3]| cloud.iter().copied().map(map).collect();
+        let other = self.other.iter().map(|other| ("the other".to_owned(), other.points()));
+        let by_knob: Vec<(String, Vec<[f64; 3]>)> = match &self.knob {
+            None => Vec::new(),
+            Some(Knob::Scale(values)) => values
+                .iter()
+                .map(|s| (format!("scale {s:e}"), mapped(&|p| p.map(|x| x * s))))
+                .collect(),
+            Some(Knob::Offset(values)) => values
+                .iter()
+                .map(|o| (format!("offset {o:?}"), mapped(&|p| [0, 1, 2].map(|k| p[k] + o[k]))))
+                .collect(),
+        };
+        other.chain(by_knob).collect()
+    }
+
+    fn ways(&self) -> Vec<Way> {
+        let precisions: Vec<Precision> = match &self.precisions {
+            None => Precision::ALL.to_vec(),
+            Some(words) => words.iter().map(|word| parsed(word)).collect(),
+        };
+        let samplers: Vec<Option<SamplerKind>> = match &self.samplers {
+            None => vec![None],
+            Some(words) => words.iter().map(|word| Some(parsed(word))).collect(),
+        };
+        let mut ways = Vec::new();
+        for precision in precisions {
+            for kernels in kernel::available().filter(|kernels| precision.runs_on(kernels)) {
+                let kernel = kernels.name;
+                ways.extend(samplers.iter().map(|&sampler| Way { precision, kernel, sampler }));
+            }
+        }
+        ways
+    }
+
+    fn classifier(&self, way: &Way, model: &ModelFile) -> Classifier {
+        let points = self.points.unwrap_or(SamplerSpec::default().points);
+        let spec = |kind| SamplerSpec { kind, points, ..SamplerSpec::default() };
+        let options = Options {
+            precision: way.precision,
+            kernel: Some(way.kernel),
+            sampler: way.sampler.map(spec),
+            ..Options::default()
+        };
+        Classifier::load(&model.path, &options).unwrap_or_else(|error| panic!("{error}"))
+    }
+}
+
+impl Expect {
+    /// That the answer is the expected one; its logits.
+    fn check(&self, what: &str, found: Result<&Prediction, Error>) -> Option<Vec<f32>> {
+        if let Some(part) = &self.refused {
+            let error = found.err().unwrap_or_else(|| panic!("{what}: not refused"));
+            assert!(error.to_string().contains(part), "{what}: {error}");
+            return None;
+        }
+        let found = found.unwrap_or_else(|error| panic!("{what}: {error}"));
+        let largest = found.logits.iter().fold(0.0f32, |most, x| most.max(x.abs()));
+        assert!(largest.is_finite(), "{what}: {:?}", found.logits);
+        // The largest of n probabilities; a sum of n rounds to n * 2^-53.
+        let least = 1.0 / found.logits.len() as f64 - 1e-12;
+        let confidence = found.confidence();
+        assert!((least..=1.0).contains(&confidence), "{what}: {confidence}");
+        let holds = |told: Option<usize>, found: usize| told.is_none_or(|told| told == found);
+        assert!(holds(self.points, found.n_points), "{what}: {} points", found.n_points);
+        assert!(holds(self.used, found.n_used), "{what}: {} used", found.n_used);
+        let most = self.used_at_most.unwrap_or(usize::MAX);
+        assert!((1..=most).contains(&found.n_used), "{what}: {} used", found.n_used);
+        let is = |told: &Option<String>, found: &str| told.as_ref().is_none_or(|t| t == found);
+        assert!(is(&self.label, &found.label), "{what}: {}", found.label);
+        assert!(is(&self.computed_in, found.precision.name()), "{what}: {}", found.precision);
+        assert!(self.confidence.is_none_or(|told| told == confidence), "{what}: {confidence}");
+        let clipped = found.n_clipped > 0;
+        assert!(self.clipped.is_none_or(|told| told == clipped), "{what}: {}", found.n_clipped);
+        assert!(self.logits_above.is_none_or(|x| f64::from(largest) > x), "{what}: {largest}");
+        Some(found.logits.clone())
+    }
+}
+
+fn assert_same(what: &str, part: f64, one: &[f32], other: &[f32]) {
+    let largest = one.iter().fold(0.0f32, |most, x| most.max(x.abs()));
+    let error = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).abs();
+    let worst = one.iter().zip(other).map(error).fold(0.0, f64::max);
+    assert!(worst <= part * f64::from(largest), "{what}: {worst:e} of {largest}");
+}
+
+impl Way {
+    fn name(&self) -> String {
+        let sampler = self.sampler.map_or("as trained", SamplerKind::name);
+        format!("{} on {}, sampler {sampler}", self.precision, self.kernel)
+    }
+}
+
+fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(word: &str) -> T {
+    word.parse().unwrap_or_else(|error| panic!("{error}"))
+}

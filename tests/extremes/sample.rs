@@ -1,0 +1,42 @@
+//! Cases of which points a sampler keeps.
+
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+use serde::Deserialize;
+
+/// A cloud, a sampler and the points that it keeps.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sample {
+    points: Vec<[f64; 3]>,
+    sampler: Kind,
+    /// Edge of a voxel, in the cloud's unit.
+    voxel_size: Option<f64>,
+    /// How many points to keep.
+    m: Option<usize>,
+    /// Indices, in the sampler's order.
+    kept: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Kind {
+    Voxel,
+    Fps,
+}
+
+impl Sample {
+    /// Samples the cloud.
+    pub fn check(&self) {
+        let spec = SamplerSpec {
+            kind: match self.sampler {
+                Kind::Voxel => SamplerKind::Voxel,
+                Kind::Fps => SamplerKind::Fps,
+            },
+            points: self.m.unwrap_or(SamplerSpec::default().points),
+            voxel_size: self.voxel_size,
+            ..SamplerSpec::default()
+        };
+        let kept = infer_cpu::choose(&self.points, &spec);
+        assert_eq!(kept.unwrap_or_else(|error| panic!("{error}")), self.kept);
+    }
+}

@@ -1,0 +1,421 @@
+//! Cases of one mesh and one sensor. Every caster's hits are held to the f64
+//! oracle, with and without culling, and to what the case expects.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use serde::Deserialize;
+use sim_gpu::bvh::{Builder, assert_well_formed};
+use sim_gpu::caster::Caster;
+use sim_gpu::cpu::oracle;
+use sim_gpu::effects::Effects;
+use sim_gpu::job::Culling;
+use sim_gpu::pose::Pose;
+use sim_gpu::resolve::{Hits, resolve};
+use sim_gpu::sensor::BeamPattern;
+use sim_gpu::target::Target;
+use tests::adapter::casters;
+use tests::casting::{beams, builtin, job_with, target_by};
+use tests::judge::{judge, near_silhouette};
+use tests::meshes::mapped;
+use tests::random::Random;
+
+use crate::shape::Shape;
+
+/// A mesh, a sensor, its beams and what they find.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scan {
+    mesh: Shape,
+    #[serde(default)]
+    builder: Build,
+    sensor: Place,
+    beams: Beams,
+    knob: Option<Knob>,
+    expect: Expect,
+}
+
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Build {
+    #[default]
+    Sah,
+    Morton,
+}
+
+/// Where the sensor stands.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a sensor has `at_m` or `distance_m`", deny_unknown_fields)]
+enum Place {
+    At { at_m: [f64; 3], quaternion_xyzw: Option<[f64; 4]> },
+    View { distance_m: f64, elevation_deg: f64, azimuth_deg: f64 },
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Beams {
+    /// Those of a sensor that comes with the program.
+    Sensor(String),
+    /// In these directions.
+    Directions(Vec<[f64; 3]>),
+    /// So many, anywhere.
+    Random(usize),
+    /// At these points.
+    AtPoints(Vec<[f64; 3]>),
+    /// At random points of a box.
+    AtBox { n: usize, low: [f64; 3], high: [f64; 3] },
+    /// At points spread evenly from one to another, both included.
+    AtSegment { n: u32, from: [f64; 3], to: [f64; 3] },
+    /// At the mesh's vertices and at the middles of its edges.
+    AtCornersAndEdges {},
+}
+
+/// What is turned, and to which values; each must give what `expect` says.
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Knob {
+    /// Everything is so many times as large.
+    Scale(Vec<f64>),
+    /// Everything stands elsewhere, metres.
+    OffsetM(Vec<[f64; 3]>),
+    /// The sensor stands so far back along its own place, metres.
+    DistanceM(Vec<f64>),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Expect {
+    ranges: Option<Ranges>,
+    /// Relative error allowed of `ranges`.
+    #[serde(default = "roundings")]
+    relative: f64,
+    hits: Option<usize>,
+    hits_at_least: Option<usize>,
+    decided_in_f64: Option<usize>,
+    /// Each value of the knob gives what the case gives without it.
+    same: Option<Same>,
+    /// Whether hits are held to the oracle: not where a case is about rays that
+    /// none can judge.
+    #[serde(default = "yes")]
+    judged: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "`aim`, `leaves-cube`, `miss`, or a list of ranges and `miss`")]
+enum Ranges {
+    All(Rule),
+    Each(Vec<Range>),
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Rule {
+    /// Every beam ends where it is aimed.
+    Aim,
+    /// Every beam leaves the cube from -1 to 1, in which the sensor is.
+    LeavesCube,
+    /// No beam finds anything.
+    Miss,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "a range in metres or `miss`")]
+enum Range {
+    Metres(f64),
+    Miss(Miss),
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Miss {
+    Miss,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Same {
+    /// Beam by beam the same triangle, ranges within this part of themselves
+    /// once the scale is taken out.
+    Relative(f64),
+    /// Ranges within so many metres; so many beams may differ, each at a
+    /// silhouette.
+    Metres { within: f64, silhouettes: usize },
+}
+
+fn roundings() -> f64 {
+    1e-12
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// One setting of the knob.
+#[derive(Clone, Copy)]
+struct Setting {
+    scale: f64,
+    offset: DVec3,
+    distance: Option<f64>,
+}
+
+/// A setting made ready to be cast, and what each beam must find, if told.
+struct Scene {
+    target: Arc<Target>,
+    pose: Pose,
+    pattern: BeamPattern,
+    ranges: Option<Vec<Option<f64>>>,
+}
+
+impl Scan {
+    /// Casts every setting on every caster.
+    pub fn check(&self) {
+        let plain = Setting { scale: 1.0, offset: DVec3::ZERO, distance: None };
+        let settings = self.knob.as_ref().map_or(vec![plain], Knob::settings);
+        let reference = self.expect.same.as_ref().map(|same| (same, self.cast_all(plain)));
+        for setting in settings {
+            let (scene, found) = self.cast_all(setting);
+            if let Some((same, (first, reference))) = &reference {
+                for (reference, found) in reference.iter().zip(&found) {
+                    same.check(setting, (first, reference), (&scene, found));
+                }
+            }
+        }
+    }
+
+    /// What every caster finds, once it was checked.
+    fn cast_all(&self, setting: Setting) -> (Scene, Vec<Hits>) {
+        let scene = self.scene(setting);
+        let check = |caster: &&Caster| {
+            let what = format!("{} on {}", setting.name(), caster.name());
+            let [hits, unculled] = [Culling::On, Culling::Off].map(|c| scene.cast(caster, c));
+            assert_eq!(hits, unculled, "{what}: culling");
+            if self.expect.judged {
+                let job = job_with(&scene.target, &scene.pose, &scene.pattern, Culling::On);
+                judge(&job, &scene.pattern, &hits).assert_kept(&what);
+            }
+            self.expect.check(&what, &scene, &hits);
+            hits
+        };
+        let found = casters(&Effects::default()).iter().map(check).collect();
+        (scene, found)
+    }
+
+    fn scene(&self, Setting { scale, offset, distance }: Setting) -> Scene {
+        let builder = match self.builder {
+            Build::Sah => Builder::Sah,
+            Build::Morton => Builder::Morton,
+        };
+        let mesh = self.mesh.mesh();
+        let pose = self.sensor.pose(distance);
+        let mut random = Random::new("aims");
+        let (pattern, aims) = self.beams.pattern(&mesh, pose.position_m, &mut random);
+        let ranges = self.expect.ranges.as_ref().map(|ranges| {
+            let told = ranges.of(pose.position_m, &pattern, aims.as_deref());
+            told.into_iter().map(|range| range.map(|range| range * scale)).collect()
+        });
+        let moved = |v: DVec3| v * scale + offset;
+        let target = target_by(builder, &mapped(&mesh, moved));
+        assert_well_formed(&target.bvh);
+        let pose = Pose { position_m: moved(pose.position_m), ..pose };
+        Scene { target, pose, pattern, ranges }
+    }
+}
+
+impl Scene {
+    /// As a scan does: a target too large for the adapter goes to the CPU.
+    fn cast(&self, caster: &Caster, culling: Culling) -> Hits {
+        let job = job_with(&self.target, &self.pose, &self.pattern, culling);
+        let jobs = std::slice::from_ref(&job);
+        let casts = match caster.fits(&self.target) {
+            true => caster.cast(jobs).unwrap_or_else(|error| panic!("{error}")),
+            false => caster.cast_on_cpu(jobs),
+        };
+        resolve(&job, &casts[0], &self.pattern, &Effects::default())
+    }
+
+    fn ranges(&self, hits: &Hits) -> Vec<Option<f64>> {
+        let mut ranges = vec![None; self.pattern.len()];
+        hits.hits.iter().for_each(|hit| ranges[hit.beam as usize] = Some(hit.range_m));
+        ranges
+    }
+}
+
+impl Place {
+    fn pose(&self, distance: Option<f64>) -> Pose {
+        match self {
+            Self::At { at_m, quaternion_xyzw } => {
+                let at = DVec3::from_array(*at_m);
+                let turned = quaternion_xyzw.map_or(DQuat::IDENTITY, DQuat::from_array);
+                let position_m = distance.map_or(at, |distance| at.normalize() * distance);
+                Pose { position_m, world_from_sensor: turned }
+            }
+            Self::View { distance_m, elevation_deg, azimuth_deg } => {
+                let distance = distance.unwrap_or(*distance_m);
+                let (elevation, azimuth) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
+                Pose::view(distance, elevation, azimuth, DVec3::ZERO)
+            }
+        }
+    }
+}
+
+impl Beams {
+    /// The pattern, and the points that its beams are aimed at, if any.
+    fn pattern(
+        &self,
+        mesh: &sim_gpu::mesh::Mesh,
+        sensor: DVec3,
+        random: &mut Random,
+    ) -> (BeamPattern, Option<Vec<DVec3>>) {
+        let vectors = |list: &[[f64; 3]]| list.iter().copied().map(DVec3::from_array).collect();
+        let points: Vec<DVec3> = match self {
+            Self::Sensor(name) => return (builtin(name), None),
+            Self::Directions(list) => return (beams(vectors(list) as Vec<DVec3>), None),
+            Self::Random(n) => {
+                return (beams((0..*n).map(|_| random.direction()).collect::<Vec<_>>()), None);
+            }
+            Self::AtPoints(list) => vectors(list),
+            Self::AtBox { n, low, high } => {
+                let (low, high) = (DVec3::from_array(*low), DVec3::from_array(*high));
+                (0..*n).map(|_| low + (high - low) * (random.in_cube() * 0.5 + 0.5)).collect()
+            }
+            Self::AtSegment { n, from, to } => {
+                let (from, to) = (DVec3::from_array(*from), DVec3::from_array(*to));
+                let last = f64::from(n - 1);
+                (0..*n).map(|i| from + (to - from) * (f64::from(i) / last)).collect()
+            }
+            Self::AtCornersAndEdges {} => corners_and_edges(mesh),
+        };
+        (beams(points.iter().map(|&point| point - sensor)), Some(points))
+    }
+}
+
+fn corners_and_edges(mesh: &sim_gpu::mesh::Mesh) -> Vec<DVec3> {
+    let of = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
+        [a, b, c, a.midpoint(b), b.midpoint(c), c.midpoint(a)]
+    };
+    mesh.triangles.iter().flat_map(of).collect()
+}
+
+impl Knob {
+    fn settings(&self) -> Vec<Setting> {
+        let plain = Setting { scale: 1.0, offset: DVec3::ZERO, distance: None };
+        match self {
+            Self::Scale(values) => values.iter().map(|&scale| Setting { scale, ..plain }).collect(),
+            Self::OffsetM(values) => {
+                let at = |&offset| Setting { offset: DVec3::from_array(offset), ..plain };
+                values.iter().map(at).collect()
+            }
+            Self::DistanceM(values) => {
+                values.iter().map(|&d| Setting { distance: Some(d), ..plain }).collect()
+            }
+        }
+    }
+}
+
+impl Setting {
+    fn name(&self) -> String {
+        let Self { scale, offset, distance } = self;
+        match distance {
+            Some(distance) => format!("distance {distance:e} m"),
+            None if *scale != 1.0 => format!("scale {scale:e}"),
+            None => format!("offset {offset}"),
+        }
+    }
+}
+
+impl Ranges {
+    fn of(&self, sensor: DVec3, pattern: &BeamPattern, aims: Option<&[DVec3]>) -> Vec<Option<f64>> {
+        let rule = match self {
+            Self::Each(list) => {
+                assert_eq!(list.len(), pattern.len(), "`expect.ranges`: one a beam");
+                return list.iter().map(|range| range.metres()).collect();
+            }
+            Self::All(rule) => *rule,
+        };
+        match rule {
+            Rule::Miss => vec![None; pattern.len()],
+            Rule::Aim => {
+                let aims = aims.expect("`expect.ranges = \"aim\"` is for beams at points");
+                aims.iter().map(|&aim| Some((aim - sensor).length())).collect()
+            }
+            Rule::LeavesCube => {
+                let leaves = |d: &DVec3| ((d.signum() - sensor) / *d).min_element();
+                pattern.directions.iter().map(|d| Some(leaves(d))).collect()
+            }
+        }
+    }
+}
+
+impl Range {
+    fn metres(self) -> Option<f64> {
+        match self {
+            Self::Metres(range) => Some(range),
+            Self::Miss(Miss::Miss) => None,
+        }
+    }
+}
+
+impl Expect {
+    fn check(&self, what: &str, scene: &Scene, hits: &Hits) {
+        let (n, in_f64) = (hits.hits.len(), hits.decided_in_f64);
+        assert!(self.hits.is_none_or(|expected| n == expected), "{what}: {n} hits");
+        assert!(self.hits_at_least.is_none_or(|least| n >= least), "{what}: {n} hits");
+        assert!(self.decided_in_f64.is_none_or(|m| in_f64 == m), "{what}: {in_f64} in f64");
+        let Some(expected) = &scene.ranges else {
+            let says = self.hits.is_some() || self.hits_at_least.is_some() || self.same.is_some();
+            assert!(says, "`expect` says nothing");
+            return;
+        };
+        for (beam, pair) in scene.ranges(hits).into_iter().zip(expected).enumerate() {
+            let same = match pair {
+                (Some(found), Some(expected)) => {
+                    (found - expected).abs() <= self.relative * expected
+                }
+                (found, expected) => found == *expected,
+            };
+            assert!(same, "{what}, beam {beam}: {:?} is not {:?}", pair.0, pair.1);
+        }
+    }
+}
+
+impl Same {
+    fn check(&self, setting: Setting, first: (&Scene, &Hits), second: (&Scene, &Hits)) {
+        match self {
+            Self::Relative(tolerance) => {
+                let what = setting.name();
+                assert_eq!(first.1.hits.len(), second.1.hits.len(), "{what}");
+                for (one, other) in first.1.hits.iter().zip(&second.1.hits) {
+                    let [a, b] = [one, other].map(|hit| (hit.beam, hit.triangle));
+                    assert_eq!(a, b, "{what}");
+                    let error = (other.range_m / setting.scale / one.range_m - 1.0).abs();
+                    assert!(error < *tolerance, "{what}: {error:e}");
+                }
+            }
+            Self::Metres { within, silhouettes } => {
+                let differing = differing(first, second, *within);
+                assert!(differing <= *silhouettes, "{}: {differing} beams", setting.name());
+            }
+        }
+    }
+}
+
+/// How many beams find another range, each of which must be at a silhouette.
+fn differing(first: (&Scene, &Hits), second: (&Scene, &Hits), within: f64) -> usize {
+    let (here, there) = (first.0.ranges(first.1), second.0.ranges(second.1));
+    let job = job_with(&first.0.target, &first.0.pose, &first.0.pattern, Culling::On);
+    let mut differing = 0;
+    for (beam, pair) in here.into_iter().zip(there).enumerate() {
+        let same = match pair {
+            (Some(here), Some(there)) => (here - there).abs() < within,
+            (here, there) => here.is_none() && there.is_none(),
+        };
+        if !same {
+            let ray = job.frame.ray(first.0.pattern.directions[beam]);
+            let truth = oracle::nearest(&job.target, &ray);
+            assert!(near_silhouette(&job.target, &ray, truth), "beam {beam}: {pair:?}");
+            differing += 1;
+        }
+    }
+    differing
+}

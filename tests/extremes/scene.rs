@@ -1,0 +1,115 @@
+//! Cases of scenes of very many objects.
+
+use std::fmt::Write;
+
+use formats::scan::Attribute;
+use glam::DVec3;
+use serde::Deserialize;
+use sim_gpu::effects::Effects;
+use sim_gpu::job::Culling;
+use sim_gpu::scene::{Scene, SceneScan, cast};
+use tests::adapter::casters;
+
+/// Cubes of 1 m on a square lattice, seen from above its middle.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ManyObjects {
+    objects: usize,
+    /// From one cube to the next, metres.
+    apart_m: f64,
+    /// Of the sensor above the cubes' middles, metres.
+    height_m: f64,
+    sensor: String,
+    expect: Expect,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Expect {
+    points_at_least: usize,
+    /// Different objects among the points' at least.
+    seen_at_least: usize,
+    /// How far a point may be from the cube that it is said to be on, and a range
+    /// from that to the nearest cube, metres.
+    within_m: f64,
+}
+
+/// Points whose cube is looked for among all of them.
+const JUDGED: usize = 500;
+
+impl ManyObjects {
+    /// Scans the scene on every caster.
+    pub fn check(&self) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let cube = "OFF\n8 6 0\n-0.5 -0.5 -0.5\n0.5 -0.5 -0.5\n0.5 0.5 -0.5\n-0.5 0.5 -0.5\n\
+                    -0.5 -0.5 0.5\n0.5 -0.5 0.5\n0.5 0.5 0.5\n-0.5 0.5 0.5\n\
+                    4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n";
+        std::fs::write(folder.path().join("cube.off"), cube).expect("a mesh");
+        let file = folder.path().join("scene.toml");
+        let scene = Scene::parse(&self.text(), &file).unwrap_or_else(|error| panic!("{error}"));
+        for caster in casters(&Effects::default()) {
+            let scans = cast(&scene, caster, Culling::On);
+            let scans = scans.unwrap_or_else(|error| panic!("{}: {error}", caster.name()));
+            self.judge(&scene, &scans[0], caster.name());
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "attributes = [\"object\"]\n[[sensor]]\nprofile = {:?}\nposition_m = [0.0, 0.0, {:?}]\nyaw_deg = 0.0\n",
+            self.sensor, self.height_m
+        );
+        for i in 0..self.objects {
+            let at = self.place(i);
+            let (x, y) = (at.x, at.y);
+            let _ = write!(
+                text,
+                "[[object]]\nmesh = \"cube.off\"\nname = \"{i}\"\nposition_m = [{x:?}, {y:?}, 0.0]\n"
+            );
+        }
+        text
+    }
+
+    fn place(&self, i: usize) -> DVec3 {
+        let side = (self.objects as f64).sqrt().ceil() as usize;
+        // Off the lattice's middle, so that no beam meets an edge by rule.
+        let along = |k: usize| (k as f64 - (side - 1) as f64 / 2.0) * self.apart_m + 0.123;
+        DVec3::new(along(i % side), along(i / side), 0.0)
+    }
+
+    fn judge(&self, scene: &Scene, found: &SceneScan, caster: &str) {
+        let Expect { points_at_least, seen_at_least, within_m } = self.expect;
+        let points = &found.scan.positions;
+        assert!(points.len() >= points_at_least, "{caster}: {} points", points.len());
+        let objects = found.scan.object.as_ref().expect("the attribute was asked for");
+        assert!(scene.attributes.contains(&Attribute::Object));
+        let mut seen = objects.clone();
+        seen.sort_unstable();
+        seen.dedup();
+        assert!(seen.len() >= seen_at_least, "{caster}: {} objects seen", seen.len());
+        let sensor = scene.sensors[0].pose.position_m;
+        let step = points.len().div_ceil(JUDGED);
+        for (i, (point, &object)) in points.iter().zip(objects).enumerate() {
+            let point = DVec3::from_array(point.map(f64::from));
+            let off = ((point - self.place(object as usize)).abs().max_element() - 0.5).abs();
+            assert!(off <= within_m, "{caster}, point {i}: {off:e} m off object {object}");
+            if i % step == 0 {
+                let range = (point - sensor).length();
+                let nearest = self.nearest(sensor, (point - sensor) / range);
+                let apart = (range - nearest).abs();
+                assert!(apart <= within_m, "{caster}, point {i}: {apart:e} m behind");
+            }
+        }
+    }
+
+    /// The nearest of all cubes along a ray, by slabs.
+    fn nearest(&self, origin: DVec3, direction: DVec3) -> f64 {
+        let enters = |i: usize| {
+            let from = origin - self.place(i);
+            let (t0, t1) = ((-0.5 - from) / direction, (0.5 - from) / direction);
+            let (enter, leave) = (t0.min(t1).max_element(), t0.max(t1).min_element());
+            (enter <= leave && enter > 0.0).then_some(enter)
+        };
+        (0..self.objects).filter_map(enters).fold(f64::INFINITY, f64::min)
+    }
+}

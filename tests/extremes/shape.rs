@@ -1,0 +1,83 @@
+//! Meshes that a case names.
+
+use glam::{DQuat, DVec3, dvec3};
+use serde::Deserialize;
+use sim_gpu::mesh::Mesh;
+use tests::meshes;
+
+/// A mesh by its rule.
+#[derive(Clone, Deserialize)]
+#[serde(tag = "shape", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Shape {
+    /// No triangle.
+    Empty {},
+    /// From -1 to 1.
+    Cube {},
+    /// Two triangles from -1 to 1 in the plane z = 0.
+    Square {},
+    /// The cube, each face of n x n squares.
+    TiledCube { n: u32 },
+    /// A wavy torus of 2 n^2 triangles.
+    Torus { n: u32 },
+    /// A unit sphere of 20 * 4^level triangles.
+    Icosphere { level: u32 },
+    /// n triangles anywhere in the cube.
+    Soup { n: u32, size: f64 },
+    /// As they are listed.
+    Triangles { vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]> },
+    /// So many slivers from one apex at -x to tips at x = 1, so far apart.
+    Fan { slivers: u32, apart: f64 },
+    /// Squares that overlap in a plane, none alike.
+    Layers {},
+    /// Several at once.
+    Together { parts: Vec<Shape> },
+    /// A cube of this half side about the origin.
+    SmallCube { half: f64 },
+}
+
+impl Shape {
+    /// The mesh.
+    pub fn mesh(&self) -> Mesh {
+        match self {
+            Self::Empty {} => Mesh::default(),
+            Self::Cube {} => meshes::cube(),
+            Self::Square {} => square(),
+            Self::TiledCube { n } => meshes::tiled_cube(*n),
+            Self::Torus { n } => meshes::torus(*n),
+            Self::Icosphere { level } => meshes::icosphere(*level),
+            Self::Soup { n, size } => meshes::soup(*n, *size),
+            Self::Triangles { vertices, triangles } => Mesh {
+                vertices: vertices.iter().copied().map(DVec3::from_array).collect(),
+                triangles: triangles.clone(),
+            },
+            Self::Fan { slivers, apart } => fan(*slivers, *apart),
+            Self::Layers {} => layers(),
+            Self::Together { parts } => {
+                meshes::together(&parts.iter().map(Self::mesh).collect::<Vec<_>>())
+            }
+            Self::SmallCube { half } => meshes::cuboid(DVec3::splat(-half), DVec3::splat(*half)),
+        }
+    }
+}
+
+/// Two triangles in the plane z = 0.
+pub fn square() -> Mesh {
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let vertices = corners.map(|(x, y)| dvec3(x, y, 0.0)).to_vec();
+    Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] }
+}
+
+fn fan(slivers: u32, apart: f64) -> Mesh {
+    let tip = |i: u32| dvec3(1.0, (f64::from(i) - f64::from(slivers) / 2.0) * apart, 0.0);
+    Mesh {
+        vertices: (0..=slivers).map(tip).chain([-DVec3::X]).collect(),
+        triangles: (0..slivers).map(|i| [slivers + 1, i, i + 1]).collect(),
+    }
+}
+
+fn layers() -> Mesh {
+    let turned = |angle: f64, size: f64| {
+        meshes::mapped(&square(), |v| DQuat::from_rotation_z(angle) * v * size)
+    };
+    meshes::together(&[square(), turned(0.4, 0.9), turned(1.1, 0.8), turned(0.0, 0.5)])
+}

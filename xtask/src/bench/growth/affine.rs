@@ -1,0 +1,212 @@
+//! Affine maps in f64 that carry, beside each value, how far a computation in some
+//! precision may be from it.
+//!
+//! Bounds are worst cases (Higham 2002, *Accuracy and Stability of Numerical
+//! Algorithms*, section 3.1): n roundings of u each in a row cost at most
+//! gamma(n) = n u / (1 - n u) of the sum of magnitudes.
+
+use half::f16;
+use infer_cpu::Precision;
+use rayon::prelude::*;
+
+/// Half a unit in the last place of f32, relative.
+pub const U32: f64 = 1.0 / (1 << 24) as f64;
+/// Of f16.
+const U16: f64 = 1.0 / (1 << 11) as f64;
+/// Half the least number of f16.
+const TINY16: f64 = 1.0 / (1 << 25) as f64;
+/// How `infer-cpu` sums products of f16: chunks of 32 products, blocks of 4 chunks,
+/// each step rounded to f16 (`kernel/scalar.rs`).
+const F16_ROUNDINGS: f64 = 32.0 + 4.0 - 1.0;
+const F16_BLOCK: f64 = 128.0;
+/// Levels of int8.
+const LEVELS: f64 = 127.0;
+
+/// The cost of `n` roundings of f32 in a row.
+pub fn gamma(n: usize) -> f64 {
+    let nu = n as f64 * U32;
+    nu / (1.0 - nu)
+}
+
+/// Rows of values, each with its bound; `[n, width]`.
+#[derive(Clone)]
+pub struct Rows {
+    pub width: usize,
+    pub value: Vec<f64>,
+    pub bound: Vec<f64>,
+}
+
+/// `y = W x + b`; W may itself be off by `dw`.
+#[derive(Clone)]
+pub struct Affine {
+    pub inputs: usize,
+    pub outputs: usize,
+    /// `[outputs, inputs]`.
+    pub w: Vec<f64>,
+    pub dw: Vec<f64>,
+    pub b: Vec<f64>,
+    pub relu: bool,
+}
+
+/// What is rounded in a layer.
+#[derive(Clone, Copy)]
+pub enum Kind {
+    /// It takes coordinates: f32, whatever the precision.
+    First,
+    /// It takes features, of which int8 is calibrated to the largest.
+    Point { range: f64 },
+    /// It takes a pooled vector.
+    Vector,
+}
+
+impl Rows {
+    /// How many rows.
+    pub fn n(&self) -> usize {
+        self.value.len() / self.width.max(1)
+    }
+
+    /// The largest of each column. Of two maxima the difference is at most the
+    /// largest difference of what they are of.
+    pub fn pooled(&self) -> Self {
+        let over = |of: &[f64]| {
+            let mut most = vec![f64::NEG_INFINITY; self.width];
+            for row in of.chunks_exact(self.width) {
+                most.iter_mut().zip(row).for_each(|(most, x)| *most = most.max(*x));
+            }
+            most
+        };
+        Self { width: self.width, value: over(&self.value), bound: over(&self.bound) }
+    }
+
+    /// Cuts what is negative, which brings nothing apart.
+    pub fn relu(mut self) -> Self {
+        self.value.iter_mut().for_each(|x| *x = x.max(0.0));
+        self
+    }
+
+    /// As a layer of `kind` takes them in `precision`.
+    pub fn taken(mut self, precision: Precision, kind: Kind) -> Self {
+        let Kind::Point { range } = kind else { return self };
+        for (x, e) in self.value.iter().zip(&mut self.bound) {
+            let size = x.abs() + *e;
+            *e += match precision {
+                Precision::F32 | Precision::F32Fc16 => 0.0,
+                Precision::F16 => U16 * size + TINY16,
+                Precision::I8 => 0.5 * range / LEVELS + (size - range).max(0.0) + U32 * size,
+            };
+        }
+        self
+    }
+}
+
+impl Affine {
+    /// The identity.
+    pub fn identity(width: usize) -> Self {
+        let mut w = vec![0.0; width * width];
+        (0..width).for_each(|i| w[i * width + i] = 1.0);
+        let (dw, b) = (vec![0.0; w.len()], vec![0.0; width]);
+        Self { inputs: width, outputs: width, w, dw, b, relu: false }
+    }
+
+    /// The product of a row with `t` `[k, k]`.
+    pub fn turn(t: &Rows, k: usize) -> Self {
+        let transposed =
+            |of: &[f64]| (0..k * k).map(|at| of[at % k * k + at / k]).collect::<Vec<f64>>();
+        let (w, dw) = (transposed(&t.value), transposed(&t.bound));
+        Self { inputs: k, outputs: k, w, dw, b: vec![0.0; k], relu: false }
+    }
+
+    /// With weights as `precision` stores them for a layer of `kind`: off by as
+    /// much as each of them is rounded.
+    pub fn stored(mut self, precision: Precision, kind: Kind) -> Self {
+        let is_first = matches!(kind, Kind::First);
+        let is_vector = matches!(kind, Kind::Vector);
+        match precision {
+            _ if is_first => {}
+            Precision::F32 => {}
+            Precision::F32Fc16 if !is_vector => {}
+            Precision::F32Fc16 | Precision::F16 => {
+                for (w, dw) in self.w.iter().zip(&mut self.dw) {
+                    let exact = (w - f64::from(f16::from_f64(*w))).abs();
+                    // What is off may round the other way.
+                    *dw += if *dw == 0.0 { exact } else { U16 * (w.abs() + *dw) + TINY16 };
+                }
+            }
+            Precision::I8 => {
+                let rows = self.w.chunks_exact(self.inputs);
+                for (row, dw) in rows.zip(self.dw.chunks_exact_mut(self.inputs)) {
+                    let largest = row.iter().zip(&*dw).fold(0.0f64, |m, (w, d)| m.max(w.abs() + d));
+                    let half = 0.5 * largest / LEVELS * (1.0 + 4.0 * U32);
+                    dw.iter_mut().for_each(|dw| *dw += half);
+                }
+            }
+        }
+        self
+    }
+
+    /// `rows` through the layer, which must be `stored` and take rows as `taken`.
+    pub fn through(&self, rows: &Rows, precision: Precision, kind: Kind) -> Rows {
+        let (part, least) = self.roundings(precision, kind);
+        let outputs: Vec<(f64, f64)> = rows
+            .value
+            .par_chunks_exact(self.inputs)
+            .zip(rows.bound.par_chunks_exact(self.inputs))
+            .flat_map_iter(|(x, e)| {
+                (0..self.outputs).map(move |o| self.output(o, x, e, part, least))
+            })
+            .collect();
+        let (value, bound) = outputs.into_iter().unzip();
+        let out = Rows { width: self.outputs, value, bound };
+        if self.relu { out.relu() } else { out }
+    }
+
+    fn output(&self, output: usize, x: &[f64], e: &[f64], part: f64, least: f64) -> (f64, f64) {
+        let at = output * self.inputs..(output + 1) * self.inputs;
+        let (w, dw) = (&self.w[at.clone()], &self.dw[at]);
+        let (mut sum, mut off) = (self.b[output], 0.0);
+        let mut magnitude = self.b[output].abs();
+        for (((w, dw), x), e) in w.iter().zip(dw).zip(x).zip(e) {
+            sum += w * x;
+            let size = x.abs() + e;
+            off += w.abs() * e + dw * size;
+            magnitude += (w.abs() + dw) * size;
+        }
+        (sum, off + part * magnitude + least)
+    }
+
+    /// Of a sum of products: how large a part of its magnitudes is lost at most,
+    /// and what is lost where products underflow.
+    fn roundings(&self, precision: Precision, kind: Kind) -> (f64, f64) {
+        let k = self.inputs as f64;
+        match (precision, kind) {
+            (Precision::F16, Kind::Point { .. }) => {
+                let blocks = (k / F16_BLOCK).ceil();
+                (F16_ROUNDINGS * U16 * 1.02 + gamma(blocks as usize + 3), 2.0 * k * TINY16)
+            }
+            // Sums of whole numbers are exact; scale, their product, bias.
+            (Precision::I8, Kind::Point { .. }) => (gamma(6), 0.0),
+            _ => (gamma(self.inputs + 3), 0.0),
+        }
+    }
+
+    /// This map after a turn by `t` `[k, k]`, a row x coming as x T: weights T W.
+    pub fn after(&self, t: &Rows, k: usize) -> Self {
+        let mut folded = self.clone();
+        for output in 0..self.outputs {
+            for i in 0..k {
+                let (mut sum, mut off) = (0.0, 0.0);
+                for j in 0..k {
+                    let (w, dw) =
+                        (self.w[output * self.inputs + j], self.dw[output * self.inputs + j]);
+                    let (t, e) = (t.value[i * k + j], t.bound[i * k + j]);
+                    sum += t * w;
+                    off +=
+                        (t.abs() + e) * dw + e * w.abs() + gamma(k + 2) * (t.abs() + e) * w.abs();
+                }
+                folded.w[output * self.inputs + i] = sum;
+                folded.dw[output * self.inputs + i] = off;
+            }
+        }
+        folded
+    }
+}

@@ -1,0 +1,111 @@
+//! Model files that end early: what a layer gives, pooled, comes out as logits
+//! through an identity, computed by `infer-cpu` itself.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Result;
+use formats::model_card::{ModelCard, Normalization};
+use formats::weights::{Tensor, write_weights};
+
+use super::net::{Chain, Net};
+
+/// A part of a chain.
+#[derive(Clone, Copy)]
+pub enum Part {
+    /// So many of its point-wise layers.
+    Points(usize),
+    /// All of these, and so many vector layers.
+    Vectors(usize),
+}
+
+/// Writes the model that gives what `part` of `chain` does.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(net: &Net, chain: &Chain, part: Part, path: &Path) -> Result<()> {
+    let (n_convs, n_fcs) = match part {
+        Part::Points(n) => (n, 0),
+        Part::Vectors(n) => (chain.convs.len(), n),
+    };
+    let mut model = Model { net, tensors: BTreeMap::new(), ranges: BTreeMap::new() };
+    for (i, name) in chain.convs[..n_convs].iter().enumerate() {
+        model.copy(name, &format!("feat.conv{}", i + 1));
+    }
+    let mut width = model.width(&chain.convs[n_convs - 1]);
+    if n_convs == 1 {
+        model.identity("feat.conv2", width);
+    }
+    for (i, name) in chain.fcs[..n_fcs].iter().enumerate() {
+        model.copy(name, &format!("fc{}", i + 1));
+        width = model.width(name);
+    }
+    if n_fcs == 0 {
+        model.identity("fc1", width);
+    }
+    if chain.stn {
+        model.copy_all("feat.stn.");
+    }
+    let turned = chain.fstn_after.filter(|&after| after < n_convs);
+    if turned.is_some() {
+        model.copy_all("feat.fstn.");
+    }
+    if chain.edges {
+        model.copy_all("edge.");
+    }
+    let whole = n_convs == chain.convs.len();
+    let card = ModelCard {
+        normalization: Normalization::UnitSphere,
+        transform_after: turned.unwrap_or(1),
+        pooled_relu: !whole || chain.pooled_relu,
+        edge_radii: if chain.edges { net.card.edge_radii.clone() } else { Vec::new() },
+        activation_ranges: model.ranges,
+        provenance: Some("a part of a network, to be measured".to_owned()),
+        ..ModelCard::default()
+    };
+    Ok(write_weights(path, &model.tensors, &card.to_metadata())?)
+}
+
+struct Model<'a> {
+    net: &'a Net,
+    tensors: BTreeMap<String, Tensor>,
+    ranges: BTreeMap<String, f32>,
+}
+
+impl Model<'_> {
+    /// Takes layer `from` as layer `to`.
+    fn copy(&mut self, from: &str, to: &str) {
+        for part in ["weight", "bias"] {
+            let mut tensor = self.net.tensors[&format!("{from}.{part}")].clone();
+            // A vector layer of a T-Net and a point-wise one differ by an axis of 1.
+            tensor.shape.truncate(2);
+            self.tensors.insert(format!("{to}.{part}"), tensor);
+        }
+        self.ranges.insert(to.to_owned(), self.net.range(from) as f32);
+    }
+
+    /// Takes every layer whose name begins with `prefix` as it is.
+    fn copy_all(&mut self, prefix: &str) {
+        let named = |name: &&String| name.starts_with(prefix);
+        for name in self.net.tensors.keys().filter(named) {
+            self.tensors.insert(name.clone(), self.net.tensors[name].clone());
+            if let Some(layer) = name.strip_suffix(".weight") {
+                self.ranges.insert(layer.to_owned(), self.net.range(layer) as f32);
+            }
+        }
+    }
+
+    fn identity(&mut self, to: &str, width: usize) {
+        let mut values = vec![0.0; width * width];
+        (0..width).for_each(|i| values[i * width + i] = 1.0);
+        let weight = Tensor { shape: vec![width, width], values };
+        self.tensors.insert(format!("{to}.weight"), weight);
+        let bias = Tensor { shape: vec![width], values: vec![0.0; width] };
+        self.tensors.insert(format!("{to}.bias"), bias);
+    }
+
+    /// Outputs of layer `name` of the network.
+    fn width(&self, name: &str) -> usize {
+        self.net.tensors[&format!("{name}.bias")].values.len()
+    }
+}
