@@ -9,6 +9,7 @@ use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::pose::load_poses;
 use sim_gpu::sensor::{Layout as BeamLayout, Sensor, Views};
+use sim_gpu::simplify::Simplify;
 use std::path::PathBuf;
 
 /// Flags that decide what a dataset holds.
@@ -72,6 +73,11 @@ pub struct Settings {
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 
+    /// Leave out triangles too small to be told apart: auto goes by the sensors' beams and
+    /// distances, a number bounds in metres how far the surface may move; needs a C++ compiler
+    #[arg(long, value_name = "auto|M")]
+    simplify: Option<Simplify>,
+
     /// Seed of every random number
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -103,6 +109,12 @@ impl Settings {
         formats.push(ScanFormat::Npz);
         formats.sort_unstable();
         formats.dedup();
+        if self.simplify.is_some() && self.attributes.contains(&Attribute::Triangle) {
+            return Err(usage(
+                "--simplify: a simplified mesh's triangles are not the file's, so that \
+                 --attributes cannot have their numbers",
+            ));
+        }
         let effects = self.effects()?;
         for set in &sets {
             effects.for_sensor(&set.sensor).map_err(|error| usage(error.to_string()))?;
@@ -116,6 +128,7 @@ impl Settings {
             seed: self.seed,
             normalize: self.normalize.or(recommended).unwrap_or_default(),
             up: self.up,
+            simplify: self.simplify,
             attributes: self.attributes.iter().copied().collect(),
             formats,
             effects,
