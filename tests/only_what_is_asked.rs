@@ -130,8 +130,11 @@ fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
 /// The rows of `other` that `plain` lacks or has otherwise; 0 for one that
 /// `other` lacks.
 fn difference(plain: &Rows, other: &Rows) -> Rows {
-    let mut differ: Rows =
-        other.iter().filter(|(row, n)| plain.get(*row) != Some(n)).map(|(r, &n)| (r.clone(), n)).collect();
+    let mut differ: Rows = other
+        .iter()
+        .filter(|(row, n)| plain.get(*row) != Some(n))
+        .map(|(r, &n)| (r.clone(), n))
+        .collect();
     differ.extend(plain.keys().filter(|row| !other.contains_key(*row)).map(|row| (row.clone(), 0)));
     differ
 }

@@ -69,7 +69,8 @@ pub fn cast(
     caster: &Caster,
     culling: Culling,
 ) -> Result<Vec<SceneScan>, SceneError> {
-    let objects = scene.objects.iter().map(|object| place(scene, object)).collect::<Result<Vec<_>, _>>()?;
+    let objects =
+        scene.objects.iter().map(|object| place(scene, object)).collect::<Result<Vec<_>, _>>()?;
     let sensors = scene.sensors.iter().zip(0..);
     sensors.map(|(sensor, i)| cast_sensor(scene, sensor, i, &objects, caster, culling)).collect()
 }

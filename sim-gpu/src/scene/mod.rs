@@ -125,8 +125,14 @@ impl Scene {
         }
         check_names("sensor", sensors.iter().map(|sensor| &sensor.name)).map_err(in_file)?;
 
-        let scene =
-            Self { seed: table.seed, objects, sensors, effects, attributes, simplify: table.simplify };
+        let scene = Self {
+            seed: table.seed,
+            objects,
+            sensors,
+            effects,
+            attributes,
+            simplify: table.simplify,
+        };
         scene.check_triangles().map_err(in_file)?;
         Ok(scene)
     }

@@ -39,7 +39,10 @@ impl Sensor {
             Layout::Grid(grid) => {
                 let (left, up) = grid.tangents();
                 let kept = left.into_iter().step_by(self.decimation.get() as usize);
-                [least_gap(kept.map(f64::atan).collect()), least_gap(up.into_iter().map(f64::atan).collect())]
+                [
+                    least_gap(kept.map(f64::atan).collect()),
+                    least_gap(up.into_iter().map(f64::atan).collect()),
+                ]
             }
         };
         steps.into_iter().flatten().filter(|&step| step > SAME_BEAM_RAD).reduce(f64::min)

@@ -20,7 +20,10 @@ pub fn distance_to_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
             return ap.dot(normal).abs() / squared.sqrt();
         }
     }
-    [(a, b), (b, c), (c, a)].into_iter().map(|(p, q)| to_segment(point, p, q)).fold(f64::INFINITY, f64::min)
+    [(a, b), (b, c), (c, a)]
+        .into_iter()
+        .map(|(p, q)| to_segment(point, p, q))
+        .fold(f64::INFINITY, f64::min)
 }
 
 fn to_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
@@ -103,7 +106,8 @@ mod tests {
         let target = Target::new(Surface::new(mesh, kept), Builder::Morton);
         let key = formats::rng::StreamKey::new(1, "points", 0);
         for i in 0..200 {
-            let point = DVec3::new(key.unit(3 * i), key.unit(3 * i + 1), key.unit(3 * i + 2)) * 4.0 - 2.0;
+            let point =
+                DVec3::new(key.unit(3 * i), key.unit(3 * i + 1), key.unit(3 * i + 2)) * 4.0 - 2.0;
             let all = target.surface.kept().iter();
             let expected = all
                 .map(|&t| distance_to_triangle(point, target.surface.corners(t)))

@@ -7,8 +7,6 @@
 //! by itself. Nothing is sampled: where the answer is yes, it holds of every
 //! point.
 
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -28,26 +26,31 @@ const PIECES_PER_TRIANGLE: usize = 64;
 /// the surface of `target`; both in metres, and so is the bound.
 #[must_use]
 pub fn lies_within(surface: &Surface, target: &Target, bound: f64) -> bool {
+    beyond(surface, target, bound).is_empty()
+}
+
+/// The triangles of `surface` of which that is not proven, ascending.
+#[must_use]
+pub fn beyond(surface: &Surface, target: &Target, bound: f64) -> Vec<u32> {
+    const TRIANGLES_PER_TASK: usize = 64;
     let frame = target.surface.frame;
     let proof = Proof {
         target,
         bound: bound / frame.scale,
         most_pieces: PIECES_PER_TRIANGLE * (surface.len() + target.surface.len()),
     };
-    let failed = AtomicBool::new(false);
-    surface.kept().par_chunks(64).all(|chunk| {
+    let chunks = surface.kept().par_chunks(TRIANGLES_PER_TASK);
+    let of_each = chunks.map(|triangles| {
         let mut last = None;
-        chunk.iter().all(|&triangle| {
+        let mut beyond = triangles.to_vec();
+        beyond.retain(|&triangle| {
             let corners = surface.corners(triangle);
             let in_world = corners.map(|p| p * surface.frame.scale + surface.frame.centre);
-            let proven =
-                !failed.load(Relaxed) && proof.holds(in_world.map(|p| frame.to_unit(p)), &mut last);
-            if !proven {
-                failed.store(true, Relaxed);
-            }
-            proven
-        })
-    })
+            !proof.holds(in_world.map(|p| frame.to_unit(p)), &mut last)
+        });
+        beyond
+    });
+    of_each.flatten_iter().collect()
 }
 
 struct Proof<'a> {
@@ -189,13 +192,15 @@ mod tests {
 
     #[test]
     fn what_reaches_beyond_an_open_border_is_found() {
-        let narrow = || Surface::new(
-            Mesh {
-                vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-                triangles: vec![[0, 1, 2]],
-            },
-            vec![0],
-        );
+        let narrow = || {
+            Surface::new(
+                Mesh {
+                    vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+                    triangles: vec![[0, 1, 2]],
+                },
+                vec![0],
+            )
+        };
         assert!(proven(&narrow(), plate(1, |_, _| 0.0), 1e-6));
         assert!(!proven(&plate(1, |_, _| 0.0), narrow(), 1e-6));
     }

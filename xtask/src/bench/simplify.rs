@@ -87,8 +87,10 @@ fn on(subject: &Subject, lanes: &[Lane], rounds: usize) -> Result<Subjected> {
     let mut next = || costs.next().unwrap_or_default();
     let (simplify, build) = (next(), [next(), next()]);
     let rays = jobs[0].iter().map(|job| job.rays.len()).sum();
-    let traces = lanes.iter().map(|lane| {
-        Traced { adapter: lane.name().to_owned(), rays, trace: [next(), next()] }
+    let traces = lanes.iter().map(|lane| Traced {
+        adapter: lane.name().to_owned(),
+        rays,
+        trace: [next(), next()],
     });
     Ok(Subjected {
         mesh: subject.name.clone(),
@@ -157,8 +159,7 @@ impl Simplified {
                 let [trace, fewer_trace] = trace.each_ref().map(cpu_s);
                 let simplify = cpu_s(&subject.simplify);
                 let (before, after) = (build + trace, fewer_build + fewer_trace);
-                let arrow =
-                    |p: f64, q: f64| format!("{} -> {}", milliseconds(p), milliseconds(q));
+                let arrow = |p: f64, q: f64| format!("{} -> {}", milliseconds(p), milliseconds(q));
                 table.push(vec![
                     subject.mesh.clone(),
                     subject.triangles.to_string(),

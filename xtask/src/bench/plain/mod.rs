@@ -98,9 +98,7 @@ fn table(turns: &Turns) -> Table {
         let mut row = vec![name.to_owned(), digits(median / turns.rays as f64 * 1e9)];
         row.extend(match ratio {
             None => ["1", "", ""].map(str::to_owned),
-            Some(Interval { low, median, high }) => {
-                [median, low, high].map(|x| format!("{x:.4}"))
-            }
+            Some(Interval { low, median, high }) => [median, low, high].map(|x| format!("{x:.4}")),
         });
         table.push(row);
     };

@@ -90,7 +90,9 @@ impl Deletions {
             let found = text.matches(deleted.as_str()).count();
             if found != 1 {
                 let (file, start) = (file.display(), deleted.trim().lines().next().unwrap_or(""));
-                bail!("{DELETED}: what begins with {start:?} stands {found} times in {file}, not once");
+                bail!(
+                    "{DELETED}: what begins with {start:?} stands {found} times in {file}, not once"
+                );
             }
             text = text.replacen(deleted.as_str(), &deletion.instead, 1);
         }
