@@ -5,6 +5,7 @@ use std::collections::hash_map::Entry;
 
 use meshopt::{SimplifyOptions, simplify_with_locks_decoder};
 
+use super::NotBuilt;
 use super::within::{beyond, lies_within};
 use crate::bvh::Builder;
 use crate::mesh::Mesh;
@@ -30,7 +31,11 @@ const ATTEMPTS: usize = 12;
 const WORTH_IT: f64 = 0.75;
 
 /// See [`super::simplified`].
-pub(super) fn decimated(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
+pub(super) fn decimated(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>, NotBuilt> {
+    Ok(proven(mesh, kept, bound))
+}
+
+fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
     if kept.is_empty() || bound.is_nan() || bound <= 0.0 {
         return None;
     }
@@ -56,8 +61,9 @@ pub(super) fn decimated(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
         }
         if lost.is_empty() || lost.len() as f64 > FEW * kept.len() as f64 {
             share *= NEXT_SHARE;
+        } else {
+            welded.lock(kept, &lost);
         }
-        welded.lock(kept, &lost);
     }
     None
 }

@@ -19,7 +19,7 @@
 //! compiler has it: the same program gives the same triangles, another
 //! platform's may give others.
 
-#[cfg(feature = "simplify")]
+#[cfg_attr(not(feature = "simplify"), path = "not_built.rs")]
 mod decimate;
 mod distance;
 mod resolution;
@@ -86,13 +86,7 @@ impl Simplify {
 /// # Errors
 /// If this build has no decimation.
 pub fn simplified(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>, NotBuilt> {
-    #[cfg(feature = "simplify")]
-    return Ok(decimate::decimated(mesh, kept, bound));
-    #[cfg(not(feature = "simplify"))]
-    {
-        let _ = (mesh, kept, bound);
-        Err(NotBuilt)
-    }
+    decimate::decimated(mesh, kept, bound)
 }
 
 /// The surface to cast at: that of [`simplified`], or of the `kept` triangles of
