@@ -21,5 +21,6 @@ pub mod scan;
 pub mod scene;
 pub mod sensor;
 pub mod shapes;
+pub mod simplify;
 pub mod surface_points;
 pub mod target;

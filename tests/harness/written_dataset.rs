@@ -39,6 +39,7 @@ pub fn config() -> DatasetConfig {
         seed: 7,
         normalize: Normalize::UnitSphere,
         up: None,
+        simplify: None,
         attributes: [Attribute::Normal].into(),
         formats: ScanFormat::POINTS.to_vec(),
         effects: Effects::default(),
@@ -102,6 +103,7 @@ fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
         triangles: 12,
         dropped_faces: 0,
         census: Census::default(),
+        simplified: None,
         scans,
     }
 }

@@ -13,6 +13,7 @@ mod merge_dataset;
 mod page;
 mod pi_target;
 mod preview_scan;
+mod rebuild;
 mod report;
 mod reproduce;
 mod sample_surfaces;
@@ -98,7 +99,7 @@ fn main() -> ExitCode {
         Command::Scan(args) => scan::run(&args),
         Command::Preview(args) => preview_scan::run(&args),
         Command::Adapters => adapters::run(),
-        Command::Bench(args) => bench::run(&args).map(|()| Outcome::Success),
+        Command::Bench(args) => bench::run(&args),
         Command::BuildPi(args) => build_pi::run(&args),
         Command::MergeDataset(args) => merge_dataset::run(&args),
         Command::ImportWeights(args) => import_weights::run(&args),

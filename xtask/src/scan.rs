@@ -1,12 +1,13 @@
 //! `cargo xtask scan`: one scene, one scan per sensor.
 
 use crate::caster::CasterArgs;
-use crate::{Outcome, Usage};
+use crate::{Outcome, Usage, rebuild};
 use anyhow::Context;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::{self, Returns};
 use sim_gpu::packets;
 use sim_gpu::scene::{Scene, SceneScan, cast};
+use sim_gpu::simplify::Simplify;
 use std::path::{Path, PathBuf};
 
 /// Flags of `scan`.
@@ -25,6 +26,11 @@ pub struct Args {
     #[arg(long, value_name = "WHICH")]
     returns: Option<Returns>,
 
+    /// Leave out triangles too small to be told apart, as gen-dataset does; for the objects that
+    /// the scene says nothing of
+    #[arg(long, value_name = "auto|M")]
+    simplify: Option<Simplify>,
+
     #[command(flatten)]
     caster: CasterArgs,
 }
@@ -33,6 +39,11 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of(&args.out)?;
     let mut scene = Scene::load(&args.scene)?;
+    scene.simplify = args.simplify.or(scene.simplify);
+    scene.check_triangles().map_err(|error| Usage(error.to_string()))?;
+    if scene.simplifies() && rebuild::lacks_simplify() {
+        return rebuild::with_simplify();
+    }
     if format == ScanFormat::Pcap {
         cast_as_packets_tell(&mut scene).with_context(|| format!("{}", args.scene.display()))?;
     } else if args.returns.is_some() {
@@ -44,10 +55,14 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         .with_context(|| format!("{}", args.scene.display()))?;
     for (number, object) in scene.objects.iter().enumerate() {
         let label = object.label.as_ref().map(|label| format!(", a {label}")).unwrap_or_default();
-        eprintln!("object {number}: {}{label}", object.name);
+        let simplified = scans.first().and_then(|scan| scan.simplified[number]);
+        let simplified = simplified
+            .map(|s| format!(", cast at as {} triangles within {:.2e} m", s.triangles, s.bound_m))
+            .unwrap_or_default();
+        eprintln!("object {number}: {}{label}{simplified}", object.name);
     }
     let several = scans.len() > 1;
-    for (SceneScan { sensor, scan, tally, too_large_for_adapter }, asked) in
+    for (SceneScan { sensor, scan, tally, too_large_for_adapter, .. }, asked) in
         scans.iter().zip(&scene.sensors)
     {
         if *too_large_for_adapter {

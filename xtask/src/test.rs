@@ -35,6 +35,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let lints = ["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"];
     step("lints", &mut cargo(&lints))?;
     let mut tests = cargo(&["test", "--workspace", "--no-fail-fast"]);
+    if has_cpp_compiler() {
+        tests.args(["--features", "tests/simplify"]);
+    } else {
+        go_without("tests of simplified meshes", "there is no C++ compiler", !args.no_install)?;
+    }
     // A machine without any Vulkan adapter tests the CPU alone, and says so.
     if !args.no_install {
         tests.env("EDGEPUCK_REQUIRE_ADAPTER", "1");
@@ -93,6 +98,12 @@ fn build_for_the_pi(required: bool) -> anyhow::Result<()> {
     }
     eprintln!("== {name}: cargo xtask build-pi");
     build_pi::run(&build_pi::Args::default()).map(|_| ())
+}
+
+/// Whether meshoptimizer, which `--simplify` uses, can be built.
+fn has_cpp_compiler() -> bool {
+    let answers = |name: &str| Command::new(name).arg("--version").output().is_ok();
+    cfg!(windows) || std::env::var_os("CXX").is_some() || answers("c++")
 }
 
 fn go_without(step: &str, lack: &str, required: bool) -> anyhow::Result<()> {

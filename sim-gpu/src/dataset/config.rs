@@ -5,6 +5,7 @@ use crate::effects::Effects;
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::Pose;
 use crate::sensor::{Sensor, Views};
+use crate::simplify::Simplify;
 use formats::rng::StreamKey;
 use formats::scan::AttributeSet;
 use formats::scan_file::ScanFormat;
@@ -22,6 +23,9 @@ pub struct DatasetConfig {
     pub normalize: Normalize,
     /// The meshes' upward axis; `None` is each format's default.
     pub up: Option<Up>,
+    /// Whether and how far meshes are simplified.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simplify: Option<Simplify>,
     /// What points carry besides positions.
     pub attributes: AttributeSet,
     /// The files each scan is written to; NPZ is always among them.

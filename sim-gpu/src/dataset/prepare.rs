@@ -8,10 +8,11 @@ use crate::job::{CastJob, Culling};
 use crate::mesh::census::survey;
 use crate::mesh::frame::{Normalize, Up, to_world};
 use crate::mesh::tree::MeshEntry;
-use crate::mesh::{LoadedMesh, MeshError, load};
+use crate::mesh::{LoadedMesh, Mesh, MeshError, load};
 use crate::pose::Pose;
 use crate::ray::RayFrame;
 use crate::sensor::BeamPattern;
+use crate::simplify::{Simplified, Watcher, resolved_m, simplified_surface};
 use crate::target::{Surface, Target};
 use glam::DAffine3;
 use std::sync::Arc;
@@ -48,11 +49,22 @@ pub fn prepare(
     culling: Culling,
     progress: &Progress,
 ) -> Result<Prepared, MeshFailure> {
-    let (record, surface) = progress
+    let (mut record, mesh, kept) = progress
         .time(Stage::Read, || read(entry, config.up, config.normalize))
         .map_err(|error| failure(entry, &error))?;
     let id = record.entry.id();
     let views = plan(config, &id);
+    let surface = match config.simplify {
+        None => Surface::new(mesh, kept),
+        Some(simplify) => {
+            let bound_m = simplify.bound_m(|| resolved_m(&mesh, 1.0, &watchers(config, &views)));
+            let surface = progress
+                .time(Stage::Build, || simplified_surface(mesh, kept, bound_m))
+                .map_err(|error| failed(entry, None, error.to_string()))?;
+            record.simplified = Some(Simplified { bound_m, triangles: surface.len() as u64 });
+            surface
+        }
+    };
     let frames: Vec<RayFrame> =
         views.iter().map(|v| RayFrame::new(&surface, &DAffine3::IDENTITY, &v.pose)).collect();
     let rays = views
@@ -93,11 +105,21 @@ fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
     views
 }
 
+/// Each set's sensor, where it stands.
+fn watchers<'a>(config: &'a DatasetConfig, views: &[PlannedView]) -> Vec<Watcher<'a>> {
+    let of_set = |(set, config): (usize, &'a SetConfig)| {
+        let its_own = views.iter().filter(|view| view.set == set);
+        let positions = its_own.map(|view| view.pose.position_m).collect();
+        Watcher { sensor: &config.sensor, positions }
+    };
+    config.sets.iter().enumerate().map(of_set).collect()
+}
+
 pub(super) fn read(
     entry: &MeshEntry,
     up: Option<Up>,
     normalize: Normalize,
-) -> Result<(MeshRecord, Surface), MeshError> {
+) -> Result<(MeshRecord, Mesh, Vec<u32>), MeshError> {
     let LoadedMesh { mesh, format, sha256, dropped_faces } = load(&entry.path)?;
     let up = up.unwrap_or(format.default_up());
     let world = to_world(&mesh, up, normalize);
@@ -112,9 +134,10 @@ pub(super) fn read(
         triangles: mesh.triangles.len() as u64,
         dropped_faces: dropped_faces as u64,
         census: survey.census,
+        simplified: None,
         scans: Vec::new(),
     };
-    Ok((record, Surface::new(world.mesh, survey.kept)))
+    Ok((record, world.mesh, survey.kept))
 }
 
 pub(super) fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {
@@ -124,6 +147,10 @@ pub(super) fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {
         }
         other => (None, other.to_string()),
     };
+    failed(entry, line, cause)
+}
+
+fn failed(entry: &MeshEntry, line: Option<u64>, cause: String) -> MeshFailure {
     MeshFailure { entry: entry.into(), source: entry.relative.clone(), line, cause }
 }
 

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 pub enum Stage {
     /// Reading and parsing the file, hashing it, scaling it, its census.
     Read,
-    /// Building the hierarchy.
+    /// Simplifying, where that is asked for, and building the hierarchy.
     Build,
     /// Aiming beams.
     Aim,

@@ -4,6 +4,7 @@ use super::config::Variant;
 use crate::mesh::census::Census;
 use crate::mesh::frame::Up;
 use crate::scan::Tally;
+use crate::simplify::Simplified;
 use formats::Split;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
@@ -42,6 +43,9 @@ pub struct MeshRecord {
     /// What was found among the triangles and vertices.
     #[serde(flatten)]
     pub census: Census,
+    /// What simplification made of it, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simplified: Option<Simplified>,
     /// Its scans: by set in the order of the configuration, then by view.
     pub scans: Vec<ScanRecord>,
 }

@@ -9,7 +9,7 @@ use crate::mesh::frame::{Normalize, Up};
 use crate::mesh::tree::MeshEntry;
 use crate::sensor::Views;
 use crate::surface_points::{area_uniform, seen_from};
-use crate::target::Target;
+use crate::target::{Surface, Target};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::packed::PackedWriter;
@@ -103,8 +103,9 @@ pub fn write_surfaces(
 }
 
 fn draw(mesh: &MeshEntry, config: &SurfaceConfig) -> Result<Drawn, MeshFailure> {
-    let (record, surface) =
+    let (record, in_world, kept) =
         read(mesh, config.up, config.normalize).map_err(|error| failure(mesh, &error))?;
+    let surface = Surface::new(in_world, kept);
     let n = config.points as usize;
     let id = record.entry.id();
     let key = |name: &str, index| StreamKey::new(config.seed, &format!("{name}/{id}"), index);

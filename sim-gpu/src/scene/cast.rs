@@ -8,10 +8,11 @@ use crate::gpu::GpuError;
 use crate::job::{CastJob, Culling};
 use crate::mesh::census::survey;
 use crate::mesh::frame::{Normalize, to_world};
-use crate::mesh::{LoadedMesh, MeshError, load};
+use crate::mesh::{LoadedMesh, Mesh, MeshError, load};
 use crate::ray::RayFrame;
 use crate::resolve::resolve;
 use crate::scan::{Seen, Tally, View, assemble};
+use crate::simplify::{NotBuilt, Simplified, Watcher, resolved_m, simplified_surface};
 use crate::target::{Surface, Target};
 use formats::Scan;
 use formats::rng::StreamKey;
@@ -30,6 +31,9 @@ pub enum SceneError {
     /// The adapter failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// A mesh cannot be simplified.
+    #[error(transparent)]
+    NotBuilt(#[from] NotBuilt),
 }
 
 /// What one sensor saw.
@@ -43,12 +47,15 @@ pub struct SceneScan {
     pub tally: Tally,
     /// Whether the CPU cast it because a mesh was too large for the adapter.
     pub too_large_for_adapter: bool,
+    /// By object, what simplification made of it where it was asked for.
+    pub simplified: Vec<Option<Simplified>>,
 }
 
 /// An object ready to be cast at.
 struct Placed {
     target: Arc<Target>,
     world_from_object: DAffine3,
+    simplified: Option<Simplified>,
 }
 
 /// One scan per sensor of `scene`. `caster` must have been opened for the
@@ -62,12 +69,13 @@ pub fn cast(
     caster: &Caster,
     culling: Culling,
 ) -> Result<Vec<SceneScan>, SceneError> {
-    let objects = scene.objects.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+    let objects =
+        scene.objects.iter().map(|object| place(scene, object)).collect::<Result<Vec<_>, _>>()?;
     let sensors = scene.sensors.iter().zip(0..);
     sensors.map(|(sensor, i)| cast_sensor(scene, sensor, i, &objects, caster, culling)).collect()
 }
 
-fn place(object: &SceneObject) -> Result<Placed, MeshError> {
+fn place(scene: &Scene, object: &SceneObject) -> Result<Placed, SceneError> {
     let LoadedMesh { mesh, format, .. } = load(&object.mesh)?;
     let normalize = object.normalize.unwrap_or(Normalize::None);
     let world = to_world(&mesh, object.up.unwrap_or(format.default_up()), normalize);
@@ -77,8 +85,34 @@ fn place(object: &SceneObject) -> Result<Placed, MeshError> {
         // The mesh keeps its own origin: undo the recentring.
         world_from_object *= DAffine3::from_translation(world.centre);
     }
-    let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
-    Ok(Placed { target: Arc::new(target), world_from_object })
+    let Some(simplify) = scene.simplify_of(object) else {
+        let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
+        return Ok(Placed { target: Arc::new(target), world_from_object, simplified: None });
+    };
+    let bound_m = simplify.bound_m(|| resolved_by(scene, object, &world.mesh, &world_from_object));
+    // No length of the mesh is longer in the world than by its largest factor.
+    let surface = simplified_surface(world.mesh, kept, bound_m / object.scale.max_element())?;
+    let simplified = Some(Simplified { bound_m, triangles: surface.len() as u64 });
+    let target = Target::new(surface, Builder::Sah);
+    Ok(Placed { target: Arc::new(target), world_from_object, simplified })
+}
+
+/// What the scene's sensors can tell apart on `mesh`, in metres.
+fn resolved_by(
+    scene: &Scene,
+    object: &SceneObject,
+    mesh: &Mesh,
+    world_from_object: &DAffine3,
+) -> f64 {
+    let object_from_world = world_from_object.inverse();
+    let watchers = scene.sensors.iter().map(|sensor| Watcher {
+        sensor: &sensor.sensor,
+        positions: vec![object_from_world.transform_point3(sensor.pose.position_m)],
+    });
+    let watchers: Vec<Watcher> = watchers.collect();
+    // No distance in the world is shorter than by the mesh's least factor.
+    let least = object.scale.min_element();
+    resolved_m(mesh, least.recip(), &watchers) * least
 }
 
 fn cast_sensor(
@@ -92,7 +126,7 @@ fn cast_sensor(
     let pattern = sensor.sensor.pattern();
     let effects = scene.effects.for_sensor(&sensor.sensor)?;
     let aim = |(placed, object): (&Placed, &SceneObject)| {
-        let Placed { target, world_from_object } = placed;
+        let Placed { target, world_from_object, .. } = placed;
         let frame = RayFrame::new(&target.surface, world_from_object, &sensor.pose);
         let stream = StreamKey::new(scene.seed, &object.name, number);
         let reflectivity = object.reflectivity as f32;
@@ -128,5 +162,7 @@ fn cast_sensor(
         stream: StreamKey::new(scene.seed, &sensor.name, number),
     };
     let (scan, tally) = assemble(&view, &seen);
-    Ok(SceneScan { sensor: sensor.name.clone(), scan, tally, too_large_for_adapter })
+    let sensor = sensor.name.clone();
+    let simplified = objects.iter().map(|placed| placed.simplified).collect();
+    Ok(SceneScan { sensor, scan, tally, too_large_for_adapter, simplified })
 }

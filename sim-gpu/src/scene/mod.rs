@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use formats::scan::AttributeSet;
+use formats::scan::{Attribute, AttributeSet};
 use glam::{DAffine3, DQuat, DVec3};
 
 use crate::config::{self, ConfigError, InvalidValue};
@@ -11,6 +11,7 @@ use crate::effects::Effects;
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::Pose;
 use crate::sensor::Sensor;
+use crate::simplify::Simplify;
 
 mod cast;
 mod table;
@@ -33,6 +34,8 @@ pub struct Scene {
     pub effects: Effects,
     /// The attributes that are wanted, positions aside.
     pub attributes: AttributeSet,
+    /// Whether and how far meshes are simplified; objects may differ.
+    pub simplify: Option<Simplify>,
 }
 
 /// An object of a scene.
@@ -58,6 +61,9 @@ pub struct SceneObject {
     /// The part of the light that comes back at vertical incidence, 0..=1.
     /// Used for intensity alone; default 1.
     pub reflectivity: f64,
+    /// Whether and how far the mesh is simplified; `Some(None)`, `false` in
+    /// TOML, is not at all. `None`, the default, is as the scene says.
+    pub simplify: Option<Option<Simplify>>,
 }
 
 /// A sensor of a scene.
@@ -119,7 +125,44 @@ impl Scene {
         }
         check_names("sensor", sensors.iter().map(|sensor| &sensor.name)).map_err(in_file)?;
 
-        Ok(Self { seed: table.seed, objects, sensors, effects, attributes })
+        let scene = Self {
+            seed: table.seed,
+            objects,
+            sensors,
+            effects,
+            attributes,
+            simplify: table.simplify,
+        };
+        scene.check_triangles().map_err(in_file)?;
+        Ok(scene)
+    }
+}
+
+impl Scene {
+    /// Whether and how far the mesh of `object` is simplified.
+    #[must_use]
+    pub fn simplify_of(&self, object: &SceneObject) -> Option<Simplify> {
+        object.simplify.unwrap_or(self.simplify)
+    }
+
+    /// Whether any mesh is to be simplified.
+    #[must_use]
+    pub fn simplifies(&self) -> bool {
+        self.objects.iter().any(|object| self.simplify_of(object).is_some())
+    }
+
+    /// That nobody asks for the file's numbers of triangles that are not the
+    /// file's.
+    ///
+    /// # Errors
+    /// If somebody does.
+    pub fn check_triangles(&self) -> Result<(), InvalidValue> {
+        if self.simplifies() && self.attributes.contains(&Attribute::Triangle) {
+            let cause = "a simplified mesh's triangles are not the file's, so that attributes \
+                         cannot have their numbers";
+            return Err(InvalidValue::new("simplify", cause));
+        }
+        Ok(())
     }
 }
 

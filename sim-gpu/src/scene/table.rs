@@ -12,6 +12,7 @@ use crate::effects::Effects;
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::{OrientationKeys, vector};
 use crate::sensor::Sensor;
+use crate::simplify::Simplify;
 
 /// The keys of a scene.
 #[derive(Deserialize)]
@@ -27,6 +28,7 @@ pub(super) struct SceneTable {
     pub effects: Effects,
     #[serde(default)]
     pub attributes: Vec<String>,
+    pub simplify: Option<Simplify>,
 }
 
 /// The keys of an object.
@@ -46,6 +48,7 @@ pub(super) struct ObjectTable {
     quaternion_xyzw: Option<[f64; 4]>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
+    simplify: Option<OwnSimplify>,
 }
 
 /// The keys of a sensor.
@@ -69,6 +72,14 @@ enum Scale {
     PerAxis([f64; 3]),
 }
 
+/// What an object says of its own simplification.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "simplify takes \"auto\", metres above 0, or false")]
+enum OwnSimplify {
+    Switch(bool),
+    Within(Simplify),
+}
+
 impl ObjectTable {
     pub fn validate(self, index: usize, folder: &Path) -> Result<SceneObject, InvalidValue> {
         let table = format!("object[{index}]");
@@ -90,6 +101,14 @@ impl ObjectTable {
             roll_deg: self.roll_deg,
             quaternion_xyzw: self.quaternion_xyzw,
         };
+        let simplify = match self.simplify {
+            None => None,
+            Some(OwnSimplify::Within(simplify)) => Some(Some(simplify)),
+            Some(OwnSimplify::Switch(false)) => Some(None),
+            Some(OwnSimplify::Switch(true)) => {
+                return Err(InvalidValue::new(key("simplify"), "takes \"auto\", metres or false"));
+            }
+        };
         let name = self.name.unwrap_or_else(|| stem.to_string_lossy().into_owned());
         Ok(SceneObject {
             name: named(&table, name)?,
@@ -101,6 +120,7 @@ impl ObjectTable {
             rotation: orientation.rotation(&table)?.unwrap_or(DQuat::IDENTITY),
             scale: DVec3::from_array(scale),
             reflectivity: within(&key("reflectivity"), self.reflectivity.unwrap_or(1.0), 0.0, 1.0)?,
+            simplify,
         })
     }
 }

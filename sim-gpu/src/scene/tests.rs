@@ -49,6 +49,19 @@ fn an_object_stands_upright_at_the_origin_by_default() {
 }
 
 #[test]
+fn an_object_is_simplified_as_it_says_or_else_as_the_scene_says() {
+    let simplify = |scene: &str, object: &str| {
+        let scene = parse(&format!("{scene}\n{OBJECT}{object}\n{SENSOR}")).unwrap();
+        scene.simplify_of(&scene.objects[0])
+    };
+    assert_eq!(simplify("", ""), None);
+    assert_eq!(simplify("simplify = \"auto\"", ""), Some(Simplify::Auto));
+    assert_eq!(simplify("simplify = \"auto\"", "simplify = false"), None);
+    assert_eq!(simplify("simplify = 1", "simplify = 0.002"), Some(Simplify::Metres(0.002)));
+    assert_eq!(simplify("", "simplify = \"auto\""), Some(Simplify::Auto));
+}
+
+#[test]
 fn an_object_is_scaled_then_turned_then_moved() {
     let keys = "position_m = [0, 0, 5]\nyaw_deg = 90\nscale = 2";
     let scene = parse(&format!("{OBJECT}{keys}\n{SENSOR}")).unwrap();
@@ -93,6 +106,12 @@ fn bad_scenes_are_named() {
         (both("attributes = [\"range\", \"colour\"]"), "attributes[1]"),
         (both("attributes = [\"range\", \"range\"]"), "attributes[1]: \"range\" stands"),
         (both("attributes = [\"intensity\"]"), "needs effects.intensity"),
+        (both("simplify = 0"), "simplify: 0 is not above 0"),
+        (both("simplify = \"much\""), "simplify: \"much\" is neither"),
+        (both("simplify = false"), "simplify takes"),
+        (object("simplify = true"), "object[0].simplify: takes"),
+        (object("simplify = -1"), "simplify takes"),
+        (both("simplify = \"auto\"\nattributes = [\"triangle\"]"), "simplify: a simplified mesh"),
         (both("effects = { fog = true }"), "fog"),
         (both("effects = { dropout = { probability = 2 } }"), "effects.dropout.probability"),
         (

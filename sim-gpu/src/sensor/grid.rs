@@ -95,7 +95,7 @@ impl Grid {
     }
 
     /// Per column the tangent to the left, per row the tangent upwards.
-    fn tangents(&self) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn tangents(&self) -> (Vec<f64>, Vec<f64>) {
         let optics = self.optics().expect("invariant: validated");
         match optics {
             Optics::FieldOfView { x_deg, y_deg } => {

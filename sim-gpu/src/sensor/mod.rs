@@ -28,6 +28,7 @@ mod profile;
 mod rings;
 mod rotating;
 mod sample;
+mod step;
 mod uniform;
 mod views;
 

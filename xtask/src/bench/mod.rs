@@ -7,6 +7,7 @@
 //! [`growth`] about errors, [`devices`] about adapters beside the CPU, the others
 //! about scanning.
 
+use crate::{Outcome, rebuild};
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -27,8 +28,10 @@ mod moller_trumbore;
 mod peers;
 pub mod pi_model;
 mod pipeline;
+mod plain;
 mod scenes;
 pub mod shot;
+mod simplify;
 pub mod speed;
 mod subject;
 pub mod table;
@@ -55,6 +58,11 @@ enum Benchmark {
     Infer(infer::InferArgs),
     /// Measure a step of training against PyTorch's, in turns.
     Train(infer::learn::TrainArgs),
+    /// Measure what a plain scene pays for effects: against a build without their code.
+    ///
+    /// The sources are copied under `target/peers`, the effects' code is deleted
+    /// there, and what is left takes turns with this program.
+    Plain(plain::PlainArgs),
     /// Model the classifier on a Raspberry Pi 5 without having one.
     ///
     /// Its inner loops, as compiled, go through llvm-mca; what is outside them
@@ -95,6 +103,9 @@ struct SimArgs {
     /// Measure instead what each knob trades of speed for accuracy.
     #[arg(long)]
     trade: bool,
+    /// Measure instead what `--simplify auto` saves and costs.
+    #[arg(long)]
+    simplify: bool,
 }
 
 /// Everything that a run measured.
@@ -114,6 +125,8 @@ struct Report {
     peers: Option<peers::Comparison>,
     #[serde(skip_serializing_if = "Option::is_none")]
     trade: Option<trade::Trade>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    simplify: Option<simplify::Simplified>,
     peak_memory_bytes: Option<u64>,
 }
 
@@ -121,18 +134,23 @@ struct Report {
 ///
 /// # Errors
 /// If no mesh can be read, an adapter fails or the report cannot be written.
-pub fn run(args: &BenchArgs) -> Result<()> {
+pub fn run(args: &BenchArgs) -> Result<Outcome> {
     match &args.what {
-        Benchmark::Sim(args) => sim(args),
+        Benchmark::Sim(args) => return sim(args),
         Benchmark::Infer(args) => infer::run(args),
         Benchmark::Train(args) => infer::learn::run(args),
+        Benchmark::Plain(args) => plain::run(args),
         Benchmark::PiModel(args) => pi_model::run(args),
         Benchmark::Growth(args) => growth::run(args),
         Benchmark::Devices(args) => devices::run(args),
-    }
+    }?;
+    Ok(Outcome::Success)
 }
 
-fn sim(args: &SimArgs) -> Result<()> {
+fn sim(args: &SimArgs) -> Result<Outcome> {
+    if args.simplify && rebuild::lacks_simplify() {
+        return rebuild::with_simplify();
+    }
     let request: Option<AdapterRequest> = match &args.adapter {
         Some(name) => Some(name.parse()?),
         None => None,
@@ -149,6 +167,7 @@ fn sim(args: &SimArgs) -> Result<()> {
         builders: None,
         peers: None,
         trade: None,
+        simplify: None,
         peak_memory_bytes: None,
     };
     let rounds = args.rounds.into();
@@ -163,6 +182,10 @@ fn sim(args: &SimArgs) -> Result<()> {
         let measured = trade::measure(&lanes::open(request.as_ref())?, rounds)?;
         measured.tables().iter().for_each(|table| print!("{table}"));
         report.trade = Some(measured);
+    } else if args.simplify {
+        let measured = simplify::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.simplify = Some(measured);
     } else {
         let lanes = lanes::open(request.as_ref())?;
         let measured = speed::measure(&subjects, &lanes, rounds)?;
@@ -180,5 +203,5 @@ fn sim(args: &SimArgs) -> Result<()> {
         let text = serde_json::to_string_pretty(&report)?;
         std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
     }
-    Ok(())
+    Ok(Outcome::Success)
 }

@@ -96,6 +96,7 @@ fn default_config() -> DatasetConfig {
         seed: 0,
         normalize: Normalize::UnitSphere,
         up: None,
+        simplify: None,
         attributes: [].into_iter().collect(),
         formats: vec![formats::scan_file::ScanFormat::Npz],
         effects: Effects { noise: Some(noise), ..Effects::default() },

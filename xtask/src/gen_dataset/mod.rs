@@ -6,7 +6,7 @@ mod settings;
 mod summary;
 
 use crate::caster::CasterArgs;
-use crate::{Outcome, Usage, gen_shapes};
+use crate::{Outcome, Usage, gen_shapes, rebuild};
 use anyhow::Context;
 use settings::Settings;
 use sim_gpu::dataset::MeshFailure;
@@ -94,6 +94,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         return check(folder);
     }
     let config = args.settings.config()?;
+    if config.simplify.is_some() && rebuild::lacks_simplify() {
+        return rebuild::with_simplify();
+    }
     let (meshes_folder, default_out) = match &args.meshes {
         Some(folder) => (folder.clone(), default_out(folder)),
         None => (write_default_shapes(config.seed)?, PathBuf::from(DEFAULT_OUT)),

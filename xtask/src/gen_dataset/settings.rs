@@ -11,6 +11,7 @@ use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::packets;
 use sim_gpu::pose::load_poses;
 use sim_gpu::sensor::{Layout as BeamLayout, Sensor, Views};
+use sim_gpu::simplify::Simplify;
 use std::path::PathBuf;
 
 /// Flags that decide what a dataset holds.
@@ -79,6 +80,11 @@ pub struct Settings {
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 
+    /// Leave out triangles too small to be told apart: auto goes by the sensors' beams and
+    /// distances, a number bounds in metres how far the surface may move; needs a C++ compiler
+    #[arg(long, value_name = "auto|M")]
+    simplify: Option<Simplify>,
+
     /// Seed of every random number
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -110,6 +116,12 @@ impl Settings {
         formats.push(ScanFormat::Npz);
         formats.sort_unstable();
         formats.dedup();
+        if self.simplify.is_some() && self.attributes.contains(&Attribute::Triangle) {
+            return Err(usage(
+                "--simplify: a simplified mesh's triangles are not the file's, so that \
+                 --attributes cannot have their numbers",
+            ));
+        }
         let effects = self.effects()?;
         if formats.contains(&ScanFormat::Pcap) {
             cast_as_packets_tell(&mut sets, &effects)?;
@@ -128,6 +140,7 @@ impl Settings {
             seed: self.seed,
             normalize: self.normalize.or(recommended).unwrap_or_default(),
             up: self.up,
+            simplify: self.simplify,
             attributes: self.attributes.iter().copied().collect(),
             formats,
             effects,

@@ -36,6 +36,13 @@ pub fn print(
         .map(|&stage| format!("{} {:.1}", stage.name(), progress.spent(stage).as_secs_f64()))
         .collect();
     eprintln!("seconds over all threads: {}, pack {:.1}", stages.join(", "), packing.as_secs_f64());
+    let simplified = manifest.meshes.iter().filter_map(|mesh| Some((mesh, mesh.simplified?)));
+    let (before, after) = simplified.fold((0, 0), |(before, after), (mesh, simplified)| {
+        (before + mesh.triangles, after + simplified.triangles)
+    });
+    if manifest.config.simplify.is_some() {
+        eprintln!("simplified: {after} triangles cast at for {before} in the files");
+    }
     for packed in &manifest.packed {
         eprintln!("{}: {} clouds, {} left out", packed.file, packed.clouds, packed.left_out.len());
     }

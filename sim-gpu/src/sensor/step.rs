@@ -1,0 +1,95 @@
+//! The least angle between neighbouring beams.
+
+use std::f64::consts::TAU;
+
+use super::{Layout, Sensor};
+
+/// Beams closer together than this are one beam that fires twice.
+const SAME_BEAM_RAD: f64 = 1e-9;
+
+impl Sensor {
+    /// The least angle between neighbouring beams in radians, along a row or
+    /// along a column, whichever is less; `None` for a single beam.
+    ///
+    /// Azimuths count as angles of the table, however high the beam: towards
+    /// the zenith real rays stand closer together.
+    #[must_use]
+    pub fn angular_step_rad(&self) -> Option<f64> {
+        let keep_each = f64::from(self.decimation.get());
+        let steps = match &self.layout {
+            Layout::Rotating(rotating) => {
+                let azimuth_rad = TAU * rotating.sequence_us * 1e-6 / rotating.period_s();
+                let elevations = rotating.beam.iter().map(|beam| beam.elevation_deg.to_radians());
+                [Some(keep_each * azimuth_rad), least_gap(elevations.collect())]
+            }
+            Layout::Uniform(uniform) => {
+                let pitch = |from_deg: f64, to_deg: f64, steps: u32| {
+                    let gaps = f64::from(steps.checked_sub(1).filter(|&gaps| gaps > 0)?);
+                    Some((to_deg - from_deg).abs().to_radians() / gaps)
+                };
+                let azimuth =
+                    pitch(uniform.azimuth_from_deg, uniform.azimuth_to_deg, uniform.azimuth_steps);
+                let elevation = pitch(
+                    uniform.elevation_from_deg,
+                    uniform.elevation_to_deg,
+                    uniform.elevation_steps,
+                );
+                [azimuth.map(|step| keep_each * step), elevation]
+            }
+            Layout::Grid(grid) => {
+                let (left, up) = grid.tangents();
+                let kept = left.into_iter().step_by(self.decimation.get() as usize);
+                [
+                    least_gap(kept.map(f64::atan).collect()),
+                    least_gap(up.into_iter().map(f64::atan).collect()),
+                ]
+            }
+        };
+        steps.into_iter().flatten().filter(|&step| step > SAME_BEAM_RAD).reduce(f64::min)
+    }
+}
+
+/// The least difference of two of `angles` that are not the same.
+fn least_gap(mut angles: Vec<f64>) -> Option<f64> {
+    angles.sort_unstable_by(f64::total_cmp);
+    let gaps = angles.windows(2).map(|pair| pair[1] - pair[0]);
+    gaps.filter(|&gap| gap > SAME_BEAM_RAD).reduce(f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::num::NonZeroU32;
+
+    fn step_deg(sensor: &Sensor) -> f64 {
+        sensor.angular_step_rad().unwrap().to_degrees()
+    }
+
+    #[test]
+    fn a_real_head_steps_by_its_firing_sequence() {
+        let vlp32c = Sensor::builtin("vlp32c").unwrap();
+        // 55.296 us of a revolution of 0.1 s; its rows are 0.333 degrees apart.
+        assert!((step_deg(&vlp32c) - 0.199_065_6).abs() < 1e-9);
+        let halved = vlp32c.decimated(NonZeroU32::new(2).unwrap());
+        assert!((step_deg(&halved) - 0.333).abs() < 1e-9, "now the rows are closer");
+    }
+
+    #[test]
+    fn a_grid_steps_by_its_pitch() {
+        let ultrapuck = Sensor::builtin("blainder-ultrapuck").unwrap();
+        assert!((step_deg(&ultrapuck) - 360.0 / 1799.0).abs() < 1e-9);
+        let camera = Sensor::builtin("generic-static").unwrap();
+        // 100 pixels over 60 degrees, uniform in the tangent: least at the edge.
+        let edge = 30f64.to_radians().tan();
+        let expected = (edge.atan() - (edge - 2.0 * edge / 99.0).atan()).to_degrees();
+        assert!((step_deg(&camera) - expected).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_single_beam_has_no_neighbour() {
+        let text = "name = \"one\"\nrange = { max_m = 10 }\n[grid]\nwidth = 1\nheight = 1\n\
+                    fov_x_deg = 10\nfov_y_deg = 10";
+        let one: Sensor = toml::from_str(text).unwrap();
+        assert_eq!(one.angular_step_rad(), None);
+    }
+}

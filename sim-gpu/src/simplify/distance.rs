@@ -1,0 +1,118 @@
+//! How far a point is from a surface, in f64.
+
+use glam::DVec3;
+
+use crate::bvh::MAX_DEPTH;
+use crate::target::Target;
+
+/// The distance from `point` to the triangle of these corners, which may be
+/// degenerate. Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
+#[must_use]
+pub fn distance_to_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let (ab, ac, ap) = (b - a, c - a, point - a);
+    let normal = ab.cross(ac);
+    let squared = normal.length_squared();
+    if squared > 0.0 {
+        // Barycentric coordinates of the foot of the perpendicular.
+        let v = ap.cross(ac).dot(normal) / squared;
+        let w = ab.cross(ap).dot(normal) / squared;
+        if v >= 0.0 && w >= 0.0 && v + w <= 1.0 {
+            return ap.dot(normal).abs() / squared.sqrt();
+        }
+    }
+    [(a, b), (b, c), (c, a)]
+        .into_iter()
+        .map(|(p, q)| to_segment(point, p, q))
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn to_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
+    let along = to - from;
+    let squared = along.length_squared();
+    let t = if squared > 0.0 { ((point - from).dot(along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    (point - (from + along * t)).length()
+}
+
+/// The distance from `point` to the surface of `target`, both in its unit
+/// frame; infinite for a surface of nothing.
+#[must_use]
+pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
+    let mut nearest = f64::INFINITY;
+    let mut stack = [0u32; MAX_DEPTH + 1];
+    let mut height = usize::from(!target.surface.is_empty());
+    while height > 0 {
+        height -= 1;
+        let node = &target.bvh.nodes[stack[height] as usize];
+        let mut children = [
+            (to_box(point, node.left_min, node.left_max), node.left, node.left_count),
+            (to_box(point, node.right_min, node.right_max), node.right, node.right_count),
+        ];
+        if children[0].0 < children[1].0 {
+            children.swap(0, 1);
+        }
+        for (distance, first, count) in children {
+            if distance >= nearest {
+                continue;
+            }
+            if count == 0 {
+                stack[height] = first;
+                height += 1;
+                continue;
+            }
+            for triangle in &target.bvh.triangles[first as usize..(first + count) as usize] {
+                let corners = target.surface.corners(triangle.index);
+                nearest = nearest.min(distance_to_triangle(point, corners));
+            }
+        }
+    }
+    nearest
+}
+
+/// Boxes are padded by more than their rounding to f32.
+fn to_box(point: DVec3, low: [f32; 3], high: [f32; 3]) -> f64 {
+    let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+    (point.clamp(corner(low), corner(high)) - point).length()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::Builder;
+    use crate::shapes::{ShapeClass, generate};
+    use crate::target::Surface;
+
+    const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
+
+    #[test]
+    fn each_region_of_a_triangle_has_its_distance() {
+        for (point, distance) in [
+            (DVec3::new(0.25, 0.25, -2.0), 2.0),
+            (DVec3::new(0.5, -3.0, 4.0), 5.0),
+            (DVec3::new(4.0, 0.0, 4.0), 5.0),
+            (DVec3::new(1.0, 1.0, 0.0), 0.5f64.sqrt()),
+            (DVec3::new(0.0, 0.5, 0.0), 0.0),
+        ] {
+            assert!((distance_to_triangle(point, CORNERS) - distance).abs() < 1e-15, "{point}");
+        }
+        let [a, b, _] = CORNERS;
+        assert_eq!(distance_to_triangle(DVec3::Y, [a, a, a]), 1.0);
+        assert_eq!(distance_to_triangle(DVec3::new(0.5, 0.0, 2.0), [a, b, a]), 2.0);
+    }
+
+    #[test]
+    fn the_tree_finds_what_a_search_of_all_triangles_finds() {
+        let mesh = generate(ShapeClass::Chair, 1, 0);
+        let kept: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+        let target = Target::new(Surface::new(mesh, kept), Builder::Morton);
+        let key = formats::rng::StreamKey::new(1, "points", 0);
+        for i in 0..200 {
+            let point =
+                DVec3::new(key.unit(3 * i), key.unit(3 * i + 1), key.unit(3 * i + 2)) * 4.0 - 2.0;
+            let all = target.surface.kept().iter();
+            let expected = all
+                .map(|&t| distance_to_triangle(point, target.surface.corners(t)))
+                .fold(f64::INFINITY, f64::min);
+            assert_eq!(distance_to_surface(&target, point), expected);
+        }
+    }
+}

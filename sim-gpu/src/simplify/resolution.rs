@@ -1,0 +1,83 @@
+//! What a sensor can tell apart on an object.
+
+use glam::DVec3;
+
+use crate::mesh::Mesh;
+use crate::sensor::Sensor;
+
+/// A step between beams holds so many beams' footprints.
+///
+/// The VLP-32C's beams diverge by 3.0 mrad across and 1.5 mrad upwards, and are
+/// 3.5 mrad apart: the narrow side of a footprint is 0.43 of a step. Profiles
+/// state steps but no divergence, so half a step stands for the footprint.
+pub const FOOTPRINTS_PER_STEP: f64 = 2.0;
+
+/// A sensor and the places from which it looks, in the object's frame.
+pub struct Watcher<'a> {
+    /// The sensor.
+    pub sensor: &'a Sensor,
+    /// Where it stands.
+    pub positions: Vec<DVec3>,
+}
+
+/// The radius of a beam's footprint where an object is nearest to any of
+/// `watchers`: by that much a surface may be displaced without leaving the beam
+/// that sees it. In the units of `mesh`, of which a metre has `units_per_m`.
+///
+/// The nearest distance is that to the mesh's bounding box, but not less than
+/// the nearest range that the sensor reports. 0 where a sensor without such a
+/// limit stands in the box; infinite where nothing is to be told apart.
+#[must_use]
+pub fn resolved_m(mesh: &Mesh, units_per_m: f64, watchers: &[Watcher<'_>]) -> f64 {
+    let (low, high) = bounding_box(mesh);
+    let radius = |watcher: &Watcher<'_>| {
+        let step_rad = watcher.sensor.angular_step_rad().unwrap_or(f64::INFINITY);
+        let distance = |from: &DVec3| (from.clamp(low, high) - *from).length();
+        let nearest = watcher.positions.iter().map(distance).fold(f64::INFINITY, f64::min);
+        let nearest = nearest.max(watcher.sensor.range.min_m * units_per_m);
+        // The tangent of half an angle; a step of a half circle tells nothing.
+        let half_footprint_rad = 0.5 * step_rad / FOOTPRINTS_PER_STEP;
+        if half_footprint_rad >= std::f64::consts::FRAC_PI_2 {
+            return f64::INFINITY;
+        }
+        nearest * half_footprint_rad.tan()
+    };
+    watchers.iter().map(radius).fold(f64::INFINITY, f64::min)
+}
+
+/// Of the vertices that triangles name.
+fn bounding_box(mesh: &Mesh) -> (DVec3, DVec3) {
+    let named = mesh.triangles.iter().flatten().map(|&v| mesh.vertices[v as usize]);
+    named.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit_square() -> Mesh {
+        let vertices = vec![DVec3::ZERO, DVec3::Y, DVec3::Z, DVec3::splat(1e9)];
+        Mesh { vertices, triangles: vec![[0, 1, 2]] }
+    }
+
+    fn seen_from(sensor: &str, positions: Vec<DVec3>) -> f64 {
+        let sensor = Sensor::builtin(sensor).unwrap();
+        resolved_m(&unit_square(), 1.0, &[Watcher { sensor: &sensor, positions }])
+    }
+
+    #[test]
+    fn the_nearest_place_decides_and_a_quarter_of_a_step_there() {
+        let two = vec![DVec3::X * 8.0, DVec3::new(2.0, 0.5, 0.5)];
+        // 0.1990656 degrees / 4 at 2 m.
+        let expected = 2.0 * (0.199_065_6f64 / 4.0).to_radians().tan();
+        assert!((seen_from("vlp32c", two) - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn nothing_is_seen_nearer_than_the_sensors_least_range() {
+        let within = vec![DVec3::splat(0.2)];
+        let at_1_m = (0.199_065_6f64 / 4.0).to_radians().tan();
+        assert!((seen_from("vlp32c", within.clone()) - at_1_m).abs() < 1e-12);
+        assert_eq!(seen_from("generic-static", within), 0.0, "it has no least range");
+    }
+}

@@ -1,0 +1,51 @@
+//! What travels to the adapter and back for each ray, in bytes.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use sim_gpu::effects::Effects;
+use sim_gpu::gpu::{Batch, modules};
+use sim_gpu::job::CastJob;
+use sim_gpu::pose::Pose;
+use sim_gpu::sensor::BeamPattern;
+use tests::{adapter, casting, meshes};
+
+use super::Rows;
+
+/// A unit sphere seen from 3 m, and the beams.
+pub fn sphere() -> (CastJob, BeamPattern) {
+    let pattern = casting::builtin("vlp32c");
+    let target = casting::target(&meshes::icosphere(4));
+    let pose = Pose::look_at(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO).unwrap();
+    (casting::job(&Arc::clone(&target), &pose, &pattern), pattern)
+}
+
+/// Bytes sent and read back for each ray: as batches are laid out, and as every
+/// caster that there is answers.
+pub fn rows(effects: &Effects) -> Rows {
+    let (job, _) = sphere();
+    let modules = modules(effects);
+    let mut batch = Batch::default();
+    batch.push(&job, 0..job.rays.len(), &modules);
+    let [codes, words] = batch.answer_bytes(&modules);
+    for caster in adapter::casters(effects) {
+        let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
+        let answered = [size_of_val(&casts[0].codes[..]), size_of_val(&casts[0].words[..])];
+        assert_eq!(answered.map(|bytes| bytes as u64), [codes, words], "{}", caster.name());
+    }
+    let n = job.rays.len() as u64;
+    let per_ray = |bytes: u64| {
+        assert_eq!(bytes % n, 0, "every ray has the same share");
+        bytes / n
+    };
+    let bytes_of = |sent: usize| per_ray(sent as u64);
+    [
+        ("ray, bytes of rays sent", bytes_of(size_of_val(&batch.rays[..]))),
+        ("ray, bytes of streams sent", bytes_of(size_of_val(&batch.streams[..]))),
+        ("ray, bytes of reflectivities sent", bytes_of(size_of_val(&batch.reflectivities[..]))),
+        ("ray, bytes of codes read back", per_ray(codes)),
+        ("ray, bytes of words read back", per_ray(words)),
+    ]
+    .map(|(row, bytes)| (row.to_owned(), bytes))
+    .into()
+}
