@@ -1,6 +1,6 @@
 //! The build from which the effects' code was deleted.
 
-use super::super::venv::workshop;
+use crate::venv::workshop;
 use crate::workspace;
 use anyhow::{Context, Result, bail};
 use formats::atomic;
