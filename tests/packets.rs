@@ -189,13 +189,13 @@ fn culling_loses_no_beam_that_starts_beside_the_sensor() {
     let steepest_m = BEAM_CROSSING_M * 25f64.to_radians().tan();
     assert!((pattern.farthest_start_m() - steepest_m).abs() < 1e-15);
     for distance_m in [1.05, 2.0, 20.0] {
-        // Small, so that 12 mm are much of it when it is near.
+        // Near, 12 mm are a tenth of it.
         let mut mesh = meshes::icosphere(2);
-        mesh.vertices.iter_mut().for_each(|v| *v *= 0.05 * distance_m);
+        mesh.vertices.iter_mut().for_each(|v| *v *= 0.1 * distance_m);
         let pose = pose(distance_m);
         let caster = Caster::Cpu(Effects::default());
         let culled = scan(&caster, &sensor, &mesh, &pose, Culling::On);
-        assert!(culled.len() > 50, "{}", culled.len());
+        assert!(culled.len() > 20, "{}", culled.len());
         assert_eq!(culled, scan(&caster, &sensor, &mesh, &pose, Culling::Off));
     }
 }
@@ -229,7 +229,7 @@ fn a_sensor_that_packets_cannot_tell_is_refused() {
     for (error, key) in [
         (changed(&|s| head_of(s).beam[7].elevation_deg += 0.001), "rotating.beam[7]: is not its"),
         (changed(&|s| head_of(s).beam[7].azimuth_offset_deg = 0.0), "rotating.beam[7]: is not its"),
-        (changed(&|s| head_of(s).beam.swap(0, 1)), "rotating.beam[1]: is not its laser 0"),
+        (changed(&|s| head_of(s).beam.swap(0, 1)), "rotating.beam[0]: is not its laser 0"),
         (changed(&|s| head_of(s).beam.truncate(31)), "rotating.beam: 31 beams"),
         (changed(&|s| head_of(s).sequence_us = 60.0), "rotating.sequence_us: 60 is not"),
         (changed(&|s| head_of(s).rpm = 299.0), "rotating.rpm: 299 is not within 300..=1200"),

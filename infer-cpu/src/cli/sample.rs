@@ -26,7 +26,7 @@ Examples:
 Points are written as they are read: samplers only choose. A voxel size
 is in the cloud's own unit. cpl chooses as the model does, of the cloud as the
 model was trained to see it; where it repeats points to come to M, so does the
-output. The output's name tells its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin.")]
+output. The output's name tells its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin, LAS.")]
 pub struct Args {
     /// Which points to keep: all, first, random, fps, voxel, cpl
     #[arg(long, value_name = "NAME")]
