@@ -211,7 +211,7 @@ pub fn bundled(set: &TestSet) -> Result<Vec<PathBuf>> {
     let files = entries.flatten().map(|entry| entry.path());
     let with_classes = |path: PathBuf| {
         let card = inspect(&path).ok()?.card;
-        (card.trained && set.fits(&path).is_ok()).then(|| (card.classes.len(), path))
+        (card.trained && set.fits(&path).is_ok()).then_some((card.classes.len(), path))
     };
     let is_model = |path: &PathBuf| path.extension().is_some_and(|end| end == "safetensors");
     let mut models: Vec<(usize, PathBuf)> =
