@@ -1,5 +1,6 @@
 //! The one command line of an Edgepuck workstation.
 
+mod ablate;
 mod adapters;
 mod bench;
 mod build_pi;
@@ -64,6 +65,8 @@ enum Command {
     ComparePoints(train::Args),
     /// Run the paper's experiments again, and write one report
     Reproduce(reproduce::Args),
+    /// Measure what each effect of a scan is worth to a classifier, and what it costs
+    Ablate(ablate::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -93,6 +96,7 @@ fn main() -> ExitCode {
         Command::Explain(args) => train::run("explain", &args),
         Command::ComparePoints(args) => train::run("compare-points", &args),
         Command::Reproduce(args) => reproduce::run(&args),
+        Command::Ablate(args) => ablate::run(&args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {
