@@ -1,8 +1,10 @@
 //! `train`: the program that `cargo xtask train` and `eval` start.
 
 mod compare_points;
+mod cross;
 mod eval;
 mod explain;
+mod once;
 mod report;
 mod reproduce;
 mod run;
@@ -33,6 +35,9 @@ enum Command {
     /// Run the paper's experiments
     #[command(hide = true)]
     Reproduce(reproduce::Args),
+    /// Train on some sets and test on some: what `cargo xtask ablate` starts
+    #[command(hide = true)]
+    Cross(cross::Args),
     /// Take part in `bench train`
     #[command(hide = true)]
     Serve(serve::Args),
@@ -45,6 +50,7 @@ fn main() -> ExitCode {
         Command::Explain(args) => explain::run(&args),
         Command::ComparePoints(args) => compare_points::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),
+        Command::Cross(args) => cross::run(&args),
         Command::Serve(args) => serve::run(&args),
     };
     match done {

@@ -1,5 +1,6 @@
 //! The one command line of an Edgepuck workstation.
 
+mod ablate;
 mod adapters;
 mod advise;
 mod bench;
@@ -79,6 +80,8 @@ enum Command {
     Advise(advise::Args),
     /// Gather everything that was measured into one page
     Report(report::Args),
+    /// Measure what each effect of a scan is worth to a classifier, and what it costs
+    Ablate(ablate::Args),
     /// Install what tests need and run all of them
     Test(test::Args),
 }
@@ -112,6 +115,7 @@ fn main() -> ExitCode {
         Command::Trade(args) => trade::run(&args),
         Command::Advise(args) => advise::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Ablate(args) => ablate::run(&args),
         Command::Test(args) => test::run(&args),
     };
     match outcome {

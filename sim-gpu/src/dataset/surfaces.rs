@@ -57,7 +57,8 @@ struct Drawn {
 /// `seen-SPLIT.npz`: for each view as many points of
 /// those that it can see, in the frame of the whole mesh's cloud: what is
 /// missing is missing, but nothing is moved. Views that see too few points are
-/// left out. Returns the meshes that could not be read or have no area.
+/// left out; with no view `seen-SPLIT.npz` is empty, and nothing is built for it.
+/// Returns the meshes that could not be read or have no area.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -123,6 +124,9 @@ fn draw(mesh: &MeshEntry, config: &SurfaceConfig) -> Result<Drawn, MeshFailure> 
     let mut whole = rounded(own);
     normalize_unit_sphere(&mut whole);
     let poses = config.views.poses(DVec3::ZERO, key("views", 0));
+    if poses.is_empty() {
+        return Ok(Drawn { whole, seen: Vec::new() });
+    }
     let target = Target::new(surface, Builder::Sah);
     let seen = poses.iter().zip(0..).map(|(pose, view)| {
         let open = seen_from(&target, pose.position_m, looked_at);

@@ -19,12 +19,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use formats::atomic;
 
 use plan::Plan;
 use section::{Section, write_csv};
 use workshop::Workshop;
+
+use crate::once;
 
 /// Flags of `reproduce`.
 #[derive(clap::Args, Debug)]
@@ -80,7 +82,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         &args.out,
     );
     shop.check()?;
-    keep_terms(&shop, &args.out)?;
+    once::keep_terms(&shop.terms()?, &args.out)?;
     fs::create_dir_all(&shop.models)?;
     let mut sections = Vec::new();
     for (name, experiment) in EXPERIMENTS {
@@ -92,22 +94,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     atomic::write_bytes(&path, &page)?;
     println!("{}", path.display());
     Ok(())
-}
-
-/// Keeps the plan, and what data it was run on, beside what comes of it.
-fn keep_terms(shop: &Workshop, out: &Path) -> anyhow::Result<()> {
-    let path = out.join("terms.toml");
-    let text = shop.terms()?;
-    if path.is_file() {
-        let earlier = fs::read_to_string(&path)?;
-        ensure!(
-            earlier == text,
-            "{}: an earlier run had another plan or other data; choose another --out",
-            path.display()
-        );
-        return Ok(());
-    }
-    Ok(atomic::write_bytes(&path, &text)?)
 }
 
 /// What experiment `name` came to, from an earlier run or from this.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use formats::hash;
 use formats::split::Split;
 use infer_cpu::Options;
@@ -17,7 +17,7 @@ use train::evaluate::{Confusion, confusion};
 use train::recipe::Recipe;
 
 use super::plan::Plan;
-use crate::run::Job;
+use crate::once;
 
 /// What all experiments have at hand.
 pub struct Workshop {
@@ -170,14 +170,7 @@ impl Workshop {
     /// Another recipe under that name; what training reports.
     pub fn network(&self, name: &str, recipe: Recipe, clouds: &Clouds) -> anyhow::Result<PathBuf> {
         let out = self.model(name);
-        if out.is_file() {
-            let trained = Recipe::read(&out.with_extension("run").join("recipe.toml"))?;
-            ensure!(trained == recipe, "{}: was trained by another recipe", out.display());
-            return Ok(out);
-        }
-        eprintln!("training {name}: {} clouds, {} points", clouds.len(), recipe.points);
-        let job = Job { recipe, clouds, data: name, data_name: name, out: &out };
-        job.run(None).with_context(|| format!("cannot train {name}"))?;
+        once::network(&out, name, recipe, clouds)?;
         Ok(out)
     }
 }

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod augment;
+mod cross;
 mod export;
 mod gradients;
 mod killed;
