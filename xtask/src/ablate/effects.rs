@@ -4,6 +4,7 @@ use super::plan::Plan;
 use anyhow::Context;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
+use formats::vlp32c::Returns;
 use sim_gpu::dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
 use sim_gpu::dataset::surfaces::SurfaceConfig;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
@@ -137,6 +138,7 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
         seed: SEED,
         normalize: Normalize::default(),
         up: None,
+        simplify: None,
         attributes: [
             kept(switches.intensity, Attribute::Intensity),
             kept(switches.time, Attribute::Time),
@@ -156,6 +158,7 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
         packed_points: plan.packed_points,
         min_points: plan.min_points,
         layouts: Vec::new(),
+        returns: Returns::default(),
     })
 }
 
