@@ -3,29 +3,26 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-use meshopt::{SimplifyOptions, simplify_with_locks_decoder};
+use meshopt::{SimplifyOptions, simplify_decoder};
+use rayon::prelude::*;
 
 use super::NotBuilt;
-use super::within::{beyond, lies_within};
+use super::distance::distance_to_surface;
+use super::within::beyond;
 use crate::bvh::Builder;
 use crate::mesh::Mesh;
 use crate::mesh::census::survey;
 use crate::target::{Surface, Target, UnitFrame};
 
-/// The part of the bound that the decimation is told first. Its errors are
-/// means over quadrics, not maxima: told all of the bound, it would go too far
-/// in a tenth of all places.
-const FIRST_SHARE: f64 = 0.5;
+/// The part of the bound that the decimation is told. Its errors are means over
+/// quadrics, not maxima: told all of the bound, it would go too far in a tenth
+/// of all places.
+const SHARE: f64 = 0.5;
 
-/// What it is told next, of what it was told.
-const NEXT_SHARE: f64 = 0.7;
-
-/// Where less than this part of the triangles is out of bounds, these are
-/// locked, and it is told the same again.
-const FEW: f64 = 0.02;
-
-/// Results that are put to the proof at most.
-const ATTEMPTS: usize = 12;
+/// How far around a triangle that strays the mesh's own come back, in bounds.
+/// They then overlap with what is left: a beam at less than atan(4) = 76 degrees
+/// from the normal cannot slip through between two layers one bound apart.
+const OVERLAP: f64 = 4.0;
 
 /// A result with more than this part of the triangles is not worth it.
 const WORTH_IT: f64 = 0.75;
@@ -35,43 +32,59 @@ pub(super) fn decimated(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<
     Ok(proven(mesh, kept, bound))
 }
 
-/// Decimates until all of the result is proven to lie near the mesh. Triangles of
-/// the mesh that are not proven to lie near the result then become part of it,
-/// which they are as near to as can be. None of the result is taken away: that
-/// would leave gaps.
+/// Decimates, and then puts right where that went too far. Triangles that are
+/// not proven to lie near the mesh are left out, and those of the mesh around
+/// them come back; so do those that are not proven to lie near what is left.
 fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
     if kept.is_empty() || bound.is_nan() || bound <= 0.0 {
         return None;
     }
     let surface = Surface::new(mesh.clone(), kept.to_vec());
-    let mut welded = Welded::of(mesh, kept, &surface.frame);
+    let welded = Welded::of(mesh, kept, &surface.frame);
     let most = (WORTH_IT * welded.corners.len() as f64) as usize;
     // No error is larger than the whole mesh, which fits a box of side 2.
-    let error = (bound / surface.frame.scale).min(2.0);
-    let mut original = None;
-    let mut share = FIRST_SHARE;
-    for _ in 0..ATTEMPTS {
-        let mut corners = welded.collapsed((share * error) as f32);
-        if corners.len() > most {
-            return None;
-        }
-        let original =
-            original.get_or_insert_with(|| Target::new(surface.clone(), Builder::Morton));
-        let fewer = target(&welded.mesh_of(mesh, &corners));
-        let strays = !lies_within(&fewer.surface, original, bound);
-        let lost = beyond(&original.surface, &fewer, bound);
-        let lost: Vec<usize> = lost.iter().filter_map(|t| kept.binary_search(t).ok()).collect();
-        if !strays {
-            lost.iter().for_each(|&nth| corners.extend(welded.triangle(nth)));
-            return (corners.len() <= most).then(|| welded.mesh_of(mesh, &corners));
-        }
-        if lost.is_empty() || lost.len() as f64 > FEW * kept.len() as f64 {
-            share *= NEXT_SHARE;
-        } else {
-            lost.iter().for_each(|&nth| welded.lock(nth));
-        }
+    let error = SHARE * (bound / surface.frame.scale).min(2.0);
+    let mut corners = welded.collapsed(error as f32);
+    if corners.len() > most {
+        return None;
     }
-    None
+    let original = Target::new(surface, Builder::Morton);
+    let strays = beyond(&target(&welded.mesh_of(mesh, &corners)).surface, &original, bound);
+    let strayed: Vec<u32> = strays.iter().flat_map(|&t| triangle(&corners, t as usize)).collect();
+    let stays = |nth: usize| strays.binary_search(&(nth as u32)).is_err();
+    let left = (0..corners.len() / 3).filter(|&nth| stays(nth));
+    corners = left.flat_map(|nth| triangle(&corners, nth)).collect();
+
+    let rest = target(&welded.mesh_of(mesh, &corners));
+    let mut back = beyond(&original.surface, &rest, bound);
+    if !strays.is_empty() {
+        let strayed = target(&welded.mesh_of(mesh, &strayed));
+        back.extend(around(&original.surface, &strayed, OVERLAP * bound));
+        back.sort_unstable();
+        back.dedup();
+    }
+    let nth = back.iter().filter_map(|t| kept.binary_search(t).ok());
+    corners.extend(nth.flat_map(|nth| triangle(&welded.corners, nth)));
+    (corners.len() <= most).then(|| welded.mesh_of(mesh, &corners))
+}
+
+/// The `nth` three of `corners`.
+fn triangle(corners: &[u32], nth: usize) -> [u32; 3] {
+    [0, 1, 2].map(|corner| corners[3 * nth + corner])
+}
+
+/// The triangles of `surface` of which some part may be within `distance` of
+/// `target`.
+fn around(surface: &Surface, target: &Target, distance: f64) -> Vec<u32> {
+    let (from, to) = (surface.frame, target.surface.frame);
+    let is_near = |&&t: &&u32| {
+        let corners = surface.corners(t).map(|p| to.to_unit(p * from.scale + from.centre));
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius =
+            corners.map(|corner| (corner - middle).length()).into_iter().fold(0.0, f64::max);
+        distance_to_surface(target, middle) <= distance / to.scale + radius
+    };
+    surface.kept().par_iter().filter(is_near).copied().collect()
 }
 
 fn target(mesh: &Mesh) -> Target {
@@ -88,8 +101,6 @@ struct Welded {
     sources: Vec<u32>,
     /// Indices into `positions`, `[n_kept * 3]`.
     corners: Vec<u32>,
-    /// Positions that collapses may not remove, `[n_welded]`.
-    locked: Vec<bool>,
 }
 
 impl Welded {
@@ -99,7 +110,6 @@ impl Welded {
             positions: Vec::new(),
             sources: Vec::new(),
             corners: Vec::with_capacity(3 * kept.len()),
-            locked: Vec::new(),
         };
         let mut by_vertex = vec![NOT_SEEN; mesh.vertices.len()];
         let mut by_position = HashMap::new();
@@ -119,18 +129,7 @@ impl Welded {
             }
             welded.corners.push(*welded_vertex);
         }
-        welded.locked.resize(welded.positions.len(), false);
         welded
-    }
-
-    /// The corners of the `nth` triangle kept.
-    fn triangle(&self, nth: usize) -> [u32; 3] {
-        [0, 1, 2].map(|corner| self.corners[3 * nth + corner])
-    }
-
-    /// Keeps the `nth` triangle's corners where they are.
-    fn lock(&mut self, nth: usize) {
-        self.triangle(nth).iter().for_each(|&corner| self.locked[corner as usize] = true);
     }
 
     /// The corners that are left when collapses may displace the surface by
@@ -138,10 +137,9 @@ impl Welded {
     fn collapsed(&self, error: f32) -> Vec<u32> {
         const AS_FAR_AS_THE_ERROR_ALLOWS: usize = 0;
         let absolute = SimplifyOptions::ErrorAbsolute;
-        simplify_with_locks_decoder(
+        simplify_decoder(
             &self.corners,
             &self.positions,
-            &self.locked,
             AS_FAR_AS_THE_ERROR_ALLOWS,
             error,
             absolute,

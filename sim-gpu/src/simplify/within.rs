@@ -20,7 +20,7 @@ const SHORTEST_PIECE: f64 = 1.0 / 16.0;
 
 /// Pieces that a proof may look at for each triangle of both surfaces: a proof
 /// that needs more is given up, and the answer is no.
-const PIECES_PER_TRIANGLE: usize = 64;
+const PIECES_PER_TRIANGLE: usize = 256;
 
 /// Whether it is proven that every point of `surface` lies within `bound` of
 /// the surface of `target`; both in metres, and so is the bound.
