@@ -37,12 +37,11 @@ pub fn body(folder: &Path) -> Result<Markup> {
         csv::Reader::from_path(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let rows: Result<Vec<Growth>, csv::Error> = csv.deserialize().collect();
     let rows = rows.with_context(|| format!("reading {}", path.display()))?;
-    let mut drawings: BTreeMap<(&str, &str), Vec<&Growth>> = BTreeMap::new();
+    let mut drawings: BTreeMap<(&str, &str, &str), Vec<&Growth>> = BTreeMap::new();
     for row in &rows {
-        drawings.entry((&row.quantity, &row.knob)).or_default().push(row);
+        drawings.entry((&row.quantity, row.model(), &row.knob)).or_default().push(row);
     }
-    let figures: Result<Vec<Markup>> =
-        drawings.iter().map(|((quantity, knob), rows)| one(quantity, knob, rows)).collect();
+    let figures: Result<Vec<Markup>> = drawings.values().map(|rows| one(rows)).collect();
     let devices = text(&folder.join("devices.csv"))?;
     let fuzz = text(&folder.join("fuzz.md"))?;
     Ok(html! {
@@ -57,35 +56,44 @@ pub fn body(folder: &Path) -> Result<Markup> {
     })
 }
 
-fn one(quantity: &str, knob: &str, rows: &[&Growth]) -> Result<Markup> {
-    let mut series: BTreeMap<String, Vec<Dot>> = BTreeMap::new();
+impl Growth {
+    /// The network, where the row is about one: layers are named `MODEL/LAYER`.
+    fn model(&self) -> &str {
+        self.layer.split_once('/').map_or("", |(model, _)| model)
+    }
+
+    fn words(&self) -> String {
+        let Self { quantity, layer, precision, knob, value, .. } = self;
+        format!("{quantity} {layer} in {precision}, {knob} {value:e}")
+    }
+}
+
+/// Errors of one quantity by one knob; a colour a precision.
+fn one(rows: &[&Growth]) -> Result<Markup> {
+    let Some(first) = rows.first() else { return Ok(Markup::default()) };
+    let mut series: BTreeMap<&str, Vec<Dot>> = BTreeMap::new();
     for row in rows {
-        let words = [row.layer.as_str(), row.precision.as_str()];
-        let name = words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ");
-        let dots = series.entry(name.clone()).or_default();
-        let at = format!("{name}\n{knob} {}", row.value);
-        dots.push(Dot {
-            x: row.value,
-            y: row.largest_error,
-            tip: format!(
-                "{at}\nlargest error {:.2e} {}, median {:.2e}",
-                row.largest_error, row.unit, row.median_error
-            ),
-            filled: true,
-        });
+        let dots = series.entry(&row.precision).or_default();
+        let Growth { median_error, largest_error, unit, .. } = row;
+        let errors = format!("largest error {largest_error:.2e} {unit}, median {median_error:.2e}");
+        let tip = format!("{}\n{errors}", row.words());
+        dots.push(Dot { x: row.value, y: *largest_error, tip, filled: true });
         dots.extend(row.bound.map(|bound| Dot {
             x: row.value,
             y: bound,
-            tip: format!("{at}\nbound {bound:.2e} {}", row.unit),
+            tip: format!("{}\nbound {bound:.2e} {unit}", row.words()),
             filled: false,
         }));
     }
-    let series: Vec<Series> =
-        series.into_iter().map(|(name, dots)| Series { name, dots, joined: true }).collect();
-    let unit = rows.first().map_or("", |row| &row.unit);
-    let (across, up) = (knob.to_owned(), format!("error, {unit}"));
-    let x = Axis { label: &across, logarithmic: true, percent: false };
-    let y = Axis { label: &up, logarithmic: true, percent: false };
-    let title = format!("{quantity} by {knob}");
-    Ok(figure(&draw(&title, &x, &y, &series)?, ""))
+    let is_one_layer = rows.iter().all(|row| row.layer == first.layer);
+    let series: Vec<Series> = series
+        .into_iter()
+        .map(|(name, dots)| Series { name: name.to_owned(), dots, joined: is_one_layer })
+        .collect();
+    let unit = if first.unit == "1" { "of the largest value" } else { &first.unit };
+    let label = format!("error, {unit}");
+    let x = Axis { label: &first.knob, logarithmic: true, percent: false };
+    let y = Axis { label: &label, logarithmic: true, percent: false };
+    let title = format!("{} {} by {}", first.model(), first.quantity, first.knob);
+    Ok(figure(&draw(title.trim(), &x, &y, &series)?, ""))
 }
