@@ -21,7 +21,7 @@ pub struct Grid {
     pub points: Vec<usize>,
     /// Ways to choose them.
     pub samplers: Vec<Chooser>,
-    /// What to compute in, fp32 first.
+    /// What to compute in besides fp32.
     pub precisions: Vec<Precision>,
     /// Threads of the network as its card has it, besides one.
     pub threads: Vec<usize>,
@@ -32,9 +32,9 @@ impl Grid {
     pub fn whole() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Self {
-            points: vec![16, 32, 64, 128, 256, 512, 1024],
+            points: vec![16, 32, 64, 128, 256, 1024],
             samplers: Chooser::ALL.to_vec(),
-            precisions: vec![Precision::F32, Precision::F32Fc16, Precision::F16, Precision::I8],
+            precisions: vec![Precision::F32Fc16, Precision::F16, Precision::I8],
             threads: (2..=threads.min(4)).collect(),
         }
     }
@@ -44,7 +44,7 @@ impl Grid {
         Self {
             points: vec![16, 64],
             samplers: vec![Chooser::RANDOM, Chooser::FPS],
-            precisions: vec![Precision::F32, Precision::I8],
+            precisions: vec![Precision::I8],
             threads: Vec::new(),
         }
     }
@@ -67,8 +67,8 @@ pub fn as_trained(model: &Path) -> Result<Classifying> {
     })
 }
 
-/// Every setting of the grid for `model`, on `set`; those that the model or
-/// the clouds cannot have are left out.
+/// One setting at a time, then combinations along the front, for `model` on `set`;
+/// those that the model or the clouds cannot have are left out.
 ///
 /// # Errors
 /// A model that cannot be read or does not know the classes; a set that does
@@ -76,27 +76,71 @@ pub fn as_trained(model: &Path) -> Result<Classifying> {
 pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> Result<Vec<Row>> {
     set.fits(model)?;
     let trained = as_trained(model)?;
-    let mut measured: Vec<(Classifying, Row)> = Vec::new();
-    for samples in sampled(&trained, set, grid) {
-        let mut reference: Option<Answers> = None;
-        for setting in with_precisions(&samples, &trained, grid) {
-            let answers = setting.answers(&set.clouds).with_context(|| {
-                format!("{} by {}", setting.model.display(), setting.sampler.name)
-            })?;
-            let compared = match setting.t_nets {
-                TNets::Both => reference.get_or_insert_with(|| answers.clone()),
+    let mut first: Vec<Measured> = Vec::new();
+    for setting in sampled(&trained, set, grid) {
+        let answers = setting.answers(&set.clouds)?;
+        first.push(Measured::new(setting, set, &trained, &answers, &answers)?);
+    }
+    let more: Vec<Measured> = promising(&first, &trained)
+        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, grid))
+        .map(|setting| {
+            let reference = first.iter().find(|sampled| sampled.chooses_as(&setting));
+            let answers = setting.answers(&set.clouds)?;
+            let compared = match (setting.t_nets, reference) {
+                (TNets::Both, Some(reference)) => &reference.answers,
                 _ => &answers,
             };
-            let mut row = setting.row(set, &answers, compared)?;
-            row.knob = knob(&setting, &trained);
-            eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
-            measured.push((setting, row));
-        }
-    }
+            Measured::new(setting, set, &trained, &answers, compared)
+        })
+        .collect::<Result<_>>()?;
+    let all: Vec<Measured> = first.into_iter().chain(more).collect();
     let from = set.most_points();
-    let rows: Result<Vec<Vec<Row>>> =
-        measured.into_par_iter().map(|(setting, row)| with_pi(row, &setting, from, pi)).collect();
+    let with_pi = |Measured { setting, row, .. }: Measured| with_pi(row, &setting, from, pi);
+    let rows: Result<Vec<Vec<Row>>> = all.into_par_iter().map(with_pi).collect();
     Ok(rows?.concat())
+}
+
+/// A setting, and what came of it.
+struct Measured {
+    setting: Classifying,
+    answers: Answers,
+    row: Row,
+}
+
+impl Measured {
+    fn new(
+        setting: Classifying,
+        set: &TestSet,
+        trained: &Classifying,
+        answers: &Answers,
+        reference: &Answers,
+    ) -> Result<Self> {
+        let mut row = setting.row(set, answers, reference)?;
+        row.knob = knob(&setting, trained);
+        eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
+        Ok(Self { setting, answers: answers.clone(), row })
+    }
+
+    fn chooses_as(&self, setting: &Classifying) -> bool {
+        (self.setting.sampler, self.setting.points) == (setting.sampler, setting.points)
+    }
+}
+
+/// Of ways to choose points those that are worth more precisions: those with the
+/// model's own sampler or its number of points, and those that no way with as few
+/// points beats.
+fn promising<'a>(
+    all: &'a [Measured],
+    trained: &'a Classifying,
+) -> impl Iterator<Item = &'a Measured> {
+    all.iter().filter(move |way| {
+        let beaten = |other: &Measured| {
+            other.setting.points <= way.setting.points && other.row.right > way.row.right
+        };
+        way.setting.sampler == trained.sampler
+            || way.setting.points == trained.points
+            || !all.iter().any(beaten)
+    })
 }
 
 /// The row with its modelled time on a Raspberry Pi 5, and rows for the board's
@@ -138,11 +182,11 @@ fn sampled(trained: &Classifying, set: &TestSet, grid: &Grid) -> Vec<Classifying
     all
 }
 
-/// One way to choose points in every precision; as trained, also with other
-/// threads and without T-Nets.
+/// One way to choose points in every precision but fp32; as trained, also with
+/// other threads and without T-Nets.
 fn with_precisions(samples: &Classifying, trained: &Classifying, grid: &Grid) -> Vec<Classifying> {
-    let precise = |precision| Classifying { precision, ..samples.clone() };
-    let mut all: Vec<Classifying> = grid.precisions.iter().map(|&p| precise(p)).collect();
+    let precise = |&precision: &Precision| Classifying { precision, ..samples.clone() };
+    let mut all: Vec<Classifying> = grid.precisions.iter().map(precise).collect();
     if (samples.sampler, samples.points) == (trained.sampler, trained.points) {
         let threads = grid.threads.iter();
         all.extend(threads.map(|&threads| Classifying { threads, ..samples.clone() }));
