@@ -2,6 +2,8 @@
 //! the promise of the module above, on a processor that flushes them to 0 and on
 //! one that does not.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 use std::path::Path;
 
 use formats::model_card::ModelCard;
