@@ -1,5 +1,6 @@
 //! Each layer's activations and the logits, by knob, in every precision.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -37,7 +38,10 @@ pub fn measure(path: &Path, n_clouds: u32) -> Result<Vec<Row>> {
     let chains = net.chains();
     for (i, chain) in chains.iter().enumerate() {
         let is_last = i + 1 == chains.len();
-        rows.extend(measure_chain(&net, &name, chain, is_last, &settings(), n_clouds)?);
+        let measured = measure_chain(&net, &name, chain, is_last, &settings(), n_clouds)?;
+        // The T-Net of features shares its first layers with the trunk.
+        let known: BTreeSet<String> = rows.iter().map(|row: &Row| row.layer.clone()).collect();
+        rows.extend(measured.into_iter().filter(|row| !known.contains(&row.layer)));
     }
     Ok(rows)
 }
