@@ -36,6 +36,6 @@ for (const canvas of document.querySelectorAll("canvas.cloud")) {
     from = [event.clientX, event.clientY];
     draw();
   });
-  canvas.addEventListener("pointerup", () => { from = null; });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { from = null; });
   draw();
 }

@@ -44,6 +44,7 @@ def look(browser, address, size):
     page.on("request", lambda request: requests.append(request.url))
     page.goto(address)
     check_clouds(page)
+    tips = 0
     for tab in page.query_selector_all("[role=tab]"):
         tab.click()
         chapter = page.query_selector("#" + tab.get_attribute("data-tab"))
@@ -52,7 +53,8 @@ def look(browser, address, size):
         assert len(shown) == 1, "one chapter at a time"
         wide = page.evaluate("document.documentElement.scrollWidth")
         assert wide <= size["width"], f"{tab.inner_text()}: {wide} px wide"
-        check_tip(page, chapter)
+        tips += check_tip(page, chapter)
+    assert tips > 0, "no chapter has a drawing with tips"
     assert complaints == [], complaints
     assert [r for r in requests if not r.startswith("file:")] == [], requests
     page.close()
@@ -89,12 +91,13 @@ def blank(canvas):
 def check_tip(page, chapter):
     dot = chapter.query_selector("[data-tip]")
     if dot is None:
-        return
+        return 0
     dot.scroll_into_view_if_needed()
     box = dot.bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     tip = page.query_selector("#tip")
     assert tip.is_visible() and tip.inner_text().strip(), "a dot says what it is"
+    return 1
 
 
 main()

@@ -3,7 +3,7 @@
 
 use crate::bench::table::digits;
 use crate::trade::bundled_record;
-use crate::trade::row::{self, Part, Row};
+use crate::trade::row::{self, Device, Part, Row};
 use crate::{Outcome, Usage};
 use anyhow::{Result, bail};
 use std::cmp::Ordering;
@@ -39,24 +39,6 @@ pub struct Args {
     record: Option<PathBuf>,
 }
 
-/// A device that was measured or modelled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Device {
-    /// A Raspberry Pi 5.
-    Pi5,
-    /// The machine that made the record.
-    Here,
-}
-
-impl Device {
-    fn ms(self, row: &Row) -> Option<f64> {
-        match self {
-            Self::Pi5 => row.ms_pi5,
-            Self::Here => row.ms_here,
-        }
-    }
-}
-
 /// A row and its time on the device.
 type Timed<'a> = (f64, &'a Row);
 
@@ -77,9 +59,10 @@ fn advise(args: &Args, rows: &[Row]) -> Result<String> {
     if args.max_ms.is_none() && args.min_accuracy.is_none() {
         return Err(Usage("name --max-ms, --min-accuracy or both".to_owned()).into());
     }
-    let classifiers = rows.iter().filter(|row| row.part == Part::Classifier);
-    let timed: Vec<Timed> =
-        classifiers.filter_map(|row| Some((args.device.ms(row)?, row))).collect();
+    // What infer-cpu classifies with: it runs all T-Nets that a model has.
+    let is_choice = |row: &&Row| row.part == Part::Classifier && row.t_nets == "both";
+    let choices = rows.iter().filter(is_choice);
+    let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     if timed.is_empty() {
         bail!("holds no time on {:?}: only what was measured is advised", args.device);
     }
@@ -135,10 +118,12 @@ impl Args {
             Some(_) => "none of those is more accurate, and of equals this is the fastest.\n",
             None => "none of those is faster.\n",
         };
-        if self.device == Device::Pi5 {
-            told += "Times are modelled (cargo xtask bench pi-model); measure a board by \
-                     infer-cpu bench.\n";
-        }
+        told += &match self.device {
+            Device::Pi5 => "Times are modelled (cargo xtask bench pi-model); measure a board by \
+                            infer-cpu bench.\n"
+                .to_owned(),
+            Device::Here => format!("Times are of {}.\n", row.machine),
+        };
         // Within the interval a reader may prefer the cheaper one.
         let as_good = |&&(other_ms, other): &&Timed| {
             other_ms < 0.75 * ms && other.accuracy >= row.accuracy_low
@@ -173,8 +158,8 @@ fn one_line((ms, row): Timed) -> String {
 
 /// The command line of the configuration.
 fn command(row: &Row) -> String {
-    let Row { model, precision, .. } = row;
-    let mut words = format!("infer-cpu classify --model assets/weights/{model}.safetensors");
+    let Row { model_file, precision, .. } = row;
+    let mut words = format!("infer-cpu classify --model {model_file}");
     // As `cpl:own:table8` says: sampler, front end, nodes of a table.
     let mut sampler = row.sampler.split(':');
     let _ = write!(words, " --sampler {}", sampler.next().unwrap_or_default());
@@ -186,9 +171,6 @@ fn command(row: &Row) -> String {
     }
     let points = row.points.unwrap_or_default();
     let _ = write!(words, " --points {points} --precision {precision}");
-    if row.t_nets != "both" {
-        let _ = write!(words, " --t-nets {}", row.t_nets);
-    }
     let _ = write!(words, " --threads {} CLOUD", row.threads.unwrap_or(1));
     words
 }
@@ -215,6 +197,8 @@ mod tests {
         let row = Row {
             part: Part::Classifier,
             model: model.to_owned(),
+            t_nets: "both".to_owned(),
+            model_file: format!("{model}.safetensors"),
             points: Some(64),
             threads: Some(threads),
             ms_pi5: Some(ms_pi5),
@@ -257,11 +241,11 @@ mod tests {
     #[test]
     fn a_configuration_is_a_command_line() {
         let row = Row { sampler: "cpl:own:table8".to_owned(), ..row("m", 1.0, 1, 2) };
-        let row = Row { precision: "i8".to_owned(), t_nets: "none".to_owned(), ..row };
+        let row = Row { precision: "i8".to_owned(), ..row };
         assert_eq!(
             command(&row),
-            "infer-cpu classify --model assets/weights/m.safetensors --sampler cpl --front own \
-             --table 8 --points 64 --precision i8 --t-nets none --threads 2 CLOUD"
+            "infer-cpu classify --model m.safetensors --sampler cpl --front own --table 8 \
+             --points 64 --precision i8 --threads 2 CLOUD"
         );
     }
 

@@ -17,6 +17,8 @@ pub struct Lane {
     pub caster: Caster,
     /// Rays that one repeat should cast at least.
     pub rays: usize,
+    /// Whether it casts beside the CPU, whose time then tells nothing.
+    pub is_gpu: bool,
 }
 
 impl Lane {
@@ -31,7 +33,11 @@ impl Lane {
 /// # Errors
 /// If the adapter asked for is not there or does not open.
 pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Lane>> {
-    let cpu = Lane { caster: Caster::Cpu(Effects::default()), rays: RAYS_TO_FILL_THE_CORES };
+    let cpu = Lane {
+        caster: Caster::Cpu(Effects::default()),
+        rays: RAYS_TO_FILL_THE_CORES,
+        is_gpu: false,
+    };
     let mut lanes = Vec::new();
     if matches!(request, None | Some(AdapterRequest::Cpu)) {
         lanes.push(cpu);
@@ -52,7 +58,7 @@ pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Lane>> {
                 .with_context(|| format!("opening {}", adapter.name))?;
             let software = adapter.kind == AdapterKind::Software;
             let rays = if software { RAYS_TO_FILL_THE_CORES } else { RAYS_TO_FILL_A_GPU };
-            lanes.push(Lane { caster, rays });
+            lanes.push(Lane { caster, rays, is_gpu: !software });
         }
     }
     if lanes.is_empty() {

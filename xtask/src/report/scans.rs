@@ -49,7 +49,7 @@ pub fn body(assets: &Path) -> Result<Markup> {
     let clouds = SENSORS.map(|(sensor, noise_m)| (sensor, noise_m, scan(&target, sensor, noise_m)));
     Ok(html! {
         p { (super::name(&path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
-            (ELEVATION_DEG) "° below it. Made now, by the f64-exact CPU path." }
+            (ELEVATION_DEG) "° below it. Made now, on the CPU." }
         div class="clouds" { @for (sensor, noise_m, cloud) in &clouds {
             figure {
                 canvas class="cloud" width="480" height="360" data-points=(thousandths(cloud))

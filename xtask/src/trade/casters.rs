@@ -8,6 +8,7 @@ use crate::bench::accuracy::Accuracy;
 use crate::bench::clock::{Contestant, interleave, measured};
 use crate::bench::lanes::Lane;
 use crate::bench::shot::Shot;
+use crate::bench::speed::short;
 use crate::bench::ways;
 use anyhow::Result;
 use glam::DVec3;
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
+use std::collections::HashMap;
 use std::hint::black_box;
 
 /// The ranges of one shot's rays, metres.
@@ -52,43 +54,47 @@ pub fn cast_all(
 ) -> Result<Vec<Cast>> {
     let cpu = Caster::Cpu(Effects::default());
     let mut ways = vec![
-        ("cpu f64".to_owned(), Way::Oracle),
-        ("cpu f32 Möller-Trumbore, f32 range".to_owned(), Way::MollerTrumbore),
-        ("cpu f32 watertight, f32 range".to_owned(), Way::F32),
-        ("cpu f32 watertight, f64 range".to_owned(), Way::Product(&cpu)),
+        ("cpu f64".to_owned(), Way::Oracle, false),
+        ("cpu f32 Möller-Trumbore, f32 range".to_owned(), Way::MollerTrumbore, false),
+        ("cpu f32 watertight, f32 range".to_owned(), Way::F32, false),
+        ("cpu f32 watertight, f64 range".to_owned(), Way::Product(&cpu), false),
     ];
     let adapters = lanes.iter().filter(|lane| lane.name() != "cpu");
     ways.extend(adapters.map(|lane| {
-        let name = format!("{} f32 watertight, f64 range", crate::bench::speed::short(lane.name()));
-        (name, Way::Product(&lane.caster))
+        let name = format!("{} f32 watertight, f64 range", short(lane.name()));
+        (name, Way::Product(&lane.caster), lane.is_gpu)
     }));
-    let settings: Vec<(&String, &Way<'_>, Culling)> = [Culling::On, Culling::Off]
-        .into_iter()
-        .flat_map(|culling| ways.iter().map(move |(name, way)| (name, way, culling)))
+    let fired = shots(objects, Culling::Off);
+    let aimed = [(Culling::On, shots(objects, Culling::On)), (Culling::Off, fired.clone())];
+    let settings: Vec<_> = aimed
+        .iter()
+        .flat_map(|(culling, shots)| ways.iter().map(move |way| (way, *culling, shots)))
         .collect();
     let mut contestants: Vec<Contestant<'_>> = Vec::new();
-    for &(_, way, culling) in &settings {
+    for &((_, way, _), _, shots) in &settings {
         contestants.push(Box::new(move || {
-            let (ranges, cost) = measured(|| way.cast(&shots(objects, culling)));
+            let (ranges, cost) = measured(|| way.cast(shots));
             black_box(ranges?);
             Ok(cost)
         }));
     }
     let costs = interleave(rounds, &mut contestants)?;
     drop(contestants);
+    let truth: Vec<Ranges> = fired.par_iter().map(ways::in_f64).collect();
     let mut all = Vec::new();
-    for ((name, way, culling), costs) in settings.into_iter().zip(costs) {
+    for (((name, way, is_gpu), culling, shots), costs) in settings.into_iter().zip(costs) {
         eprintln!("caster: {name}, culling {}", word(culling));
-        let mut cast = judged(objects, way, culling)?;
-        let cpu_s = costs.cpu_s().median / cast.clouds.len() as f64;
+        let mut cast = judged(way, shots, &fired, &truth)?;
+        let spent = if *is_gpu { costs.wall_s() } else { costs.cpu_s() };
+        let seconds = spent.median / cast.clouds.len() as f64;
         let rays = Scanning::reference().sensor.pattern().len() as f64;
         cast.row = Row {
             test_set: test_set.to_owned(),
             caster: name.clone(),
             culling: word(culling).to_owned(),
-            rays_per_cpu_s: Some(rays / cpu_s),
-            scans_per_cpu_s: Some(1.0 / cpu_s),
-            ms_here: Some(cpu_s * 1e3),
+            rays_per_cpu_s: Some(rays / seconds).filter(|_| !is_gpu),
+            scans_per_cpu_s: Some(1.0 / seconds).filter(|_| !is_gpu),
+            ms_here: Some(seconds * 1e3),
             ..cast.row
         };
         all.push(cast);
@@ -125,13 +131,13 @@ impl Way<'_> {
     }
 }
 
-fn judged(objects: &[Object], way: &Way<'_>, culling: Culling) -> Result<Cast> {
-    let shots = shots(objects, culling);
-    let ranges = way.cast(&shots)?;
-    let truth: Vec<Ranges> = shots.par_iter().map(ways::in_f64).collect();
-    let accuracy = Accuracy::of(&ranges.concat(), &truth.concat());
+/// What `way` makes of the rays aimed, beside the truth of all that are `fired`.
+fn judged(way: &Way<'_>, aimed: &[Shot], fired: &[Shot], truth: &[Ranges]) -> Result<Cast> {
+    let ranges = way.cast(aimed)?;
+    let of_all = aimed.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
+    let accuracy = Accuracy::of(&of_all.collect::<Vec<_>>().concat(), &truth.concat());
     let wrong = accuracy.false_hits_per_million() + accuracy.misses_per_million();
-    let clouds: Vec<Cloud> = shots.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
+    let clouds: Vec<Cloud> = aimed.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
     let points: usize = clouds.iter().map(Vec::len).sum();
     let row = Row {
         part: Part::Caster,
@@ -144,6 +150,13 @@ fn judged(objects: &[Object], way: &Way<'_>, culling: Culling) -> Result<Cast> {
         ..Row::default()
     };
     Ok(Cast { row, clouds })
+}
+
+/// The ranges of all rays fired: none where a ray was left out.
+fn of_fired(aimed: &Shot, ranges: &Ranges, fired: &Shot) -> Ranges {
+    let by_beam: HashMap<u32, Option<f64>> =
+        aimed.job.beams.iter().copied().zip(ranges.iter().copied()).collect();
+    fired.job.beams.iter().map(|beam| by_beam.get(beam).copied().flatten()).collect()
 }
 
 /// The points that a shot's rays hit, in the order of its beams.

@@ -3,6 +3,7 @@
 use super::energy::Energy;
 use super::row::{Part, Row};
 use crate::bench::clock::Spread;
+use crate::workspace;
 use anyhow::{Context, Result, ensure};
 use formats::labelled::read_labelled;
 use infer_cpu::sampler::{FrontChoice, SamplerKind, SamplerSpec};
@@ -101,8 +102,8 @@ pub struct Answers {
     pub classes: Vec<Option<String>>,
     /// All logits, one cloud after another.
     pub logits: Vec<f32>,
-    /// The median, milliseconds.
-    pub median_ms: f64,
+    /// The median, milliseconds; none without a cloud to time.
+    pub median_ms: Option<f64>,
     /// Of one classification, where the machine tells.
     pub joules: Option<f64>,
 }
@@ -208,6 +209,8 @@ impl Classifying {
         let mut classifier = self.load(capacity)?;
         let each = clouds.len().div_ceil(TIMED).max(1);
         let timed: Vec<_> = clouds.iter().step_by(each).filter(|cloud| !cloud.is_empty()).collect();
+        let Some(first) = timed.first() else { return Ok(()) };
+        classifier.classify(first)?;
         let mut ms = Vec::new();
         let energy = Energy::here();
         let before = energy.as_ref().map(Energy::now);
@@ -218,7 +221,7 @@ impl Classifying {
         }
         let joules = |(energy, before): (&Energy, Vec<u64>)| energy.joules_since(&before);
         answers.joules = energy.as_ref().zip(before).map(joules).map(|all| all / ms.len() as f64);
-        answers.median_ms = Spread::of(ms).median;
+        answers.median_ms = Some(Spread::of(ms).median);
         Ok(())
     }
 
@@ -231,12 +234,13 @@ impl Classifying {
             part: Part::Classifier,
             test_set: set.name.clone(),
             model: self.model_name(),
+            model_file: self.model_file(),
             sampler: self.sampler.name.to_owned(),
             points: Some(self.points),
             precision: self.precision.to_string(),
             t_nets: self.t_nets.to_string(),
             threads: Some(self.threads),
-            ms_here: Some(answers.median_ms),
+            ms_here: answers.median_ms,
             joules: answers.joules,
             megabytes: Some(inspect(&self.model)?.bytes(self.precision) as f64 * 1e-6),
             agreement: Some(answers.agreement(reference)),
@@ -244,6 +248,12 @@ impl Classifying {
             ..Row::default()
         };
         Ok(row.with_accuracy(set.right(answers), set.clouds.len()))
+    }
+
+    /// The model's file, from the workspace's root if it lies there.
+    pub fn model_file(&self) -> String {
+        let inside = self.model.strip_prefix(workspace::root());
+        inside.unwrap_or(&self.model).display().to_string()
     }
 
     /// The model's name, without folder and extension.

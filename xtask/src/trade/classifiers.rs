@@ -50,7 +50,8 @@ impl Grid {
     }
 }
 
-/// The sampler and the points that a model was trained with, in fp32.
+/// The sampler and the points that a model was trained with, or random points
+/// where it names none to choose by, in fp32.
 ///
 /// # Errors
 /// A model that cannot be read.
@@ -86,10 +87,7 @@ pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> 
         .map(|setting| {
             let reference = first.iter().find(|sampled| sampled.chooses_as(&setting));
             let answers = setting.answers(&set.clouds)?;
-            let compared = match (setting.t_nets, reference) {
-                (TNets::Both, Some(reference)) => &reference.answers,
-                _ => &answers,
-            };
+            let compared = reference.map_or(&answers, |reference| &reference.answers);
             Measured::new(setting, set, &trained, &answers, compared)
         })
         .collect::<Result<_>>()?;

@@ -1,36 +1,49 @@
 //! Which settings no other makes pointless.
 
-use super::row::{Part, Row};
+use super::row::{Device, Part, Row};
 use std::collections::BTreeMap;
 
-/// Marks the rows on the front of their part and test set: no other costs at
-/// most as much and errs at most as much, and one of both less.
+/// Marks the rows on the front of their kind, for each device: no other costs at
+/// most as much there and errs at most as much, and one of both less.
+///
+/// Costs are as measured and shares are of clouds: a row that is beaten by less
+/// than the interval of its accuracy is beaten all the same.
 pub fn mark(rows: &mut [Row]) {
-    let figures: Vec<Option<[f64; 3]>> = rows.iter().map(figures).collect();
-    let kin: Vec<(Part, String, Option<u64>)> = rows.iter().map(kin).collect();
-    for (i, row) in rows.iter_mut().enumerate() {
-        let Some(own) = figures[i] else { continue };
-        let beats = |other: &[f64; 3]| {
-            *other != own && other.iter().zip(own).all(|(other, own)| *other <= own)
-        };
-        let rivals = figures.iter().zip(&kin).filter(|(_, other)| **other == kin[i]);
-        row.on_front = !rivals.filter_map(|(figures, _)| figures.as_ref()).any(beats);
+    for device in Device::ALL {
+        let figures: Vec<Option<[f64; 3]>> = rows.iter().map(|row| figures(row, device)).collect();
+        let kin: Vec<Kin> = rows.iter().map(kin).collect();
+        for (i, row) in rows.iter_mut().enumerate() {
+            let rivals = figures.iter().zip(&kin).filter(|(_, other)| **other == kin[i]);
+            let mut rivals = rivals.filter_map(|(figures, _)| figures.as_ref());
+            let on_front = figures[i].is_some_and(|own| !rivals.any(|other| beats(other, &own)));
+            match device {
+                Device::Pi5 => row.front_pi5 = on_front,
+                Device::Here => row.front_here = on_front,
+            }
+        }
     }
 }
 
-/// Rows that are compared. A distance is no choice: scans from 3 m and from
-/// 20 m are compared among themselves.
-fn kin(row: &Row) -> (Part, String, Option<u64>) {
-    (row.part, row.test_set.clone(), row.distance_m.map(f64::to_bits))
+fn beats(other: &[f64; 3], own: &[f64; 3]) -> bool {
+    other != own && other.iter().zip(own).all(|(other, own)| other <= own)
+}
+
+type Kin = (Part, String, Option<u64>, Option<u64>);
+
+/// Rows that are compared. Distance and noise are no choices: scans from 3 m and
+/// from 20 m are compared among themselves.
+fn kin(row: &Row) -> Kin {
+    let bits = |x: Option<f64>| x.map(f64::to_bits);
+    (row.part, row.test_set.clone(), bits(row.distance_m), bits(row.noise_m))
 }
 
 /// Cost and errors. Ranges tell casters apart, classes everything else.
-fn figures(row: &Row) -> Option<[f64; 3]> {
+fn figures(row: &Row, device: Device) -> Option<[f64; 3]> {
     let [first, second] = match row.part {
         Part::Caster => [row.range_rms_m?, row.wrong_rays_per_million?],
         Part::Scan | Part::Classifier => [1.0 - row.accuracy, 0.0],
     };
-    let figures = [row.cost_ms()?, first, second];
+    let figures = [row.ms(device)?, first, second];
     figures.iter().all(|figure| figure.is_finite()).then_some(figures)
 }
 
@@ -53,7 +66,8 @@ pub fn dominated_everywhere(rows: &[Row]) -> Vec<Choice> {
             ],
         };
         for (knob, value) in of_part {
-            *choices.entry((knob, (*value).clone())).or_default() |= row.on_front;
+            *choices.entry((knob, (*value).clone())).or_default() |=
+                row.front_here || row.front_pi5;
         }
     }
     choices.into_iter().filter(|(_, on_front)| !on_front).map(|(choice, _)| choice).collect()
@@ -72,7 +86,7 @@ mod tests {
     fn a_row_is_on_the_front_unless_another_is_as_cheap_and_as_good() {
         let mut rows = [row("a", 1.0, 80), row("b", 2.0, 90), row("c", 2.0, 85), row("d", 3.0, 90)];
         mark(&mut rows);
-        assert_eq!(rows.each_ref().map(|row| row.on_front), [true, true, false, false]);
+        assert_eq!(rows.each_ref().map(|row| row.front_pi5), [true, true, false, false]);
         assert_eq!(
             dominated_everywhere(&rows)[..2],
             [("model", "c".to_owned()), ("model", "d".to_owned())]
@@ -83,7 +97,16 @@ mod tests {
     fn equals_stay_side_by_side_and_what_has_no_cost_is_nowhere() {
         let mut rows = [row("a", 1.0, 80), row("b", 1.0, 80), row("c", f64::NAN, 99)];
         mark(&mut rows);
-        assert_eq!(rows.each_ref().map(|row| row.on_front), [true, true, false]);
+        assert_eq!(rows.each_ref().map(|row| row.front_pi5), [true, true, false]);
+    }
+
+    #[test]
+    fn a_time_here_is_no_rival_to_one_on_a_board() {
+        let here = Row { ms_here: Some(0.1), ms_pi5: None, ..row("x86", 0.0, 99) };
+        let mut rows = [row("board", 1.0, 80), here];
+        mark(&mut rows);
+        assert_eq!(rows.each_ref().map(|row| row.front_pi5), [true, false]);
+        assert_eq!(rows.each_ref().map(|row| row.front_here), [false, true]);
     }
 
     #[test]
@@ -94,6 +117,6 @@ mod tests {
         };
         let mut rows = [scan(3.0, 90), scan(20.0, 50), scan(20.0, 40)];
         mark(&mut rows);
-        assert_eq!(rows.each_ref().map(|row| row.on_front), [true, true, false]);
+        assert_eq!(rows.each_ref().map(|row| row.front_here), [true, true, false]);
     }
 }

@@ -19,9 +19,10 @@ mod scans;
 mod sensors;
 
 use crate::bench::lanes;
+use crate::bench::machine::Machine;
 use crate::bench::table::{Table, digits};
 use crate::{Outcome, Usage, gen_shapes, workspace};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use classes::TestSet;
 use classifiers::{Grid, as_trained, bundled, on_a_pi};
 use formats::cloud::resample;
@@ -73,7 +74,7 @@ pub struct Args {
 }
 
 /// Meshes of a class that a whole run scans at most.
-const MOST_PER_CLASS: usize = 10;
+const MOST_PER_CLASS: usize = 5;
 
 /// The same of a quick run.
 const FEW_PER_CLASS: usize = 2;
@@ -92,6 +93,8 @@ pub fn run(args: &Args) -> Result<Outcome> {
     let objects = objects::read(&meshes(args)?, per_class)?;
     let mut rows = scan_rows(args, &objects)?;
     rows.extend(classifier_rows(args, &objects)?);
+    let machine = machine();
+    rows.iter_mut().for_each(|row| row.machine.clone_from(&machine));
     front::mark(&mut rows);
     row::write(&rows, &args.out.join("trade.csv"))?;
     page::write(&rows, &args.out)?;
@@ -143,20 +146,24 @@ fn scan_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
     let reference = scan_set(objects, &name, &scanned[0].clouds);
     let model = model_for(args, &reference)?;
     let classifying = as_trained(&model)?;
-    let answers = classifying.answers(&reference.clouds)?;
+    // Scans are compared with the reference, casters with the first: f64.
+    let noisy = classifying.answers(&reference.clouds)?;
+    let exact = classifying.answers(&cast[0].clouds)?;
     let all = scanned.into_iter().map(|scanned| (scanned.row, scanned.clouds));
     let all = all.chain(cast.into_iter().map(|cast| (cast.row, cast.clouds)));
     all.map(|(row, clouds)| {
         let set = scan_set(objects, &name, &clouds);
         let found = classifying.answers(&set.clouds)?;
+        let answers = if row.part == row::Part::Caster { &exact } else { &noisy };
         let row = Row {
             model: classifying.model_name(),
+            model_file: classifying.model_file(),
             sampler: classifying.sampler.name.to_owned(),
             points: Some(classifying.points),
             precision: classifying.precision.to_string(),
             t_nets: classifying.t_nets.to_string(),
             threads: Some(classifying.threads),
-            agreement: Some(found.agreement(&answers)),
+            agreement: Some(found.agreement(answers)),
             ..row
         };
         Ok(row.with_accuracy(set.right(&found), set.clouds.len()))
@@ -188,10 +195,11 @@ fn classifier_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
             scan_set(objects, &name_of_meshes(args), &clouds)
         }
     };
-    let models = match (&args.clouds, &args.model) {
-        (None, Some(model)) => vec![model.clone()],
-        _ => bundled(&set)?,
+    let models = match &args.model {
+        Some(model) => vec![model.clone()],
+        None => bundled(&set)?,
     };
+    ensure!(!models.is_empty(), "no bundled model knows the classes of {}: --model", set.name);
     let grid = if args.quick { Grid::quick() } else { Grid::whole() };
     let mut rows = Vec::new();
     for model in &models {
@@ -199,6 +207,12 @@ fn classifier_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
         rows.extend(classifiers::rows(model, &set, &grid, pi.as_ref())?);
     }
     Ok(rows)
+}
+
+/// What measures: the processor, and how many of its threads.
+fn machine() -> String {
+    let Machine { cpu, threads, system, .. } = Machine::here();
+    format!("{}, {threads} threads, {system}", cpu.as_deref().unwrap_or("unknown processor"))
 }
 
 /// As many points as gen-dataset packs: the Raspberry Pi's model wants one size.
@@ -209,13 +223,15 @@ fn packed(cloud: &[[f32; 3]]) -> Cloud {
 
 /// The fronts, and what is on none.
 fn print(rows: &[Row]) {
-    let heading = ["on a front", "ms", "accuracy %", "95 % interval", "as reference %"];
+    let heading =
+        ["on a front", "ms here", "ms on a Pi 5", "accuracy %", "95 % interval", "as reference %"];
     let mut table = Table::new("Settings that no other makes pointless", &heading);
-    for row in rows.iter().filter(|row| row.on_front) {
+    for row in rows.iter().filter(|row| row.front_here || row.front_pi5) {
         let percent = |share: f64| format!("{:.1}", 100.0 * share);
         table.push(vec![
             row.to_string(),
-            row.cost_ms().map(digits).unwrap_or_default(),
+            row.ms_here.map(digits).unwrap_or_default(),
+            row.ms_pi5.map(digits).unwrap_or_default(),
             percent(row.accuracy),
             format!("{} to {}", percent(row.accuracy_low), percent(row.accuracy_high)),
             row.agreement.map(percent).unwrap_or_default(),

@@ -1,7 +1,7 @@
 //! The record as a page and as drawings.
 
 use super::front::dominated_everywhere;
-use super::row::{Part, Row};
+use super::row::{Device, Part, Row};
 use crate::bench::table::digits;
 use crate::page::chart::{Axis, Dot, Series, draw};
 use crate::page::table::table;
@@ -11,9 +11,6 @@ use formats::atomic;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 use std::path::Path;
-
-const MS: &str =
-    "milliseconds (CPU time of a scan; of a classification on a Raspberry Pi 5, modelled)";
 
 /// Writes `trade.html` and a drawing a part to `folder`.
 ///
@@ -57,20 +54,27 @@ pub fn chapters(rows: &[Row]) -> Result<Vec<Chapter>> {
 
 /// Cost against accuracy of one part's rows.
 fn fronts(rows: &[Row], part: Part) -> Result<String> {
+    let device = device_of(rows, part);
     let mut series: BTreeMap<String, Vec<Dot>> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.part == part) {
         let name = match part {
             Part::Scan => format!("{} m away", row.distance_m.unwrap_or_default()),
             Part::Caster | Part::Classifier => row.model.clone(),
         };
-        let Some(cost) = row.cost_ms() else { continue };
-        let dot = Dot { x: cost, y: row.accuracy, tip: tip(row), filled: row.on_front };
+        let Some(ms) = row.ms(device) else { continue };
+        let filled = row.on_front(device);
+        let dot = Dot { x: ms, y: row.accuracy, tip: tip(row, ms), filled };
         series.entry(name).or_default().push(dot);
     }
     let joined = part == Part::Scan;
     let series: Vec<Series> =
         series.into_iter().map(|(name, dots)| Series { name, dots, joined }).collect();
-    let x = Axis { label: MS, logarithmic: true, percent: false };
+    let label = match (part, device) {
+        (Part::Classifier, Device::Pi5) => "milliseconds on a Raspberry Pi 5, modelled",
+        (Part::Classifier, Device::Here) => "milliseconds on this machine",
+        _ => "milliseconds of CPU time a scan",
+    };
+    let x = Axis { label, logarithmic: true, percent: false };
     let y = Axis { label: "classified as labelled", logarithmic: false, percent: true };
     let title = match part {
         Part::Scan => "From mesh to scan",
@@ -80,14 +84,20 @@ fn fronts(rows: &[Row], part: Part) -> Result<String> {
     draw(title, &x, &y, &series)
 }
 
-fn tip(row: &Row) -> String {
+/// The board where it was modelled, else the machine of the record.
+fn device_of(rows: &[Row], part: Part) -> Device {
+    let modelled = rows.iter().any(|row| row.part == part && row.ms_pi5.is_some());
+    if modelled { Device::Pi5 } else { Device::Here }
+}
+
+fn tip(row: &Row, ms: f64) -> String {
     let share = format!(
         "{:.1} % ({:.1} to {:.1})",
         100.0 * row.accuracy,
         100.0 * row.accuracy_low,
         100.0 * row.accuracy_high
     );
-    format!("{row}\n{} ms, {share}", row.cost_ms().map(digits).unwrap_or_default())
+    format!("{row}\n{} ms, {share}", digits(ms))
 }
 
 fn percent(share: Option<f64>) -> String {
@@ -107,7 +117,9 @@ fn accuracy(row: &Row) -> String {
 /// What the rows of `part` were measured on.
 fn caption(rows: &[Row], part: Part) -> String {
     let row = rows.iter().find(|row| row.part == part);
-    row.map_or_else(String::new, |row| format!("On {}, {} clouds", row.test_set, row.clouds))
+    row.map_or_else(String::new, |row| {
+        format!("On {}, {} clouds; {}", row.test_set, row.clouds, row.machine)
+    })
 }
 
 fn rows_of(
@@ -116,7 +128,7 @@ fn rows_of(
     words: impl Fn(&Row) -> Vec<String>,
 ) -> Vec<(bool, Vec<String>)> {
     let of_part = rows.iter().filter(|row| row.part == part);
-    of_part.map(|row| (row.on_front, words(row))).collect()
+    of_part.map(|row| (row.front_here || row.front_pi5, words(row))).collect()
 }
 
 fn classifier_table(rows: &[Row]) -> Markup {

@@ -20,6 +20,20 @@ pub enum Part {
     Classifier,
 }
 
+/// A device that was measured or modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Device {
+    /// A Raspberry Pi 5, modelled.
+    Pi5,
+    /// The machine that made the record.
+    Here,
+}
+
+impl Device {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Pi5, Self::Here];
+}
+
 /// One setting of all knobs. A field that a part does not have is empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
@@ -46,8 +60,10 @@ pub struct Row {
     pub caster: String,
     /// Whether beams that cannot hit are left out: on or off.
     pub culling: String,
-    /// The model file.
+    /// The model's name.
     pub model: String,
+    /// Its file.
+    pub model_file: String,
     /// How points are chosen.
     pub sampler: String,
     /// Points that the network sees.
@@ -63,7 +79,8 @@ pub struct Row {
     pub rays_per_cpu_s: Option<f64>,
     /// Scans a second of CPU time, from aiming to points.
     pub scans_per_cpu_s: Option<f64>,
-    /// CPU time of a scan, or the median wall time of a classification, on this machine.
+    /// CPU time of a scan (on a GPU wall time), or the median wall time of a classification, on
+    /// this machine.
     pub ms_here: Option<f64>,
     /// Modelled time of a classification on a Raspberry Pi 5.
     pub ms_pi5: Option<f64>,
@@ -78,13 +95,15 @@ pub struct Row {
     pub range_rms_m: Option<f64>,
     /// The largest of these differences.
     pub range_worst_m: Option<f64>,
-    /// Rays that hit where f64 does not, or miss where it hits, in a million.
+    /// Rays that hit where f64 does not, or miss where it hits, in a million that are fired.
     pub wrong_rays_per_million: Option<f64>,
-    /// Mean distance to the clean VLP-32C scan in f64 from the same place, both ways added.
+    /// Mean distance to the clean VLP-32C scan (ranges in f64) from the same place, both ways
+    /// added, of some of those scans that have points.
     pub chamfer_m: Option<f64>,
     /// Largest difference of a logit from f32's at the same points.
     pub logit_error: Option<f64>,
-    /// Share of clouds with the same answer as the reference's.
+    /// Share of clouds with the same answer as the reference's: the reference scan's, the f64
+    /// caster's, or that of fp32 and all T-Nets at the same points.
     pub agreement: Option<f64>,
     /// Clouds classified as labelled.
     pub right: usize,
@@ -96,8 +115,12 @@ pub struct Row {
     pub accuracy_low: f64,
     /// Upper end.
     pub accuracy_high: f64,
-    /// Whether no other row of its part and test set costs less and is better.
-    pub on_front: bool,
+    /// What measured it.
+    pub machine: String,
+    /// Whether no other row of its kind costs less here and is better.
+    pub front_here: bool,
+    /// The same on a Raspberry Pi 5, modelled.
+    pub front_pi5: bool,
 }
 
 impl Row {
@@ -110,11 +133,22 @@ impl Row {
         self
     }
 
-    /// What is spent: milliseconds on a Raspberry Pi 5, where that was
-    /// modelled, else here.
+    /// Milliseconds on `device`.
     #[must_use]
-    pub fn cost_ms(&self) -> Option<f64> {
-        self.ms_pi5.or(self.ms_here)
+    pub fn ms(&self, device: Device) -> Option<f64> {
+        match device {
+            Device::Pi5 => self.ms_pi5,
+            Device::Here => self.ms_here,
+        }
+    }
+
+    /// Whether it is on the front of `device`.
+    #[must_use]
+    pub fn on_front(&self, device: Device) -> bool {
+        match device {
+            Device::Pi5 => self.front_pi5,
+            Device::Here => self.front_here,
+        }
     }
 }
 
