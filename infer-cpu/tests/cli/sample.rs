@@ -78,7 +78,6 @@ fn what_cannot_be_sampled_leaves_no_file() {
         ),
         (1, "--sampler fps --points 2 absent.xyz out.xyz", "error: absent.xyz: "),
         (1, "--sampler fps --points 2 c.xyz out.off", "error: out.off: extension: "),
-        (1, "--sampler fps --points 2 c.xyz out.las", "error: out.las: "),
         (2, "--sampler fps --points 0 c.xyz out.xyz", "error: a sampler is asked for 0 points"),
         (2, "--sampler all --points 2 c.xyz out.xyz", "error: --points means nothing"),
         (2, "--points 2 c.xyz out.xyz", "error: the following required arguments"),
