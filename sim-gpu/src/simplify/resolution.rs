@@ -75,7 +75,8 @@ mod tests {
 
     #[test]
     fn nothing_is_seen_nearer_than_the_sensors_least_range() {
-        let within = vec![DVec3::splat(0.2)];
+        // The square stands in the plane x = 0, and so does its box.
+        let within = vec![DVec3::new(0.0, 0.2, 0.2)];
         let at_1_m = (0.199_065_6f64 / 4.0).to_radians().tan();
         assert!((seen_from("vlp32c", within.clone()) - at_1_m).abs() < 1e-12);
         assert_eq!(seen_from("generic-static", within), 0.0, "it has no least range");
