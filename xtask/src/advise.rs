@@ -48,6 +48,7 @@ type Timed<'a> = (f64, &'a Row);
 /// A record that cannot be read or does not know the device; limits that no
 /// measured setting keeps.
 pub fn run(args: &Args) -> Result<Outcome> {
+    args.check()?;
     let path = args.record.clone().unwrap_or_else(bundled_record);
     let rows = row::read(&path)?;
     let advice = advise(args, &rows).map_err(|cause| cause.context(path.display().to_string()))?;
@@ -56,9 +57,6 @@ pub fn run(args: &Args) -> Result<Outcome> {
 }
 
 fn advise(args: &Args, rows: &[Row]) -> Result<String> {
-    if args.max_ms.is_none() && args.min_accuracy.is_none() {
-        return Err(Usage("name --max-ms, --min-accuracy or both".to_owned()).into());
-    }
     // What infer-cpu classifies with: it runs all T-Nets that a model has.
     let is_choice = |row: &&Row| row.part == Part::Classifier && row.t_nets == "both";
     let choices = rows.iter().filter(is_choice);
@@ -74,6 +72,13 @@ fn advise(args: &Args, rows: &[Row]) -> Result<String> {
 }
 
 impl Args {
+    fn check(&self) -> Result<()> {
+        if self.max_ms.is_none() && self.min_accuracy.is_none() {
+            return Err(Usage("name --max-ms, --min-accuracy or both".to_owned()).into());
+        }
+        Ok(())
+    }
+
     fn allow(&self, &(ms, row): &Timed) -> bool {
         self.max_ms.is_none_or(|most| ms <= most)
             && self.min_accuracy.is_none_or(|least| row.accuracy >= least)
@@ -256,6 +261,6 @@ mod tests {
         let here = Args { device: Device::Here, ..asked(Some(5.0), None) };
         let error = advise(&here, &rows()).unwrap_err().to_string();
         assert!(error.contains("only what was measured"), "{error}");
-        assert!(advise(&asked(None, None), &rows()).unwrap_err().is::<Usage>());
+        assert!(asked(None, None).check().unwrap_err().is::<Usage>());
     }
 }

@@ -220,7 +220,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trade.csv");
         write(&[Row::default(), Row::default()], &path).unwrap();
-        let text = std::fs::read_to_string(&path).unwrap().replacen("scan,", "scam,", 1);
+        let text = std::fs::read_to_string(&path).unwrap().replacen("\nscan,", "\nscam,", 1);
         std::fs::write(&path, text).unwrap();
         let error = format!("{:#}", read(&path).unwrap_err());
         assert!(error.contains("trade.csv") && error.contains("line: 2"), "{error}");

@@ -202,10 +202,9 @@ mod tests {
         let fine = Scanning::reference().with_azimuth(1);
         assert!((step_deg(&fine) - 0.09953).abs() < 1e-5);
         let coarse = Scanning::reference().with_azimuth(8);
-        assert_eq!(
-            coarse.sensor.pattern().len(),
-            fine.sensor.pattern().len().div_ceil(8 * 32) * 32
-        );
+        // The last sequence of a revolution may be cut short.
+        let rays = |scanning: &Scanning| scanning.sensor.pattern().len();
+        assert!((8 * rays(&coarse)).abs_diff(rays(&fine)) <= 8 * 32);
     }
 
     #[test]
