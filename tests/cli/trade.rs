@@ -65,8 +65,10 @@ fn scans_are_as_true_as_they_claim(rows: &[Row]) {
 
 fn casters_differ_as_they_should(rows: &[Row]) {
     let cpu = the(rows, &[("caster", "cpu f32 watertight, f64 range"), ("part", "caster")]);
-    // The triangle is the oracle's, and so is the formula of the range.
-    assert_eq!((number(cpu, "range_worst_m"), number(cpu, "wrong_rays_per_million")), (0.0, 0.0));
+    assert_eq!(number(cpu, "wrong_rays_per_million"), 0.0);
+    // The triangle is the oracle's; what is left is f64's rounding of 2 to 4 m, 2^-51 m,
+    // which slopes of up to 10^3 amplify.
+    assert!(number(cpu, "range_worst_m") < 1e-12);
     let f32 = the(rows, &[("caster", "cpu f32 watertight, f32 range"), ("culling", "on")]);
     assert!(number(f32, "range_worst_m") > 0.0);
 }
