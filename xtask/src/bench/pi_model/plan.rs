@@ -14,8 +14,6 @@ pub enum Sampler {
     All,
     /// Points drawn at random.
     Random,
-    /// One point a cell of a grid.
-    Voxel,
     /// Farthest point sampling.
     Fps,
     /// A Critical Points Layer with a front end of its own.
@@ -31,7 +29,6 @@ impl Sampler {
         match self {
             Self::All => "all",
             Self::Random => "random",
-            Self::Voxel => "voxel",
             Self::Fps => "fps",
             Self::Cpl => "cpl:own:truncate",
             Self::CplStn => "cpl:stn:truncate",
@@ -93,8 +90,8 @@ pub fn stages(
     let formats = Formats::of(precision);
     let mut stages = Vec::new();
     match sampler {
-        // What these do is all outside the inner loops.
-        Sampler::All | Sampler::Random | Sampler::Voxel => {}
+        // What this does is all outside the inner loops.
+        Sampler::All | Sampler::Random => {}
         Sampler::Fps => stages.push(Stage::Farthest { points: from, picks: points }),
         Sampler::Cpl | Sampler::CplStn => {
             let front = if sampler == Sampler::Cpl { &network.front } else { &network.stn };
