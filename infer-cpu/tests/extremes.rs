@@ -55,6 +55,7 @@ fn run_all(kind: &str, check: impl Fn(&File)) {
 }
 
 #[test]
+#[cfg_attr(target_arch = "aarch64", ignore = "takes many minutes under an emulator")]
 fn clouds_and_weights_have_their_outcome() {
     run_all("classify", |file| file.classify.as_ref().unwrap().check());
 }
