@@ -179,7 +179,9 @@ mod tests {
         for Deletion { file, .. } in &deletions.delete {
             let text = fs::read_to_string(workspace::root().join(file)).unwrap();
             let left = deletions.applied(Path::new(file), text).unwrap();
-            for word in ["NoiseModel", "Dropout", "append_words", "words", "quantum.and_then"] {
+            for word in
+                ["NoiseModel", "Dropout", "append_words", "Words", "words.", "quantum.and_then"]
+            {
                 assert!(!left.contains(word), "{file} has {word} left");
             }
         }
