@@ -2,6 +2,7 @@
 //! `cargo xtask trade` measured.
 
 use crate::bench::table::digits;
+use crate::flags::positive;
 use crate::trade::bundled_record;
 use crate::trade::row::{self, Device, Part, Row};
 use crate::{Outcome, Usage};
@@ -178,13 +179,6 @@ fn command(row: &Row) -> String {
     let _ = write!(words, " --points {points} --precision {precision}");
     let _ = write!(words, " --threads {} CLOUD", row.threads.unwrap_or(1));
     words
-}
-
-fn positive(word: &str) -> Result<f64, String> {
-    match word.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("a positive number is needed".to_owned()),
-    }
 }
 
 fn share(word: &str) -> Result<f64, String> {

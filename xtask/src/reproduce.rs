@@ -1,7 +1,9 @@
 //! `cargo xtask reproduce`: makes the datasets that the paper's experiments
 //! need and hands them to `train`, which runs the experiments.
 
-use crate::{Outcome, Usage, train, workspace};
+use crate::flags::need_folder_of_meshes;
+use crate::workspace::command_line;
+use crate::{Outcome, train, workspace};
 use anyhow::{Context, bail};
 use formats::atomic;
 use std::ffi::OsString;
@@ -46,9 +48,7 @@ const SIGMAS: [&str; 3] = ["0.02", "0.05", "0.1"];
 
 /// Runs the experiments.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    if let Some(path) = args.meshes.as_ref().filter(|path| !path.is_dir()) {
-        return Err(Usage(format!("--meshes: {} is no folder", path.display())).into());
-    }
+    need_folder_of_meshes(args.meshes.as_deref())?;
     let scans = args.out.join("data");
     let meshes = match &args.meshes {
         Some(folder) => folder.clone(),
@@ -150,14 +150,4 @@ fn run_self(words: &[&str], paths: &[(&str, &Path)], last: &Path) -> anyhow::Res
 /// Whether `path` was written since `begun`.
 fn is_new(path: &Path, begun: SystemTime) -> bool {
     path.metadata().and_then(|data| data.modified()).is_ok_and(|written| written >= begun)
-}
-
-/// What the user typed.
-fn command_line() -> String {
-    let quoted = |word: String| match word.contains([' ', '(', '\'', ';', '&']) {
-        true => format!("{word:?}"),
-        false => word,
-    };
-    let words: Vec<String> = std::env::args().skip(1).map(quoted).collect();
-    format!("cargo xtask {}", words.join(" "))
 }

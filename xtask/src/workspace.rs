@@ -61,6 +61,21 @@ pub fn executable(messages: &str) -> anyhow::Result<PathBuf> {
     last.context("Cargo names no executable")
 }
 
+/// What the user typed.
+pub fn command_line() -> String {
+    let quoted = |word: String| match word.contains([' ', '(', '\'', ';', '&']) {
+        true => format!("{word:?}"),
+        false => word,
+    };
+    let words: Vec<String> = std::env::args().skip(1).map(quoted).collect();
+    format!("cargo xtask {}", words.join(" "))
+}
+
+/// A file's or folder's own name, for people.
+pub fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

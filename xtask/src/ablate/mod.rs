@@ -10,7 +10,8 @@ mod positions;
 mod rows;
 mod summary;
 
-use crate::{Outcome, Usage, train};
+use crate::flags::need_folder_of_meshes;
+use crate::{Outcome, train};
 use anyhow::{Context, ensure};
 use datasets::{Made, bytes_per_cloud, clouds, make};
 use effects::{DATASETS, EFFECTS, Judge, Source};
@@ -50,9 +51,7 @@ const SHAPES: [u32; 2] = [40, 10];
 /// Makes, trains, tests and compares what is not there yet; writes
 /// `ablations.csv` and `tables.txt`, and prints the latter.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    if let Some(path) = args.meshes.as_ref().filter(|path| !path.is_dir()) {
-        return Err(Usage(format!("--meshes: {} is no folder", path.display())).into());
-    }
+    need_folder_of_meshes(args.meshes.as_deref())?;
     let plan = Plan::read(args.plan.as_deref(), args.quick)?;
     let work = args.out.join("work");
     keep_terms(&plan, args.meshes.as_deref(), &args.out)?;

@@ -18,16 +18,16 @@ use sim_gpu::bvh::Builder;
 use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::census::survey;
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{Ray, RayFrame};
 use sim_gpu::resolve::{Hits, resolve};
 use sim_gpu::sensor::{BeamPattern, Sensor};
 use sim_gpu::shapes::{ShapeClass, generate};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::target::Target;
 
 use super::lanes::{self, Lane};
+use super::speed::target;
 use super::subject::{self, Subject};
 use super::table::{Table, digits};
 use crate::workspace::root;
@@ -91,7 +91,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     let pattern = Sensor::builtin("vlp32c").expect("invariant: it is built in").pattern();
     let mut all = Vec::new();
     for subject in &subjects {
-        let target = target(subject);
+        let target = target(subject.mesh.clone(), Builder::Sah);
         for view in 0..args.views {
             let seen = View::new(&target, &pattern, view, args.views);
             let reference = seen.cast(cpu)?;
@@ -114,11 +114,6 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
 fn shape(class: ShapeClass) -> Subject {
     let mesh = to_world(&generate(class, 0, 0), Up::Z, Normalize::UnitSphere).mesh;
     Subject { name: format!("shape {class}"), mesh }
-}
-
-fn target(subject: &Subject) -> Arc<Target> {
-    let kept = survey(&subject.mesh).kept;
-    Arc::new(Target::new(Surface::new(subject.mesh.clone(), kept), Builder::Sah))
 }
 
 /// A sensor's look at a mesh.

@@ -1,9 +1,10 @@
 //! Records of `cargo xtask bench`.
 
-use super::{entries, missing, name, remarks, text};
+use super::{entries, missing, remarks, text};
 use crate::bench::clock::Spread;
 use crate::page::chart::{Axis, Dot, Series, draw};
 use crate::page::figure;
+use crate::workspace::file_name;
 use anyhow::{Context, Result};
 use maud::{Markup, html};
 use serde::Deserialize;
@@ -56,9 +57,9 @@ fn one(folder: &Path) -> Result<Markup> {
     let texts =
         entries(folder).into_iter().filter(|path| path.extension().is_some_and(|x| x == "txt"));
     let texts: Result<Vec<(String, Option<String>)>> =
-        texts.map(|path| Ok((name(&path), text(&path)?))).collect();
+        texts.map(|path| Ok((file_name(&path), text(&path)?))).collect();
     Ok(html! {
-        h3 { (name(folder)) }
+        h3 { (file_name(folder)) }
         (remarks(folder)?)
         @if let Some(drawing) = drawing { (drawing) }
         @for (name, text) in texts? {

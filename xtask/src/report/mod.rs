@@ -103,8 +103,3 @@ fn remarks(folder: &Path) -> Result<Markup> {
         html! { @if let Some(text) = text { details { summary { "How it was measured" } pre { (text) } } } },
     )
 }
-
-/// A file's or folder's own name.
-fn name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
-}

@@ -1,7 +1,8 @@
 //! Records that are tables: the ablations, and the paper's experiments.
 
-use super::{entries, missing, name, remarks, text};
+use super::{entries, missing, remarks, text};
 use crate::page::table::{of_csv, table};
+use crate::workspace::file_name;
 use anyhow::{Context, Result};
 use maud::{Markup, html};
 use serde::Deserialize;
@@ -58,7 +59,7 @@ pub fn reproduction(reports: &Path) -> Result<Markup> {
     }
     Ok(html! {
         p { "Meyer and Reitmann 2026, by " code { "cargo xtask reproduce" } "; the record "
-            (name(folder)) " has the same with drawings and clouds. The number before a table's name is "
+            (file_name(folder)) " has the same with drawings and clouds. The number before a table's name is "
             "the experiment's." }
         (remarks(folder)?)
         @for name in names { (one_table(name, &cells)) }

@@ -1,25 +1,18 @@
 //! Clouds to turn: one mesh as several sensors see it.
 
-use super::entries;
-use anyhow::{Context, Result};
+use crate::one_scan::{Look, load_target};
+use crate::workspace::file_name;
+use anyhow::Result;
 use formats::rng::StreamKey;
 use formats::scan::AttributeSet;
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use maud::{Markup, html};
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
-use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::census::survey;
-use sim_gpu::mesh::frame::{Normalize, to_world};
-use sim_gpu::mesh::load;
+use sim_gpu::mesh::tree::discover;
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::RayFrame;
-use sim_gpu::resolve::resolve;
-use sim_gpu::scan::{Seen, View, assemble};
 use sim_gpu::sensor::Sensor;
-use sim_gpu::target::{Surface, Target};
-use std::path::{Path, PathBuf};
+use sim_gpu::target::Target;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Sensors, and noise along the ray in metres.
@@ -39,16 +32,15 @@ const MOST_POINTS: usize = 6000;
 /// # Errors
 /// A mesh that cannot be read.
 pub fn body(assets: &Path) -> Result<Markup> {
-    let Some(path) = first_mesh(&assets.join("meshes")) else {
-        return Ok(html! { p { "There is no mesh under " (assets.join("meshes").display()) "." } });
+    let folder = assets.join("meshes");
+    let Some(entry) = discover(&folder, 0).ok().and_then(|entries| entries.into_iter().next())
+    else {
+        return Ok(html! { p { "There is no mesh under " (folder.display()) "." } });
     };
-    let loaded = load(&path).with_context(|| format!("cannot scan {}", path.display()))?;
-    let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::default());
-    let kept = survey(&world.mesh).kept;
-    let target = Arc::new(Target::new(Surface::new(world.mesh, kept), Builder::Sah));
+    let target = load_target(&entry)?;
     let clouds = SENSORS.map(|(sensor, noise_m)| (sensor, noise_m, scan(&target, sensor, noise_m)));
     Ok(html! {
-        p { (super::name(&path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
+        p { (file_name(&entry.path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
             (ELEVATION_DEG) "° below it. Made now, on the CPU." }
         div class="clouds" { @for (sensor, noise_m, cloud) in &clouds {
             figure {
@@ -63,38 +55,22 @@ pub fn body(assets: &Path) -> Result<Markup> {
     })
 }
 
-/// The first mesh below `folder`.
-fn first_mesh(folder: &Path) -> Option<PathBuf> {
-    entries(folder).into_iter().find_map(|path| match path.is_dir() {
-        true => first_mesh(&path),
-        false => sim_gpu::mesh::MeshFormat::of(&path).map(|_| path),
-    })
-}
-
 fn scan(target: &Arc<Target>, sensor: &str, sigma_m: f64) -> Vec<[f32; 3]> {
     let sensor = Sensor::builtin(sensor).expect("invariant: these profiles are built in");
     let noise = Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range };
     let effects = Effects { noise: (sigma_m > 0.0).then_some(noise), ..Effects::default() };
     let (elevation, azimuth) = (ELEVATION_DEG.to_radians(), AZIMUTH_DEG.to_radians());
     let pose = Pose::view(DISTANCE_M, elevation, azimuth, DVec3::ZERO);
-    let pattern = sensor.pattern();
-    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
-    let stream = StreamKey::new(0, "report", 0);
-    let job = CastJob::aim(Arc::clone(target), frame, &pattern, Culling::On, stream, 1.0);
-    let casts = Caster::Cpu(effects.clone()).cast_on_cpu(std::slice::from_ref(&job));
-    let hits = resolve(&job, &casts[0], &pattern, &effects);
-    let view = View {
+    let look = Look {
+        target,
         sensor: &sensor,
-        pattern: &pattern,
+        pattern: &sensor.pattern(),
         pose: &pose,
-        cast_effects: &effects,
         effects: &effects,
         attributes: &AttributeSet::default(),
-        stream,
+        stream: StreamKey::new(0, "report", 0),
     };
-    let world_from_object = &DAffine3::IDENTITY;
-    let seen = [Seen { object: 0, world_from_object, job: &job, hits: &hits }];
-    assemble(&view, &seen).0.positions
+    look.scan().0.positions
 }
 
 /// Some of the points, spread over all.

@@ -3,11 +3,11 @@
 use super::energy::Energy;
 use super::row::{Part, Row};
 use crate::bench::clock::Spread;
-use crate::workspace;
+use crate::workspace::{self, file_name};
 use anyhow::{Context, Result, ensure};
 use formats::labelled::read_labelled;
 use infer_cpu::sampler::{FrontChoice, SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, Options, Precision, TNets, inspect};
+use infer_cpu::{Classifier, Options, Precision, Summary, TNets};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -120,9 +120,8 @@ impl TestSet {
         let names = names.with_context(|| format!("{}: no key `classes`", path.display()))?;
         let kept = limit.min(set.len());
         let chosen: Vec<usize> = (0..kept).map(|i| i * set.len() / kept).collect();
-        let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         Ok(Self {
-            name,
+            name: file_name(path),
             clouds: chosen.iter().map(|&i| set.cloud(i).to_vec()).collect(),
             labels: chosen.iter().map(|&i| names[set.labels[i]].clone()).collect(),
         })
@@ -225,11 +224,15 @@ impl Classifying {
         Ok(())
     }
 
-    /// The row of `answers` on `set`, compared with `reference`'s.
-    ///
-    /// # Errors
-    /// A model that cannot be read.
-    pub fn row(&self, set: &TestSet, answers: &Answers, reference: &Answers) -> Result<Row> {
+    /// The row of `answers` on `set`, compared with `reference`'s; `model` is what
+    /// its file holds.
+    pub fn row(
+        &self,
+        set: &TestSet,
+        model: &Summary,
+        answers: &Answers,
+        reference: &Answers,
+    ) -> Row {
         let row = Row {
             part: Part::Classifier,
             test_set: set.name.clone(),
@@ -242,12 +245,12 @@ impl Classifying {
             threads: Some(self.threads),
             ms_here: answers.median_ms,
             joules: answers.joules,
-            megabytes: Some(inspect(&self.model)?.bytes(self.precision) as f64 * 1e-6),
+            megabytes: Some(model.bytes(self.precision) as f64 * 1e-6),
             agreement: Some(answers.agreement(reference)),
             logit_error: Some(answers.largest_error(reference)),
             ..Row::default()
         };
-        Ok(row.with_accuracy(set.right(answers), set.clouds.len()))
+        row.with_accuracy(set.right(answers), set.clouds.len())
     }
 
     /// The model's file, from the workspace's root if it lies there.

@@ -5,7 +5,7 @@ use super::row::Row;
 use crate::bench::pi_model::{Modelled, Sampler};
 use anyhow::{Context, Result};
 use infer_cpu::sampler::SamplerKind;
-use infer_cpu::{Precision, TNets, inspect};
+use infer_cpu::{Precision, Summary, TNets, inspect};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -76,19 +76,24 @@ pub fn as_trained(model: &Path) -> Result<Classifying> {
 /// not fit.
 pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> Result<Vec<Row>> {
     set.fits(model)?;
-    let trained = as_trained(model)?;
+    let (trained, summary) = (as_trained(model)?, inspect(model)?);
+    let measured = |setting: Classifying, answers: Answers, reference: Option<&Answers>| {
+        let mut row = setting.row(set, &summary, &answers, reference.unwrap_or(&answers));
+        row.knob = knob(&setting, &trained);
+        eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
+        Measured { setting, answers, row }
+    };
     let mut first: Vec<Measured> = Vec::new();
     for setting in sampled(&trained, set, grid) {
         let answers = setting.answers(&set.clouds)?;
-        first.push(Measured::new(setting, set, &trained, &answers, &answers)?);
+        first.push(measured(setting, answers, None));
     }
     let more: Vec<Measured> = promising(&first, &trained)
-        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, grid))
+        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, grid, &summary))
         .map(|setting| {
             let reference = first.iter().find(|sampled| sampled.chooses_as(&setting));
             let answers = setting.answers(&set.clouds)?;
-            let compared = reference.map_or(&answers, |reference| &reference.answers);
-            Measured::new(setting, set, &trained, &answers, compared)
+            Ok(measured(setting, answers, reference.map(|reference| &reference.answers)))
         })
         .collect::<Result<_>>()?;
     let all: Vec<Measured> = first.into_iter().chain(more).collect();
@@ -106,19 +111,6 @@ struct Measured {
 }
 
 impl Measured {
-    fn new(
-        setting: Classifying,
-        set: &TestSet,
-        trained: &Classifying,
-        answers: &Answers,
-        reference: &Answers,
-    ) -> Result<Self> {
-        let mut row = setting.row(set, answers, reference)?;
-        row.knob = knob(&setting, trained);
-        eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
-        Ok(Self { setting, answers: answers.clone(), row })
-    }
-
     fn chooses_as(&self, setting: &Classifying) -> bool {
         (self.setting.sampler, self.setting.points) == (setting.sampler, setting.points)
     }
@@ -177,21 +169,22 @@ fn sampled(trained: &Classifying, set: &TestSet, grid: &Grid) -> Vec<Classifying
 
 /// One way to choose points in every precision but fp32; as trained, also with
 /// other threads and without T-Nets.
-fn with_precisions(samples: &Classifying, trained: &Classifying, grid: &Grid) -> Vec<Classifying> {
+fn with_precisions(
+    samples: &Classifying,
+    trained: &Classifying,
+    grid: &Grid,
+    summary: &Summary,
+) -> Vec<Classifying> {
     let precise = |&precision: &Precision| Classifying { precision, ..samples.clone() };
     let mut all: Vec<Classifying> = grid.precisions.iter().map(precise).collect();
     if (samples.sampler, samples.points) == (trained.sampler, trained.points) {
         let threads = grid.threads.iter();
         all.extend(threads.map(|&threads| Classifying { threads, ..samples.clone() }));
-        if has_t_nets(&samples.model) {
+        if summary.stn.is_some() || summary.fstn.is_some() {
             all.push(Classifying { t_nets: TNets::Neither, ..samples.clone() });
         }
     }
     all
-}
-
-fn has_t_nets(model: &Path) -> bool {
-    inspect(model).is_ok_and(|summary| summary.stn.is_some() || summary.fstn.is_some())
 }
 
 fn knob(setting: &Classifying, trained: &Classifying) -> String {

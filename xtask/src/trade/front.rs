@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 /// Costs are as measured and shares are of clouds: a row that is beaten by less
 /// than the interval of its accuracy is beaten all the same.
 pub fn mark(rows: &mut [Row]) {
+    let kin: Vec<Kin> = rows.iter().map(kin).collect();
     for device in Device::ALL {
         let figures: Vec<Option<[f64; 3]>> = rows.iter().map(|row| figures(row, device)).collect();
-        let kin: Vec<Kin> = rows.iter().map(kin).collect();
         for (i, row) in rows.iter_mut().enumerate() {
             let rivals = figures.iter().zip(&kin).filter(|(_, other)| **other == kin[i]);
             let mut rivals = rivals.filter_map(|(figures, _)| figures.as_ref());

@@ -21,7 +21,9 @@ mod sensors;
 use crate::bench::lanes;
 use crate::bench::machine::Machine;
 use crate::bench::table::{Table, digits};
-use crate::{Outcome, Usage, gen_shapes, workspace};
+use crate::flags::need_folder_of_meshes;
+use crate::workspace::file_name;
+use crate::{Outcome, gen_shapes, workspace};
 use anyhow::{Context, Result, ensure};
 use classes::TestSet;
 use classifiers::{Grid, as_trained, bundled, on_a_pi};
@@ -30,7 +32,6 @@ use formats::rng::StreamKey;
 use objects::Object;
 use row::Row;
 use scans::Cloud;
-use sensors::Scanning;
 use sim_gpu::shapes;
 use std::path::PathBuf;
 
@@ -84,15 +85,13 @@ const FEW_CLOUDS: usize = 100;
 
 /// Measures and writes the record.
 pub fn run(args: &Args) -> Result<Outcome> {
-    if let Some(folder) = args.meshes.as_ref().filter(|folder| !folder.is_dir()) {
-        return Err(Usage(format!("--meshes: {} is no folder", folder.display())).into());
-    }
+    need_folder_of_meshes(args.meshes.as_deref())?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make {}", args.out.display()))?;
     let per_class = if args.quick { FEW_PER_CLASS } else { MOST_PER_CLASS };
     let objects = objects::read(&meshes(args)?, per_class)?;
-    let mut rows = scan_rows(args, &objects)?;
-    rows.extend(classifier_rows(args, &objects)?);
+    let (mut rows, reference) = scan_rows(args, &objects)?;
+    rows.extend(classifier_rows(args, reference)?);
     let machine = machine();
     rows.iter_mut().for_each(|row| row.machine.clone_from(&machine));
     front::mark(&mut rows);
@@ -115,10 +114,8 @@ fn meshes(args: &Args) -> Result<PathBuf> {
 }
 
 fn name_of_meshes(args: &Args) -> String {
-    let of = |folder: &PathBuf| {
-        folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
-    };
-    let named = args.meshes_name.clone().or_else(|| args.meshes.as_ref().map(of));
+    let of_folder = || args.meshes.as_deref().map(file_name);
+    let named = args.meshes_name.clone().or_else(of_folder);
     format!("scans of {}", named.as_deref().unwrap_or("shapes of our own"))
 }
 
@@ -134,8 +131,8 @@ fn model_for(args: &Args, set: &TestSet) -> Result<PathBuf> {
     })
 }
 
-/// Rows of sensors and of casters.
-fn scan_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
+/// Rows of sensors and of casters, and the reference scans.
+fn scan_rows(args: &Args, objects: &[Object]) -> Result<(Vec<Row>, TestSet)> {
     let (name, rounds) = (name_of_meshes(args), usize::from(args.rounds));
     let mut ways = sensors::one_at_a_time();
     if !args.quick {
@@ -151,24 +148,26 @@ fn scan_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
     let exact = classifying.answers(&cast[0].clouds)?;
     let all = scanned.into_iter().map(|scanned| (scanned.row, scanned.clouds));
     let all = all.chain(cast.into_iter().map(|cast| (cast.row, cast.clouds)));
-    all.map(|(row, clouds)| {
-        let set = scan_set(objects, &name, &clouds);
-        let found = classifying.answers(&set.clouds)?;
-        let answers = if row.part == row::Part::Caster { &exact } else { &noisy };
-        let row = Row {
-            model: classifying.model_name(),
-            model_file: classifying.model_file(),
-            sampler: classifying.sampler.name.to_owned(),
-            points: Some(classifying.points),
-            precision: classifying.precision.to_string(),
-            t_nets: classifying.t_nets.to_string(),
-            threads: Some(classifying.threads),
-            agreement: Some(found.agreement(answers)),
-            ..row
-        };
-        Ok(row.with_accuracy(set.right(&found), set.clouds.len()))
-    })
-    .collect()
+    let rows: Result<Vec<Row>> = all
+        .map(|(row, clouds)| {
+            let set = scan_set(objects, &name, &clouds);
+            let found = classifying.answers(&set.clouds)?;
+            let answers = if row.part == row::Part::Caster { &exact } else { &noisy };
+            let row = Row {
+                model: classifying.model_name(),
+                model_file: classifying.model_file(),
+                sampler: classifying.sampler.name.to_owned(),
+                points: Some(classifying.points),
+                precision: classifying.precision.to_string(),
+                t_nets: classifying.t_nets.to_string(),
+                threads: Some(classifying.threads),
+                agreement: Some(found.agreement(answers)),
+                ..row
+            };
+            Ok(row.with_accuracy(set.right(&found), set.clouds.len()))
+        })
+        .collect();
+    Ok((rows?, reference))
 }
 
 /// Clouds of [`objects::places`], labelled.
@@ -180,7 +179,7 @@ fn scan_set(objects: &[Object], name: &str, clouds: &[Cloud]) -> TestSet {
 }
 
 /// Rows of classifiers, on the clouds given or else on the reference scans.
-fn classifier_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
+fn classifier_rows(args: &Args, reference: TestSet) -> Result<Vec<Row>> {
     let set = match &args.clouds {
         Some(path) => {
             let limit = if args.quick { FEW_CLOUDS } else { usize::MAX };
@@ -189,10 +188,8 @@ fn classifier_rows(args: &Args, objects: &[Object]) -> Result<Vec<Row>> {
             set
         }
         None => {
-            let ways = [Scanning::reference()];
-            let scanned = scans::scan_all(objects, &ways, 1, "")?.swap_remove(0);
-            let clouds: Vec<Cloud> = scanned.clouds.iter().map(|cloud| packed(cloud)).collect();
-            scan_set(objects, &name_of_meshes(args), &clouds)
+            let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
+            TestSet { clouds, ..reference }
         }
     };
     let models = match &args.model {

@@ -1,17 +1,14 @@
 //! The objects that are scanned, and the places they are scanned from.
 
-use anyhow::{Context, Result, ensure};
+use crate::one_scan::load_target;
+use anyhow::{Result, ensure};
 use formats::Split;
 use formats::rng::StreamKey;
 use glam::DVec3;
-use sim_gpu::bvh::Builder;
-use sim_gpu::mesh::census::survey;
-use sim_gpu::mesh::frame::{Normalize, to_world};
-use sim_gpu::mesh::load;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::Views;
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::target::Target;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -59,12 +56,8 @@ pub fn read(folder: &Path, per_class: usize) -> Result<Vec<Object>> {
 }
 
 fn object(entry: &MeshEntry) -> Result<Object> {
-    let loaded = load(&entry.path).with_context(|| format!("cannot scan {}", entry.relative))?;
-    let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::default());
-    let kept = survey(&world.mesh).kept;
-    let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
     let id = format!("{}/{}", entry.class, entry.name);
-    Ok(Object { class: entry.class.clone(), id, target: Arc::new(target) })
+    Ok(Object { class: entry.class.clone(), id, target: load_target(entry)? })
 }
 
 /// The four sides of gen-dataset's rotating set, from `distance_m`.

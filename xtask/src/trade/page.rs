@@ -6,6 +6,7 @@ use crate::bench::table::digits;
 use crate::page::chart::{Axis, Dot, Series, draw};
 use crate::page::table::table;
 use crate::page::{self, Chapter, figure};
+use crate::workspace::command_line;
 use anyhow::Result;
 use formats::atomic;
 use maud::{Markup, html};
@@ -24,7 +25,7 @@ pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     let lead = html! {
         p { "What each knob of the chain, from mesh to class, costs, and what it is worth. "
             "Bold rows are on the front: no other of their kind costs as little and is as good." }
-        pre { "cargo xtask " (std::env::args().skip(1).collect::<Vec<_>>().join(" ")) }
+        pre { (command_line()) }
     };
     let html = page::of("The trade: speed against accuracy", &lead, &chapters(rows)?);
     Ok(atomic::write_bytes(&folder.join("trade.html"), html.as_bytes())?)

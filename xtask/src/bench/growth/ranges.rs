@@ -11,14 +11,14 @@ use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::Mesh;
-use sim_gpu::mesh::census::survey;
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{MISS, RayFrame};
 use sim_gpu::resolve::resolve;
 use sim_gpu::sensor::{BeamPattern, Sensor};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::target::Target;
 
 use super::super::scenes::torus;
+use super::super::speed::target as target_of;
 use super::Row;
 
 /// Beams this close to a surface's plane are promised less: 0.1 degree.
@@ -127,9 +127,7 @@ impl Setting {
 
 fn target(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Arc<Target> {
     let vertices = mesh.vertices.iter().map(|&v| map(v)).collect();
-    let mesh = Mesh { vertices, triangles: mesh.triangles.clone() };
-    let kept = survey(&mesh).kept;
-    Arc::new(Target::new(Surface::new(mesh, kept), Builder::Sah))
+    target_of(Mesh { vertices, triangles: mesh.triangles.clone() }, Builder::Sah)
 }
 
 fn job(target: Arc<Target>, pose: Pose, pattern: &BeamPattern) -> CastJob {

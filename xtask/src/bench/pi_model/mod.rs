@@ -6,6 +6,7 @@
 //! out, [`model`] how long that takes. What is outside the loops is [`count`]ed
 //! under QEMU.
 
+use crate::flags::positive;
 use crate::{build_pi, pi_target};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
@@ -46,17 +47,18 @@ pub struct PiModelArgs {
     #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
     precision: Vec<Precision>,
     /// Cores at work.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, default_value_t = model::Machine::PI_5.threads as u16,
+          value_parser = clap::value_parser!(u16).range(1..))]
     threads: u16,
     /// Clock of the cores.
-    #[arg(long, default_value_t = 2.4, value_name = "GHZ", value_parser = positive)]
+    #[arg(long, default_value_t = model::Machine::PI_5.hertz / 1e9, value_name = "GHZ", value_parser = positive)]
     clock: f64,
     /// What memory delivers to all cores together.
-    #[arg(long, default_value_t = 10.0, value_name = "GB/S", value_parser = positive)]
+    #[arg(long, default_value_t = model::Machine::PI_5.bytes_per_s / 1e9, value_name = "GB/S", value_parser = positive)]
     bandwidth: f64,
     /// Instructions a cycle outside inner loops; the core's two SIMD pipes
     /// allow two.
-    #[arg(long, default_value_t = 2.0, value_name = "IPC", value_parser = positive)]
+    #[arg(long, default_value_t = model::Machine::PI_5.instructions_per_cycle, value_name = "IPC", value_parser = positive)]
     other_ipc: f64,
     /// Do not count instructions under QEMU: inner loops and memory alone.
     #[arg(long)]
@@ -211,12 +213,5 @@ fn eights(word: &str) -> Result<usize, String> {
     match word.parse::<usize>() {
         Ok(n) if n > 0 && n.is_multiple_of(8) => Ok(n),
         _ => Err("a positive multiple of 8 is needed".to_owned()),
-    }
-}
-
-fn positive(word: &str) -> Result<f64, String> {
-    match word.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("a positive number is needed".to_owned()),
     }
 }
