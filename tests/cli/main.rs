@@ -14,6 +14,9 @@ mod meshes;
 mod packets;
 mod reference;
 mod scenes;
+// Without the feature the binary would build itself anew.
+#[cfg(feature = "simplify")]
+mod simplified;
 mod surfaces;
 mod trade;
 

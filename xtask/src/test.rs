@@ -36,7 +36,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     step("lints", &mut cargo(&lints))?;
     let mut tests = cargo(&["test", "--workspace", "--no-fail-fast"]);
     if has_cpp_compiler() {
-        tests.args(["--features", "tests/simplify"]);
+        tests.args(["--features", "tests/simplify,xtask/simplify"]);
     } else {
         go_without("tests of simplified meshes", "there is no C++ compiler", !args.no_install)?;
     }

@@ -2,6 +2,7 @@
 
 use super::energy::Energy;
 use super::row::{Part, Row};
+use super::scans::Cloud;
 use crate::bench::clock::Spread;
 use crate::workspace::{self, file_name};
 use anyhow::{Context, Result, ensure};
@@ -12,15 +13,15 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Clouds whose classification is timed.
-const TIMED: usize = 200;
+/// Clouds whose classification is timed, a round.
+const TIMED: usize = 100;
 
 /// Labelled clouds.
 pub struct TestSet {
     /// Its name in the rows.
     pub name: String,
     /// The clouds.
-    pub clouds: Vec<Vec<[f32; 3]>>,
+    pub clouds: Vec<Cloud>,
     /// Each one's class, by name.
     pub labels: Vec<String>,
 }
@@ -95,16 +96,21 @@ pub struct Classifying {
     pub threads: usize,
 }
 
-/// What was said of each cloud, and in which time.
+/// What was said of each cloud.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answers {
     /// The class of each cloud; `None` where there was no point to judge by.
     pub classes: Vec<Option<String>>,
     /// All logits, one cloud after another.
     pub logits: Vec<f32>,
-    /// The median, milliseconds; none without a cloud to time.
-    pub median_ms: Option<f64>,
-    /// Of one classification, where the machine tells.
+}
+
+/// What classifications cost.
+#[derive(Clone, Debug, Default)]
+pub struct Costs {
+    /// Wall time of each, milliseconds.
+    pub ms: Vec<f64>,
+    /// Of all together, where the machine tells.
     pub joules: Option<f64>,
 }
 
@@ -181,11 +187,11 @@ impl Classifying {
         Ok(Classifier::load(&self.model, &self.options(capacity))?)
     }
 
-    /// Classifies `clouds`, all for the answers and some for the time.
+    /// Classifies `clouds`.
     ///
     /// # Errors
     /// As [`Self::load`]; a cloud that is no cloud.
-    pub fn answers(&self, clouds: &[Vec<[f32; 3]>]) -> Result<Answers> {
+    pub fn answers(&self, clouds: &[Cloud]) -> Result<Answers> {
         let capacity = clouds.iter().map(Vec::len).max().unwrap_or_default();
         // Answers do not depend on the number of threads.
         let alone = Self { threads: 1, ..self.clone() };
@@ -199,28 +205,28 @@ impl Classifying {
             answers.classes.extend(part.classes);
             answers.logits.extend(part.logits);
         }
-        self.time(clouds, capacity, &mut answers)?;
         Ok(answers)
     }
 
-    /// Times some of `clouds`, spread over all, one after another.
-    fn time(&self, clouds: &[Vec<[f32; 3]>], capacity: usize, answers: &mut Answers) -> Result<()> {
-        let mut classifier = self.load(capacity)?;
+    /// Times some of `clouds`, spread over all, one after another, and adds them to
+    /// `costs`.
+    ///
+    /// # Errors
+    /// As [`Self::answers`].
+    pub fn time(&self, clouds: &[Cloud], energy: Option<&Energy>, costs: &mut Costs) -> Result<()> {
+        let mut classifier = self.load(clouds.iter().map(Vec::len).max().unwrap_or_default())?;
         let each = clouds.len().div_ceil(TIMED).max(1);
         let timed: Vec<_> = clouds.iter().step_by(each).filter(|cloud| !cloud.is_empty()).collect();
         let Some(first) = timed.first() else { return Ok(()) };
         classifier.classify(first)?;
-        let mut ms = Vec::new();
-        let energy = Energy::here();
-        let before = energy.as_ref().map(Energy::now);
+        let before = energy.map(Energy::now);
         for cloud in timed {
             let start = Instant::now();
             classifier.classify(cloud)?;
-            ms.push(start.elapsed().as_secs_f64() * 1e3);
+            costs.ms.push(start.elapsed().as_secs_f64() * 1e3);
         }
-        let joules = |(energy, before): (&Energy, Vec<u64>)| energy.joules_since(&before);
-        answers.joules = energy.as_ref().zip(before).map(joules).map(|all| all / ms.len() as f64);
-        answers.median_ms = Some(Spread::of(ms).median);
+        let joules = energy.zip(before).map(|(energy, before)| energy.joules_since(&before));
+        costs.joules = joules.map(|joules| joules + costs.joules.unwrap_or_default());
         Ok(())
     }
 
@@ -243,8 +249,6 @@ impl Classifying {
             precision: self.precision.to_string(),
             t_nets: self.t_nets.to_string(),
             threads: Some(self.threads),
-            ms_here: answers.median_ms,
-            joules: answers.joules,
             megabytes: Some(model.bytes(self.precision) as f64 * 1e-6),
             agreement: Some(answers.agreement(reference)),
             logit_error: Some(answers.largest_error(reference)),
@@ -265,7 +269,7 @@ impl Classifying {
     }
 }
 
-fn classified(classifier: &mut Classifier, clouds: &[Vec<[f32; 3]>]) -> Result<Answers> {
+fn classified(classifier: &mut Classifier, clouds: &[Cloud]) -> Result<Answers> {
     let mut answers = Answers::default();
     for cloud in clouds {
         if cloud.is_empty() {
@@ -277,6 +281,18 @@ fn classified(classifier: &mut Classifier, clouds: &[Vec<[f32; 3]>]) -> Result<A
         answers.logits.extend(&prediction.logits);
     }
     Ok(answers)
+}
+
+impl Costs {
+    /// The median of one, milliseconds; none without a cloud to time.
+    pub fn median_ms(&self) -> Option<f64> {
+        (!self.ms.is_empty()).then(|| Spread::of(self.ms.clone()).median)
+    }
+
+    /// Of one, where the machine tells.
+    pub fn joules_each(&self) -> Option<f64> {
+        self.joules.map(|all| all / self.ms.len().max(1) as f64)
+    }
 }
 
 impl Answers {

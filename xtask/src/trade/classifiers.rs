@@ -1,6 +1,7 @@
 //! Models, samplers, points, precisions, T-Nets and threads on one test set.
 
-use super::classes::{Answers, Chooser, Classifying, TestSet};
+use super::classes::{Answers, Chooser, Classifying, Costs, TestSet};
+use super::energy::Energy;
 use super::row::Row;
 use crate::bench::pi_model::{Modelled, Sampler};
 use anyhow::{Context, Result};
@@ -74,7 +75,13 @@ pub fn as_trained(model: &Path) -> Result<Classifying> {
 /// # Errors
 /// A model that cannot be read or does not know the classes; a set that does
 /// not fit.
-pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> Result<Vec<Row>> {
+pub fn rows(
+    model: &Path,
+    set: &TestSet,
+    grid: &Grid,
+    rounds: usize,
+    pi: Option<&Modelled>,
+) -> Result<Vec<Row>> {
     set.fits(model)?;
     let (trained, summary) = (as_trained(model)?, inspect(model)?);
     let measured = |setting: Classifying, answers: Answers, reference: Option<&Answers>| {
@@ -96,7 +103,8 @@ pub fn rows(model: &Path, set: &TestSet, grid: &Grid, pi: Option<&Modelled>) -> 
             Ok(measured(setting, answers, reference.map(|reference| &reference.answers)))
         })
         .collect::<Result<_>>()?;
-    let all: Vec<Measured> = first.into_iter().chain(more).collect();
+    let mut all: Vec<Measured> = first.into_iter().chain(more).collect();
+    time(&mut all, set, rounds)?;
     let from = set.most_points();
     let with_pi = |Measured { setting, row, .. }: Measured| with_pi(row, &setting, from, pi);
     let rows: Vec<Vec<Row>> = all.into_par_iter().map(with_pi).collect();
@@ -114,6 +122,21 @@ impl Measured {
     fn chooses_as(&self, setting: &Classifying) -> bool {
         (self.setting.sampler, self.setting.points) == (setting.sampler, setting.points)
     }
+}
+
+/// Times all settings in turns, so that a slow minute is everybody's.
+fn time(all: &mut [Measured], set: &TestSet, rounds: usize) -> Result<()> {
+    let energy = Energy::here();
+    let mut costs = vec![Costs::default(); all.len()];
+    for _ in 0..rounds {
+        for (measured, costs) in all.iter().zip(&mut costs) {
+            measured.setting.time(&set.clouds, energy.as_ref(), costs)?;
+        }
+    }
+    for (Measured { row, .. }, costs) in all.iter_mut().zip(costs) {
+        (row.ms_here, row.joules) = (costs.median_ms(), costs.joules_each());
+    }
+    Ok(())
 }
 
 /// Of ways to choose points those that are worth more precisions: those with the

@@ -53,24 +53,37 @@ pub type Choice = (&'static str, String);
 /// The choices that a user has and that are on no front of the rows in which
 /// they occur.
 pub fn dominated_everywhere(rows: &[Row]) -> Vec<Choice> {
-    let mut choices: BTreeMap<Choice, bool> = BTreeMap::new();
+    let mut all: BTreeMap<Choice, bool> = BTreeMap::new();
     for row in rows {
-        let of_part: &[(&'static str, &String)] = match row.part {
-            Part::Scan => &[("sensor", &row.sensor)],
-            Part::Caster => &[("caster", &row.caster), ("culling", &row.culling)],
-            Part::Classifier => &[
-                ("model", &row.model),
-                ("sampler", &row.sampler),
-                ("precision", &row.precision),
-                ("T-Nets", &row.t_nets),
-            ],
-        };
-        for (knob, value) in of_part {
-            *choices.entry((knob, (*value).clone())).or_default() |=
-                row.front_here || row.front_pi5;
+        for (knob, value) in choices_of(row) {
+            *all.entry((knob, value)).or_default() |= row.front_here || row.front_pi5;
         }
     }
-    choices.into_iter().filter(|(_, on_front)| !on_front).map(|(choice, _)| choice).collect()
+    all.into_iter().filter(|(_, on_front)| !on_front).map(|(choice, _)| choice).collect()
+}
+
+/// The knobs of a row that a user turns. Where an object stands is none; threads
+/// are left out, since a front does not count cores.
+fn choices_of(row: &Row) -> Vec<Choice> {
+    let text = |knob, value: &String| Some((knob, value.clone()));
+    let count = |knob, value: Option<usize>| Some((knob, value?.to_string()));
+    let size = |knob, value: Option<f64>, digits| Some((knob, format!("{:.digits$}", value?)));
+    let choices = match row.part {
+        Part::Scan => vec![
+            text("sensor", &row.sensor),
+            size("azimuth step, degrees", row.azimuth_step_deg, 1),
+            size("range quantum, m", row.range_quantum_m, 3),
+        ],
+        Part::Caster => vec![text("caster", &row.caster), text("culling", &row.culling)],
+        Part::Classifier => vec![
+            text("model", &row.model),
+            text("sampler", &row.sampler),
+            count("points", row.points),
+            text("precision", &row.precision),
+            text("T-Nets", &row.t_nets),
+        ],
+    };
+    choices.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

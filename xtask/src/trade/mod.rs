@@ -65,7 +65,7 @@ pub struct Args {
     #[arg(long)]
     quick: bool,
 
-    /// Counted repeats of each scan; the median is taken
+    /// Counted rounds of all scans and of all classifiers; medians are taken
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     rounds: u16,
 
@@ -201,7 +201,7 @@ fn classifier_rows(args: &Args, reference: TestSet) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for model in &models {
         let pi = if args.quick { None } else { on_a_pi(model) };
-        rows.extend(classifiers::rows(model, &set, &grid, pi.as_ref())?);
+        rows.extend(classifiers::rows(model, &set, &grid, usize::from(args.rounds), pi.as_ref())?);
     }
     Ok(rows)
 }

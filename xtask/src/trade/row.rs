@@ -162,7 +162,10 @@ impl fmt::Display for Row {
                 words
                     .push(format!("{}, {} {points}, {}", self.model, self.sampler, self.precision));
                 words.push(format!("T-Nets {}", self.t_nets));
-                words.extend(self.threads.map(|threads| format!("{threads} threads")));
+                words.extend(self.threads.map(|threads| match threads {
+                    1 => "1 thread".to_owned(),
+                    _ => format!("{threads} threads"),
+                }));
             }
             Part::Caster => words.push(format!("{}, culling {}", self.caster, self.culling)),
             Part::Scan => {
