@@ -153,6 +153,11 @@ fn hold_to_the_bound(root: &Path, every: usize) {
 }
 
 #[test]
+fn the_meshes_that_ship_keep_the_bound() {
+    hold_to_the_bound(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/meshes"), 1);
+}
+
+#[test]
 fn modelnet_keeps_the_bound() {
     if let Some(root) = shared("meshes/modelnet") {
         hold_to_the_bound(&root, 1);

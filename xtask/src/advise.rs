@@ -59,7 +59,8 @@ pub fn run(args: &Args) -> Result<Outcome> {
 
 fn advise(args: &Args, rows: &[Row]) -> Result<String> {
     // What infer-cpu classifies with: it runs all T-Nets that a model has.
-    let is_choice = |row: &&Row| row.part == Part::Classifier && row.t_nets == "both";
+    let runs_all = |row: &&Row| matches!(row.t_nets.as_str(), "" | "both");
+    let is_choice = |row: &&Row| row.part == Part::Classifier && runs_all(row);
     let choices = rows.iter().filter(is_choice);
     let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     if timed.is_empty() {
@@ -226,7 +227,7 @@ mod tests {
     fn the_most_accurate_within_the_time_is_advised_and_what_a_little_less_saves() {
         let advice = advise(&asked(Some(5.0), None), &rows()).unwrap();
         assert!(advice.starts_with("large"), "{advice}");
-        assert!(advice.contains("1 threads"), "of equals fewer threads: {advice}");
+        assert!(advice.contains("1 thread:"), "of equals fewer threads: {advice}");
         assert!(advice.contains("0.5 points less save 40 % of the time"), "{advice}");
         assert!(advice.contains("Beyond its interval, for more:\n  huge"), "{advice}");
     }

@@ -6,6 +6,7 @@ mod advise;
 mod bench;
 mod build_pi;
 mod caster;
+mod even_grid;
 mod export_onnx;
 mod flags;
 mod gen_dataset;
@@ -94,6 +95,8 @@ enum Outcome {
     Success,
     /// Some inputs failed and were named.
     SomeFailed,
+    /// Another process did what was asked, and ended with this.
+    Elsewhere(u8),
 }
 
 fn main() -> ExitCode {
@@ -123,6 +126,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Outcome::Success) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(1),
+        Ok(Outcome::Elsewhere(code)) => ExitCode::from(code),
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", told_once(&error));

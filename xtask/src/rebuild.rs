@@ -21,7 +21,9 @@ pub fn with_simplify() -> anyhow::Result<Outcome> {
         );
     }
     let status = cargo("run").arg("--").args(std::env::args_os().skip(1)).status()?;
-    Ok(if status.success() { Outcome::Success } else { Outcome::SomeFailed })
+    // None where a signal ended it.
+    let code = status.code().and_then(|code| u8::try_from(code).ok());
+    Ok(Outcome::Elsewhere(code.unwrap_or(1)))
 }
 
 /// Cargo on this program, with its own features and `simplify`.

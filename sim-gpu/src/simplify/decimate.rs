@@ -44,12 +44,29 @@ fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
     let most = (WORTH_IT * welded.corners.len() as f64) as usize;
     // No error is larger than the whole mesh, which fits a box of side 2.
     let error = SHARE * (bound / surface.frame.scale).min(2.0);
-    let mut corners = welded.collapsed(error as f32);
+    let corners = welded.collapsed(error as f32);
     if corners.len() > most {
         return None;
     }
     let original = Target::new(surface, Builder::Morton);
-    let strays = beyond(&target(&welded.mesh_of(mesh, &corners)).surface, &original, bound);
+    let corners = put_right(mesh, &welded, &original, corners, bound);
+    (corners.len() <= most).then(|| welded.mesh_of(mesh, &corners))
+}
+
+/// `corners` without the triangles that stray from the `original`, and with what
+/// has to come back.
+fn put_right(
+    mesh: &Mesh,
+    welded: &Welded,
+    original: &Target,
+    corners: Vec<u32>,
+    bound: f64,
+) -> Vec<u32> {
+    // Each triangle once, or one of two equal ones would go without a proof.
+    let once = survey(&welded.mesh_of(mesh, &corners)).kept;
+    let mut corners: Vec<u32> =
+        once.iter().flat_map(|&nth| triangle(&corners, nth as usize)).collect();
+    let strays = beyond(&target(&welded.mesh_of(mesh, &corners)).surface, original, bound);
     let strayed: Vec<u32> = strays.iter().flat_map(|&t| triangle(&corners, t as usize)).collect();
     let stays = |nth: usize| strays.binary_search(&(nth as u32)).is_err();
     let left = (0..corners.len() / 3).filter(|&nth| stays(nth));
@@ -63,9 +80,9 @@ fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
         back.sort_unstable();
         back.dedup();
     }
-    let nth = back.iter().filter_map(|t| kept.binary_search(t).ok());
+    let nth = back.iter().filter_map(|t| original.surface.kept().binary_search(t).ok());
     corners.extend(nth.flat_map(|nth| triangle(&welded.corners, nth)));
-    (corners.len() <= most).then(|| welded.mesh_of(mesh, &corners))
+    corners
 }
 
 /// The `nth` three of `corners`.
@@ -164,5 +181,38 @@ impl Welded {
         fewer.triangles =
             corners.as_chunks::<3>().0.iter().map(|triangle| triangle.map(&mut number)).collect();
         fewer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn triangles_that_stray_go_though_there_are_two_of_them() {
+        // A roof over a square of 2 m: its four sides, and no floor.
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let mut vertices: Vec<DVec3> = corners.map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec();
+        vertices.push(DVec3::Z);
+        let triangles = (0..4).map(|i| [i, (i + 1) % 4, 4]).collect();
+        let mesh = Mesh { vertices, triangles };
+        let kept = survey(&mesh).kept;
+        let surface = Surface::new(mesh.clone(), kept.clone());
+        let welded = Welded::of(&mesh, &kept, &surface.frame);
+        let original = Target::new(surface, Builder::Morton);
+        // Half a floor twice, up to 0.7 m below the roof, and three of four sides.
+        let nth = |vertex: usize| {
+            let is = |&source: &u32| source as usize == vertex;
+            welded.sources.iter().position(is).unwrap() as u32
+        };
+        let floor = [0, 1, 2].map(nth);
+        let sides = [0, 1, 2].map(|i| triangle(&welded.corners, i));
+        let wrong = [floor.as_slice(), &floor, sides.as_flattened()].concat();
+        let left = put_right(&mesh, &welded, &original, wrong, 0.1);
+        let has = |wanted: [u32; 3]| left.as_chunks::<3>().0.contains(&wanted);
+        assert!(!has(floor), "{left:?}");
+        let all: Vec<bool> = (0..4).map(|i| has(triangle(&welded.corners, i))).collect();
+        assert_eq!(all, [true; 4]);
     }
 }

@@ -1,6 +1,7 @@
 //! The effects, and for each two datasets that differ in nothing else.
 
 use super::plan::Plan;
+use crate::even_grid::as_even_grid;
 use anyhow::Context;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
@@ -9,7 +10,7 @@ use sim_gpu::dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
 use sim_gpu::dataset::surfaces::SurfaceConfig;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::mesh::frame::Normalize;
-use sim_gpu::sensor::{Layout, Rotating, Sensor, Uniform, Views};
+use sim_gpu::sensor::{Sensor, Views};
 
 /// What is switched on and off.
 pub struct Effect {
@@ -133,7 +134,7 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
         intensity: switches.intensity.then_some(Intensity),
     };
     let kept = |wanted: bool, attribute| wanted.then_some(attribute);
-    let sensor = if switches.beams { sensor } else { as_grid(sensor)? };
+    let sensor = if switches.beams { sensor } else { as_even_grid(sensor)? };
     Ok(DatasetConfig {
         seed: SEED,
         normalize: Normalize::default(),
@@ -185,34 +186,6 @@ fn views(plan: &Plan) -> Views {
     Views { count: plan.views, ..Views::ROTATING }
 }
 
-/// The same sensor with as many rows and columns, evenly spread between its
-/// lowest and its highest beam and all around.
-fn as_grid(sensor: Sensor) -> anyhow::Result<Sensor> {
-    let Layout::Rotating(table) = &sensor.layout else {
-        anyhow::bail!("{}: has no table of beams", sensor.name);
-    };
-    let name = format!("{}-grid", sensor.name);
-    let layout = Layout::Uniform(grid(table));
-    Ok(Sensor { name, layout, ..sensor })
-}
-
-fn grid(table: &Rotating) -> Uniform {
-    let elevations = || table.beam.iter().map(|beam| beam.elevation_deg);
-    let rows = table.beam.len() as u32;
-    let columns = (table.rays_per_revolution() / u64::from(rows)).max(1) as u32;
-    let step_deg = 360.0 / f64::from(columns);
-    Uniform {
-        azimuth_from_deg: -180.0,
-        // Both ends belong to the grid: the last column is not the first again.
-        azimuth_to_deg: 180.0 - step_deg,
-        azimuth_steps: columns,
-        elevation_from_deg: elevations().fold(f64::INFINITY, f64::min),
-        elevation_to_deg: elevations().fold(f64::NEG_INFINITY, f64::max),
-        elevation_steps: rows,
-        rpm: Some(table.rpm),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -240,19 +213,5 @@ mod tests {
             let n = differ.iter().filter(|differ| **differ).count();
             assert_eq!(n, if effect.name == "all-of-these" { 4 } else { 1 }, "{}", effect.name);
         }
-    }
-
-    #[test]
-    fn the_grid_spans_what_the_beams_do_with_as_many_rays() {
-        let sensor = sensor().unwrap();
-        let Layout::Rotating(table) = &sensor.layout else { panic!("no table") };
-        let rays = table.rays_per_revolution();
-        let Layout::Uniform(grid) = as_grid(sensor.clone()).unwrap().layout else {
-            panic!("no grid")
-        };
-        assert_eq!((grid.elevation_from_deg, grid.elevation_to_deg), (-25.0, 15.0));
-        // The last firing sequence of a revolution is cut short.
-        let of_grid = u64::from(grid.azimuth_steps) * u64::from(grid.elevation_steps);
-        assert!(rays - of_grid < u64::from(grid.elevation_steps), "{rays}, {of_grid}");
     }
 }

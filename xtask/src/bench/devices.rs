@@ -3,8 +3,6 @@
 //! Positions must be equal within the promised bound, points as many but for beams
 //! at silhouettes, which are listed, and classes equal.
 
-use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -102,7 +100,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
             }
         }
     }
-    atomic::write(&args.csv, |file| file.write_all(csv(&all).as_bytes()))?;
+    atomic::write_bytes(&args.csv, &csv(&all)?)?;
     print!("{}", summary(&all, others));
     match all.iter().find(|comparison| !comparison.is_equal()) {
         None => Ok(()),
@@ -214,27 +212,38 @@ impl Comparison {
     }
 }
 
-fn csv(all: &[Comparison]) -> String {
-    let mut text = String::from(
-        "mesh,view,adapter,points_cpu,points,silhouette_beams,largest_difference_m,bound_m,class_cpu,class,equal\n",
-    );
+fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record([
+        "mesh",
+        "view",
+        "adapter",
+        "points_cpu",
+        "points",
+        "silhouette_beams",
+        "largest_difference_m",
+        "bound_m",
+        "class_cpu",
+        "class",
+        "equal",
+    ])?;
     for c in all {
         let beams: Vec<String> = c.silhouettes.iter().map(u32::to_string).collect();
-        // Names of adapters may hold commas.
-        let adapter = c.adapter.replace('"', "'");
-        let ([cpu, found], [class_cpu, class]) = (c.points, &c.classes);
-        let _ = writeln!(
-            text,
-            "{},{},\"{adapter}\",{cpu},{found},{},{:e},{:.3e},{class_cpu},{class},{}",
-            c.mesh,
-            c.view,
+        csv.write_record([
+            c.mesh.clone(),
+            c.view.to_string(),
+            c.adapter.clone(),
+            c.points[0].to_string(),
+            c.points[1].to_string(),
             beams.join(" "),
-            c.apart_m,
-            c.bound_m,
-            c.is_equal()
-        );
+            format!("{:e}", c.apart_m),
+            format!("{:.3e}", c.bound_m),
+            c.classes[0].clone(),
+            c.classes[1].clone(),
+            c.is_equal().to_string(),
+        ])?;
     }
-    text
+    Ok(csv.into_inner()?)
 }
 
 fn summary(all: &[Comparison], others: &[Lane]) -> Table {

@@ -33,7 +33,7 @@ struct Measured {
 /// # Errors
 /// A file that `bench` did not write.
 pub fn body(bench: &Path) -> Result<Markup> {
-    let records: Vec<_> = entries(bench).into_iter().filter(|path| path.is_dir()).collect();
+    let records: Vec<_> = entries(bench)?.into_iter().filter(|path| path.is_dir()).collect();
     if records.is_empty() {
         return Ok(missing(bench, "cargo xtask bench"));
     }
@@ -55,7 +55,7 @@ fn one(folder: &Path) -> Result<Markup> {
         None => None,
     };
     let texts =
-        entries(folder).into_iter().filter(|path| path.extension().is_some_and(|x| x == "txt"));
+        entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|x| x == "txt"));
     let texts: Result<Vec<(String, Option<String>)>> =
         texts.map(|path| Ok((file_name(&path), text(&path)?))).collect();
     Ok(html! {

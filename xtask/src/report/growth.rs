@@ -90,8 +90,9 @@ fn one(rows: &[&Growth]) -> Result<Markup> {
         .into_iter()
         .map(|(name, dots)| Series { name: name.to_owned(), dots, joined: is_one_layer })
         .collect();
-    let unit = if first.unit == "1" { "of the largest value" } else { &first.unit };
-    let label = format!("error, {unit}");
+    // Activations and logits have no unit: their errors are differences.
+    let unit = if first.unit == "1" { "" } else { &first.unit };
+    let label = ["error", unit].join(" ");
     let x = Axis { label: &first.knob, logarithmic: true, percent: false };
     let y = Axis { label: &label, logarithmic: true, percent: false };
     let title = format!("{} {} by {}", first.model(), first.quantity, first.knob);

@@ -89,11 +89,19 @@ fn text(path: &Path) -> Result<Option<String>> {
 }
 
 /// What stands in `folder`, sorted; nothing where there is no such folder.
-fn entries(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+///
+/// # Errors
+/// A folder that is there and cannot be read.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let unread = || format!("cannot read {}", folder.display());
+    let entries = fs::read_dir(folder).with_context(unread)?;
+    let paths: std::io::Result<Vec<PathBuf>> = entries.map(|entry| Ok(entry?.path())).collect();
+    let mut paths = paths.with_context(unread)?;
     paths.sort();
-    paths
+    Ok(paths)
 }
 
 /// The text that a record comes with.

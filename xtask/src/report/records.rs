@@ -42,7 +42,7 @@ struct Cell {
 /// # Errors
 /// A file that `reproduce` did not write.
 pub fn reproduction(reports: &Path) -> Result<Markup> {
-    let records = entries(reports);
+    let records = entries(reports)?;
     let Some(folder) = records.iter().rev().find(|path| path.join("report.csv").is_file()) else {
         return Ok(missing(&reports.join("DATE/report.csv"), "cargo xtask reproduce"));
     };

@@ -33,8 +33,8 @@ const MOST_POINTS: usize = 6000;
 /// A mesh that cannot be read.
 pub fn body(assets: &Path) -> Result<Markup> {
     let folder = assets.join("meshes");
-    let Some(entry) = discover(&folder, 0).ok().and_then(|entries| entries.into_iter().next())
-    else {
+    let entries = if folder.exists() { discover(&folder, 0)? } else { Vec::new() };
+    let Some(entry) = entries.into_iter().next() else {
         return Ok(html! { p { "There is no mesh under " (folder.display()) "." } });
     };
     let target = load_target(&entry)?;

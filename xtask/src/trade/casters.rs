@@ -34,6 +34,14 @@ enum Way<'a> {
     Product(&'a Caster),
 }
 
+/// The rays of every scan.
+struct Aimed {
+    culling: Culling,
+    shots: Vec<Shot>,
+    /// Those of the shots, as casters take them.
+    jobs: Vec<CastJob>,
+}
+
 /// One way's rows, but for the accuracy of classes, and the clouds that it finds.
 pub struct Cast {
     /// Costs and errors.
@@ -64,34 +72,33 @@ pub fn cast_all(
         let name = format!("{} f32 watertight, f64 range", short(lane.name()));
         (name, Way::Product(&lane.caster), lane.is_gpu)
     }));
-    let fired = shots(objects, Culling::Off);
-    let aimed = [(Culling::On, shots(objects, Culling::On)), (Culling::Off, fired.clone())];
-    let settings: Vec<_> = aimed
-        .iter()
-        .flat_map(|(culling, shots)| ways.iter().map(move |way| (way, *culling, shots)))
-        .collect();
+    let aimed = [Culling::On, Culling::Off].map(|culling| Aimed::at(objects, culling));
+    let settings: Vec<_> =
+        aimed.iter().flat_map(|aimed| ways.iter().map(move |way| (way, aimed))).collect();
     let mut contestants: Vec<Contestant<'_>> = Vec::new();
-    for &((_, way, _), _, shots) in &settings {
+    for &((_, way, _), aimed) in &settings {
         contestants.push(Box::new(move || {
-            let (ranges, cost) = measured(|| way.cast(shots));
+            let (ranges, cost) = measured(|| way.cast(aimed));
             black_box(ranges?);
             Ok(cost)
         }));
     }
     let costs = interleave(rounds, &mut contestants)?;
     drop(contestants);
+    let fired = &aimed[1].shots;
     let truth: Vec<Ranges> = fired.par_iter().map(ways::in_f64).collect();
     let mut all = Vec::new();
-    for (((name, way, is_gpu), culling, shots), costs) in settings.into_iter().zip(costs) {
-        eprintln!("caster: {name}, culling {}", word(culling));
-        let mut cast = judged(way, shots, &fired, &truth)?;
+    for (((name, way, is_gpu), aimed), costs) in settings.into_iter().zip(costs) {
+        let culling = word(aimed.culling);
+        eprintln!("caster: {name}, culling {culling}");
+        let mut cast = judged(way, aimed, fired, &truth)?;
         let spent = if *is_gpu { costs.wall_s() } else { costs.cpu_s() };
         let seconds = spent.median / cast.clouds.len() as f64;
         let rays = Scanning::reference().sensor.pattern().len() as f64;
         cast.row = Row {
             test_set: test_set.to_owned(),
             caster: name.clone(),
-            culling: word(culling).to_owned(),
+            culling: culling.to_owned(),
             rays_per_cpu_s: Some(rays / seconds).filter(|_| !is_gpu),
             scans_per_cpu_s: Some(1.0 / seconds).filter(|_| !is_gpu),
             ms_here: Some(seconds * 1e3),
@@ -109,22 +116,26 @@ fn word(culling: Culling) -> &'static str {
     }
 }
 
-fn shots(objects: &[Object], culling: Culling) -> Vec<Shot> {
-    let clean = Scanning::clean(Scanning::reference().distance_m);
-    let pattern = clean.sensor.pattern();
-    let aim = |place: &Place<'_>| Shot::sweep(&place.object.target, &place.pose, &pattern, culling);
-    places(objects, clean.distance_m).par_iter().map(aim).collect()
+impl Aimed {
+    fn at(objects: &[Object], culling: Culling) -> Self {
+        let clean = Scanning::clean(Scanning::reference().distance_m);
+        let pattern = clean.sensor.pattern();
+        let aim =
+            |place: &Place<'_>| Shot::sweep(&place.object.target, &place.pose, &pattern, culling);
+        let shots: Vec<Shot> = places(objects, clean.distance_m).par_iter().map(aim).collect();
+        let jobs = shots.iter().map(|shot| shot.job.clone()).collect();
+        Self { culling, shots, jobs }
+    }
 }
 
 impl Way<'_> {
-    fn cast(&self, shots: &[Shot]) -> Result<Vec<Ranges>> {
+    fn cast(&self, Aimed { shots, jobs, .. }: &Aimed) -> Result<Vec<Ranges>> {
         Ok(match self {
             Self::Oracle => shots.iter().map(ways::in_f64).collect(),
             Self::MollerTrumbore => shots.iter().map(ways::moller_trumbore).collect(),
             Self::F32 => shots.iter().map(ways::watertight_in_f32).collect(),
             Self::Product(caster) => {
-                let jobs: Vec<CastJob> = shots.iter().map(|shot| shot.job.clone()).collect();
-                let casts = caster.cast(&jobs)?;
+                let casts = caster.cast(jobs)?;
                 shots.par_iter().zip(&casts).map(|(shot, cast)| shot.ranges(cast)).collect()
             }
         })
@@ -132,12 +143,12 @@ impl Way<'_> {
 }
 
 /// What `way` makes of the rays aimed, beside the truth of all that are `fired`.
-fn judged(way: &Way<'_>, aimed: &[Shot], fired: &[Shot], truth: &[Ranges]) -> Result<Cast> {
+fn judged(way: &Way<'_>, aimed: &Aimed, fired: &[Shot], truth: &[Ranges]) -> Result<Cast> {
     let ranges = way.cast(aimed)?;
-    let of_all = aimed.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
+    let of_all = aimed.shots.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
     let accuracy = Accuracy::of(&of_all.collect::<Vec<_>>().concat(), &truth.concat());
     let wrong = accuracy.false_hits_per_million() + accuracy.misses_per_million();
-    let clouds: Vec<Cloud> = aimed.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
+    let clouds: Vec<Cloud> = aimed.shots.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
     let points: usize = clouds.iter().map(Vec::len).sum();
     let row = Row {
         part: Part::Caster,

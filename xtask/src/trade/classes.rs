@@ -242,29 +242,37 @@ impl Classifying {
         let row = Row {
             part: Part::Classifier,
             test_set: set.name.clone(),
-            model: self.model_name(),
-            model_file: self.model_file(),
-            sampler: self.sampler.name.to_owned(),
-            points: Some(self.points),
-            precision: self.precision.to_string(),
-            t_nets: self.t_nets.to_string(),
-            threads: Some(self.threads),
             megabytes: Some(model.bytes(self.precision) as f64 * 1e-6),
             agreement: Some(answers.agreement(reference)),
             logit_error: Some(answers.largest_error(reference)),
             ..Row::default()
         };
-        row.with_accuracy(set.right(answers), set.clouds.len())
+        self.named_in(row, model).with_accuracy(set.right(answers), set.clouds.len())
+    }
+
+    /// `row` with the names of everything that classifies.
+    pub fn named_in(&self, row: Row, model: &Summary) -> Row {
+        let has_t_nets = model.stn.is_some() || model.fstn.is_some();
+        Row {
+            model: self.model_name(),
+            model_file: self.model_file(),
+            sampler: self.sampler.name.to_owned(),
+            points: Some(self.points),
+            precision: self.precision.to_string(),
+            t_nets: if has_t_nets { self.t_nets.to_string() } else { String::new() },
+            threads: Some(self.threads),
+            ..row
+        }
     }
 
     /// The model's file, from the workspace's root if it lies there.
-    pub fn model_file(&self) -> String {
+    fn model_file(&self) -> String {
         let inside = self.model.strip_prefix(workspace::root());
         inside.unwrap_or(&self.model).display().to_string()
     }
 
     /// The model's name, without folder and extension.
-    pub fn model_name(&self) -> String {
+    fn model_name(&self) -> String {
         self.model.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
     }
 }

@@ -186,8 +186,23 @@ fn sampled(trained: &Classifying, set: &TestSet, grid: &Grid) -> Vec<Classifying
     }
     // All points of a cloud are the same whoever chooses them.
     all.retain(|setting| setting.points < most || setting.sampler == Chooser::RANDOM);
-    all.retain(|setting| setting.load(most).is_ok());
+    let as_trained = |setting: &Classifying| {
+        (setting.sampler, setting.points) == (trained.sampler, trained.points)
+    };
+    if trained.points < most && !all.iter().any(as_trained) {
+        all.insert(0, trained.clone());
+    }
+    all.retain(|setting| loads(setting, most));
     all
+}
+
+/// Whether the model has what the sampler needs; if not, says so.
+fn loads(setting: &Classifying, most: usize) -> bool {
+    let loaded = setting.load(most);
+    if let Err(error) = &loaded {
+        eprintln!("left out: {} {}: {error:#}", setting.sampler.name, setting.points);
+    }
+    loaded.is_ok()
 }
 
 /// One way to choose points in every precision but fp32; as trained, also with

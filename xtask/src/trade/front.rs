@@ -65,7 +65,7 @@ pub fn dominated_everywhere(rows: &[Row]) -> Vec<Choice> {
 /// The knobs of a row that a user turns. Where an object stands is none; threads
 /// are left out, since a front does not count cores.
 fn choices_of(row: &Row) -> Vec<Choice> {
-    let text = |knob, value: &String| Some((knob, value.clone()));
+    let text = |knob, value: &String| (!value.is_empty()).then(|| (knob, value.clone()));
     let count = |knob, value: Option<usize>| Some((knob, value?.to_string()));
     let size = |knob, value: Option<f64>, digits| Some((knob, format!("{:.digits$}", value?)));
     let choices = match row.part {

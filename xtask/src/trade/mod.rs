@@ -29,6 +29,7 @@ use classes::TestSet;
 use classifiers::{Grid, as_trained, bundled, on_a_pi};
 use formats::cloud::resample;
 use formats::rng::StreamKey;
+use infer_cpu::inspect;
 use objects::Object;
 use row::Row;
 use scans::Cloud;
@@ -142,7 +143,7 @@ fn scan_rows(args: &Args, objects: &[Object]) -> Result<(Vec<Row>, TestSet)> {
     let cast = casters::cast_all(objects, &lanes::open(None)?, rounds, &name)?;
     let reference = scan_set(objects, &name, &scanned[0].clouds);
     let model = model_for(args, &reference)?;
-    let classifying = as_trained(&model)?;
+    let (classifying, summary) = (as_trained(&model)?, inspect(&model)?);
     // Scans are compared with the reference, casters with the first: f64.
     let noisy = classifying.answers(&reference.clouds)?;
     let exact = classifying.answers(&cast[0].clouds)?;
@@ -153,17 +154,8 @@ fn scan_rows(args: &Args, objects: &[Object]) -> Result<(Vec<Row>, TestSet)> {
             let set = scan_set(objects, &name, &clouds);
             let found = classifying.answers(&set.clouds)?;
             let answers = if row.part == row::Part::Caster { &exact } else { &noisy };
-            let row = Row {
-                model: classifying.model_name(),
-                model_file: classifying.model_file(),
-                sampler: classifying.sampler.name.to_owned(),
-                points: Some(classifying.points),
-                precision: classifying.precision.to_string(),
-                t_nets: classifying.t_nets.to_string(),
-                threads: Some(classifying.threads),
-                agreement: Some(found.agreement(answers)),
-                ..row
-            };
+            let row = Row { agreement: Some(found.agreement(answers)), ..row };
+            let row = classifying.named_in(row, &summary);
             Ok(row.with_accuracy(set.right(&found), set.clouds.len()))
         })
         .collect();

@@ -70,7 +70,7 @@ pub struct Row {
     pub points: Option<usize>,
     /// What the network computes in.
     pub precision: String,
-    /// T-Nets that are run.
+    /// T-Nets that are run; empty where the model has none.
     pub t_nets: String,
     /// Threads of the classifier.
     pub threads: Option<usize>,
@@ -100,10 +100,11 @@ pub struct Row {
     /// Mean distance to the clean VLP-32C scan (ranges in f64) from the same place, both ways
     /// added, of some of those scans that have points.
     pub chamfer_m: Option<f64>,
-    /// Largest difference of a logit from f32's at the same points.
+    /// Largest difference of a logit from f32's by the same sampler and number of points; a CPL
+    /// chooses its points in the row's own precision, so they need not be the same ones.
     pub logit_error: Option<f64>,
     /// Share of clouds with the same answer as the reference's: the reference scan's, the f64
-    /// caster's, or that of fp32 and all T-Nets at the same points.
+    /// caster's, or that of fp32 and all T-Nets by the same sampler and number of points.
     pub agreement: Option<f64>,
     /// Clouds classified as labelled.
     pub right: usize,
@@ -161,7 +162,9 @@ impl fmt::Display for Row {
                 let points = self.points.unwrap_or_default();
                 words
                     .push(format!("{}, {} {points}, {}", self.model, self.sampler, self.precision));
-                words.push(format!("T-Nets {}", self.t_nets));
+                if !self.t_nets.is_empty() {
+                    words.push(format!("T-Nets {}", self.t_nets));
+                }
                 words.extend(self.threads.map(|threads| match threads {
                     1 => "1 thread".to_owned(),
                     _ => format!("{threads} threads"),

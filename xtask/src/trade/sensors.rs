@@ -1,7 +1,8 @@
 //! The VLP-32C, and what may be left out of it.
 
+use crate::even_grid::as_even_grid;
 use sim_gpu::effects::{Effects, Noise, NoiseModel, Quantum};
-use sim_gpu::sensor::{Layout, Sensor, Uniform};
+use sim_gpu::sensor::{Layout, Sensor};
 use std::num::NonZeroU32;
 
 /// A way to scan.
@@ -157,18 +158,8 @@ fn fewer_beams(sensor: &Sensor, keep_each: usize) -> Sensor {
 
 /// As many rays as the VLP-32C has, on an even grid of the same field of view.
 fn even_grid() -> Scanning {
-    let mut sensor = vlp32c();
-    sensor.layout = Layout::Uniform(Uniform {
-        azimuth_from_deg: -180.0,
-        azimuth_to_deg: 180.0,
-        azimuth_steps: 1809,
-        elevation_from_deg: -25.0,
-        elevation_to_deg: 15.0,
-        elevation_steps: 32,
-        rpm: Some(600.0),
-    });
-    let name = "even grid of 32 rows".to_owned();
-    of_another("beam table", name, sensor, 32)
+    let sensor = as_even_grid(vlp32c()).expect("invariant: the VLP-32C has a table of beams");
+    of_another("beam table", "even grid of 32 rows".to_owned(), sensor, 32)
 }
 
 fn blainder() -> Scanning {
