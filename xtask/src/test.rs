@@ -35,6 +35,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let lints = ["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"];
     step("lints", &mut cargo(&lints))?;
     let mut tests = cargo(&["test", "--workspace", "--no-fail-fast"]);
+    tests.args(["--features", "formats/hdf5,train/hdf5"]);
     if has_cpp_compiler() {
         tests.args(["--features", "tests/simplify,xtask/simplify"]);
     } else {
@@ -45,9 +46,6 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         tests.env("EDGEPUCK_REQUIRE_ADAPTER", "1");
     }
     step("tests", &mut tests)?;
-    let packages = ["test", "--package", "formats", "--package", "train"];
-    let hdf5 = [&packages[..], &["--features", "hdf5", "--test", "modelnet_h5"]].concat();
-    step("HDF5 layout", &mut cargo(&hdf5))?;
     let mut documentation = cargo(&["doc", "--workspace", "--no-deps"]);
     step("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"))?;
     check_that_infer_cpu_is_light()?;

@@ -18,6 +18,7 @@ pub mod accuracy;
 mod bins;
 mod builders;
 pub mod clock;
+mod companion;
 mod devices;
 mod growth;
 mod infer;

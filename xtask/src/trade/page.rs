@@ -42,7 +42,7 @@ pub fn chapters(rows: &[Row]) -> Result<Vec<Chapter>> {
         (classifier_table(rows))
     };
     let scan = html! {
-        (figure(&fronts(rows, Part::Scan)?, "Sensors, by distance. Filled: on the front of their distance."))
+        (figure(&fronts(rows, Part::Scan)?, "Sensors, by distance. Filled: on the front of their distance and noise."))
         (scan_table(rows))
     };
     Ok(vec![
@@ -56,20 +56,19 @@ pub fn chapters(rows: &[Row]) -> Result<Vec<Chapter>> {
 /// Cost against accuracy of one part's rows.
 fn fronts(rows: &[Row], part: Part) -> Result<String> {
     let device = device_of(rows, part);
-    let mut series: BTreeMap<String, Vec<Dot>> = BTreeMap::new();
-    for row in rows.iter().filter(|row| row.part == part) {
-        let name = match part {
-            Part::Scan => format!("{} m away", row.distance_m.unwrap_or_default()),
-            Part::Caster | Part::Classifier => row.model.clone(),
-        };
+    let of_part = || rows.iter().filter(|row| row.part == part);
+    let noise_m = of_part().next().and_then(|reference| reference.noise_m);
+    let mut series: BTreeMap<Kin, Vec<Dot>> = BTreeMap::new();
+    for row in of_part() {
         let Some(ms) = row.ms(device) else { continue };
         let filled = row.on_front(device);
         let dot = Dot { x: ms, y: row.accuracy, tip: tip(row, ms), filled };
-        series.entry(name).or_default().push(dot);
+        series.entry(kin(row, noise_m)).or_default().push(dot);
     }
-    let joined = part == Part::Scan;
-    let series: Vec<Series> =
-        series.into_iter().map(|(name, dots)| Series { name, dots, joined }).collect();
+    let series: Vec<Series> = series
+        .into_iter()
+        .map(|(Kin { name, joined, .. }, dots)| Series { name, dots, joined })
+        .collect();
     let label = match (part, device) {
         (Part::Classifier, Device::Pi5) => "milliseconds on a Raspberry Pi 5, modelled",
         (Part::Classifier, Device::Here) => "milliseconds on this machine",
@@ -83,6 +82,30 @@ fn fronts(rows: &[Row], part: Part) -> Result<String> {
         Part::Classifier => "From cloud to class",
     };
     draw(title, &x, &y, &series)
+}
+
+/// Rows of one colour; in the order of distances, then of names.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Kin {
+    /// Bits of a number that is not negative: they order as it does.
+    distance: u64,
+    name: String,
+    /// Whether a line joins those on the front.
+    joined: bool,
+}
+
+/// Scans with other noise than `noise_m` stand for themselves: noise is no choice,
+/// so that they are on no common front.
+fn kin(row: &Row, noise_m: Option<f64>) -> Kin {
+    match (row.part, row.distance_m) {
+        (Part::Scan, Some(distance_m)) => {
+            let joined = row.noise_m == noise_m;
+            let rest = if joined { "" } else { ", other noise" };
+            let name = format!("{distance_m} m away{rest}");
+            Kin { distance: distance_m.to_bits(), name, joined }
+        }
+        _ => Kin { distance: 0, name: row.model.clone(), joined: false },
+    }
 }
 
 /// The board where it was modelled, else the machine of the record.

@@ -2,18 +2,16 @@
 //! own too. The protocol is described in `peers/infer/turns.py`.
 
 use super::super::clock::Cost;
+use super::super::companion::Companion;
 use super::entrant::{Job, Lane};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::Command;
 
 /// A running rival.
 pub struct Server {
-    child: Child,
-    requests: Option<ChildStdin>,
-    answers: BufReader<ChildStdout>,
+    process: Companion,
     /// Of its package.
     pub version: String,
 }
@@ -51,30 +49,14 @@ impl Server {
     /// # Errors
     /// If it does not start, or says that its engine cannot be had.
     pub fn start(command: &mut Command) -> Result<Self> {
-        let mut child = command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .with_context(|| format!("starting {}", command.get_program().display()))?;
-        let requests = child.stdin.take();
-        let answers = BufReader::new(child.stdout.take().context("the rival has no output")?);
-        let mut server = Self { child, requests, answers, version: String::new() };
-        server.version = server.read::<Hello>()?.version;
-        Ok(server)
+        let mut process = Companion::start(command)?;
+        let Hello { version } = parse(&process.hear()?)?;
+        Ok(Self { process, version })
     }
 
     fn ask<T: DeserializeOwned>(&mut self, request: &str) -> Result<T> {
-        let requests = self.requests.as_mut().context("it has ended")?;
-        writeln!(requests, "{request}").context("it has ended")?;
-        self.read()
-    }
-
-    fn read<T: DeserializeOwned>(&mut self) -> Result<T> {
-        let mut line = String::new();
-        if self.answers.read_line(&mut line)? == 0 {
-            bail!("it has ended");
-        }
-        parse(&line)
+        self.process.tell(request)?;
+        parse(&self.process.hear()?)
     }
 }
 
@@ -82,7 +64,7 @@ fn parse<T: DeserializeOwned>(line: &str) -> Result<T> {
     match serde_json::from_str(line) {
         Ok(Message::Answered(answer)) => Ok(answer),
         Ok(Message::Failed { error }) => bail!("{error}"),
-        Err(_) => bail!("it said {}", line.trim_end()),
+        Err(_) => bail!("it said {line}"),
     }
 }
 
@@ -108,14 +90,6 @@ impl Lane for Server {
     }
 }
 
-impl Drop for Server {
-    fn drop(&mut self) {
-        self.requests = None;
-        // Its input is closed, so it ends; how does not matter any more.
-        let _ = self.child.wait();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,7 +107,7 @@ mod tests {
     fn an_error_is_told_in_the_rivals_words() {
         let told = |line: &str| parse::<Answer>(line).map(|_| ()).unwrap_err().to_string();
         assert_eq!(told(r#"{"error": "no such request: x"}"#), "no such request: x");
-        assert_eq!(told("Segmentation fault\n"), "it said Segmentation fault");
+        assert_eq!(told("Segmentation fault"), "it said Segmentation fault");
         assert_eq!(told("{}"), "it said {}");
         assert!(parse::<Done>("{}").is_ok());
     }

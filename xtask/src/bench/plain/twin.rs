@@ -1,14 +1,14 @@
 //! The build from which the effects' code was deleted.
 
+use super::super::companion::Companion;
 use crate::venv::workshop;
 use crate::workspace;
 use anyhow::{Context, Result, bail};
 use formats::atomic;
 use serde::Deserialize;
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::Command;
 
 /// What is deleted from which file.
 const DELETED: &str = "xtask/peers/plain/deleted.toml";
@@ -45,9 +45,7 @@ struct Deletion {
 
 /// The program, running.
 pub struct Twin {
-    child: Child,
-    requests: Option<ChildStdin>,
-    answers: BufReader<ChildStdout>,
+    process: Companion,
     /// Of its scan.
     pub fingerprint: u64,
 }
@@ -132,14 +130,9 @@ impl Twin {
     /// # Errors
     /// If it does not start.
     pub fn start(program: &Path, path: &Path) -> Result<Self> {
-        let mut command = Command::new(program);
-        command.arg(std::path::absolute(path)?).stdin(Stdio::piped()).stdout(Stdio::piped());
-        let mut child = command.spawn().with_context(|| format!("{}", program.display()))?;
-        let requests = child.stdin.take();
-        let answers = BufReader::new(child.stdout.take().context("the twin has no output")?);
-        let mut twin = Self { child, requests, answers, fingerprint: 0 };
-        twin.fingerprint = twin.line()?.parse()?;
-        Ok(twin)
+        let mut process = Companion::start(Command::new(program).arg(std::path::absolute(path)?))?;
+        let fingerprint = process.hear().context("the twin")?.parse()?;
+        Ok(Self { process, fingerprint })
     }
 
     /// Seconds of CPU time that one turn takes.
@@ -147,25 +140,8 @@ impl Twin {
     /// # Errors
     /// If it has ended.
     pub fn turn(&mut self) -> Result<f64> {
-        let requests = self.requests.as_mut().context("the twin has ended")?;
-        writeln!(requests).context("the twin has ended")?;
-        Ok(self.line()?.parse()?)
-    }
-
-    fn line(&mut self) -> Result<String> {
-        let mut line = String::new();
-        if self.answers.read_line(&mut line)? == 0 {
-            bail!("the twin has ended");
-        }
-        Ok(line.trim_end().to_owned())
-    }
-}
-
-impl Drop for Twin {
-    fn drop(&mut self) {
-        self.requests = None;
-        // Its input is closed, so it ends; how does not matter any more.
-        let _ = self.child.wait();
+        self.process.tell("").context("the twin")?;
+        Ok(self.process.hear().context("the twin")?.parse()?)
     }
 }
 
