@@ -87,7 +87,7 @@ fn bad_input_is_named() {
     assert!(exits(2, at, "trade --meshes nowhere").contains("nowhere is no folder"));
     fs::write(at.join("a.csv"), "part,points\nscan,1\n").unwrap();
     let said = exits(1, at, "advise --device pi5 --max-ms 5 --record a.csv");
-    assert!(said.contains("a.csv holds no measurements"), "{said}");
+    assert!(said.contains("a.csv is no record"), "{said}");
     let said = exits(1, at, "advise --device pi5 --max-ms 5 --record no.csv");
     assert!(said.contains("no.csv"), "{said}");
     exits(2, at, "advise --device pi5");
@@ -95,4 +95,40 @@ fn bad_input_is_named() {
     exits(2, at, "advise --device toaster --max-ms 5");
     fs::create_dir(at.join("empty")).unwrap();
     assert!(exits(1, at, "trade --meshes empty").contains("empty"));
+}
+
+#[test]
+fn what_trade_cannot_use_is_found_before_it_scans_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeds(at, "gen-shapes --out shapes --train 1 --test 1");
+    fs::write(at.join("clouds.npz"), "no clouds").unwrap();
+    let refused = exits(1, at, "trade --quick --meshes shapes --clouds clouds.npz --out out");
+    assert!(refused.contains("clouds.npz"), "{refused}");
+    for class in ["yak", "zebra"] {
+        let test = at.join("animals").join(class).join("test");
+        fs::create_dir_all(&test).unwrap();
+        fs::write(test.join(format!("{class}.off")), crate::meshes::off(8, 0.3)).unwrap();
+    }
+    let refused = exits(1, at, "trade --quick --meshes animals --out out");
+    assert!(refused.contains("no bundled model knows the classes"), "{refused}");
+    assert!(!refused.contains("reference:"), "nothing was scanned: {refused}");
+    assert!(!at.join("out").exists());
+}
+
+#[test]
+fn records_that_are_none_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("folder")).unwrap();
+    fs::write(at.join("empty.csv"), "").unwrap();
+    for (record, cause) in [("folder", "cannot read"), ("empty.csv", "holds no rows")] {
+        let refused = exits(1, at, &format!("advise --device pi5 --max-ms 5 --record {record}"));
+        assert!(refused.contains(record) && refused.contains(cause), "{refused}");
+    }
+    let refused = exits(2, at, "advise --device pi5 --max-ms -1");
+    assert!(refused.contains("--max-ms"), "{refused}");
+    let refused = exits(1, at, "report --assets gone --out report.html");
+    assert!(refused.contains("gone is no folder"), "{refused}");
+    assert!(!at.join("report.html").exists());
 }

@@ -20,19 +20,19 @@ pub struct Args {
     device: Device,
 
     /// Most milliseconds from a raw cloud to its class
-    #[arg(long, value_name = "MS", value_parser = positive)]
+    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     max_ms: Option<f64>,
 
     /// Least share of clouds classified as labelled, 0 to 1
-    #[arg(long, value_name = "SHARE", value_parser = share)]
+    #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true)]
     min_accuracy: Option<f64>,
 
     /// Most megabytes of weights
-    #[arg(long, value_name = "MB", value_parser = positive)]
+    #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
     max_mb: Option<f64>,
 
     /// Most threads
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     max_threads: Option<usize>,
 
     /// What `cargo xtask trade` wrote [default: the record that ships]
@@ -64,7 +64,7 @@ fn advise(args: &Args, rows: &[Row]) -> Result<String> {
     let choices = rows.iter().filter(is_choice);
     let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     if timed.is_empty() {
-        bail!("holds no time on {:?}: only what was measured is advised", args.device);
+        bail!("holds no times of {}: only what was measured is advised", args.device);
     }
     let fitting: Vec<Timed> = timed.iter().copied().filter(|timed| args.allow(timed)).collect();
     let Some(&chosen) = fitting.iter().max_by(|a, b| args.compare(a, b)) else {
@@ -75,10 +75,18 @@ fn advise(args: &Args, rows: &[Row]) -> Result<String> {
 
 impl Args {
     fn check(&self) -> Result<()> {
-        if self.max_ms.is_none() && self.min_accuracy.is_none() {
-            return Err(Usage("name --max-ms, --min-accuracy or both".to_owned()).into());
+        let limits = [self.max_ms, self.min_accuracy, self.max_mb];
+        if limits.iter().all(Option::is_none) && self.max_threads.is_none() {
+            let cause = "name a limit: --max-ms, --min-accuracy, --max-mb or --max-threads";
+            return Err(Usage(cause.to_owned()).into());
         }
         Ok(())
+    }
+
+    /// Whether accuracy counts before time: where only accuracy is asked for,
+    /// time does.
+    fn accuracy_first(&self) -> bool {
+        self.max_ms.is_some() || self.min_accuracy.is_none()
     }
 
     fn allow(&self, &(ms, row): &Timed) -> bool {
@@ -88,12 +96,11 @@ impl Args {
             && self.max_threads.is_none_or(|most| row.threads.is_some_and(|n| n <= most))
     }
 
-    /// Where time is limited accuracy counts first; where only accuracy is
-    /// asked for, time. Of equals the one of fewer threads is greater.
+    /// The greater is the better one; of equals the one of fewer threads.
     fn compare(&self, a: &Timed, b: &Timed) -> Ordering {
         let accuracy = a.1.accuracy.total_cmp(&b.1.accuracy);
         let speed = b.0.total_cmp(&a.0);
-        let first = if self.max_ms.is_some() { accuracy.then(speed) } else { speed.then(accuracy) };
+        let first = if self.accuracy_first() { accuracy.then(speed) } else { speed.then(accuracy) };
         first.then(b.1.threads.cmp(&a.1.threads))
     }
 
@@ -102,7 +109,11 @@ impl Args {
         let mut told = "nothing that was measured keeps these limits".to_owned();
         let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
         let best = timed.iter().max_by(|a, b| a.1.accuracy.total_cmp(&b.1.accuracy));
-        for (what, timed) in [("fastest", fastest), ("most accurate", best)] {
+        let megabytes = |timed: &&Timed| timed.1.megabytes.unwrap_or(f64::INFINITY);
+        let smallest = timed.iter().min_by(|a, b| megabytes(a).total_cmp(&megabytes(b)));
+        let smallest = smallest.filter(|_| self.max_mb.is_some());
+        for (what, timed) in [("fastest", fastest), ("most accurate", best), ("smallest", smallest)]
+        {
             if let Some(timed) = timed {
                 let _ = write!(told, "\n  the {what}: {}", one_line(*timed));
             }
@@ -121,15 +132,19 @@ impl Args {
             row.clouds,
             fitting.len()
         );
-        told += match self.max_ms {
-            Some(_) => "none of those is more accurate, and of equals this is the fastest.\n",
-            None => "none of those is faster.\n",
+        told += match self.accuracy_first() {
+            true => "none of those is more accurate, and of equals this is the fastest.\n",
+            false => "none of those is faster.\n",
         };
         told += &match self.device {
             Device::Pi5 => "Times are modelled (cargo xtask bench pi-model); measure a board by \
-                            infer-cpu bench.\n"
+                            infer-cpu bench.\nIts infer-cpu is made by cargo xtask build-pi.\n"
                 .to_owned(),
-            Device::Here => format!("Times are of {}.\n", row.machine),
+            Device::Here => format!(
+                "Times are of {}.\nIts infer-cpu is made by cargo build --release --package \
+                 infer-cpu, as target/release/infer-cpu.\n",
+                row.machine
+            ),
         };
         // Within the interval a reader may prefer the cheaper one.
         let as_good = |&&(other_ms, other): &&Timed| {

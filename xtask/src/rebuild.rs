@@ -12,7 +12,9 @@ pub fn lacks_simplify() -> bool {
 /// Builds this program with the feature `simplify` and runs the same command
 /// line in it: so nobody needs a C++ compiler who simplifies nothing.
 pub fn with_simplify() -> anyhow::Result<Outcome> {
-    eprintln!("--simplify: building with meshoptimizer, which takes a C++ compiler.");
+    eprintln!(
+        "--simplify: building with meshoptimizer, which takes a C++ compiler and, the first time, minutes."
+    );
     let built = cargo("build").status().context("cannot start cargo")?;
     if !built.success() {
         bail!(
@@ -20,7 +22,8 @@ pub fn with_simplify() -> anyhow::Result<Outcome> {
              what is missing, on Debian or Ubuntu `apt-get install g++` brings one"
         );
     }
-    let status = cargo("run").arg("--").args(std::env::args_os().skip(1)).status()?;
+    let status =
+        cargo("run").arg("--quiet").arg("--").args(std::env::args_os().skip(1)).status()?;
     // None where a signal ended it.
     let code = status.code().and_then(|code| u8::try_from(code).ok());
     Ok(Outcome::Elsewhere(code.unwrap_or(1)))
@@ -30,7 +33,7 @@ pub fn with_simplify() -> anyhow::Result<Outcome> {
 fn cargo(command: &str) -> Command {
     let features = if cfg!(feature = "hdf5") { "simplify,hdf5" } else { "simplify" };
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.args([command, "--quiet", "--release", "--package", "xtask", "--bin", "xtask"]);
+    cargo.args([command, "--release", "--package", "xtask", "--bin", "xtask"]);
     cargo.args(["--features", features, "--manifest-path"]);
     cargo.arg(workspace::root().join("Cargo.toml"));
     if cfg!(windows) {

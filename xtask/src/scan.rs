@@ -28,7 +28,7 @@ pub struct Args {
 
     /// Leave out triangles too small to be told apart, as gen-dataset does; for the objects that
     /// the scene says nothing of
-    #[arg(long, value_name = "auto|M")]
+    #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
     simplify: Option<Simplify>,
 
     #[command(flatten)]
@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         let label = object.label.as_ref().map(|label| format!(", a {label}")).unwrap_or_default();
         let simplified = scans.first().and_then(|scan| scan.simplified[number]);
         let simplified = simplified
-            .map(|s| format!(", cast at as {} triangles within {:.2e} m", s.triangles, s.bound_m))
+            .map(|s| format!(", {} triangles left, within {:.2e} m", s.triangles, s.bound_m))
             .unwrap_or_default();
         eprintln!("object {number}: {}{label}{simplified}", object.name);
     }

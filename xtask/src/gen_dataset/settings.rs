@@ -82,7 +82,7 @@ pub struct Settings {
 
     /// Leave out triangles too small to be told apart: auto goes by the sensors' beams and
     /// distances, a number bounds in metres how far the surface may move; needs a C++ compiler
-    #[arg(long, value_name = "auto|M")]
+    #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
     simplify: Option<Simplify>,
 
     /// Seed of every random number

@@ -14,7 +14,7 @@ mod scans;
 use crate::page::{self, Chapter};
 use crate::trade::{self, row};
 use crate::{Outcome, workspace};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use formats::atomic;
 use maud::{Markup, html};
 use std::fs;
@@ -38,6 +38,7 @@ pub struct Args {
 /// A record that is not what its name says; what the system reports.
 pub fn run(args: &Args) -> Result<Outcome> {
     let assets = args.assets.clone().unwrap_or_else(|| workspace::root().join("assets"));
+    ensure!(assets.is_dir(), "--assets: {} is no folder", assets.display());
     let reports = assets.join("reports");
     let mut chapters = vec![Chapter { id: "scans", title: "Scans", body: scans::body(&assets)? }];
     chapters.extend(trade_chapters(&reports.join("trade/trade.csv"))?);

@@ -34,7 +34,7 @@ use objects::Object;
 use row::Row;
 use scans::Cloud;
 use sim_gpu::shapes;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Flags of `trade`.
 #[derive(clap::Args)]
@@ -87,12 +87,18 @@ const FEW_CLOUDS: usize = 100;
 /// Measures and writes the record.
 pub fn run(args: &Args) -> Result<Outcome> {
     need_folder_of_meshes(args.meshes.as_deref())?;
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("cannot make {}", args.out.display()))?;
+    let clouds = clouds(args)?;
+    if let Some(clouds) = &clouds {
+        models_for(args, clouds)?;
+    }
     let per_class = if args.quick { FEW_PER_CLASS } else { MOST_PER_CLASS };
     let objects = objects::read(&meshes(args)?, per_class)?;
-    let (mut rows, reference) = scan_rows(args, &objects)?;
-    rows.extend(classifier_rows(args, reference)?);
+    let unseen = vec![Cloud::new(); objects.len()];
+    let model = models_for(args, &scan_set(&objects, &name_of_meshes(args), &unseen))?;
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("cannot make {}", args.out.display()))?;
+    let (mut rows, reference) = scan_rows(args, &objects, &model[0])?;
+    rows.extend(classifier_rows(args, clouds, reference)?);
     let machine = machine();
     rows.iter_mut().for_each(|row| row.machine.clone_from(&machine));
     front::mark(&mut rows);
@@ -120,20 +126,31 @@ fn name_of_meshes(args: &Args) -> String {
     format!("scans of {}", named.as_deref().unwrap_or("shapes of our own"))
 }
 
-/// The model that classifies `set`'s scans.
-fn model_for(args: &Args, set: &TestSet) -> Result<PathBuf> {
+/// The models that tell the classes of `set`: the one asked for, or bundled ones.
+fn models_for(args: &Args, set: &TestSet) -> Result<Vec<PathBuf>> {
     if let Some(model) = &args.model {
         set.fits(model)?;
-        return Ok(model.clone());
+        return Ok(vec![model.clone()]);
     }
     let known = bundled(set)?;
-    known.into_iter().next().with_context(|| {
-        format!("no bundled model knows the classes of the {}: name one by --model", set.name)
-    })
+    ensure!(
+        !known.is_empty(),
+        "no bundled model knows the classes of {}: name one by --model",
+        set.name
+    );
+    Ok(known)
+}
+
+/// The clouds asked for.
+fn clouds(args: &Args) -> Result<Option<TestSet>> {
+    let Some(path) = &args.clouds else { return Ok(None) };
+    let mut set = TestSet::read(path, if args.quick { FEW_CLOUDS } else { usize::MAX })?;
+    set.name = args.clouds_name.clone().unwrap_or(set.name);
+    Ok(Some(set))
 }
 
 /// Rows of sensors and of casters, and the reference scans.
-fn scan_rows(args: &Args, objects: &[Object]) -> Result<(Vec<Row>, TestSet)> {
+fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>, TestSet)> {
     let (name, rounds) = (name_of_meshes(args), usize::from(args.rounds));
     let mut ways = sensors::one_at_a_time();
     if !args.quick {
@@ -142,8 +159,7 @@ fn scan_rows(args: &Args, objects: &[Object]) -> Result<(Vec<Row>, TestSet)> {
     let scanned = scans::scan_all(objects, &ways, rounds, &name)?;
     let cast = casters::cast_all(objects, &lanes::open(None)?, rounds, &name)?;
     let reference = scan_set(objects, &name, &scanned[0].clouds);
-    let model = model_for(args, &reference)?;
-    let (classifying, summary) = (as_trained(&model)?, inspect(&model)?);
+    let (classifying, summary) = (as_trained(model)?, inspect(model)?);
     // Scans are compared with the reference, casters with the first: f64.
     let noisy = classifying.answers(&reference.clouds)?;
     let exact = classifying.answers(&cast[0].clouds)?;
@@ -171,24 +187,12 @@ fn scan_set(objects: &[Object], name: &str, clouds: &[Cloud]) -> TestSet {
 }
 
 /// Rows of classifiers, on the clouds given or else on the reference scans.
-fn classifier_rows(args: &Args, reference: TestSet) -> Result<Vec<Row>> {
-    let set = match &args.clouds {
-        Some(path) => {
-            let limit = if args.quick { FEW_CLOUDS } else { usize::MAX };
-            let mut set = TestSet::read(path, limit)?;
-            set.name = args.clouds_name.clone().unwrap_or(set.name);
-            set
-        }
-        None => {
-            let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
-            TestSet { clouds, ..reference }
-        }
-    };
-    let models = match &args.model {
-        Some(model) => vec![model.clone()],
-        None => bundled(&set)?,
-    };
-    ensure!(!models.is_empty(), "no bundled model knows the classes of {}: --model", set.name);
+fn classifier_rows(args: &Args, clouds: Option<TestSet>, reference: TestSet) -> Result<Vec<Row>> {
+    let set = clouds.unwrap_or_else(|| {
+        let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
+        TestSet { clouds, ..reference }
+    });
+    let models = models_for(args, &set)?;
     let grid = if args.quick { Grid::quick() } else { Grid::whole() };
     let mut rows = Vec::new();
     for model in &models {

@@ -1,6 +1,6 @@
 //! One measured setting: what it is, what it costs, how right it is.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use formats::atomic;
 use formats::interval::wilson;
 use serde::{Deserialize, Serialize};
@@ -27,6 +27,15 @@ pub enum Device {
     Pi5,
     /// The machine that made the record.
     Here,
+}
+
+impl fmt::Display for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Pi5 => "pi5",
+            Self::Here => "here",
+        })
+    }
 }
 
 impl Device {
@@ -200,10 +209,14 @@ pub fn write(rows: &[Row], path: &Path) -> Result<()> {
 /// # Errors
 /// Names the file, and the line that is not as it should be.
 pub fn read(path: &Path) -> Result<Vec<Row>> {
-    let mut csv =
-        csv::Reader::from_path(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let unread = || format!("cannot read {}", path.display());
+    let bytes = std::fs::read(path).with_context(unread)?;
+    let mut csv = csv::Reader::from_reader(bytes.as_slice());
     let rows: Result<Vec<Row>, csv::Error> = csv.deserialize().collect();
-    rows.with_context(|| format!("{} holds no measurements of `cargo xtask trade`", path.display()))
+    let rows =
+        rows.with_context(|| format!("{} is no record of `cargo xtask trade`", path.display()))?;
+    ensure!(!rows.is_empty(), "{} holds no rows", path.display());
+    Ok(rows)
 }
 
 #[cfg(test)]

@@ -67,7 +67,12 @@ pub fn scan_all(
     let mut truths: BTreeMap<u64, Vec<Made>> = BTreeMap::new();
     let mut all = Vec::new();
     for (i, (way, pattern)) in ways.iter().zip(&patterns).enumerate() {
-        eprintln!("{}: {}, {} m", way.knob, way.name, way.distance_m);
+        let (noise_m, quantum_m) = (way.noise_m, way.range_quantum_m);
+        let step = way.azimuth_step_deg.map(|step| format!(" {step:.1}°")).unwrap_or_default();
+        eprintln!(
+            "{}: {}{step}, {} m, noise {noise_m} m, quantum {quantum_m} m",
+            way.knob, way.name, way.distance_m
+        );
         let truth = truths.entry(way.distance_m.to_bits());
         let truth = truth.or_insert_with(|| truth_from(objects, way.distance_m));
         let (mut row, clouds) = judged(objects, way, pattern, truth)?;
