@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 use super::NotBuilt;
 use super::distance::distance_to_surface;
+use super::surface_of;
 use super::within::beyond;
 use crate::bvh::Builder;
 use crate::mesh::Mesh;
-use crate::mesh::census::survey;
 use crate::target::{Surface, Target, UnitFrame};
 
 /// The part of the bound that the decimation is told. Its errors are means over
@@ -62,27 +62,25 @@ fn put_right(
     corners: Vec<u32>,
     bound: f64,
 ) -> Vec<u32> {
-    // Each triangle once, or one of two equal ones would go without a proof.
-    let once = survey(&welded.mesh_of(mesh, &corners)).kept;
-    let mut corners: Vec<u32> =
-        once.iter().flat_map(|&nth| triangle(&corners, nth as usize)).collect();
-    let strays = beyond(&target(&welded.mesh_of(mesh, &corners)).surface, original, bound);
-    let strayed: Vec<u32> = strays.iter().flat_map(|&t| triangle(&corners, t as usize)).collect();
-    let stays = |nth: usize| strays.binary_search(&(nth as u32)).is_err();
-    let left = (0..corners.len() / 3).filter(|&nth| stays(nth));
-    corners = left.flat_map(|nth| triangle(&corners, nth)).collect();
+    let collapsed = surface_of(welded.mesh_of(mesh, &corners));
+    let strays = beyond(&collapsed, original, bound);
+    let corners_of = |&nth: &u32| triangle(&corners, nth as usize);
+    let strayed: Vec<u32> = strays.iter().flat_map(corners_of).collect();
+    // Only what the surface keeps was proven: of equal triangles the first.
+    let stays = |nth: &&u32| strays.binary_search(nth).is_err();
+    let mut left: Vec<u32> = collapsed.kept().iter().filter(stays).flat_map(corners_of).collect();
 
-    let rest = target(&welded.mesh_of(mesh, &corners));
+    let rest = target(welded.mesh_of(mesh, &left));
     let mut back = beyond(&original.surface, &rest, bound);
     if !strays.is_empty() {
-        let strayed = target(&welded.mesh_of(mesh, &strayed));
+        let strayed = target(welded.mesh_of(mesh, &strayed));
         back.extend(around(&original.surface, &strayed, OVERLAP * bound));
         back.sort_unstable();
         back.dedup();
     }
     let nth = back.iter().filter_map(|t| original.surface.kept().binary_search(t).ok());
-    corners.extend(nth.flat_map(|nth| triangle(&welded.corners, nth)));
-    corners
+    left.extend(nth.flat_map(|nth| triangle(&welded.corners, nth)));
+    left
 }
 
 /// The `nth` three of `corners`.
@@ -104,9 +102,8 @@ fn around(surface: &Surface, target: &Target, distance: f64) -> Vec<u32> {
     surface.kept().par_iter().filter(is_near).copied().collect()
 }
 
-fn target(mesh: &Mesh) -> Target {
-    let kept = survey(mesh).kept;
-    Target::new(Surface::new(mesh.clone(), kept), Builder::Morton)
+fn target(mesh: Mesh) -> Target {
+    Target::new(surface_of(mesh), Builder::Morton)
 }
 
 /// Triangles whose corners at one position are one vertex: files often repeat
@@ -187,6 +184,7 @@ impl Welded {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::census::survey;
     use glam::DVec3;
 
     #[test]

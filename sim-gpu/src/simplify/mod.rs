@@ -95,11 +95,16 @@ pub fn simplified(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>,
 /// # Errors
 /// If this build has no decimation.
 pub fn simplified_surface(mesh: Mesh, kept: Vec<u32>, bound: f64) -> Result<Surface, NotBuilt> {
-    let Some(fewer) = simplified(&mesh, &kept, bound)? else {
-        return Ok(Surface::new(mesh, kept));
-    };
-    let kept = survey(&fewer).kept;
-    Ok(Surface::new(fewer, kept))
+    Ok(match simplified(&mesh, &kept, bound)? {
+        Some(fewer) => surface_of(fewer),
+        None => Surface::new(mesh, kept),
+    })
+}
+
+/// The surface of all triangles of `mesh` that casters need.
+fn surface_of(mesh: Mesh) -> Surface {
+    let kept = survey(&mesh).kept;
+    Surface::new(mesh, kept)
 }
 
 /// [`Simplify`] as written.

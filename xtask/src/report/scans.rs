@@ -1,6 +1,6 @@
 //! Clouds to turn: one mesh as several sensors see it.
 
-use crate::one_scan::{Look, load_target};
+use crate::one_scan::{self, load_target};
 use crate::workspace::file_name;
 use anyhow::Result;
 use formats::rng::StreamKey;
@@ -10,6 +10,7 @@ use maud::{Markup, html};
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
 use sim_gpu::mesh::tree::discover;
 use sim_gpu::pose::Pose;
+use sim_gpu::scan::View;
 use sim_gpu::sensor::Sensor;
 use sim_gpu::target::Target;
 use std::path::Path;
@@ -61,16 +62,16 @@ fn scan(target: &Arc<Target>, sensor: &str, sigma_m: f64) -> Vec<[f32; 3]> {
     let effects = Effects { noise: (sigma_m > 0.0).then_some(noise), ..Effects::default() };
     let (elevation, azimuth) = (ELEVATION_DEG.to_radians(), AZIMUTH_DEG.to_radians());
     let pose = Pose::view(DISTANCE_M, elevation, azimuth, DVec3::ZERO);
-    let look = Look {
-        target,
+    let view = View {
         sensor: &sensor,
         pattern: &sensor.pattern(),
         pose: &pose,
+        cast_effects: &effects,
         effects: &effects,
         attributes: &AttributeSet::default(),
         stream: StreamKey::new(0, "report", 0),
     };
-    look.scan().0.positions
+    one_scan::scan(target, &view).0.positions
 }
 
 /// Some of the points, spread over all.

@@ -179,6 +179,11 @@ impl Classifying {
         }
     }
 
+    /// Whether both choose the same points of a cloud.
+    pub fn chooses_as(&self, other: &Self) -> bool {
+        (self.sampler, self.points) == (other.sampler, other.points)
+    }
+
     /// Loads the model as asked for.
     ///
     /// # Errors

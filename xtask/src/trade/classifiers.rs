@@ -82,7 +82,6 @@ pub fn rows(
     rounds: usize,
     pi: Option<&Modelled>,
 ) -> Result<Vec<Row>> {
-    set.fits(model)?;
     let (trained, summary) = (as_trained(model)?, inspect(model)?);
     let measured = |setting: Classifying, answers: Answers, reference: Option<&Answers>| {
         let mut row = setting.row(set, &summary, &answers, reference.unwrap_or(&answers));
@@ -98,7 +97,7 @@ pub fn rows(
     let more: Vec<Measured> = promising(&first, &trained)
         .flat_map(|sampled| with_precisions(&sampled.setting, &trained, grid, &summary))
         .map(|setting| {
-            let reference = first.iter().find(|sampled| sampled.chooses_as(&setting));
+            let reference = first.iter().find(|sampled| sampled.setting.chooses_as(&setting));
             let answers = setting.answers(&set.clouds)?;
             Ok(measured(setting, answers, reference.map(|reference| &reference.answers)))
         })
@@ -116,12 +115,6 @@ struct Measured {
     setting: Classifying,
     answers: Answers,
     row: Row,
-}
-
-impl Measured {
-    fn chooses_as(&self, setting: &Classifying) -> bool {
-        (self.setting.sampler, self.setting.points) == (setting.sampler, setting.points)
-    }
 }
 
 /// Times all settings in turns, so that a slow minute is everybody's.
@@ -186,10 +179,7 @@ fn sampled(trained: &Classifying, set: &TestSet, grid: &Grid) -> Vec<Classifying
     }
     // All points of a cloud are the same whoever chooses them.
     all.retain(|setting| setting.points < most || setting.sampler == Chooser::RANDOM);
-    let as_trained = |setting: &Classifying| {
-        (setting.sampler, setting.points) == (trained.sampler, trained.points)
-    };
-    if trained.points < most && !all.iter().any(as_trained) {
+    if trained.points < most && !all.iter().any(|setting| setting.chooses_as(trained)) {
         all.insert(0, trained.clone());
     }
     all.retain(|setting| loads(setting, most));
@@ -215,7 +205,7 @@ fn with_precisions(
 ) -> Vec<Classifying> {
     let precise = |&precision: &Precision| Classifying { precision, ..samples.clone() };
     let mut all: Vec<Classifying> = grid.precisions.iter().map(precise).collect();
-    if (samples.sampler, samples.points) == (trained.sampler, trained.points) {
+    if samples.chooses_as(trained) {
         let threads = grid.threads.iter();
         all.extend(threads.map(|&threads| Classifying { threads, ..samples.clone() }));
         if summary.stn.is_some() || summary.fstn.is_some() {

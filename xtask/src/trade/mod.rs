@@ -88,17 +88,16 @@ const FEW_CLOUDS: usize = 100;
 pub fn run(args: &Args) -> Result<Outcome> {
     need_folder_of_meshes(args.meshes.as_deref())?;
     let clouds = clouds(args)?;
-    if let Some(clouds) = &clouds {
-        models_for(args, clouds)?;
-    }
+    let of_clouds = clouds.as_ref().map(|set| models_for(args, set)).transpose()?;
     let per_class = if args.quick { FEW_PER_CLASS } else { MOST_PER_CLASS };
     let objects = objects::read(&meshes(args)?, per_class)?;
     let unseen = vec![Cloud::new(); objects.len()];
-    let model = models_for(args, &scan_set(&objects, &name_of_meshes(args), &unseen))?;
+    let of_scans = models_for(args, &scan_set(&objects, &name_of_meshes(args), &unseen))?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make {}", args.out.display()))?;
-    let (mut rows, reference) = scan_rows(args, &objects, &model[0])?;
-    rows.extend(classifier_rows(args, clouds, reference)?);
+    let (mut rows, reference) = scan_rows(args, &objects, &of_scans[0])?;
+    let models = of_clouds.unwrap_or(of_scans);
+    rows.extend(classifier_rows(args, &models, clouds, reference)?);
     let machine = machine();
     rows.iter_mut().for_each(|row| row.machine.clone_from(&machine));
     front::mark(&mut rows);
@@ -167,12 +166,11 @@ fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>,
     let all = all.chain(cast.into_iter().map(|cast| (cast.row, cast.clouds)));
     let rows: Result<Vec<Row>> = all
         .map(|(row, clouds)| {
-            let set = scan_set(objects, &name, &clouds);
-            let found = classifying.answers(&set.clouds)?;
+            let found = classifying.answers(&clouds)?;
             let answers = if row.part == row::Part::Caster { &exact } else { &noisy };
             let row = Row { agreement: Some(found.agreement(answers)), ..row };
             let row = classifying.named_in(row, &summary);
-            Ok(row.with_accuracy(set.right(&found), set.clouds.len()))
+            Ok(row.with_accuracy(reference.right(&found), clouds.len()))
         })
         .collect();
     Ok((rows?, reference))
@@ -187,15 +185,19 @@ fn scan_set(objects: &[Object], name: &str, clouds: &[Cloud]) -> TestSet {
 }
 
 /// Rows of classifiers, on the clouds given or else on the reference scans.
-fn classifier_rows(args: &Args, clouds: Option<TestSet>, reference: TestSet) -> Result<Vec<Row>> {
+fn classifier_rows(
+    args: &Args,
+    models: &[PathBuf],
+    clouds: Option<TestSet>,
+    reference: TestSet,
+) -> Result<Vec<Row>> {
     let set = clouds.unwrap_or_else(|| {
         let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
         TestSet { clouds, ..reference }
     });
-    let models = models_for(args, &set)?;
     let grid = if args.quick { Grid::quick() } else { Grid::whole() };
     let mut rows = Vec::new();
-    for model in &models {
+    for model in models {
         let pi = if args.quick { None } else { on_a_pi(model) };
         rows.extend(classifiers::rows(model, &set, &grid, usize::from(args.rounds), pi.as_ref())?);
     }

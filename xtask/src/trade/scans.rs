@@ -5,12 +5,13 @@ use super::objects::{Object, Place, places};
 use super::row::{Part, Row};
 use super::sensors::Scanning;
 use crate::bench::clock::{Contestant, interleave, measured};
-use crate::one_scan::Look;
+use crate::one_scan;
 use anyhow::Result;
 use formats::chamfer::chamfer;
 use formats::scan::{Attribute, AttributeSet, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use rayon::prelude::*;
+use sim_gpu::scan::View;
 use sim_gpu::sensor::BeamPattern;
 use std::collections::BTreeMap;
 use std::hint::black_box;
@@ -139,8 +140,9 @@ fn scan(
     let of = |place: &Place<'_>| {
         let Place { object, pose, stream } = place;
         let (target, sensor, stream) = (&object.target, &way.sensor, *stream);
-        let look = Look { target, sensor, pattern, pose, effects, attributes, stream };
-        let (scan, hits) = look.scan();
+        let cast_effects = effects;
+        let view = View { sensor, pattern, pose, cast_effects, effects, attributes, stream };
+        let (scan, hits) = one_scan::scan(target, &view);
         let exact = |beam: &u32| {
             let at = hits.hits.binary_search_by_key(beam, |hit| hit.beam);
             at.map_or(f64::NAN, |at| hits.hits[at].range_m)

@@ -14,8 +14,6 @@ mod ranges;
 mod twin;
 mod widths;
 
-use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -89,7 +87,7 @@ pub fn run(args: &GrowthArgs) -> Result<()> {
         eprintln!("{}", model.display());
         rows.extend(layers::measure(&model, args.clouds)?);
     }
-    atomic::write(&args.csv, |file| file.write_all(csv(&rows).as_bytes()))?;
+    atomic::write_bytes(&args.csv, &csv(&rows)?)?;
     println!("{} rows: {}", rows.len(), args.csv.display());
     println!("{}", verdict(&rows));
     let over = rows.iter().find(|row| !row.holds());
@@ -119,18 +117,20 @@ impl GrowthArgs {
     }
 }
 
-fn csv(rows: &[Row]) -> String {
-    let mut text =
-        String::from("quantity,layer,precision,knob,value,median_error,largest_error,bound,unit\n");
+fn csv(rows: &[Row]) -> Result<Vec<u8>> {
+    const HEADING: &str =
+        "quantity,layer,precision,knob,value,median_error,largest_error,bound,unit";
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(HEADING.split(','))?;
     for row in rows {
         let (median, largest) = row.summary();
-        let Row { quantity, layer, precision, knob, value, bound, unit, .. } = row;
-        let _ = writeln!(
-            text,
-            "{quantity},{layer},{precision},{knob},{value:e},{median:.3e},{largest:.3e},{bound:.3e},{unit}"
-        );
+        let numbers = [median, largest, row.bound].map(|x| format!("{x:.3e}"));
+        let value = format!("{:e}", row.value);
+        let words = [row.quantity, &row.layer, &row.precision, row.knob, &value];
+        let words = words.into_iter().chain(numbers.iter().map(String::as_str));
+        csv.write_record(words.chain([row.unit]))?;
     }
-    text
+    Ok(csv.into_inner()?)
 }
 
 /// A layer needs more than f16 where f16 overflows, or where its error is above
