@@ -35,7 +35,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let lints = ["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"];
     step("lints", &mut cargo(&lints))?;
     let mut tests = cargo(&["test", "--workspace", "--no-fail-fast"]);
-    tests.args(["--features", "formats/hdf5,train/hdf5"]);
+    tests.args(["--features", "edgepuck-formats/hdf5,train/hdf5"]);
     if has_cpp_compiler() {
         tests.args(["--features", "tests/simplify,xtask/simplify"]);
     } else {
