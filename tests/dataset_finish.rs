@@ -1,16 +1,16 @@
 //! A finished dataset is complete, the same however often it was finished, and
 //! says what was done to it since.
 
+use edgepuck_dataset::config::Layout;
+use edgepuck_dataset::finish::finish;
+use edgepuck_dataset::journal::{Journal, Terms};
+use edgepuck_dataset::manifest::{Manifest, Poses};
+use edgepuck_dataset::record::Entry;
+use edgepuck_dataset::verify::verify;
+use edgepuck_dataset::{DatasetError, MeshFailure, check_layouts, layout};
 use formats::Split::{Test, Train};
 use formats::packed::read_packed;
-use sim_gpu::dataset::config::Layout;
-use sim_gpu::dataset::finish::finish;
-use sim_gpu::dataset::journal::{Journal, Terms};
-use sim_gpu::dataset::manifest::{Manifest, Poses};
-use sim_gpu::dataset::record::Entry;
-use sim_gpu::dataset::verify::verify;
-use sim_gpu::dataset::{DatasetError, MeshFailure, check_layouts, layout};
-use sim_gpu::sensor::{BUILTIN_NAMES, Sensor};
+use sim_gpu::sensor::{Sensor, builtin_names};
 use std::fs;
 use std::path::Path;
 use tests::written_dataset::{
@@ -242,7 +242,7 @@ fn poses_are_in_full_once_where_they_are_equal() {
 #[test]
 fn every_builtin_sensor_comes_back_from_a_manifest() {
     let folder = tempfile::tempdir().unwrap();
-    for name in BUILTIN_NAMES {
+    for name in builtin_names() {
         let mut config = config();
         config.sets[0].sensor = Sensor::builtin(name).unwrap();
         let terms = terms(config, None);

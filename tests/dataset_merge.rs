@@ -1,12 +1,12 @@
 //! Shards that are merged are one run, byte for byte.
 
+use edgepuck_dataset::finish::finish;
+use edgepuck_dataset::journal::{Journal, Terms};
+use edgepuck_dataset::merge::merge;
+use edgepuck_dataset::record::Entry;
+use edgepuck_dataset::verify::verify;
+use edgepuck_dataset::{DatasetError, MeshFailure, layout};
 use formats::Split::{Test, Train};
-use sim_gpu::dataset::finish::finish;
-use sim_gpu::dataset::journal::{Journal, Terms};
-use sim_gpu::dataset::merge::merge;
-use sim_gpu::dataset::record::Entry;
-use sim_gpu::dataset::verify::verify;
-use sim_gpu::dataset::{DatasetError, MeshFailure, layout};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tests::written_dataset::{config, entry, failure, files, terms, write};

@@ -287,7 +287,7 @@ const SCENE: &str = "[[object]]\nmesh = \"fine.off\"\nup = \"z\"\nscale = [1, 1,
 #[test]
 fn a_scene_says_which_objects_are_simplified() {
     let folder = tempfile::tempdir().unwrap();
-    sim_gpu::shapes::write_off(&meshes::icosphere(5), &folder.path().join("fine.off")).unwrap();
+    edgepuck_shapes::write_off(&meshes::icosphere(5), &folder.path().join("fine.off")).unwrap();
     let caster = Caster::Cpu(Effects::default());
     let scan = |scene_key: &str, object_key: &str| {
         let object = format!("{object_key}\nup =");

@@ -1,18 +1,18 @@
 //! Datasets whose scans were never cast: finishing, checking and merging only
 //! need files and records that agree.
 
+use edgepuck_dataset::config::Layout;
+use edgepuck_dataset::journal::{Journal, Terms};
+use edgepuck_dataset::record::{Entry, FileRecord};
+use edgepuck_dataset::{
+    DatasetConfig, MeshFailure, MeshRecord, ScanRecord, SetConfig, Variant, VariantRecord,
+    Viewpoints, layout,
+};
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::Returns;
 use formats::{Split, hash};
-use sim_gpu::dataset::config::Layout;
-use sim_gpu::dataset::journal::{Journal, Terms};
-use sim_gpu::dataset::record::{Entry, FileRecord};
-use sim_gpu::dataset::{
-    DatasetConfig, MeshFailure, MeshRecord, ScanRecord, SetConfig, Variant, VariantRecord,
-    Viewpoints, layout,
-};
 use sim_gpu::effects::Effects;
 use sim_gpu::mesh::census::Census;
 use sim_gpu::mesh::frame::{Normalize, Up};

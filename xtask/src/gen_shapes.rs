@@ -2,7 +2,7 @@
 
 use crate::Outcome;
 use anyhow::Context;
-use sim_gpu::shapes;
+use edgepuck_shapes as shapes;
 use std::path::PathBuf;
 
 /// Flags of `gen-shapes`.

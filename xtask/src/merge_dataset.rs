@@ -1,7 +1,7 @@
 //! `cargo xtask merge-dataset`: shards into one dataset.
 
 use crate::{Outcome, gen_dataset};
-use sim_gpu::dataset::merge::merge;
+use edgepuck_dataset::merge::merge;
 use std::path::PathBuf;
 
 /// Flags of `merge-dataset`.

@@ -10,12 +10,6 @@ use crate::cpu::traverse::{ACCURACY, FAR_SCALE, LEAST_COMPONENT, NO_HIT};
 use crate::effects::{Effects, NoiseModel};
 use crate::ray::{AMBIGUOUS, MISS};
 
-macro_rules! shader {
-    ($path:literal) => {
-        include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../shaders/", $path))
-    };
-}
-
 /// Rays of one workgroup. Lavapipe and GPUs trace alike from 32 to 256.
 pub(super) const WORKGROUP_SIZE: usize = 64;
 
@@ -43,11 +37,11 @@ fn constants() -> String {
 
 /// What every variant holds.
 const TRACE: [&str; 5] = [
-    shader!("shared/bvh.wgsl"),
-    shader!("shared/ray.wgsl"),
-    shader!("intersect.wgsl"),
-    shader!("traverse.wgsl"),
-    shader!("trace.wgsl"),
+    edgepuck_shaders::BVH,
+    edgepuck_shaders::RAY,
+    edgepuck_shaders::INTERSECT,
+    edgepuck_shaders::TRAVERSE,
+    edgepuck_shaders::TRACE,
 ];
 
 /// A per-ray input that some effects read.
@@ -81,21 +75,21 @@ pub fn modules(effects: &Effects) -> Vec<Module> {
     let noise = effects.noise.map(|noise| {
         let constants = vec![("noise_mean_m", noise.mean_m), ("noise_sigma_m", noise.sigma_m)];
         let (name, source, words) = match noise.model {
-            NoiseModel::Range => ("noise_range", shader!("effects/noise_range.wgsl"), 1),
-            NoiseModel::Xyz => ("noise_xyz", shader!("effects/noise_xyz.wgsl"), 3),
+            NoiseModel::Range => ("noise_range", edgepuck_shaders::NOISE_RANGE, 1),
+            NoiseModel::Xyz => ("noise_xyz", edgepuck_shaders::NOISE_XYZ, 3),
         };
         Module { name, source, words, input: Input::Stream, constants }
     });
     let dropout = effects.dropout.map(|dropout| Module {
         name: "dropout",
-        source: shader!("effects/dropout.wgsl"),
+        source: edgepuck_shaders::DROPOUT,
         words: 1,
         input: Input::Stream,
         constants: vec![("dropout_probability", dropout.probability)],
     });
     let intensity = effects.intensity.map(|_| Module {
         name: "intensity",
-        source: shader!("effects/intensity.wgsl"),
+        source: edgepuck_shaders::INTENSITY,
         words: 1,
         input: Input::Reflectivity,
         constants: vec![],
@@ -115,12 +109,12 @@ pub fn compose(modules: &[Module]) -> String {
         wgsl.push('\n');
         wgsl.push_str(source);
     };
-    push(shader!("shared/words.wgsl"));
+    push(edgepuck_shaders::WORDS);
     if reads(modules, Input::Stream) {
-        push(shader!("shared/stream.wgsl"));
+        push(edgepuck_shaders::STREAM);
     }
     if modules.iter().any(|m| m.name.starts_with("noise")) {
-        push(shader!("shared/normal_deviate.wgsl"));
+        push(edgepuck_shaders::NORMAL_DEVIATE);
     }
     modules.iter().for_each(|module| push(module.source));
     push(&finish(modules));

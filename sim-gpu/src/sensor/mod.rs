@@ -7,6 +7,7 @@
 use std::num::NonZeroU32;
 use std::path::Path;
 
+use edgepuck_assets::SENSORS;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, ConfigError, InvalidValue};
@@ -35,27 +36,10 @@ mod views;
 #[cfg(test)]
 mod tests;
 
-/// The names of all sensors that are part of the program.
-pub const BUILTIN_NAMES: [&str; 7] = [
-    "vlp32c",
-    "blainder-ultrapuck",
-    "generic-static",
-    "kinect-v2",
-    "vlp16",
-    "hdl64e",
-    "modelnet40c-lidar",
-];
-
-/// The profiles of [`BUILTIN_NAMES`], in its order.
-const BUILTIN_PROFILES: [&str; BUILTIN_NAMES.len()] = [
-    include_str!("../../../assets/sensors/vlp32c.toml"),
-    include_str!("../../../assets/sensors/blainder-ultrapuck.toml"),
-    include_str!("../../../assets/sensors/generic-static.toml"),
-    include_str!("../../../assets/sensors/kinect-v2.toml"),
-    include_str!("../../../assets/sensors/vlp16.toml"),
-    include_str!("../../../assets/sensors/hdl64e.toml"),
-    include_str!("../../../assets/sensors/modelnet40c-lidar.toml"),
-];
+/// The names of the built-in sensors, the default one first.
+pub fn builtin_names() -> impl Iterator<Item = &'static str> {
+    SENSORS.into_iter().map(|(name, _)| name)
+}
 
 /// The most rays a sensor may have: an image of 8192 x 8192 pixels. The
 /// pattern of so many takes 2.5 GB.
@@ -131,9 +115,8 @@ impl Sensor {
     /// The built-in sensor of this name, if there is one.
     #[must_use]
     pub fn builtin(name: &str) -> Option<Self> {
-        let index = BUILTIN_NAMES.iter().position(|&known| known == name)?;
-        let file = format!("assets/sensors/{name}.toml");
-        let sensor = profile::parse(BUILTIN_PROFILES[index], Path::new(&file));
+        let (_, text) = SENSORS.iter().find(|(known, _)| *known == name)?;
+        let sensor = profile::parse(text, Path::new(name));
         Some(sensor.expect("invariant: a test parses all built-in profiles"))
     }
 
@@ -171,7 +154,7 @@ impl Sensor {
         if meant_as_path || file.exists() {
             return Self::load(&file);
         }
-        let known = BUILTIN_NAMES.join(", ");
+        let known = builtin_names().collect::<Vec<_>>().join(", ");
         Err(ConfigError::UnknownSensor { name: name_or_path.to_owned(), known })
     }
 

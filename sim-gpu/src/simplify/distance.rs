@@ -78,7 +78,7 @@ fn to_box(point: DVec3, low: [f32; 3], high: [f32; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::bvh::Builder;
-    use crate::shapes::{ShapeClass, generate};
+    use crate::mesh::Mesh;
     use crate::target::Surface;
 
     const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
@@ -101,10 +101,18 @@ mod tests {
 
     #[test]
     fn the_tree_finds_what_a_search_of_all_triangles_finds() {
-        let mesh = generate(ShapeClass::Chair, 1, 0);
-        let kept: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-        let target = Target::new(Surface::new(mesh, kept), Builder::Morton);
         let key = formats::rng::StreamKey::new(1, "points", 0);
+        // Small triangles all over a cube.
+        let vertex = |i: u64| {
+            let around = |n| DVec3::from_array([0, 1, 2].map(|axis| key.unit(3 * n + axis)));
+            around(1_000 + i / 3) + 0.1 * around(10_000 + i)
+        };
+        let n_triangles = 500;
+        let vertices = (0..3 * n_triangles).map(vertex).collect();
+        let triangles = (0..n_triangles as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let kept = (0..n_triangles as u32).collect();
+        let surface = Surface::new(Mesh { vertices, triangles }, kept);
+        let target = Target::new(surface, Builder::Morton);
         for i in 0..200 {
             let point =
                 DVec3::new(key.unit(3 * i), key.unit(3 * i + 1), key.unit(3 * i + 2)) * 4.0 - 2.0;

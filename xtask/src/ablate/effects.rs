@@ -3,11 +3,11 @@
 use super::plan::Plan;
 use crate::even_grid::as_even_grid;
 use anyhow::Context;
+use edgepuck_dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
+use edgepuck_dataset::surfaces::SurfaceConfig;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
-use sim_gpu::dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
-use sim_gpu::dataset::surfaces::SurfaceConfig;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::mesh::frame::Normalize;
 use sim_gpu::sensor::{Sensor, Views};

@@ -14,13 +14,13 @@ use crate::flags::need_folder_of_meshes;
 use crate::{Outcome, train};
 use anyhow::{Context, ensure};
 use datasets::{Made, bytes_per_cloud, clouds, make};
+use edgepuck_shapes as shapes;
 use effects::{DATASETS, EFFECTS, Judge, Source};
 use formats::atomic;
 use plan::Plan;
 use rows::{Answer, Cost};
 use serde::Serialize;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
-use sim_gpu::shapes;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -2,8 +2,8 @@
 
 use super::datasets::scan_files;
 use anyhow::{bail, ensure};
+use edgepuck_dataset::manifest::Manifest;
 use formats::npz::read_scan;
-use sim_gpu::dataset::manifest::Manifest;
 use std::path::Path;
 
 /// Compares all positions of two datasets of the same meshes and views, bit by

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::Args;
+use edgepuck_shapes::{ShapeClass, generate};
 use formats::atomic;
 use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
@@ -21,7 +22,6 @@ use sim_gpu::pose::Pose;
 use sim_gpu::ray::{Ray, RayFrame};
 use sim_gpu::resolve::{Hits, resolve};
 use sim_gpu::sensor::{BeamPattern, Sensor};
-use sim_gpu::shapes::{ShapeClass, generate};
 use sim_gpu::target::Target;
 
 use super::lanes::{self, Lane};

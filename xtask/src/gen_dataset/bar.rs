@@ -1,7 +1,7 @@
 //! The progress bar; quiet where standard error is no terminal.
 
+use edgepuck_dataset::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
-use sim_gpu::dataset::progress::Progress;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 

@@ -1,13 +1,13 @@
 //! The picture that a run ends with: one mesh from all its views, clean above
 //! noisy.
 
+use edgepuck_dataset::config::Variant;
+use edgepuck_dataset::layout;
+use edgepuck_dataset::manifest::Manifest;
+use edgepuck_dataset::record::MeshRecord;
 use formats::Scan;
 use formats::scan_file::{ScanFormat, read_scan};
 use glam::DVec3;
-use sim_gpu::dataset::config::Variant;
-use sim_gpu::dataset::layout;
-use sim_gpu::dataset::manifest::Manifest;
-use sim_gpu::dataset::record::MeshRecord;
 use sim_gpu::pose::Pose;
 use std::path::{Path, PathBuf};
 use xtask::preview;

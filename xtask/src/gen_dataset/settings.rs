@@ -2,10 +2,10 @@
 
 use super::usage;
 use anyhow::Context;
+use edgepuck_dataset::config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
 use formats::scan::{Attribute, AttributeSet};
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
-use sim_gpu::dataset::config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::packets;

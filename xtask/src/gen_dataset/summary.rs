@@ -1,7 +1,7 @@
 //! What a run did, in a few lines.
 
-use sim_gpu::dataset::manifest::Manifest;
-use sim_gpu::dataset::progress::{Progress, Stage};
+use edgepuck_dataset::manifest::Manifest;
+use edgepuck_dataset::progress::{Progress, Stage};
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
@@ -47,7 +47,7 @@ pub fn print(
         eprintln!("{}: {} clouds, {} left out", packed.file, packed.clouds, packed.left_out.len());
     }
     if !manifest.failures.is_empty() {
-        let file = sim_gpu::dataset::layout::failures(out);
+        let file = edgepuck_dataset::layout::failures(out);
         eprintln!("Meshes that failed are listed in {}", file.display());
     }
     eprintln!("Dataset: {}", out.display());

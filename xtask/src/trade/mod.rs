@@ -27,13 +27,13 @@ use crate::{Outcome, gen_shapes, workspace};
 use anyhow::{Context, Result, ensure};
 use classes::TestSet;
 use classifiers::{Grid, as_trained, bundled, on_a_pi};
+use edgepuck_shapes as shapes;
 use formats::cloud::resample;
 use formats::rng::StreamKey;
 use infer_cpu::inspect;
 use objects::Object;
 use row::Row;
 use scans::Cloud;
-use sim_gpu::shapes;
 use std::path::{Path, PathBuf};
 
 /// Flags of `trade`.

@@ -2,7 +2,7 @@ use super::*;
 
 #[test]
 fn every_builtin_profile_is_sound_named_and_sourced() {
-    for (name, text) in BUILTIN_NAMES.into_iter().zip(BUILTIN_PROFILES) {
+    for (name, text) in SENSORS {
         let sensor = parse(text).unwrap();
         assert_eq!(sensor.name, name);
         assert!(!sensor.description.is_empty() && !sensor.sources.is_empty(), "{name}");
@@ -12,7 +12,7 @@ fn every_builtin_profile_is_sound_named_and_sourced() {
 
 #[test]
 fn every_sensor_survives_a_round_trip_through_json() {
-    for name in BUILTIN_NAMES {
+    for name in builtin_names() {
         let json = serde_json::to_string(&sensor(name)).unwrap();
         assert_eq!(serde_json::from_str::<Sensor>(&json).unwrap(), sensor(name), "{json}");
     }
@@ -48,9 +48,9 @@ fn a_file_too_long_or_not_text_is_refused() {
 /// error must hold the third.
 #[test]
 fn bad_profiles_are_named() {
-    let uniform = BUILTIN_PROFILES[1];
-    let grid = BUILTIN_PROFILES[2];
-    let recipe = BUILTIN_PROFILES[6];
+    let uniform = SENSORS[1].1;
+    let grid = SENSORS[2].1;
+    let recipe = SENSORS[6].1;
     let crossing = &TINY.replace("rpm = 60", "rpm = 60\nbeam_crossing_m = 0.04");
     for (profile, from, to, part) in [
         (TINY, "name = \"tiny\"", "name = \"\"", "name: is empty"),

@@ -6,7 +6,7 @@ use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::{SEED, ShapeClass, for_all, generate};
-use crate::mesh::Mesh;
+use sim_gpu::mesh::Mesh;
 
 /// The box of the vertices: its lowest and highest corner.
 pub fn bounds(mesh: &Mesh) -> [DVec3; 2] {

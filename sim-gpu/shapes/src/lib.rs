@@ -37,9 +37,9 @@ pub use write::{WriteError, write_obj, write_off};
 
 use formats::rng::StreamKey;
 
-use crate::mesh::Mesh;
 use finish::Finish;
 use sampler::Sampler;
+use sim_gpu::mesh::Mesh;
 
 /// The shape that `seed` and `instance` give in `class`.
 ///

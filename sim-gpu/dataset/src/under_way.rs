@@ -3,10 +3,10 @@
 use super::budget::Share;
 use super::prepare::Prepared;
 use super::progress::Progress;
-use crate::caster::{Caster, Casting};
-use crate::gpu::GpuError;
-use crate::job::{Cast, CastJob};
 use crossbeam_channel::Receiver;
+use sim_gpu::caster::{Caster, Casting};
+use sim_gpu::gpu::GpuError;
+use sim_gpu::job::{Cast, CastJob};
 
 /// Rays gathered before a batch is sent, unless no mesh is waiting.
 const RAYS_PER_BATCH: usize = 1 << 20;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::descriptors::{aspect_ratios, height_profile, shape_distribution};
 use super::{SEED, ShapeClass, generate};
-use crate::mesh::Mesh;
+use sim_gpu::mesh::Mesh;
 
 const TRAIN: u32 = 40;
 const TEST: u32 = 20;

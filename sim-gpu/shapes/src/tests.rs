@@ -8,7 +8,7 @@ mod soundness;
 use rayon::prelude::*;
 
 use super::{ShapeClass, generate};
-use crate::mesh::Mesh;
+use sim_gpu::mesh::Mesh;
 
 /// Instances looked at in each class.
 const INSTANCES: u32 = 200;

@@ -1,9 +1,9 @@
 //! Why a dataset cannot be made, merged or verified.
 
-use crate::config::{ConfigError, InvalidValue};
-use crate::gpu::GpuError;
-use crate::mesh::tree::TreeError;
 use formats::FormatError;
+use sim_gpu::config::{ConfigError, InvalidValue};
+use sim_gpu::gpu::GpuError;
+use sim_gpu::mesh::tree::TreeError;
 use std::path::PathBuf;
 
 /// Why a dataset cannot be made, merged or verified. A bad mesh is no such

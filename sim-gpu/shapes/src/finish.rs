@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 use super::builder::Builder;
 use super::class::ShapeClass;
 use super::sampler::Sampler;
-use crate::mesh::Mesh;
+use sim_gpu::mesh::Mesh;
 
 /// The fewest triangles of a shape.
 pub const MIN_TRIANGLES: usize = 200;

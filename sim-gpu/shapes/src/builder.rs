@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::mesh::Mesh;
+use sim_gpu::mesh::Mesh;
 
 /// A mesh under construction.
 ///

@@ -1,17 +1,17 @@
 //! What a dataset is to hold. The manifest keeps it in full.
 
-use crate::config::InvalidValue;
-use crate::effects::Effects;
-use crate::mesh::frame::{Normalize, Up};
-use crate::pose::Pose;
-use crate::sensor::{Sensor, Views};
-use crate::simplify::Simplify;
 use formats::rng::StreamKey;
 use formats::scan::AttributeSet;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use sim_gpu::config::InvalidValue;
+use sim_gpu::effects::Effects;
+use sim_gpu::mesh::frame::{Normalize, Up};
+use sim_gpu::pose::Pose;
+use sim_gpu::sensor::{Sensor, Views};
+use sim_gpu::simplify::Simplify;
 
 /// What a dataset is to hold: with the meshes and the adapter, this decides
 /// every byte of it.

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::builder::Builder;
 use super::finish::{Finish, MIN_TRIANGLES};
-use crate::mesh::Mesh;
+use sim_gpu::mesh::Mesh;
 
 /// Trials before the best mesh so far is good enough.
 const MAX_TRIALS: usize = 10;

@@ -7,8 +7,8 @@ use super::config::{DatasetConfig, SetConfig, Viewpoints};
 use super::error::DatasetError;
 use super::journal::{Terms, digest, read_json, write_json};
 use super::record::{Entry, MeshFailure, MeshRecord};
-use crate::pose::Pose;
 use serde::{Deserialize, Serialize};
+use sim_gpu::pose::Pose;
 use std::collections::BTreeSet;
 use std::path::{Component, Path};
 

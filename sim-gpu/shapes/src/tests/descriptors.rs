@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::super::sampler::Sampler;
 use super::soundness::{bounds, corners};
-use crate::mesh::Mesh;
 use formats::rng::StreamKey;
+use sim_gpu::mesh::Mesh;
 
 /// Bins of the distance histogram.
 const BINS: usize = 24;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use crate::mesh::Mesh;
+use sim_gpu::mesh::Mesh;
 
 /// A mesh file that could not be written.
 #[derive(Debug, thiserror::Error)]

@@ -1,13 +1,13 @@
 //! What is known of each mesh once its scans are written.
 
 use super::config::Variant;
-use crate::mesh::census::Census;
-use crate::mesh::frame::Up;
-use crate::scan::Tally;
-use crate::simplify::Simplified;
 use formats::Split;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
+use sim_gpu::mesh::census::Census;
+use sim_gpu::mesh::frame::Up;
+use sim_gpu::scan::Tally;
+use sim_gpu::simplify::Simplified;
 
 /// Which mesh of a dataset: orders everything that is listed.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

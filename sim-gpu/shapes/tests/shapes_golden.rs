@@ -1,7 +1,7 @@
 //! Shapes keep their bytes: those under `assets/meshes` are what the
 //! generator gives, and hashes stand for larger ones.
 //!
-//! `UPDATE_GOLDEN=1 cargo test -p sim-gpu --test shapes_golden` rewrites both
+//! `UPDATE_GOLDEN=1 cargo test -p edgepuck-shapes --test shapes_golden` rewrites both
 //! after a change that is meant.
 
 use std::fmt::Write as _;
@@ -9,8 +9,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use edgepuck_shapes::{ShapeClass, generate, write_obj, write_off};
 use sha2::{Digest, Sha256};
-use sim_gpu::shapes::{ShapeClass, generate, write_obj, write_off};
 
 /// The seed of the committed meshes; `gen-shapes` with it gives the same.
 const SEED: u64 = 1;
@@ -37,7 +37,7 @@ const HOW_TO_UPDATE: &str = "if that is meant, UPDATE_GOLDEN=1 rewrites it";
 const MAX_COMMITTED_BYTES: usize = 300 * 1024;
 
 fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 /// Whether the golden file holds `bytes`; writes it first if so asked.

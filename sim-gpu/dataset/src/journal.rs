@@ -5,11 +5,11 @@ use super::config::DatasetConfig;
 use super::error::DatasetError;
 use super::layout;
 use super::record::{Entry, MeshRecord};
-use crate::caster::Caster;
-use crate::mesh::tree::MeshEntry;
 use formats::atomic;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use sim_gpu::caster::Caster;
+use sim_gpu::mesh::tree::MeshEntry;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

@@ -4,18 +4,18 @@
 use super::error::DatasetError;
 use super::prepare::{failure, read};
 use super::record::{Entry, MeshFailure};
-use crate::bvh::Builder;
-use crate::mesh::frame::{Normalize, Up};
-use crate::mesh::tree::MeshEntry;
-use crate::sensor::Views;
-use crate::surface_points::{area_uniform, seen_from};
-use crate::target::{Surface, Target};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::packed::PackedWriter;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use rayon::prelude::*;
+use sim_gpu::bvh::Builder;
+use sim_gpu::mesh::frame::{Normalize, Up};
+use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::sensor::Views;
+use sim_gpu::surface_points::{area_uniform, seen_from};
+use sim_gpu::target::{Surface, Target};
 use std::collections::BTreeSet;
 use std::path::Path;
 
