@@ -4,6 +4,9 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use std::ffi::c_void;
+use std::hint::black_box;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 
 use formats::model_card::ModelCard;
@@ -17,50 +20,95 @@ mod tiny_model;
 
 /// Runs `work` on this thread while its arithmetic flushes subnormal numbers, taken
 /// and given, to 0.
+///
+/// Rust does not model the processor's mode: the compiler may move arithmetic out of a
+/// region between two `asm!` blocks that change it. It cannot move anything out of a
+/// function that [`call_flushed`] calls, since all it sees of the call is a pointer.
 fn flushed<T>(work: impl FnOnce() -> T) -> T {
-    let before = mode();
-    set_mode(before | FLUSH);
-    let result = work();
-    set_mode(before);
-    result
+    let mut call = Call { work: Some(work), result: None };
+    // SAFETY: `run` gets a pointer to the `Call` of its own types, which outlives the
+    // call and is used by nothing else meanwhile. `run` does not unwind.
+    unsafe { call_flushed((&raw mut call).cast(), call.entry()) };
+    match call.result.expect("the trampoline calls `run`") {
+        Ok(result) => result,
+        Err(panic) => resume_unwind(panic),
+    }
 }
 
-/// Bits 15 (flush to zero) and 6 (denormals are zeros) of MXCSR: Intel's manual,
-/// volume 1, 10.2.3.
+/// What is to be called, and what came of it.
+struct Call<F, T> {
+    work: Option<F>,
+    result: Option<std::thread::Result<T>>,
+}
+
+/// A function with C's calling convention that works on a [`Call`].
+type Entry = unsafe extern "C" fn(*mut c_void);
+
+impl<F: FnOnce() -> T, T> Call<F, T> {
+    fn entry(&self) -> Entry {
+        Self::run
+    }
+
+    /// # Safety
+    /// `call` points to a `Call` of these types that nothing else uses.
+    unsafe extern "C" fn run(call: *mut c_void) {
+        // SAFETY: this function's contract.
+        let call = unsafe { &mut *call.cast::<Self>() };
+        let work = call.work.take().expect("the trampoline calls `run` once");
+        // A panic must not pass the trampoline, which has no unwind tables.
+        call.result = Some(catch_unwind(AssertUnwindSafe(work)));
+    }
+}
+
+/// Calls `entry(data)` while bits 15 (flush to zero) and 6 (denormals are zeros) of
+/// MXCSR are set (Intel's manual, volume 1, 10.2.3), and restores MXCSR.
+///
+/// # Safety
+/// `entry` may be called with `data`, and does not unwind.
 #[cfg(target_arch = "x86_64")]
-const FLUSH: u64 = 1 << 15 | 1 << 6;
-/// Bits 24 (FZ) and 19 (FZ16) of FPCR: Arm's manual, C5.2.8.
-#[cfg(target_arch = "aarch64")]
-const FLUSH: u64 = 1 << 24 | 1 << 19;
-
-#[cfg(target_arch = "x86_64")]
-fn mode() -> u64 {
-    let mut mode = 0u32;
-    // SAFETY: stores MXCSR into a variable of its size, and nothing else.
-    unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut mode, options(nostack)) };
-    mode.into()
+#[unsafe(naked)]
+unsafe extern "C" fn call_flushed(data: *mut c_void, entry: Entry) {
+    std::arch::naked_asm!(
+        "push rbp",
+        "mov rbp, rsp",
+        "sub rsp, 16",
+        "stmxcsr [rsp]",
+        "mov eax, [rsp]",
+        "or eax, {flush}",
+        "mov [rsp + 4], eax",
+        "ldmxcsr [rsp + 4]",
+        "call rsi",
+        "ldmxcsr [rsp]",
+        "leave",
+        "ret",
+        flush = const 1 << 15 | 1 << 6,
+    )
 }
 
-#[cfg(target_arch = "x86_64")]
-fn set_mode(mode: u64) {
-    let mode = mode as u32;
-    // SAFETY: the value was read from MXCSR but for two bits that every x86-64 has.
-    unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const mode, options(nostack)) };
-}
-
+/// Calls `entry(data)` while bits 24 (FZ) and 19 (FZ16) of FPCR are set (Arm's manual,
+/// C5.2.8), and restores FPCR. A processor ignores a bit that it lacks.
+///
+/// # Safety
+/// `entry` may be called with `data`, and does not unwind.
 #[cfg(target_arch = "aarch64")]
-fn mode() -> u64 {
-    let mode: u64;
-    // SAFETY: reads a register.
-    unsafe { std::arch::asm!("mrs {}, fpcr", out(reg) mode, options(nomem, nostack)) };
-    mode
-}
-
-#[cfg(target_arch = "aarch64")]
-fn set_mode(mode: u64) {
-    // SAFETY: the value was read from FPCR but for two bits; one that a processor
-    // lacks is ignored.
-    unsafe { std::arch::asm!("msr fpcr, {}", in(reg) mode, options(nomem, nostack)) };
+#[unsafe(naked)]
+unsafe extern "C" fn call_flushed(data: *mut c_void, entry: Entry) {
+    std::arch::naked_asm!(
+        "stp x29, x30, [sp, #-32]!",
+        "mov x29, sp",
+        "mrs x9, fpcr",
+        "str x9, [sp, #16]",
+        "orr x9, x9, #{fz}",
+        "orr x9, x9, #{fz16}",
+        "msr fpcr, x9",
+        "blr x1",
+        "ldr x9, [sp, #16]",
+        "msr fpcr, x9",
+        "ldp x29, x30, [sp], #32",
+        "ret",
+        fz = const 1 << 24,
+        fz16 = const 1 << 19,
+    )
 }
 
 /// The logits of a small model, one layer of which is `factor` times as large.
@@ -74,9 +122,17 @@ fn logits(model: &Path, precision: Precision, kernel: kernel::KernelName) -> Vec
 
 #[test]
 fn flushing_is_flushing() {
-    let tiny = std::hint::black_box(f32::MIN_POSITIVE);
-    assert!(tiny * std::hint::black_box(0.5) > 0.0);
-    assert_eq!(flushed(|| std::hint::black_box(tiny) * std::hint::black_box(0.5)), 0.0);
+    let half_of_least = || black_box(black_box(f32::MIN_POSITIVE) * black_box(0.5));
+    assert!(half_of_least() > 0.0);
+    assert_eq!(flushed(half_of_least), 0.0);
+    assert!(half_of_least() > 0.0, "the mode is restored");
+}
+
+#[test]
+fn a_panic_of_flushed_work_comes_through_and_restores_the_mode() {
+    let panic = catch_unwind(|| flushed(|| panic!("of work"))).unwrap_err();
+    assert_eq!(panic.downcast_ref(), Some(&"of work"));
+    assert!(black_box(black_box(f32::MIN_POSITIVE) * black_box(0.5)) > 0.0);
 }
 
 /// Weights of 1e-42 and products of as much: each sum of K = 64 of them moves by

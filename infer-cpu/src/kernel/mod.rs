@@ -25,7 +25,7 @@ use half::f16;
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
-#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
+#[cfg(all(test, not(windows), any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod flushed;
 #[cfg(target_arch = "aarch64")]
 mod neon;
