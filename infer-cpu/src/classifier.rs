@@ -14,8 +14,7 @@ use crate::options::{MOST_POINTS, MOST_THREADS, Options};
 use crate::precision::Precision;
 use crate::prediction::{Prediction, argmax};
 use crate::sampler::{SamplerKind, SamplerSpec};
-use crate::selection::{FrontEnd, Selection};
-use crate::tabulate;
+use crate::selection::{Selection, front_pass};
 use crate::votes::Votes;
 
 /// A network ready to classify clouds.
@@ -68,7 +67,8 @@ impl Classifier {
             Some(spec) => spec.clone(),
             None => SamplerSpec::as_trained(path, &loaded.card)?,
         };
-        let front = front_end(path, &loaded, &spec, options.table_nodes)?;
+        let is_cpl = spec.kind == SamplerKind::Cpl;
+        let front = is_cpl.then(|| front_pass(spec.front, &loaded.parts)).transpose()?;
         let selection = Selection::new(&spec, front)?;
         let Loaded { card, network, .. } = loaded;
         let classes = class_names(&card, network.n_classes());
@@ -275,29 +275,6 @@ fn class_names(card: &ModelCard, n_classes: usize) -> Vec<Arc<str>> {
         true => (0..n_classes).map(|class| format!("class {class}").into()).collect(),
         false => card.classes.iter().map(|name| name.as_str().into()).collect(),
     }
-}
-
-/// What computes the features that `spec` pools, if it pools any.
-fn front_end(
-    path: &Path,
-    loaded: &Loaded,
-    spec: &SamplerSpec,
-    table_nodes: Option<usize>,
-) -> Result<Option<FrontEnd>, Error> {
-    if spec.kind != SamplerKind::Cpl {
-        return Ok(None);
-    }
-    let pass = FrontEnd::choose(spec.front, &loaded.parts)?;
-    let table = match (table_nodes, &loaded.table) {
-        (Some(_), _) if pass == crate::engine::Pass::Trunk && loaded.parts.edges => {
-            let what = "a trunk that looks around points, which no table of coordinates holds";
-            return Err(Error::FrontMissing { choice: spec.front, what });
-        }
-        (Some(nodes), _) => Some(tabulate::front_end(path, pass, nodes)?),
-        (None, Some(table)) if pass == crate::engine::Pass::Front => Some(table.clone()),
-        _ => None,
-    };
-    Ok(Some(table.map_or(FrontEnd::Pass(pass), FrontEnd::Table)))
 }
 
 fn setup(options: &Options, precision: Precision) -> Result<Setup<'_>, Error> {

@@ -3,19 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use formats::FormatError;
 use formats::model_card::ModelCard;
-use formats::weights::{Tensor, WeightsFile, tensor_part};
+use formats::weights::WeightsFile;
 
 use crate::calibrate;
 use crate::engine::{Engine, Memory, Met, Pass};
 use crate::error::Error;
 use crate::kernel::Kernels;
 use crate::layers;
-use crate::network::{Front, TABLE};
 use crate::options::TNets;
 use crate::precision::{F16, F32, F32Fc16, Format, I8, Precision};
-use crate::sampler::Lattice;
 use crate::selection::Parts;
 use crate::team::Team;
 
@@ -94,8 +91,6 @@ pub struct Loaded {
     pub network: Box<dyn Forward>,
     /// What the network consists of.
     pub parts: Parts,
-    /// The look-up table that the file brings as its front end.
-    pub table: Option<Lattice>,
 }
 
 /// What to load a network for.
@@ -147,16 +142,8 @@ fn loaded<T: Format>(
         stn: layers.stn.is_some(),
         fstn: layers.fstn.is_some(),
         front: layers.front.is_some(),
-        edges: !layers.edges.is_empty(),
-    };
-    let table = match layers.front.take_if(|front| matches!(front, Front::Table(_))) {
-        Some(Front::Table(Tensor { shape, values })) => Some(
-            Lattice::new(shape[0], shape[3], &values)
-                .map_err(|cause| FormatError::malformed(file.path(), tensor_part(TABLE), cause))?,
-        ),
-        _ => None,
     };
     let engine = Engine::new(layers, kernels, threads, false);
     let team = Team::new(engine, threads).map_err(|source| Error::Threads { threads, source })?;
-    Ok(Loaded { card, network: Box::new(team), parts, table })
+    Ok(Loaded { card, network: Box::new(team), parts })
 }

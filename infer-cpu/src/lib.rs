@@ -24,7 +24,6 @@ pub mod sampler;
 mod screen;
 mod selection;
 mod summary;
-mod tabulate;
 mod team;
 mod votes;
 
@@ -40,7 +39,7 @@ pub mod sharing {
 /// another form.
 pub mod model_file {
     pub use crate::dense::Dense;
-    pub use crate::network::{Front, Network, TNet, read};
+    pub use crate::network::{Network, TNet, read};
 }
 
 #[cfg(feature = "npz")]
@@ -54,4 +53,4 @@ pub use normalize::to_unit_sphere;
 pub use options::{Options, TNets};
 pub use precision::Precision;
 pub use prediction::Prediction;
-pub use summary::{FrontSummary, LayerShape, NetShape, Summary, inspect};
+pub use summary::{LayerShape, NetShape, Summary, inspect};

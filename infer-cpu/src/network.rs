@@ -4,8 +4,7 @@
 //! Names are those of yanx27/Pointnet_Pointnet2_pytorch, for any number of
 //! layers: `feat.conv1…`, `feat.bn1…` the trunk, `feat.stn.*` and `feat.fstn.*`
 //! the T-Nets (`conv`, `fc`, and `bn` counted through both), `fc1…`, `bn1…` the
-//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`, or the tensor
-//! `cpl.table` `[n, n, n, channels]`. What a point's surroundings add to its
+//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`. What a point's surroundings add to its
 //! coordinates comes from `edge.conv1…`, one layer for each of the card's
 //! `edge_radii`. Where no layer has a batch norm, all are
 //! taken as folded already.
@@ -18,9 +17,6 @@ use formats::model_card::ModelCard;
 use formats::weights::{Tensor, WeightsFile, tensor_part};
 
 use crate::dense::{BatchNorm, Dense};
-
-/// The tensor that holds a tabulated front end.
-pub const TABLE: &str = "cpl.table";
 
 /// A network whose point-wise layers are `C` and whose vector layers are `F`.
 pub struct Network<C, F> {
@@ -38,7 +34,7 @@ pub struct Network<C, F> {
     /// The layers from the pooled vector to the logits.
     pub head: Vec<F>,
     /// What a Critical Points Layer pools, if the file brings its own.
-    pub front: Option<Front<C>>,
+    pub front: Option<Vec<C>>,
 }
 
 /// A network that predicts a `k` x `k` matrix, row by row; the identity is in
@@ -50,14 +46,6 @@ pub struct TNet<C, F> {
     pub convs: Vec<C>,
     /// Layers after it.
     pub fcs: Vec<F>,
-}
-
-/// A front end of a Critical Points Layer.
-pub enum Front<C> {
-    /// A multi-layer perceptron shared by all points.
-    Mlp(Vec<C>),
-    /// A look-up table, `[nodes, nodes, nodes, channels]`.
-    Table(Tensor),
 }
 
 /// Where a point-wise layer stands.
@@ -273,29 +261,13 @@ impl<M, N> Reader<'_, M, N> {
         Ok(layers)
     }
 
-    fn front<C>(&mut self) -> Result<Option<Front<C>>, FormatError>
+    /// The layers of a front end of the model's own, if it has one.
+    fn front<C>(&mut self) -> Result<Option<Vec<C>>, FormatError>
     where
         M: FnMut(Dense, Role) -> C,
     {
-        if self.names.contains(TABLE) {
-            let table = self.tensor(TABLE)?;
-            return match table.shape[..] {
-                [a, b, c, channels] if a == b && b == c && a >= 2 && channels > 0 => {
-                    Ok(Some(Front::Table(table)))
-                }
-                _ => {
-                    let cause = format!(
-                        "expected shape [n, n, n, channels], n >= 2, found {:?}",
-                        table.shape
-                    );
-                    Err(self.error(TABLE, cause))
-                }
-            };
-        }
-        if !self.has("cpl.") {
-            return Ok(None);
-        }
-        Ok(Some(Front::Mlp(self.point_layers("cpl", 3, Role::First)?.0)))
+        let layers = self.has("cpl.").then(|| self.point_layers("cpl", 3, Role::First));
+        Ok(layers.transpose()?.map(|(layers, _)| layers))
     }
 
     /// Reads one layer of `inputs` inputs and the batch norm that follows it.

@@ -95,9 +95,6 @@ pub struct Options {
     pub t_nets: TNets,
     /// Which points the network sees; as in training if `None`.
     pub sampler: Option<SamplerSpec>,
-    /// Replaces the front end of a Critical Points Layer by a look-up table of
-    /// this many nodes an axis.
-    pub table_nodes: Option<usize>,
     /// The largest activation of each layer, for int8; the model's own
     /// calibration if `None`, and shapes made by rule if it has none.
     pub activation_ranges: Option<BTreeMap<String, f32>>,
@@ -129,7 +126,6 @@ impl Default for Options {
             threads: 1,
             t_nets: TNets::Both,
             sampler: None,
-            table_nodes: None,
             activation_ranges: None,
             normalization: None,
             drop_invalid: false,

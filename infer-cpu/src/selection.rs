@@ -5,22 +5,15 @@ use crate::error::Error;
 use crate::forward::Forward;
 use crate::kernel::Kernels;
 use crate::sampler::{
-    CanonicalOrder, CriticalPoints, FrontChoice, Lattice, Sampler, SamplerKind, SamplerSpec,
+    CanonicalOrder, CriticalPoints, FrontChoice, Sampler, SamplerKind, SamplerSpec,
 };
-
-/// What computes the features that a Critical Points Layer pools.
-pub enum FrontEnd {
-    /// Layers of the network, in its own precision.
-    Pass(Pass),
-    /// A look-up table, in fp32.
-    Table(Lattice),
-}
 
 /// A sampler and its memory.
 pub struct Selection {
     spec: SamplerSpec,
     sampler: Sampler,
-    front: Option<FrontEnd>,
+    /// The pass whose features a Critical Points Layer pools.
+    front: Option<Pass>,
     /// All points, sorted by geometry, each once.
     cloud: CanonicalOrder,
     critical: CriticalPoints,
@@ -40,7 +33,7 @@ impl Selection {
     ///
     /// # Errors
     /// A specification that cannot be met.
-    pub fn new(spec: &SamplerSpec, front: Option<FrontEnd>) -> Result<Self, Error> {
+    pub fn new(spec: &SamplerSpec, front: Option<Pass>) -> Result<Self, Error> {
         let coordinates_alone = match spec.kind {
             SamplerKind::Cpl => SamplerSpec { kind: SamplerKind::All, ..spec.clone() },
             _ => spec.clone(),
@@ -113,19 +106,19 @@ impl Selection {
     }
 
     fn select_critical(&mut self, network: &dyn Forward, memory: &mut Memory) {
-        let Some(front) = &self.front else {
+        let Some(front) = self.front else {
             unreachable!("invariant: a classifier gives critical points a front end");
         };
         network.set_surroundings(&self.cloud.points);
-        front.pool(&self.cloud.points, network, memory);
-        self.pooled_stn = matches!(front, FrontEnd::Pass(Pass::Stn));
+        pool(front, &self.cloud.points, network, memory);
+        self.pooled_stn = front == Pass::Stn;
         self.critical.rank(&memory.values, &memory.winners);
         // The T-Net wants the whole cloud's pooling, which a second one ends.
         while let Some(rows) = self.critical.next_pass(self.cloud.points.len(), &self.spec) {
             self.pooled_stn = false;
             self.left.clear();
             self.left.extend(rows.iter().map(|&row| self.cloud.points[row as usize]));
-            front.pool(&self.left, network, memory);
+            pool(front, &self.left, network, memory);
             self.critical.rank_next(&memory.values, &memory.winners);
         }
         let CriticalPoints { rows, scores, .. } = &self.critical;
@@ -153,8 +146,8 @@ impl Selection {
         self.left.reserve(n);
         self.rows.reserve(most);
         self.sampler.select(&cloud, kernels)?;
-        if let Some(front) = &self.front {
-            let channels = front.channels(network);
+        if let Some(front) = self.front {
+            let channels = network.channels(front);
             self.critical.reserve(channels, n);
             memory.reserve(channels);
         }
@@ -162,51 +155,29 @@ impl Selection {
     }
 }
 
-impl FrontEnd {
-    /// The front end that `choice` names, for a network that has these parts.
-    ///
-    /// # Errors
-    /// A network that lacks it.
-    pub fn choose(choice: FrontChoice, parts: &Parts) -> Result<Pass, Error> {
-        let lacks = |what: &'static str| Err(Error::FrontMissing { choice, what });
-        match choice {
-            FrontChoice::Own if parts.front => Ok(Pass::Front),
-            FrontChoice::Stn if parts.stn => Ok(Pass::Stn),
-            FrontChoice::Trunk if !parts.stn && !parts.fstn => Ok(Pass::Trunk),
-            FrontChoice::Auto if parts.front => Ok(Pass::Front),
-            FrontChoice::Auto if parts.stn => Ok(Pass::Stn),
-            FrontChoice::Auto if !parts.fstn => Ok(Pass::Trunk),
-            FrontChoice::Own => lacks("no front end of its own"),
-            FrontChoice::Stn => lacks("no T-Net of coordinates"),
-            FrontChoice::Trunk => lacks("T-Nets, on which its trunk's features depend"),
-            FrontChoice::Auto => lacks("neither a front end nor a T-Net of coordinates"),
-        }
+/// The pass that front end `choice` names, in a network that has these parts.
+///
+/// # Errors
+/// The network lacks it.
+pub fn front_pass(choice: FrontChoice, parts: &Parts) -> Result<Pass, Error> {
+    let lacks = |what: &'static str| Err(Error::FrontMissing { choice, what });
+    match choice {
+        FrontChoice::Own if parts.front => Ok(Pass::Front),
+        FrontChoice::Stn if parts.stn => Ok(Pass::Stn),
+        FrontChoice::Trunk if !parts.stn && !parts.fstn => Ok(Pass::Trunk),
+        FrontChoice::Auto if parts.front => Ok(Pass::Front),
+        FrontChoice::Auto if parts.stn => Ok(Pass::Stn),
+        FrontChoice::Auto if !parts.fstn => Ok(Pass::Trunk),
+        FrontChoice::Own => lacks("no front end of its own"),
+        FrontChoice::Stn => lacks("no T-Net of coordinates"),
+        FrontChoice::Trunk => lacks("T-Nets, on which its trunk's features depend"),
+        FrontChoice::Auto => lacks("neither a front end nor a T-Net of coordinates"),
     }
+}
 
-    /// How many features a point has.
-    pub fn channels(&self, network: &dyn Forward) -> usize {
-        match self {
-            Self::Pass(pass) => network.channels(*pass),
-            Self::Table(lattice) => lattice.channels(),
-        }
-    }
-
-    fn pool(&self, points: &[[f32; 3]], network: &dyn Forward, memory: &mut Memory) {
-        match self {
-            Self::Pass(pass) => {
-                network.set_points(points);
-                network.pool_winners(*pass, memory);
-            }
-            Self::Table(lattice) => {
-                let channels = lattice.channels();
-                memory.values.clear();
-                memory.values.resize(channels, f32::NEG_INFINITY);
-                memory.winners.clear();
-                memory.winners.resize(channels, 0);
-                lattice.max(points, &mut memory.values, &mut memory.winners, 0..channels);
-            }
-        }
-    }
+fn pool(pass: Pass, points: &[[f32; 3]], network: &dyn Forward, memory: &mut Memory) {
+    network.set_points(points);
+    network.pool_winners(pass, memory);
 }
 
 /// What a network consists of, as far as front ends go.
@@ -218,6 +189,4 @@ pub struct Parts {
     pub fstn: bool,
     /// A front end of its own.
     pub front: bool,
-    /// Layers that look at a point's surroundings.
-    pub edges: bool,
 }

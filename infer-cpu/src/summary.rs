@@ -7,7 +7,7 @@ use formats::weights::WeightsFile;
 
 use crate::dense::Dense;
 use crate::error::Error;
-use crate::network::{Front, Network, read_network};
+use crate::network::{Network, read_network};
 use crate::precision::Precision;
 
 /// A model file's network, layer by layer.
@@ -24,7 +24,7 @@ pub struct Summary {
     /// The trunk, and the layers from the pooled vector to the logits.
     pub trunk: NetShape,
     /// The front end of a critical points layer, if the file brings its own.
-    pub front: Option<FrontSummary>,
+    pub front: Option<Vec<LayerShape>>,
     /// Elements of all tensors in the file.
     pub n_stored: usize,
 }
@@ -49,20 +49,6 @@ pub struct LayerShape {
     pub outputs: usize,
 }
 
-/// A front end of a critical points layer.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FrontSummary {
-    /// Layers that each point goes through.
-    Layers(Vec<LayerShape>),
-    /// A look-up table.
-    Table {
-        /// Nodes an axis.
-        nodes: usize,
-        /// Features of a point.
-        channels: usize,
-    },
-}
-
 /// Reads the model file at `path`, every tensor of it.
 ///
 /// # Errors
@@ -79,12 +65,7 @@ pub fn inspect(path: &Path) -> Result<Summary, Error> {
         fstn: fstn.map(|net| NetShape { convs: net.convs, fcs: net.fcs }),
         edges: edges.into_iter().map(|(radius, dense)| (radius, shape_of(dense))).collect(),
         trunk: NetShape { convs: trunk, fcs: head },
-        front: front.map(|front| match front {
-            Front::Mlp(layers) => FrontSummary::Layers(layers),
-            Front::Table(table) => {
-                FrontSummary::Table { nodes: table.shape[0], channels: table.shape[3] }
-            }
-        }),
+        front,
         n_stored,
     })
 }
@@ -131,26 +112,19 @@ impl Summary {
     }
 
     /// Multiplications that a front end of the model's own costs each point
-    /// that it chooses from. A table interpolates between eight nodes.
+    /// that it chooses from.
     #[must_use]
     pub fn front_macs_per_point(&self) -> Option<usize> {
-        Some(match self.front.as_ref()? {
-            FrontSummary::Layers(layers) => layers.iter().map(LayerShape::macs).sum(),
-            FrontSummary::Table { channels, .. } => 8 * channels,
-        })
+        Some(self.front.as_ref()?.iter().map(LayerShape::macs).sum())
     }
 
     /// Weights and biases once batch norms are folded in.
     #[must_use]
     pub fn parameters(&self) -> usize {
-        let front = match &self.front {
-            Some(FrontSummary::Layers(layers)) => layers.iter().map(LayerShape::parameters).sum(),
-            Some(FrontSummary::Table { nodes, channels }) => nodes.pow(3) * channels,
-            None => 0,
-        };
         let layers = self.nets().flat_map(|net| net.convs.iter().chain(&net.fcs));
         let edges = self.edges.iter().map(|(_, layer)| layer);
-        layers.chain(edges).map(LayerShape::parameters).sum::<usize>() + front
+        let front = self.front.iter().flatten();
+        layers.chain(edges).chain(front).map(LayerShape::parameters).sum()
     }
 
     /// Bytes of the weights in `precision`, their biases (fp32) and scales
@@ -178,11 +152,7 @@ impl Summary {
         let convs = nets.map(|net| outer(&net.convs)).sum::<usize>()
             + self.fstn.as_ref().map_or(0, |fstn| inner(&fstn.convs))
             + self.edges.iter().map(|(_, edge)| 4 * edge.parameters()).sum::<usize>();
-        let front = match &self.front {
-            Some(FrontSummary::Layers(layers)) => outer(layers),
-            Some(FrontSummary::Table { nodes, channels }) => 4 * nodes.pow(3) * channels,
-            None => 0,
-        };
+        let front = self.front.as_deref().map_or(0, outer);
         let fcs = self.nets().flat_map(|net| &net.fcs).map(|fc| layer(fc, vector_bytes));
         convs + fcs.sum::<usize>() + front
     }

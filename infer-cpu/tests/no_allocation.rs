@@ -116,17 +116,9 @@ fn main() {
         capacity: CAPACITY,
         ..Options::default()
     };
-    let table = Options {
-        sampler: Some(spec(SamplerKind::Cpl)),
-        table_nodes: Some(4),
-        capacity: CAPACITY,
-        ..Options::default()
-    };
-    for (what, options) in [("votes", votes), ("table", table)] {
-        let n = allocations(&model, &options, &clouds, 2 * clouds.len());
-        if n > 0 {
-            found.push(format!("{what}: {n}"));
-        }
+    let n = allocations(&model, &votes, &clouds, 2 * clouds.len());
+    if n > 0 {
+        found.push(format!("votes: {n}"));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
     // What grows by something a cloud shows in many.

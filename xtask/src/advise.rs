@@ -4,6 +4,7 @@
 use crate::bench::table::digits;
 use crate::flags::positive;
 use crate::trade::bundled_record;
+use crate::trade::classes::Chooser;
 use crate::trade::row::{self, Device, Part, Row};
 use crate::{Outcome, Usage};
 use anyhow::{Result, bail};
@@ -60,7 +61,9 @@ pub fn run(args: &Args) -> Result<Outcome> {
 fn advise(args: &Args, rows: &[Row]) -> Result<String> {
     // What infer-cpu classifies with: it runs all T-Nets that a model has.
     let runs_all = |row: &&Row| matches!(row.t_nets.as_str(), "" | "both");
-    let is_choice = |row: &&Row| row.part == Part::Classifier && runs_all(row);
+    // A record may hold samplers that infer-cpu had when it was made and has no more.
+    let is_known = |row: &&Row| row.sampler.is_empty() || Chooser::named(&row.sampler).is_some();
+    let is_choice = |row: &&Row| row.part == Part::Classifier && runs_all(row) && is_known(row);
     let choices = rows.iter().filter(is_choice);
     let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     if timed.is_empty() {
@@ -182,14 +185,11 @@ fn one_line((ms, row): Timed) -> String {
 fn command(row: &Row) -> String {
     let Row { model_file, precision, .. } = row;
     let mut words = format!("infer-cpu classify --model {model_file}");
-    // As `cpl:own:table8` says: sampler, front end, nodes of a table.
+    // A row names the sampler, and after a colon the front end of `cpl`.
     let mut sampler = row.sampler.split(':');
     let _ = write!(words, " --sampler {}", sampler.next().unwrap_or_default());
-    for word in sampler {
-        let _ = match word.strip_prefix("table") {
-            Some(nodes) => write!(words, " --table {nodes}"),
-            None => write!(words, " --front {word}"),
-        };
+    if let Some(front) = sampler.next() {
+        let _ = write!(words, " --front {front}");
     }
     let points = row.points.unwrap_or_default();
     let _ = write!(words, " --points {points} --precision {precision}");
@@ -255,13 +255,21 @@ mod tests {
 
     #[test]
     fn a_configuration_is_a_command_line() {
-        let row = Row { sampler: "cpl:own:table8".to_owned(), ..row("m", 1.0, 1, 2) };
+        let row = Row { sampler: "cpl:own".to_owned(), ..row("m", 1.0, 1, 2) };
         let row = Row { precision: "i8".to_owned(), ..row };
         assert_eq!(
             command(&row),
-            "infer-cpu classify --model m.safetensors --sampler cpl --front own --table 8 \
+            "infer-cpu classify --model m.safetensors --sampler cpl --front own \
              --points 64 --precision i8 --threads 2 CLOUD"
         );
+    }
+
+    #[test]
+    fn a_sampler_that_infer_cpu_lacks_is_not_advised() {
+        let best = Row { sampler: "cpl:own:table8".to_owned(), ..row("best", 0.1, 999, 4) };
+        let rows = [rows(), vec![best]].concat();
+        let advice = advise(&asked(Some(5.0), None), &rows).unwrap();
+        assert!(advice.starts_with("large"), "{advice}");
     }
 
     #[test]

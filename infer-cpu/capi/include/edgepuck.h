@@ -144,11 +144,6 @@ typedef struct EdgepuckOptions {
    */
   const char *front;
   /**
-   * Replaces the front end of "cpl" by a look-up table of this many nodes an
-   * axis. 0: the network itself, or the table that the model brings.
-   */
-  size_t table_nodes;
-  /**
    * How clouds are normalised: "unit-sphere" or "none". Null: as in
    * training.
    */

@@ -48,9 +48,6 @@ pub struct EdgepuckOptions {
     pub passes: usize,
     /// What "cpl" pools: "auto", "own", "stn" or "trunk". Null: "auto".
     pub front: *const c_char,
-    /// Replaces the front end of "cpl" by a look-up table of this many nodes an
-    /// axis. 0: the network itself, or the table that the model brings.
-    pub table_nodes: usize,
     /// How clouds are normalised: "unit-sphere" or "none". Null: as in
     /// training.
     pub normalization: *const c_char,
@@ -84,7 +81,6 @@ pub extern "C" fn edgepuck_options_default() -> EdgepuckOptions {
         resize: null(),
         passes: 0,
         front: null(),
-        table_nodes: 0,
         normalization: null(),
         drop_invalid: options.drop_invalid,
         votes: options.votes,
@@ -111,7 +107,6 @@ impl EdgepuckOptions {
                 threads: self.threads.max(1),
                 t_nets: word("t_nets", self.t_nets)?.unwrap_or_default(),
                 sampler: self.sampler()?,
-                table_nodes: (self.table_nodes != 0).then_some(self.table_nodes),
                 activation_ranges: None,
                 normalization: word("normalization", self.normalization)?,
                 drop_invalid: self.drop_invalid,

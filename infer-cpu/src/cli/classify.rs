@@ -163,7 +163,6 @@ impl Args {
                 None => cores().min(MOST_THREADS_BY_DEFAULT),
             },
             sampler: Some(self.how.apply(self.sampler, trained)?),
-            table_nodes: self.how.table_nodes(),
             normalization: self.normalize,
             drop_invalid: self.drop_invalid,
             votes: self.votes,

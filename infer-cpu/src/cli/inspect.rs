@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use infer_cpu::sampler::SamplerSpec;
-use infer_cpu::{FrontSummary, LayerShape, NetShape, Precision, Summary};
+use infer_cpu::{LayerShape, NetShape, Precision, Summary};
 use serde_json::{Value, json};
 
 use super::Outcome;
@@ -53,12 +53,7 @@ fn as_json(path: &Path, summary: &Summary, sampler: &SamplerSpec) -> Value {
     let layer = |layer: &LayerShape| json!({ "name": layer.name, "inputs": layer.inputs, "outputs": layer.outputs });
     let layers = |layers: &[LayerShape]| layers.iter().map(layer).collect::<Value>();
     let net = |net: &NetShape| json!({ "convs": layers(&net.convs), "fcs": layers(&net.fcs) });
-    let front = summary.front.as_ref().map(|front| match front {
-        FrontSummary::Layers(convs) => json!({ "convs": layers(convs) }),
-        FrontSummary::Table { nodes, channels } => {
-            json!({ "nodes": nodes, "channels": channels })
-        }
-    });
+    let front = summary.front.as_ref().map(|convs| json!({ "convs": layers(convs) }));
     let bytes: serde_json::Map<_, _> = Precision::ALL
         .iter()
         .map(|&precision| (precision.name().to_owned(), summary.bytes(precision).into()))
@@ -139,10 +134,7 @@ fn as_text(
         "front end",
         match &summary.front {
             None => "none of its own".to_owned(),
-            Some(FrontSummary::Layers(layers)) => format!("{}, max", chain(layers)),
-            Some(FrontSummary::Table { nodes, channels }) => {
-                format!("table of {nodes} x {nodes} x {nodes} nodes, {channels} channels")
-            }
+            Some(layers) => format!("{}, max", chain(layers)),
         },
     )?;
     row("parameters", format!("{} ({} stored)", summary.parameters(), summary.n_stored))?;

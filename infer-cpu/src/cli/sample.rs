@@ -94,8 +94,7 @@ fn choose(args: &Args, points: &[[f64; 3]]) -> anyhow::Result<Vec<u32>> {
     }
     let (model, card) = args.model.open()?;
     let spec = args.how.apply(Some(args.sampler), SamplerSpec::as_trained(&model, &card)?)?;
-    let options =
-        Options { sampler: Some(spec), table_nodes: args.how.table_nodes(), ..Options::default() };
+    let options = Options { sampler: Some(spec), ..Options::default() };
     let mut classifier = Classifier::load(&model, &options).map_err(of_setup)?;
     Ok(classifier.sample(points).with_context(here)?.to_vec())
 }

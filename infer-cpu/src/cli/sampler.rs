@@ -40,10 +40,6 @@ pub struct SamplerArgs {
     /// [default: auto]
     #[arg(long, value_name = "NET")]
     front: Option<FrontChoice>,
-
-    /// Replace cpl's front end by a look-up table of so many nodes an axis
-    #[arg(long, value_name = "NODES", value_parser = clap::value_parser!(u16).range(2..=256))]
-    table: Option<u16>,
 }
 
 impl SamplerArgs {
@@ -71,21 +67,15 @@ impl SamplerArgs {
         })
     }
 
-    /// Nodes an axis of the table that is to replace a front end.
-    pub fn table_nodes(&self) -> Option<usize> {
-        self.table.map(usize::from)
-    }
-
     fn check_flags(&self, kind: SamplerKind) -> Result<(), Usage> {
         use SamplerKind::{Cpl, First, Fps, Random, Voxel};
-        let flags: [(_, _, &[SamplerKind]); 7] = [
+        let flags: [(_, _, &[SamplerKind]); 6] = [
             ("--points", self.points.is_some(), &[First, Random, Fps, Voxel, Cpl]),
             ("--fps-start", self.fps_start.is_some(), &[Fps]),
             ("--voxel-size", self.voxel_size.is_some(), &[Voxel]),
             ("--resize", self.resize.is_some(), &[Cpl]),
             ("--passes", self.passes.is_some(), &[Cpl]),
             ("--front", self.front.is_some(), &[Cpl]),
-            ("--table", self.table.is_some(), &[Cpl]),
         ];
         match flags.iter().find(|(_, is_given, kinds)| *is_given && !kinds.contains(&kind)) {
             Some((flag, _, kinds)) => {
@@ -113,7 +103,6 @@ mod tests {
             resize: None,
             passes: None,
             front: None,
-            table: None,
         }
     }
 
@@ -140,8 +129,8 @@ mod tests {
             error,
             "--points means nothing to sampler all; --sampler may be first, random, fps, voxel, cpl"
         );
-        let table = SamplerArgs { table: Some(8), ..none() };
-        assert!(table.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());
-        assert!(table.apply(Some(SamplerKind::Cpl), SamplerSpec::default()).is_ok());
+        let passes = SamplerArgs { passes: Some(2), ..none() };
+        assert!(passes.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());
+        assert!(passes.apply(Some(SamplerKind::Cpl), SamplerSpec::default()).is_ok());
     }
 }

@@ -8,7 +8,6 @@ use super::{
 };
 use crate::kernel::{Panels, Rows};
 use crate::layers::Conv;
-use crate::network::Front;
 use crate::precision::{Format, Matrix};
 use crate::team::{Team, Work};
 
@@ -76,7 +75,7 @@ impl<T: Format> Engine<T> {
 
     /// Takes the points through every layer that there is.
     pub fn observe(team: &Team<Self>, memory: &mut Memory) {
-        if matches!(team.work().layers.front, Some(Front::Mlp(_))) {
+        if team.work().layers.front.is_some() {
             Self::pool(team, Pass::Front, false, memory);
         }
         Self::classify(team, memory, false);

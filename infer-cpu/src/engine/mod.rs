@@ -17,7 +17,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 use crate::edge::{Edges, Surroundings};
 use crate::kernel::{Columns, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
-use crate::network::Front;
 use crate::precision::Format;
 pub use crate::screen::GROUP;
 use crate::screen::{Levels, Sieve};
@@ -266,11 +265,7 @@ impl<T: Format> Engine<T> {
     pub fn observed(&self) -> Vec<(String, f32)> {
         let nets = [self.layers.stn.as_ref(), self.layers.fstn.as_ref()];
         let convs = nets.into_iter().flatten().flat_map(|net| &net.convs);
-        let front = match &self.layers.front {
-            Some(Front::Mlp(front)) => &front[..],
-            _ => &[],
-        };
-        let convs = self.layers.trunk.iter().chain(convs).chain(front);
+        let convs = self.layers.trunk.iter().chain(convs).chain(self.front());
         let mut seen: Vec<_> = convs
             .map(|conv| match conv {
                 Conv::First(first) => (first.dense.name.clone(), first.seen.get()),
@@ -317,9 +312,7 @@ impl Widths {
         let columns = fcs.map(|layer| &layer.columns);
         let mut convs: Vec<&[Conv<T>]> = nets.map(|net| &net.convs[..]).collect();
         convs.push(&layers.trunk);
-        if let Some(Front::Mlp(front)) = &layers.front {
-            convs.push(front);
-        }
+        convs.extend(layers.front.as_deref());
         let hidden = convs.iter().flat_map(|net| &net[..net.len() - 1]).map(Conv::width);
         let pooled = pooled_layers(layers).map(Packed::width);
         Self {
@@ -333,11 +326,7 @@ impl Widths {
 /// The layers whose outputs are pooled.
 fn pooled_layers<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &Packed<T>> {
     let nets = [&layers.stn, &layers.fstn].into_iter().flatten().map(|net| &net.convs[..]);
-    let front = match &layers.front {
-        Some(Front::Mlp(front)) => Some(&front[..]),
-        _ => None,
-    };
-    let nets = nets.chain([&layers.trunk[..]]).chain(front);
+    let nets = nets.chain([&layers.trunk[..]]).chain(layers.front.as_deref());
     nets.filter_map(|net| net.last()).map(Conv::packed)
 }
 

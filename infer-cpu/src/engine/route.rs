@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::{Engine, Pass, read};
 use crate::layers::{Conv, First, Packed, Vector};
-use crate::network::{Front, TNet};
+use crate::network::TNet;
 use crate::precision::Format;
 
 /// A layer of a pass, by where it is kept.
@@ -22,10 +22,7 @@ pub(super) enum Place {
 
 impl<T: Format> Engine<T> {
     pub(super) fn front(&self) -> &[Conv<T>] {
-        match &self.layers.front {
-            Some(Front::Mlp(front)) => front,
-            _ => &[],
-        }
+        self.layers.front.as_deref().unwrap_or_default()
     }
 
     /// The layers of `pass` after its first.

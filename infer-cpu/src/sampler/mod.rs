@@ -2,9 +2,8 @@
 //!
 //! [`Sampler`] covers those that need coordinates alone. A Critical Points
 //! Layer is put together by whoever computes features: the distinct points
-//! ([`CanonicalOrder`]) go through a front end, a network or a [`Lattice`];
-//! [`CriticalPoints`] ranks what wins its maxima, and [`Resize`] makes M of
-//! them.
+//! ([`CanonicalOrder`]) go through a front end; [`CriticalPoints`] ranks what
+//! wins its maxima, and [`Resize`] makes M of them.
 //!
 //! Nothing here allocates once its memory has grown to a cloud's size.
 
@@ -12,7 +11,6 @@ mod canonical;
 mod cpl;
 mod fps;
 mod index_map;
-mod lattice;
 mod random;
 mod resize;
 mod spec;
@@ -27,7 +25,6 @@ use crate::kernel::Kernels;
 pub use canonical::CanonicalOrder;
 pub use cpl::CriticalPoints;
 pub use fps::FarthestPoints;
-pub use lattice::{Lattice, LatticeError};
 pub use random::RandomSubset;
 use spec::MOST_CRITICAL;
 pub use spec::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};

@@ -8,7 +8,6 @@ use formats::split::Split;
 use infer_cpu::sampler::{Resize, Sampler, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, kernel};
 use train::clouds::Clouds;
-use train::evaluate::confusion;
 use train::front::Cpl;
 use train::recipe::{Recipe, Sampling};
 
@@ -55,7 +54,6 @@ pub fn run(shop: &Workshop) -> anyhow::Result<Section> {
             latency(shop, &held)?,
             unique(shop, &held)?,
             resized(shop, &held)?,
-            tabulated(shop, &held)?,
         ],
         ..Section::default()
     })
@@ -222,38 +220,6 @@ fn resized(shop: &Workshop, held: &Clouds) -> anyhow::Result<Table> {
         caption: format!("Instance accuracy by the rule that makes {keep} points of the ranking"),
         rows_are: "front end".to_owned(),
         columns: rules.map(|rule| rule.to_string()).into(),
-        rows,
-    })
-}
-
-/// Accuracy and time of front ends as look-up tables, made of the learnt
-/// layers after training.
-fn tabulated(shop: &Workshop, held: &Clouds) -> anyhow::Result<Table> {
-    const NODES: [Option<usize>; 4] = [None, Some(5), Some(9), Some(17)];
-    let keep = shop.plan.kept[0];
-    let mut rows = Vec::new();
-    for front in &shop.plan.fronts {
-        let name = cpl_name(front, keep);
-        let model = shop.model(&name);
-        let mut cells = Vec::new();
-        for table_nodes in NODES {
-            let options = Options { table_nodes, ..Options::default() };
-            cells.push(Cell::instance(&confusion(&model, held, &options)?));
-            let mut classifier = Classifier::load(&model, &options)?;
-            let ms = median(held, |cloud| Ok(classifier.sample(&wide(cloud))?.len()))?;
-            cells.push(Cell::Number(ms, 3));
-        }
-        rows.push((name, cells));
-    }
-    let heading = |nodes: Option<usize>| match nodes {
-        Some(n) => [format!("table of {n}³"), format!("{n}³, ms")],
-        None => ["layers".to_owned(), "layers, ms".to_owned()],
-    };
-    Ok(Table {
-        id: "4 tabulated".to_owned(),
-        caption: format!("Front ends as trilinear tables, {keep} points"),
-        rows_are: "front end".to_owned(),
-        columns: NODES.into_iter().flat_map(heading).collect(),
         rows,
     })
 }

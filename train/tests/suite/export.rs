@@ -236,9 +236,4 @@ fn points_look_around_among_all_whatever_the_sampler_kept() {
             }
         }
     }
-    // No table of coordinates holds what surrounds a point.
-    let sampler = Some(SamplerSpec { kind: SamplerKind::Cpl, points: 8, ..SamplerSpec::default() });
-    let options = Options { sampler, table_nodes: Some(5), ..Options::default() };
-    let error = Classifier::load(&path, &options).err().unwrap().to_string();
-    assert!(error.contains("a trunk that looks around points"), "{error}");
 }

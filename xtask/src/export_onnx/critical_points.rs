@@ -6,7 +6,6 @@
 //! by x, y, z, have the same ties.
 
 use anyhow::bail;
-use infer_cpu::model_file::Front;
 
 use super::graph::{Graph, int, word};
 use super::pointnet::{Net, Seen, convolutions, pool, transposed, trunk};
@@ -18,7 +17,7 @@ pub const KEPT: &str = "kept";
 /// network sees then. Value [`KEPT`] holds their indices.
 ///
 /// # Errors
-/// A network without a front end, or with a look-up table for one.
+/// A network without a front end.
 pub fn add(graph: &mut Graph, net: &Net, cloud: &str, n_points: usize) -> anyhow::Result<Seen> {
     let (features, is_stn) = front(graph, net, cloud)?;
     let pooled = pool(graph, "cpl.pool", &features);
@@ -34,10 +33,7 @@ pub fn add(graph: &mut Graph, net: &Net, cloud: &str, n_points: usize) -> anyhow
 fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, bool)> {
     let mut entry = || transposed(graph, "cpl.entry", cloud);
     match (&net.front, &net.stn, &net.fstn) {
-        (Some(Front::Table(_)), ..) => {
-            bail!("its front end is a look-up table, which no operator of ONNX interpolates in")
-        }
-        (Some(Front::Mlp(layers)), ..) => {
+        (Some(layers), ..) => {
             let entry = entry();
             Ok((convolutions(graph, layers, &entry, "cpl"), false))
         }

@@ -33,44 +33,33 @@ pub struct Chooser {
     pub name: &'static str,
     kind: SamplerKind,
     front: FrontChoice,
-    table_nodes: Option<usize>,
 }
 
 impl Chooser {
     /// Points drawn at random.
-    pub const RANDOM: Self = Self::by("random", SamplerKind::Random, FrontChoice::Auto, None);
+    pub const RANDOM: Self = Self::by("random", SamplerKind::Random, FrontChoice::Auto);
     /// Farthest point sampling.
-    pub const FPS: Self = Self::by("fps", SamplerKind::Fps, FrontChoice::Auto, None);
+    pub const FPS: Self = Self::by("fps", SamplerKind::Fps, FrontChoice::Auto);
     /// One point a cell of a grid.
-    pub const VOXEL: Self = Self::by("voxel", SamplerKind::Voxel, FrontChoice::Auto, None);
+    pub const VOXEL: Self = Self::by("voxel", SamplerKind::Voxel, FrontChoice::Auto);
     /// Critical points by a front end of the model's own.
-    pub const CPL: Self = Self::by("cpl:own", SamplerKind::Cpl, FrontChoice::Own, None);
-    /// The same by a look-up table of 8 nodes an axis.
-    pub const CPL_TABLE: Self =
-        Self::by("cpl:own:table8", SamplerKind::Cpl, FrontChoice::Own, Some(8));
+    pub const CPL: Self = Self::by("cpl:own", SamplerKind::Cpl, FrontChoice::Own);
     /// Critical points of the trunk of the coordinates' T-Net.
-    pub const CPL_STN: Self = Self::by("cpl:stn", SamplerKind::Cpl, FrontChoice::Stn, None);
+    pub const CPL_STN: Self = Self::by("cpl:stn", SamplerKind::Cpl, FrontChoice::Stn);
     /// Critical points of the network's own trunk.
-    pub const CPL_TRUNK: Self = Self::by("cpl:trunk", SamplerKind::Cpl, FrontChoice::Trunk, None);
+    pub const CPL_TRUNK: Self = Self::by("cpl:trunk", SamplerKind::Cpl, FrontChoice::Trunk);
 
     /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::RANDOM,
-        Self::FPS,
-        Self::VOXEL,
-        Self::CPL,
-        Self::CPL_TABLE,
-        Self::CPL_STN,
-        Self::CPL_TRUNK,
-    ];
+    pub const ALL: [Self; 6] =
+        [Self::RANDOM, Self::FPS, Self::VOXEL, Self::CPL, Self::CPL_STN, Self::CPL_TRUNK];
 
-    const fn by(
-        name: &'static str,
-        kind: SamplerKind,
-        front: FrontChoice,
-        table_nodes: Option<usize>,
-    ) -> Self {
-        Self { name, kind, front, table_nodes }
+    const fn by(name: &'static str, kind: SamplerKind, front: FrontChoice) -> Self {
+        Self { name, kind, front }
+    }
+
+    /// The one that a row names so.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|chooser| chooser.name == name)
     }
 
     /// The first of its kind.
@@ -166,14 +155,13 @@ impl TestSet {
 
 impl Classifying {
     fn options(&self, capacity: usize) -> Options {
-        let Chooser { kind, front, table_nodes, .. } = self.sampler;
+        let Chooser { kind, front, .. } = self.sampler;
         let sampler = SamplerSpec { kind, front, points: self.points, ..SamplerSpec::default() };
         Options {
             precision: self.precision,
             threads: self.threads,
             t_nets: self.t_nets,
             sampler: Some(sampler),
-            table_nodes,
             capacity,
             ..Options::default()
         }

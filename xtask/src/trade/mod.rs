@@ -8,7 +8,7 @@
 //! `cargo xtask advise` reads the same file.
 
 mod casters;
-mod classes;
+pub mod classes;
 mod classifiers;
 mod energy;
 pub mod front;

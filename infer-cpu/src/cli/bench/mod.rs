@@ -1,14 +1,10 @@
-//! `infer-cpu bench`: how fast this machine is, and what each shortcut costs.
+//! `infer-cpu bench`: how fast this machine is.
 
 mod grid;
 mod latency;
 mod machine;
-#[cfg(feature = "trade")]
-mod plot;
 mod statistics;
 mod table;
-#[cfg(feature = "trade")]
-mod trade;
 mod variant;
 
 use std::collections::BTreeMap;
@@ -26,12 +22,10 @@ use variant::Variant;
 Examples:
   infer-cpu bench --json > pi5.json
   infer-cpu bench --points 64,1024 --precision f32,f16 --threads 1,4
-  infer-cpu bench --trade --data test.npz --csv trade.csv --svg trade.svg
 
 Latency is that of a whole classification, from coordinates to class. A sampler
 is a name, perhaps with more behind colons: `fps`, `cpl`, `cpl:stn`,
-`cpl:trunk`, `cpl:table8` (a look-up table of 8 nodes an axis), `random:votes5`,
-`random:votes5:turned`.")]
+`cpl:trunk`, `random:votes5`, `random:votes5:turned`.")]
 pub struct Args {
     /// Model file [default: the bundled weights]
     #[arg(long, value_name = "FILE")]
@@ -72,40 +66,14 @@ pub struct Args {
     repeats: u32,
 
     /// Print one JSON object with all samples instead of a table
-    #[cfg_attr(feature = "trade", arg(long, conflicts_with = "trade"))]
-    #[cfg_attr(not(feature = "trade"), arg(long))]
+    #[arg(long)]
     json: bool,
-
-    #[cfg(feature = "trade")]
-    /// Measure accuracy beside latency, on the labelled clouds of --data
-    #[arg(long, requires = "data")]
-    trade: bool,
-
-    #[cfg(feature = "trade")]
-    /// Labelled clouds: a packed NPZ
-    #[arg(long, value_name = "NPZ", requires = "trade")]
-    data: Option<PathBuf>,
-
-    #[cfg(feature = "trade")]
-    /// Take every cloud of --data, or this many spread over it
-    #[arg(long, value_name = "N", requires = "trade")]
-    limit: Option<std::num::NonZeroUsize>,
 
     #[cfg(feature = "npz")]
     /// Clouds to calibrate int8 with, a packed NPZ [default: the model's own
     /// calibration, else shapes made by rule]
     #[arg(long, value_name = "NPZ")]
     calibrate: Option<PathBuf>,
-
-    #[cfg(feature = "trade")]
-    /// Write the trade's rows to this file
-    #[arg(long, value_name = "FILE", requires = "trade")]
-    csv: Option<PathBuf>,
-
-    #[cfg(feature = "trade")]
-    /// Draw the trade into this file
-    #[arg(long, value_name = "FILE", requires = "trade")]
-    svg: Option<PathBuf>,
 }
 
 /// The largest activations on the clouds of `--calibrate`: none can be read.
@@ -130,9 +98,5 @@ fn at_least_one(word: &str) -> Result<usize, String> {
 /// # Errors
 /// A model or a set that cannot be read, a file that cannot be written.
 pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
-    #[cfg(feature = "trade")]
-    if args.trade {
-        return trade::run(args, model);
-    }
     latency::run(args, model)
 }

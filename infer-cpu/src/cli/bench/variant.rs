@@ -13,7 +13,6 @@ pub struct Variant {
     kind: SamplerKind,
     front: FrontChoice,
     resize: Resize,
-    table_nodes: Option<usize>,
     votes: u32,
     rotations: bool,
 }
@@ -33,7 +32,6 @@ impl Variant {
             resize: self.resize,
             ..SamplerSpec::default()
         });
-        options.table_nodes = self.table_nodes;
         options.votes = self.votes;
         options.vote_rotations = self.rotations;
     }
@@ -52,7 +50,6 @@ impl FromStr for Variant {
             kind,
             front: FrontChoice::Auto,
             resize: Resize::default(),
-            table_nodes: None,
             votes: 1,
             rotations: false,
         };
@@ -61,8 +58,6 @@ impl FromStr for Variant {
                 variant.front = front;
             } else if let Ok(resize) = word.parse() {
                 variant.resize = resize;
-            } else if let Some(nodes) = number_after(word, "table") {
-                variant.table_nodes = Some(nodes);
             } else if let Some(votes) = number_after(word, "votes") {
                 variant.votes = u32::try_from(votes).unwrap_or(u32::MAX);
             } else if word == "turned" {
@@ -70,7 +65,7 @@ impl FromStr for Variant {
             } else {
                 return Err(format!(
                     "`{word}` says nothing of a sampler; a front end, a rule of resizing, \
-                     tableN, votesN or turned does"
+                     votesN or turned does"
                 ));
             }
         }
@@ -94,11 +89,10 @@ mod tests {
 
     #[test]
     fn a_variant_says_what_follows_the_sampler() {
-        let variant: Variant = "cpl:stn:truncate:table8".parse().unwrap();
+        let variant: Variant = "cpl:stn:truncate".parse().unwrap();
         assert_eq!(variant.kind, SamplerKind::Cpl);
         assert_eq!(variant.front, FrontChoice::Stn);
         assert_eq!(variant.resize, Resize::Truncate);
-        assert_eq!(variant.table_nodes, Some(8));
         let variant: Variant = "random:votes5:turned".parse().unwrap();
         assert_eq!((variant.votes, variant.rotations), (5, true));
         assert!("fps:votes".parse::<Variant>().unwrap_err().contains("`votes` says nothing"));
