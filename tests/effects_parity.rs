@@ -16,6 +16,7 @@ use sim_gpu::pose::Pose;
 use sim_gpu::ray::{AMBIGUOUS, MISS, RayFrame};
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
+use test_support::need;
 use tests::adapter::{adapter, casters};
 use tests::casting::{at, beams, builtin, hits_with, job, target};
 use tests::meshes::{cube, icosphere, soup, torus};
@@ -73,7 +74,7 @@ fn range_noise_is_the_twins() {
         noise(NoiseModel::Range, 5.0, 1e3),
     ] {
         let effects = Effects { noise: Some(noise), ..Effects::default() };
-        let Some(gpu) = adapter(&effects) else { return };
+        let gpu = need!(adapter(&effects));
         for stream in streams() {
             let job = all_hit(stream, &pattern);
             let cast = words(gpu, &job);
@@ -90,7 +91,7 @@ fn point_noise_is_the_twins() {
     let pattern = builtin("vlp32c");
     for noise in [noise(NoiseModel::Xyz, 0.0, 1.0), noise(NoiseModel::Xyz, 0.25, 0.02)] {
         let effects = Effects { noise: Some(noise), ..Effects::default() };
-        let Some(gpu) = adapter(&effects) else { return };
+        let gpu = need!(adapter(&effects));
         for stream in streams() {
             let job = all_hit(stream, &pattern);
             let cast = words(gpu, &job);

@@ -8,7 +8,8 @@ use sim_gpu::mesh::census::survey;
 use sim_gpu::mesh::frame::{Normalize, to_world};
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::mesh::{LoadedMesh, load};
-use tests::shared_data::{shared, unpacked};
+use test_support::{need, shared_data};
+use tests::shared_data::unpacked;
 
 fn load_all(root: &Path) -> Vec<(MeshEntry, LoadedMesh)> {
     let entries = discover(root, 0).expect("the shared data can be listed");
@@ -33,7 +34,7 @@ fn check(entry: &MeshEntry, loaded: &LoadedMesh) {
 
 #[test]
 fn modelnet_is_read_in_full_and_keeps_its_splits() {
-    let Some(root) = shared("meshes/modelnet") else { return };
+    let root = need!(shared_data("meshes/modelnet"));
     let meshes = load_all(&root);
     assert_eq!(meshes.len(), 13);
     for (entry, loaded) in &meshes {
@@ -54,8 +55,11 @@ fn modelnet_is_read_in_full_and_keeps_its_splits() {
 
 #[test]
 fn princeton_meshes_are_read_in_full() {
-    for (folder, n_meshes) in [("meshes/psb_infomr", 148), ("meshes/psb_segbench", 12)] {
-        let Some(root) = shared(folder) else { continue };
+    let folders = [("meshes/psb_infomr", 148), ("meshes/psb_segbench", 12)];
+    let roots = need!(
+        folders.map(|(folder, _)| shared_data(folder)).into_iter().collect::<Result<Vec<_>, _>>()
+    );
+    for ((_, n_meshes), root) in folders.into_iter().zip(roots) {
         let meshes = load_all(&root);
         assert_eq!(meshes.len(), n_meshes);
         for (entry, loaded) in &meshes {
@@ -67,7 +71,7 @@ fn princeton_meshes_are_read_in_full() {
 
 #[test]
 fn the_720_obj_meshes_are_read_in_full() {
-    let Some(folder) = unpacked("meshes20/meshes20.tar.xz") else { return };
+    let folder = need!(unpacked("meshes20/meshes20.tar.xz"));
     let meshes = load_all(folder.path());
     assert_eq!(meshes.len(), 720);
     for (entry, loaded) in &meshes {
@@ -80,7 +84,7 @@ fn the_720_obj_meshes_are_read_in_full() {
 /// differ.
 #[test]
 fn the_time_to_read_modelnet_is_shown() {
-    let Some(root) = shared("meshes/modelnet") else { return };
+    let root = need!(shared_data("meshes/modelnet"));
     for entry in discover(&root, 0).unwrap() {
         let (mut reading, mut surveying, mut placing) =
             (Duration::MAX, Duration::MAX, Duration::MAX);

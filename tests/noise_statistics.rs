@@ -12,6 +12,7 @@ use sim_gpu::cpu::effects::stream::{normal_deviate, stream_words};
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::ray::RayFrame;
+use test_support::need;
 use tests::adapter::adapter;
 use tests::casting::{at, beams, target};
 use tests::meshes::cube;
@@ -189,7 +190,7 @@ fn deviates_of_different_things_do_not_correlate() {
 fn a_million_deviates_of_the_adapter_are_normal() {
     let noise = Noise { mean_m: 0.0, sigma_m: 1.0, model: NoiseModel::Range };
     let effects = Effects { noise: Some(noise), ..Effects::default() };
-    let Some(gpu) = adapter(&effects) else { return };
+    let gpu = need!(adapter(&effects));
     let mut random = Random::new("directions");
     let pattern = beams((0..1_000_000).map(|_| random.direction()));
     let target = target(&cube());

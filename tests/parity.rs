@@ -13,6 +13,7 @@ use sim_gpu::pose::Pose;
 use sim_gpu::ray::AMBIGUOUS;
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
+use test_support::need;
 use tests::adapter::{adapter, casters};
 use tests::casting::{at, beams, builtin, hits, job, job_with, target, target_by};
 use tests::judge::{SILHOUETTE_RAD, Verdict, judge, near_edge};
@@ -111,7 +112,7 @@ fn beams_aimed_at_sharp_edges_keep_the_promise() {
 #[test]
 fn the_adapter_names_the_triangles_of_its_twin() {
     let plain = Effects::default();
-    let Some(gpu) = adapter(&plain) else { return };
+    let gpu = need!(adapter(&plain));
     let cpu = casters(&plain)[0];
     let (mut rays, mut differing) = (0, 0);
     for_all_jobs(|name, target, pose, pattern| {

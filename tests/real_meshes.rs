@@ -12,10 +12,11 @@ use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::pose::Pose;
 use sim_gpu::resolve::resolve;
 use sim_gpu::sensor::BeamPattern;
+use test_support::{need, shared_data};
 use tests::adapter::casters;
 use tests::casting::{builtin, job, target};
 use tests::judge::{Verdict, judge};
-use tests::shared_data::{shared, unpacked};
+use tests::shared_data::unpacked;
 
 /// What a folder of meshes showed on one caster.
 #[derive(Default)]
@@ -91,22 +92,20 @@ impl Tally {
 
 #[test]
 fn modelnet_agrees_with_the_oracle() {
-    if let Some(root) = shared("meshes/modelnet") {
+    survey_folder(&need!(shared_data("meshes/modelnet")), 1);
+}
+
+#[test]
+fn princeton_agrees_with_the_oracle() {
+    let infomr = need!(shared_data("meshes/psb_infomr"));
+    let segbench = need!(shared_data("meshes/psb_segbench"));
+    for root in [infomr, segbench] {
         survey_folder(&root, 1);
     }
 }
 
 #[test]
-fn princeton_agrees_with_the_oracle() {
-    for folder in ["meshes/psb_infomr", "meshes/psb_segbench"] {
-        if let Some(root) = shared(folder) {
-            survey_folder(&root, 1);
-        }
-    }
-}
-
-#[test]
 fn a_sample_of_twenty_classes_agrees_with_the_oracle() {
-    let Some(folder) = unpacked("meshes20/meshes20.tar.xz") else { return };
+    let folder = need!(unpacked("meshes20/meshes20.tar.xz"));
     survey_folder(folder.path(), 12);
 }

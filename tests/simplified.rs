@@ -23,8 +23,9 @@ use sim_gpu::sensor::{Sensor, Views};
 use sim_gpu::simplify::{Watcher, distance_to_surface, resolved_m, simplified};
 use sim_gpu::surface_points::area_uniform;
 use sim_gpu::target::Target;
+use test_support::{need, shared_data};
 use tests::casting::{builtin, job, target};
-use tests::shared_data::{shared, unpacked};
+use tests::shared_data::unpacked;
 use tests::{meshes, random};
 
 /// Distances are sums of a few coordinates of order 1 m, each rounded to f64.
@@ -159,23 +160,21 @@ fn the_meshes_that_ship_keep_the_bound() {
 
 #[test]
 fn modelnet_keeps_the_bound() {
-    if let Some(root) = shared("meshes/modelnet") {
-        hold_to_the_bound(&root, 1);
-    }
+    hold_to_the_bound(&need!(shared_data("meshes/modelnet")), 1);
 }
 
 #[test]
 fn princeton_keeps_the_bound() {
-    for folder in ["meshes/psb_infomr", "meshes/psb_segbench"] {
-        if let Some(root) = shared(folder) {
-            hold_to_the_bound(&root, 2);
-        }
+    let infomr = need!(shared_data("meshes/psb_infomr"));
+    let segbench = need!(shared_data("meshes/psb_segbench"));
+    for root in [infomr, segbench] {
+        hold_to_the_bound(&root, 2);
     }
 }
 
 #[test]
 fn a_sample_of_twenty_classes_keeps_the_bound() {
-    let Some(folder) = unpacked("meshes20/meshes20.tar.xz") else { return };
+    let folder = need!(unpacked("meshes20/meshes20.tar.xz"));
     hold_to_the_bound(folder.path(), 12);
 }
 

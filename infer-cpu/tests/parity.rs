@@ -9,11 +9,11 @@ use formats::model_card::Normalization;
 use formats::weights::WeightsFile;
 use infer_cpu::kernel;
 use infer_cpu::{Classifier, Options, Precision};
-use support::shared_data;
+use test_support::{need, shared_data};
 
 #[test]
 fn the_baseline_gives_pytorch_s_log_probabilities() {
-    let Some(folder) = shared_data("parity") else { return };
+    let folder = need!(shared_data("parity"));
     let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();
     for kernel in kernel::available().map(|kernels| kernels.name) {
         for threads in [1, 2, 3] {
@@ -41,7 +41,7 @@ fn the_baseline_gives_pytorch_s_log_probabilities() {
 
 #[test]
 fn cheaper_precisions_stay_near() {
-    let Some(folder) = shared_data("parity") else { return };
+    let folder = need!(shared_data("parity"));
     let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();
     for precision in [Precision::F32Fc16, Precision::F16, Precision::I8] {
         let options =

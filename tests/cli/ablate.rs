@@ -4,6 +4,7 @@ use crate::{exits, said, xtask};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Output;
+use test_support::need;
 
 const PLAN: &str = r#"
 about = "a test"
@@ -28,9 +29,12 @@ head = [12]
 "#;
 
 /// The program `train` beside ours: there whenever all tests are built.
-fn train() -> Option<PathBuf> {
+fn train() -> Result<PathBuf, String> {
     let name = format!("train{}", std::env::consts::EXE_SUFFIX);
-    Some(Path::new(env!("CARGO_BIN_EXE_xtask")).with_file_name(name)).filter(|path| path.is_file())
+    let path = Path::new(env!("CARGO_BIN_EXE_xtask")).with_file_name(name);
+    let missing =
+        "the program `train` is not built beside xtask: build the whole workspace's tests";
+    if path.is_file() { Ok(path) } else { Err(missing.to_owned()) }
 }
 
 fn ablate(folder: &Path, train: &Path) -> Output {
@@ -56,10 +60,7 @@ fn timeless(file: &Path) -> Vec<BTreeMap<String, String>> {
 
 #[test]
 fn every_effect_has_its_lines_and_an_interrupted_run_goes_on() {
-    let Some(train) = train() else {
-        eprintln!("SKIPPED: no program `train` is built beside xtask; build the workspace's tests");
-        return;
-    };
+    let train = need!(train());
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("plan.toml"), PLAN).unwrap();

@@ -6,7 +6,7 @@ use formats::weights::{Tensor, WeightsFile};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use tests::shared_data::shared;
+use test_support::{need, shared_data};
 
 type Tensors = BTreeMap<String, Tensor>;
 
@@ -267,7 +267,7 @@ fn bad_tables_and_class_lists_are_named() {
 
 #[test]
 fn an_imported_baseline_equals_the_same_weights_saved_as_safetensors() {
-    let Some(checkpoint) = shared("parity/pointnet.pth") else { return };
+    let checkpoint = need!(shared_data("parity/pointnet.pth"));
     let folder = tempfile::tempdir().unwrap();
     import(folder.path(), &checkpoint, "");
     let (imported, card) = read(&folder.path().join("m.safetensors"));
@@ -280,7 +280,7 @@ fn an_imported_baseline_equals_the_same_weights_saved_as_safetensors() {
 
 #[test]
 fn weights_that_others_trained_without_t_nets_come_whole() {
-    let Some(checkpoint) = shared("checkpoints/3dcertify_64p_natural.pth") else { return };
+    let checkpoint = need!(shared_data("checkpoints/3dcertify_64p_natural.pth"));
     let folder = tempfile::tempdir().unwrap();
     import(folder.path(), &checkpoint, "");
     let (tensors, card) = read(&folder.path().join("m.safetensors"));

@@ -8,14 +8,14 @@ use infer_cpu::sampler::{FpsStart, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options, Precision};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
-use tests::shared_data::shared;
+use test_support::{need, shared_data};
 
 /// The clouds that references are of, and a checkpoint imported into `folder`.
-fn imported(folder: &Path, checkpoint: &str) -> Option<(LabelledSet, PathBuf)> {
-    let checkpoint = shared(&format!("checkpoints/{checkpoint}.pth"))?;
-    let clouds = shared("modelnet40-clouds/dev.npz")?;
+fn imported(folder: &Path, checkpoint: &str) -> Result<(LabelledSet, PathBuf), String> {
+    let checkpoint = shared_data(&format!("checkpoints/{checkpoint}.pth"))?;
+    let clouds = shared_data("modelnet40-clouds/dev.npz")?;
     succeeds(folder, &format!("import-weights {} --out m.safetensors", checkpoint.display()));
-    Some((read_labelled(&clouds).unwrap(), folder.join("m.safetensors")))
+    Ok((read_labelled(&clouds).unwrap(), folder.join("m.safetensors")))
 }
 
 /// 64 points from the first by farthest point sampling, as that network was
@@ -23,8 +23,8 @@ fn imported(folder: &Path, checkpoint: &str) -> Option<(LabelledSet, PathBuf)> {
 #[test]
 fn the_network_of_3dcertify_gives_its_reference_logits_and_accuracy() {
     let folder = tempfile::tempdir().unwrap();
-    let Some((set, model)) = imported(folder.path(), "3dcertify_64p_natural") else { return };
-    let Some(reference) = shared("reference/3dcertify_64p/logits_fps64.npy") else { return };
+    let (set, model) = need!(imported(folder.path(), "3dcertify_64p_natural"));
+    let reference = need!(shared_data("reference/3dcertify_64p/logits_fps64.npy"));
     let reference: Array2<f32> = ndarray_npy::read_npy(reference).unwrap();
     let sampler = SamplerSpec {
         kind: SamplerKind::Fps,
@@ -55,8 +55,8 @@ fn the_network_of_3dcertify_gives_its_reference_logits_and_accuracy() {
 #[test]
 fn the_baseline_s_network_gives_its_reference_log_probabilities() {
     let folder = tempfile::tempdir().unwrap();
-    let Some((set, model)) = imported(folder.path(), "pointnet_cls_modelnet40") else { return };
-    let Some(reference) = shared("reference/pointnet_cls/logp_1024.npy") else { return };
+    let (set, model) = need!(imported(folder.path(), "pointnet_cls_modelnet40"));
+    let reference = need!(shared_data("reference/pointnet_cls/logp_1024.npy"));
     let reference: Array2<f32> = ndarray_npy::read_npy(reference).unwrap();
     let options = Options { normalization: Some(Normalization::None), ..Options::default() };
     let mut classifier = Classifier::load(&model, &options).unwrap();
@@ -75,7 +75,7 @@ fn the_baseline_s_network_gives_its_reference_log_probabilities() {
 #[test]
 fn cheaper_precisions_agree_with_fp32_on_trained_weights() {
     let folder = tempfile::tempdir().unwrap();
-    let Some((set, model)) = imported(folder.path(), "3dcertify_64p_natural") else { return };
+    let (set, model) = need!(imported(folder.path(), "3dcertify_64p_natural"));
     let classes = |precision| {
         let options = Options { precision, ..Options::default() };
         let mut classifier = Classifier::load(&model, &options).unwrap();

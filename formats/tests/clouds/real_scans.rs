@@ -5,16 +5,7 @@ use std::path::{Path, PathBuf};
 
 use formats::cloud_file::read_cloud;
 use formats::labelled::read_labelled;
-
-/// A path below `../shared/data`; where it is absent, a line says that the
-/// test skips.
-fn shared(relative: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(relative);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-    }
-    path.exists().then_some(path)
-}
+use test_support::{need, shared_data};
 
 /// Every file below `folder` with one of `extensions`.
 fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
@@ -38,7 +29,7 @@ fn reach_m(points: &[[f64; 3]]) -> f64 {
 
 #[test]
 fn scans_of_cars_have_their_points() {
-    let Some(folder) = shared("real_scans") else { return };
+    let folder = need!(shared_data("real_scans"));
     for (name, n) in [
         ("kitti_hdl64e_000000.f32x4.bin", 115_384),
         ("kitti_hdl64e_000008_camfov.f32x4.bin", 17_238),
@@ -57,7 +48,7 @@ fn scans_of_cars_have_their_points() {
 
 #[test]
 fn sampled_models_have_their_points() {
-    let Some(folder) = shared("points") else { return };
+    let folder = need!(shared_data("points"));
     for (below, extension, n_files, n) in [
         ("paper_instances", "npy", 9, 1024),
         ("normal_resampled_txt", "txt", 5, 10_000),
@@ -75,13 +66,13 @@ fn sampled_models_have_their_points() {
 
 #[test]
 fn the_first_line_of_a_sampled_model_is_its_first_point() {
-    let Some(path) = shared("points/normal_resampled_txt/airplane_0655.txt") else { return };
+    let path = need!(shared_data("points/normal_resampled_txt/airplane_0655.txt"));
     assert_eq!(read_cloud(&path).unwrap()[0], [0.081_140, -0.105_800, 0.299_000]);
 }
 
 #[test]
 fn labelled_models_fill_the_unit_sphere() {
-    let Some(path) = shared("modelnet40-clouds/dev.npz") else { return };
+    let path = need!(shared_data("modelnet40-clouds/dev.npz"));
     let set = read_labelled(&path).unwrap();
     assert_eq!((set.len(), set.n_points), (1234, 1024));
     let (names, classes) = (set.names.clone().unwrap(), set.classes.clone().unwrap());

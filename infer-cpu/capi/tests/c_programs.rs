@@ -11,6 +11,7 @@ use std::process::{Command, Output};
 
 use infer_cpu::{Classifier, Options};
 use support::Compiler;
+use test_support::need;
 
 /// Long in y, and no longer anywhere without its last line.
 const CLOUD: &str = "0 0 0\n0.5 0.25 0.125\n0.1 0.75 0.2\n\n  1e-1\t0.9 .3\n";
@@ -25,7 +26,7 @@ fn text(bytes: &[u8]) -> &str {
 
 #[test]
 fn the_example_gives_what_the_rust_library_gives() {
-    let Some(compiler) = Compiler::c() else { return };
+    let compiler = need!(Compiler::c());
     let example = compiler.compile("examples/classify.c", &support::static_link());
     let model = compiler.folder().join("model.safetensors");
     support::write_longest_axis_model(&model);
@@ -53,7 +54,7 @@ fn the_example_gives_what_the_rust_library_gives() {
 
 #[test]
 fn the_example_says_what_is_wrong() {
-    let Some(compiler) = Compiler::c() else { return };
+    let compiler = need!(Compiler::c());
     let example = compiler.compile("examples/classify.c", &support::static_link());
     let model = compiler.folder().join("model.safetensors");
     support::write_longest_axis_model(&model);
@@ -76,7 +77,7 @@ fn the_example_says_what_is_wrong() {
 
 #[test]
 fn the_header_s_promises_hold_in_c() {
-    let Some(compiler) = Compiler::c() else { return };
+    let compiler = need!(Compiler::c());
     let model = compiler.folder().join("model.safetensors");
     support::write_longest_axis_model(&model);
     for link in [support::static_link(), support::dynamic_link()] {
@@ -89,7 +90,7 @@ fn the_header_s_promises_hold_in_c() {
 
 #[test]
 fn the_header_is_c_plus_plus_too() {
-    let Some(compiler) = Compiler::c_plus_plus() else { return };
+    let compiler = need!(Compiler::c_plus_plus());
     let program = compiler.compile("tests/c/version.cpp", &support::static_link());
     assert!(run(&program, &[]).status.success());
 }

@@ -3,7 +3,7 @@
 //! tile and on values at every extreme.
 //!
 //! [`suite`] makes the tests of one file of kernels; `declare_kernels` calls
-//! it. A machine without the instructions says so and passes.
+//! it. A machine without the instructions skips them.
 
 use formats::rng::StreamKey;
 use half::f16;
@@ -515,23 +515,26 @@ pub fn fps_is_the_reference(kernels: &Kernels) {
     }
 }
 
+/// Products that a set of kernels may leave to another set.
+pub fn products<G>(gemm: Option<&G>) -> Result<&G, String> {
+    gemm.ok_or_else(|| "this set of kernels leaves these products to another".to_owned())
+}
+
 /// The tests of the kernels that `$kernels()` gives.
 macro_rules! suite {
     ($kernels:path) => {
+        use test_support::need;
         use $crate::kernel::suite as must;
 
-        /// The kernels, or a message that this machine cannot run them.
-        fn here() -> Option<&'static $crate::kernel::Kernels> {
-            let kernels = $kernels();
-            if kernels.is_none() {
-                eprintln!("skipped: this machine lacks the instructions of {}", module_path!());
-            }
-            kernels
+        /// The kernels; an error if this machine cannot run them.
+        fn here() -> Result<&'static $crate::kernel::Kernels, String> {
+            let lack = concat!("this machine lacks the instructions of ", module_path!());
+            $kernels().ok_or_else(|| lack.to_owned())
         }
 
         #[test]
         fn f32_products() {
-            let Some(gemm) = here().and_then(|kernels| kernels.f32.as_ref()) else { return };
+            let gemm = need!(must::products(need!(here()).f32.as_ref()));
             must::float_rows_are_near_exact(gemm);
             must::float_rows_are_finished(gemm);
             must::float_maxima_are_those_of_the_rows(gemm);
@@ -540,7 +543,7 @@ macro_rules! suite {
 
         #[test]
         fn f16_products() {
-            let Some(gemm) = here().and_then(|kernels| kernels.f16.as_ref()) else { return };
+            let gemm = need!(must::products(need!(here()).f16.as_ref()));
             must::float_rows_are_near_exact(gemm);
             must::float_rows_are_finished(gemm);
             must::float_maxima_are_those_of_the_rows(gemm);
@@ -549,13 +552,13 @@ macro_rules! suite {
 
         #[test]
         fn i8_products() {
-            let Some(gemm) = here().and_then(|kernels| kernels.i8.as_ref()) else { return };
+            let gemm = need!(must::products(need!(here()).i8.as_ref()));
             must::integers_are_exact(gemm);
         }
 
         #[test]
         fn vectors() {
-            let Some(kernels) = here() else { return };
+            let kernels = need!(here());
             must::gemv_is_near_exact(kernels);
             must::narrowing_is_the_reference(kernels);
             must::fps_is_the_reference(kernels);
@@ -563,7 +566,7 @@ macro_rules! suite {
 
         #[test]
         fn screening() {
-            let Some(kernels) = here() else { return };
+            let kernels = need!(here());
             must::levels_are_the_reference(kernels);
             must::sifting_is_the_reference(kernels);
             must::dots_are_near_exact(kernels);

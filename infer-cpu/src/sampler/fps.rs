@@ -132,6 +132,8 @@ fn power_that_halves(largest: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use test_support::need;
+
     use super::super::testing::{any_cloud, extremes, gather, shared_array, shuffled, uniform};
     use super::*;
     use crate::kernel::{KernelName, available};
@@ -150,9 +152,8 @@ mod tests {
     fn indices_are_those_of_numpy() {
         const N: usize = 1024;
         const M: usize = 64;
-        let clouds = shared_array("modelnet40-clouds/dev.npz", "<i2");
-        let expected = shared_array("reference/3dcertify_64p/fps64_idx.npy", "<u2");
-        let (Some(clouds), Some(expected)) = (clouds, expected) else { return };
+        let clouds = need!(shared_array("modelnet40-clouds/dev.npz", "<i2"));
+        let expected = need!(shared_array("reference/3dcertify_64p/fps64_idx.npy", "<u2"));
         let expected = expected.as_chunks::<2>().0;
         assert_eq!(expected.len(), 1234 * M);
 

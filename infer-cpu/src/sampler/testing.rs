@@ -1,7 +1,5 @@
 //! Clouds for the tests of samplers.
 
-use std::path::Path;
-
 use formats::rng::StreamKey;
 use proptest::prelude::*;
 
@@ -63,18 +61,14 @@ pub fn extremes() -> Vec<(&'static str, Vec<[f32; 3]>, usize)> {
 }
 
 /// What follows the header of the first NumPy array in the file at `relative`
-/// below `../shared/data`, an array or an uncompressed archive of some. Where
-/// it is absent, a line says that the test skips.
-pub fn shared_array(relative: &str, descr: &str) -> Option<Vec<u8>> {
+/// below `../shared/data`, an array or an uncompressed archive of some; an
+/// error where it is absent.
+pub fn shared_array(relative: &str, descr: &str) -> Result<Vec<u8>, String> {
     const MAGIC: &[u8] = b"\x93NUMPY\x01\0";
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(relative);
-    let Ok(bytes) = std::fs::read(&path) else {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    };
+    let bytes = std::fs::read(test_support::shared_data(relative)?).unwrap();
     let array = bytes.windows(MAGIC.len()).position(|window| window == MAGIC).unwrap();
     let (length, header) = bytes[array + MAGIC.len()..].split_first_chunk().unwrap();
     let (header, data) = header.split_at(u16::from_le_bytes(*length).into());
     assert!(String::from_utf8_lossy(header).contains(&format!("'descr': '{descr}'")));
-    Some(data.to_vec())
+    Ok(data.to_vec())
 }

@@ -1,17 +1,15 @@
 use formats::rng::StreamKey;
+use test_support::need;
 
 use super::*;
 use crate::kernel::available;
 
 const ROWS: usize = 48;
 
-/// Kernels that screen, or a message that this machine has none.
-fn screening_kernels() -> Option<&'static Kernels> {
+/// Kernels that screen; an error if this machine has none.
+fn screening_kernels() -> Result<&'static Kernels, String> {
     let found = available().find(|kernels| kernels.screens);
-    if found.is_none() {
-        eprintln!("skipped: no kernels of this machine screen");
-    }
-    found
+    found.ok_or_else(|| "this machine runs no kernels that screen".to_owned())
 }
 
 /// A layer and the activations of some blocks before it, of a kind each.
@@ -125,7 +123,7 @@ fn bound(sum: f64) -> f64 {
 
 #[test]
 fn maxima_are_those_of_all_products() {
-    let Some(kernels) = screening_kernels() else { return };
+    let kernels = need!(screening_kernels());
     for kind in KINDS {
         let case = case(kind);
         let Some((maxima, winners)) = pool(&case, kernels, true) else {
@@ -151,7 +149,7 @@ fn maxima_are_those_of_all_products() {
 
 #[test]
 fn what_a_relu_cuts_is_not_looked_for() {
-    let Some(kernels) = screening_kernels() else { return };
+    let kernels = need!(screening_kernels());
     let mut case = case("ordinary");
     case.layer.bias.iter_mut().step_by(2).for_each(|bias| *bias = -1e4);
     let (maxima, _) = pool(&case, kernels, false).unwrap();
@@ -166,7 +164,7 @@ fn what_a_relu_cuts_is_not_looked_for() {
 
 #[test]
 fn of_equal_rows_the_first_wins() {
-    let Some(kernels) = screening_kernels() else { return };
+    let kernels = need!(screening_kernels());
     let mut case = case("ordinary");
     let (_, before) = pool(&case, kernels, true).unwrap();
     // Every winner again, in rows after it.
@@ -180,7 +178,7 @@ fn of_equal_rows_the_first_wins() {
 /// Of each channel's products, most must be ruled out, or screening is no gain.
 #[test]
 fn few_products_are_left() {
-    let Some(kernels) = screening_kernels() else { return };
+    let kernels = need!(screening_kernels());
     let case = case("ordinary");
     let screen = Screen::new(&case.layer, kernels).unwrap();
     let mut sieve = Sieve::new(ROWS);
@@ -199,7 +197,7 @@ fn few_products_are_left() {
 
 #[test]
 fn levels_are_refused_where_they_mean_nothing() {
-    let Some(kernels) = screening_kernels() else { return };
+    let kernels = need!(screening_kernels());
     let mut levels = Levels::with_room(STRIDE);
     let mut takes = |value: f32| {
         let mut row = [0.0; STRIDE];

@@ -1,6 +1,6 @@
 //! `inspect`: what a model holds and costs.
 
-use std::path::Path;
+use test_support::{need, shared_data};
 
 use crate::program::Folder;
 
@@ -38,12 +38,7 @@ fn a_model_is_shown_layer_by_layer() {
 /// The baseline's figures as its authors' code has them.
 #[test]
 fn the_baseline_costs_what_it_is_known_to() {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/parity");
-    let model = shared.join("pointnet.safetensors");
-    if !model.exists() {
-        eprintln!("skipped: {} is not there", model.display());
-        return;
-    }
+    let model = need!(shared_data("parity/pointnet.safetensors"));
     let folder = Folder::new();
     let json = &folder.run(&format!("inspect --json {}", model.display())).json()[0];
     assert_eq!(json["macs_per_point"], 426_377);

@@ -286,22 +286,18 @@ mod tests {
     use crate::target::{Surface, Target};
     use formats::rng::StreamKey;
     use glam::{DAffine3, DVec3};
+    use test_support::need;
 
-    /// A caster of all effects, or one line if there is no adapter.
-    fn caster() -> Option<GpuCaster> {
+    /// A caster of all effects; an error if there is no adapter.
+    fn caster() -> Result<GpuCaster, String> {
         let effects = Effects {
             noise: Some(Noise { mean_m: 0.0, sigma_m: 1.0, model: NoiseModel::Xyz }),
             dropout: Some(Dropout { probability: 0.5 }),
             intensity: Some(Intensity),
             quantum: None,
         };
-        let required = std::env::var("EDGEPUCK_REQUIRE_ADAPTER").is_ok_and(|value| value == "1");
-        let best = adapter::adapters().into_iter().next();
-        assert!(best.is_some() || !required, "there is no adapter");
-        if best.is_none() {
-            println!("the GPU half did not run: there is no adapter");
-        }
-        best.map(|adapter| GpuCaster::open(&adapter, &effects).unwrap())
+        let best = test_support::adapter(adapter::adapters().into_iter().next())?;
+        Ok(GpuCaster::open(&best, &effects).unwrap())
     }
 
     /// Pyramids of different sizes, each from its own side.
@@ -324,7 +320,7 @@ mod tests {
 
     #[test]
     fn rays_cut_into_many_dispatches_answer_as_in_one() {
-        let Some(mut caster) = caster() else { return };
+        let mut caster = need!(caster());
         let jobs = jobs();
         let whole = caster.submit(&jobs).unwrap().wait().unwrap();
         assert_eq!(whole.iter().map(|cast| cast.codes.len()).sum::<usize>(), 50_000);
@@ -339,7 +335,7 @@ mod tests {
 
     #[test]
     fn targets_that_fill_a_binding_are_parted() {
-        let Some(mut caster) = caster() else { return };
+        let mut caster = need!(caster());
         let jobs = jobs();
         let whole = caster.submit(&jobs).unwrap().wait().unwrap();
         // Four triangles of 48 bytes each: room for two targets.
@@ -351,7 +347,7 @@ mod tests {
 
     #[test]
     fn a_target_beyond_a_binding_is_refused_by_name() {
-        let Some(mut caster) = caster() else { return };
+        let mut caster = need!(caster());
         Arc::get_mut(&mut caster.core).unwrap().limits.binding_bytes = 100;
         let Err(error) = caster.submit(&jobs()) else { panic!("it was accepted") };
         assert!(matches!(error, GpuError::TooLarge { binding_bytes: 100, .. }), "{error}");

@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn default_classes_are_those_of_the_data_sets_labels() {
-        let Some(path) = ::tests::shared_data::shared("points/classes.txt") else { return };
+        let path = test_support::need!(test_support::shared_data("points/classes.txt"));
         let text = std::fs::read_to_string(path).unwrap();
         for table in Table::builtin().unwrap() {
             assert!(text.lines().eq(&table.default_classes), "{}", table.name);

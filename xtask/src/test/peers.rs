@@ -7,13 +7,13 @@
 //! here. A script `x.py` shares the packages of `requirements.txt`, unless there
 //! is an `x-requirements.txt`: packages too large for every run.
 
+use super::summary::{Counts, Summary};
 use crate::venv::{Environment, workshop};
 use crate::workspace::{executable, output, root};
-use anyhow::{Context, bail};
-use std::cell::OnceCell;
+use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::thread::JoinHandle;
 use std::{env, fs};
 
 /// The folder of the scripts.
@@ -40,77 +40,98 @@ pub enum Which {
     All,
 }
 
-/// Runs the scripts; `install` lets packages be fetched.
-///
-/// # Errors
-/// One that fails; one that cannot be run is named and passed over.
-pub fn run(which: Which, install: bool) -> anyhow::Result<()> {
-    if which == Which::None {
-        eprintln!("== peers: SKIPPED, as --peers none asks for");
-        return Ok(());
-    }
-    let infer = infer_cpu()?;
-    let (start, mut failed) = (Instant::now(), Vec::new());
-    let pythons = Pythons { which, install, shared: OnceCell::new() };
-    for script in scripts()? {
-        let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let ending = match pythons.of(&name) {
-            Ok(python) => check(&name, &script, &python, &infer)?,
-            Err(cause) => Ending::Skipped(cause),
-        };
-        match ending {
-            Ending::Passed => {}
-            Ending::Skipped(cause) => eprintln!("== peer {name}: SKIPPED, {cause}"),
-            Ending::Failed => failed.push(name),
-        }
-    }
-    eprintln!("== peers: {:.0} s", start.elapsed().as_secs_f64());
-    match failed.is_empty() {
-        true => Ok(()),
-        false => bail!("we differ from these peers, or they failed: {}", failed.join(", ")),
-    }
-}
-
-/// How a script ended.
-enum Ending {
-    Passed,
-    Skipped(String),
-    Failed,
-}
-
-/// Who runs scripts.
-struct Pythons {
+/// The environments of packages: what scripts are run by.
+pub struct Packages {
     which: Which,
     /// Whether packages may be fetched.
     install: bool,
-    /// Tried once: without a network, giving up takes a while.
-    shared: OnceCell<Result<PathBuf, String>>,
+    /// Fetches those that most scripts share.
+    shared: JoinHandle<Result<PathBuf, String>>,
 }
 
-impl Pythons {
-    /// The interpreter that has what script `name` imports, or why there is none.
-    fn of(&self, name: &str) -> Result<PathBuf, String> {
+impl Packages {
+    /// Begins to fetch the packages that most scripts share, which takes
+    /// minutes, while other steps compile.
+    pub fn fetch_meanwhile(which: Which, install: bool) -> Self {
+        let fetch = move || match which {
+            Which::None => Err("--peers none asks for none".to_owned()),
+            Which::Light | Which::All => interpreter(&SHARED, install),
+        };
+        Self { which, install, shared: std::thread::spawn(fetch) }
+    }
+
+    /// The interpreter that has the packages of most scripts, or why there is none.
+    fn shared(self) -> (Result<PathBuf, String>, Large) {
+        let large = Large { which: self.which, install: self.install };
+        (self.shared.join().unwrap_or_else(|_| Err("fetching them panicked".to_owned())), large)
+    }
+}
+
+/// The packages that single scripts need.
+struct Large {
+    which: Which,
+    install: bool,
+}
+
+impl Large {
+    /// The interpreter that has what script `name` imports; `None` if it needs
+    /// what most scripts do.
+    fn of(&self, name: &str) -> Option<Result<PathBuf, String>> {
         let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
         if !root().join(&requirements).exists() {
-            return self.shared.get_or_init(|| self.interpreter(&SHARED)).clone();
+            return None;
         }
         if self.which != Which::All {
-            return Err("its packages are large; --peers all runs it".to_owned());
+            return Some(Err("its packages are large; --peers all runs it".to_owned()));
         }
         let folder = format!("tests-{name}-venv");
         let size = "some 5 GB";
-        self.interpreter(&Environment { name: &folder, requirements: &requirements, size })
-    }
-
-    fn interpreter(&self, environment: &Environment<'_>) -> Result<PathBuf, String> {
-        match self.install {
-            true => environment.interpreter(),
-            false => environment.made()?.ok_or_else(|| "its packages are missing".to_owned()),
-        }
+        let environment = Environment { name: &folder, requirements: &requirements, size };
+        Some(interpreter(&environment, self.install))
     }
 }
 
-fn check(name: &str, script: &Path, python: &Path, infer: &Path) -> anyhow::Result<Ending> {
+fn interpreter(environment: &Environment<'_>, install: bool) -> Result<PathBuf, String> {
+    match install {
+        true => environment.interpreter(),
+        false => environment.made()?.ok_or_else(|| "its packages are missing".to_owned()),
+    }
+}
+
+/// Runs the scripts. A script whose packages are missing is skipped, and named.
+pub fn run(summary: &mut Summary, packages: Packages) {
+    summary.step("peers", |summary| {
+        let scripts = scripts()?;
+        if packages.which == Which::None {
+            let n = scripts.len() as u64;
+            summary.remark(format!("peers: {n} SKIPPED, as --peers none asks for"));
+            return Ok(Counts { skipped: n, ..Counts::default() });
+        }
+        let infer = infer_cpu()?;
+        let (shared, large) = packages.shared();
+        let mut counts = Counts::default();
+        for script in scripts {
+            let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let python = large.of(&name).unwrap_or_else(|| shared.clone());
+            counts = counts.and(match python {
+                Ok(python) => check(summary, &name, &script, &python, &infer)?,
+                Err(cause) => {
+                    summary.remark(format!("peer {name}: SKIPPED, {cause}"));
+                    Counts::SKIPPED
+                }
+            });
+        }
+        Ok(counts)
+    });
+}
+
+fn check(
+    summary: &mut Summary,
+    name: &str,
+    script: &Path,
+    python: &Path,
+    infer: &Path,
+) -> anyhow::Result<Counts> {
     let out = workshop().join("tests").join(name);
     empty(&out)?;
     eprintln!("== peer {name}: {SCRIPTS}/{name}.py");
@@ -123,9 +144,15 @@ fn check(name: &str, script: &Path, python: &Path, infer: &Path) -> anyhow::Resu
     command.env("EDGEPUCK_ROOT", root()).env("EDGEPUCK_OUT", &out);
     let status = command.status().with_context(|| format!("cannot run {}", script.display()))?;
     Ok(match status.code() {
-        Some(0) => Ending::Passed,
-        Some(SKIPPED) => Ending::Skipped("as it says above".to_owned()),
-        _ => Ending::Failed,
+        Some(0) => Counts::PASSED,
+        Some(SKIPPED) => {
+            summary.remark(format!("peer {name}: SKIPPED, it said why"));
+            Counts::SKIPPED
+        }
+        _ => {
+            summary.remark(format!("peer {name}: FAILED, {status}"));
+            Counts::FAILED
+        }
     })
 }
 

@@ -37,35 +37,32 @@ pub struct Compiler {
 
 impl Compiler {
     /// A compiler of C, see [`Compiler::find`].
-    pub fn c() -> Option<Self> {
+    pub fn c() -> Result<Self, String> {
         Self::find("CC", "cc", "-std=c99")
     }
 
     /// A compiler of C++, see [`Compiler::find`].
-    pub fn c_plus_plus() -> Option<Self> {
+    pub fn c_plus_plus() -> Result<Self, String> {
         Self::find("CXX", "c++", "-std=c++11")
     }
 
     /// The compiler that environment variable `variable` names, else `default`;
-    /// none, with a message, if it is missing or makes programs for another
-    /// machine.
-    fn find(variable: &str, default: &str, standard: &'static str) -> Option<Self> {
+    /// an error if it is missing or makes programs for another machine.
+    fn find(variable: &str, default: &str, standard: &'static str) -> Result<Self, String> {
         let command = std::env::var(variable).unwrap_or_else(|_| default.to_owned());
         let machine = match Command::new(&command).arg("-dumpmachine").output() {
             Ok(output) if output.status.success() => String::from_utf8(output.stdout).unwrap(),
             _ => {
-                eprintln!("skipped: no compiler `{command}`");
-                return None;
+                return Err(format!("there is no compiler `{command}`"));
             }
         };
         let arch = machine.split('-').next().map(|arch| arch.replace("arm64", "aarch64"));
         let same_arch = arch.as_deref() == Some(std::env::consts::ARCH);
         if !same_arch || machine.contains("musl") != cfg!(target_env = "musl") {
-            eprintln!("skipped: `{command}` compiles for {}", machine.trim());
-            return None;
+            return Err(format!("`{command}` compiles for {}", machine.trim()));
         }
         let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
-        Some(Self { command, standard, folder })
+        Ok(Self { command, standard, folder })
     }
 
     /// Where what it makes belongs.

@@ -150,11 +150,7 @@ mod tests {
 
     #[test]
     fn the_judge_agrees_with_pytorch() {
-        let parity = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/parity");
-        if !parity.exists() {
-            println!("skipped: {} is not there", parity.display());
-            return;
-        }
+        let parity = test_support::need!(test_support::shared_data("parity"));
         let judge = Judge::open(&parity.join("pointnet.safetensors")).unwrap();
         let mut golden = WeightsFile::open(&parity.join("golden.safetensors")).unwrap();
         for n in [16, 64, 128, 1024] {

@@ -1,0 +1,82 @@
+//! Feeds each hand-written parser with mutated input for a while.
+
+use super::summary::{Counts, Summary};
+use crate::workspace::{cargo, root, step};
+use anyhow::Context;
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Child, Command};
+use std::thread::available_parallelism;
+
+/// The targets, a program each.
+const TARGETS: [&str; 4] = ["off", "mesh", "clouds", "model"];
+
+/// Named, so that build scripts go without the flags.
+const TRIPLE: &str = "x86_64-unknown-linux-gnu";
+
+/// libFuzzer's coverage, by flags that a stable compiler takes.
+const COVERAGE: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
+     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
+     -Cllvm-args=-sanitizer-coverage-pc-table \
+     -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1";
+
+/// Fuzzes every target for `seconds`, as many at a time as there are cores.
+pub fn run(summary: &mut Summary, seconds: u32) {
+    summary.step("fuzzing", |summary| {
+        let n = TARGETS.len() as u64;
+        let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
+        if seconds == 0 || !is_known {
+            let reason =
+                if is_known { "--fuzz-seconds 0" } else { "its flags are for x86-64 Linux" };
+            summary.remark(format!("fuzzing: {n} SKIPPED, {reason}"));
+            return Ok(Counts { skipped: n, ..Counts::default() });
+        }
+        build()?;
+        let mut counts = Counts::default();
+        for targets in TARGETS.chunks(available_parallelism()?.get()) {
+            let started = targets.iter().map(|target| start(target, seconds));
+            let started = started.collect::<anyhow::Result<Vec<_>>>()?;
+            for (target, mut child) in targets.iter().zip(started) {
+                let passed = child.wait()?.success();
+                if !passed {
+                    let log = fs::read(log(target)).unwrap_or_default();
+                    eprintln!("{}", String::from_utf8_lossy(&log));
+                    summary.remark(format!("fuzzing {target}: FAILED"));
+                }
+                counts = counts.and(if passed { Counts::PASSED } else { Counts::FAILED });
+            }
+        }
+        Ok(counts)
+    });
+}
+
+fn folder() -> std::path::PathBuf {
+    root().join("tests/fuzz")
+}
+
+fn log(target: &str) -> std::path::PathBuf {
+    folder().join("target").join(format!("{target}.log"))
+}
+
+fn build() -> anyhow::Result<()> {
+    let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
+    step("fuzzing", build.current_dir(folder()).env("RUSTFLAGS", COVERAGE))
+}
+
+/// Starts fuzzing `target`; what it says goes to a file of its own.
+fn start(target: &str, seconds: u32) -> anyhow::Result<Child> {
+    let folder = folder();
+    let program = Path::new("target").join(TRIPLE).join("release").join(target);
+    let mut command = Command::new(folder.join(program));
+    command.arg(format!("-max_total_time={seconds}")).current_dir(&folder);
+    // What is found goes to the first folder; the second is where it starts.
+    if folder.join("seeds").join(target).is_dir() {
+        fs::create_dir_all(folder.join("corpus").join(target))?;
+        command.args([format!("corpus/{target}"), format!("seeds/{target}")]);
+    }
+    let log = log(target);
+    let said = File::create(&log).with_context(|| log.display().to_string())?;
+    eprintln!("== fuzzing {target} for {seconds} s, see {}", log.display());
+    command.stdout(said.try_clone()?).stderr(said);
+    command.spawn().with_context(|| format!("cannot start the fuzz target {target}"))
+}

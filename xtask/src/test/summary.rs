@@ -1,0 +1,171 @@
+//! What became of the checks of a run: counts by step, and the table that ends it.
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+/// How many checks passed, failed and were skipped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Checks that ran and found nothing wrong.
+    pub passed: u64,
+    /// Checks that found something wrong, or could not be run to their end.
+    pub failed: u64,
+    /// Checks that this machine cannot run, or that are too heavy to run by default.
+    pub skipped: u64,
+}
+
+impl Counts {
+    /// One check that passed.
+    pub const PASSED: Self = Self { passed: 1, failed: 0, skipped: 0 };
+    /// One check that failed.
+    pub const FAILED: Self = Self { passed: 0, failed: 1, skipped: 0 };
+    /// One check that was skipped.
+    pub const SKIPPED: Self = Self { passed: 0, failed: 0, skipped: 1 };
+
+    /// The counts in the line that closes a test program's output; `None` for
+    /// any other line. Rust's own harness and libtest-mimic write the same line:
+    /// `test result: ok. 9 passed; 0 failed; 1 ignored; 0 measured; ...`.
+    pub fn of_closing_line(line: &str) -> Option<Self> {
+        let (_, counts) = line.trim().strip_prefix("test result: ")?.split_once(". ")?;
+        let count = |name: &str| {
+            let mut parts = counts.split("; ").map(|part| part.split_once(' '));
+            let (number, _) = parts.find_map(|part| part.filter(|(_, found)| *found == name))?;
+            number.parse().ok()
+        };
+        Some(Self {
+            passed: count("passed")?,
+            failed: count("failed")?,
+            skipped: count("ignored")?,
+        })
+    }
+
+    /// Both together.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            passed: self.passed + other.passed,
+            failed: self.failed + other.failed,
+            skipped: self.skipped + other.skipped,
+        }
+    }
+
+    /// The same checks, `n` of which were counted as passed and were skipped.
+    #[must_use]
+    pub fn of_which_skipped(self, n: u64) -> Self {
+        Self { passed: self.passed.saturating_sub(n), skipped: self.skipped + n, ..self }
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { passed, failed, skipped } = self;
+        write!(f, "{passed} passed, {failed} failed, {skipped} skipped")
+    }
+}
+
+/// The steps of a run so far.
+#[derive(Default)]
+pub struct Summary {
+    steps: Vec<(String, Duration, Counts)>,
+    /// What was skipped or failed, and why: a sentence each.
+    remarks: Vec<String>,
+}
+
+impl Summary {
+    /// Runs one step. A step that ends in an error has failed; the steps after
+    /// it run all the same.
+    pub fn step(&mut self, name: &str, check: impl FnOnce(&mut Self) -> anyhow::Result<Counts>) {
+        let start = Instant::now();
+        let counts = check(self).unwrap_or_else(|error| {
+            eprintln!("== {name}: FAILED, {error:#}");
+            self.remark(format!("{name}: FAILED, {error:#}"));
+            Counts::FAILED
+        });
+        eprintln!("== {name}: {:.0} s, {counts}", start.elapsed().as_secs_f64());
+        self.steps.push((name.to_owned(), start.elapsed(), counts));
+    }
+
+    /// Keeps a sentence for the end of the run.
+    pub fn remark(&mut self, remark: String) {
+        self.remarks.push(remark);
+    }
+
+    /// All steps together.
+    pub fn total(&self) -> Counts {
+        self.steps.iter().fold(Counts::default(), |total, (.., counts)| total.and(*counts))
+    }
+}
+
+impl fmt::Display for Summary {
+    /// The remarks, the table of steps, and the total alone on the last line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for remark in &self.remarks {
+            writeln!(f, "{remark}")?;
+        }
+        let width = self.steps.iter().map(|(name, ..)| name.len()).max().unwrap_or(0).max(4);
+        writeln!(
+            f,
+            "{:width$}  {:>7}  {:>7}  {:>7}  {:>7}",
+            "step", "seconds", "passed", "failed", "skipped"
+        )?;
+        for (name, time, Counts { passed, failed, skipped }) in &self.steps {
+            let seconds = time.as_secs_f64();
+            writeln!(f, "{name:width$}  {seconds:>7.0}  {passed:>7}  {failed:>7}  {skipped:>7}")?;
+        }
+        write!(f, "{}", self.total())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closing_lines_of_test_programs_are_counted() {
+        let ok = "test result: ok. 59 passed; 0 failed; 1 ignored; 0 measured; 3 filtered out; \
+                  finished in 0.31s";
+        assert_eq!(Counts::of_closing_line(ok), Some(Counts { passed: 59, failed: 0, skipped: 1 }));
+        let failed = "test result: FAILED. 1 passed; 22 failed; 0 ignored; 0 measured; 0 filtered \
+                      out; finished in 1.00s\n";
+        assert_eq!(
+            Counts::of_closing_line(failed),
+            Some(Counts { passed: 1, failed: 22, skipped: 0 })
+        );
+    }
+
+    #[test]
+    fn other_lines_hold_no_counts() {
+        for line in [
+            "",
+            "running 3 tests",
+            "test a::b ... ok",
+            "test result: ok. many passed; 0 failed; 0 ignored; 0 measured",
+            "test result: ok. 1 passed; 0 failed",
+            "found test result: ok. 1 passed; 0 failed; 0 ignored; 0 measured",
+        ] {
+            assert_eq!(Counts::of_closing_line(line), None, "{line}");
+        }
+    }
+
+    #[test]
+    fn a_skipped_test_is_not_counted_as_passed() {
+        let counts = Counts { passed: 5, failed: 1, skipped: 1 }.of_which_skipped(2);
+        assert_eq!(counts, Counts { passed: 3, failed: 1, skipped: 3 });
+    }
+
+    #[test]
+    fn a_step_that_fails_stops_no_other_and_the_total_closes_the_table() {
+        let mut summary = Summary::default();
+        summary.step("lints", |_| anyhow::bail!("one warning"));
+        summary.step("tests", |_| Ok(Counts { passed: 40, failed: 0, skipped: 2 }));
+        assert_eq!(summary.total(), Counts { passed: 40, failed: 1, skipped: 2 });
+        let shown = summary.to_string();
+        let lines: Vec<&str> = shown.lines().collect();
+        assert_eq!(lines[0], "lints: FAILED, one warning");
+        assert_eq!(lines[1], "step   seconds   passed   failed  skipped");
+        assert_eq!(lines[2], "lints        0        0        1        0");
+        assert_eq!(lines[3], "tests        0       40        0        2");
+        assert_eq!(lines[4], "40 passed, 1 failed, 2 skipped");
+        assert_eq!(lines.len(), 5);
+    }
+}
