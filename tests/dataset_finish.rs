@@ -9,7 +9,7 @@ use edgepuck_dataset::record::Entry;
 use edgepuck_dataset::verify::verify;
 use edgepuck_dataset::{DatasetError, MeshFailure, check_layouts, layout};
 use formats::Split::{Test, Train};
-use formats::packed::read_packed;
+use formats::labelled::read_labelled;
 use sim_gpu::sensor::{Sensor, builtin_names};
 use std::fs;
 use std::path::Path;
@@ -75,18 +75,19 @@ fn packed_sets_hold_all_scans_of_enough_points() {
     // Two sets, two variants, two splits.
     assert_eq!(manifest.packed.len(), 8);
     for packed in &manifest.packed {
-        let set = read_packed(&folder.path().join(&packed.file)).unwrap();
+        let set = read_labelled(&folder.path().join(&packed.file)).unwrap();
         assert_eq!(set.len() as u64, packed.clouds);
         assert_eq!(set.n_points, PACKED_POINTS as usize);
-        assert_eq!(set.classes, ["bowl", "chair", "cup"]);
-        assert!(set.n_raw.iter().all(|&n| n >= MIN_POINTS));
+        let (classes, names) = (set.classes.as_ref().unwrap(), set.names.as_ref().unwrap());
+        assert_eq!(classes[..], ["bowl", "chair", "cup"]);
+        assert!(set.n_raw.as_ref().unwrap().iter().all(|&n| n >= MIN_POINTS));
         assert!(packed.left_out.iter().all(|scan| scan.points < MIN_POINTS.into()));
         all_left_out += packed.left_out.len();
-        for (name, &label) in set.names.iter().zip(&set.labels) {
-            let class = &set.classes[label as usize];
+        for (name, &label) in names.iter().zip(&set.labels) {
+            let class = &classes[label];
             assert!(name.starts_with(&format!("{class}/")), "{name}: {class}");
         }
-        let names: std::collections::BTreeSet<_> = set.names.iter().collect();
+        let names: std::collections::BTreeSet<_> = names.iter().collect();
         assert_eq!(names.len(), set.len(), "names are unique");
         for i in 0..set.len() {
             let largest = set.cloud(i).iter().map(|p| p[0].hypot(p[1]).hypot(p[2]));
@@ -252,7 +253,7 @@ fn every_builtin_sensor_comes_back_from_a_manifest() {
     }
     // No mesh at all: sets are empty, but there.
     assert!(verify(folder.path()).unwrap().is_sound());
-    let set = read_packed(&folder.path().join("packed/static-noisy-test.npz")).unwrap();
+    let set = read_labelled(&folder.path().join("packed/static-noisy-test.npz")).unwrap();
     assert!(set.is_empty());
 }
 

@@ -24,8 +24,8 @@ impl<W: Write + Seek> NpzWriter<W> {
     pub fn write(writer: W, fill: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
         let mut npz = Self { zip: ZipWriter::new(writer) };
         if let Err(error) = fill(&mut npz) {
-            // Dropped, it would try to end the archive and complain to stderr
-            // that it cannot; the caller reports the error.
+            // When it is dropped it tries to end the archive and prints to stderr
+            // that it cannot. The caller reports the error already.
             std::mem::forget(npz.zip);
             return Err(error);
         }
@@ -52,7 +52,7 @@ impl<W: Write + Seek> NpzWriter<W> {
         shape: &[usize],
         elements: impl ExactSizeIterator<Item = A>,
     ) -> io::Result<()> {
-        // The header of an array of ours takes at most 128 bytes.
+        // A header that this crate writes takes at most 128 bytes.
         let n_bytes = (size_of::<A>() * elements.len()) as u64 + 128;
         // Elements are written one by one; zip sums up each write.
         let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
@@ -63,7 +63,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     /// Writes the array `key` of NumPy's fixed-width text (`<U`), which
     /// `np.load` takes without pickle.
     pub fn text(&mut self, key: &str, lines: &[String]) -> io::Result<()> {
-        // NumPy knows no text of width 0.
+        // NumPy has no text of width 0.
         let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0).max(1);
         let header = npy_header::header_bytes(&format!("<U{width}"), &[lines.len()]);
         let n_bytes = header.len() as u64 + (lines.len() * width * 4) as u64;
@@ -104,7 +104,7 @@ impl<R: Read + Seek> NpzReader<R> {
         let file_size =
             reader.seek(SeekFrom::End(0)).map_err(|source| FormatError::io(path, source))?;
         let zip = ZipArchive::new(reader).map_err(|cause| {
-            let cause = format!("no NPZ, or one that is cut short ({file_size} bytes): {cause}");
+            let cause = format!("expected a whole NPZ file, found {file_size} bytes: {cause}");
             FormatError::malformed(path, "archive", cause)
         })?;
         Ok(Self { path: path.to_path_buf(), file_size, zip })
@@ -137,19 +137,25 @@ impl<R: Read + Seek> NpzReader<R> {
     /// letters (`<U`) or bytes (`S`).
     pub fn text(&mut self, key: &str) -> Result<Vec<String>, FormatError> {
         self.entry(key, |header, size, entry| {
-            let no_text = || invalid(format!("{} is no list of text", header.descr));
-            let (kind, width) = header.descr.split_at_checked(2).ok_or_else(no_text)?;
-            let width: usize = width.parse().map_err(|_| no_text())?;
+            let not_text = || {
+                invalid(format!(
+                    "expected a list of text, found {} of shape {:?}",
+                    header.descr, header.shape
+                ))
+            };
+            let (kind, width) = header.descr.split_at_checked(2).ok_or_else(not_text)?;
+            let width: usize = width.parse().map_err(|_| not_text())?;
             let (letter_size, decode): (usize, Decode) = match kind {
                 "<U" => (4, decode_letters),
                 "|S" => (1, decode_bytes),
-                _ => return Err(no_text()),
+                _ => return Err(not_text()),
             };
             if width == 0 || header.shape.len() != 1 {
-                return Err(no_text());
+                return Err(not_text());
             }
             let line_size = width.checked_mul(letter_size);
-            let line_size = line_size.ok_or_else(|| invalid("lines without end"))?;
+            let line_size =
+                line_size.ok_or_else(|| invalid("the text is wider than memory can hold"))?;
             check_size(&header, line_size, size)?;
             let mut bytes = Vec::new();
             entry.read_to_end(&mut bytes)?;
@@ -170,10 +176,12 @@ impl<R: Read + Seek> NpzReader<R> {
             zip::result::ZipError::FileNotFound => here("missing".to_owned()),
             other => here(other.to_string()),
         })?;
-        // No deflated byte becomes more than 1032 (zlib's technical notes), so
-        // that an entry cannot honestly be larger than this.
+        // A deflated byte unfolds to at most 1032 bytes (zlib's technical notes).
         if entry.size() / 1032 > *file_size {
-            return Err(here(format!("{} bytes in a file of {file_size}", entry.size())));
+            return Err(here(format!(
+                "the entry states {} bytes in a file of {file_size}",
+                entry.size()
+            )));
         }
         let size = entry.size();
         let header =
@@ -198,7 +206,8 @@ fn check_size(header: &Header, element_size: usize, found: u64) -> io::Result<()
     }
     let (descr, shape) = (&header.descr, &header.shape);
     let cause = format!(
-        "{descr} of shape {shape:?} in {found} bytes, expected {element_size} bytes an element"
+        "expected {element_size} bytes for each element of shape {shape:?}, \
+         found {found} bytes of {descr}"
     );
     Err(invalid(cause))
 }
@@ -206,11 +215,11 @@ fn check_size(header: &Header, element_size: usize, found: u64) -> io::Result<()
 fn decode_letters(bytes: &[u8]) -> io::Result<String> {
     let letters = bytes.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes));
     let line: Option<String> = letters.map(char::from_u32).collect();
-    let line = line.ok_or_else(|| invalid("text that is not Unicode"))?;
+    let line = line.ok_or_else(|| invalid("expected Unicode text"))?;
     Ok(line.trim_end_matches('\0').to_owned())
 }
 
 fn decode_bytes(bytes: &[u8]) -> io::Result<String> {
-    let line = std::str::from_utf8(bytes).map_err(|_| invalid("text that is not UTF-8"))?;
+    let line = std::str::from_utf8(bytes).map_err(|_| invalid("expected UTF-8 text"))?;
     Ok(line.trim_end_matches('\0').to_owned())
 }

@@ -34,12 +34,7 @@ pub fn write_scan(path: &Path, scan: &Scan) -> Result<(), FormatError> {
 
 fn header(scan: &Scan) -> Vec<&'static str> {
     let mut names = vec!["x", "y", "z"];
-    for (attribute, column) in scan.columns() {
-        match column {
-            Column::Vector(_) => names.extend(["nx", "ny", "nz"]),
-            _ => names.push(attribute.name()),
-        }
-    }
+    names.extend(scan.columns().flat_map(|(attribute, _)| attribute.column_names()));
     names
 }
 

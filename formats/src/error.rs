@@ -3,12 +3,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::scan::Attribute;
-
 /// An error that names the file, the part of it and the cause.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FormatError {
-    /// The operating system refused.
+    /// The operating system reported an error.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file that was read or written.
@@ -22,7 +21,7 @@ pub enum FormatError {
         /// The file that was to be written; nothing lies under its name.
         path: PathBuf,
     },
-    /// The file is not what its name or its header promises.
+    /// The file's content is not what its name or its header says.
     #[error("{}: {part}: {cause}", path.display())]
     Malformed {
         /// The file that was read.
@@ -33,10 +32,10 @@ pub enum FormatError {
         cause: String,
     },
     /// A scan's attribute is not as long as its positions.
-    #[error("attribute {attribute} has {found} values for {expected} points")]
+    #[error("attribute {attribute}: expected {expected} values, one for each point, found {found}")]
     Length {
-        /// The attribute at fault.
-        attribute: Attribute,
+        /// The name of the attribute at fault.
+        attribute: &'static str,
         /// The number of points.
         expected: usize,
         /// The number of values.
@@ -50,21 +49,21 @@ pub enum FormatError {
         /// Why it cannot be held.
         cause: String,
     },
-    /// A word that names none of the things it could name.
-    #[error("`{word}` is no {what}; choose one of {choices}")]
+    /// A word that is not one of the known names.
+    #[error("unknown {what} `{word}`, expected one of {choices}")]
     UnknownName {
         /// The word as given.
         word: String,
-        /// What it should have named.
+        /// What it should name.
         what: &'static str,
-        /// What it could have been.
+        /// The known names, separated by commas.
         choices: String,
     },
 }
 
 impl FormatError {
-    /// The error of a failed read or write of `path`. A disk or quota that is
-    /// full is told apart, since it ends a run where other errors need not.
+    /// The error of a failed read or write of `path`. A full disk or quota is
+    /// an error of its own, because it ends a run and other errors need not.
     #[must_use]
     pub fn io(path: &Path, source: io::Error) -> Self {
         let path = path.to_path_buf();
@@ -80,7 +79,7 @@ impl FormatError {
         Self::Malformed { path: path.to_path_buf(), part: part.into(), cause: cause.to_string() }
     }
 
-    /// The error of an instance that a layout cannot hold.
+    /// The error of an instance that a dataset's layout cannot hold.
     #[must_use]
     pub fn instance(name: &str, cause: impl Into<String>) -> Self {
         Self::Instance { name: name.to_owned(), cause: cause.into() }

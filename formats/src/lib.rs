@@ -43,6 +43,8 @@ pub mod csv;
 mod decoding;
 #[cfg(feature = "npz")]
 pub mod labelled;
+#[cfg(feature = "files")]
+mod lines;
 #[cfg(feature = "weights")]
 pub mod model_card;
 #[cfg(feature = "hdf5")]
@@ -59,7 +61,7 @@ mod number;
 pub mod packed;
 #[cfg(feature = "pcap")]
 mod pcap;
-#[cfg(feature = "dataset")]
+#[cfg(feature = "ply")]
 pub mod ply;
 #[cfg(feature = "files")]
 mod python_literal;

@@ -83,7 +83,7 @@ impl std::str::FromStr for Normalization {
         Self::ALL.into_iter().find(|one| one.name() == word).ok_or_else(|| {
             FormatError::UnknownName {
                 word: word.to_owned(),
-                what: "normalisation",
+                what: "normalization",
                 choices: Self::ALL.map(Self::name).join(", "),
             }
         })
@@ -135,7 +135,9 @@ impl ModelCard {
         let text = |key: &str| metadata.get(key).cloned();
         let number = |key: &str| {
             let parse = |value: String| {
-                value.parse::<usize>().map_err(|_| bad(key, format!("`{value}` is no count")))
+                value
+                    .parse::<usize>()
+                    .map_err(|_| bad(key, format!("expected a count, found `{value}`")))
             };
             text(key).map(parse).transpose()
         };
@@ -143,7 +145,7 @@ impl ModelCard {
             None => Ok(None),
             Some(value) if value == yes => Ok(Some(true)),
             Some(value) if value == no => Ok(Some(false)),
-            Some(value) => Err(bad(key, format!("`{value}` is neither `{yes}` nor `{no}`"))),
+            Some(value) => Err(bad(key, format!("expected `{yes}` or `{no}`, found `{value}`"))),
         };
         let default = Self::default();
         let classes = text("classes").map(|value| serde_json::from_str(&value)).transpose();

@@ -63,22 +63,25 @@ impl ModelNetH5Writer {
         name: &str,
     ) -> Result<(), FormatError> {
         if points.len() != self.n_points {
-            let cause = format!("{} points in a set of {}", points.len(), self.n_points);
+            let cause = format!("expected {} points, found {}", self.n_points, points.len());
             return Err(FormatError::instance(name, cause));
         }
         let label = u8::try_from(label)
             .ok()
             .filter(|&label| usize::from(label) < self.classes.len())
             .ok_or_else(|| {
-                let cause = format!("label {label} of {} classes", self.classes.len());
-                FormatError::instance(name, format!("{cause}; the layout has room for 256"))
+                let cause = format!("expected a label below {}, found {label}", self.classes.len());
+                FormatError::instance(
+                    name,
+                    format!("{cause}; the layout holds at most 256 classes"),
+                )
             })?;
         self.data.extend_from_slice(points.as_flattened());
         self.labels.push(label);
         if self.labels.len() == CLOUDS_PER_FILE { self.write_file() } else { Ok(()) }
     }
 
-    /// Writes what is left and the lists. A set without clouds has one file
+    /// Writes the clouds that are left, and the lists. A set without clouds has one file
     /// that is empty, since readers join what they find.
     ///
     /// # Errors
@@ -129,13 +132,7 @@ fn file_name(split: Split, k: usize) -> String {
 pub fn read(folder: &Path, split: Split) -> Result<LabelledSet, FormatError> {
     let list = list(folder, split);
     let names = fs::read_to_string(&list).map_err(|source| FormatError::io(&list, source))?;
-    let mut set = LabelledSet {
-        points: Vec::new(),
-        n_points: 0,
-        labels: Vec::new(),
-        names: None,
-        classes: class_names(folder)?,
-    };
+    let mut set = LabelledSet { classes: class_names(folder)?, ..LabelledSet::default() };
     for line in names.lines().map(str::trim).filter(|line| !line.is_empty()) {
         let name = Path::new(line).file_name().unwrap_or(line.as_ref());
         read_file(&folder.join(name), &mut set)?;
@@ -158,7 +155,7 @@ fn class_names(folder: &Path) -> Result<Option<Vec<String>>, FormatError> {
 /// Appends the clouds of one file.
 fn read_file(path: &Path, set: &mut LabelledSet) -> Result<(), FormatError> {
     let bad = |part: &str, cause: String| FormatError::malformed(path, part, cause);
-    // Its own errors do not name the file.
+    // The crate's own errors do not name the file.
     let bytes = fs::read(path).map_err(|source| FormatError::io(path, source))?;
     let file = File::from_bytes(bytes).map_err(|error| bad("HDF5", error.to_string()))?;
     let dataset = |name: &str| {
@@ -174,16 +171,23 @@ fn read_file(path: &Path, set: &mut LabelledSet) -> Result<(), FormatError> {
     let points = data.read_f32().map_err(|error| bad(&part, error.to_string()))?;
     let (label_part, label, shape) = dataset("label")?;
     if shape.iter().product::<u64>() != m {
-        return Err(bad(&label_part, format!("shape {shape:?} for {m} clouds")));
+        return Err(bad(
+            &label_part,
+            format!("expected {m} labels, one for each cloud, found shape {shape:?}"),
+        ));
     }
     let labels = label.read_u8().map_err(|error| bad(&label_part, error.to_string()))?;
     if !set.labels.is_empty() && set.n_points as u64 != n_points {
-        return Err(bad(&part, format!("clouds of {n_points} points after {}", set.n_points)));
+        return Err(bad(
+            &part,
+            format!("expected clouds of {} points, found {n_points}", set.n_points),
+        ));
     }
     let n_classes = set.classes.as_ref().map_or(usize::MAX, Vec::len);
     if let Some(cloud) = labels.iter().position(|&label| usize::from(label) >= n_classes) {
-        let cause = format!("{} of {n_classes} classes in shape_names.txt", labels[cloud]);
-        return Err(bad(&label_part, format!("cloud {cloud}: label {cause}")));
+        let found = labels[cloud];
+        let cause = format!("cloud {cloud}: expected a label below {n_classes}, found {found}");
+        return Err(bad(&label_part, cause));
     }
     set.n_points = n_points as usize;
     set.points.extend(points);

@@ -7,7 +7,7 @@ use crate::npy_header::{Header, header_ending_in};
 use crate::number::{Number, NumberType};
 use crate::records;
 
-/// How NumPy calls what [`write_array`] writes.
+/// NumPy's name of the type that [`write_array`] writes.
 fn descr(number: NumberType) -> &'static str {
     match number {
         NumberType::I8 => "|i1",
@@ -30,8 +30,8 @@ pub(crate) fn write_array<A: Number>(
     shape: &[usize],
     elements: impl IntoIterator<Item = A>,
 ) -> io::Result<()> {
-    // The hashes of datasets depend on this brace, which NumPy itself would set
-    // apart by a comma.
+    // Recorded hashes of datasets depend on this brace; NumPy itself writes a
+    // comma before it.
     writer.write_all(&header_ending_in("}", descr(A::TYPE), shape))?;
     elements
         .into_iter()
@@ -39,7 +39,7 @@ pub(crate) fn write_array<A: Number>(
 }
 
 /// Reads the elements of a whole array in C order, whichever order the file
-/// has them in. They must be of the type asked for.
+/// has. They must be of the type `A`.
 pub(crate) fn read_elements<A: Number>(
     reader: &mut (impl Read + ?Sized),
     header: &Header,
@@ -48,7 +48,10 @@ pub(crate) fn read_elements<A: Number>(
         Some((number, order)) if number == A::TYPE => order,
         _ => {
             let expected = descr(A::TYPE);
-            return Err(invalid(format!("elements are {}, not {expected}", header.descr)));
+            return Err(invalid(format!(
+                "expected elements of type {expected}, found {}",
+                header.descr
+            )));
         }
     };
     read_in_c_order(reader, header, size_of::<A>(), |bytes| A::from_bytes(bytes, order))
@@ -71,7 +74,9 @@ fn read_in_c_order<T: Copy>(
     size: usize,
     decode: impl Fn(&[u8]) -> T,
 ) -> io::Result<Vec<T>> {
-    let n = header.n_elements().ok_or_else(|| invalid("elements without end"))?;
+    let n = header
+        .n_elements()
+        .ok_or_else(|| invalid("the shape has more elements than memory can hold"))?;
     let mut elements = Vec::new();
     records::read(reader, size, n as u64, |bytes| elements.push(decode(bytes)))?;
     if header.is_fortran_order { Ok(to_c_order(&elements, &header.shape)) } else { Ok(elements) }
@@ -120,8 +125,8 @@ mod tests {
             n_bytes: 0,
         };
         let error = read_elements::<f32>(&mut io::empty(), &header).unwrap_err();
-        assert_eq!(error.to_string(), "elements without end");
+        assert_eq!(error.to_string(), "the shape has more elements than memory can hold");
         let error = read_elements::<f64>(&mut io::empty(), &header).unwrap_err();
-        assert_eq!(error.to_string(), "elements are <f4, not <f8");
+        assert_eq!(error.to_string(), "expected elements of type <f8, found <f4");
     }
 }

@@ -1,10 +1,9 @@
 //! The header of NumPy's array files.
 //!
-//! Format: NumPy enhancement proposal 1, `numpy.lib.format`. It is read and
-//! written here and not by `ndarray-npy`, because that crate's parser of Python
-//! literals (`py_literal`, over `pest` and `psm`) needs a C compiler for the
-//! target, which a Raspberry Pi's cross build should do without; and because
-//! arrays of text, streams and headers that lie need this much anyway.
+//! Format: NumPy enhancement proposal 1, `numpy.lib.format`. The crate
+//! `ndarray-npy` is not used: its parser of Python literals (`py_literal`, over
+//! `pest` and `psm`) needs a C compiler for the target, which a cross build for
+//! the Raspberry Pi should not need; and it reads neither text nor streams.
 
 use std::io::{self, Read};
 
@@ -12,12 +11,12 @@ use crate::decoding::{excerpt, invalid};
 use crate::number::{ByteOrder, NumberType};
 use crate::python_literal::{dictionary, string, tuple};
 
-/// What every array's file begins with.
+/// The first bytes of every array file.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 /// Data begins at a multiple of this.
 const ALIGNMENT: usize = 64;
-/// No header of an array of ours comes near it; NumPy itself refuses to parse
-/// more than 10,000 bytes.
+/// The longest header that is read. NumPy itself refuses to parse more than
+/// 10,000 bytes.
 const LONGEST_HEADER: u64 = 1 << 20;
 
 /// What an array's header says.
@@ -69,11 +68,13 @@ impl Header {
 
     /// As [`Header::number`]; anything else is an error.
     pub fn number_or_error(&self) -> io::Result<(NumberType, ByteOrder)> {
-        let no_numbers = || match self.descr.as_str() {
-            "|O" => invalid("pickled Python objects"),
-            descr => invalid(format!("elements of type `{}` are no numbers", excerpt(descr))),
+        let not_numbers = || match self.descr.as_str() {
+            "|O" => invalid("expected numbers, found pickled Python objects"),
+            descr => {
+                invalid(format!("expected numbers, found elements of type `{}`", excerpt(descr)))
+            }
         };
-        self.number().ok_or_else(no_numbers)
+        self.number().ok_or_else(not_numbers)
     }
 }
 
@@ -105,18 +106,20 @@ pub(crate) fn read_header(reader: &mut (impl Read + ?Sized)) -> io::Result<Heade
     let mut start = [0; MAGIC.len() + 2];
     reader.read_exact(&mut start)?;
     if !start.starts_with(MAGIC) {
-        return Err(invalid("not a NumPy array"));
+        return Err(invalid("expected a NumPy array"));
     }
     let length_size = match start[MAGIC.len()] {
         1 => 2,
         2 | 3 => 4,
-        version => return Err(invalid(format!("unknown NPY version {version}"))),
+        version => return Err(invalid(format!("expected NPY version 1, 2 or 3, found {version}"))),
     };
     let mut length = [0; 4];
     reader.read_exact(&mut length[..length_size])?;
     let length = u64::from(u32::from_le_bytes(length));
     if length > LONGEST_HEADER {
-        return Err(invalid(format!("a header of {length} bytes")));
+        return Err(invalid(format!(
+            "expected a header of at most {LONGEST_HEADER} bytes, found {length}"
+        )));
     }
     let mut text = Vec::new();
     if reader.take(length).read_to_end(&mut text)? as u64 != length {
@@ -124,8 +127,12 @@ pub(crate) fn read_header(reader: &mut (impl Read + ?Sized)) -> io::Result<Heade
     }
     let n_bytes = start.len() + length_size + text.len();
     let text = std::str::from_utf8(&text).map_err(invalid)?;
-    interpret(text, n_bytes)
-        .ok_or_else(|| invalid(format!("a header that makes no sense: {}", excerpt(text))))
+    interpret(text, n_bytes).ok_or_else(|| {
+        invalid(format!(
+            "expected a dictionary with descr, fortran_order and shape, found {}",
+            excerpt(text)
+        ))
+    })
 }
 
 fn interpret(text: &str, n_bytes: usize) -> Option<Header> {

@@ -108,7 +108,8 @@ fn read_columns<A: Number>(
     };
     match expected {
         Some(expected) if n != expected => {
-            Err(npz.error(key, format!("{n} values for {expected} points")))
+            Err(npz
+                .error(key, format!("expected {expected} values, one for each point, found {n}")))
         }
         _ => Ok(elements),
     }

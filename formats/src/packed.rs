@@ -8,15 +8,16 @@
 //! | `n_raw` | u32 | `[m]` | points of the scan before resampling |
 //! | `classes` | text | `[k]` | class names in the order of the labels |
 //!
-//! Labels are i64 because PyTorch's losses take nothing else for class
-//! indices: `torch.from_numpy(set["labels"])` is ready for use. Text is NumPy's
+//! Labels are i64 because PyTorch's losses take no other type as class indices:
+//! `torch.from_numpy(set["labels"])` is ready for use. Text is NumPy's
 //! fixed-width kind, which `np.load` reads without `allow_pickle`.
+//! [`crate::labelled`] reads these sets.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use crate::archive::{NpzReader, NpzWriter, Values};
+use crate::archive::NpzWriter;
 use crate::atomic;
 use crate::error::FormatError;
 use crate::npy_header;
@@ -84,11 +85,11 @@ impl PackedWriter {
         n_raw: u32,
     ) -> Result<(), FormatError> {
         if points.len() != self.n_points {
-            let cause = format!("{} points in a set of {}", points.len(), self.n_points);
+            let cause = format!("expected {} points, found {}", self.n_points, points.len());
             return Err(FormatError::instance(name, cause));
         }
         if label >= self.classes.len() {
-            let cause = format!("label {label} of {} classes", self.classes.len());
+            let cause = format!("expected a label below {}, found {label}", self.classes.len());
             return Err(FormatError::instance(name, cause));
         }
         for coordinate in points.as_flattened() {
@@ -126,73 +127,4 @@ impl PackedWriter {
             })
         })
     }
-}
-
-/// A packed set in memory.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PackedSet {
-    /// Coordinates of all clouds, `[m, n_points, 3]` in C order.
-    pub points: Vec<f32>,
-    /// Points of a cloud.
-    pub n_points: usize,
-    /// Class of each cloud, an index into `classes`.
-    pub labels: Vec<i64>,
-    /// Name of each cloud.
-    pub names: Vec<String>,
-    /// Points of each scan before it was resampled.
-    pub n_raw: Vec<u32>,
-    /// Class names in the order of the labels.
-    pub classes: Vec<String>,
-}
-
-impl PackedSet {
-    /// How many clouds there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.labels.len()
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.labels.is_empty()
-    }
-
-    /// The points of cloud `i`, which must be below [`PackedSet::len`].
-    #[must_use]
-    pub fn cloud(&self, i: usize) -> &[[f32; 3]] {
-        let size = self.n_points * 3;
-        self.points[i * size..(i + 1) * size].as_chunks::<3>().0
-    }
-}
-
-/// Reads the packed set at `path`.
-///
-/// # Errors
-/// An array that is missing, of another type or length than expected, or a
-/// label without a class: [`FormatError::Malformed`] with file and key.
-pub fn read_packed(path: &Path) -> Result<PackedSet, FormatError> {
-    let mut npz = NpzReader::open(path)?;
-    let Values { shape, elements: points } = npz.array::<f32>("points")?;
-    let [m, n_points, 3] = shape[..] else {
-        return Err(npz.error("points", format!("expected shape [m, n, 3], found {shape:?}")));
-    };
-    let set = PackedSet {
-        points,
-        n_points,
-        labels: npz.array("labels")?.elements,
-        names: npz.text("names")?,
-        n_raw: npz.array("n_raw")?.elements,
-        classes: npz.text("classes")?,
-    };
-    let lengths =
-        [("labels", set.labels.len()), ("names", set.names.len()), ("n_raw", set.n_raw.len())];
-    if let Some((key, found)) = lengths.into_iter().find(|&(_, length)| length != m) {
-        return Err(npz.error(key, format!("{found} values for {m} clouds")));
-    }
-    let has_class = |&label: &i64| usize::try_from(label).is_ok_and(|l| l < set.classes.len());
-    if let Some(label) = set.labels.iter().find(|label| !has_class(label)) {
-        return Err(npz.error("labels", format!("{label} of {} classes", set.classes.len())));
-    }
-    Ok(set)
 }

@@ -7,11 +7,11 @@ use crate::decoding::invalid;
 
 /// Bytes that are read at once.
 const BLOCK_SIZE: usize = 1 << 16;
-/// The largest record that is believed: no point of any sensor comes near it.
+/// The largest record that is read. No sensor has points of this size.
 const LARGEST_RECORD: usize = 1 << 24;
 
-/// Hands `n` records of `size` bytes to `each`. Memory grows by nothing, so
-/// that a header may promise any `n`.
+/// Hands `n` records of `size` bytes to `each`. Memory does not grow with `n`,
+/// which comes from a header and may be wrong.
 ///
 /// # Errors
 /// [`io::ErrorKind::UnexpectedEof`] for fewer than `n` records, and what the
@@ -41,7 +41,7 @@ pub(crate) fn truncated(found: u64, n: u64) -> io::Error {
     io::Error::new(io::ErrorKind::UnexpectedEof, format!("the file ends after {found} of {n}"))
 }
 
-/// Passes over `n` bytes.
+/// Skips `n` bytes.
 pub(crate) fn skip(reader: &mut (impl Read + ?Sized), n: u64) -> io::Result<()> {
     let skipped = io::copy(&mut reader.take(n), &mut io::sink())?;
     if skipped < n { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
@@ -70,7 +70,9 @@ fn read_at_most(
     mut each: impl FnMut(&[u8]),
 ) -> io::Result<(u64, usize)> {
     if !(1..=LARGEST_RECORD).contains(&size) {
-        return Err(invalid(format!("points of {size} bytes")));
+        return Err(invalid(format!(
+            "expected points of 1 to {LARGEST_RECORD} bytes, found {size}"
+        )));
     }
     let per_block = (BLOCK_SIZE / size).max(1) as u64;
     let mut block = vec![0; per_block.min(n) as usize * size];

@@ -165,9 +165,11 @@ impl Scan {
         let expected = self.len();
         match self.columns().find(|(_, column)| column.len() != expected) {
             None => Ok(()),
-            Some((attribute, column)) => {
-                Err(FormatError::Length { attribute, expected, found: column.len() })
-            }
+            Some((attribute, column)) => Err(FormatError::Length {
+                attribute: attribute.name(),
+                expected,
+                found: column.len(),
+            }),
         }
     }
 }
@@ -184,6 +186,16 @@ impl Attribute {
         Self::Intensity,
         Self::Normal,
     ];
+
+    /// The names of the attribute's columns in PLY and CSV files: its own, or
+    /// three for a vector.
+    #[cfg(feature = "dataset")]
+    pub(crate) fn column_names(self) -> Vec<&'static str> {
+        match self {
+            Self::Normal => vec!["nx", "ny", "nz"],
+            other => vec![other.name()],
+        }
+    }
 
     /// The attribute's name on the command line and in files.
     #[must_use]
@@ -232,7 +244,7 @@ mod tests {
         }
         let error = "colour".parse::<Attribute>().unwrap_err().to_string();
         assert!(
-            error.starts_with("`colour` is no attribute; choose one of range, beam"),
+            error.starts_with("unknown attribute `colour`, expected one of range, beam,"),
             "{error}"
         );
     }
@@ -246,6 +258,6 @@ mod tests {
             ..Scan::default()
         };
         let error = scan.check_lengths().unwrap_err().to_string();
-        assert_eq!(error, "attribute time has 1 values for 2 points");
+        assert_eq!(error, "attribute time: expected 2 values, one for each point, found 1");
     }
 }

@@ -90,21 +90,43 @@ fn what_is_no_labelled_set_is_refused_with_its_key() {
     for (arrays, message) in [
         (vec![LABELS], "points: missing"),
         (vec![I16], "labels: missing"),
-        (vec![("points", "<i2", "(2, 1, 3)", I16.3), LABELS], "points: elements of type `<i2`"),
+        (
+            vec![("points", "<i2", "(2, 1, 3)", I16.3), LABELS],
+            "points: expected elements of type f2, f4 or f8, found <i2",
+        ),
         (
             vec![("points", "<f2", "(2, 3)", F16.3), LABELS],
             "points: expected shape [m, n, 3], found [2, 3]",
         ),
-        (vec![F16, ("labels", "|u1", "(3,)", &[0; 3])], "labels: 3 values for 2 clouds"),
-        (vec![F16, ("labels", "|i1", "(2,)", &[0, 0xff])], "labels: -1 is no label"),
-        (vec![F16, ("labels", "<f2", "(2,)", &[0, 0x38, 0, 0])], "labels: 0.5 is no label"),
+        (
+            vec![F16, ("labels", "|u1", "(3,)", &[0; 3])],
+            "labels: expected 2 values, one for each cloud, found 3",
+        ),
+        (
+            vec![F16, ("labels", "|i1", "(2,)", &[0, 0xff])],
+            "labels: expected whole numbers from 0, found -1",
+        ),
+        (
+            vec![F16, ("labels", "<f2", "(2,)", &[0, 0x38, 0, 0])],
+            "labels: expected whole numbers from 0, found 0.5",
+        ),
         (
             vec![F16, ("labels", "|u1", "(1, 2)", &[0; 2])],
             "labels: expected shape [m], found [1, 2]",
         ),
-        (vec![F16, LABELS, ("names", "|S1", "(1,)", b"a")], "names: 1 values for 2 clouds"),
-        (vec![F16, LABELS, ("names", "|O", "(2,)", b"ab")], "names: |O is no list of text"),
-        (vec![F16, LABELS, classes], "labels: 1 of 1 classes"),
+        (
+            vec![F16, LABELS, ("names", "|S1", "(1,)", b"a")],
+            "names: expected 2 values, one for each cloud, found 1",
+        ),
+        (
+            vec![F16, LABELS, ("n_raw", "<i8", "(1,)", &[7, 0, 0, 0, 0, 0, 0, 0])],
+            "n_raw: expected 2 values, one for each cloud, found 1",
+        ),
+        (
+            vec![F16, LABELS, ("names", "|O", "(2,)", b"ab")],
+            "names: expected a list of text, found |O of shape [2]",
+        ),
+        (vec![F16, LABELS, classes], "labels: expected labels below 1, found 1"),
         (
             vec![("points", "<f2", "(1000000000000000000, 1, 3)", F16.3), LABELS],
             "points: the file ends after 6 of 3000000000000000000",

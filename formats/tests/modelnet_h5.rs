@@ -109,5 +109,5 @@ fn a_bad_file_is_named_with_its_cause() {
     failed(["dataset `label`", "shape [1, 1] for 2 clouds"]);
     with(&[2, 4, 3], &[0, 9]);
     fs::write(at.join("shape_names.txt"), "bowl\nchair\n\n").unwrap();
-    failed(["a.h5", "cloud 1: label 9 of 2 classes"]);
+    failed(["a.h5", "cloud 1: expected a label below 2, found 9"]);
 }

@@ -5,7 +5,8 @@
 use std::fs;
 use std::path::Path;
 
-use formats::packed::{PackedSet, PackedWriter, read_packed};
+use formats::labelled::{LabelledSet, read_labelled};
+use formats::packed::PackedWriter;
 
 fn classes() -> Vec<String> {
     ["bowl", "chaise longue", "étagère"].map(str::to_owned).to_vec()
@@ -25,13 +26,20 @@ fn a_set_comes_back_from_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("packed/rotational-clean-train.npz");
     write(&path, 4, 2);
-    let set = read_packed(&path).unwrap();
+    let set = read_labelled(&path).unwrap();
     assert_eq!(set.len(), 4);
     assert_eq!(set.cloud(3), [[3.0, 0.0, 0.5], [3.0, 1.0, 0.5]]);
     assert_eq!(set.labels, [0, 1, 2, 0]);
-    assert_eq!(set.names, ["mesh_0_v0", "mesh_1_v0", "mesh_2_v0", "mesh_3_v0"]);
-    assert_eq!(set.n_raw, [10, 11, 12, 13]);
-    assert_eq!(set.classes, classes());
+    assert_eq!(
+        set.names.as_ref().unwrap()[..],
+        ["mesh_0_v0", "mesh_1_v0", "mesh_2_v0", "mesh_3_v0"]
+    );
+    assert_eq!(set.n_raw.as_ref().unwrap()[..], [10, 11, 12, 13]);
+    assert_eq!(set.classes, Some(classes()));
+    let some = set.select(&[3, 1]);
+    assert_eq!(some.cloud(0), set.cloud(3));
+    assert_eq!((some.labels, some.n_raw), (vec![0, 1], Some(vec![13, 11])));
+    assert_eq!(some.names.unwrap(), ["mesh_3_v0", "mesh_1_v0"]);
 }
 
 #[test]
@@ -39,14 +47,13 @@ fn a_set_may_be_empty() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty.npz");
     write(&path, 0, 1024);
-    let set = read_packed(&path).unwrap();
-    let none = PackedSet {
-        points: vec![],
+    let set = read_labelled(&path).unwrap();
+    let none = LabelledSet {
         n_points: 1024,
-        labels: vec![],
-        names: vec![],
-        n_raw: vec![],
-        classes: classes(),
+        names: Some(vec![]),
+        n_raw: Some(vec![]),
+        classes: Some(classes()),
+        ..LabelledSet::default()
     };
     assert_eq!(set, none);
 }
@@ -78,11 +85,11 @@ fn what_does_not_fit_is_refused_by_name() {
     let path = folder.path().join("set.npz");
     let mut writer = PackedWriter::create(&path, 2, classes()).unwrap();
     let size = writer.push(&[[0.0; 3]], 0, "a_v1", 1).unwrap_err().to_string();
-    assert_eq!(size, "instance `a_v1`: 1 points in a set of 2");
+    assert_eq!(size, "instance `a_v1`: expected 2 points, found 1");
     let label = writer.push(&[[0.0; 3]; 2], 3, "a_v1", 1).unwrap_err().to_string();
-    assert_eq!(label, "instance `a_v1`: label 3 of 3 classes");
+    assert_eq!(label, "instance `a_v1`: expected a label below 3, found 3");
     writer.finish().unwrap();
-    assert_eq!(read_packed(&path).unwrap().len(), 0);
+    assert_eq!(read_labelled(&path).unwrap().len(), 0);
 }
 
 #[test]
@@ -95,8 +102,8 @@ fn no_damaged_byte_makes_the_reader_panic() {
         let mut bytes = whole.clone();
         bytes[at] ^= 0x15;
         fs::write(&path, &bytes).unwrap();
-        let _ = read_packed(&path);
+        let _ = read_labelled(&path);
         fs::write(&path, &whole[..at]).unwrap();
-        assert!(read_packed(&path).is_err(), "cut at {at}");
+        assert!(read_labelled(&path).is_err(), "cut at {at}");
     }
 }

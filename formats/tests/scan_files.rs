@@ -121,7 +121,10 @@ fn an_attribute_of_another_length_is_not_written() {
     let scan = Scan { ring: Some(vec![1]), ..scan(2, 0) };
     for format in ScanFormat::POINTS {
         let error = write_scan(&path, format, &scan).unwrap_err();
-        assert_eq!(error.to_string(), "attribute ring has 1 values for 2 points");
+        assert_eq!(
+            error.to_string(),
+            "attribute ring: expected 2 values, one for each point, found 1"
+        );
         assert!(!path.exists());
     }
 }
@@ -140,14 +143,25 @@ fn error_of(name: &str, bytes: &[u8]) -> String {
 fn errors_name_the_file_and_the_part() {
     assert!(error_of("a.npz", b"no archive").starts_with(": archive: "));
     assert!(error_of("a.npz", b"").starts_with(": archive: "));
-    assert!(error_of("a.xyz", b"").starts_with(": extension: `xyz` is no scan format"));
+    assert!(error_of("a.xyz", b"").starts_with(": extension: unknown scan format `xyz`"));
     assert!(error_of("a.ply", b"ply\n").starts_with(": header: "));
-    let header = "ply\nformat ascii 1.0\nelement vertex 1000000000\nproperty float x\n";
-    assert!(error_of("a.ply", format!("{header}end_header\n").as_bytes()).contains("end of file"));
+    let axes = "property float x\nproperty float y\nproperty float z\n";
+    let header = format!("ply\nformat ascii 1.0\nelement vertex 1000000000\n{axes}end_header\n");
+    assert_eq!(
+        error_of("a.ply", header.as_bytes()),
+        ": line 8: the file ends after 0 of 1000000000"
+    );
     let short = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n";
-    assert_eq!(error_of("a.ply", short.as_bytes()), ": element vertex: no property y");
+    assert_eq!(error_of("a.ply", short.as_bytes()), ": element vertex: property y is missing");
     let empty = "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\nend_header\n";
-    assert_eq!(error_of("a.ply", empty.as_bytes()), ": element vertex: missing");
-    let ring = "ply\nformat ascii 1.0\nelement vertex 1\nproperty int ring\nend_header\n65536\n";
-    assert!(error_of("a.ply", ring.as_bytes()).starts_with(": element vertex: "));
+    assert_eq!(error_of("a.ply", empty.as_bytes()), ": element vertex: property x is missing");
+    let ring = |property: &str, value: &str| {
+        let header = format!("ply\nformat ascii 1.0\nelement vertex 1\n{axes}{property}\n");
+        error_of("a.ply", format!("{header}end_header\n0 0 0 {value}\n").as_bytes())
+    };
+    let expected = ": property ring: expected a whole number of 16 bits, found ";
+    assert_eq!(ring("property int ring", "65536"), format!("{expected}65536"));
+    assert_eq!(ring("property float ring", "0.5"), format!("{expected}0.5"));
+    let list = ": element vertex: expected a number as property ring, found a list";
+    assert_eq!(ring("property list uchar int ring", "1 7"), list);
 }

@@ -1,7 +1,7 @@
 //! `gen-dataset`: the same bytes whatever the way they are made.
 
 use crate::{assert_same_tree, exits, meshes, said, succeeds, tree};
-use formats::packed::read_packed;
+use formats::labelled::read_labelled;
 use formats::scan_file::read_scan;
 use std::path::Path;
 
@@ -22,8 +22,8 @@ fn the_default_sets_are_written_packed_and_verified() {
                 read_scan(&out.join(format!("{set}/{variant}/donut/test/donut_0003_v0.npz")));
             assert!(scan.unwrap().len() > 500);
             let packed =
-                read_packed(&out.join(format!("packed/{set}-{variant}-train.npz"))).unwrap();
-            assert_eq!(packed.classes, ["ball", "donut", "ring"]);
+                read_labelled(&out.join(format!("packed/{set}-{variant}-train.npz"))).unwrap();
+            assert_eq!(packed.classes.as_ref().unwrap()[..], ["ball", "donut", "ring"]);
             assert_eq!(packed.n_points, 1024);
             assert_eq!(packed.len(), if set == "rotational" { 6 * 4 } else { 6 });
         }

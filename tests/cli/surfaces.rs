@@ -1,7 +1,7 @@
 //! `sample-surfaces`: what scans are compared with.
 
 use crate::{exits, succeeds, tree};
-use formats::packed::read_packed;
+use formats::labelled::read_labelled;
 
 #[test]
 fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
@@ -9,19 +9,20 @@ fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
     let at = folder.path();
     succeeds(at, "gen-shapes --out shapes --train 1 --test 1");
     succeeds(at, "sample-surfaces shapes --out a --points 200");
-    let whole = read_packed(&at.join("a/surface-test.npz")).unwrap();
-    let seen = read_packed(&at.join("a/seen-test.npz")).unwrap();
+    let whole = read_labelled(&at.join("a/surface-test.npz")).unwrap();
+    let seen = read_labelled(&at.join("a/seen-test.npz")).unwrap();
+    let (names, seen_names) = (whole.names.as_ref().unwrap(), seen.names.as_ref().unwrap());
     assert_eq!((whole.len(), whole.n_points, seen.len()), (10, 200, 40));
     let radius = |p: &[f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
     for i in 0..whole.len() {
         let largest = whole.cloud(i).iter().map(radius).fold(0.0, f32::max);
         assert!((largest - 1.0).abs() < 1e-6, "{largest}");
-        let of_mesh = |name: &str| name.strip_suffix("_v0") == Some(&whole.names[i]);
-        let view = seen.names.iter().position(|name| of_mesh(name)).unwrap();
+        let of_mesh = |name: &str| name.strip_suffix("_v0") == Some(&names[i]);
+        let view = seen_names.iter().position(|name| of_mesh(name)).unwrap();
         // Views 0 and 2 are from +x and -x: each sees more of its own side.
         let mean = |cloud: &[[f32; 3]]| cloud.iter().map(|p| p[0]).sum::<f32>() / 200.0;
         let [front, back] = [view, view + 2].map(|view| mean(seen.cloud(view)));
-        assert!(front > back, "{}: {front}, {back}", whole.names[i]);
+        assert!(front > back, "{}: {front}, {back}", names[i]);
         // In the whole's frame: nothing beyond it but what other samples miss.
         assert!(seen.cloud(view).iter().all(|p| radius(p) < 1.2));
         // Of 1,200 points looked at not all are seen, and not none.

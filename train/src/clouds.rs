@@ -121,17 +121,7 @@ impl Clouds {
     /// The clouds at `indices`.
     #[must_use]
     pub fn some(&self, indices: &[usize]) -> Self {
-        let mut points = Vec::with_capacity(indices.len() * self.set.n_points * 3);
-        indices.iter().for_each(|&i| points.extend_from_slice(self.set.cloud(i).as_flattened()));
-        let names = self.set.names.as_ref();
-        let set = LabelledSet {
-            points,
-            n_points: self.set.n_points,
-            labels: indices.iter().map(|&i| self.set.labels[i]).collect(),
-            names: names.map(|names| indices.iter().map(|&i| names[i].clone()).collect()),
-            classes: None,
-        };
-        Self { set, classes: self.classes.clone() }
+        Self { set: self.set.select(indices), classes: self.classes.clone() }
     }
 
     /// These clouds and then `others`.
@@ -153,7 +143,7 @@ impl Clouds {
             n_points: self.set.n_points,
             labels: [&self.set.labels[..], &others.set.labels[..]].concat(),
             names: names.map(|(a, b)| join(a, b)),
-            classes: None,
+            ..LabelledSet::default()
         };
         Ok(Self { set, classes: self.classes.clone() })
     }

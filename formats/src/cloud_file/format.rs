@@ -1,4 +1,4 @@
-//! The formats of clouds, and how names and first bytes tell them apart.
+//! The file formats of clouds, recognised by name or by first bytes.
 
 use std::fmt;
 use std::path::Path;
@@ -10,8 +10,9 @@ use crate::npy_header;
 /// How many first bytes [`CloudFormat::of_content`] looks at.
 pub(super) const SNIFFED_SIZE: usize = 512;
 
-/// A format of clouds.
+/// A file format of clouds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum CloudFormat {
     /// Stanford's polygon format.
     Ply,
@@ -54,7 +55,7 @@ impl CloudFormat {
     /// The format that `path`'s extension names, in whichever case.
     ///
     /// # Errors
-    /// [`FormatError::Malformed`] if it names none, or one that holds no cloud.
+    /// [`FormatError::Malformed`] if the extension is unknown or a mesh's.
     pub fn of(path: &Path) -> Result<Self, FormatError> {
         let refuse = |cause: String| Err(FormatError::malformed(path, "extension", cause));
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -70,16 +71,16 @@ impl CloudFormat {
             "laz" => refuse(COMPRESSED_LAS.to_owned()),
             "off" | "obj" | "stl" => refuse(MESH.to_owned()),
             _ => {
-                refuse(format!("`{extension}` is no format of clouds; choose one of {EXTENSIONS}"))
+                refuse(format!("unknown cloud format `{extension}`, expected one of {EXTENSIONS}"))
             }
         }
     }
 
-    /// The format whose files begin like `start`, of a file that errors call
-    /// `name`. What holds no zero byte and begins like nothing else is text.
+    /// The format whose files begin with `start`. Errors call the file `name`.
+    /// Bytes without a zero that no other format begins with are text.
     ///
     /// # Errors
-    /// [`FormatError::Malformed`] for a mesh and for bytes without a sign.
+    /// [`FormatError::Malformed`] for a mesh and for unknown binary data.
     pub fn of_content(start: &[u8], name: &Path) -> Result<Self, FormatError> {
         let refuse = |cause: &str| Err(FormatError::malformed(name, "format", cause));
         let begins = |sign: &[u8]| start.starts_with(sign);
@@ -91,17 +92,17 @@ impl CloudFormat {
             () if begins(b"# .PCD") || begins(b"VERSION") => Ok(Self::Pcd),
             () if begins(b"LASF") => Ok(Self::Las),
             () if begins(b"OFF") || begins(b"solid ") => refuse(MESH),
-            () if start.contains(&0) => refuse(UNTOLD),
+            () if start.contains(&0) => refuse(UNKNOWN),
             () => Ok(Self::Text),
         }
     }
 }
 
-/// Why there is no reading `.laz`.
+/// Why `.laz` is not read.
 pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";
-const MESH: &str = "a mesh, not a cloud: scan it first";
-const UNTOLD: &str = "binary, but with the first bytes of no format; name it";
+const MESH: &str = "expected a cloud, found a mesh: scan it first";
+const UNKNOWN: &str = "the first bytes are of no known binary format; name the format";
 const EXTENSIONS: &str = "ply, npz, npy, pcd, xyz, txt, asc, tsv, csv, bin, las";
 
 impl fmt::Display for CloudFormat {
@@ -117,7 +118,7 @@ impl FromStr for CloudFormat {
         Self::ALL.into_iter().find(|format| format.name() == word).ok_or_else(|| {
             FormatError::UnknownName {
                 word: word.to_owned(),
-                what: "format of clouds",
+                what: "cloud format",
                 choices: Self::ALL.map(Self::name).join(", "),
             }
         })
@@ -134,7 +135,7 @@ mod tests {
             assert_eq!(format.to_string().parse::<CloudFormat>().unwrap(), format);
         }
         let error = "e57".parse::<CloudFormat>().unwrap_err().to_string();
-        assert!(error.starts_with("`e57` is no format of clouds; choose one of ply, npz"));
+        assert!(error.starts_with("unknown cloud format `e57`, expected one of ply, npz,"));
     }
 
     #[test]
@@ -151,10 +152,12 @@ mod tests {
         let refusal = |name: &str| CloudFormat::of(Path::new(name)).unwrap_err().to_string();
         assert_eq!(
             refusal("chair.off"),
-            "chair.off: extension: a mesh, not a cloud: scan it first"
+            "chair.off: extension: expected a cloud, found a mesh: scan it first"
         );
         assert!(refusal("a.laz").starts_with("a.laz: extension: LAZ is compressed LAS: "));
-        assert!(refusal("a").starts_with("a: extension: `` is no format of clouds; choose"));
+        assert!(
+            refusal("a").starts_with("a: extension: unknown cloud format ``, expected one of ply,")
+        );
     }
 
     #[test]
@@ -163,8 +166,11 @@ mod tests {
         assert_eq!(of(b"plywood 1 2").unwrap(), CloudFormat::Text);
         assert_eq!(of(b"").unwrap(), CloudFormat::Text);
         let mesh = of(b"OFF\n8 6 12\n").unwrap_err().to_string();
-        assert_eq!(mesh, "-: format: a mesh, not a cloud: scan it first");
+        assert_eq!(mesh, "-: format: expected a cloud, found a mesh: scan it first");
         let raw = of(&[0, 0, 0x80, 0x3f]).unwrap_err().to_string();
-        assert_eq!(raw, "-: format: binary, but with the first bytes of no format; name it");
+        assert_eq!(
+            raw,
+            "-: format: the first bytes are of no known binary format; name the format"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! Raw little-endian f32, as KITTI keeps its scans: x, y, z and intensity of
 //! one point after the other, without a header.
 //!
-//! Names tell of other numbers of columns: `NAME.f32x5.bin` has five, and so
+//! Names state other numbers of columns: `NAME.f32x5.bin` has five, and so
 //! has nuScenes's `NAME.pcd.bin` (x, y, z, intensity, ring).
 
 use std::io::{BufRead, Write};
@@ -21,7 +21,7 @@ const COLUMN_SIZE: usize = size_of::<f32>();
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let start = reader.fill_buf().map_err(|source| FormatError::io(name, source))?;
     if is_velodyne_packets(start) {
-        let cause = "raw Velodyne packets, not points: decode them first";
+        let cause = "expected points, found raw Velodyne packets: decode them first";
         return Err(FormatError::malformed(name, "format", cause));
     }
     let columns = columns(name);
@@ -36,7 +36,8 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
         0 => Ok(points),
         rest => {
             let part = format!("point {}", points.len());
-            let cause = format!("{rest} of the {} bytes of {columns} f32", columns * COLUMN_SIZE);
+            let cause =
+                format!("expected {} bytes, {columns} f32, found {rest}", columns * COLUMN_SIZE);
             Err(FormatError::malformed(name, part, cause))
         }
     }
@@ -46,8 +47,8 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
 fn columns(name: &Path) -> usize {
     let name = name.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let stem = name.strip_suffix(".bin").unwrap_or(&name);
-    let told = stem.rsplit_once(".f32x").and_then(|(_, columns)| columns.parse().ok());
-    match told {
+    let stated = stem.rsplit_once(".f32x").and_then(|(_, columns)| columns.parse().ok());
+    match stated {
         Some(columns @ 3..=64) => columns,
         _ if stem.ends_with(".pcd") => NUSCENES_COLUMNS,
         _ => KITTI_COLUMNS,
@@ -55,8 +56,8 @@ fn columns(name: &Path) -> usize {
 }
 
 /// Whether `start` begins with two blocks of a Velodyne data packet: each has
-/// 100 bytes and begins with the flag 0xFFEE (VLP-16 user manual, 9.3). The
-/// packets of some scans would pass for whole points.
+/// 100 bytes and begins with the flag 0xFFEE (VLP-16 user manual, 9.3). Such
+/// packets could be read as points.
 fn is_velodyne_packets(start: &[u8]) -> bool {
     const FLAG: &[u8] = &[0xff, 0xee];
     start.starts_with(FLAG) && start.get(100..102) == Some(FLAG)
@@ -66,12 +67,12 @@ fn is_velodyne_packets(start: &[u8]) -> bool {
 pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let columns = columns(path);
     if columns != KITTI_COLUMNS {
-        let cause = format!("{columns} columns are read but not written");
+        let cause = format!("files of {columns} columns are read but not written");
         return Err(FormatError::malformed(path, "extension", cause));
     }
     let fits = |x: &f64| !x.is_finite() || (*x as f32).is_finite();
     if let Some(i) = points.iter().position(|point| !point.iter().all(fits)) {
-        let cause = format!("{:?} does not fit f32, all that the format holds", points[i]);
+        let cause = format!("{:?} does not fit f32, the format's only type", points[i]);
         return Err(FormatError::malformed(path, format!("point {i}"), cause));
     }
     atomic::write(path, |writer| {

@@ -1,8 +1,8 @@
 //! LAS, the ASPRS's format of airborne scans.
 //!
-//! Crate `las` reads the header and knows the point formats. Its own reader of
-//! points is not used: it believes the sizes that records after the points
-//! claim, so that a file of a hundred bytes can ask for all memory there is.
+//! The crate `las` reads the header and knows the point formats. Its reader of
+//! points is not used: it allocates what records after the points claim, so that
+//! a file of a hundred bytes can exhaust the memory.
 
 use std::io::{self, BufRead, Read};
 use std::path::Path;
@@ -49,7 +49,9 @@ fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
     let (found, least) = (header.point_data_record_length, format.len());
     if found < least {
         let format = header.point_data_record_format;
-        return Err(invalid(format!("points of {found} bytes, format {format} has {least}")));
+        return Err(invalid(format!(
+            "expected points of {least} bytes in format {format}, found {found}"
+        )));
     }
     let n_bytes = header.header_size.max(header.version.header_size());
     Ok((header, n_bytes.into()))

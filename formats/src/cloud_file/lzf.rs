@@ -14,7 +14,7 @@ use crate::decoding::invalid;
 pub(super) fn decompress(compressed: &[u8], n: u64) -> io::Result<Vec<u8>> {
     let mut output = Vec::new();
     let mut input = compressed.iter().copied();
-    let mut next = || input.next().ok_or_else(|| invalid("LZF data that end too early"));
+    let mut next = || input.next().ok_or_else(|| invalid("the LZF data end too early"));
     while (output.len() as u64) < n {
         let control = usize::from(next()?);
         if control < 32 {
@@ -29,14 +29,14 @@ pub(super) fn decompress(compressed: &[u8], n: u64) -> io::Result<Vec<u8>> {
         };
         let distance = ((control & 0x1f) << 8) + usize::from(next()?) + 1;
         let start = output.len().checked_sub(distance);
-        let start = start.ok_or_else(|| invalid("an LZF copy from before the start"))?;
+        let start = start.ok_or_else(|| invalid("an LZF copy begins before the data"))?;
         // The copy may overlap what it makes.
         for i in start..start + length + 2 {
             output.push(output[i]);
         }
     }
     if output.len() as u64 > n {
-        return Err(invalid(format!("LZF data of more than {n} bytes")));
+        return Err(invalid(format!("expected {n} bytes of LZF data, found more")));
     }
     Ok(output)
 }

@@ -11,9 +11,9 @@
 //! | KITTI `.bin` | f32, four to a point or as many as the name says | f32, intensity 0 |
 //! | LAS | 1.0 to 1.4 | 1.2, in steps of 1 nm or more |
 //!
-//! NaN and infinities are coordinates like others; whoever reads decides what
-//! to do with them. Memory grows with the bytes that are there, unpacked where
-//! they are compressed, never with what a header promises.
+//! NaN and infinities are kept; the caller decides what to do with them. Memory
+//! grows with the bytes of the file (unpacked, where they are compressed), never
+//! with a count that a header states.
 
 mod format;
 mod kitti;
@@ -21,7 +21,6 @@ mod kitti;
 mod las;
 #[cfg(feature = "las")]
 mod las_write;
-mod lines;
 #[cfg(feature = "pcd")]
 mod lzf;
 mod npy;
@@ -33,8 +32,6 @@ mod pcd;
 mod pcd_header;
 #[cfg(feature = "ply")]
 mod ply;
-#[cfg(feature = "ply")]
-mod ply_header;
 mod precision;
 mod text;
 
@@ -48,12 +45,12 @@ use crate::records;
 pub use format::CloudFormat;
 use precision::Precision;
 
-/// Reads the cloud at `path`, in the format that its name tells.
+/// Reads the cloud at `path`, in the format that its extension names.
 ///
 /// # Errors
-/// A name without a known format, a format that this build leaves out, a mesh,
-/// a file that cannot be read or is not what its name says. The error names the
-/// file and the line, element or key at fault.
+/// An unknown extension, a format that this build does not include, a mesh, a
+/// file that cannot be read or is not of its extension's format. The error names
+/// the file and the line, element or key at fault.
 pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let format = CloudFormat::of(path)?;
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
@@ -66,12 +63,12 @@ pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
 
 /// Reads a cloud from `reader`, which errors call `name`.
 ///
-/// Without a `format` the first bytes tell it; raw floats (KITTI) have nothing
-/// to be told by, and must be named. An NPZ archive is held in memory, since
-/// its table of contents comes last.
+/// Without a `format`, the first bytes tell it. Raw floats (KITTI) cannot be
+/// recognised and must be named. An NPZ archive is held in memory, because its
+/// table of contents comes last.
 ///
 /// # Errors
-/// As [`read_cloud`]; and bytes that begin like no format.
+/// As [`read_cloud`], and bytes of no known format.
 pub fn read_cloud_from(
     mut reader: impl Read,
     format: Option<CloudFormat>,
@@ -114,15 +111,14 @@ fn read_as(
     }
 }
 
-/// Writes `points` to `path`, atomically, in the format that its name tells.
+/// Writes `points` to `path`, atomically, in the format that its extension names.
 ///
-/// Coordinates are written as f32 where that loses nothing, that is for clouds
-/// that came as f32, and else as f64; the same points give the same bytes. Three
-/// formats round: KITTI's holds f32 only, in PCD f64 stands only where f32
-/// would lose more than a millionth of the cloud's extent, since the usual
-/// clouds of PCL and Open3D take no other type from it, and LAS holds whole
-/// steps: 1 nm in clouds of up to 4 m, ten times as much in those ten times as
-/// large.
+/// Coordinates are written as f32 where that loses nothing, as for clouds that
+/// were read as f32, and otherwise as f64; the same points give the same bytes.
+/// Three formats round. KITTI's holds f32 only. PCD gets f64 only where f32 would
+/// lose more than a millionth of the cloud's extent, because the usual clouds of
+/// PCL and Open3D read no other type. LAS holds whole steps: 1 nm in clouds of up
+/// to 4 m, 10 nm up to 40 m, and so on.
 ///
 /// # Errors
 /// As [`read_cloud`]; raw floats of a number of columns other than four; a
@@ -153,5 +149,5 @@ pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> 
 
 #[allow(dead_code, reason = "a build may leave no format out")]
 fn not_in_this_build(format: CloudFormat, name: &Path) -> FormatError {
-    FormatError::malformed(name, "format", format!("{format} is left out of this build"))
+    FormatError::malformed(name, "format", format!("this build does not include {format}"))
 }

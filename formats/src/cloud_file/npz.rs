@@ -54,11 +54,14 @@ fn only_array_of_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<String
         [key] => Ok(key.clone()),
         [] => Err(npz.error(
             "archive",
-            format!("no array of shape [n, 3] among its keys [{}]", keys.join(", ")),
+            format!("expected an array of shape [n, 3], found the keys [{}]", keys.join(", ")),
         )),
         several => Err(npz.error(
             "archive",
-            format!("which of {} holds the points? name it `{POINTS}`", several.join(", ")),
+            format!(
+                "expected one array of points, found {}: name one `{POINTS}`",
+                several.join(", ")
+            ),
         )),
     }
 }

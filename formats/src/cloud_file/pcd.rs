@@ -1,18 +1,18 @@
 //! PCD, the Point Cloud Library's format: text, binary or LZF-compressed.
 //!
-//! Read here and not by crate `pcd-rs`: that one indexes beyond its buffers
-//! where a compressed file holds less than its header promises, and makes a
-//! vector of every field of every point.
+//! The crate `pcd-rs` is not used: it indexes beyond its buffers where a
+//! compressed file holds less than its header says, and allocates a vector for
+//! every field of every point.
 
 use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
 
-use super::lines::Lines;
 use super::lzf;
 use super::pcd_header::{Coordinate, Encoding, Header, read_header};
 use super::precision::Precision;
 use crate::decoding::{error_in, invalid};
 use crate::error::FormatError;
+use crate::lines::Lines;
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
@@ -76,7 +76,9 @@ fn read_compressed(
     let promised = header.n.checked_mul(header.point_size());
     if promised != Some(uncompressed) {
         let (n, size) = (header.n, header.point_size());
-        return Err(invalid(format!("{uncompressed} bytes for {n} points of {size}")));
+        return Err(invalid(format!(
+            "expected {n} points of {size} bytes, found {uncompressed} bytes in all"
+        )));
     }
     let mut bytes = Vec::new();
     if reader.take(compressed).read_to_end(&mut bytes)? as u64 != compressed {

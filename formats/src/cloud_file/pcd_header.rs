@@ -3,9 +3,9 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use super::lines::{Line, Lines};
 use crate::decoding::excerpt;
 use crate::error::FormatError;
+use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
 
 /// What a header says of the points.
@@ -52,7 +52,8 @@ pub(super) fn read_header<R: BufRead>(
     lines: &mut Lines<'_, R>,
     name: &Path,
 ) -> Result<Header, FormatError> {
-    let missing = |key: &str| FormatError::malformed(name, "header", format!("no line {key}"));
+    let missing =
+        |key: &str| FormatError::malformed(name, "header", format!("the line {key} is missing"));
     let mut fields: Vec<Field> = Vec::new();
     let (mut points, mut width, mut height) = (None, None, None);
     while let Some(line) = lines.next()? {
@@ -66,7 +67,7 @@ pub(super) fn read_header<R: BufRead>(
                 Ok(())
             })?,
             "COUNT" => each(&line, &mut fields, words, |field, word| {
-                // The library takes 0 for 1.
+                // The library reads 0 as 1.
                 field.count = line.count(word)?.max(1);
                 Ok(())
             })?,
@@ -98,13 +99,17 @@ fn each<'a>(
 ) -> Result<(), FormatError> {
     let words: Vec<_> = words.collect();
     if words.len() != fields.len() {
-        return Err(line.error(format!("{} words for {} FIELDS", words.len(), fields.len())));
+        return Err(line.error(format!(
+            "expected {} words, one for each of FIELDS, found {}",
+            fields.len(),
+            words.len()
+        )));
     }
     fields.iter_mut().zip(words).try_for_each(|(field, word)| set(field, word))
 }
 
 impl Header {
-    /// Bytes of a binary point; more than any file has if it cannot be counted.
+    /// Bytes of a binary point; the largest u64 if the sum is larger.
     pub fn point_size(&self) -> u64 {
         self.fields.iter().fold(0, |sum: u64, field| sum.saturating_add(field.n_bytes()))
     }
@@ -114,12 +119,15 @@ impl Header {
         let at = self.fields.iter().position(|field| field.name.eq_ignore_ascii_case(axis));
         let at = at.ok_or_else(|| {
             let names: Vec<_> = self.fields.iter().map(|field| field.name.as_str()).collect();
-            format!("no {axis} in `{}`", excerpt(&names.join(" ")))
+            format!("expected a field {axis}, found `{}`", excerpt(&names.join(" ")))
         })?;
         let field = &self.fields[at];
         let before = &self.fields[..at];
         let number = field.number().filter(|_| field.count == 1).ok_or_else(|| {
-            format!("{axis} is {} number(s) of type {}{}", field.count, field.kind, field.size)
+            format!(
+                "expected one number as {axis}, found {} of type {}{}",
+                field.count, field.kind, field.size
+            )
         })?;
         let offset = before.iter().fold(0, |sum: u64, field| sum.saturating_add(field.n_bytes()));
         let column = before.iter().fold(0, |sum: u64, field| sum.saturating_add(field.count));
@@ -159,7 +167,10 @@ impl Encoding {
             "ascii" => Ok(Self::Ascii),
             "binary" => Ok(Self::Binary),
             "binary_compressed" => Ok(Self::Compressed),
-            other => Err(line.error(format!("`{}` is no kind of data", excerpt(other)))),
+            other => Err(line.error(format!(
+                "expected ascii, binary or binary_compressed, found `{}`",
+                excerpt(other)
+            ))),
         }
     }
 }

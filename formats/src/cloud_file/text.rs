@@ -1,15 +1,15 @@
 //! Clouds as text: a point a line.
 //!
-//! Columns are separated by semicolons, commas, tabs or blanks: by the first of
-//! these that the first line has. A first line of names says which columns are
-//! x, y and z; without it, or without these names, they are the first three.
-//! What follows a `#` or stands on a line that begins with `//` is a comment.
+//! Columns are separated by semicolons, commas, tabs or blanks: the first of
+//! these that the first line has. A first line of names states which columns are
+//! x, y and z; otherwise they are the first three. Text after a `#`, and a line
+//! that begins with `//`, is a comment.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
-use super::lines::{Line, Lines};
 use crate::error::FormatError;
+use crate::lines::{Line, Lines};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -79,7 +79,7 @@ impl Layout {
             && is_named
             && let Some((axis, _)) = missing.next()
         {
-            return Err(line.error(format!("column names without {axis}")));
+            return Err(line.error(format!("expected a column named {axis} beside those named")));
         }
         Ok((Self { separator, columns: [0, 1, 2] }, is_header))
     }

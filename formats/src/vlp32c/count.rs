@@ -19,7 +19,7 @@ const FRAME_SIZE: usize = PROTOCOLS_SIZE + PAYLOAD_SIZE;
 /// [`super::write()`] wrote: the two returns of one beam are one.
 ///
 /// # Errors
-/// A file that cannot be read or is no such capture; the packet is named.
+/// A file that cannot be read or is not such a capture; the packet is named.
 pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     let mut reader = BufReader::new(file);
@@ -38,7 +38,9 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
             Err(FormatError::malformed(path, format!("packet {packet}"), cause))
         }
         (None, 0) => Ok(count),
-        (None, _) => Err(FormatError::malformed(path, format!("packet {packet}"), "is cut off")),
+        (None, _) => {
+            Err(FormatError::malformed(path, format!("packet {packet}"), "the file ends within it"))
+        }
     }
 }
 
@@ -48,27 +50,27 @@ fn read_header(reader: &mut impl Read) -> io::Result<()> {
     if header.starts_with(&MAGIC.to_le_bytes()) {
         return Ok(());
     }
-    Err(invalid("no little-endian capture with times in microseconds"))
+    Err(invalid("expected a little-endian capture with times in microseconds"))
 }
 
 /// The returns in a frame with its header.
 fn returns_in(record: &[u8]) -> Result<u64, &'static str> {
     let (header, frame) = record.split_at(FRAME_HEADER_SIZE);
     if header[8..12] != (FRAME_SIZE as u32).to_le_bytes() {
-        return Err("is no data packet, by its length");
+        return Err("expected a data packet of 1248 bytes, found another length");
     }
     let payload = &frame[PROTOCOLS_SIZE..];
-    let [.., mode, model] = payload else { return Err("is empty") };
-    let returns = Returns::of_byte(*mode).ok_or("has an unknown return mode")?;
+    let [.., mode, model] = payload else { return Err("expected a payload, found none") };
+    let returns = Returns::of_byte(*mode).ok_or("unknown return mode")?;
     if *model != MODEL {
-        return Err("is of another model");
+        return Err("expected a VLP-32C, found another model");
     }
     let blocks = payload.chunks_exact(BLOCK_SIZE).take(BLOCKS);
     let mut count = 0;
     for block in blocks.step_by(returns.blocks_per_sequence()) {
         let (header, measured) = block.split_at(BLOCK_HEADER_SIZE);
         if !header.starts_with(&FLAG) {
-            return Err("has a block without a flag");
+            return Err("a block does not begin with its flag");
         }
         let seen = measured.chunks_exact(MEASUREMENT_SIZE).filter(|bytes| bytes[..2] != [0, 0]);
         count += seen.count() as u64;

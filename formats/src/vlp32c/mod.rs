@@ -167,7 +167,7 @@ impl FromStr for Returns {
         Self::ALL.into_iter().find(|returns| returns.name() == word).ok_or_else(|| {
             FormatError::UnknownName {
                 word: word.to_owned(),
-                what: "choice of returns",
+                what: "return mode",
                 choices: Self::ALL.map(Self::name).join(", "),
             }
         })
@@ -216,7 +216,11 @@ fn measurements(
     scan: &Scan,
 ) -> Result<Vec<[Measurement; LASERS]>, FormatError> {
     scan.check_lengths()?;
-    let missing = |attribute| FormatError::Length { attribute, expected: scan.len(), found: 0 };
+    let missing = |attribute: Attribute| FormatError::Length {
+        attribute: attribute.name(),
+        expected: scan.len(),
+        found: 0,
+    };
     let beams = scan.beam.as_ref().ok_or_else(|| missing(Attribute::Beam))?;
     let ranges_m = scan.range_m.as_ref().ok_or_else(|| missing(Attribute::Range))?;
     let mut fired = vec![[Measurement::NONE; LASERS]; revolution.sequences() as usize];

@@ -27,8 +27,8 @@ fn what_is_not_finite_is_passed_on() {
 #[test]
 fn an_unfinished_point_is_refused() {
     let bytes = floats(&[1.0; 13]);
-    assert_eq!(error("a.bin", &bytes), "point 3: 4 of the 16 bytes of 4 f32");
-    assert_eq!(error("a.f32x5.bin", &bytes[..21]), "point 1: 1 of the 20 bytes of 5 f32");
+    assert_eq!(error("a.bin", &bytes), "point 3: expected 16 bytes, 4 f32, found 4");
+    assert_eq!(error("a.f32x5.bin", &bytes[..21]), "point 1: expected 20 bytes, 5 f32, found 1");
 }
 
 #[test]
@@ -38,6 +38,6 @@ fn packets_of_the_sensor_are_not_taken_for_points() {
         packet[..1200].chunks_mut(100).for_each(|block| block[..2].copy_from_slice(&[0xff, 0xee]));
     }
     // 603 times 16 bytes: their size does not tell.
-    let message = "format: raw Velodyne packets, not points: decode them first";
+    let message = "format: expected points, found raw Velodyne packets: decode them first";
     assert_eq!(error("a.bin", packets), message);
 }

@@ -63,7 +63,7 @@ fn what_is_no_cloud_is_refused() {
     let compressed = error("a.las", changed(whole(), POINT_FORMAT, &[0x81]));
     assert!(compressed.starts_with("header: LAZ is compressed LAS: decompress"), "{compressed}");
     let short = error("a.las", changed(whole(), POINT_SIZE, &[27, 0]));
-    assert_eq!(short, "header: points of 27 bytes, format 1 has 28");
+    assert_eq!(short, "header: expected points of 28 bytes in format 1, found 27");
     let early = error("a.las", changed(whole(), OFFSET_TO_POINTS, &[100, 0, 0, 0]));
     assert_eq!(early, "header: the points begin before the header ends");
     let late = error("a.las", changed(whole(), OFFSET_TO_POINTS, &[0xff; 4]));

@@ -75,11 +75,11 @@ fn what_is_no_cloud_is_refused_with_its_key() {
     let flat = || bytes_of("(3,)", &[1; 3]);
     assert_eq!(
         error("a.npz", npz(&[("a", flat()), ("b", flat())])),
-        "archive: no array of shape [n, 3] among its keys [a, b]"
+        "archive: expected an array of shape [n, 3], found the keys [a, b]"
     );
     assert_eq!(
         error("a.npz", npz(&[("a", cloud()), ("b", cloud())])),
-        "archive: which of a, b holds the points? name it `points`"
+        "archive: expected one array of points, found a, b: name one `points`"
     );
     let set = bytes_of("(2, 1, 3)", &[1; 6]);
     assert_eq!(
@@ -88,7 +88,7 @@ fn what_is_no_cloud_is_refused_with_its_key() {
     );
     assert_eq!(
         error("a.npz", npz(&[("positions", cloud()), ("origin", flat())])),
-        "origin: |u1 of shape [3] in 3 bytes, expected 8 bytes an element"
+        "origin: expected 8 bytes for each element of shape [3], found 3 bytes of |u1"
     );
     let short = npy("<f8", "False", "(2,)", &[0; 16]);
     assert_eq!(

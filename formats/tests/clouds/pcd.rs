@@ -55,27 +55,33 @@ fn what_is_no_cloud_is_refused() {
     let refuse = |header: &str, data: &[u8]| error("a.pcd", pcd(header, data));
     let xyz = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n";
     for (header, message) in [
-        ("", "header: no line DATA"),
-        ("FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n", "FIELDS: no z in `x y`"),
-        ("FIELDS x y z\nSIZE 4 4\n", "line 4: 2 words for 3 FIELDS"),
-        ("FIELDS x y z\nSIZE 4 4 -4\n", "line 4: `-4` is no count"),
+        ("", "header: the line DATA is missing"),
+        (
+            "FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n",
+            "FIELDS: expected a field z, found `x y`",
+        ),
+        ("FIELDS x y z\nSIZE 4 4\n", "line 4: expected 3 words, one for each of FIELDS, found 2"),
+        ("FIELDS x y z\nSIZE 4 4 -4\n", "line 4: expected a count, found `-4`"),
         (
             "FIELDS x y z\nSIZE 4 4 3\nTYPE F F F\nPOINTS 1\nDATA ascii\n",
-            "FIELDS: z is 1 number(s) of type F3",
+            "FIELDS: expected one number as z, found 1 of type F3",
         ),
         (
             "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 2 1\nPOINTS 1\nDATA ascii\n",
-            "FIELDS: y is 2 number(s) of type F4",
+            "FIELDS: expected one number as y, found 2 of type F4",
         ),
     ] {
         assert_eq!(refuse(header, b""), message);
     }
     let with = |rest: &str| format!("{xyz}{rest}");
-    assert_eq!(refuse(&with("DATA ascii\n"), b""), "header: no line POINTS");
-    assert_eq!(refuse(&with("POINTS 1\nDATA zip\n"), b""), "line 8: `zip` is no kind of data");
+    assert_eq!(refuse(&with("DATA ascii\n"), b""), "header: the line POINTS is missing");
+    assert_eq!(
+        refuse(&with("POINTS 1\nDATA zip\n"), b""),
+        "line 8: expected ascii, binary or binary_compressed, found `zip`"
+    );
     let ascii = with("POINTS 2\nDATA ascii\n");
     assert_eq!(refuse(&ascii, b"1 2 3\n4 5\n"), "line 10: expected a number in column 3");
-    assert_eq!(refuse(&ascii, b"1 2 3\n4 5 x\n"), "line 10: `x` is no number");
+    assert_eq!(refuse(&ascii, b"1 2 3\n4 5 x\n"), "line 10: expected a number, found `x`");
     assert_eq!(refuse(&ascii, b"1 2 3\n"), "line 10: the file ends after 1 of 2");
     let binary = with("POINTS 2\nDATA binary\n");
     assert_eq!(refuse(&binary, &[0; 23]), "points: the file ends after 1 of 2");
@@ -84,14 +90,17 @@ fn what_is_no_cloud_is_refused() {
 #[test]
 fn compressed_points_that_lie_are_refused() {
     let refuse = |bytes: Vec<u8>| error("a.pcd", bytes);
-    assert_eq!(refuse(compressed("2", &FIELDS, 11)), "points: 11 bytes for 2 points of 6");
+    assert_eq!(
+        refuse(compressed("2", &FIELDS, 11)),
+        "points: expected 2 points of 6 bytes, found 11 bytes in all"
+    );
     assert_eq!(
         refuse(compressed("715827882", &FIELDS, 4_294_967_292)),
-        "points: LZF data that end too early"
+        "points: the LZF data end too early"
     );
     assert_eq!(
         refuse(compressed(MANY, &FIELDS, 12)),
-        format!("points: 12 bytes for {MANY} points of 6")
+        format!("points: expected {MANY} points of 6 bytes, found 12 bytes in all")
     );
     let mut cut = compressed("2", &FIELDS, 12);
     cut.truncate(cut.len() - 1);
@@ -108,5 +117,8 @@ fn a_promise_beyond_all_memory_is_an_error() {
     let wide = format!(
         "FIELDS a x y z\nSIZE {MANY} 4 4 4\nTYPE F F F F\nCOUNT {MANY} 1 1 1\nPOINTS 1\nDATA binary\n"
     );
-    assert!(error("a.pcd", pcd(&wide, &[0; 36])).starts_with("points: points of 1844674407370955"));
+    assert!(
+        error("a.pcd", pcd(&wide, &[0; 36]))
+            .starts_with("points: expected points of 1 to 16777216 bytes, found 1844674407370955")
+    );
 }

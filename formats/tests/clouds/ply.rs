@@ -94,35 +94,38 @@ fn no_vertices_are_a_cloud() {
 fn what_is_no_cloud_is_refused() {
     for (header, message) in [
         ("element face 0\n", "element vertex: missing"),
-        ("element vertex 0\nproperty float x\n", "element vertex: no property y"),
+        ("element vertex 0\nproperty float x\n", "element vertex: property y is missing"),
         (
             "element vertex 1\nproperty list uchar float x\nproperty int y\nproperty int z\n",
-            "element vertex: property x is a list",
+            "element vertex: expected a number as property x, found a list",
         ),
-        ("element vertex -1\n", "line 4: `-1` is no count"),
-        ("property float x\n", "line 4: a property of no element"),
-        ("element vertex 1\nproperty real x\n", "line 5: `real` is no type of PLY's"),
+        ("element vertex -1\n", "line 4: expected a count, found `-1`"),
+        ("property float x\n", "line 4: expected an element before its properties"),
+        ("element vertex 1\nproperty real x\n", "line 5: expected a type of PLY, found `real`"),
         ("element vertex 1\nproperty x\n", "line 5: expected `property TYPE NAME`"),
         (
             "element vertex 1\nproperty list float int x\n",
-            "line 5: a length that is no whole number",
+            "line 5: expected a whole number as the type of a list's length",
         ),
-        ("vertices 7\n", "line 4: what is `vertices 7`?"),
+        ("vertices 7\n", "line 4: expected a keyword of PLY, found `vertices 7`"),
     ] {
         assert_eq!(error("a.ply", ply("ascii", header, b"")), message);
     }
-    assert_eq!(error("a.ply", ply("zip", "", b"")), "line 2: `zip` is no format of PLY's");
-    assert_eq!(error("a.ply", "plywood"), "header: the first line is not `ply`");
-    assert_eq!(error("a.ply", "ply\nend_header\n"), "header: no line `format`");
+    assert_eq!(
+        error("a.ply", ply("zip", "", b"")),
+        "line 2: expected ascii, binary_little_endian or binary_big_endian, found `zip`"
+    );
+    assert_eq!(error("a.ply", "plywood"), "header: expected `ply` as the first line");
+    assert_eq!(error("a.ply", "ply\nend_header\n"), "header: the line `format` is missing");
     assert_eq!(error("a.ply", "ply\n"), "header: the file ends before `end_header`");
     let rows =
         |data: &[u8]| error("a.ply", ply("ascii", &format!("element vertex 2\n{XYZ}"), data));
-    assert_eq!(rows(b"1 2 3\n4 5 up\n"), "line 10: `up` is no number");
-    assert_eq!(rows(b"1 2 3\n4 5\n"), "line 10: no number for property z");
+    assert_eq!(rows(b"1 2 3\n4 5 up\n"), "line 10: expected a number, found `up`");
+    assert_eq!(rows(b"1 2 3\n4 5\n"), "line 10: the number for property z is missing");
     assert_eq!(rows(b"1 2 3\n"), "line 10: the file ends after 1 of 2");
     let list = format!("element vertex 1\nproperty list char int n\n{XYZ}");
     let negative = ply("binary_big_endian", &list, &[0xff; 40]);
-    assert_eq!(error("a.ply", negative), "element vertex: a list n of -1 numbers");
+    assert_eq!(error("a.ply", negative), "element vertex: the list n has length -1");
 }
 
 #[test]

@@ -185,12 +185,15 @@ fn what_cannot_be_written_leaves_nothing() {
         refusal("a.las", f64::INFINITY),
         "point 1: [0.0, inf, 0.0] is not finite, and LAS holds whole numbers"
     );
-    assert_eq!(refusal("a.f32x5.bin", 0.0), "extension: 5 columns are read but not written");
+    assert_eq!(
+        refusal("a.f32x5.bin", 0.0),
+        "extension: files of 5 columns are read but not written"
+    );
     assert_eq!(
         refusal("a.bin", 1e39),
-        "point 1: [0.0, 1e39, 0.0] does not fit f32, all that the format holds"
+        "point 1: [0.0, 1e39, 0.0] does not fit f32, the format's only type"
     );
-    assert_eq!(refusal("a.off", 0.0), "extension: a mesh, not a cloud: scan it first");
+    assert_eq!(refusal("a.off", 0.0), "extension: expected a cloud, found a mesh: scan it first");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 

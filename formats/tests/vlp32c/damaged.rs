@@ -30,18 +30,24 @@ fn damage_is_named() {
     assert_eq!(counted(&whole), Ok(2));
     let error = |bytes: &[u8]| counted(bytes).unwrap_err();
     assert!(error(b"").starts_with(": header: "));
-    assert!(error(b"no capture, but long enough").contains("no little-endian capture"));
-    assert_eq!(error(&whole[..whole.len() - 1]), ": packet 2: is cut off");
+    assert!(error(b"no capture, but long enough").contains("expected a little-endian capture"));
+    assert_eq!(error(&whole[..whole.len() - 1]), ": packet 2: the file ends within it");
     let changed = |at: usize, byte: u8| {
         let mut bytes = whole.clone();
         bytes[at] = byte;
         error(&bytes)
     };
     let second = 24 + 16 + 1248;
-    assert_eq!(changed(second + 8, 1), ": packet 1: is no data packet, by its length");
-    assert_eq!(changed(second + 16 + 42, 0), ": packet 1: has a block without a flag");
-    assert_eq!(changed(second + 16 + 1246, 0), ": packet 1: has an unknown return mode");
-    assert_eq!(changed(second + 16 + 1247, 0x22), ": packet 1: is of another model");
+    assert_eq!(
+        changed(second + 8, 1),
+        ": packet 1: expected a data packet of 1248 bytes, found another length"
+    );
+    assert_eq!(changed(second + 16 + 42, 0), ": packet 1: a block does not begin with its flag");
+    assert_eq!(changed(second + 16 + 1246, 0), ": packet 1: unknown return mode");
+    assert_eq!(
+        changed(second + 16 + 1247, 0x22),
+        ": packet 1: expected a VLP-32C, found another model"
+    );
 }
 
 proptest! {

@@ -168,9 +168,18 @@ fn a_scan_that_says_too_little_or_too_much_is_refused() {
     let path = folder.path().join("scan.pcap");
     let whole = scan(&[(0, 5.0)]);
     for (scan, part) in [
-        (Scan { beam: None, ..whole.clone() }, "attribute beam has 0 values for 1 points"),
-        (Scan { range_m: None, ..whole.clone() }, "attribute range has 0 values for 1 points"),
-        (Scan { beam: Some(vec![1, 2]), ..whole.clone() }, "attribute beam has 2 values for 1"),
+        (
+            Scan { beam: None, ..whole.clone() },
+            "attribute beam: expected 1 values, one for each point, found 0",
+        ),
+        (
+            Scan { range_m: None, ..whole.clone() },
+            "attribute range: expected 1 values, one for each point, found 0",
+        ),
+        (
+            Scan { beam: Some(vec![1, 2]), ..whole.clone() },
+            "attribute beam: expected 1 values, one for each point, found 2",
+        ),
         (Scan { beam: Some(vec![57_870]), ..whole.clone() }, "beam: 57870 of 57870"),
     ] {
         let error: FormatError = write(&path, &REVOLUTION, Returns::Dual, &scan).unwrap_err();

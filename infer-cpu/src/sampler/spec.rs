@@ -213,7 +213,7 @@ mod tests {
         assert_eq!(kinds.iter().map(ToString::to_string).collect::<Vec<_>>(), words);
         assert_eq!(
             "fsp".parse::<SamplerKind>().unwrap_err().to_string(),
-            "`fsp` is no sampler; choose one of all, first, random, fps, voxel, cpl"
+            "unknown sampler `fsp`, expected one of all, first, random, fps, voxel, cpl"
         );
     }
 

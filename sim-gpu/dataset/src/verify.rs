@@ -5,7 +5,7 @@ use super::finish::failure_lines;
 use super::journal::Journal;
 use super::layout;
 use super::manifest::Manifest;
-use formats::packed::read_packed;
+use formats::labelled::read_labelled;
 use formats::scan_file::{ScanFormat, read_scan};
 use formats::{FormatError, hash, vlp32c};
 use rayon::prelude::*;
@@ -153,7 +153,7 @@ impl Expected<'_> {
                 (read_scan(path).map(|scan| scan.len() as u64), points, "points")
             }
             Holds::Clouds(clouds) => {
-                (read_packed(path).map(|set| set.len() as u64), clouds, "clouds")
+                (read_labelled(path).map(|set| set.len() as u64), clouds, "clouds")
             }
             Holds::Anything => return None,
         };

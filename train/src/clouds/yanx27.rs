@@ -47,7 +47,8 @@ pub fn read(root: &Path, split: Split, n_points: usize) -> Result<LabelledSet, E
         .map(|(id, &label)| cloud(&root.join(&classes[label]).join(format!("{id}.txt")), n_points))
         .collect::<Result<_, _>>()?;
     let points = clouds.concat();
-    Ok(LabelledSet { points, n_points, labels, names: Some(ids), classes: Some(classes) })
+    let (names, classes) = (Some(ids), Some(classes));
+    Ok(LabelledSet { points, n_points, labels, names, classes, ..LabelledSet::default() })
 }
 
 fn cloud(path: &Path, n_points: usize) -> Result<Vec<f32>, FormatError> {

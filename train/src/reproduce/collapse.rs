@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 use anyhow::ensure;
-use formats::packed::read_packed;
+use formats::labelled::read_labelled;
 use formats::rng::StreamKey;
 use formats::split::Split;
 use infer_cpu::{Normalization, Options};
@@ -136,9 +136,9 @@ fn turned(clouds: &Clouds, y_up: bool) -> Clouds {
 /// Of each cloud of `seen` as many points as the scan of the same view has;
 /// the others are repetitions. Views that have no scan are left out.
 fn thinned(shop: &Workshop, seen: &Clouds) -> anyhow::Result<Clouds> {
-    let scans = read_packed(&shop.scans.join("lidar/packed/rotational-clean-test.npz"))?;
-    let counts: BTreeMap<&str, u32> =
-        scans.names.iter().map(String::as_str).zip(scans.n_raw.iter().copied()).collect();
+    let scans = read_labelled(&shop.scans.join("lidar/packed/rotational-clean-test.npz"))?;
+    let names = scans.names.iter().flatten().map(String::as_str);
+    let counts: BTreeMap<&str, u32> = names.zip(scans.n_raw.iter().flatten().copied()).collect();
     let names = seen.set.names.iter().flatten();
     let kept: Vec<(usize, usize)> = names
         .enumerate()
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn turning_keeps_heights_or_lays_them_along_y() {
         let points = vec![0.6, 0.0, 0.8, 0.0, 0.0, 1.0];
-        let set = LabelledSet { points, n_points: 2, labels: vec![0], names: None, classes: None };
+        let set = LabelledSet { points, n_points: 2, labels: vec![0], ..LabelledSet::default() };
         let clouds = Clouds { set, classes: vec!["cup".to_owned()] };
         let about_z = turned(&clouds, false);
         assert_eq!(about_z.set.points[2], 0.8);

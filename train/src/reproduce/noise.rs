@@ -1,6 +1,6 @@
 //! Errors by class, scans of few points, and noise in training and in tests.
 
-use formats::packed::read_packed;
+use anyhow::Context;
 use formats::split::Split;
 use train::clouds::Clouds;
 
@@ -57,7 +57,8 @@ fn confusion(matrix: &[Vec<usize>], classes: &[String]) -> Table {
 fn thresholds(shop: &Workshop, model: &std::path::Path) -> anyhow::Result<Table> {
     let noisy = SIGMAS[1].1;
     let held = shop.scans(noisy, Split::Test)?;
-    let n_raw = read_packed(&shop.scans.join(format!("{noisy}-test.npz")))?.n_raw;
+    let n_raw = held.set.n_raw.as_ref();
+    let n_raw = n_raw.with_context(|| format!("{noisy}-test.npz does not list n_raw"))?;
     let mut rows = Vec::new();
     for least in THRESHOLDS {
         let kept: Vec<usize> = (0..held.len()).filter(|&i| n_raw[i] >= least).collect();

@@ -40,8 +40,7 @@ fn clouds_of(seed: u64, n: usize) -> Clouds {
         points,
         n_points: 32,
         labels: (0..n).map(|cloud| cloud % 3).collect(),
-        names: None,
-        classes: None,
+        ..LabelledSet::default()
     };
     Clouds { set, classes: ["ball", "disc", "rod"].map(str::to_owned).to_vec() }
 }

@@ -120,7 +120,7 @@ pub fn bytes_per_cloud(made: &Made, source: Source, folder: &Path) -> anyhow::Re
             path.push(format!("-{split}.npz"));
             let path = PathBuf::from(path);
             bytes += size(&path)?;
-            n += formats::packed::read_packed(&path)?.len();
+            n += formats::labelled::read_labelled(&path)?.len();
         }
     }
     Ok(bytes as f64 / n.max(1) as f64)

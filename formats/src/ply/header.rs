@@ -3,13 +3,13 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use super::lines::{Line, Lines};
 use crate::decoding::excerpt;
 use crate::error::FormatError;
+use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
 
 /// What a header says.
-pub(super) struct Header {
+pub(crate) struct Header {
     /// How the elements follow: as text, or in which byte order.
     pub encoding: Encoding,
     /// What to add to every point, from the comment `origin X Y Z` of scans.
@@ -20,7 +20,7 @@ pub(super) struct Header {
 
 /// How elements follow the header.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Encoding {
+pub(crate) enum Encoding {
     /// A line each.
     Ascii,
     /// Number after number.
@@ -28,14 +28,14 @@ pub(super) enum Encoding {
 }
 
 /// A kind of element, of which the file has `n`.
-pub(super) struct Element {
+pub(crate) struct Element {
     pub name: String,
     pub n: u64,
     pub properties: Vec<Property>,
 }
 
 /// A property that each element of a kind has.
-pub(super) struct Property {
+pub(crate) struct Property {
     pub name: String,
     /// The type of its number, or of its list's numbers.
     pub number: NumberType,
@@ -44,6 +44,24 @@ pub(super) struct Property {
 }
 
 impl Element {
+    /// Whether it has a property of this name.
+    #[cfg(feature = "dataset")]
+    pub fn has(&self, name: &str) -> bool {
+        self.properties.iter().any(|property| property.name == name)
+    }
+
+    /// The place of the property `name`, or what is wrong with it.
+    pub fn scalar(&self, name: &str) -> Result<usize, String> {
+        let at = self.properties.iter().position(|property| property.name == name);
+        match at {
+            None => Err(format!("property {name} is missing")),
+            Some(at) if self.properties[at].length.is_some() => {
+                Err(format!("expected a number as property {name}, found a list"))
+            }
+            Some(at) => Ok(at),
+        }
+    }
+
     /// Bytes of a binary element; none if it has a list.
     pub fn size(&self) -> Option<usize> {
         let size = |property: &Property| match property.length {
@@ -55,14 +73,14 @@ impl Element {
 }
 
 /// Reads a header up to its last line, `end_header`.
-pub(super) fn read_header<R: BufRead>(
+pub(crate) fn read_header<R: BufRead>(
     lines: &mut Lines<'_, R>,
     name: &Path,
 ) -> Result<Header, FormatError> {
     let wrong = |cause: &str| FormatError::malformed(name, "header", cause);
     match lines.next()? {
         Some(line) if line.text == "ply" => {}
-        _ => return Err(wrong("the first line is not `ply`")),
+        _ => return Err(wrong("expected `ply` as the first line")),
     }
     let (mut encoding, mut origin, mut elements) = (None, None, Vec::new());
     while let Some(line) = lines.next()? {
@@ -81,14 +99,18 @@ pub(super) fn read_header<R: BufRead>(
             }),
             ("property", words) => {
                 let element = elements.last_mut();
-                let element = element.ok_or_else(|| line.error("a property of no element"))?;
+                let element = element
+                    .ok_or_else(|| line.error("expected an element before its properties"))?;
                 element.properties.push(property(&line, words)?);
             }
             ("end_header", []) => {
-                let encoding = encoding.ok_or_else(|| wrong("no line `format`"))?;
+                let encoding = encoding.ok_or_else(|| wrong("the line `format` is missing"))?;
                 return Ok(Header { encoding, origin, elements });
             }
-            _ => return Err(line.error(format!("what is `{}`?", excerpt(&line.text)))),
+            _ => {
+                return Err(line
+                    .error(format!("expected a keyword of PLY, found `{}`", excerpt(&line.text))));
+            }
         }
     }
     Err(wrong("the file ends before `end_header`"))
@@ -104,7 +126,10 @@ fn encoding_named(line: &Line<'_>, word: &str) -> Result<Encoding, FormatError> 
         "ascii" => Ok(Encoding::Ascii),
         "binary_little_endian" => Ok(Encoding::Binary(ByteOrder::Little)),
         "binary_big_endian" => Ok(Encoding::Binary(ByteOrder::Big)),
-        other => Err(line.error(format!("`{}` is no format of PLY's", excerpt(other)))),
+        other => Err(line.error(format!(
+            "expected ascii, binary_little_endian or binary_big_endian, found `{}`",
+            excerpt(other)
+        ))),
     }
 }
 
@@ -115,7 +140,7 @@ fn property(line: &Line<'_>, words: &[&str]) -> Result<Property, FormatError> {
         _ => return Err(line.error("expected `property TYPE NAME`")),
     };
     if let Some(NumberType::F32 | NumberType::F64) = length {
-        return Err(line.error("a length that is no whole number"));
+        return Err(line.error("expected a whole number as the type of a list's length"));
     }
     Ok(Property { name: (*name).to_owned(), number: number_named(line, number)?, length })
 }
@@ -130,6 +155,8 @@ fn number_named(line: &Line<'_>, word: &str) -> Result<NumberType, FormatError> 
         "uint" | "uint32" => NumberType::U32,
         "float" | "float32" => NumberType::F32,
         "double" | "float64" => NumberType::F64,
-        other => return Err(line.error(format!("`{}` is no type of PLY's", excerpt(other)))),
+        other => {
+            return Err(line.error(format!("expected a type of PLY, found `{}`", excerpt(other))));
+        }
     })
 }

@@ -7,12 +7,12 @@ use std::path::Path;
 use crate::decoding::excerpt;
 use crate::error::FormatError;
 
-/// The longest line that is believed. A point takes some hundred bytes; this
+/// The longest line that is read. A point takes some hundred bytes; the limit
 /// keeps a file without line ends from filling the memory.
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// The lines of a text, one by one.
-pub(super) struct Lines<'a, R> {
+pub(crate) struct Lines<'a, R> {
     /// What follows the last line that was read.
     pub reader: &'a mut R,
     name: &'a Path,
@@ -21,8 +21,8 @@ pub(super) struct Lines<'a, R> {
 }
 
 /// One line, without blanks at its ends.
-pub(super) struct Line<'a> {
-    /// The line itself; bytes that are no UTF-8 are replaced.
+pub(crate) struct Line<'a> {
+    /// The line itself; bytes that are not UTF-8 are replaced.
     pub text: Cow<'a, str>,
     name: &'a Path,
     number: u64,
@@ -77,11 +77,12 @@ impl Line<'_> {
 
     /// The number that `word` spells: NaN and infinities too.
     pub fn number(&self, word: &str) -> Result<f64, FormatError> {
-        word.parse().map_err(|_| self.error(format!("`{}` is no number", excerpt(word))))
+        word.parse()
+            .map_err(|_| self.error(format!("expected a number, found `{}`", excerpt(word))))
     }
 
     /// The whole number that `word` spells.
     pub fn count(&self, word: &str) -> Result<u64, FormatError> {
-        word.parse().map_err(|_| self.error(format!("`{}` is no count", excerpt(word))))
+        word.parse().map_err(|_| self.error(format!("expected a count, found `{}`", excerpt(word))))
     }
 }

@@ -1,0 +1,135 @@
+//! Scans as PLY files, binary little-endian, one `vertex` a point.
+//!
+//! Properties: `x y z`, then `range` (float), `beam` (uint), `ring` (ushort),
+//! `time` (float), `triangle` (uint), `object` (uint), `intensity` (float),
+//! `nx ny nz` (float), those that the scan has. An origin other than 0 is the
+//! comment `origin X Y Z`. Open3D 0.20 reads the properties of type float and
+//! skips the others; from NPZ it reads all of them.
+
+use std::fs::File;
+use std::io::{BufReader, Write};
+use std::path::Path;
+
+use super::vertices::read_vertices;
+use crate::atomic;
+use crate::error::FormatError;
+use crate::scan::{Attribute, Column, ColumnSlot, Scan};
+
+/// Writes `scan` to `path`, atomically.
+///
+/// # Errors
+/// An attribute of another length than the positions; what the system reports.
+pub fn write_scan(path: &Path, scan: &Scan) -> Result<(), FormatError> {
+    scan.check_lengths()?;
+    let columns: Vec<_> = scan.columns().map(|(_, column)| column).collect();
+    atomic::write(path, |writer| {
+        writer.write_all(header(scan).as_bytes())?;
+        for (i, position) in scan.positions.iter().enumerate() {
+            write_vector(writer, position)?;
+            for column in &columns {
+                match column {
+                    Column::F32(values) => writer.write_all(&values[i].to_le_bytes())?,
+                    Column::U16(values) => writer.write_all(&values[i].to_le_bytes())?,
+                    Column::U32(values) => writer.write_all(&values[i].to_le_bytes())?,
+                    Column::Vector(values) => write_vector(writer, &values[i])?,
+                }
+            }
+        }
+        Ok(())
+    })
+}
+
+fn write_vector(writer: &mut impl Write, vector: &[f32; 3]) -> std::io::Result<()> {
+    vector.iter().try_for_each(|component| writer.write_all(&component.to_le_bytes()))
+}
+
+fn header(scan: &Scan) -> String {
+    let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
+    if scan.origin != [0.0; 3] {
+        let [x, y, z] = scan.origin;
+        header += &format!("comment origin {x} {y} {z}\n");
+    }
+    header += &format!("element vertex {}\n", scan.len());
+    header += "property float x\nproperty float y\nproperty float z\n";
+    for (attribute, column) in scan.columns() {
+        let number = match column {
+            Column::F32(_) | Column::Vector(_) => "float",
+            Column::U16(_) => "ushort",
+            Column::U32(_) => "uint",
+        };
+        for name in attribute.column_names() {
+            header += &format!("property {number} {name}\n");
+        }
+    }
+    header + "end_header\n"
+}
+
+/// Reads a scan from a PLY file, ASCII or binary, whatever the order of its
+/// properties. Properties of other names are skipped.
+///
+/// # Errors
+/// A file that is not PLY, lacks x, y or z, holds a number that does not fit its
+/// attribute, or has fewer vertices than its header says:
+/// [`FormatError::Malformed`].
+pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
+    let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
+    let (mut known, mut values) = (Vec::new(), Vec::new());
+    let origin = read_vertices(
+        &mut BufReader::new(file),
+        path,
+        |vertex| {
+            let has = |attribute: &Attribute| {
+                attribute.column_names().iter().all(|name| vertex.has(name))
+            };
+            known = Attribute::ALL.into_iter().filter(has).collect();
+            let names = known.iter().flat_map(|attribute| attribute.column_names());
+            ["x", "y", "z"].into_iter().chain(names).map(|name| vertex.scalar(name)).collect()
+        },
+        |row| values.extend_from_slice(row),
+    )?;
+    let width = 3 + known.iter().map(|attribute| attribute.column_names().len()).sum::<usize>();
+    let rows = Rows { values: &values, width };
+    let mut scan =
+        Scan { origin: origin.unwrap_or_default(), positions: rows.vectors(0), ..Scan::default() };
+    let mut first = 3;
+    for attribute in known {
+        let wrong =
+            |cause: String| FormatError::malformed(path, format!("property {attribute}"), cause);
+        match scan.slot(attribute) {
+            ColumnSlot::F32(slot) => *slot = Some(rows.column(first).map(|x| x as f32).collect()),
+            ColumnSlot::U16(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
+            ColumnSlot::U32(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
+            ColumnSlot::Vector(slot) => *slot = Some(rows.vectors(first)),
+        }
+        first += attribute.column_names().len();
+    }
+    Ok(scan)
+}
+
+/// The numbers of all vertices, `width` of each.
+struct Rows<'a> {
+    values: &'a [f64],
+    width: usize,
+}
+
+impl Rows<'_> {
+    fn column(&self, at: usize) -> impl Iterator<Item = f64> {
+        self.values.chunks_exact(self.width).map(move |row| row[at])
+    }
+
+    fn vectors(&self, first: usize) -> Vec<[f32; 3]> {
+        let vector = |row: &[f64]| [0, 1, 2].map(|axis| row[first + axis] as f32);
+        self.values.chunks_exact(self.width).map(vector).collect()
+    }
+
+    /// A column of whole numbers that fit `T`.
+    fn whole<T: TryFrom<u32>>(&self, at: usize) -> Result<Vec<T>, String> {
+        let most = 8 * size_of::<T>();
+        let whole = |x: f64| {
+            let is_u32 = x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&x);
+            let fits = is_u32.then_some(x as u32).and_then(|n| T::try_from(n).ok());
+            fits.ok_or_else(|| format!("expected a whole number of {most} bits, found {x}"))
+        };
+        self.column(at).map(whole).collect()
+    }
+}
