@@ -10,3 +10,10 @@ pub const SENSORS: [(&str, &str); 7] = [
     ("hdl64e", include_str!("sensors/hdl64e.toml")),
     ("modelnet40c-lidar", include_str!("sensors/modelnet40c-lidar.toml")),
 ];
+
+/// The record of `cargo xtask trade` that ships, as CSV: what `edgepuck advise`
+/// recommends from.
+pub const TRADE_RECORD: &str = include_str!("reports/trade/trade.csv");
+
+/// The bundled default model, `edge-64`, as a model file's bytes.
+pub const EDGE_64: &[u8] = include_bytes!("weights/edge-64.safetensors");

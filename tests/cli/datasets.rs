@@ -54,7 +54,7 @@ fn one_thread_gives_the_bytes_of_many() {
     meshes_in(folder.path());
     for (threads, out) in [("1", "one"), ("5", "many")] {
         let words = ["gen-dataset", "meshes", "--out", out, "--adapter", "cpu"];
-        let mut command = crate::xtask(folder.path(), &words);
+        let mut command = crate::edgepuck(folder.path(), &words);
         let status = command.env("RAYON_NUM_THREADS", threads).status().unwrap();
         assert!(status.success());
     }

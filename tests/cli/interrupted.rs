@@ -1,6 +1,6 @@
 //! A run that is killed at any moment goes on to the same bytes.
 
-use crate::{assert_same_tree, exits, meshes, said, succeeds, xtask};
+use crate::{assert_same_tree, edgepuck, exits, meshes, said, succeeds};
 use formats::rng::StreamKey;
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     let fixed = [2, 5, 9, 14, 20, 30, 40, 60, 90, 130, 180, 240, 320];
     for milliseconds in fixed.into_iter().chain(random).chain([60_000]) {
         let mut child =
-            xtask(folder.path(), &words).stderr(std::process::Stdio::null()).spawn().unwrap();
+            edgepuck(folder.path(), &words).stderr(std::process::Stdio::null()).spawn().unwrap();
         let killed_at = std::time::Instant::now() + Duration::from_millis(milliseconds);
         while child.try_wait().unwrap().is_none() && std::time::Instant::now() < killed_at {
             std::thread::sleep(Duration::from_millis(1));

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
-mod ablate;
+mod advise;
 mod bad_input;
 mod checkpoints;
 mod datasets;
@@ -18,15 +18,14 @@ mod scenes;
 #[cfg(feature = "simplify")]
 mod simplified;
 mod surfaces;
-mod trade;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// `cargo xtask` with these words, run in `folder`.
-fn xtask(folder: &Path, words: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_xtask"));
+/// `edgepuck` with these words, run in `folder`.
+fn edgepuck(folder: &Path, words: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_edgepuck"));
     command.current_dir(folder).args(words);
     command
 }
@@ -46,7 +45,7 @@ fn exits(code: i32, folder: &Path, words: &str) -> String {
 }
 
 fn run(folder: &Path, words: &str) -> Output {
-    xtask(folder, &words.split_whitespace().collect::<Vec<_>>()).output().unwrap()
+    edgepuck(folder, &words.split_whitespace().collect::<Vec<_>>()).output().unwrap()
 }
 
 fn said(output: &Output) -> String {

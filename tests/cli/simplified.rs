@@ -43,7 +43,7 @@ fn a_dataset_of_simplified_meshes_is_the_same_again_and_keeps_its_hits() {
     for (words, threads) in [("one --simplify 0.001", "1"), ("many --simplify 0.001", "5")] {
         let words: Vec<&str> =
             "gen-dataset meshes --out".split(' ').chain(words.split(' ')).collect();
-        let mut command = crate::xtask(folder.path(), &words);
+        let mut command = crate::edgepuck(folder.path(), &words);
         assert!(command.env("RAYON_NUM_THREADS", threads).status().unwrap().success());
     }
     succeeds(folder.path(), "gen-dataset meshes --out whole");

@@ -122,7 +122,7 @@ def compare_critical_points(model, n_kept, clouds, files):
 def exported(model, name, *flags):
     """A session of ONNX Runtime with the model, once ONNX's checker took it."""
     file = OUT / f"{name}.onnx"
-    run([os.environ["EDGEPUCK_XTASK"], "export-onnx", str(model), "--out", str(file), *flags])
+    run([os.environ["EDGEPUCK_PROGRAM"], "export-onnx", str(model), "--out", str(file), *flags])
     graph = onnx.load(file)
     onnx.checker.check_model(graph, full_check=True)
     assert [(o.domain, o.version) for o in graph.opset_import] == [("", OPSET)]

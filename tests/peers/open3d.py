@@ -124,7 +124,7 @@ def scanned(placed_mesh, sensor, position, adapter):
         f'scale = {float(scale)!r}\nposition_m = {[float(x) for x in place]}\n'
         f'[[sensor]]\nprofile = "{sensor}"\nposition_m = {position}\nlook_at_m = {TARGET_M}\n'
     )
-    command = [os.environ["EDGEPUCK_XTASK"], "scan", str(scene), "--out", str(scan)]
+    command = [os.environ["EDGEPUCK_PROGRAM"], "scan", str(scene), "--out", str(scan)]
     done = subprocess.run([*command, "--adapter", adapter], capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"{' '.join(command)}\n{done.stdout}{done.stderr}")

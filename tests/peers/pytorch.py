@@ -138,7 +138,7 @@ def untrained(widths, t_nets, random):
     name = f"random{len(widths)}"
     checkpoint, file = OUT / f"{name}.pth", OUT / f"{name}.safetensors"
     torch.save({"model_state_dict": model.state_dict()}, checkpoint)
-    run([os.environ["EDGEPUCK_XTASK"], "import-weights", str(checkpoint), "--out", str(file)])
+    run([os.environ["EDGEPUCK_PROGRAM"], "import-weights", str(checkpoint), "--out", str(file)])
     return model, file
 
 

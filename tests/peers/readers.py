@@ -1,7 +1,7 @@
 """Open3D, NumPy, plyfile, laspy and h5py on every file that we write.
 
 Each finds the numbers that the NPZ of the same scan holds. Run by `cargo xtask
-test`, which sets EDGEPUCK_XTASK, EDGEPUCK_INFER and EDGEPUCK_OUT.
+test`, which sets EDGEPUCK_PROGRAM, EDGEPUCK_INFER and EDGEPUCK_OUT.
 """
 
 import os
@@ -22,7 +22,7 @@ except ImportError as error:
     print(f"SKIPPED: {error} (Debian: apt-get install libusb-1.0-0 libgomp1)")
     sys.exit(77)
 
-XTASK = os.environ["EDGEPUCK_XTASK"]
+EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
 INFER = os.environ["EDGEPUCK_INFER"]
 OUT = Path(os.environ["EDGEPUCK_OUT"])
 
@@ -59,14 +59,14 @@ def write_meshes():
 
 def write_dataset():
     """The dataset, and whether the HDF5 layout is in it."""
-    words = [XTASK, "gen-dataset", OUT / "meshes", "--out", OUT / "set", "--sensor", "vlp32c",
+    words = [EDGEPUCK, "gen-dataset", OUT / "meshes", "--out", OUT / "set", "--sensor", "vlp32c",
              "--views", 2, "--points", N_POINTS, "--format", "ply,csv", "--attributes",
              ",".join(COLUMNS), "--adapter", "cpu", "--layout"]
     done = run(*words, "yanx27,modelnet-h5", allowed=(0, 1))
     if done.returncode == 0:
         return True
     assert "build with `--features hdf5`" in done.stderr, done.stderr
-    print("NOT TESTED: HDF5. This xtask was built without `--features hdf5`.")
+    print("NOT TESTED: HDF5. This edgepuck was built without `--features hdf5`.")
     run(*words, "yanx27")
     return False
 

@@ -27,7 +27,7 @@ def main():
     from playwright.sync_api import sync_playwright
 
     page_file = pathlib.Path(os.environ["EDGEPUCK_OUT"]) / "report.html"
-    subprocess.run([os.environ["EDGEPUCK_XTASK"], "report", "--out", page_file], check=True)
+    subprocess.run([os.environ["EDGEPUCK_LAB"], "report", "--out", page_file], check=True)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path, args=FLAGS)
         for size in (DESKTOP, PHONE):

@@ -1,7 +1,7 @@
 """velodyne-decoder, a driver of real sensors, on packets that we write.
 
 It decodes `--format pcap` to the points of the NPZ of the same scan. Run by
-`cargo xtask test`, which sets EDGEPUCK_XTASK, EDGEPUCK_ROOT and EDGEPUCK_OUT.
+`cargo xtask test`, which sets EDGEPUCK_PROGRAM, EDGEPUCK_ROOT and EDGEPUCK_OUT.
 """
 
 import json
@@ -20,7 +20,7 @@ except ImportError as error:
     print(f"SKIPPED: {error}")
     sys.exit(77)
 
-XTASK = os.environ["EDGEPUCK_XTASK"]
+EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
 ROOT = Path(os.environ["EDGEPUCK_ROOT"])
 OUT = Path(os.environ["EDGEPUCK_OUT"])
 
@@ -151,10 +151,10 @@ def datasets():
     (meshes / "torus_0001.off").write_text(torus(64, 0.3))
     for returns in KINDS:
         out = OUT / f"set-{returns}"
-        run(XTASK, "gen-dataset", OUT / "meshes", "--out", out, "--sensor", "vlp32c", "--format",
+        run(EDGEPUCK, "gen-dataset", OUT / "meshes", "--out", out, "--sensor", "vlp32c", "--format",
             "pcap", "--returns", returns, "--views", 3, "--distance", 2.5, "--noise", 0.02,
             "--dropout", 0.1, "--attributes", ",".join(ATTRIBUTES), "--adapter", "cpu")
-        run(XTASK, "gen-dataset", "--verify", out)
+        run(EDGEPUCK, "gen-dataset", "--verify", out)
         manifest = json.loads((out / "manifest.json").read_text())
         poses = manifest["poses"][0]["every_mesh"]
         for view, pose in enumerate(poses):
@@ -178,7 +178,7 @@ def scene(name, mesh, sensor, rpm):
             f"effects = {{ intensity = true }}\n"
             f"[[object]]\nmesh = \"{name}.off\"\nreflectivity = 0.9\n"
             f"[[sensor]]\nprofile = \"./{name}-{extension}-sensor.toml\"\n{sensor}\n")
-        run(XTASK, "scan", OUT / f"{name}-{extension}.toml", "--out", OUT / f"{name}.{extension}",
+        run(EDGEPUCK, "scan", OUT / f"{name}-{extension}.toml", "--out", OUT / f"{name}.{extension}",
             "--adapter", "cpu")
     return str(OUT / f"{name}.pcap"), OUT / f"{name}.npz"
 

@@ -7,11 +7,10 @@ mod sanitize;
 mod summary;
 mod test_programs;
 
-use crate::Outcome;
-use crate::workspace::{cargo, root, step};
 use anyhow::bail;
 use std::process::Command;
 use summary::{Counts, Summary};
+use xtask::workspace::{cargo, root, step};
 
 /// The script that lists and installs the packages that tests need.
 const PACKAGES: &str = "xtask/packages.sh";
@@ -38,7 +37,7 @@ pub struct Args {
 
 /// Installs what is missing, runs every step whether or not one before it
 /// failed, and ends with a table of them.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &Args) -> anyhow::Result<u8> {
     let mut summary = Summary::default();
     if args.sanitize {
         sanitize::run(&mut summary);
@@ -46,7 +45,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         run_all(args, &mut summary);
     }
     println!("{summary}");
-    Ok(if summary.total().failed == 0 { Outcome::Success } else { Outcome::SomeFailed })
+    Ok(u8::from(summary.total().failed > 0))
 }
 
 fn run_all(args: &Args, summary: &mut Summary) {
@@ -98,7 +97,7 @@ fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
     tests.args(["--features", "edgepuck-formats/hdf5,train/hdf5"]);
     let mut counts = Counts::default();
     if has_cpp_compiler() {
-        tests.args(["--features", "tests/simplify,xtask/simplify"]);
+        tests.args(["--features", "tests/simplify,edgepuck/simplify"]);
     } else {
         let lack = "there is no C++ compiler";
         counts = go_without(summary, "tests of simplified meshes", lack, required)?;

@@ -9,7 +9,7 @@ const PYTHONS: [&str; 3] = ["python3", "python", "py"];
 
 /// The folder of the programs that `bench` runs, and their pinned packages.
 pub fn programs() -> PathBuf {
-    root().join("xtask/peers")
+    root().join("xtask/lab/peers")
 }
 
 /// The folder of what is made for the peers.

@@ -13,9 +13,14 @@ pub fn root() -> &'static Path {
 
 /// Cargo, at the root.
 pub fn cargo(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO"));
+    let mut command = cargo_command();
     command.args(args).current_dir(root());
     command
+}
+
+/// The Cargo that runs us.
+pub fn cargo_command() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
 /// Runs one command after naming it, and says how long it took; its output goes

@@ -58,7 +58,7 @@ fn write(path: &Path, clouds: &Clouds, from: usize) {
 }
 
 fn cross(folder: &Path, design: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_train"))
+    Command::new(env!("CARGO_BIN_EXE_edgepuck-train"))
         .args(["cross", "--design", design, "--out", "out"])
         .current_dir(folder)
         .output()

@@ -10,7 +10,7 @@ use formats::rng::StreamKey;
 use crate::program::folder;
 
 fn run(folder: &Path, out: &str) -> std::process::Child {
-    Command::new(env!("CARGO_BIN_EXE_train"))
+    Command::new(env!("CARGO_BIN_EXE_edgepuck-train"))
         .args(["train", "--data", ".", "--recipe", "small.toml", "--epochs", "40", "--out", out])
         .current_dir(folder)
         .stdout(Stdio::null())

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use formats::packed::PackedWriter;
 
 fn train(folder: &Path, words: &str) -> Output {
-    let program = Command::new(env!("CARGO_BIN_EXE_train"))
+    let program = Command::new(env!("CARGO_BIN_EXE_edgepuck-train"))
         .args(words.split_whitespace())
         .current_dir(folder)
         .output();

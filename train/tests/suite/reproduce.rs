@@ -59,7 +59,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn reproduce(folder: &Path, plan: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_train"))
+    Command::new(env!("CARGO_BIN_EXE_edgepuck-train"))
         .args(["reproduce", "--clouds", "surfaces/surface", "--clouds-are", "shapes <of ours>"])
         .args(["--scans", ".", "--meshes-are", "shapes", "--command", "a test"])
         .args(["--plan", plan, "--out", "out"])

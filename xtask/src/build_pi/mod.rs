@@ -2,7 +2,7 @@
 
 mod elf;
 
-use crate::{Outcome, pi_target, workspace};
+use crate::{pi_target, workspace};
 use anyhow::{Context, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ pub struct Args {
 }
 
 /// Builds, checks and, where QEMU is there, tries the binary.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &Args) -> anyhow::Result<()> {
     pi_target::need_standard_library()?;
     let built = build(&[])?;
     let binary = match &args.out {
@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     println!("    scp {shown} pi@raspberrypi.local:infer-cpu");
     println!("    scp MODEL.safetensors pi@raspberrypi.local:");
     println!("    ssh pi@raspberrypi.local ./infer-cpu bench --model MODEL.safetensors");
-    Ok(Outcome::Success)
+    Ok(())
 }
 
 /// Builds infer-cpu for the Pi, with these words for rustc besides, and returns

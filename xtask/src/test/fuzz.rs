@@ -1,12 +1,12 @@
 //! Feeds each hand-written parser with mutated input for a while.
 
 use super::summary::{Counts, Summary};
-use crate::workspace::{cargo, root, step};
 use anyhow::Context;
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Child, Command};
 use std::thread::available_parallelism;
+use xtask::workspace::{cargo, root, step};
 
 /// The targets, a program each.
 const TARGETS: [&str; 4] = ["off", "mesh", "clouds", "model"];

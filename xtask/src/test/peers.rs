@@ -1,20 +1,20 @@
 //! Proof against software nobody here wrote: the scripts in `tests/peers`.
 //!
 //! Each runs alone, by Python, in an environment of pinned packages from PyPI,
-//! and is told by `EDGEPUCK_XTASK` and `EDGEPUCK_INFER` where our programs are,
+//! and is told by `EDGEPUCK_PROGRAM`, `EDGEPUCK_LAB` and `EDGEPUCK_INFER` where our programs are,
 //! by `EDGEPUCK_ROOT` where the workspace is, and by `EDGEPUCK_OUT` an empty
 //! folder. It ends with 0 if all is well and with [`SKIPPED`] if it cannot run
 //! here. A script `x.py` shares the packages of `requirements.txt`, unless there
 //! is an `x-requirements.txt`: packages too large for every run.
 
 use super::summary::{Counts, Summary};
-use crate::venv::{Environment, workshop};
-use crate::workspace::{executable, output, root};
 use anyhow::Context;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
-use std::{env, fs};
+use xtask::venv::{Environment, workshop};
+use xtask::workspace::{executable, output, root};
 
 /// The folder of the scripts.
 const SCRIPTS: &str = "tests/peers";
@@ -107,14 +107,14 @@ pub fn run(summary: &mut Summary, packages: Packages) {
             summary.remark(format!("peers: {n} SKIPPED, as --peers none asks for"));
             return Ok(Counts { skipped: n, ..Counts::default() });
         }
-        let infer = infer_cpu()?;
+        let programs = programs()?;
         let (shared, large) = packages.shared();
         let mut counts = Counts::default();
         for script in scripts {
             let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let python = large.of(&name).unwrap_or_else(|| shared.clone());
             counts = counts.and(match python {
-                Ok(python) => check(summary, &name, &script, &python, &infer)?,
+                Ok(python) => check(summary, &name, &script, &python, &programs)?,
                 Err(cause) => {
                     summary.remark(format!("peer {name}: SKIPPED, {cause}"));
                     Counts::SKIPPED
@@ -130,7 +130,7 @@ fn check(
     name: &str,
     script: &Path,
     python: &Path,
-    infer: &Path,
+    programs: &Programs,
 ) -> anyhow::Result<Counts> {
     let out = workshop().join("tests").join(name);
     empty(&out)?;
@@ -140,7 +140,9 @@ fn check(
     command.arg("-B").arg(script).current_dir(&out);
     // Scripts are named after packages, which must not be taken for them.
     command.env("PYTHONSAFEPATH", "1");
-    command.env("EDGEPUCK_XTASK", env::current_exe()?).env("EDGEPUCK_INFER", infer);
+    for (variable, program) in programs {
+        command.env(variable, program);
+    }
     command.env("EDGEPUCK_ROOT", root()).env("EDGEPUCK_OUT", &out);
     let status = command.status().with_context(|| format!("cannot run {}", script.display()))?;
     Ok(match status.code() {
@@ -176,10 +178,22 @@ fn empty(folder: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(folder).with_context(here)
 }
 
-/// A release build of infer-cpu.
-fn infer_cpu() -> anyhow::Result<PathBuf> {
-    let words = ["build", "--release", "--package", "infer-cpu", "--bin", "infer-cpu"];
-    let mut cargo = crate::workspace::cargo(&words);
+/// The variables that tell scripts of our programs, and the programs.
+type Programs = [(&'static str, PathBuf); 3];
+
+/// Release builds of our programs.
+fn programs() -> anyhow::Result<Programs> {
+    Ok([
+        ("EDGEPUCK_PROGRAM", built("edgepuck")?),
+        ("EDGEPUCK_LAB", built("edgepuck-lab")?),
+        ("EDGEPUCK_INFER", built("infer-cpu")?),
+    ])
+}
+
+/// A release build of the program that is called like its package.
+fn built(package: &str) -> anyhow::Result<PathBuf> {
+    let words = ["build", "--release", "--package", package, "--bin", package];
+    let mut cargo = xtask::workspace::cargo(&words);
     cargo.args(["--message-format", "json-render-diagnostics"]);
     executable(&output(cargo.stderr(Stdio::inherit()))?)
 }

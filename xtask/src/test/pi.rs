@@ -2,7 +2,7 @@
 
 use super::summary::{Counts, Summary};
 use super::{check, go_without, test_programs};
-use crate::{build_pi, pi_target};
+use xtask::{build_pi, pi_target};
 
 /// Runs the three checks; those that cannot run here fail where they are `required`.
 pub fn run(summary: &mut Summary, required: bool) {

@@ -3,8 +3,8 @@
 
 use super::summary::Summary;
 use super::{go_without, test_programs};
-use crate::workspace::{cargo, output};
 use std::process::Command;
+use xtask::workspace::{cargo, output};
 
 /// Its runtime comes with Rust for this target.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";

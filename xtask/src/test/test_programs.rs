@@ -1,12 +1,12 @@
 //! Runs test programs through Cargo and counts their tests.
 
 use super::summary::{Counts, Summary};
-use crate::workspace::{root, words};
 use anyhow::Context;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use test_support::SKIPPED_TESTS;
+use xtask::workspace::{root, words};
 
 /// Runs `cargo`, a `cargo test`, and shows what it prints.
 ///

@@ -1,0 +1,286 @@
+//! `cargo xtask advise`: one configuration for a device, out of what
+//! `cargo xtask trade` measured.
+
+use crate::flags::positive;
+use crate::sampler_config::SamplerConfig;
+use crate::significant_digits::digits;
+use crate::trade_record::{self as row, Device, Part, Row};
+use crate::{Outcome, Usage};
+use anyhow::{Context, Result, bail};
+use std::cmp::Ordering;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Flags of `advise`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// What the classifier runs on: pi5 (modelled), or here (the machine of the record)
+    #[arg(long, value_enum)]
+    device: Device,
+
+    /// Most milliseconds from a raw cloud to its class
+    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
+    max_ms: Option<f64>,
+
+    /// Least share of clouds classified as labelled, 0 to 1
+    #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true)]
+    min_accuracy: Option<f64>,
+
+    /// Most megabytes of weights
+    #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
+    max_mb: Option<f64>,
+
+    /// Most threads
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    max_threads: Option<usize>,
+
+    /// What `cargo xtask trade` wrote [default: the record that ships]
+    #[arg(long, value_name = "CSV")]
+    record: Option<PathBuf>,
+}
+
+/// A row and its time on the device.
+type Timed<'a> = (f64, &'a Row);
+
+/// Prints one configuration, and why.
+///
+/// # Errors
+/// A record that cannot be read or does not know the device; limits that no
+/// measured setting keeps.
+pub fn run(args: &Args) -> Result<Outcome> {
+    args.check()?;
+    let (name, rows) = match &args.record {
+        Some(path) => (path.display().to_string(), row::read(path)?),
+        None => ("the record that ships".to_owned(), row::bundled()?),
+    };
+    let advice = advise(args, &rows).context(name)?;
+    std::io::stdout().write_all(advice.as_bytes())?;
+    Ok(Outcome::Success)
+}
+
+fn advise(args: &Args, rows: &[Row]) -> Result<String> {
+    // What infer-cpu classifies with: it runs all T-Nets that a model has.
+    let runs_all = |row: &&Row| matches!(row.t_nets.as_str(), "" | "both");
+    // A record may hold samplers that infer-cpu had when it was made and has no more.
+    let is_known =
+        |row: &&Row| row.sampler.is_empty() || SamplerConfig::named(&row.sampler).is_some();
+    let is_choice = |row: &&Row| row.part == Part::Classifier && runs_all(row) && is_known(row);
+    let choices = rows.iter().filter(is_choice);
+    let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
+    if timed.is_empty() {
+        bail!("holds no times of {}: only what was measured is advised", args.device);
+    }
+    let fitting: Vec<Timed> = timed.iter().copied().filter(|timed| args.allow(timed)).collect();
+    let Some(&chosen) = fitting.iter().max_by(|a, b| args.compare(a, b)) else {
+        bail!("{}", args.none_fits(&timed));
+    };
+    Ok(args.told(chosen, &fitting, &timed))
+}
+
+impl Args {
+    fn check(&self) -> Result<()> {
+        let limits = [self.max_ms, self.min_accuracy, self.max_mb];
+        if limits.iter().all(Option::is_none) && self.max_threads.is_none() {
+            let cause = "name a limit: --max-ms, --min-accuracy, --max-mb or --max-threads";
+            return Err(Usage(cause.to_owned()).into());
+        }
+        Ok(())
+    }
+
+    /// Whether accuracy counts before time: where only accuracy is asked for,
+    /// time does.
+    fn accuracy_first(&self) -> bool {
+        self.max_ms.is_some() || self.min_accuracy.is_none()
+    }
+
+    fn allow(&self, &(ms, row): &Timed) -> bool {
+        self.max_ms.is_none_or(|most| ms <= most)
+            && self.min_accuracy.is_none_or(|least| row.accuracy >= least)
+            && self.max_mb.is_none_or(|most| row.megabytes.is_some_and(|mb| mb <= most))
+            && self.max_threads.is_none_or(|most| row.threads.is_some_and(|n| n <= most))
+    }
+
+    /// The greater is the better one; of equals the one of fewer threads.
+    fn compare(&self, a: &Timed, b: &Timed) -> Ordering {
+        let accuracy = a.1.accuracy.total_cmp(&b.1.accuracy);
+        let speed = b.0.total_cmp(&a.0);
+        let first = if self.accuracy_first() { accuracy.then(speed) } else { speed.then(accuracy) };
+        first.then(b.1.threads.cmp(&a.1.threads))
+    }
+
+    /// What comes nearest to limits that nothing keeps.
+    fn none_fits(&self, timed: &[Timed]) -> String {
+        let mut told = "nothing that was measured keeps these limits".to_owned();
+        let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let best = timed.iter().max_by(|a, b| a.1.accuracy.total_cmp(&b.1.accuracy));
+        let megabytes = |timed: &&Timed| timed.1.megabytes.unwrap_or(f64::INFINITY);
+        let smallest = timed.iter().min_by(|a, b| megabytes(a).total_cmp(&megabytes(b)));
+        let smallest = smallest.filter(|_| self.max_mb.is_some());
+        for (what, timed) in [("fastest", fastest), ("most accurate", best), ("smallest", smallest)]
+        {
+            if let Some(timed) = timed {
+                let _ = write!(told, "\n  the {what}: {}", one_line(*timed));
+            }
+        }
+        told
+    }
+
+    fn told(&self, chosen: Timed, fitting: &[Timed], timed: &[Timed]) -> String {
+        let (ms, row) = chosen;
+        let mut told = format!("{}\n\n  {}\n", one_line(chosen), command(row));
+        let _ = write!(
+            told,
+            "\nWhy: of {} settings measured on {} ({} clouds), {} keep the limits; ",
+            timed.len(),
+            row.test_set,
+            row.clouds,
+            fitting.len()
+        );
+        told += match self.accuracy_first() {
+            true => "none of those is more accurate, and of equals this is the fastest.\n",
+            false => "none of those is faster.\n",
+        };
+        told += &match self.device {
+            Device::Pi5 => "Times are modelled (cargo xtask bench pi-model); measure a board by \
+                            infer-cpu bench.\nIts infer-cpu is made by cargo xtask build-pi.\n"
+                .to_owned(),
+            Device::Here => format!(
+                "Times are of {}.\nIts infer-cpu is made by cargo build --release --package \
+                 infer-cpu, as target/release/infer-cpu.\n",
+                row.machine
+            ),
+        };
+        // Within the interval a reader may prefer the cheaper one.
+        let as_good = |&&(other_ms, other): &&Timed| {
+            other_ms < 0.75 * ms && other.accuracy >= row.accuracy_low
+        };
+        if let Some(&cheaper) = fitting.iter().filter(as_good).min_by(|a, b| a.0.total_cmp(&b.0)) {
+            let lost = 100.0 * (row.accuracy - cheaper.1.accuracy);
+            let saved = 100.0 * (1.0 - cheaper.0 / ms);
+            let _ = writeln!(
+                told,
+                "Within its 95 % interval: {lost:.1} points less save {saved:.0} % of the time:\n  {}",
+                one_line(cheaper)
+            );
+        }
+        let better = |&&(_, other): &&Timed| other.accuracy > row.accuracy_high;
+        if let Some(&better) = timed.iter().filter(better).min_by(|a, b| a.0.total_cmp(&b.0)) {
+            let _ = writeln!(told, "Beyond its interval, for more:\n  {}", one_line(better));
+        }
+        told
+    }
+}
+
+fn one_line((ms, row): Timed) -> String {
+    format!(
+        "{row}: {} ms, {:.2} % ({:.2} to {:.2}), {} MB of weights",
+        digits(ms),
+        100.0 * row.accuracy,
+        100.0 * row.accuracy_low,
+        100.0 * row.accuracy_high,
+        row.megabytes.map(digits).unwrap_or_default(),
+    )
+}
+
+/// The command line of the configuration.
+fn command(row: &Row) -> String {
+    let Row { model_file, precision, .. } = row;
+    let mut words = format!("infer-cpu classify --model {model_file}");
+    // A row names the sampler, and after a colon the front end of `cpl`.
+    let mut sampler = row.sampler.split(':');
+    let _ = write!(words, " --sampler {}", sampler.next().unwrap_or_default());
+    if let Some(front) = sampler.next() {
+        let _ = write!(words, " --front {front}");
+    }
+    let points = row.points.unwrap_or_default();
+    let _ = write!(words, " --points {points} --precision {precision}");
+    let _ = write!(words, " --threads {} CLOUD", row.threads.unwrap_or(1));
+    words
+}
+
+fn share(word: &str) -> Result<f64, String> {
+    match word.parse::<f64>() {
+        Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
+        _ => Err("a share from 0 to 1 is needed, such as 0.85".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(model: &str, ms_pi5: f64, right: usize, threads: usize) -> Row {
+        let row = Row {
+            part: Part::Classifier,
+            model: model.to_owned(),
+            t_nets: "both".to_owned(),
+            model_file: format!("{model}.safetensors"),
+            points: Some(64),
+            threads: Some(threads),
+            ms_pi5: Some(ms_pi5),
+            megabytes: Some(2.0),
+            ..Row::default()
+        };
+        row.with_accuracy(right, 1000)
+    }
+
+    fn rows() -> Vec<Row> {
+        vec![
+            row("small", 0.3, 850, 4),
+            row("middle", 0.6, 895, 4),
+            row("large", 1.0, 900, 4),
+            row("huge", 9.0, 950, 4),
+            row("large", 1.0, 900, 1),
+        ]
+    }
+
+    fn asked(max_ms: Option<f64>, min_accuracy: Option<f64>) -> Args {
+        let (max_mb, max_threads, record) = (None, None, None);
+        Args { device: Device::Pi5, max_ms, min_accuracy, max_mb, max_threads, record }
+    }
+
+    #[test]
+    fn the_most_accurate_within_the_time_is_advised_and_what_a_little_less_saves() {
+        let advice = advise(&asked(Some(5.0), None), &rows()).unwrap();
+        assert!(advice.starts_with("large"), "{advice}");
+        assert!(advice.contains("1 thread:"), "of equals fewer threads: {advice}");
+        assert!(advice.contains("0.5 points less save 40 % of the time"), "{advice}");
+        assert!(advice.contains("Beyond its interval, for more:\n  huge"), "{advice}");
+    }
+
+    #[test]
+    fn the_fastest_that_is_accurate_enough_is_advised() {
+        let advice = advise(&asked(None, Some(0.89)), &rows()).unwrap();
+        assert!(advice.starts_with("middle"), "{advice}");
+    }
+
+    #[test]
+    fn a_configuration_is_a_command_line() {
+        let row = Row { sampler: "cpl:own".to_owned(), ..row("m", 1.0, 1, 2) };
+        let row = Row { precision: "i8".to_owned(), ..row };
+        assert_eq!(
+            command(&row),
+            "infer-cpu classify --model m.safetensors --sampler cpl --front own \
+             --points 64 --precision i8 --threads 2 CLOUD"
+        );
+    }
+
+    #[test]
+    fn a_sampler_that_infer_cpu_lacks_is_not_advised() {
+        let best = Row { sampler: "cpl:own:table8".to_owned(), ..row("best", 0.1, 999, 4) };
+        let rows = [rows(), vec![best]].concat();
+        let advice = advise(&asked(Some(5.0), None), &rows).unwrap();
+        assert!(advice.starts_with("large"), "{advice}");
+    }
+
+    #[test]
+    fn what_was_not_measured_is_not_advised() {
+        let error = advise(&asked(Some(0.1), None), &rows()).unwrap_err().to_string();
+        assert!(error.contains("the fastest: small") && error.contains("most accurate: huge"));
+        let here = Args { device: Device::Here, ..asked(Some(5.0), None) };
+        let error = advise(&here, &rows()).unwrap_err().to_string();
+        assert!(error.contains("only what was measured"), "{error}");
+        assert!(asked(None, None).check().unwrap_err().is::<Usage>());
+    }
+}

@@ -1,0 +1,156 @@
+//! `cargo xtask export-onnx`: a model file as ONNX, for other engines.
+
+mod critical_points;
+mod edges;
+mod graph;
+mod pointnet;
+mod proto;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use formats::atomic;
+use formats::model_card::ModelCard;
+use infer_cpu::model_file;
+use prost::Message;
+
+use crate::{Outcome, Usage, checkout};
+use graph::{Graph, Size};
+use pointnet::{Net, Seen};
+use proto::{ModelProto, OperatorSetIdProto, StringStringEntryProto, data_type};
+
+/// The operators that are used are those of ONNX 1.13, the first whose
+/// ReduceMax takes its axes as an input: ONNX Runtime 1.14 and later run them.
+const OPSET: i64 = 18;
+
+/// The version of the messages that came with [`OPSET`].
+const IR_VERSION: i64 = 8;
+
+/// What no message of protobuf exceeds, in bytes.
+const LARGEST: usize = i32::MAX as usize;
+
+/// Flags of `export-onnx`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  cargo xtask export-onnx pointnet-64 --out pointnet-64.onnx
+  cargo xtask export-onnx cpl-64 --critical-points --out cpl-64.onnx
+
+Opset 18, IR version 8, f32. Batch norms are folded into weights. Weights are
+named as in PyTorch's checkpoints (feat.conv1.weight).
+
+Inputs, f32, normalised as the model's card says (unit-sphere: mean to 0, largest
+radius to 1; infer-cpu does it by itself, a graph does not):
+  points [batch, points, 3]  what the network sees, chosen by any sampler
+  cloud  [batch, all, 3]     all points, for networks that look around theirs
+With --critical-points `cloud` is the only input: the graph chooses. Surroundings
+take up points x all x 64 channels x 4 bytes at a time: 16 MB for 64 of 1,024.
+Outputs:
+  logits [batch, classes]    before any softmax, as infer-cpu's --json has them
+  kept   [batch, M], int64   with --critical-points: the points chosen, by index
+
+The card (classes, normalization, sampler, ...) is in the file's metadata_props.")]
+pub struct Args {
+    /// Model file, or the name of a bundled one, such as edge-64
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+
+    /// File to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+
+    /// Put the model's Critical Points Layer into the graph, as infer-cpu's
+    /// --sampler cpl
+    #[arg(long)]
+    critical_points: bool,
+
+    /// How many points the layer keeps [default: as the model was trained]
+    #[arg(long, value_name = "M", requires = "critical_points")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    points: Option<u32>,
+}
+
+/// Exports the model.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let path = find(&args.model);
+    let (card, net) = model_file::read(&path)?;
+    let n_points = args.critical_points.then(|| kept_points(args, &path, &card)).transpose()?;
+    let here = || format!("{} cannot be exported", path.display());
+    let model = export(&net, &card, n_points).with_context(here)?;
+    let size = model.encoded_len();
+    if size > LARGEST {
+        bail!("{}: an ONNX file holds 2 GiB at most, this one needs {size} bytes", here());
+    }
+    atomic::write_bytes(&args.out, model.encode_to_vec())?;
+    let graph = model.graph.as_ref().context("invariant: a model has a graph")?;
+    let names = |values: &[proto::ValueInfoProto]| {
+        values.iter().map(|value| value.name.clone()).collect::<Vec<_>>().join(", ")
+    };
+    let (from, to) = (names(&graph.input), names(&graph.output));
+    eprintln!("{}: {from} -> {to}, opset {OPSET}, {size} bytes", args.out.display());
+    Ok(Outcome::Success)
+}
+
+/// A file, or else the bundled model of this name that lies in a checkout.
+fn find(model: &Path) -> PathBuf {
+    let bundled = |root: PathBuf| {
+        let file = root.join("assets/weights").join(model).with_extension("safetensors");
+        file.is_file().then_some(file)
+    };
+    let found = if model.exists() { None } else { checkout::root().and_then(bundled) };
+    found.unwrap_or_else(|| model.to_path_buf())
+}
+
+fn kept_points(args: &Args, path: &Path, card: &ModelCard) -> anyhow::Result<usize> {
+    let trained = card.points.and_then(|points| u32::try_from(points).ok());
+    match args.points.or(trained) {
+        Some(points) if points > 0 => Ok(points as usize),
+        _ => Err(Usage(format!(
+            "{} does not say how many points it was trained on: name a number by --points",
+            path.display()
+        ))
+        .into()),
+    }
+}
+
+/// The model of `net`, behind a Critical Points Layer of `n_points` if that is
+/// asked for.
+fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Result<ModelProto> {
+    const BATCH: Size<'_> = Size::Named("batch");
+    let mut graph = Graph::default();
+    let mut input = |name, n| graph.input(name, &[BATCH, Size::Named(n), Size::Fixed(3)]);
+    let seen = match n_points {
+        Some(n_points) => {
+            let cloud = input("cloud", "all");
+            critical_points::add(&mut graph, net, &cloud, n_points)?
+        }
+        None => {
+            let points = input("points", "points");
+            let cloud = (!net.edges.is_empty()).then(|| input("cloud", "all"));
+            Seen { points, cloud, pooled_stn: None }
+        }
+    };
+    pointnet::add(&mut graph, net, &seen);
+    let n_classes = net.head.last().map_or(0, |layer| layer.outputs);
+    graph.output("logits", data_type::FLOAT, &[BATCH, Size::Fixed(n_classes)]);
+    if n_points.is_some() {
+        graph.output(critical_points::KEPT, data_type::INT64, &[BATCH, Size::Named("kept")]);
+    }
+    Ok(ModelProto {
+        ir_version: IR_VERSION,
+        producer_name: "edgepuck".to_owned(),
+        producer_version: env!("CARGO_PKG_VERSION").to_owned(),
+        doc_string: "PointNet: logits of clouds that are normalised as metadata `normalization` \
+                     says"
+            .to_owned(),
+        graph: Some(graph.finish("pointnet")),
+        opset_import: vec![OperatorSetIdProto { domain: String::new(), version: OPSET }],
+        metadata_props: card
+            .to_metadata()
+            .into_iter()
+            .map(|(key, value)| StringStringEntryProto { key, value })
+            .collect(),
+    })
+}

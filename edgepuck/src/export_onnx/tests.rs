@@ -1,0 +1,117 @@
+use std::collections::BTreeSet;
+
+use super::proto::{GraphProto, TensorProto};
+use super::*;
+
+/// The checkout that the tests are built in.
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
+/// Bundled models, and narrow ones: `tiny` with batch norms and T-Nets.
+fn models() -> Vec<PathBuf> {
+    let bundled = ["untrained-test", "pointnet-64", "pointnet-1024", "edge-64", "cpl-64"];
+    let narrow = root().join("infer-cpu/tests/golden");
+    let mut models = bundled.map(|name| find(Path::new(name))).to_vec();
+    models.extend(["tiny", "plain"].map(|name| narrow.join(name).with_extension("safetensors")));
+    models
+}
+
+fn exported(path: &Path, n_points: Option<usize>) -> ModelProto {
+    let (card, net) = model_file::read(path).unwrap();
+    export(&net, &card, n_points).unwrap()
+}
+
+fn graph_of(path: &Path, n_points: Option<usize>) -> GraphProto {
+    exported(path, n_points).graph.unwrap()
+}
+
+fn constant<'a>(graph: &'a GraphProto, name: &str) -> &'a TensorProto {
+    graph.initializer.iter().find(|tensor| tensor.name == name).unwrap()
+}
+
+/// ONNX's rules for a graph (IR.md, "Names within a graph" and "Nodes").
+#[test]
+fn every_value_is_made_once_before_it_is_used_and_every_constant_is_used() {
+    for path in models() {
+        for n_points in [None, Some(16)] {
+            let graph = graph_of(&path, n_points);
+            let inputs = graph.input.iter().map(|value| value.name.as_str());
+            let constants = graph.initializer.iter().map(|tensor| tensor.name.as_str());
+            let mut known: BTreeSet<&str> = inputs.chain(constants).collect();
+            assert_eq!(known.len(), graph.input.len() + graph.initializer.len());
+            let mut used = BTreeSet::new();
+            for node in &graph.node {
+                for name in &node.input {
+                    assert!(known.contains(name.as_str()), "{}: {name}", path.display());
+                    used.insert(name.as_str());
+                }
+                for name in &node.output {
+                    assert!(known.insert(name), "{}: {name} is made twice", path.display());
+                }
+            }
+            assert!(graph.output.iter().all(|value| known.contains(value.name.as_str())));
+            for tensor in &graph.initializer {
+                assert!(used.contains(tensor.name.as_str()), "{} is idle", tensor.name);
+                let size = if tensor.data_type == data_type::FLOAT { 4 } else { 8 };
+                let count = tensor.dims.iter().product::<i64>() as usize;
+                assert_eq!(tensor.raw_data.len(), count * size, "{}", tensor.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn weights_bear_pytorch_s_names_and_shapes_and_hold_the_norms() {
+    let graph = graph_of(&find(Path::new("pointnet-1024")), None);
+    for (name, shape) in [
+        ("feat.conv1.weight", &[64, 3, 1][..]),
+        ("feat.stn.conv3.weight", &[1024, 128, 1]),
+        ("feat.fstn.fc3.weight", &[4096, 256]),
+        ("fc3.bias", &[40]),
+    ] {
+        assert_eq!(constant(&graph, name).dims, shape, "{name}");
+    }
+    let tiny = root().join("infer-cpu/tests/golden/tiny.safetensors");
+    let (_, net) = model_file::read(&tiny).unwrap();
+    let bias: Vec<u8> = net.trunk[0].bias.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let graph = graph_of(&tiny, None);
+    assert_eq!(constant(&graph, "feat.conv1.bias").raw_data, bias);
+    assert!(graph.initializer.iter().all(|tensor| !tensor.name.contains("bn")));
+}
+
+#[test]
+fn inputs_and_outputs_are_what_the_network_looks_at() {
+    let names = |name: &str, n_points| {
+        let graph = graph_of(&find(Path::new(name)), n_points);
+        let names = |values: Vec<proto::ValueInfoProto>| {
+            values.into_iter().map(|value| value.name).collect::<Vec<_>>().join(" ")
+        };
+        (names(graph.input), names(graph.output))
+    };
+    let is = |inputs: &str, outputs: &str| (inputs.to_owned(), outputs.to_owned());
+    assert_eq!(names("pointnet-64", None), is("points", "logits"));
+    assert_eq!(names("edge-64", None), is("points cloud", "logits"));
+    assert_eq!(names("edge-64", Some(64)), is("cloud", "logits kept"));
+}
+
+#[test]
+fn the_file_states_its_opset_and_the_model_s_card() {
+    let model = exported(&find(Path::new("cpl-64")), Some(64));
+    let read = ModelProto::decode(&model.encode_to_vec()[..]).unwrap();
+    assert_eq!(read, model);
+    assert_eq!((read.ir_version, read.opset_import[0].version), (8, 18));
+    let remark = |key: &str| {
+        read.metadata_props.iter().find(|entry| entry.key == key).map(|entry| entry.value.as_str())
+    };
+    assert_eq!(remark("normalization"), Some("unit-sphere"));
+    assert_eq!(remark("points"), Some("64"));
+}
+
+#[test]
+fn what_onnx_cannot_choose_by_is_refused() {
+    let (card, mut net) = model_file::read(&find(Path::new("pointnet-1024"))).unwrap();
+    let refused = |net: &Net| export(net, &card, Some(16)).unwrap_err().to_string();
+    (net.front, net.stn) = (None, None);
+    assert!(refused(&net).contains("neither a front end"), "{}", refused(&net));
+}

@@ -1,0 +1,61 @@
+//! The picture that a run ends with: one mesh from all its views, clean above
+//! noisy.
+
+use crate::preview;
+use edgepuck_dataset::config::Variant;
+use edgepuck_dataset::layout;
+use edgepuck_dataset::manifest::Manifest;
+use edgepuck_dataset::record::MeshRecord;
+use formats::Scan;
+use formats::scan_file::{ScanFormat, read_scan};
+use glam::DVec3;
+use sim_gpu::pose::Pose;
+use std::path::{Path, PathBuf};
+
+/// Draws a mesh from the middle of the list that fills a packed cloud, or else
+/// the one with the most points; `None` if no scan holds a point.
+pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> {
+    let Some(set) = manifest.config.sets.first() else { return Ok(None) };
+    let points = |record: &&MeshRecord| -> u64 {
+        let of_set = record.scans.iter().filter(|scan| scan.set == set.name);
+        of_set.filter_map(|scan| scan.variants.first()).map(|v| v.tally.points).sum()
+    };
+    let enough = u64::from(manifest.config.packed_points);
+    let (before, after) = manifest.meshes.split_at(manifest.meshes.len() / 2);
+    let full = after.iter().chain(before).find(|record| points(record) >= enough);
+    let most = full.or_else(|| manifest.meshes.iter().max_by_key(points));
+    let Some(record) = most.filter(|record| points(record) > 0) else { return Ok(None) };
+    let poses = set.poses(manifest.config.seed, &record.entry.id());
+    let all_views = |variant| all_views(out, record, &set.name, variant, &poses);
+    let clean = all_views(Variant::Clean)?;
+    let has_noisy = manifest.config.variants.contains(&Variant::Noisy);
+    let noisy = has_noisy.then(|| all_views(Variant::Noisy)).transpose()?;
+    let (name, sensor, n_views) = (&record.entry.name, &set.sensor.name, poses.len());
+    let title = format!("{name} as {sensor} sees it, {n_views} views together");
+    let picture = layout::example(out);
+    preview::draw(&clean, noisy.as_ref(), &title, &picture)?;
+    Ok(Some(picture))
+}
+
+/// The scans of all views as one cloud, each point with its range.
+fn all_views(
+    out: &Path,
+    record: &MeshRecord,
+    set: &str,
+    variant: Variant,
+    poses: &[Pose],
+) -> anyhow::Result<Scan> {
+    let mut positions = Vec::new();
+    let mut ranges_m = Vec::new();
+    for (pose, view) in poses.iter().zip(0..) {
+        let file = layout::scan(out, set, variant, &record.entry, view, ScanFormat::Npz);
+        let scan = read_scan(&file)?;
+        let origin = DVec3::from_array(scan.origin);
+        ranges_m.extend(scan.positions.iter().map(|&position| {
+            let point = origin + DVec3::from_array(position.map(f64::from));
+            point.distance(pose.position_m) as f32
+        }));
+        positions.extend(scan.positions);
+    }
+    Ok(Scan { positions, range_m: Some(ranges_m), ..Scan::default() })
+}

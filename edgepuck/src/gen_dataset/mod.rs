@@ -1,0 +1,190 @@
+//! `cargo xtask gen-dataset`: a folder of meshes into a LiDAR dataset.
+
+mod bar;
+mod example;
+mod settings;
+mod summary;
+
+use crate::caster::CasterArgs;
+use crate::{Outcome, Usage, flags, gen_shapes};
+use anyhow::Context;
+use edgepuck_dataset::MeshFailure;
+use edgepuck_dataset::check_layouts;
+use edgepuck_dataset::finish::finish;
+use edgepuck_dataset::journal::Terms;
+use edgepuck_dataset::manifest::Manifest;
+use edgepuck_dataset::pipeline::{Run, scan_all};
+use edgepuck_dataset::progress::Progress;
+use edgepuck_dataset::start::{Begin, Start, begin};
+use edgepuck_dataset::verify::verify;
+use edgepuck_shapes as shapes;
+use settings::Settings;
+use sim_gpu::mesh::tree::{MeshEntry, discover};
+use std::collections::BTreeSet;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Instant;
+
+/// Where the meshes of a run without meshes are written, a seed behind it.
+const DEFAULT_SHAPES: &str = "data/default-shapes";
+
+/// Where the dataset of a run without meshes is written.
+const DEFAULT_OUT: &str = "data/lidar-shapes";
+
+/// Flags of `gen-dataset`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder of OBJ, OFF, PLY and STL files, as CLASS/{train,test}/NAME or in any other way;
+    /// default: parametric shapes of our own, written to data/default-shapes-SEED
+    #[arg(value_name = "MESHES")]
+    meshes: Option<PathBuf>,
+
+    /// Folder of the dataset [default: data/lidar-MESHES, or data/lidar-shapes]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Check a finished dataset against its manifest, and do nothing else
+    #[arg(long, value_name = "DIR", exclusive = true)]
+    verify: Option<PathBuf>,
+
+    /// Go on with a run that was interrupted; it ends with the same bytes
+    #[arg(long, conflicts_with = "overwrite")]
+    resume: bool,
+
+    /// Replace the dataset that is in the folder
+    #[arg(long)]
+    overwrite: bool,
+
+    /// Make part I of N of the dataset; `merge-dataset` joins them
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+
+    #[command(flatten)]
+    settings: Settings,
+
+    #[command(flatten)]
+    caster: CasterArgs,
+}
+
+/// Part `number` (from 0) of `of` parts.
+#[derive(Clone, Copy, Debug)]
+struct Shard {
+    number: u32,
+    of: u32,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, of) = text.split_once('/').ok_or("expected I/N, such as 1/4")?;
+        match (number.parse::<u32>(), of.parse::<u32>()) {
+            (Ok(number), Ok(of)) if 1 <= number && number <= of => {
+                Ok(Self { number: number - 1, of })
+            }
+            _ => Err("expected I/N with whole I from 1 to N".to_owned()),
+        }
+    }
+}
+
+/// Makes or verifies a dataset.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    if let Some(folder) = &args.verify {
+        return check(folder);
+    }
+    let config = args.settings.config()?;
+    if config.simplify.is_some() && cfg!(not(feature = "simplify")) {
+        return Err(usage(flags::BUILT_WITHOUT_SIMPLIFY));
+    }
+    let (meshes_folder, default_out) = match &args.meshes {
+        Some(folder) => (folder.clone(), default_out(folder)),
+        None => (write_default_shapes(config.seed)?, PathBuf::from(DEFAULT_OUT)),
+    };
+    let out = args.out.clone().unwrap_or(default_out);
+    let meshes = shard(discover(&meshes_folder, config.seed)?, args.shard);
+    let classes: BTreeSet<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
+    check_layouts(&config, &Vec::from_iter(classes))?;
+    let caster = args.caster.open(&config.cast_effects())?;
+    let part = args.shard.map(|shard| (shard.number, shard.of));
+    let terms = Terms::new(config, &caster, &meshes, part);
+    let how = match (args.resume, args.overwrite) {
+        (true, _) => Begin::Resume,
+        (_, true) => Begin::Overwrite,
+        _ => Begin::Fresh,
+    };
+    if let Start::Complete(manifest) = begin(&out, &terms, how)? {
+        eprintln!("{}: complete already.", out.display());
+        return end(&out, &manifest);
+    }
+
+    let started = Instant::now();
+    let progress = Progress::default();
+    let (config, culling) = (&terms.config, args.caster.culling());
+    let run = Run { out: &out, config, caster: &caster, culling, progress: &progress };
+    let scanned = bar::beside(&progress, meshes.len(), || scan_all(&run, &meshes))?;
+    report_failures(&scanned.failures);
+    let packing = Instant::now();
+    let manifest = finish(&out, &terms, scanned.records, scanned.failures)?;
+    summary::print(&out, &manifest, &progress, started.elapsed(), packing.elapsed());
+    end(&out, &manifest)
+}
+
+/// Names the meshes that were left out, and why.
+pub fn report_failures(failures: &[MeshFailure]) {
+    for failure in failures {
+        let line = failure.line.map(|line| format!(":{line}")).unwrap_or_default();
+        eprintln!("failed: {}{line}: {}", failure.source, failure.cause);
+    }
+}
+
+/// Draws the example, which a killed run may lack, and names it.
+pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
+    match example::draw(out, manifest).context("cannot draw the example")? {
+        Some(picture) => eprintln!("An example to look at: {}", picture.display()),
+        None => eprintln!("No scan holds a point, so there is no example to look at."),
+    }
+    Ok(if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+}
+
+fn check(folder: &Path) -> anyhow::Result<Outcome> {
+    let report = verify(folder)?;
+    let mut out = std::io::stdout().lock();
+    for problem in &report.problems {
+        writeln!(out, "{problem}")?;
+    }
+    eprintln!(
+        "{}: {} files checked, {} problems.",
+        folder.display(),
+        report.files,
+        report.problems.len()
+    );
+    Ok(if report.problems.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+}
+
+fn write_default_shapes(seed: u64) -> anyhow::Result<PathBuf> {
+    // A folder of its own for each seed: meshes of another run must not mix in.
+    let folder = PathBuf::from(format!("{DEFAULT_SHAPES}-{seed}"));
+    eprintln!("No meshes named: writing shapes of our own to {}.", folder.display());
+    shapes::write_tree(&folder, seed, gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS)
+        .context("cannot write the shapes")?;
+    Ok(folder)
+}
+
+/// `data/lidar-NAME` for the folder called NAME.
+fn default_out(meshes: &Path) -> PathBuf {
+    let absolute = std::path::absolute(meshes).unwrap_or_else(|_| meshes.to_owned());
+    let name = absolute.file_stem().map_or("meshes".into(), |name| name.to_string_lossy());
+    Path::new("data").join(format!("lidar-{name}"))
+}
+
+/// Every N-th mesh, from the I-th.
+fn shard(meshes: Vec<MeshEntry>, shard: Option<Shard>) -> Vec<MeshEntry> {
+    let Some(Shard { number, of }) = shard else { return meshes };
+    meshes.into_iter().skip(number as usize).step_by(of as usize).collect()
+}
+
+/// A usage error.
+fn usage(message: impl Into<String>) -> anyhow::Error {
+    Usage(message.into()).into()
+}

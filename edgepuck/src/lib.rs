@@ -1,0 +1,23 @@
+//! The commands of the program `edgepuck`, a module each.
+
+pub mod adapters;
+pub mod advise;
+pub mod caster;
+pub mod checkout;
+pub mod export_onnx;
+pub mod flags;
+pub mod gen_dataset;
+pub mod gen_shapes;
+pub mod import_weights;
+pub mod merge_dataset;
+pub mod outcome;
+pub mod preview;
+pub mod preview_scan;
+pub mod sample_surfaces;
+pub mod sampler_config;
+pub mod scan;
+pub mod significant_digits;
+pub mod trade_record;
+pub mod trainer;
+
+pub use outcome::{Outcome, Usage};

@@ -1,0 +1,76 @@
+//! The program `edgepuck`.
+
+use clap::{Parser, Subcommand};
+use edgepuck_program::{
+    Outcome, adapters, advise, export_onnx, gen_dataset, gen_shapes, import_weights, merge_dataset,
+    outcome, preview_scan, sample_surfaces, scan, trainer,
+};
+use std::process::ExitCode;
+
+/// Turns CAD meshes into realistic LiDAR training data.
+#[derive(Parser)]
+#[command(name = "edgepuck", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Scan a folder of meshes into a LiDAR dataset (default: built-in procedural shapes)
+    #[command(alias = "gen")]
+    GenDataset(Box<gen_dataset::Args>),
+    /// Write the procedural shapes that gen-dataset uses by default as OFF files
+    GenShapes(gen_shapes::Args),
+    /// Sample points uniformly from the surfaces of meshes, as ModelNet40's clouds are
+    SampleSurfaces(sample_surfaces::Args),
+    /// Scan one scene
+    Scan(scan::Args),
+    /// Draw a scan from the side, from above and from the front
+    Preview(preview_scan::Args),
+    /// List the adapters that can cast
+    Adapters,
+    /// Merge the shards of a dataset into one dataset
+    MergeDataset(merge_dataset::Args),
+    /// Convert a PyTorch checkpoint into a model file for infer-cpu
+    ImportWeights(import_weights::Args),
+    /// Write a model file as ONNX, for other engines
+    ExportOnnx(export_onnx::Args),
+    /// Train a network: `edgepuck train --help`
+    #[command(disable_help_flag = true)]
+    Train(trainer::Args),
+    /// Measure a model's accuracy on labelled clouds: `edgepuck eval --help`
+    #[command(disable_help_flag = true)]
+    Eval(trainer::Args),
+    /// Show which points determined a prediction: `edgepuck explain --help`
+    #[command(disable_help_flag = true)]
+    Explain(trainer::Args),
+    /// Measure the distance between two clouds: `edgepuck compare-points A B`
+    #[command(disable_help_flag = true)]
+    ComparePoints(trainer::Args),
+    /// Recommend one configuration for a device, from what was measured
+    Advise(advise::Args),
+}
+
+fn main() -> ExitCode {
+    outcome::exit_code(run(&Cli::parse().command))
+}
+
+fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::GenDataset(args) => gen_dataset::run(args),
+        Command::GenShapes(args) => gen_shapes::run(args),
+        Command::SampleSurfaces(args) => sample_surfaces::run(args),
+        Command::Scan(args) => scan::run(args),
+        Command::Preview(args) => preview_scan::run(args),
+        Command::Adapters => adapters::run(),
+        Command::MergeDataset(args) => merge_dataset::run(args),
+        Command::ImportWeights(args) => import_weights::run(args),
+        Command::ExportOnnx(args) => export_onnx::run(args),
+        Command::Train(args) => trainer::run("train", args),
+        Command::Eval(args) => trainer::run("eval", args),
+        Command::Explain(args) => trainer::run("explain", args),
+        Command::ComparePoints(args) => trainer::run("compare-points", args),
+        Command::Advise(args) => advise::run(args),
+    }
+}

@@ -1,0 +1,128 @@
+//! `ablate`: what each effect is worth, on shapes that take no time.
+
+use crate::{LAB, beside, exits, said};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const PLAN: &str = r#"
+about = "a test"
+most_per_class = [2, 1]
+views = 2
+dropout = 0.1
+packed_points = 64
+min_points = 8
+seeds = [0, 1]
+steps = 4
+cost_rounds = 1
+cost_meshes = 2
+[recipe]
+points = 16
+batch = 10
+validation = 0.0
+[recipe.network]
+input_transform = false
+feature_transform = false
+trunk = [8, 16]
+head = [12]
+"#;
+
+fn ablate(folder: &Path, train: &Path) -> Output {
+    let words = ["ablate", "--plan", "plan.toml", "--out", "out"];
+    Command::new(LAB).current_dir(folder).args(words).env("EDGEPUCK_TRAIN", train).output().unwrap()
+}
+
+/// The lines of a CSV file by heading.
+fn lines(file: &Path) -> Vec<BTreeMap<String, String>> {
+    let text = std::fs::read_to_string(file).unwrap();
+    let split = |line: &str| -> Vec<String> { line.split(',').map(str::to_owned).collect() };
+    let mut lines = text.lines().map(split);
+    let heading = lines.next().unwrap();
+    lines.map(|line| heading.iter().cloned().zip(line).collect()).collect()
+}
+
+/// All but what the clock says.
+fn timeless(file: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut lines = lines(file);
+    lines.iter_mut().for_each(|line| line.retain(|key, _| !key.starts_with("scan_seconds")));
+    lines
+}
+
+#[test]
+fn every_effect_has_its_lines_and_an_interrupted_run_goes_on() {
+    let train = beside("edgepuck-train").expect("`cargo test --workspace` builds edgepuck-train");
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("plan.toml"), PLAN).unwrap();
+    let ran = ablate(at, &train);
+    assert!(ran.status.success(), "{}", said(&ran));
+    let csv = at.join("out/ablations.csv");
+    let found = lines(&csv);
+    for (effect, expected) in [
+        ("noise", 8),
+        ("noise-model", 8),
+        ("dropout", 8),
+        ("quantum", 8),
+        ("beams", 8),
+        ("all-of-these", 8),
+        // Tested on the reference's scans besides.
+        ("occlusion", 12),
+        ("intensity", 2),
+        ("time", 2),
+    ] {
+        let n = found.iter().filter(|line| line["effect"] == effect).count();
+        assert_eq!(n, expected, "{effect}");
+    }
+    let number = |line: &BTreeMap<String, String>, key: &str| line[key].parse::<f64>().unwrap();
+    for line in &found {
+        assert!(number(line, "scan_seconds_cpu") > 0.0 && number(line, "n") > 0.0, "{line:?}");
+        if line["judged_by"] == "networks" {
+            let [low, high] = ["accuracy_low", "accuracy_high"].map(|key| number(line, key));
+            let accuracy = number(line, "accuracy");
+            assert!(0.0 <= low && low <= accuracy && accuracy <= high && high <= 1.0, "{line:?}");
+        } else {
+            // 10 classes of 3 meshes, from 2 sides: no position differs.
+            assert_eq!((line["n"].as_str(), line["accuracy"].as_str()), ("60", ""), "{line:?}");
+        }
+    }
+    // An attribute of 4 bytes a point is paid for, and nothing else.
+    let bytes = |effect: &str, trained_on: &str| {
+        let is_it = |l: &&BTreeMap<_, _>| l["effect"] == effect && l["trained_on"] == trained_on;
+        number(found.iter().find(is_it).unwrap(), "bytes_per_cloud")
+    };
+    assert!(bytes("intensity", "with") > bytes("intensity", "without"));
+    assert_eq!(bytes("noise", "with"), bytes("noise", "without"));
+    assert!(said(&ran).contains("gain"), "{}", said(&ran));
+
+    // As if it had been killed before the end, in a dataset and in a training.
+    let networks = at.join("out/work/trained/networks");
+    std::fs::remove_file(networks.join("reference-seed-1.safetensors")).unwrap();
+    std::fs::remove_dir_all(at.join("out/work/data/grid")).unwrap();
+    let first = timeless(&csv);
+    std::fs::remove_file(&csv).unwrap();
+    let again = ablate(at, &train);
+    assert!(again.status.success(), "{}", said(&again));
+    assert_eq!(timeless(&csv), first);
+}
+
+#[test]
+fn what_cannot_be_run_is_refused_before_anything_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let plan = |name: &str, text: String| std::fs::write(at.join(name), text).unwrap();
+    plan("typo.toml", PLAN.replace("views", "sides"));
+    plan("certain.toml", PLAN.replace("dropout = 0.1", "dropout = 1.0"));
+    let refused = |code, words: &str, expected: &str| {
+        let said = exits(code, Path::new(LAB), at, words);
+        assert!(said.contains(expected), "{words}: {said}");
+        assert!(!at.join("out").exists() && !at.join("data").exists(), "{words}");
+    };
+    refused(1, "ablate --plan typo.toml --out out", "unknown field `sides`");
+    refused(1, "ablate --plan certain.toml --out out", "certain.toml: dropout");
+    refused(1, "ablate --plan nowhere.toml --out out", "cannot read nowhere.toml");
+    refused(2, "ablate --meshes nowhere --out out", "--meshes: nowhere is no folder");
+    std::fs::create_dir(at.join("other")).unwrap();
+    std::fs::write(at.join("other/terms.toml"), "version = \"another\"").unwrap();
+    let said = exits(1, Path::new(LAB), at, "ablate --quick --out other");
+    assert!(said.contains("an earlier run had another plan or other meshes"), "{said}");
+}

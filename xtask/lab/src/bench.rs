@@ -1,0 +1,173 @@
+//! `cargo xtask bench`: measures, and writes down what it measured and where.
+//!
+//! One file per question asked: [`speed`] of building and tracing, [`trade`]
+//! of speed against accuracy, which [`builders`] pays when, the share of each
+//! stage of the [`pipeline`], and how [`peers`] compare. [`infer`] is about
+//! classifying, sampling and learning, [`pi_model`] about both on a Raspberry Pi,
+//! [`growth`] about errors, [`devices`] about adapters beside the CPU, the others
+//! about scanning.
+
+use crate::measure::{lanes, machine, subject};
+use crate::pi5;
+use crate::rivals::{casting as peers, infer};
+use crate::study::casting::{builders, simplify, speed, to_disk, trade};
+use crate::study::{devices, numerics as growth};
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand};
+use edgepuck_program::Outcome;
+use serde::Serialize;
+use sim_gpu::gpu::AdapterRequest;
+use std::path::PathBuf;
+
+/// What to measure.
+#[derive(Args, Debug)]
+pub struct BenchArgs {
+    #[command(subcommand)]
+    what: Benchmark,
+}
+
+#[derive(Subcommand, Debug)]
+enum Benchmark {
+    /// Measure the simulator: building, casting, the whole way to disk.
+    Sim(SimArgs),
+    /// Measure the classifier and the sampler against other engines, in turns.
+    ///
+    /// The others are Python packages, installed from PyPI under `target/peers`,
+    /// and Rust crates, built there. Who cannot be had is skipped with a
+    /// message; who does not give what the weights do is not timed.
+    Infer(infer::InferArgs),
+    /// Measure a step of training against PyTorch's, in turns.
+    Train(infer::learn::TrainArgs),
+    /// Model the classifier on a Raspberry Pi 5 without having one.
+    ///
+    /// Its inner loops, as compiled, go through llvm-mca; what is outside them
+    /// is counted under QEMU; memory and threads are reckoned.
+    PiModel(pi5::PiModelArgs),
+    /// Measure how errors grow with scale, offset, N and K, beside derived bounds.
+    Growth(growth::GrowthArgs),
+    /// Compare every adapter with the CPU on the same meshes.
+    Devices(devices::DevicesArgs),
+}
+
+#[derive(Args, Debug)]
+struct SimArgs {
+    /// Meshes to measure besides the ones made by rule: a file or a folder.
+    meshes: Option<PathBuf>,
+    /// Measure this adapter only: `auto`, `cpu` or part of a name [default: all].
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Write everything measured to this file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Counted repeats of each measurement; the median is shown.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+    /// Sizes of the meshes made by rule, triangles.
+    #[arg(long, value_delimiter = ',', default_value = "1000,10000,100000,1000000")]
+    triangles: Vec<usize>,
+    /// Take at most this many of the meshes given, spread over their list.
+    #[arg(long, default_value_t = 16, value_name = "N")]
+    limit: usize,
+    /// Measure instead which builder pays for how many rays.
+    #[arg(long)]
+    builders: bool,
+    /// Measure instead against Embree, from a Python environment made from
+    /// PyPI under `target/peers`.
+    #[arg(long)]
+    peers: bool,
+    /// Measure instead what each knob trades of speed for accuracy.
+    #[arg(long)]
+    trade: bool,
+    /// Measure instead what `--simplify auto` saves and costs.
+    #[arg(long)]
+    simplify: bool,
+}
+
+/// Everything that a run measured.
+#[derive(Serialize)]
+struct Report {
+    machine: machine::Machine,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speed: Option<speed::Speed>,
+    /// Empty unless meshes were given.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    datasets: Vec<to_disk::Dataset>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    builders: Option<builders::Ways>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peers: Option<peers::Comparison>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trade: Option<trade::Trade>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    simplify: Option<simplify::Simplified>,
+    peak_memory_bytes: Option<u64>,
+}
+
+/// Runs the benchmark that `args` ask for.
+///
+/// # Errors
+/// If no mesh can be read, an adapter fails or the report cannot be written.
+pub fn run(args: &BenchArgs) -> Result<Outcome> {
+    match &args.what {
+        Benchmark::Sim(args) => return sim(args),
+        Benchmark::Infer(args) => infer::run(args),
+        Benchmark::Train(args) => infer::learn::run(args),
+        Benchmark::PiModel(args) => pi5::run(args),
+        Benchmark::Growth(args) => growth::run(args),
+        Benchmark::Devices(args) => devices::run(args),
+    }?;
+    Ok(Outcome::Success)
+}
+
+fn sim(args: &SimArgs) -> Result<Outcome> {
+    let request: Option<AdapterRequest> = match &args.adapter {
+        Some(name) => Some(name.parse()?),
+        None => None,
+    };
+    let mut subjects = subject::tori(&args.triangles);
+    if let Some(meshes) = &args.meshes {
+        subjects.extend(subject::real(meshes, args.limit)?);
+    }
+    let mut report = Report {
+        machine: machine::Machine::here(),
+        speed: None,
+        datasets: Vec::new(),
+        builders: None,
+        peers: None,
+        trade: None,
+        simplify: None,
+        peak_memory_bytes: None,
+    };
+    let rounds = args.rounds.into();
+    if args.builders {
+        let measured = builders::measure(&subjects, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.builders = Some(measured);
+    } else if args.peers {
+        report.peers = peers::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
+        report.peers.iter().for_each(|measured| print!("{}", measured.table()));
+    } else if args.trade {
+        let measured = trade::measure(&lanes::open(request.as_ref())?, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.trade = Some(measured);
+    } else if args.simplify {
+        let measured = simplify::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.simplify = Some(measured);
+    } else {
+        let lanes = lanes::open(request.as_ref())?;
+        let measured = speed::measure(&subjects, &lanes, rounds)?;
+        measured.tables().iter().for_each(|table| print!("{table}"));
+        report.speed = Some(measured);
+        if let Some(meshes) = &args.meshes {
+            report.datasets = to_disk::measure(meshes, args.limit, &lanes, rounds)?;
+            print!("{}", to_disk::table(&report.datasets));
+        }
+    }
+    report.peak_memory_bytes = machine::peak_memory_bytes();
+    if let Some(file) = &args.json {
+        let text = serde_json::to_string_pretty(&report)?;
+        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
+    }
+    Ok(Outcome::Success)
+}

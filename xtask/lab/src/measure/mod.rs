@@ -1,0 +1,14 @@
+//! What every measurement shares: clocks, machines, backends, meshes and rays.
+
+pub mod accuracy;
+pub mod clock;
+pub mod companion;
+pub mod energy;
+pub mod lanes;
+pub mod machine;
+pub mod moller_trumbore;
+pub mod scan_mesh;
+pub mod scenes;
+pub mod shot;
+pub mod subject;
+pub mod ways;

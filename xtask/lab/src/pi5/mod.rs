@@ -1,0 +1,217 @@
+//! `cargo xtask bench pi-model`: a Raspberry Pi 5's figures without one.
+//!
+//! The inner loop of each NEON [`kernels`] function, as compiled, goes through
+//! llvm-mca ([`mca`]) for cycles. The [`plan`] says how often a classification
+//! goes round each, [`load`] what that asks of the machine as threads share it
+//! out, [`model`] how long that takes. What is outside the loops is [`count`]ed
+//! under QEMU.
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use edgepuck_program::flags::positive;
+use infer_cpu::Precision;
+use std::path::{Path, PathBuf};
+use xtask::{build_pi, pi_target};
+
+mod assembly;
+mod count;
+mod kernels;
+mod load;
+mod mca;
+mod model;
+mod network;
+mod number;
+mod plan;
+mod report;
+mod rows;
+
+pub use plan::Sampler;
+
+/// Flags of `bench pi-model`.
+#[derive(Args, Debug)]
+pub struct PiModelArgs {
+    /// Model file [default: the baseline network with weights drawn at random]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Points that the network sees, multiples of 8.
+    #[arg(long, value_delimiter = ',', value_parser = eights,
+          default_value = "16,32,64,128,256,512,1024,2048,4096")]
+    points: Vec<usize>,
+    /// Points of the clouds that samplers choose from.
+    #[arg(long, value_parser = eights, default_value = "1024", value_name = "N")]
+    from: usize,
+    /// Points that a Critical Points Layer keeps.
+    #[arg(long, value_parser = eights, default_value = "64", value_name = "N")]
+    critical: usize,
+    /// Precisions: f32, f32-fc16, f16, i8.
+    #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
+    precision: Vec<Precision>,
+    /// Cores at work.
+    #[arg(long, default_value_t = model::Machine::PI_5.threads as u16,
+          value_parser = clap::value_parser!(u16).range(1..))]
+    threads: u16,
+    /// Clock of the cores.
+    #[arg(long, default_value_t = model::Machine::PI_5.hertz / 1e9, value_name = "GHZ", value_parser = positive)]
+    clock: f64,
+    /// What memory delivers to all cores together.
+    #[arg(long, default_value_t = model::Machine::PI_5.bytes_per_s / 1e9, value_name = "GB/S", value_parser = positive)]
+    bandwidth: f64,
+    /// Instructions a cycle outside inner loops; the core's two SIMD pipes
+    /// allow two.
+    #[arg(long, default_value_t = model::Machine::PI_5.instructions_per_cycle, value_name = "IPC", value_parser = positive)]
+    other_ipc: f64,
+    /// Do not count instructions under QEMU: inner loops and memory alone.
+    #[arg(long)]
+    no_counts: bool,
+    /// Fail if a tile's inner loop is below this share of FMA peak, percent.
+    #[arg(long, value_name = "PERCENT", value_parser = positive)]
+    least_peak: Option<f64>,
+    /// llvm-mca of LLVM 19 or newer [default: the newest on the PATH]
+    #[arg(long, value_name = "PROGRAM")]
+    llvm_mca: Option<String>,
+    /// Write everything to this file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the modelled times to this file, one a row.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+/// Models what `args` ask for and prints it.
+///
+/// # Errors
+/// No llvm-mca that knows the core, a build that fails, a kernel without the
+/// loop that is looked for or below the share of peak asked for, a file that
+/// cannot be read or written.
+pub fn run(args: &PiModelArgs) -> Result<()> {
+    let board = Board::open(args.llvm_mca.as_deref())?;
+    print!("{}", report::kernels(&board.kernels, &board.llvm_mca));
+    check_peaks(&board.kernels, args.least_peak)?;
+
+    let model = model_file(args, &board.folder)?;
+    let network = network::Network::read(&model)?;
+    let counter = if args.no_counts { None } else { board.counter(&model) };
+    let rows = rows::rows(args, &network, &board.kernels, counter.as_ref())?;
+    let report = report::Report::new(args, &board.llvm_mca, &board.kernels, rows);
+    print!("{report}");
+    if let Some(file) = &args.json {
+        let text = serde_json::to_string_pretty(&report)? + "\n";
+        std::fs::write(file, text).with_context(|| format!("writing {}", file.display()))?;
+    }
+    if let Some(file) = &args.csv {
+        let text = report.csv();
+        std::fs::write(file, text).with_context(|| format!("writing {}", file.display()))?;
+    }
+    Ok(())
+}
+
+/// The Raspberry Pi's build of infer-cpu, looked into.
+struct Board {
+    llvm_mca: String,
+    folder: PathBuf,
+    binary: PathBuf,
+    kernels: kernels::Kernels,
+}
+
+impl Board {
+    fn open(llvm_mca: Option<&str>) -> Result<Self> {
+        let mca = mca::Mca::find(llvm_mca)?;
+        pi_target::need_standard_library()?;
+        let folder = xtask::workspace::root().join("target/pi-model");
+        std::fs::create_dir_all(&folder)?;
+        let listing = folder.join("infer-cpu.s");
+        let emit = format!("asm={}", listing.display());
+        let binary = build_pi::build(&["-C", "strip=none", "--emit", &emit])?;
+        let text = std::fs::read_to_string(&listing).with_context(|| {
+            format!("cannot read {}; remove target and retry", listing.display())
+        })?;
+        let kernels = kernels::Kernels::of(&text, &mca)?;
+        Ok(Self { llvm_mca: mca.version, folder, binary, kernels })
+    }
+
+    /// Counts instructions, where that is possible.
+    fn counter(&self, model: &Path) -> Option<count::Counter> {
+        match count::Counter::new(&self.folder, &self.binary, model) {
+            Ok(counter) => Some(counter),
+            Err(error) => {
+                eprintln!("instructions outside inner loops are not counted: {error:#}");
+                None
+            }
+        }
+    }
+}
+
+/// Modelled times of one model file on a Raspberry Pi 5 at work with all its
+/// cores.
+pub struct Modelled {
+    board: Board,
+    machine: model::Machine,
+    network: network::Network,
+    counter: count::Counter,
+}
+
+impl Modelled {
+    /// Looks into the build and the model file at `model`.
+    ///
+    /// # Errors
+    /// What [`run`] reports, and an emulator that cannot count: times without
+    /// what is outside the inner loops would be too good.
+    pub fn open(model: &Path) -> Result<Self> {
+        let board = Board::open(None)?;
+        let counter = count::Counter::new(&board.folder, &board.binary, model)?;
+        let network = network::Network::read(model)?;
+        Ok(Self { board, machine: model::Machine::PI_5, network, counter })
+    }
+
+    /// Milliseconds to a class of `points` of a cloud of `from`, by threads;
+    /// `None` if the network lacks what the sampler needs.
+    ///
+    /// # Errors
+    /// A binary that cannot be counted.
+    pub fn total_ms(
+        &self,
+        sampler: Sampler,
+        (from, points): (usize, usize),
+        precision: Precision,
+        threads: &[usize],
+    ) -> Result<Option<Vec<f64>>> {
+        let setting = rows::Setting { sampler, from, points, precision };
+        let Some(stages) = setting.stages(&self.network) else { return Ok(None) };
+        let (network, kernels) = (&self.network, &self.board.kernels);
+        let counted = rows::count(&self.counter, network, kernels, setting)?;
+        let of = |&threads: &usize| {
+            let machine = model::Machine { threads, ..self.machine };
+            let other = Some(counted.other);
+            model::time(&machine, kernels, &stages, counted.columns_read, other).total_ms
+        };
+        Ok(Some(threads.iter().map(of).collect()))
+    }
+}
+
+fn check_peaks(kernels: &kernels::Kernels, least_percent: Option<f64>) -> Result<()> {
+    let Some(least) = least_percent else { return Ok(()) };
+    for kernel in kernels.all() {
+        if let Some(share) = kernel.share_of_peak() {
+            let percent = share * 100.0;
+            ensure!(percent >= least, "{}: {percent:.1} % of peak, below {least}", kernel.name);
+        }
+    }
+    Ok(())
+}
+
+/// The model asked for, or a stand-in that is written for the purpose.
+fn model_file(args: &PiModelArgs, folder: &Path) -> Result<PathBuf> {
+    if let Some(model) = &args.model {
+        return Ok(model.clone());
+    }
+    let path = folder.join("untrained-baseline.safetensors");
+    network::write_stand_in(&path)?;
+    Ok(path)
+}
+
+fn eights(word: &str) -> Result<usize, String> {
+    match word.parse::<usize>() {
+        Ok(n) if n > 0 && n.is_multiple_of(8) => Ok(n),
+        _ => Err("a positive multiple of 8 is needed".to_owned()),
+    }
+}

@@ -1,0 +1,112 @@
+//! Records that are tables: the ablations, and the paper's experiments.
+
+use super::{entries, missing, remarks, text};
+use crate::render::table::{of_csv, table};
+use anyhow::{Context, Result};
+use maud::{Markup, html};
+use serde::Deserialize;
+use std::path::Path;
+use xtask::workspace::file_name;
+
+/// What each effect is worth, of the record in `folder`.
+///
+/// # Errors
+/// A file that is no CSV.
+pub fn ablations(folder: &Path) -> Result<Markup> {
+    let path = folder.join("ablations.csv");
+    let Some(csv) = text(&path)? else { return Ok(missing(&path, "cargo xtask ablate")) };
+    let rows = of_csv("With each effect and without it", csv.as_bytes())
+        .with_context(|| format!("reading {}", path.display()))?;
+    Ok(html! {
+        p { "Networks trained and tested with and without each effect of a scan, all else equal: "
+            code { "cargo xtask ablate" } "." }
+        (remarks(folder)?)
+        (rows)
+    })
+}
+
+/// A cell of `cargo xtask reproduce`'s CSV.
+#[derive(Deserialize)]
+struct Cell {
+    table: String,
+    row: String,
+    column: String,
+    value: Option<f64>,
+    low: Option<f64>,
+    high: Option<f64>,
+    text: String,
+}
+
+/// The paper's experiments, of the newest record in `reports`.
+///
+/// # Errors
+/// A file that `reproduce` did not write.
+pub fn reproduction(reports: &Path) -> Result<Markup> {
+    let records = entries(reports)?;
+    let Some(folder) = records.iter().rev().find(|path| path.join("report.csv").is_file()) else {
+        return Ok(missing(&reports.join("DATE/report.csv"), "cargo xtask reproduce"));
+    };
+    let path = folder.join("report.csv");
+    let mut csv =
+        csv::Reader::from_path(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let cells: Result<Vec<Cell>, csv::Error> = csv.deserialize().collect();
+    let cells = cells.with_context(|| format!("reading {}", path.display()))?;
+    let mut names: Vec<&str> = Vec::new();
+    for cell in &cells {
+        if !names.contains(&cell.table.as_str()) {
+            names.push(&cell.table);
+        }
+    }
+    Ok(html! {
+        p { "Meyer and Reitmann 2026, by " code { "cargo xtask reproduce" } "; the record "
+            (file_name(folder)) " has the same with drawings and clouds. The number before a table's name is "
+            "the experiment's." }
+        (remarks(folder)?)
+        @for name in names { (one_table(name, &cells)) }
+    })
+}
+
+fn one_table(name: &str, cells: &[Cell]) -> Markup {
+    let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.table == name).collect();
+    let (mut rows, mut columns): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
+    for cell in &cells {
+        if !rows.contains(&cell.row.as_str()) {
+            rows.push(&cell.row);
+        }
+        if !columns.contains(&cell.column.as_str()) {
+            columns.push(&cell.column);
+        }
+    }
+    let words = |row: &&str| {
+        let of = |column: &&str| {
+            let cell = cells.iter().find(|cell| cell.row == **row && cell.column == **column);
+            cell.map(|cell| cell.words()).unwrap_or_default()
+        };
+        let first = std::iter::once((*row).to_owned());
+        (false, first.chain(columns.iter().map(of)).collect())
+    };
+    let heading: Vec<&str> = std::iter::once("").chain(columns.iter().copied()).collect();
+    let open = cells.len() <= 60;
+    html! {
+        details open[open] {
+            summary { (name) }
+            (table("", &heading, &rows.iter().map(words).collect::<Vec<_>>()))
+        }
+    }
+}
+
+impl Cell {
+    fn words(&self) -> String {
+        let number = |x: f64| match x.fract() == 0.0 && x.abs() > 1.0 {
+            true => format!("{x:.0}"),
+            false => format!("{x:.3}"),
+        };
+        match (self.value, self.low, self.high) {
+            (None, ..) => self.text.clone(),
+            (Some(value), Some(low), Some(high)) => {
+                format!("{} ({} to {})", number(value), number(low), number(high))
+            }
+            (Some(value), ..) => number(value),
+        }
+    }
+}

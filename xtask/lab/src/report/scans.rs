@@ -1,0 +1,86 @@
+//! Clouds to turn: one mesh as several sensors see it.
+
+use crate::measure::scan_mesh::{self, load_target};
+use anyhow::Result;
+use formats::rng::StreamKey;
+use formats::scan::AttributeSet;
+use glam::DVec3;
+use maud::{Markup, html};
+use sim_gpu::effects::{Effects, Noise, NoiseModel};
+use sim_gpu::mesh::tree::discover;
+use sim_gpu::pose::Pose;
+use sim_gpu::scan::View;
+use sim_gpu::sensor::Sensor;
+use sim_gpu::target::Target;
+use std::path::Path;
+use std::sync::Arc;
+use xtask::workspace::file_name;
+
+/// Sensors, and noise along the ray in metres.
+const SENSORS: [(&str, f64); 4] =
+    [("vlp32c", 0.0), ("vlp32c", 0.02), ("vlp16", 0.0), ("generic-static", 0.0)];
+
+/// As gen-dataset's rotating set has it, from one of its sides.
+const DISTANCE_M: f64 = 3.0;
+const ELEVATION_DEG: f64 = 20.0;
+const AZIMUTH_DEG: f64 = 45.0;
+
+/// Points that a canvas draws at most, so that a phone turns them.
+const MOST_POINTS: usize = 6000;
+
+/// One mesh of `assets`, as each of the sensors sees it.
+///
+/// # Errors
+/// A mesh that cannot be read.
+pub fn body(assets: &Path) -> Result<Markup> {
+    let folder = assets.join("meshes");
+    let entries = if folder.exists() { discover(&folder, 0)? } else { Vec::new() };
+    let Some(entry) = entries.into_iter().next() else {
+        return Ok(html! { p { "There is no mesh under " (folder.display()) "." } });
+    };
+    let target = load_target(&entry)?;
+    let clouds = SENSORS.map(|(sensor, noise_m)| (sensor, noise_m, scan(&target, sensor, noise_m)));
+    Ok(html! {
+        p { (file_name(&entry.path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
+            (ELEVATION_DEG) "° below it. Made now, on the CPU." }
+        div class="clouds" { @for (sensor, noise_m, cloud) in &clouds {
+            figure {
+                canvas class="cloud" width="480" height="360" data-points=(thousandths(cloud))
+                    data-colours=("0".repeat(shown(cloud).count())) data-palette="#1763c7" {}
+                figcaption {
+                    (sensor) @if *noise_m > 0.0 { ", noise " (noise_m) " m" } ": " (cloud.len()) " points. "
+                    "Drag to turn."
+                }
+            }
+        } }
+    })
+}
+
+fn scan(target: &Arc<Target>, sensor: &str, sigma_m: f64) -> Vec<[f32; 3]> {
+    let sensor = Sensor::builtin(sensor).expect("invariant: these profiles are built in");
+    let noise = Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range };
+    let effects = Effects { noise: (sigma_m > 0.0).then_some(noise), ..Effects::default() };
+    let (elevation, azimuth) = (ELEVATION_DEG.to_radians(), AZIMUTH_DEG.to_radians());
+    let pose = Pose::view(DISTANCE_M, elevation, azimuth, DVec3::ZERO);
+    let view = View {
+        sensor: &sensor,
+        pattern: &sensor.pattern(),
+        pose: &pose,
+        cast_effects: &effects,
+        effects: &effects,
+        attributes: &AttributeSet::default(),
+        stream: StreamKey::new(0, "report", 0),
+    };
+    scan_mesh::scan(target, &view).0.positions
+}
+
+/// Some of the points, spread over all.
+fn shown(cloud: &[[f32; 3]]) -> impl Iterator<Item = &[f32; 3]> {
+    cloud.iter().step_by(cloud.len().div_ceil(MOST_POINTS).max(1))
+}
+
+/// Coordinates in thousandths, as the page's script takes them.
+fn thousandths(cloud: &[[f32; 3]]) -> String {
+    let numbers = shown(cloud).flatten().map(|x| format!("{:.0}", x * 1e3));
+    numbers.collect::<Vec<_>>().join(" ")
+}

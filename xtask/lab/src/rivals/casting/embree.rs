@@ -1,0 +1,128 @@
+//! Embree, through Open3D in a child process.
+
+use crate::measure::clock::Cost;
+use crate::measure::shot::Shot;
+use anyhow::{Context, Result};
+use ndarray::{Array1, Array2};
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use sim_gpu::mesh::Mesh;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use tempfile::TempDir;
+use xtask::venv;
+
+/// A running `peers/embree.py`.
+pub struct Embree {
+    child: Child,
+    requests: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+    files: TempDir,
+    /// Versions of the packages.
+    pub versions: Value,
+}
+
+impl Embree {
+    /// Starts the program with `python`.
+    ///
+    /// # Errors
+    /// If it does not start, which includes packages that do not load here.
+    pub fn start(python: &Path) -> Result<Self> {
+        let mut child = Command::new(python)
+            .arg(venv::programs().join("embree.py"))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .with_context(|| format!("starting {}", python.display()))?;
+        let requests = child.stdin.take();
+        let stdout = child.stdout.take().context("the peer has no output")?;
+        let mut peer = Self {
+            child,
+            requests,
+            answers: BufReader::new(stdout),
+            files: tempfile::tempdir()?,
+            versions: Value::Null,
+        };
+        peer.versions = peer.answer()?;
+        Ok(peer)
+    }
+
+    /// Builds a scene of `mesh`; what the build cost.
+    ///
+    /// # Errors
+    /// If the program ends.
+    pub fn load(&mut self, mesh: &Mesh) -> Result<Cost> {
+        let vertices = mesh.vertices.iter().flat_map(|v| v.as_vec3().to_array()).collect();
+        let triangles = mesh.triangles.iter().flatten().copied().collect();
+        let files = [self.files.path().join("vertices.npy"), self.files.path().join("corners.npy")];
+        write(&files[0], vertices, 3)?;
+        write::<u32>(&files[1], triangles, 3)?;
+        self.ask(&json!({ "mesh": files }))
+    }
+
+    /// Prepares to cast the rays of `shot`, `copies` times over, as `key`.
+    ///
+    /// # Errors
+    /// If the program ends.
+    pub fn aim(&mut self, key: &str, shot: &Shot, copies: usize) -> Result<()> {
+        let rays = shot
+            .in_world()
+            .flat_map(|(origin, direction)| [origin.as_vec3(), direction.as_vec3()])
+            .flat_map(|v| v.to_array())
+            .collect();
+        let file = self.files.path().join("rays.npy");
+        write(&file, rays, 6)?;
+        self.ask::<Cost>(&json!({ "rays": file, "copies": copies, "as": key }))?;
+        Ok(())
+    }
+
+    /// Casts the rays of `key` once; what it cost.
+    ///
+    /// # Errors
+    /// If the program ends.
+    pub fn cast(&mut self, key: &str) -> Result<Cost> {
+        self.ask(&json!({ "cast": key }))
+    }
+
+    /// The ranges of one copy of the rays of `key`, metres; infinite where nothing is hit.
+    ///
+    /// # Errors
+    /// If the program ends.
+    pub fn ranges(&mut self, key: &str) -> Result<Vec<f32>> {
+        let file = self.files.path().join("ranges.npy");
+        self.ask::<Cost>(&json!({ "answers": file, "of": key }))?;
+        let ranges: Array1<f32> = ndarray_npy::read_npy(&file)?;
+        Ok(ranges.to_vec())
+    }
+
+    fn ask<T: DeserializeOwned>(&mut self, request: &Value) -> Result<T> {
+        let requests = self.requests.as_mut().context("the peer has ended")?;
+        writeln!(requests, "{request}").context("the peer has ended")?;
+        self.answer()
+    }
+
+    fn answer<T: DeserializeOwned>(&mut self) -> Result<T> {
+        let mut line = String::new();
+        self.answers.read_line(&mut line)?;
+        serde_json::from_str(&line).context("the peer has ended; see what it said above")
+    }
+}
+
+impl Drop for Embree {
+    fn drop(&mut self) {
+        self.requests = None;
+        // Its input is closed, so it ends; how does not matter any more.
+        let _ = self.child.wait();
+    }
+}
+
+fn write<T: ndarray_npy::WritableElement>(
+    file: &Path,
+    numbers: Vec<T>,
+    columns: usize,
+) -> Result<()> {
+    let rows = numbers.len() / columns;
+    let array = Array2::from_shape_vec((rows, columns), numbers)?;
+    ndarray_npy::write_npy(file, &array).with_context(|| format!("writing {}", file.display()))
+}

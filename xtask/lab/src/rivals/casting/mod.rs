@@ -1,0 +1,265 @@
+//! How others do on the same meshes and rays, in the same run.
+
+mod embree;
+
+use crate::measure::accuracy::Accuracy;
+use crate::measure::clock::{Contestant, Costs, interleave, measured};
+use crate::measure::lanes::Lane;
+use crate::measure::scenes::in_a_room;
+use crate::measure::shot::Shot;
+use crate::measure::subject::Subject;
+use crate::render::text_table::{Table, digits, millions_per_s, milliseconds};
+use crate::study::casting::speed::{casting, short, sweep_pose, target, vlp32c};
+use anyhow::Result;
+use embree::Embree;
+use glam::DAffine3;
+use serde::Serialize;
+use sim_gpu::bvh::Builder;
+use sim_gpu::caster::Caster;
+use sim_gpu::cpu::oracle;
+use sim_gpu::effects::Effects;
+use sim_gpu::job::{Cast, CastJob, Culling};
+use sim_gpu::mesh::Mesh;
+use sim_gpu::pose::Pose;
+use sim_gpu::ray::{Ray, RayFrame};
+use sim_gpu::resolve::resolve;
+use sim_gpu::sensor::BeamPattern;
+use sim_gpu::target::Target;
+use std::cell::RefCell;
+use std::hint::black_box;
+use std::sync::Arc;
+use xtask::venv::Environment;
+
+const OPEN3D: Environment<'_> = Environment {
+    name: "venv",
+    requirements: "xtask/lab/peers/requirements.txt",
+    size: "some 700 MB",
+};
+
+/// Rays in the order in which we cast them: neighbours traverse alike.
+const OURS: &str = "our order";
+
+/// The same rays in the order in which the sensor fires them.
+const FIRED: &str = "firing order";
+
+/// One caster on one set of rays.
+#[derive(Serialize)]
+struct Entry {
+    mesh: String,
+    triangles: usize,
+    rays_from: &'static str,
+    caster: String,
+    rays: usize,
+    costs: Costs,
+    #[serde(flatten)]
+    accuracy: Accuracy,
+}
+
+/// All figures, and the versions of what they were compared with.
+#[derive(Serialize)]
+pub struct Comparison {
+    versions: serde_json::Value,
+    entries: Vec<Entry>,
+}
+
+/// Compares `lanes` with Embree on `subjects`; `None`, with a message, where
+/// Embree cannot be had.
+///
+/// # Errors
+/// If an adapter or the peer fails on the way.
+pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Option<Comparison>> {
+    let embree = match OPEN3D.interpreter() {
+        Ok(python) => Embree::start(&python).map_err(|error| format!("{error:#}")),
+        Err(cause) => Err(cause),
+    };
+    let embree = match embree {
+        Ok(embree) => RefCell::new(embree),
+        Err(cause) => {
+            println!("skipped the comparison with Embree: {cause}");
+            return Ok(None);
+        }
+    };
+    let mut entries = Vec::new();
+    let pattern = vlp32c();
+    for subject in subjects {
+        eprintln!("{}", subject.name);
+        let room = in_a_room(subject.mesh.clone());
+        for (mesh, trace, whole) in [
+            (&room, "sweep, all hit", "whole, all hit"),
+            (&subject.mesh, "sweep, object", "whole, object"),
+        ] {
+            let bench = Bench { subject, mesh, lanes, rounds, embree: &embree };
+            let culling = if trace == "sweep, object" { Culling::On } else { Culling::Off };
+            let target = bench.load()?;
+            let pose = sweep_pose()?;
+            let shot = Shot::sweep(&target, &pose, &pattern, culling);
+            entries.extend(bench.trace(trace, &shot)?);
+            entries.extend(bench.whole(whole, &target, &pose, &pattern)?);
+        }
+        let bench = Bench { subject, mesh: &subject.mesh, lanes, rounds, embree: &embree };
+        entries
+            .extend(bench.trace("incoherent", &Shot::incoherent(&bench.load()?, pattern.len()))?);
+    }
+    let versions = embree.into_inner().versions.clone();
+    Ok(Some(Comparison { versions, entries }))
+}
+
+/// One mesh and who casts at it.
+struct Bench<'a> {
+    subject: &'a Subject,
+    mesh: &'a Mesh,
+    lanes: &'a [Lane],
+    rounds: usize,
+    embree: &'a RefCell<Embree>,
+}
+
+impl Bench<'_> {
+    fn load(&self) -> Result<Arc<Target>> {
+        self.embree.borrow_mut().load(self.mesh)?;
+        Ok(target(self.mesh.clone(), Builder::Sah))
+    }
+
+    /// Tracing alone: the same rays, ready in memory.
+    fn trace(&self, name: &'static str, shot: &Shot) -> Result<Vec<Entry>> {
+        let most = self.lanes.iter().map(|lane| lane.rays).max().unwrap_or(0);
+        let copies = most.div_ceil(shot.rays.len().max(1));
+        let jobs = vec![shot.job.clone(); copies];
+        let mut contestants: Vec<Contestant<'_>> =
+            self.lanes.iter().map(|lane| casting(lane, jobs.clone())).collect();
+        self.embree.borrow_mut().aim(OURS, shot, copies)?;
+        self.embree.borrow_mut().aim(FIRED, &shot.in_firing_order(), copies)?;
+        contestants.push(Box::new(|| self.embree.borrow_mut().cast(FIRED)));
+        contestants.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
+        let costs = interleave(self.rounds, &mut contestants)?;
+        let ranges = |caster: &Caster| -> Result<_> {
+            let cast = caster.cast(std::slice::from_ref(&shot.job))?;
+            Ok(shot.ranges(cast.first().unwrap_or(&Cast::default())))
+        };
+        self.entries(name, shot, shot.rays.len() * copies, costs, ranges)
+    }
+
+    /// From beams to ranges: we aim, cast and solve in f64; Embree is handed
+    /// all rays of the revolution and answers in f32.
+    fn whole(
+        &self,
+        name: &'static str,
+        target: &Arc<Target>,
+        pose: &Pose,
+        pattern: &BeamPattern,
+    ) -> Result<Vec<Entry>> {
+        let all = Shot::sweep(target, pose, pattern, Culling::Off);
+        let copies = 10;
+        let aim = || {
+            let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
+            let stream = all.job.stream;
+            CastJob::aim(Arc::clone(target), frame, pattern, Culling::On, stream, 1.0)
+        };
+        let whole = |caster: &Caster| -> Result<()> {
+            let jobs: Vec<CastJob> = (0..copies).map(|_| aim()).collect();
+            for (job, cast) in jobs.iter().zip(caster.cast(&jobs)?) {
+                black_box(resolve(job, &cast, pattern, &Effects::default()));
+            }
+            Ok(())
+        };
+        let mut contestants: Vec<Contestant<'_>> = Vec::new();
+        for lane in self.lanes {
+            let whole = &whole;
+            contestants.push(Box::new(move || {
+                let (done, cost) = measured(|| whole(&lane.caster));
+                done.map(|()| cost)
+            }));
+        }
+        self.embree.borrow_mut().aim(OURS, &all, copies)?;
+        contestants.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
+        let costs = interleave(self.rounds, &mut contestants)?;
+        let ranges = |caster: &Caster| -> Result<_> {
+            let job = aim();
+            let casts = caster.cast(std::slice::from_ref(&job))?;
+            let mut by_beam = vec![None; pattern.len()];
+            for cast in &casts {
+                for hit in resolve(&job, cast, pattern, &Effects::default()).hits {
+                    by_beam[hit.beam as usize] = Some(hit.range_m);
+                }
+            }
+            Ok(all.job.beams.iter().map(|&beam| by_beam[beam as usize]).collect())
+        };
+        self.entries(name, &all, all.rays.len() * copies, costs, ranges)
+    }
+
+    fn entries(
+        &self,
+        rays_from: &'static str,
+        shot: &Shot,
+        rays: usize,
+        costs: Vec<Costs>,
+        ranges: impl Fn(&Caster) -> Result<Vec<Option<f64>>>,
+    ) -> Result<Vec<Entry>> {
+        let target = &shot.job.target;
+        let nearest = |ray: &Ray| oracle::nearest(target, ray).map(|crossing| crossing.range_m);
+        let truth: Vec<Option<f64>> = shot.rays.iter().map(nearest).collect();
+        let mut answers = Vec::new();
+        for lane in self.lanes {
+            answers.push((lane.name().to_owned(), ranges(&lane.caster)?));
+        }
+        let finite = |t: f32| t.is_finite().then_some(f64::from(t));
+        let of_embree: Vec<Option<f64>> =
+            self.embree.borrow_mut().ranges(OURS)?.into_iter().map(finite).collect();
+        if costs.len() > self.lanes.len() + 1 {
+            // The same rays: only the time depends on their order.
+            answers.push(("Embree, firing order".to_owned(), of_embree.clone()));
+        }
+        answers.push(("Embree".to_owned(), of_embree));
+        let entry = |((caster, ranges), costs): ((String, Vec<_>), Costs)| Entry {
+            mesh: self.subject.name.clone(),
+            triangles: target.surface.len(),
+            rays_from,
+            caster,
+            rays,
+            costs,
+            accuracy: Accuracy::of(&ranges, &truth),
+        };
+        Ok(answers.into_iter().zip(costs).map(entry).collect())
+    }
+}
+
+impl Comparison {
+    /// The figures for people.
+    pub fn table(&self) -> Table {
+        let mut table = Table::new(
+            format!(
+                "Against Embree (Open3D {}), million rays a second; `whole` is aiming, casting and \
+                 solving ranges in f64, the beams that culling spares counted",
+                self.versions["open3d"].as_str().unwrap_or("?")
+            ),
+            &[
+                "mesh",
+                "rays",
+                "caster",
+                "per CPU-s",
+                "per wall s",
+                "CPU ms",
+                "x Embree",
+                "hit mismatches",
+                "worst range error m",
+            ],
+        );
+        for group in self.entries.chunk_by(|a, b| a.mesh == b.mesh && a.rays_from == b.rays_from) {
+            let Some(embree) = group.last() else { continue };
+            for entry in group {
+                let cpu_s = entry.costs.cpu_s().median;
+                table.push(vec![
+                    entry.mesh.clone(),
+                    entry.rays_from.to_owned(),
+                    short(&entry.caster),
+                    millions_per_s(entry.rays, cpu_s),
+                    millions_per_s(entry.rays, entry.costs.wall_s().median),
+                    milliseconds(cpu_s),
+                    digits(embree.costs.cpu_s().median / cpu_s),
+                    (entry.accuracy.false_hits + entry.accuracy.misses).to_string(),
+                    digits(entry.accuracy.worst_m),
+                ]);
+            }
+        }
+        table
+    }
+}

@@ -1,0 +1,221 @@
+//! One job, done by all in turns.
+
+use super::entrant::{Arithmetic, Entrant, Job};
+use crate::measure::clock::{Cost, Costs, Spread};
+use anyhow::{Result, ensure};
+use serde::ser::SerializeMap as _;
+use serde::{Serialize, Serializer};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// How long a turn should last: long against a scheduler's slice, short
+/// against what disturbs a machine for a while.
+const TURN_S: f64 = 0.04;
+
+/// Repeats in a turn.
+const REPEATS: [usize; 2] = [3, 40];
+
+/// Threads of the pool that ran last may still spin; ncnn's do for 20 ms.
+const PAUSE: Duration = Duration::from_millis(30);
+
+/// What an entrant did on one job.
+#[derive(Clone, Debug, Serialize)]
+pub struct Entry {
+    /// The entrant's name.
+    pub engine: String,
+    /// What it computes with.
+    pub arithmetic: Arithmetic,
+    /// Whether it is ours.
+    pub ours: bool,
+    /// The job.
+    #[serde(flatten)]
+    pub job: Job,
+    /// How far its answer was from the judge's.
+    pub error: f64,
+    /// Of every repeat of every turn.
+    #[serde(flatten, serialize_with = "in_ns")]
+    pub costs: Costs,
+}
+
+fn in_ns<S: Serializer>(costs: &Costs, serializer: S) -> Result<S::Ok, S::Error> {
+    let ns = |of: fn(&Cost) -> f64| -> Vec<u64> {
+        costs.0.iter().map(|cost| (of(cost) * 1e9).round() as u64).collect()
+    };
+    let mut map = serializer.serialize_map(Some(2))?;
+    map.serialize_entry("wall_ns", &ns(|cost| cost.wall_s))?;
+    map.serialize_entry("cpu_ns", &ns(|cost| cost.cpu_s))?;
+    map.end()
+}
+
+/// Lets all `entrants` do `job` in `rounds` rounds of one turn each, their
+/// order rotated from round to round. Whose answer is farther from the
+/// `judge`'s than `tolerance` allows, or who fails, is left out with a message.
+pub fn hold(
+    entrants: &mut [Entrant],
+    job: Job,
+    rounds: usize,
+    judge: impl Fn(&[f64]) -> Result<f64>,
+    tolerance: impl Fn(Arithmetic) -> f64,
+) -> Vec<Entry> {
+    let mut fields = Vec::new();
+    for entrant in entrants {
+        match enter(entrant, job, &judge, &tolerance) {
+            Ok((repeats, entry)) => fields.push(Field { entrant, repeats, is_out: false, entry }),
+            Err(cause) => refuse(&entrant.name, job, &cause),
+        }
+    }
+    for round in 0..rounds {
+        let count = fields.len();
+        for k in 0..count {
+            let field = &mut fields[(round + k) % count];
+            if let Err(cause) = field.turn() {
+                refuse(&field.entrant.name, job, &cause);
+                field.is_out = true;
+            }
+        }
+        fields.retain(|field| !field.is_out);
+    }
+    fields.into_iter().map(|field| field.entry).collect()
+}
+
+fn refuse(name: &str, job: Job, cause: &anyhow::Error) {
+    println!("left out {name} at {} points, {}: {cause:#}", job.points, job.setting);
+}
+
+/// An entrant on the field.
+struct Field<'a> {
+    entrant: &'a mut Entrant,
+    repeats: usize,
+    is_out: bool,
+    entry: Entry,
+}
+
+/// Lets `entrant` try `job`: repeats that fill a turn, and an entry without
+/// costs.
+fn enter(
+    entrant: &mut Entrant,
+    job: Job,
+    judge: impl Fn(&[f64]) -> Result<f64>,
+    tolerance: impl Fn(Arithmetic) -> f64,
+) -> Result<(usize, Entry)> {
+    entrant.lane.load(job)?;
+    let error = judge(&entrant.lane.answer()?)?;
+    let allowed = tolerance(entrant.arithmetic);
+    ensure!(error <= allowed, "its answer is off by {error:.1e}, more than {allowed:.1e}");
+    let trial = entrant.lane.time(REPEATS[0])?;
+    let least_s = Spread::of(trial.iter().map(|cost| cost.wall_s)).min;
+    let entry = Entry {
+        engine: entrant.name.clone(),
+        arithmetic: entrant.arithmetic,
+        ours: entrant.ours,
+        job,
+        error,
+        costs: Costs::default(),
+    };
+    Ok((repeats(least_s), entry))
+}
+
+impl Field<'_> {
+    fn turn(&mut self) -> Result<()> {
+        sleep(PAUSE);
+        self.entry.costs.0.extend(self.entrant.lane.time(self.repeats)?);
+        Ok(())
+    }
+}
+
+/// Repeats that fill a turn, of work that takes `each_s`.
+fn repeats(each_s: f64) -> usize {
+    let [least, most] = REPEATS;
+    ((TURN_S / each_s) as usize).clamp(least, most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::entrant::Lane;
+    use super::*;
+    use anyhow::bail;
+    use std::cell::RefCell;
+    use std::rc::Rc;
+
+    /// Answers `answer`, notes its turns and fails at the last of `turns`.
+    struct Scripted {
+        name: char,
+        answer: f64,
+        turns: usize,
+        notes: Rc<RefCell<String>>,
+    }
+
+    impl Lane for Scripted {
+        fn load(&mut self, _: Job) -> Result<()> {
+            Ok(())
+        }
+
+        fn answer(&mut self) -> Result<Vec<f64>> {
+            Ok(vec![self.answer])
+        }
+
+        fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
+            self.notes.borrow_mut().push(self.name);
+            self.turns -= 1;
+            if self.turns == 0 {
+                bail!("gone");
+            }
+            Ok(vec![Cost { wall_s: 0.02, cpu_s: 0.01 }; repeats])
+        }
+    }
+
+    fn play(rounds: usize, cast: &[(char, f64, usize)]) -> (String, Vec<Entry>) {
+        let notes = Rc::new(RefCell::new(String::new()));
+        let entrant = |&(name, answer, turns): &(char, f64, usize)| Entrant {
+            name: name.to_string(),
+            arithmetic: Arithmetic::F32,
+            ours: false,
+            version: String::new(),
+            lane: Box::new(Scripted { name, answer, turns, notes: Rc::clone(&notes) }),
+        };
+        let mut entrants: Vec<Entrant> = cast.iter().map(entrant).collect();
+        let job = Job { points: 16, setting: 1 };
+        let entries = hold(&mut entrants, job, rounds, |a| Ok((a[0] - 1.0).abs()), |_| 0.1);
+        (notes.take(), entries)
+    }
+
+    #[test]
+    fn turns_go_round_and_everyone_begins_once() {
+        let (notes, entries) = play(3, &[('a', 1.0, 99), ('b', 1.0, 99), ('c', 1.0, 99)]);
+        // The trials, then three rounds.
+        assert_eq!(notes, "abcabcbcacab");
+        assert_eq!(entries[0].costs.0.len(), 9);
+        assert_eq!(entries.iter().map(|e| &e.engine[..]).collect::<String>(), "abc");
+    }
+
+    #[test]
+    fn who_answers_wrongly_is_not_timed() {
+        let (notes, entries) = play(2, &[('a', 1.2, 99), ('b', 1.05, 99), ('c', f64::NAN, 99)]);
+        assert_eq!(notes, "bbb");
+        assert!((entries[0].error - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn who_breaks_off_is_left_out_and_the_others_go_on() {
+        let (notes, entries) = play(2, &[('a', 1.0, 99), ('b', 1.0, 2)]);
+        assert_eq!(notes, "ababa");
+        assert_eq!(entries.iter().map(|e| &e.engine[..]).collect::<String>(), "a");
+    }
+
+    #[test]
+    fn a_record_holds_every_repeat_in_nanoseconds() {
+        let (_, entries) = play(1, &[('a', 1.0, 99)]);
+        let record = serde_json::to_value(&entries[0]).unwrap();
+        assert_eq!(record["wall_ns"], serde_json::json!([20_000_000, 20_000_000, 20_000_000]));
+        assert_eq!(record["cpu_ns"][2], 10_000_000);
+        assert_eq!(record["points"], 16);
+    }
+
+    #[test]
+    fn a_turn_is_filled_within_limits() {
+        assert_eq!(repeats(0.004), 10);
+        assert_eq!(repeats(1.0), 3);
+        assert_eq!(repeats(1e-9), 40);
+        assert_eq!(repeats(0.0), 40);
+    }
+}

@@ -1,0 +1,174 @@
+//! `cargo xtask bench infer`: our classifier and sampler and those of others,
+//! on the same weights and clouds, in one run, in turns.
+
+mod classify;
+mod cloud;
+mod contest;
+mod entrant;
+mod grid;
+mod hosts;
+mod judge;
+pub mod learn;
+mod model;
+mod ours;
+mod roster;
+mod sample;
+mod server;
+
+use crate::measure::machine::Machine;
+use anyhow::{Context, Result};
+use clap::Args;
+use cloud::Cloud;
+use contest::Entry;
+use edgepuck_program::Usage;
+use hosts::Material;
+use judge::Judge;
+use roster::{CLASSIFIERS, SAMPLERS};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use xtask::venv::workshop;
+
+/// What `bench infer` is told.
+#[derive(Args, Debug)]
+pub struct InferArgs {
+    /// Weights for all engines: safetensors with the key names of yanx27's
+    /// `pointnet_cls` [default: random ones of its shapes].
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Sizes of the clouds to classify, points.
+    #[arg(
+        long,
+        value_name = "N,...",
+        value_delimiter = ',',
+        default_value = "16,32,64,128,256,512,1024,2048,4096",
+        value_parser = positive
+    )]
+    points: Vec<usize>,
+    /// Numbers of threads to classify with.
+    #[arg(
+        long,
+        value_name = "N,...",
+        value_delimiter = ',',
+        default_value = "1,2",
+        value_parser = positive
+    )]
+    threads: Vec<usize>,
+    /// Turns that each engine has at each job, of several repeats each; the
+    /// median of all repeats is shown.
+    #[arg(long, value_name = "N", default_value = "9", value_parser = positive)]
+    rounds: usize,
+    /// Write everything measured, with every repeat, to this file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Measure these engines only; `ncnn` names `ncnn-f16` too, and `ours` all
+    /// of ours [default: all but PyTorch].
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    engines: Vec<String>,
+    /// Measure PyTorch too: some 3 GB from PyPI.
+    #[arg(long)]
+    torch: bool,
+}
+
+/// Everything that a run measured.
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    model: PathBuf,
+    /// Of each engine.
+    versions: BTreeMap<String, String>,
+    classifying: Vec<Entry>,
+    sampling: Vec<Entry>,
+}
+
+/// Runs the benchmark that `args` ask for.
+///
+/// # Errors
+/// If an engine is unknown, the model cannot be read or a file not written.
+pub fn run(args: &InferArgs) -> Result<()> {
+    check(&args.engines)?;
+    let is_wanted = |name: &str| {
+        let by = |wanted: &String| is_named(name, wanted);
+        args.engines.is_empty() || args.engines.iter().any(by)
+    };
+    let material = Material { model: args.model()?, folder: workshop().join("infer") };
+    let judge = Judge::open(&material.model)?;
+    let cloud = Cloud::new(args.points.iter().copied().fold(sample::MOST_POINTS, usize::max));
+    cloud.write(&material.cloud())?;
+
+    let mut classifiers = ours::classifiers(&material.model, &cloud, is_wanted);
+    classifiers.extend(roster::start(&CLASSIFIERS, is_wanted, args.torch, &material));
+    let mut samplers: Vec<_> = ours::sampler(&cloud, is_wanted).into_iter().collect();
+    samplers.extend(roster::start(&SAMPLERS, is_wanted, args.torch, &material));
+    let version = |entrant: &entrant::Entrant| (entrant.name.clone(), entrant.version.clone());
+    let mut report = Report {
+        machine: Machine::here(),
+        versions: classifiers.iter().chain(&samplers).map(version).collect(),
+        model: material.model,
+        classifying: Vec::new(),
+        sampling: Vec::new(),
+    };
+    if !classifiers.is_empty() {
+        let (points, threads) = (&args.points, &args.threads);
+        let judge = (&judge, &cloud);
+        report.classifying =
+            classify::contest(&mut classifiers, points, threads, args.rounds, judge)?;
+    }
+    if !samplers.is_empty() {
+        report.sampling = sample::contest(&mut samplers, args.rounds, &cloud);
+    }
+    if let Some(file) = &args.json {
+        let text = serde_json::to_string(&report)?;
+        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
+    }
+    Ok(())
+}
+
+impl InferArgs {
+    /// The model given, or the random one, written.
+    fn model(&self) -> Result<PathBuf> {
+        if let Some(model) = &self.model {
+            return Ok(model.clone());
+        }
+        let model = workshop().join("infer/random.safetensors");
+        model::write_random(&model)?;
+        Ok(model)
+    }
+}
+
+/// Whether `engine` is what `word` stands for.
+fn is_named(engine: &str, word: &str) -> bool {
+    engine.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+}
+
+fn check(words: &[String]) -> Result<(), Usage> {
+    let rivals = CLASSIFIERS.iter().chain(&SAMPLERS).map(|rival| rival.name.to_owned());
+    let known: Vec<String> = ours::names().into_iter().chain(rivals).collect();
+    let is_unknown = |word: &&String| !known.iter().any(|engine| is_named(engine, word));
+    match words.iter().find(is_unknown) {
+        Some(word) => {
+            Err(Usage(format!("no engine is called {word}; there are {}", known.join(", "))))
+        }
+        None => Ok(()),
+    }
+}
+
+fn positive(word: &str) -> Result<usize, String> {
+    word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "not a positive number".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_names_an_engine_and_its_variants() {
+        assert!(is_named("ncnn-f16", "ncnn"));
+        assert!(is_named("ncnn-f16", "ncnn-f16"));
+        assert!(!is_named("ncnn", "ncnn-f16"));
+        assert!(!is_named("torchscript", "torch"));
+        assert!(check(&["ours".to_owned(), "fpsample".to_owned()]).is_ok());
+        let error = check(&["onnx".to_owned()]).unwrap_err();
+        assert!(error.to_string().starts_with("no engine is called onnx; there are ours-f32,"));
+    }
+}

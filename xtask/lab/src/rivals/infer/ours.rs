@@ -1,0 +1,156 @@
+//! Our own engine, in this process.
+
+use super::cloud::Cloud;
+use super::entrant::{Arithmetic, Entrant, Job, Lane};
+use crate::measure::clock::{Cost, measured};
+use anyhow::{Context, Result};
+use infer_cpu::kernel::{self, Kernels};
+use infer_cpu::sampler::{FarthestPoints, FpsStart};
+use infer_cpu::{Classifier, Normalization, Options, Precision};
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+
+/// Runs before those that count, as the rivals' programs have.
+const UNCOUNTED: usize = 3;
+
+/// Its name with the precision's behind it.
+fn name(precision: Precision) -> String {
+    format!("ours-{precision}")
+}
+
+/// Our sampler's name.
+const SAMPLER: &str = "ours";
+
+/// What `--engines` can call us.
+pub fn names() -> Vec<String> {
+    Precision::ALL.map(name).into_iter().chain([SAMPLER.to_owned()]).collect()
+}
+
+/// Our farthest point sampling, if it `is_wanted`.
+pub fn sampler(cloud: &Cloud, is_wanted: impl Fn(&str) -> bool) -> Option<Entrant> {
+    let kernels = kernel::available().next().filter(|_| is_wanted(SAMPLER))?;
+    let lane = Sampling {
+        kernels,
+        sampler: FarthestPoints::default(),
+        cloud: cloud.points(),
+        job: Job { points: 0, setting: 0 },
+        picked: Vec::new(),
+    };
+    Some(Entrant {
+        name: SAMPLER.to_owned(),
+        arithmetic: Arithmetic::F32,
+        ours: true,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        lane: Box::new(lane),
+    })
+}
+
+struct Sampling {
+    kernels: &'static Kernels,
+    sampler: FarthestPoints,
+    cloud: Vec<[f32; 3]>,
+    job: Job,
+    picked: Vec<u32>,
+}
+
+impl Sampling {
+    fn sample(&mut self) {
+        let points = &self.cloud[..self.job.points];
+        let (n, start) = (self.job.setting, FpsStart::First);
+        self.sampler.select(points, n, start, self.kernels, &mut self.picked);
+    }
+}
+
+impl Lane for Sampling {
+    fn load(&mut self, job: Job) -> Result<()> {
+        self.job = job;
+        Ok(())
+    }
+
+    fn answer(&mut self) -> Result<Vec<f64>> {
+        self.sample();
+        Ok(self.picked.iter().map(|&i| f64::from(i)).collect())
+    }
+
+    fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
+        (0..UNCOUNTED).for_each(|_| self.sample());
+        let once = |_| {
+            let ((), cost) = measured(|| self.sample());
+            black_box(&self.picked);
+            cost
+        };
+        Ok((0..repeats).map(once).collect())
+    }
+}
+
+/// Our classifier in each precision that `is_wanted` by its name.
+pub fn classifiers(model: &Path, cloud: &Cloud, is_wanted: impl Fn(&str) -> bool) -> Vec<Entrant> {
+    let wanted = Precision::ALL.into_iter().filter(|&precision| is_wanted(&name(precision)));
+    let entrant = |precision: Precision| Entrant {
+        name: name(precision),
+        arithmetic: match precision {
+            Precision::F32 => Arithmetic::F32,
+            Precision::F32Fc16 | Precision::F16 => Arithmetic::Half,
+            Precision::I8 => Arithmetic::I8,
+        },
+        ours: true,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        lane: Box::new(Ours {
+            model: model.to_path_buf(),
+            precision,
+            cloud: cloud.points(),
+            loaded: None,
+        }),
+    };
+    wanted.map(entrant).collect()
+}
+
+struct Ours {
+    model: PathBuf,
+    precision: Precision,
+    cloud: Vec<[f32; 3]>,
+    /// With the number of points that it is to be given.
+    loaded: Option<(Classifier, usize)>,
+}
+
+impl Ours {
+    fn loaded(&mut self) -> Result<(&mut Classifier, &[[f32; 3]])> {
+        let (classifier, points) = self.loaded.as_mut().context("nothing is loaded")?;
+        Ok((classifier, &self.cloud[..*points]))
+    }
+}
+
+impl Lane for Ours {
+    fn load(&mut self, job: Job) -> Result<()> {
+        let options = Options {
+            precision: self.precision,
+            threads: job.setting,
+            normalization: Some(Normalization::None),
+            ..Options::default()
+        };
+        // The old one's threads end first.
+        self.loaded = None;
+        self.loaded = Some((Classifier::load(&self.model, &options)?, job.points));
+        Ok(())
+    }
+
+    fn answer(&mut self) -> Result<Vec<f64>> {
+        let (classifier, points) = self.loaded()?;
+        let prediction = classifier.classify(points)?;
+        let classes = 0..prediction.logits.len();
+        Ok(classes.map(|class| prediction.log_probability(class)).collect())
+    }
+
+    fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
+        let (classifier, points) = self.loaded()?;
+        let mut once = || -> Result<Cost> {
+            let (prediction, cost) = measured(|| classifier.classify(points).map(|_| ()));
+            black_box(prediction?);
+            Ok(cost)
+        };
+        for _ in 0..UNCOUNTED {
+            once()?;
+        }
+        (0..repeats).map(|_| once()).collect()
+    }
+}

@@ -1,0 +1,221 @@
+//! `cargo xtask ablate`: what each effect of a scan is worth to a classifier,
+//! and what it costs. Datasets with and without it are made here; networks are
+//! trained on them by `train`.
+
+mod costs;
+mod datasets;
+mod effects;
+mod plan;
+mod positions;
+mod rows;
+mod summary;
+
+use anyhow::{Context, ensure};
+use datasets::{Made, bytes_per_cloud, clouds, make};
+use edgepuck_program::flags::need_folder_of_meshes;
+use edgepuck_program::{Outcome, trainer as train};
+use edgepuck_shapes as shapes;
+use effects::{DATASETS, EFFECTS, Judge, Source};
+use formats::atomic;
+use plan::Plan;
+use rows::{Answer, Cost};
+use serde::Serialize;
+use sim_gpu::mesh::tree::{MeshEntry, discover};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Flags of `ablate`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A folder of meshes, as gen-dataset takes it [default: shapes of our own]
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+
+    /// A look at a few meshes, in two minutes
+    #[arg(long, conflicts_with = "plan")]
+    quick: bool,
+
+    /// How much is made and trained, as the files in assets/ablations
+    #[arg(long, value_name = "TOML")]
+    plan: Option<PathBuf>,
+
+    /// Where ablations.csv goes, with all that it is made from; a run goes on from what is there
+    #[arg(long, value_name = "DIR", default_value = "data/ablations")]
+    out: PathBuf,
+}
+
+/// Shapes of each class that are made where no meshes are named, to train on
+/// and to test with.
+const SHAPES: [u32; 2] = [40, 10];
+
+/// Makes, trains, tests and compares what is not there yet; writes
+/// `ablations.csv` and `tables.txt`, and prints the latter.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    need_folder_of_meshes(args.meshes.as_deref())?;
+    let plan = Plan::read(args.plan.as_deref(), args.quick)?;
+    let work = args.out.join("work");
+    keep_terms(&plan, args.meshes.as_deref(), &args.out)?;
+    let meshes = meshes(&plan, args.meshes.as_deref(), &work)?;
+    let made = make_all(&plan, &meshes, &work)?;
+    let compared = compare(&made, &work)?;
+    let seconds = costs::costs(&plan, &meshes, &work.join("scratch"), &work.join("costs.json"))?;
+    let mut costs = BTreeMap::new();
+    for (&(name, source), made) in DATASETS.iter().zip(&made) {
+        let bytes_per_cloud = bytes_per_cloud(made, source, &folder(&work, name))?;
+        let seconds = *seconds.get(name).with_context(|| format!("no cost of {name}"))?;
+        costs.insert(name.to_owned(), Cost { seconds, bytes_per_cloud });
+    }
+    let Some(answers) = answers(&plan, &work)? else { return Ok(Outcome::SomeFailed) };
+    let rows = rows::rows(&answers, &compared, &costs);
+    let summary = summary::of(&rows);
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    rows.iter().try_for_each(|row| csv.serialize(row))?;
+    atomic::write_bytes(&args.out.join("tables.txt"), summary.trim_start())?;
+    atomic::write_bytes(&args.out.join("ablations.csv"), csv.into_inner()?)?;
+    println!("{summary}\n{}", args.out.join("ablations.csv").display());
+    let failed = made.iter().any(|made| made.failures > 0);
+    Ok(if failed { Outcome::SomeFailed } else { Outcome::Success })
+}
+
+/// Keeps the plan, and which meshes it is run on, beside what comes of it.
+fn keep_terms(plan: &Plan, meshes: Option<&Path>, out: &Path) -> anyhow::Result<()> {
+    #[derive(Serialize)]
+    struct Terms<'a> {
+        version: &'a str,
+        meshes: String,
+        plan: &'a Plan,
+    }
+    let meshes = match meshes {
+        Some(folder) => folder.canonicalize()?.display().to_string(),
+        None => "shapes of our own".to_owned(),
+    };
+    let text = toml::to_string(&Terms { version: env!("CARGO_PKG_VERSION"), meshes, plan })?;
+    let path = out.join("terms.toml");
+    if !path.is_file() {
+        return Ok(atomic::write_bytes(&path, text)?);
+    }
+    let earlier = std::fs::read_to_string(&path)?;
+    ensure!(
+        earlier == text,
+        "{}: an earlier run had another plan or other meshes; choose another --out",
+        path.display()
+    );
+    Ok(())
+}
+
+/// The meshes, of each class and split as many as the plan wants.
+fn meshes(plan: &Plan, folder: Option<&Path>, work: &Path) -> anyhow::Result<Vec<MeshEntry>> {
+    let folder = match folder {
+        Some(folder) => folder.to_owned(),
+        None => {
+            let [train, test] = plan.most_per_class.unwrap_or(SHAPES);
+            let folder = work.join("shapes");
+            shapes::write_tree(&folder, 0, train, test).context("cannot write the shapes")?;
+            folder
+        }
+    };
+    let mut meshes = discover(&folder, 0)?;
+    let Some([train, test]) = plan.most_per_class else { return Ok(meshes) };
+    let mut seen = BTreeMap::new();
+    meshes.retain(|mesh| {
+        let most = if mesh.split == formats::split::Split::Train { train } else { test };
+        let n = seen.entry((mesh.class.clone(), mesh.split)).or_insert(0);
+        *n += 1;
+        *n <= most
+    });
+    Ok(meshes)
+}
+
+/// Where the dataset `name` lies.
+fn folder(work: &Path, name: &str) -> PathBuf {
+    work.join("data").join(name)
+}
+
+/// All datasets, in the order of [`DATASETS`].
+fn make_all(plan: &Plan, meshes: &[MeshEntry], work: &Path) -> anyhow::Result<Vec<Made>> {
+    let made = DATASETS.iter().map(|&(name, source)| {
+        eprintln!("dataset {name}: {} meshes", meshes.len());
+        make((name, source), plan, meshes, &folder(work, name))
+            .with_context(|| format!("dataset {name}"))
+    });
+    made.collect()
+}
+
+/// How many scans are equal in all positions, of each effect that reaches none.
+fn compare(made: &[Made], work: &Path) -> anyhow::Result<BTreeMap<&'static str, usize>> {
+    let manifest = |name: &str| {
+        let at = DATASETS.iter().position(|(known, _)| *known == name);
+        at.and_then(|at| made[at].manifest.as_ref()).with_context(|| format!("{name}: no scans"))
+    };
+    let mut compared = BTreeMap::new();
+    for effect in EFFECTS.iter().filter(|effect| effect.judged_by == Judge::Positions) {
+        let (with, without) = (effect.with, effect.without);
+        let n = positions::compare(
+            (manifest(with)?, &folder(work, with)),
+            (manifest(without)?, &folder(work, without)),
+        );
+        compared.insert(effect.name, n.with_context(|| format!("effect {}", effect.name))?);
+    }
+    Ok(compared)
+}
+
+/// What networks answer, which `train` finds out; `None` if it failed and said
+/// why.
+fn answers(plan: &Plan, work: &Path) -> anyhow::Result<Option<Vec<Answer>>> {
+    let design = work.join("design.toml");
+    atomic::write_bytes(&design, toml::to_string(&Design::of(plan))?)?;
+    let flags = ["--design".into(), design.into(), "--out".into(), work.join("trained").into()];
+    if let Outcome::SomeFailed = train::run("cross", &train::Args::from(flags.to_vec()))? {
+        return Ok(None);
+    }
+    let path = work.join("trained/answers.csv");
+    let mut csv = csv::Reader::from_path(&path).with_context(|| path.display().to_string())?;
+    let answers = csv.deserialize().collect::<Result<_, _>>();
+    answers.map(Some).with_context(|| path.display().to_string())
+}
+
+/// What `train cross` is asked for. Paths are from the folder it lies in.
+#[derive(Serialize)]
+struct Design<'a> {
+    seeds: &'a [u64],
+    steps: u32,
+    recipe: &'a toml::Table,
+    set: Vec<Set>,
+    test: Vec<Test>,
+}
+
+#[derive(Serialize)]
+struct Set {
+    name: &'static str,
+    path: PathBuf,
+    matched: bool,
+}
+
+#[derive(Serialize)]
+struct Test {
+    trained_on: &'static str,
+    tested_on: &'static str,
+}
+
+impl<'a> Design<'a> {
+    fn of(plan: &'a Plan) -> Self {
+        let tests = rows::tests();
+        let used = |name: &str| tests.iter().any(|(p, q)| [*p, *q].contains(&name));
+        let set = |&(name, source): &(&'static str, Source)| Set {
+            name,
+            path: clouds(source, &folder(Path::new(""), name)),
+            // Whole meshes have no views to be matched by.
+            matched: source != Source::Surface,
+        };
+        Self {
+            seeds: &plan.seeds,
+            steps: plan.steps,
+            recipe: &plan.recipe,
+            set: DATASETS.iter().filter(|(name, _)| used(name)).map(set).collect(),
+            test: tests
+                .iter()
+                .map(|&(trained_on, tested_on)| Test { trained_on, tested_on })
+                .collect(),
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! The lines of `ablations.csv`, joined over seeds, for people.
+
+use super::effects::EFFECTS;
+use super::rows::Row;
+use crate::measure::clock::Spread;
+use crate::render::text_table::{Table, digits};
+
+/// Two tables: what training with an effect gains, and what the effect costs.
+pub fn of(rows: &[Row]) -> String {
+    format!("{}{}", gains(rows), costs(rows))
+}
+
+fn gains(rows: &[Row]) -> Table {
+    let heading = ["effect", "tested", "trained with", "trained without", "gain", "least", "most"];
+    let mut table = Table::new(
+        "Instance accuracy, %, mean over seeds; gain of training with the effect, points, and \
+         the ends over seeds",
+        &heading,
+    );
+    for effect in &EFFECTS {
+        for tested in ["with", "without", "reference"] {
+            let of = |trained: &str| -> Vec<(u64, f64)> {
+                let wanted = rows.iter().filter(|row| {
+                    (row.effect, row.trained_on, row.tested_on)
+                        == (effect.name, trained, Some(tested))
+                });
+                wanted.filter_map(|row| Some((row.seed?, 100.0 * row.accuracy?))).collect()
+            };
+            let (with, without) = (of("with"), of("without"));
+            if with.is_empty() {
+                continue;
+            }
+            let pairs = with.iter().flat_map(|(seed, p)| {
+                without.iter().filter(move |(other, _)| other == seed).map(move |(_, q)| p - q)
+            });
+            let gain: Vec<f64> = pairs.collect();
+            let ends = Spread::of(gain.iter().copied());
+            let accuracies = [&with, &without]
+                .map(|found| mean(found.iter().map(|(_, accuracy)| *accuracy)))
+                .map(|mean| format!("{mean:.1}"));
+            let [p, q] = accuracies;
+            let points = [mean(gain.into_iter()), ends.min, ends.max].map(|x| format!("{x:+.1}"));
+            let [gain, least, most] = points;
+            let row = [effect.name, tested].map(str::to_owned);
+            table.push(row.into_iter().chain([p, q, gain, least, most]).collect());
+        }
+    }
+    table
+}
+
+fn mean(figures: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = figures.fold((0.0, 0), |(sum, n), x| (sum + x, n + 1));
+    sum / f64::from(n.max(1))
+}
+
+fn costs(rows: &[Row]) -> Table {
+    let mut table = Table::new(
+        "CPU ms a mesh with all its views, median and ends of the rounds; bytes of a cloud on disk",
+        &["effect", "judged by", "set", "ms", "least", "most", "bytes", "equal scans"],
+    );
+    for effect in &EFFECTS {
+        for direction in ["with", "without"] {
+            let row =
+                rows.iter().find(|row| (row.effect, row.trained_on) == (effect.name, direction));
+            let Some(row) = row else { continue };
+            let ms = [row.scan_seconds_cpu, row.scan_seconds_cpu_low, row.scan_seconds_cpu_high];
+            let equal = if row.seed.is_none() { row.n.to_string() } else { "-".to_owned() };
+            let words = [format!("{} {direction}", effect.name), row.judged_by.to_owned()];
+            let numbers = ms.map(|seconds| digits(1e3 * seconds));
+            let last = [format!("{:.0}", row.bytes_per_cloud), equal];
+            let words = words.into_iter().chain([row.trained_set.to_owned()]);
+            table.push(words.chain(numbers).chain(last).collect());
+        }
+    }
+    table
+}

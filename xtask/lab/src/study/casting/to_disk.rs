@@ -1,0 +1,137 @@
+//! The whole way to disk: the default dataset, as `gen-dataset` makes it, in a
+//! folder that is removed again.
+
+use crate::measure::clock::{Cost, measured};
+use crate::measure::lanes::Lane;
+use crate::render::text_table::{Table, digits};
+use crate::study::casting::speed::short;
+use anyhow::{Context, Result};
+use edgepuck_dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
+use edgepuck_dataset::journal::{Journal, Terms};
+use edgepuck_dataset::pipeline::{Run, scan_all};
+use edgepuck_dataset::progress::{Progress, Stage};
+use serde::Serialize;
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::{Effects, Noise, NoiseModel};
+use sim_gpu::gpu::AdapterRequest;
+use sim_gpu::job::Culling;
+use sim_gpu::mesh::frame::Normalize;
+use sim_gpu::mesh::tree::{self, MeshEntry};
+use sim_gpu::sensor::Sensor;
+use std::path::Path;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// One dataset on one adapter.
+#[derive(Serialize)]
+pub struct Dataset {
+    adapter: String,
+    meshes: usize,
+    scans: u64,
+    points: u64,
+    rays_cast: u64,
+    rays_culled: u64,
+    /// The repeat of the median CPU time.
+    cost: Cost,
+    /// Seconds that all threads together spent in each stage of that repeat.
+    stages: Vec<(&'static str, f64)>,
+}
+
+/// Makes the default dataset of at most `limit` of the meshes under `root`, on
+/// each of `lanes`, `rounds` times.
+///
+/// # Errors
+/// If there is no mesh, an adapter fails or the disk does.
+pub fn measure(root: &Path, limit: usize, lanes: &[Lane], rounds: usize) -> Result<Vec<Dataset>> {
+    let entries = tree::discover(root, 0)?;
+    let taken = limit.clamp(1, entries.len());
+    let chosen: Vec<MeshEntry> =
+        (0..taken).map(|k| entries[k * entries.len() / taken].clone()).collect();
+    let config = default_config();
+    let mut datasets = Vec::new();
+    for lane in lanes {
+        let request = match &lane.caster {
+            Caster::Cpu(_) => AdapterRequest::Cpu,
+            Caster::Gpu(_) => AdapterRequest::Named(lane.name().to_owned()),
+        };
+        let caster = Caster::open(&request, &config.cast_effects())?;
+        let mut repeats = Vec::with_capacity(rounds);
+        for _ in 0..rounds {
+            repeats.push(once(&config, &caster, &chosen)?);
+        }
+        repeats.sort_by(|a, b| a.cost.cpu_s.total_cmp(&b.cost.cpu_s));
+        datasets.extend(repeats.into_iter().nth(rounds / 2));
+    }
+    Ok(datasets)
+}
+
+fn once(config: &DatasetConfig, caster: &Caster, meshes: &[MeshEntry]) -> Result<Dataset> {
+    let folder = tempfile::tempdir()?;
+    let terms = Terms::new(config.clone(), caster, meshes, None);
+    Journal::of(folder.path()).begin(&terms)?;
+    let progress = Progress::default();
+    let run = Run { out: folder.path(), config, caster, culling: Culling::On, progress: &progress };
+    let (scanned, cost) = measured(|| scan_all(&run, meshes));
+    let scanned = scanned.context("making the default dataset")?;
+    Ok(Dataset {
+        adapter: caster.name().to_owned(),
+        meshes: scanned.records.len(),
+        scans: progress.scans.load(Relaxed),
+        points: progress.points.load(Relaxed),
+        rays_cast: progress.rays_cast.load(Relaxed),
+        rays_culled: progress.rays_culled.load(Relaxed),
+        cost,
+        stages: Stage::ALL.map(|s| (s.name(), progress.spent(s).as_secs_f64())).to_vec(),
+    })
+}
+
+/// What `gen-dataset` makes without flags.
+fn default_config() -> DatasetConfig {
+    let noise = Noise { mean_m: 0.0, sigma_m: 0.01, model: NoiseModel::Range };
+    let set = |name: &str, sensor: &str| {
+        let sensor = Sensor::builtin(sensor).expect("invariant: this profile is built in");
+        let viewpoints = Viewpoints::Views(sensor.default_views());
+        SetConfig { name: name.to_owned(), sensor, viewpoints }
+    };
+    DatasetConfig {
+        seed: 0,
+        normalize: Normalize::UnitSphere,
+        up: None,
+        simplify: None,
+        attributes: [].into_iter().collect(),
+        formats: vec![formats::scan_file::ScanFormat::Npz],
+        effects: Effects { noise: Some(noise), ..Effects::default() },
+        variants: vec![Variant::Clean, Variant::Noisy],
+        sets: vec![set("rotational", "vlp32c"), set("static", "generic-static")],
+        packed_points: 1024,
+        min_points: 64,
+        layouts: vec![],
+        returns: Default::default(),
+    }
+}
+
+/// The figures for people.
+pub fn table(datasets: &[Dataset]) -> Table {
+    let mut heading = vec!["adapter", "meshes", "scans", "points", "wall s", "CPU s"];
+    heading.extend(Stage::ALL.map(Stage::name));
+    heading.extend(["meshes/s", "meshes/CPU-s", "k rays/CPU-s", "k beams/CPU-s"]);
+    let mut table = Table::new(
+        "From file to disk: the default dataset (stages: seconds of all threads, share; waiting \
+         counts as casting)",
+        &heading,
+    );
+    for d in datasets {
+        let spent: f64 = d.stages.iter().map(|(_, s)| s).sum();
+        let mut row = vec![short(&d.adapter), d.meshes.to_string()];
+        row.extend([d.scans, d.points].map(|n| n.to_string()));
+        row.extend([d.cost.wall_s, d.cost.cpu_s].map(digits));
+        let share = |s: f64| format!("{} ({:.0} %)", digits(s), 100.0 * s / spent);
+        row.extend(d.stages.iter().map(|&(_, s)| share(s)));
+        row.push(digits(d.meshes as f64 / d.cost.wall_s));
+        let per_cpu_s = |n: f64| digits(n / d.cost.cpu_s);
+        row.push(per_cpu_s(d.meshes as f64));
+        row.push(per_cpu_s(d.rays_cast as f64 / 1e3));
+        row.push(per_cpu_s((d.rays_cast + d.rays_culled) as f64 / 1e3));
+        table.push(row);
+    }
+    table
+}

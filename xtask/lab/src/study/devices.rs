@@ -1,0 +1,264 @@
+//! `cargo xtask bench devices`: the same meshes on every adapter and on the CPU.
+//!
+//! Positions must be equal within the promised bound, points as many but for beams
+//! at silhouettes, which are listed, and classes equal.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use edgepuck_shapes::{ShapeClass, generate};
+use formats::atomic;
+use formats::rng::StreamKey;
+use glam::{DAffine3, DVec3};
+use infer_cpu::{Classifier, Options};
+use sim_gpu::bvh::Builder;
+use sim_gpu::cpu::oracle;
+use sim_gpu::effects::Effects;
+use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::mesh::frame::{Normalize, Up, to_world};
+use sim_gpu::pose::Pose;
+use sim_gpu::ray::{Ray, RayFrame};
+use sim_gpu::resolve::{Hits, resolve};
+use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::target::Target;
+
+use crate::measure::lanes::{self, Lane};
+use crate::measure::subject::{self, Subject};
+use crate::render::text_table::{Table, digits};
+use crate::study::casting::speed::target;
+use xtask::workspace::root;
+
+/// Relative error that is promised of a range.
+const RANGE_TOLERANCE: f64 = 1e-6;
+/// Beams this close to a silhouette may see what lies on its other side.
+const SILHOUETTE_RAD: f64 = 1e-6;
+/// From the middle of a mesh of the unit sphere, metres.
+const DISTANCE_M: f64 = 3.0;
+
+/// What `bench devices` is told.
+#[derive(Args, Debug)]
+pub struct DevicesArgs {
+    /// File to write: a row for each mesh, view and adapter.
+    #[arg(long, value_name = "FILE")]
+    csv: PathBuf,
+    /// Meshes besides the parametric shapes [default: assets/meshes].
+    meshes: Option<PathBuf>,
+    /// Model that classifies, in f32 [default: edge-64 of assets/weights].
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Views of each mesh, spread around it.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
+    views: u32,
+}
+
+/// One mesh from one side, on one adapter beside the CPU.
+struct Comparison {
+    mesh: String,
+    view: u32,
+    adapter: String,
+    points: [usize; 2],
+    /// Beams that see another surface, or none.
+    silhouettes: Vec<u32>,
+    /// Of them, those that have no silhouette near.
+    unexplained: usize,
+    /// Between positions where both see one.
+    apart_m: f64,
+    bound_m: f64,
+    classes: [String; 2],
+}
+
+/// Compares all adapters with the CPU.
+///
+/// # Errors
+/// If a mesh or the model cannot be read, an adapter fails, the file cannot be
+/// written, or something is unequal.
+pub fn run(args: &DevicesArgs) -> Result<()> {
+    let weights = || root().join("assets/weights/edge-64.safetensors");
+    let model = args.model.clone().unwrap_or_else(weights);
+    let mut classifier = Classifier::load(&model, &Options::default())?;
+    let meshes = args.meshes.clone().unwrap_or_else(|| root().join("assets/meshes"));
+    let mut subjects = subject::real(&meshes, usize::MAX)?;
+    subjects.extend(ShapeClass::ALL.into_iter().map(shape));
+    let lanes = lanes::open(None)?;
+    let [cpu, others @ ..] = &lanes[..] else { bail!("the CPU is always there") };
+    if others.is_empty() {
+        bail!("there is no adapter to compare with the CPU; `cargo xtask adapters` lists them");
+    }
+    let pattern = Sensor::builtin("vlp32c").expect("invariant: it is built in").pattern();
+    let mut all = Vec::new();
+    for subject in &subjects {
+        let target = target(subject.mesh.clone(), Builder::Sah);
+        for view in 0..args.views {
+            let seen = View::new(&target, &pattern, view, args.views);
+            let reference = seen.cast(cpu)?;
+            for lane in others {
+                let found = seen.cast(lane)?;
+                let place = (subject.name.as_str(), view, lane.name());
+                all.push(seen.compare(place, &reference, &found, &mut classifier)?);
+            }
+        }
+    }
+    atomic::write_bytes(&args.csv, &csv(&all)?)?;
+    print!("{}", summary(&all, others));
+    match all.iter().find(|comparison| !comparison.is_equal()) {
+        None => Ok(()),
+        Some(c) => bail!("{}, view {} on {}: not what the CPU finds", c.mesh, c.view, c.adapter),
+    }
+}
+
+/// The first of the parametric shapes of `class`.
+fn shape(class: ShapeClass) -> Subject {
+    let mesh = to_world(&generate(class, 0, 0), Up::Z, Normalize::UnitSphere).mesh;
+    Subject { name: format!("shape {class}"), mesh }
+}
+
+/// A sensor's look at a mesh.
+struct View<'a> {
+    job: CastJob,
+    pose: Pose,
+    pattern: &'a BeamPattern,
+}
+
+impl<'a> View<'a> {
+    fn new(target: &Arc<Target>, pattern: &'a BeamPattern, view: u32, of: u32) -> Self {
+        let azimuth = std::f64::consts::TAU * f64::from(view) / f64::from(of) + 0.3;
+        let pose = Pose::view(DISTANCE_M, 20f64.to_radians(), azimuth, DVec3::ZERO);
+        let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
+        let stream = StreamKey::new(0, "devices", view);
+        let job = CastJob::aim(Arc::clone(target), frame, pattern, Culling::On, stream, 1.0);
+        Self { job, pose, pattern }
+    }
+
+    fn cast(&self, lane: &Lane) -> Result<Hits> {
+        let jobs = std::slice::from_ref(&self.job);
+        let casts = match lane.caster.fits(&self.job.target) {
+            true => lane.caster.cast(jobs)?,
+            false => lane.caster.cast_on_cpu(jobs),
+        };
+        Ok(resolve(&self.job, &casts[0], self.pattern, &Effects::default()))
+    }
+
+    fn compare(
+        &self,
+        (mesh, view, adapter): (&str, u32, &str),
+        cpu: &Hits,
+        other: &Hits,
+        classifier: &mut Classifier,
+    ) -> Result<Comparison> {
+        let mut ranges = vec![[None; 2]; self.pattern.len()];
+        for (side, hits) in [cpu, other].into_iter().enumerate() {
+            hits.hits.iter().for_each(|hit| ranges[hit.beam as usize][side] = Some(hit.range_m));
+        }
+        let (mut apart_m, mut bound_m) = (0.0f64, 0.0f64);
+        let (mut silhouettes, mut unexplained) = (Vec::new(), 0);
+        for (beam, pair) in (0u32..).zip(&ranges) {
+            let same = match pair {
+                [Some(a), Some(b)] if (a - b).abs() <= RANGE_TOLERANCE * a => {
+                    apart_m = apart_m.max((a - b).abs());
+                    bound_m = bound_m.max(RANGE_TOLERANCE * a);
+                    true
+                }
+                [a, b] => a.is_none() && b.is_none(),
+            };
+            if !same {
+                silhouettes.push(beam);
+                unexplained += usize::from(!self.is_near_edge(beam));
+            }
+        }
+        let mut class = |hits: &Hits| -> Result<String> {
+            let points: Vec<[f64; 3]> = hits.hits.iter().map(|hit| self.position(hit)).collect();
+            Ok(classifier.classify_f64(&points)?.label.to_string())
+        };
+        let classes = [class(cpu)?, class(other)?];
+        Ok(Comparison {
+            mesh: mesh.to_owned(),
+            view,
+            adapter: adapter.to_owned(),
+            points: [cpu.hits.len(), other.hits.len()],
+            silhouettes,
+            unexplained,
+            apart_m,
+            bound_m,
+            classes,
+        })
+    }
+
+    fn position(&self, hit: &sim_gpu::resolve::Hit) -> [f64; 3] {
+        let direction = self.pose.world_from_sensor * self.pattern.directions[hit.beam as usize];
+        (self.pose.position_m + direction * hit.range_m).to_array()
+    }
+
+    /// Whether one of eight beams around `beam` sees another triangle, or none.
+    fn is_near_edge(&self, beam: u32) -> bool {
+        let ray = self.job.frame.ray(self.pattern.directions[beam as usize]);
+        let seen = |ray: &Ray| oracle::nearest(&self.job.target, ray).map(|found| found.index);
+        let length = ray.direction.length();
+        let (across, up) = (ray.direction / length).any_orthonormal_pair();
+        let own = seen(&ray);
+        (0..8).any(|eighth| {
+            let (sine, cosine) = (f64::from(eighth) * std::f64::consts::FRAC_PI_4).sin_cos();
+            let aside = (across * cosine + up * sine) * (SILHOUETTE_RAD * length);
+            seen(&Ray { direction: ray.direction + aside, ..ray }) != own
+        })
+    }
+}
+
+impl Comparison {
+    /// Positions and classes equal, and as many points but for silhouettes.
+    fn is_equal(&self) -> bool {
+        self.unexplained == 0 && self.classes[0] == self.classes[1]
+    }
+}
+
+fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record([
+        "mesh",
+        "view",
+        "adapter",
+        "points_cpu",
+        "points",
+        "silhouette_beams",
+        "largest_difference_m",
+        "bound_m",
+        "class_cpu",
+        "class",
+        "equal",
+    ])?;
+    for c in all {
+        let beams: Vec<String> = c.silhouettes.iter().map(u32::to_string).collect();
+        csv.write_record([
+            c.mesh.clone(),
+            c.view.to_string(),
+            c.adapter.clone(),
+            c.points[0].to_string(),
+            c.points[1].to_string(),
+            beams.join(" "),
+            format!("{:e}", c.apart_m),
+            format!("{:.3e}", c.bound_m),
+            c.classes[0].clone(),
+            c.classes[1].clone(),
+            c.is_equal().to_string(),
+        ])?;
+    }
+    Ok(csv.into_inner()?)
+}
+
+fn summary(all: &[Comparison], others: &[Lane]) -> Table {
+    let heading = ["adapter", "scans", "points", "silhouette beams", "apart, m", "equal"];
+    let mut table = Table::new("Each adapter beside the CPU", &heading);
+    for lane in others {
+        let of: Vec<&Comparison> = all.iter().filter(|c| c.adapter == lane.name()).collect();
+        table.push(vec![
+            lane.name().to_owned(),
+            of.len().to_string(),
+            of.iter().map(|c| c.points[1]).sum::<usize>().to_string(),
+            of.iter().map(|c| c.silhouettes.len()).sum::<usize>().to_string(),
+            digits(of.iter().map(|c| c.apart_m).fold(0.0, f64::max)),
+            of.iter().filter(|c| c.is_equal()).count().to_string(),
+        ]);
+    }
+    table
+}

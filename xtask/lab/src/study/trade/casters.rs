@@ -1,0 +1,182 @@
+//! What finds the hits, and whether beams that cannot hit are left out.
+
+use super::objects::{Object, Place, places};
+use super::scans::Cloud;
+use super::sensors::Scanning;
+use crate::measure::accuracy::Accuracy;
+use crate::measure::clock::{Contestant, interleave, measured};
+use crate::measure::lanes::Lane;
+use crate::measure::shot::Shot;
+use crate::measure::ways;
+use crate::study::casting::speed::short;
+use anyhow::Result;
+use edgepuck_program::trade_record::{Part, Row};
+use glam::DVec3;
+use rayon::prelude::*;
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::Effects;
+use sim_gpu::job::{CastJob, Culling};
+use std::collections::HashMap;
+use std::hint::black_box;
+
+/// The ranges of one shot's rays, metres.
+type Ranges = Vec<Option<f64>>;
+
+/// How rays become ranges.
+enum Way<'a> {
+    /// Everything in f64: the oracle.
+    Oracle,
+    /// Möller and Trumbore's test in f32.
+    MollerTrumbore,
+    /// The watertight test, and ranges in f32.
+    F32,
+    /// The product: the watertight test in f32, ranges in f64.
+    Product(&'a Caster),
+}
+
+/// The rays of every scan.
+struct Aimed {
+    culling: Culling,
+    shots: Vec<Shot>,
+    /// Those of the shots, as casters take them.
+    jobs: Vec<CastJob>,
+}
+
+/// One way's rows, but for the accuracy of classes, and the clouds that it finds.
+pub struct Cast {
+    /// Costs and errors.
+    pub row: Row,
+    /// One cloud a place.
+    pub clouds: Vec<Cloud>,
+}
+
+/// Casts the clean reference scans in every way there is, in turns.
+///
+/// # Errors
+/// An adapter that fails.
+pub fn cast_all(
+    objects: &[Object],
+    lanes: &[Lane],
+    rounds: usize,
+    test_set: &str,
+) -> Result<Vec<Cast>> {
+    let cpu = Caster::Cpu(Effects::default());
+    let mut ways = vec![
+        ("cpu f64".to_owned(), Way::Oracle, false),
+        ("cpu f32 Möller-Trumbore, f32 range".to_owned(), Way::MollerTrumbore, false),
+        ("cpu f32 watertight, f32 range".to_owned(), Way::F32, false),
+        ("cpu f32 watertight, f64 range".to_owned(), Way::Product(&cpu), false),
+    ];
+    let adapters = lanes.iter().filter(|lane| lane.name() != "cpu");
+    ways.extend(adapters.map(|lane| {
+        let name = format!("{} f32 watertight, f64 range", short(lane.name()));
+        (name, Way::Product(&lane.caster), lane.is_gpu)
+    }));
+    let aimed = [Culling::On, Culling::Off].map(|culling| Aimed::at(objects, culling));
+    let settings: Vec<_> =
+        aimed.iter().flat_map(|aimed| ways.iter().map(move |way| (way, aimed))).collect();
+    let mut contestants: Vec<Contestant<'_>> = Vec::new();
+    for &((_, way, _), aimed) in &settings {
+        contestants.push(Box::new(move || {
+            let (ranges, cost) = measured(|| way.cast(aimed));
+            black_box(ranges?);
+            Ok(cost)
+        }));
+    }
+    let costs = interleave(rounds, &mut contestants)?;
+    drop(contestants);
+    let fired = &aimed[1].shots;
+    let truth: Vec<Ranges> = fired.par_iter().map(ways::in_f64).collect();
+    let mut all = Vec::new();
+    for (((name, way, is_gpu), aimed), costs) in settings.into_iter().zip(costs) {
+        let culling = word(aimed.culling);
+        eprintln!("caster: {name}, culling {culling}");
+        let mut cast = judged(way, aimed, fired, &truth)?;
+        let spent = if *is_gpu { costs.wall_s() } else { costs.cpu_s() };
+        let seconds = spent.median / cast.clouds.len() as f64;
+        let rays = Scanning::reference().sensor.pattern().len() as f64;
+        cast.row = Row {
+            test_set: test_set.to_owned(),
+            caster: name.clone(),
+            culling: culling.to_owned(),
+            rays_per_cpu_s: Some(rays / seconds).filter(|_| !is_gpu),
+            scans_per_cpu_s: Some(1.0 / seconds).filter(|_| !is_gpu),
+            ms_here: Some(seconds * 1e3),
+            ..cast.row
+        };
+        all.push(cast);
+    }
+    Ok(all)
+}
+
+fn word(culling: Culling) -> &'static str {
+    match culling {
+        Culling::On => "on",
+        Culling::Off => "off",
+    }
+}
+
+impl Aimed {
+    fn at(objects: &[Object], culling: Culling) -> Self {
+        let clean = Scanning::clean(Scanning::reference().distance_m);
+        let pattern = clean.sensor.pattern();
+        let aim =
+            |place: &Place<'_>| Shot::sweep(&place.object.target, &place.pose, &pattern, culling);
+        let shots: Vec<Shot> = places(objects, clean.distance_m).par_iter().map(aim).collect();
+        let jobs = shots.iter().map(|shot| shot.job.clone()).collect();
+        Self { culling, shots, jobs }
+    }
+}
+
+impl Way<'_> {
+    fn cast(&self, Aimed { shots, jobs, .. }: &Aimed) -> Result<Vec<Ranges>> {
+        Ok(match self {
+            Self::Oracle => shots.iter().map(ways::in_f64).collect(),
+            Self::MollerTrumbore => shots.iter().map(ways::moller_trumbore).collect(),
+            Self::F32 => shots.iter().map(ways::watertight_in_f32).collect(),
+            Self::Product(caster) => {
+                let casts = caster.cast(jobs)?;
+                shots.par_iter().zip(&casts).map(|(shot, cast)| shot.ranges(cast)).collect()
+            }
+        })
+    }
+}
+
+/// What `way` makes of the rays aimed, beside the truth of all that are `fired`.
+fn judged(way: &Way<'_>, aimed: &Aimed, fired: &[Shot], truth: &[Ranges]) -> Result<Cast> {
+    let ranges = way.cast(aimed)?;
+    let of_all = aimed.shots.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
+    let accuracy = Accuracy::of(&of_all.collect::<Vec<_>>().concat(), &truth.concat());
+    let wrong = accuracy.false_hits_per_million() + accuracy.misses_per_million();
+    let clouds: Vec<Cloud> = aimed.shots.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
+    let points: usize = clouds.iter().map(Vec::len).sum();
+    let row = Row {
+        part: Part::Caster,
+        knob: "caster".to_owned(),
+        sensor: Scanning::reference().name,
+        points_per_scan: Some(points as f64 / clouds.len() as f64),
+        range_rms_m: Some(accuracy.rms_m),
+        range_worst_m: Some(accuracy.worst_m),
+        wrong_rays_per_million: Some(wrong),
+        ..Row::default()
+    };
+    Ok(Cast { row, clouds })
+}
+
+/// The ranges of all rays fired: none where a ray was left out.
+fn of_fired(aimed: &Shot, ranges: &Ranges, fired: &Shot) -> Ranges {
+    let by_beam: HashMap<u32, Option<f64>> =
+        aimed.job.beams.iter().copied().zip(ranges.iter().copied()).collect();
+    fired.job.beams.iter().map(|beam| by_beam.get(beam).copied().flatten()).collect()
+}
+
+/// The points that a shot's rays hit, in the order of its beams.
+fn cloud(shot: &Shot, ranges: &Ranges) -> Cloud {
+    let rays = shot.job.beams.iter().zip(shot.in_world()).zip(ranges);
+    let hit = |((&beam, (origin, direction)), range): ((&u32, (DVec3, DVec3)), &Option<f64>)| {
+        range.map(|range_m| (beam, (origin + range_m * direction).as_vec3().to_array()))
+    };
+    let mut points: Vec<(u32, [f32; 3])> = rays.filter_map(hit).collect();
+    points.sort_unstable_by_key(|(beam, _)| *beam);
+    points.into_iter().map(|(_, point)| point).collect()
+}

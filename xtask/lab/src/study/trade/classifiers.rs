@@ -1,0 +1,289 @@
+//! Models, samplers, points, precisions, T-Nets and threads on one test set.
+
+use super::classes::{Answers, Classifying, Costs, TestSet};
+use crate::measure::energy::Energy;
+use crate::pi5::{Modelled, Sampler};
+use anyhow::{Context, Result};
+use edgepuck_program::sampler_config::SamplerConfig;
+use edgepuck_program::trade_record::Row;
+use infer_cpu::sampler::SamplerKind;
+use infer_cpu::{Precision, Summary, TNets, inspect};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// Points of the baseline's clouds.
+const AS_THE_BASELINE: usize = 1024;
+
+/// Threads whose times on a Raspberry Pi 5 are modelled: it has four cores.
+const PI_THREADS: [usize; 3] = [1, 2, 4];
+
+/// How far the grid reaches.
+pub struct Grid {
+    /// Points that networks see.
+    pub points: Vec<usize>,
+    /// Ways to choose them.
+    pub samplers: Vec<SamplerConfig>,
+    /// What to compute in besides fp32.
+    pub precisions: Vec<Precision>,
+    /// Threads of the network as its card has it, besides one.
+    pub threads: Vec<usize>,
+}
+
+impl Grid {
+    /// Everything that a user can choose.
+    pub fn whole() -> Self {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        Self {
+            points: vec![16, 64, 256, 1024],
+            samplers: SamplerConfig::ALL.to_vec(),
+            precisions: vec![Precision::F32Fc16, Precision::F16, Precision::I8],
+            threads: (2..=threads.min(4)).collect(),
+        }
+    }
+
+    /// A corner of it.
+    pub fn quick() -> Self {
+        Self {
+            points: vec![16, 64],
+            samplers: vec![SamplerConfig::RANDOM, SamplerConfig::FPS],
+            precisions: vec![Precision::I8],
+            threads: Vec::new(),
+        }
+    }
+}
+
+/// The sampler and the points that a model was trained with, or random points
+/// where it names none to choose by, in fp32.
+///
+/// # Errors
+/// A model that cannot be read.
+pub fn as_trained(model: &Path) -> Result<Classifying> {
+    let card = inspect(model)?.card;
+    let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
+    Ok(Classifying {
+        model: model.to_owned(),
+        sampler: SamplerConfig::of(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
+        points: card.points.unwrap_or(AS_THE_BASELINE),
+        precision: Precision::F32,
+        t_nets: TNets::Both,
+        threads: 1,
+    })
+}
+
+/// One setting at a time, then combinations along the front, for `model` on `set`;
+/// those that the model or the clouds cannot have are left out.
+///
+/// # Errors
+/// A model that cannot be read or does not know the classes; a set that does
+/// not fit.
+pub fn rows(
+    model: &Path,
+    set: &TestSet,
+    grid: &Grid,
+    rounds: usize,
+    pi: Option<&Modelled>,
+) -> Result<Vec<Row>> {
+    let (trained, summary) = (as_trained(model)?, inspect(model)?);
+    let measured = |setting: Classifying, answers: Answers, reference: Option<&Answers>| {
+        let mut row = setting.row(set, &summary, &answers, reference.unwrap_or(&answers));
+        row.knob = knob(&setting, &trained);
+        eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
+        Measured { setting, answers, row }
+    };
+    let mut first: Vec<Measured> = Vec::new();
+    for setting in sampled(&trained, set, grid) {
+        let answers = setting.answers(&set.clouds)?;
+        first.push(measured(setting, answers, None));
+    }
+    let more: Vec<Measured> = promising(&first, &trained)
+        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, grid, &summary))
+        .map(|setting| {
+            let reference = first.iter().find(|sampled| sampled.setting.chooses_as(&setting));
+            let answers = setting.answers(&set.clouds)?;
+            Ok(measured(setting, answers, reference.map(|reference| &reference.answers)))
+        })
+        .collect::<Result<_>>()?;
+    let mut all: Vec<Measured> = first.into_iter().chain(more).collect();
+    time(&mut all, set, rounds)?;
+    let from = set.most_points();
+    let with_pi = |Measured { setting, row, .. }: Measured| with_pi(row, &setting, from, pi);
+    let rows: Vec<Vec<Row>> = all.into_par_iter().map(with_pi).collect();
+    Ok(rows.concat())
+}
+
+/// A setting, and what came of it.
+struct Measured {
+    setting: Classifying,
+    answers: Answers,
+    row: Row,
+}
+
+/// Times all settings in turns, so that a slow minute is everybody's.
+fn time(all: &mut [Measured], set: &TestSet, rounds: usize) -> Result<()> {
+    let energy = Energy::here();
+    let mut costs = vec![Costs::default(); all.len()];
+    for _ in 0..rounds {
+        for (measured, costs) in all.iter().zip(&mut costs) {
+            measured.setting.time(&set.clouds, energy.as_ref(), costs)?;
+        }
+    }
+    for (Measured { row, .. }, costs) in all.iter_mut().zip(costs) {
+        (row.ms_here, row.joules) = (costs.median_ms(), costs.joules_each());
+    }
+    Ok(())
+}
+
+/// Of ways to choose points those that are worth more precisions: those with the
+/// model's own sampler or its number of points, and those that no way with as few
+/// points beats.
+fn promising<'a>(
+    all: &'a [Measured],
+    trained: &'a Classifying,
+) -> impl Iterator<Item = &'a Measured> {
+    all.iter().filter(move |way| {
+        let beaten = |other: &Measured| {
+            other.setting.points <= way.setting.points && other.row.right > way.row.right
+        };
+        way.setting.sampler == trained.sampler
+            || way.setting.points == trained.points
+            || !all.iter().any(beaten)
+    })
+}
+
+/// The row with its modelled time on a Raspberry Pi 5, and rows for the board's
+/// other numbers of threads: answers do not depend on them.
+fn with_pi(row: Row, setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Vec<Row> {
+    let Some(ms) = pi_ms(setting, from, pi) else { return vec![row] };
+    if setting.threads != 1 {
+        return vec![row];
+    }
+    let on_board = |(&threads, ms): (&usize, f64)| {
+        let here = threads == setting.threads;
+        Row {
+            threads: Some(threads),
+            ms_here: row.ms_here.filter(|_| here),
+            joules: row.joules.filter(|_| here),
+            ms_pi5: Some(ms),
+            ..row.clone()
+        }
+    };
+    PI_THREADS.iter().zip(ms).map(on_board).collect()
+}
+
+/// The ways to choose points, in fp32 on one thread.
+fn sampled(trained: &Classifying, set: &TestSet, grid: &Grid) -> Vec<Classifying> {
+    let most = set.most_points();
+    let mut all = Vec::new();
+    for &sampler in &grid.samplers {
+        let points = grid.points.iter().copied().filter(|&points| points <= most);
+        all.extend(points.map(|points| Classifying { sampler, points, ..trained.clone() }));
+    }
+    // All points of a cloud are the same whoever chooses them.
+    all.retain(|setting| setting.points < most || setting.sampler == SamplerConfig::RANDOM);
+    if trained.points < most && !all.iter().any(|setting| setting.chooses_as(trained)) {
+        all.insert(0, trained.clone());
+    }
+    all.retain(|setting| loads(setting, most));
+    all
+}
+
+/// Whether the model has what the sampler needs; if not, says so.
+fn loads(setting: &Classifying, most: usize) -> bool {
+    let loaded = setting.load(most);
+    if let Err(error) = &loaded {
+        eprintln!("left out: {} {}: {error:#}", setting.sampler.name, setting.points);
+    }
+    loaded.is_ok()
+}
+
+/// One way to choose points in every precision but fp32; as trained, also with
+/// other threads and without T-Nets.
+fn with_precisions(
+    samples: &Classifying,
+    trained: &Classifying,
+    grid: &Grid,
+    summary: &Summary,
+) -> Vec<Classifying> {
+    let precise = |&precision: &Precision| Classifying { precision, ..samples.clone() };
+    let mut all: Vec<Classifying> = grid.precisions.iter().map(precise).collect();
+    if samples.chooses_as(trained) {
+        let threads = grid.threads.iter();
+        all.extend(threads.map(|&threads| Classifying { threads, ..samples.clone() }));
+        if summary.stn.is_some() || summary.fstn.is_some() {
+            all.push(Classifying { t_nets: TNets::Neither, ..samples.clone() });
+        }
+    }
+    all
+}
+
+fn knob(setting: &Classifying, trained: &Classifying) -> String {
+    let turned = [
+        ("sampler", setting.sampler != trained.sampler),
+        ("points", setting.points != trained.points),
+        ("precision", setting.precision != trained.precision),
+        ("T-Nets", setting.t_nets != trained.t_nets),
+        ("threads", setting.threads != trained.threads),
+    ];
+    let turned: Vec<&str> = turned.iter().filter(|(_, is)| *is).map(|(name, _)| *name).collect();
+    if turned.is_empty() { "reference".to_owned() } else { turned.join(" and ") }
+}
+
+/// Modelled milliseconds for each of [`PI_THREADS`]; `None` for what is not
+/// modelled: of voxels nobody knows beforehand how many points they leave.
+fn pi_ms(setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Option<Vec<f64>> {
+    let (Some(pi), TNets::Both) = (pi, setting.t_nets) else { return None };
+    // Tiles of the model are of eight rows.
+    if !setting.points.is_multiple_of(8) || !from.is_multiple_of(8) {
+        return None;
+    }
+    let sampler = match setting.sampler {
+        _ if setting.points == from => Sampler::All,
+        SamplerConfig::RANDOM => Sampler::Random,
+        SamplerConfig::FPS => Sampler::Fps,
+        SamplerConfig::CPL => Sampler::Cpl,
+        SamplerConfig::CPL_STN => Sampler::CplStn,
+        _ => return None,
+    };
+    let sizes = (from, setting.points);
+    match pi.total_ms(sampler, sizes, setting.precision, &PI_THREADS) {
+        Ok(ms) => ms,
+        // A front end of few channels keeps fewer points than it is asked for.
+        Err(error) => {
+            let (name, points) = (setting.sampler.name, setting.points);
+            eprintln!("not modelled: {name} {points} in {}: {error:#}", setting.precision);
+            None
+        }
+    }
+}
+
+/// The Raspberry Pi's model of a model file, or why there is none.
+pub fn on_a_pi(model: &Path) -> Option<Modelled> {
+    match Modelled::open(model) {
+        Ok(modelled) => Some(modelled),
+        Err(error) => {
+            eprintln!("No modelled times of a Raspberry Pi: {error:#}");
+            None
+        }
+    }
+}
+
+/// Bundled models that tell the classes of `set`, and as few others as any.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn bundled(set: &TestSet) -> Result<Vec<PathBuf>> {
+    let folder = xtask::workspace::root().join("assets/weights");
+    let entries =
+        std::fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let files = entries.flatten().map(|entry| entry.path());
+    let with_classes = |path: PathBuf| {
+        let card = inspect(&path).ok()?.card;
+        (card.trained && set.fits(&path).is_ok()).then_some((card.classes.len(), path))
+    };
+    let is_model = |path: &PathBuf| path.extension().is_some_and(|end| end == "safetensors");
+    let mut models: Vec<(usize, PathBuf)> =
+        files.filter(is_model).filter_map(with_classes).collect();
+    models.sort();
+    let fewest = models.first().map_or(0, |(classes, _)| *classes);
+    Ok(models.into_iter().filter(|(n, _)| *n == fewest).map(|(_, path)| path).collect())
+}

@@ -1,0 +1,239 @@
+//! `cargo xtask trade`: what each knob of the chain, from mesh to class, costs
+//! and what it is worth.
+//!
+//! [`objects`] are scanned in the ways of [`sensors`] ([`scans`]) and by all
+//! [`casters`]; [`classifiers`] go through models, samplers, points and
+//! precisions. Everything becomes a [`row::Row`] of one CSV file, of which
+//! [`front`] marks what no other row makes pointless and [`page`] draws a page.
+//! `cargo xtask advise` reads the same file.
+
+mod casters;
+pub mod classes;
+mod classifiers;
+pub mod front;
+mod objects;
+pub mod page;
+mod scans;
+mod sensors;
+
+use crate::measure::lanes;
+use crate::measure::machine::Machine;
+use crate::render::text_table::{Table, digits};
+use anyhow::{Context, Result, ensure};
+use classes::TestSet;
+use classifiers::{Grid, as_trained, bundled, on_a_pi};
+use edgepuck_program::flags::need_folder_of_meshes;
+use edgepuck_program::trade_record::{self, Row};
+use edgepuck_program::{Outcome, gen_shapes};
+use edgepuck_shapes as shapes;
+use formats::cloud::resample;
+use formats::rng::StreamKey;
+use infer_cpu::inspect;
+use objects::Object;
+use scans::Cloud;
+use std::path::{Path, PathBuf};
+use xtask::workspace::file_name;
+
+/// Flags of `trade`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder of meshes, as gen-dataset takes it; the test meshes are scanned [default: shapes
+    /// of our own]
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+
+    /// What the record calls them [default: the folder's name]
+    #[arg(long, value_name = "TEXT", requires = "meshes")]
+    meshes_name: Option<String>,
+
+    /// Classifies the scans; it must know the meshes' classes [default: the bundled weights
+    /// that do]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+
+    /// Labelled clouds for models, samplers, points and precisions, a packed NPZ [default: the
+    /// scans themselves]
+    #[arg(long, value_name = "NPZ")]
+    clouds: Option<PathBuf>,
+
+    /// What the record calls them [default: the file's name]
+    #[arg(long, value_name = "TEXT", requires = "clouds")]
+    clouds_name: Option<String>,
+
+    /// Few meshes, few settings, no model of a Raspberry Pi: in two minutes
+    #[arg(long)]
+    quick: bool,
+
+    /// Counted rounds of all scans and of all classifiers; medians are taken
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+
+    /// Where trade.csv, trade.html and the drawings go
+    #[arg(long, value_name = "DIR", default_value = "data/trade")]
+    out: PathBuf,
+}
+
+/// Meshes of a class that a whole run scans at most.
+const MOST_PER_CLASS: usize = 5;
+
+/// The same of a quick run.
+const FEW_PER_CLASS: usize = 2;
+
+/// Clouds of a quick run.
+const FEW_CLOUDS: usize = 100;
+
+/// Measures and writes the record.
+pub fn run(args: &Args) -> Result<Outcome> {
+    need_folder_of_meshes(args.meshes.as_deref())?;
+    let clouds = clouds(args)?;
+    let of_clouds = clouds.as_ref().map(|set| models_for(args, set)).transpose()?;
+    let per_class = if args.quick { FEW_PER_CLASS } else { MOST_PER_CLASS };
+    let objects = objects::read(&meshes(args)?, per_class)?;
+    let unseen = vec![Cloud::new(); objects.len()];
+    let of_scans = models_for(args, &scan_set(&objects, &name_of_meshes(args), &unseen))?;
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("cannot make {}", args.out.display()))?;
+    let (mut rows, reference) = scan_rows(args, &objects, &of_scans[0])?;
+    let models = of_clouds.unwrap_or(of_scans);
+    rows.extend(classifier_rows(args, &models, clouds, reference)?);
+    let machine = machine();
+    rows.iter_mut().for_each(|row| row.machine.clone_from(&machine));
+    front::mark(&mut rows);
+    trade_record::write(&rows, &args.out.join("trade.csv"))?;
+    page::write(&rows, &args.out)?;
+    print(&rows);
+    eprintln!("A page to look at: {}", args.out.join("trade.html").display());
+    Ok(Outcome::Success)
+}
+
+/// The meshes asked for, or shapes of our own.
+fn meshes(args: &Args) -> Result<PathBuf> {
+    if let Some(folder) = &args.meshes {
+        return Ok(folder.clone());
+    }
+    let folder = args.out.join("shapes");
+    let (train, test) = (gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS);
+    shapes::write_tree(&folder, objects::SEED, train, test).context("cannot write the shapes")?;
+    Ok(folder)
+}
+
+fn name_of_meshes(args: &Args) -> String {
+    let of_folder = || args.meshes.as_deref().map(file_name);
+    let named = args.meshes_name.clone().or_else(of_folder);
+    format!("scans of {}", named.as_deref().unwrap_or("shapes of our own"))
+}
+
+/// The models that tell the classes of `set`: the one asked for, or bundled ones.
+fn models_for(args: &Args, set: &TestSet) -> Result<Vec<PathBuf>> {
+    if let Some(model) = &args.model {
+        set.fits(model)?;
+        return Ok(vec![model.clone()]);
+    }
+    let known = bundled(set)?;
+    ensure!(
+        !known.is_empty(),
+        "no bundled model knows the classes of {}: name one by --model",
+        set.name
+    );
+    Ok(known)
+}
+
+/// The clouds asked for.
+fn clouds(args: &Args) -> Result<Option<TestSet>> {
+    let Some(path) = &args.clouds else { return Ok(None) };
+    let mut set = TestSet::read(path, if args.quick { FEW_CLOUDS } else { usize::MAX })?;
+    set.name = args.clouds_name.clone().unwrap_or(set.name);
+    Ok(Some(set))
+}
+
+/// Rows of sensors and of casters, and the reference scans.
+fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>, TestSet)> {
+    let (name, rounds) = (name_of_meshes(args), usize::from(args.rounds));
+    let mut ways = sensors::one_at_a_time();
+    if !args.quick {
+        ways.extend(sensors::combinations());
+    }
+    let scanned = scans::scan_all(objects, &ways, rounds, &name)?;
+    let cast = casters::cast_all(objects, &lanes::open(None)?, rounds, &name)?;
+    let reference = scan_set(objects, &name, &scanned[0].clouds);
+    let (classifying, summary) = (as_trained(model)?, inspect(model)?);
+    // Scans are compared with the reference, casters with the first: f64.
+    let noisy = classifying.answers(&reference.clouds)?;
+    let exact = classifying.answers(&cast[0].clouds)?;
+    let all = scanned.into_iter().map(|scanned| (scanned.row, scanned.clouds));
+    let all = all.chain(cast.into_iter().map(|cast| (cast.row, cast.clouds)));
+    let rows: Result<Vec<Row>> = all
+        .map(|(row, clouds)| {
+            let found = classifying.answers(&clouds)?;
+            let answers = if row.part == trade_record::Part::Caster { &exact } else { &noisy };
+            let row = Row { agreement: Some(found.agreement(answers)), ..row };
+            let row = classifying.named_in(row, &summary);
+            Ok(row.with_accuracy(reference.right(&found), clouds.len()))
+        })
+        .collect();
+    Ok((rows?, reference))
+}
+
+/// Clouds of [`objects::places`], labelled.
+fn scan_set(objects: &[Object], name: &str, clouds: &[Cloud]) -> TestSet {
+    let views = clouds.len() / objects.len().max(1);
+    let label = |object: &Object| vec![object.class.clone(); views];
+    let labels = objects.iter().flat_map(label).collect();
+    TestSet { name: name.to_owned(), clouds: clouds.to_vec(), labels }
+}
+
+/// Rows of classifiers, on the clouds given or else on the reference scans.
+fn classifier_rows(
+    args: &Args,
+    models: &[PathBuf],
+    clouds: Option<TestSet>,
+    reference: TestSet,
+) -> Result<Vec<Row>> {
+    let set = clouds.unwrap_or_else(|| {
+        let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
+        TestSet { clouds, ..reference }
+    });
+    let grid = if args.quick { Grid::quick() } else { Grid::whole() };
+    let mut rows = Vec::new();
+    for model in models {
+        let pi = if args.quick { None } else { on_a_pi(model) };
+        rows.extend(classifiers::rows(model, &set, &grid, usize::from(args.rounds), pi.as_ref())?);
+    }
+    Ok(rows)
+}
+
+/// What measures: the processor, and how many of its threads.
+fn machine() -> String {
+    let Machine { cpu, threads, system, .. } = Machine::here();
+    format!("{}, {threads} threads, {system}", cpu.as_deref().unwrap_or("unknown processor"))
+}
+
+/// As many points as gen-dataset packs: the Raspberry Pi's model wants one size.
+fn packed(cloud: &[[f32; 3]]) -> Cloud {
+    const POINTS: usize = 1024;
+    resample(cloud, POINTS, StreamKey::new(objects::SEED, "trade", 0)).unwrap_or_default()
+}
+
+/// The fronts, and what is on none.
+fn print(rows: &[Row]) {
+    let heading =
+        ["on a front", "ms here", "ms on a Pi 5", "accuracy %", "95 % interval", "as reference %"];
+    let mut table = Table::new("Settings that no other makes pointless", &heading);
+    for row in rows.iter().filter(|row| row.front_here || row.front_pi5) {
+        let percent = |share: f64| format!("{:.1}", 100.0 * share);
+        table.push(vec![
+            row.to_string(),
+            row.ms_here.map(digits).unwrap_or_default(),
+            row.ms_pi5.map(digits).unwrap_or_default(),
+            percent(row.accuracy),
+            format!("{} to {}", percent(row.accuracy_low), percent(row.accuracy_high)),
+            row.agreement.map(percent).unwrap_or_default(),
+        ]);
+    }
+    print!("{table}");
+    let mut dominated = Table::new("On no front", &["knob", "setting"]);
+    for (knob, setting) in front::dominated_everywhere(rows) {
+        dominated.push(vec![knob.to_owned(), setting]);
+    }
+    print!("{dominated}");
+}

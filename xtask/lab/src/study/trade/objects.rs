@@ -1,0 +1,77 @@
+//! The objects that are scanned, and the places they are scanned from.
+
+use crate::measure::scan_mesh::load_target;
+use anyhow::{Result, ensure};
+use formats::Split;
+use formats::rng::StreamKey;
+use glam::DVec3;
+use sim_gpu::mesh::tree::{MeshEntry, discover};
+use sim_gpu::pose::Pose;
+use sim_gpu::sensor::Views;
+use sim_gpu::target::Target;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Keys all random numbers of the chain.
+pub const SEED: u64 = 0;
+
+/// A mesh in the unit sphere, and its class.
+pub struct Object {
+    /// Its class's name.
+    pub class: String,
+    /// Class and name.
+    id: String,
+    /// What rays are cast at.
+    pub target: Arc<Target>,
+}
+
+/// One scan to be made: an object from one of its sides.
+pub struct Place<'a> {
+    /// The object.
+    pub object: &'a Object,
+    /// Where the sensor stands.
+    pub pose: Pose,
+    /// Keys its noise.
+    pub stream: StreamKey,
+}
+
+/// The test objects of the tree at `folder`, at most `per_class` of each class.
+///
+/// # Errors
+/// A folder without test meshes of at least two classes, a mesh that cannot be
+/// read.
+pub fn read(folder: &Path, per_class: usize) -> Result<Vec<Object>> {
+    let mut taken: BTreeMap<String, usize> = BTreeMap::new();
+    let mut wanted = |entry: &MeshEntry| {
+        let taken = taken.entry(entry.class.clone()).or_default();
+        *taken += 1;
+        entry.split == Split::Test && *taken <= per_class
+    };
+    let mut entries = discover(folder, SEED)?;
+    entries.retain(|entry| entry.split == Split::Test);
+    entries.retain(&mut wanted);
+    ensure!(taken.len() > 1, "{}: test meshes of one class alone", folder.display());
+    entries.iter().map(object).collect()
+}
+
+fn object(entry: &MeshEntry) -> Result<Object> {
+    let id = format!("{}/{}", entry.class, entry.name);
+    Ok(Object { class: entry.class.clone(), id, target: load_target(entry)? })
+}
+
+/// The four sides of gen-dataset's rotating set, from `distance_m`.
+pub fn places(objects: &[Object], distance_m: f64) -> Vec<Place<'_>> {
+    let views = Views { distance_m, ..Views::ROTATING };
+    let of = |object| {
+        let poses = views.poses(DVec3::ZERO, StreamKey::new(SEED, "trade", 0));
+        poses.into_iter().zip(0..).map(move |(pose, view)| place(object, pose, view))
+    };
+    objects.iter().flat_map(of).collect()
+}
+
+fn place(object: &Object, pose: Pose, view: u32) -> Place<'_> {
+    // As gen-dataset keys its set `rotational`.
+    let stream = StreamKey::new(SEED, &format!("rotational/{}", object.id), view);
+    Place { object, pose, stream }
+}

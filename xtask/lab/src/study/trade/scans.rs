@@ -1,0 +1,189 @@
+//! Scans of all objects in one way, what they cost, and how true they are.
+
+use super::objects::{Object, Place, places};
+use super::sensors::Scanning;
+use crate::measure::clock::{Contestant, interleave, measured};
+use crate::measure::energy::Energy;
+use crate::measure::scan_mesh;
+use anyhow::Result;
+use edgepuck_program::trade_record::{Part, Row};
+use formats::chamfer::chamfer;
+use formats::scan::{Attribute, AttributeSet, Scan};
+use formats::scan_file::{ScanFormat, write_scan};
+use rayon::prelude::*;
+use sim_gpu::scan::View;
+use sim_gpu::sensor::BeamPattern;
+use std::collections::BTreeMap;
+use std::hint::black_box;
+
+/// A cloud as the classifier takes it.
+pub type Cloud = Vec<[f32; 3]>;
+
+/// One in so many scans is looked at: of all four sides in turn.
+const CHAMFER_EACH: usize = 7;
+
+/// A scan and its ranges without any effect.
+struct Made {
+    scan: Scan,
+    /// Of each point of the scan.
+    exact_m: Vec<f64>,
+}
+
+/// Everything about one way of scanning.
+pub struct Scanned {
+    /// Costs and geometric errors, without accuracy.
+    pub row: Row,
+    /// One cloud a place.
+    pub clouds: Vec<Cloud>,
+}
+
+/// Scans `objects` in all of `ways`, in turns, `rounds` times each.
+///
+/// # Errors
+/// A scan that cannot be written.
+pub fn scan_all(
+    objects: &[Object],
+    ways: &[Scanning],
+    rounds: usize,
+    test_set: &str,
+) -> Result<Vec<Scanned>> {
+    let patterns: Vec<BeamPattern> = ways.iter().map(|way| way.sensor.pattern()).collect();
+    let energy = Energy::here();
+    let mut joules: Vec<f64> = vec![0.0; ways.len()];
+    let mut contestants: Vec<Contestant<'_>> = Vec::new();
+    for ((way, pattern), joules) in ways.iter().zip(&patterns).zip(&mut joules) {
+        let (energy, places) = (energy.as_ref(), places(objects, way.distance_m));
+        contestants.push(Box::new(move || {
+            let before = energy.map(Energy::now);
+            let (scans, cost) = measured(|| scan(&places, way, pattern, &AttributeSet::default()));
+            if let (Some(energy), Some(before)) = (energy, before) {
+                *joules += energy.joules_since(&before) / places.len() as f64;
+            }
+            black_box(scans);
+            Ok(cost)
+        }));
+    }
+    let costs = interleave(rounds, &mut contestants)?;
+    drop(contestants);
+    let mut truths: BTreeMap<u64, Vec<Made>> = BTreeMap::new();
+    let mut all = Vec::new();
+    for (i, (way, pattern)) in ways.iter().zip(&patterns).enumerate() {
+        let (noise_m, quantum_m) = (way.noise_m, way.range_quantum_m);
+        let step = way.azimuth_step_deg.map(|step| format!(" {step:.1}°")).unwrap_or_default();
+        eprintln!(
+            "{}: {}{step}, {} m, noise {noise_m} m, quantum {quantum_m} m",
+            way.knob, way.name, way.distance_m
+        );
+        let truth = truths.entry(way.distance_m.to_bits());
+        let truth = truth.or_insert_with(|| truth_from(objects, way.distance_m));
+        let (mut row, clouds) = judged(objects, way, pattern, truth)?;
+        let cpu_s = costs[i].cpu_s().median / clouds.len() as f64;
+        row.test_set = test_set.to_owned();
+        row.rays_per_cpu_s = Some(pattern.len() as f64 / cpu_s);
+        row.scans_per_cpu_s = Some(1.0 / cpu_s);
+        row.ms_here = Some(cpu_s * 1e3);
+        // The repeat that is not counted has its joules in the sum, too.
+        row.joules = energy.is_some().then(|| joules[i] / (rounds + 1) as f64);
+        all.push(Scanned { row, clouds });
+    }
+    Ok(all)
+}
+
+/// What `way` makes of the ranges, beside the `truth` from there, and its clouds.
+fn judged(
+    objects: &[Object],
+    way: &Scanning,
+    pattern: &BeamPattern,
+    truth: &[Made],
+) -> Result<(Row, Vec<Cloud>)> {
+    let places = places(objects, way.distance_m);
+    let columns = AttributeSet::from([Attribute::Range, Attribute::Beam]);
+    let made = scan(&places, way, pattern, &columns);
+    let (mut sum, mut worst, mut n) = (0.0, 0.0f64, 0usize);
+    for made in &made {
+        let ranges = made.scan.range_m.iter().flatten();
+        for (range_m, exact_m) in ranges.zip(&made.exact_m) {
+            let error = (f64::from(*range_m) - exact_m).abs();
+            (sum, worst, n) = (sum + error * error, worst.max(error), n + 1);
+        }
+    }
+    let clouds: Vec<Cloud> = made.into_iter().map(|made| made.scan.positions).collect();
+    let row = Row {
+        part: Part::Scan,
+        knob: way.knob.to_owned(),
+        sensor: way.name.clone(),
+        beams: Some(way.beams),
+        azimuth_step_deg: way.azimuth_step_deg,
+        range_quantum_m: Some(way.range_quantum_m),
+        distance_m: Some(way.distance_m),
+        noise_m: Some(way.noise_m),
+        caster: "cpu f32 watertight, f64 range".to_owned(),
+        culling: "on".to_owned(),
+        megabytes: Some(file_bytes(&clouds)? * 1e-6),
+        points_per_scan: Some(n as f64 / clouds.len().max(1) as f64),
+        range_rms_m: (n > 0).then(|| (sum / n as f64).sqrt()),
+        range_worst_m: (n > 0).then_some(worst),
+        chamfer_m: mean_chamfer(truth, &clouds),
+        ..Row::default()
+    };
+    Ok((row, clouds))
+}
+
+/// One scan a place, on the CPU, without files.
+fn scan(
+    places: &[Place<'_>],
+    way: &Scanning,
+    pattern: &BeamPattern,
+    attributes: &AttributeSet,
+) -> Vec<Made> {
+    let effects = &way.effects();
+    let of = |place: &Place<'_>| {
+        let Place { object, pose, stream } = place;
+        let (target, sensor, stream) = (&object.target, &way.sensor, *stream);
+        let cast_effects = effects;
+        let view = View { sensor, pattern, pose, cast_effects, effects, attributes, stream };
+        let (scan, hits) = scan_mesh::scan(target, &view);
+        let exact = |beam: &u32| {
+            let at = hits.hits.binary_search_by_key(beam, |hit| hit.beam);
+            at.map_or(f64::NAN, |at| hits.hits[at].range_m)
+        };
+        let exact_m = scan.beam.iter().flatten().map(exact).collect();
+        Made { scan, exact_m }
+    };
+    places.par_iter().map(of).collect()
+}
+
+/// Mean bytes of an NPZ file of a scan.
+fn file_bytes(clouds: &[Cloud]) -> Result<f64> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("scan.npz");
+    let mut bytes = 0;
+    for cloud in clouds {
+        let scan = Scan { positions: cloud.clone(), ..Scan::default() };
+        write_scan(&path, ScanFormat::Npz, &scan)?;
+        bytes += path.metadata()?.len();
+    }
+    Ok(bytes as f64 / clouds.len().max(1) as f64)
+}
+
+/// Some of the clean scans of the VLP-32C from `distance_m`.
+fn truth_from(objects: &[Object], distance_m: f64) -> Vec<Made> {
+    let clean = Scanning::clean(distance_m);
+    let some: Vec<Place<'_>> =
+        places(objects, distance_m).into_iter().step_by(CHAMFER_EACH).collect();
+    scan(&some, &clean, &clean.sensor.pattern(), &AttributeSet::default())
+}
+
+/// The mean distance of those clouds to the `truth` from the same places; `None`
+/// if there are none with points.
+fn mean_chamfer(truth: &[Made], clouds: &[Cloud]) -> Option<f64> {
+    let pairs: Vec<_> = truth.iter().zip(clouds.iter().step_by(CHAMFER_EACH)).collect();
+    let distance = |(truth, cloud): &(&Made, &Cloud)| {
+        let wide =
+            |points: &[[f32; 3]]| points.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
+        chamfer(&wide(&truth.scan.positions), &wide(cloud)).plain
+    };
+    let distances: Vec<f64> = pairs.par_iter().map(distance).collect();
+    let known: Vec<f64> = distances.into_iter().filter(|distance| distance.is_finite()).collect();
+    (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+}

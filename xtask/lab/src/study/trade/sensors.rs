@@ -1,0 +1,219 @@
+//! The VLP-32C, and what may be left out of it.
+
+use crate::study::uniform_raster::as_even_grid;
+use sim_gpu::effects::{Effects, Noise, NoiseModel, Quantum};
+use sim_gpu::sensor::{Layout, Sensor};
+use std::num::NonZeroU32;
+
+/// A way to scan.
+#[derive(Clone)]
+pub struct Scanning {
+    /// The knob that is turned.
+    pub knob: &'static str,
+    /// The sensor's name, and what was made of it.
+    pub name: String,
+    /// The sensor.
+    pub sensor: Sensor,
+    /// Its beams, one above the other.
+    pub beams: usize,
+    /// From one firing to the next; a camera has none.
+    pub azimuth_step_deg: Option<f64>,
+    /// To the object's centre.
+    pub distance_m: f64,
+    /// Along the ray.
+    pub noise_m: f64,
+    /// 0: ranges are not rounded.
+    pub range_quantum_m: f64,
+}
+
+/// From gen-dataset's defaults.
+const DISTANCE_M: f64 = 3.0;
+const NOISE_M: f64 = 0.01;
+
+impl Scanning {
+    /// The real beam table at 600 rpm, as gen-dataset's rotating set has it.
+    pub fn reference() -> Self {
+        let sensor = vlp32c();
+        Self {
+            knob: "reference",
+            name: sensor.name.clone(),
+            beams: 32,
+            azimuth_step_deg: azimuth_step_deg(&sensor),
+            sensor,
+            distance_m: DISTANCE_M,
+            noise_m: NOISE_M,
+            range_quantum_m: 0.0,
+        }
+    }
+
+    /// The reference without any effect: the truth to compare with.
+    pub fn clean(distance_m: f64) -> Self {
+        Self { distance_m, noise_m: 0.0, ..Self::reference() }
+    }
+
+    /// Noise and rounding, where they are asked for.
+    pub fn effects(&self) -> Effects {
+        let noise = Noise { mean_m: 0.0, sigma_m: self.noise_m, model: NoiseModel::Range };
+        Effects {
+            noise: (self.noise_m > 0.0).then_some(noise),
+            quantum: (self.range_quantum_m > 0.0)
+                .then_some(Quantum { step_m: Some(self.range_quantum_m) }),
+            ..Effects::default()
+        }
+    }
+
+    fn turned(self, knob: &'static str) -> Self {
+        Self { knob, ..self }
+    }
+
+    fn with_beams(self, keep_each: usize) -> Self {
+        let sensor = fewer_beams(&self.sensor, keep_each);
+        let beams = self.beams / keep_each;
+        Self { name: format!("{}, {beams} beams", self.name), beams, sensor, ..self }
+    }
+
+    /// One firing each 0.1° times `k`: 300 rpm, of which each `k`-th is kept.
+    fn with_azimuth(self, k: u32) -> Self {
+        let mut sensor = self.sensor;
+        if let Layout::Rotating(rotating) = &mut sensor.layout {
+            rotating.rpm = 300.0;
+        }
+        let azimuth_step_deg = azimuth_step_deg(&sensor).map(|step| step * f64::from(k));
+        let sensor = sensor.decimated(NonZeroU32::new(k).unwrap_or(NonZeroU32::MIN));
+        Self { azimuth_step_deg, sensor, ..self }
+    }
+}
+
+/// Each knob by itself, away from the reference.
+pub fn one_at_a_time() -> Vec<Scanning> {
+    let reference = Scanning::reference;
+    let mut all = vec![reference()];
+    all.extend([2, 4].map(|keep_each| reference().with_beams(keep_each).turned("beams")));
+    all.extend([even_grid(), blainder()]);
+    all.extend([1, 4, 8].map(|k| reference().with_azimuth(k).turned("azimuth step")));
+    all.extend([0.004, 0.02].map(|range_quantum_m| Scanning {
+        range_quantum_m,
+        ..reference().turned("range quantum")
+    }));
+    all.extend(
+        [0.0, 0.005, 0.02, 0.05, 0.1]
+            .map(|noise_m| Scanning { noise_m, ..reference().turned("noise") }),
+    );
+    all.extend(
+        [2.0, 5.0, 10.0, 20.0, 50.0]
+            .map(|distance_m| Scanning { distance_m, ..reference().turned("distance") }),
+    );
+    all
+}
+
+/// What can be left out of a sensor, in all combinations, near and far: what
+/// costs nothing at 3 m may cost everything at 20 m.
+pub fn combinations() -> Vec<Scanning> {
+    let mut all = Vec::new();
+    for distance_m in [3.0, 5.0, 10.0, 20.0] {
+        for keep_each in [1, 2, 4] {
+            for k in [2, 4, 8] {
+                let scanning = Scanning { distance_m, ..Scanning::reference() };
+                let scanning = match keep_each {
+                    1 => scanning,
+                    _ => scanning.with_beams(keep_each),
+                };
+                all.push(scanning.with_azimuth(k).turned("combination"));
+            }
+        }
+    }
+    all
+}
+
+fn vlp32c() -> Sensor {
+    Sensor::builtin("vlp32c").expect("invariant: this profile is built in")
+}
+
+fn azimuth_step_deg(sensor: &Sensor) -> Option<f64> {
+    match &sensor.layout {
+        Layout::Rotating(rotating) => {
+            Some(360.0 * rotating.sequence_us * 1e-6 / rotating.period_s())
+        }
+        Layout::Uniform(uniform) => {
+            let span = uniform.azimuth_to_deg - uniform.azimuth_from_deg;
+            Some(span / f64::from(uniform.azimuth_steps.max(2) - 1))
+        }
+        Layout::Grid(_) => None,
+    }
+}
+
+/// Each `keep_each`-th beam by elevation, from below.
+fn fewer_beams(sensor: &Sensor, keep_each: usize) -> Sensor {
+    let mut sensor = sensor.clone();
+    if let Layout::Rotating(rotating) = &mut sensor.layout {
+        let mut by_elevation: Vec<usize> = (0..rotating.beam.len()).collect();
+        let elevation = |&i: &usize| rotating.beam[i].elevation_deg;
+        by_elevation.sort_by(|a, b| elevation(a).total_cmp(&elevation(b)));
+        let kept: Vec<usize> = by_elevation.into_iter().step_by(keep_each).collect();
+        let mut place = 0..;
+        rotating.beam.retain(|_| place.next().is_some_and(|i: usize| kept.contains(&i)));
+    }
+    sensor
+}
+
+/// As many rays as the VLP-32C has, on an even grid of the same field of view.
+fn even_grid() -> Scanning {
+    let sensor = as_even_grid(vlp32c()).expect("invariant: the VLP-32C has a table of beams");
+    of_another("beam table", "even grid of 32 rows".to_owned(), sensor, 32)
+}
+
+fn blainder() -> Scanning {
+    let sensor = Sensor::builtin("blainder-ultrapuck").expect("invariant: it is built in");
+    of_another("beam table", sensor.name.clone(), sensor, 122)
+}
+
+fn of_another(knob: &'static str, name: String, sensor: Sensor, beams: usize) -> Scanning {
+    let azimuth_step_deg = azimuth_step_deg(&sensor);
+    Scanning { knob, name, beams, azimuth_step_deg, sensor, ..Scanning::reference() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fewer_beams_span_the_same_field() {
+        let sixteen = Scanning::reference().with_beams(2);
+        let Layout::Rotating(rotating) = &sixteen.sensor.layout else { panic!("it turns") };
+        assert_eq!((rotating.beam.len(), sixteen.beams), (16, 16));
+        let lowest = rotating.beam.iter().map(|beam| beam.elevation_deg).fold(90.0, f64::min);
+        assert_eq!(lowest, -25.0);
+    }
+
+    #[test]
+    fn azimuth_steps_are_those_of_the_sensor() {
+        // SIMULATORS' table: 0.09953° at 300 rpm, 0.19907° at 600.
+        let step_deg = |scanning: &Scanning| scanning.azimuth_step_deg.unwrap();
+        assert!((step_deg(&Scanning::reference()) - 0.19907).abs() < 1e-5);
+        let fine = Scanning::reference().with_azimuth(1);
+        assert!((step_deg(&fine) - 0.09953).abs() < 1e-5);
+        let coarse = Scanning::reference().with_azimuth(8);
+        // The last sequence of a revolution may be cut short.
+        let rays = |scanning: &Scanning| scanning.sensor.pattern().len();
+        assert!((8 * rays(&coarse)).abs_diff(rays(&fine)) <= 8 * 32);
+    }
+
+    #[test]
+    fn one_knob_is_turned_at_a_time() {
+        let knobs = |s: &Scanning| {
+            (s.name.clone(), s.azimuth_step_deg, s.distance_m, s.noise_m, s.range_quantum_m)
+        };
+        let reference = knobs(&Scanning::reference());
+        for scanning in &one_at_a_time()[1..] {
+            let turned = knobs(scanning);
+            let differ = [
+                turned.0 != reference.0,
+                turned.0 == reference.0 && turned.1 != reference.1,
+                turned.2 != reference.2,
+                turned.3 != reference.3,
+                turned.4 != reference.4,
+            ];
+            assert_eq!(differ.iter().filter(|&&differs| differs).count(), 1, "{}", scanning.knob);
+        }
+    }
+}
