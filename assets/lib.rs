@@ -11,6 +11,20 @@ pub const SENSORS: [(&str, &str); 7] = [
     ("modelnet40c-lidar", include_str!("sensors/modelnet40c-lidar.toml")),
 ];
 
+/// The tables of layer names that `edgepuck import-weights` knows: a table's
+/// path in the repository and its TOML.
+pub const IMPORTERS: [(&str, &str); 2] = [
+    ("assets/importers/yanx27.toml", include_str!("importers/yanx27.toml")),
+    ("assets/importers/3dcertify.toml", include_str!("importers/3dcertify.toml")),
+];
+
+/// The scene that `edgepuck scan` takes by default, and the mesh in it: a file's
+/// path and its text. The scene is the first.
+pub const DEFAULT_SCENE: [(&str, &str); 2] = [
+    ("scenes/two_chairs.toml", include_str!("scenes/two_chairs.toml")),
+    ("meshes/chair/chair_0046.obj", include_str!("meshes/chair/chair_0046.obj")),
+];
+
 /// The record of `cargo xtask trade` that ships, as CSV: what `edgepuck advise`
 /// recommends from.
 pub const TRADE_RECORD: &str = include_str!("reports/trade/trade.csv");

@@ -1,11 +1,11 @@
-//! `cargo xtask adapters`: what can cast.
+//! `edgepuck adapters`: lists what can cast.
 
 use crate::Outcome;
 use crate::caster::HOW_TO_GET_VULKAN;
 use sim_gpu::gpu::list_adapters;
 use std::io::Write;
 
-/// Lists every adapter, best first, and the CPU twin.
+/// Lists every adapter, best first, and the CPU caster.
 pub fn run() -> anyhow::Result<Outcome> {
     let adapters = list_adapters();
     let mut out = std::io::stdout().lock();
@@ -20,9 +20,9 @@ pub fn run() -> anyhow::Result<Outcome> {
             adapter.max_binding_bytes >> 20
         )?;
     }
-    writeln!(out, "cpu\n    the CPU twin, without a driver, on all cores")?;
+    writeln!(out, "cpu\n    the CPU caster, on all cores; it needs no driver")?;
     if adapters.is_empty() {
-        writeln!(out, "No GPU and no software Vulkan was found; {HOW_TO_GET_VULKAN}.")?;
+        writeln!(out, "No GPU or software Vulkan was found; {HOW_TO_GET_VULKAN}.")?;
     }
     Ok(Outcome::Success)
 }

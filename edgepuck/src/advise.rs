@@ -1,4 +1,4 @@
-//! `cargo xtask advise`: one configuration for a device, out of what
+//! `edgepuck advise`: recommends one configuration for a device, from what
 //! `cargo xtask trade` measured.
 
 use crate::flags::positive;
@@ -15,27 +15,27 @@ use std::path::PathBuf;
 /// Flags of `advise`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// What the classifier runs on: pi5 (modelled), or here (the machine of the record)
+    /// Device that runs the classifier: pi5 (modelled) or here (the machine of the record)
     #[arg(long, value_enum)]
     device: Device,
 
-    /// Most milliseconds from a raw cloud to its class
+    /// Longest time from a raw cloud to its class, milliseconds
     #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     max_ms: Option<f64>,
 
-    /// Least share of clouds classified as labelled, 0 to 1
+    /// Lowest accuracy, a share from 0 to 1
     #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true)]
     min_accuracy: Option<f64>,
 
-    /// Most megabytes of weights
+    /// Largest size of the weights, megabytes
     #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
     max_mb: Option<f64>,
 
-    /// Most threads
+    /// Largest number of threads
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     max_threads: Option<usize>,
 
-    /// What `cargo xtask trade` wrote [default: the record that ships]
+    /// Record that `cargo xtask trade` wrote [default: the built-in record]
     #[arg(long, value_name = "CSV")]
     record: Option<PathBuf>,
 }
@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<Outcome> {
     args.check()?;
     let (name, rows) = match &args.record {
         Some(path) => (path.display().to_string(), row::read(path)?),
-        None => ("the record that ships".to_owned(), row::bundled()?),
+        None => ("the built-in record".to_owned(), row::bundled()?),
     };
     let advice = advise(args, &rows).context(name)?;
     std::io::stdout().write_all(advice.as_bytes())?;
@@ -69,20 +69,24 @@ fn advise(args: &Args, rows: &[Row]) -> Result<String> {
     let choices = rows.iter().filter(is_choice);
     let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     if timed.is_empty() {
-        bail!("holds no times of {}: only what was measured is advised", args.device);
+        bail!(
+            "holds no timings for {}; `cargo xtask trade` in a checkout measures them",
+            args.device
+        );
     }
     let fitting: Vec<Timed> = timed.iter().copied().filter(|timed| args.allow(timed)).collect();
     let Some(&chosen) = fitting.iter().max_by(|a, b| args.compare(a, b)) else {
         bail!("{}", args.none_fits(&timed));
     };
-    Ok(args.told(chosen, &fitting, &timed))
+    Ok(args.text(chosen, &fitting, &timed))
 }
 
 impl Args {
     fn check(&self) -> Result<()> {
         let limits = [self.max_ms, self.min_accuracy, self.max_mb];
         if limits.iter().all(Option::is_none) && self.max_threads.is_none() {
-            let cause = "name a limit: --max-ms, --min-accuracy, --max-mb or --max-threads";
+            let cause =
+                "expected at least one limit: --max-ms, --min-accuracy, --max-mb or --max-threads";
             return Err(Usage(cause.to_owned()).into());
         }
         Ok(())
@@ -109,9 +113,9 @@ impl Args {
         first.then(b.1.threads.cmp(&a.1.threads))
     }
 
-    /// What comes nearest to limits that nothing keeps.
+    /// Describes the settings nearest to limits that none of them meets.
     fn none_fits(&self, timed: &[Timed]) -> String {
-        let mut told = "nothing that was measured keeps these limits".to_owned();
+        let mut text = "no measured setting meets these limits".to_owned();
         let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
         let best = timed.iter().max_by(|a, b| a.1.accuracy.total_cmp(&b.1.accuracy));
         let megabytes = |timed: &&Timed| timed.1.megabytes.unwrap_or(f64::INFINITY);
@@ -120,34 +124,37 @@ impl Args {
         for (what, timed) in [("fastest", fastest), ("most accurate", best), ("smallest", smallest)]
         {
             if let Some(timed) = timed {
-                let _ = write!(told, "\n  the {what}: {}", one_line(*timed));
+                let _ = write!(text, "\n  the {what}: {}", one_line(*timed));
             }
         }
-        told
+        text
     }
 
-    fn told(&self, chosen: Timed, fitting: &[Timed], timed: &[Timed]) -> String {
+    fn text(&self, chosen: Timed, fitting: &[Timed], timed: &[Timed]) -> String {
         let (ms, row) = chosen;
-        let mut told = format!("{}\n\n  {}\n", one_line(chosen), command(row));
+        let mut text = format!("{}\n\n  {}\n", one_line(chosen), command(row));
         let _ = write!(
-            told,
-            "\nWhy: of {} settings measured on {} ({} clouds), {} keep the limits; ",
+            text,
+            "\nWhy: of {} settings measured on {} ({} clouds), {} meet the limits; ",
             timed.len(),
             row.test_set,
             row.clouds,
             fitting.len()
         );
-        told += match self.accuracy_first() {
-            true => "none of those is more accurate, and of equals this is the fastest.\n",
-            false => "none of those is faster.\n",
+        text += match self.accuracy_first() {
+            true => {
+                "this is the most accurate of them, and the fastest of equally accurate ones.\n"
+            }
+            false => "this is the fastest of them.\n",
         };
-        told += &match self.device {
-            Device::Pi5 => "Times are modelled (cargo xtask bench pi-model); measure a board by \
-                            infer-cpu bench.\nIts infer-cpu is made by cargo xtask build-pi.\n"
+        text += &match self.device {
+            Device::Pi5 => "The times are modelled (`cargo xtask bench pi-model`); `infer-cpu \
+                            bench` measures a board.\n`cargo xtask build-pi` builds infer-cpu \
+                            for the Raspberry Pi.\n"
                 .to_owned(),
             Device::Here => format!(
-                "Times are of {}.\nIts infer-cpu is made by cargo build --release --package \
-                 infer-cpu, as target/release/infer-cpu.\n",
+                "The times were measured on {}.\n`cargo build --release --package infer-cpu` \
+                 builds infer-cpu as target/release/infer-cpu.\n",
                 row.machine
             ),
         };
@@ -159,16 +166,20 @@ impl Args {
             let lost = 100.0 * (row.accuracy - cheaper.1.accuracy);
             let saved = 100.0 * (1.0 - cheaper.0 / ms);
             let _ = writeln!(
-                told,
-                "Within its 95 % interval: {lost:.1} points less save {saved:.0} % of the time:\n  {}",
+                text,
+                "A cheaper setting within the 95 % interval loses {lost:.1} points and saves {saved:.0} % of the time:\n  {}",
                 one_line(cheaper)
             );
         }
         let better = |&&(_, other): &&Timed| other.accuracy > row.accuracy_high;
         if let Some(&better) = timed.iter().filter(better).min_by(|a, b| a.0.total_cmp(&b.0)) {
-            let _ = writeln!(told, "Beyond its interval, for more:\n  {}", one_line(better));
+            let _ = writeln!(
+                text,
+                "A setting that is significantly more accurate, beyond the limits:\n  {}",
+                one_line(better)
+            );
         }
-        told
+        text
     }
 }
 
@@ -202,7 +213,7 @@ fn command(row: &Row) -> String {
 fn share(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {
         Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
-        _ => Err("a share from 0 to 1 is needed, such as 0.85".to_owned()),
+        _ => Err("expected a share from 0 to 1, such as 0.85".to_owned()),
     }
 }
 
@@ -280,7 +291,7 @@ mod tests {
         assert!(error.contains("the fastest: small") && error.contains("most accurate: huge"));
         let here = Args { device: Device::Here, ..asked(Some(5.0), None) };
         let error = advise(&here, &rows()).unwrap_err().to_string();
-        assert!(error.contains("only what was measured"), "{error}");
+        assert!(error.contains("`cargo xtask trade`"), "{error}");
         assert!(asked(None, None).check().unwrap_err().is::<Usage>());
     }
 }

@@ -6,18 +6,18 @@ use sim_gpu::effects::Effects;
 use sim_gpu::gpu::AdapterRequest;
 use sim_gpu::job::Culling;
 
-/// What to do where no adapter is found.
+/// How to install an adapter where none is found.
 pub const HOW_TO_GET_VULKAN: &str =
-    "on Debian or Ubuntu, `apt-get install mesa-vulkan-drivers` gives software Vulkan";
+    "on Debian or Ubuntu, `apt-get install mesa-vulkan-drivers` installs software Vulkan";
 
 /// Flags of every command that casts.
 #[derive(clap::Args)]
 pub struct CasterArgs {
-    /// What casts: auto (GPU, then software Vulkan, then CPU), cpu, or part of an adapter's name
+    /// Adapter that casts: auto (GPU, then software Vulkan, then CPU), cpu, or part of a name
     #[arg(long, default_value = "auto", value_name = "ADAPTER")]
     pub adapter: AdapterRequest,
 
-    /// Cast every beam, those that cannot hit too; the output is the same
+    /// Also cast the beams that cannot hit; this is slower and gives the same output
     #[arg(long)]
     no_cull: bool,
 }
@@ -26,16 +26,16 @@ impl CasterArgs {
     /// Opens the adapter for `effects` and says which it is.
     pub fn open(&self, effects: &Effects) -> anyhow::Result<Caster> {
         if self.adapter != AdapterRequest::Auto {
-            let caster = Caster::open(&self.adapter, effects).context("cannot cast")?;
+            let caster = Caster::open(&self.adapter, effects).context("cannot open the adapter")?;
             eprintln!("Casting on {}.", caster.name());
             return Ok(caster);
         }
         let (caster, passed_over) = Caster::open_best(effects);
         for error in &passed_over {
-            eprintln!("Passed over: {error}.");
+            eprintln!("Skipped an adapter: {error}.");
         }
         if matches!(caster, Caster::Cpu(_)) {
-            eprintln!("No adapter found: the CPU casts; {HOW_TO_GET_VULKAN}.");
+            eprintln!("No adapter was found, so the CPU casts; {HOW_TO_GET_VULKAN}.");
         } else {
             eprintln!("Casting on {}.", caster.name());
         }

@@ -14,7 +14,7 @@ pub const BUILT_WITHOUT_SIMPLIFY: &str = "--simplify: this program was built wit
 /// A usage error that names the path.
 pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
     match meshes.filter(|path| !path.is_dir()) {
-        Some(path) => Err(Usage(format!("--meshes: {} is no folder", path.display()))),
+        Some(path) => Err(Usage(format!("--meshes: expected a folder, found {}", path.display()))),
         None => Ok(()),
     }
 }
@@ -23,6 +23,6 @@ pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
 pub fn positive(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("a positive number is needed".to_owned()),
+        _ => Err("expected a finite number above 0".to_owned()),
     }
 }

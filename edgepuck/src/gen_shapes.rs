@@ -1,4 +1,4 @@
-//! `cargo xtask gen-shapes`: the parametric shapes as files.
+//! `edgepuck gen-shapes`: writes the procedural shapes as files.
 
 use crate::Outcome;
 use anyhow::Context;
@@ -12,23 +12,23 @@ pub struct Args {
     #[arg(long, default_value = "data/shapes", value_name = "DIR")]
     out: PathBuf,
 
-    /// Seed of every shape
+    /// Seed of all shapes
     #[arg(long, default_value_t = 0)]
     seed: u64,
 
-    /// Shapes of each class to train on
+    /// Number of training shapes of each class
     #[arg(long, default_value_t = TRAIN_PER_CLASS, value_name = "N")]
     train: u32,
 
-    /// Shapes of each class to test with
+    /// Number of test shapes of each class
     #[arg(long, default_value_t = TEST_PER_CLASS, value_name = "N")]
     test: u32,
 }
 
-/// Shapes of each class to train on, unless asked otherwise.
+/// The default number of training shapes of each class.
 pub const TRAIN_PER_CLASS: u32 = 40;
 
-/// Shapes of each class to test with, unless asked otherwise.
+/// The default number of test shapes of each class.
 pub const TEST_PER_CLASS: u32 = 10;
 
 /// Writes the shapes.

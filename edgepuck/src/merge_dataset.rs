@@ -1,4 +1,4 @@
-//! `cargo xtask merge-dataset`: shards into one dataset.
+//! `edgepuck merge-dataset`: merges shards into one dataset.
 
 use crate::{Outcome, gen_dataset};
 use edgepuck_dataset::merge::merge;
@@ -7,11 +7,11 @@ use std::path::PathBuf;
 /// Flags of `merge-dataset`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The shards' folders, all of them
+    /// Folders of all the shards
     #[arg(required = true, value_name = "SHARD")]
     shards: Vec<PathBuf>,
 
-    /// Folder of the whole dataset
+    /// Folder to write the merged dataset to
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -22,8 +22,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     eprintln!("{} meshes: {}", manifest.meshes.len(), args.out.display());
     if manifest.adapters.len() > 1 {
         eprintln!(
-            "Parts were cast on different adapters ({}): clean scans are what one run gives, \
-             noise differs in its last digits.",
+            "The shards were cast on different adapters ({}): clean scans are the same as from \
+             one run, noise differs in its last digits.",
             manifest.adapters.join(", ")
         );
     }

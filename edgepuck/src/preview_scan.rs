@@ -1,4 +1,4 @@
-//! `cargo xtask preview`: a picture of a scan.
+//! `edgepuck preview`: a picture of a scan.
 
 use crate::{Outcome, preview};
 use formats::scan_file::read_scan;
@@ -7,15 +7,15 @@ use std::path::{Path, PathBuf};
 /// Flags of `preview`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The scan, .npz or .ply; drawn above its noisy twin where it lies in a dataset's clean/
+    /// Scan to draw, .npz or .ply; a scan in a dataset's clean/ is drawn above its noisy version
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
 
-    /// A second scan to draw below the first
+    /// Second scan, drawn below the first
     #[arg(long, value_name = "SCAN")]
     noisy: Option<PathBuf>,
 
-    /// The picture
+    /// PNG file to write
     #[arg(long, default_value = "scan.png", value_name = "PNG")]
     out: PathBuf,
 }

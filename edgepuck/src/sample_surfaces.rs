@@ -1,4 +1,4 @@
-//! `cargo xtask sample-surfaces`: points spread evenly over each mesh.
+//! `edgepuck sample-surfaces`: samples points uniformly from each mesh.
 
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
@@ -15,17 +15,17 @@ pub struct Args {
     #[arg(value_name = "MESHES")]
     meshes: PathBuf,
 
-    /// Folder for surface-{train,test}.npz, points of whole meshes, and seen-{train,test}.npz,
-    /// what of such points lies open to a sensor at each of gen-dataset's default places
+    /// Folder for surface-{train,test}.npz (points of whole meshes) and seen-{train,test}.npz
+    /// (those points that are visible from each of gen-dataset's default viewpoints)
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
-    /// Points of each cloud
+    /// Number of points in each cloud
     #[arg(long, default_value_t = 1024, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     points: u32,
 
-    /// Views that see fewer of six times as many points are left out
+    /// Smallest number of visible points, of six times --points, that a viewpoint must have
     #[arg(long, default_value_t = 64, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,
@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 
-    /// Seed of every random number
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }

@@ -1,8 +1,9 @@
-//! `cargo xtask scan`: one scene, one scan per sensor.
+//! `edgepuck scan`: one scene, one scan per sensor.
 
 use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, flags};
 use anyhow::Context;
+use formats::atomic;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::{self, Returns};
 use sim_gpu::packets;
@@ -13,21 +14,21 @@ use std::path::{Path, PathBuf};
 /// Flags of `scan`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The scene, such as assets/scenes/two_chairs.toml
+    /// Scene file [default: two chairs, written to data/default-scene for you to edit]
     #[arg(value_name = "SCENE")]
-    scene: PathBuf,
+    scene: Option<PathBuf>,
 
-    /// File to write: .npz, .ply, .csv or .pcap; with several sensors, one file each, named
-    /// after it. .pcap, a VLP-32C's packets, takes that sensor alone
+    /// File to write: .npz, .ply, .csv or .pcap (VLP-32C packets, for that sensor only). With
+    /// several sensors, each has a file of its own, named after it
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// Returns of each beam in packets: strongest, last or dual, which is both
+    /// Returns of each beam in the packets: strongest, last, or dual (both)
     #[arg(long, value_name = "WHICH")]
     returns: Option<Returns>,
 
-    /// Leave out triangles too small to be told apart, as gen-dataset does; for the objects that
-    /// the scene says nothing of
+    /// Simplify the meshes of objects for which the scene file has no `simplify` key, as
+    /// gen-dataset does
     #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
     simplify: Option<Simplify>,
 
@@ -38,21 +39,25 @@ pub struct Args {
 /// Scans the scene.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of(&args.out)?;
-    let mut scene = Scene::load(&args.scene)?;
+    let scene_file = match &args.scene {
+        Some(file) => file.clone(),
+        None => write_default_scene()?,
+    };
+    let mut scene = Scene::load(&scene_file)?;
     scene.simplify = args.simplify.or(scene.simplify);
     scene.check_triangles().map_err(|error| Usage(error.to_string()))?;
     if scene.simplifies() && cfg!(not(feature = "simplify")) {
         return Err(Usage(flags::BUILT_WITHOUT_SIMPLIFY.to_owned()).into());
     }
     if format == ScanFormat::Pcap {
-        cast_as_packets_tell(&mut scene).with_context(|| format!("{}", args.scene.display()))?;
+        cast_as_packets_tell(&mut scene).with_context(|| format!("{}", scene_file.display()))?;
     } else if args.returns.is_some() {
-        let cause = "--returns says what packets hold: name a .pcap file to write";
+        let cause = "--returns applies to packets only: expected --out with the extension .pcap";
         return Err(Usage(cause.to_owned()).into());
     }
     let caster = args.caster.open(&scene.effects)?;
     let scans = cast(&scene, &caster, args.caster.culling())
-        .with_context(|| format!("{}", args.scene.display()))?;
+        .with_context(|| format!("{}", scene_file.display()))?;
     for (number, object) in scene.objects.iter().enumerate() {
         let label = object.label.as_ref().map(|label| format!(", a {label}")).unwrap_or_default();
         let simplified = scans.first().and_then(|scan| scan.simplified[number]);
@@ -66,7 +71,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         scans.iter().zip(&scene.sensors)
     {
         if *too_large_for_adapter {
-            eprintln!("{sensor}: a mesh is too large for one binding: the CPU cast it");
+            eprintln!(
+                "{sensor}: one mesh exceeds the adapter's largest binding, so the CPU cast it"
+            );
         }
         let file = if several { beside(&args.out, sensor) } else { args.out.clone() };
         match format {
@@ -88,8 +95,25 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Has the sensors' beams cast as their packets tell them, and the scans hold
-/// what packets are made of.
+/// The folder of the scene that is scanned by default.
+const DEFAULT_SCENE: &str = "data/default-scene";
+
+/// Writes the default scene and its mesh, unless they are there, and returns the
+/// scene's file.
+fn write_default_scene() -> anyhow::Result<PathBuf> {
+    let file = |path: &str| Path::new(DEFAULT_SCENE).join(path);
+    for (path, text) in edgepuck_assets::DEFAULT_SCENE {
+        if !file(path).exists() {
+            atomic::write_bytes(&file(path), text)?;
+        }
+    }
+    let scene = file(edgepuck_assets::DEFAULT_SCENE[0].0);
+    eprintln!("No scene was named: scanning {}.", scene.display());
+    Ok(scene)
+}
+
+/// Gives the sensors the beam geometry that their packets describe, and the scans
+/// the attributes that packets are made of.
 fn cast_as_packets_tell(scene: &mut Scene) -> anyhow::Result<()> {
     packets::check_effects(&scene.effects)?;
     for (i, sensor) in scene.sensors.iter_mut().enumerate() {

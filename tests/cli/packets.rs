@@ -70,7 +70,7 @@ fn what_packets_cannot_tell_is_refused_before_it_is_cast() {
     }
     scene(folder.path(), "vlp32c");
     let said = exits(2, folder.path(), "scan scene.toml --out scan.npz --returns dual");
-    assert!(said.contains("name a .pcap file"), "{said}");
+    assert!(said.contains("--returns applies to packets only"), "{said}");
     for name in ["scan.pcap", "scan.npz"] {
         assert!(!folder.path().join(name).exists());
     }

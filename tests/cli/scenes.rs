@@ -60,3 +60,11 @@ fn the_scene_that_ships_is_scanned_and_drawn() {
     let plain = read_scan(&folder.path().join("plain.npz")).unwrap();
     assert_eq!(plain.columns().count(), 0, "what was not asked for is not there");
 }
+
+#[test]
+fn without_a_scene_the_default_one_is_written_and_scanned() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = succeeds(folder.path(), "scan --adapter cpu --out scan.npz");
+    assert!(folder.path().join("data/default-scene/scenes/two_chairs.toml").is_file());
+    assert!(!said(&output).contains(" 0 points") && folder.path().join("scan.npz").is_file());
+}

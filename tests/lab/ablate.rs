@@ -120,7 +120,7 @@ fn what_cannot_be_run_is_refused_before_anything_is_made() {
     refused(1, "ablate --plan typo.toml --out out", "unknown field `sides`");
     refused(1, "ablate --plan certain.toml --out out", "certain.toml: dropout");
     refused(1, "ablate --plan nowhere.toml --out out", "cannot read nowhere.toml");
-    refused(2, "ablate --meshes nowhere --out out", "--meshes: nowhere is no folder");
+    refused(2, "ablate --meshes nowhere --out out", "--meshes: expected a folder, found nowhere");
     std::fs::create_dir(at.join("other")).unwrap();
     std::fs::write(at.join("other/terms.toml"), "version = \"another\"").unwrap();
     let said = exits(1, Path::new(LAB), at, "ablate --quick --out other");

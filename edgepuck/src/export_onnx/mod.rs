@@ -1,4 +1,4 @@
-//! `cargo xtask export-onnx`: a model file as ONNX, for other engines.
+//! `edgepuck export-onnx`: a model file as ONNX, for other engines.
 
 mod critical_points;
 mod edges;
@@ -35,8 +35,8 @@ const LARGEST: usize = i32::MAX as usize;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  cargo xtask export-onnx pointnet-64 --out pointnet-64.onnx
-  cargo xtask export-onnx cpl-64 --critical-points --out cpl-64.onnx
+  edgepuck export-onnx pointnet-64 --out pointnet-64.onnx
+  edgepuck export-onnx cpl-64 --critical-points --out cpl-64.onnx
 
 Opset 18, IR version 8, f32. Batch norms are folded into weights. Weights are
 named as in PyTorch's checkpoints (feat.conv1.weight).

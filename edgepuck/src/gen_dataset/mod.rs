@@ -1,4 +1,4 @@
-//! `cargo xtask gen-dataset`: a folder of meshes into a LiDAR dataset.
+//! `edgepuck gen-dataset`: a folder of meshes into a LiDAR dataset.
 
 mod bar;
 mod example;
@@ -35,28 +35,28 @@ const DEFAULT_OUT: &str = "data/lidar-shapes";
 /// Flags of `gen-dataset`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder of OBJ, OFF, PLY and STL files, as CLASS/{train,test}/NAME or in any other way;
-    /// default: parametric shapes of our own, written to data/default-shapes-SEED
+    /// Folder of OBJ, OFF, PLY and STL files, as CLASS/{train,test}/NAME or in any other layout
+    /// [default: built-in procedural shapes, written to data/default-shapes-SEED]
     #[arg(value_name = "MESHES")]
     meshes: Option<PathBuf>,
 
-    /// Folder of the dataset [default: data/lidar-MESHES, or data/lidar-shapes]
+    /// Folder to write the dataset to [default: data/lidar-MESHES, or data/lidar-shapes]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Check a finished dataset against its manifest, and do nothing else
+    /// Only check a finished dataset against its manifest
     #[arg(long, value_name = "DIR", exclusive = true)]
     verify: Option<PathBuf>,
 
-    /// Go on with a run that was interrupted; it ends with the same bytes
+    /// Continue an interrupted run; the result has the same bytes
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
 
-    /// Replace the dataset that is in the folder
+    /// Replace an existing dataset in the folder
     #[arg(long)]
     overwrite: bool,
 
-    /// Make part I of N of the dataset; `merge-dataset` joins them
+    /// Make part I of N of the dataset; `merge-dataset` joins the parts
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
 
@@ -114,7 +114,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         _ => Begin::Fresh,
     };
     if let Start::Complete(manifest) = begin(&out, &terms, how)? {
-        eprintln!("{}: complete already.", out.display());
+        eprintln!("{}: the dataset is already complete.", out.display());
         return end(&out, &manifest);
     }
 
@@ -130,7 +130,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     end(&out, &manifest)
 }
 
-/// Names the meshes that were left out, and why.
+/// Prints which meshes failed, and why.
 pub fn report_failures(failures: &[MeshFailure]) {
     for failure in failures {
         let line = failure.line.map(|line| format!(":{line}")).unwrap_or_default();
@@ -138,11 +138,11 @@ pub fn report_failures(failures: &[MeshFailure]) {
     }
 }
 
-/// Draws the example, which a killed run may lack, and names it.
+/// Draws the example picture, which an interrupted run may lack, and prints its name.
 pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
     match example::draw(out, manifest).context("cannot draw the example")? {
-        Some(picture) => eprintln!("An example to look at: {}", picture.display()),
-        None => eprintln!("No scan holds a point, so there is no example to look at."),
+        Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
+        None => eprintln!("No scan holds a point, so no example picture was drawn."),
     }
     Ok(if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
 }
@@ -165,7 +165,7 @@ fn check(folder: &Path) -> anyhow::Result<Outcome> {
 fn write_default_shapes(seed: u64) -> anyhow::Result<PathBuf> {
     // A folder of its own for each seed: meshes of another run must not mix in.
     let folder = PathBuf::from(format!("{DEFAULT_SHAPES}-{seed}"));
-    eprintln!("No meshes named: writing shapes of our own to {}.", folder.display());
+    eprintln!("No meshes were named: writing built-in procedural shapes to {}.", folder.display());
     shapes::write_tree(&folder, seed, gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS)
         .context("cannot write the shapes")?;
     Ok(folder)

@@ -22,27 +22,27 @@ pub struct Settings {
     #[arg(long, value_name = "NAME|TOML")]
     sensor: Option<String>,
 
-    /// Places around the mesh from which the sensor looks [default: the sensor's own, or 4]
+    /// Number of viewpoints around the mesh [default: the sensor's own, or 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
     views: Option<u32>,
 
-    /// Metres from the mesh's centre to the sensor [default: the sensor's own, or 3]
+    /// Distance from the mesh's centre to the sensor, metres [default: the sensor's own, or 3]
     #[arg(long, value_name = "M")]
     distance: Option<f64>,
 
-    /// Degrees of the sensor above the mesh [default: the sensor's own, or 20]
+    /// Elevation of the sensor above the mesh, degrees [default: the sensor's own, or 20]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     elevation: Option<f64>,
 
-    /// Poses of the sensor, instead of views around the mesh
+    /// File of sensor poses, which replaces the viewpoints around the mesh
     #[arg(long, value_name = "TOML", conflicts_with_all = ["views", "distance", "elevation"])]
     poses: Option<PathBuf>,
 
-    /// Standard deviation of the noisy scans' error, metres; 0 writes clean scans alone
+    /// Standard deviation of the noise, metres; 0 writes clean scans only
     #[arg(long, default_value_t = 0.01, value_name = "M", allow_negative_numbers = true)]
     noise: f64,
 
-    /// What the noise is added to: range, along the ray, or xyz, each coordinate
+    /// What the noise is added to: `range` (along the ray) or `xyz` (each coordinate)
     #[arg(long, default_value = "range", value_name = "MODEL", value_parser = noise_model)]
     noise_model: NoiseModel,
 
@@ -58,17 +58,17 @@ pub struct Settings {
     #[arg(long, value_name = "M", num_args = 0..=1, default_missing_value = "sensor")]
     quantise: Option<String>,
 
-    /// Per-point attributes besides positions: range, beam, ring, time, triangle, object,
+    /// Attributes of each point besides its position: range, beam, ring, time, triangle, object,
     /// intensity, normal
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 
-    /// Files of each scan; NPZ is always written. pcap, a VLP-32C's packets, takes that sensor
-    /// alone and casts its beams as packets tell them, for all files
+    /// File formats of each scan; NPZ is always written. `pcap` writes VLP-32C packets: it
+    /// accepts that sensor only, and all files then use the beam geometry of the packets
     #[arg(long, value_delimiter = ',', default_value = "npz", value_name = "npz,ply,csv,pcap")]
     format: Vec<ScanFormat>,
 
-    /// Returns of each beam in packets: strongest, last or dual, which is both
+    /// Returns of each beam in the packets: strongest, last, or dual (both)
     #[arg(long, value_name = "WHICH")]
     returns: Option<Returns>,
 
@@ -80,12 +80,12 @@ pub struct Settings {
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 
-    /// Leave out triangles too small to be told apart: auto goes by the sensors' beams and
-    /// distances, a number bounds in metres how far the surface may move; needs a C++ compiler
+    /// Simplify meshes below what the sensor resolves: `auto` derives the bound from the beams
+    /// and distances, a number is the largest distance in metres that the surface may move
     #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
     simplify: Option<Simplify>,
 
-    /// Seed of every random number
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
 
@@ -94,12 +94,12 @@ pub struct Settings {
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     points: u32,
 
-    /// Scans with fewer points are left out of packed sets
+    /// Smallest number of points of a scan that joins the packed sets
     #[arg(long, default_value_t = 64, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,
 
-    /// Layouts of other projects to write besides: yanx27, modelnet-h5
+    /// Additional layouts, which other projects read: yanx27, modelnet-h5
     #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = layout)]
     layout: Vec<Layout>,
 }
@@ -118,15 +118,14 @@ impl Settings {
         formats.dedup();
         if self.simplify.is_some() && self.attributes.contains(&Attribute::Triangle) {
             return Err(usage(
-                "--simplify: a simplified mesh's triangles are not the file's, so that \
-                 --attributes cannot have their numbers",
+                "--simplify renumbers the triangles of a mesh: leave `triangle` out of --attributes",
             ));
         }
         let effects = self.effects()?;
         if formats.contains(&ScanFormat::Pcap) {
             cast_as_packets_tell(&mut sets, &effects)?;
         } else if self.returns.is_some() {
-            return Err(usage("--returns says what packets hold: add --format pcap"));
+            return Err(usage("--returns applies to packets only: add --format pcap"));
         }
         for set in &sets {
             effects.for_sensor(&set.sensor).map_err(|error| usage(error.to_string()))?;
@@ -159,11 +158,11 @@ impl Settings {
         let step_m = match self.quantise.as_deref() {
             None => None,
             Some("sensor") => Some(None),
-            Some(metres) => Some(Some(
-                metres
-                    .parse()
-                    .map_err(|_| usage(format!("--quantise: {metres:?} is no number")))?,
-            )),
+            Some(metres) => Some(Some(metres.parse().map_err(|_| {
+                usage(format!(
+                    "--quantise: expected a number of metres or sensor, found {metres:?}"
+                ))
+            })?)),
         };
         let effects = Effects {
             noise: (self.noise != 0.0 || self.noise_mean != 0.0).then_some(noise),
@@ -211,7 +210,7 @@ impl Settings {
     }
 }
 
-/// Has the sensors' beams cast as their packets tell them.
+/// Gives the sensors the beam geometry that their packets describe.
 fn cast_as_packets_tell(sets: &mut [SetConfig], effects: &Effects) -> anyhow::Result<()> {
     let refuse = |error| usage(format!("--format pcap: {error}"));
     packets::check_effects(effects).map_err(refuse)?;

@@ -1,4 +1,4 @@
-//! `cargo xtask import-weights`: a PyTorch checkpoint into a model file.
+//! `edgepuck import-weights`: a PyTorch checkpoint into a model file.
 
 mod card;
 mod checkpoint;

@@ -8,12 +8,8 @@ use anyhow::{Context, bail};
 use formats::model_card::ModelCard;
 use serde::Deserialize;
 
-/// The tables that are part of the program, in the order in which they are
-/// tried.
-const BUILTIN: [(&str, &str); 2] = [
-    ("assets/importers/yanx27.toml", include_str!("../../../assets/importers/yanx27.toml")),
-    ("assets/importers/3dcertify.toml", include_str!("../../../assets/importers/3dcertify.toml")),
-];
+/// The built-in tables, in the order in which they are tried.
+const BUILTIN: [(&str, &str); 2] = edgepuck_assets::IMPORTERS;
 
 /// What PyTorch calls the tensors of a layer that a model needs.
 const PARTS: [&str; 4] = ["weight", "bias", "running_mean", "running_var"];
@@ -132,7 +128,7 @@ pub fn choose<'t, 'k>(
             nearest = Some((table, unknown));
         }
     }
-    let Some((table, unknown)) = nearest else { bail!("there is no importer table") };
+    let Some((table, unknown)) = nearest else { bail!("expected an importer table, found none") };
     let listed = unknown.iter().take(LISTED).map(|key| format!("`{key}`"));
     let listed = listed.collect::<Vec<_>>().join(", ");
     let more = match unknown.len().saturating_sub(LISTED) {
