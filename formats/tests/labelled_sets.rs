@@ -1,5 +1,4 @@
 //! Labelled sets under either convention of keys, and what is wrong with others.
-#![cfg(all(feature = "npz", feature = "dataset"))]
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 use std::fs::File;

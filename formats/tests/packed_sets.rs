@@ -1,5 +1,4 @@
 //! Packed sets survive their files and grow no memory on their way.
-#![cfg(feature = "dataset")]
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 use std::fs;

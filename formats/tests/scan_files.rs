@@ -1,5 +1,4 @@
 //! Scans survive their files, and files that are not scans are refused.
-#![cfg(feature = "dataset")]
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 use std::fs;

@@ -1,6 +1,5 @@
 //! What datasets consist of is written as it ever was, to the byte: manifests
 //! list the hashes.
-#![cfg(feature = "dataset")]
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 use formats::packed::PackedWriter;

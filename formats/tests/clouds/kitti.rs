@@ -1,6 +1,6 @@
 //! Raw floats: KITTI's four columns, and as many as a name says.
 
-use crate::{error, read};
+use super::{error, read};
 
 fn floats(numbers: &[f32]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()

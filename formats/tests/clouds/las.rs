@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use las::{Builder, Point, Transform, Vector, Version, Writer};
 
-use crate::{error, read};
+use super::{error, read};
 
 /// Where fields of the header lie (LAS 1.4 R15, table 3).
 const OFFSET_TO_POINTS: usize = 96;

@@ -1,6 +1,6 @@
 //! NumPy's arrays: every type of number, either order, and headers that lie.
 
-use crate::{MANY, error, read};
+use super::{MANY, error, read};
 use proptest::prelude::*;
 
 /// An NPY file whose header is the dictionary `{'descr': ..., ...}`.

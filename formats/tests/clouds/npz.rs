@@ -7,8 +7,8 @@ use formats::cloud_file::read_cloud_from;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use crate::npy::npy;
-use crate::{MANY, error, read};
+use super::npy::npy;
+use super::{MANY, error, read};
 
 /// An archive of arrays, deflated as `np.savez_compressed` does.
 fn npz(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {

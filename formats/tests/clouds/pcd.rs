@@ -1,6 +1,6 @@
 //! PCD: text, binary and compressed, fields in any order and of any type.
 
-use crate::{MANY, error, read};
+use super::{MANY, error, read};
 
 const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n";
 

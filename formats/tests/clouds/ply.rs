@@ -1,6 +1,6 @@
 //! PLY: text and binary, other properties, lists and elements passed over.
 
-use crate::{MANY, error, read};
+use super::{MANY, error, read};
 
 const POINTS: [[f64; 3]; 2] = [[0.5, -2.0, 3.0], [4.0, 5.0, 6.0]];
 

@@ -1,0 +1,19 @@
+//! Tests across crates, a module for each question.
+
+mod analytic;
+mod bvh_properties;
+mod dataset_finish;
+mod dataset_merge;
+mod effects_parity;
+mod meshes_read;
+mod noise_statistics;
+mod off_properties;
+mod only_what_is_asked;
+mod packets;
+mod parity;
+mod real_meshes;
+mod scan_effects;
+mod shaders_valid;
+#[cfg(feature = "simplify")]
+mod simplified;
+mod watertight;
