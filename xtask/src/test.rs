@@ -58,12 +58,12 @@ fn run_all(args: &Args, summary: &mut Summary) {
     let packages = peers::Packages::fetch_meanwhile(args.peers, install);
     summary.step("format", |_| check("format", &mut cargo(&["fmt", "--all", "--check"])));
     summary.step("lints", |_| {
-        let lints = ["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"];
-        check("lints", &mut cargo(&lints))
+        let mut lints = cargo_on_all(&["clippy", "--all-targets"]);
+        check("lints", lints.args(["--", "--deny", "warnings"]))
     });
     summary.step("tests", |summary| tests(summary, install));
     summary.step("documentation", |_| {
-        let mut documentation = cargo(&["doc", "--workspace", "--no-deps"]);
+        let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
         check("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"))
     });
     summary.step("dependencies", |_| infer_cpu_is_light());
@@ -91,22 +91,30 @@ fn go_without(
     Ok(Counts::SKIPPED)
 }
 
+/// A command of Cargo on every crate, with the features that all such commands
+/// share, so that nothing is built twice.
+fn cargo_on_all(words: &[&str]) -> Command {
+    let mut command = cargo(words);
+    command.args(["--workspace", "--features", "edgepuck/hdf5,train/hdf5"]);
+    if has_cpp_compiler() {
+        command.args(["--features", "edgepuck/simplify,edgepuck-lab/simplify,tests/simplify"]);
+    }
+    command
+}
+
 /// The tests of all crates.
 fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
-    let mut tests = cargo(&["test", "--workspace", "--no-fail-fast"]);
-    tests.args(["--features", "edgepuck-formats/hdf5,train/hdf5"]);
-    let mut counts = Counts::default();
-    if has_cpp_compiler() {
-        tests.args(["--features", "tests/simplify,edgepuck/simplify"]);
-    } else {
-        let lack = "there is no C++ compiler";
-        counts = go_without(summary, "tests of simplified meshes", lack, required)?;
-    }
+    let mut tests = cargo_on_all(&["test", "--no-fail-fast"]);
     // A machine without any Vulkan adapter tests the CPU alone, and says so.
     if required {
         tests.env(test_support::REQUIRE_ADAPTER, "1");
     }
-    Ok(counts.and(test_programs::run(summary, &mut tests)?))
+    let counts = test_programs::run(summary, &mut tests)?;
+    if has_cpp_compiler() {
+        return Ok(counts);
+    }
+    let lack = "there is no C++ compiler";
+    Ok(counts.and(go_without(summary, "tests of simplified meshes", lack, required)?))
 }
 
 /// Whether meshoptimizer, which `--simplify` uses, can be built.

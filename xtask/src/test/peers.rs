@@ -7,14 +7,16 @@
 //! here. A script `x.py` shares the packages of `requirements.txt`, unless there
 //! is an `x-requirements.txt`: packages too large for every run.
 
+use super::cargo_on_all;
 use super::summary::{Counts, Summary};
 use anyhow::Context;
+use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use xtask::venv::{Environment, workshop};
-use xtask::workspace::{executable, output, root};
+use xtask::workspace::{output, root};
 
 /// The folder of the scripts.
 const SCRIPTS: &str = "tests/peers";
@@ -181,8 +183,13 @@ fn empty(folder: &Path) -> anyhow::Result<()> {
 /// The variables that tell scripts of our programs, and the programs.
 type Programs = [(&'static str, PathBuf); 3];
 
-/// Release builds of our programs.
+/// Our programs as the tests have built them: nothing is built for the peers alone.
 fn programs() -> anyhow::Result<Programs> {
+    let mut cargo = cargo_on_all(&["test", "--no-run"]);
+    cargo.args(["--message-format", "json-render-diagnostics"]);
+    let messages = output(cargo.stderr(Stdio::inherit()))?;
+    let built =
+        |name: &str| program(&messages, name).with_context(|| format!("no test has built {name}"));
     Ok([
         ("EDGEPUCK_PROGRAM", built("edgepuck")?),
         ("EDGEPUCK_LAB", built("edgepuck-lab")?),
@@ -190,10 +197,29 @@ fn programs() -> anyhow::Result<Programs> {
     ])
 }
 
-/// A release build of the program that is called like its package.
-fn built(package: &str) -> anyhow::Result<PathBuf> {
-    let words = ["build", "--release", "--package", package, "--bin", package];
-    let mut cargo = xtask::workspace::cargo(&words);
-    cargo.args(["--message-format", "json-render-diagnostics"]);
-    executable(&output(cargo.stderr(Stdio::inherit()))?)
+/// The program `name` among Cargo's `messages`, one JSON object a line.
+fn program(messages: &str, name: &str) -> Option<PathBuf> {
+    let messages = messages.lines().filter_map(|m| serde_json::from_str::<Value>(m).ok());
+    let mut programs = messages.filter(|message| {
+        let target = &message["target"];
+        let is_test = message["profile"]["test"].as_bool().unwrap_or(false);
+        target["name"] == name && target["kind"][0] == "bin" && !is_test
+    });
+    programs.find_map(|message| Some(message["executable"].as_str()?.into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_found_among_tests_and_libraries_of_its_name() {
+        let messages = r#"{"reason":"build-script-executed"}
+{"target":{"kind":["lib"],"name":"a"},"profile":{"test":false},"executable":null}
+{"target":{"kind":["bin"],"name":"a"},"profile":{"test":true},"executable":"/t/deps/a-1"}
+{"target":{"kind":["bin"],"name":"a"},"profile":{"test":false},"executable":"/t/a"}
+not JSON"#;
+        assert_eq!(program(messages, "a"), Some(PathBuf::from("/t/a")));
+        assert_eq!(program(messages, "b"), None);
+    }
 }
