@@ -79,7 +79,7 @@ impl<T: Format> Forward for Team<Engine<T>> {
     }
 
     fn n_classes(&self) -> usize {
-        self.work().layers().head.last().map_or(0, |layer| layer.columns.outputs)
+        self.work().layers().head.last().map_or(0, |layer| layer.columns.outputs())
     }
 }
 

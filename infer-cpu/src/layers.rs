@@ -120,7 +120,8 @@ impl Packer<'_> {
                 let mut plain = empty::<crate::precision::F32>(self.kernels, &dense);
                 plain.fill(|input, output| dense.at(input, output));
                 // Bias and ReLU are for after the product.
-                (plain.bias, plain.relu) = (vec![0.0; plain.bias.len()], false);
+                plain.biases_mut().fill(0.0);
+                plain.set_relu(false);
                 Conv::Turned(self.packed(&dense), plain)
             }
         }
@@ -165,8 +166,8 @@ impl Packer<'_> {
 /// Panels of zeros for `dense`, with its biases.
 fn empty<T: Format>(kernels: &Kernels, dense: &Dense) -> Panels<T::Weight> {
     let mut panels = panels::<T>(kernels, dense.inputs, dense.outputs);
-    panels.bias[..dense.outputs].copy_from_slice(&dense.bias);
-    panels.relu = dense.relu;
+    panels.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
+    panels.set_relu(dense.relu);
     panels
 }
 
@@ -211,7 +212,7 @@ impl<T: Format> Packed<T> {
     pub fn set(&mut self, matrix: &Matrix<'_>, range: f32) {
         let at = |input: usize, output: usize| matrix.data[input * matrix.stride + output];
         T::fill(&mut self.panels, range, at);
-        let (inputs, outputs) = (self.panels.inputs, self.panels.outputs);
+        let (inputs, outputs) = (self.panels.inputs(), self.panels.outputs());
         let gain = |output| (0..inputs).map(|input| at(input, output).abs()).sum::<f32>();
         self.gain = (0..outputs).map(gain).fold(0.0, f32::max);
     }

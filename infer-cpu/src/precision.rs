@@ -285,15 +285,13 @@ impl Format for I8 {
 
     fn fill(panels: &mut Panels<i8>, range: f32, weight: impl Fn(usize, usize) -> f32) {
         let per_activation = range / f32::from(I8_LARGEST);
-        panels.scale.resize(panels.padded_outputs(), 1.0);
-        for output in 0..panels.outputs {
-            let weights = (0..panels.inputs).map(|input| weight(input, output));
-            let step = step_of(weights);
-            for input in 0..panels.inputs {
-                let at = panels.index(input, output);
-                panels.data[at] = (weight(input, output) / step).round_ties_even() as i8;
+        for output in 0..panels.outputs() {
+            let step = step_of((0..panels.inputs()).map(|input| weight(input, output)));
+            for input in 0..panels.inputs() {
+                let level = (weight(input, output) / step).round_ties_even() as i8;
+                panels.set(input, output, level);
             }
-            panels.scale[output] = step * per_activation;
+            panels.scales_mut()[output] = step * per_activation;
         }
     }
 
@@ -305,9 +303,8 @@ impl Format for I8 {
         columns.fill(|input, output| {
             (dense.at(input, output) / steps[output]).round_ties_even() as i8
         });
-        columns.scale = steps;
-        columns.scale.resize(columns.bias.len(), 1.0);
-        columns.bias[..dense.outputs].copy_from_slice(&dense.bias);
+        columns.scales_mut()[..dense.outputs].copy_from_slice(&steps);
+        columns.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
         columns
     }
 }
@@ -322,6 +319,6 @@ fn step_of(weights: impl Iterator<Item = f32>) -> f32 {
 fn columns<W: Copy + Default>(dense: &Dense, store: impl Fn(f32) -> W) -> Columns<W> {
     let mut columns = Columns::zeros(dense.inputs, dense.outputs);
     columns.fill(|input, output| store(dense.at(input, output)));
-    columns.bias[..dense.outputs].copy_from_slice(&dense.bias);
+    columns.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
     columns
 }

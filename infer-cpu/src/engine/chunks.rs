@@ -31,7 +31,7 @@ impl<T: Format> Engine<T> {
         let mut scratch = lock(&self.scratch[thread]);
         let Scratch { edged, wide, narrow: [from, to], .. } = &mut *scratch;
         let rows = block_rows(&points, first_block + slot);
-        let n = rows.n;
+        let n = rows.n();
         let first = self.first(pass);
         let mut width = first.panels.padded_outputs();
         match pass {
@@ -53,7 +53,7 @@ impl<T: Format> Engine<T> {
                 break;
             }
             let gemm = T::gemm(self.kernels).expect("invariant: kernels fit the format");
-            let rows = Rows { data: from, stride: width, n };
+            let rows = Rows::new(from, width, n);
             width = layer.width();
             (gemm.rows)(&rows, &layer.panels, 0..layer.panels.n_panels(), wide, width);
             if self.observing {
@@ -63,24 +63,24 @@ impl<T: Format> Engine<T> {
             std::mem::swap(from, to);
         }
         let last = self.place(self.last(pass), &feature, &folded);
-        write(&self.blocks[slot]).set(self.kernels, &Rows { data: from, stride: width, n }, last);
+        write(&self.blocks[slot]).set(self.kernels, &Rows::new(from, width, n), last);
     }
 
     /// `rows` of coordinates, each followed by what surrounds the point.
     fn with_surroundings<'a>(&self, rows: &Rows<'a, f32>, edged: &'a mut [f32]) -> Rows<'a, f32> {
         if self.edges.is_empty() {
-            return Rows { data: rows.data, stride: rows.stride, n: rows.n };
+            return *rows;
         }
         let cloud = read(&self.surroundings);
         let first = self.layers.trunk[0].first();
-        let (inputs, stride) = (first.panels.inputs, first.panels.padded_inputs);
-        let points = rows.data.chunks_exact(rows.stride);
+        let (inputs, stride) = (first.panels.inputs(), first.panels.padded_inputs());
+        let points = rows.data().chunks_exact(rows.stride());
         for (point, row) in points.zip(edged.chunks_exact_mut(stride)) {
             let (centre, features) = row[..inputs].split_at_mut(3);
             centre.copy_from_slice(&point[..3]);
             self.edges.features([point[0], point[1], point[2]], &cloud, features);
         }
-        Rows { data: &edged[..rows.n * stride], stride, n: rows.n }
+        Rows::new(&edged[..rows.n() * stride], stride, rows.n())
     }
 
     /// Rounds a layer's outputs for the layer `next`, and notes what is lost.
@@ -110,8 +110,7 @@ impl<T: Format> Engine<T> {
         for slot in 0..n_blocks {
             let first_row = (first_block + slot) * BLOCK;
             let block = read(&self.blocks[slot]);
-            let rows =
-                Rows { data: &block.features[..], stride, n: BLOCK.min(n_points - first_row) };
+            let rows = Rows::new(&block.features[..], stride, BLOCK.min(n_points - first_row));
             let is_pooled = pool.screens && block.has_levels && {
                 let sieve = &mut lock(&self.scratch[thread]).sieve;
                 pool.screen::<T>(
@@ -150,11 +149,11 @@ impl<T: Format> Engine<T> {
 impl<T: Format> Block<T> {
     /// Keeps `rows` for the layer `next`.
     fn set(&mut self, kernels: &Kernels, rows: &Rows<'_, T::Activation>, next: &Packed<T>) {
-        let n = rows.n * rows.stride;
-        self.features[..n].copy_from_slice(&rows.data[..n]);
-        let plain = next.screen.as_ref().and_then(|_| T::as_f32(rows.data, &mut []));
+        let n = rows.n() * rows.stride();
+        self.features[..n].copy_from_slice(&rows.data()[..n]);
+        let plain = next.screen.as_ref().and_then(|_| T::as_f32(rows.data(), &mut []));
         self.has_levels = plain.is_some_and(|(data, _)| {
-            self.levels.take(kernels, &Rows { data, stride: rows.stride, n: rows.n })
+            self.levels.take(kernels, &Rows::new(data, rows.stride(), rows.n()))
         });
     }
 }
@@ -182,9 +181,9 @@ impl<S: Copy> Group<S> {
         first_row: usize,
     ) -> bool {
         let channels = n_channels(last, group);
-        let plain = T::as_f32(rows.data, &mut self.maxima[..channels]);
+        let plain = T::as_f32(rows.data(), &mut self.maxima[..channels]);
         let (Some(screen), Some((data, maxima))) = (&last.screen, plain) else { return false };
-        let rows = Rows { data, stride: rows.stride, n: rows.n };
+        let rows = Rows::new(data, rows.stride(), rows.n());
         let winners = &mut self.winners[..channels];
         let mut best = Best { maxima, winners, first_row: first_row as u32 };
         screen.pool(kernels, group, (&rows, levels), sieve, &mut best)
@@ -219,5 +218,5 @@ fn n_channels<T: Format>(last: &Packed<T>, group: usize) -> usize {
 /// The rows of block `block` of `points`.
 fn block_rows(points: &[f32], block: usize) -> Rows<'_, f32> {
     let n = BLOCK.min(points.len() / 4 - block * BLOCK);
-    Rows { data: &points[block * BLOCK * 4..][..n * 4], stride: 4, n }
+    Rows::new(&points[block * BLOCK * 4..][..n * 4], 4, n)
 }

@@ -41,7 +41,7 @@ impl<T: Format> Engine<T> {
     pub fn memory(&self) -> Memory {
         let pooled = self.groups.len() * GROUP;
         let vector = self.vector_out.len() * VECTOR_CHUNK * super::VECTOR_BLOCK;
-        let product = read(&self.folded).panels.data.len() * 2;
+        let product = read(&self.folded).panels.n_weights() * 2;
         Memory {
             values: Vec::with_capacity(pooled.max(vector)),
             winners: Vec::with_capacity(pooled),
@@ -106,14 +106,14 @@ impl<T: Format> Engine<T> {
         let spread = Spread::new(read(&self.points).len() / 4);
         memory.values.clear();
         memory.winners.clear();
-        for (g, first) in (0..panels.outputs).step_by(GROUP).enumerate() {
+        for (g, first) in (0..panels.outputs()).step_by(GROUP).enumerate() {
             let group = lock(&self.groups[g]);
-            let channels = first..panels.outputs.min(first + GROUP);
+            let channels = first..panels.outputs().min(first + GROUP);
             for (channel, (&sum, &winner)) in channels.zip(group.maxima.iter().zip(&group.winners))
             {
-                let scale = panels.scale.get(channel).copied().unwrap_or(1.0);
-                let value = T::widen(sum) * scale + panels.bias[channel];
-                let is_cut = panels.relu && value < 0.0;
+                let scale = panels.scales().get(channel).copied().unwrap_or(1.0);
+                let value = T::widen(sum) * scale + panels.biases()[channel];
+                let is_cut = panels.relu() && value < 0.0;
                 memory.values.push(if is_cut { 0.0 } else { value });
                 memory.winners.push(spread.point(winner as usize) as u32);
             }
@@ -132,14 +132,14 @@ impl<T: Format> Engine<T> {
             engine.begin(Task::Vector { head, layer: i });
             let columns = &layer.columns;
             let n_chunks = columns.n_blocks().div_ceil(VECTOR_CHUNK);
-            if columns.inputs * columns.outputs < SMALL_VECTOR {
+            if columns.inputs() * columns.outputs() < SMALL_VECTOR {
                 (0..n_chunks).for_each(|chunk| engine.chunk(0, chunk));
             } else {
                 team.run(n_chunks);
             }
             values.clear();
             for chunk in 0..n_chunks {
-                let left = columns.outputs - values.len();
+                let left = columns.outputs() - values.len();
                 let out = lock(&engine.vector_out[chunk]);
                 values.extend(out.iter().take(left));
             }
@@ -169,8 +169,8 @@ impl<T: Format> Engine<T> {
         let Conv::Turned(after, plain) = &self.layers.trunk[self.layers.transform_after] else {
             unreachable!("invariant: the layer after a feature transform has that role");
         };
-        let k = plain.inputs;
-        let fold = !T::SIGNED || self.observing || folding_pays(n, after.panels.outputs);
+        let k = plain.inputs();
+        let fold = !T::SIGNED || self.observing || folding_pays(n, after.panels.outputs());
         self.fold.store(fold, Ordering::Relaxed);
         let range = self.range_before_transform();
         if !fold {
@@ -179,7 +179,7 @@ impl<T: Format> Engine<T> {
         }
         let width = plain.padded_outputs();
         product.resize(k * width, 0.0);
-        let rows = Rows { data: transform, stride: k, n: k };
+        let rows = Rows::new(transform, k, k);
         self.multiply(&rows, plain, product, width);
         write(&self.folded).set(&Matrix { data: product, stride: width }, range);
     }

@@ -157,10 +157,10 @@ impl<T: Format> Engine<T> {
         });
         let (feature, folded) = match transformed {
             Some((k, after)) => {
-                let mut folded = Packed::zeros(kernels, k, after.panels.outputs);
+                let mut folded = Packed::zeros(kernels, k, after.panels.outputs());
                 folded.name.clone_from(&after.name);
-                folded.panels.bias.clone_from(&after.panels.bias);
-                folded.panels.relu = after.panels.relu;
+                folded.panels.biases_mut().copy_from_slice(after.panels.biases());
+                folded.panels.set_relu(after.panels.relu());
                 folded.range = after.range;
                 (Packed::zeros(kernels, k, k), folded)
             }
@@ -169,7 +169,7 @@ impl<T: Format> Engine<T> {
         let Widths { hidden, pooled, vector } = Widths::of(&layers);
         let screens = pooled_layers(&layers).any(|layer| layer.screen.is_some());
         let edges = Edges::new(&layers.edges);
-        let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs };
+        let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs() };
         let scratch = || Scratch {
             edged: vec![0.0; edged],
             wide: vec![0.0; BLOCK * hidden],
@@ -250,7 +250,7 @@ impl<T: Format> Engine<T> {
     /// How many features `pass` pools.
     pub fn channels(&self, pass: Pass) -> usize {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
-        self.place(self.last(pass), &feature, &folded).panels.outputs
+        self.place(self.last(pass), &feature, &folded).panels.outputs()
     }
 
     /// What the passes since [`Engine::reset`] met.
@@ -318,7 +318,7 @@ impl Widths {
         Self {
             hidden: hidden.max().unwrap_or(0),
             pooled: pooled.max().unwrap_or(0),
-            vector: columns.map(|c| c.bias.len().max(c.inputs)).max().unwrap_or(0),
+            vector: columns.map(|c| c.padded_outputs().max(c.inputs())).max().unwrap_or(0),
         }
     }
 }

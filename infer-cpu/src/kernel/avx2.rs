@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use half::f16;
 
-use super::x86::Lanes;
+use super::x86::{Lanes, implement_lanes};
 use super::{Gemm, Screening, declare_kernels};
 
 const NR: usize = 16;
@@ -33,190 +33,61 @@ declare_kernels!(
 
 super::x86::entries!(__m256, 8, "avx2,fma,f16c");
 
-impl Lanes for __m256 {
-    type Int = __m256i;
-    const N: usize = 8;
-    const ROWS: usize = 6;
-
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_set1_ps(value) }
-    }
-
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_loadu_ps(from) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_f16(from: *const f16) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_cvtph_ps(_mm_loadu_si128(from.cast())) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_i8(from: *const i8) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64(from.cast()))) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_storeu_ps(to, self) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_f16(self, to: *mut f16) {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm_storeu_si128(to.cast(), _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self)) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_u8(self, to: *mut u8) {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            let ints = _mm256_cvtps_epi32(self);
-            let words =
-                _mm_packs_epi32(_mm256_castsi256_si128(ints), _mm256_extracti128_si256::<1>(ints));
-            _mm_storel_epi64(to.cast(), _mm_packus_epi16(words, words))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn fma(self, factor: Self, term: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_fmadd_ps(self, factor, term) }
-    }
-
-    #[inline(always)]
-    unsafe fn mul(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_mul_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_add_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_sub_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_max_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_min_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn abs(self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self) }
-    }
-
-    #[inline(always)]
-    unsafe fn round(self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self) }
-    }
-
-    #[inline(always)]
-    unsafe fn greater(self, other: Self) -> u32 {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self, other)) as u32 }
-    }
-
-    #[inline(always)]
-    unsafe fn total(self) -> f32 {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            let four = _mm_add_ps(_mm256_castps256_ps128(self), _mm256_extractf128_ps::<1>(self));
-            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
-            _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            let greater = _mm256_cmp_ps::<_CMP_GT_OQ>(self, *best);
-            *best = _mm256_blendv_ps(*best, self, greater);
-            *who = _mm256_blendv_epi8(*who, index, _mm256_castps_si256(greater))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn splat_int(value: i32) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_set1_epi32(value) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_int(from: *const i32) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_loadu_si256(from.cast()) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_int(int: Self::Int, to: *mut i32) {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_storeu_si256(to.cast(), int) }
-    }
-
-    #[inline(always)]
-    unsafe fn add_int(a: Self::Int, b: Self::Int) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_add_epi32(a, b) }
-    }
-
-    #[inline(always)]
-    unsafe fn max_int(a: Self::Int, b: Self::Int) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_max_epi32(a, b) }
-    }
-
-    #[inline(always)]
-    unsafe fn keep_greater_int(
+implement_lanes!(__m256, int: __m256i, lanes: 8, rows: 6, {
+    fn splat(value: f32) -> Self = _mm256_set1_ps(value);
+    fn load(from: *const f32) -> Self = _mm256_loadu_ps(from);
+    fn load_f16(from: *const f16) -> Self = _mm256_cvtph_ps(_mm_loadu_si128(from.cast()));
+    fn load_i8(from: *const i8) -> Self =
+        _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64(from.cast())));
+    fn store(self, to: *mut f32) = _mm256_storeu_ps(to, self);
+    fn store_f16(self, to: *mut f16) =
+        _mm_storeu_si128(to.cast(), _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self));
+    fn store_u8(self, to: *mut u8) = {
+        let ints = _mm256_cvtps_epi32(self);
+        let words =
+            _mm_packs_epi32(_mm256_castsi256_si128(ints), _mm256_extracti128_si256::<1>(ints));
+        _mm_storel_epi64(to.cast(), _mm_packus_epi16(words, words))
+    };
+    fn fma(self, factor: Self, term: Self) -> Self = _mm256_fmadd_ps(self, factor, term);
+    fn mul(self, other: Self) -> Self = _mm256_mul_ps(self, other);
+    fn add(self, other: Self) -> Self = _mm256_add_ps(self, other);
+    fn sub(self, other: Self) -> Self = _mm256_sub_ps(self, other);
+    fn max(self, other: Self) -> Self = _mm256_max_ps(self, other);
+    fn min(self, other: Self) -> Self = _mm256_min_ps(self, other);
+    fn abs(self) -> Self = _mm256_andnot_ps(_mm256_set1_ps(-0.0), self);
+    fn round(self) -> Self =
+        _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self);
+    fn greater(self, other: Self) -> u32 =
+        _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self, other)) as u32;
+    fn total(self) -> f32 = {
+        let four = _mm_add_ps(_mm256_castps256_ps128(self), _mm256_extractf128_ps::<1>(self));
+        let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+        _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
+    };
+    fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
+        let greater = _mm256_cmp_ps::<_CMP_GT_OQ>(self, *best);
+        *best = _mm256_blendv_ps(*best, self, greater);
+        *who = _mm256_blendv_epi8(*who, index, _mm256_castps_si256(greater))
+    };
+    fn splat_int(value: i32) -> Self::Int = _mm256_set1_epi32(value);
+    fn load_int(from: *const i32) -> Self::Int = _mm256_loadu_si256(from.cast());
+    fn store_int(int: Self::Int, to: *mut i32) = _mm256_storeu_si256(to.cast(), int);
+    fn add_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm256_add_epi32(a, b);
+    fn max_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm256_max_epi32(a, b);
+    fn keep_greater_int(
         value: Self::Int,
         best: &mut Self::Int,
         who: &mut Self::Int,
         index: Self::Int,
-    ) {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            let greater = _mm256_cmpgt_epi32(value, *best);
-            *best = _mm256_blendv_epi8(*best, value, greater);
-            *who = _mm256_blendv_epi8(*who, index, greater)
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            // Two products of at most 127 * 127 fit 16 bits: nothing saturates.
-            let pairs = _mm256_maddubs_epi16(a, w);
-            _mm256_add_epi32(sum, _mm256_madd_epi16(pairs, _mm256_set1_epi16(1)))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn to_float(int: Self::Int) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm256_cvtepi32_ps(int) }
-    }
-}
+    ) = {
+        let greater = _mm256_cmpgt_epi32(value, *best);
+        *best = _mm256_blendv_epi8(*best, value, greater);
+        *who = _mm256_blendv_epi8(*who, index, greater)
+    };
+    fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int = {
+        // Two products of at most 127 * 127 fit 16 bits: nothing saturates.
+        let pairs = _mm256_maddubs_epi16(a, w);
+        _mm256_add_epi32(sum, _mm256_madd_epi16(pairs, _mm256_set1_epi16(1)))
+    };
+    fn to_float(int: Self::Int) -> Self = _mm256_cvtepi32_ps(int);
+});

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use half::f16;
 
-use super::x86::Lanes;
+use super::x86::{Lanes, implement_lanes};
 use super::{Gemm, Screening, declare_kernels};
 
 const NR: usize = 32;
@@ -37,179 +37,48 @@ declare_kernels!(
 
 super::x86::entries!(__m512, 4, "avx512f,avx512bw,avx512vl,avx512vnni");
 
-impl Lanes for __m512 {
-    type Int = __m512i;
-    const N: usize = 16;
-    const ROWS: usize = 12;
-
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_set1_ps(value) }
-    }
-
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_loadu_ps(from) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_f16(from: *const f16) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_cvtph_ps(_mm256_loadu_si256(from.cast())) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_i8(from: *const i8) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(_mm_loadu_si128(from.cast()))) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_storeu_ps(to, self) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_f16(self, to: *mut f16) {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            _mm256_storeu_si256(to.cast(), _mm512_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn store_u8(self, to: *mut u8) {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm_storeu_si128(to.cast(), _mm512_cvtepi32_epi8(_mm512_cvtps_epi32(self))) }
-    }
-
-    #[inline(always)]
-    unsafe fn fma(self, factor: Self, term: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_fmadd_ps(self, factor, term) }
-    }
-
-    #[inline(always)]
-    unsafe fn mul(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_mul_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_add_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_sub_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_max_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn min(self, other: Self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_min_ps(self, other) }
-    }
-
-    #[inline(always)]
-    unsafe fn abs(self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_abs_ps(self) }
-    }
-
-    #[inline(always)]
-    unsafe fn round(self) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_roundscale_ps::<_MM_FROUND_TO_NEAREST_INT>(self) }
-    }
-
-    #[inline(always)]
-    unsafe fn greater(self, other: Self) -> u32 {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, other).into() }
-    }
-
-    #[inline(always)]
-    unsafe fn total(self) -> f32 {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_reduce_add_ps(self) }
-    }
-
-    #[inline(always)]
-    unsafe fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            let greater = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, *best);
-            *best = _mm512_mask_mov_ps(*best, greater, self);
-            *who = _mm512_mask_mov_epi32(*who, greater, index)
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn splat_int(value: i32) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_set1_epi32(value) }
-    }
-
-    #[inline(always)]
-    unsafe fn load_int(from: *const i32) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_loadu_si512(from.cast()) }
-    }
-
-    #[inline(always)]
-    unsafe fn store_int(int: Self::Int, to: *mut i32) {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_storeu_si512(to.cast(), int) }
-    }
-
-    #[inline(always)]
-    unsafe fn add_int(a: Self::Int, b: Self::Int) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_add_epi32(a, b) }
-    }
-
-    #[inline(always)]
-    unsafe fn max_int(a: Self::Int, b: Self::Int) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_max_epi32(a, b) }
-    }
-
-    #[inline(always)]
-    unsafe fn keep_greater_int(
+implement_lanes!(__m512, int: __m512i, lanes: 16, rows: 12, {
+    fn splat(value: f32) -> Self = _mm512_set1_ps(value);
+    fn load(from: *const f32) -> Self = _mm512_loadu_ps(from);
+    fn load_f16(from: *const f16) -> Self = _mm512_cvtph_ps(_mm256_loadu_si256(from.cast()));
+    fn load_i8(from: *const i8) -> Self =
+        _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(_mm_loadu_si128(from.cast())));
+    fn store(self, to: *mut f32) = _mm512_storeu_ps(to, self);
+    fn store_f16(self, to: *mut f16) =
+        _mm256_storeu_si256(to.cast(), _mm512_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self));
+    fn store_u8(self, to: *mut u8) =
+        _mm_storeu_si128(to.cast(), _mm512_cvtepi32_epi8(_mm512_cvtps_epi32(self)));
+    fn fma(self, factor: Self, term: Self) -> Self = _mm512_fmadd_ps(self, factor, term);
+    fn mul(self, other: Self) -> Self = _mm512_mul_ps(self, other);
+    fn add(self, other: Self) -> Self = _mm512_add_ps(self, other);
+    fn sub(self, other: Self) -> Self = _mm512_sub_ps(self, other);
+    fn max(self, other: Self) -> Self = _mm512_max_ps(self, other);
+    fn min(self, other: Self) -> Self = _mm512_min_ps(self, other);
+    fn abs(self) -> Self = _mm512_abs_ps(self);
+    fn round(self) -> Self = _mm512_roundscale_ps::<_MM_FROUND_TO_NEAREST_INT>(self);
+    fn greater(self, other: Self) -> u32 = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, other).into();
+    fn total(self) -> f32 = _mm512_reduce_add_ps(self);
+    fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
+        let greater = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, *best);
+        *best = _mm512_mask_mov_ps(*best, greater, self);
+        *who = _mm512_mask_mov_epi32(*who, greater, index)
+    };
+    fn splat_int(value: i32) -> Self::Int = _mm512_set1_epi32(value);
+    fn load_int(from: *const i32) -> Self::Int = _mm512_loadu_si512(from.cast());
+    fn store_int(int: Self::Int, to: *mut i32) = _mm512_storeu_si512(to.cast(), int);
+    fn add_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm512_add_epi32(a, b);
+    fn max_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm512_max_epi32(a, b);
+    fn keep_greater_int(
         value: Self::Int,
         best: &mut Self::Int,
         who: &mut Self::Int,
         index: Self::Int,
-    ) {
-        // SAFETY: as the trait's callers promise.
-        unsafe {
-            let greater = _mm512_cmpgt_epi32_mask(value, *best);
-            *best = _mm512_mask_mov_epi32(*best, greater, value);
-            *who = _mm512_mask_mov_epi32(*who, greater, index)
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_dpbusd_epi32(sum, a, w) }
-    }
-
-    #[inline(always)]
-    unsafe fn to_float(int: Self::Int) -> Self {
-        // SAFETY: as the trait's callers promise.
-        unsafe { _mm512_cvtepi32_ps(int) }
-    }
-}
+    ) = {
+        let greater = _mm512_cmpgt_epi32_mask(value, *best);
+        *best = _mm512_mask_mov_epi32(*best, greater, value);
+        *who = _mm512_mask_mov_epi32(*who, greater, index)
+    };
+    fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int =
+        _mm512_dpbusd_epi32(sum, a, w);
+    fn to_float(int: Self::Int) -> Self = _mm512_cvtepi32_ps(int);
+});

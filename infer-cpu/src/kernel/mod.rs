@@ -34,6 +34,7 @@ mod neon_dot;
 #[cfg(target_arch = "aarch64")]
 mod neon_f16;
 mod panels;
+mod pooled;
 mod scalar;
 #[cfg(test)]
 mod suite;
@@ -64,7 +65,8 @@ macro_rules! declare_kernels {
 }
 use declare_kernels;
 
-pub use panels::{Columns, Panels};
+pub(crate) use panels::{Columns, Panels};
+pub use pooled::PooledProducts;
 
 /// Output channels are padded to a multiple of this, so that the rows of one
 /// layer are whole vectors of any kernel for the next.
@@ -72,40 +74,73 @@ pub const WIDTH_STEP: usize = 64;
 
 /// The largest activation of an int8 layer: seven bits, so that kernels for
 /// signed and for unsigned activations take the same bytes.
-pub const I8_LARGEST: u8 = 127;
+pub(crate) const I8_LARGEST: u8 = 127;
 
-/// Activations of `n` points, row by row.
+/// Activations of `n` points, row by row, `stride` apart; the last row may be
+/// shorter.
+///
+/// # Invariant
+/// Every row begins within the data: `(n - 1) * stride` does not exceed its
+/// length. [`Rows::new`] checks it and the fields are private, so that
+/// [`Rows::check`] cannot wrap.
 #[derive(Clone, Copy)]
-pub struct Rows<'a, T> {
-    /// `n` rows of `stride` elements; the last may be shorter.
-    pub data: &'a [T],
-    /// From one row to the next.
-    pub stride: usize,
-    /// How many rows.
-    pub n: usize,
+pub(crate) struct Rows<'a, T> {
+    data: &'a [T],
+    stride: usize,
+    n: usize,
 }
 
-impl<T> Rows<'_, T> {
-    /// That `k` elements of every row are there, which unsafe kernels rely on.
-    fn check(&self, k: usize) {
-        let needed = if self.n == 0 { 0 } else { (self.n - 1) * self.stride + k };
-        assert!(self.stride >= k && self.data.len() >= needed, "rows end before their width");
+impl<'a, T> Rows<'a, T> {
+    /// `n` rows of `data`, `stride` apart.
+    ///
+    /// # Panics
+    /// If a row begins beyond the data.
+    pub fn new(data: &'a [T], stride: usize, n: usize) -> Self {
+        assert!(holds_rows(data.len(), n, stride, 0), "rows begin beyond their data");
+        Self { data, stride, n }
     }
+
+    /// The elements of all rows.
+    pub fn data(&self) -> &'a [T] {
+        self.data
+    }
+
+    /// How far one row's beginning is from the next.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// How many rows there are.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// Asserts that every row has `k` elements, which unsafe kernels rely on.
+    fn check(&self, k: usize) {
+        assert!(holds_rows(self.data.len(), self.n, self.stride, k), "rows end before their width");
+    }
+}
+
+/// Whether `len` elements hold `n` rows of `width`, `stride` apart.
+fn holds_rows(len: usize, n: usize, stride: usize, width: usize) -> bool {
+    let Some(before_last) = n.checked_sub(1) else { return true };
+    let end = before_last.checked_mul(stride).and_then(|last| last.checked_add(width));
+    width <= stride && end.is_some_and(|end| end <= len)
 }
 
 /// `rows` times the panels of a range, scaled, with bias and ReLU as the panels
 /// say, into rows of `out` that are `out_stride` apart. The column of a channel
 /// is its number.
-pub type RowsKernel<A, W> =
+pub(crate) type RowsKernel<A, W> =
     fn(&Rows<'_, A>, &Panels<W>, Range<usize>, out: &mut [f32], out_stride: usize);
 
 /// Raises each of `maxima` (a channel of the range each) to the largest
 /// accumulator over the rows, before scale and bias. NaN raises nothing.
-pub type MaxKernel<A, W, C> = fn(&Rows<'_, A>, &Panels<W>, Range<usize>, maxima: &mut [C]);
+pub(crate) type MaxKernel<A, W, C> = fn(&Rows<'_, A>, &Panels<W>, Range<usize>, maxima: &mut [C]);
 
 /// The same, and remembers in `winners` the row (counted from `first_row`) that
 /// raised each last. Of equal rows the first wins.
-pub type ArgmaxKernel<A, W, C> = fn(
+pub(crate) type ArgmaxKernel<A, W, C> = fn(
     &Rows<'_, A>,
     &Panels<W>,
     Range<usize>,
@@ -116,7 +151,7 @@ pub type ArgmaxKernel<A, W, C> = fn(
 
 /// Matrix products of one number format: activations `A`, weights `W`,
 /// accumulators `C`.
-pub struct Gemm<A, W, C> {
+pub(crate) struct Gemm<A, W, C> {
     /// Output channels of a panel; divides [`WIDTH_STEP`].
     pub nr: usize,
     /// Panels hold inputs up to a multiple of this; divides [`WIDTH_STEP`].
@@ -135,11 +170,11 @@ pub struct Gemm<A, W, C> {
 /// `nonzero` holds (input, value) in the order of inputs; what is left out
 /// counts as 0 and its column is never read. Writes dot products and biases of
 /// a range of blocks to `out`.
-pub type Gemv<W> = fn(nonzero: &[(u32, f32)], &Columns<W>, Range<usize>, out: &mut [f32]);
+pub(crate) type Gemv<W> = fn(nonzero: &[(u32, f32)], &Columns<W>, Range<usize>, out: &mut [f32]);
 
 /// What rounding a row to levels lost and left, in levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LevelSums {
+pub(crate) struct LevelSums {
     /// The sum of the squares of what rounding took.
     pub lost: f32,
     /// The sum of the squares of the levels.
@@ -149,7 +184,7 @@ pub struct LevelSums {
 /// A product that a screening could not rule out to be the largest of its
 /// channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Its row.
     pub row: u16,
     /// Its channel.
@@ -158,7 +193,7 @@ pub struct Candidate {
 
 /// What tells the largest products from estimates of all of them, and from few
 /// in fp32. Rows are whole vectors: multiples of [`WIDTH_STEP`].
-pub struct Screening {
+pub(crate) struct Screening {
     /// Rounds a row of `value * per_unit`, 0 to [`I8_LARGEST`] (clipped there),
     /// to levels.
     pub levels: fn(&[f32], per_unit: f32, out: &mut [u8]) -> LevelSums,
@@ -173,17 +208,17 @@ pub struct Screening {
 
 /// Puts every value above the floor of its column into `found`, row by row.
 /// Returns how many there are, or `None` if there is no room for them.
-pub type Sift = fn(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize>;
+pub(crate) type Sift = fn(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize>;
 
 /// Products of `candidates`: rows by `weights`, which has as many elements for
 /// each channel as `rows` has from one row to the next, a multiple of
 /// [`WIDTH_STEP`]. One product's roundings do not depend on the others.
-pub type Dots =
+pub(crate) type Dots =
     fn(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &mut [f32]);
 
 /// Cloud coordinates as structure of arrays, for sampling.
 #[derive(Clone, Copy)]
-pub struct Soa<'a> {
+pub(crate) struct Soa<'a> {
     /// Coordinates along x.
     pub x: &'a [f32],
     /// Along y, as many.
@@ -197,31 +232,31 @@ pub struct Kernels {
     /// Which instruction set.
     pub name: KernelName,
     /// fp32.
-    pub f32: Option<Gemm<f32, f32, f32>>,
+    pub(crate) f32: Option<Gemm<f32, f32, f32>>,
     /// fp16 activations and weights.
-    pub f16: Option<Gemm<f16, f16, f32>>,
+    pub(crate) f16: Option<Gemm<f16, f16, f32>>,
     /// Unsigned seven-bit activations, int8 weights.
-    pub i8: Option<Gemm<u8, i8, i32>>,
+    pub(crate) i8: Option<Gemm<u8, i8, i32>>,
     /// Whether int8 products cost so much less than those of fp32 that most of
     /// the latter are worth ruling out by the former.
-    pub screens: bool,
+    pub(crate) screens: bool,
     /// What it takes to do so.
-    pub screening: Screening,
+    pub(crate) screening: Screening,
     /// fp32 weights.
-    pub gemv_f32: Gemv<f32>,
+    pub(crate) gemv_f32: Gemv<f32>,
     /// fp16 weights, fp32 arithmetic.
-    pub gemv_f16: Gemv<f16>,
+    pub(crate) gemv_f16: Gemv<f16>,
     /// int8 weights, fp32 arithmetic.
-    pub gemv_i8: Gemv<i8>,
+    pub(crate) gemv_i8: Gemv<i8>,
     /// Rounds to fp16 and returns the largest magnitude before rounding.
-    pub narrow_f16: fn(&[f32], &mut [f16]) -> f32,
+    pub(crate) narrow_f16: fn(&[f32], &mut [f16]) -> f32,
     /// Rounds `value * per_unit` to 0..=[`I8_LARGEST`] and returns how many
     /// values had to be clipped at the top.
-    pub narrow_i8: fn(&[f32], per_unit: f32, &mut [u8]) -> u64,
+    pub(crate) narrow_i8: fn(&[f32], per_unit: f32, &mut [u8]) -> u64,
     /// One step of farthest point sampling: lowers `distance` (squared, per
     /// point) to that from `pick` and returns the first of the farthest points.
     /// Squares are summed as `(dx² + dy²) + dz²`, each rounded, as NumPy does.
-    pub fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
+    pub(crate) fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
 }
 
 /// An instruction set that kernels are written for.
@@ -304,5 +339,23 @@ impl FromStr for KernelName {
             .into_iter()
             .find(|kernel| kernel.name() == word)
             .ok_or_else(|| NoSuchKernel(word.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_no_data_holds_are_refused_instead_of_wrapped() {
+        // Two strides of 2^63 are 2^64, which wraps to 0.
+        let half = usize::MAX / 2 + 1;
+        suite::panics_with("rows begin beyond", || Rows::new(&[0.0f32; 4], half, 3));
+        suite::panics_with("rows begin beyond", || Rows::new(&[0.0f32; 4], 5, 2));
+        let rows = Rows::new(&[0.0f32; 4], 2, 2);
+        rows.check(2);
+        suite::panics_with("rows end before", || rows.check(3));
+        suite::panics_with("rows end before", || rows.check(usize::MAX));
+        Rows::new(&[0.0f32; 0], 0, 0).check(usize::MAX);
     }
 }

@@ -59,7 +59,7 @@ impl Tile<2> for F32 {
 
 impl<S: Sink<float32x4_t, 2>> Feed<S, 2> for F32 {
     unsafe fn feed<const R: usize>(strip: &Strip<f32, f32>, sink: &mut S) {
-        // SAFETY: the caller's; NEON is on every aarch64.
+        // SAFETY: the contract of `Feed::feed`; NEON is on every aarch64.
         unsafe { tile_f32_8x8::<S, R>(strip, sink) }
     }
 }
@@ -88,7 +88,7 @@ unsafe fn tile_f32_8x8<S: Sink<float32x4_t, 2>, const R: usize>(
             }
             at += VECTOR_BYTES;
         }
-        // SAFETY: the caller's.
+        // SAFETY: the sink has room for the strip's rows, by the contract of `Feed::feed`.
         unsafe { sink.take(sums) };
         rows = strip.next_rows(rows);
     }
@@ -105,7 +105,7 @@ unsafe fn add_input<const LANE: i32, const R: usize>(
     a: &[float32x4_t; R],
     weights: *const f32,
 ) {
-    // SAFETY: the caller's.
+    // SAFETY: this function's contract.
     let w = unsafe { [vld1q_f32(weights), vld1q_f32(weights.add(4))] };
     for (sums, &a) in sums.iter_mut().zip(a) {
         sums[0] = vfmaq_laneq_f32::<LANE>(sums[0], w[0], a);

@@ -50,7 +50,7 @@ impl Tile<2> for I8 {
 
 impl<S: Sink<int32x4_t, 2>> Feed<S, 2> for I8 {
     unsafe fn feed<const R: usize>(strip: &Strip<u8, i8>, sink: &mut S) {
-        // SAFETY: the caller's.
+        // SAFETY: the contract of `Feed::feed`.
         unsafe { tile_i8_8x8::<S, R>(strip, sink) }
     }
 }
@@ -76,7 +76,7 @@ unsafe fn tile_i8_8x8<S: Sink<int32x4_t, 2>, const R: usize>(strip: &Strip<u8, i
             }
             at += VECTOR_BYTES;
         }
-        // SAFETY: the caller's.
+        // SAFETY: the sink has room for the strip's rows, by the contract of `Feed::feed`.
         unsafe { sink.take(sums) };
         rows = strip.next_rows(rows);
     }
@@ -94,7 +94,7 @@ unsafe fn add_group<const LANE: u32, const R: usize>(
     a: &[int8x16_t; R],
     weights: *const i8,
 ) {
-    // SAFETY: the caller's.
+    // SAFETY: this function's contract.
     let w = unsafe { [vld1q_s8(weights), vld1q_s8(weights.add(16))] };
     for (sums, &a) in sums.iter_mut().zip(a) {
         sums[0] = sdot::<LANE>(sums[0], w[0], a);

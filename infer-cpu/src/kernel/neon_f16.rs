@@ -59,7 +59,7 @@ impl Tile<4> for F16 {
 
 impl<S: HalfSink + Sink<float32x4_t, 4>> Feed<S, 4> for F16 {
     unsafe fn feed<const R: usize>(strip: &Strip<f16, f16>, sink: &mut S) {
-        // SAFETY: the caller's.
+        // SAFETY: the contract of `Feed::feed`.
         unsafe {
             match strip.inputs {
                 ..=F16_BLOCK => tile_f16_8x16::<S, R>(strip, sink),
@@ -87,10 +87,10 @@ unsafe fn feed_blocks<S: Sink<float32x4_t, 4>, const R: usize>(
                 n_tiles: 1,
                 ..*strip
             };
-            // SAFETY: part of what the caller vouches for; whole STEPs.
+            // SAFETY: a part of the strip, of whole STEPs: the contract of `Feed::feed`.
             unsafe { tile_f16_8x16::<_, R>(&block, &mut blocks) };
         }
-        // SAFETY: the caller's.
+        // SAFETY: the sink has room for the strip's rows, by the contract of `Feed::feed`.
         unsafe { sink.take(blocks.sums) };
     }
 }
@@ -130,7 +130,7 @@ unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, si
                 }
             }
             if at >= strip.row_bytes() {
-                // SAFETY: the caller's.
+                // SAFETY: the sink has room for the strip's rows, by the contract of `Feed::feed`.
                 unsafe { sink.take_half(&sums) };
                 break;
             }
@@ -151,7 +151,7 @@ unsafe fn add_inputs<const R: usize>(
     a: &[float16x8_t; R],
     weights: *const f16,
 ) {
-    // SAFETY: the caller's.
+    // SAFETY: this function's contract.
     unsafe {
         add_input::<0, R>(sums, a, weights);
         add_input::<1, R>(sums, a, weights.add(16));
@@ -175,7 +175,7 @@ unsafe fn add_input<const LANE: i32, const R: usize>(
     a: &[float16x8_t; R],
     weights: *const f16,
 ) {
-    // SAFETY: the caller's.
+    // SAFETY: this function's contract.
     let w = unsafe { [load(weights), load(weights.add(8))] };
     for (sums, &a) in sums.iter_mut().zip(a) {
         sums[0] = vfmaq_laneq_f16::<LANE>(sums[0], w[0], a);
@@ -188,6 +188,6 @@ unsafe fn add_input<const LANE: i32, const R: usize>(
 #[inline]
 #[target_feature(enable = "neon")]
 unsafe fn load(from: *const f16) -> float16x8_t {
-    // SAFETY: the caller's; an `f16` is its bits.
+    // SAFETY: this function's contract; an `f16` is its bits.
     vreinterpretq_f16_u16(unsafe { vld1q_u16(from.cast()) })
 }

@@ -9,91 +9,166 @@ use super::WIDTH_STEP;
 /// Within a panel, inputs go in groups of `group` (1, or 4 for int8, whose
 /// instructions take four inputs at once): element (input k, channel o) is at
 /// `((panel * padded_inputs / group + k / group) * nr + o % nr) * group + k % group`.
+///
+/// # Invariant
+/// Unsafe kernels rely on these lengths. The fields are private, [`Panels::zeros`]
+/// establishes them, and no method changes the length of a vector but
+/// [`Panels::scales_mut`], which makes it whole.
+///
+/// - `padded_outputs`, the length of `bias`, is a multiple of [`WIDTH_STEP`] and
+///   so of `nr`.
+/// - `data` has `padded_inputs * padded_outputs` elements.
+/// - `scale` is empty or has `padded_outputs` elements.
+/// - `padded_inputs` is a multiple of the `k_step` of construction and of `group`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Panels<W> {
-    /// Inputs of the layer.
-    pub inputs: usize,
-    /// Inputs with zeros up to the kernel's step.
-    pub padded_inputs: usize,
-    /// Output channels of the layer.
-    pub outputs: usize,
-    /// Output channels of a panel.
-    pub nr: usize,
-    /// Inputs that lie side by side.
-    pub group: usize,
-    /// The weights, zero where padded.
-    pub data: Vec<W>,
-    /// What an accumulator is multiplied by, for each padded output; empty
-    /// for 1.
-    pub scale: Vec<f32>,
-    /// What is added then, for each padded output.
-    pub bias: Vec<f32>,
-    /// Whether negative outputs become 0.
-    pub relu: bool,
+pub(crate) struct Panels<W> {
+    inputs: usize,
+    padded_inputs: usize,
+    outputs: usize,
+    nr: usize,
+    group: usize,
+    data: Vec<W>,
+    scale: Vec<f32>,
+    bias: Vec<f32>,
+    relu: bool,
 }
 
 impl<W: Copy + Default> Panels<W> {
-    /// Panels of zeros.
-    #[must_use]
+    /// Panels of zeros of `nr` channels, whose inputs are padded to a multiple
+    /// of `k_step` and go in groups of `group`.
+    ///
+    /// # Panics
+    /// If `nr` does not divide [`WIDTH_STEP`], if `group` does not divide
+    /// `k_step`, or if the weights would not fit in memory.
     pub fn zeros(
         inputs: usize,
         outputs: usize,
         (nr, k_step, group): (usize, usize, usize),
     ) -> Self {
-        let padded_inputs = inputs.next_multiple_of(k_step).max(k_step);
-        let padded_outputs = outputs.next_multiple_of(WIDTH_STEP);
+        assert!(
+            nr > 0 && WIDTH_STEP.is_multiple_of(nr),
+            "expected panels that divide {WIDTH_STEP} channels, found {nr}"
+        );
+        assert!(
+            group > 0 && k_step > 0 && k_step.is_multiple_of(group),
+            "expected a k step of whole groups of {group}, found {k_step}"
+        );
+        let padded_inputs = padded(inputs.max(1), k_step);
+        let padded_outputs = padded(outputs, WIDTH_STEP);
         Self {
             inputs,
             padded_inputs,
             outputs,
             nr,
             group,
-            data: vec![W::default(); padded_inputs * padded_outputs],
+            data: vec![W::default(); product(padded_inputs, padded_outputs)],
             scale: Vec::new(),
             bias: vec![0.0; padded_outputs],
             relu: false,
         }
     }
 
+    /// Inputs of the layer.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Inputs of the layer, with zeros up to the kernel's step.
+    pub fn padded_inputs(&self) -> usize {
+        self.padded_inputs
+    }
+
+    /// Output channels of the layer.
+    pub fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// Output channels of a panel.
+    pub fn nr(&self) -> usize {
+        self.nr
+    }
+
+    /// How many weights there are, padding included.
+    pub fn n_weights(&self) -> usize {
+        self.data.len()
+    }
+
+    /// What an accumulator is multiplied by, for each padded output; empty
+    /// for 1.
+    pub fn scales(&self) -> &[f32] {
+        &self.scale
+    }
+
+    /// The scales, to be set: one for each padded output, 1 until then.
+    pub fn scales_mut(&mut self) -> &mut [f32] {
+        self.scale.resize(self.bias.len(), 1.0);
+        &mut self.scale
+    }
+
+    /// What is added to a scaled accumulator, for each padded output.
+    pub fn biases(&self) -> &[f32] {
+        &self.bias
+    }
+
+    /// The biases, to be set: one for each padded output, 0 until then.
+    pub fn biases_mut(&mut self) -> &mut [f32] {
+        &mut self.bias
+    }
+
+    /// Whether negative outputs become 0.
+    pub fn relu(&self) -> bool {
+        self.relu
+    }
+
+    /// Sets whether negative outputs become 0.
+    pub fn set_relu(&mut self, relu: bool) {
+        self.relu = relu;
+    }
+
     /// Where the weight of `input` for `output` is.
-    #[must_use]
-    pub fn index(&self, input: usize, output: usize) -> usize {
+    fn index(&self, input: usize, output: usize) -> usize {
         let Self { nr, group, padded_inputs, .. } = self;
         let row = output / nr * (padded_inputs / group) + input / group;
         (row * nr + output % nr) * group + input % group
+    }
+
+    /// The weight of `input` for `output`.
+    pub fn weight(&self, input: usize, output: usize) -> W {
+        self.data[self.index(input, output)]
+    }
+
+    /// Sets the weight of `input` for `output`.
+    pub fn set(&mut self, input: usize, output: usize, weight: W) {
+        let at = self.index(input, output);
+        self.data[at] = weight;
     }
 
     /// Sets every weight to `weight(input, output)`.
     pub fn fill(&mut self, weight: impl Fn(usize, usize) -> W) {
         for output in 0..self.outputs {
             for input in 0..self.inputs {
-                let at = self.index(input, output);
-                self.data[at] = weight(input, output);
+                self.set(input, output, weight(input, output));
             }
         }
     }
 
     /// How many panels there are.
-    #[must_use]
     pub fn n_panels(&self) -> usize {
         self.padded_outputs() / self.nr
     }
 
     /// Output channels with those that are padding.
-    #[must_use]
     pub fn padded_outputs(&self) -> usize {
         self.bias.len()
     }
 
     /// The weights of one panel.
-    #[must_use]
     pub fn panel(&self, panel: usize) -> &[W] {
         let size = self.padded_inputs * self.nr;
         &self.data[panel * size..][..size]
     }
 
     /// The output channels of some panels.
-    #[must_use]
     pub fn channels(&self, panels: &Range<usize>) -> Range<usize> {
         panels.start * self.nr..panels.end * self.nr
     }
@@ -101,21 +176,24 @@ impl<W: Copy + Default> Panels<W> {
 
 /// A layer's weights for matrix-vector products: blocks of
 /// [`Columns::BLOCK`] outputs, within a block input by input, so that an
-/// input of 0 spares a stretch of memory.
+/// input of 0 spares a stretch of memory. Element (input j, output o) is at
+/// `(o / BLOCK * inputs + j) * BLOCK + o % BLOCK`.
+///
+/// # Invariant
+/// Unsafe kernels rely on these lengths. The fields are private,
+/// [`Columns::zeros`] establishes them, and no method changes the length of a
+/// vector but [`Columns::scales_mut`], which makes it whole.
+///
+/// - The length of `bias` is a multiple of [`Columns::BLOCK`].
+/// - `data` has `inputs` times as many elements.
+/// - `scale` is empty or has as many elements as `bias`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Columns<W> {
-    /// Inputs of the layer.
-    pub inputs: usize,
-    /// Outputs of the layer.
-    pub outputs: usize,
-    /// Element (input j, output o) is at
-    /// `(o / BLOCK * inputs + j) * BLOCK + o % BLOCK`; zero where padded.
-    pub data: Vec<W>,
-    /// What a dot product is multiplied by, for each padded output; empty
-    /// for 1.
-    pub scale: Vec<f32>,
-    /// What is added then, for each padded output.
-    pub bias: Vec<f32>,
+pub(crate) struct Columns<W> {
+    inputs: usize,
+    outputs: usize,
+    data: Vec<W>,
+    scale: Vec<f32>,
+    bias: Vec<f32>,
 }
 
 impl<W: Copy + Default> Columns<W> {
@@ -123,16 +201,55 @@ impl<W: Copy + Default> Columns<W> {
     pub const BLOCK: usize = 64;
 
     /// Columns of zeros.
-    #[must_use]
+    ///
+    /// # Panics
+    /// If the weights would not fit in memory.
     pub fn zeros(inputs: usize, outputs: usize) -> Self {
-        let padded = outputs.next_multiple_of(Self::BLOCK);
+        let padded = padded(outputs, Self::BLOCK);
         Self {
             inputs,
             outputs,
-            data: vec![W::default(); padded * inputs],
+            data: vec![W::default(); product(padded, inputs)],
             scale: Vec::new(),
             bias: vec![0.0; padded],
         }
+    }
+
+    /// Inputs of the layer.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Outputs of the layer.
+    pub fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// Outputs with those that are padding.
+    pub fn padded_outputs(&self) -> usize {
+        self.bias.len()
+    }
+
+    /// What a dot product is multiplied by, for each padded output; empty
+    /// for 1.
+    pub fn scales(&self) -> &[f32] {
+        &self.scale
+    }
+
+    /// The scales, to be set: one for each padded output, 1 until then.
+    pub fn scales_mut(&mut self) -> &mut [f32] {
+        self.scale.resize(self.bias.len(), 1.0);
+        &mut self.scale
+    }
+
+    /// What is added to a scaled dot product, for each padded output.
+    pub fn biases(&self) -> &[f32] {
+        &self.bias
+    }
+
+    /// The biases, to be set: one for each padded output, 0 until then.
+    pub fn biases_mut(&mut self) -> &mut [f32] {
+        &mut self.bias
     }
 
     /// Sets every weight to `weight(input, output)`.
@@ -147,15 +264,50 @@ impl<W: Copy + Default> Columns<W> {
     }
 
     /// How many blocks there are.
-    #[must_use]
     pub fn n_blocks(&self) -> usize {
         self.bias.len() / Self::BLOCK
     }
 
     /// The weights of one block.
-    #[must_use]
     pub fn block(&self, block: usize) -> &[W] {
         let size = self.inputs * Self::BLOCK;
         &self.data[block * size..][..size]
+    }
+}
+
+fn padded(n: usize, step: usize) -> usize {
+    n.checked_next_multiple_of(step).expect("a layer's width fits in memory")
+}
+
+fn product(a: usize, b: usize) -> usize {
+    a.checked_mul(b).expect("a layer's weights fit in memory")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::suite::panics_with;
+
+    #[test]
+    fn sizes_that_no_memory_holds_are_refused_instead_of_wrapped() {
+        let many = usize::MAX / WIDTH_STEP + 2;
+        panics_with("fit in memory", || Panels::<f32>::zeros(many, WIDTH_STEP, (8, 1, 1)));
+        panics_with("fit in memory", || Columns::<f32>::zeros(many, WIDTH_STEP));
+        panics_with("fit in memory", || Columns::<f32>::zeros(1, usize::MAX));
+    }
+
+    #[test]
+    fn panels_that_no_kernel_reads_are_refused() {
+        panics_with("found 24", || Panels::<f32>::zeros(1, 1, (24, 1, 1)));
+        panics_with("found 6", || Panels::<i8>::zeros(1, 1, (8, 6, 4)));
+    }
+
+    #[test]
+    fn scales_are_whole_once_one_is_set() {
+        let mut panels = Panels::<i8>::zeros(5, 70, (8, 4, 4));
+        assert!(panels.scales().is_empty());
+        panels.scales_mut()[69] = 2.0;
+        assert_eq!(panels.scales().len(), panels.padded_outputs());
+        assert_eq!((panels.scales()[0], panels.scales()[69]), (1.0, 2.0));
     }
 }

@@ -36,14 +36,14 @@ declare_kernels!(Scalar, runs_here: true, {
 
 fn dot_f32(row: &[f32], weights: &Panels<f32>, output: usize) -> f32 {
     let products = row.iter().enumerate();
-    products.fold(0.0, |sum, (k, &a)| sum + a * weights.data[weights.index(k, output)])
+    products.fold(0.0, |sum, (k, &a)| sum + a * weights.weight(k, output))
 }
 
 fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
     let chunk_sum = |first: usize, chunk: &[f16]| {
         let products = chunk.iter().enumerate();
         products.fold(f16::ZERO, |sum, (k, &a)| {
-            let weight = weights.data[weights.index(first + k, output)];
+            let weight = weights.weight(first + k, output);
             // The product is exact in f64, and the sum but for the rarest
             // double rounding: a fused multiply-add in fp16.
             f16::from_f64(a.to_f64() * weight.to_f64() + sum.to_f64())
@@ -59,7 +59,7 @@ fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
 
 fn dot_i8(row: &[u8], weights: &Panels<i8>, output: usize) -> i32 {
     let products = row.iter().enumerate();
-    products.map(|(k, &a)| i32::from(a) * i32::from(weights.data[weights.index(k, output)])).sum()
+    products.map(|(k, &a)| i32::from(a) * i32::from(weights.weight(k, output))).sum()
 }
 
 /// Calls `sink(row, output, accumulator)` for every row and every channel of
@@ -71,9 +71,9 @@ fn for_each<A, W: Copy + Default, C>(
     dot: impl Fn(&[A], &Panels<W>, usize) -> C,
     mut sink: impl FnMut(usize, usize, C),
 ) {
-    rows.check(weights.inputs);
+    rows.check(weights.inputs());
     for row in 0..rows.n {
-        let activations = &rows.data[row * rows.stride..][..weights.inputs];
+        let activations = &rows.data[row * rows.stride..][..weights.inputs()];
         for output in weights.channels(&panels) {
             sink(row, output, dot(activations, weights, output));
         }
@@ -81,9 +81,9 @@ fn for_each<A, W: Copy + Default, C>(
 }
 
 fn finish<W: Copy + Default>(weights: &Panels<W>, output: usize, accumulator: f32) -> f32 {
-    let scale = weights.scale.get(output).copied().unwrap_or(1.0);
-    let value = accumulator * scale + weights.bias[output];
-    if weights.relu { value.max(0.0) } else { value }
+    let scale = weights.scales().get(output).copied().unwrap_or(1.0);
+    let value = accumulator * scale + weights.biases()[output];
+    if weights.relu() { value.max(0.0) } else { value }
 }
 
 macro_rules! gemm {
@@ -196,8 +196,8 @@ fn gemv<W: Copy + Default>(
             let dot = products.fold(0.0f32, |sum, &(j, value)| {
                 sum + value * widen(columns[j as usize * BLOCK + o])
             });
-            let scale = weights.scale.get(block * BLOCK + o).copied().unwrap_or(1.0);
-            *out = dot * scale + weights.bias[block * BLOCK + o];
+            let scale = weights.scales().get(block * BLOCK + o).copied().unwrap_or(1.0);
+            *out = dot * scale + weights.biases()[block * BLOCK + o];
         }
     }
 }

@@ -5,6 +5,8 @@
 //! [`suite`] makes the tests of one file of kernels; `declare_kernels` calls
 //! it. A machine without the instructions skips them.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use formats::rng::StreamKey;
 use half::f16;
 
@@ -144,7 +146,7 @@ struct Problem<A, W> {
 
 impl<A: Copy, W> Problem<A, W> {
     fn rows(&self) -> Rows<'_, A> {
-        Rows { data: &self.activations, stride: self.stride, n: self.n }
+        Rows::new(&self.activations, self.stride, self.n)
     }
 }
 
@@ -160,7 +162,7 @@ fn float_problem<T: Number>(
         .collect();
     weights.fill(|input, output| plain[input * outputs + output]);
     // A stride of its own: padding of the panels' inputs and some more.
-    let stride = weights.padded_inputs + 4;
+    let stride = weights.padded_inputs() + 4;
     let mut activations = vec![T::default(); n * stride];
     for row in activations.chunks_exact_mut(stride) {
         for a in &mut row[..inputs] {
@@ -224,10 +226,12 @@ pub fn float_rows_are_finished<T: Number>(gemm: &Gemm<T, T, f32>) {
     let size = (13, 17, 65);
     let mut problem = float_problem(gemm, size, Values::Ordinary);
     let width = problem.weights.padded_outputs();
-    problem.weights.scale = (0..width).map(|o| 0.5 + o as f32).collect();
-    problem.weights.bias = (0..width).map(|o| 3.0 - o as f32).collect();
+    for output in 0..width {
+        problem.weights.scales_mut()[output] = 0.5 + output as f32;
+        problem.weights.biases_mut()[output] = 3.0 - output as f32;
+    }
     for relu in [false, true] {
-        problem.weights.relu = relu;
+        problem.weights.set_relu(relu);
         let mut out = vec![7.0; size.0 * width];
         let panels = 0..problem.weights.n_panels();
         (gemm.rows)(&problem.rows(), &problem.weights, panels, &mut out, width);
@@ -317,12 +321,12 @@ fn integer_case(gemm: &Gemm<u8, i8, i32>, size: (usize, usize, usize), extreme: 
         .map(|i| (level(127) * if i % 3 == 0 { -1 } else { 1 }) as i8)
         .collect();
     weights.fill(|input, output| plain[input * outputs + output]);
-    let stride = weights.padded_inputs + 4;
+    let stride = weights.padded_inputs() + 4;
     let mut activations = vec![0u8; n * stride];
     for row in activations.chunks_exact_mut(stride) {
         row[..inputs].fill_with(|| level(i32::from(I8_LARGEST)) as u8);
     }
-    let rows = Rows { data: &activations, stride, n };
+    let rows = Rows::new(&activations, stride, n);
     let width = weights.padded_outputs();
     let panels = 0..weights.n_panels();
     let mut out = vec![7.0; n * width];
@@ -371,10 +375,11 @@ pub fn gemv_is_near_exact(kernels: &Kernels) {
             f32s.fill(weight);
             f16s.fill(|j, o| f16::from_f32(weight(j, o)));
             i8s.fill(|j, o| plain[j * outputs + o]);
-            let width = f32s.bias.len();
-            let bias: Vec<f32> = (0..width).map(|o| o as f32).collect();
-            (f32s.bias, f16s.bias, i8s.bias) = (bias.clone(), bias.clone(), bias);
-            i8s.scale = vec![0.25; width];
+            let width = f32s.padded_outputs();
+            for biases in [f32s.biases_mut(), f16s.biases_mut(), i8s.biases_mut()] {
+                (0..width).for_each(|o| biases[o] = o as f32);
+            }
+            i8s.scales_mut().fill(0.25);
             let blocks = 0..f32s.n_blocks();
             let mut found = [vec![7.0; width], vec![7.0; width], vec![7.0; width]];
             (kernels.gemv_f32)(&nonzero, &f32s, blocks.clone(), &mut found[0]);
@@ -480,7 +485,7 @@ pub fn dots_are_near_exact(kernels: &Kernels) {
                 .map(|i| Candidate { row: (i / channels) as u16, channel: (i % channels) as u16 })
                 .collect();
             let mut out = vec![7.0; candidates.len()];
-            let rows = Rows { data: &data, stride: width, n };
+            let rows = Rows::new(&data, width, n);
             (kernels.screening.dots)(&rows, &weights, &candidates, &mut out);
             for (candidate, out) in candidates.iter().zip(out) {
                 let of = |data: &[f32], at: u16| data[usize::from(at) * width..][..width].to_vec();
@@ -520,6 +525,48 @@ pub fn products<G>(gemm: Option<&G>) -> Result<&G, String> {
     gemm.ok_or_else(|| "this set of kernels leaves these products to another".to_owned())
 }
 
+/// That `work` panics with a message that contains `words`.
+pub fn panics_with<T>(words: &str, work: impl FnOnce() -> T) {
+    let panic = catch_unwind(AssertUnwindSafe(|| drop(work()))).expect_err("it goes through");
+    let message = panic.downcast_ref::<String>().map(String::as_str);
+    let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or_default();
+    assert!(message.contains(words), "expected a message with `{words}`, found `{message}`");
+}
+
+/// That operands of which a kernel would read or write beyond the end are refused.
+pub fn operands_that_do_not_fit_are_refused<A, W, C>(gemm: &Gemm<A, W, C>, group: usize)
+where
+    A: Copy + Default,
+    W: Copy + Default,
+    C: Copy + Default,
+{
+    let panels = Panels::<W>::zeros(2 * gemm.k_step, WIDTH_STEP, (gemm.nr, gemm.k_step, group));
+    let all = 0..panels.n_panels();
+    let k = panels.padded_inputs();
+    let data = vec![A::default(); 3 * k];
+    let rows = Rows::new(&data, k, 3);
+    let mut out = vec![0.0; 3 * WIDTH_STEP];
+    // The last row ends too early.
+    let short = Rows::new(&data[..3 * k - 1], k, 3);
+    panics_with("rows end before their width", || {
+        (gemm.rows)(&short, &panels, all.clone(), &mut out, WIDTH_STEP);
+    });
+    // Outputs of the last row have no room, or rows of outputs overlap.
+    for (len, stride) in [(3 * WIDTH_STEP - 1, WIDTH_STEP), (3 * WIDTH_STEP, usize::MAX / 2 + 1)] {
+        panics_with("", || (gemm.rows)(&rows, &panels, all.clone(), &mut out[..len], stride));
+    }
+    // Inputs that are no whole steps of the kernel's loop.
+    if gemm.k_step > group {
+        let odd = Panels::<W>::zeros(2 * gemm.k_step - group, WIDTH_STEP, (gemm.nr, group, group));
+        let width = odd.padded_inputs();
+        let rows = Rows::new(&data[..width], width, 1);
+        let mut maxima = vec![C::default(); WIDTH_STEP];
+        panics_with("packed for another kernel", || {
+            (gemm.max)(&rows, &odd, 0..odd.n_panels(), &mut maxima);
+        });
+    }
+}
+
 /// The tests of the kernels that `$kernels()` gives.
 macro_rules! suite {
     ($kernels:path) => {
@@ -539,6 +586,7 @@ macro_rules! suite {
             must::float_rows_are_finished(gemm);
             must::float_maxima_are_those_of_the_rows(gemm);
             must::a_range_of_panels_is_its_own(gemm);
+            must::operands_that_do_not_fit_are_refused(gemm, 1);
         }
 
         #[test]
@@ -548,12 +596,14 @@ macro_rules! suite {
             must::float_rows_are_finished(gemm);
             must::float_maxima_are_those_of_the_rows(gemm);
             must::a_range_of_panels_is_its_own(gemm);
+            must::operands_that_do_not_fit_are_refused(gemm, 1);
         }
 
         #[test]
         fn i8_products() {
             let gemm = need!(must::products(need!(here()).i8.as_ref()));
             must::integers_are_exact(gemm);
+            must::operands_that_do_not_fit_are_refused(gemm, 4);
         }
 
         #[test]

@@ -29,15 +29,15 @@ impl Levels {
     /// Takes the levels of `rows`, whole ones, and returns whether there are
     /// any: not of activations below 0, of none above 0 and of extreme ones.
     pub fn take(&mut self, kernels: &Kernels, rows: &Rows<'_, f32>) -> bool {
-        let values = &rows.data[..rows.n * rows.stride];
+        let values = &rows.data()[..rows.n() * rows.stride()];
         let (least, largest) = extremes(values);
         if least < 0.0 || !ORDINARY.contains(&largest) {
             return false;
         }
         self.step = largest / f32::from(I8_LARGEST);
         let mut most = LevelSums::default();
-        let bytes = self.bytes.chunks_exact_mut(rows.stride);
-        for (row, bytes) in values.chunks_exact(rows.stride).zip(bytes) {
+        let bytes = self.bytes.chunks_exact_mut(rows.stride());
+        for (row, bytes) in values.chunks_exact(rows.stride()).zip(bytes) {
             let sums = (kernels.screening.levels)(row, 1.0 / self.step, bytes);
             most.lost = most.lost.max(sums.lost);
             most.squares = most.squares.max(sums.squares);

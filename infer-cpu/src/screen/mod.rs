@@ -187,7 +187,7 @@ impl Screen {
         let width = best.maxima.len();
         channels.estimate(kernels, rows, levels, sieve);
         let Sieve { estimates, bounds, floors, peak_rows, found, products } = sieve;
-        let (estimates, bounds) = (&mut estimates[..rows.n * width], &bounds[..width]);
+        let (estimates, bounds) = (&mut estimates[..rows.n() * width], &bounds[..width]);
         let (floors, peak_rows) = (&mut floors[..width], &mut peak_rows[..width]);
         peaks(estimates, floors, peak_rows);
         let per_step = 1.0 / levels.step;
@@ -211,7 +211,7 @@ impl Screen {
             // An infinite bound rules out nothing, not even beside an infinity.
             floors[channel] = if floor.is_nan() { f32::NEG_INFINITY } else { floor };
         }
-        let most = rows.n * width / ONE_IN;
+        let most = rows.n() * width / ONE_IN;
         let Some(n) = sift(estimates, floors, &mut found[..most]) else { return false };
         dots(rows, weights, &found[..n], &mut products[..n]);
         best.raise(&found[..n], &products[..n]);
@@ -255,16 +255,16 @@ impl Channels {
             sum if ORDINARY.contains(&sum) => self.ordinary_bound(channel, weights, sum),
             _ => {
                 // Estimates of 0 for all: none can be ruled out.
-                self.panels.scale[channel] = 0.0;
+                self.panels.scales_mut()[channel] = 0.0;
                 Bound { rounding: f32::INFINITY, ..Bound::default() }
             }
         };
     }
 
     fn ordinary_bound(&self, channel: usize, weights: &[f32], sum: f64) -> Bound {
-        let step = f64::from(self.panels.scale[channel]);
+        let step = f64::from(self.panels.scales()[channel]);
         let rest = |(input, &w): (usize, &f32)| {
-            f64::from(w) - step * f64::from(self.panels.data[self.panels.index(input, channel)])
+            f64::from(w) - step * f64::from(self.panels.weight(input, channel))
         };
         let norm = |squares: f64| (squares.sqrt() * NORM_SLACK) as f32;
         Bound {
@@ -285,8 +285,8 @@ impl Channels {
     ) {
         let gemm = I8::gemm(kernels).expect("invariant: kernels that screen have int8 products");
         let width = self.panels.padded_outputs();
-        let bytes = Rows { data: &levels.bytes[..], stride: rows.stride, n: rows.n };
-        let out = &mut sieve.estimates[..rows.n * width];
+        let bytes = Rows::new(&levels.bytes[..], rows.stride(), rows.n());
+        let out = &mut sieve.estimates[..rows.n() * width];
         (gemm.rows)(&bytes, &self.panels, 0..self.panels.n_panels(), out, width);
         for (out, bound) in sieve.bounds.iter_mut().zip(&self.bounds) {
             *out = bound.of_levels * levels.norm + bound.of_lost * levels.lost + bound.rounding;

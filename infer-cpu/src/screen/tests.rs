@@ -99,7 +99,7 @@ fn pool(case: &Case, kernels: &Kernels, wants_winners: bool) -> Option<(Vec<f32>
         let (mut maxima, mut winners) = (vec![0.0; width], vec![0; width]);
         screen.begin(group, wants_winners, &mut maxima);
         for (b, block) in case.blocks.iter().enumerate() {
-            let rows = Rows { data: block, stride: STRIDE, n: ROWS };
+            let rows = Rows::new(block, STRIDE, ROWS);
             let mut levels = Levels::with_room(block.len());
             assert!(levels.take(kernels, &rows));
             let first_row = (b * ROWS) as u32;
@@ -184,7 +184,7 @@ fn few_products_are_left() {
     let mut sieve = Sieve::new(ROWS);
     let (mut maxima, mut winners) = (vec![0.0; GROUP], vec![0; GROUP]);
     screen.begin(0, true, &mut maxima);
-    let rows = Rows { data: &case.blocks[0], stride: STRIDE, n: ROWS };
+    let rows = Rows::new(&case.blocks[0], STRIDE, ROWS);
     let mut levels = Levels::with_room(ROWS * STRIDE);
     assert!(levels.take(kernels, &rows));
     let mut best = Best { maxima: &mut maxima, winners: &mut winners, first_row: 0 };
@@ -202,7 +202,7 @@ fn levels_are_refused_where_they_mean_nothing() {
     let mut takes = |value: f32| {
         let mut row = [0.0; STRIDE];
         row[70] = value;
-        levels.take(kernels, &Rows { data: &row, stride: STRIDE, n: 1 })
+        levels.take(kernels, &Rows::new(&row, STRIDE, 1))
     };
     assert!(takes(1.0) && takes(1e-14) && takes(1e14));
     for value in [0.0, -1.0, 1e-20, 1e20, f32::INFINITY, f32::NAN, f32::NEG_INFINITY] {

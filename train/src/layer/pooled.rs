@@ -19,7 +19,7 @@
 //!
 //! so all points together cost a product with a matrix of inputs by inputs.
 
-use infer_cpu::kernel::{self, Panels};
+use infer_cpu::kernel::PooledProducts;
 use ndarray::parallel::prelude::*;
 use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
@@ -106,14 +106,10 @@ impl PooledLayer {
         let (inputs, outputs) = self.base.linear.size();
         let scale = &self.base.norm.scale.value;
         let sign = |c: usize| if scale[c] < 0.0 { -1.0 } else { 1.0 };
-        let gemm = kernel::available()
-            .find_map(|kernels| kernels.f32.as_ref())
-            .expect("invariant: the scalar kernels run everywhere");
-        let mut panels = Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, 1));
         let weights = self.base.linear.weight.matrix();
-        panels.fill(|input, output| sign(output) * weights[(output, input)]);
-        let stride = panels.padded_inputs;
-        let padded = panels.padded_outputs();
+        let pooled = PooledProducts::new(inputs, outputs, |input, output| {
+            sign(output) * weights[(output, input)]
+        });
         let n_clouds = rows.n_clouds();
         let mut products = Matrix::zeros((n_clouds, outputs));
         let mut winners = vec![0; n_clouds * outputs];
@@ -125,17 +121,14 @@ impl PooledLayer {
             .for_each(|(cloud, (mut products, winners))| {
                 let (first, last) = (rows.starts[cloud], rows.starts[cloud + 1]);
                 let points = x.slice(ndarray::s![first..last, ..]);
-                let data = padded_rows(points, stride);
-                let points = kernel::Rows { data: &data, stride, n: last - first };
-                let mut maxima = vec![f32::NEG_INFINITY; padded];
+                let points = points.to_slice().expect("invariant: rows are contiguous");
+                let mut maxima = vec![f32::NEG_INFINITY; outputs];
                 // NaN wins nothing: then the first row counts as the winner.
-                let mut who = vec![first as u32; padded];
-                let all = 0..panels.n_panels();
-                (gemm.argmax)(&points, &panels, all, first as u32, &mut maxima, &mut who);
+                winners.fill(first as u32);
+                pooled.argmax(points, first as u32, &mut maxima, winners);
                 for c in 0..outputs {
                     products[c] = sign(c) * maxima[c];
                 }
-                winners.copy_from_slice(&who[..outputs]);
             });
         (products, winners)
     }
@@ -255,13 +248,4 @@ fn covariance(centred: &Matrix, rows: Rows<'_>) -> Matrix {
     let mut out = vec![0.0; n * n];
     matrix::gradient(weighted.view(), centred.view(), &mut out);
     Matrix::from_shape_vec((n, n), out).expect("invariant: square")
-}
-
-/// `rows` with zeros up to `stride`.
-fn padded_rows(rows: ArrayView2<'_, f32>, stride: usize) -> Vec<f32> {
-    let mut data = vec![0.0; rows.nrows() * stride];
-    for (data, row) in data.chunks_exact_mut(stride).zip(rows.rows()) {
-        data[..row.len()].copy_from_slice(row.to_slice().expect("invariant: contiguous"));
-    }
-    data
 }

@@ -32,8 +32,8 @@ pub fn gemv<W: Weight>(
 ) {
     for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
         let sums = dot_products(nonzero, weights.block(block));
-        let bias: [float32x4_t; 16] = load(&weights.bias[block * BLOCK..]);
-        let scale = match &weights.scale[..] {
+        let bias: [float32x4_t; 16] = load(&weights.biases()[block * BLOCK..]);
+        let scale = match weights.scales() {
             [] => [float32x4_t::splat(1.0); 16],
             scale => load(&scale[block * BLOCK..]),
         };

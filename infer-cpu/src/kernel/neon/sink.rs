@@ -4,7 +4,7 @@
 use std::arch::aarch64::*;
 use std::array::from_fn;
 
-use super::super::Panels;
+use super::super::{Panels, holds_rows};
 use super::lanes::{Lanes, Sums, load};
 
 /// Takes the sums of one panel's channels, from the first row to the last.
@@ -37,17 +37,14 @@ impl<const V: usize> Finish<V> {
         out_stride: usize,
     ) -> Self {
         let channels = weights.channels(&(panel..panel + 1));
-        assert!(
-            n_rows == 0 || out.len() >= (n_rows - 1) * out_stride + channels.end,
-            "no room for the outputs"
-        );
+        assert!(holds_rows(out.len(), n_rows, out_stride, channels.end), "no room for the outputs");
         Self {
-            scale: match &weights.scale[..] {
+            scale: match weights.scales() {
                 [] => [Lanes::splat(1.0); V],
                 scale => load(&scale[channels.clone()]),
             },
-            bias: load(&weights.bias[channels.clone()]),
-            floor: Lanes::splat(if weights.relu { 0.0 } else { f32::NAN }),
+            bias: load(&weights.biases()[channels.clone()]),
+            floor: Lanes::splat(if weights.relu() { 0.0 } else { f32::NAN }),
             out: out.as_mut_ptr().wrapping_add(channels.start),
             out_stride,
         }
@@ -59,7 +56,8 @@ impl<L: Sums, const V: usize> Sink<L, V> for Finish<V> {
     unsafe fn take<const R: usize>(&mut self, sums: [[L; V]; R]) {
         for sums in sums {
             for (v, sums) in sums.into_iter().enumerate() {
-                // SAFETY: `new` found room for all rows.
+                // SAFETY: `new` found room for as many rows as the caller, by the
+                // contract of `take`, gives.
                 unsafe {
                     let finished = vfmaq_f32(self.bias[v], sums.to_f32(), self.scale[v]);
                     vst1q_f32(self.out.add(4 * v), vmaxnmq_f32(finished, self.floor));

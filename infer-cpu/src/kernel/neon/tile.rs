@@ -158,10 +158,10 @@ fn multiply<T: Feed<S, V>, S, const V: usize>(
     panel: usize,
     sink: &mut S,
 ) {
-    let inputs = weights.padded_inputs;
+    let inputs = weights.padded_inputs();
     rows.check(inputs);
     assert!(
-        weights.nr == 4 * V && inputs.is_multiple_of(T::STEP),
+        weights.nr() == 4 * V && inputs.is_multiple_of(T::STEP),
         "panels packed for another kernel"
     );
     let weights = weights.panel(panel).as_ptr();
@@ -173,9 +173,9 @@ fn multiply<T: Feed<S, V>, S, const V: usize>(
         inputs,
     };
     let n_tiles = rows.n / TALLEST;
-    // SAFETY: a table of kernels is only given out where its instructions are;
-    // `check` and `panel` found the operands whole; sinks are made for `rows.n`
-    // rows.
+    // SAFETY: `kernels()` gives out a table where its instructions are; `check`
+    // found `inputs` activations in each row, and `Panels` keeps as many weights
+    // for each channel of a panel; sinks are made for `rows.n` rows.
     unsafe {
         T::feed::<TALLEST>(&strip(0, n_tiles), sink);
         if rows.n.is_multiple_of(TALLEST) {

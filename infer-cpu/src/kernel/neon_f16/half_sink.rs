@@ -18,7 +18,7 @@ impl HalfSink for Finish<4> {
     #[target_feature(enable = "neon,fp16")]
     unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
         for sums in sums {
-            // SAFETY: the caller's.
+            // SAFETY: this function's contract.
             unsafe { self.take([promoted(sums)]) };
         }
     }
@@ -28,7 +28,7 @@ impl HalfSink for Max<float32x4_t, 4> {
     #[inline]
     #[target_feature(enable = "neon,fp16")]
     unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
-        // SAFETY: the caller's.
+        // SAFETY: this function's contract.
         unsafe { self.take([promoted(&largest(sums))]) }
     }
 }

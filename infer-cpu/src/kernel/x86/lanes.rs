@@ -5,8 +5,12 @@ use half::f16;
 /// A vector of f32 and one of i32 of as many lanes.
 ///
 /// # Safety
-/// Every function needs the instruction set of its implementor; those that
-/// take a pointer need [`Lanes::N`] elements there.
+/// This is the contract of every function: the machine has the instruction set
+/// of the implementor, and at a pointer are [`Lanes::N`] elements. The first
+/// holds because only the functions that [`super::entries`] makes call into
+/// this module, and a table of them is given out where the machine was found to
+/// have the instructions. The second holds by the invariants of `Rows`, `Panels`
+/// and `Columns`, which the loops check or cite.
 pub(in crate::kernel) trait Lanes: Copy {
     /// As many lanes of i32.
     type Int: Copy;
@@ -61,6 +65,9 @@ pub(in crate::kernel) trait Lanes: Copy {
 }
 
 /// A weight that a kernel reads as f32.
+///
+/// # Safety
+/// The contract of [`Lanes`].
 pub(in crate::kernel) trait Weight: Copy + Default {
     unsafe fn lanes<L: Lanes>(from: *const Self) -> L;
 }
@@ -68,7 +75,7 @@ pub(in crate::kernel) trait Weight: Copy + Default {
 impl Weight for f32 {
     #[inline(always)]
     unsafe fn lanes<L: Lanes>(from: *const f32) -> L {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`.
         unsafe { L::load(from) }
     }
 }
@@ -76,7 +83,7 @@ impl Weight for f32 {
 impl Weight for f16 {
     #[inline(always)]
     unsafe fn lanes<L: Lanes>(from: *const f16) -> L {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`.
         unsafe { L::load_f16(from) }
     }
 }
@@ -84,7 +91,30 @@ impl Weight for f16 {
 impl Weight for i8 {
     #[inline(always)]
     unsafe fn lanes<L: Lanes>(from: *const i8) -> L {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`.
         unsafe { L::load_i8(from) }
     }
 }
+
+/// Implements [`Lanes`] for a vector: a function a line, each of which is one
+/// expression of intrinsics.
+macro_rules! implement_lanes {
+    ($vector:ty, int: $int:ty, lanes: $n:literal, rows: $rows:literal, {
+        $(fn $name:ident($($arguments:tt)*) $(-> $out:ty)? = $body:expr;)*
+    }) => {
+        impl Lanes for $vector {
+            type Int = $int;
+            const N: usize = $n;
+            const ROWS: usize = $rows;
+            $(
+                #[inline(always)]
+                unsafe fn $name($($arguments)*) $(-> $out)? {
+                    // SAFETY: the contract of `Lanes`: the machine has the instructions,
+                    // and a whole vector lies at a pointer.
+                    unsafe { $body }
+                }
+            )*
+        }
+    };
+}
+pub(in crate::kernel) use implement_lanes;

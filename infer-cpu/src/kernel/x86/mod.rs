@@ -7,7 +7,7 @@ mod products;
 mod tile;
 mod vectors;
 
-pub(super) use lanes::{Lanes, Weight};
+pub(super) use lanes::{Lanes, Weight, implement_lanes};
 pub(super) use products::{argmax, max, rows};
 pub(super) use tile::{Byte, Half, Single};
 pub(super) use vectors::{dots, fps_step, gemv, levels, narrow_f16, narrow_i8, peaks, sift};
@@ -38,10 +38,11 @@ macro_rules! entries {
         fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
             #[target_feature(enable = $features)]
             unsafe fn run(values: &[f32], out: &mut [f16]) -> (usize, f32) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::narrow_f16::<$lanes>(values, out) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             let (whole, largest) = unsafe { run(values, out) };
             largest.max($crate::kernel::scalar::narrow_f16(&values[whole..], &mut out[whole..]))
         }
@@ -49,10 +50,11 @@ macro_rules! entries {
         fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
             #[target_feature(enable = $features)]
             unsafe fn run(values: &[f32], per_unit: f32, out: &mut [u8]) -> (usize, u64) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::narrow_i8::<$lanes>(values, per_unit, out) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             let (whole, clipped) = unsafe { run(values, per_unit, out) };
             let (values, out) = (&values[whole..], &mut out[whole..]);
             clipped + $crate::kernel::scalar::narrow_i8(values, per_unit, out)
@@ -61,20 +63,22 @@ macro_rules! entries {
         fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
             #[target_feature(enable = $features)]
             unsafe fn run(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::levels::<$lanes>(row, per_unit, out) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(row, per_unit, out) }
         }
 
         fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
             #[target_feature(enable = $features)]
             unsafe fn run(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::peaks::<$lanes>(values, peaks, rows) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(values, peaks, rows) }
         }
 
@@ -85,10 +89,11 @@ macro_rules! entries {
                 floors: &[f32],
                 found: &mut [Candidate],
             ) -> Option<usize> {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::sift::<$lanes>(values, floors, found) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(values, floors, found) }
         }
 
@@ -105,20 +110,22 @@ macro_rules! entries {
                 candidates: &[Candidate],
                 out: &mut [f32],
             ) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::dots::<$lanes>(rows, weights, candidates, out) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(rows, weights, candidates, out) }
         }
 
         fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
             #[target_feature(enable = $features)]
             unsafe fn run(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::fps_step::<$lanes>(cloud, pick, distance) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(cloud, pick, distance) }
         }
     };
@@ -139,10 +146,11 @@ macro_rules! entries {
                 out: &mut [f32],
                 stride: usize,
             ) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::rows::<$lanes, $tile>(rows, weights, panels, out, stride) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(rows, weights, panels, out, stride) }
         }
 
@@ -159,10 +167,11 @@ macro_rules! entries {
                 panels: Range<usize>,
                 maxima: &mut [$c],
             ) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::max::<$lanes, $tile>(rows, weights, panels, maxima) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(rows, weights, panels, maxima) }
         }
 
@@ -183,14 +192,15 @@ macro_rules! entries {
                 maxima: &mut [$c],
                 winners: &mut [u32],
             ) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe {
                     x86::argmax::<$lanes, $tile>(
                         rows, weights, panels, first_row, maxima, winners,
                     );
                 }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(rows, weights, panels, first_row, maxima, winners) }
         }
     };
@@ -208,10 +218,11 @@ macro_rules! entries {
                 blocks: Range<usize>,
                 out: &mut [f32],
             ) {
-                // SAFETY: the features are enabled.
+                // SAFETY: `run` enables the features.
                 unsafe { x86::gemv::<$lanes, $w, $b>(nonzero, weights, blocks, out) }
             }
-            // SAFETY: the table of these functions is given out after detection.
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
             unsafe { run(nonzero, weights, blocks, out) }
         }
     };

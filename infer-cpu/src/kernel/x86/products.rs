@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::tile::Tile;
 use super::{Lanes, V};
-use crate::kernel::{Panels, Rows};
+use crate::kernel::{Panels, Rows, holds_rows};
 
 /// Runs `$body` with `$r` rows known when compiling: a full tile, or what is
 /// left.
@@ -50,18 +50,15 @@ pub(in crate::kernel) unsafe fn rows<L: Lanes, T: Tile<L>>(
     out: &mut [f32],
     out_stride: usize,
 ) {
-    rows.check(weights.padded_inputs);
-    if rows.n == 0 {
-        return;
-    }
-    assert!(weights.nr == V * L::N && panels.end <= weights.n_panels());
-    assert!(panels.end * weights.nr <= out_stride);
-    assert!((rows.n - 1) * out_stride + panels.end * weights.nr <= out.len());
+    check::<L, T>(rows, weights, &panels);
+    let width = weights.channels(&panels).end;
+    assert!(holds_rows(out.len(), rows.n, out_stride, width), "no room for the outputs");
     for panel in panels {
-        let first = panel * weights.nr;
+        let first = panel * weights.nr();
         let data = weights.panel(panel);
         for_tiles!(L, rows.n, |row, R| {
-            // SAFETY: rows and outputs were checked above.
+            // SAFETY: `check` found `padded_inputs` activations in each row, and
+            // `holds_rows` room for the channels of each row up to `width`.
             unsafe {
                 let from = rows.data.as_ptr().add(row * rows.stride);
                 let sums = T::sums::<R>(from, rows.stride, data);
@@ -77,18 +74,39 @@ pub(in crate::kernel) unsafe fn rows<L: Lanes, T: Tile<L>>(
     }
 }
 
-/// Scale, bias and ReLU of the channels from `channel`.
+/// Asserts what unsafe loops rely on beyond the invariants of [`Rows`] and
+/// [`Panels`]: rows as wide as the panels, panels packed for this tile, and a
+/// range of panels that are there.
 #[inline(always)]
-unsafe fn finish<L: Lanes, W>(value: L, weights: &Panels<W>, channel: usize) -> L {
-    // SAFETY: scales and biases are padded to whole panels.
+fn check<L: Lanes, T: Tile<L>>(
+    rows: &Rows<'_, T::Activation>,
+    weights: &Panels<T::Weight>,
+    panels: &Range<usize>,
+) {
+    rows.check(weights.padded_inputs());
+    assert!(
+        weights.nr() == V * L::N && weights.padded_inputs().is_multiple_of(T::STEP),
+        "panels packed for another kernel"
+    );
+    assert!(panels.end <= weights.n_panels(), "panels that are not there");
+}
+
+/// Scale, bias and ReLU of the channels from `channel`.
+///
+/// # Safety
+/// The instruction set of `L`; `channel` begins a vector of one of the panels.
+#[inline(always)]
+unsafe fn finish<L: Lanes, W: Copy + Default>(value: L, weights: &Panels<W>, channel: usize) -> L {
+    // SAFETY: `Panels` keeps biases, and scales where there are any, as long as
+    // all panels are wide, so that a whole vector begins at `channel`.
     unsafe {
-        let bias = L::load(weights.bias.as_ptr().add(channel));
-        let value = if weights.scale.is_empty() {
+        let bias = L::load(weights.biases().as_ptr().add(channel));
+        let value = if weights.scales().is_empty() {
             value.add(bias)
         } else {
-            value.fma(L::load(weights.scale.as_ptr().add(channel)), bias)
+            value.fma(L::load(weights.scales().as_ptr().add(channel)), bias)
         };
-        if weights.relu { value.max(L::splat(0.0)) } else { value }
+        if weights.relu() { value.max(L::splat(0.0)) } else { value }
     }
 }
 
@@ -103,12 +121,12 @@ pub(in crate::kernel) unsafe fn max<L: Lanes, T: Tile<L>>(
     panels: Range<usize>,
     maxima: &mut [T::Sum],
 ) {
-    rows.check(weights.padded_inputs);
-    assert!(weights.nr == V * L::N && panels.end <= weights.n_panels());
-    assert!(maxima.len() == panels.len() * weights.nr);
+    check::<L, T>(rows, weights, &panels);
+    assert!(maxima.len() == panels.len() * weights.nr(), "expected a maximum for each channel");
     for (panel, maxima) in panels.zip(maxima.chunks_exact_mut(V * L::N)) {
         let data = weights.panel(panel);
-        // SAFETY: a chunk has V vectors; rows were checked above.
+        // SAFETY: a chunk has V vectors, and `check` found `padded_inputs` activations
+        // in each row.
         unsafe {
             let mut best: [T::Sums; V] =
                 std::array::from_fn(|v| T::load(maxima.as_ptr().add(v * L::N)));
@@ -140,14 +158,17 @@ pub(in crate::kernel) unsafe fn argmax<L: Lanes, T: Tile<L>>(
     maxima: &mut [T::Sum],
     winners: &mut [u32],
 ) {
-    rows.check(weights.padded_inputs);
-    assert!(weights.nr == V * L::N && panels.end <= weights.n_panels());
-    assert!(maxima.len() == panels.len() * weights.nr && winners.len() == maxima.len());
+    check::<L, T>(rows, weights, &panels);
+    assert!(
+        maxima.len() == panels.len() * weights.nr() && winners.len() == maxima.len(),
+        "expected a maximum and a winner for each channel"
+    );
     let chunks = maxima.chunks_exact_mut(V * L::N).zip(winners.chunks_exact_mut(V * L::N));
     for (panel, (maxima, winners)) in panels.zip(chunks) {
         let data = weights.panel(panel);
         let winners = winners.as_mut_ptr().cast::<i32>();
-        // SAFETY: a chunk has V vectors; rows were checked above.
+        // SAFETY: a chunk has V vectors, and `check` found `padded_inputs` activations
+        // in each row.
         unsafe {
             let mut best: [T::Sums; V] =
                 std::array::from_fn(|v| T::load(maxima.as_ptr().add(v * L::N)));

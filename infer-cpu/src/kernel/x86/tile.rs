@@ -22,16 +22,21 @@ pub(in crate::kernel) trait Tile<L: Lanes> {
     type Sum: Copy;
     /// A vector of sums.
     type Sums: Copy;
+    /// Inputs that the loop takes at a time: a panel has a multiple of them.
+    const STEP: usize;
 
     /// The sums of `R` rows and one panel.
     ///
     /// # Safety
-    /// `R` rows of `panel.len() / nr` activations, `stride` apart, at `rows`.
+    /// The instruction set of `L`; at `rows` are `R` rows of `panel.len() / (V *
+    /// L::N)` activations, `stride` apart, and that number is a multiple of
+    /// [`Tile::STEP`].
     unsafe fn sums<const R: usize>(
         rows: *const Self::Activation,
         stride: usize,
         panel: &[Self::Weight],
     ) -> [[Self::Sums; V]; R];
+    /// Sums as f32. As the functions below, it has the contract of [`Lanes`].
     unsafe fn float(sums: Self::Sums) -> L;
     unsafe fn load(from: *const Self::Sum) -> Self::Sums;
     unsafe fn store(sums: Self::Sums, to: *mut Self::Sum);
@@ -51,6 +56,11 @@ pub(in crate::kernel) struct Half;
 /// Byte rows and weights.
 pub(in crate::kernel) struct Byte;
 
+/// Adds the products of the first `k` inputs.
+///
+/// # Safety
+/// The instruction set of `L`; `k` inputs of a panel and of `R` rows, `stride`
+/// apart.
 #[inline(always)]
 unsafe fn accumulate<L: Lanes, W: Weight, const R: usize>(
     acc: &mut [[L; V]; R],
@@ -60,7 +70,7 @@ unsafe fn accumulate<L: Lanes, W: Weight, const R: usize>(
     k: usize,
 ) {
     for k in 0..k {
-        // SAFETY: panel and rows have k inputs, as the caller promises.
+        // SAFETY: panel and rows have more than `k` inputs, by this function's contract.
         unsafe {
             let w: [L; V] = std::array::from_fn(|v| W::lanes(panel.add((k * V + v) * L::N)));
             for (r, acc) in acc.iter_mut().enumerate() {
@@ -74,7 +84,8 @@ unsafe fn accumulate<L: Lanes, W: Weight, const R: usize>(
 }
 
 macro_rules! float_sums {
-    ($activation:ty) => {
+    ($activation:ty, $step:expr) => {
+        const STEP: usize = $step;
         type Activation = $activation;
         type Weight = $activation;
         type Sum = f32;
@@ -87,36 +98,36 @@ macro_rules! float_sums {
 
         #[inline(always)]
         unsafe fn load(from: *const f32) -> L {
-            // SAFETY: as the caller promises.
+            // SAFETY: the contract of `Lanes`, which this function passes on.
             unsafe { L::load(from) }
         }
 
         #[inline(always)]
         unsafe fn store(sums: L, to: *mut f32) {
-            // SAFETY: as the caller promises.
+            // SAFETY: the contract of `Lanes`, which this function passes on.
             unsafe { sums.store(to) }
         }
 
         #[inline(always)]
         unsafe fn max(sums: L, best: L) -> L {
-            // SAFETY: as the caller promises.
+            // SAFETY: the contract of `Lanes`, which this function passes on.
             unsafe { sums.max(best) }
         }
 
         #[inline(always)]
         unsafe fn keep_greater(sums: L, best: &mut L, who: &mut L::Int, index: L::Int) {
-            // SAFETY: as the caller promises.
+            // SAFETY: the contract of `Lanes`, which this function passes on.
             unsafe { sums.keep_greater(best, who, index) }
         }
     };
 }
 
 impl<L: Lanes> Tile<L> for Single {
-    float_sums!(f32);
+    float_sums!(f32, 1);
 
     #[inline(always)]
     unsafe fn sums<const R: usize>(rows: *const f32, stride: usize, panel: &[f32]) -> [[L; V]; R] {
-        // SAFETY: as the caller promises.
+        // SAFETY: by the contract of `Tile::sums`, rows have as many inputs as the panel.
         unsafe {
             let mut acc = [[L::splat(0.0); V]; R];
             accumulate(&mut acc, rows, stride, panel.as_ptr(), panel.len() / (V * L::N));
@@ -126,11 +137,12 @@ impl<L: Lanes> Tile<L> for Single {
 }
 
 impl<L: Lanes> Tile<L> for Half {
-    float_sums!(f16);
+    float_sums!(f16, L::N);
 
     #[inline(always)]
     unsafe fn sums<const R: usize>(rows: *const f16, stride: usize, panel: &[f16]) -> [[L; V]; R] {
-        // SAFETY: as the caller promises; panels' inputs are whole vectors.
+        // SAFETY: by the contract of `Tile::sums`, rows have as many inputs as the panel,
+        // and those are whole vectors, since STEP is a vector's length.
         unsafe {
             let mut acc = [[L::splat(0.0); V]; R];
             let mut wide = [[0.0f32; WIDENED]; R];
@@ -150,6 +162,7 @@ impl<L: Lanes> Tile<L> for Half {
 }
 
 impl<L: Lanes> Tile<L> for Byte {
+    const STEP: usize = 4;
     type Activation = u8;
     type Weight = i8;
     type Sum = i32;
@@ -161,7 +174,8 @@ impl<L: Lanes> Tile<L> for Byte {
         stride: usize,
         panel: &[i8],
     ) -> [[L::Int; V]; R] {
-        // SAFETY: as the caller promises; panels' inputs are whole groups of 4.
+        // SAFETY: by the contract of `Tile::sums`, rows have as many inputs as the panel,
+        // and those are whole groups of STEP.
         unsafe {
             let mut acc = [[L::splat_int(0); V]; R];
             let panel_start = panel.as_ptr().cast::<i32>();
@@ -182,31 +196,31 @@ impl<L: Lanes> Tile<L> for Byte {
 
     #[inline(always)]
     unsafe fn float(sums: L::Int) -> L {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`, which this function passes on.
         unsafe { L::to_float(sums) }
     }
 
     #[inline(always)]
     unsafe fn load(from: *const i32) -> L::Int {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`, which this function passes on.
         unsafe { L::load_int(from) }
     }
 
     #[inline(always)]
     unsafe fn store(sums: L::Int, to: *mut i32) {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`, which this function passes on.
         unsafe { L::store_int(sums, to) }
     }
 
     #[inline(always)]
     unsafe fn max(sums: L::Int, best: L::Int) -> L::Int {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`, which this function passes on.
         unsafe { L::max_int(sums, best) }
     }
 
     #[inline(always)]
     unsafe fn keep_greater(sums: L::Int, best: &mut L::Int, who: &mut L::Int, index: L::Int) {
-        // SAFETY: as the caller promises.
+        // SAFETY: the contract of `Lanes`, which this function passes on.
         unsafe { L::keep_greater_int(sums, best, who, index) }
     }
 }

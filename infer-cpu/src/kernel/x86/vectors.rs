@@ -23,11 +23,11 @@ pub(in crate::kernel) unsafe fn gemv<L: Lanes, W: Weight, const B: usize>(
 ) {
     const BLOCK: usize = Columns::<f32>::BLOCK;
     assert!(B * L::N == BLOCK && blocks.end <= weights.n_blocks());
-    assert!(nonzero.iter().all(|&(j, _)| (j as usize) < weights.inputs));
+    assert!(nonzero.iter().all(|&(j, _)| (j as usize) < weights.inputs()));
     for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
         let columns = weights.block(block).as_ptr();
-        // SAFETY: every input has a column of B vectors, and the block its
-        // scales and biases.
+        // SAFETY: inputs were checked above; `Columns` keeps a column of BLOCK weights
+        // for each of them, and BLOCK biases, and scales where there are any.
         unsafe {
             let mut sums = [[L::splat(0.0); B]; 2];
             let pairs = nonzero.chunks_exact(2);
@@ -42,12 +42,12 @@ pub(in crate::kernel) unsafe fn gemv<L: Lanes, W: Weight, const B: usize>(
             }
             for v in 0..B {
                 let channel = block * BLOCK + v * L::N;
-                let bias = L::load(weights.bias.as_ptr().add(channel));
+                let bias = L::load(weights.biases().as_ptr().add(channel));
                 let sum = sums[0][v].add(sums[1][v]);
-                let value = if weights.scale.is_empty() {
+                let value = if weights.scales().is_empty() {
                     sum.add(bias)
                 } else {
-                    sum.fma(L::load(weights.scale.as_ptr().add(channel)), bias)
+                    sum.fma(L::load(weights.scales().as_ptr().add(channel)), bias)
                 };
                 value.store(out.as_mut_ptr().add(v * L::N));
             }
@@ -55,6 +55,10 @@ pub(in crate::kernel) unsafe fn gemv<L: Lanes, W: Weight, const B: usize>(
     }
 }
 
+/// Adds a column times `value`.
+///
+/// # Safety
+/// The instruction set of `L`; `column` has `B` vectors of weights.
 #[inline(always)]
 unsafe fn add_column<L: Lanes, W: Weight, const B: usize>(
     sums: &mut [L; B],
@@ -62,7 +66,7 @@ unsafe fn add_column<L: Lanes, W: Weight, const B: usize>(
     value: f32,
 ) {
     for (v, sum) in sums.iter_mut().enumerate() {
-        // SAFETY: as the caller promises.
+        // SAFETY: this function's contract.
         unsafe { *sum = W::lanes::<L>(column.add(v * L::N)).fma(L::splat(value), *sum) };
     }
 }
