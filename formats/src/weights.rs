@@ -5,8 +5,9 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{Cursor, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use half::f16;
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
@@ -31,11 +32,16 @@ pub struct Tensor {
 /// A safetensors file that is being read.
 pub struct WeightsFile {
     path: PathBuf,
-    file: File,
+    file: Box<dyn Source>,
     /// Where the tensors' bytes begin.
     data_offset: u64,
     header: Metadata,
 }
+
+/// A file, or its bytes in memory.
+trait Source: Read + Seek + Send {}
+
+impl<T: Read + Seek + Send> Source for T {}
 
 impl WeightsFile {
     /// Opens the file at `path` and checks its header against its size.
@@ -44,12 +50,27 @@ impl WeightsFile {
     /// A file that cannot be read, is no safetensors, or is cut short.
     pub fn open(path: &Path) -> Result<Self, FormatError> {
         let here = |source| FormatError::io(path, source);
-        let bad = |cause: String| FormatError::malformed(path, "header", cause);
         if path.is_dir() {
             return Err(FormatError::malformed(path, "file", "a folder, no safetensors"));
         }
-        let mut file = File::open(path).map_err(here)?;
+        let file = File::open(path).map_err(here)?;
         let file_size = file.metadata().map_err(here)?.len();
+        Self::new(path, Box::new(file), file_size)
+    }
+
+    /// Takes a file's `bytes` from memory and checks its header against their
+    /// number; errors call it `name`.
+    ///
+    /// # Errors
+    /// Bytes that are no safetensors, or cut short.
+    pub fn from_bytes(name: &Path, bytes: Arc<[u8]>) -> Result<Self, FormatError> {
+        let size = bytes.len() as u64;
+        Self::new(name, Box::new(Cursor::new(bytes)), size)
+    }
+
+    fn new(path: &Path, mut file: Box<dyn Source>, file_size: u64) -> Result<Self, FormatError> {
+        let here = |source| FormatError::io(path, source);
+        let bad = |cause: String| FormatError::malformed(path, "header", cause);
         let mut length = [0; LENGTH_SIZE as usize];
         file.read_exact(&mut length).map_err(|_| bad("too short for safetensors".to_owned()))?;
         let start = length;

@@ -5,16 +5,15 @@ use std::path::Path;
 
 #[cfg(feature = "npz")]
 use formats::labelled::LabelledSet;
-use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
-use formats::weights::WeightsFile;
 
-use crate::engine::Engine;
+use crate::engine::{Engine, Input};
 use crate::error::Error;
 use crate::kernel;
 use crate::layers;
 use crate::normalize;
 use crate::precision::{F32, Precision};
+use crate::source::ModelSource;
 use crate::team::Team;
 
 /// Points of a cloud that shapes are drawn into.
@@ -46,19 +45,24 @@ pub fn on_clouds<'a>(
     path: &Path,
     clouds: impl IntoIterator<Item = &'a [[f32; 3]]>,
 ) -> Result<BTreeMap<String, f32>, Error> {
-    let mut file = WeightsFile::open(path)?;
-    let card = ModelCard::from_metadata(path, &file.metadata())?;
+    on_clouds_of(&ModelSource::File(path.to_path_buf()), clouds)
+}
+
+fn on_clouds_of<'a>(
+    model: &ModelSource,
+    clouds: impl IntoIterator<Item = &'a [[f32; 3]]>,
+) -> Result<BTreeMap<String, f32>, Error> {
+    let (mut file, card) = model.open()?;
     let kernels = kernel::available()
         .find(|kernels| Precision::F32.runs_on(kernels))
         .ok_or(Error::KernelMissing(kernel::KernelName::Scalar))?;
     let layers = layers::pack::<F32>(&mut file, &card, kernels)?;
     let team = Team::new(Engine::new(layers, kernels, 1, true), 1)
         .map_err(|source| Error::Threads { threads: 1, source })?;
-    let mut memory = team.work().memory();
+    let mut scratch = team.work().scratch();
     for cloud in clouds {
-        team.work().set_points(cloud);
-        team.work().set_surroundings(cloud);
-        Engine::observe(&team, &mut memory);
+        let input = Input { points: cloud, cloud, pooled_stn: false };
+        Engine::observe(&team, &input, &mut scratch);
     }
     let observed = team.work().observed().into_iter();
     Ok(observed.filter(|(_, largest)| largest.is_normal()).collect())
@@ -70,8 +74,16 @@ pub fn on_clouds<'a>(
 /// # Errors
 /// A file that is no model.
 pub fn on_shapes(path: &Path) -> Result<BTreeMap<String, f32>, Error> {
+    on_shapes_of(&ModelSource::File(path.to_path_buf()))
+}
+
+/// The same for a model wherever it is.
+///
+/// # Errors
+/// A source that is not a model.
+pub fn on_shapes_of(model: &ModelSource) -> Result<BTreeMap<String, f32>, Error> {
     let clouds: Vec<_> = (0..4 * SHAPES).map(shape).collect();
-    on_clouds(path, clouds.iter().map(Vec::as_slice))
+    on_clouds_of(model, clouds.iter().map(Vec::as_slice))
 }
 
 /// A box stretched at random: full, its surface, an ellipsoid's surface, or

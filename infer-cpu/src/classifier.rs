@@ -1,11 +1,11 @@
 //! From a cloud to a class.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use formats::model_card::{ModelCard, Normalization};
 
-use crate::engine::Memory;
+use crate::engine::{Input, RangeEvents, Scratch};
 use crate::error::Error;
 use crate::forward::{self, Forward, Loaded, Setup};
 use crate::kernel::{self, KernelName, Kernels};
@@ -15,6 +15,7 @@ use crate::precision::Precision;
 use crate::prediction::{Prediction, argmax};
 use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::selection::{Selection, front_pass};
+use crate::source::ModelSource;
 use crate::votes::Votes;
 
 /// A network ready to classify clouds.
@@ -36,7 +37,9 @@ use crate::votes::Votes;
 /// # Ok::<(), infer_cpu::Error>(())
 /// ```
 pub struct Classifier {
-    path: PathBuf,
+    /// The model's bytes, from which the fallback is built; `None` where fp32 is
+    /// asked for, which has no fallback.
+    source: Option<ModelSource>,
     card: ModelCard,
     classes: Vec<Arc<str>>,
     options: Options,
@@ -44,7 +47,9 @@ pub struct Classifier {
     network: Box<dyn Forward>,
     /// fp32, once a cloud overflowed the precision asked for.
     fallback: Option<Box<dyn Forward>>,
-    memory: Memory,
+    scratch: Scratch,
+    /// What the cloud at hand met in the precision asked for.
+    events: RangeEvents,
     selection: Selection,
     votes: Votes,
     finite: Vec<[f64; 3]>,
@@ -55,32 +60,54 @@ pub struct Classifier {
 impl Classifier {
     /// Loads the model file at `path` and packs it as `options` ask.
     ///
+    /// No file is read afterwards: for a precision that can overflow, the
+    /// file's bytes stay in memory.
+    ///
     /// # Errors
-    /// A file that is no model, options that it or this machine cannot meet.
+    /// A file that cannot be read or is not a model; options that the model or
+    /// this machine cannot meet.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
+        let source = ModelSource::File(path.to_path_buf());
+        let source = match options.precision {
+            Precision::F32 => source,
+            _ => source.into_memory()?,
+        };
+        Self::from_source(source, options)
+    }
+
+    /// The same for a model file's bytes, such as a program embeds by
+    /// `include_bytes!`.
+    ///
+    /// # Errors
+    /// As [`Classifier::load`].
+    pub fn from_bytes(bytes: &[u8], options: &Options) -> Result<Self, Error> {
+        Self::from_source(ModelSource::from_bytes(bytes), options)
+    }
+
+    fn from_source(source: ModelSource, options: &Options) -> Result<Self, Error> {
         if options.threads > MOST_THREADS {
             return Err(Error::TooManyThreads(options.threads));
         }
         let setup = setup(options, options.precision)?;
-        let loaded = forward::load(path, &setup)?;
+        let Loaded { card, network, parts } = forward::load(&source, &setup)?;
         let spec = match &options.sampler {
             Some(spec) => spec.clone(),
-            None => SamplerSpec::as_trained(path, &loaded.card)?,
+            None => SamplerSpec::as_trained(source.name(), &card)?,
         };
         let is_cpl = spec.kind == SamplerKind::Cpl;
-        let front = is_cpl.then(|| front_pass(spec.front, &loaded.parts)).transpose()?;
+        let front = is_cpl.then(|| front_pass(spec.front, &parts)).transpose()?;
         let selection = Selection::new(&spec, front)?;
-        let Loaded { card, network, .. } = loaded;
         let classes = class_names(&card, network.n_classes());
         let prediction = Prediction::empty(&classes, options.precision);
         let mut classifier = Self {
-            path: path.to_path_buf(),
+            source: (options.precision != Precision::F32).then_some(source),
             card,
             votes: Votes::new(options, &spec, classes.len())?,
             classes,
             options: options.clone(),
             kernels: setup.kernels,
-            memory: network.memory(),
+            scratch: network.scratch(),
+            events: RangeEvents::default(),
             network,
             fallback: None,
             selection,
@@ -104,7 +131,7 @@ impl Classifier {
         self.finite.reserve(n);
         self.normalized.reserve(n);
         self.votes.reserve(n);
-        self.selection.reserve(n, self.kernels, &*self.network, &mut self.memory)
+        self.selection.reserve(n, self.kernels, &*self.network, &mut self.scratch)
     }
 
     /// Class names in the order of the logits.
@@ -164,8 +191,8 @@ impl Classifier {
         }
         self.take(points.iter().copied())?;
         self.normalize();
-        let Self { selection, normalized, kernels, network, memory, .. } = self;
-        selection.select(normalized, kernels, &**network, memory)
+        let Self { selection, normalized, kernels, network, scratch, .. } = self;
+        selection.select(normalized, kernels, &**network, scratch)
     }
 
     /// Keeps what is finite of `points`.
@@ -201,53 +228,44 @@ impl Classifier {
 
     fn predict(&mut self) -> Result<&Prediction, Error> {
         self.normalize();
-        self.network.reset();
+        self.events = RangeEvents::default();
         self.prediction.precision = self.options.precision;
         if self.votes.n() <= 1 {
-            self.forward_whole()?;
-            self.prediction.logits.clone_from(&self.memory.values);
+            self.forward()?;
+            self.prediction.logits.clone_from(&self.scratch.values);
         } else {
             self.vote()?;
         }
         self.prediction.n_used = self.selection.points().len();
-        self.prediction.n_clipped = self.network.met().clipped;
+        self.prediction.n_clipped = self.events.clipped;
         self.prediction.class = argmax(&self.prediction.logits);
         self.prediction.label = Arc::clone(&self.classes[self.prediction.class]);
         Ok(&self.prediction)
     }
 
     /// Takes the normalised cloud through sampler and network; logits are left
-    /// in memory.
-    fn forward_whole(&mut self) -> Result<(), Error> {
-        let Self { selection, normalized, kernels, network, memory, .. } = self;
-        selection.select(normalized, kernels, &**network, memory)?;
-        network.set_points(selection.points());
-        network.set_surroundings(normalized);
-        network.classify(memory, selection.pooled_stn());
-        if network.met().overflow || !all_finite(&memory.values) {
+    /// in scratch.
+    fn forward(&mut self) -> Result<(), Error> {
+        let Self { selection, normalized, kernels, network, scratch, .. } = self;
+        self.events.add(forward_whole(&**network, selection, normalized, kernels, scratch)?);
+        if self.events.overflow || !all_finite(&self.scratch.values) {
             self.forward_in_f32()?;
         }
         Ok(())
     }
 
-    /// The way out when the precision asked for overflows.
+    /// The same in fp32, where the precision asked for overflows.
     fn forward_in_f32(&mut self) -> Result<(), Error> {
-        if self.options.precision == Precision::F32 {
-            return Err(Error::Overflow);
-        }
         if self.fallback.is_none() {
+            let Some(source) = &self.source else { return Err(Error::Overflow) };
             let setup = setup(&self.options, Precision::F32)?;
-            self.fallback = Some(forward::load(&self.path, &setup)?.network);
+            self.fallback = Some(forward::load(source, &setup)?.network);
         }
         let Some(network) = &self.fallback else { return Err(Error::Overflow) };
-        let Self { selection, normalized, kernels, memory, .. } = self;
-        network.reset();
-        selection.select(normalized, kernels, &**network, memory)?;
-        network.set_points(selection.points());
-        network.set_surroundings(normalized);
-        network.classify(memory, selection.pooled_stn());
+        let Self { selection, normalized, kernels, scratch, .. } = self;
+        let events = forward_whole(&**network, selection, normalized, kernels, scratch)?;
         self.prediction.precision = Precision::F32;
-        let is_sound = !network.met().overflow && all_finite(&memory.values);
+        let is_sound = !events.overflow && all_finite(&scratch.values);
         if is_sound { Ok(()) } else { Err(Error::Overflow) }
     }
 
@@ -258,12 +276,28 @@ impl Classifier {
         for vote in 0..self.votes.n() {
             self.selection.set_seed(self.votes.seed(vote));
             self.votes.turn(vote, &mut self.normalized);
-            self.forward_whole()?;
-            self.votes.count(&self.memory.values);
+            self.forward()?;
+            self.votes.count(&self.scratch.values);
         }
         self.votes.result(&mut self.prediction.logits);
         Ok(())
     }
+}
+
+/// Takes `cloud` through the sampler and `network`; logits are left in
+/// `scratch`. Returns how far it left the range of the network's format.
+fn forward_whole(
+    network: &dyn Forward,
+    selection: &mut Selection,
+    cloud: &[[f32; 3]],
+    kernels: &'static Kernels,
+    scratch: &mut Scratch,
+) -> Result<RangeEvents, Error> {
+    scratch.events = RangeEvents::default();
+    selection.select(cloud, kernels, network, scratch)?;
+    let input = Input { points: selection.points(), cloud, pooled_stn: selection.pooled_stn() };
+    network.run(&input, scratch);
+    Ok(scratch.events)
 }
 
 fn all_finite(values: &[f32]) -> bool {

@@ -1,42 +1,38 @@
 //! A network of whichever precision, loaded and ready to run.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use formats::model_card::ModelCard;
 use formats::weights::WeightsFile;
 
 use crate::calibrate;
-use crate::engine::{Engine, Memory, Met, Pass};
+use crate::engine::{Engine, Input, Pass, Scratch};
 use crate::error::Error;
 use crate::kernel::Kernels;
 use crate::layers;
+use crate::network::Parts;
 use crate::options::TNets;
 use crate::precision::{F16, F32, F32Fc16, Format, I8, Precision};
-use crate::selection::Parts;
+use crate::source::ModelSource;
 use crate::team::Team;
 
 /// A network behind whichever format.
+///
+/// A run takes all it needs by its arguments: no call depends on those before.
 pub trait Forward: Send + Sync {
     /// Makes room for clouds of `n` points.
     fn reserve(&self, n: usize);
-    /// Takes the points of the passes that follow.
-    fn set_points(&self, points: &[[f32; 3]]);
-    /// Takes `cloud` for what surrounds those points, where the network looks
-    /// at it.
-    fn set_surroundings(&self, cloud: &[[f32; 3]]);
-    /// Forgets what earlier passes met.
-    fn reset(&self);
-    /// Pools the points of `pass` into `memory`, with the points that won.
-    fn pool_winners(&self, pass: Pass, memory: &mut Memory);
+    /// Takes `input` through the whole network; the logits are left in
+    /// `scratch.values`, and what left the format's range is added to
+    /// `scratch.events`.
+    fn run(&self, input: &Input<'_>, scratch: &mut Scratch);
+    /// Pools the features of `pass` into `scratch.values`, with the points
+    /// that won in `scratch.winners`.
+    fn pool_winners(&self, pass: Pass, input: &Input<'_>, scratch: &mut Scratch);
     /// How many features `pass` pools.
     fn channels(&self, pass: Pass) -> usize;
-    /// Leaves the logits in `memory.values`; see [`Engine::classify`].
-    fn classify(&self, memory: &mut Memory, pooled_stn: bool);
-    /// What passes met since [`Forward::reset`].
-    fn met(&self) -> Met;
-    /// Memory that no pass outgrows.
-    fn memory(&self) -> Memory;
+    /// Memory that no run outgrows.
+    fn scratch(&self) -> Scratch;
     /// How many classes the network tells apart.
     fn n_classes(&self) -> usize;
 }
@@ -46,36 +42,20 @@ impl<T: Format> Forward for Team<Engine<T>> {
         self.work().reserve(n);
     }
 
-    fn set_points(&self, points: &[[f32; 3]]) {
-        self.work().set_points(points);
+    fn run(&self, input: &Input<'_>, scratch: &mut Scratch) {
+        Engine::run(self, input, scratch);
     }
 
-    fn set_surroundings(&self, cloud: &[[f32; 3]]) {
-        self.work().set_surroundings(cloud);
-    }
-
-    fn reset(&self) {
-        self.work().reset();
-    }
-
-    fn pool_winners(&self, pass: Pass, memory: &mut Memory) {
-        Engine::pool(self, pass, true, memory);
+    fn pool_winners(&self, pass: Pass, input: &Input<'_>, scratch: &mut Scratch) {
+        Engine::pool_winners(self, pass, input, scratch);
     }
 
     fn channels(&self, pass: Pass) -> usize {
         self.work().channels(pass)
     }
 
-    fn classify(&self, memory: &mut Memory, pooled_stn: bool) {
-        Engine::classify(self, memory, pooled_stn);
-    }
-
-    fn met(&self) -> Met {
-        self.work().met()
-    }
-
-    fn memory(&self) -> Memory {
-        self.work().memory()
+    fn scratch(&self) -> Scratch {
+        self.work().scratch()
     }
 
     fn n_classes(&self) -> usize {
@@ -83,7 +63,7 @@ impl<T: Format> Forward for Team<Engine<T>> {
     }
 }
 
-/// A model file, packed and ready.
+/// A model, packed and ready.
 pub struct Loaded {
     /// What it says about itself.
     pub card: ModelCard,
@@ -108,18 +88,17 @@ pub struct Setup<'a> {
     pub activation_ranges: Option<&'a BTreeMap<String, f32>>,
 }
 
-/// Loads the model at `path` and packs it.
+/// Loads `model` and packs it.
 ///
 /// # Errors
-/// A file that is no model; threads that cannot be started.
-pub fn load(path: &Path, setup: &Setup<'_>) -> Result<Loaded, Error> {
-    let mut file = WeightsFile::open(path)?;
-    let mut card = ModelCard::from_metadata(path, &file.metadata())?;
+/// A source that is not a model; threads that cannot be started.
+pub fn load(model: &ModelSource, setup: &Setup<'_>) -> Result<Loaded, Error> {
+    let (mut file, mut card) = model.open()?;
     if let Some(ranges) = setup.activation_ranges {
         card.activation_ranges.clone_from(ranges);
     }
     if setup.precision == Precision::I8 && card.activation_ranges.is_empty() {
-        card.activation_ranges = calibrate::on_shapes(path)?;
+        card.activation_ranges = calibrate::on_shapes_of(model)?;
     }
     match setup.precision {
         Precision::F32 => loaded::<F32>(&mut file, card, setup),
@@ -138,11 +117,7 @@ fn loaded<T: Format>(
     let mut layers = layers::pack::<T>(file, &card, kernels)?;
     layers.stn.take_if(|_| !t_nets.runs_input());
     layers.fstn.take_if(|_| !t_nets.runs_feature());
-    let parts = Parts {
-        stn: layers.stn.is_some(),
-        fstn: layers.fstn.is_some(),
-        front: layers.front.is_some(),
-    };
+    let parts = layers.parts();
     let engine = Engine::new(layers, kernels, threads, false);
     let team = Team::new(engine, threads).map_err(|source| Error::Threads { threads, source })?;
     Ok(Loaded { card, network: Box::new(team), parts })

@@ -23,6 +23,7 @@ mod prediction;
 pub mod sampler;
 mod screen;
 mod selection;
+mod source;
 mod summary;
 mod team;
 mod votes;

@@ -37,6 +37,25 @@ pub struct Network<C, F> {
     pub front: Option<Vec<C>>,
 }
 
+/// What a network consists of, as far as a Critical Points Layer can pool it.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts {
+    /// Whether it has a T-Net of coordinates.
+    pub stn: bool,
+    /// Whether it has a T-Net of features.
+    pub fstn: bool,
+    /// Whether it has a front end of its own.
+    pub front: bool,
+}
+
+impl<C, F> Network<C, F> {
+    /// What it consists of.
+    pub(crate) fn parts(&self) -> Parts {
+        let Self { stn, fstn, front, .. } = self;
+        Parts { stn: stn.is_some(), fstn: fstn.is_some(), front: front.is_some() }
+    }
+}
+
 /// A network that predicts a `k` x `k` matrix, row by row; the identity is in
 /// its last biases.
 pub struct TNet<C, F> {

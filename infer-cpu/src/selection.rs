@@ -1,9 +1,10 @@
 //! The points that a network gets to see: what a sampler keeps, each once.
 
-use crate::engine::{Memory, Pass};
+use crate::engine::{Input, Pass, Scratch};
 use crate::error::Error;
 use crate::forward::Forward;
 use crate::kernel::Kernels;
+use crate::network::Parts;
 use crate::sampler::{
     CanonicalOrder, CriticalPoints, FrontChoice, Sampler, SamplerKind, SamplerSpec,
 };
@@ -85,13 +86,13 @@ impl Selection {
         points: &[[f32; 3]],
         kernels: &'static Kernels,
         network: &dyn Forward,
-        memory: &mut Memory,
+        scratch: &mut Scratch,
     ) -> Result<&[u32], Error> {
         self.pooled_stn = false;
         self.rows.clear();
         if self.spec.kind == SamplerKind::Cpl {
             self.cloud.sort(points);
-            self.select_critical(network, memory);
+            self.select_critical(network, scratch);
             // Rows of the sorted cloud, from here on places in the given one.
             for row in &mut self.rows {
                 *row = self.cloud.index[*row as usize];
@@ -105,21 +106,24 @@ impl Selection {
         Ok(&self.rows)
     }
 
-    fn select_critical(&mut self, network: &dyn Forward, memory: &mut Memory) {
+    fn select_critical(&mut self, network: &dyn Forward, scratch: &mut Scratch) {
         let Some(front) = self.front else {
             unreachable!("invariant: a classifier gives critical points a front end");
         };
-        network.set_surroundings(&self.cloud.points);
-        pool(front, &self.cloud.points, network, memory);
+        let cloud = &self.cloud.points;
+        let pool = |points: &[[f32; 3]], scratch: &mut Scratch| {
+            network.pool_winners(front, &Input { points, cloud, pooled_stn: false }, scratch);
+        };
+        pool(cloud, scratch);
         self.pooled_stn = front == Pass::Stn;
-        self.critical.rank(&memory.values, &memory.winners);
+        self.critical.rank(&scratch.values, &scratch.winners);
         // The T-Net wants the whole cloud's pooling, which a second one ends.
         while let Some(rows) = self.critical.next_pass(self.cloud.points.len(), &self.spec) {
             self.pooled_stn = false;
             self.left.clear();
             self.left.extend(rows.iter().map(|&row| self.cloud.points[row as usize]));
-            pool(front, &self.left, network, memory);
-            self.critical.rank_next(&memory.values, &memory.winners);
+            pool(&self.left, scratch);
+            self.critical.rank_next(&scratch.values, &scratch.winners);
         }
         let CriticalPoints { rows, scores, .. } = &self.critical;
         self.spec.resize.apply(rows, scores, self.spec.points, &mut self.rows);
@@ -134,7 +138,7 @@ impl Selection {
         n: usize,
         kernels: &'static Kernels,
         network: &dyn Forward,
-        memory: &mut Memory,
+        scratch: &mut Scratch,
     ) -> Result<(), Error> {
         // A cloud that no rule finds easier than another: all points differ.
         let cloud: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, (i % 7) as f32, 0.0]).collect();
@@ -149,7 +153,7 @@ impl Selection {
         if let Some(front) = self.front {
             let channels = network.channels(front);
             self.critical.reserve(channels, n);
-            memory.reserve(channels);
+            scratch.reserve(channels);
         }
         Ok(())
     }
@@ -173,20 +177,4 @@ pub fn front_pass(choice: FrontChoice, parts: &Parts) -> Result<Pass, Error> {
         FrontChoice::Trunk => lacks("T-Nets, on which its trunk's features depend"),
         FrontChoice::Auto => lacks("neither a front end nor a T-Net of coordinates"),
     }
-}
-
-fn pool(pass: Pass, points: &[[f32; 3]], network: &dyn Forward, memory: &mut Memory) {
-    network.set_points(points);
-    network.pool_winners(pass, memory);
-}
-
-/// What a network consists of, as far as front ends go.
-#[derive(Clone, Copy, Debug)]
-pub struct Parts {
-    /// A T-Net of coordinates.
-    pub stn: bool,
-    /// A T-Net of features.
-    pub fstn: bool,
-    /// A front end of its own.
-    pub front: bool,
 }

@@ -3,7 +3,8 @@
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Block, Engine, GROUP, Group, Head, Pass, Run, Scratch, Task, VECTOR_BLOCK, VECTOR_CHUNK,
+    BLOCK, Block, Engine, GROUP, Group, Head, Pass, Run, Task, ThreadScratch, VECTOR_BLOCK,
+    VECTOR_CHUNK,
 };
 use super::{lock, read, write};
 use crate::kernel::{Kernels, Rows};
@@ -28,8 +29,8 @@ impl<T: Format> Engine<T> {
     fn hidden(&self, thread: usize, pass: Pass, first_block: usize, slot: usize) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let points = read(&self.points);
-        let mut scratch = lock(&self.scratch[thread]);
-        let Scratch { edged, wide, narrow: [from, to], .. } = &mut *scratch;
+        let mut scratch = lock(&self.threads[thread]);
+        let ThreadScratch { edged, wide, narrow: [from, to], .. } = &mut *scratch;
         let rows = block_rows(&points, first_block + slot);
         let n = rows.n();
         let first = self.first(pass);
@@ -112,7 +113,7 @@ impl<T: Format> Engine<T> {
             let block = read(&self.blocks[slot]);
             let rows = Rows::new(&block.features[..], stride, BLOCK.min(n_points - first_row));
             let is_pooled = pool.screens && block.has_levels && {
-                let sieve = &mut lock(&self.scratch[thread]).sieve;
+                let sieve = &mut lock(&self.threads[thread]).sieve;
                 pool.screen::<T>(
                     self.kernels,
                     (last, group),

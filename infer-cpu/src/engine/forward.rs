@@ -3,8 +3,8 @@
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, Run, SMALL_VECTOR, Spread, Task, VECTOR_CHUNK,
-    lock, read, write,
+    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Spread, Task,
+    VECTOR_CHUNK, lock, read, write,
 };
 use crate::kernel::{Panels, Rows};
 use crate::layers::Conv;
@@ -18,17 +18,31 @@ pub const fn folding_pays(n: usize, outputs: usize) -> bool {
     n > outputs
 }
 
-/// The caller's own memory of a forward pass.
+/// What a network is run on.
+#[derive(Clone, Copy)]
+pub struct Input<'a> {
+    /// The points that it sees.
+    pub points: &'a [[f32; 3]],
+    /// The cloud in which EdgeConv layers look for a point's neighbors.
+    pub cloud: &'a [[f32; 3]],
+    /// Whether [`Scratch::values`] holds the vector that the coordinates'
+    /// T-Net pools of these points, or of a cloud that pools to the same.
+    pub pooled_stn: bool,
+}
+
+/// The caller's own memory of forward passes.
 #[derive(Default)]
-pub struct Memory {
-    /// The pooled vector, and what follows from it.
+pub struct Scratch {
+    /// The pooled vector, and what follows from it: the logits in the end.
     pub values: Vec<f32>,
     /// Which point won each channel, after a pass that keeps them.
     pub winners: Vec<u32>,
+    /// What passes met that left a format's range, since the caller reset it.
+    pub events: RangeEvents,
     product: Vec<f32>,
 }
 
-impl Memory {
+impl Scratch {
     /// Makes room for a pooling of `channels`.
     pub fn reserve(&mut self, channels: usize) {
         self.values.reserve(channels.saturating_sub(self.values.len()));
@@ -38,57 +52,70 @@ impl Memory {
 
 impl<T: Format> Engine<T> {
     /// Memory that no pass of this engine outgrows.
-    pub fn memory(&self) -> Memory {
+    pub fn scratch(&self) -> Scratch {
         let pooled = self.groups.len() * GROUP;
         let vector = self.vector_out.len() * VECTOR_CHUNK * super::VECTOR_BLOCK;
         let product = read(&self.folded).panels.n_weights() * 2;
-        Memory {
+        Scratch {
             values: Vec::with_capacity(pooled.max(vector)),
             winners: Vec::with_capacity(pooled),
+            events: RangeEvents::default(),
             product: Vec::with_capacity(product),
         }
     }
 
-    /// Takes the points through the whole network; the logits are left in
-    /// `memory.values`. Where `memory.values` already holds the pooled vector
-    /// of the coordinates' T-Net, `pooled_stn` says so.
-    pub fn classify(team: &Team<Self>, memory: &mut Memory, pooled_stn: bool) {
+    /// Takes `input` through the whole network; the logits are left in
+    /// `scratch.values`.
+    pub fn run(team: &Team<Self>, input: &Input<'_>, scratch: &mut Scratch) {
+        team.work().take(input);
+        Self::classify(team, input.pooled_stn, scratch);
+        scratch.events.add(team.work().events());
+    }
+
+    /// Takes `input` through `pass`; the pooled vector is left in
+    /// `scratch.values`, and the points that won in `scratch.winners`.
+    pub fn pool_winners(team: &Team<Self>, pass: Pass, input: &Input<'_>, scratch: &mut Scratch) {
+        team.work().take(input);
+        Self::pool(team, pass, true, scratch);
+        scratch.events.add(team.work().events());
+    }
+
+    /// Takes `input` through every layer that there is.
+    pub fn observe(team: &Team<Self>, input: &Input<'_>, scratch: &mut Scratch) {
+        if team.work().layers.front.is_some() {
+            Self::pool_winners(team, Pass::Front, input, scratch);
+        }
+        Self::run(team, input, scratch);
+    }
+
+    fn classify(team: &Team<Self>, pooled_stn: bool, scratch: &mut Scratch) {
         let engine = team.work();
         let n_points = read(&engine.points).len() / 4;
         if engine.layers.stn.is_some() {
             if !pooled_stn {
-                Self::pool(team, Pass::Stn, false, memory);
+                Self::pool(team, Pass::Stn, false, scratch);
             }
-            Self::vectors(team, Head::Stn, &mut memory.values);
-            engine.note_overflow(&memory.values);
-            engine.set_input_transform(&memory.values);
+            Self::vectors(team, Head::Stn, &mut scratch.values);
+            engine.note_overflow(&scratch.values);
+            engine.set_input_transform(&scratch.values);
         }
         if engine.layers.fstn.is_some() {
-            Self::pool(team, Pass::Fstn, false, memory);
-            Self::vectors(team, Head::Fstn, &mut memory.values);
-            engine.note_overflow(&memory.values);
-            engine.set_feature_transform(memory, n_points);
+            Self::pool(team, Pass::Fstn, false, scratch);
+            Self::vectors(team, Head::Fstn, &mut scratch.values);
+            engine.note_overflow(&scratch.values);
+            engine.set_feature_transform(scratch, n_points);
         }
-        Self::pool(team, Pass::Trunk, false, memory);
-        Self::vectors(team, Head::Class, &mut memory.values);
+        Self::pool(team, Pass::Trunk, false, scratch);
+        Self::vectors(team, Head::Class, &mut scratch.values);
     }
 
-    /// Takes the points through every layer that there is.
-    pub fn observe(team: &Team<Self>, memory: &mut Memory) {
-        if team.work().layers.front.is_some() {
-            Self::pool(team, Pass::Front, false, memory);
-        }
-        Self::classify(team, memory, false);
-    }
-
-    /// Takes the points through `pass`; the pooled vector is left in
-    /// `memory.values`, and, if they are asked for, the points that won in
-    /// `memory.winners`.
-    pub fn pool(team: &Team<Self>, pass: Pass, winners: bool, memory: &mut Memory) {
+    fn pool(team: &Team<Self>, pass: Pass, winners: bool, scratch: &mut Scratch) {
         let engine = team.work();
         let n_points = read(&engine.points).len() / 4;
         let n_blocks = n_points.div_ceil(BLOCK);
         let width = engine.last_width(pass);
+        // Blocks go in runs, so that the features kept before the last layer are
+        // bounded whatever the cloud's size.
         for first_block in (0..n_blocks).step_by(RUN_BLOCKS) {
             let n_blocks = RUN_BLOCKS.min(n_blocks - first_block);
             engine.begin(Task::Hidden { pass, first_block });
@@ -96,16 +123,16 @@ impl<T: Format> Engine<T> {
             engine.begin(Task::Pool { pass, run: Run { first_block, n_blocks, winners } });
             team.run(width.div_ceil(GROUP));
         }
-        engine.collect(pass, memory);
+        engine.collect(pass, scratch);
     }
 
     /// Scales, biases and ReLU, once for the maxima: all of them keep order.
-    fn collect(&self, pass: Pass, memory: &mut Memory) {
+    fn collect(&self, pass: Pass, scratch: &mut Scratch) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let panels = &self.place(self.last(pass), &feature, &folded).panels;
         let spread = Spread::new(read(&self.points).len() / 4);
-        memory.values.clear();
-        memory.winners.clear();
+        scratch.values.clear();
+        scratch.winners.clear();
         for (g, first) in (0..panels.outputs()).step_by(GROUP).enumerate() {
             let group = lock(&self.groups[g]);
             let channels = first..panels.outputs().min(first + GROUP);
@@ -114,8 +141,8 @@ impl<T: Format> Engine<T> {
                 let scale = panels.scales().get(channel).copied().unwrap_or(1.0);
                 let value = T::widen(sum) * scale + panels.biases()[channel];
                 let is_cut = panels.relu() && value < 0.0;
-                memory.values.push(if is_cut { 0.0 } else { value });
-                memory.winners.push(spread.point(winner as usize) as u32);
+                scratch.values.push(if is_cut { 0.0 } else { value });
+                scratch.winners.push(spread.point(winner as usize) as u32);
             }
         }
     }
@@ -164,8 +191,8 @@ impl<T: Format> Engine<T> {
 
     /// Packs the feature transform `[k, k]`, by itself or in the layer after
     /// it, whichever takes fewer products for `n` points.
-    fn set_feature_transform(&self, memory: &mut Memory, n: usize) {
-        let Memory { values: transform, product, .. } = memory;
+    fn set_feature_transform(&self, scratch: &mut Scratch, n: usize) {
+        let Scratch { values: transform, product, .. } = scratch;
         let Conv::Turned(after, plain) = &self.layers.trunk[self.layers.transform_after] else {
             unreachable!("invariant: the layer after a feature transform has that role");
         };

@@ -26,7 +26,7 @@ mod forward;
 mod route;
 mod spread;
 
-pub use forward::{Memory, folding_pays};
+pub use forward::{Input, Scratch, folding_pays};
 use spread::Spread;
 
 /// Points of a block: whole tiles of every kernel, and few enough that their
@@ -98,7 +98,7 @@ pub struct Engine<T: Format> {
     surroundings: RwLock<Surroundings>,
     blocks: Vec<RwLock<Block<T>>>,
     groups: Vec<Mutex<Group<T::Sum>>>,
-    scratch: Vec<Mutex<Scratch<T>>>,
+    threads: Vec<Mutex<ThreadScratch<T>>>,
     /// The input of the vector layer at hand: what is not 0.
     vector: RwLock<Vec<(u32, f32)>>,
     vector_out: Vec<Mutex<Vec<f32>>>,
@@ -124,7 +124,7 @@ struct Group<S> {
 }
 
 /// A thread's own memory: a block's features, before and after rounding.
-struct Scratch<T: Format> {
+struct ThreadScratch<T: Format> {
     /// Points with what is known of their surroundings.
     edged: Vec<f32>,
     wide: Vec<f32>,
@@ -132,13 +132,21 @@ struct Scratch<T: Format> {
     sieve: Sieve,
 }
 
-/// What a forward pass met.
+/// How far passes left the range of their number format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Met {
+pub struct RangeEvents {
     /// Activations above their calibrated range, which were clipped.
     pub clipped: u64,
     /// Whether a sum or an activation may have left the range of fp16.
     pub overflow: bool,
+}
+
+impl RangeEvents {
+    /// Adds those of further passes.
+    pub fn add(&mut self, further: Self) {
+        self.clipped += further.clipped;
+        self.overflow |= further.overflow;
+    }
 }
 
 impl<T: Format> Engine<T> {
@@ -170,7 +178,7 @@ impl<T: Format> Engine<T> {
         let screens = pooled_layers(&layers).any(|layer| layer.screen.is_some());
         let edges = Edges::new(&layers.edges);
         let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs() };
-        let scratch = || Scratch {
+        let thread = || ThreadScratch {
             edged: vec![0.0; edged],
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
@@ -198,7 +206,7 @@ impl<T: Format> Engine<T> {
             surroundings: RwLock::default(),
             blocks: (0..RUN_BLOCKS).map(|_| block()).collect(),
             groups: (0..pooled.div_ceil(GROUP)).map(|_| Mutex::new(group())).collect(),
-            scratch: (0..n_threads.max(1)).map(|_| Mutex::new(scratch())).collect(),
+            threads: (0..n_threads.max(1)).map(|_| Mutex::new(thread())).collect(),
             vector: RwLock::new(Vec::with_capacity(vector)),
             vector_out: (0..vector.div_ceil(VECTOR_CHUNK * VECTOR_BLOCK))
                 .map(|_| chunk())
@@ -225,24 +233,18 @@ impl<T: Format> Engine<T> {
         }
     }
 
-    /// Takes `points` for the passes that follow.
-    pub fn set_points(&self, points: &[[f32; 3]]) {
+    /// Takes `input` for the pass that follows, and forgets what earlier ones
+    /// met.
+    fn take(&self, input: &Input<'_>) {
+        let Input { points, cloud, .. } = *input;
         let mut rows = write(&self.points);
         rows.clear();
         let spread = Spread::new(points.len());
         let in_order = (0..points.len()).map(|row| points[spread.point(row)]);
         rows.extend(in_order.flat_map(|[x, y, z]| [x, y, z, 0.0]));
-    }
-
-    /// Takes `cloud` for what surrounds the points of the passes that follow.
-    pub fn set_surroundings(&self, cloud: &[[f32; 3]]) {
         if !self.edges.is_empty() {
             write(&self.surroundings).set(cloud);
         }
-    }
-
-    /// Forgets what earlier passes met.
-    pub fn reset(&self) {
         self.clipped.store(0, Ordering::Relaxed);
         self.overflow.store(false, Ordering::Relaxed);
     }
@@ -253,9 +255,8 @@ impl<T: Format> Engine<T> {
         self.place(self.last(pass), &feature, &folded).panels.outputs()
     }
 
-    /// What the passes since [`Engine::reset`] met.
-    pub fn met(&self) -> Met {
-        Met {
+    fn events(&self) -> RangeEvents {
+        RangeEvents {
             clipped: self.clipped.load(Ordering::Relaxed),
             overflow: self.overflow.load(Ordering::Relaxed),
         }
