@@ -16,7 +16,7 @@ use crate::prediction::{Prediction, argmax};
 use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::selection::{Selection, front_pass};
 use crate::source::ModelSource;
-use crate::votes::Votes;
+use crate::test_time_augmentation::TestTimeAugmentation;
 
 /// A network ready to classify clouds.
 ///
@@ -51,7 +51,7 @@ pub struct Classifier {
     /// What the cloud at hand met in the precision asked for.
     events: RangeEvents,
     selection: Selection,
-    votes: Votes,
+    augmentation: TestTimeAugmentation,
     finite: Vec<[f64; 3]>,
     normalized: Vec<[f32; 3]>,
     prediction: Prediction,
@@ -102,7 +102,7 @@ impl Classifier {
         let mut classifier = Self {
             source: (options.precision != Precision::F32).then_some(source),
             card,
-            votes: Votes::new(options, &spec, classes.len())?,
+            augmentation: TestTimeAugmentation::new(options, &spec, classes.len())?,
             classes,
             options: options.clone(),
             kernels: setup.kernels,
@@ -130,7 +130,7 @@ impl Classifier {
         self.network.reserve(n);
         self.finite.reserve(n);
         self.normalized.reserve(n);
-        self.votes.reserve(n);
+        self.augmentation.reserve(n);
         self.selection.reserve(n, self.kernels, &*self.network, &mut self.scratch)
     }
 
@@ -230,7 +230,7 @@ impl Classifier {
         self.normalize();
         self.events = RangeEvents::default();
         self.prediction.precision = self.options.precision;
-        if self.votes.n() <= 1 {
+        if self.augmentation.n() <= 1 {
             self.forward()?;
             self.prediction.logits.clone_from(&self.scratch.values);
         } else {
@@ -272,14 +272,14 @@ impl Classifier {
     /// Averages the log-probabilities of several draws, which take the place of
     /// logits.
     fn vote(&mut self) -> Result<(), Error> {
-        self.votes.begin(&self.normalized);
-        for vote in 0..self.votes.n() {
-            self.selection.set_seed(self.votes.seed(vote));
-            self.votes.turn(vote, &mut self.normalized);
+        self.augmentation.begin(&self.normalized);
+        for vote in 0..self.augmentation.n() {
+            self.selection.set_seed(self.augmentation.seed(vote));
+            self.augmentation.turn(vote, &mut self.normalized);
             self.forward()?;
-            self.votes.count(&self.scratch.values);
+            self.augmentation.count(&self.scratch.values);
         }
-        self.votes.result(&mut self.prediction.logits);
+        self.augmentation.result(&mut self.prediction.logits);
         Ok(())
     }
 }

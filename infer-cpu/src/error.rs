@@ -54,7 +54,7 @@ pub enum Error {
         /// What the model has or lacks.
         what: &'static str,
     },
-    /// Votes draw random subsets; another sampler has one opinion only.
+    /// TestTimeAugmentation draw random subsets; another sampler has one opinion only.
     #[error("votes need random subsets or rotations: sampler {0} would repeat itself")]
     VotesWithoutDraws(crate::sampler::SamplerKind),
     /// Room for more points than memory could hold.

@@ -10,7 +10,7 @@ use crate::dense::Dense;
 use crate::kernel::{Columns, Kernels, Panels};
 use crate::network::{Network, Role, read_network};
 use crate::precision::{Format, Matrix};
-use crate::screen::Screen;
+use crate::prefilter::Int8Prefilter;
 
 /// A network packed for format `T`.
 pub type Layers<T> = Network<Conv<T>, Vector<T>>;
@@ -44,8 +44,8 @@ pub struct Packed<T: Format> {
     pub name: String,
     /// Its weights.
     pub panels: Panels<T::Weight>,
-    /// What its pooling is screened by, where that pays.
-    pub screen: Option<Screen>,
+    /// What prefilters its pooling, where that pays.
+    pub prefilter: Option<Int8Prefilter>,
     /// See [`Dense::gain`].
     pub gain: f32,
     /// Its largest output, where calibrated.
@@ -113,8 +113,8 @@ impl Packer<'_> {
             Role::Inner => Conv::Inner(self.packed(&dense)),
             Role::Last => {
                 let is_f32 = T::as_f32(&[], &mut []).is_some();
-                let screen = is_f32.then(|| Screen::new(&dense, self.kernels)).flatten();
-                Conv::Inner(Packed { screen, ..self.packed(&dense) })
+                let prefilter = is_f32.then(|| Int8Prefilter::new(&dense, self.kernels)).flatten();
+                Conv::Inner(Packed { prefilter, ..self.packed(&dense) })
             }
             Role::AfterTransform => {
                 let mut plain = empty::<crate::precision::F32>(self.kernels, &dense);
@@ -140,7 +140,7 @@ impl Packer<'_> {
         Packed {
             name: dense.name.clone(),
             panels,
-            screen: None,
+            prefilter: None,
             gain: dense.gain(),
             range: self.range(&dense.name),
             seen: Largest::default(),
@@ -182,7 +182,7 @@ pub fn panels<T: Format>(kernels: &Kernels, inputs: usize, outputs: usize) -> Pa
 
 impl First {
     /// Packs the layer behind an input transform `t` `[3, 3]`: a point p, a
-    /// row, comes to it as p t. What is known of its surroundings stays.
+    /// row, comes to it as p t. The weights of EdgeConv features stay.
     pub fn turn(&self, t: &[f32], panels: &mut Panels<f32>) {
         panels.fill(|input, output| match input {
             0..3 => (0..3).map(|j| t[input * 3 + j] * self.dense.at(j, output)).sum(),
@@ -200,7 +200,7 @@ impl<T: Format> Packed<T> {
         Self {
             name: String::new(),
             panels,
-            screen: None,
+            prefilter: None,
             gain: 0.0,
             range: UNKNOWN_RANGE,
             seen: Largest::default(),

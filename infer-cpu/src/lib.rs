@@ -9,7 +9,7 @@ mod calibrate;
 mod choose;
 mod classifier;
 mod dense;
-mod edge;
+mod edge_conv;
 mod engine;
 mod error;
 mod forward;
@@ -20,20 +20,20 @@ mod normalize;
 mod options;
 mod precision;
 mod prediction;
+mod prefilter;
 pub mod sampler;
-mod screen;
 mod selection;
 mod source;
 mod summary;
 mod team;
-mod votes;
+mod test_time_augmentation;
 
 /// How a team of threads shares out a cloud, for models of its speed.
 pub mod sharing {
     pub use crate::engine::{
         BLOCK, GROUP, RUN_BLOCKS, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK, folding_pays,
     };
-    pub use crate::screen::screening_pays;
+    pub use crate::prefilter::prefilter_pays;
 }
 
 /// What a model file holds, layer by layer, for programs that write it in
@@ -51,7 +51,7 @@ pub use classifier::Classifier;
 pub use error::Error;
 pub use formats::model_card::{ModelCard, Normalization};
 pub use normalize::to_unit_sphere;
-pub use options::{Options, TNets};
+pub use options::{Options, TNets, UpAxis};
 pub use precision::Precision;
 pub use prediction::Prediction;
 pub use summary::{LayerShape, NetShape, Summary, inspect};

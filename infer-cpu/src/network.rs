@@ -4,8 +4,7 @@
 //! Names are those of yanx27/Pointnet_Pointnet2_pytorch, for any number of
 //! layers: `feat.conv1…`, `feat.bn1…` the trunk, `feat.stn.*` and `feat.fstn.*`
 //! the T-Nets (`conv`, `fc`, and `bn` counted through both), `fc1…`, `bn1…` the
-//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`. What a point's surroundings add to its
-//! coordinates comes from `edge.conv1…`, one layer for each of the card's
+//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`. The features of a point's neighborhood come from `edge.conv1…`, one layer for each of the card's
 //! `edge_radii`. Where no layer has a batch norm, all are
 //! taken as folded already.
 
@@ -22,9 +21,9 @@ use crate::dense::{BatchNorm, Dense};
 pub struct Network<C, F> {
     /// The T-Net of the coordinates.
     pub stn: Option<TNet<C, F>>,
-    /// What surrounds a point, by radius, where the network looks at it.
+    /// The EdgeConv layers, each with its radius.
     pub edges: Vec<(f32, Dense)>,
-    /// The layers from coordinates, and features of their surroundings, to the
+    /// The layers from coordinates, and EdgeConv features, to the
     /// features that are pooled.
     pub trunk: Vec<C>,
     /// The T-Net of the features.
@@ -195,7 +194,7 @@ impl<M, N> Reader<'_, M, N> {
         Ok(TNet { k, convs, fcs })
     }
 
-    /// The layers that look at a point's surroundings.
+    /// The EdgeConv layers, each with its radius.
     fn edges(&mut self, card: &ModelCard) -> Result<Vec<(f32, Dense)>, FormatError> {
         let (n, radii) = (self.count("edge.conv"), &card.edge_radii);
         if radii.len() != n {

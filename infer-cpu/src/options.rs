@@ -68,6 +68,30 @@ impl std::str::FromStr for TNets {
     }
 }
 
+/// The axis of a cloud that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum UpAxis {
+    /// x.
+    X,
+    /// y, as in ModelNet40's files.
+    Y,
+    /// z, as in scans.
+    #[default]
+    Z,
+}
+
+impl UpAxis {
+    /// The two axes that a rotation about this one turns, the first towards
+    /// the second.
+    pub(crate) fn others(self) -> [usize; 2] {
+        match self {
+            Self::X => [1, 2],
+            Self::Y => [2, 0],
+            Self::Z => [0, 1],
+        }
+    }
+}
+
 /// How a [`crate::Classifier`] computes.
 ///
 /// ```
@@ -106,8 +130,8 @@ pub struct Options {
     pub votes: u32,
     /// Turn the cloud about its up axis between votes, evenly spread.
     pub vote_rotations: bool,
-    /// The axis that points up: 0 for x, 1 for y, 2 for z.
-    pub up: usize,
+    /// The axis that points up.
+    pub up: UpAxis,
     /// Points to make room for at once; larger clouds allocate when they come.
     pub capacity: usize,
 }
@@ -131,7 +155,7 @@ impl Default for Options {
             drop_invalid: false,
             votes: 1,
             vote_rotations: false,
-            up: 2,
+            up: UpAxis::Z,
             capacity: 4096,
         }
     }

@@ -143,7 +143,7 @@ pub trait Format: Send + Sync + 'static {
     fn columns(dense: &Dense) -> Columns<Self::Stored>;
 
     /// Activations and maxima as fp32 where they are, so that a
-    /// [`Screen`](crate::screen::Screen) can tell the latter from the former.
+    /// [`Int8Prefilter`](crate::prefilter::Int8Prefilter) can tell the latter from the former.
     fn as_f32<'a>(
         _: &'a [Self::Activation],
         _: &'a mut [Self::Sum],

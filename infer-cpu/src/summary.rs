@@ -19,7 +19,7 @@ pub struct Summary {
     pub stn: Option<NetShape>,
     /// The T-Net of the features, if there is one.
     pub fstn: Option<NetShape>,
-    /// What looks at a point's surroundings, with its radius.
+    /// The EdgeConv layers, each with its radius.
     pub edges: Vec<(f32, LayerShape)>,
     /// The trunk, and the layers from the pooled vector to the logits.
     pub trunk: NetShape,

@@ -4,7 +4,7 @@
 //! among them: where another process holds a core, the others do its share,
 //! and the caller never waits for a thread that has claimed nothing. Where the
 //! caller had to wait long for a chunk that was claimed, its worker was driven
-//! off its core: the caller then works alone for a while ([`Pause`]), so that a
+//! off its core: the caller then works alone for a while ([`Backoff`]), so that a
 //! busy neighbour costs no more than the team gains. Idle threads spin for a
 //! moment, since the next task of a frame is microseconds away, and then park,
 //! since the next frame is not.
@@ -34,21 +34,21 @@ pub trait Work: Send + Sync + 'static {
 /// Threads that do chunks of `W`.
 pub struct Team<W: Work> {
     work: Arc<W>,
-    board: Arc<Board>,
+    queue: Arc<TaskQueue>,
     workers: Vec<JoinHandle<()>>,
     threads: Vec<Thread>,
-    pause: Mutex<Pause>,
+    backoff: Mutex<Backoff>,
 }
 
 /// When the caller works alone: for a while after a long wait, twice as long
 /// after each that follows, and half as long after many tasks without.
-struct Pause {
+struct Backoff {
     until: Option<Instant>,
     length: Duration,
     good_tasks: u32,
 }
 
-impl Pause {
+impl Backoff {
     const SHORTEST: Duration = Duration::from_millis(20);
     const LONGEST: Duration = Duration::from_secs(1);
     /// About ten frames' worth.
@@ -82,7 +82,7 @@ impl Pause {
 }
 
 /// Where tasks are announced.
-struct Board {
+struct TaskQueue {
     /// Number of the task (32 bits), its chunks (16), the next to claim (16).
     /// All in one word, so that a claim cannot mix two tasks.
     ticket: AtomicU64,
@@ -106,7 +106,7 @@ impl<W: Work> Team<W> {
     pub fn new(work: W, n_threads: usize) -> std::io::Result<Self> {
         let n_workers = n_threads.max(1) - 1;
         let work = Arc::new(work);
-        let board = Arc::new(Board {
+        let queue = Arc::new(TaskQueue {
             ticket: AtomicU64::new(0),
             done: AtomicU32::new(0),
             started: AtomicU32::new(0),
@@ -116,21 +116,21 @@ impl<W: Work> Team<W> {
         // Built first, so that those that did start are stopped if one cannot.
         let mut team = Self {
             work,
-            board,
+            queue,
             workers: Vec::new(),
             threads: Vec::new(),
-            pause: Mutex::new(Pause::new()),
+            backoff: Mutex::new(Backoff::new()),
         };
         for worker in 0..n_workers {
-            let (work, board) = (Arc::clone(&team.work), Arc::clone(&team.board));
+            let (work, queue) = (Arc::clone(&team.work), Arc::clone(&team.queue));
             let handle = thread::Builder::new()
                 .name(format!("infer-{}", worker + 1))
-                .spawn(move || board.serve(&*work, worker))?;
+                .spawn(move || queue.serve(&*work, worker))?;
             team.threads.push(handle.thread().clone());
             team.workers.push(handle);
         }
         // A thread that starts allocates; none does so once the team is there.
-        while (team.board.started.load(Ordering::Acquire) as usize) < n_workers {
+        while (team.queue.started.load(Ordering::Acquire) as usize) < n_workers {
             thread::yield_now();
         }
         Ok(team)
@@ -147,35 +147,35 @@ impl<W: Work> Team<W> {
     pub fn run(&self, n_chunks: usize) {
         assert!(n_chunks <= MOST_CHUNKS, "a task of {n_chunks} chunks");
         let start = Instant::now();
-        let mut pause = self.pause.lock().unwrap_or_else(PoisonError::into_inner);
-        if n_chunks <= 1 || self.workers.is_empty() || pause.is_on(start) {
+        let mut backoff = self.backoff.lock().unwrap_or_else(PoisonError::into_inner);
+        if n_chunks <= 1 || self.workers.is_empty() || backoff.is_on(start) {
             (0..n_chunks).for_each(|chunk| self.work.chunk(0, chunk));
             return;
         }
-        let board = &*self.board;
-        board.announce(n_chunks);
-        let wanted = self.threads.iter().zip(&board.parked).take(n_chunks - 1);
+        let queue = &*self.queue;
+        queue.announce(n_chunks);
+        let wanted = self.threads.iter().zip(&queue.parked).take(n_chunks - 1);
         for (thread, parked) in wanted {
             if parked.swap(false, Ordering::SeqCst) {
                 thread.unpark();
             }
         }
         let mut n_own = 0;
-        while let Some(chunk) = board.claim() {
-            board.perform(&*self.work, 0, chunk);
+        while let Some(chunk) = queue.claim() {
+            queue.perform(&*self.work, 0, chunk);
             n_own += 1;
         }
         let done = Instant::now();
-        board.wait_until_done(n_chunks);
+        queue.wait_until_done(n_chunks);
         let end = Instant::now();
         let usual = (done - start) / n_own.max(1) * LONG_WAIT_CHUNKS + LONG_WAIT;
-        pause.note(end - done > usual, end);
+        backoff.note(end - done > usual, end);
     }
 }
 
 impl<W: Work> Drop for Team<W> {
     fn drop(&mut self) {
-        self.board.stop.store(true, Ordering::SeqCst);
+        self.queue.stop.store(true, Ordering::SeqCst);
         self.threads.iter().for_each(Thread::unpark);
         for worker in self.workers.drain(..) {
             // A worker that panicked has said so on standard error.
@@ -184,7 +184,7 @@ impl<W: Work> Drop for Team<W> {
     }
 }
 
-impl Board {
+impl TaskQueue {
     /// Puts up the next task. All chunks of the one before are done.
     fn announce(&self, n_chunks: usize) {
         let number = (self.ticket.load(Ordering::Relaxed) >> 32).wrapping_add(1);
@@ -322,22 +322,22 @@ mod tests {
         let team = Team::new(work, 2).unwrap();
         team.run(2);
         let before = team.work().by_workers.load(Ordering::SeqCst);
-        // Well within the shortest pause, unless this thread is held up itself.
+        // Well within the shortest backoff, unless this thread is held up itself.
         let start = Instant::now();
         team.run(1000);
         let after = team.work().by_workers.load(Ordering::SeqCst);
-        assert!(before == after || start.elapsed() > Pause::SHORTEST, "{before} {after}");
+        assert!(before == after || start.elapsed() > Backoff::SHORTEST, "{before} {after}");
     }
 
     #[test]
     fn pauses_lengthen_while_waits_are_long_and_shorten_once_they_are_not() {
-        let (mut pause, now) = (Pause::new(), Instant::now());
-        assert!(!pause.is_on(now));
-        pause.note(true, now);
-        assert!(pause.is_on(now) && !pause.is_on(now + Pause::SHORTEST));
-        (0..20).for_each(|_| pause.note(true, now));
-        assert_eq!(pause.length, Pause::LONGEST);
-        (0..20 * Pause::GOOD_TASKS).for_each(|_| pause.note(false, now));
-        assert_eq!(pause.length, Pause::SHORTEST);
+        let (mut backoff, now) = (Backoff::new(), Instant::now());
+        assert!(!backoff.is_on(now));
+        backoff.note(true, now);
+        assert!(backoff.is_on(now) && !backoff.is_on(now + Backoff::SHORTEST));
+        (0..20).for_each(|_| backoff.note(true, now));
+        assert_eq!(backoff.length, Backoff::LONGEST);
+        (0..20 * Backoff::GOOD_TASKS).for_each(|_| backoff.note(false, now));
+        assert_eq!(backoff.length, Backoff::SHORTEST);
     }
 }

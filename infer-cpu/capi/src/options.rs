@@ -5,8 +5,8 @@ use std::fmt::Display;
 use std::ptr::null;
 use std::str::FromStr;
 
-use infer_cpu::Options;
 use infer_cpu::sampler::SamplerSpec;
+use infer_cpu::{Options, UpAxis};
 
 use crate::failure::Failure;
 
@@ -85,7 +85,7 @@ pub extern "C" fn edgepuck_options_default() -> EdgepuckOptions {
         drop_invalid: options.drop_invalid,
         votes: options.votes,
         vote_rotations: options.vote_rotations,
-        up: options.up,
+        up: 2,
         capacity: options.capacity,
     }
 }
@@ -96,9 +96,12 @@ impl EdgepuckOptions {
     /// # Safety
     /// Every word is null or a NUL-terminated string.
     pub(crate) unsafe fn read(&self) -> Result<Options, Failure> {
-        if self.up > 2 {
-            return Err(bad("up", format!("{} is no axis; choose one of 0, 1, 2", self.up)));
-        }
+        let up = match self.up {
+            0 => UpAxis::X,
+            1 => UpAxis::Y,
+            2 => UpAxis::Z,
+            other => return Err(bad("up", format!("expected 0, 1 or 2, found {other}"))),
+        };
         // SAFETY: words are the caller's promise.
         unsafe {
             Ok(Options {
@@ -112,7 +115,7 @@ impl EdgepuckOptions {
                 drop_invalid: self.drop_invalid,
                 votes: self.votes,
                 vote_rotations: self.vote_rotations,
-                up: self.up,
+                up,
                 capacity: self.capacity,
             })
         }

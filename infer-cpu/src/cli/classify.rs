@@ -13,7 +13,7 @@ use formats::cloud_file::CloudFormat;
 use formats::model_card::{ModelCard, Normalization};
 use infer_cpu::kernel::KernelName;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, Options, Precision};
+use infer_cpu::{Classifier, Options, Precision, UpAxis};
 
 use super::Outcome;
 use super::failure::{of_setup, told_once};
@@ -118,6 +118,16 @@ enum Axis {
     Z,
 }
 
+impl From<Axis> for UpAxis {
+    fn from(axis: Axis) -> Self {
+        match axis {
+            Axis::X => Self::X,
+            Axis::Y => Self::Y,
+            Axis::Z => Self::Z,
+        }
+    }
+}
+
 /// Classifies what `args` name, one after the other.
 ///
 /// # Errors
@@ -167,7 +177,7 @@ impl Args {
             drop_invalid: self.drop_invalid,
             votes: self.votes,
             vote_rotations: self.vote_rotations,
-            up: self.up as usize,
+            up: self.up.into(),
             ..Options::default()
         })
     }

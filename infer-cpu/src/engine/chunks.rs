@@ -10,7 +10,7 @@ use super::{lock, read, write};
 use crate::kernel::{Kernels, Rows};
 use crate::layers::Packed;
 use crate::precision::{F16_LARGEST, Format};
-use crate::screen::{Best, Levels, Sieve};
+use crate::prefilter::{Best, Levels, PrefilterScratch};
 use crate::team::Work;
 
 impl<T: Format> Work for Engine<T> {
@@ -38,7 +38,7 @@ impl<T: Format> Engine<T> {
         match pass {
             Pass::Front | Pass::Stn => self.multiply(&rows, &first.panels, wide, width),
             Pass::Fstn | Pass::Trunk => {
-                let rows = self.with_surroundings(&rows, edged);
+                let rows = self.with_edge_features(&rows, edged);
                 self.multiply(&rows, &read(&self.entry), wide, width);
             }
         }
@@ -67,12 +67,12 @@ impl<T: Format> Engine<T> {
         write(&self.blocks[slot]).set(self.kernels, &Rows::new(from, width, n), last);
     }
 
-    /// `rows` of coordinates, each followed by what surrounds the point.
-    fn with_surroundings<'a>(&self, rows: &Rows<'a, f32>, edged: &'a mut [f32]) -> Rows<'a, f32> {
+    /// `rows` of coordinates, each followed by the point's EdgeConv features.
+    fn with_edge_features<'a>(&self, rows: &Rows<'a, f32>, edged: &'a mut [f32]) -> Rows<'a, f32> {
         if self.edges.is_empty() {
             return *rows;
         }
-        let cloud = read(&self.surroundings);
+        let cloud = read(&self.cloud);
         let first = self.layers.trunk[0].first();
         let (inputs, stride) = (first.panels.inputs(), first.panels.padded_inputs());
         let points = rows.data().chunks_exact(rows.stride());
@@ -112,18 +112,18 @@ impl<T: Format> Engine<T> {
             let first_row = (first_block + slot) * BLOCK;
             let block = read(&self.blocks[slot]);
             let rows = Rows::new(&block.features[..], stride, BLOCK.min(n_points - first_row));
-            let is_pooled = pool.screens && block.has_levels && {
-                let sieve = &mut lock(&self.threads[thread]).sieve;
-                pool.screen::<T>(
+            let is_pooled = pool.prefilters && block.has_levels && {
+                let prefilter_scratch = &mut lock(&self.threads[thread]).prefilter_scratch;
+                pool.prefilter::<T>(
                     self.kernels,
                     (last, group),
                     (&rows, &block.levels),
-                    sieve,
+                    prefilter_scratch,
                     first_row,
                 )
             };
             if !is_pooled {
-                pool.screens &= !block.has_levels;
+                pool.prefilters &= !block.has_levels;
                 let first_row = winners.then_some(first_row as u32);
                 pool.multiply::<T>(self.kernels, (last, group), &rows, first_row);
             }
@@ -152,7 +152,7 @@ impl<T: Format> Block<T> {
     fn set(&mut self, kernels: &Kernels, rows: &Rows<'_, T::Activation>, next: &Packed<T>) {
         let n = rows.n() * rows.stride();
         self.features[..n].copy_from_slice(&rows.data()[..n]);
-        let plain = next.screen.as_ref().and_then(|_| T::as_f32(rows.data(), &mut []));
+        let plain = next.prefilter.as_ref().and_then(|_| T::as_f32(rows.data(), &mut []));
         self.has_levels = plain.is_some_and(|(data, _)| {
             self.levels.take(kernels, &Rows::new(data, rows.stride(), rows.n()))
         });
@@ -163,31 +163,33 @@ impl<S: Copy> Group<S> {
     fn begin<T: Format<Sum = S>>(&mut self, last: &Packed<T>, group: usize, wants_winners: bool) {
         self.maxima.fill(T::LOWEST);
         self.winners.fill(0);
-        self.screens = last.screen.is_some();
+        self.prefilters = last.prefilter.is_some();
         let channels = n_channels(last, group);
-        if let Some(screen) = &last.screen
+        if let Some(prefilter) = &last.prefilter
             && let Some((_, maxima)) = T::as_f32(&[], &mut self.maxima[..channels])
         {
-            screen.begin(group, wants_winners, maxima);
+            prefilter.begin(group, wants_winners, maxima);
         }
     }
 
     /// Pools rows whose levels are known; returns whether it did.
-    fn screen<T: Format<Sum = S>>(
+    fn prefilter<T: Format<Sum = S>>(
         &mut self,
         kernels: &Kernels,
         (last, group): (&Packed<T>, usize),
         (rows, levels): (&Rows<'_, T::Activation>, &Levels),
-        sieve: &mut Sieve,
+        prefilter_scratch: &mut PrefilterScratch,
         first_row: usize,
     ) -> bool {
         let channels = n_channels(last, group);
         let plain = T::as_f32(rows.data(), &mut self.maxima[..channels]);
-        let (Some(screen), Some((data, maxima))) = (&last.screen, plain) else { return false };
+        let (Some(prefilter), Some((data, maxima))) = (&last.prefilter, plain) else {
+            return false;
+        };
         let rows = Rows::new(data, rows.stride(), rows.n());
         let winners = &mut self.winners[..channels];
         let mut best = Best { maxima, winners, first_row: first_row as u32 };
-        screen.pool(kernels, group, (&rows, levels), sieve, &mut best)
+        prefilter.pool(kernels, group, (&rows, levels), prefilter_scratch, &mut best)
     }
 
     /// Pools rows by all of their products, and keeps winners if their first

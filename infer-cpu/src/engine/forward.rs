@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Engine, GROUP, Head, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Spread, Task,
+    BLOCK, Engine, GROUP, Head, Interleave, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Task,
     VECTOR_CHUNK, lock, read, write,
 };
 use crate::kernel::{Panels, Rows};
@@ -130,7 +130,7 @@ impl<T: Format> Engine<T> {
     fn collect(&self, pass: Pass, scratch: &mut Scratch) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let panels = &self.place(self.last(pass), &feature, &folded).panels;
-        let spread = Spread::new(read(&self.points).len() / 4);
+        let interleave = Interleave::new(read(&self.points).len() / 4);
         scratch.values.clear();
         scratch.winners.clear();
         for (g, first) in (0..panels.outputs()).step_by(GROUP).enumerate() {
@@ -142,7 +142,7 @@ impl<T: Format> Engine<T> {
                 let value = T::widen(sum) * scale + panels.biases()[channel];
                 let is_cut = panels.relu() && value < 0.0;
                 scratch.values.push(if is_cut { 0.0 } else { value });
-                scratch.winners.push(spread.point(winner as usize) as u32);
+                scratch.winners.push(interleave.point(winner as usize) as u32);
             }
         }
     }

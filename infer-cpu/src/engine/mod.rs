@@ -14,20 +14,20 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
-use crate::edge::{Edges, Surroundings};
+use crate::edge_conv::{EdgeConv, Neighborhood};
 use crate::kernel::{Columns, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
 use crate::precision::Format;
-pub use crate::screen::GROUP;
-use crate::screen::{Levels, Sieve};
+pub use crate::prefilter::GROUP;
+use crate::prefilter::{Levels, PrefilterScratch};
 
 mod chunks;
 mod forward;
+mod interleave;
 mod route;
-mod spread;
 
 pub use forward::{Input, Scratch, folding_pays};
-use spread::Spread;
+use interleave::Interleave;
 
 /// Points of a block: whole tiles of every kernel, and few enough that their
 /// features stay in a first-level cache.
@@ -91,11 +91,11 @@ pub struct Engine<T: Format> {
     folded: RwLock<Packed<T>>,
     fold: AtomicBool,
     task: RwLock<Task>,
-    /// Rows x, y, z, 0, in the order of [`Spread`].
+    /// Rows x, y, z, 0, in the order of [`Interleave`].
     points: RwLock<Vec<f32>>,
-    edges: Edges,
+    edges: EdgeConv,
     /// All points among which `edges` looks for neighbours.
-    surroundings: RwLock<Surroundings>,
+    cloud: RwLock<Neighborhood>,
     blocks: Vec<RwLock<Block<T>>>,
     groups: Vec<Mutex<Group<T::Sum>>>,
     threads: Vec<Mutex<ThreadScratch<T>>>,
@@ -119,17 +119,17 @@ struct Block<T: Format> {
 struct Group<S> {
     maxima: Vec<S>,
     winners: Vec<u32>,
-    /// Whether screening has paid so far.
-    screens: bool,
+    /// Whether prefiltering has paid so far.
+    prefilters: bool,
 }
 
 /// A thread's own memory: a block's features, before and after rounding.
 struct ThreadScratch<T: Format> {
-    /// Points with what is known of their surroundings.
+    /// Points with their EdgeConv features.
     edged: Vec<f32>,
     wide: Vec<f32>,
     narrow: [Vec<T::Activation>; 2],
-    sieve: Sieve,
+    prefilter_scratch: PrefilterScratch,
 }
 
 /// How far passes left the range of their number format.
@@ -175,21 +175,25 @@ impl<T: Format> Engine<T> {
             None => (Packed::zeros(kernels, 1, 1), Packed::zeros(kernels, 1, 1)),
         };
         let Widths { hidden, pooled, vector } = Widths::of(&layers);
-        let screens = pooled_layers(&layers).any(|layer| layer.screen.is_some());
-        let edges = Edges::new(&layers.edges);
+        let prefilters = pooled_layers(&layers).any(|layer| layer.prefilter.is_some());
+        let edges = EdgeConv::new(&layers.edges);
         let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs() };
         let thread = || ThreadScratch {
             edged: vec![0.0; edged],
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
-            sieve: if screens { Sieve::new(BLOCK) } else { Sieve::new(0) },
+            prefilter_scratch: if prefilters {
+                PrefilterScratch::new(BLOCK)
+            } else {
+                PrefilterScratch::new(0)
+            },
         };
         let group =
-            || Group { maxima: vec![T::LOWEST; GROUP], winners: vec![0; GROUP], screens: false };
+            || Group { maxima: vec![T::LOWEST; GROUP], winners: vec![0; GROUP], prefilters: false };
         let block = || {
             RwLock::new(Block {
                 features: vec![T::Activation::default(); BLOCK * hidden],
-                levels: Levels::with_room(if screens { BLOCK * hidden } else { 0 }),
+                levels: Levels::with_room(if prefilters { BLOCK * hidden } else { 0 }),
                 has_levels: false,
             })
         };
@@ -203,7 +207,7 @@ impl<T: Format> Engine<T> {
             task: RwLock::new(Task::Vector { head: Head::Class, layer: 0 }),
             points: RwLock::new(Vec::new()),
             edges,
-            surroundings: RwLock::default(),
+            cloud: RwLock::default(),
             blocks: (0..RUN_BLOCKS).map(|_| block()).collect(),
             groups: (0..pooled.div_ceil(GROUP)).map(|_| Mutex::new(group())).collect(),
             threads: (0..n_threads.max(1)).map(|_| Mutex::new(thread())).collect(),
@@ -229,7 +233,7 @@ impl<T: Format> Engine<T> {
         let missing = (n * 4).saturating_sub(points.len());
         points.reserve(missing);
         if !self.edges.is_empty() {
-            write(&self.surroundings).reserve(n);
+            write(&self.cloud).reserve(n);
         }
     }
 
@@ -239,11 +243,11 @@ impl<T: Format> Engine<T> {
         let Input { points, cloud, .. } = *input;
         let mut rows = write(&self.points);
         rows.clear();
-        let spread = Spread::new(points.len());
-        let in_order = (0..points.len()).map(|row| points[spread.point(row)]);
+        let interleave = Interleave::new(points.len());
+        let in_order = (0..points.len()).map(|row| points[interleave.point(row)]);
         rows.extend(in_order.flat_map(|[x, y, z]| [x, y, z, 0.0]));
         if !self.edges.is_empty() {
-            write(&self.surroundings).set(cloud);
+            write(&self.cloud).set(cloud);
         }
         self.clipped.store(0, Ordering::Relaxed);
         self.overflow.store(false, Ordering::Relaxed);

@@ -10,7 +10,7 @@ use std::ops::Range;
 use half::f16;
 
 use super::x86::{Lanes, implement_lanes};
-use super::{Gemm, Screening, declare_kernels};
+use super::{Gemm, PrefilterKernels, declare_kernels};
 
 const NR: usize = 32;
 
@@ -24,8 +24,8 @@ declare_kernels!(
         f32: Some(Gemm { nr: NR, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
         f16: Some(Gemm { nr: NR, k_step: 16, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
         i8: Some(Gemm { nr: NR, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
-        screens: true,
-        screening: Screening { levels, peaks, sift, dots },
+        prefilters: true,
+        prefilter: PrefilterKernels { levels, peaks, above_floors, dots },
         gemv_f32,
         gemv_f16,
         gemv_i8,

@@ -181,7 +181,7 @@ pub(crate) struct LevelSums {
     pub squares: f32,
 }
 
-/// A product that a screening could not rule out to be the largest of its
+/// A product that a prefilter could not rule out to be the largest of its
 /// channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Candidate {
@@ -193,7 +193,7 @@ pub(crate) struct Candidate {
 
 /// What tells the largest products from estimates of all of them, and from few
 /// in fp32. Rows are whole vectors: multiples of [`WIDTH_STEP`].
-pub(crate) struct Screening {
+pub(crate) struct PrefilterKernels {
     /// Rounds a row of `value * per_unit`, 0 to [`I8_LARGEST`] (clipped there),
     /// to levels.
     pub levels: fn(&[f32], per_unit: f32, out: &mut [u8]) -> LevelSums,
@@ -201,14 +201,15 @@ pub(crate) struct Screening {
     /// are no NaN.
     pub peaks: fn(values: &[f32], peaks: &mut [f32], rows: &mut [u32]),
     /// Finds what is above the floors.
-    pub sift: Sift,
+    pub above_floors: AboveFloors,
     /// Products of candidates.
     pub dots: Dots,
 }
 
 /// Puts every value above the floor of its column into `found`, row by row.
 /// Returns how many there are, or `None` if there is no room for them.
-pub(crate) type Sift = fn(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize>;
+pub(crate) type AboveFloors =
+    fn(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize>;
 
 /// Products of `candidates`: rows by `weights`, which has as many elements for
 /// each channel as `rows` has from one row to the next, a multiple of
@@ -239,9 +240,9 @@ pub struct Kernels {
     pub(crate) i8: Option<Gemm<u8, i8, i32>>,
     /// Whether int8 products cost so much less than those of fp32 that most of
     /// the latter are worth ruling out by the former.
-    pub(crate) screens: bool,
+    pub(crate) prefilters: bool,
     /// What it takes to do so.
-    pub(crate) screening: Screening,
+    pub(crate) prefilter: PrefilterKernels,
     /// fp32 weights.
     pub(crate) gemv_f32: Gemv<f32>,
     /// fp16 weights, fp32 arithmetic.

@@ -25,7 +25,7 @@ pub(super) mod fps;
 pub(super) mod gemv;
 pub(super) mod lanes;
 pub(super) mod narrow;
-pub(super) mod screen;
+pub(super) mod prefilter;
 pub(super) mod sink;
 pub(super) mod tile;
 
@@ -36,8 +36,8 @@ declare_kernels!(Neon, runs_here: true, {
     f32: Some(GEMM_F32),
     f16: None,
     i8: None,
-    screens: false,
-    screening: screen::SCREENING,
+    prefilters: false,
+    prefilter: prefilter::PREFILTER,
     gemv_f32: gemv::gemv::<f32>,
     gemv_f16: gemv::gemv::<half::f16>,
     gemv_i8: gemv::gemv::<i8>,

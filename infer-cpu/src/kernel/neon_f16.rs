@@ -28,7 +28,7 @@ use super::declare_kernels;
 use super::neon::lanes::Lanes;
 use super::neon::sink::Sink;
 use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
-use super::neon::{GEMM_F32, fps, gemv, narrow, screen};
+use super::neon::{GEMM_F32, fps, gemv, narrow, prefilter};
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 
 mod half_sink;
@@ -39,8 +39,8 @@ declare_kernels!(NeonF16, runs_here: is_aarch64_feature_detected!("fp16"), {
     f32: Some(GEMM_F32),
     f16: Some(gemm::<F16, 4>()),
     i8: None,
-    screens: false,
-    screening: screen::SCREENING,
+    prefilters: false,
+    prefilter: prefilter::PREFILTER,
     gemv_f32: gemv::gemv::<f32>,
     gemv_f16: gemv::gemv::<f16>,
     gemv_i8: gemv::gemv::<i8>,

@@ -6,7 +6,8 @@ use std::ops::Range;
 use half::f16;
 
 use super::{
-    Candidate, Columns, Gemm, I8_LARGEST, LevelSums, Panels, Rows, Screening, Soa, declare_kernels,
+    Candidate, Columns, Gemm, I8_LARGEST, LevelSums, Panels, PrefilterKernels, Rows, Soa,
+    declare_kernels,
 };
 
 /// Products of fp16 are summed in fp16 over this many inputs.
@@ -24,8 +25,8 @@ declare_kernels!(Scalar, runs_here: true, {
     f32: Some(Gemm { nr: 8, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
     f16: Some(Gemm { nr: 8, k_step: 1, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
     i8: Some(Gemm { nr: 8, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
-    screens: false,
-    screening: Screening { levels, peaks, sift, dots },
+    prefilters: false,
+    prefilter: PrefilterKernels { levels, peaks, above_floors, dots },
     gemv_f32,
     gemv_f16,
     gemv_i8,
@@ -161,7 +162,7 @@ fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
     }
 }
 
-fn sift(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
+fn above_floors(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
     let mut n = 0;
     for (row, values) in values.chunks_exact(floors.len()).enumerate() {
         for (channel, _) in values.iter().enumerate().filter(|&(c, value)| *value > floors[c]) {

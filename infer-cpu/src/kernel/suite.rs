@@ -432,8 +432,8 @@ pub fn levels_are_the_reference(kernels: &Kernels) {
         row[..6].copy_from_slice(&[0.0, -0.0, 0.5, 1.5, 127.5, 1e9]);
         for per_unit in [1.0, 0.37, 0.0] {
             let (mut found, mut expected) = (vec![9u8; n], vec![0u8; n]);
-            let sums = (kernels.screening.levels)(&row, per_unit, &mut found);
-            let exact = (reference.screening.levels)(&row, per_unit, &mut expected);
+            let sums = (kernels.prefilter.levels)(&row, per_unit, &mut found);
+            let exact = (reference.prefilter.levels)(&row, per_unit, &mut expected);
             assert_eq!(found, expected, "{n}");
             let near = |a: f32, b: f32| (a - b).abs() <= n as f32 * f32::EPSILON * b;
             assert!(near(sums.lost, exact.lost), "{sums:?}, {exact:?}");
@@ -444,28 +444,28 @@ pub fn levels_are_the_reference(kernels: &Kernels) {
 
 /// That peaks are those of the reference, first rows among equals, and that
 /// what is above a floor is found, in order, or nothing where room is short.
-pub fn sifting_is_the_reference(kernels: &Kernels) {
+pub fn candidates_are_those_of_the_reference(kernels: &Kernels) {
     let reference = super::scalar::kernels().unwrap();
-    let mut draw = Draw::new("sift");
+    let mut draw = Draw::new("above_floors");
     for (n, width) in [(0, 64), (1, 64), (7, 128), (48, 128)] {
         // A coarse grid, for ties.
         let mut values: Vec<f32> = (0..n * width).map(|_| (draw.signed() * 9.0).round()).collect();
         values.iter_mut().step_by(17).for_each(|value| *value = f32::NEG_INFINITY);
         let (mut peaks, mut rows) = (vec![7.0; width], vec![7; width]);
         let (mut expected_peaks, mut expected_rows) = (vec![0.0; width], vec![0; width]);
-        (kernels.screening.peaks)(&values, &mut peaks, &mut rows);
-        (reference.screening.peaks)(&values, &mut expected_peaks, &mut expected_rows);
+        (kernels.prefilter.peaks)(&values, &mut peaks, &mut rows);
+        (reference.prefilter.peaks)(&values, &mut expected_peaks, &mut expected_rows);
         assert_eq!((&peaks, &rows), (&expected_peaks, &expected_rows));
         let mut floors: Vec<f32> = (0..width).map(|_| (draw.signed() * 9.0).round()).collect();
         floors[..3].copy_from_slice(&[f32::NAN, f32::INFINITY, f32::NEG_INFINITY]);
         let mut expected = vec![Candidate::default(); n * width];
-        let count = (reference.screening.sift)(&values, &floors, &mut expected).unwrap();
+        let count = (reference.prefilter.above_floors)(&values, &floors, &mut expected).unwrap();
         let mut found = vec![Candidate::default(); count];
-        assert_eq!((kernels.screening.sift)(&values, &floors, &mut found), Some(count));
+        assert_eq!((kernels.prefilter.above_floors)(&values, &floors, &mut found), Some(count));
         assert_eq!(found, expected[..count]);
         if count > 0 {
             let short = &mut found[..count - 1];
-            assert_eq!((kernels.screening.sift)(&values, &floors, short), None);
+            assert_eq!((kernels.prefilter.above_floors)(&values, &floors, short), None);
         }
     }
 }
@@ -486,7 +486,7 @@ pub fn dots_are_near_exact(kernels: &Kernels) {
                 .collect();
             let mut out = vec![7.0; candidates.len()];
             let rows = Rows::new(&data, width, n);
-            (kernels.screening.dots)(&rows, &weights, &candidates, &mut out);
+            (kernels.prefilter.dots)(&rows, &weights, &candidates, &mut out);
             for (candidate, out) in candidates.iter().zip(out) {
                 let of = |data: &[f32], at: u16| data[usize::from(at) * width..][..width].to_vec();
                 let (row, weights) = (of(&data, candidate.row), of(&weights, candidate.channel));
@@ -615,10 +615,10 @@ macro_rules! suite {
         }
 
         #[test]
-        fn screening() {
+        fn prefilter() {
             let kernels = need!(here());
             must::levels_are_the_reference(kernels);
-            must::sifting_is_the_reference(kernels);
+            must::candidates_are_those_of_the_reference(kernels);
             must::dots_are_near_exact(kernels);
         }
     };

@@ -10,7 +10,9 @@ mod vectors;
 pub(super) use lanes::{Lanes, Weight, implement_lanes};
 pub(super) use products::{argmax, max, rows};
 pub(super) use tile::{Byte, Half, Single};
-pub(super) use vectors::{dots, fps_step, gemv, levels, narrow_f16, narrow_i8, peaks, sift};
+pub(super) use vectors::{
+    above_floors, dots, fps_step, gemv, levels, narrow_f16, narrow_i8, peaks,
+};
 
 /// Vectors of channels in a tile.
 const V: usize = 2;
@@ -82,7 +84,7 @@ macro_rules! entries {
             unsafe { run(values, peaks, rows) }
         }
 
-        fn sift(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
+        fn above_floors(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
             #[target_feature(enable = $features)]
             unsafe fn run(
                 values: &[f32],
@@ -90,7 +92,7 @@ macro_rules! entries {
                 found: &mut [Candidate],
             ) -> Option<usize> {
                 // SAFETY: `run` enables the features.
-                unsafe { x86::sift::<$lanes>(values, floors, found) }
+                unsafe { x86::above_floors::<$lanes>(values, floors, found) }
             }
             // SAFETY: `kernels()` gives out the table of these functions where the
             // machine was found to have the features.

@@ -121,7 +121,7 @@ pub(in crate::kernel) unsafe fn narrow_i8<L: Lanes>(
     }
 }
 
-/// [`crate::kernel::Screening::levels`].
+/// [`crate::kernel::PrefilterKernels::levels`].
 ///
 /// # Safety
 /// The instruction set of `L`.
@@ -148,7 +148,7 @@ pub(in crate::kernel) unsafe fn levels<L: Lanes>(
     }
 }
 
-/// [`crate::kernel::Screening::peaks`].
+/// [`crate::kernel::PrefilterKernels::peaks`].
 ///
 /// # Safety
 /// The instruction set of `L`.
@@ -174,12 +174,12 @@ pub(in crate::kernel) unsafe fn peaks<L: Lanes>(
     }
 }
 
-/// [`crate::kernel::Screening::sift`].
+/// [`crate::kernel::PrefilterKernels::above_floors`].
 ///
 /// # Safety
 /// The instruction set of `L`.
 #[inline(always)]
-pub(in crate::kernel) unsafe fn sift<L: Lanes>(
+pub(in crate::kernel) unsafe fn above_floors<L: Lanes>(
     values: &[f32],
     floors: &[f32],
     found: &mut [Candidate],
@@ -204,7 +204,7 @@ pub(in crate::kernel) unsafe fn sift<L: Lanes>(
     Some(n)
 }
 
-/// [`crate::kernel::Screening::dots`]: four sums of every fourth vector each,
+/// [`crate::kernel::PrefilterKernels::dots`]: four sums of every fourth vector each,
 /// for the sake of latency.
 ///
 /// # Safety

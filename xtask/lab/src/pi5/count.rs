@@ -176,7 +176,9 @@ fn place(name: &str) -> Place {
     let is = |parts: &[&str]| parts.iter().any(|part| name.contains(part));
     if is(&["gemv::gemv", "fps::step"]) || is(&Number::ALL.map(Number::tile_prefix)) {
         Place::Kernel
-    } else if is(&["kernel::", "engine::chunks", "edge::"]) || name == "memcpy" || name == "memset"
+    } else if is(&["kernel::", "engine::chunks", "edge_conv::"])
+        || name == "memcpy"
+        || name == "memset"
     {
         Place::Shared
     } else {

@@ -3,7 +3,7 @@
 use super::network::{Layer, Net, Network};
 use super::number::Number;
 use infer_cpu::Precision;
-use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays, screening_pays};
+use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays, prefilter_pays};
 use serde::Serialize;
 
 /// Where the points that a network sees come from.
@@ -165,7 +165,7 @@ impl Formats {
                 number: if i == 0 { Number::F32 } else { self.points },
             })
             .collect();
-        let screened = self.points == Number::F32 && screening_pays(last.inputs);
+        let screened = self.points == Number::F32 && prefilter_pays(last.inputs);
         let number = if screened { Number::I8 } else { self.points };
         let product = Product { layer: last, number };
         for first in (0..rows).step_by(BLOCK * RUN_BLOCKS) {

@@ -3,16 +3,16 @@
 //! Callers sort points, so neighbours follow each other, and a block of them
 //! knows one corner of the cloud. Taken a golden section of the cloud apart, any
 //! block is a sample of the whole, and the first few come close to the
-//! largest products: there is less left for a [`crate::screen`] to compute.
+//! largest products: there is less left for a [`crate::prefilter`] to compute.
 
 /// A permutation of the points.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Spread {
+pub struct Interleave {
     n: u64,
     step: u64,
 }
 
-impl Spread {
+impl Interleave {
     /// The order for `n` points.
     pub fn new(n: usize) -> Self {
         let n = n as u64;
@@ -40,9 +40,9 @@ mod tests {
     #[test]
     fn every_point_comes_once() {
         for n in (1..300).chain([1023, 1024, 4096, 65_537]) {
-            let spread = Spread::new(n);
+            let interleave = Interleave::new(n);
             let mut came = vec![false; n];
-            (0..n).for_each(|row| came[spread.point(row)] = true);
+            (0..n).for_each(|row| came[interleave.point(row)] = true);
             assert!(came.into_iter().all(|came| came), "{n}");
         }
     }
@@ -50,9 +50,10 @@ mod tests {
     #[test]
     fn a_block_is_a_sample_of_the_whole() {
         let (n, block) = (1024, 48);
-        let spread = Spread::new(n);
+        let interleave = Interleave::new(n);
         for first in (0..n - block).step_by(block) {
-            let mut points: Vec<_> = (first..first + block).map(|row| spread.point(row)).collect();
+            let mut points: Vec<_> =
+                (first..first + block).map(|row| interleave.point(row)).collect();
             points.sort_unstable();
             // Evenly spread, gaps would be n / block.
             let widest = points.windows(2).map(|pair| pair[1] - pair[0]).max();

@@ -4,20 +4,20 @@
 use formats::rng::StreamKey;
 
 use crate::error::Error;
-use crate::options::Options;
+use crate::options::{Options, UpAxis};
 use crate::sampler::{SamplerKind, SamplerSpec};
 
 /// Collects votes; keeps its memory from cloud to cloud.
-pub struct Votes {
+pub struct TestTimeAugmentation {
     n: u32,
     rotations: bool,
-    up: usize,
+    up: UpAxis,
     seed: u64,
     cloud: Vec<[f32; 3]>,
     sums: Vec<f64>,
 }
 
-impl Votes {
+impl TestTimeAugmentation {
     /// As `options` ask, of a network of `n_classes` behind sampler `spec`.
     ///
     /// # Errors
@@ -30,7 +30,7 @@ impl Votes {
         Ok(Self {
             n,
             rotations: options.vote_rotations,
-            up: options.up.min(2),
+            up: options.up,
             seed: spec.seed,
             cloud: Vec::new(),
             sums: vec![0.0; n_classes],
@@ -73,7 +73,7 @@ impl Votes {
             false => 0.0,
         };
         let (sin, cos) = angle.sin_cos();
-        let (a, b) = ((self.up + 1) % 3, (self.up + 2) % 3);
+        let [a, b] = self.up.others();
         for (out, point) in out.iter_mut().zip(&self.cloud) {
             *out = *point;
             if angle != 0.0 {

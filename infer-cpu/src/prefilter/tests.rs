@@ -6,10 +6,10 @@ use crate::kernel::available;
 
 const ROWS: usize = 48;
 
-/// Kernels that screen; an error if this machine has none.
-fn screening_kernels() -> Result<&'static Kernels, String> {
-    let found = available().find(|kernels| kernels.screens);
-    found.ok_or_else(|| "this machine runs no kernels that screen".to_owned())
+/// Kernels that prefilter; an error if this machine has none.
+fn prefiltering_kernels() -> Result<&'static Kernels, String> {
+    let found = available().find(|kernels| kernels.prefilters);
+    found.ok_or_else(|| "this machine runs no kernels that prefilter".to_owned())
 }
 
 /// A layer and the activations of some blocks before it, of a kind each.
@@ -89,22 +89,23 @@ fn exact_maximum(case: &Case, output: usize) -> (f64, f64) {
     })
 }
 
-/// Pools a case; `None` where screening gave up.
+/// Pools a case; `None` where the prefilter gave up.
 fn pool(case: &Case, kernels: &Kernels, wants_winners: bool) -> Option<(Vec<f32>, Vec<u32>)> {
-    let screen = Screen::new(&case.layer, kernels).unwrap();
-    let mut sieve = Sieve::new(ROWS);
+    let prefilter = Int8Prefilter::new(&case.layer, kernels).unwrap();
+    let mut prefilter_scratch = PrefilterScratch::new(ROWS);
     let (mut all_maxima, mut all_winners) = (Vec::new(), Vec::new());
     for group in 0..OUTPUTS.div_ceil(GROUP) {
         let width = GROUP.min(OUTPUTS.next_multiple_of(WIDTH_STEP) - group * GROUP);
         let (mut maxima, mut winners) = (vec![0.0; width], vec![0; width]);
-        screen.begin(group, wants_winners, &mut maxima);
+        prefilter.begin(group, wants_winners, &mut maxima);
         for (b, block) in case.blocks.iter().enumerate() {
             let rows = Rows::new(block, STRIDE, ROWS);
             let mut levels = Levels::with_room(block.len());
             assert!(levels.take(kernels, &rows));
             let first_row = (b * ROWS) as u32;
             let mut best = Best { maxima: &mut maxima, winners: &mut winners, first_row };
-            if !screen.pool(kernels, group, (&rows, &levels), &mut sieve, &mut best) {
+            if !prefilter.pool(kernels, group, (&rows, &levels), &mut prefilter_scratch, &mut best)
+            {
                 return None;
             }
         }
@@ -123,7 +124,7 @@ fn bound(sum: f64) -> f64 {
 
 #[test]
 fn maxima_are_those_of_all_products() {
-    let kernels = need!(screening_kernels());
+    let kernels = need!(prefiltering_kernels());
     for kind in KINDS {
         let case = case(kind);
         let Some((maxima, winners)) = pool(&case, kernels, true) else {
@@ -149,7 +150,7 @@ fn maxima_are_those_of_all_products() {
 
 #[test]
 fn what_a_relu_cuts_is_not_looked_for() {
-    let kernels = need!(screening_kernels());
+    let kernels = need!(prefiltering_kernels());
     let mut case = case("ordinary");
     case.layer.bias.iter_mut().step_by(2).for_each(|bias| *bias = -1e4);
     let (maxima, _) = pool(&case, kernels, false).unwrap();
@@ -164,7 +165,7 @@ fn what_a_relu_cuts_is_not_looked_for() {
 
 #[test]
 fn of_equal_rows_the_first_wins() {
-    let kernels = need!(screening_kernels());
+    let kernels = need!(prefiltering_kernels());
     let mut case = case("ordinary");
     let (_, before) = pool(&case, kernels, true).unwrap();
     // Every winner again, in rows after it.
@@ -175,21 +176,21 @@ fn of_equal_rows_the_first_wins() {
     assert_eq!(before, after);
 }
 
-/// Of each channel's products, most must be ruled out, or screening is no gain.
+/// Of each channel's products, most must be ruled out, or prefiltering gains nothing.
 #[test]
 fn few_products_are_left() {
-    let kernels = need!(screening_kernels());
+    let kernels = need!(prefiltering_kernels());
     let case = case("ordinary");
-    let screen = Screen::new(&case.layer, kernels).unwrap();
-    let mut sieve = Sieve::new(ROWS);
+    let prefilter = Int8Prefilter::new(&case.layer, kernels).unwrap();
+    let mut prefilter_scratch = PrefilterScratch::new(ROWS);
     let (mut maxima, mut winners) = (vec![0.0; GROUP], vec![0; GROUP]);
-    screen.begin(0, true, &mut maxima);
+    prefilter.begin(0, true, &mut maxima);
     let rows = Rows::new(&case.blocks[0], STRIDE, ROWS);
     let mut levels = Levels::with_room(ROWS * STRIDE);
     assert!(levels.take(kernels, &rows));
     let mut best = Best { maxima: &mut maxima, winners: &mut winners, first_row: 0 };
-    assert!(screen.pool(kernels, 0, (&rows, &levels), &mut sieve, &mut best));
-    let left = sieve.estimates.iter().zip(sieve.floors.iter().cycle());
+    assert!(prefilter.pool(kernels, 0, (&rows, &levels), &mut prefilter_scratch, &mut best));
+    let left = prefilter_scratch.estimates.iter().zip(prefilter_scratch.floors.iter().cycle());
     let left = left.filter(|(estimate, floor)| estimate > floor).count();
     // Measured: 1 in 50 besides the peaks.
     assert!(left < ROWS * GROUP / 20, "{left}");
@@ -197,7 +198,7 @@ fn few_products_are_left() {
 
 #[test]
 fn levels_are_refused_where_they_mean_nothing() {
-    let kernels = need!(screening_kernels());
+    let kernels = need!(prefiltering_kernels());
     let mut levels = Levels::with_room(STRIDE);
     let mut takes = |value: f32| {
         let mut row = [0.0; STRIDE];

@@ -38,7 +38,7 @@ impl Levels {
         let mut most = LevelSums::default();
         let bytes = self.bytes.chunks_exact_mut(rows.stride());
         for (row, bytes) in values.chunks_exact(rows.stride()).zip(bytes) {
-            let sums = (kernels.screening.levels)(row, 1.0 / self.step, bytes);
+            let sums = (kernels.prefilter.levels)(row, 1.0 / self.step, bytes);
             most.lost = most.lost.max(sums.lost);
             most.squares = most.squares.max(sums.squares);
         }

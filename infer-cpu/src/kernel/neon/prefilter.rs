@@ -1,17 +1,17 @@
-//! What screening takes: candidates found among estimates, and their products.
+//! What the int8 prefilter takes: candidates found among estimates, and their products.
 
 use std::arch::aarch64::*;
 
-use super::super::{Candidate, I8_LARGEST, LevelSums, Rows, Screening, WIDTH_STEP};
+use super::super::{Candidate, I8_LARGEST, LevelSums, PrefilterKernels, Rows, WIDTH_STEP};
 use super::lanes::{Lanes, Sums};
 
 /// Estimates looked at together: candidates are few.
 const BATCH: usize = 16;
 
 /// All of it.
-pub const SCREENING: Screening = Screening { levels, peaks, sift, dots };
+pub const PREFILTER: PrefilterKernels = PrefilterKernels { levels, peaks, above_floors, dots };
 
-/// [`Screening::levels`].
+/// [`PrefilterKernels::levels`].
 fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
     assert!(row.len().is_multiple_of(WIDTH_STEP) && out.len() == row.len());
     let (batches, _) = row.as_chunks::<BATCH>();
@@ -41,7 +41,7 @@ fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
     unsafe { LevelSums { lost: vaddvq_f32(lost), squares: vaddvq_f32(squares) } }
 }
 
-/// [`Screening::peaks`].
+/// [`PrefilterKernels::peaks`].
 fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
     let width = peaks.len();
     assert!(rows.len() == width && width.is_multiple_of(WIDTH_STEP));
@@ -61,8 +61,8 @@ fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
     }
 }
 
-/// [`Screening::sift`].
-fn sift(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
+/// [`PrefilterKernels::above_floors`].
+fn above_floors(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
     let width = floors.len();
     assert!(width.is_multiple_of(WIDTH_STEP));
     let mut n = 0;
@@ -93,7 +93,7 @@ fn any_above(values: &[f32; BATCH], floors: &[f32; BATCH]) -> bool {
     }
 }
 
-/// [`Screening::dots`]: four sums of every fourth vector each, as many
+/// [`PrefilterKernels::dots`]: four sums of every fourth vector each, as many
 /// as hide the latency of FMLA.
 fn dots(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &mut [f32]) {
     let width = rows.stride;

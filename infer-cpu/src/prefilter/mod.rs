@@ -36,16 +36,16 @@ use std::ops::Range;
 pub use levels::Levels;
 
 use crate::dense::Dense;
-use crate::kernel::{Candidate, I8_LARGEST, Kernels, Panels, Rows, Screening, WIDTH_STEP};
+use crate::kernel::{Candidate, I8_LARGEST, Kernels, Panels, PrefilterKernels, Rows, WIDTH_STEP};
 use crate::precision::{Format, I8};
 
 /// Output channels that a thread pools at a time.
 pub const GROUP: usize = 128;
 
 /// Whether products of so many inputs are worth ruling out, where kernels
-/// screen at all: not of so few that they are cheap.
+/// prefilter at all: not of so few that they are cheap.
 #[must_use]
-pub const fn screening_pays(inputs: usize) -> bool {
+pub const fn prefilter_pays(inputs: usize) -> bool {
     inputs >= 32
 }
 
@@ -60,8 +60,8 @@ const ORDINARY: Range<f64> = 1e-15..1e15;
 /// Norms are rounded up, by more than fp32 may have lost of them.
 const NORM_SLACK: f64 = 1.0001;
 
-/// What a pooled layer is screened by.
-pub struct Screen {
+/// Int8 weights of a pooled layer, which rule out most of its fp32 products.
+pub struct Int8Prefilter {
     channels: Vec<Channels>,
     /// `[outputs, inputs]`, inputs padded to whole vectors.
     weights: Vec<f32>,
@@ -91,8 +91,8 @@ struct Bound {
     rounding: f32,
 }
 
-/// A thread's own memory of screening a block of rows.
-pub struct Sieve {
+/// A thread's own memory of prefiltering a block of rows.
+pub struct PrefilterScratch {
     estimates: Vec<f32>,
     bounds: Vec<f32>,
     /// The largest estimate of each channel, later what others must exceed.
@@ -102,7 +102,7 @@ pub struct Sieve {
     products: Vec<f32>,
 }
 
-impl Sieve {
+impl PrefilterScratch {
     /// Memory for so many rows.
     pub fn new(rows: usize) -> Self {
         let channels = GROUP;
@@ -143,10 +143,10 @@ impl Best<'_> {
     }
 }
 
-impl Screen {
-    /// A screen of `layer`; none where it would not pay.
+impl Int8Prefilter {
+    /// A prefilter of `layer`; none where it would not pay.
     pub fn new(layer: &Dense, kernels: &Kernels) -> Option<Self> {
-        if !kernels.screens || !screening_pays(layer.inputs) {
+        if !kernels.prefilters || !prefilter_pays(layer.inputs) {
             return None;
         }
         let groups = (0..layer.outputs).step_by(GROUP);
@@ -179,14 +179,15 @@ impl Screen {
         kernels: &Kernels,
         group: usize,
         (rows, levels): (&Rows<'_, f32>, &Levels),
-        sieve: &mut Sieve,
+        prefilter_scratch: &mut PrefilterScratch,
         best: &mut Best<'_>,
     ) -> bool {
-        let Screening { peaks, sift, dots, .. } = kernels.screening;
+        let PrefilterKernels { peaks, above_floors, dots, .. } = kernels.prefilter;
         let channels = &self.channels[group];
         let width = best.maxima.len();
-        channels.estimate(kernels, rows, levels, sieve);
-        let Sieve { estimates, bounds, floors, peak_rows, found, products } = sieve;
+        channels.estimate(kernels, rows, levels, prefilter_scratch);
+        let PrefilterScratch { estimates, bounds, floors, peak_rows, found, products } =
+            prefilter_scratch;
         let (estimates, bounds) = (&mut estimates[..rows.n() * width], &bounds[..width]);
         let (floors, peak_rows) = (&mut floors[..width], &mut peak_rows[..width]);
         peaks(estimates, floors, peak_rows);
@@ -212,7 +213,7 @@ impl Screen {
             floors[channel] = if floor.is_nan() { f32::NEG_INFINITY } else { floor };
         }
         let most = rows.n() * width / ONE_IN;
-        let Some(n) = sift(estimates, floors, &mut found[..most]) else { return false };
+        let Some(n) = above_floors(estimates, floors, &mut found[..most]) else { return false };
         dots(rows, weights, &found[..n], &mut products[..n]);
         best.raise(&found[..n], &products[..n]);
         true
@@ -221,7 +222,7 @@ impl Screen {
 
 impl Channels {
     fn new(layer: &Dense, range: Range<usize>, kernels: &Kernels) -> Self {
-        let gemm = I8::gemm(kernels).expect("invariant: kernels that screen have int8 products");
+        let gemm = I8::gemm(kernels).expect("invariant: kernels that prefilter have int8 products");
         let (inputs, n) = (layer.inputs, range.len());
         let mut panels = Panels::zeros(inputs, n, (gemm.nr, gemm.k_step, I8::GROUP));
         // A range of as many units as there are levels: sums come out in levels.
@@ -274,21 +275,21 @@ impl Channels {
         }
     }
 
-    /// Leaves an estimate of every product in `sieve`, in steps of the levels,
+    /// Leaves an estimate of every product in `prefilter_scratch`, in steps of the levels,
     /// and its bound.
     fn estimate(
         &self,
         kernels: &Kernels,
         rows: &Rows<'_, f32>,
         levels: &Levels,
-        sieve: &mut Sieve,
+        prefilter_scratch: &mut PrefilterScratch,
     ) {
-        let gemm = I8::gemm(kernels).expect("invariant: kernels that screen have int8 products");
+        let gemm = I8::gemm(kernels).expect("invariant: kernels that prefilter have int8 products");
         let width = self.panels.padded_outputs();
         let bytes = Rows::new(&levels.bytes[..], rows.stride(), rows.n());
-        let out = &mut sieve.estimates[..rows.n() * width];
+        let out = &mut prefilter_scratch.estimates[..rows.n() * width];
         (gemm.rows)(&bytes, &self.panels, 0..self.panels.n_panels(), out, width);
-        for (out, bound) in sieve.bounds.iter_mut().zip(&self.bounds) {
+        for (out, bound) in prefilter_scratch.bounds.iter_mut().zip(&self.bounds) {
             *out = bound.of_levels * levels.norm + bound.of_lost * levels.lost + bound.rounding;
         }
     }

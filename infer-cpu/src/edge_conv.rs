@@ -1,4 +1,4 @@
-//! What surrounds a point: an EdgeConv (Wang et al. 2019, *Dynamic Graph CNN*,
+//! Features of a point's neighborhood: an EdgeConv (Wang et al. 2019, *Dynamic Graph CNN*,
 //! equation 8 with features of coordinates' differences alone) before the
 //! trunk's first layer.
 //!
@@ -9,7 +9,7 @@
 //! max over q in C, |q - p| <= r, of relu(w (q - p) / r + b)
 //! ```
 //!
-//! the extent of its surroundings in a direction that was learnt: an edge, a
+//! the extent of its neighborhood in a direction that was learnt: an edge, a
 //! plate and a rod differ in it where a few sampled points do not. Neighbours
 //! are taken from all points, kept by the sampler or not. p is its own
 //! neighbour, so that the maximum is never of nothing. It depends neither on
@@ -23,7 +23,7 @@ const TILE: usize = 64;
 
 /// The layers of all radii, the widest first.
 #[derive(Clone, Debug, Default)]
-pub struct Edges {
+pub struct EdgeConv {
     layers: Vec<EdgeLayer>,
 }
 
@@ -39,11 +39,11 @@ struct EdgeLayer {
 
 /// All points of a cloud, coordinate by coordinate.
 #[derive(Clone, Debug, Default)]
-pub struct Surroundings {
+pub struct Neighborhood {
     axes: [Vec<f32>; 3],
 }
 
-impl Surroundings {
+impl Neighborhood {
     /// Makes room for `n` points.
     pub fn reserve(&mut self, n: usize) {
         for axis in &mut self.axes {
@@ -60,7 +60,7 @@ impl Surroundings {
     }
 }
 
-impl Edges {
+impl EdgeConv {
     /// Layers of `[channels, 3]` each, with their radii.
     pub fn new(layers: &[(f32, Dense)]) -> Self {
         let mut first = 0;
@@ -89,7 +89,7 @@ impl Edges {
 
     /// Writes the features of `centre` into `out`, `[channels]`, in the order
     /// in which layers were given.
-    pub fn features(&self, centre: [f32; 3], cloud: &Surroundings, out: &mut [f32]) {
+    pub fn features(&self, centre: [f32; 3], cloud: &Neighborhood, out: &mut [f32]) {
         // The centre's own: nothing times the weights.
         out.fill(0.0);
         let Some(widest) = self.layers.first() else { return };
@@ -178,18 +178,18 @@ mod tests {
         features
     }
 
-    fn features(edges: &Edges, p: [f32; 3], cloud: &[[f32; 3]], n: usize) -> Vec<f32> {
-        let mut surroundings = Surroundings::default();
-        surroundings.set(cloud);
+    fn features(edges: &EdgeConv, p: [f32; 3], cloud: &[[f32; 3]], n: usize) -> Vec<f32> {
+        let mut neighborhood = Neighborhood::default();
+        neighborhood.set(cloud);
         let mut out = vec![f32::NAN; n];
-        edges.features(p, &surroundings, &mut out);
+        edges.features(p, &neighborhood, &mut out);
         out
     }
 
     #[test]
     fn features_are_those_of_the_definition() {
         let layers = [(0.2, dense(5, 1)), (0.6, dense(3, 2))];
-        let edges = Edges::new(&layers);
+        let edges = EdgeConv::new(&layers);
         for n in [1, 2, 63, 64, 65, 500] {
             let cloud = cloud(n);
             let found = features(&edges, cloud[n / 2], &cloud, 8);
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn neither_order_nor_repetitions_count() {
-        let edges = Edges::new(&[(0.3, dense(16, 3))]);
+        let edges = EdgeConv::new(&[(0.3, dense(16, 3))]);
         let cloud = cloud(200);
         let expected = features(&edges, cloud[0], &cloud, 16);
         let mut other = [cloud.clone(), cloud.clone()].concat();
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn far_and_huge_points_are_no_neighbours() {
-        let edges = Edges::new(&[(0.3, dense(4, 3))]);
+        let edges = EdgeConv::new(&[(0.3, dense(4, 3))]);
         let alone = features(&edges, [0.0; 3], &[[0.0; 3]], 4);
         let crowd = [[0.0; 3], [f32::MAX, 0.0, 0.0], [0.0, -1e30, 0.0], [0.301, 0.0, 0.0]];
         assert_eq!(features(&edges, [0.0; 3], &crowd, 4), alone);
