@@ -26,6 +26,14 @@ pub enum Error {
         /// Its coordinates.
         z: f64,
     },
+    /// A label of an evaluation that the model has no class for.
+    #[error("expected labels below {n_classes}, the model's number of classes, found {label}")]
+    UnknownLabel {
+        /// The label.
+        label: usize,
+        /// How many classes the model has.
+        n_classes: usize,
+    },
     /// More points than their indices can count.
     #[error("{0} points are more than 4,294,967,295")]
     TooManyPoints(usize),

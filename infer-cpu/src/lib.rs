@@ -12,6 +12,8 @@ mod dense;
 mod edge_conv;
 mod engine;
 mod error;
+#[cfg(feature = "evaluate")]
+mod evaluate;
 mod forward;
 pub mod kernel;
 mod layers;
@@ -49,6 +51,8 @@ pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_rang
 pub use choose::choose;
 pub use classifier::Classifier;
 pub use error::Error;
+#[cfg(feature = "evaluate")]
+pub use evaluate::{Evaluation, evaluate, evaluate_some};
 pub use formats::model_card::{ModelCard, Normalization};
 pub use normalize::to_unit_sphere;
 pub use options::{Options, TNets, UpAxis};

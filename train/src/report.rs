@@ -6,7 +6,7 @@ use std::path::Path;
 use formats::interval::wilson;
 use svg::Document;
 use svg::node::element::{Rectangle, Text};
-use train::evaluate::Confusion;
+use infer_cpu::Evaluation;
 
 /// Accuracies with their intervals, in one line.
 pub fn line(found: &Confusion, data: &Path) -> String {
@@ -28,7 +28,7 @@ pub fn line(found: &Confusion, data: &Path) -> String {
 /// The matrix as CSV: a row a true class, a column an answer.
 pub fn csv(found: &Confusion, classes: &[String]) -> String {
     let mut csv = format!("class,{}\n", classes.join(","));
-    for (class, answers) in classes.iter().zip(&found.0) {
+    for (class, answers) in classes.iter().zip(&found.confusion) {
         let answers: Vec<String> = answers.iter().map(ToString::to_string).collect();
         // Writing to a string cannot fail.
         let _ = writeln!(csv, "{class},{}", answers.join(","));
@@ -51,7 +51,7 @@ pub fn drawing(found: &Confusion, classes: &[String]) -> Document {
     };
     let background = Rectangle::new().set("width", side).set("height", side).set("fill", "white");
     let mut document = Document::new().set("viewBox", (0, 0, side, side)).add(background);
-    for (row, (class, answers)) in classes.iter().zip(&found.0).enumerate() {
+    for (row, (class, answers)) in classes.iter().zip(&found.confusion).enumerate() {
         let y = MARGIN + row as f64 * CELL;
         document = document.add(text(class, MARGIN - 6.0, y + 12.0).set("text-anchor", "end")).add(
             text(class, 0.0, 0.0)
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn a_matrix_has_a_row_for_each_true_class() {
-        let found = Confusion(vec![vec![3, 1], vec![0, 2]]);
+        let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 2]] };
         let classes = ["cup".to_owned(), "vase".to_owned()];
         assert_eq!(csv(&found, &classes), "class,cup,vase\ncup,3,1\nvase,0,2\n");
         assert_eq!(drawing(&found, &classes).to_string().matches("<rect").count(), 4);

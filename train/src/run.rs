@@ -11,7 +11,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use infer_cpu::Options;
 use train::checkpoint;
 use train::clouds::Clouds;
-use train::evaluate::{Confusion, confusion};
+use infer_cpu::Evaluation;
+use train::evaluate::confusion;
 use train::recipe::{Recipe, Sampling};
 use train::trainer::{Learnt, Trainer};
 use train::{batches, model};
@@ -255,7 +256,7 @@ impl Run {
         Ok(checkpoint::write(&path, &mut self.trainer, &notes)?)
     }
 
-    fn note(&mut self, epoch: u32, learnt: &Learnt, validated: Option<&Confusion>) {
+    fn note(&mut self, epoch: u32, learnt: &Learnt, validated: Option<&Evaluation>) {
         let recipe = &self.trainer.recipe;
         let factor = recipe.schedule.factor(f64::from(epoch - 1), recipe.epochs);
         let row = Row {
@@ -263,7 +264,7 @@ impl Run {
             rate: recipe.adam.rate * factor,
             loss: learnt.loss,
             accuracy: learnt.accuracy,
-            validation_instance: validated.map(Confusion::instance_accuracy),
+            validation_instance: validated.map(Evaluation::instance_accuracy),
             validation_class: validated.map(|found| found.class_accuracy().0),
             seconds: learnt.time.as_secs_f64(),
             clouds_per_second: learnt.clouds as f64 / learnt.time.as_secs_f64(),

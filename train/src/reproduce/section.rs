@@ -4,7 +4,7 @@ use std::path::Path;
 
 use formats::interval::wilson;
 use serde::{Deserialize, Serialize};
-use train::evaluate::Confusion;
+use infer_cpu::Evaluation;
 
 /// One experiment of the report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -72,12 +72,12 @@ impl Cell {
     }
 
     /// Instance accuracy.
-    pub fn instance(found: &Confusion) -> Self {
+    pub fn instance(found: &Evaluation) -> Self {
         Self::Share(found.correct(), found.total())
     }
 
     /// Class accuracy.
-    pub fn class(found: &Confusion) -> Self {
+    pub fn class(found: &Evaluation) -> Self {
         let (mean, half) = found.class_accuracy();
         Self::Mean(mean, half)
     }

@@ -13,7 +13,8 @@ use infer_cpu::Options;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use serde::Serialize;
 use train::clouds::Clouds;
-use train::evaluate::{Confusion, confusion};
+use infer_cpu::Evaluation;
+use train::evaluate::confusion;
 use train::recipe::Recipe;
 
 use super::plan::Plan;
@@ -189,7 +190,7 @@ pub fn test(
     model: &Path,
     clouds: &Clouds,
     sampler: Option<SamplerSpec>,
-) -> anyhow::Result<Confusion> {
+) -> anyhow::Result<Evaluation> {
     let options = Options { sampler, ..Options::default() };
     Ok(confusion(model, clouds, &options)?)
 }

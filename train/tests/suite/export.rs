@@ -6,7 +6,7 @@ use formats::model_card::ModelCard;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options};
 use train::clouds::Clouds;
-use train::evaluate::Confusion;
+use infer_cpu::Evaluation;
 use train::front::Cpl;
 use train::model;
 use train::network::{Edge, Shape};
@@ -132,7 +132,7 @@ fn a_front_end_and_its_network_tell_plain_shapes_by_few_points() {
 }
 
 /// What a model that `write` writes answers on `test` by eight critical points.
-fn by_eight_points(test: &Clouds, write: impl FnOnce(&Path, &ModelCard)) -> Confusion {
+fn by_eight_points(test: &Clouds, write: impl FnOnce(&Path, &ModelCard)) -> Evaluation {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.safetensors");
     let card = ModelCard {

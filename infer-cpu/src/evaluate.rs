@@ -1,0 +1,137 @@
+//! The accuracy of a classifier on labelled clouds.
+
+use formats::interval::Z;
+use formats::labelled::LabelledSet;
+
+use crate::classifier::Classifier;
+use crate::error::Error;
+
+/// How a classifier's answers compare with the labels.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Evaluation {
+    /// Clouds by their label and the answer: `[label][answer]`, a square of the
+    /// model's classes.
+    pub confusion: Vec<Vec<usize>>,
+}
+
+/// Classifies every cloud of `set`, whose labels are indices into
+/// [`Classifier::classes`].
+///
+/// ```
+/// use formats::labelled::LabelledSet;
+/// use infer_cpu::{Classifier, Options, evaluate};
+///
+/// # let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
+/// # let model = std::path::Path::new(weights).join("untrained-test.safetensors");
+/// let mut classifier = Classifier::load(&model, &Options::default())?;
+/// let points = vec![0.0, 0.0, 0.1, 0.3, 0.0, 0.1, 0.3, 0.2, 0.0];
+/// let set = LabelledSet { points, n_points: 3, labels: vec![2], names: None, classes: None };
+/// let evaluation = evaluate(&mut classifier, &set)?;
+/// assert_eq!(evaluation.total(), 1);
+/// println!("{:.2} %", 100.0 * evaluation.instance_accuracy());
+/// # Ok::<(), infer_cpu::Error>(())
+/// ```
+///
+/// # Errors
+/// A label that the model has no class for; a cloud that cannot be classified.
+pub fn evaluate(classifier: &mut Classifier, set: &LabelledSet) -> Result<Evaluation, Error> {
+    evaluate_some(classifier, set, 0..set.len())
+}
+
+/// The same for the clouds of `set` that `indices` name, so that several
+/// classifiers can share a set; [`Evaluation::merge`] puts their parts together.
+///
+/// # Errors
+/// As [`evaluate`].
+///
+/// # Panics
+/// If an index is not below the number of clouds.
+pub fn evaluate_some(
+    classifier: &mut Classifier,
+    set: &LabelledSet,
+    indices: impl IntoIterator<Item = usize>,
+) -> Result<Evaluation, Error> {
+    let n_classes = classifier.classes().len();
+    let mut confusion = vec![vec![0; n_classes]; n_classes];
+    for i in indices {
+        let label = set.labels[i];
+        let answers = confusion.get_mut(label).ok_or(Error::UnknownLabel { label, n_classes })?;
+        answers[classifier.classify(set.cloud(i))?.class] += 1;
+    }
+    Ok(Evaluation { confusion })
+}
+
+impl Evaluation {
+    /// Adds the counts of another part of the set.
+    ///
+    /// # Panics
+    /// If the parts are of models with different numbers of classes.
+    pub fn merge(&mut self, part: &Self) {
+        if self.confusion.is_empty() {
+            self.clone_from(part);
+            return;
+        }
+        assert_eq!(self.confusion.len(), part.confusion.len(), "expected as many classes");
+        let counts = self.confusion.iter_mut().flatten();
+        counts.zip(part.confusion.iter().flatten()).for_each(|(sum, n)| *sum += n);
+    }
+
+    /// How many clouds were classified.
+    #[must_use]
+    pub fn total(&self) -> usize {
+        self.confusion.iter().flatten().sum()
+    }
+
+    /// How many were classified as labelled.
+    #[must_use]
+    pub fn correct(&self) -> usize {
+        self.confusion.iter().enumerate().map(|(class, answers)| answers[class]).sum()
+    }
+
+    /// The share of clouds that were classified as labelled; 0 without clouds.
+    #[must_use]
+    pub fn instance_accuracy(&self) -> f64 {
+        self.correct() as f64 / self.total().max(1) as f64
+    }
+
+    /// The mean over classes that have clouds of the share classified as
+    /// labelled, and the half width of its 95 % interval.
+    ///
+    /// Each class's share is one of independent trials, with Agresti and
+    /// Coull's (1998) two of each outcome added, so that a class without errors
+    /// is not taken for one that never errs.
+    #[must_use]
+    pub fn class_accuracy(&self) -> (f64, f64) {
+        let classes = self.confusion.iter().enumerate().filter_map(|(class, answers)| {
+            let n: usize = answers.iter().sum();
+            (n > 0).then(|| (answers[class] as f64, n as f64))
+        });
+        let classes: Vec<(f64, f64)> = classes.collect();
+        let count = classes.len().max(1) as f64;
+        let mean = classes.iter().map(|(right, n)| right / n).sum::<f64>() / count;
+        let variance = classes.iter().map(|(right, n)| {
+            let share = (right + 2.0) / (n + 4.0);
+            share * (1.0 - share) / (n + 4.0)
+        });
+        (mean, Z * variance.sum::<f64>().sqrt() / count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_set_add_up() {
+        let part = |confusion: [[usize; 2]; 2]| Evaluation {
+            confusion: confusion.map(|answers| answers.to_vec()).to_vec(),
+        };
+        let mut whole = Evaluation::default();
+        whole.merge(&part([[3, 1], [0, 0]]));
+        whole.merge(&part([[0, 0], [2, 2]]));
+        assert_eq!(whole, part([[3, 1], [2, 2]]));
+        assert_eq!((whole.total(), whole.correct()), (8, 5));
+        assert_eq!(whole.instance_accuracy(), 0.625);
+        assert_eq!(whole.class_accuracy().0, 0.625);
+    }
+}
