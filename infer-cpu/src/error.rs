@@ -7,6 +7,7 @@ use crate::options::{MOST_POINTS, MOST_THREADS};
 
 /// An error of loading a model or classifying a cloud.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file that cannot be read, or is not what it should be.
     #[error(transparent)]

@@ -12,6 +12,7 @@ use crate::sampler::SamplerSpec;
 /// Which of a model's T-Nets are run; one that is left out counts as the
 /// identity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TNets {
     /// All that the model has.
     #[default]

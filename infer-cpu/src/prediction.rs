@@ -6,6 +6,7 @@ use crate::Precision;
 
 /// The class of a cloud, and how it was found.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Prediction {
     /// The class: an index into [`crate::Classifier::classes`]. Of equal
     /// logits the first wins.

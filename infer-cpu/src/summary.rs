@@ -12,6 +12,7 @@ use crate::precision::Precision;
 
 /// A model file's network, layer by layer.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Summary {
     /// What the file says about itself.
     pub card: ModelCard,

@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use formats::interval::wilson;
+use infer_cpu::Evaluation;
 use svg::Document;
 use svg::node::element::{Rectangle, Text};
-use infer_cpu::Evaluation;
 
 /// Accuracies with their intervals, in one line.
-pub fn line(found: &Confusion, data: &Path) -> String {
+pub fn line(found: &Evaluation, data: &Path) -> String {
     let (n, correct) = (found.total(), found.correct());
     let (low, high) = wilson(correct, n);
     let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();
@@ -26,7 +26,7 @@ pub fn line(found: &Confusion, data: &Path) -> String {
 }
 
 /// The matrix as CSV: a row a true class, a column an answer.
-pub fn csv(found: &Confusion, classes: &[String]) -> String {
+pub fn csv(found: &Evaluation, classes: &[String]) -> String {
     let mut csv = format!("class,{}\n", classes.join(","));
     for (class, answers) in classes.iter().zip(&found.confusion) {
         let answers: Vec<String> = answers.iter().map(ToString::to_string).collect();
@@ -37,7 +37,7 @@ pub fn csv(found: &Confusion, classes: &[String]) -> String {
 }
 
 /// The matrix as a drawing: shares of each true class, darker for more.
-pub fn drawing(found: &Confusion, classes: &[String]) -> Document {
+pub fn drawing(found: &Evaluation, classes: &[String]) -> Document {
     const CELL: f64 = 16.0;
     const MARGIN: f64 = 110.0;
     let n = classes.len() as f64;

@@ -95,6 +95,8 @@ fn status_of(error: &Error) -> EdgepuckStatus {
         | Error::VotesWithoutDraws(_)
         | Error::TooManyThreads(_)
         | Error::TooMuchRoom(_) => EdgepuckStatus::BadOption,
+        // Of functions that this interface does not offer.
+        _ => EdgepuckStatus::Internal,
     }
 }
 

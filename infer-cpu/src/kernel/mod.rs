@@ -262,6 +262,7 @@ pub struct Kernels {
 
 /// An instruction set that kernels are written for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum KernelName {
     /// Plain Rust, everywhere.
     Scalar,

@@ -32,6 +32,7 @@ pub use voxel::VoxelGrid;
 
 /// Why points cannot be chosen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SamplerError {
     /// M is 0.
     #[error("a sampler is asked for 0 points; it keeps 1 or more")]

@@ -35,7 +35,11 @@ pub fn run(shop: &Workshop) -> anyhow::Result<Section> {
              The threshold filter: scans of fewer points are left out of the test."
                 .to_owned(),
         ],
-        tables: vec![confusion(&found.confusion, &held.classes), thresholds(shop, &model)?, sweep(shop)?],
+        tables: vec![
+            confusion(&found.confusion, &held.classes),
+            thresholds(shop, &model)?,
+            sweep(shop)?,
+        ],
         drawings: vec![report::drawing(&found, &held.classes).to_string()],
         ..Section::default()
     })

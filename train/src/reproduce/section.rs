@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use formats::interval::wilson;
-use serde::{Deserialize, Serialize};
 use infer_cpu::Evaluation;
+use serde::{Deserialize, Serialize};
 
 /// One experiment of the report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

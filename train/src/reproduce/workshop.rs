@@ -9,11 +9,11 @@ use std::rc::Rc;
 use anyhow::ensure;
 use formats::hash;
 use formats::split::Split;
+use infer_cpu::Evaluation;
 use infer_cpu::Options;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use serde::Serialize;
 use train::clouds::Clouds;
-use infer_cpu::Evaluation;
 use train::evaluate::confusion;
 use train::recipe::Recipe;
 

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use formats::model_card::ModelCard;
+use infer_cpu::Evaluation;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options};
 use train::clouds::Clouds;
-use infer_cpu::Evaluation;
 use train::front::Cpl;
 use train::model;
 use train::network::{Edge, Shape};

@@ -52,7 +52,7 @@ static void loading_fails(const char *model)
     options = edgepuck_options_default();
     options.up = 3;
     EXPECT_ERROR(edgepuck_load(model, &options, &classifier), EDGEPUCK_STATUS_BAD_OPTION,
-                 "option `up`: 3");
+                 "option `up`: expected 0, 1 or 2, found 3");
     options = edgepuck_options_default();
     options.votes = 2;
     EXPECT_ERROR(edgepuck_load(model, &options, &classifier), EDGEPUCK_STATUS_BAD_OPTION,
