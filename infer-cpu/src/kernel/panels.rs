@@ -276,7 +276,7 @@ impl<W: Copy + Default> Columns<W> {
 }
 
 fn padded(n: usize, step: usize) -> usize {
-    n.checked_next_multiple_of(step).expect("a layer's width fits in memory")
+    n.checked_next_multiple_of(step).expect("a layer's widths fit in memory")
 }
 
 fn product(a: usize, b: usize) -> usize {
