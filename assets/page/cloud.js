@@ -1,4 +1,4 @@
-// Every canvas draws its own cloud; z is up, and dragging turns it.
+// Every canvas draws its own cloud; z is up, and dragging rotates it.
 "use strict";
 for (const canvas of document.querySelectorAll("canvas.cloud")) {
   const numbers = canvas.dataset.points.split(" ").map(Number);

@@ -1,4 +1,4 @@
-// Tabs show one chapter at a time; what bears a tip says it where the pointer is.
+// Tabs show one chapter at a time; an element with a tip shows it under the pointer.
 "use strict";
 const tabs = [...document.querySelectorAll("[role=tab]")];
 const show = (id) => {

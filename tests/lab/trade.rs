@@ -129,6 +129,6 @@ fn a_missing_folder_of_records_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let refused = exits(1, lab(), at, "report --assets gone --out report.html");
-    assert!(refused.contains("gone is no folder"), "{refused}");
+    assert!(refused.contains("gone is not a folder"), "{refused}");
     assert!(!at.join("report.html").exists());
 }

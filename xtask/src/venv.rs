@@ -13,7 +13,7 @@ pub fn programs() -> PathBuf {
 }
 
 /// The folder of what is made for the peers.
-pub fn workshop() -> PathBuf {
+pub fn cache_dir() -> PathBuf {
     root().join("target/peers")
 }
 
@@ -28,7 +28,7 @@ pub struct Environment<'a> {
 }
 
 impl Environment<'_> {
-    /// The interpreter of the environment, made under [`workshop`] unless it
+    /// The interpreter of the environment, made under [`cache_dir`] unless it
     /// is there.
     ///
     /// # Errors
@@ -63,7 +63,7 @@ impl Environment<'_> {
     }
 
     fn folder(&self) -> PathBuf {
-        workshop().join(self.name)
+        cache_dir().join(self.name)
     }
 
     fn python(&self) -> PathBuf {

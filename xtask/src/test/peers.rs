@@ -15,7 +15,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
-use xtask::venv::{Environment, workshop};
+use xtask::venv::{Environment, cache_dir};
 use xtask::workspace::{output, root};
 
 /// The folder of the scripts.
@@ -134,7 +134,7 @@ fn check(
     python: &Path,
     programs: &Programs,
 ) -> anyhow::Result<Counts> {
-    let out = workshop().join("tests").join(name);
+    let out = cache_dir().join("tests").join(name);
     empty(&out)?;
     eprintln!("== peer {name}: {SCRIPTS}/{name}.py");
     // -B keeps compiled files from lying beside the scripts.

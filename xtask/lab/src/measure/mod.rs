@@ -2,13 +2,14 @@
 
 pub mod accuracy;
 pub mod clock;
-pub mod companion;
 pub mod energy;
 pub mod lanes;
 pub mod machine;
 pub mod moller_trumbore;
+pub mod reference_network;
 pub mod scan_mesh;
 pub mod scenes;
 pub mod shot;
 pub mod subject;
+pub mod subprocess;
 pub mod ways;

@@ -5,7 +5,7 @@ use super::kernels::{Kernel, Kernels};
 use super::model::Machine;
 use super::plan::Sampler;
 use super::rows::{Row, machine};
-use crate::render::text_table::{Table, digits};
+use crate::render::table::{Table, digits};
 use serde::Serialize;
 use std::fmt;
 

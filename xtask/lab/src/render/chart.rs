@@ -1,12 +1,9 @@
-//! Dots over two axes, either of which may be logarithmic. Each dot says what
-//! it is where the pointer is upon it.
+//! Dots over two axes, either of which may be logarithmic, as an SVG drawing with its
+//! message above it and its legend below. Each dot has a tip that the page shows.
 
-use crate::render::text_table::digits;
-use anyhow::{Result, anyhow};
-use maud::html;
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
-use plotters::style::register_font;
+use super::table::digits;
+use maud::{Markup, PreEscaped, html};
+use std::ops::Range;
 
 /// An axis.
 pub struct Axis<'a> {
@@ -14,16 +11,16 @@ pub struct Axis<'a> {
     pub label: &'a str,
     /// Whether equal steps are equal factors.
     pub logarithmic: bool,
-    /// Whether values are shares, to be written in percent.
+    /// Whether values are shares, which are written in percent.
     pub percent: bool,
 }
 
-/// One measured thing.
+/// One measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dot {
-    /// Across.
+    /// Horizontal position.
     pub x: f64,
-    /// Up.
+    /// Vertical position.
     pub y: f64,
     /// What it is.
     pub tip: String,
@@ -34,7 +31,7 @@ pub struct Dot {
 /// Dots of one colour.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
-    /// What they are.
+    /// Its name in the legend.
     pub name: String,
     /// The dots.
     pub dots: Vec<Dot>,
@@ -42,119 +39,255 @@ pub struct Series {
     pub joined: bool,
 }
 
-const FONT: &str = "sans-serif";
-const SIZE: (u32, u32) = (720, 420);
-const COLOURS: [RGBColor; 8] = [
-    RGBColor(0x17, 0x63, 0xc7),
-    RGBColor(0xd3, 0x3b, 0x12),
-    RGBColor(0x8a, 0x2f, 0xc0),
-    RGBColor(0x1d, 0x85, 0x3b),
-    RGBColor(0xa8, 0x76, 0x00),
-    RGBColor(0x00, 0x7f, 0x8c),
-    RGBColor(0xb8, 0x2f, 0x74),
-    RGBColor(0x44, 0x44, 0x44),
-];
+const COLOURS: [&str; 8] =
+    ["#1763c7", "#d33b12", "#8a2fc0", "#1d853b", "#a87600", "#007f8c", "#b82f74", "#444444"];
 
-impl Axis<'_> {
-    /// Where `value` lies on it; `None` for what has no place there.
-    fn place(&self, value: f64) -> Option<f64> {
-        let place = if self.logarithmic { value.log10() } else { value };
-        place.is_finite().then_some(place)
-    }
+/// The drawing's size, and the plot inside it, in the drawing's units.
+const SIZE: [f64; 2] = [640.0, 410.0];
+const PLOT_X: Range<f64> = 78.0..622.0;
+const PLOT_Y: Range<f64> = 40.0..344.0;
 
-    fn words(&self, place: f64) -> String {
-        let value = if self.logarithmic { 10f64.powf(place) } else { place };
-        if self.percent { format!("{:.0} %", 100.0 * value) } else { digits(value) }
-    }
+/// From one series of a file's legend to the next.
+const LEGEND_LINE: f64 = 20.0;
 
-    /// From a little before the least to a little beyond the greatest.
-    fn range(&self, values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
-        let places = values.filter_map(|value| self.place(value));
-        let (low, high) = places
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        if low > high {
-            return 0.0..1.0;
+/// What a page's style sheet says of charts, for a file of its own.
+const FILE_STYLE: &str = ".grid line{stroke:#ddd}.hollow{opacity:.35}[data-tip]{display:none}";
+
+/// Most steps between two ticks.
+const MOST_STEPS: f64 = 6.0;
+
+/// An axis with the range of values that it shows.
+struct Scale<'a> {
+    axis: &'a Axis<'a>,
+    /// In values, or in powers of ten if the axis is logarithmic.
+    range: Range<f64>,
+    /// In the drawing's units.
+    drawn: Range<f64>,
+}
+
+/// A chart with one message.
+pub struct Chart<'a> {
+    /// The message, in words.
+    pub message: String,
+    /// How to read the dots; may be empty.
+    pub caption: &'a str,
+    /// The horizontal axis.
+    pub x: Axis<'a>,
+    /// The vertical axis.
+    pub y: Axis<'a>,
+    /// The dots. Those without a place on an axis (such as 0 on a logarithmic one) are
+    /// left out.
+    pub series: Vec<Series>,
+}
+
+impl Chart<'_> {
+    /// The chart as part of a page.
+    pub fn figure(&self) -> Markup {
+        html! {
+            figure class="chart" {
+                h3 { (self.message) }
+                svg viewBox={ "0 0 " (SIZE[0]) " " (SIZE[1]) } role="img" aria-label=(self.message) {
+                    (self.plot())
+                }
+                @if self.series.iter().any(|series| !series.name.is_empty()) {
+                    ul class="legend" { @for (series, colour) in self.coloured() {
+                        li { span style={ "background:" (colour) } {} (series.name) }
+                    } }
+                }
+                @if !self.caption.is_empty() { figcaption { (self.caption) } }
+            }
         }
-        let room = if high > low { 0.05 * (high - low) } else { 0.5 };
-        low - room..high + room
+    }
+
+    /// The chart as an SVG file, its legend below the plot.
+    pub fn file(&self) -> String {
+        let height = SIZE[1] + LEGEND_LINE * self.series.len() as f64;
+        let svg = html! {
+            svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (SIZE[0]) " " (height) }
+                font-family="sans-serif" font-size="13" {
+                title { (self.message) }
+                style { (PreEscaped(FILE_STYLE)) }
+                rect width="100%" height="100%" fill="white" {}
+                (self.plot())
+                @for (i, (series, colour)) in self.coloured().enumerate() {
+                    circle cx=(PLOT_X.start) cy=(SIZE[1] + LEGEND_LINE * i as f64) r="4.5" fill=(colour) {}
+                    text x=(PLOT_X.start + 14.0) y=(SIZE[1] + 4.5 + LEGEND_LINE * i as f64) {
+                        (series.name)
+                    }
+                }
+            }
+        };
+        svg.into_string()
+    }
+
+    fn coloured(&self) -> impl Iterator<Item = (&Series, &'static str)> {
+        self.series.iter().zip(COLOURS.into_iter().cycle())
+    }
+
+    fn plot(&self) -> Markup {
+        let dots = || self.series.iter().flat_map(|series| &series.dots);
+        let x = Scale::new(&self.x, dots().map(|dot| dot.x), PLOT_X);
+        let y = Scale::new(&self.y, dots().map(|dot| dot.y), PLOT_Y.end..PLOT_Y.start);
+        html! {
+            (grid(&x, &y))
+            @for (series, colour) in self.coloured() { (drawn(series, colour, &x, &y)) }
+            // Tips lie above everything that is drawn.
+            @for dot in dots() { (tip(dot, &x, &y)) }
+        }
     }
 }
 
-/// The drawing as SVG; dots that have no place on an axis are left out.
-///
-/// # Errors
-/// What the plotting library reports.
-pub fn draw(title: &str, x: &Axis<'_>, y: &Axis<'_>, series: &[Series]) -> Result<String> {
-    // Sizes of words are measured by this font; the browser takes its own.
-    register_font(FONT, FontStyle::Normal, epaint_default_fonts::HACK_REGULAR)
-        .map_err(|_| anyhow!("the bundled font cannot be read"))?;
-    let dots = || series.iter().flat_map(|series| &series.dots);
-    let (across, up) = (x.range(dots().map(|dot| dot.x)), y.range(dots().map(|dot| dot.y)));
-    let mut svg = String::new();
-    let mut tips = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
-            .caption(title, (FONT, 16))
-            .margin(12)
-            .x_label_area_size(38)
-            .y_label_area_size(60)
-            .build_cartesian_2d(across, up)?;
-        let (x_words, y_words) = (|at: &f64| x.words(*at), |at: &f64| y.words(*at));
-        let mut mesh = chart.configure_mesh();
-        mesh.x_desc(x.label).y_desc(y.label).light_line_style(WHITE);
-        mesh.x_label_formatter(&x_words).y_label_formatter(&y_words).draw()?;
-        for (series, &colour) in series.iter().zip(COLOURS.iter().cycle()) {
-            tips += &one(&mut chart, series, colour, (x, y))?;
+fn grid(x: &Scale<'_>, y: &Scale<'_>) -> Markup {
+    html! {
+        g class="grid" {
+            @for (at, label) in x.ticks() {
+                line x1=(at) x2=(at) y1=(PLOT_Y.start) y2=(PLOT_Y.end) {}
+                text x=(at) y=(PLOT_Y.end + 22.0) text-anchor="middle" { (label) }
+            }
+            @for (at, label) in y.ticks() {
+                line x1=(PLOT_X.start) x2=(PLOT_X.end) y1=(at) y2=(at) {}
+                text x=(PLOT_X.start - 8.0) y=(at) dy="0.35em" text-anchor="end" { (label) }
+            }
+            text x=((PLOT_X.start + PLOT_X.end) / 2.0) y=(SIZE[1] - 14.0) text-anchor="middle" {
+                (x.axis.label)
+            }
+            text x="4" y="24" { (y.axis.label) }
         }
-        let mut legend = chart.configure_series_labels();
-        legend.position(SeriesLabelPosition::LowerRight).background_style(WHITE.mix(0.8)).draw()?;
-        area.present()?;
     }
-    // What the pointer finds lies above everything that is drawn.
-    Ok(svg.replace("</svg>", &format!("{tips}</svg>")))
 }
 
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
-/// Draws one series; returns what the pointer finds of it.
-fn one(
-    chart: &mut Chart<'_, '_>,
-    series: &Series,
-    colour: RGBColor,
-    (x, y): (&Axis<'_>, &Axis<'_>),
-) -> Result<String> {
-    let mut placed: Vec<(f64, f64, &Dot)> = series
-        .dots
-        .iter()
-        .filter_map(|dot| Some((x.place(dot.x)?, y.place(dot.y)?, dot)))
-        .collect();
-    placed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let hollow = placed.iter().filter(|(.., dot)| !dot.filled);
-    chart.draw_series(hollow.map(|&(x, y, _)| Circle::new((x, y), 2, colour.mix(0.4))))?;
-    let filled = placed.iter().filter(|(.., dot)| dot.filled);
-    chart
-        .draw_series(filled.clone().map(|&(x, y, _)| Circle::new((x, y), 4, colour.filled())))?
-        .label(&series.name)
-        .legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
-    if series.joined {
-        chart.draw_series(LineSeries::new(filled.map(|&(x, y, _)| (x, y)), colour.mix(0.7)))?;
-    }
-    let tip = |&(x, y, dot): &(f64, f64, &Dot)| {
-        let (left, top) = chart.backend_coord(&(x, y));
-        let tip = &dot.tip;
-        html! { circle cx=(left) cy=(top) r="7" fill="transparent" data-tip=(tip) {} }.into_string()
+/// The dots of `series` and the line through the filled ones.
+fn drawn(series: &Series, colour: &str, x: &Scale<'_>, y: &Scale<'_>) -> Markup {
+    let placed = |filled: bool| {
+        let dots = series.dots.iter().filter(move |dot| dot.filled == filled);
+        dots.filter_map(|dot| Some((x.place(dot.x)?, y.place(dot.y)?))).collect::<Vec<_>>()
     };
-    Ok(placed.iter().map(tip).collect())
+    let (hollow, mut filled) = (placed(false), placed(true));
+    filled.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let line: Vec<String> = filled.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+    html! {
+        g fill=(colour) stroke=(colour) {
+            @for (x, y) in &hollow { (circle(*x, *y, "2.5", "hollow")) }
+            @if series.joined && line.len() > 1 { polyline points=(line.join(" ")) fill="none" {} }
+            @for (x, y) in &filled { (circle(*x, *y, "4.5", "filled")) }
+        }
+    }
+}
+
+fn circle(x: f64, y: f64, radius: &str, class: &str) -> Markup {
+    html! { circle class=(class) cx={ (format!("{x:.1}")) } cy={ (format!("{y:.1}")) } r=(radius) {} }
+}
+
+fn tip(dot: &Dot, x: &Scale<'_>, y: &Scale<'_>) -> Markup {
+    let (Some(x), Some(y)) = (x.place(dot.x), y.place(dot.y)) else { return Markup::default() };
+    let (x, y) = (format!("{x:.1}"), format!("{y:.1}"));
+    html! { circle cx=(x) cy=(y) r="9" fill="transparent" data-tip=(dot.tip) {} }
+}
+
+impl<'a> Scale<'a> {
+    fn new(axis: &'a Axis<'a>, values: impl Iterator<Item = f64>, drawn: Range<f64>) -> Self {
+        let unit = |value: f64| if axis.logarithmic { value.log10() } else { value };
+        let units = values.map(unit).filter(|unit| unit.is_finite());
+        let (low, high) = units
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let range = if low > high {
+            0.0..1.0
+        } else {
+            let room = if high > low { 0.05 * (high - low) } else { 0.5 };
+            low - room..high + room
+        };
+        Self { axis, range, drawn }
+    }
+
+    /// Where `value` is drawn; `None` if it has no place on the axis.
+    fn place(&self, value: f64) -> Option<f64> {
+        let unit = if self.axis.logarithmic { value.log10() } else { value };
+        let share = (unit - self.range.start) / (self.range.end - self.range.start);
+        let at = self.drawn.start + share * (self.drawn.end - self.drawn.start);
+        at.is_finite().then_some(at)
+    }
+
+    /// Round values on the axis: where they are drawn, and their labels.
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let values = if self.axis.logarithmic {
+            logarithmic_ticks(&self.range)
+        } else {
+            linear_ticks(&self.range)
+        };
+        let label = |value: f64| match self.axis.percent {
+            true => format!("{} %", number(100.0 * value)),
+            false => number(value),
+        };
+        values.into_iter().filter_map(|value| Some((self.place(value)?, label(value)))).collect()
+    }
+}
+
+/// Multiples of 1, 2 or 5 times a power of ten.
+fn linear_ticks(range: &Range<f64>) -> Vec<f64> {
+    let least = (range.end - range.start) / MOST_STEPS;
+    let power = 10f64.powf(least.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power);
+    let step = step.into_iter().find(|step| *step >= least).unwrap_or(10.0 * power);
+    let first = (range.start / step).ceil() as i64;
+    let last = (range.end / step).floor() as i64;
+    (first..=last).map(|i| i as f64 * step).collect()
+}
+
+/// Of a range of exponents: 1, 2, 5, 10 over a short one, 1, 3, 10 over a longer one, and
+/// powers of ten alone over a long one.
+fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
+    let decades = range.end - range.start;
+    let factors: &[f64] = match decades {
+        _ if decades <= 1.5 => &[1.0, 2.0, 5.0],
+        _ if decades <= 3.5 => &[1.0, 3.0],
+        _ => &[1.0],
+    };
+    let each = (decades / MOST_STEPS).ceil().max(1.0) as i32;
+    let exponents = range.start.floor() as i32..=range.end.ceil() as i32;
+    let values = exponents
+        .filter(|exponent| exponent.rem_euclid(each) == 0)
+        .flat_map(|exponent| factors.iter().map(move |factor| factor * 10f64.powi(exponent)));
+    values.filter(|value| range.contains(&value.log10())).collect()
+}
+
+/// `value` as a tick's label; powers of ten far from 1 are written as such.
+fn number(value: f64) -> String {
+    // Room for the rounding of a logarithm that should be whole.
+    let exponent = value.abs().log10() + 1e-9;
+    if value == 0.0 || (-3.5..4.5).contains(&exponent) {
+        let is_large = value.abs() >= 10.0;
+        return if is_large { format!("{value:.1}").replace(".0", "") } else { digits(value) };
+    }
+    let superscript = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    };
+    let power: String = format!("{:.0}", exponent.floor()).chars().map(superscript).collect();
+    match (value / 10f64.powf(exponent.floor())).round() {
+        1.0 => format!("10{power}"),
+        factor => format!("{factor}·10{power}"),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn axis(label: &str, logarithmic: bool) -> Axis<'_> {
-        Axis { label, logarithmic, percent: false }
+    fn axis(logarithmic: bool) -> Axis<'static> {
+        Axis { label: "axis", logarithmic, percent: false }
+    }
+
+    fn chart(series: Vec<Series>) -> Chart<'static> {
+        let message = "message".to_owned();
+        Chart { message, caption: "", x: axis(true), y: axis(false), series }
+    }
+
+    fn drawn(dots: Vec<Dot>) -> String {
+        let series = Series { name: "s".to_owned(), dots, joined: true };
+        chart(vec![series]).figure().into_string()
     }
 
     fn dot(x: f64, y: f64, tip: &str) -> Dot {
@@ -162,24 +295,31 @@ mod tests {
     }
 
     #[test]
-    fn each_dot_says_what_it_is() {
-        let dots = vec![dot(1.0, 2.0, "a < b"), dot(10.0, 3.0, "c")];
-        let series = Series { name: "s".to_owned(), dots, joined: true };
-        let svg = draw("t", &axis("x", true), &axis("y", false), &[series]).unwrap();
-        assert_eq!(svg.matches("data-tip").count(), 2);
-        assert!(svg.contains(r#"data-tip="a &lt; b""#) && svg.ends_with("</svg>\n"), "{svg}");
+    fn each_dot_has_its_tip() {
+        let figure = drawn(vec![dot(1.0, 2.0, "a < b"), dot(10.0, 3.0, "c")]);
+        assert_eq!(figure.matches("data-tip").count(), 2);
+        assert!(figure.contains(r#"data-tip="a &lt; b""#), "{figure}");
+        assert!(figure.contains("<h3>message</h3>") && figure.contains("polyline"), "{figure}");
     }
 
     #[test]
-    fn what_has_no_place_is_left_out() {
-        let dots = vec![
-            dot(0.0, 1.0, "no logarithm"),
-            dot(f64::NAN, 1.0, "nowhere"),
-            dot(1.0, 1.0, "here"),
-        ];
-        let series = Series { dots, ..Series::default() };
-        let svg = draw("t", &axis("x", true), &axis("y", false), &[series]).unwrap();
-        assert_eq!(svg.matches("data-tip").count(), 1);
-        draw("nothing at all", &axis("x", true), &axis("y", true), &[]).unwrap();
+    fn dots_without_a_place_are_left_out() {
+        let figure = drawn(vec![dot(0.0, 1.0, "0"), dot(f64::NAN, 1.0, "NaN"), dot(1.0, 1.0, "1")]);
+        assert_eq!(figure.matches("data-tip").count(), 1);
+        assert!(drawn(Vec::new()).contains("</svg>"));
+    }
+
+    #[test]
+    fn ticks_are_numbers_that_a_person_would_choose() {
+        let labels = |logarithmic, range: Range<f64>| {
+            let axis = axis(logarithmic);
+            let ticks = Scale { axis: &axis, range, drawn: PLOT_X }.ticks();
+            ticks.into_iter().map(|(_, label)| label).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(labels(true, 0.2f64.log10()..15f64.log10()), "0.3 1 3 10");
+        assert_eq!(labels(true, 0.9f64.log10()..25f64.log10()), "1 2 5 10 20");
+        assert_eq!(labels(true, -12.5..3.0), "10⁻¹² 10⁻⁹ 10⁻⁶ 0.001 1");
+        assert_eq!(labels(false, 0.0..1.0), "0 0.2 0.4 0.6 0.8 1");
+        assert_eq!(labels(false, -30.0..1100.0), "0 200 400 600 800 1000");
     }
 }

@@ -1,6 +1,5 @@
-//! How results are shown: tables for a terminal, charts, and pages.
+//! How results are shown: tables for terminals and pages, charts, and pages.
 
 pub mod chart;
 pub mod page;
 pub mod table;
-pub mod text_table;

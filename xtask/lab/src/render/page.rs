@@ -1,5 +1,4 @@
-//! Pages that need nothing else: one HTML file with its styles, its drawings
-//! and what little script it has.
+//! Self-contained pages: one HTML file with its styles, drawings and scripts.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -9,9 +8,11 @@ const CLOUDS: &str = include_str!("../../../../assets/page/cloud.js");
 
 /// One chapter of a page.
 pub struct Chapter {
-    /// What links to it: letters and hyphens.
+    /// Its anchor: letters and hyphens.
     pub id: &'static str,
-    /// What its tab says.
+    /// One or two words for its tab.
+    pub tab: &'static str,
+    /// Its heading: what a reader wants to know.
     pub title: &'static str,
     /// What it shows.
     pub body: Markup,
@@ -33,7 +34,7 @@ pub fn of(title: &str, lead: &Markup, chapters: &[Chapter]) -> String {
                 (lead)
                 div role="tablist" { @for chapter in chapters {
                     button type="button" role="tab" data-tab=(chapter.id) aria-controls=(chapter.id) {
-                        (chapter.title)
+                        (chapter.tab)
                     }
                 } }
                 @for chapter in chapters {
@@ -48,20 +49,20 @@ pub fn of(title: &str, lead: &Markup, chapters: &[Chapter]) -> String {
     page.into_string()
 }
 
-/// A drawing as part of a page.
-pub fn figure(svg: &str, caption: &str) -> Markup {
-    html! { figure { (PreEscaped(svg)) figcaption { (caption) } } }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_page_needs_nothing_else_and_escapes_names() {
+    fn a_page_is_self_contained_and_escapes_names() {
         let body = html! { p { "a < b" } };
-        let page = of("T & T", &html! {}, &[Chapter { id: "one", title: "One", body }]);
-        assert!(page.contains("a &lt; b") && page.contains("T &amp; T"));
+        let page =
+            of("T & T", &html! {}, &[Chapter { id: "one", tab: "One", title: "Which one?", body }]);
+        assert!(
+            page.contains("<h2>Which one?</h2>")
+                && page.contains("a &lt; b")
+                && page.contains("T &amp; T")
+        );
         assert!(page.contains(r#"data-tab="one""#) && page.contains(r#"<section id="one""#));
         for outside in ["http://", "https://", "src=", "@import"] {
             assert!(!page.contains(outside), "{outside}");

@@ -1,37 +1,111 @@
-//! Tables of a page.
+//! Tables: the same rows as text for a terminal and as HTML for a page.
 
+pub use edgepuck_program::significant_digits::digits;
 use maud::{Markup, html};
+use std::fmt;
 
-/// Rows of words under headings; rows that are marked are set in bold.
-pub fn table(caption: &str, heading: &[&str], rows: &[(bool, Vec<String>)]) -> Markup {
-    html! {
-        div class="scroll" {
-            table {
-                caption { (caption) }
-                thead { tr { @for word in heading { th scope="col" { (word) } } } }
-                tbody { @for (marked, words) in rows {
-                    tr { @for (i, word) in words.iter().enumerate() {
-                        @if i == 0 { th scope="row" { (word) } }
-                        @else { td class=[marked.then_some("front")] { (word) } }
+/// Rows of words under a heading.
+pub struct Table {
+    title: String,
+    heading: Vec<String>,
+    rows: Vec<Row>,
+}
+
+struct Row {
+    is_marked: bool,
+    cells: Vec<String>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(title: impl Into<String>, heading: &[&str]) -> Self {
+        let heading = heading.iter().map(|&word| word.to_owned()).collect();
+        Self { title: title.into(), heading, rows: Vec::new() }
+    }
+
+    /// The rows of a CSV file.
+    ///
+    /// # Errors
+    /// Bytes that are not CSV, with the line.
+    pub fn from_csv(title: &str, bytes: &[u8]) -> anyhow::Result<Self> {
+        let mut csv = csv::Reader::from_reader(bytes);
+        let mut table = Self::new(title, &csv.headers()?.iter().collect::<Vec<_>>());
+        for record in csv.records() {
+            table.push(record?.iter().map(str::to_owned).collect());
+        }
+        Ok(table)
+    }
+
+    /// Adds a row, as long as the heading.
+    pub fn push(&mut self, cells: Vec<String>) {
+        self.push_marked(false, cells);
+    }
+
+    /// Adds a row, which is set in bold on a page if it `is_marked`.
+    pub fn push_marked(&mut self, is_marked: bool, cells: Vec<String>) {
+        debug_assert_eq!(cells.len(), self.heading.len());
+        self.rows.push(Row { is_marked, cells });
+    }
+
+    /// How many rows there are.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The table as HTML.
+    pub fn html(&self) -> Markup {
+        html! {
+            div class="scroll" {
+                table {
+                    @if !self.title.is_empty() { caption { (self.title) } }
+                    thead { tr { @for word in &self.heading { th scope="col" { (word) } } } }
+                    tbody { @for row in &self.rows {
+                        tr class=[row.is_marked.then_some("marked")] {
+                            @for (i, word) in row.cells.iter().enumerate() {
+                                @if i == 0 { th scope="row" { (word) } } @else { td { (word) } }
+                            }
+                        }
                     } }
-                } }
+                }
             }
         }
     }
 }
 
-/// A CSV file as a table.
-///
-/// # Errors
-/// What is no CSV.
-pub fn of_csv(caption: &str, bytes: &[u8]) -> anyhow::Result<Markup> {
-    let mut csv = csv::Reader::from_reader(bytes);
-    let heading = csv.headers()?.clone();
-    let rows: Result<Vec<(bool, Vec<String>)>, csv::Error> = csv
-        .records()
-        .map(|record| Ok((false, record?.iter().map(str::to_owned).collect())))
-        .collect();
-    Ok(table(caption, &heading.iter().collect::<Vec<_>>(), &rows?))
+/// As text: the first column is flush left, the others are flush right.
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = || std::iter::once(&self.heading).chain(self.rows.iter().map(|row| &row.cells));
+        let width = |i: usize| rows().map(|row| row[i].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..self.heading.len()).map(width).collect();
+        writeln!(f, "\n{}", self.title)?;
+        for row in rows() {
+            for (i, (word, &width)) in row.iter().zip(&widths).enumerate() {
+                if i == 0 {
+                    write!(f, "  {word:width$}")?;
+                } else {
+                    write!(f, "  {word:>width$}")?;
+                }
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
+/// `count` per `seconds`, in millions with three digits.
+pub fn millions_per_s(count: usize, seconds: f64) -> String {
+    if seconds > 0.0 { digits(count as f64 / seconds / 1e6) } else { "-".to_owned() }
+}
+
+/// `seconds` in milliseconds.
+pub fn milliseconds(seconds: f64) -> String {
+    digits(seconds * 1e3)
+}
+
+/// A share in percent with one decimal.
+pub fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
 }
 
 #[cfg(test)]
@@ -39,10 +113,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_same_rows_are_text_and_html() {
+        let mut table = Table::new("title", &["name", "ms"]);
+        table.push(vec!["a < b".to_owned(), "1".to_owned()]);
+        table.push_marked(true, vec!["c".to_owned(), "10".to_owned()]);
+        assert_eq!(table.to_string(), "\ntitle\n  name   ms\n  a < b   1\n  c      10\n");
+        let html = table.html().into_string();
+        assert!(html.contains("<th scope=\"row\">a &lt; b</th><td>1</td>"), "{html}");
+        assert!(html.contains("<tr class=\"marked\">"), "{html}");
+    }
+
+    #[test]
     fn a_csv_file_becomes_rows() {
-        let found = of_csv("caption", b"a,b\n1,\"x, y\"\n").unwrap().into_string();
+        let found = Table::from_csv("caption", b"a,b\n1,\"x, y\"\n").unwrap().html().into_string();
         assert!(found.contains("<th scope=\"col\">a</th>"));
         assert!(found.contains("<th scope=\"row\">1</th>") && found.contains("<td>x, y</td>"));
-        assert!(of_csv("caption", b"a,b\n1\n").is_err());
+        assert!(Table::from_csv("caption", b"a,b\n1\n").is_err());
     }
 }

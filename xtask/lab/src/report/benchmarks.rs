@@ -2,8 +2,8 @@
 
 use super::{entries, missing, remarks, text};
 use crate::measure::clock::Spread;
-use crate::render::chart::{Axis, Dot, Series, draw};
-use crate::render::page::figure;
+use crate::render::chart::{Axis, Chart, Dot, Series};
+use crate::render::table::digits;
 use anyhow::{Context, Result};
 use maud::{Markup, html};
 use serde::Deserialize;
@@ -13,7 +13,7 @@ use xtask::workspace::file_name;
 
 /// What is read of `bench infer --json`.
 #[derive(Deserialize)]
-struct Contest {
+struct Comparison {
     classifying: Vec<Measured>,
 }
 
@@ -42,15 +42,12 @@ pub fn body(bench: &Path) -> Result<Markup> {
 }
 
 fn one(folder: &Path) -> Result<Markup> {
-    let contest = folder.join("infer.json");
-    let drawing = match text(&contest)? {
+    let file = folder.join("infer.json");
+    let drawing = match text(&file)? {
         Some(json) => {
-            let contest: Contest = serde_json::from_str(&json)
-                .with_context(|| format!("reading {}", contest.display()))?;
-            Some(figure(
-                &by_points(&contest)?,
-                "Filled: ours. One thread, medians of one run in turns.",
-            ))
+            let comparison: Comparison = serde_json::from_str(&json)
+                .with_context(|| format!("reading {}", file.display()))?;
+            Some(by_points(&comparison).figure())
         }
         None => None,
     };
@@ -69,19 +66,49 @@ fn one(folder: &Path) -> Result<Markup> {
 }
 
 /// Milliseconds by points, one thread.
-fn by_points(contest: &Contest) -> Result<String> {
+fn by_points(comparison: &Comparison) -> Chart<'static> {
     let mut series: BTreeMap<&str, Vec<Dot>> = BTreeMap::new();
-    for measured in contest.classifying.iter().filter(|measured| measured.setting == 1) {
-        let ms = Spread::of(measured.wall_ns.iter().map(|ns| ns * 1e-6)).median;
+    for measured in comparison.on_one_thread() {
+        let ms = measured.ms();
         let tip = format!("{}, {} points\n{ms:.3} ms", measured.engine, measured.points);
         let dot = Dot { x: measured.points as f64, y: ms, tip, filled: measured.ours };
         series.entry(&measured.engine).or_default().push(dot);
     }
-    let series: Vec<Series> = series
-        .into_iter()
-        .map(|(name, dots)| Series { name: name.to_owned(), dots, joined: true })
-        .collect();
-    let x = Axis { label: "points", logarithmic: true, percent: false };
-    let y = Axis { label: "milliseconds", logarithmic: true, percent: false };
-    draw("PointNet of one cloud, one thread", &x, &y, &series)
+    let series = series.into_iter();
+    let series = series.map(|(name, dots)| Series { name: name.to_owned(), dots, joined: true });
+    Chart {
+        message: comparison.message(),
+        caption: "PointNet on one cloud with one thread, medians of one run in turns. Filled: Edgepuck.",
+        x: Axis { label: "points", logarithmic: true, percent: false },
+        y: Axis { label: "milliseconds", logarithmic: true, percent: false },
+        series: series.collect(),
+    }
+}
+
+impl Measured {
+    fn ms(&self) -> f64 {
+        Spread::of(self.wall_ns.iter().map(|ns| ns * 1e-6)).median
+    }
+}
+
+impl Comparison {
+    fn on_one_thread(&self) -> impl Iterator<Item = &Measured> {
+        self.classifying.iter().filter(|measured| measured.setting == 1)
+    }
+
+    /// The fastest of ours and of the others at the baseline's number of points.
+    fn message(&self) -> String {
+        const POINTS: usize = 1024;
+        let fastest = |ours: bool| {
+            let of = self.on_one_thread().filter(|m| m.points == POINTS && m.ours == ours);
+            of.min_by(|a, b| a.ms().total_cmp(&b.ms()))
+        };
+        let words = |m: &Measured| format!("{} takes {} ms", m.engine, digits(m.ms()));
+        match fastest(true).zip(fastest(false)) {
+            Some((ours, other)) => {
+                format!("With {POINTS} points {}, {}.", words(ours), words(other))
+            }
+            None => "Milliseconds to classify one cloud, by its points.".to_owned(),
+        }
+    }
 }

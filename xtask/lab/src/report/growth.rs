@@ -1,9 +1,8 @@
 //! How errors grow towards the extremes, beside the bounds derived for them.
 
 use super::{missing, remarks, text};
-use crate::render::chart::{Axis, Dot, Series, draw};
-use crate::render::page::figure;
-use crate::render::table::of_csv;
+use crate::render::chart::{Axis, Chart, Dot, Series};
+use crate::render::table::{Table, digits};
 use anyhow::{Context, Result};
 use maud::{Markup, html};
 use serde::Deserialize;
@@ -37,21 +36,27 @@ pub fn body(folder: &Path) -> Result<Markup> {
         csv::Reader::from_path(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let rows: Result<Vec<Growth>, csv::Error> = csv.deserialize().collect();
     let rows = rows.with_context(|| format!("reading {}", path.display()))?;
-    let mut drawings: BTreeMap<(&str, &str, &str), Vec<&Growth>> = BTreeMap::new();
+    let mut groups: BTreeMap<(&str, &str), BTreeMap<&str, Vec<&Growth>>> = BTreeMap::new();
     for row in &rows {
-        drawings.entry((&row.quantity, row.model(), &row.knob)).or_default().push(row);
+        let group = groups.entry((row.model(), &row.quantity)).or_default();
+        group.entry(&row.knob).or_default().push(row);
     }
-    let figures: Result<Vec<Markup>> = drawings.values().map(|rows| one(rows)).collect();
     let devices = text(&folder.join("devices.csv"))?;
     let fuzz = text(&folder.join("fuzz.md"))?;
     Ok(html! {
-        p { "Errors against the f64 reference, the largest of each setting; hollow dots are the bound "
-            "that is derived for them. " code { "cargo xtask bench growth" } "." }
+        p { "Each error is the difference from the f64 reference. Filled dots are the largest error of a "
+            "setting, hollow dots the bound that is derived for it. " code { "cargo xtask bench growth" } "." }
         (remarks(folder)?)
-        @for figure in figures? { (figure) }
-        @if let Some(csv) = devices {
-            (of_csv("The same dataset on every adapter", csv.as_bytes()).context("reading devices.csv")?)
+        @for (i, ((model, quantity), charts)) in groups.iter().enumerate() {
+            details open[i == 0] {
+                summary { "Errors of each " (quantity) @if !model.is_empty() { " of " (model) } }
+                @for (parameter, rows) in charts { (chart(parameter, rows).figure()) }
+            }
         }
+        @if let Some(csv) = devices { details {
+            summary { "The same dataset on every adapter" }
+            (Table::from_csv("", csv.as_bytes()).context("reading devices.csv")?.html())
+        } }
         @if let Some(fuzz) = fuzz { details { summary { "Fuzzing" } pre { (fuzz) } } }
     })
 }
@@ -68,9 +73,8 @@ impl Growth {
     }
 }
 
-/// Errors of one quantity by one knob; a colour a precision.
-fn one(rows: &[&Growth]) -> Result<Markup> {
-    let Some(first) = rows.first() else { return Ok(Markup::default()) };
+/// Errors of one quantity by one parameter; a colour a precision.
+fn chart<'a>(parameter: &'a str, rows: &[&'a Growth]) -> Chart<'a> {
     let mut series: BTreeMap<&str, Vec<Dot>> = BTreeMap::new();
     for row in rows {
         let dots = series.entry(&row.precision).or_default();
@@ -85,16 +89,34 @@ fn one(rows: &[&Growth]) -> Result<Markup> {
             filled: false,
         }));
     }
-    let is_one_layer = rows.iter().all(|row| row.layer == first.layer);
-    let series: Vec<Series> = series
-        .into_iter()
-        .map(|(name, dots)| Series { name: name.to_owned(), dots, joined: is_one_layer })
-        .collect();
+    let is_one_layer = rows.iter().all(|row| row.layer == rows[0].layer);
+    let series = series.into_iter();
+    let series =
+        series.map(|(name, dots)| Series { name: name.to_owned(), dots, joined: is_one_layer });
     // Activations and logits have no unit: their errors are differences.
-    let unit = if first.unit == "1" { "" } else { &first.unit };
-    let label = ["error", unit].join(" ");
-    let x = Axis { label: &first.knob, logarithmic: true, percent: false };
-    let y = Axis { label: &label, logarithmic: true, percent: false };
-    let title = format!("{} {} by {}", first.model(), first.quantity, first.knob);
-    Ok(figure(&draw(title.trim(), &x, &y, &series)?, ""))
+    let in_metres = rows.iter().any(|row| row.unit == "m");
+    Chart {
+        message: message(parameter, rows),
+        caption: "",
+        x: Axis { label: parameter, logarithmic: true, percent: false },
+        y: Axis {
+            label: if in_metres { "error, metres" } else { "error" },
+            logarithmic: true,
+            percent: false,
+        },
+        series: series.collect(),
+    }
+}
+
+/// How near the errors of `rows` come to their bounds.
+fn message(parameter: &str, rows: &[&Growth]) -> String {
+    let share = |row: &&Growth| row.bound.map(|bound| row.largest_error / bound);
+    let largest = rows.iter().filter_map(share).fold(0.0, f64::max);
+    match largest <= 1.0 {
+        true => format!(
+            "By {parameter}: no error is above its bound; the nearest is {} % of it.",
+            digits(100.0 * largest)
+        ),
+        false => format!("By {parameter}: an error is {} times its bound.", digits(largest)),
+    }
 }

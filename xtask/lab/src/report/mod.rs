@@ -1,10 +1,9 @@
-//! `cargo xtask report`: everything that was measured, on one page that needs
-//! nothing else.
+//! `cargo xtask report`: every record on one self-contained page.
 //!
-//! A file a chapter: [`scans`] shows clouds to turn, [`records`] what the files
-//! under `assets/reports` hold, [`growth`] draws errors beside their bounds,
-//! [`benchmarks`] draws `assets/bench`. What is not there is said, with the
-//! command that makes it.
+//! Each file makes a chapter: [`scans`] shows clouds that can be rotated, [`records`]
+//! the tables under `assets/reports`, [`growth`] errors beside their bounds,
+//! [`benchmarks`] the records under `assets/bench`. For a missing record the page names
+//! the command that makes it.
 
 mod benchmarks;
 mod growth;
@@ -15,7 +14,7 @@ use crate::render::page::{self, Chapter};
 use crate::study::trade;
 use anyhow::{Context, Result, ensure};
 use edgepuck_program::Outcome;
-use edgepuck_program::trade_record as row;
+use edgepuck_program::trade_record;
 use formats::atomic;
 use maud::{Markup, html};
 use std::fs;
@@ -40,41 +39,50 @@ pub struct Args {
 /// A record that is not what its name says; what the system reports.
 pub fn run(args: &Args) -> Result<Outcome> {
     let assets = args.assets.clone().unwrap_or_else(|| workspace::root().join("assets"));
-    ensure!(assets.is_dir(), "--assets: {} is no folder", assets.display());
+    ensure!(assets.is_dir(), "--assets: {} is not a folder", assets.display());
     let reports = assets.join("reports");
-    let mut chapters = vec![Chapter { id: "scans", title: "Scans", body: scans::body(&assets)? }];
+    let chapter = |id, tab, title, body| Chapter { id, tab, title, body };
+    let scans = scans::body(&assets)?;
+    let mut chapters = vec![chapter("scans", "Scans", "What does a scan look like?", scans)];
     chapters.extend(trade_chapters(&reports.join("trade/trade.csv"))?);
-    let more: [(&'static str, &'static str, Markup); 4] = [
-        ("effects", "Effects", records::ablations(&reports.join("ablations"))?),
-        ("extremes", "Extremes", growth::body(&reports.join("extremes"))?),
-        ("paper", "The paper, run again", records::reproduction(&reports)?),
-        ("benchmarks", "Benchmarks", benchmarks::body(&assets.join("bench"))?),
-    ];
-    chapters.extend(more.map(|(id, title, body)| Chapter { id, title, body }));
+    let effects = records::ablations(&reports.join("ablations"))?;
+    let errors = growth::body(&reports.join("extremes"))?;
+    let paper = records::reproduction(&reports)?;
+    let speed = benchmarks::body(&assets.join("bench"))?;
+    chapters.extend([
+        chapter("effects", "Effects", "Which effects of a scan matter to a classifier?", effects),
+        chapter("extremes", "Errors", "How large can errors get?", errors),
+        chapter("paper", "Paper", "Do the paper's experiments hold?", paper),
+        chapter("benchmarks", "Speed", "How fast is it beside other engines?", speed),
+    ]);
     let lead = html! {
-        p { "LiDAR scans of meshes, and what classifies them: what was measured, in one file that needs "
-            "no network. Touch or point at a dot for its figures; drag a cloud to turn it." }
-        p { "edgepuck " (env!("CARGO_PKG_VERSION")) ", " code { "cargo xtask report" } "; each chapter "
-            "names the command that measures it again." }
+        p { "LiDAR scans of meshes and the networks that classify them: every measurement of edgepuck "
+            (env!("CARGO_PKG_VERSION")) " in one file that works offline. Touch or point at a dot for its "
+            "figures. Each chapter names the command that measures it again." }
     };
-    let page = page::of("Edgepuck: what was measured", &lead, &chapters);
+    let page = page::of("Edgepuck: every measurement", &lead, &chapters);
     if let Some(folder) = args.out.parent() {
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     }
     atomic::write_bytes(&args.out, page.as_bytes())?;
-    eprintln!("A page to look at: {}", args.out.display());
+    eprintln!("The page is in {}", args.out.display());
     Ok(Outcome::Success)
 }
 
 fn trade_chapters(record: &Path) -> Result<Vec<Chapter>> {
     if !record.is_file() {
         let body = missing(record, "cargo xtask trade");
-        return Ok(vec![Chapter { id: "trade", title: "The trade", body }]);
+        return Ok(vec![Chapter {
+            id: "classifier",
+            tab: "Settings",
+            title: "Which setting fits my time budget?",
+            body,
+        }]);
     }
-    trade::page::chapters(&row::read(record)?)
+    Ok(trade::page::chapters(&trade_record::read(record)?))
 }
 
-/// Says that nothing was measured, and how to.
+/// Says that there is no record, and which command makes it.
 fn missing(record: &Path, command: &str) -> Markup {
     html! { p { "There is no " (record.display()) " yet: " code { (command) } " makes it." } }
 }
@@ -107,7 +115,7 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// The text that a record comes with.
+/// The README of a record.
 fn remarks(folder: &Path) -> Result<Markup> {
     let text = text(&folder.join("README.md"))?;
     Ok(

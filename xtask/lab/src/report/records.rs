@@ -1,27 +1,27 @@
 //! Records that are tables: the ablations, and the paper's experiments.
 
 use super::{entries, missing, remarks, text};
-use crate::render::table::{of_csv, table};
+use crate::render::table::Table;
 use anyhow::{Context, Result};
 use maud::{Markup, html};
 use serde::Deserialize;
 use std::path::Path;
 use xtask::workspace::file_name;
 
-/// What each effect is worth, of the record in `folder`.
+/// How much each effect matters, of the record in `folder`.
 ///
 /// # Errors
-/// A file that is no CSV.
+/// A file that is not CSV.
 pub fn ablations(folder: &Path) -> Result<Markup> {
     let path = folder.join("ablations.csv");
     let Some(csv) = text(&path)? else { return Ok(missing(&path, "cargo xtask ablate")) };
-    let rows = of_csv("With each effect and without it", csv.as_bytes())
+    let rows = Table::from_csv("With each effect and without it", csv.as_bytes())
         .with_context(|| format!("reading {}", path.display()))?;
     Ok(html! {
         p { "Networks trained and tested with and without each effect of a scan, all else equal: "
             code { "cargo xtask ablate" } "." }
         (remarks(folder)?)
-        (rows)
+        (rows.html())
     })
 }
 
@@ -77,21 +77,18 @@ fn one_table(name: &str, cells: &[Cell]) -> Markup {
             columns.push(&cell.column);
         }
     }
-    let words = |row: &&str| {
+    let heading: Vec<&str> = std::iter::once("").chain(columns.iter().copied()).collect();
+    let mut table = Table::new("", &heading);
+    for row in rows {
         let of = |column: &&str| {
-            let cell = cells.iter().find(|cell| cell.row == **row && cell.column == **column);
+            let cell = cells.iter().find(|cell| cell.row == *row && cell.column == **column);
             cell.map(|cell| cell.words()).unwrap_or_default()
         };
-        let first = std::iter::once((*row).to_owned());
-        (false, first.chain(columns.iter().map(of)).collect())
-    };
-    let heading: Vec<&str> = std::iter::once("").chain(columns.iter().copied()).collect();
-    let open = cells.len() <= 60;
+        let first = std::iter::once(row.to_owned());
+        table.push(first.chain(columns.iter().map(of)).collect());
+    }
     html! {
-        details open[open] {
-            summary { (name) }
-            (table("", &heading, &rows.iter().map(words).collect::<Vec<_>>()))
-        }
+        details open[cells.len() <= 60] { summary { (name) } (table.html()) }
     }
 }
 

@@ -26,7 +26,7 @@ use sim_gpu::target::Target;
 
 use crate::measure::lanes::{self, Lane};
 use crate::measure::subject::{self, Subject};
-use crate::render::text_table::{Table, digits};
+use crate::render::table::{Table, digits};
 use crate::study::casting::speed::target;
 use xtask::workspace::root;
 

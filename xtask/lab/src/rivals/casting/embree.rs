@@ -1,23 +1,21 @@
-//! Embree, through Open3D in a child process.
+//! Embree, through Open3D in a subprocess.
 
 use crate::measure::clock::Cost;
 use crate::measure::shot::Shot;
+use crate::measure::subprocess::Subprocess;
 use anyhow::{Context, Result};
 use ndarray::{Array1, Array2};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sim_gpu::mesh::Mesh;
-use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::Command;
 use tempfile::TempDir;
 use xtask::venv;
 
 /// A running `peers/embree.py`.
 pub struct Embree {
-    child: Child,
-    requests: Option<ChildStdin>,
-    answers: BufReader<ChildStdout>,
+    process: Subprocess,
     files: TempDir,
     /// Versions of the packages.
     pub versions: Value,
@@ -29,21 +27,9 @@ impl Embree {
     /// # Errors
     /// If it does not start, which includes packages that do not load here.
     pub fn start(python: &Path) -> Result<Self> {
-        let mut child = Command::new(python)
-            .arg(venv::programs().join("embree.py"))
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .with_context(|| format!("starting {}", python.display()))?;
-        let requests = child.stdin.take();
-        let stdout = child.stdout.take().context("the peer has no output")?;
-        let mut peer = Self {
-            child,
-            requests,
-            answers: BufReader::new(stdout),
-            files: tempfile::tempdir()?,
-            versions: Value::Null,
-        };
+        let mut command = Command::new(python);
+        let process = Subprocess::start(command.arg(venv::programs().join("embree.py")))?;
+        let mut peer = Self { process, files: tempfile::tempdir()?, versions: Value::Null };
         peer.versions = peer.answer()?;
         Ok(peer)
     }
@@ -97,23 +83,13 @@ impl Embree {
     }
 
     fn ask<T: DeserializeOwned>(&mut self, request: &Value) -> Result<T> {
-        let requests = self.requests.as_mut().context("the peer has ended")?;
-        writeln!(requests, "{request}").context("the peer has ended")?;
+        self.process.send(&request.to_string())?;
         self.answer()
     }
 
     fn answer<T: DeserializeOwned>(&mut self) -> Result<T> {
-        let mut line = String::new();
-        self.answers.read_line(&mut line)?;
-        serde_json::from_str(&line).context("the peer has ended; see what it said above")
-    }
-}
-
-impl Drop for Embree {
-    fn drop(&mut self) {
-        self.requests = None;
-        // Its input is closed, so it ends; how does not matter any more.
-        let _ = self.child.wait();
+        let line = self.process.receive()?;
+        serde_json::from_str(&line).with_context(|| format!("expected JSON, found {line}"))
     }
 }
 

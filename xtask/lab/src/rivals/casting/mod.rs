@@ -8,7 +8,7 @@ use crate::measure::lanes::Lane;
 use crate::measure::scenes::in_a_room;
 use crate::measure::shot::Shot;
 use crate::measure::subject::Subject;
-use crate::render::text_table::{Table, digits, millions_per_s, milliseconds};
+use crate::render::table::{Table, digits, millions_per_s, milliseconds};
 use crate::study::casting::speed::{casting, short, sweep_pose, target, vlp32c};
 use anyhow::Result;
 use embree::Embree;

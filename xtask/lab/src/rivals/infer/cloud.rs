@@ -3,7 +3,6 @@
 use anyhow::Result;
 use formats::rng::StreamKey;
 use formats::weights::{Tensor, write_weights};
-use ndarray::{Array2, ArrayView2, s};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -15,31 +14,30 @@ const SEED: u64 = 3;
 const RADII_M: [f64; 2] = [0.7, 0.3];
 
 /// Points in a fixed order; a cloud of n is the first n of them.
-pub struct Cloud(Array2<f32>);
+pub struct Cloud(Vec<[f32; 3]>);
 
 impl Cloud {
     /// `n` points.
     pub fn new(n: usize) -> Self {
         let stream = StreamKey::new(SEED, "bench infer", 0);
-        let mut points = Array2::zeros((n, 3));
-        for (i, mut point) in points.rows_mut().into_iter().enumerate() {
-            let angle = |k| TAU * stream.unit(2 * i as u64 + k);
+        let point = |i: u64| {
+            let angle = |k| TAU * stream.unit(2 * i + k);
             let (around, along) = (angle(0), angle(1));
             let radius_m = RADII_M[0] + RADII_M[1] * along.cos();
             let x = [radius_m * around.cos(), radius_m * around.sin(), RADII_M[1] * along.sin()];
-            point.assign(&ndarray::aview1(&x.map(|x| x as f32)));
-        }
-        Self(points)
+            x.map(|x| x as f32)
+        };
+        Self((0..n as u64).map(point).collect())
     }
 
-    /// The first `n` points, `[n, 3]`.
-    pub fn first(&self, n: usize) -> ArrayView2<'_, f32> {
-        self.0.slice(s![..n, ..])
+    /// The first `n` points.
+    pub fn first(&self, n: usize) -> &[[f32; 3]] {
+        &self.0[..n]
     }
 
     /// All points.
     pub fn points(&self) -> Vec<[f32; 3]> {
-        self.0.rows().into_iter().map(|point| [point[0], point[1], point[2]]).collect()
+        self.0.clone()
     }
 
     /// Writes the cloud for other programs, as tensor `points`.
@@ -47,8 +45,7 @@ impl Cloud {
     /// # Errors
     /// If it cannot be written.
     pub fn write(&self, file: &Path) -> Result<()> {
-        let values = self.0.iter().copied().collect();
-        let points = Tensor { shape: self.0.shape().to_vec(), values };
+        let points = Tensor { shape: vec![self.0.len(), 3], values: self.0.concat() };
         let tensors = BTreeMap::from([("points".to_owned(), points)]);
         Ok(write_weights(file, &tensors, &BTreeMap::new())?)
     }

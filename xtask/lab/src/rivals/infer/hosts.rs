@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use xtask::venv::{Environment, programs, succeeds, workshop};
+use xtask::venv::{Environment, cache_dir, programs, succeeds};
 
 const GENERAL: Environment<'_> = Environment {
     name: "infer-venv",
@@ -112,7 +112,7 @@ impl Program {
 
 /// Builds the Rust engines; cargo knows whether there is anything to do.
 fn build() -> Result<PathBuf, String> {
-    let folder = workshop().join("engines");
+    let folder = cache_dir().join("engines");
     if !folder.exists() {
         eprintln!("building {} (some minutes)", folder.display());
     }

@@ -1,19 +1,19 @@
 //! `cargo xtask bench train`: one step of training the baseline, ours and
 //! PyTorch's, in turns.
 
+use super::candidate::{Arithmetic, Candidate, Job};
 use super::cloud::Cloud;
-use super::contest::{Entry, hold};
-use super::entrant::{Arithmetic, Entrant, Job};
-use super::grid::Grid;
+use super::comparison::{Entry, compare};
 use super::hosts;
 use super::model;
 use super::server::Server;
+use super::speed_tables::SpeedTables;
 use crate::measure::machine::Machine;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use xtask::venv::workshop;
+use xtask::venv::cache_dir;
 use xtask::workspace;
 
 /// Flags of `bench train`.
@@ -53,17 +53,17 @@ struct Report {
 /// # Errors
 /// If our own program cannot be built or started, or a file not written.
 pub fn run(args: &TrainArgs) -> Result<()> {
-    let folder = workshop().join("train");
+    let folder = cache_dir().join("train");
     std::fs::create_dir_all(&folder)?;
     let model = folder.join("random.safetensors");
     model::write_random(&model)?;
     let most = args.points.iter().max().copied().unwrap_or(0) * args.batch;
     Cloud::new(most).write(&folder.join("cloud.safetensors"))?;
 
-    let mut entrants = vec![ours(&model, &folder)?];
+    let mut candidates = vec![ours(&model, &folder)?];
     if !args.no_torch {
         match hosts::trainer(&model, &folder).map(|mut command| Server::start(&mut command)) {
-            Ok(Ok(server)) => entrants.push(entrant("torch", false, server)),
+            Ok(Ok(server)) => candidates.push(candidate("torch", false, server)),
             Ok(Err(cause)) => println!("skipped torch: {cause:#}"),
             Err(cause) => println!("skipped torch: {cause}"),
         }
@@ -73,18 +73,18 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     let mut steps = Vec::new();
     for &job in &jobs {
         eprintln!("{} clouds of {} points", job.setting, job.points);
-        let lane = &mut entrants[0].lane;
-        lane.load(job)?;
-        let truth = lane.answer()?;
-        let judge = |given: &[f64]| {
+        let engine = &mut candidates[0].engine;
+        engine.load(job)?;
+        let truth = engine.answer()?;
+        let error_of = |given: &[f64]| {
             ensure!(given.len() == truth.len(), "{} losses", given.len());
             let apart = |(a, b): (&f64, &f64)| ((a - b) / b).abs();
             Ok(given.iter().zip(&truth).map(apart).fold(0.0, f64::max))
         };
-        steps.extend(hold(&mut entrants, job, args.rounds, judge, |_| TOLERANCE));
+        steps.extend(compare(&mut candidates, job, args.rounds, error_of, |_| TOLERANCE));
     }
     let title = format!("A step of training, batch {}", args.batch);
-    Grid::new(title, &steps, jobs, |job| job.points.to_string()).show();
+    SpeedTables::new(title, &steps, jobs, |job| job.points.to_string()).show();
     if let Some(file) = &args.json {
         let text = serde_json::to_string(&Report { machine: Machine::here(), steps })?;
         std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
@@ -93,18 +93,18 @@ pub fn run(args: &TrainArgs) -> Result<()> {
 }
 
 /// Our own program, built if need be.
-fn ours(model: &Path, folder: &Path) -> Result<Entrant> {
+fn ours(model: &Path, folder: &Path) -> Result<Candidate> {
     let mut command = workspace::cargo(&["run", "--quiet", "--release", "--package", "train"]);
     command.args(["--", "serve"]).arg(model).arg(folder);
-    Ok(entrant("ours", true, Server::start(&mut command)?))
+    Ok(candidate("ours", true, Server::start(&mut command)?))
 }
 
-fn entrant(name: &str, ours: bool, server: Server) -> Entrant {
-    Entrant {
+fn candidate(name: &str, ours: bool, server: Server) -> Candidate {
+    Candidate {
         name: name.to_owned(),
         arithmetic: Arithmetic::F32,
         ours,
         version: server.version.clone(),
-        lane: Box::new(server),
+        engine: Box::new(server),
     }
 }

@@ -1,33 +1,33 @@
 //! `cargo xtask bench infer`: our classifier and sampler and those of others,
 //! on the same weights and clouds, in one run, in turns.
 
+mod candidate;
 mod classify;
 mod cloud;
-mod contest;
-mod entrant;
-mod grid;
+mod comparison;
 mod hosts;
-mod judge;
 pub mod learn;
 mod model;
 mod ours;
+mod reference;
 mod roster;
 mod sample;
 mod server;
+mod speed_tables;
 
 use crate::measure::machine::Machine;
+use crate::measure::reference_network::Network;
 use anyhow::{Context, Result};
 use clap::Args;
 use cloud::Cloud;
-use contest::Entry;
+use comparison::Entry;
 use edgepuck_program::Usage;
 use hosts::Material;
-use judge::Judge;
 use roster::{CLASSIFIERS, SAMPLERS};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use xtask::venv::workshop;
+use xtask::venv::cache_dir;
 
 /// What `bench infer` is told.
 #[derive(Args, Debug)]
@@ -91,8 +91,8 @@ pub fn run(args: &InferArgs) -> Result<()> {
         let by = |wanted: &String| is_named(name, wanted);
         args.engines.is_empty() || args.engines.iter().any(by)
     };
-    let material = Material { model: args.model()?, folder: workshop().join("infer") };
-    let judge = Judge::open(&material.model)?;
+    let material = Material { model: args.model()?, folder: cache_dir().join("infer") };
+    let reference = Network::read(&material.model)?;
     let cloud = Cloud::new(args.points.iter().copied().fold(sample::MOST_POINTS, usize::max));
     cloud.write(&material.cloud())?;
 
@@ -100,7 +100,8 @@ pub fn run(args: &InferArgs) -> Result<()> {
     classifiers.extend(roster::start(&CLASSIFIERS, is_wanted, args.torch, &material));
     let mut samplers: Vec<_> = ours::sampler(&cloud, is_wanted).into_iter().collect();
     samplers.extend(roster::start(&SAMPLERS, is_wanted, args.torch, &material));
-    let version = |entrant: &entrant::Entrant| (entrant.name.clone(), entrant.version.clone());
+    let version =
+        |candidate: &candidate::Candidate| (candidate.name.clone(), candidate.version.clone());
     let mut report = Report {
         machine: Machine::here(),
         versions: classifiers.iter().chain(&samplers).map(version).collect(),
@@ -110,12 +111,12 @@ pub fn run(args: &InferArgs) -> Result<()> {
     };
     if !classifiers.is_empty() {
         let (points, threads) = (&args.points, &args.threads);
-        let judge = (&judge, &cloud);
+        let reference = (&reference, &cloud);
         report.classifying =
-            classify::contest(&mut classifiers, points, threads, args.rounds, judge)?;
+            classify::compare_all(&mut classifiers, points, threads, args.rounds, reference)?;
     }
     if !samplers.is_empty() {
-        report.sampling = sample::contest(&mut samplers, args.rounds, &cloud);
+        report.sampling = sample::compare_all(&mut samplers, args.rounds, &cloud);
     }
     if let Some(file) = &args.json {
         let text = serde_json::to_string(&report)?;
@@ -130,7 +131,7 @@ impl InferArgs {
         if let Some(model) = &self.model {
             return Ok(model.clone());
         }
-        let model = workshop().join("infer/random.safetensors");
+        let model = cache_dir().join("infer/random.safetensors");
         model::write_random(&model)?;
         Ok(model)
     }

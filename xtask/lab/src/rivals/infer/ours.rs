@@ -1,7 +1,7 @@
 //! Our own engine, in this process.
 
+use super::candidate::{Arithmetic, Candidate, Engine, Job};
 use super::cloud::Cloud;
-use super::entrant::{Arithmetic, Entrant, Job, Lane};
 use crate::measure::clock::{Cost, measured};
 use anyhow::{Context, Result};
 use infer_cpu::kernel::{self, Kernels};
@@ -27,21 +27,21 @@ pub fn names() -> Vec<String> {
 }
 
 /// Our farthest point sampling, if it `is_wanted`.
-pub fn sampler(cloud: &Cloud, is_wanted: impl Fn(&str) -> bool) -> Option<Entrant> {
+pub fn sampler(cloud: &Cloud, is_wanted: impl Fn(&str) -> bool) -> Option<Candidate> {
     let kernels = kernel::available().next().filter(|_| is_wanted(SAMPLER))?;
-    let lane = Sampling {
+    let engine = Sampling {
         kernels,
         sampler: FarthestPoints::default(),
         cloud: cloud.points(),
         job: Job { points: 0, setting: 0 },
         picked: Vec::new(),
     };
-    Some(Entrant {
+    Some(Candidate {
         name: SAMPLER.to_owned(),
         arithmetic: Arithmetic::F32,
         ours: true,
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        lane: Box::new(lane),
+        engine: Box::new(engine),
     })
 }
 
@@ -61,7 +61,7 @@ impl Sampling {
     }
 }
 
-impl Lane for Sampling {
+impl Engine for Sampling {
     fn load(&mut self, job: Job) -> Result<()> {
         self.job = job;
         Ok(())
@@ -84,9 +84,13 @@ impl Lane for Sampling {
 }
 
 /// Our classifier in each precision that `is_wanted` by its name.
-pub fn classifiers(model: &Path, cloud: &Cloud, is_wanted: impl Fn(&str) -> bool) -> Vec<Entrant> {
+pub fn classifiers(
+    model: &Path,
+    cloud: &Cloud,
+    is_wanted: impl Fn(&str) -> bool,
+) -> Vec<Candidate> {
     let wanted = Precision::ALL.into_iter().filter(|&precision| is_wanted(&name(precision)));
-    let entrant = |precision: Precision| Entrant {
+    let candidate = |precision: Precision| Candidate {
         name: name(precision),
         arithmetic: match precision {
             Precision::F32 => Arithmetic::F32,
@@ -95,14 +99,14 @@ pub fn classifiers(model: &Path, cloud: &Cloud, is_wanted: impl Fn(&str) -> bool
         },
         ours: true,
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        lane: Box::new(Ours {
+        engine: Box::new(Ours {
             model: model.to_path_buf(),
             precision,
             cloud: cloud.points(),
             loaded: None,
         }),
     };
-    wanted.map(entrant).collect()
+    wanted.map(candidate).collect()
 }
 
 struct Ours {
@@ -120,7 +124,7 @@ impl Ours {
     }
 }
 
-impl Lane for Ours {
+impl Engine for Ours {
     fn load(&mut self, job: Job) -> Result<()> {
         let options = Options {
             precision: self.precision,

@@ -1,6 +1,6 @@
 //! The rivals.
 
-use super::entrant::{Arithmetic, Entrant};
+use super::candidate::{Arithmetic, Candidate};
 use super::hosts::{Host, Material, Program};
 use super::server::Server;
 use Arithmetic::{F32, Half, I8};
@@ -52,33 +52,33 @@ pub fn start(
     is_wanted: impl Fn(&str) -> bool,
     torch: bool,
     material: &Material,
-) -> Vec<Entrant> {
+) -> Vec<Candidate> {
     let may = |rival: &&Rival| is_wanted(rival.name) && (torch || rival.host != Host::Torch);
     let rivals: Vec<&Rival> = rivals.iter().filter(may).collect();
     let prepared = LazyCell::new(|| material.prepare());
-    let mut entrants = Vec::new();
+    let mut candidates = Vec::new();
     for group in rivals.chunk_by(|a, b| a.host == b.host) {
         let host = group[0].host;
         let ready = if host.needs_preparing() { prepared.clone() } else { Ok(()) };
         match ready.and_then(|()| host.program(material)) {
-            Ok(program) => entrants.extend(group.iter().filter_map(|r| entrant(r, &program))),
+            Ok(program) => candidates.extend(group.iter().filter_map(|r| candidate(r, &program))),
             Err(cause) => {
                 let names: Vec<&str> = group.iter().map(|rival| rival.name).collect();
                 println!("skipped {}: {cause}", names.join(", "));
             }
         }
     }
-    entrants
+    candidates
 }
 
-fn entrant(rival: &Rival, program: &Program) -> Option<Entrant> {
+fn candidate(rival: &Rival, program: &Program) -> Option<Candidate> {
     match Server::start(&mut program.of(rival.name)) {
-        Ok(server) => Some(Entrant {
+        Ok(server) => Some(Candidate {
             name: rival.name.to_owned(),
             arithmetic: rival.arithmetic,
             ours: false,
             version: server.version.clone(),
-            lane: Box::new(server),
+            engine: Box::new(server),
         }),
         Err(cause) => {
             println!("skipped {}: {cause:#}", rival.name);

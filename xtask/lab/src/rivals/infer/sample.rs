@@ -1,10 +1,10 @@
 //! Farthest point sampling, one thread.
 
+use super::candidate::{Candidate, Job};
 use super::cloud::Cloud;
-use super::contest::{Entry, hold};
-use super::entrant::{Entrant, Job};
-use super::grid::Grid;
-use super::judge::shortfall;
+use super::comparison::{Entry, compare};
+use super::reference::shortfall;
+use super::speed_tables::SpeedTables;
 
 /// From so many points to so many.
 const JOBS: [Job; 3] = [
@@ -21,15 +21,15 @@ pub const MOST_POINTS: usize = 4096;
 /// squared diameter, and the least distance kept here is a hundredth of that.
 const TOLERANCE: f64 = 1e-4;
 
-/// Lets `entrants` sample parts of `cloud`, and shows how they did.
-pub fn contest(entrants: &mut [Entrant], rounds: usize, cloud: &Cloud) -> Vec<Entry> {
+/// Lets `candidates` sample parts of `cloud`, and shows how they did.
+pub fn compare_all(candidates: &mut [Candidate], rounds: usize, cloud: &Cloud) -> Vec<Entry> {
     let mut entries = Vec::new();
     for job in JOBS {
         eprintln!("sampling {} of {} points", job.setting, job.points);
-        let judge = |kept: &[f64]| shortfall(cloud.first(job.points), kept, job.setting);
-        entries.extend(hold(entrants, job, rounds, judge, |_| TOLERANCE));
+        let error_of = |kept: &[f64]| shortfall(cloud.first(job.points), kept, job.setting);
+        entries.extend(compare(candidates, job, rounds, error_of, |_| TOLERANCE));
     }
     let heading = |job: &Job| format!("{}->{}", job.points, job.setting);
-    Grid::new("Farthest point sampling".to_owned(), &entries, JOBS.into(), heading).show();
+    SpeedTables::new("Farthest point sampling".to_owned(), &entries, JOBS.into(), heading).show();
     entries
 }

@@ -1,9 +1,9 @@
 //! A rival in a process of its own, so that its threads and its memory are its
 //! own too. The protocol is described in `peers/infer/turns.py`.
 
-use super::entrant::{Job, Lane};
+use super::candidate::{Engine, Job};
 use crate::measure::clock::Cost;
-use crate::measure::companion::Companion;
+use crate::measure::subprocess::Subprocess;
 use anyhow::{Result, bail};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -11,7 +11,7 @@ use std::process::Command;
 
 /// A running rival.
 pub struct Server {
-    process: Companion,
+    process: Subprocess,
     /// Of its package.
     pub version: String,
 }
@@ -49,14 +49,14 @@ impl Server {
     /// # Errors
     /// If it does not start, or says that its engine cannot be had.
     pub fn start(command: &mut Command) -> Result<Self> {
-        let mut process = Companion::start(command)?;
-        let Hello { version } = parse(&process.hear()?)?;
+        let mut process = Subprocess::start(command)?;
+        let Hello { version } = parse(&process.receive()?)?;
         Ok(Self { process, version })
     }
 
     fn ask<T: DeserializeOwned>(&mut self, request: &str) -> Result<T> {
-        self.process.tell(request)?;
-        parse(&self.process.hear()?)
+        self.process.send(request)?;
+        parse(&self.process.receive()?)
     }
 }
 
@@ -76,7 +76,7 @@ impl Times {
     }
 }
 
-impl Lane for Server {
+impl Engine for Server {
     fn load(&mut self, job: Job) -> Result<()> {
         self.ask(&format!("load {} {}", job.points, job.setting)).map(|Done {}| ())
     }

@@ -3,7 +3,7 @@
 use super::effects::EFFECTS;
 use super::rows::Row;
 use crate::measure::clock::Spread;
-use crate::render::text_table::{Table, digits};
+use crate::render::table::{Table, digits};
 
 /// Two tables: what training with an effect gains, and what the effect costs.
 pub fn of(rows: &[Row]) -> String {

@@ -5,7 +5,7 @@
 use crate::measure::clock::{Cost, Costs, measured};
 use crate::measure::shot::Shot;
 use crate::measure::subject::Subject;
-use crate::render::text_table::{Table, digits, milliseconds};
+use crate::render::table::{Table, digits, milliseconds};
 use crate::study::casting::speed::vlp32c;
 use anyhow::Result;
 use glam::DVec3;

@@ -6,7 +6,7 @@ use crate::measure::clock::{Contestant, Costs, interleave, measured};
 use crate::measure::lanes::Lane;
 use crate::measure::shot::Shot;
 use crate::measure::subject::Subject;
-use crate::render::text_table::{Table, digits, milliseconds};
+use crate::render::table::{Table, digits, milliseconds};
 use crate::study::casting::speed::{casting, short, vlp32c};
 use anyhow::Result;
 use glam::DVec3;

@@ -6,7 +6,7 @@ use crate::measure::lanes::Lane;
 use crate::measure::scenes::in_a_room;
 use crate::measure::shot::Shot;
 use crate::measure::subject::Subject;
-use crate::render::text_table::{Table, digits, millions_per_s, milliseconds};
+use crate::render::table::{Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use glam::{DVec3, dvec3};
 use serde::Serialize;

@@ -3,7 +3,7 @@
 
 use crate::measure::clock::{Cost, measured};
 use crate::measure::lanes::Lane;
-use crate::render::text_table::{Table, digits};
+use crate::render::table::{Table, digits};
 use crate::study::casting::speed::short;
 use anyhow::{Context, Result};
 use edgepuck_dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};

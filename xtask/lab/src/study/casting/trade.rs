@@ -6,7 +6,7 @@ use crate::measure::lanes::Lane;
 use crate::measure::scenes::{closed_sphere, edge_midpoints, in_a_room, rippled_plate, torus};
 use crate::measure::shot::Shot;
 use crate::measure::ways;
-use crate::render::text_table::{Table, digits, millions_per_s, milliseconds};
+use crate::render::table::{Table, digits, millions_per_s, milliseconds};
 use crate::study::casting::speed::{short, sweep_pose, target, vlp32c};
 use anyhow::Result;
 use formats::rng::StreamKey;

@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use infer_cpu::{Classifier, Options, Precision, to_unit_sphere};
 
 use super::Row;
-use super::affine::{Rows, U32, gamma};
 use super::clouds::cloud;
-use super::net::{Chain, Net};
 use super::probe::{self, Part};
-use super::twin::{Output, Points, outputs};
+use crate::measure::reference_network::affine::{Rows, U32, gamma};
+use crate::measure::reference_network::{Chain, Network, Output, Points, outputs};
 
 /// Points of a cloud where their number is not what is turned.
 const N: usize = 64;
@@ -32,14 +31,17 @@ pub(super) struct Setting {
 /// # Errors
 /// A model that cannot be read.
 pub fn measure(path: &Path, n_clouds: u32) -> Result<Vec<Row>> {
-    let net = Net::read(path)?;
+    let network = Network::read(path)?;
+    if let Some(norm) = network.tensors.keys().find(|name| name.ends_with(".running_var")) {
+        bail!("{}: {norm}: expected batch norms that are folded in", path.display());
+    }
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut rows = Vec::new();
-    let chains = net.chains();
+    let chains = network.chains();
     for (i, chain) in chains.iter().enumerate() {
         let is_last = i + 1 == chains.len();
-        let measured = measure_chain(&net, &name, chain, is_last, &settings(), n_clouds)?;
-        // The T-Net of features shares its first layers with the trunk.
+        let measured = measure_chain(&network, &name, chain, is_last, &settings(), n_clouds)?;
+        // The T-Network of features shares its first layers with the trunk.
         let known: BTreeSet<String> = rows.iter().map(|row: &Row| row.layer.clone()).collect();
         rows.extend(measured.into_iter().filter(|row| !known.contains(&row.layer)));
     }
@@ -59,7 +61,7 @@ fn settings() -> Vec<Setting> {
 
 /// The layers of one chain.
 pub(super) fn measure_chain(
-    net: &Net,
+    network: &Network,
     name: &str,
     chain: &Chain,
     gives_logits: bool,
@@ -73,7 +75,7 @@ pub(super) fn measure_chain(
     let folder = tempfile::tempdir()?;
     let files: Vec<_> = (0..parts.len()).map(|i| folder.path().join(format!("{i}.st"))).collect();
     for (part, file) in parts.iter().zip(&files) {
-        probe::write(net, chain, *part, file)?;
+        probe::write(network, chain, *part, file)?;
     }
     let mut rows = Vec::new();
     for precision in Precision::ALL {
@@ -86,7 +88,7 @@ pub(super) fn measure_chain(
             let mut found: Vec<Met> = parts.iter().map(|_| Met::default()).collect();
             for number in 0..n_clouds {
                 let (input, points) = setting.clouds(number);
-                let truth = outputs(net, chain, &points, precision);
+                let truth = outputs(network, chain, &points, precision)?;
                 for (part, ((probe, truth), met)) in
                     parts.iter().zip(probes.iter_mut().zip(&truth).zip(&mut found))
                 {

@@ -5,13 +5,10 @@
 //! logits, [`widths`] about how many products a sum has. A row is one setting of
 //! one knob; the CSV is for whoever draws it.
 
-mod affine;
 mod clouds;
 mod layers;
-mod net;
 mod probe;
 mod ranges;
-mod twin;
 mod widths;
 
 use std::path::PathBuf;

@@ -8,7 +8,7 @@ use anyhow::Result;
 use formats::model_card::{ModelCard, Normalization};
 use formats::weights::{Tensor, write_weights};
 
-use super::net::{Chain, Net};
+use crate::measure::reference_network::{Chain, Network};
 
 /// A part of a chain.
 #[derive(Clone, Copy)]
@@ -23,12 +23,12 @@ pub enum Part {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(net: &Net, chain: &Chain, part: Part, path: &Path) -> Result<()> {
+pub fn write(network: &Network, chain: &Chain, part: Part, path: &Path) -> Result<()> {
     let (n_convs, n_fcs) = match part {
         Part::Points(n) => (n, 0),
         Part::Vectors(n) => (chain.convs.len(), n),
     };
-    let mut model = Model { net, tensors: BTreeMap::new(), ranges: BTreeMap::new() };
+    let mut model = Model { network, tensors: BTreeMap::new(), ranges: BTreeMap::new() };
     for (i, name) in chain.convs[..n_convs].iter().enumerate() {
         model.copy(name, &format!("feat.conv{}", i + 1));
     }
@@ -58,7 +58,7 @@ pub fn write(net: &Net, chain: &Chain, part: Part, path: &Path) -> Result<()> {
         normalization: Normalization::UnitSphere,
         transform_after: turned.unwrap_or(1),
         pooled_relu: !whole || chain.pooled_relu,
-        edge_radii: if chain.edges { net.card.edge_radii.clone() } else { Vec::new() },
+        edge_radii: if chain.edges { network.card.edge_radii.clone() } else { Vec::new() },
         activation_ranges: model.ranges,
         provenance: Some("a part of a network, to be measured".to_owned()),
         ..ModelCard::default()
@@ -67,7 +67,7 @@ pub fn write(net: &Net, chain: &Chain, part: Part, path: &Path) -> Result<()> {
 }
 
 struct Model<'a> {
-    net: &'a Net,
+    network: &'a Network,
     tensors: BTreeMap<String, Tensor>,
     ranges: BTreeMap<String, f32>,
 }
@@ -76,21 +76,21 @@ impl Model<'_> {
     /// Takes layer `from` as layer `to`.
     fn copy(&mut self, from: &str, to: &str) {
         for part in ["weight", "bias"] {
-            let mut tensor = self.net.tensors[&format!("{from}.{part}")].clone();
-            // A vector layer of a T-Net and a point-wise one differ by an axis of 1.
+            let mut tensor = self.network.tensors[&format!("{from}.{part}")].clone();
+            // A vector layer of a T-Network and a point-wise one differ by an axis of 1.
             tensor.shape.truncate(2);
             self.tensors.insert(format!("{to}.{part}"), tensor);
         }
-        self.ranges.insert(to.to_owned(), self.net.range(from) as f32);
+        self.ranges.insert(to.to_owned(), self.network.range(from) as f32);
     }
 
     /// Takes every layer whose name begins with `prefix` as it is.
     fn copy_all(&mut self, prefix: &str) {
         let named = |name: &&String| name.starts_with(prefix);
-        for name in self.net.tensors.keys().filter(named) {
-            self.tensors.insert(name.clone(), self.net.tensors[name].clone());
+        for name in self.network.tensors.keys().filter(named) {
+            self.tensors.insert(name.clone(), self.network.tensors[name].clone());
             if let Some(layer) = name.strip_suffix(".weight") {
-                self.ranges.insert(layer.to_owned(), self.net.range(layer) as f32);
+                self.ranges.insert(layer.to_owned(), self.network.range(layer) as f32);
             }
         }
     }
@@ -106,6 +106,6 @@ impl Model<'_> {
 
     /// Outputs of layer `name` of the network.
     fn width(&self, name: &str) -> usize {
-        self.net.tensors[&format!("{name}.bias")].values.len()
+        self.network.tensors[&format!("{name}.bias")].values.len()
     }
 }

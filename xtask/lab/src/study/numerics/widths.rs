@@ -10,7 +10,7 @@ use formats::weights::Tensor;
 
 use super::Row;
 use super::layers::{measure_chain, of_knob};
-use super::net::{Chain, Net};
+use crate::measure::reference_network::{Chain, Network};
 
 const WIDTHS: [usize; 5] = [16, 64, 256, 1024, 4096];
 const OUTPUTS: usize = 64;
@@ -22,7 +22,7 @@ const OUTPUTS: usize = 64;
 pub fn measure() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for k in WIDTHS {
-        let net = random(k);
+        let network = random(k);
         let chain = Chain {
             convs: vec!["feat.conv1".to_owned(), "feat.conv2".to_owned()],
             fcs: Vec::new(),
@@ -32,7 +32,7 @@ pub fn measure() -> Result<Vec<Row>> {
             edges: false,
         };
         let setting = of_knob("K", k as f64);
-        let measured = measure_chain(&net, "random", &chain, false, &[setting], 2)?;
+        let measured = measure_chain(&network, "random", &chain, false, &[setting], 2)?;
         // The first layer has three inputs whatever the width.
         rows.extend(measured.into_iter().filter(|row| row.layer.ends_with("conv2")));
     }
@@ -41,7 +41,7 @@ pub fn measure() -> Result<Vec<Row>> {
 
 /// A network of coordinates, K features and some outputs, uniform as He et al. 2015
 /// have it, so that activations keep their magnitude.
-fn random(k: usize) -> Net {
+fn random(k: usize) -> Network {
     let mut tensors = BTreeMap::new();
     for (name, inputs, outputs) in [("feat.conv1", 3, k), ("feat.conv2", k, OUTPUTS)] {
         let mut add = |part: &str, shape: Vec<usize>, largest: f64| {
@@ -57,5 +57,5 @@ fn random(k: usize) -> Net {
     // Of weights of at most 1.42 and coordinates of a unit sphere.
     let largest = (1.42 * 3f64.sqrt() + 0.1) as f32;
     let ranges = BTreeMap::from([("feat.conv1".to_owned(), largest)]);
-    Net { card: ModelCard { activation_ranges: ranges, ..ModelCard::default() }, tensors }
+    Network { card: ModelCard { activation_ranges: ranges, ..ModelCard::default() }, tensors }
 }

@@ -1,29 +1,28 @@
-//! `cargo xtask trade`: what each knob of the chain, from mesh to class, costs
-//! and what it is worth.
+//! `cargo xtask trade`: sweeps every parameter from mesh to class and records time and
+//! accuracy.
 //!
-//! [`objects`] are scanned in the ways of [`sensors`] ([`scans`]) and by all
-//! [`casters`]; [`classifiers`] go through models, samplers, points and
-//! precisions. Everything becomes a [`row::Row`] of one CSV file, of which
-//! [`front`] marks what no other row makes pointless and [`page`] draws a page.
-//! `cargo xtask advise` reads the same file.
+//! [`objects`] are scanned with the settings of [`sensors`] ([`scans`]) and by all
+//! [`casters`]; [`classifiers`] sweep models, samplers, points and precisions. Each
+//! setting becomes a [`Row`] of one CSV file, in which [`pareto`] marks the
+//! Pareto-optimal rows and of which [`page`] makes a page. `cargo xtask advise` reads
+//! the same file.
 
 mod casters;
-pub mod classes;
+mod classes;
 mod classifiers;
-pub mod front;
 mod objects;
 pub mod page;
+mod pareto;
 mod scans;
 mod sensors;
 
 use crate::measure::lanes;
 use crate::measure::machine::Machine;
-use crate::render::text_table::{Table, digits};
 use anyhow::{Context, Result, ensure};
 use classes::TestSet;
 use classifiers::{Grid, as_trained, bundled, on_a_pi};
 use edgepuck_program::flags::need_folder_of_meshes;
-use edgepuck_program::trade_record::{self, Row};
+use edgepuck_program::trade_record::{self, Part, Row};
 use edgepuck_program::{Outcome, gen_shapes};
 use edgepuck_shapes as shapes;
 use formats::cloud::resample;
@@ -98,7 +97,7 @@ pub fn run(args: &Args) -> Result<Outcome> {
     rows.extend(classifier_rows(args, &models, clouds, reference)?);
     let machine = machine();
     rows.iter_mut().for_each(|row| row.machine.clone_from(&machine));
-    front::mark(&mut rows);
+    pareto::mark(&mut rows);
     trade_record::write(&rows, &args.out.join("trade.csv"))?;
     page::write(&rows, &args.out)?;
     print(&rows);
@@ -165,7 +164,7 @@ fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>,
     let rows: Result<Vec<Row>> = all
         .map(|(row, clouds)| {
             let found = classifying.answers(&clouds)?;
-            let answers = if row.part == trade_record::Part::Caster { &exact } else { &noisy };
+            let answers = if row.part == Part::Caster { &exact } else { &noisy };
             let row = Row { agreement: Some(found.agreement(answers)), ..row };
             let row = classifying.named_in(row, &summary);
             Ok(row.with_accuracy(reference.right(&found), clouds.len()))
@@ -214,26 +213,10 @@ fn packed(cloud: &[[f32; 3]]) -> Cloud {
     resample(cloud, POINTS, StreamKey::new(objects::SEED, "trade", 0)).unwrap_or_default()
 }
 
-/// The fronts, and what is on none.
+/// The Pareto-optimal settings, and the dominated ones.
 fn print(rows: &[Row]) {
-    let heading =
-        ["on a front", "ms here", "ms on a Pi 5", "accuracy %", "95 % interval", "as reference %"];
-    let mut table = Table::new("Settings that no other makes pointless", &heading);
-    for row in rows.iter().filter(|row| row.front_here || row.front_pi5) {
-        let percent = |share: f64| format!("{:.1}", 100.0 * share);
-        table.push(vec![
-            row.to_string(),
-            row.ms_here.map(digits).unwrap_or_default(),
-            row.ms_pi5.map(digits).unwrap_or_default(),
-            percent(row.accuracy),
-            format!("{} to {}", percent(row.accuracy_low), percent(row.accuracy_high)),
-            row.agreement.map(percent).unwrap_or_default(),
-        ]);
+    for part in [Part::Classifier, Part::Scan, Part::Caster] {
+        print!("{}", page::pareto_table(rows, part));
     }
-    print!("{table}");
-    let mut dominated = Table::new("On no front", &["knob", "setting"]);
-    for (knob, setting) in front::dominated_everywhere(rows) {
-        dominated.push(vec![knob.to_owned(), setting]);
-    }
-    print!("{dominated}");
+    print!("{}", page::dominated_table(rows));
 }

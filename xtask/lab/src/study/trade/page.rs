@@ -1,10 +1,9 @@
-//! The record as a page and as drawings.
+//! The record as tables, charts and a page.
 
-use super::front::dominated_everywhere;
-use crate::render::chart::{Axis, Dot, Series, draw};
-use crate::render::page::{self, Chapter, figure};
-use crate::render::table::table;
-use crate::render::text_table::digits;
+use super::pareto::{dominated_settings, is_optimal};
+use crate::render::chart::{Axis, Chart, Dot, Series};
+use crate::render::page::{self, Chapter};
+use crate::render::table::{Table, digits, percent};
 use anyhow::Result;
 use edgepuck_program::trade_record::{Device, Part, Row};
 use formats::atomic;
@@ -13,98 +12,150 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use xtask::workspace::command_line;
 
-/// Writes `trade.html` and a drawing a part to `folder`.
+/// How the dots of both charts are read.
+const CAPTION: &str = "Filled dots are Pareto-optimal: no other setting is as fast and as accurate. \
+     Touch or point at a dot for its figures.";
+
+/// Writes `trade.html` and the two charts to `folder`.
 ///
 /// # Errors
-/// What the system or the plotting library reports.
+/// A file that cannot be written.
 pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     for (part, name) in [(Part::Classifier, "classifier"), (Part::Scan, "scan")] {
-        let svg = fronts(rows, part)?;
+        let svg = chart(rows, part).file();
         atomic::write_bytes(&folder.join(format!("trade-{name}.svg")), svg.as_bytes())?;
     }
     let lead = html! {
-        p { "What each knob of the chain, from mesh to class, costs, and what it is worth. "
-            "Bold rows are on the front: no other of their kind costs as little and is as good." }
+        p { "The time and the accuracy of every setting, from mesh to class." }
         pre { (command_line()) }
     };
-    let html = page::of("The trade: speed against accuracy", &lead, &chapters(rows)?);
+    let html = page::of("Speed and accuracy of every setting", &lead, &chapters(rows));
     Ok(atomic::write_bytes(&folder.join("trade.html"), html.as_bytes())?)
 }
 
-/// A chapter for each part of the chain, and one of what is dominated.
-///
-/// # Errors
-/// What the plotting library reports.
-pub fn chapters(rows: &[Row]) -> Result<Vec<Chapter>> {
+/// A chapter for each part of the chain.
+pub fn chapters(rows: &[Row]) -> Vec<Chapter> {
     let classifier = html! {
-        (figure(&fronts(rows, Part::Classifier)?, "Every model, sampler, number of points, precision \
-            and number of threads. Filled: on the front of all."))
-        (classifier_table(rows))
+        (chart(rows, Part::Classifier).figure())
+        (pareto_table(rows, Part::Classifier).html())
+        p { "For each dominated setting, wherever it was measured, another is as fast and as accurate." }
+        (dominated_table(rows).html())
+        (every_setting(&classifier_table(rows)))
     };
     let scan = html! {
-        (figure(&fronts(rows, Part::Scan)?, "Sensors, by distance. Filled: on the front of their distance and noise."))
-        (scan_table(rows))
+        (chart(rows, Part::Scan).figure())
+        (pareto_table(rows, Part::Scan).html())
+        (every_setting(&scan_table(rows)))
     };
-    Ok(vec![
-        Chapter { id: "classifier", title: "From cloud to class", body: classifier },
-        Chapter { id: "scan", title: "From mesh to scan", body: scan },
-        Chapter { id: "caster", title: "Casters", body: caster_table(rows) },
-        Chapter { id: "dominated", title: "On no front", body: dominated(rows) },
-    ])
+    vec![
+        Chapter {
+            id: "classifier",
+            tab: "Settings",
+            title: "Which setting fits my time budget?",
+            body: classifier,
+        },
+        Chapter {
+            id: "scan",
+            tab: "Sensors",
+            title: "Which beams and steps can a sensor do without?",
+            body: scan,
+        },
+        Chapter {
+            id: "caster",
+            tab: "Casters",
+            title: "How exact are the ranges, and what does that cost?",
+            body: caster_table(rows).html(),
+        },
+    ]
 }
 
-/// Cost against accuracy of one part's rows.
-fn fronts(rows: &[Row], part: Part) -> Result<String> {
+fn every_setting(table: &Table) -> Markup {
+    html! { details { summary { "All " (table.len()) " settings" } (table.html()) } }
+}
+
+/// Time against accuracy of one part's rows.
+fn chart(rows: &[Row], part: Part) -> Chart<'static> {
     let device = device_of(rows, part);
     let of_part = || rows.iter().filter(|row| row.part == part);
     let noise_m = of_part().next().and_then(|reference| reference.noise_m);
-    let mut series: BTreeMap<Kin, Vec<Dot>> = BTreeMap::new();
+    let mut series: BTreeMap<SeriesKey, Vec<Dot>> = BTreeMap::new();
     for row in of_part() {
         let Some(ms) = row.ms(device) else { continue };
         let filled = row.on_front(device);
         let dot = Dot { x: ms, y: row.accuracy, tip: tip(row, ms), filled };
-        series.entry(kin(row, noise_m)).or_default().push(dot);
+        series.entry(series_key(row, noise_m)).or_default().push(dot);
     }
-    let series: Vec<Series> = series
-        .into_iter()
-        .map(|(Kin { name, joined, .. }, dots)| Series { name, dots, joined })
-        .collect();
+    let series = series.into_iter();
+    let series = series.map(|(SeriesKey { name, joined, .. }, dots)| Series { name, dots, joined });
     let label = match (part, device) {
-        (Part::Classifier, Device::Pi5) => "milliseconds on a Raspberry Pi 5, modelled",
-        (Part::Classifier, Device::Here) => "milliseconds on this machine",
+        (Part::Classifier, Device::Pi5) => "milliseconds a cloud on a Raspberry Pi 5, modelled",
+        (Part::Classifier, Device::Here) => "milliseconds a cloud on this machine",
         _ => "milliseconds of CPU time a scan",
     };
-    let x = Axis { label, logarithmic: true, percent: false };
-    let y = Axis { label: "classified as labelled", logarithmic: false, percent: true };
-    let title = match part {
-        Part::Scan => "From mesh to scan",
-        Part::Caster => "Casters",
-        Part::Classifier => "From cloud to class",
-    };
-    draw(title, &x, &y, &series)
+    Chart {
+        message: message(rows, part, device),
+        caption: CAPTION,
+        x: Axis { label, logarithmic: true, percent: false },
+        y: Axis { label: "classified correctly", logarithmic: false, percent: true },
+        series: series.collect(),
+    }
 }
 
-/// Rows of one colour; in the order of distances, then of names.
+/// What the chart of `part` shows, in words.
+fn message(rows: &[Row], part: Part, device: Device) -> String {
+    let optimal = || rows.iter().filter(|row| row.part == part && row.on_front(device));
+    let by_accuracy = |a: &&Row, b: &&Row| a.accuracy.total_cmp(&b.accuracy);
+    let share = |row: &Row| format!("{} %", percent(row.accuracy));
+    if part == Part::Classifier {
+        let ms = |row: &Row| digits(row.ms(device).unwrap_or_default());
+        let fastest = optimal().min_by(by_accuracy);
+        return match (optimal().max_by(by_accuracy), fastest) {
+            (Some(best), Some(fastest)) => format!(
+                "The best setting classifies {} of the clouds correctly in {} ms, the fastest {} in {} ms.",
+                share(best),
+                ms(best),
+                share(fastest),
+                ms(fastest)
+            ),
+            _ => "No setting was measured.".to_owned(),
+        };
+    }
+    let at = |row: &&Row| row.distance_m.unwrap_or_default();
+    let best_from = |distance_m: f64| {
+        optimal().filter(|row| at(row) == distance_m).max_by(by_accuracy).map(share)
+    };
+    let distances = optimal().map(|row| at(&row));
+    let (near, far) = distances
+        .fold((f64::INFINITY, 0.0), |(near, far): (f64, f64), m| (near.min(m), far.max(m)));
+    match best_from(near).zip(best_from(far)) {
+        Some((best, worst)) => format!(
+            "At best, {best} of the scans from {near} m are classified correctly, and {worst} from {far} m."
+        ),
+        None => "No setting was measured.".to_owned(),
+    }
+}
+
+/// Rows of one colour, in the order of distances and then of names.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct Kin {
+struct SeriesKey {
     /// Bits of a number that is not negative: they order as it does.
     distance: u64,
     name: String,
-    /// Whether a line joins those on the front.
+    /// Whether a line joins the Pareto-optimal ones.
     joined: bool,
 }
 
-/// Scans with other noise than `noise_m` stand for themselves: noise is no choice,
-/// so that they are on no common front.
-fn kin(row: &Row, noise_m: Option<f64>) -> Kin {
+/// Scans with other noise than `noise_m` are a series of their own: noise is not a
+/// choice, so they are not compared with the others.
+fn series_key(row: &Row, noise_m: Option<f64>) -> SeriesKey {
     match (row.part, row.distance_m) {
         (Part::Scan, Some(distance_m)) => {
             let joined = row.noise_m == noise_m;
             let rest = if joined { "" } else { ", other noise" };
-            let name = format!("{distance_m} m away{rest}");
-            Kin { distance: distance_m.to_bits(), name, joined }
+            let name = format!("from {distance_m} m{rest}");
+            SeriesKey { distance: distance_m.to_bits(), name, joined }
         }
-        _ => Kin { distance: 0, name: row.model.clone(), joined: false },
+        _ => SeriesKey { distance: 0, name: row.model.clone(), joined: false },
     }
 }
 
@@ -115,159 +166,130 @@ fn device_of(rows: &[Row], part: Part) -> Device {
 }
 
 fn tip(row: &Row, ms: f64) -> String {
-    let share = format!(
-        "{:.1} % ({:.1} to {:.1})",
-        100.0 * row.accuracy,
-        100.0 * row.accuracy_low,
-        100.0 * row.accuracy_high
-    );
-    format!("{row}\n{} ms, {share}", digits(ms))
-}
-
-fn percent(share: Option<f64>) -> String {
-    share.map(|share| format!("{:.1}", 100.0 * share)).unwrap_or_default()
+    format!("{row}\n{} ms, {} %", digits(ms), accuracy(row))
 }
 
 fn number(x: Option<f64>) -> String {
     x.map(digits).unwrap_or_default()
 }
 
+fn count(n: Option<usize>) -> String {
+    n.map(|n| n.to_string()).unwrap_or_default()
+}
+
 fn accuracy(row: &Row) -> String {
-    let [value, low, high] =
-        [row.accuracy, row.accuracy_low, row.accuracy_high].map(|share| percent(Some(share)));
+    let [value, low, high] = [row.accuracy, row.accuracy_low, row.accuracy_high].map(percent);
     format!("{value} ({low} to {high})")
 }
 
-/// What the rows of `part` were measured on.
-fn caption(rows: &[Row], part: Part) -> String {
-    let row = rows.iter().find(|row| row.part == part);
-    row.map_or_else(String::new, |row| {
-        format!("On {}, {} clouds; {}", row.test_set, row.clouds, row.machine)
-    })
-}
-
-fn rows_of(
-    rows: &[Row],
-    part: Part,
-    words: impl Fn(&Row) -> Vec<String>,
-) -> Vec<(bool, Vec<String>)> {
-    let of_part = rows.iter().filter(|row| row.part == part);
-    of_part.map(|row| (row.front_here || row.front_pi5, words(row))).collect()
-}
-
-fn classifier_table(rows: &[Row]) -> Markup {
-    let heading = [
-        "model",
-        "sampler",
-        "points",
-        "precision",
-        "T-Nets",
-        "threads",
-        "ms here",
-        "ms on a Pi 5",
-        "J",
-        "MB",
-        "accuracy %",
-        "as fp32 %",
-        "largest error of a logit",
-        "turned",
-    ];
-    let words = |row: &Row| {
-        vec![
-            row.model.clone(),
-            row.sampler.clone(),
-            row.points.map(|n| n.to_string()).unwrap_or_default(),
-            row.precision.clone(),
-            row.t_nets.clone(),
-            row.threads.map(|n| n.to_string()).unwrap_or_default(),
-            number(row.ms_here),
-            number(row.ms_pi5),
-            number(row.joules),
-            number(row.megabytes),
-            accuracy(row),
-            percent(row.agreement),
-            number(row.logit_error),
-            row.knob.clone(),
-        ]
+/// The Pareto-optimal rows of `part`, the fastest first.
+pub fn pareto_table(rows: &[Row], part: Part) -> Table {
+    let device = device_of(rows, part);
+    let mut optimal: Vec<&Row> =
+        rows.iter().filter(|row| row.part == part && is_optimal(row)).collect();
+    let ms = |row: &Row| row.ms(device).unwrap_or(f64::INFINITY);
+    optimal.sort_by(|a, b| ms(a).total_cmp(&ms(b)));
+    let heading = ["setting", "ms here", "ms on a Pi 5", "accuracy % (95 % interval)"];
+    let title = match part {
+        Part::Scan => "Pareto-optimal settings of the sensor, by distance and noise",
+        Part::Caster => "Pareto-optimal casters",
+        Part::Classifier => "Pareto-optimal settings of the classifier",
     };
-    let part = Part::Classifier;
-    table(&caption(rows, part), &heading, &rows_of(rows, part, words))
-}
-
-fn scan_table(rows: &[Row]) -> Markup {
-    let heading = [
-        "sensor",
-        "turned",
-        "azimuth step °",
-        "distance m",
-        "noise m",
-        "quantum m",
-        "CPU ms a scan",
-        "M rays/CPU-s",
-        "J",
-        "kB",
-        "points",
-        "range error m, RMS",
-        "worst",
-        "Chamfer m",
-        "accuracy %",
-        "as reference %",
-    ];
-    let words = |row: &Row| {
-        vec![
-            row.sensor.clone(),
-            row.knob.clone(),
-            number(row.azimuth_step_deg),
-            number(row.distance_m),
-            number(row.noise_m),
-            number(row.range_quantum_m),
-            number(row.ms_here),
-            number(row.rays_per_cpu_s.map(|rays| rays * 1e-6)),
-            number(row.joules),
-            number(row.megabytes.map(|mb| mb * 1e3)),
-            row.points_per_scan.map(|n| format!("{n:.0}")).unwrap_or_default(),
-            number(row.range_rms_m),
-            number(row.range_worst_m),
-            number(row.chamfer_m),
-            accuracy(row),
-            percent(row.agreement),
-        ]
-    };
-    table(&caption(rows, Part::Scan), &heading, &rows_of(rows, Part::Scan, words))
-}
-
-fn caster_table(rows: &[Row]) -> Markup {
-    let heading = [
-        "caster",
-        "culling",
-        "CPU ms a scan",
-        "M rays/CPU-s",
-        "range error m, RMS",
-        "worst",
-        "wrong rays in a million",
-        "accuracy %",
-    ];
-    let words = |row: &Row| {
-        vec![
-            row.caster.clone(),
-            row.culling.clone(),
-            number(row.ms_here),
-            number(row.rays_per_cpu_s.map(|rays| rays * 1e-6)),
-            number(row.range_rms_m),
-            number(row.range_worst_m),
-            number(row.wrong_rays_per_million),
-            accuracy(row),
-        ]
-    };
-    table(&caption(rows, Part::Caster), &heading, &rows_of(rows, Part::Caster, words))
-}
-
-fn dominated(rows: &[Row]) -> Markup {
-    let choices = dominated_everywhere(rows).into_iter();
-    let choices: Vec<(bool, Vec<String>)> =
-        choices.map(|(knob, value)| (false, vec![knob.to_owned(), value])).collect();
-    html! {
-        p { "For each of these settings, wherever it was measured, another costs as little and is as good." }
-        (table("On no front", &["knob", "setting"], &choices))
+    let mut table = Table::new(title, &heading);
+    for row in optimal {
+        table.push(vec![row.to_string(), number(row.ms_here), number(row.ms_pi5), accuracy(row)]);
     }
+    table
+}
+
+/// The values of each parameter that no Pareto-optimal row has.
+pub fn dominated_table(rows: &[Row]) -> Table {
+    let mut table = Table::new("Dominated settings", &["parameter", "value"]);
+    for (parameter, value) in dominated_settings(rows) {
+        table.push(vec![parameter.to_owned(), value]);
+    }
+    table
+}
+
+/// All rows of `part`, the Pareto-optimal ones marked; a column is a heading and a
+/// row's words under it.
+fn table_of(rows: &[Row], part: Part, columns: &[(&str, &dyn Fn(&Row) -> String)]) -> Table {
+    let of_part = || rows.iter().filter(|row| row.part == part);
+    let caption = of_part().next().map_or_else(String::new, |row| {
+        format!("On {}, {} clouds; {}", row.test_set, row.clouds, row.machine)
+    });
+    let heading: Vec<&str> = columns.iter().map(|(heading, _)| *heading).collect();
+    let mut table = Table::new(caption, &heading);
+    for row in of_part() {
+        let words = columns.iter().map(|(_, words)| words(row)).collect();
+        table.push_marked(is_optimal(row), words);
+    }
+    table
+}
+
+fn classifier_table(rows: &[Row]) -> Table {
+    table_of(
+        rows,
+        Part::Classifier,
+        &[
+            ("model", &|row| row.model.clone()),
+            ("sampler", &|row| row.sampler.clone()),
+            ("points", &|row| count(row.points)),
+            ("precision", &|row| row.precision.clone()),
+            ("T-Nets", &|row| row.t_nets.clone()),
+            ("threads", &|row| count(row.threads)),
+            ("ms here", &|row| number(row.ms_here)),
+            ("ms on a Pi 5", &|row| number(row.ms_pi5)),
+            ("J", &|row| number(row.joules)),
+            ("MB", &|row| number(row.megabytes)),
+            ("accuracy %", &accuracy),
+            ("same class as fp32 %", &|row| row.agreement.map(percent).unwrap_or_default()),
+            ("largest error of a logit", &|row| number(row.logit_error)),
+            ("changed", &|row| row.knob.clone()),
+        ],
+    )
+}
+
+fn scan_table(rows: &[Row]) -> Table {
+    table_of(
+        rows,
+        Part::Scan,
+        &[
+            ("sensor", &|row| row.sensor.clone()),
+            ("changed", &|row| row.knob.clone()),
+            ("azimuth step °", &|row| number(row.azimuth_step_deg)),
+            ("distance m", &|row| number(row.distance_m)),
+            ("noise m", &|row| number(row.noise_m)),
+            ("quantum m", &|row| number(row.range_quantum_m)),
+            ("CPU ms a scan", &|row| number(row.ms_here)),
+            ("M rays/CPU-s", &|row| number(row.rays_per_cpu_s.map(|rays| rays * 1e-6))),
+            ("J", &|row| number(row.joules)),
+            ("kB", &|row| number(row.megabytes.map(|mb| mb * 1e3))),
+            ("points", &|row| row.points_per_scan.map(|n| format!("{n:.0}")).unwrap_or_default()),
+            ("range error m, RMS", &|row| number(row.range_rms_m)),
+            ("worst", &|row| number(row.range_worst_m)),
+            ("Chamfer m", &|row| number(row.chamfer_m)),
+            ("accuracy %", &accuracy),
+            ("same class as the reference %", &|row| {
+                row.agreement.map(percent).unwrap_or_default()
+            }),
+        ],
+    )
+}
+
+fn caster_table(rows: &[Row]) -> Table {
+    table_of(
+        rows,
+        Part::Caster,
+        &[
+            ("caster", &|row| row.caster.clone()),
+            ("culling", &|row| row.culling.clone()),
+            ("CPU ms a scan", &|row| number(row.ms_here)),
+            ("M rays/CPU-s", &|row| number(row.rays_per_cpu_s.map(|rays| rays * 1e-6))),
+            ("range error m, RMS", &|row| number(row.range_rms_m)),
+            ("worst", &|row| number(row.range_worst_m)),
+            ("wrong rays in a million", &|row| number(row.wrong_rays_per_million)),
+            ("accuracy %", &accuracy),
+        ],
+    )
 }

@@ -1,8 +1,8 @@
 //! Tables of engines by jobs, and who is how many times as fast.
 
-use super::contest::Entry;
-use super::entrant::{Arithmetic, Job};
-use crate::render::text_table::{Table, digits, milliseconds};
+use super::candidate::{Arithmetic, Job};
+use super::comparison::Entry;
+use crate::render::table::{Table, digits, milliseconds};
 
 /// Which of an entry's figures a table shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Figure {
 }
 
 /// Entries in the order of their engines, and the jobs that make the columns.
-pub struct Grid<'a> {
+pub struct SpeedTables<'a> {
     title: String,
     entries: &'a [Entry],
     jobs: Vec<Job>,
@@ -47,7 +47,7 @@ pub struct Grid<'a> {
     heading: fn(&Job) -> String,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> SpeedTables<'a> {
     /// Of those of `entries` that did one of `jobs`.
     pub fn new(
         title: String,
@@ -172,9 +172,9 @@ mod tests {
         text.lines().skip(3).map(words).collect()
     }
 
-    fn grid(entries: &[Entry]) -> Grid<'_> {
+    fn grid(entries: &[Entry]) -> SpeedTables<'_> {
         let jobs = [16, 64].map(|points| Job { points, setting: 1 });
-        Grid::new("Speed".to_owned(), entries, jobs.into(), |job| job.points.to_string())
+        SpeedTables::new("Speed".to_owned(), entries, jobs.into(), |job| job.points.to_string())
     }
 
     #[test]

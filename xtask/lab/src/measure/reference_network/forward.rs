@@ -1,102 +1,134 @@
-//! A network's chain in f64 by plain loops, with the bound of each value.
+//! Runs a chain of layers in f64, with the bound of each value.
 
+use super::affine::{Affine, Kind, Rows, gamma};
+use super::{Chain, Network};
+use anyhow::{Context, Result, ensure};
 use infer_cpu::Precision;
 use infer_cpu::sharing::folding_pays;
 
-use super::affine::{Affine, Kind, Rows, gamma};
-use super::net::{Chain, Net};
-
-/// The points that a network takes, in f64, and as f32 has them.
+/// The points that a network takes, in f64 and rounded to f32.
 pub struct Points {
     /// `[n, 3]`, with the bound of what normalisation leaves of them.
     pub exact: Rows,
-    /// What decides who is whose neighbour.
+    /// The coordinates by which neighbours are found.
     pub rounded: Vec<[f32; 3]>,
 }
 
-/// What a layer gives: pooled, or of the pooled vector.
+/// A layer's outputs: pooled over the points, or of the pooled vector.
 pub struct Output {
     pub layer: String,
     pub values: Rows,
 }
 
-/// Everything that `chain` gives of `points`, layer by layer, in `precision`.
-pub fn outputs(net: &Net, chain: &Chain, points: &Points, precision: Precision) -> Vec<Output> {
+/// The outputs of `chain` for `points`, layer by layer, in `precision`.
+///
+/// # Errors
+/// A tensor that is missing, or layers whose sizes do not follow each other.
+pub fn outputs(
+    network: &Network,
+    chain: &Chain,
+    points: &Points,
+    precision: Precision,
+) -> Result<Vec<Output>> {
     let mut rows = points.exact.clone();
-    let turn = chain.stn.then(|| transform(net, "feat.stn.", points, precision));
+    let turn = match chain.stn {
+        true => Some(transform(network, "feat.stn.", points, precision)?),
+        false => None,
+    };
     if chain.edges {
-        rows = with_edges(net, points, rows);
+        rows = with_edges(network, points, rows)?;
     }
     let mut all = Vec::new();
     for (i, name) in chain.convs.iter().enumerate() {
         let last = i + 1 == chain.convs.len();
-        let kind = kind(net, chain, i);
-        let mut layer = net.affine(name, !last || chain.pooled_relu);
+        let kind = kind(network, chain, i);
+        let mut layer = network.affine(name, !last || chain.pooled_relu)?;
         if let (0, Some(t)) = (i, &turn) {
             layer = layer.after(t, 3);
         }
         if chain.fstn_after == Some(i) {
-            let t = transform(net, "feat.fstn.", points, precision);
+            let t = transform(network, "feat.fstn.", points, precision)?;
             let k = layer.inputs;
             if precision == Precision::I8 || folding_pays(points.rounded.len(), layer.outputs) {
                 layer = layer.after(&t, k);
             } else {
-                let turn = Affine::turn(&t, k).stored(precision, kind);
+                let turn = Affine::transform(&t, k).stored(precision, kind);
                 rows = turn.through(&rows.taken(precision, kind), precision, kind);
             }
         }
+        ensure!(
+            layer.inputs == rows.width,
+            "{name}: expected {} inputs, found {}",
+            layer.inputs,
+            rows.width
+        );
         rows = rows.taken(precision, kind);
         rows = layer.stored(precision, kind).through(&rows, precision, kind);
-        let seen = if i == 0 { as_taken(net, chain, &rows, precision) } else { rows.clone() };
+        let seen = if i == 0 { as_taken(network, chain, &rows, precision) } else { rows.clone() };
         all.push(Output { layer: name.clone(), values: seen.pooled() });
     }
     rows = rows.pooled();
     for (i, name) in chain.fcs.iter().enumerate() {
-        let layer = net.affine(name, i + 1 < chain.fcs.len()).stored(precision, Kind::Vector);
+        let layer = network.affine(name, i + 1 < chain.fcs.len())?.stored(precision, Kind::Vector);
+        ensure!(
+            layer.inputs == rows.width,
+            "{name}: expected {} inputs, found {}",
+            layer.inputs,
+            rows.width
+        );
         rows = layer.through(&rows, precision, Kind::Vector);
         all.push(Output { layer: name.clone(), values: rows.clone() });
     }
-    all
+    Ok(all)
 }
 
 /// The first layer as the second takes it: through an identity, as it is measured.
-fn as_taken(net: &Net, chain: &Chain, rows: &Rows, precision: Precision) -> Rows {
-    let kind = kind(net, chain, 1);
+fn as_taken(network: &Network, chain: &Chain, rows: &Rows, precision: Precision) -> Rows {
+    let kind = kind(network, chain, 1);
     let identity = Affine::identity(rows.width).stored(precision, kind);
     identity.through(&rows.clone().taken(precision, kind), precision, kind)
 }
 
 /// What layer `i` of a chain takes.
-fn kind(net: &Net, chain: &Chain, i: usize) -> Kind {
+fn kind(network: &Network, chain: &Chain, i: usize) -> Kind {
     match i {
         0 => Kind::First,
-        _ => Kind::Point { range: net.range(&chain.convs[i - 1]) },
+        _ => Kind::Point { range: network.range(&chain.convs[i - 1]) },
     }
 }
 
 /// The matrix of a T-Net, the identity added.
-fn transform(net: &Net, prefix: &str, points: &Points, precision: Precision) -> Rows {
-    let chains = net.chains();
-    let chain = chains.iter().find(|chain| chain.fcs[0].starts_with(prefix));
-    let chain = chain.expect("invariant: a T-Net that turns has a chain");
-    let all = outputs(net, chain, points, precision);
-    let mut matrix = all.last().expect("invariant: a chain has layers").values.clone();
+fn transform(
+    network: &Network,
+    prefix: &str,
+    points: &Points,
+    precision: Precision,
+) -> Result<Rows> {
+    let chains = network.chains();
+    let chain =
+        chains.iter().find(|chain| chain.fcs.first().is_some_and(|fc| fc.starts_with(prefix)));
+    let chain = chain.with_context(|| format!("{prefix}: expected a T-Net"))?;
+    let all = outputs(network, chain, points, precision)?;
+    let mut matrix = all.last().context("a T-Net has layers")?.values.clone();
     let k = matrix.width.isqrt();
+    ensure!(k * k == matrix.width, "{prefix}: expected a square, found {} values", matrix.width);
     (0..k).for_each(|i| matrix.value[i * k + i] += 1.0);
-    matrix
+    Ok(matrix)
 }
 
-/// Points with what surrounds them: see `infer-cpu/src/edge.rs`. Who is a neighbour
-/// is decided in f32, as there; a maximum over the same neighbours is off by no more
-/// than what it is of.
-fn with_edges(net: &Net, points: &Points, rows: Rows) -> Rows {
-    let layers: Vec<(f32, Affine)> = net
+/// Points with their EdgeConv features. Neighbours are found in f32, as `infer-cpu`
+/// finds them; a maximum over the same neighbours is off by no more than its operands.
+fn with_edges(network: &Network, points: &Points, rows: Rows) -> Result<Rows> {
+    let layers: Result<Vec<(f32, Affine)>> = network
         .card
         .edge_radii
         .iter()
         .zip(1..)
-        .map(|(&radius, i): (&f32, usize)| (radius, net.affine(&format!("edge.conv{i}"), true)))
+        .map(|(&radius, i): (&f32, usize)| {
+            Ok((radius, network.affine(&format!("edge.conv{i}"), true)?))
+        })
         .collect();
+    let layers = layers?;
     let width = 3 + layers.iter().map(|(_, layer)| layer.outputs).sum::<usize>();
     let mut out = Rows { width, value: Vec::new(), bound: Vec::new() };
     for i in 0..rows.n() {
@@ -110,7 +142,7 @@ fn with_edges(net: &Net, points: &Points, rows: Rows) -> Rows {
             out.bound.extend(features.bound);
         }
     }
-    out
+    Ok(out)
 }
 
 fn neighbours(points: &[[f32; 3]], i: usize, radius: f32) -> Vec<usize> {

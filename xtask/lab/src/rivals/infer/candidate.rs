@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::fmt;
 
 /// Someone who does the work that is timed.
-pub trait Lane {
+pub trait Engine {
     /// Makes ready for `job`.
     ///
     /// # Errors
@@ -59,8 +59,8 @@ impl fmt::Display for Arithmetic {
     }
 }
 
-/// A lane and what tables say of it.
-pub struct Entrant {
+/// A engine and what tables say of it.
+pub struct Candidate {
     /// Its name, which `--engines` takes.
     pub name: String,
     /// What it computes with.
@@ -70,5 +70,5 @@ pub struct Entrant {
     /// Of the package.
     pub version: String,
     /// What runs.
-    pub lane: Box<dyn Lane>,
+    pub engine: Box<dyn Engine>,
 }

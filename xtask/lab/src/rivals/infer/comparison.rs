@@ -1,6 +1,6 @@
-//! One job, done by all in turns.
+//! One job, done by all candidates in turns.
 
-use super::entrant::{Arithmetic, Entrant, Job};
+use super::candidate::{Arithmetic, Candidate, Job};
 use crate::measure::clock::{Cost, Costs, Spread};
 use anyhow::{Result, ensure};
 use serde::ser::SerializeMap as _;
@@ -18,10 +18,10 @@ const REPEATS: [usize; 2] = [3, 40];
 /// Threads of the pool that ran last may still spin; ncnn's do for 20 ms.
 const PAUSE: Duration = Duration::from_millis(30);
 
-/// What an entrant did on one job.
+/// What a candidate did on one job.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
-    /// The entrant's name.
+    /// The candidate's name.
     pub engine: String,
     /// What it computes with.
     pub arithmetic: Arithmetic,
@@ -30,7 +30,7 @@ pub struct Entry {
     /// The job.
     #[serde(flatten)]
     pub job: Job,
-    /// How far its answer was from the judge's.
+    /// How far its answer was from the reference's.
     pub error: f64,
     /// Of every repeat of every turn.
     #[serde(flatten, serialize_with = "in_ns")]
@@ -47,67 +47,69 @@ fn in_ns<S: Serializer>(costs: &Costs, serializer: S) -> Result<S::Ok, S::Error>
     map.end()
 }
 
-/// Lets all `entrants` do `job` in `rounds` rounds of one turn each, their
-/// order rotated from round to round. Whose answer is farther from the
-/// `judge`'s than `tolerance` allows, or who fails, is left out with a message.
-pub fn hold(
-    entrants: &mut [Entrant],
+/// Lets all `candidates` do `job` in `rounds` rounds of one turn each, their
+/// order rotated from round to round. A candidate that fails, or whose answer's
+/// `error_of` is above the `tolerance`, is left out with a message.
+pub fn compare(
+    candidates: &mut [Candidate],
     job: Job,
     rounds: usize,
-    judge: impl Fn(&[f64]) -> Result<f64>,
+    error_of: impl Fn(&[f64]) -> Result<f64>,
     tolerance: impl Fn(Arithmetic) -> f64,
 ) -> Vec<Entry> {
-    let mut fields = Vec::new();
-    for entrant in entrants {
-        match enter(entrant, job, &judge, &tolerance) {
-            Ok((repeats, entry)) => fields.push(Field { entrant, repeats, is_out: false, entry }),
-            Err(cause) => refuse(&entrant.name, job, &cause),
+    let mut participants = Vec::new();
+    for candidate in candidates {
+        match enter(candidate, job, &error_of, &tolerance) {
+            Ok((repeats, entry)) => {
+                participants.push(Participant { candidate, repeats, is_out: false, entry })
+            }
+            Err(cause) => refuse(&candidate.name, job, &cause),
         }
     }
     for round in 0..rounds {
-        let count = fields.len();
+        let count = participants.len();
         for k in 0..count {
-            let field = &mut fields[(round + k) % count];
-            if let Err(cause) = field.turn() {
-                refuse(&field.entrant.name, job, &cause);
-                field.is_out = true;
+            let participant = &mut participants[(round + k) % count];
+            if let Err(cause) = participant.turn() {
+                refuse(&participant.candidate.name, job, &cause);
+                participant.is_out = true;
             }
         }
-        fields.retain(|field| !field.is_out);
+        participants.retain(|participant| !participant.is_out);
     }
-    fields.into_iter().map(|field| field.entry).collect()
+    participants.into_iter().map(|participant| participant.entry).collect()
 }
 
 fn refuse(name: &str, job: Job, cause: &anyhow::Error) {
     println!("left out {name} at {} points, {}: {cause:#}", job.points, job.setting);
 }
 
-/// An entrant on the field.
-struct Field<'a> {
-    entrant: &'a mut Entrant,
+/// A candidate that takes part.
+struct Participant<'a> {
+    candidate: &'a mut Candidate,
     repeats: usize,
     is_out: bool,
     entry: Entry,
 }
 
-/// Lets `entrant` try `job`: repeats that fill a turn, and an entry without
+/// Lets `candidate` try `job`: repeats that fill a turn, and an entry without
 /// costs.
 fn enter(
-    entrant: &mut Entrant,
+    candidate: &mut Candidate,
     job: Job,
-    judge: impl Fn(&[f64]) -> Result<f64>,
+    error_of: impl Fn(&[f64]) -> Result<f64>,
     tolerance: impl Fn(Arithmetic) -> f64,
 ) -> Result<(usize, Entry)> {
-    entrant.lane.load(job)?;
-    let error = judge(&entrant.lane.answer()?)?;
-    let allowed = tolerance(entrant.arithmetic);
+    candidate.engine.load(job)?;
+    let error = error_of(&candidate.engine.answer()?)?;
+    let allowed = tolerance(candidate.arithmetic);
     ensure!(error <= allowed, "its answer is off by {error:.1e}, more than {allowed:.1e}");
-    let trial = entrant.lane.time(REPEATS[0])?;
+    let trial = candidate.engine.time(REPEATS[0])?;
     let least_s = Spread::of(trial.iter().map(|cost| cost.wall_s)).min;
     let entry = Entry {
-        engine: entrant.name.clone(),
-        arithmetic: entrant.arithmetic,
-        ours: entrant.ours,
+        engine: candidate.name.clone(),
+        arithmetic: candidate.arithmetic,
+        ours: candidate.ours,
         job,
         error,
         costs: Costs::default(),
@@ -115,10 +117,10 @@ fn enter(
     Ok((repeats(least_s), entry))
 }
 
-impl Field<'_> {
+impl Participant<'_> {
     fn turn(&mut self) -> Result<()> {
         sleep(PAUSE);
-        self.entry.costs.0.extend(self.entrant.lane.time(self.repeats)?);
+        self.entry.costs.0.extend(self.candidate.engine.time(self.repeats)?);
         Ok(())
     }
 }
@@ -131,7 +133,7 @@ fn repeats(each_s: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::entrant::Lane;
+    use super::super::candidate::Engine;
     use super::*;
     use anyhow::bail;
     use std::cell::RefCell;
@@ -145,7 +147,7 @@ mod tests {
         notes: Rc<RefCell<String>>,
     }
 
-    impl Lane for Scripted {
+    impl Engine for Scripted {
         fn load(&mut self, _: Job) -> Result<()> {
             Ok(())
         }
@@ -166,16 +168,16 @@ mod tests {
 
     fn play(rounds: usize, cast: &[(char, f64, usize)]) -> (String, Vec<Entry>) {
         let notes = Rc::new(RefCell::new(String::new()));
-        let entrant = |&(name, answer, turns): &(char, f64, usize)| Entrant {
+        let candidate = |&(name, answer, turns): &(char, f64, usize)| Candidate {
             name: name.to_string(),
             arithmetic: Arithmetic::F32,
             ours: false,
             version: String::new(),
-            lane: Box::new(Scripted { name, answer, turns, notes: Rc::clone(&notes) }),
+            engine: Box::new(Scripted { name, answer, turns, notes: Rc::clone(&notes) }),
         };
-        let mut entrants: Vec<Entrant> = cast.iter().map(entrant).collect();
+        let mut candidates: Vec<Candidate> = cast.iter().map(candidate).collect();
         let job = Job { points: 16, setting: 1 };
-        let entries = hold(&mut entrants, job, rounds, |a| Ok((a[0] - 1.0).abs()), |_| 0.1);
+        let entries = compare(&mut candidates, job, rounds, |a| Ok((a[0] - 1.0).abs()), |_| 0.1);
         (notes.take(), entries)
     }
 
@@ -189,14 +191,14 @@ mod tests {
     }
 
     #[test]
-    fn who_answers_wrongly_is_not_timed() {
+    fn a_wrong_answer_is_not_timed() {
         let (notes, entries) = play(2, &[('a', 1.2, 99), ('b', 1.05, 99), ('c', f64::NAN, 99)]);
         assert_eq!(notes, "bbb");
         assert!((entries[0].error - 0.05).abs() < 1e-12);
     }
 
     #[test]
-    fn who_breaks_off_is_left_out_and_the_others_go_on() {
+    fn a_failing_candidate_is_left_out_and_the_others_go_on() {
         let (notes, entries) = play(2, &[('a', 1.0, 99), ('b', 1.0, 2)]);
         assert_eq!(notes, "ababa");
         assert_eq!(entries.iter().map(|e| &e.engine[..]).collect::<String>(), "a");

@@ -109,7 +109,7 @@ impl Affine {
     }
 
     /// The product of a row with `t` `[k, k]`.
-    pub fn turn(t: &Rows, k: usize) -> Self {
+    pub fn transform(t: &Rows, k: usize) -> Self {
         let transposed =
             |of: &[f64]| (0..k * k).map(|at| of[at % k * k + at / k]).collect::<Vec<f64>>();
         let (w, dw) = (transposed(&t.value), transposed(&t.bound));
