@@ -70,14 +70,33 @@ pub fn executable(messages: &str) -> anyhow::Result<PathBuf> {
     last.context("Cargo names no executable")
 }
 
-/// What the user typed.
+/// The command line as records and pages show it.
 pub fn command_line() -> String {
     let quoted = |word: String| match word.contains([' ', '(', '\'', ';', '&']) {
         true => format!("{word:?}"),
         false => word,
     };
-    let words: Vec<String> = std::env::args().skip(1).map(quoted).collect();
+    let words: Vec<String> = arguments().into_iter().map(quoted).collect();
     format!("cargo xtask {}", words.join(" "))
+}
+
+/// The arguments that the user typed, paths as [`recorded`] writes them.
+pub fn arguments() -> Vec<String> {
+    let recorded = |word: String| match word.split_once('=') {
+        Some((flag, path)) => format!("{flag}={}", recorded(Path::new(path))),
+        None => recorded(Path::new(&word)),
+    };
+    std::env::args().skip(1).map(recorded).collect()
+}
+
+/// `path` as a record names it: from the workspace's root if it lies there, and without
+/// its folders if it is absolute, so that a record does not name folders of a machine.
+pub fn recorded(path: &Path) -> String {
+    match path.strip_prefix(root()) {
+        Ok(inside) => inside.display().to_string(),
+        Err(_) if path.is_absolute() => file_name(path),
+        Err(_) => path.display().to_string(),
+    }
 }
 
 /// A file's or folder's own name, for people.
@@ -88,6 +107,14 @@ pub fn file_name(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_record_names_no_folder_of_the_machine() {
+        assert_eq!(recorded(&root().join("assets/a.toml")), "assets/a.toml");
+        assert_eq!(recorded(&std::env::temp_dir().join("a.json")), "a.json");
+        assert_eq!(recorded(Path::new("data/a.json")), "data/a.json");
+        assert_eq!(recorded(Path::new("--quick")), "--quick");
+    }
 
     #[test]
     fn finds_the_executable_among_cargos_messages() {

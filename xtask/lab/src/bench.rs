@@ -1,17 +1,16 @@
-//! `cargo xtask bench`: measures, and writes down what it measured and where.
+//! `cargo xtask bench`: measures, and writes the figures and the machine to a record.
 //!
-//! One file per question asked: [`speed`] of building and tracing, [`trade`]
-//! of speed against accuracy, which [`builders`] pays when, the share of each
-//! stage of the [`pipeline`], and how [`peers`] compare. [`infer`] is about
-//! classifying, sampling and learning, [`pi_model`] about both on a Raspberry Pi,
-//! [`growth`] about errors, [`devices`] about adapters beside the CPU, the others
-//! about scanning.
+//! `bench sim` has a file for each question: the [`speed`] of building and tracing, the
+//! time of a dataset [`to_disk`], which of the [`builders`] is faster for how many rays,
+//! the comparison with Embree ([`peers`]), the rays lost without [`watertightness`], and
+//! what [`simplify`] saves. [`infer`] is about classifying, sampling and learning,
+//! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters.
 
 use crate::measure::{lanes, machine, subject};
 use crate::pi5;
 use crate::rivals::{casting as peers, infer};
-use crate::study::casting::{builders, simplify, speed, to_disk, trade};
-use crate::study::{devices, numerics as growth};
+use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
+use crate::study::{devices, numerics};
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -44,7 +43,7 @@ enum Benchmark {
     /// is counted under QEMU; memory and threads are reckoned.
     PiModel(pi5::PiModelArgs),
     /// Measure how errors grow with scale, offset, N and K, beside derived bounds.
-    Growth(growth::GrowthArgs),
+    Growth(numerics::GrowthArgs),
     /// Compare every adapter with the CPU on the same meshes.
     Devices(devices::DevicesArgs),
 }
@@ -75,7 +74,7 @@ struct SimArgs {
     /// PyPI under `target/peers`.
     #[arg(long)]
     peers: bool,
-    /// Measure instead what each knob trades of speed for accuracy.
+    /// Measure instead the rays that plain Möller-Trumbore in f32 loses at vertices and edges.
     #[arg(long)]
     trade: bool,
     /// Measure instead what `--simplify auto` saves and costs.
@@ -97,7 +96,7 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     peers: Option<peers::Comparison>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    trade: Option<trade::Trade>,
+    trade: Option<watertightness::Watertightness>,
     #[serde(skip_serializing_if = "Option::is_none")]
     simplify: Option<simplify::Simplified>,
     peak_memory_bytes: Option<u64>,
@@ -113,7 +112,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome> {
         Benchmark::Infer(args) => infer::run(args),
         Benchmark::Train(args) => infer::learn::run(args),
         Benchmark::PiModel(args) => pi5::run(args),
-        Benchmark::Growth(args) => growth::run(args),
+        Benchmark::Growth(args) => numerics::run(args),
         Benchmark::Devices(args) => devices::run(args),
     }?;
     Ok(Outcome::Success)
@@ -147,8 +146,8 @@ fn sim(args: &SimArgs) -> Result<Outcome> {
         report.peers = peers::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
         report.peers.iter().for_each(|measured| print!("{}", measured.table()));
     } else if args.trade {
-        let measured = trade::measure(&lanes::open(request.as_ref())?, rounds)?;
-        measured.tables().iter().for_each(|table| print!("{table}"));
+        let measured = watertightness::measure(rounds)?;
+        print!("{}", measured.table());
         report.trade = Some(measured);
     } else if args.simplify {
         let measured = simplify::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;

@@ -11,7 +11,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub struct Machine {
     /// Seconds since 1970 at the start of the run.
     pub unix_time_s: u64,
-    /// The command line.
+    /// The arguments of the command, absolute paths without their folders.
     pub command: Vec<String>,
     /// Version of this program.
     pub version: &'static str,
@@ -49,7 +49,7 @@ impl Machine {
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             unix_time_s: now.map_or(0, |since| since.as_secs()),
-            command: std::env::args().skip(1).collect(),
+            command: xtask::workspace::arguments(),
             version: env!("CARGO_PKG_VERSION"),
             commit: commit(),
             cpu: field("/proc/cpuinfo", "model name"),

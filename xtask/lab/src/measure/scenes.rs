@@ -36,23 +36,6 @@ pub fn in_a_room(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
-/// A plate of 2 m by 2 m in `n` by `n` squares with ripples of 1 mm: from just
-/// above, nearly every beam grazes it.
-pub fn rippled_plate(n: usize) -> Mesh {
-    let mut mesh = Mesh::default();
-    for i in 0..=n {
-        for j in 0..=n {
-            let (x, y) = (2.0 * i as f64 / n as f64 - 1.0, 2.0 * j as f64 / n as f64 - 1.0);
-            mesh.vertices.push(dvec3(x, y, 1e-3 * (11.0 * x).sin() * (13.0 * y).sin()));
-            if i < n && j < n {
-                let at = |i: usize, j: usize| (i * (n + 1) + j) as u32;
-                push_quad(&mut mesh, [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-            }
-        }
-    }
-    mesh
-}
-
 /// A closed sphere of 20 * 4^`levels` triangles, neither centred nor aligned.
 pub fn closed_sphere(levels: u32) -> Mesh {
     let mut mesh = icosahedron();

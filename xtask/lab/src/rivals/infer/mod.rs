@@ -28,6 +28,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use xtask::venv::cache_dir;
+use xtask::workspace::recorded;
 
 /// What `bench infer` is told.
 #[derive(Args, Debug)]
@@ -74,7 +75,7 @@ pub struct InferArgs {
 #[derive(Serialize)]
 struct Report {
     machine: Machine,
-    model: PathBuf,
+    model: String,
     /// Of each engine.
     versions: BTreeMap<String, String>,
     classifying: Vec<Entry>,
@@ -105,7 +106,7 @@ pub fn run(args: &InferArgs) -> Result<()> {
     let mut report = Report {
         machine: Machine::here(),
         versions: classifiers.iter().chain(&samplers).map(version).collect(),
-        model: material.model,
+        model: recorded(&material.model),
         classifying: Vec::new(),
         sampling: Vec::new(),
     };

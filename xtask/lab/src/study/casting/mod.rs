@@ -5,4 +5,4 @@ pub mod kernel;
 pub mod simplify;
 pub mod speed;
 pub mod to_disk;
-pub mod trade;
+pub mod watertightness;

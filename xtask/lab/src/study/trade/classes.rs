@@ -12,7 +12,7 @@ use infer_cpu::{Classifier, Options, Precision, Summary, TNets};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use xtask::workspace::{self, file_name};
+use xtask::workspace::{file_name, recorded};
 
 /// Clouds whose classification is timed, a round.
 const TIMED: usize = 100;
@@ -207,7 +207,7 @@ impl Classifying {
         let has_t_nets = model.stn.is_some() || model.fstn.is_some();
         Row {
             model: self.model_name(),
-            model_file: self.model_file(),
+            model_file: recorded(&self.model),
             sampler: self.sampler.name.to_owned(),
             points: Some(self.points),
             precision: self.precision.to_string(),
@@ -215,12 +215,6 @@ impl Classifying {
             threads: Some(self.threads),
             ..row
         }
-    }
-
-    /// The model's file, from the workspace's root if it lies there.
-    fn model_file(&self) -> String {
-        let inside = self.model.strip_prefix(workspace::root());
-        inside.unwrap_or(&self.model).display().to_string()
     }
 
     /// The model's name, without folder and extension.

@@ -42,16 +42,15 @@ pub struct Place<'a> {
 /// A folder without test meshes of at least two classes, a mesh that cannot be
 /// read.
 pub fn read(folder: &Path, per_class: usize) -> Result<Vec<Object>> {
-    let mut taken: BTreeMap<String, usize> = BTreeMap::new();
-    let mut wanted = |entry: &MeshEntry| {
-        let taken = taken.entry(entry.class.clone()).or_default();
-        *taken += 1;
-        entry.split == Split::Test && *taken <= per_class
-    };
     let mut entries = discover(folder, SEED)?;
     entries.retain(|entry| entry.split == Split::Test);
-    entries.retain(&mut wanted);
-    ensure!(taken.len() > 1, "{}: test meshes of one class alone", folder.display());
+    let mut taken: BTreeMap<String, usize> = BTreeMap::new();
+    entries.retain(|entry| {
+        let taken = taken.entry(entry.class.clone()).or_default();
+        *taken += 1;
+        *taken <= per_class
+    });
+    ensure!(taken.len() > 1, "{}: expected test meshes of at least two classes", folder.display());
     entries.iter().map(object).collect()
 }
 

@@ -1,0 +1,121 @@
+//! Rays through the vertices and edges of a closed mesh: the common f32 intersection test
+//! loses some of them, the watertight test none.
+
+use crate::measure::accuracy::Accuracy;
+use crate::measure::clock::{Contestant, Costs, interleave, measured};
+use crate::measure::scenes::{closed_sphere, edge_midpoints};
+use crate::measure::shot::Shot;
+use crate::measure::ways;
+use crate::render::table::{Table, digits, millions_per_s};
+use crate::study::casting::speed::target;
+use anyhow::Result;
+use formats::rng::StreamKey;
+use glam::DVec3;
+use serde::Serialize;
+use sim_gpu::bvh::Builder;
+use std::hint::black_box;
+
+/// How rays become ranges.
+type Method = fn(&Shot) -> Vec<Option<f64>>;
+
+const METHODS: [(&str, Method); 3] = [
+    ("cpu f64 oracle", ways::in_f64),
+    ("cpu f32 Möller-Trumbore, f32 range", ways::moller_trumbore),
+    ("cpu f32 watertight, f32 range", ways::watertight_in_f32),
+];
+
+/// One method on one set of rays.
+#[derive(Serialize)]
+struct Setting {
+    scene: &'static str,
+    knobs: &'static str,
+    rays: usize,
+    /// Rays that hit in f64.
+    hits: usize,
+    costs: Costs,
+    #[serde(flatten)]
+    accuracy: Accuracy,
+}
+
+/// Every method on both sets of rays.
+#[derive(Serialize)]
+pub struct Watertightness {
+    settings: Vec<Setting>,
+}
+
+/// Casts rays from within a closed sphere through its vertices and its edges' midpoints.
+///
+/// # Errors
+/// None: no method can fail.
+pub fn measure(rounds: usize) -> Result<Watertightness> {
+    let sphere = closed_sphere(5);
+    let through = [("at vertices", sphere.vertices.clone()), ("at edges", edge_midpoints(&sphere))];
+    let target = target(sphere, Builder::Sah);
+    let mut settings = Vec::new();
+    for (scene, points) in through {
+        let rays = Shot::through(&target, &places_within(), &points);
+        let truth = ways::in_f64(&rays);
+        let mut contestants: Vec<Contestant<'_>> = Vec::new();
+        for (_, method) in METHODS {
+            let rays = &rays;
+            contestants.push(Box::new(move || {
+                let (ranges, cost) = measured(|| method(rays));
+                black_box(ranges);
+                Ok(cost)
+            }));
+        }
+        let costs = interleave(rounds, &mut contestants)?;
+        settings.extend(METHODS.iter().zip(costs).map(|((knobs, method), costs)| Setting {
+            scene,
+            knobs,
+            rays: truth.len(),
+            hits: truth.iter().flatten().count(),
+            costs,
+            accuracy: Accuracy::of(&method(&rays), &truth),
+        }));
+    }
+    Ok(Watertightness { settings })
+}
+
+/// Twenty places within [`closed_sphere`].
+fn places_within() -> Vec<DVec3> {
+    let key = StreamKey::new(0, "places within", 0);
+    let coordinate = |n: u64| 0.8 * key.unit(n) - 0.4;
+    let place =
+        |i: u64| DVec3::new(coordinate(3 * i), coordinate(3 * i + 1), coordinate(3 * i + 2));
+    (0..20).map(place).collect()
+}
+
+impl Watertightness {
+    /// The figures as a table.
+    pub fn table(&self) -> Table {
+        let heading = ["rays", "method", "lost %", "M rays/CPU-s", "worst error m"];
+        let mut table = Table::new("Rays lost at vertices and edges of a closed sphere", &heading);
+        for Setting { scene, knobs, rays, costs, accuracy, .. } in &self.settings {
+            table.push(vec![
+                (*scene).to_owned(),
+                (*knobs).to_owned(),
+                digits(1e-4 * accuracy.misses_per_million()),
+                millions_per_s(*rays, costs.cpu_s().median),
+                digits(accuracy.worst_m),
+            ]);
+        }
+        table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_watertight_test_loses_no_ray() {
+        let misses = |name: &str| {
+            let measured = measure(1).unwrap();
+            let of = measured.settings.into_iter().filter(|setting| setting.knobs.contains(name));
+            of.map(|setting| setting.accuracy.misses).collect::<Vec<_>>()
+        };
+        assert_eq!(misses("watertight"), [0, 0]);
+        assert!(misses("Möller-Trumbore").iter().all(|&misses| misses > 0));
+    }
+}
