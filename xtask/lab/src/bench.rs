@@ -27,22 +27,22 @@ pub struct BenchArgs {
 
 #[derive(Subcommand, Debug)]
 enum Benchmark {
-    /// Measure the simulator: building, casting, the whole way to disk.
+    /// Measure the simulator: building hierarchies, casting rays, writing a dataset to disk.
     Sim(SimArgs),
     /// Measure the classifier and the sampler against other engines, in turns.
     ///
-    /// The others are Python packages, installed from PyPI under `target/peers`,
-    /// and Rust crates, built there. Who cannot be had is skipped with a
-    /// message; who does not give what the weights do is not timed.
+    /// The other engines are Python packages, installed from PyPI under `target/peers`,
+    /// and Rust crates, built there. An engine that cannot be installed is skipped with a
+    /// message; an engine whose answer is wrong is not timed.
     Infer(infer::InferArgs),
     /// Measure a step of training against PyTorch's, in turns.
     Train(infer::learn::TrainArgs),
     /// Model the classifier on a Raspberry Pi 5 without having one.
     ///
-    /// Its inner loops, as compiled, go through llvm-mca; what is outside them
-    /// is counted under QEMU; memory and threads are reckoned.
+    /// llvm-mca analyses the compiled inner loops, QEMU counts the instructions outside
+    /// them, and a model adds memory and threads.
     PiModel(pi5::PiModelArgs),
-    /// Measure how errors grow with scale, offset, N and K, beside derived bounds.
+    /// Measure how errors grow with scale, offset, N and K, and compare them with derived bounds.
     Growth(numerics::GrowthArgs),
     /// Compare every adapter with the CPU on the same meshes.
     Devices(devices::DevicesArgs),
@@ -50,39 +50,38 @@ enum Benchmark {
 
 #[derive(Args, Debug)]
 struct SimArgs {
-    /// Meshes to measure besides the ones made by rule: a file or a folder.
+    /// Meshes to measure besides the generated ones: a file or a folder.
     meshes: Option<PathBuf>,
     /// Measure this adapter only: `auto`, `cpu` or part of a name [default: all].
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Write everything measured to this file.
+    /// Write all figures to this JSON file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Counted repeats of each measurement; the median is shown.
+    /// Repeats of each measurement; the median is shown.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
     rounds: u16,
-    /// Sizes of the meshes made by rule, triangles.
+    /// Sizes of the generated meshes, in triangles.
     #[arg(long, value_delimiter = ',', default_value = "1000,10000,100000,1000000")]
     triangles: Vec<usize>,
-    /// Take at most this many of the meshes given, spread over their list.
+    /// Use at most this many of the given meshes, spread evenly over their list.
     #[arg(long, default_value_t = 16, value_name = "N")]
     limit: usize,
-    /// Measure instead which builder pays for how many rays.
+    /// Measure instead which builder is faster for how many rays.
     #[arg(long)]
     builders: bool,
-    /// Measure instead against Embree, from a Python environment made from
-    /// PyPI under `target/peers`.
+    /// Compare instead with Embree, which is installed from PyPI under `target/peers`.
     #[arg(long)]
     peers: bool,
     /// Measure instead the rays that plain Möller-Trumbore in f32 loses at vertices and edges.
     #[arg(long)]
     trade: bool,
-    /// Measure instead what `--simplify auto` saves and costs.
+    /// Measure instead the time that `--simplify auto` saves and the errors that it makes.
     #[arg(long)]
     simplify: bool,
 }
 
-/// Everything that a run measured.
+/// All figures of a run.
 #[derive(Serialize)]
 struct Report {
     machine: machine::Machine,

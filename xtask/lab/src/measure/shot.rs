@@ -83,12 +83,6 @@ impl Shot {
         Self { job, rays }
     }
 
-    /// The same rays against another hierarchy over the same surface.
-    pub fn at(&self, target: &Arc<Target>) -> Self {
-        let job = CastJob { target: Arc::clone(target), ..self.job.clone() };
-        Self { job, rays: self.rays.clone() }
-    }
-
     /// The same rays in the order of their beams: as the sensor fires them.
     pub fn in_firing_order(&self) -> Self {
         let mut order: Vec<usize> = (0..self.rays.len()).collect();

@@ -47,9 +47,9 @@ impl Mca {
         }
         let found = names.into_iter().find_map(|program| {
             let output = Command::new(&program).arg("--version").output().ok()?;
-            let said = String::from_utf8_lossy(&output.stdout).into_owned();
+            let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
             let version =
-                said.lines().find(|line| line.contains("LLVM version"))?.trim().to_owned();
+                stdout.lines().find(|line| line.contains("LLVM version"))?.trim().to_owned();
             (major(&version)? >= LEAST_VERSION).then_some(Self { program, version })
         });
         let Some(mca) = found else {
@@ -90,8 +90,8 @@ impl Mca {
         drop(input);
         let output = child.wait_with_output()?;
         if !output.status.success() {
-            let said = String::from_utf8_lossy(&output.stderr);
-            bail!("{} refuses the code: {}", self.program, said.trim());
+            let stderr = String::from_utf8_lossy(&output.stderr);
+            bail!("{} refuses the code: {}", self.program, stderr.trim());
         }
         written?;
         parse(&String::from_utf8_lossy(&output.stdout))

@@ -1,10 +1,9 @@
-//! `cargo xtask bench pi-model`: a Raspberry Pi 5's figures without one.
+//! `cargo xtask bench pi-model`: models the times of a Raspberry Pi 5.
 //!
-//! The inner loop of each NEON [`kernels`] function, as compiled, goes through
-//! llvm-mca ([`mca`]) for cycles. The [`plan`] says how often a classification
-//! goes round each, [`load`] what that asks of the machine as threads share it
-//! out, [`model`] how long that takes. What is outside the loops is [`count`]ed
-//! under QEMU.
+//! llvm-mca ([`mca`]) finds the cycles of the compiled inner loop of each NEON function
+//! ([`kernels`]). The [`plan`] counts the iterations of each loop in a classification,
+//! [`load`] divides the work among threads, and [`model`] finds the time. Instructions
+//! outside the loops are [`count`]ed under QEMU.
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
@@ -33,7 +32,7 @@ pub struct PiModelArgs {
     /// Model file [default: the baseline network with weights drawn at random]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Points that the network sees, multiples of 8.
+    /// Numbers of points that the network sees, multiples of 8.
     #[arg(long, value_delimiter = ',', value_parser = eights,
           default_value = "16,32,64,128,256,512,1024,2048,4096")]
     points: Vec<usize>,
@@ -46,21 +45,21 @@ pub struct PiModelArgs {
     /// Precisions: f32, f32-fc16, f16, i8.
     #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
     precision: Vec<Precision>,
-    /// Cores at work.
+    /// Number of cores that work.
     #[arg(long, default_value_t = model::Machine::PI_5.threads as u16,
           value_parser = clap::value_parser!(u16).range(1..))]
     threads: u16,
-    /// Clock of the cores.
+    /// Clock rate of the cores, GHz.
     #[arg(long, default_value_t = model::Machine::PI_5.hertz / 1e9, value_name = "GHZ", value_parser = positive)]
     clock: f64,
-    /// What memory delivers to all cores together.
+    /// Memory bandwidth of all cores together, GB/s.
     #[arg(long, default_value_t = model::Machine::PI_5.bytes_per_s / 1e9, value_name = "GB/S", value_parser = positive)]
     bandwidth: f64,
     /// Instructions a cycle outside inner loops; the core's two SIMD pipes
     /// allow two.
     #[arg(long, default_value_t = model::Machine::PI_5.instructions_per_cycle, value_name = "IPC", value_parser = positive)]
     other_ipc: f64,
-    /// Do not count instructions under QEMU: inner loops and memory alone.
+    /// Do not count instructions under QEMU; model inner loops and memory alone.
     #[arg(long)]
     no_counts: bool,
     /// Fail if a tile's inner loop is below this share of FMA peak, percent.
@@ -69,10 +68,10 @@ pub struct PiModelArgs {
     /// llvm-mca of LLVM 19 or newer [default: the newest on the PATH]
     #[arg(long, value_name = "PROGRAM")]
     llvm_mca: Option<String>,
-    /// Write everything to this file.
+    /// Write all figures to this JSON file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the modelled times to this file, one a row.
+    /// Write the modelled times to this CSV file, one a row.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 }
@@ -105,7 +104,7 @@ pub fn run(args: &PiModelArgs) -> Result<()> {
     Ok(())
 }
 
-/// The Raspberry Pi's build of infer-cpu, looked into.
+/// The Raspberry Pi's build of infer-cpu, analysed.
 struct Board {
     llvm_mca: String,
     folder: PathBuf,
@@ -141,8 +140,7 @@ impl Board {
     }
 }
 
-/// Modelled times of one model file on a Raspberry Pi 5 at work with all its
-/// cores.
+/// The model of one model file on a Raspberry Pi 5.
 pub struct Modelled {
     board: Board,
     machine: model::Machine,
@@ -151,7 +149,7 @@ pub struct Modelled {
 }
 
 impl Modelled {
-    /// Looks into the build and the model file at `model`.
+    /// Analyses the build and the model file at `model`.
     ///
     /// # Errors
     /// What [`run`] reports, and an emulator that cannot count: times without
@@ -212,6 +210,6 @@ fn model_file(args: &PiModelArgs, folder: &Path) -> Result<PathBuf> {
 fn eights(word: &str) -> Result<usize, String> {
     match word.parse::<usize>() {
         Ok(n) if n > 0 && n.is_multiple_of(8) => Ok(n),
-        _ => Err("a positive multiple of 8 is needed".to_owned()),
+        _ => Err("expected a positive multiple of 8".to_owned()),
     }
 }

@@ -15,7 +15,8 @@ struct Growth {
     quantity: String,
     layer: String,
     precision: String,
-    knob: String,
+    #[serde(rename = "knob")]
+    parameter: String,
     value: f64,
     median_error: f64,
     largest_error: f64,
@@ -39,7 +40,7 @@ pub fn body(folder: &Path) -> Result<Markup> {
     let mut groups: BTreeMap<(&str, &str), BTreeMap<&str, Vec<&Growth>>> = BTreeMap::new();
     for row in &rows {
         let group = groups.entry((row.model(), &row.quantity)).or_default();
-        group.entry(&row.knob).or_default().push(row);
+        group.entry(&row.parameter).or_default().push(row);
     }
     let devices = text(&folder.join("devices.csv"))?;
     let fuzz = text(&folder.join("fuzz.md"))?;
@@ -68,8 +69,8 @@ impl Growth {
     }
 
     fn words(&self) -> String {
-        let Self { quantity, layer, precision, knob, value, .. } = self;
-        format!("{quantity} {layer} in {precision}, {knob} {value:e}")
+        let Self { quantity, layer, precision, parameter, value, .. } = self;
+        format!("{quantity} {layer} in {precision}, {parameter} {value:e}")
     }
 }
 

@@ -1,7 +1,7 @@
 //! `cargo xtask bench devices`: the same meshes on every adapter and on the CPU.
 //!
-//! Positions must be equal within the promised bound, points as many but for beams
-//! at silhouettes, which are listed, and classes equal.
+//! Positions must be equal within the promised bound, classes must be equal, and so must
+//! the number of points but for beams at silhouettes, which are listed.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -37,10 +37,10 @@ const SILHOUETTE_RAD: f64 = 1e-6;
 /// From the middle of a mesh of the unit sphere, metres.
 const DISTANCE_M: f64 = 3.0;
 
-/// What `bench devices` is told.
+/// Flags of `bench devices`.
 #[derive(Args, Debug)]
 pub struct DevicesArgs {
-    /// File to write: a row for each mesh, view and adapter.
+    /// CSV file to write, a row for each mesh, view and adapter.
     #[arg(long, value_name = "FILE")]
     csv: PathBuf,
     /// Meshes besides the parametric shapes [default: assets/meshes].
@@ -84,7 +84,9 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     let lanes = lanes::open(None)?;
     let [cpu, others @ ..] = &lanes[..] else { bail!("the CPU is always there") };
     if others.is_empty() {
-        bail!("there is no adapter to compare with the CPU; `cargo xtask adapters` lists them");
+        bail!(
+            "expected an adapter to compare with the CPU, found none; `cargo xtask adapters` lists them"
+        );
     }
     let pattern = Sensor::builtin("vlp32c").expect("invariant: it is built in").pattern();
     let mut all = Vec::new();
@@ -104,7 +106,12 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     print!("{}", summary(&all, others));
     match all.iter().find(|comparison| !comparison.is_equal()) {
         None => Ok(()),
-        Some(c) => bail!("{}, view {} on {}: not what the CPU finds", c.mesh, c.view, c.adapter),
+        Some(c) => bail!(
+            "{}, view {} on {}: expected the points and classes of the CPU",
+            c.mesh,
+            c.view,
+            c.adapter
+        ),
     }
 }
 

@@ -37,7 +37,7 @@ pub struct Rows {
 }
 
 /// `y = W x + b`; W may itself be off by `dw`.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Affine {
     pub inputs: usize,
     pub outputs: usize,

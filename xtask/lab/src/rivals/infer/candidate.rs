@@ -1,34 +1,34 @@
-//! Who takes part.
+//! The candidates of a comparison.
 
 use crate::measure::clock::Cost;
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt;
 
-/// Someone who does the work that is timed.
+/// Does the work that is timed.
 pub trait Engine {
-    /// Makes ready for `job`.
+    /// Prepares `job`.
     ///
     /// # Errors
     /// If it cannot be done.
     fn load(&mut self, job: Job) -> Result<()>;
 
-    /// Does what was loaded once; its answer: log-probabilities, or the
+    /// Does the loaded job once and returns its answer: log-probabilities, or the
     /// indices of the points kept.
     ///
     /// # Errors
     /// If it cannot be done.
     fn answer(&mut self) -> Result<Vec<f64>>;
 
-    /// Does what was loaded, some times uncounted and then `repeats` times;
-    /// what each of the latter cost.
+    /// Does the loaded job a few times uncounted and then `repeats` times; the cost of
+    /// each of the latter.
     ///
     /// # Errors
     /// If it cannot be done.
     fn time(&mut self, repeats: usize) -> Result<Vec<Cost>>;
 }
 
-/// What is to be done.
+/// The work to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Job {
     /// Points of the cloud.
@@ -59,7 +59,7 @@ impl fmt::Display for Arithmetic {
     }
 }
 
-/// A engine and what tables say of it.
+/// An engine and its description in tables.
 pub struct Candidate {
     /// Its name, which `--engines` takes.
     pub name: String,
@@ -67,8 +67,8 @@ pub struct Candidate {
     pub arithmetic: Arithmetic,
     /// Whether it is ours.
     pub ours: bool,
-    /// Of the package.
+    /// Version of its package.
     pub version: String,
-    /// What runs.
+    /// The engine itself.
     pub engine: Box<dyn Engine>,
 }

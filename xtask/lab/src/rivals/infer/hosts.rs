@@ -1,4 +1,4 @@
-//! The programs that rivals live in, and what must be made before they start.
+//! The programs that run rivals, and the files that they need.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,13 +7,13 @@ use xtask::venv::{Environment, cache_dir, programs, succeeds};
 const GENERAL: Environment<'_> = Environment {
     name: "infer-venv",
     requirements: "xtask/lab/peers/infer/requirements.txt",
-    size: "some 150 MB",
+    size: "about 150 MB",
 };
 
 const TORCH: Environment<'_> = Environment {
     name: "torch-venv",
     requirements: "xtask/lab/peers/infer/torch-requirements.txt",
-    size: "some 3 GB",
+    size: "about 3 GB",
 };
 
 /// Keeps Python from writing compiled files beside its programs.
@@ -32,7 +32,7 @@ pub enum Host {
     Rust,
 }
 
-/// What rivals are given.
+/// The input of all rivals.
 pub struct Material {
     /// The weights.
     pub model: PathBuf,
@@ -40,7 +40,7 @@ pub struct Material {
     pub folder: PathBuf,
 }
 
-/// A program that is there, and what it is told after the engine's name.
+/// An installed program, and its arguments after the engine's name.
 pub struct Program {
     words: Vec<PathBuf>,
     arguments: Vec<PathBuf>,
@@ -55,7 +55,7 @@ impl Material {
     /// Writes the model in every form.
     ///
     /// # Errors
-    /// Why that cannot be, in words for the user.
+    /// The cause, for the user.
     pub fn prepare(&self) -> Result<(), String> {
         let mut command = Command::new(GENERAL.interpreter()?);
         command.arg(NO_CACHE).arg(programs().join("infer/prepare.py"));
@@ -72,7 +72,7 @@ impl Host {
     /// Its program, installed or built if need be.
     ///
     /// # Errors
-    /// Why there can be none, in words for the user.
+    /// The cause, for the user.
     pub fn program(self, material: &Material) -> Result<Program, String> {
         let python = |environment: Environment, script: &str, arguments: &[&PathBuf]| {
             let words = vec![environment.interpreter()?, NO_CACHE.into(), programs().join(script)];
@@ -93,7 +93,7 @@ impl Host {
 /// `folder`.
 ///
 /// # Errors
-/// Why there can be none, in words for the user.
+/// The cause, for the user.
 pub fn trainer(model: &Path, folder: &Path) -> Result<Command, String> {
     let mut command = Command::new(TORCH.interpreter()?);
     command.arg(NO_CACHE).arg(programs().join("train/train.py")).arg("torch");

@@ -1,5 +1,5 @@
-//! `cargo xtask bench train`: one step of training the baseline, ours and
-//! PyTorch's, in turns.
+//! `cargo xtask bench train`: times one step of training the baseline with our program
+//! and with PyTorch, in turns.
 
 use super::candidate::{Arithmetic, Candidate, Job};
 use super::cloud::Cloud;
@@ -19,21 +19,21 @@ use xtask::workspace;
 /// Flags of `bench train`.
 #[derive(Args, Debug)]
 pub struct TrainArgs {
-    /// Sizes of the clouds, points.
+    /// Sizes of the clouds, in points.
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = super::positive,
           default_value = "64,1024")]
     points: Vec<usize>,
     /// Clouds of a batch.
     #[arg(long, value_name = "N", value_parser = super::positive, default_value = "24")]
     batch: usize,
-    /// Turns that each has at each size, of several steps each; the median of
-    /// all steps is shown.
+    /// Turns of each program at each size, of several steps each; the median of all
+    /// steps is shown.
     #[arg(long, value_name = "N", value_parser = super::positive, default_value = "5")]
     rounds: usize,
-    /// Leave PyTorch out, which is some 3 GB from PyPI.
+    /// Leave PyTorch out, which downloads about 3 GB from PyPI.
     #[arg(long)]
     no_torch: bool,
-    /// Write everything measured, with every step, to this file.
+    /// Write all figures, with every step, to this JSON file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

@@ -1,5 +1,5 @@
-//! `cargo xtask bench infer`: our classifier and sampler and those of others,
-//! on the same weights and clouds, in one run, in turns.
+//! `cargo xtask bench infer`: compares our classifier and sampler with those of other
+//! projects, on the same weights and clouds, in one run, in turns.
 
 mod candidate;
 mod classify;
@@ -30,14 +30,14 @@ use std::path::PathBuf;
 use xtask::venv::cache_dir;
 use xtask::workspace::recorded;
 
-/// What `bench infer` is told.
+/// Flags of `bench infer`.
 #[derive(Args, Debug)]
 pub struct InferArgs {
-    /// Weights for all engines: safetensors with the key names of yanx27's
-    /// `pointnet_cls` [default: random ones of its shapes].
+    /// Weights for all engines: a safetensors file with the key names of yanx27's
+    /// `pointnet_cls` [default: random weights of its shapes].
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Sizes of the clouds to classify, points.
+    /// Sizes of the clouds to classify, in points.
     #[arg(
         long,
         value_name = "N,...",
@@ -55,23 +55,23 @@ pub struct InferArgs {
         value_parser = positive
     )]
     threads: Vec<usize>,
-    /// Turns that each engine has at each job, of several repeats each; the
-    /// median of all repeats is shown.
+    /// Turns of each engine at each job, of several repeats each; the median of all
+    /// repeats is shown.
     #[arg(long, value_name = "N", default_value = "9", value_parser = positive)]
     rounds: usize,
-    /// Write everything measured, with every repeat, to this file.
+    /// Write all figures, with every repeat, to this JSON file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Measure these engines only; `ncnn` names `ncnn-f16` too, and `ours` all
-    /// of ours [default: all but PyTorch].
+    /// Measure these engines only; `ncnn` includes `ncnn-f16`, and `ours` includes all
+    /// precisions of ours [default: all but PyTorch].
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     engines: Vec<String>,
-    /// Measure PyTorch too: some 3 GB from PyPI.
+    /// Measure PyTorch too, which downloads about 3 GB from PyPI.
     #[arg(long)]
     torch: bool,
 }
 
-/// Everything that a run measured.
+/// All figures of a run.
 #[derive(Serialize)]
 struct Report {
     machine: Machine,
@@ -138,7 +138,7 @@ impl InferArgs {
     }
 }
 
-/// Whether `engine` is what `word` stands for.
+/// Whether `word` names `engine`.
 fn is_named(engine: &str, word: &str) -> bool {
     engine.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
 }
@@ -149,14 +149,14 @@ fn check(words: &[String]) -> Result<(), Usage> {
     let is_unknown = |word: &&String| !known.iter().any(|engine| is_named(engine, word));
     match words.iter().find(is_unknown) {
         Some(word) => {
-            Err(Usage(format!("no engine is called {word}; there are {}", known.join(", "))))
+            Err(Usage(format!("expected an engine among {}, found {word}", known.join(", "))))
         }
         None => Ok(()),
     }
 }
 
 fn positive(word: &str) -> Result<usize, String> {
-    word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "not a positive number".to_owned())
+    word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected a positive number".to_owned())
 }
 
 #[cfg(test)]
@@ -171,6 +171,6 @@ mod tests {
         assert!(!is_named("torchscript", "torch"));
         assert!(check(&["ours".to_owned(), "fpsample".to_owned()]).is_ok());
         let error = check(&["onnx".to_owned()]).unwrap_err();
-        assert!(error.to_string().starts_with("no engine is called onnx; there are ours-f32,"));
+        assert!(error.to_string().starts_with("expected an engine among ours-f32,"));
     }
 }

@@ -1,4 +1,4 @@
-//! The rivals.
+//! The engines of other projects.
 
 use super::candidate::{Arithmetic, Candidate};
 use super::hosts::{Host, Material, Program};
@@ -21,7 +21,7 @@ const fn rival(name: &'static str, arithmetic: Arithmetic, host: Host) -> Rival 
     Rival { name, arithmetic, host }
 }
 
-/// Those that classify.
+/// Engines that classify.
 pub const CLASSIFIERS: [Rival; 13] = [
     rival("onnxruntime", F32, Host::Python),
     rival("openvino", F32, Host::Python),
@@ -38,15 +38,15 @@ pub const CLASSIFIERS: [Rival; 13] = [
     rival("ncnn-i8", I8, Host::Python),
 ];
 
-/// Those that sample farthest points.
+/// Engines that sample farthest points.
 pub const SAMPLERS: [Rival; 3] = [
     rival("numpy", F32, Host::Sampling),
     rival("fpsample", F32, Host::Sampling),
     rival("fpsample-tree", F32, Host::Sampling),
 ];
 
-/// Starts those of `rivals` that are wanted by their names; those in PyTorch
-/// only if `torch`. A message names those that cannot take part, and says why.
+/// Starts those of `rivals` whose names are wanted, those in PyTorch only if `torch`. A
+/// message names those that cannot be started, and the cause.
 pub fn start(
     rivals: &[Rival],
     is_wanted: impl Fn(&str) -> bool,

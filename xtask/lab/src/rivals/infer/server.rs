@@ -1,5 +1,4 @@
-//! A rival in a process of its own, so that its threads and its memory are its
-//! own too. The protocol is described in `peers/infer/turns.py`.
+//! A rival in a subprocess, so that its threads and its memory are separate from ours. The protocol is described in `peers/infer/turns.py`.
 
 use super::candidate::{Engine, Job};
 use crate::measure::clock::Cost;
@@ -47,7 +46,7 @@ impl Server {
     /// Starts `command`.
     ///
     /// # Errors
-    /// If it does not start, or says that its engine cannot be had.
+    /// If it does not start, or reports that its engine is not available.
     pub fn start(command: &mut Command) -> Result<Self> {
         let mut process = Subprocess::start(command)?;
         let Hello { version } = parse(&process.receive()?)?;
@@ -64,7 +63,7 @@ fn parse<T: DeserializeOwned>(line: &str) -> Result<T> {
     match serde_json::from_str(line) {
         Ok(Message::Answered(answer)) => Ok(answer),
         Ok(Message::Failed { error }) => bail!("{error}"),
-        Err(_) => bail!("it said {line}"),
+        Err(_) => bail!("expected JSON, found {line}"),
     }
 }
 
@@ -104,11 +103,11 @@ mod tests {
     }
 
     #[test]
-    fn an_error_is_told_in_the_rivals_words() {
-        let told = |line: &str| parse::<Answer>(line).map(|_| ()).unwrap_err().to_string();
-        assert_eq!(told(r#"{"error": "no such request: x"}"#), "no such request: x");
-        assert_eq!(told("Segmentation fault"), "it said Segmentation fault");
-        assert_eq!(told("{}"), "it said {}");
+    fn an_error_has_the_rivals_words() {
+        let error_of = |line: &str| parse::<Answer>(line).map(|_| ()).unwrap_err().to_string();
+        assert_eq!(error_of(r#"{"error": "no such request: x"}"#), "no such request: x");
+        assert_eq!(error_of("Segmentation fault"), "expected JSON, found Segmentation fault");
+        assert_eq!(error_of("{}"), "expected JSON, found {}");
         assert!(parse::<Done>("{}").is_ok());
     }
 

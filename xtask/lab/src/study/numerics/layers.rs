@@ -1,4 +1,4 @@
-//! Each layer's activations and the logits, by knob, in every precision.
+//! Errors of each layer's activations and of the logits, by parameter, in every precision.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -12,14 +12,14 @@ use super::probe::{self, Part};
 use crate::measure::reference_network::affine::{Rows, U32, gamma};
 use crate::measure::reference_network::{Chain, Network, Output, Points, outputs};
 
-/// Points of a cloud where their number is not what is turned.
+/// Points of a cloud where their number is not the parameter.
 const N: usize = 64;
 /// Half a unit in the last place of f64, relative.
 const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// One value of one knob.
+/// One value of one parameter.
 pub(super) struct Setting {
-    knob: &'static str,
+    parameter: &'static str,
     value: f64,
     n: usize,
     scale: f64,
@@ -49,7 +49,7 @@ pub fn measure(path: &Path, n_clouds: u32) -> Result<Vec<Row>> {
 }
 
 fn settings() -> Vec<Setting> {
-    let plain = |knob, value| Setting { knob, value, n: N, scale: 1.0, offset: 0.0 };
+    let plain = |parameter, value| Setting { parameter, value, n: N, scale: 1.0, offset: 0.0 };
     let mut all = Vec::new();
     all.extend([16, 64, 256, 1024].map(|n| Setting { n, ..plain("N", n as f64) }));
     let scales = [1e-12, 1e-6, 1e6, 1e12];
@@ -85,7 +85,7 @@ pub(super) fn measure_chain(
         };
         let mut probes = files.iter().map(load).collect::<Result<Vec<_>>>()?;
         for setting in settings {
-            let mut found: Vec<Met> = parts.iter().map(|_| Met::default()).collect();
+            let mut found: Vec<Found> = parts.iter().map(|_| Found::default()).collect();
             for number in 0..n_clouds {
                 let (input, points) = setting.clouds(number);
                 let truth = outputs(network, chain, &points, precision)?;
@@ -102,7 +102,7 @@ pub(super) fn measure_chain(
                     quantity: if is_logit { "logit" } else { "activation" },
                     layer: format!("{name}/{layer}"),
                     precision: met.precision(precision),
-                    knob: setting.knob,
+                    parameter: setting.parameter,
                     value: setting.value,
                     errors: met.errors,
                     bound: met.bound,
@@ -115,16 +115,16 @@ pub(super) fn measure_chain(
     Ok(rows)
 }
 
-/// What comparing met.
+/// What a comparison found.
 #[derive(Default)]
-struct Met {
+struct Found {
     errors: Vec<f64>,
     bound: f64,
     magnitude: f64,
     overflowed: bool,
 }
 
-impl Met {
+impl Found {
     fn compare(
         &mut self,
         probe: &mut Classifier,
@@ -183,7 +183,7 @@ fn normalized(points: &[[f64; 3]]) -> (Vec<f64>, f64) {
     (centred.as_flattened().iter().map(|x| x / radius).collect(), radius)
 }
 
-/// A setting for a measurement where another thing is turned.
-pub(super) fn of_knob(knob: &'static str, value: f64) -> Setting {
-    Setting { knob, value, n: N, scale: 1.0, offset: 0.0 }
+/// A setting for a measurement of another parameter.
+pub(super) fn of_parameter(parameter: &'static str, value: f64) -> Setting {
+    Setting { parameter, value, n: N, scale: 1.0, offset: 0.0 }
 }

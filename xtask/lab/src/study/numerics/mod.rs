@@ -1,9 +1,9 @@
 //! `cargo xtask bench growth`: how errors grow, measured against f64, with the
-//! bound that was derived beside each.
+//! derived bound of each.
 //!
-//! [`ranges`] is about what casters find, [`layers`] about a network's layers and
-//! logits, [`widths`] about how many products a sum has. A row is one setting of
-//! one knob; the CSV is for whoever draws it.
+//! [`ranges`] is about the ranges that casters find, [`layers`] about a network's
+//! layers and logits, [`widths`] about the number of products in a sum. A row is one
+//! value of one parameter.
 
 mod clouds;
 mod layers;
@@ -19,17 +19,17 @@ use formats::atomic;
 
 use xtask::workspace::root;
 
-/// What `bench growth` is told.
+/// Flags of `bench growth`.
 #[derive(Args, Debug)]
 pub struct GrowthArgs {
-    /// File to write: a row for each quantity, layer, precision and value of a knob.
+    /// CSV file to write, a row for each quantity, layer, precision and value of a parameter.
     #[arg(long, value_name = "FILE")]
     csv: PathBuf,
     /// Models whose layers are measured; batch norms must be folded in [default:
     /// edge-64, pointnet-64 and pointnet-1024 of assets/weights].
     #[arg(long, value_name = "FILE,...", value_delimiter = ',')]
     models: Vec<PathBuf>,
-    /// Clouds of each setting.
+    /// Clouds for each value of a parameter.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     clouds: u32,
 }
@@ -42,11 +42,11 @@ pub struct Row {
     pub layer: String,
     /// What it was computed in.
     pub precision: String,
-    /// What was turned: scale, offset, distance, N (points or triangles), K (inputs).
-    pub knob: &'static str,
-    /// To which value.
+    /// The parameter: scale, offset, distance, N (points or triangles), K (inputs).
+    pub parameter: &'static str,
+    /// Its value.
     pub value: f64,
-    /// The errors met.
+    /// The errors found.
     pub errors: Vec<f64>,
     /// No error may be above this.
     pub bound: f64,
@@ -72,7 +72,7 @@ impl Row {
     }
 }
 
-/// Measures, writes the CSV, and says which layers f16 does not do for.
+/// Measures, writes the CSV, and names the layers for which f16 is not exact enough.
 ///
 /// # Errors
 /// A model that cannot be read or has batch norms, a file that cannot be written,
@@ -95,7 +95,7 @@ pub fn run(args: &GrowthArgs) -> Result<()> {
             row.quantity,
             row.layer,
             row.precision,
-            row.knob,
+            row.parameter,
             row.value,
             row.summary().1,
             row.bound
@@ -123,7 +123,7 @@ fn csv(rows: &[Row]) -> Result<Vec<u8>> {
         let (median, largest) = row.summary();
         let numbers = [median, largest, row.bound].map(|x| format!("{x:.3e}"));
         let value = format!("{:e}", row.value);
-        let words = [row.quantity, &row.layer, &row.precision, row.knob, &value];
+        let words = [row.quantity, &row.layer, &row.precision, row.parameter, &value];
         let words = words.into_iter().chain(numbers.iter().map(String::as_str));
         csv.write_record(words.chain([row.unit]))?;
     }
@@ -135,7 +135,7 @@ fn csv(rows: &[Row]) -> Result<Vec<u8>> {
 /// good as the precision below it.
 fn verdict(rows: &[Row]) -> String {
     const HALF_A_STEP: f64 = 1.0 / 254.0;
-    let in_f16 = |row: &&Row| row.precision.starts_with("f16") && row.knob != "K";
+    let in_f16 = |row: &&Row| row.precision.starts_with("f16") && row.parameter != "K";
     let part = |row: &Row| row.summary().1 / row.magnitude;
     let mut needy: Vec<&str> = rows
         .iter()
@@ -154,7 +154,7 @@ fn verdict(rows: &[Row]) -> String {
             "no layer needs more than f16; the worst, {}, is off by {:.2e} of its largest value at {} {:e}",
             row.layer,
             part(row),
-            row.knob,
+            row.parameter,
             row.value
         )
     })

@@ -46,8 +46,8 @@ pub fn write(network: &Network, chain: &Chain, part: Part, path: &Path) -> Resul
     if chain.stn {
         model.copy_all("feat.stn.");
     }
-    let turned = chain.fstn_after.filter(|&after| after < n_convs);
-    if turned.is_some() {
+    let transformed = chain.fstn_after.filter(|&after| after < n_convs);
+    if transformed.is_some() {
         model.copy_all("feat.fstn.");
     }
     if chain.edges {
@@ -56,7 +56,7 @@ pub fn write(network: &Network, chain: &Chain, part: Part, path: &Path) -> Resul
     let whole = n_convs == chain.convs.len();
     let card = ModelCard {
         normalization: Normalization::UnitSphere,
-        transform_after: turned.unwrap_or(1),
+        transform_after: transformed.unwrap_or(1),
         pooled_relu: !whole || chain.pooled_relu,
         edge_radii: if chain.edges { network.card.edge_radii.clone() } else { Vec::new() },
         activation_ranges: model.ranges,

@@ -26,9 +26,9 @@ const GRAZING_TANGENT: f64 = 573.0;
 /// Half a unit in the last place of f64, relative.
 const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// One value of one knob.
+/// One value of one parameter.
 struct Setting {
-    knob: &'static str,
+    parameter: &'static str,
     value: f64,
     triangles: usize,
     scale: f64,
@@ -39,8 +39,8 @@ struct Setting {
 /// Measures every setting on the CPU twin; other adapters find the same triangles
 /// and have their ranges from the same f64.
 pub fn measure() -> Vec<Row> {
-    let plain = |knob, value| Setting {
-        knob,
+    let plain = |parameter, value| Setting {
+        parameter,
         value,
         triangles: 10_000,
         scale: 1.0,
@@ -111,7 +111,7 @@ impl Setting {
             quantity: "range",
             layer: String::new(),
             precision: precision.to_owned(),
-            knob: self.knob,
+            parameter: self.parameter,
             value: self.value,
             errors,
             bound,

@@ -9,7 +9,7 @@ use formats::rng::StreamKey;
 use formats::weights::Tensor;
 
 use super::Row;
-use super::layers::{measure_chain, of_knob};
+use super::layers::{measure_chain, of_parameter};
 use crate::measure::reference_network::{Chain, Network};
 
 const WIDTHS: [usize; 5] = [16, 64, 256, 1024, 4096];
@@ -31,7 +31,7 @@ pub fn measure() -> Result<Vec<Row>> {
             fstn_after: None,
             edges: false,
         };
-        let setting = of_knob("K", k as f64);
+        let setting = of_parameter("K", k as f64);
         let measured = measure_chain(&network, "random", &chain, false, &[setting], 2)?;
         // The first layer has three inputs whatever the width.
         rows.extend(measured.into_iter().filter(|row| row.layer.ends_with("conv2")));

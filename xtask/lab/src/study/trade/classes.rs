@@ -1,4 +1,4 @@
-//! What a classifier says of some clouds, and how long it takes.
+//! The classes that a classifier finds for clouds, and the time it takes.
 
 use super::scans::Cloud;
 use crate::measure::clock::Spread;
@@ -27,7 +27,7 @@ pub struct TestSet {
     pub labels: Vec<String>,
 }
 
-/// A way to classify.
+/// The settings of a classifier.
 #[derive(Clone, Debug)]
 pub struct Classifying {
     /// The model file.
@@ -44,10 +44,10 @@ pub struct Classifying {
     pub threads: usize,
 }
 
-/// What was said of each cloud.
+/// The classes found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answers {
-    /// The class of each cloud; `None` where there was no point to judge by.
+    /// The class of each cloud; `None` for a cloud without points.
     pub classes: Vec<Option<String>>,
     /// All logits, one cloud after another.
     pub logits: Vec<f32>,
@@ -58,7 +58,7 @@ pub struct Answers {
 pub struct Costs {
     /// Wall time of each, milliseconds.
     pub ms: Vec<f64>,
-    /// Of all together, where the machine tells.
+    /// Of all together, if the machine measures it.
     pub joules: Option<f64>,
 }
 
@@ -99,12 +99,11 @@ impl TestSet {
     pub fn fits(&self, model: &Path) -> Result<()> {
         let classifier = Classifier::load(model, &Options::default())?;
         let known = classifier.classes();
-        let stranger =
-            self.labels.iter().find(|label| !known.iter().any(|name| **name == ***label));
-        match stranger {
+        let unknown = self.labels.iter().find(|label| !known.iter().any(|name| **name == ***label));
+        match unknown {
             None => Ok(()),
             Some(class) => anyhow::bail!(
-                "{} knows no class `{class}`, which {} has; name another by --model",
+                "{}: expected a model with the class `{class}` of {}; name another with --model",
                 model.display(),
                 self.name
             ),
@@ -142,7 +141,7 @@ impl Classifying {
     /// Classifies `clouds`.
     ///
     /// # Errors
-    /// As [`Self::load`]; a cloud that is no cloud.
+    /// As [`Self::load`]; a cloud that cannot be classified.
     pub fn answers(&self, clouds: &[Cloud]) -> Result<Answers> {
         let capacity = clouds.iter().map(Vec::len).max().unwrap_or_default();
         // Answers do not depend on the number of threads.
@@ -243,7 +242,7 @@ impl Costs {
         (!self.ms.is_empty()).then(|| Spread::of(self.ms.clone()).median)
     }
 
-    /// Of one, where the machine tells.
+    /// Of one, if the machine measures it.
     pub fn joules_each(&self) -> Option<f64> {
         self.joules.map(|all| all / self.ms.len().max(1) as f64)
     }

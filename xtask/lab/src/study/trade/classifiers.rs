@@ -17,11 +17,11 @@ const AS_THE_BASELINE: usize = 1024;
 /// Threads whose times on a Raspberry Pi 5 are modelled: it has four cores.
 const PI_THREADS: [usize; 3] = [1, 2, 4];
 
-/// How far the grid reaches.
-pub struct Grid {
+/// The values that are swept.
+pub struct Sweep {
     /// Points that networks see.
     pub points: Vec<usize>,
-    /// Ways to choose them.
+    /// How they are chosen.
     pub samplers: Vec<SamplerConfig>,
     /// What to compute in besides fp32.
     pub precisions: Vec<Precision>,
@@ -29,7 +29,7 @@ pub struct Grid {
     pub threads: Vec<usize>,
 }
 
-impl Grid {
+impl Sweep {
     /// Everything that a user can choose.
     pub fn whole() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -41,7 +41,7 @@ impl Grid {
         }
     }
 
-    /// A corner of it.
+    /// A few of them.
     pub fn quick() -> Self {
         Self {
             points: vec![16, 64],
@@ -70,8 +70,8 @@ pub fn as_trained(model: &Path) -> Result<Classifying> {
     })
 }
 
-/// One setting at a time, then combinations along the front, for `model` on `set`;
-/// those that the model or the clouds cannot have are left out.
+/// Rows of one parameter at a time, then of combinations of the promising ones, for
+/// `model` on `set`; what the model or the clouds do not allow is left out.
 ///
 /// # Errors
 /// A model that cannot be read or does not know the classes; a set that does
@@ -79,24 +79,24 @@ pub fn as_trained(model: &Path) -> Result<Classifying> {
 pub fn rows(
     model: &Path,
     set: &TestSet,
-    grid: &Grid,
+    sweep: &Sweep,
     rounds: usize,
     pi: Option<&Modelled>,
 ) -> Result<Vec<Row>> {
     let (trained, summary) = (as_trained(model)?, inspect(model)?);
     let measured = |setting: Classifying, answers: Answers, reference: Option<&Answers>| {
         let mut row = setting.row(set, &summary, &answers, reference.unwrap_or(&answers));
-        row.knob = knob(&setting, &trained);
+        row.knob = varied(&setting, &trained);
         eprintln!("{row}: {:.1} %", 100.0 * row.accuracy);
         Measured { setting, answers, row }
     };
     let mut first: Vec<Measured> = Vec::new();
-    for setting in sampled(&trained, set, grid) {
+    for setting in sampled(&trained, set, sweep) {
         let answers = setting.answers(&set.clouds)?;
         first.push(measured(setting, answers, None));
     }
     let more: Vec<Measured> = promising(&first, &trained)
-        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, grid, &summary))
+        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, sweep, &summary))
         .map(|setting| {
             let reference = first.iter().find(|sampled| sampled.setting.chooses_as(&setting));
             let answers = setting.answers(&set.clouds)?;
@@ -118,7 +118,7 @@ struct Measured {
     row: Row,
 }
 
-/// Times all settings in turns, so that a slow minute is everybody's.
+/// Times all settings in turns, so that a slow minute affects them all.
 fn time(all: &mut [Measured], set: &TestSet, rounds: usize) -> Result<()> {
     let energy = Energy::here();
     let mut costs = vec![Costs::default(); all.len()];
@@ -133,19 +133,19 @@ fn time(all: &mut [Measured], set: &TestSet, rounds: usize) -> Result<()> {
     Ok(())
 }
 
-/// Of ways to choose points those that are worth more precisions: those with the
-/// model's own sampler or its number of points, and those that no way with as few
-/// points beats.
+/// The samplings that are measured in every precision: those with the model's own
+/// sampler or its number of points, and those that are more accurate than every other
+/// with as few points.
 fn promising<'a>(
     all: &'a [Measured],
     trained: &'a Classifying,
 ) -> impl Iterator<Item = &'a Measured> {
-    all.iter().filter(move |way| {
+    all.iter().filter(move |sampled| {
         let beaten = |other: &Measured| {
-            other.setting.points <= way.setting.points && other.row.right > way.row.right
+            other.setting.points <= sampled.setting.points && other.row.right > sampled.row.right
         };
-        way.setting.sampler == trained.sampler
-            || way.setting.points == trained.points
+        sampled.setting.sampler == trained.sampler
+            || sampled.setting.points == trained.points
             || !all.iter().any(beaten)
     })
 }
@@ -170,12 +170,12 @@ fn with_pi(row: Row, setting: &Classifying, from: usize, pi: Option<&Modelled>) 
     PI_THREADS.iter().zip(ms).map(on_board).collect()
 }
 
-/// The ways to choose points, in fp32 on one thread.
-fn sampled(trained: &Classifying, set: &TestSet, grid: &Grid) -> Vec<Classifying> {
+/// Every sampler and number of points, in fp32 on one thread.
+fn sampled(trained: &Classifying, set: &TestSet, sweep: &Sweep) -> Vec<Classifying> {
     let most = set.most_points();
     let mut all = Vec::new();
-    for &sampler in &grid.samplers {
-        let points = grid.points.iter().copied().filter(|&points| points <= most);
+    for &sampler in &sweep.samplers {
+        let points = sweep.points.iter().copied().filter(|&points| points <= most);
         all.extend(points.map(|points| Classifying { sampler, points, ..trained.clone() }));
     }
     // All points of a cloud are the same whoever chooses them.
@@ -201,13 +201,13 @@ fn loads(setting: &Classifying, most: usize) -> bool {
 fn with_precisions(
     samples: &Classifying,
     trained: &Classifying,
-    grid: &Grid,
+    sweep: &Sweep,
     summary: &Summary,
 ) -> Vec<Classifying> {
     let precise = |&precision: &Precision| Classifying { precision, ..samples.clone() };
-    let mut all: Vec<Classifying> = grid.precisions.iter().map(precise).collect();
+    let mut all: Vec<Classifying> = sweep.precisions.iter().map(precise).collect();
     if samples.chooses_as(trained) {
-        let threads = grid.threads.iter();
+        let threads = sweep.threads.iter();
         all.extend(threads.map(|&threads| Classifying { threads, ..samples.clone() }));
         if summary.stn.is_some() || summary.fstn.is_some() {
             all.push(Classifying { t_nets: TNets::Neither, ..samples.clone() });
@@ -216,20 +216,21 @@ fn with_precisions(
     all
 }
 
-fn knob(setting: &Classifying, trained: &Classifying) -> String {
-    let turned = [
+/// The parameters in which `setting` differs from `trained`.
+fn varied(setting: &Classifying, trained: &Classifying) -> String {
+    let differ = [
         ("sampler", setting.sampler != trained.sampler),
         ("points", setting.points != trained.points),
         ("precision", setting.precision != trained.precision),
         ("T-Nets", setting.t_nets != trained.t_nets),
         ("threads", setting.threads != trained.threads),
     ];
-    let turned: Vec<&str> = turned.iter().filter(|(_, is)| *is).map(|(name, _)| *name).collect();
-    if turned.is_empty() { "reference".to_owned() } else { turned.join(" and ") }
+    let names: Vec<&str> = differ.iter().filter(|(_, is)| *is).map(|(name, _)| *name).collect();
+    if names.is_empty() { "reference".to_owned() } else { names.join(" and ") }
 }
 
 /// Modelled milliseconds for each of [`PI_THREADS`]; `None` for what is not
-/// modelled: of voxels nobody knows beforehand how many points they leave.
+/// modelled: the number of points that voxels leave is not known beforehand.
 fn pi_ms(setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Option<Vec<f64>> {
     let (Some(pi), TNets::Both) = (pi, setting.t_nets) else { return None };
     // Tiles of the model are of eight rows.
@@ -256,7 +257,7 @@ fn pi_ms(setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Option<Ve
     }
 }
 
-/// The Raspberry Pi's model of a model file, or why there is none.
+/// The modelled times of `model` on a Raspberry Pi; a message says why there are none.
 pub fn on_a_pi(model: &Path) -> Option<Modelled> {
     match Modelled::open(model) {
         Ok(modelled) => Some(modelled),
@@ -267,7 +268,8 @@ pub fn on_a_pi(model: &Path) -> Option<Modelled> {
     }
 }
 
-/// Bundled models that tell the classes of `set`, and as few others as any.
+/// The bundled models that know the classes of `set`, of those the ones with the fewest
+/// classes.
 ///
 /// # Errors
 /// A folder that cannot be read.

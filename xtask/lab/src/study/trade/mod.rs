@@ -20,7 +20,7 @@ use crate::measure::lanes;
 use crate::measure::machine::Machine;
 use anyhow::{Context, Result, ensure};
 use classes::TestSet;
-use classifiers::{Grid, as_trained, bundled, on_a_pi};
+use classifiers::{Sweep, as_trained, bundled, on_a_pi};
 use edgepuck_program::flags::need_folder_of_meshes;
 use edgepuck_program::trade_record::{self, Part, Row};
 use edgepuck_program::{Outcome, gen_shapes};
@@ -36,38 +36,38 @@ use xtask::workspace::file_name;
 /// Flags of `trade`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder of meshes, as gen-dataset takes it; the test meshes are scanned [default: shapes
-    /// of our own]
+    /// Folder of meshes, as gen-dataset takes it; the test meshes are scanned [default:
+    /// built-in procedural shapes]
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
-    /// What the record calls them [default: the folder's name]
+    /// Name of the meshes in the record [default: the folder's name]
     #[arg(long, value_name = "TEXT", requires = "meshes")]
     meshes_name: Option<String>,
 
-    /// Classifies the scans; it must know the meshes' classes [default: the bundled weights
-    /// that do]
+    /// Model that classifies the scans; it must know the meshes' classes [default: the bundled
+    /// models that do]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
-    /// Labelled clouds for models, samplers, points and precisions, a packed NPZ [default: the
-    /// scans themselves]
+    /// Labelled clouds on which models, samplers, points and precisions are compared, a packed
+    /// NPZ file [default: the scans themselves]
     #[arg(long, value_name = "NPZ")]
     clouds: Option<PathBuf>,
 
-    /// What the record calls them [default: the file's name]
+    /// Name of the clouds in the record [default: the file's name]
     #[arg(long, value_name = "TEXT", requires = "clouds")]
     clouds_name: Option<String>,
 
-    /// Few meshes, few settings, no model of a Raspberry Pi: in two minutes
+    /// Measure few meshes and few settings, and do not model a Raspberry Pi: takes two minutes
     #[arg(long)]
     quick: bool,
 
-    /// Counted rounds of all scans and of all classifiers; medians are taken
+    /// Rounds of all scans and of all classifiers; the medians are recorded
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     rounds: u16,
 
-    /// Where trade.csv, trade.html and the drawings go
+    /// Folder for trade.csv, trade.html and the charts
     #[arg(long, value_name = "DIR", default_value = "data/trade")]
     out: PathBuf,
 }
@@ -122,7 +122,7 @@ fn name_of_meshes(args: &Args) -> String {
     format!("scans of {}", named.as_deref().unwrap_or("shapes of our own"))
 }
 
-/// The models that tell the classes of `set`: the one asked for, or bundled ones.
+/// The models that know the classes of `set`: the one asked for, or bundled ones.
 fn models_for(args: &Args, set: &TestSet) -> Result<Vec<PathBuf>> {
     if let Some(model) = &args.model {
         set.fits(model)?;
@@ -131,7 +131,7 @@ fn models_for(args: &Args, set: &TestSet) -> Result<Vec<PathBuf>> {
     let known = bundled(set)?;
     ensure!(
         !known.is_empty(),
-        "no bundled model knows the classes of {}: name one by --model",
+        "no bundled model knows the classes of {}; name a model with --model",
         set.name
     );
     Ok(known)
@@ -192,11 +192,11 @@ fn classifier_rows(
         let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
         TestSet { clouds, ..reference }
     });
-    let grid = if args.quick { Grid::quick() } else { Grid::whole() };
+    let sweep = if args.quick { Sweep::quick() } else { Sweep::whole() };
     let mut rows = Vec::new();
     for model in models {
         let pi = if args.quick { None } else { on_a_pi(model) };
-        rows.extend(classifiers::rows(model, &set, &grid, usize::from(args.rounds), pi.as_ref())?);
+        rows.extend(classifiers::rows(model, &set, &sweep, usize::from(args.rounds), pi.as_ref())?);
     }
     Ok(rows)
 }

@@ -72,7 +72,7 @@ pub fn scan_all(
         let step = way.azimuth_step_deg.map(|step| format!(" {step:.1}°")).unwrap_or_default();
         eprintln!(
             "{}: {}{step}, {} m, noise {noise_m} m, quantum {quantum_m} m",
-            way.knob, way.name, way.distance_m
+            way.parameter, way.name, way.distance_m
         );
         let truth = truths.entry(way.distance_m.to_bits());
         let truth = truth.or_insert_with(|| truth_from(objects, way.distance_m));
@@ -110,7 +110,7 @@ fn judged(
     let clouds: Vec<Cloud> = made.into_iter().map(|made| made.scan.positions).collect();
     let row = Row {
         part: Part::Scan,
-        knob: way.knob.to_owned(),
+        knob: way.parameter.to_owned(),
         sensor: way.name.clone(),
         beams: Some(way.beams),
         azimuth_step_deg: way.azimuth_step_deg,

@@ -1,16 +1,16 @@
-//! The VLP-32C, and what may be left out of it.
+//! The VLP-32C, and the sensors and settings compared with it.
 
 use crate::study::uniform_raster::as_even_grid;
 use sim_gpu::effects::{Effects, Noise, NoiseModel, Quantum};
 use sim_gpu::sensor::{Layout, Sensor};
 use std::num::NonZeroU32;
 
-/// A way to scan.
+/// The settings of a scan.
 #[derive(Clone)]
 pub struct Scanning {
-    /// The knob that is turned.
-    pub knob: &'static str,
-    /// The sensor's name, and what was made of it.
+    /// The parameter that differs from the reference.
+    pub parameter: &'static str,
+    /// The sensor's name, and how it differs from its profile.
     pub name: String,
     /// The sensor.
     pub sensor: Sensor,
@@ -35,7 +35,7 @@ impl Scanning {
     pub fn reference() -> Self {
         let sensor = vlp32c();
         Self {
-            knob: "reference",
+            parameter: "reference",
             name: sensor.name.clone(),
             beams: 32,
             azimuth_step_deg: azimuth_step_deg(&sensor),
@@ -62,8 +62,8 @@ impl Scanning {
         }
     }
 
-    fn turned(self, knob: &'static str) -> Self {
-        Self { knob, ..self }
+    fn varying(self, parameter: &'static str) -> Self {
+        Self { parameter, ..self }
     }
 
     fn with_beams(self, keep_each: usize) -> Self {
@@ -84,30 +84,30 @@ impl Scanning {
     }
 }
 
-/// Each knob by itself, away from the reference.
+/// Each parameter by itself, the others as in the reference.
 pub fn one_at_a_time() -> Vec<Scanning> {
     let reference = Scanning::reference;
     let mut all = vec![reference()];
-    all.extend([2, 4].map(|keep_each| reference().with_beams(keep_each).turned("beams")));
+    all.extend([2, 4].map(|keep_each| reference().with_beams(keep_each).varying("beams")));
     all.extend([even_grid(), blainder()]);
-    all.extend([1, 4, 8].map(|k| reference().with_azimuth(k).turned("azimuth step")));
+    all.extend([1, 4, 8].map(|k| reference().with_azimuth(k).varying("azimuth step")));
     all.extend([0.004, 0.02].map(|range_quantum_m| Scanning {
         range_quantum_m,
-        ..reference().turned("range quantum")
+        ..reference().varying("range quantum")
     }));
     all.extend(
         [0.0, 0.005, 0.02, 0.05, 0.1]
-            .map(|noise_m| Scanning { noise_m, ..reference().turned("noise") }),
+            .map(|noise_m| Scanning { noise_m, ..reference().varying("noise") }),
     );
     all.extend(
         [2.0, 5.0, 10.0, 20.0, 50.0]
-            .map(|distance_m| Scanning { distance_m, ..reference().turned("distance") }),
+            .map(|distance_m| Scanning { distance_m, ..reference().varying("distance") }),
     );
     all
 }
 
-/// What can be left out of a sensor, in all combinations, near and far: what
-/// costs nothing at 3 m may cost everything at 20 m.
+/// Fewer beams and fewer azimuth steps in all combinations, near and far: what
+/// loses nothing at 3 m may lose everything at 20 m.
 pub fn combinations() -> Vec<Scanning> {
     let mut all = Vec::new();
     for distance_m in [3.0, 5.0, 10.0, 20.0] {
@@ -118,7 +118,7 @@ pub fn combinations() -> Vec<Scanning> {
                     1 => scanning,
                     _ => scanning.with_beams(keep_each),
                 };
-                all.push(scanning.with_azimuth(k).turned("combination"));
+                all.push(scanning.with_azimuth(k).varying("combination"));
             }
         }
     }
@@ -167,9 +167,9 @@ fn blainder() -> Scanning {
     of_another("beam table", sensor.name.clone(), sensor, 122)
 }
 
-fn of_another(knob: &'static str, name: String, sensor: Sensor, beams: usize) -> Scanning {
+fn of_another(parameter: &'static str, name: String, sensor: Sensor, beams: usize) -> Scanning {
     let azimuth_step_deg = azimuth_step_deg(&sensor);
-    Scanning { knob, name, beams, azimuth_step_deg, sensor, ..Scanning::reference() }
+    Scanning { parameter, name, beams, azimuth_step_deg, sensor, ..Scanning::reference() }
 }
 
 #[cfg(test)]
@@ -199,21 +199,26 @@ mod tests {
     }
 
     #[test]
-    fn one_knob_is_turned_at_a_time() {
-        let knobs = |s: &Scanning| {
+    fn one_parameter_varies_at_a_time() {
+        let values = |s: &Scanning| {
             (s.name.clone(), s.azimuth_step_deg, s.distance_m, s.noise_m, s.range_quantum_m)
         };
-        let reference = knobs(&Scanning::reference());
+        let reference = values(&Scanning::reference());
         for scanning in &one_at_a_time()[1..] {
-            let turned = knobs(scanning);
+            let varied = values(scanning);
             let differ = [
-                turned.0 != reference.0,
-                turned.0 == reference.0 && turned.1 != reference.1,
-                turned.2 != reference.2,
-                turned.3 != reference.3,
-                turned.4 != reference.4,
+                varied.0 != reference.0,
+                varied.0 == reference.0 && varied.1 != reference.1,
+                varied.2 != reference.2,
+                varied.3 != reference.3,
+                varied.4 != reference.4,
             ];
-            assert_eq!(differ.iter().filter(|&&differs| differs).count(), 1, "{}", scanning.knob);
+            assert_eq!(
+                differ.iter().filter(|&&differs| differs).count(),
+                1,
+                "{}",
+                scanning.parameter
+            );
         }
     }
 }
