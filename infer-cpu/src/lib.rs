@@ -42,7 +42,7 @@ pub mod sharing {
 /// another form.
 pub mod model_file {
     pub use crate::dense::Dense;
-    pub use crate::network::{Network, TNet, read};
+    pub use crate::network::{Network, TNet, read, read_bytes};
 }
 
 #[cfg(feature = "npz")]

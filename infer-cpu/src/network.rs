@@ -10,6 +10,7 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
 use formats::FormatError;
 use formats::model_card::ModelCard;
@@ -88,8 +89,22 @@ const WIDEST: usize = 1 << 16;
 /// # Errors
 /// A file that is no model: what [`crate::Classifier::load`] refuses.
 pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    let mut file = WeightsFile::open(path)?;
-    let card = ModelCard::from_metadata(path, &file.metadata())?;
+    read_from(WeightsFile::open(path)?)
+}
+
+/// As [`read`], from the `bytes` of a model file that errors call `name`.
+///
+/// # Errors
+/// Bytes that are not a model file: what [`crate::Classifier::from_bytes`] refuses.
+pub fn read_bytes(
+    name: &Path,
+    bytes: Arc<[u8]>,
+) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
+    read_from(WeightsFile::from_bytes(name, bytes)?)
+}
+
+fn read_from(mut file: WeightsFile) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
+    let card = ModelCard::from_metadata(file.path(), &file.metadata())?;
     let network = read_network(&mut file, &card, |dense, _| dense, |dense| dense)?;
     Ok((card, network))
 }

@@ -11,8 +11,8 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use formats::atomic;
 use formats::model_card::ModelCard;
+use formats::{FormatError, atomic};
 use infer_cpu::model_file;
 use prost::Message;
 
@@ -35,8 +35,8 @@ const LARGEST: usize = i32::MAX as usize;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  edgepuck export-onnx pointnet-64 --out pointnet-64.onnx
-  edgepuck export-onnx cpl-64 --critical-points --out cpl-64.onnx
+  edgepuck export-onnx edge-64 --out edge-64.onnx
+  edgepuck export-onnx cpl-64.safetensors --critical-points --out cpl-64.onnx
 
 Opset 18, IR version 8, f32. Batch norms are folded into weights. Weights are
 named as in PyTorch's checkpoints (feat.conv1.weight).
@@ -44,16 +44,16 @@ named as in PyTorch's checkpoints (feat.conv1.weight).
 Inputs, f32, normalised as the model's card says (unit-sphere: mean to 0, largest
 radius to 1; infer-cpu does it by itself, a graph does not):
   points [batch, points, 3]  what the network sees, chosen by any sampler
-  cloud  [batch, all, 3]     all points, for networks that look around theirs
-With --critical-points `cloud` is the only input: the graph chooses. Surroundings
-take up points x all x 64 channels x 4 bytes at a time: 16 MB for 64 of 1,024.
+  cloud  [batch, all, 3]     all points, for networks with EdgeConv features
+With --critical-points, `cloud` is the only input, and the graph selects the points.
+EdgeConv takes points x all x 64 channels x 4 bytes: 16 MB for 64 of 1,024 points.
 Outputs:
   logits [batch, classes]    before any softmax, as infer-cpu's --json has them
   kept   [batch, M], int64   with --critical-points: the points chosen, by index
 
 The card (classes, normalization, sampler, ...) is in the file's metadata_props.")]
 pub struct Args {
-    /// Model file, or the name of a bundled one, such as edge-64
+    /// Model file, or the name of a bundled model: edge-64, or in a checkout any in assets/weights
     #[arg(value_name = "MODEL")]
     model: PathBuf,
 
@@ -61,12 +61,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// Put the model's Critical Points Layer into the graph, as infer-cpu's
-    /// --sampler cpl
+    /// Include the model's Critical Points Layer in the graph, as infer-cpu's --sampler cpl
     #[arg(long)]
     critical_points: bool,
 
-    /// How many points the layer keeps [default: as the model was trained]
+    /// Number of points that the layer keeps [default: as the model was trained]
     #[arg(long, value_name = "M", requires = "critical_points")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     points: Option<u32>,
@@ -75,7 +74,7 @@ pub struct Args {
 /// Exports the model.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let path = find(&args.model);
-    let (card, net) = model_file::read(&path)?;
+    let (card, net) = read(&path)?;
     let n_points = args.critical_points.then(|| kept_points(args, &path, &card)).transpose()?;
     let here = || format!("{} cannot be exported", path.display());
     let model = export(&net, &card, n_points).with_context(here)?;
@@ -101,6 +100,17 @@ fn find(model: &Path) -> PathBuf {
     };
     let found = if model.exists() { None } else { checkout::root().and_then(bundled) };
     found.unwrap_or_else(|| model.to_path_buf())
+}
+
+/// The name under which the default model is built in.
+const BUILTIN: &str = "edge-64";
+
+/// Reads the model file, or the model that is built into this program.
+fn read(path: &Path) -> Result<(ModelCard, Net), FormatError> {
+    if path == Path::new(BUILTIN) && !path.exists() {
+        return model_file::read_bytes(path, edgepuck_assets::EDGE_64.into());
+    }
+    model_file::read(path)
 }
 
 fn kept_points(args: &Args, path: &Path, card: &ModelCard) -> anyhow::Result<usize> {

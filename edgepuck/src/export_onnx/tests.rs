@@ -115,3 +115,12 @@ fn what_onnx_cannot_choose_by_is_refused() {
     (net.front, net.stn) = (None, None);
     assert!(refused(&net).contains("neither a front end"), "{}", refused(&net));
 }
+
+#[test]
+fn the_default_model_is_exported_without_a_file() {
+    let (card, built_in) = read(Path::new(BUILTIN)).unwrap();
+    let (_, from_file) =
+        model_file::read(&root().join("assets/weights/edge-64.safetensors")).unwrap();
+    let export = |net| export(net, &card, None).unwrap().encode_to_vec();
+    assert!(export(&built_in) == export(&from_file));
+}
