@@ -1,6 +1,8 @@
 //! The repository's command line: its chores, and a way to its programs.
 
 mod forward;
+mod release_check;
+mod summary;
 mod test;
 
 use clap::{Parser, Subcommand};
@@ -26,6 +28,8 @@ struct Cli {
 enum Command {
     /// Install what tests need and run all of them
     Test(test::Args),
+    /// Check what a release needs besides the tests: packages, binaries, dependencies
+    ReleaseCheck,
     /// Build infer-cpu as one static file for a Raspberry Pi
     BuildPi(build_pi::Args),
     /// Measure speed and accuracy: `cargo xtask bench --help`
@@ -61,6 +65,7 @@ struct Forwarded {
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Test(args) => test::run(&args),
+        Command::ReleaseCheck => release_check::run(),
         Command::BuildPi(args) => build_pi::run(&args).map(|()| 0),
         Command::Bench(args) => forward::run(Program::Lab, Some("bench"), &args.words),
         Command::Trade(args) => forward::run(Program::Lab, Some("trade"), &args.words),

@@ -4,12 +4,11 @@ mod fuzz;
 mod peers;
 mod pi;
 mod sanitize;
-mod summary;
 mod test_programs;
 
+use crate::summary::{Counts, Summary};
 use anyhow::bail;
 use std::process::Command;
-use summary::{Counts, Summary};
 use xtask::workspace::{cargo, root, step};
 
 /// The script that lists and installs the packages that tests need.

@@ -1,6 +1,6 @@
 //! Feeds each hand-written parser with mutated input for a while.
 
-use super::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary};
 use anyhow::Context;
 use std::fs::{self, File};
 use std::path::Path;

@@ -8,7 +8,7 @@
 //! is an `x-requirements.txt`: packages too large for every run.
 
 use super::cargo_on_all;
-use super::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary};
 use anyhow::Context;
 use serde_json::Value;
 use std::fs;

@@ -1,7 +1,7 @@
 //! What is compiled for the Raspberry Pi: lints, tests under an emulator, the binary.
 
-use super::summary::{Counts, Summary};
 use super::{check, go_without, test_programs};
+use crate::summary::{Counts, Summary};
 use xtask::{build_pi, pi_target};
 
 /// Runs the three checks; those that cannot run here fail where they are `required`.

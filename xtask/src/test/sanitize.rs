@@ -1,8 +1,8 @@
 //! The tests of kernels and parsers under AddressSanitizer, which finds what a
 //! wrong offset in `unsafe` code reads or writes.
 
-use super::summary::Summary;
 use super::{go_without, test_programs};
+use crate::summary::Summary;
 use std::process::Command;
 use xtask::workspace::{cargo, output};
 

@@ -1,6 +1,6 @@
 //! Runs test programs through Cargo and counts their tests.
 
-use super::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary};
 use anyhow::Context;
 use std::fs;
 use std::io::{BufRead, BufReader};

@@ -1,0 +1,121 @@
+//! `cargo xtask release-check`: what a release must pass besides the tests.
+
+use crate::summary::{Counts, Summary};
+use anyhow::{Context, bail};
+use serde_json::Value;
+use std::process::Command;
+use xtask::workspace::{cargo, output, root, step};
+
+/// A program that checks, and the package that installs it.
+struct Tool {
+    program: &'static str,
+    package: &'static str,
+}
+
+const DIST: Tool = Tool { program: "dist", package: "cargo-dist" };
+const DENY: Tool = Tool { program: "cargo-deny", package: "cargo-deny" };
+const SEMVER: Tool = Tool { program: "cargo-semver-checks", package: "cargo-semver-checks" };
+
+/// Runs every check, whether or not one before it failed, and ends with a table.
+pub fn run() -> anyhow::Result<u8> {
+    let mut summary = Summary::default();
+    summary.step("packages", |_| packages());
+    summary.step("binaries", binaries);
+    summary.step("dependencies", |_| {
+        let mut deny = DENY.command()?;
+        check("dependencies", deny.args(["check", "--hide-inclusion-graph"]))
+    });
+    summary.step("semantic versions", semantic_versions);
+    println!("{summary}");
+    Ok(u8::from(summary.total().failed > 0))
+}
+
+/// That every crate for crates.io builds from what its package holds.
+fn packages() -> anyhow::Result<Counts> {
+    let mut package = cargo(&["package", "--allow-dirty"]);
+    for crate_ in crates()?.iter().filter(|crate_| crate_["publish"].is_null()) {
+        package.args(["--package", crate_["name"].as_str().unwrap_or_default()]);
+    }
+    check("packages", &mut package)
+}
+
+/// What a release would hold for each system.
+fn binaries(summary: &mut Summary) -> anyhow::Result<Counts> {
+    let is_known = crates()?.iter().any(|crate_| crate_["repository"].is_string());
+    if !is_known {
+        return Ok(skip(summary, "binaries", "no manifest names the `repository` to release from"));
+    }
+    check("binaries", DIST.command()?.arg("plan"))
+}
+
+/// That the public interface changes as the versions say.
+fn semantic_versions(summary: &mut Summary) -> anyhow::Result<Counts> {
+    let mut git = Command::new("git");
+    let tags = output(git.args(["tag", "--list", "v*"]).current_dir(root()))?;
+    if tags.trim().is_empty() {
+        return Ok(skip(summary, "semantic versions", "no version has been released yet"));
+    }
+    check("semantic versions", SEMVER.command()?.args(["semver-checks", "--workspace"]))
+}
+
+fn check(name: &str, command: &mut Command) -> anyhow::Result<Counts> {
+    step(name, command).map(|()| Counts::PASSED)
+}
+
+fn skip(summary: &mut Summary, name: &str, reason: &str) -> Counts {
+    summary.remark(format!("{name}: SKIPPED, {reason}"));
+    Counts::SKIPPED
+}
+
+/// The workspace's crates as `cargo metadata` describes them.
+fn crates() -> anyhow::Result<Vec<Value>> {
+    let metadata = output(&mut cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
+    let mut metadata: Value = serde_json::from_str(&metadata).context("cargo metadata")?;
+    Ok(metadata["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
+}
+
+impl Tool {
+    /// The program, at the workspace's root.
+    ///
+    /// # Errors
+    /// It is not installed; the error says what installs it.
+    fn command(&self) -> anyhow::Result<Command> {
+        let Self { program, package } = self;
+        if Command::new(program).arg("--version").output().is_err() {
+            bail!("{program} is missing: `cargo install --locked {package}` installs it");
+        }
+        let mut command = Command::new(program);
+        command.current_dir(root());
+        Ok(command)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_tool_is_named_with_what_installs_it() {
+        let tool = Tool { program: "edgepuck-no-such-tool", package: "a-package" };
+        let error = tool.command().unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "edgepuck-no-such-tool is missing: `cargo install --locked a-package` installs it"
+        );
+    }
+
+    #[test]
+    fn the_crates_for_users_are_published_and_the_chores_are_not() {
+        let crates = crates().unwrap();
+        let is_published = |name: &str| {
+            let crate_ = crates.iter().find(|crate_| crate_["name"] == name).unwrap();
+            crate_["publish"].is_null()
+        };
+        assert!(
+            ["edgepuck", "edgepuck-formats", "sim-gpu", "infer-cpu"]
+                .iter()
+                .all(|n| is_published(n))
+        );
+        assert!(!["xtask", "tests", "edgepuck-lab"].iter().any(|n| is_published(n)));
+    }
+}
