@@ -1,5 +1,5 @@
 // Watertight ray-triangle test: Woop, Benthin, Wald, "Watertight ray/triangle
-// intersection", JCGT 2(1), 2013. Twin: `sim-gpu/src/cpu/intersect.rs`.
+// intersection", JCGT 2(1), 2013. Counterpart: `sim-gpu/src/cpu/intersect.rs`.
 //
 // Two triangles that share an edge must get exactly opposite values of its
 // edge function. Corners come in canonical order, so a shared edge is always

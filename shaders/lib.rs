@@ -18,12 +18,12 @@ pub const STREAM: &str = include_str!("shared/stream.wgsl");
 /// A normal deviate from random bits.
 pub const NORMAL_DEVIATE: &str = include_str!("shared/normal_deviate.wgsl");
 /// The buffer that effects write to.
-pub const WORDS: &str = include_str!("shared/words.wgsl");
-/// Gaussian error of the range.
-pub const NOISE_RANGE: &str = include_str!("effects/noise_range.wgsl");
-/// Gaussian error of each coordinate.
-pub const NOISE_XYZ: &str = include_str!("effects/noise_xyz.wgsl");
-/// Lost returns.
-pub const DROPOUT: &str = include_str!("effects/dropout.wgsl");
-/// Intensity of a return.
-pub const INTENSITY: &str = include_str!("effects/intensity.wgsl");
+pub const EFFECT_OUTPUTS: &str = include_str!("shared/effect_outputs.wgsl");
+
+/// The effects: the name of each one's function, and its source.
+pub const EFFECTS: [(&str, &str); 4] = [
+    ("noise_range", include_str!("effects/noise_range.wgsl")),
+    ("noise_xyz", include_str!("effects/noise_xyz.wgsl")),
+    ("dropout", include_str!("effects/dropout.wgsl")),
+    ("intensity", include_str!("effects/intensity.wgsl")),
+];

@@ -1,4 +1,4 @@
-// Finds the nearest triangle along a ray. Twin: `sim-gpu/src/cpu/traverse.rs`.
+// Finds the nearest triangle along a ray. Counterpart: `sim-gpu/src/cpu/traverse.rs`.
 
 fn reciprocal(direction: vec3f) -> vec3f {
     let away = select(vec3f(-LEAST_COMPONENT), vec3f(LEAST_COMPONENT), direction >= vec3f(0.0));

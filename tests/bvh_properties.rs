@@ -3,10 +3,10 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use sim_gpu::bvh::{Builder, Bvh, LeafTriangle, assert_well_formed};
+use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::AdapterRequest;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::target::Target;

@@ -1,15 +1,12 @@
 //! The effects' shaders against their f64 twins:
 //! `shaders/effects/{noise_range,noise_xyz,dropout,intensity}.wgsl`,
-//! `shaders/shared/{stream,normal_deviate}.wgsl` and `sim-gpu/src/cpu/effects`.
+//! `shaders/shared/{stream,normal_deviate}.wgsl` and `sim-gpu/src/cpu/effects.rs`.
 
 use std::sync::Arc;
 
 use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
-use sim_gpu::cpu::effects::dropout::dropout;
-use sim_gpu::cpu::effects::intensity::intensity;
-use sim_gpu::cpu::effects::noise_range::noise_range;
-use sim_gpu::cpu::effects::noise_xyz::noise_xyz;
+use sim_gpu::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::pose::Pose;
@@ -56,7 +53,7 @@ fn streams() -> Vec<StreamKey> {
     names.iter().enumerate().map(key).collect()
 }
 
-fn words(caster: &sim_gpu::caster::Caster, job: &CastJob) -> Cast {
+fn cast_all_hit(caster: &sim_gpu::caster::Caster, job: &CastJob) -> Cast {
     let mut casts = caster.cast(std::slice::from_ref(job)).expect("the adapter casts");
     let cast = casts.remove(0);
     assert!(cast.codes.iter().all(|&code| code != MISS));
@@ -77,8 +74,8 @@ fn range_noise_is_the_twins() {
         let gpu = need!(adapter(&effects));
         for stream in streams() {
             let job = all_hit(stream, &pattern);
-            let cast = words(gpu, &job);
-            for (&beam, &word) in job.beams.iter().zip(&cast.words) {
+            let cast = cast_all_hit(gpu, &job);
+            for (&beam, &word) in job.beams.iter().zip(&cast.effect_outputs) {
                 let error = (f64::from(word) - noise_range(&noise, stream, beam)).abs();
                 assert!(error <= noise_tolerance(&noise), "beam {beam}: {error:.2e} of {noise:?}");
             }
@@ -94,8 +91,8 @@ fn point_noise_is_the_twins() {
         let gpu = need!(adapter(&effects));
         for stream in streams() {
             let job = all_hit(stream, &pattern);
-            let cast = words(gpu, &job);
-            for (&beam, word) in job.beams.iter().zip(cast.words.chunks_exact(3)) {
+            let cast = cast_all_hit(gpu, &job);
+            for (&beam, word) in job.beams.iter().zip(cast.effect_outputs.chunks_exact(3)) {
                 let word = DVec3::new(word[0].into(), word[1].into(), word[2].into());
                 let error = (word - noise_xyz(&noise, stream, beam)).abs().max_element();
                 assert!(error <= noise_tolerance(&noise), "beam {beam}: {error:.2e} of {noise:?}");
@@ -113,9 +110,9 @@ fn the_same_returns_drop_out_everywhere() {
         for caster in casters(&effects) {
             for stream in streams() {
                 let job = all_hit(stream, &pattern);
-                let cast = words(caster, &job);
+                let cast = cast_all_hit(caster, &job);
                 let mut dropped = 0;
-                for (&beam, &word) in job.beams.iter().zip(&cast.words) {
+                for (&beam, &word) in job.beams.iter().zip(&cast.effect_outputs) {
                     assert_eq!(word == 1.0, dropout(&model, stream, beam), "beam {beam}");
                     assert!(word == 0.0 || word == 1.0);
                     dropped += usize::from(word == 1.0);
@@ -151,7 +148,7 @@ fn intensity_is_the_twins() {
             let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
             let mut n = 0;
             for ((&code, &beam), &word) in
-                casts[0].codes.iter().zip(&job.beams).zip(&casts[0].words)
+                casts[0].codes.iter().zip(&job.beams).zip(&casts[0].effect_outputs)
             {
                 if code == MISS {
                     continue;
@@ -171,7 +168,7 @@ fn intensity_is_the_twins() {
 }
 
 #[test]
-fn the_words_of_all_effects_stand_side_by_side() {
+fn the_outputs_of_all_effects_stand_side_by_side() {
     let noise = noise(NoiseModel::Xyz, 0.0, 0.5);
     let dropout = Dropout { probability: 0.25 };
     let all = Effects {
@@ -191,7 +188,7 @@ fn the_words_of_all_effects_stand_side_by_side() {
         let job = all_hit(StreamKey::new(3, "x", 1), &pattern);
         casters(effects)
             .iter()
-            .map(|caster| hits_with(caster, &job, &pattern, effects).words)
+            .map(|caster| hits_with(caster, &job, &pattern, effects).effect_outputs)
             .collect()
     };
     let together = on(&all);

@@ -8,7 +8,7 @@ use std::f64::consts::SQRT_2;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::cpu::effects::stream::{normal_deviate, stream_words};
+use sim_gpu::cpu::random::{normal_deviate, random_bits};
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::ray::RayFrame;
@@ -29,7 +29,7 @@ fn normal_cdf(z: f64) -> f64 {
 }
 
 fn deviates(key: StreamKey, n: u32) -> Vec<f64> {
-    (0..n).into_par_iter().map(|beam| normal_deviate(stream_words(key, beam, 1)[0])).collect()
+    (0..n).into_par_iter().map(|beam| normal_deviate(random_bits(key, beam, 1)[0])).collect()
 }
 
 fn assert_normal(deviates: &mut [f64]) {
@@ -160,7 +160,7 @@ fn deviates_of_different_things_do_not_correlate() {
         let key = StreamKey::new(1, "chair_0001", 2);
         (0..n)
             .into_par_iter()
-            .map(|beam| normal_deviate(stream_words(key, beam, purpose)[i]))
+            .map(|beam| normal_deviate(random_bits(key, beam, purpose)[i]))
             .collect()
     };
     let others = [
@@ -199,7 +199,7 @@ fn a_million_deviates_of_the_adapter_are_normal() {
     let stream = StreamKey::new(1, "chair_0001", 2);
     let job = CastJob::aim(target, frame, &pattern, Culling::On, stream, 1.0);
     let casts = gpu.cast(std::slice::from_ref(&job)).unwrap();
-    let mut deviates: Vec<f64> = casts[0].words.iter().map(|&word| word.into()).collect();
+    let mut deviates: Vec<f64> = casts[0].effect_outputs.iter().map(|&word| word.into()).collect();
     assert_eq!(deviates.len(), 1_000_000);
     assert_normal(&mut deviates);
 }

@@ -5,11 +5,13 @@ use std::collections::BTreeSet;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use naga::TypeInner;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use sim_gpu::bvh::{LeafTriangle, Node};
+use sim_gpu::cpu::effects::append_outputs;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
-use sim_gpu::gpu::{compose, modules};
+use sim_gpu::gpu::compose;
 use sim_gpu::ray::TraceRay;
 
 /// What every variant is made of.
@@ -38,7 +40,7 @@ fn variants() -> Vec<(Effects, Vec<&'static str>)> {
 fn files(noise: Option<NoiseModel>, dropout: bool, intensity: bool) -> Vec<&'static str> {
     let mut files = TRACE.to_vec();
     let mut add = |wanted: bool, file| files.extend(wanted.then_some(file));
-    add(noise.is_some() || dropout || intensity, "shared/words.wgsl");
+    add(noise.is_some() || dropout || intensity, "shared/effect_outputs.wgsl");
     add(noise.is_some() || dropout, "shared/stream.wgsl");
     add(noise.is_some(), "shared/normal_deviate.wgsl");
     add(noise == Some(NoiseModel::Range), "effects/noise_range.wgsl");
@@ -49,7 +51,7 @@ fn files(noise: Option<NoiseModel>, dropout: bool, intensity: bool) -> Vec<&'sta
 }
 
 fn parsed(effects: &Effects) -> naga::Module {
-    let wgsl = compose(&modules(effects));
+    let wgsl = compose(effects);
     let module = naga::front::wgsl::parse_str(&wgsl)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
     Validator::new(ValidationFlags::all(), Capabilities::default())
@@ -72,7 +74,7 @@ fn all_files() -> BTreeSet<String> {
     for folder in ["", "shared/", "effects/"] {
         for entry in std::fs::read_dir(root().join("shaders").join(folder)).expect("a folder") {
             let entry = entry.expect("a file");
-            if entry.file_type().expect("a file's type").is_file() {
+            if entry.path().extension().is_some_and(|extension| extension == "wgsl") {
                 files.insert(format!("{folder}{}", entry.file_name().display()));
             }
         }
@@ -125,7 +127,7 @@ fn the_plain_variant_holds_no_code_of_any_effect() {
     for (_, global) in module.global_variables.iter() {
         assert_eq!(global.binding.as_ref().map(|b| b.group), Some(0), "{:?}", global.name);
     }
-    let wgsl = compose(&modules(&Effects::default()));
+    let wgsl = compose(&Effects::default());
     for word in ["@group(1)", "noise", "dropout", "intensity", "philox", "deviate", "override"] {
         assert!(!wgsl.contains(word), "{word}");
     }
@@ -152,7 +154,7 @@ fn every_shader_file_is_part_of_some_variant() {
         variants().iter().flat_map(|(_, files)| files).map(|file| (*file).to_owned()).collect();
     assert_eq!(all_files(), used);
     for (effects, files) in variants() {
-        let wgsl = compose(&modules(&effects));
+        let wgsl = compose(&effects);
         for file in all_files() {
             let expected = files.contains(&file.as_str());
             assert_eq!(wgsl.contains(&read(&file)), expected, "{file} in {effects:?}");
@@ -161,10 +163,16 @@ fn every_shader_file_is_part_of_some_variant() {
 }
 
 #[test]
-fn every_pass_and_effect_has_a_twin_of_its_name() {
+fn every_pass_and_effect_has_a_counterpart_of_its_name() {
+    let cpu = root().join("sim-gpu/src/cpu");
+    let effects = std::fs::read_to_string(cpu.join("effects.rs")).expect("a source file");
     for file in all_files().iter().filter(|file| !file.starts_with("shared/")) {
-        let twin = root().join("sim-gpu/src/cpu").join(file.replace(".wgsl", ".rs"));
-        assert!(twin.is_file(), "{}", twin.display());
+        let name = file.trim_end_matches(".wgsl");
+        let found = match name.strip_prefix("effects/") {
+            Some(effect) => effects.contains(&format!("pub fn {effect}(")),
+            None => cpu.join(format!("{name}.rs")).is_file(),
+        };
+        assert!(found, "{file} has no counterpart");
     }
     // Shared files name theirs, as do some of the others.
     for file in all_files() {
@@ -174,6 +182,65 @@ fn every_pass_and_effect_has_a_twin_of_its_name() {
         {
             assert!(root().join(name).is_file(), "{file} names {name}");
         }
+    }
+}
+
+/// Scalars of a value of a type.
+fn width(module: &naga::Module, ty: naga::Handle<naga::Type>) -> usize {
+    match module.types[ty].inner {
+        TypeInner::Scalar(naga::Scalar::F32) => 1,
+        TypeInner::Vector { size, scalar: naga::Scalar::F32 } => size as usize,
+        ref other => panic!("expected f32 or a vector of it, found {other:?}"),
+    }
+}
+
+/// `Effects::per_ray` is the one definition of which outputs there are, in which
+/// order and how many: shaders and the CPU must both follow it.
+#[test]
+fn shaders_and_the_cpu_give_the_outputs_that_effects_define() {
+    let target = tests::casting::target(&tests::meshes::cube());
+    let pattern = tests::casting::beams([DVec3::X]);
+    let job = tests::casting::job(&target, &tests::casting::at(DVec3::X * 3.0), &pattern);
+    let ray = job.frame.beam(&pattern, 0);
+    for (effects, _) in variants() {
+        let module = parsed(&effects);
+        let mut stored = Vec::new();
+        for effect in effects.per_ray() {
+            let (_, function) = module
+                .functions
+                .iter()
+                .find(|(_, function)| function.name.as_deref() == Some(effect.name()))
+                .unwrap_or_else(|| panic!("the shader has no function {}", effect.name()));
+            let result = function.result.as_ref().expect("an effect gives numbers");
+            assert_eq!(width(&module, result.ty), effect.width(), "{}", effect.name());
+            stored.extend(std::iter::repeat_n(effect.name(), effect.width()));
+
+            // Only the one effect: so each has its own width on the CPU, too.
+            let alone = Effects {
+                noise: effects.noise.filter(|_| effect.name().starts_with("noise")),
+                dropout: effects.dropout.filter(|_| effect.name() == "dropout"),
+                intensity: effects.intensity.filter(|_| effect.name() == "intensity"),
+                quantum: None,
+            };
+            let mut outputs = Vec::new();
+            append_outputs(&mut outputs, &alone, &job, 0, &ray, 0);
+            assert_eq!(outputs.len(), effect.width(), "{}", effect.name());
+        }
+        let wgsl = compose(&effects);
+        let in_order: Vec<&str> = wgsl
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("effect_outputs[first + "))
+            .enumerate()
+            .map(|(at, line)| {
+                let (place, value) = line.split_once("u] = ").expect("an assignment");
+                assert_eq!(place, at.to_string(), "outputs stand side by side");
+                value.split_once("_output").expect("an effect's output").0
+            })
+            .collect();
+        assert_eq!(in_order, stored, "{effects:?}");
+        let mut together = Vec::new();
+        append_outputs(&mut together, &effects, &job, 0, &ray, 0);
+        assert_eq!(together.len(), effects.outputs_per_ray());
     }
 }
 

@@ -1,9 +1,9 @@
 //! Opens the adapter that a command line asks for.
 
 use anyhow::Context;
+use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::AdapterRequest;
 use sim_gpu::job::Culling;
 
 /// How to install an adapter where none is found.

@@ -1,5 +1,5 @@
-// |cos(incidence)| times the object's reflectivity: BLAINDER's model. Twin:
-// `sim-gpu/src/cpu/effects/intensity.rs`.
+// |cos(incidence)| times the object's reflectivity: BLAINDER's model. Counterpart:
+// `sim-gpu/src/cpu/effects.rs`.
 
 @group(1) @binding(2) var<storage, read> reflectivities: array<f32>;
 

@@ -1,7 +1,7 @@
 // A standard normal deviate from 32 random bits, by inversion: PPND7 of
 // Wichura, "Algorithm AS 241", Applied Statistics 37(3), 1988. The top bit is
 // the sign, the others a tail probability in (0, 1/2), so deviates reach 6.3
-// standard deviations. Twin: `sim-gpu/src/cpu/effects/stream.rs`.
+// standard deviations. Counterpart: `sim-gpu/src/cpu/random.rs`.
 
 const PER_2_32: f32 = 1.0 / 4294967296.0;
 

@@ -1,5 +1,5 @@
-// Counter-based random numbers. Twin: `formats/src/rng.rs` and
-// `sim-gpu/src/cpu/effects/stream.rs`.
+// Counter-based random numbers. Counterpart: `formats/src/rng.rs` and
+// `sim-gpu/src/cpu/random.rs`.
 
 // Key in x and y, beam in z.
 @group(1) @binding(1) var<storage, read> streams: array<vec4u>;
@@ -30,7 +30,7 @@ fn philox(counter: vec4u, key: vec2u) -> vec4u {
     return x;
 }
 
-fn stream_words(i: u32, purpose: u32) -> vec4u {
+fn random_bits(i: u32, purpose: u32) -> vec4u {
     let stream = streams[i];
     return philox(vec4u(stream.z, purpose, 0u, 0u), stream.xy);
 }

@@ -1,51 +1,89 @@
 //! One interface to every way of casting.
 
+use crate::cast_error::CastError;
 use crate::cpu;
 use crate::effects::Effects;
-use crate::gpu::{AdapterRequest, GpuCaster, GpuError, Pending, adapter};
+#[cfg(feature = "gpu")]
+use crate::gpu::{self, GpuCaster, Pending};
 use crate::job::{Cast, CastJob};
 use crate::target::Target;
 use rayon::prelude::*;
+use std::str::FromStr;
 
 /// A way of casting.
 pub enum Caster {
-    /// The CPU twin.
+    /// The CPU, with these effects.
     Cpu(Effects),
     /// A GPU, or software Vulkan.
+    #[cfg(feature = "gpu")]
     Gpu(Box<GpuCaster>),
 }
 
-/// Jobs under way.
+/// Jobs in flight.
 pub enum Casting {
     /// Already done, on the CPU.
     Done(Vec<Cast>),
     /// On their way through the adapter.
+    #[cfg(feature = "gpu")]
     Pending(Box<Pending>),
+}
+
+/// Which adapter is to cast.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AdapterRequest {
+    /// The best there is: discrete GPU, integrated GPU, software Vulkan, CPU.
+    #[default]
+    Auto,
+    /// The CPU, without any graphics driver.
+    Cpu,
+    /// The first adapter whose name holds this text, letter case ignored.
+    Named(String),
+}
+
+impl FromStr for AdapterRequest {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            "cpu" => Self::Cpu,
+            name => Self::Named(name.to_owned()),
+        })
+    }
 }
 
 impl Caster {
     /// The caster that answers `request` and models `effects`.
     ///
-    /// `Auto` falls back to the CPU twin where no adapter is found.
+    /// `Auto` falls back to the CPU where no adapter is found.
     ///
     /// # Errors
     /// If a named adapter is missing or the device cannot be opened.
-    pub fn open(request: &AdapterRequest, effects: &Effects) -> Result<Self, GpuError> {
+    pub fn open(request: &AdapterRequest, effects: &Effects) -> Result<Self, CastError> {
         match request {
             AdapterRequest::Cpu => Ok(Self::Cpu(effects.clone())),
             AdapterRequest::Auto => Ok(Self::open_best(effects).0),
-            AdapterRequest::Named(name) => {
-                let adapter = adapter::find_adapter(name)?;
-                Ok(Self::Gpu(Box::new(GpuCaster::open(&adapter, effects)?)))
-            }
+            AdapterRequest::Named(name) => Self::open_named(name, effects),
         }
     }
 
+    #[cfg(feature = "gpu")]
+    fn open_named(name: &str, effects: &Effects) -> Result<Self, CastError> {
+        let adapter = gpu::find_adapter(name)?;
+        Ok(Self::Gpu(Box::new(GpuCaster::open(&adapter, effects)?)))
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn open_named(name: &str, _: &Effects) -> Result<Self, CastError> {
+        Err(CastError::NoGpuSupport { wanted: name.to_owned() })
+    }
+
     /// The best caster that opens, and why better ones did not.
+    #[cfg(feature = "gpu")]
     #[must_use]
-    pub fn open_best(effects: &Effects) -> (Self, Vec<GpuError>) {
+    pub fn open_best(effects: &Effects) -> (Self, Vec<CastError>) {
         let mut passed_over = Vec::new();
-        for adapter in adapter::adapters() {
+        for adapter in gpu::adapters() {
             match GpuCaster::open(&adapter, effects) {
                 Ok(gpu) => return (Self::Gpu(Box::new(gpu)), passed_over),
                 Err(error) => passed_over.push(error),
@@ -54,21 +92,41 @@ impl Caster {
         (Self::Cpu(effects.clone()), passed_over)
     }
 
-    /// The adapter's name, `cpu` for the twin.
+    /// The best caster that opens, which without the feature `gpu` is the CPU.
+    #[cfg(not(feature = "gpu"))]
+    #[must_use]
+    pub fn open_best(effects: &Effects) -> (Self, Vec<CastError>) {
+        (Self::Cpu(effects.clone()), Vec::new())
+    }
+
+    /// The adapter's name, or `cpu`.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
             Self::Cpu(_) => "cpu",
+            #[cfg(feature = "gpu")]
             Self::Gpu(gpu) => &gpu.summary().name,
         }
     }
 
-    /// Whether `target` fits the adapter's bindings; if not, the CPU twin
-    /// casts it.
+    /// The effects that are modelled.
     #[must_use]
+    pub fn effects(&self) -> &Effects {
+        match self {
+            Self::Cpu(effects) => effects,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(gpu) => gpu.effects(),
+        }
+    }
+
+    /// Whether `target` fits the adapter's bindings; if not, the CPU has to
+    /// cast at it.
+    #[must_use]
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "the CPU takes any target"))]
     pub fn fits(&self, target: &Target) -> bool {
         match self {
             Self::Cpu(_) => true,
+            #[cfg(feature = "gpu")]
             Self::Gpu(gpu) => gpu.limits().holds(target),
         }
     }
@@ -76,29 +134,26 @@ impl Caster {
     /// Starts casting `jobs` all together.
     ///
     /// # Errors
-    /// If the device is lost or out of memory.
-    pub fn submit(&self, jobs: &[CastJob]) -> Result<Casting, GpuError> {
+    /// If the device is lost or out of memory, or a target does not fit.
+    pub fn submit(&self, jobs: &[CastJob]) -> Result<Casting, CastError> {
         match self {
             Self::Cpu(_) => Ok(Casting::Done(self.cast_on_cpu(jobs))),
+            #[cfg(feature = "gpu")]
             Self::Gpu(gpu) => Ok(Casting::Pending(Box::new(gpu.submit(jobs)?))),
         }
     }
 
-    /// Casts `jobs` with the CPU twin, whatever the adapter.
+    /// Casts `jobs` on the CPU, whatever the adapter.
     #[must_use]
     pub fn cast_on_cpu(&self, jobs: &[CastJob]) -> Vec<Cast> {
-        let effects = match self {
-            Self::Cpu(effects) => effects,
-            Self::Gpu(gpu) => gpu.effects(),
-        };
-        jobs.par_iter().map(|job| cpu::trace::cast(job, effects)).collect()
+        jobs.par_iter().map(|job| cpu::trace::cast(job, self.effects())).collect()
     }
 
     /// Casts `jobs` and waits.
     ///
     /// # Errors
     /// As [`Caster::submit`].
-    pub fn cast(&self, jobs: &[CastJob]) -> Result<Vec<Cast>, GpuError> {
+    pub fn cast(&self, jobs: &[CastJob]) -> Result<Vec<Cast>, CastError> {
         self.submit(jobs)?.wait()
     }
 }
@@ -108,9 +163,10 @@ impl Casting {
     ///
     /// # Errors
     /// If the device was lost.
-    pub fn wait(self) -> Result<Vec<Cast>, GpuError> {
+    pub fn wait(self) -> Result<Vec<Cast>, CastError> {
         match self {
             Self::Done(casts) => Ok(casts),
+            #[cfg(feature = "gpu")]
             Self::Pending(pending) => pending.wait(),
         }
     }

@@ -78,7 +78,100 @@ pub struct Quantum {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Intensity;
 
+/// An effect that casters compute for each ray that hits, with its numbers.
+///
+/// [`Effects::per_ray`] lists those that are wanted in the order in which their
+/// outputs stand side by side. Everything else follows that list: the shader is
+/// composed from it, the CPU appends its outputs by it, and a scan reads them
+/// by it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RayEffect {
+    /// Gaussian error of the range along the ray, metres: one output.
+    NoiseRange(Noise),
+    /// Gaussian error of each coordinate in the world frame, metres: three outputs.
+    NoiseXyz(Noise),
+    /// Whether the return is lost, 1 or 0: one output.
+    Dropout(Dropout),
+    /// Intensity of the return, 0 to 1: one output.
+    Intensity,
+}
+
+/// What an effect reads besides the ray and the triangle that it hits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayInput {
+    /// The ray's random bits: the shader's `streams`.
+    RandomBits,
+    /// Normal deviates made of the ray's random bits.
+    NormalDeviates,
+    /// The object's reflectivity: the shader's `reflectivities`.
+    Reflectivity,
+}
+
+impl RayEffect {
+    /// The name of the effect's function, on the CPU and in its shader
+    /// `shaders/effects/NAME.wgsl`.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NoiseRange(_) => "noise_range",
+            Self::NoiseXyz(_) => "noise_xyz",
+            Self::Dropout(_) => "dropout",
+            Self::Intensity => "intensity",
+        }
+    }
+
+    /// How many numbers the effect gives for each ray, 1 to 4.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        match self {
+            Self::NoiseXyz(_) => 3,
+            Self::NoiseRange(_) | Self::Dropout(_) | Self::Intensity => 1,
+        }
+    }
+
+    /// What the effect reads.
+    #[must_use]
+    pub fn input(&self) -> RayInput {
+        match self {
+            Self::NoiseRange(_) | Self::NoiseXyz(_) => RayInput::NormalDeviates,
+            Self::Dropout(_) => RayInput::RandomBits,
+            Self::Intensity => RayInput::Reflectivity,
+        }
+    }
+
+    /// The names and values of the shader's `override` constants.
+    #[must_use]
+    pub fn constants(&self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::NoiseRange(noise) | Self::NoiseXyz(noise) => {
+                vec![("noise_mean_m", noise.mean_m), ("noise_sigma_m", noise.sigma_m)]
+            }
+            Self::Dropout(dropout) => vec![("dropout_probability", dropout.probability)],
+            Self::Intensity => vec![],
+        }
+    }
+}
+
 impl Effects {
+    /// The effects that casters compute for each ray, in the order of their
+    /// outputs. Rounding of the range is left out: it depends on no ray.
+    pub fn per_ray(&self) -> impl Iterator<Item = RayEffect> + use<> {
+        let noise = self.noise.map(|noise| match noise.model {
+            NoiseModel::Range => RayEffect::NoiseRange(noise),
+            NoiseModel::Xyz => RayEffect::NoiseXyz(noise),
+        });
+        let dropout = self.dropout.map(RayEffect::Dropout);
+        let intensity = self.intensity.map(|Intensity| RayEffect::Intensity);
+        [noise, dropout, intensity].into_iter().flatten()
+    }
+
+    /// How many numbers all effects together give for each ray.
+    #[must_use]
+    pub fn outputs_per_ray(&self) -> usize {
+        self.per_ray().map(|effect| effect.width()).sum()
+    }
+
     /// What is left of them in a clean scan: all that leaves its points alone.
     #[must_use]
     pub fn clean(&self) -> Self {
@@ -183,59 +276,4 @@ impl From<Effects> for EffectsTable {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_effect_is_the_default_and_plain() {
-        let effects: Effects = toml::from_str("").unwrap();
-        assert!(effects.is_plain());
-        let off: Effects = toml::from_str("intensity = false\nquantise_m = false").unwrap();
-        assert!(off.is_plain());
-    }
-
-    #[test]
-    fn effects_survive_a_round_trip() {
-        for text in [
-            "",
-            "noise = { sigma_m = 0.01 }",
-            "noise = { mean_m = -0.5, sigma_m = 1000, model = \"xyz\" }",
-            "dropout = { probability = 1 }\nquantise_m = true",
-            "quantise_m = 0.004\nintensity = true",
-        ] {
-            let effects: Effects = toml::from_str(text).unwrap();
-            let json = serde_json::to_string(&effects).unwrap();
-            assert_eq!(serde_json::from_str::<Effects>(&json).unwrap(), effects, "{json}");
-        }
-    }
-
-    #[test]
-    fn bad_numbers_are_named() {
-        for (text, key) in [
-            ("noise = { sigma_m = -1e-9 }", "effects.noise.sigma_m"),
-            ("noise = { sigma_m = inf }", "effects.noise.sigma_m"),
-            ("noise = { sigma_m = 0, mean_m = nan }", "effects.noise.mean_m"),
-            ("dropout = { probability = 1.01 }", "effects.dropout.probability"),
-            ("dropout = { probability = nan }", "effects.dropout.probability"),
-            ("quantise_m = 0.0", "effects.quantise_m"),
-            ("quantise_m = -0.004", "effects.quantise_m"),
-            ("quantise_m = \"4 mm\"", "quantise_m"),
-            ("noise = { sigma = 0.1 }", "sigma"),
-            ("fog = true", "fog"),
-        ] {
-            let error = toml::from_str::<Effects>(text).unwrap_err().to_string();
-            assert!(error.contains(key), "{text}: {error}");
-        }
-    }
-
-    #[test]
-    fn the_sensors_own_quantum_is_filled_in() {
-        let effects: Effects = toml::from_str("quantise_m = true").unwrap();
-        let vlp32c = Sensor::builtin("vlp32c").unwrap();
-        let resolved = effects.for_sensor(&vlp32c).unwrap();
-        assert_eq!(resolved.quantum, Some(Quantum { step_m: Some(0.004) }));
-        let kinect = Sensor::builtin("kinect-v2").unwrap();
-        let error = effects.for_sensor(&kinect).unwrap_err();
-        assert!(error.to_string().contains("kinect-v2"), "{error}");
-    }
-}
+mod tests;

@@ -73,6 +73,8 @@ pub struct Cast {
     /// Per ray: triangle index, [`crate::ray::MISS`] or
     /// [`crate::ray::AMBIGUOUS`]; `[n_rays]`.
     pub codes: Vec<u32>,
-    /// The effects' words where the code is no miss, `[n_rays, words]`.
-    pub words: Vec<f32>,
+    /// The effects' outputs, [`Effects::per_ray`](crate::effects::Effects::per_ray)
+    /// side by side, of no meaning where the code is a miss;
+    /// `[n_rays, outputs_per_ray]`.
+    pub effect_outputs: Vec<f32>,
 }

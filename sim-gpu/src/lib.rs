@@ -5,10 +5,12 @@
 //! packets.
 
 pub mod bvh;
+pub mod cast_error;
 pub mod caster;
 pub mod config;
 pub mod cpu;
 pub mod effects;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod job;
 pub mod mesh;

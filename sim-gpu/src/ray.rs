@@ -25,6 +25,10 @@ pub struct TraceRay {
 /// What a caster answers where a ray hits nothing.
 pub const MISS: u32 = u32::MAX;
 
+/// The distance of a ray that hits nothing, unit lengths: beyond every other
+/// distance, and finite.
+pub const NO_HIT: f32 = 1e30;
+
 /// Set in a caster's answer where another triangle may be truly nearer by
 /// more than the promised accuracy, and f64 must decide.
 pub const AMBIGUOUS: u32 = 1 << 31;

@@ -4,7 +4,7 @@
 //! the same to the last bit on every adapter that finds the same triangle,
 //! and as accurate near grazing as elsewhere.
 
-use crate::cpu::effects::append_words;
+use crate::cpu::effects::append_outputs;
 use crate::cpu::oracle;
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
@@ -27,8 +27,8 @@ pub struct Hit {
 pub struct Hits {
     /// By beam, ascending.
     pub hits: Vec<Hit>,
-    /// `[n_hits, words_per_ray]`.
-    pub words: Vec<f32>,
+    /// The effects' outputs, as in [`Cast`]; `[n_hits, outputs_per_ray]`.
+    pub effect_outputs: Vec<f32>,
     /// Rays for which f32 left more than one surface in question.
     pub decided_in_f64: usize,
 }
@@ -36,7 +36,7 @@ pub struct Hits {
 /// Solves the ranges of `job`'s hits and puts them in the order of beams.
 #[must_use]
 pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effects) -> Hits {
-    let words_per_ray = cast.words.len() / cast.codes.len().max(1);
+    let per_ray = effects.outputs_per_ray();
     let mut order: Vec<usize> = (0..cast.codes.len()).filter(|&i| cast.codes[i] != MISS).collect();
     order.sort_unstable_by_key(|&i| job.beams[i]);
     let mut resolved = Hits { hits: Vec::with_capacity(order.len()), ..Hits::default() };
@@ -54,9 +54,10 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
         let Some(range_m) = oracle::range_to(&job.target, &ray, triangle) else { continue };
         resolved.hits.push(Hit { beam, triangle, range_m });
         if triangle == found {
-            resolved.words.extend(&cast.words[i * words_per_ray..(i + 1) * words_per_ray]);
+            let of_ray = &cast.effect_outputs[i * per_ray..(i + 1) * per_ray];
+            resolved.effect_outputs.extend(of_ray);
         } else {
-            append_words(&mut resolved.words, effects, job, beam, &ray, triangle);
+            append_outputs(&mut resolved.effect_outputs, effects, job, beam, &ray, triangle);
         }
     }
     resolved

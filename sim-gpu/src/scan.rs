@@ -1,7 +1,7 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
 use crate::cpu::oracle;
-use crate::effects::{Effects, NoiseModel};
+use crate::effects::{Effects, NoiseModel, RayEffect};
 use crate::job::CastJob;
 use crate::pose::Pose;
 use crate::resolve::Hits;
@@ -21,7 +21,7 @@ pub struct View<'a> {
     pub pattern: &'a BeamPattern,
     /// Where it stands.
     pub pose: &'a Pose,
-    /// The effects that were cast: they say what each hit's words mean.
+    /// The effects that were cast: they say what each hit's outputs mean.
     pub cast_effects: &'a Effects,
     /// The effects to apply, a part of those cast; a quantum must be in metres
     /// ([`Effects::for_sensor`]).
@@ -145,13 +145,13 @@ fn measure(
         tally.out_of_range += 1;
         return None;
     }
-    let words = Words::of(view.cast_effects, seen.hits, hit);
-    if view.effects.dropout.is_some() && words.dropped {
+    let effects = HitEffects::of(view.cast_effects, seen.hits, hit);
+    if view.effects.dropout.is_some() && effects.dropped {
         tally.dropped += 1;
         return None;
     }
     let noise = view.effects.noise.map(|noise| noise.model);
-    let along = if noise == Some(NoiseModel::Range) { words.noise.x } else { 0.0 };
+    let along = if noise == Some(NoiseModel::Range) { effects.noise.x } else { 0.0 };
     let mut range_m = nearest.range_m + along;
     if let Some(step_m) = view.effects.quantum.and_then(|quantum| quantum.step_m) {
         range_m = (range_m / step_m).round() * step_m;
@@ -161,7 +161,7 @@ fn measure(
         return None;
     }
     let beam = view.pose.world_from_sensor * view.pattern.directions[nearest.beam as usize];
-    let sideways = if noise == Some(NoiseModel::Xyz) { words.noise } else { DVec3::ZERO };
+    let sideways = if noise == Some(NoiseModel::Xyz) { effects.noise } else { DVec3::ZERO };
     let from_start = beam * range_m + sideways;
     let from_sensor = start(view, nearest.beam).map_or(from_start, |start| from_start + start);
     Some(Return { object, hit, from_sensor })
@@ -173,27 +173,34 @@ fn start(view: &View, beam: u32) -> Option<DVec3> {
     view.pattern.start(beam).map(|start| view.pose.world_from_sensor * start)
 }
 
-/// One hit's words, by meaning.
-struct Words {
+/// What the effects say of one hit.
+#[derive(Default)]
+struct HitEffects {
+    /// Along the ray in x where the noise is of the range.
     noise: DVec3,
     dropped: bool,
     intensity: f32,
 }
 
-impl Words {
-    /// Reads them in the order of `gpu::modules`.
+impl HitEffects {
+    /// Reads the outputs of `cast_effects` for number `hit` of `hits`.
     fn of(cast_effects: &Effects, hits: &Hits, hit: usize) -> Self {
-        let per_hit = hits.words.len() / hits.hits.len().max(1);
-        let mut words = hits.words[hit * per_hit..(hit + 1) * per_hit].iter().copied();
-        let mut next = || words.next().unwrap_or_default();
-        let noise = match cast_effects.noise.map(|noise| noise.model) {
-            Some(NoiseModel::Range) => DVec3::new(next().into(), 0.0, 0.0),
-            Some(NoiseModel::Xyz) => DVec3::new(next().into(), next().into(), next().into()),
-            None => DVec3::ZERO,
-        };
-        let dropped = cast_effects.dropout.is_some() && next() != 0.0;
-        let intensity = if cast_effects.intensity.is_some() { next() } else { 0.0 };
-        Self { noise, dropped, intensity }
+        let per_hit = cast_effects.outputs_per_ray();
+        let mut outputs = &hits.effect_outputs[hit * per_hit..(hit + 1) * per_hit];
+        let mut found = Self::default();
+        for effect in cast_effects.per_ray() {
+            let (own, others) = outputs.split_at(effect.width());
+            outputs = others;
+            match effect {
+                RayEffect::NoiseRange(_) => found.noise.x = own[0].into(),
+                RayEffect::NoiseXyz(_) => {
+                    found.noise = DVec3::new(own[0].into(), own[1].into(), own[2].into());
+                }
+                RayEffect::Dropout(_) => found.dropped = own[0] != 0.0,
+                RayEffect::Intensity => found.intensity = own[0],
+            }
+        }
+        found
     }
 }
 
@@ -240,7 +247,7 @@ fn with_attributes(mut scan: Scan, view: &View, seen: &[Seen], returns: &[Return
             Attribute::Object => scan.object = column(returns, |r| seen[r.object].object),
             Attribute::Intensity => {
                 scan.intensity = column(returns, |r| {
-                    Words::of(view.cast_effects, seen[r.object].hits, r.hit).intensity
+                    HitEffects::of(view.cast_effects, seen[r.object].hits, r.hit).intensity
                 });
             }
             Attribute::Normal => {

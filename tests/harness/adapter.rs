@@ -2,9 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::AdapterRequest;
 
 /// The CPU twin, and the adapter if there is one.
 #[must_use]

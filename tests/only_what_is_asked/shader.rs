@@ -2,14 +2,14 @@
 
 use naga::{Block, Function, Statement};
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::{compose, modules};
+use sim_gpu::gpu::compose;
 use std::collections::BTreeSet;
 
 use super::Rows;
 
 /// Instructions by function, bindings and constants, and their totals.
 pub fn rows(effects: &Effects) -> Rows {
-    let wgsl = compose(&modules(effects));
+    let wgsl = compose(effects);
     let module = naga::front::wgsl::parse_str(&wgsl)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
     let mut rows = Rows::new();

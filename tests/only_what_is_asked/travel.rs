@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::{Batch, modules};
+use sim_gpu::gpu::Batch;
 use sim_gpu::job::CastJob;
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::BeamPattern;
@@ -24,16 +24,17 @@ pub fn sphere() -> (CastJob, BeamPattern) {
 /// caster that there is answers.
 pub fn rows(effects: &Effects) -> Rows {
     let (job, _) = sphere();
-    let modules = modules(effects);
     let mut batch = Batch::default();
-    batch.push(&job, 0..job.rays.len(), &modules);
-    let [codes, words] = batch.answer_bytes(&modules);
+    batch.push(&job, 0..job.rays.len(), effects);
+    let n = job.rays.len() as u64;
+    let codes = n * size_of::<u32>() as u64;
+    let outputs = n * (effects.outputs_per_ray() * size_of::<f32>()) as u64;
     for caster in adapter::casters(effects) {
         let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
-        let answered = [size_of_val(&casts[0].codes[..]), size_of_val(&casts[0].words[..])];
-        assert_eq!(answered.map(|bytes| bytes as u64), [codes, words], "{}", caster.name());
+        let answered =
+            [size_of_val(&casts[0].codes[..]), size_of_val(&casts[0].effect_outputs[..])];
+        assert_eq!(answered.map(|bytes| bytes as u64), [codes, outputs], "{}", caster.name());
     }
-    let n = job.rays.len() as u64;
     let per_ray = |bytes: u64| {
         assert_eq!(bytes % n, 0, "every ray has the same share");
         bytes / n
@@ -44,7 +45,7 @@ pub fn rows(effects: &Effects) -> Rows {
         ("ray, bytes of streams sent", bytes_of(size_of_val(&batch.streams[..]))),
         ("ray, bytes of reflectivities sent", bytes_of(size_of_val(&batch.reflectivities[..]))),
         ("ray, bytes of codes read back", per_ray(codes)),
-        ("ray, bytes of words read back", per_ray(words)),
+        ("ray, bytes of effect outputs read back", per_ray(outputs)),
     ]
     .map(|(row, bytes)| (row.to_owned(), bytes))
     .into()

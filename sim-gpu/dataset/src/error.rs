@@ -1,8 +1,8 @@
 //! Why a dataset cannot be made, merged or verified.
 
 use formats::FormatError;
+use sim_gpu::cast_error::CastError;
 use sim_gpu::config::{ConfigError, InvalidValue};
-use sim_gpu::gpu::GpuError;
 use sim_gpu::mesh::tree::TreeError;
 use std::path::PathBuf;
 
@@ -87,7 +87,7 @@ pub enum DatasetError {
     Format(#[from] FormatError),
     /// The adapter failed.
     #[error(transparent)]
-    Gpu(#[from] GpuError),
+    Gpu(#[from] CastError),
 }
 
 impl DatasetError {

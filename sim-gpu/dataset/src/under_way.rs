@@ -4,8 +4,8 @@ use super::budget::Share;
 use super::prepare::Prepared;
 use super::progress::Progress;
 use crossbeam_channel::Receiver;
+use sim_gpu::cast_error::CastError;
 use sim_gpu::caster::{Caster, Casting};
-use sim_gpu::gpu::GpuError;
 use sim_gpu::job::{Cast, CastJob};
 
 /// Rays gathered before a batch is sent, unless no mesh is waiting.
@@ -58,7 +58,7 @@ pub fn submit<'b>(
     batch: Vec<Held<'b>>,
     caster: &Caster,
     progress: &Progress,
-) -> Result<UnderWay<'b>, GpuError> {
+) -> Result<UnderWay<'b>, CastError> {
     let mut jobs = Vec::new();
     let mut waiting = Vec::with_capacity(batch.len());
     for mut held in batch {
@@ -86,7 +86,7 @@ impl<'b> UnderWay<'b> {
     ///
     /// # Errors
     /// If the adapter fails.
-    pub fn wait(self) -> Result<Vec<(Held<'b>, Vec<Cast>)>, GpuError> {
+    pub fn wait(self) -> Result<Vec<(Held<'b>, Vec<Cast>)>, CastError> {
         let mut casts = self.casting.wait()?.into_iter();
         let mut jobs = self.jobs.into_iter();
         let finish = |waiting| match waiting {

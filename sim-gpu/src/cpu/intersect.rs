@@ -10,8 +10,8 @@
 //! that a beam hits it on the one and what lies behind it on the other. Such a
 //! triangle is smaller than the rounding of any vertex that is not next to 0.
 
-use super::traverse::NO_HIT;
 use crate::bvh::LeafTriangle;
+use crate::ray::NO_HIT;
 use glam::Vec3;
 
 /// Rows of the shear that maps the ray onto +z.

@@ -4,5 +4,6 @@
 pub mod effects;
 pub mod intersect;
 pub mod oracle;
+pub mod random;
 pub mod trace;
 pub mod traverse;

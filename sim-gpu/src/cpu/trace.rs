@@ -1,11 +1,10 @@
 //! One ray per call: the nearest triangle's code, and what the effects asked
 //! for. Twin of `shaders/trace.wgsl`.
 
-use super::effects::append_words;
+use super::effects::append_outputs;
 use super::traverse::traverse;
 use crate::bvh::{LeafTriangle, Node};
 use crate::effects::Effects;
-use crate::gpu::{modules, words_per_ray};
 use crate::job::{Cast, CastJob};
 use crate::ray::{AMBIGUOUS, MISS, Ray, TraceRay};
 use glam::Vec3;
@@ -34,14 +33,14 @@ pub fn trace(nodes: &[Node], triangles: &[LeafTriangle], rays: &[TraceRay]) -> V
 pub fn cast(job: &CastJob, effects: &Effects) -> Cast {
     let bvh = &job.target.bvh;
     let codes = trace(&bvh.nodes, &bvh.triangles, &job.rays);
-    let words_per_ray = words_per_ray(&modules(effects));
-    if words_per_ray == 0 {
-        return Cast { codes, words: Vec::new() };
+    let per_ray = effects.outputs_per_ray();
+    if per_ray == 0 {
+        return Cast { codes, effect_outputs: Vec::new() };
     }
-    let mut words = Vec::with_capacity(codes.len() * words_per_ray);
+    let mut effect_outputs = Vec::with_capacity(codes.len() * per_ray);
     for ((&code, &beam), ray) in codes.iter().zip(&job.beams).zip(&job.rays) {
         if code == MISS {
-            words.resize(words.len() + words_per_ray, 0.0);
+            effect_outputs.resize(effect_outputs.len() + per_ray, 0.0);
             continue;
         }
         // Only the direction matters to an effect, and f32 holds it well.
@@ -49,7 +48,7 @@ pub fn cast(job: &CastJob, effects: &Effects) -> Cast {
             origin: Vec3::from_array(ray.origin).as_dvec3(),
             direction: Vec3::from_array(ray.direction).as_dvec3(),
         };
-        append_words(&mut words, effects, job, beam, &ray, code & !AMBIGUOUS);
+        append_outputs(&mut effect_outputs, effects, job, beam, &ray, code & !AMBIGUOUS);
     }
-    Cast { codes, words }
+    Cast { codes, effect_outputs }
 }

@@ -2,11 +2,8 @@
 
 use super::intersect::{Candidate, Shear, intersect};
 use crate::bvh::{LeafTriangle, MAX_DEPTH, Node};
-use crate::ray::{AMBIGUOUS, MISS, TraceRay};
+use crate::ray::{AMBIGUOUS, MISS, NO_HIT, TraceRay};
 use glam::{Vec3, Vec3A};
-
-/// Beyond every distance, and finite.
-pub const NO_HIT: f32 = 1e30;
 
 /// Directions closer to zero than this count as this: a reciprocal stays
 /// finite and boxes are padded by far more than a ray drifts by it.

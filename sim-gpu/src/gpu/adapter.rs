@@ -1,31 +1,8 @@
-//! Which adapter casts.
+//! The adapters of this machine.
 
 use std::fmt;
-use std::str::FromStr;
 
-/// What the user asked for with `--adapter`.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum AdapterRequest {
-    /// The best there is: discrete GPU, integrated GPU, software Vulkan, CPU.
-    #[default]
-    Auto,
-    /// The CPU twin, without any graphics driver.
-    Cpu,
-    /// The first adapter whose name holds this text, letter case ignored.
-    Named(String),
-}
-
-impl FromStr for AdapterRequest {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(match text {
-            "auto" => Self::Auto,
-            "cpu" => Self::Cpu,
-            name => Self::Named(name.to_owned()),
-        })
-    }
-}
+use crate::cast_error::CastError;
 
 /// What sort of device an adapter is, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -69,16 +46,6 @@ pub struct AdapterSummary {
     pub max_binding_bytes: u64,
 }
 
-/// No adapter answers the request.
-#[derive(Debug, thiserror::Error)]
-#[error("no adapter's name holds {wanted:?}; there are: {}", present.join(", "))]
-pub struct AdapterError {
-    /// The name asked for.
-    pub wanted: String,
-    /// The names there are.
-    pub present: Vec<String>,
-}
-
 /// All adapters, best first.
 #[must_use]
 pub fn list_adapters() -> Vec<AdapterSummary> {
@@ -86,13 +53,13 @@ pub fn list_adapters() -> Vec<AdapterSummary> {
 }
 
 /// The first adapter whose name holds `wanted`, best first.
-pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, AdapterError> {
+pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, CastError> {
     let mut adapters = adapters();
     let holds =
         |a: &wgpu::Adapter| a.get_info().name.to_lowercase().contains(&wanted.to_lowercase());
     match adapters.iter().position(holds) {
         Some(at) => Ok(adapters.swap_remove(at)),
-        None => Err(AdapterError {
+        None => Err(CastError::NoSuchAdapter {
             wanted: wanted.to_owned(),
             present: adapters.iter().map(|a| a.get_info().name).chain(["cpu".to_owned()]).collect(),
         }),

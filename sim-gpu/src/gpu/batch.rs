@@ -1,7 +1,8 @@
 //! Many meshes and views laid side by side for one dispatch.
 
-use super::compose::{Input, Module, reads, words_per_ray};
+use super::compose::{reads, reads_random_bits};
 use crate::bvh::{LeafTriangle, Node};
+use crate::effects::{Effects, RayInput};
 use crate::job::CastJob;
 use crate::ray::TraceRay;
 use crate::target::Target;
@@ -59,24 +60,17 @@ impl Batch {
     }
 
     /// Adds rays `range` of `job`.
-    pub fn push(&mut self, job: &CastJob, range: std::ops::Range<usize>, modules: &[Module]) {
+    pub fn push(&mut self, job: &CastJob, range: std::ops::Range<usize>, effects: &Effects) {
         let root = self.root_of(&job.target);
         let rays = &job.rays[range.clone()];
         self.rays.extend(rays.iter().map(|ray| TraceRay { root: ray.root + root, ..*ray }));
-        if reads(modules, Input::Stream) {
+        if reads_random_bits(effects) {
             let [low, high] = job.stream.0;
             self.streams.extend(job.beams[range].iter().map(|&beam| [low, high, beam, 0]));
         }
-        if reads(modules, Input::Reflectivity) {
+        if reads(effects, RayInput::Reflectivity) {
             self.reflectivities.resize(self.rays.len(), job.reflectivity);
         }
-    }
-
-    /// Bytes that the adapter sends back.
-    #[must_use]
-    pub fn answer_bytes(&self, modules: &[Module]) -> [u64; 2] {
-        let rays = self.rays.len() as u64;
-        [rays * 4, rays * 4 * words_per_ray(modules) as u64]
     }
 
     /// Where the tree of `target` starts; it is copied here once.

@@ -1,63 +1,27 @@
 //! Sends batches through an adapter.
 
-use super::adapter::{self, AdapterError, AdapterSummary};
+use super::adapter::{self, AdapterSummary};
 use super::batch::{Batch, BatchLimits};
-use super::compose::{Input, Module, WORKGROUP_SIZE, compose, modules, reads, words_per_ray};
-use super::slot::Slot;
+use super::compose::WORKGROUP_SIZE;
+use super::pipeline::Pipeline;
+use super::slot::{Answer, Slot};
+use crate::cast_error::CastError;
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Rays in one dispatch: enough to fill any adapter, few enough that a display
 /// driver's watchdog does not stop it.
 const RAYS_PER_DISPATCH: usize = 1 << 22;
-
-/// Casting on an adapter failed.
-#[derive(Debug, thiserror::Error)]
-pub enum GpuError {
-    /// The adapter asked for is not there.
-    #[error(transparent)]
-    Adapter(#[from] AdapterError),
-    /// The adapter would not open.
-    #[error("adapter {name}: {cause}; try --adapter cpu")]
-    Open {
-        /// The adapter.
-        name: String,
-        /// Why.
-        cause: wgpu::RequestDeviceError,
-    },
-    /// A mesh is too large for the adapter's bindings.
-    #[error("adapter {name}: a mesh of {nodes} nodes exceeds a binding of {binding_bytes} bytes")]
-    TooLarge {
-        /// The adapter.
-        name: String,
-        /// The mesh's nodes.
-        nodes: usize,
-        /// The limit.
-        binding_bytes: usize,
-    },
-    /// The device stopped answering.
-    #[error("adapter {name}: {cause}; try --adapter cpu")]
-    Lost {
-        /// The adapter.
-        name: String,
-        /// What it said.
-        cause: String,
-    },
-}
 
 /// Casts on one adapter, for one set of effects.
 pub struct GpuCaster {
     core: Arc<Core>,
 }
 
-/// What batches under way share with their caster.
-pub(super) struct Core {
-    pub(super) device: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
-    pub(super) pipeline: wgpu::ComputePipeline,
-    pub(super) modules: Vec<Module>,
-    effects: Effects,
+/// What batches in flight share with their caster.
+struct Core {
+    pipeline: Pipeline,
     summary: AdapterSummary,
     limits: BatchLimits,
     idle: Mutex<Vec<Slot>>,
@@ -75,6 +39,7 @@ pub struct Pending {
     core: Arc<Core>,
     dispatches: Vec<(Slot, Vec<Part>)>,
     jobs: usize,
+    timed: bool,
 }
 
 impl GpuCaster {
@@ -82,28 +47,27 @@ impl GpuCaster {
     ///
     /// # Errors
     /// If the adapter gives no device.
-    pub fn open(adapter: &wgpu::Adapter, effects: &Effects) -> Result<Self, GpuError> {
+    pub fn open(adapter: &wgpu::Adapter, effects: &Effects) -> Result<Self, CastError> {
         let summary = adapter::summary(adapter);
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("edgepuck"),
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: adapter.limits(),
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|cause| GpuError::Open { name: summary.name.clone(), cause })?;
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&descriptor)).map_err(|cause| {
+                CastError::Open { name: summary.name.clone(), cause: cause.to_string() }
+            })?;
         let failure = Arc::new(Mutex::new(None));
-        let seen = Arc::clone(&failure);
+        let first = Arc::clone(&failure);
         device.on_uncaptured_error(Arc::new(move |error| {
-            let mut seen = seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-            seen.get_or_insert_with(|| error.to_string());
+            lock(&first).get_or_insert_with(|| error.to_string());
         }));
-        let modules = modules(effects);
-        let pipeline = pipeline(&device, &modules);
-        let limits = limits(&device.limits(), &modules);
+        let limits = limits(&device.limits(), effects);
+        let pipeline = Pipeline::new(device, queue, effects);
         let idle = Mutex::new(Vec::new());
-        let effects = effects.clone();
-        let core =
-            Core { device, queue, pipeline, modules, effects, summary, limits, idle, failure };
+        let core = Core { pipeline, summary, limits, idle, failure };
         core.check()?;
         Ok(Self { core: Arc::new(core) })
     }
@@ -117,7 +81,7 @@ impl GpuCaster {
     /// The effects that are modelled.
     #[must_use]
     pub fn effects(&self) -> &Effects {
-        &self.core.effects
+        &self.core.pipeline.effects
     }
 
     /// What one dispatch can hold.
@@ -130,10 +94,24 @@ impl GpuCaster {
     ///
     /// # Errors
     /// If a mesh exceeds the limits or the device failed.
-    pub fn submit(&self, jobs: &[CastJob]) -> Result<Pending, GpuError> {
+    pub fn submit(&self, jobs: &[CastJob]) -> Result<Pending, CastError> {
+        self.start(jobs, false)
+    }
+
+    /// Casts `jobs`, waits, and says how many seconds the adapter's own clock
+    /// counted while rays were traced, upload and read-back left out; `None`
+    /// where the adapter keeps no time.
+    ///
+    /// # Errors
+    /// As [`GpuCaster::submit`].
+    pub fn cast_timed(&self, jobs: &[CastJob]) -> Result<(Vec<Cast>, Option<f64>), CastError> {
+        self.start(jobs, true)?.collect()
+    }
+
+    fn start(&self, jobs: &[CastJob], timed: bool) -> Result<Pending, CastError> {
         let core = &self.core;
         let mut pending =
-            Pending { core: Arc::clone(core), dispatches: Vec::new(), jobs: jobs.len() };
+            Pending { core: Arc::clone(core), dispatches: Vec::new(), jobs: jobs.len(), timed };
         let mut batch = Batch::default();
         let mut parts = Vec::new();
         for (at, job) in jobs.iter().enumerate() {
@@ -147,7 +125,7 @@ impl GpuCaster {
                     pending.dispatch(std::mem::take(&mut batch), std::mem::take(&mut parts));
                 }
                 let rays = left.min(core.limits.rays - batch.rays.len());
-                batch.push(job, start..start + rays, &core.modules);
+                batch.push(job, start..start + rays, &core.pipeline.effects);
                 parts.push(Part { job: at, rays });
                 start += rays;
             }
@@ -157,8 +135,8 @@ impl GpuCaster {
         Ok(pending)
     }
 
-    fn too_large(&self, job: &CastJob) -> GpuError {
-        GpuError::TooLarge {
+    fn too_large(&self, job: &CastJob) -> CastError {
+        CastError::TooLarge {
             name: self.core.summary.name.clone(),
             nodes: job.target.bvh.nodes.len(),
             binding_bytes: self.core.limits.binding_bytes,
@@ -168,18 +146,15 @@ impl GpuCaster {
 
 impl Core {
     /// An error if the device reported one.
-    fn check(&self) -> Result<(), GpuError> {
-        let failure = self.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        match &*failure {
+    fn check(&self) -> Result<(), CastError> {
+        match &*lock(&self.failure) {
             None => Ok(()),
-            Some(cause) => {
-                Err(GpuError::Lost { name: self.summary.name.clone(), cause: cause.clone() })
-            }
+            Some(cause) => Err(self.lost(cause.clone())),
         }
     }
 
-    fn idle(&self) -> std::sync::MutexGuard<'_, Vec<Slot>> {
-        self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    fn lost(&self, cause: String) -> CastError {
+        CastError::Lost { name: self.summary.name.clone(), cause }
     }
 }
 
@@ -188,8 +163,10 @@ impl Pending {
         if batch.rays.is_empty() {
             return;
         }
-        let mut slot = self.core.idle().pop().unwrap_or_default();
-        slot.start(&self.core, &batch);
+        let core = &self.core;
+        let idle = if self.timed { None } else { lock(&core.idle).pop() };
+        let mut slot = idle.unwrap_or_else(|| Slot::new(&core.pipeline, self.timed));
+        slot.start(&core.pipeline, &batch);
         self.dispatches.push((slot, parts));
     }
 
@@ -197,80 +174,51 @@ impl Pending {
     ///
     /// # Errors
     /// If the device was lost.
-    pub fn wait(self) -> Result<Vec<Cast>, GpuError> {
-        let words_per_ray = words_per_ray(&self.core.modules);
+    pub fn wait(self) -> Result<Vec<Cast>, CastError> {
+        Ok(self.collect()?.0)
+    }
+
+    /// The answers, and the seconds of all dispatches where each has them.
+    fn collect(self) -> Result<(Vec<Cast>, Option<f64>), CastError> {
+        let per_ray = self.core.pipeline.effects.outputs_per_ray();
         let mut casts = vec![Cast::default(); self.jobs];
+        let mut total = Some(0.0);
         for (slot, parts) in self.dispatches {
-            let answer = slot
-                .wait(&self.core)
-                .map_err(|cause| GpuError::Lost { name: self.core.summary.name.clone(), cause });
+            let answer = slot.wait(&self.core.pipeline);
+            // What the device reported says more than that the wait failed.
             self.core.check()?;
-            let (codes, words) = answer?;
-            let (mut codes, mut words) = (&codes[..], &words[..]);
+            let Answer { codes, outputs, seconds } =
+                answer.map_err(|cause| self.core.lost(cause))?;
+            let (mut codes, mut outputs) = (&codes[..], &outputs[..]);
             for Part { job, rays } in parts {
                 casts[job].codes.extend_from_slice(&codes[..rays]);
-                casts[job].words.extend_from_slice(&words[..rays * words_per_ray]);
-                (codes, words) = (&codes[rays..], &words[rays * words_per_ray..]);
+                casts[job].effect_outputs.extend_from_slice(&outputs[..rays * per_ray]);
+                (codes, outputs) = (&codes[rays..], &outputs[rays * per_ray..]);
             }
-            self.core.idle().push(slot);
+            total = total.zip(seconds).map(|(total, seconds)| total + seconds);
+            if !self.timed {
+                lock(&self.core.idle).push(slot);
+            }
         }
-        Ok(casts)
+        Ok((casts, total))
     }
 }
 
-fn limits(limits: &wgpu::Limits, modules: &[Module]) -> BatchLimits {
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn limits(limits: &wgpu::Limits, effects: &Effects) -> BatchLimits {
     let binding = usize::try_from(limits.max_storage_buffer_binding_size).unwrap_or(usize::MAX);
     let buffer = usize::try_from(limits.max_buffer_size).unwrap_or(usize::MAX);
     let binding_bytes = binding.min(buffer);
-    // A ray is the largest record per ray, unless many words are asked for.
-    let per_ray = (4 * words_per_ray(modules)).max(size_of::<crate::ray::TraceRay>());
+    // A ray is the largest record per ray, unless effects give many numbers.
+    let per_ray =
+        (size_of::<f32>() * effects.outputs_per_ray()).max(size_of::<crate::ray::TraceRay>());
     let per_axis = limits.max_compute_workgroups_per_dimension as usize;
     let dispatchable = WORKGROUP_SIZE.saturating_mul(per_axis).saturating_mul(per_axis);
     let rays = RAYS_PER_DISPATCH.min(binding_bytes / per_ray).min(dispatchable);
     BatchLimits { binding_bytes, rays }
-}
-
-fn pipeline(device: &wgpu::Device, modules: &[Module]) -> wgpu::ComputePipeline {
-    let storage = |binding, read_only| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Storage { read_only },
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    };
-    let layout = |entries: &[wgpu::BindGroupLayoutEntry]| {
-        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries })
-    };
-    let trace = layout(&[storage(0, true), storage(1, true), storage(2, true), storage(3, false)]);
-    let mut entries = vec![storage(0, false)];
-    entries.extend(reads(modules, Input::Stream).then(|| storage(1, true)));
-    entries.extend(reads(modules, Input::Reflectivity).then(|| storage(2, true)));
-    let effects = (!modules.is_empty()).then(|| layout(&entries));
-    let mut groups = vec![Some(&trace)];
-    groups.extend(effects.iter().map(Some));
-    let constants: Vec<_> = modules.iter().flat_map(|m| m.constants.iter().copied()).collect();
-    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("trace"),
-        layout: Some(&device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &groups,
-            immediate_size: 0,
-        })),
-        module: &device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("trace"),
-            source: wgpu::ShaderSource::Wgsl(compose(modules).into()),
-        }),
-        entry_point: Some("main"),
-        compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &constants,
-            // No workgroup memory is used.
-            zero_initialize_workgroup_memory: false,
-        },
-        cache: None,
-    })
 }
 
 #[cfg(test)]
@@ -324,7 +272,7 @@ mod tests {
         let jobs = jobs();
         let whole = caster.submit(&jobs).unwrap().wait().unwrap();
         assert_eq!(whole.iter().map(|cast| cast.codes.len()).sum::<usize>(), 50_000);
-        // Less than a workgroup, no multiple of one, less than a job, more.
+        // Less than a workgroup, not a multiple of one, less than a job, more.
         for rays in [40, 1000, 6400, 25_001] {
             Arc::get_mut(&mut caster.core).unwrap().limits.rays = rays;
             let pending = caster.submit(&jobs).unwrap();
@@ -350,7 +298,7 @@ mod tests {
         let mut caster = need!(caster());
         Arc::get_mut(&mut caster.core).unwrap().limits.binding_bytes = 100;
         let Err(error) = caster.submit(&jobs()) else { panic!("it was accepted") };
-        assert!(matches!(error, GpuError::TooLarge { binding_bytes: 100, .. }), "{error}");
+        assert!(matches!(error, CastError::TooLarge { binding_bytes: 100, .. }), "{error}");
         assert!(error.to_string().contains(&caster.summary().name));
     }
 }

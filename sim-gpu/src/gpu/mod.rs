@@ -1,12 +1,15 @@
 //! Casting on a GPU, or on software Vulkan, through wgpu.
 
-pub(crate) mod adapter;
+mod adapter;
 mod batch;
 mod caster;
+mod clock;
 mod compose;
+mod pipeline;
 mod slot;
 
-pub use adapter::{AdapterError, AdapterKind, AdapterRequest, AdapterSummary, list_adapters};
+pub use adapter::{AdapterKind, AdapterSummary, list_adapters};
+pub(crate) use adapter::{adapters, find_adapter};
 pub use batch::{Batch, BatchLimits};
-pub use caster::{GpuCaster, GpuError, Pending};
-pub use compose::{Input, Module, compose, modules, reads, words_per_ray};
+pub use caster::{GpuCaster, Pending};
+pub use compose::compose;

@@ -1,183 +1,269 @@
-//! The buffers of one dispatch under way. Slots are used again, so that a long
+//! The buffers of one dispatch in flight. Slots are used again, so that a long
 //! run allocates as much as its largest batches need and no more.
 
 use super::batch::Batch;
-use super::caster::Core;
-use super::compose::{Input, WORKGROUP_SIZE, reads};
-use std::sync::mpsc::{Receiver, channel};
+use super::clock::Clock;
+use super::compose::{WORKGROUP_SIZE, reads, reads_random_bits};
+use super::pipeline::Pipeline;
+use crate::effects::RayInput;
+use std::sync::mpsc::{Receiver, Sender, channel};
 
 const INPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST);
 const OUTPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC);
+const UNIFORM: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM.union(wgpu::BufferUsages::COPY_DST);
 const READBACK: wgpu::BufferUsages =
     wgpu::BufferUsages::MAP_READ.union(wgpu::BufferUsages::COPY_DST);
 
 /// A buffer that is replaced by a larger one when it must hold more.
-#[derive(Default)]
-struct Growing(Option<wgpu::Buffer>);
+struct Growing {
+    label: &'static str,
+    usage: wgpu::BufferUsages,
+    buffer: Option<wgpu::Buffer>,
+}
 
 impl Growing {
-    fn with_room(
-        &mut self,
-        device: &wgpu::Device,
-        bytes: u64,
-        usage: wgpu::BufferUsages,
-    ) -> &wgpu::Buffer {
-        let too_small = self.0.as_ref().is_none_or(|buffer| buffer.size() < bytes);
-        if too_small {
-            let limits = device.limits();
-            let limit = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-            let size = bytes.next_power_of_two().max(4096).min(limit).max(bytes);
-            self.0 = None;
-            self.0 = Some(device.create_buffer(&wgpu::BufferDescriptor {
-                label: None,
-                size,
-                usage,
-                mapped_at_creation: false,
-            }));
+    fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
+        Self { label, usage, buffer: None }
+    }
+
+    /// Makes room for `bytes`; whether the buffer is another one now.
+    fn reserve(&mut self, device: &wgpu::Device, bytes: u64) -> bool {
+        if self.buffer.as_ref().is_some_and(|buffer| buffer.size() >= bytes) {
+            return false;
         }
-        self.0.as_ref().expect("invariant: it was filled above")
+        let limits = device.limits();
+        let limit = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+        let size = bytes.next_power_of_two().max(4096).min(limit).max(bytes);
+        // The old buffer goes first, so that both are never held together.
+        self.buffer = None;
+        self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(self.label),
+            size,
+            usage: self.usage,
+            mapped_at_creation: false,
+        }));
+        true
+    }
+
+    fn upload(&mut self, pipeline: &Pipeline, bytes: &[u8]) -> bool {
+        let grown = self.reserve(&pipeline.device, bytes.len() as u64);
+        pipeline.queue.write_buffer(self.get(), 0, bytes);
+        grown
+    }
+
+    fn get(&self) -> &wgpu::Buffer {
+        self.buffer.as_ref().expect("invariant: room was made before the buffer is used")
     }
 }
 
+/// Both groups of bindings, which stay as they are until a buffer grows.
+struct BindGroups {
+    trace: wgpu::BindGroup,
+    effects: Option<wgpu::BindGroup>,
+}
+
 /// See the module.
-#[derive(Default)]
 pub(super) struct Slot {
     nodes: Growing,
     triangles: Growing,
     rays: Growing,
+    ray_count: Growing,
     codes: Growing,
-    words: Growing,
+    outputs: Growing,
     streams: Growing,
     reflectivities: Growing,
     codes_readback: Growing,
-    words_readback: Growing,
-    answer_bytes: [u64; 2],
+    outputs_readback: Growing,
+    bind_groups: Option<BindGroups>,
+    clock: Option<Clock>,
+    answer: AnswerBytes,
     submission: Option<wgpu::SubmissionIndex>,
     mapped: Option<Receiver<Result<(), wgpu::BufferAsyncError>>>,
 }
 
-impl Slot {
-    /// Uploads `batch`, dispatches it and asks for the answer.
-    pub(super) fn start(&mut self, core: &Core, batch: &Batch) {
-        let Core { device, queue, modules, .. } = core;
-        self.answer_bytes = batch.answer_bytes(modules);
-        let [codes_bytes, words_bytes] = self.answer_bytes;
-        let upload = |to: &mut Growing, bytes: &[u8]| {
-            let buffer = to.with_room(device, bytes.len() as u64, INPUT);
-            queue.write_buffer(buffer, 0, bytes);
-            (buffer.clone(), bytes.len() as u64)
-        };
-        let mut trace = vec![
-            upload(&mut self.nodes, bytemuck::cast_slice(&batch.nodes)),
-            upload(&mut self.triangles, bytemuck::cast_slice(&batch.triangles)),
-            upload(&mut self.rays, bytemuck::cast_slice(&batch.rays)),
-        ];
-        let codes = self.codes.with_room(device, codes_bytes, OUTPUT).clone();
-        trace.push((codes.clone(), codes_bytes));
+/// Bytes of each buffer that is read back; 0 for those that are not.
+#[derive(Clone, Copy, Default)]
+struct AnswerBytes {
+    codes: u64,
+    outputs: u64,
+    clock: u64,
+}
 
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&core.pipeline);
-        pass.set_bind_group(0, &bind(core, 0, &[0, 1, 2, 3], &trace), &[]);
-        if !modules.is_empty() {
-            let words = self.words.with_room(device, words_bytes, OUTPUT).clone();
-            let (mut bindings, mut buffers) = (vec![0], vec![(words, words_bytes)]);
-            if reads(modules, Input::Stream) {
-                bindings.push(1);
-                buffers.push(upload(&mut self.streams, bytemuck::cast_slice(&batch.streams)));
-            }
-            if reads(modules, Input::Reflectivity) {
-                let bytes = bytemuck::cast_slice(&batch.reflectivities);
-                bindings.push(2);
-                buffers.push(upload(&mut self.reflectivities, bytes));
-            }
-            pass.set_bind_group(1, &bind(core, 1, &bindings, &buffers), &[]);
+/// What the adapter found for one batch.
+pub(super) struct Answer {
+    pub(super) codes: Vec<u32>,
+    pub(super) outputs: Vec<f32>,
+    /// How long the pass took by the adapter's clock, where that was asked for.
+    pub(super) seconds: Option<f64>,
+}
+
+impl Slot {
+    /// A slot without buffers; with a clock if the passes are to be `timed` and
+    /// the device keeps time.
+    pub(super) fn new(pipeline: &Pipeline, timed: bool) -> Self {
+        Self {
+            nodes: Growing::new("nodes", INPUT),
+            triangles: Growing::new("triangles", INPUT),
+            rays: Growing::new("rays", INPUT),
+            ray_count: Growing::new("ray count", UNIFORM),
+            codes: Growing::new("codes", OUTPUT),
+            outputs: Growing::new("effect outputs", OUTPUT),
+            streams: Growing::new("streams", INPUT),
+            reflectivities: Growing::new("reflectivities", INPUT),
+            codes_readback: Growing::new("codes, read back", READBACK),
+            outputs_readback: Growing::new("effect outputs, read back", READBACK),
+            bind_groups: None,
+            clock: if timed { Clock::new(pipeline) } else { None },
+            answer: AnswerBytes::default(),
+            submission: None,
+            mapped: None,
+        }
+    }
+
+    /// Uploads `batch`, dispatches it and asks for the answer.
+    pub(super) fn start(&mut self, pipeline: &Pipeline, batch: &Batch) {
+        let device = &pipeline.device;
+        let grown = self.upload(pipeline, batch);
+        if grown || self.bind_groups.is_none() {
+            self.bind_groups = Some(self.bind(pipeline));
+        }
+        let Some(BindGroups { trace, effects }) = &self.bind_groups else { return };
+        let mut encoder =
+            device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("trace") });
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("trace"),
+            timestamp_writes: self.clock.as_ref().map(Clock::around_pass),
+        });
+        pass.set_pipeline(&pipeline.compute);
+        pass.set_bind_group(0, trace, &[]);
+        if let Some(effects) = effects {
+            pass.set_bind_group(1, effects, &[]);
         }
         let [x, y] = workgroups(batch.rays.len(), &device.limits());
         pass.dispatch_workgroups(x, y, 1);
         drop(pass);
-        self.read_back(core, encoder, &codes);
+        self.read_back(pipeline, encoder);
     }
 
-    fn read_back(&mut self, core: &Core, mut encoder: wgpu::CommandEncoder, codes: &wgpu::Buffer) {
-        let [codes_bytes, words_bytes] = self.answer_bytes;
-        let device = &core.device;
-        let readback = self.codes_readback.with_room(device, codes_bytes, READBACK).clone();
-        encoder.copy_buffer_to_buffer(codes, 0, &readback, 0, codes_bytes);
-        let words_readback = self.words.0.as_ref().filter(|_| words_bytes > 0).map(|words| {
-            let readback = self.words_readback.with_room(device, words_bytes, READBACK);
-            encoder.copy_buffer_to_buffer(words, 0, readback, 0, words_bytes);
-            readback.clone()
-        });
-        self.submission = Some(core.queue.submit([encoder.finish()]));
-        let (send, receive) = channel();
-        let map = |buffer: &wgpu::Buffer, bytes| {
-            let send = send.clone();
-            buffer.slice(..bytes).map_async(wgpu::MapMode::Read, move |mapped| {
-                // The receiver is gone only if nobody waits any more.
-                let _ = send.send(mapped);
-            });
-        };
-        map(&readback, codes_bytes);
-        if let Some(buffer) = &words_readback {
-            map(buffer, words_bytes);
+    /// Fills the buffers for `batch`; whether any of those that are bound is
+    /// another one now.
+    fn upload(&mut self, pipeline: &Pipeline, batch: &Batch) -> bool {
+        let Pipeline { device, effects, .. } = pipeline;
+        let n_rays = batch.rays.len();
+        self.answer.codes = (n_rays * size_of::<u32>()) as u64;
+        self.answer.outputs = (n_rays * effects.outputs_per_ray() * size_of::<f32>()) as u64;
+        let count = u32::try_from(n_rays).expect("invariant: a batch holds at most 2^22 rays");
+        let mut grown = self.nodes.upload(pipeline, bytemuck::cast_slice(&batch.nodes));
+        grown |= self.triangles.upload(pipeline, bytemuck::cast_slice(&batch.triangles));
+        grown |= self.rays.upload(pipeline, bytemuck::cast_slice(&batch.rays));
+        grown |= self.ray_count.upload(pipeline, bytemuck::bytes_of(&count));
+        grown |= self.codes.reserve(device, self.answer.codes);
+        if self.answer.outputs > 0 {
+            grown |= self.outputs.reserve(device, self.answer.outputs);
         }
+        if reads_random_bits(effects) {
+            grown |= self.streams.upload(pipeline, bytemuck::cast_slice(&batch.streams));
+        }
+        if reads(effects, RayInput::Reflectivity) {
+            let reflectivities = bytemuck::cast_slice(&batch.reflectivities);
+            grown |= self.reflectivities.upload(pipeline, reflectivities);
+        }
+        grown
+    }
+
+    fn bind(&self, pipeline: &Pipeline) -> BindGroups {
+        let group = |label, layout, buffers: &[(u32, &Growing)]| {
+            let mut entries = Vec::with_capacity(buffers.len());
+            for &(binding, buffer) in buffers {
+                let resource = buffer.get().as_entire_binding();
+                entries.push(wgpu::BindGroupEntry { binding, resource });
+            }
+            pipeline.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(label),
+                layout,
+                entries: &entries,
+            })
+        };
+        let trace = [&self.nodes, &self.triangles, &self.rays, &self.codes, &self.ray_count];
+        let trace: Vec<_> = (0..).zip(trace).collect();
+        let effects = &pipeline.effects;
+        let mut read_by_effects = vec![(0, &self.outputs)];
+        read_by_effects.extend(reads_random_bits(effects).then_some((1, &self.streams)));
+        let reads_reflectivity = reads(effects, RayInput::Reflectivity);
+        read_by_effects.extend(reads_reflectivity.then_some((2, &self.reflectivities)));
+        BindGroups {
+            trace: group("trace", &pipeline.trace_layout, &trace),
+            effects: pipeline
+                .effects_layout
+                .as_ref()
+                .map(|layout| group("effects", layout, &read_by_effects)),
+        }
+    }
+
+    fn read_back(&mut self, pipeline: &Pipeline, mut encoder: wgpu::CommandEncoder) {
+        let (send, receive) = channel();
+        let mut copy = |from: &Growing, to: &mut Growing, bytes| {
+            if bytes > 0 {
+                to.reserve(&pipeline.device, bytes);
+                encoder.copy_buffer_to_buffer(from.get(), 0, to.get(), 0, bytes);
+            }
+        };
+        copy(&self.codes, &mut self.codes_readback, self.answer.codes);
+        copy(&self.outputs, &mut self.outputs_readback, self.answer.outputs);
+        if let Some(clock) = &self.clock {
+            clock.resolve(&mut encoder);
+            self.answer.clock = clock.readback().size();
+        }
+        self.submission = Some(pipeline.queue.submit([encoder.finish()]));
+        map(self.codes_readback.buffer.as_ref(), self.answer.codes, &send);
+        map(self.outputs_readback.buffer.as_ref(), self.answer.outputs, &send);
+        map(self.clock.as_ref().map(Clock::readback), self.answer.clock, &send);
         self.mapped = Some(receive);
     }
 
-    /// The codes and words of the batch, once they are there.
-    pub(super) fn wait(&self, core: &Core) -> Result<(Vec<u32>, Vec<f32>), String> {
+    /// What was found for the batch, once it is there.
+    pub(super) fn wait(&self, pipeline: &Pipeline) -> Result<Answer, String> {
         let mapped = self.mapped.as_ref().ok_or("nothing was dispatched")?;
         // This batch alone: the next may be on its way already.
         let submission_index = self.submission.clone();
         let poll = wgpu::PollType::Wait { submission_index, timeout: None };
-        core.device.poll(poll).map_err(|e| e.to_string())?;
+        pipeline.device.poll(poll).map_err(|e| e.to_string())?;
         // Another thread may be the one that runs the callbacks: this waits for
         // it, until both ends of the channel were dropped.
         for result in mapped {
             result.map_err(|error| error.to_string())?;
         }
-        let [codes_bytes, words_bytes] = self.answer_bytes;
-        Ok((
-            copy_out(&self.codes_readback, codes_bytes)?,
-            copy_out(&self.words_readback, words_bytes)?,
-        ))
+        let ticks = copy_out(self.clock.as_ref().map(Clock::readback), self.answer.clock)?;
+        Ok(Answer {
+            codes: copy_out(self.codes_readback.buffer.as_ref(), self.answer.codes)?,
+            outputs: copy_out(self.outputs_readback.buffer.as_ref(), self.answer.outputs)?,
+            seconds: self.clock.as_ref().map(|clock| clock.seconds(&ticks)),
+        })
     }
 }
 
-fn copy_out<T: bytemuck::AnyBitPattern>(from: &Growing, bytes: u64) -> Result<Vec<T>, String> {
-    let Some(buffer) = from.0.as_ref().filter(|_| bytes > 0) else { return Ok(Vec::new()) };
+/// Asks for the first `bytes` of `buffer`; the result goes to `done`.
+fn map(
+    buffer: Option<&wgpu::Buffer>,
+    bytes: u64,
+    done: &Sender<Result<(), wgpu::BufferAsyncError>>,
+) {
+    let Some(buffer) = buffer.filter(|_| bytes > 0) else { return };
+    let done = done.clone();
+    buffer.slice(..bytes).map_async(wgpu::MapMode::Read, move |mapped| {
+        // The receiver is gone only if nobody waits any more.
+        let _ = done.send(mapped);
+    });
+}
+
+fn copy_out<T: bytemuck::Pod>(from: Option<&wgpu::Buffer>, bytes: u64) -> Result<Vec<T>, String> {
+    let Some(buffer) = from.filter(|_| bytes > 0) else { return Ok(Vec::new()) };
     let copy = {
         let view = buffer.slice(..bytes).get_mapped_range().map_err(|e| e.to_string())?;
-        bytemuck::cast_slice(&view).to_vec()
+        bytemuck::pod_collect_to_vec(&view[..])
     };
     buffer.unmap();
     Ok(copy)
-}
-
-fn bind(
-    core: &Core,
-    group: u32,
-    bindings: &[u32],
-    buffers: &[(wgpu::Buffer, u64)],
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = bindings
-        .iter()
-        .zip(buffers)
-        .map(|(&binding, (buffer, bytes))| wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                buffer,
-                offset: 0,
-                size: wgpu::BufferSize::new(*bytes),
-            }),
-        })
-        .collect();
-    core.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &core.pipeline.get_bind_group_layout(group),
-        entries: &entries,
-    })
 }
 
 /// Workgroups in x and y that cover `rays`.

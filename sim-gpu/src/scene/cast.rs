@@ -2,9 +2,9 @@
 
 use super::{Scene, SceneObject, SceneSensor};
 use crate::bvh::Builder;
+use crate::cast_error::CastError;
 use crate::caster::Caster;
 use crate::config::InvalidValue;
-use crate::gpu::GpuError;
 use crate::job::{CastJob, Culling};
 use crate::mesh::census::survey;
 use crate::mesh::frame::{Normalize, to_world};
@@ -30,7 +30,7 @@ pub enum SceneError {
     Invalid(#[from] InvalidValue),
     /// The adapter failed.
     #[error(transparent)]
-    Gpu(#[from] GpuError),
+    Gpu(#[from] CastError),
     /// A mesh cannot be simplified.
     #[error(transparent)]
     NotBuilt(#[from] NotBuilt),

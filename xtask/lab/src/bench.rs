@@ -15,7 +15,7 @@ use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
 use serde::Serialize;
-use sim_gpu::gpu::AdapterRequest;
+use sim_gpu::caster::AdapterRequest;
 use std::path::PathBuf;
 
 /// What to measure.

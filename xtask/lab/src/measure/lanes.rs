@@ -1,9 +1,10 @@
 //! The ways of casting that a run compares.
 
 use anyhow::{Context, Result, bail};
+use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::{AdapterKind, AdapterRequest, list_adapters};
+use sim_gpu::gpu::{AdapterKind, list_adapters};
 
 /// Rays that fill a GPU, so that what is measured is not its idling.
 const RAYS_TO_FILL_A_GPU: usize = 1 << 22;

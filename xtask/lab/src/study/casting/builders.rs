@@ -112,7 +112,10 @@ fn views(target: &Arc<Target>, pattern: &BeamPattern, rays: usize) -> Vec<Shot> 
 
 fn codes_of(shot: &Shot) -> Cast {
     let bvh = &shot.job.target.bvh;
-    Cast { codes: trace::trace(&bvh.nodes, &bvh.triangles, &shot.job.rays), words: Vec::new() }
+    Cast {
+        codes: trace::trace(&bvh.nodes, &bvh.triangles, &shot.job.rays),
+        effect_outputs: Vec::new(),
+    }
 }
 
 fn through_tree(surface: Surface, builder: Builder, shots: &[Shot]) -> (Cost, Cost, Vec<Cast>) {
@@ -121,7 +124,7 @@ fn through_tree(surface: Surface, builder: Builder, shots: &[Shot]) -> (Cost, Co
     let (codes, cost) = measured(|| -> Vec<_> {
         shots.iter().map(|s| trace::trace(&bvh.nodes, &bvh.triangles, &s.job.rays)).collect()
     });
-    let casts = codes.into_iter().map(|codes| Cast { codes, words: Vec::new() });
+    let casts = codes.into_iter().map(|codes| Cast { codes, effect_outputs: Vec::new() });
     (build, cost, casts.collect())
 }
 

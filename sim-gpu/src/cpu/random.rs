@@ -1,11 +1,12 @@
-//! Random bits and normal deviates. Twin of `shaders/shared/stream.wgsl` and
-//! `shaders/shared/normal_deviate.wgsl`.
+//! Random bits and normal deviates. Counterpart of `shaders/shared/stream.wgsl`
+//! and `shaders/shared/normal_deviate.wgsl`.
 
 use formats::rng::StreamKey;
 
-/// The stream's words for one beam and one purpose (1 noise, 2 dropout).
+/// The random bits of `stream` for one beam and one purpose (1 is noise, 2 is
+/// dropout).
 #[must_use]
-pub fn stream_words(stream: StreamKey, beam: u32, purpose: u32) -> [u32; 4] {
+pub fn random_bits(stream: StreamKey, beam: u32, purpose: u32) -> [u32; 4] {
     stream.words([beam, purpose, 0, 0])
 }
 

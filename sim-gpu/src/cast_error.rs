@@ -1,0 +1,50 @@
+//! What can go wrong while rays are cast.
+
+/// Casting failed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CastError {
+    /// No adapter has the name that was asked for.
+    #[error("expected an adapter whose name holds {wanted:?}, found {}", present.join(", "))]
+    NoSuchAdapter {
+        /// The name asked for.
+        wanted: String,
+        /// The names there are.
+        present: Vec<String>,
+    },
+    /// An adapter was asked for by a program that was built without GPUs.
+    #[error(
+        "expected an adapter whose name holds {wanted:?}, but this program was built without GPU \
+         support: build it with `--features gpu`, or take the adapter \"cpu\""
+    )]
+    NoGpuSupport {
+        /// The name asked for.
+        wanted: String,
+    },
+    /// The adapter does not open.
+    #[error("adapter {name}: {cause}; try --adapter cpu")]
+    Open {
+        /// The adapter.
+        name: String,
+        /// Why.
+        cause: String,
+    },
+    /// A mesh is too large for the adapter's bindings.
+    #[error("adapter {name}: a mesh of {nodes} nodes exceeds a binding of {binding_bytes} bytes")]
+    TooLarge {
+        /// The adapter.
+        name: String,
+        /// The mesh's nodes.
+        nodes: usize,
+        /// The limit.
+        binding_bytes: usize,
+    },
+    /// The device stopped answering.
+    #[error("adapter {name}: {cause}; try --adapter cpu")]
+    Lost {
+        /// The adapter.
+        name: String,
+        /// What the device reported.
+        cause: String,
+    },
+}

@@ -1,0 +1,76 @@
+//! A device with the shader variant of one set of effects compiled on it.
+
+use super::compose::{compose, reads, reads_random_bits};
+use crate::effects::{Effects, RayInput};
+
+/// A device, its queue and the compiled shader.
+pub(super) struct Pipeline {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    pub(super) compute: wgpu::ComputePipeline,
+    /// The layout of group 0: what every variant reads and writes.
+    pub(super) trace_layout: wgpu::BindGroupLayout,
+    /// The layout of group 1: what effects read and write, if there are any.
+    pub(super) effects_layout: Option<wgpu::BindGroupLayout>,
+    pub(super) effects: Effects,
+}
+
+impl Pipeline {
+    /// Compiles the variant that models `effects`.
+    pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue, effects: &Effects) -> Self {
+        let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries,
+            })
+        };
+        let trace = [storage(0, true), storage(1, true), storage(2, true), storage(3, false)];
+        let ray_count = entry(4, wgpu::BufferBindingType::Uniform);
+        let trace_layout = layout("trace", &[&trace[..], &[ray_count]].concat());
+        let effects_layout = effects.per_ray().next().map(|_| {
+            let mut entries = vec![storage(0, false)];
+            entries.extend(reads_random_bits(effects).then(|| storage(1, true)));
+            entries.extend(reads(effects, RayInput::Reflectivity).then(|| storage(2, true)));
+            layout("effects", &entries)
+        });
+        let groups: Vec<_> = [Some(&trace_layout), effects_layout.as_ref()]
+            .into_iter()
+            .filter(Option::is_some)
+            .collect();
+        let constants: Vec<_> = effects.per_ray().flat_map(|effect| effect.constants()).collect();
+        let compute = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("trace"),
+            layout: Some(&device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("trace"),
+                bind_group_layouts: &groups,
+                immediate_size: 0,
+            })),
+            module: &device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("trace"),
+                source: wgpu::ShaderSource::Wgsl(compose(effects).into()),
+            }),
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                // No workgroup memory is used.
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        });
+        let effects = effects.clone();
+        Self { device, queue, compute, trace_layout, effects_layout, effects }
+    }
+}
+
+fn storage(binding: u32, read_only: bool) -> wgpu::BindGroupLayoutEntry {
+    entry(binding, wgpu::BufferBindingType::Storage { read_only })
+}
+
+fn entry(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        count: None,
+    }
+}
