@@ -124,7 +124,7 @@ proptest! {
 fn one_of(target: &Target, triangle: &LeafTriangle) -> Target {
     let corners = [triangle.a, triangle.b, triangle.c];
     let bvh = Bvh::build(Builder::Sah, &[corners], &[triangle.index]);
-    Target { surface: target.surface.clone(), bvh }
+    Target { surface: target.surface.clone(), bvh: bvh.into() }
 }
 
 #[test]

@@ -2,8 +2,6 @@
 //! `shaders/effects/{noise_range,noise_xyz,dropout,intensity}.wgsl`,
 //! `shaders/shared/{stream,normal_deviate}.wgsl` and `sim-gpu/src/cpu/effects.rs`.
 
-use std::sync::Arc;
-
 use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
 use sim_gpu::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
@@ -142,7 +140,7 @@ fn intensity_is_the_twins() {
     let pattern = builtin("vlp32c");
     for caster in casters(&effects) {
         for mesh in [icosphere(4), torus(40), soup(500, 0.3), cube()] {
-            let target: Arc<Target> = target(&mesh);
+            let target: Target = target(&mesh);
             let pose = Pose::look_at(DVec3::new(2.5, 1.0, 0.7), DVec3::ZERO).unwrap();
             let job = job(&target, &pose, &pattern);
             let casts = caster.cast(std::slice::from_ref(&job)).unwrap();

@@ -17,7 +17,7 @@ use sim_gpu::packets::{as_packets_tell, check_effects, revolution};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::RayFrame;
 use sim_gpu::resolve::resolve;
-use sim_gpu::scan::{Seen, View, assemble};
+use sim_gpu::scan::ScanRequest;
 use sim_gpu::sensor::{Layout, Rotating, Sensor};
 use tests::{adapter, casting, judge, meshes};
 
@@ -56,22 +56,10 @@ fn pose(distance_m: f64) -> Pose {
 fn scan(caster: &Caster, sensor: &Sensor, mesh: &Mesh, pose: &Pose, culling: Culling) -> Scan {
     let pattern = sensor.pattern();
     let target = casting::target(mesh);
-    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
-    let job = CastJob::aim(target, frame, &pattern, culling, STREAM, 1.0);
-    let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
-    let effects = Effects::default();
-    let hits = resolve(&job, &casts[0], &pattern, &effects);
-    let view = View {
-        sensor,
-        pattern: &pattern,
-        pose,
-        cast_effects: &effects,
-        effects: &effects,
-        attributes: &[Attribute::Range, Attribute::Beam].into(),
-        stream: STREAM,
-    };
-    let seen = [Seen { object: 0, world_from_object: &DAffine3::IDENTITY, job: &job, hits: &hits }];
-    assemble(&view, &seen).0
+    let mut request = ScanRequest::new(sensor, &pattern, *pose);
+    request.attributes = [Attribute::Range, Attribute::Beam].into();
+    (request.stream, request.culling) = (STREAM, culling);
+    sim_gpu::scan(caster, &target, &request).unwrap()
 }
 
 /// A point from a packet: azimuth clockwise and elevation in degrees, range in

@@ -2,8 +2,6 @@
 //! other: `shaders/{trace,traverse,intersect}.wgsl` and their twins in
 //! `sim-gpu/src/cpu`.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use sim_gpu::bvh::Builder;
 use sim_gpu::effects::Effects;
@@ -43,7 +41,7 @@ fn sensors() -> [BeamPattern; 2] {
     [builtin("vlp32c"), builtin("generic-static")]
 }
 
-fn for_all_jobs(mut check: impl FnMut(&str, &Arc<Target>, &Pose, &BeamPattern)) {
+fn for_all_jobs(mut check: impl FnMut(&str, &Target, &Pose, &BeamPattern)) {
     let sensors = sensors();
     for (name, mesh) in surfaces() {
         let target = target(&mesh);

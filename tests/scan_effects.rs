@@ -4,15 +4,12 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
 use formats::rng::StreamKey;
-use formats::scan::{Attribute, AttributeSet, Scan};
-use glam::{DAffine3, DVec3};
+use formats::scan::{Attribute, Scan};
+use glam::DVec3;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
-use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::RayFrame;
-use sim_gpu::resolve::resolve;
-use sim_gpu::scan::{Seen, Tally, View, assemble};
+use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
 use sim_gpu::sensor::Sensor;
 use tests::{adapter, casting, meshes};
 
@@ -23,24 +20,14 @@ fn scan(caster: &Caster, sensor: &Sensor, effects: &Effects) -> (Scan, Tally) {
     let pattern = sensor.pattern();
     let target = casting::target(&meshes::icosphere(4));
     let pose = Pose::look_at(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO).unwrap();
-    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
-    let job = CastJob::aim(target, frame, &pattern, Culling::On, STREAM, 0.5);
-    let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
-    let hits = resolve(&job, &casts[0], &pattern, effects);
-    let mut attributes: AttributeSet =
-        [Attribute::Range, Attribute::Beam, Attribute::Normal].into();
-    attributes.extend(effects.intensity.map(|_| Attribute::Intensity));
-    let view = View {
-        sensor,
-        pattern: &pattern,
-        pose: &pose,
-        cast_effects: effects,
-        effects,
-        attributes: &attributes,
-        stream: STREAM,
-    };
-    let seen = [Seen { object: 0, world_from_object: &DAffine3::IDENTITY, job: &job, hits: &hits }];
-    assemble(&view, &seen)
+    let mut placed = PlacedTarget::new(&target);
+    placed.reflectivity = 0.5;
+    let mut request = ScanRequest::new(sensor, &pattern, pose);
+    request.attributes = [Attribute::Range, Attribute::Beam, Attribute::Normal].into();
+    request.attributes.extend(effects.intensity.map(|_| Attribute::Intensity));
+    (request.effects, request.stream) = (Some(effects.clone()), STREAM);
+    let scanned = scan_objects(caster, &[placed], &request).unwrap();
+    (scanned.scan, scanned.tally)
 }
 
 fn vlp32c() -> Sensor {

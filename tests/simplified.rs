@@ -4,7 +4,6 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
-use std::sync::Arc;
 
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -69,7 +68,7 @@ fn assert_near(mesh: &Mesh, fewer: &Mesh, bound_m: f64, what: &str) {
 }
 
 /// The points of a scan of `target` from `pose`, metres.
-fn scanned(target: &Arc<Target>, pose: &Pose) -> Vec<DVec3> {
+fn scanned(target: &Target, pose: &Pose) -> Vec<DVec3> {
     let pattern = builtin("vlp32c");
     let job = job(target, pose, &pattern);
     let hits = tests::casting::hits(&Caster::Cpu(Effects::default()), &job, &pattern);

@@ -2,7 +2,6 @@
 //! none may slip through, on any caster.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -61,7 +60,7 @@ fn aimed(target: &Target, sensor: DVec3, points: &[DVec3]) -> BeamPattern {
 }
 
 /// Casts from `SENSORS` places inside at all corners and edges; how many rays.
-fn cast_from_inside(target: &Arc<Target>, expected: usize, effects: &Effects) {
+fn cast_from_inside(target: &Target, expected: usize, effects: &Effects) {
     let points = corners_and_midpoints(target);
     assert_eq!(points.len() * SENSORS, expected);
     let mut random = Random::new("inside");

@@ -5,13 +5,12 @@ use crate::ray::{RayFrame, TraceRay};
 use crate::sensor::BeamPattern;
 use crate::target::Target;
 use formats::rng::StreamKey;
-use std::sync::Arc;
 
 /// The rays of one sensor against one object.
 #[derive(Clone, Debug)]
 pub struct CastJob {
     /// The object.
-    pub target: Arc<Target>,
+    pub target: Target,
     /// How the sensor sees it.
     pub frame: RayFrame,
     /// The beam of each ray, `[n_rays]`.
@@ -38,7 +37,7 @@ impl CastJob {
     /// Aims the beams of `pattern` at `target` through `frame`.
     #[must_use]
     pub fn aim(
-        target: Arc<Target>,
+        target: Target,
         frame: RayFrame,
         pattern: &BeamPattern,
         culling: Culling,

@@ -24,3 +24,7 @@ pub mod sensor;
 pub mod simplify;
 pub mod surface_points;
 pub mod target;
+
+pub use formats;
+pub use glam;
+pub use scan::{scan, scan_many};

@@ -1,8 +1,12 @@
 //! A mesh made ready for casting.
 
 use crate::bvh::{Builder, Bvh};
-use crate::mesh::Mesh;
+use crate::mesh::census::survey as triangle_stats;
+use crate::mesh::frame::{Normalize, to_world};
+use crate::mesh::{Mesh, MeshError, load};
 use glam::DVec3;
+use std::path::Path;
+use std::sync::Arc;
 
 /// Maps an object to its unit frame: box centre to 0, half the longest side to
 /// (0.5, 1]. The scale is a power of two, so that it rounds nothing.
@@ -61,16 +65,24 @@ pub struct Surface {
 }
 
 /// A mesh made ready for casting: its surface for ranges, and a hierarchy over
-/// it in f32 for finding them.
+/// it in f32 for finding them. A clone shares both.
 #[derive(Clone, Debug)]
 pub struct Target {
     /// The surface, in f64.
-    pub surface: Surface,
+    pub surface: Arc<Surface>,
     /// The hierarchy that casters traverse.
-    pub bvh: Bvh,
+    pub bvh: Arc<Bvh>,
 }
 
 impl Surface {
+    /// The triangles of `mesh` that a ray can meet: all that are neither
+    /// degenerate nor duplicates.
+    #[must_use]
+    pub fn of_mesh(mesh: Mesh) -> Self {
+        let kept = triangle_stats(&mesh).kept;
+        Self::new(mesh, kept)
+    }
+
     /// The triangles of `mesh` whose indices `kept` lists, ascending;
     /// `mesh::census::survey` lists those that are neither degenerate nor
     /// duplicates.
@@ -116,6 +128,17 @@ impl Surface {
 }
 
 impl Target {
+    /// Reads the mesh at `path`, turns it z up as its format has it, scales it
+    /// as `normalize` says, and makes it ready for casting.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn load(path: &Path, normalize: Normalize) -> Result<Self, MeshError> {
+        let loaded = load(path)?;
+        let world = to_world(&loaded.mesh, loaded.format.default_up(), normalize);
+        Ok(Self::new(Surface::of_mesh(world.mesh), Builder::Sah))
+    }
+
     /// Builds the hierarchy over `surface`.
     #[must_use]
     pub fn new(surface: Surface, builder: Builder) -> Self {
@@ -127,13 +150,13 @@ impl Target {
             .map(|&t| surface.triangles[t as usize].map(|v| rounded[v as usize]))
             .collect();
         let bvh = Bvh::build(builder, &corners, &surface.kept);
-        Self { surface, bvh }
+        Self { surface: Arc::new(surface), bvh: Arc::new(bvh) }
     }
 
     /// Bytes held, for memory budgets.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let Surface { vertices, triangles, kept, .. } = &self.surface;
+        let Surface { vertices, triangles, kept, .. } = &*self.surface;
         self.bvh.bytes()
             + size_of_val(&vertices[..])
             + size_of_val(&triangles[..])

@@ -1,7 +1,5 @@
 //! Relations between several scans, which no table of one says plainly.
 
-use std::sync::Arc;
-
 use formats::rng::StreamKey;
 use glam::{DAffine3, DMat3, DVec3, dvec3};
 use libtest_mimic::Trial;
@@ -51,7 +49,7 @@ pub fn trials() -> Vec<Trial> {
 }
 
 /// Casts on all casters, holds each to the oracle, and returns what all found.
-fn scan(name: &str, target: &Arc<Target>, pose: &Pose, pattern: &BeamPattern) -> Vec<Hits> {
+fn scan(name: &str, target: &Target, pose: &Pose, pattern: &BeamPattern) -> Vec<Hits> {
     let job = job(target, pose, pattern);
     let cast = |caster: &&Caster| {
         let hits = hits(caster, &job, pattern);
@@ -124,9 +122,9 @@ fn an_empty_object_in_a_batch_has_no_hits() {
 }
 
 /// Every triangle of `mesh` is kept, whatever a survey says.
-fn unsurveyed(mesh: Mesh) -> Arc<Target> {
+fn unsurveyed(mesh: Mesh) -> Target {
     let kept = (0..mesh.triangles.len() as u32).collect();
-    Arc::new(Target::new(Surface::new(mesh, kept), Builder::Sah))
+    Target::new(Surface::new(mesh, kept), Builder::Sah)
 }
 
 /// Coincident triangles, near enough for f64 to be asked and far enough for
@@ -178,7 +176,7 @@ fn a_squeezed_object_is_seen_as_its_squeezed_mesh() {
         let frame = RayFrame::new(&plain.surface, &world_from_object, &pose);
         for culling in [Culling::On, Culling::Off] {
             let stream = StreamKey::new(0, "", 0);
-            let job = CastJob::aim(Arc::clone(&plain), frame, &pattern, culling, stream, 1.0);
+            let job = CastJob::aim(plain.clone(), frame, &pattern, culling, stream, 1.0);
             for caster in casters(&Effects::default()) {
                 let found = hits(caster, &job, &pattern);
                 judge(&job, &pattern, &found).assert_kept("squeezed");
@@ -205,7 +203,7 @@ fn an_object_flattened_to_nothing_is_not_seen() {
         let frame = RayFrame::new(&target.surface, &flat, &view(1.0, DVec3::ZERO));
         let stream = StreamKey::new(0, "", 0);
         for culling in [Culling::On, Culling::Off] {
-            let job = CastJob::aim(Arc::clone(&target), frame, &pattern, culling, stream, 1.0);
+            let job = CastJob::aim(target.clone(), frame, &pattern, culling, stream, 1.0);
             for caster in casters(&Effects::default()) {
                 assert!(hits(caster, &job, &pattern).hits.is_empty(), "{stretch}");
             }

@@ -1,8 +1,6 @@
 //! Cases of one mesh and one sensor. Every caster's hits are held to the f64
 //! oracle, with and without culling, and to what the case expects.
 
-use std::sync::Arc;
-
 use glam::{DQuat, DVec3};
 use serde::Deserialize;
 use sim_gpu::bvh::{Builder, assert_well_formed};
@@ -160,7 +158,7 @@ struct Setting {
 
 /// A setting made ready to be cast, and what each beam must find, if told.
 struct Scene {
-    target: Arc<Target>,
+    target: Target,
     pose: Pose,
     pattern: BeamPattern,
     ranges: Option<Vec<Option<f64>>>,

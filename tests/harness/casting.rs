@@ -1,7 +1,5 @@
 //! From a mesh and a sensor to hits, in one call.
 
-use std::sync::Arc;
-
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3};
 use sim_gpu::bvh::Builder;
@@ -18,15 +16,15 @@ use sim_gpu::target::{Surface, Target};
 
 /// `mesh` without its degenerate and duplicate triangles, ready for casting.
 #[must_use]
-pub fn target(mesh: &Mesh) -> Arc<Target> {
+pub fn target(mesh: &Mesh) -> Target {
     target_by(Builder::Sah, mesh)
 }
 
 /// As [`target`], by this builder.
 #[must_use]
-pub fn target_by(builder: Builder, mesh: &Mesh) -> Arc<Target> {
+pub fn target_by(builder: Builder, mesh: &Mesh) -> Target {
     let kept = survey(mesh).kept;
-    Arc::new(Target::new(Surface::new(mesh.clone(), kept), builder))
+    Target::new(Surface::new(mesh.clone(), kept), builder)
 }
 
 /// The beams of a sensor that comes with the program.
@@ -54,21 +52,16 @@ pub fn at(position_m: DVec3) -> Pose {
 
 /// `pattern` from `pose` at a target whose frame is the world's.
 #[must_use]
-pub fn job(target: &Arc<Target>, pose: &Pose, pattern: &BeamPattern) -> CastJob {
+pub fn job(target: &Target, pose: &Pose, pattern: &BeamPattern) -> CastJob {
     job_with(target, pose, pattern, Culling::On)
 }
 
 /// As [`job`], with or without culling.
 #[must_use]
-pub fn job_with(
-    target: &Arc<Target>,
-    pose: &Pose,
-    pattern: &BeamPattern,
-    culling: Culling,
-) -> CastJob {
+pub fn job_with(target: &Target, pose: &Pose, pattern: &BeamPattern, culling: Culling) -> CastJob {
     let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
     let stream = StreamKey::new(7, "object", 0);
-    CastJob::aim(Arc::clone(target), frame, pattern, culling, stream, 0.75)
+    CastJob::aim(target.clone(), frame, pattern, culling, stream, 0.75)
 }
 
 /// What `caster` finds for `job`, without effects.

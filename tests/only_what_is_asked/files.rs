@@ -3,13 +3,12 @@
 use formats::Scan;
 use formats::scan::AttributeSet;
 use formats::scan_file::{ScanFormat, write_scan};
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
 use sim_gpu::pose::Pose;
-use sim_gpu::scan::{Seen, View, assemble};
+use sim_gpu::scan::ScanRequest;
 use sim_gpu::sensor::Sensor;
-use tests::casting;
 
 use super::Rows;
 use super::travel::sphere;
@@ -37,21 +36,11 @@ pub fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
 
 fn scan(effects: &Effects, attributes: &AttributeSet) -> Scan {
     let (job, pattern) = sphere();
-    let caster = Caster::Cpu(effects.clone());
-    let hits = casting::hits_with(&caster, &job, &pattern, effects);
     let sensor = Sensor::builtin("vlp32c").unwrap();
     let pose = Pose::look_at(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO).unwrap();
-    let view = View {
-        sensor: &sensor,
-        pattern: &pattern,
-        pose: &pose,
-        cast_effects: effects,
-        effects,
-        attributes,
-        stream: job.stream,
-    };
-    let seen = [Seen { object: 0, world_from_object: &DAffine3::IDENTITY, job: &job, hits: &hits }];
-    assemble(&view, &seen).0
+    let mut request = ScanRequest::new(&sensor, &pattern, pose);
+    (request.attributes, request.stream) = (attributes.clone(), job.stream);
+    sim_gpu::scan(&Caster::Cpu(effects.clone()), &job.target, &request).unwrap()
 }
 
 /// The first points of `scan`.

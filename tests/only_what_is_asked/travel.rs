@@ -1,7 +1,5 @@
 //! What travels to the adapter and back for each ray, in bytes.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use sim_gpu::effects::Effects;
 use sim_gpu::gpu::Batch;
@@ -17,7 +15,7 @@ pub fn sphere() -> (CastJob, BeamPattern) {
     let pattern = casting::builtin("vlp32c");
     let target = casting::target(&meshes::icosphere(4));
     let pose = Pose::look_at(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO).unwrap();
-    (casting::job(&Arc::clone(&target), &pose, &pattern), pattern)
+    (casting::job(&target, &pose, &pattern), pattern)
 }
 
 /// Bytes sent and read back for each ray: as batches are laid out, and as every

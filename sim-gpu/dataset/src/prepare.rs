@@ -15,7 +15,6 @@ use sim_gpu::ray::RayFrame;
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::simplify::{Simplified, Watcher, resolved_m, simplified_surface};
 use sim_gpu::target::{Surface, Target};
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// A mesh and everything that is to be cast at it.
@@ -76,12 +75,12 @@ pub fn prepare(
         })
         .sum();
     let builder = Builder::for_rays(surface.len(), rays);
-    let target = Arc::new(progress.time(Stage::Build, || Target::new(surface, builder)));
+    let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {
         let aim = |(view, frame): (&PlannedView, RayFrame)| {
             let set: &SetConfig = &config.sets[view.set];
             let stream = set.stream(config.seed, &id, view.view);
-            CastJob::aim(Arc::clone(&target), frame, &patterns[view.set], culling, stream, 1.0)
+            CastJob::aim(target.clone(), frame, &patterns[view.set], culling, stream, 1.0)
         };
         views.iter().zip(frames).map(aim).collect()
     });

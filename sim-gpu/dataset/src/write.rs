@@ -7,13 +7,13 @@ use super::prepare::{PlannedView, Prepared};
 use super::progress::{Progress, Stage};
 use super::record::{FileRecord, MeshRecord, ScanRecord, VariantRecord};
 use formats::scan_file::{ScanFormat, write_scan};
-use formats::vlp32c::{self, Returns};
+use formats::vlp32c;
 use glam::DAffine3;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{Cast, CastJob};
 use sim_gpu::packets;
 use sim_gpu::resolve::{Hits, resolve};
-use sim_gpu::scan::{Seen, View, assemble};
+use sim_gpu::scan::{ObjectHits, ScanRequest, assemble};
 use sim_gpu::sensor::BeamPattern;
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
@@ -62,20 +62,17 @@ fn write_view(
 ) -> Result<ScanRecord, DatasetError> {
     let config = output.config;
     let set = &config.sets[planned.set];
-    let seen = [Seen { object: 0, world_from_object: &DAffine3::IDENTITY, job, hits }];
+    let world_from_object = DAffine3::IDENTITY;
+    let objects = [ObjectHits { object: 0, world_from_object, job, hits }];
     let mut variants = Vec::new();
     for &variant in &config.variants {
-        let effects = config.effects_of(set, variant)?;
-        let view = View {
-            sensor: &set.sensor,
-            pattern: &output.patterns[planned.set],
-            pose: &planned.pose,
-            cast_effects: output.cast_effects,
-            effects: &effects,
-            attributes: &config.attributes,
-            stream: job.stream,
-        };
-        let (scan, tally) = output.progress.time(Stage::Resolve, || assemble(&view, &seen));
+        let mut request =
+            ScanRequest::new(&set.sensor, &output.patterns[planned.set], planned.pose);
+        request.effects = Some(config.effects_of(set, variant)?);
+        (request.attributes, request.stream) = (config.attributes.clone(), job.stream);
+        let (scan, tally) = output
+            .progress
+            .time(Stage::Resolve, || assemble(&request, output.cast_effects, &objects))?;
         output.progress.scans.fetch_add(1, Relaxed);
         output.progress.points.fetch_add(tally.points, Relaxed);
         let files: Result<_, DatasetError> = output.progress.time(Stage::Write, || {
@@ -86,7 +83,7 @@ fn write_view(
                     let (out, entry) = (output.out, &record.entry);
                     let path = layout::scan(out, &set.name, variant, entry, planned.view, format);
                     match format {
-                        ScanFormat::Pcap => write_packets(&path, &view, &seen, config.returns)?,
+                        ScanFormat::Pcap => write_packets(output, &path, &request, &objects)?,
                         _ => write_scan(&path, format, &scan)?,
                     }
                     Ok(FileRecord { format, sha256: formats::hash::of_file(&path)? })
@@ -100,13 +97,15 @@ fn write_view(
 
 /// Writes the packets of one view, whatever attributes its points have.
 fn write_packets(
+    output: &Output,
     path: &Path,
-    view: &View,
-    seen: &[Seen],
-    returns: Returns,
+    request: &ScanRequest,
+    objects: &[ObjectHits],
 ) -> Result<(), DatasetError> {
-    let revolution = packets::revolution(view.sensor)?;
-    let attributes = packets::attributes(view.effects);
-    let (scan, _) = assemble(&View { attributes: &attributes, ..*view }, seen);
-    Ok(vlp32c::write(path, &revolution, returns, &scan)?)
+    let revolution = packets::revolution(request.sensor)?;
+    let effects = request.applied_effects(output.cast_effects)?;
+    let mut request = request.clone();
+    request.attributes = packets::attributes(&effects);
+    let (scan, _) = assemble(&request, output.cast_effects, objects)?;
+    Ok(vlp32c::write(path, &revolution, output.config.returns, &scan)?)
 }

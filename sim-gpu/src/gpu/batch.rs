@@ -1,7 +1,7 @@
 //! Many meshes and views laid side by side for one dispatch.
 
 use super::compose::{reads, reads_random_bits};
-use crate::bvh::{LeafTriangle, Node};
+use crate::bvh::{Bvh, LeafTriangle, Node};
 use crate::effects::{Effects, RayInput};
 use crate::job::CastJob;
 use crate::ray::TraceRay;
@@ -40,18 +40,18 @@ pub struct Batch {
     pub streams: Vec<[u32; 4]>,
     /// Reflectivity per ray; empty unless an effect reads it.
     pub reflectivities: Vec<f32>,
-    bases: HashMap<*const Target, u32>,
+    bases: HashMap<*const Bvh, u32>,
 }
 
 impl Batch {
     /// Whether `rays` more rays of `target` fit beside what is here. What fits
     /// no batch at all is for the caller to keep away.
     #[must_use]
-    pub fn has_room(&self, target: &Arc<Target>, rays: usize, limits: &BatchLimits) -> bool {
+    pub fn has_room(&self, target: &Target, rays: usize, limits: &BatchLimits) -> bool {
         if self.rays.len() + rays > limits.rays {
             return false;
         }
-        self.bases.contains_key(&Arc::as_ptr(target)) || {
+        self.bases.contains_key(&Arc::as_ptr(&target.bvh)) || {
             let nodes = self.nodes.len() + target.bvh.nodes.len();
             let triangles = self.triangles.len() + target.bvh.triangles.len();
             nodes * size_of::<Node>() <= limits.binding_bytes
@@ -74,9 +74,9 @@ impl Batch {
     }
 
     /// Where the tree of `target` starts; it is copied here once.
-    fn root_of(&mut self, target: &Arc<Target>) -> u32 {
+    fn root_of(&mut self, target: &Target) -> u32 {
         let (nodes, triangles) = (&mut self.nodes, &mut self.triangles);
-        *self.bases.entry(Arc::as_ptr(target)).or_insert_with(|| {
+        *self.bases.entry(Arc::as_ptr(&target.bvh)).or_insert_with(|| {
             let (node_base, triangle_base) = (nodes.len() as u32, triangles.len() as u32);
             nodes.extend(target.bvh.nodes.iter().map(|n| n.moved(node_base, triangle_base)));
             triangles.extend_from_slice(&target.bvh.triangles);

@@ -259,7 +259,7 @@ mod tests {
                 let position_m = DVec3::new(4.0, f64::from(i) - 3.0, 1.0) * f64::from(i);
                 let pose = Pose::look_at(position_m, DVec3::ZERO).unwrap();
                 let frame = RayFrame::new(&surface, &DAffine3::IDENTITY, &pose);
-                let target = Arc::new(Target::new(surface, Builder::Sah));
+                let target = Target::new(surface, Builder::Sah);
                 let stream = StreamKey::new(0, "pyramid", i);
                 CastJob::aim(target, frame, &pattern, Culling::Off, stream, 0.1 * i as f32)
             })

@@ -2,22 +2,17 @@
 
 use super::{Scene, SceneObject, SceneSensor};
 use crate::bvh::Builder;
-use crate::cast_error::CastError;
 use crate::caster::Caster;
-use crate::config::InvalidValue;
-use crate::job::{CastJob, Culling};
+use crate::job::Culling;
 use crate::mesh::census::survey;
 use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::{LoadedMesh, Mesh, MeshError, load};
-use crate::ray::RayFrame;
-use crate::resolve::resolve;
-use crate::scan::{Seen, Tally, View, assemble};
+use crate::scan::{PlacedTarget, ScanError, ScanRequest, Scanned, Tally, scan_objects};
 use crate::simplify::{NotBuilt, Simplified, Watcher, resolved_m, simplified_surface};
 use crate::target::{Surface, Target};
 use formats::Scan;
 use formats::rng::StreamKey;
 use glam::DAffine3;
-use std::sync::Arc;
 
 /// Why a scene cannot be scanned.
 #[derive(Debug, thiserror::Error)]
@@ -25,12 +20,9 @@ pub enum SceneError {
     /// A mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// An effect does not fit a sensor.
+    /// An effect does not fit a sensor, or the adapter failed.
     #[error(transparent)]
-    Invalid(#[from] InvalidValue),
-    /// The adapter failed.
-    #[error(transparent)]
-    Gpu(#[from] CastError),
+    Scan(#[from] ScanError),
     /// A mesh cannot be simplified.
     #[error(transparent)]
     NotBuilt(#[from] NotBuilt),
@@ -53,7 +45,7 @@ pub struct SceneScan {
 
 /// An object ready to be cast at.
 struct Placed {
-    target: Arc<Target>,
+    target: Target,
     world_from_object: DAffine3,
     simplified: Option<Simplified>,
 }
@@ -87,14 +79,14 @@ fn place(scene: &Scene, object: &SceneObject) -> Result<Placed, SceneError> {
     }
     let Some(simplify) = scene.simplify_of(object) else {
         let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
-        return Ok(Placed { target: Arc::new(target), world_from_object, simplified: None });
+        return Ok(Placed { target, world_from_object, simplified: None });
     };
     let bound_m = simplify.bound_m(|| resolved_by(scene, object, &world.mesh, &world_from_object));
     // No length of the mesh is longer in the world than by its largest factor.
     let surface = simplified_surface(world.mesh, kept, bound_m / object.scale.max_element())?;
     let simplified = Some(Simplified { bound_m, triangles: surface.len() as u64 });
     let target = Target::new(surface, Builder::Sah);
-    Ok(Placed { target: Arc::new(target), world_from_object, simplified })
+    Ok(Placed { target, world_from_object, simplified })
 }
 
 /// What the scene's sensors can tell apart on `mesh`, in metres.
@@ -124,45 +116,23 @@ fn cast_sensor(
     culling: Culling,
 ) -> Result<SceneScan, SceneError> {
     let pattern = sensor.sensor.pattern();
-    let effects = scene.effects.for_sensor(&sensor.sensor)?;
-    let aim = |(placed, object): (&Placed, &SceneObject)| {
-        let Placed { target, world_from_object, .. } = placed;
-        let frame = RayFrame::new(&target.surface, world_from_object, &sensor.pose);
-        let stream = StreamKey::new(scene.seed, &object.name, number);
-        let reflectivity = object.reflectivity as f32;
-        CastJob::aim(Arc::clone(target), frame, &pattern, culling, stream, reflectivity)
-    };
-    let jobs: Vec<CastJob> = objects.iter().zip(&scene.objects).map(aim).collect();
-    let too_large_for_adapter = !jobs.iter().all(|job| caster.fits(&job.target));
-    let casts =
-        if too_large_for_adapter { caster.cast_on_cpu(&jobs) } else { caster.cast(&jobs)? };
-    let hits: Vec<_> = jobs
+    let placed: Vec<PlacedTarget> = objects
         .iter()
-        .zip(&casts)
-        .map(|(job, cast)| resolve(job, cast, &pattern, &scene.effects))
-        .collect();
-    let seen: Vec<Seen> = objects
-        .iter()
-        .zip(jobs.iter().zip(&hits))
-        .zip(0..)
-        .map(|((placed, (job, hits)), object)| Seen {
-            object,
-            world_from_object: &placed.world_from_object,
-            job,
-            hits,
+        .zip(&scene.objects)
+        .map(|(placed, object)| {
+            let mut target = PlacedTarget::new(&placed.target);
+            target.world_from_object = placed.world_from_object;
+            target.reflectivity = object.reflectivity as f32;
+            target.stream = Some(StreamKey::new(scene.seed, &object.name, number));
+            target
         })
         .collect();
-    let view = View {
-        sensor: &sensor.sensor,
-        pattern: &pattern,
-        pose: &sensor.pose,
-        cast_effects: &scene.effects,
-        effects: &effects,
-        attributes: &scene.attributes,
-        stream: StreamKey::new(scene.seed, &sensor.name, number),
-    };
-    let (scan, tally) = assemble(&view, &seen);
-    let sensor = sensor.name.clone();
+    let mut request = ScanRequest::new(&sensor.sensor, &pattern, sensor.pose);
+    request.attributes = scene.attributes.clone();
+    request.stream = StreamKey::new(scene.seed, &sensor.name, number);
+    request.culling = culling;
+    let Scanned { scan, tally, cast_on_cpu, .. } = scan_objects(caster, &placed, &request)?;
     let simplified = objects.iter().map(|placed| placed.simplified).collect();
-    Ok(SceneScan { sensor, scan, tally, too_large_for_adapter, simplified })
+    let sensor = sensor.name.clone();
+    Ok(SceneScan { sensor, scan, tally, too_large_for_adapter: cast_on_cpu, simplified })
 }

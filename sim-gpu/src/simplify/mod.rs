@@ -31,7 +31,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive};
 use crate::mesh::Mesh;
-use crate::mesh::census::survey;
 use crate::target::Surface;
 
 pub use distance::{distance_to_surface, distance_to_triangle};
@@ -96,15 +95,9 @@ pub fn simplified(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>,
 /// If this build has no decimation.
 pub fn simplified_surface(mesh: Mesh, kept: Vec<u32>, bound: f64) -> Result<Surface, NotBuilt> {
     Ok(match simplified(&mesh, &kept, bound)? {
-        Some(fewer) => surface_of(fewer),
+        Some(fewer) => Surface::of_mesh(fewer),
         None => Surface::new(mesh, kept),
     })
-}
-
-/// The surface of all triangles of `mesh` that casters need.
-fn surface_of(mesh: Mesh) -> Surface {
-    let kept = survey(&mesh).kept;
-    Surface::new(mesh, kept)
 }
 
 /// [`Simplify`] as written.

@@ -7,7 +7,6 @@ pub mod lanes;
 pub mod machine;
 pub mod moller_trumbore;
 pub mod reference_network;
-pub mod scan_mesh;
 pub mod scenes;
 pub mod shot;
 pub mod subject;

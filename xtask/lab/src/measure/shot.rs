@@ -8,7 +8,6 @@ use sim_gpu::pose::Pose;
 use sim_gpu::ray::{AMBIGUOUS, MISS, Ray, RayFrame};
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
-use std::sync::Arc;
 
 /// Numbers the benchmark's own random streams.
 const SEED: u64 = 0x000E_D6E9;
@@ -25,28 +24,23 @@ pub struct Shot {
 
 impl Shot {
     /// One revolution or image of a sensor at `pose`.
-    pub fn sweep(
-        target: &Arc<Target>,
-        pose: &Pose,
-        pattern: &BeamPattern,
-        culling: Culling,
-    ) -> Self {
+    pub fn sweep(target: &Target, pose: &Pose, pattern: &BeamPattern, culling: Culling) -> Self {
         let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
         let stream = StreamKey::new(SEED, "sweep", 0);
-        let job = CastJob::aim(Arc::clone(target), frame, pattern, culling, stream, 1.0);
+        let job = CastJob::aim(target.clone(), frame, pattern, culling, stream, 1.0);
         let rays = job.beams.iter().map(|&beam| frame.beam(pattern, beam)).collect();
         Self { job, rays }
     }
 
     /// Rays from each of `origins` through each of `points`, all in the world.
-    pub fn through(target: &Arc<Target>, origins: &[DVec3], points: &[DVec3]) -> Self {
+    pub fn through(target: &Target, origins: &[DVec3], points: &[DVec3]) -> Self {
         let pairs = origins.iter().flat_map(|&o| points.iter().map(move |&p| (o, p)));
         Self::of(target, pairs)
     }
 
     /// `n` rays from random places 5 m away through random points of the unit
     /// ball: hardly two of them traverse alike.
-    pub fn incoherent(target: &Arc<Target>, n: usize) -> Self {
+    pub fn incoherent(target: &Target, n: usize) -> Self {
         const DISTANCE_M: f64 = 5.0;
         let key = StreamKey::new(SEED, "incoherent", 0);
         let on_sphere = |i: u64| {
@@ -62,7 +56,7 @@ impl Shot {
         Self::of(target, pairs)
     }
 
-    fn of(target: &Arc<Target>, pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Self {
+    fn of(target: &Target, pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Self {
         let surface = &target.surface;
         let anywhere = Pose { position_m: DVec3::ZERO, world_from_sensor: DQuat::IDENTITY };
         let frame = RayFrame::new(surface, &DAffine3::IDENTITY, &anywhere);
@@ -73,7 +67,7 @@ impl Shot {
             })
             .collect();
         let job = CastJob {
-            target: Arc::clone(target),
+            target: target.clone(),
             frame,
             beams: (0..rays.len() as u32).collect(),
             rays: rays.iter().map(|ray| frame.trace_ray_unculled(ray, 0)).collect(),

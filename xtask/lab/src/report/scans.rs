@@ -1,19 +1,18 @@
 //! Clouds to turn: one mesh as several sensors see it.
 
-use crate::measure::scan_mesh::{self, load_target};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use formats::rng::StreamKey;
-use formats::scan::AttributeSet;
 use glam::DVec3;
 use maud::{Markup, html};
+use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
+use sim_gpu::mesh::frame::Normalize;
 use sim_gpu::mesh::tree::discover;
 use sim_gpu::pose::Pose;
-use sim_gpu::scan::View;
+use sim_gpu::scan::ScanRequest;
 use sim_gpu::sensor::Sensor;
 use sim_gpu::target::Target;
 use std::path::Path;
-use std::sync::Arc;
 use xtask::workspace::file_name;
 
 /// Sensors, and noise along the ray in metres.
@@ -38,8 +37,12 @@ pub fn body(assets: &Path) -> Result<Markup> {
     let Some(entry) = entries.into_iter().next() else {
         return Ok(html! { p { "There is no mesh under " (folder.display()) "." } });
     };
-    let target = load_target(&entry)?;
-    let clouds = SENSORS.map(|(sensor, noise_m)| (sensor, noise_m, scan(&target, sensor, noise_m)));
+    let target = Target::load(&entry.path, Normalize::default())
+        .with_context(|| format!("cannot scan {}", entry.relative))?;
+    let clouds: Vec<_> = SENSORS
+        .into_iter()
+        .map(|(sensor, noise_m)| Ok((sensor, noise_m, scan(&target, sensor, noise_m)?)))
+        .collect::<Result<_>>()?;
     Ok(html! {
         p { (file_name(&entry.path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
             (ELEVATION_DEG) "° below it. Made now, on the CPU." }
@@ -56,22 +59,16 @@ pub fn body(assets: &Path) -> Result<Markup> {
     })
 }
 
-fn scan(target: &Arc<Target>, sensor: &str, sigma_m: f64) -> Vec<[f32; 3]> {
+fn scan(target: &Target, sensor: &str, sigma_m: f64) -> Result<Vec<[f32; 3]>> {
     let sensor = Sensor::builtin(sensor).expect("invariant: these profiles are built in");
     let noise = Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range };
     let effects = Effects { noise: (sigma_m > 0.0).then_some(noise), ..Effects::default() };
     let (elevation, azimuth) = (ELEVATION_DEG.to_radians(), AZIMUTH_DEG.to_radians());
     let pose = Pose::view(DISTANCE_M, elevation, azimuth, DVec3::ZERO);
-    let view = View {
-        sensor: &sensor,
-        pattern: &sensor.pattern(),
-        pose: &pose,
-        cast_effects: &effects,
-        effects: &effects,
-        attributes: &AttributeSet::default(),
-        stream: StreamKey::new(0, "report", 0),
-    };
-    scan_mesh::scan(target, &view).0.positions
+    let pattern = sensor.pattern();
+    let mut request = ScanRequest::new(&sensor, &pattern, pose);
+    request.stream = StreamKey::new(0, "report", 0);
+    Ok(sim_gpu::scan(&Caster::Cpu(effects), target, &request)?.positions)
 }
 
 /// Some of the points, spread over all.

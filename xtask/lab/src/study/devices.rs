@@ -4,7 +4,6 @@
 //! the number of points but for beams at silhouettes, which are listed.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -129,12 +128,12 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    fn new(target: &Arc<Target>, pattern: &'a BeamPattern, view: u32, of: u32) -> Self {
+    fn new(target: &Target, pattern: &'a BeamPattern, view: u32, of: u32) -> Self {
         let azimuth = std::f64::consts::TAU * f64::from(view) / f64::from(of) + 0.3;
         let pose = Pose::view(DISTANCE_M, 20f64.to_radians(), azimuth, DVec3::ZERO);
         let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
         let stream = StreamKey::new(0, "devices", view);
-        let job = CastJob::aim(Arc::clone(target), frame, pattern, Culling::On, stream, 1.0);
+        let job = CastJob::aim(target.clone(), frame, pattern, Culling::On, stream, 1.0);
         Self { job, pose, pattern }
     }
 

@@ -27,7 +27,6 @@ use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
 use std::cell::RefCell;
 use std::hint::black_box;
-use std::sync::Arc;
 use xtask::venv::Environment;
 
 const OPEN3D: Environment<'_> = Environment {
@@ -114,7 +113,7 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn load(&self) -> Result<Arc<Target>> {
+    fn load(&self) -> Result<Target> {
         self.embree.borrow_mut().load(self.mesh)?;
         Ok(target(self.mesh.clone(), Builder::Sah))
     }
@@ -143,7 +142,7 @@ impl Bench<'_> {
     fn whole(
         &self,
         name: &'static str,
-        target: &Arc<Target>,
+        target: &Target,
         pose: &Pose,
         pattern: &BeamPattern,
     ) -> Result<Vec<Entry>> {
@@ -152,7 +151,7 @@ impl Bench<'_> {
         let aim = || {
             let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
             let stream = all.job.stream;
-            CastJob::aim(Arc::clone(target), frame, pattern, Culling::On, stream, 1.0)
+            CastJob::aim(target.clone(), frame, pattern, Culling::On, stream, 1.0)
         };
         let whole = |caster: &Caster| -> Result<()> {
             let jobs: Vec<CastJob> = (0..copies).map(|_| aim()).collect();

@@ -18,7 +18,6 @@ use sim_gpu::pose::ring_of_views;
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::{Surface, Target};
 use std::hint::black_box;
-use std::sync::Arc;
 
 /// Rays cast at each mesh, in turn.
 const RAYS: [usize; 5] = [1_000, 10_000, 30_000, 100_000, 1_000_000];
@@ -62,7 +61,7 @@ pub fn measure(subjects: &[Subject], rounds: usize) -> Result<Ways> {
 
 fn at(subject: &Subject, pattern: &BeamPattern, rays: usize, rounds: usize) -> Vec<Way> {
     let surface = Surface::new(subject.mesh.clone(), census::survey(&subject.mesh).kept);
-    let sah = Arc::new(Target::new(surface.clone(), Builder::Sah));
+    let sah = Target::new(surface.clone(), Builder::Sah);
     let shots = views(&sah, pattern, rays);
     let truth: Vec<_> = shots.iter().map(|shot| shot.ranges(&codes_of(shot))).collect();
     let mut ways = [("Sah", Builder::Sah), ("Morton", Builder::Morton)].map(|(name, builder)| {
@@ -93,7 +92,7 @@ fn at(subject: &Subject, pattern: &BeamPattern, rays: usize, rounds: usize) -> V
 }
 
 /// About `rays` rays from at least four views, as the default set has them.
-fn views(target: &Arc<Target>, pattern: &BeamPattern, rays: usize) -> Vec<Shot> {
+fn views(target: &Target, pattern: &BeamPattern, rays: usize) -> Vec<Shot> {
     let n_views = rays.div_ceil(RAYS_PER_VIEW).max(4);
     let poses = ring_of_views(n_views as u32, 3.0, 20f64.to_radians(), 0.0, DVec3::ZERO);
     let share = rays / n_views;

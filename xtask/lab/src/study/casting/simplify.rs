@@ -20,7 +20,6 @@ use sim_gpu::sensor::{Sensor, Views};
 use sim_gpu::simplify::{Watcher, resolved_m, simplified};
 use sim_gpu::target::{Surface, Target};
 use std::hint::black_box;
-use std::sync::Arc;
 
 /// One mesh as it is and as `--simplify auto` has it.
 #[derive(Serialize)]
@@ -71,8 +70,7 @@ fn on(subject: &Subject, lanes: &[Lane], rounds: usize) -> Result<Subjected> {
     let kept = census::survey(&subject.mesh).kept;
     let fewer = simplified(&subject.mesh, &kept, bound_m)?.unwrap_or_else(|| subject.mesh.clone());
     let surfaces = [&subject.mesh, &fewer].map(surface);
-    let targets =
-        surfaces.each_ref().map(|surface| Arc::new(Target::new(surface.clone(), Builder::Sah)));
+    let targets = surfaces.each_ref().map(|surface| Target::new(surface.clone(), Builder::Sah));
     let shots = targets.each_ref().map(|target| shots(target, &views));
 
     let mut contestants: Vec<Contestant<'_>> = vec![simplifying(&subject.mesh, &kept, bound_m)];
@@ -108,7 +106,7 @@ fn surface(mesh: &Mesh) -> Surface {
     Surface::new(mesh.clone(), census::survey(mesh).kept)
 }
 
-fn shots(target: &Arc<Target>, views: &[Pose]) -> Vec<Shot> {
+fn shots(target: &Target, views: &[Pose]) -> Vec<Shot> {
     let pattern = vlp32c();
     views.iter().map(|pose| Shot::sweep(target, pose, &pattern, Culling::Off)).collect()
 }

@@ -17,7 +17,6 @@ use sim_gpu::pose::Pose;
 use sim_gpu::sensor::{BeamPattern, Sensor};
 use sim_gpu::target::{Surface, Target};
 use std::hint::black_box;
-use std::sync::Arc;
 
 /// The sweeps stand 5 m away, as those of the published comparisons do.
 const SENSOR_M: DVec3 = dvec3(5.0, 0.0, 0.5);
@@ -96,9 +95,9 @@ pub fn sweep_pose() -> Result<Pose> {
 }
 
 /// `mesh` as casters want it.
-pub fn target(mesh: Mesh, builder: Builder) -> Arc<Target> {
+pub fn target(mesh: Mesh, builder: Builder) -> Target {
     let kept = census::survey(&mesh).kept;
-    Arc::new(Target::new(Surface::new(mesh, kept), builder))
+    Target::new(Surface::new(mesh, kept), builder)
 }
 
 fn builds(subject: &Subject, rounds: usize, speed: &mut Speed) -> Result<()> {

@@ -1,7 +1,5 @@
 //! Ranges: what f32 finds by itself, and what is delivered once f64 has solved it.
 
-use std::sync::Arc;
-
 use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
 use sim_gpu::bvh::Builder;
@@ -125,12 +123,12 @@ impl Setting {
     }
 }
 
-fn target(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Arc<Target> {
+fn target(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Target {
     let vertices = mesh.vertices.iter().map(|&v| map(v)).collect();
     target_of(Mesh { vertices, triangles: mesh.triangles.clone() }, Builder::Sah)
 }
 
-fn job(target: Arc<Target>, pose: Pose, pattern: &BeamPattern) -> CastJob {
+fn job(target: Target, pose: Pose, pattern: &BeamPattern) -> CastJob {
     let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
     let stream = StreamKey::new(0, "growth", 0);
     CastJob::aim(target, frame, pattern, Culling::On, stream, 1.0)

@@ -1,17 +1,16 @@
 //! The objects that are scanned, and the places they are scanned from.
 
-use crate::measure::scan_mesh::load_target;
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use formats::Split;
 use formats::rng::StreamKey;
 use glam::DVec3;
+use sim_gpu::mesh::frame::Normalize;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::Views;
 use sim_gpu::target::Target;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Keys all random numbers of the chain.
 pub const SEED: u64 = 0;
@@ -23,7 +22,7 @@ pub struct Object {
     /// Class and name.
     id: String,
     /// What rays are cast at.
-    pub target: Arc<Target>,
+    pub target: Target,
 }
 
 /// One scan to be made: an object from one of its sides.
@@ -56,7 +55,9 @@ pub fn read(folder: &Path, per_class: usize) -> Result<Vec<Object>> {
 
 fn object(entry: &MeshEntry) -> Result<Object> {
     let id = format!("{}/{}", entry.class, entry.name);
-    Ok(Object { class: entry.class.clone(), id, target: load_target(entry)? })
+    let target = Target::load(&entry.path, Normalize::default())
+        .with_context(|| format!("cannot scan {}", entry.relative))?;
+    Ok(Object { class: entry.class.clone(), id, target })
 }
 
 /// The four sides of gen-dataset's rotating set, from `distance_m`.

@@ -4,16 +4,17 @@ use super::objects::{Object, Place, places};
 use super::sensors::Scanning;
 use crate::measure::clock::{Contestant, interleave, measured};
 use crate::measure::energy::Energy;
-use crate::measure::scan_mesh;
 use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
 use formats::chamfer::chamfer;
 use formats::scan::{Attribute, AttributeSet, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use rayon::prelude::*;
-use sim_gpu::scan::View;
+use sim_gpu::caster::Caster;
+use sim_gpu::scan::{ScanRequest, scan_many};
 use sim_gpu::sensor::BeamPattern;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::hint::black_box;
 
 /// A cloud as the classifier takes it.
@@ -59,7 +60,7 @@ pub fn scan_all(
             if let (Some(energy), Some(before)) = (energy, before) {
                 *joules += energy.joules_since(&before) / places.len() as f64;
             }
-            black_box(scans);
+            black_box(scans?);
             Ok(cost)
         }));
     }
@@ -75,7 +76,10 @@ pub fn scan_all(
             way.parameter, way.name, way.distance_m
         );
         let truth = truths.entry(way.distance_m.to_bits());
-        let truth = truth.or_insert_with(|| truth_from(objects, way.distance_m));
+        let truth = match truth {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => place.insert(truth_from(objects, way.distance_m)?),
+        };
         let (mut row, clouds) = judged(objects, way, pattern, truth)?;
         let cpu_s = costs[i].cpu_s().median / clouds.len() as f64;
         row.test_set = test_set.to_owned();
@@ -98,7 +102,7 @@ fn judged(
 ) -> Result<(Row, Vec<Cloud>)> {
     let places = places(objects, way.distance_m);
     let columns = AttributeSet::from([Attribute::Range, Attribute::Beam]);
-    let made = scan(&places, way, pattern, &columns);
+    let made = scan(&places, way, pattern, &columns)?;
     let (mut sum, mut worst, mut n) = (0.0, 0.0f64, 0usize);
     for made in &made {
         let ranges = made.scan.range_m.iter().flatten();
@@ -130,27 +134,29 @@ fn judged(
 }
 
 /// One scan a place, on the CPU, without files.
-fn scan(
-    places: &[Place<'_>],
+fn scan<'a>(
+    places: &[Place<'a>],
     way: &Scanning,
     pattern: &BeamPattern,
     attributes: &AttributeSet,
-) -> Vec<Made> {
-    let effects = &way.effects();
-    let of = |place: &Place<'_>| {
-        let Place { object, pose, stream } = place;
-        let (target, sensor, stream) = (&object.target, &way.sensor, *stream);
-        let cast_effects = effects;
-        let view = View { sensor, pattern, pose, cast_effects, effects, attributes, stream };
-        let (scan, hits) = scan_mesh::scan(target, &view);
+) -> Result<Vec<Made>> {
+    let request = |place: &Place<'a>| {
+        let mut request = ScanRequest::new(&way.sensor, pattern, place.pose);
+        (request.attributes, request.stream) = (attributes.clone(), place.stream);
+        (&place.object.target, request)
+    };
+    let made = |sim_gpu::scan::Scanned { scan, hits, .. }| {
+        let hits = &hits[0].hits;
         let exact = |beam: &u32| {
-            let at = hits.hits.binary_search_by_key(beam, |hit| hit.beam);
-            at.map_or(f64::NAN, |at| hits.hits[at].range_m)
+            let at = hits.binary_search_by_key(beam, |hit| hit.beam);
+            at.map_or(f64::NAN, |at| hits[at].range_m)
         };
         let exact_m = scan.beam.iter().flatten().map(exact).collect();
         Made { scan, exact_m }
     };
-    places.par_iter().map(of).collect()
+    let requests: Vec<_> = places.iter().map(request).collect();
+    let scans = scan_many(&Caster::Cpu(way.effects()), &requests)?;
+    Ok(scans.into_iter().map(made).collect())
 }
 
 /// Mean bytes of an NPZ file of a scan.
@@ -167,7 +173,7 @@ fn file_bytes(clouds: &[Cloud]) -> Result<f64> {
 }
 
 /// Some of the clean scans of the VLP-32C from `distance_m`.
-fn truth_from(objects: &[Object], distance_m: f64) -> Vec<Made> {
+fn truth_from(objects: &[Object], distance_m: f64) -> Result<Vec<Made>> {
     let clean = Scanning::clean(distance_m);
     let some: Vec<Place<'_>> =
         places(objects, distance_m).into_iter().step_by(CHAMFER_EACH).collect();

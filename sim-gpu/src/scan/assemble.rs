@@ -1,44 +1,25 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
+use super::request::ScanRequest;
+use crate::config::InvalidValue;
 use crate::cpu::oracle;
 use crate::effects::{Effects, NoiseModel, RayEffect};
 use crate::job::CastJob;
-use crate::pose::Pose;
 use crate::resolve::Hits;
-use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
+use crate::sensor::{Sensor, polar_angle_rad};
 use formats::rng::StreamKey;
-use formats::scan::{Attribute, AttributeSet, Scan};
+use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// One sensor at one place, and what is wanted of its scan.
-#[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
-    /// The sensor.
-    pub sensor: &'a Sensor,
-    /// Its beams.
-    pub pattern: &'a BeamPattern,
-    /// Where it stands.
-    pub pose: &'a Pose,
-    /// The effects that were cast: they say what each hit's outputs mean.
-    pub cast_effects: &'a Effects,
-    /// The effects to apply, a part of those cast; a quantum must be in metres
-    /// ([`Effects::for_sensor`]).
-    pub effects: &'a Effects,
-    /// What each point carries besides its position.
-    pub attributes: &'a AttributeSet,
-    /// Keys what is drawn per scan: the points of sensors that sample.
-    pub stream: StreamKey,
-}
-
 /// What one object returned.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
+pub struct ObjectHits<'a> {
     /// The object's number in its scene.
     pub object: u32,
-    /// Where it stands.
-    pub world_from_object: &'a DAffine3,
+    /// Where the object stands.
+    pub world_from_object: DAffine3,
     /// The rays that were cast at it.
     pub job: &'a CastJob,
     /// What they hit.
@@ -71,26 +52,42 @@ impl AddAssign for Tally {
 /// 1 km to 0.06 mm and no better.
 const ORIGIN_BEYOND_M: f64 = 1024.0;
 
-/// The scan of `view` over all objects `seen`: for each beam the nearest
-/// surface, in the order of firing.
-#[must_use]
-pub fn assemble(view: &View, seen: &[Seen]) -> (Scan, Tally) {
-    let origin = origin_for(view.pose.position_m);
+/// The scan that `request` asks for over all `objects`, at which a caster of
+/// `cast_effects` has cast: for each beam the nearest surface, in the order of
+/// firing.
+///
+/// # Errors
+/// As [`ScanRequest::applied_effects`].
+pub fn assemble(
+    request: &ScanRequest,
+    cast_effects: &Effects,
+    objects: &[ObjectHits],
+) -> Result<(Scan, Tally), InvalidValue> {
+    let effects = request.applied_effects(cast_effects)?;
+    let view = View { request, cast_effects, effects };
+    let position_m = request.pose.position_m;
+    let origin = origin_for(position_m);
     let mut tally = Tally::default();
-    let mut returns: Vec<Return> = nearest_per_beam(seen)
-        .filter_map(|(object, hit)| measure(view, &seen[object], object, hit, &mut tally))
+    let mut returns: Vec<Return> = nearest_per_beam(objects)
+        .filter_map(|(object, hit)| measure(&view, &objects[object], object, hit, &mut tally))
         .collect();
-    post_process(view, &mut returns);
+    post_process(request, &mut returns);
     tally.points = returns.len() as u64;
     let scan = Scan {
         origin: origin.to_array(),
-        positions: returns
-            .iter()
-            .map(|r| f32x3(r.from_sensor + (view.pose.position_m - origin)))
-            .collect(),
+        positions: returns.iter().map(|r| f32x3(r.from_sensor + (position_m - origin))).collect(),
         ..Scan::default()
     };
-    (with_attributes(scan, view, seen, &returns), tally)
+    Ok((with_attributes(scan, &view, objects, &returns), tally))
+}
+
+/// A request, and what its effects come to.
+struct View<'a> {
+    request: &'a ScanRequest<'a>,
+    /// The effects that were cast: they say what each hit's outputs mean.
+    cast_effects: &'a Effects,
+    /// The effects to apply, a part of those that were cast.
+    effects: Effects,
 }
 
 /// Zero near the world's origin, else whole metres near the sensor.
@@ -102,18 +99,18 @@ fn f32x3(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
-/// Places in `seen` and in its hits: one per beam, ascending. Of equal ranges
+/// Places in `objects` and in its hits: one per beam, ascending. Of equal ranges
 /// the object that comes first wins.
-fn nearest_per_beam(seen: &[Seen]) -> impl Iterator<Item = (usize, usize)> {
-    let mut all: Vec<(u32, f64, usize, usize)> = seen
+fn nearest_per_beam(objects: &[ObjectHits]) -> impl Iterator<Item = (usize, usize)> {
+    let mut all: Vec<(u32, f64, usize, usize)> = objects
         .iter()
         .enumerate()
-        .flat_map(|(object, seen)| {
-            let hits = seen.hits.hits.iter().enumerate();
+        .flat_map(|(object, found)| {
+            let hits = found.hits.hits.iter().enumerate();
             hits.map(move |(i, hit)| (hit.beam, hit.range_m, object, i))
         })
         .collect();
-    if seen.len() > 1 {
+    if objects.len() > 1 {
         all.sort_unstable_by(|p, q| {
             p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)).then((p.2, p.3).cmp(&(q.2, q.3)))
         });
@@ -134,18 +131,18 @@ struct Return {
 /// What the sensor makes of a hit; `None` if it returns nothing.
 fn measure(
     view: &View,
-    seen: &Seen,
+    found: &ObjectHits,
     object: usize,
     hit: usize,
     tally: &mut Tally,
 ) -> Option<Return> {
-    let nearest = &seen.hits.hits[hit];
-    let limits = &view.sensor.range;
+    let nearest = &found.hits.hits[hit];
+    let limits = &view.request.sensor.range;
     if !(limits.min_m..=limits.max_m).contains(&nearest.range_m) {
         tally.out_of_range += 1;
         return None;
     }
-    let effects = HitEffects::of(view.cast_effects, seen.hits, hit);
+    let effects = HitEffects::of(view.cast_effects, found.hits, hit);
     if view.effects.dropout.is_some() && effects.dropped {
         tally.dropped += 1;
         return None;
@@ -160,7 +157,8 @@ fn measure(
         tally.negative += 1;
         return None;
     }
-    let beam = view.pose.world_from_sensor * view.pattern.directions[nearest.beam as usize];
+    let beam = view.request.pose.world_from_sensor
+        * view.request.pattern.directions[nearest.beam as usize];
     let sideways = if noise == Some(NoiseModel::Xyz) { effects.noise } else { DVec3::ZERO };
     let from_start = beam * range_m + sideways;
     let from_sensor = start(view, nearest.beam).map_or(from_start, |start| from_start + start);
@@ -170,7 +168,7 @@ fn measure(
 /// Where a beam starts, from the sensor, in world axes; `None` where that is
 /// the sensor itself.
 fn start(view: &View, beam: u32) -> Option<DVec3> {
-    view.pattern.start(beam).map(|start| view.pose.world_from_sensor * start)
+    view.request.pattern.start(beam).map(|start| view.request.pose.world_from_sensor * start)
 }
 
 /// What the effects say of one hit.
@@ -205,10 +203,10 @@ impl HitEffects {
 }
 
 /// The rings and the drawing of points that a sensor's profile may ask for.
-fn post_process(view: &View, returns: &mut Vec<Return>) {
-    let Sensor { rings, sample, .. } = view.sensor;
+fn post_process(request: &ScanRequest, returns: &mut Vec<Return>) {
+    let Sensor { rings, sample, .. } = request.sensor;
     if let (Some(sample), Some(_)) = (sample, rings) {
-        let drawn = sample.draw_before_rings(returns.len() as u32, view.stream);
+        let drawn = sample.draw_before_rings(returns.len() as u32, request.stream);
         *returns = drawn.iter().map(|&i| returns[i as usize]).collect();
     }
     if let Some(rings) = rings {
@@ -222,37 +220,42 @@ fn post_process(view: &View, returns: &mut Vec<Return>) {
         });
     }
     if let Some(sample) = sample {
-        let [low, high] = view.stream.0;
+        let [low, high] = request.stream.0;
         let drawn = sample.draw(returns.len() as u32, StreamKey([!low, high]));
         *returns = drawn.iter().map(|&i| returns[i as usize]).collect();
     }
 }
 
-fn with_attributes(mut scan: Scan, view: &View, seen: &[Seen], returns: &[Return]) -> Scan {
-    let hit = |r: &Return| &seen[r.object].hits.hits[r.hit];
+fn with_attributes(
+    mut scan: Scan,
+    view: &View,
+    objects: &[ObjectHits],
+    returns: &[Return],
+) -> Scan {
+    let hit = |r: &Return| &objects[r.object].hits.hits[r.hit];
     let beam = |r: &Return| hit(r).beam as usize;
     let from_start =
         |r: &Return| start(view, hit(r).beam).map_or(r.from_sensor, |start| r.from_sensor - start);
-    for attribute in view.attributes {
+    for attribute in &view.request.attributes {
         match attribute {
             Attribute::Range => {
                 scan.range_m = column(returns, |r| from_start(r).length() as f32);
             }
             Attribute::Beam => scan.beam = column(returns, |r| hit(r).beam),
-            Attribute::Ring => scan.ring = column(returns, |r| view.pattern.ring[beam(r)]),
+            Attribute::Ring => scan.ring = column(returns, |r| view.request.pattern.ring[beam(r)]),
             Attribute::Time => {
-                scan.time_s = column(returns, |r| view.pattern.time_s[beam(r)] as f32);
+                scan.time_s = column(returns, |r| view.request.pattern.time_s[beam(r)] as f32);
             }
             Attribute::Triangle => scan.triangle = column(returns, |r| hit(r).triangle),
-            Attribute::Object => scan.object = column(returns, |r| seen[r.object].object),
+            Attribute::Object => scan.object = column(returns, |r| objects[r.object].object),
             Attribute::Intensity => {
                 scan.intensity = column(returns, |r| {
-                    HitEffects::of(view.cast_effects, seen[r.object].hits, r.hit).intensity
+                    HitEffects::of(view.cast_effects, objects[r.object].hits, r.hit).intensity
                 });
             }
             Attribute::Normal => {
                 scan.normal =
-                    column(returns, |r| normal(&seen[r.object], hit(r).triangle, from_start(r)));
+                    column(returns, |r| normal(&objects[r.object], hit(r).triangle, from_start(r)));
             }
         }
     }
@@ -264,9 +267,9 @@ fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>>
 }
 
 /// The surface's unit normal in world axes, against the `beam` that hit it.
-fn normal(seen: &Seen, triangle: u32, beam: DVec3) -> [f32; 3] {
-    let in_object = oracle::normal(&seen.job.target, triangle);
-    let turned = seen.world_from_object.matrix3.inverse().transpose() * in_object;
+fn normal(found: &ObjectHits, triangle: u32, beam: DVec3) -> [f32; 3] {
+    let in_object = oracle::normal(&found.job.target, triangle);
+    let turned = found.world_from_object.matrix3.inverse().transpose() * in_object;
     let normal = turned.normalize_or_zero();
     f32x3(if normal.dot(beam) > 0.0 { -normal } else { normal })
 }

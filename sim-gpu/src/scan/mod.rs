@@ -1,0 +1,141 @@
+//! Scans: what a sensor measures of objects.
+//!
+//! [`scan()`] is the whole way in one call; [`scan_many`] casts many scans
+//! together, which keeps a GPU busy; [`scan_objects`] looks at several objects
+//! at once. All three aim the sensor's beams ([`ScanRequest::aim`]), cast them
+//! ([`Caster::cast`]), solve the ranges ([`resolve`]) and make points of them
+//! ([`assemble`]).
+
+mod assemble;
+mod request;
+
+pub use assemble::{ObjectHits, Tally, assemble};
+pub use request::{PlacedTarget, ScanRequest};
+
+use crate::cast_error::CastError;
+use crate::caster::Caster;
+use crate::config::InvalidValue;
+use crate::job::{Cast, CastJob};
+use crate::resolve::{Hits, resolve};
+use crate::target::Target;
+use formats::Scan;
+use rayon::prelude::*;
+
+/// Why there is no scan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScanError {
+    /// The request asks for what its sensor or its caster does not have.
+    #[error(transparent)]
+    Request(#[from] InvalidValue),
+    /// The adapter failed.
+    #[error(transparent)]
+    Cast(#[from] CastError),
+}
+
+/// A scan, and what is known of it besides.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Scanned {
+    /// The points.
+    pub scan: Scan,
+    /// What became of the returns.
+    pub tally: Tally,
+    /// What the beams hit before any effect, by object.
+    pub hits: Vec<Hits>,
+    /// Whether the CPU cast because an object was too large for the adapter.
+    pub cast_on_cpu: bool,
+}
+
+/// The scan of `target` that `request` asks for. `target` stands where its mesh
+/// says.
+///
+/// # Errors
+/// [`ScanError`]: the adapter failed, or the request asks for what its sensor
+/// or `caster` does not have.
+pub fn scan(caster: &Caster, target: &Target, request: &ScanRequest) -> Result<Scan, ScanError> {
+    Ok(scan_objects(caster, &[PlacedTarget::new(target)], request)?.scan)
+}
+
+/// As [`scan()`], for many targets and requests, whose rays are cast together.
+/// The scans stand in the order of the requests.
+///
+/// # Errors
+/// As [`scan()`].
+pub fn scan_many(
+    caster: &Caster,
+    requests: &[(&Target, ScanRequest)],
+) -> Result<Vec<Scanned>, ScanError> {
+    let placed: Vec<_> = requests.iter().map(|(target, _)| [PlacedTarget::new(target)]).collect();
+    let scans: Vec<_> =
+        placed.iter().zip(requests).map(|(placed, (_, request))| (&placed[..], request)).collect();
+    scan_all(caster, &scans)
+}
+
+/// The scan that `request` asks for of several objects: each beam returns from
+/// the nearest one.
+///
+/// # Errors
+/// As [`scan()`].
+pub fn scan_objects(
+    caster: &Caster,
+    objects: &[PlacedTarget],
+    request: &ScanRequest,
+) -> Result<Scanned, ScanError> {
+    let mut scans = scan_all(caster, &[(objects, request)])?;
+    Ok(scans.pop().expect("invariant: one request gives one scan"))
+}
+
+fn scan_all(
+    caster: &Caster,
+    requests: &[(&[PlacedTarget], &ScanRequest)],
+) -> Result<Vec<Scanned>, ScanError> {
+    let aim = |(objects, request): &(&[PlacedTarget], &ScanRequest)| {
+        objects.iter().map(|object| request.aim(object)).collect::<Vec<_>>()
+    };
+    let jobs: Vec<CastJob> = requests.par_iter().flat_map(aim).collect();
+    let cast_on_cpu = !jobs.iter().all(|job| caster.fits(&job.target));
+    let casts = if cast_on_cpu { caster.cast_on_cpu(&jobs) } else { caster.cast(&jobs)? };
+
+    let (mut jobs, mut casts) = (&jobs[..], &casts[..]);
+    let mut parts = Vec::with_capacity(requests.len());
+    for &(objects, request) in requests {
+        let (own_jobs, own_casts);
+        (own_jobs, jobs) = jobs.split_at(objects.len());
+        (own_casts, casts) = casts.split_at(objects.len());
+        parts.push((objects, request, own_jobs, own_casts));
+    }
+    parts
+        .into_par_iter()
+        .map(|(objects, request, jobs, casts)| {
+            let (hits, scan, tally) = finish(caster, objects, request, jobs, casts)?;
+            Ok(Scanned { scan, tally, hits, cast_on_cpu })
+        })
+        .collect()
+}
+
+/// From what was cast for one request to its scan.
+fn finish(
+    caster: &Caster,
+    objects: &[PlacedTarget],
+    request: &ScanRequest,
+    jobs: &[CastJob],
+    casts: &[Cast],
+) -> Result<(Vec<Hits>, Scan, Tally), InvalidValue> {
+    let effects = caster.effects();
+    let hits: Vec<Hits> = jobs
+        .iter()
+        .zip(casts)
+        .map(|(job, cast)| resolve(job, cast, request.pattern, effects))
+        .collect();
+    let found: Vec<ObjectHits> = (0..)
+        .zip(objects)
+        .zip(jobs.iter().zip(&hits))
+        .map(|((object, placed), (job, hits))| {
+            let world_from_object = placed.world_from_object;
+            ObjectHits { object, world_from_object, job, hits }
+        })
+        .collect();
+    let (scan, tally) = assemble(request, effects, &found)?;
+    Ok((hits, scan, tally))
+}
