@@ -81,7 +81,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
                 let revolution = packets::revolution(&asked.sensor)?;
                 vlp32c::write(&file, &revolution, args.returns.unwrap_or_default(), scan)?;
             }
-            _ => write_scan(&file, format, scan)?,
+            _ => {
+                write_scan(&file, format, scan)?;
+            }
         }
         eprintln!(
             "{sensor}: {} points ({} out of range, {} dropped, {} with a negative range): {}",

@@ -9,9 +9,11 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
 use crate::error::FormatError;
+use crate::hash::hexadecimal;
 
 const PREFIX: &str = ".edgepuck-";
 const SUFFIX: &str = ".tmp";
@@ -26,15 +28,58 @@ pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), FormatError> {
+    write_through(path, |file| file, fill, drop)
+}
+
+/// As [`write()`], and returns the SHA-256 of the file in hexadecimal digits.
+/// Bytes are hashed while they are written, in order: nothing is read back.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_hashed(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<HashingFile>) -> io::Result<()>,
+) -> Result<String, FormatError> {
+    let hashing = |file| HashingFile { file, hash: Sha256::new() };
+    write_through(path, hashing, fill, |written| hexadecimal(&written.hash.finalize()))
+}
+
+/// A file that is hashed while it is written.
+pub struct HashingFile {
+    file: File,
+    hash: Sha256,
+}
+
+impl Write for HashingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.hash.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Fills a temporary file through the writer that `open` makes of it, renames
+/// it to `path`, and returns what `close` makes of the writer.
+fn write_through<W: Write, T>(
+    path: &Path,
+    open: impl FnOnce(File) -> W,
+    fill: impl FnOnce(&mut BufWriter<W>) -> io::Result<()>,
+    close: impl FnOnce(W) -> T,
+) -> Result<T, FormatError> {
     let here = |source| FormatError::io(path, source);
     let folder = make_folder_of(path)?;
     let temporary = named_temporary(folder).map_err(here)?;
     let (file, temporary) = temporary.into_parts();
-    let mut writer = BufWriter::new(file);
-    fill(&mut writer).and_then(|()| writer.flush()).map_err(here)?;
-    // Windows renames no file that is open for writing.
-    drop(writer);
-    temporary.persist(path).map_err(|error| here(error.error))
+    let mut writer = BufWriter::new(open(file));
+    fill(&mut writer).map_err(here)?;
+    // Windows cannot rename a file that is open for writing.
+    let closed = close(writer.into_inner().map_err(|error| here(error.into_error()))?);
+    temporary.persist(path).map_err(|error| here(error.error))?;
+    Ok(closed)
 }
 
 /// [`write()`] of bytes that are at hand.
@@ -142,6 +187,26 @@ mod tests {
         assert!(error.to_string().ends_with("scan.bin: the disk is full"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["scan.bin"]);
+    }
+
+    #[test]
+    fn a_file_is_hashed_as_it_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scan.bin");
+        // More than one buffer, in pieces of many lengths.
+        let bytes: Vec<u8> = (0..100_000u32).map(|i| (i * i >> 3) as u8).collect();
+        let sha256 = write_hashed(&path, |writer| {
+            let mut rest = &bytes[..];
+            for length in (1..).take_while(|length| length * (length + 1) / 2 <= bytes.len()) {
+                let (piece, others) = rest.split_at(length);
+                writer.write_all(piece)?;
+                rest = others;
+            }
+            writer.write_all(rest)
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), bytes);
+        assert_eq!(sha256, crate::hash::of_file(&path).unwrap());
     }
 
     #[test]

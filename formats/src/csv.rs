@@ -1,27 +1,27 @@
 //! Scans as CSV, for spreadsheets and eyes.
 
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 
 use csv::Writer;
 
-use crate::atomic;
+use crate::atomic::{self, HashingFile};
 use crate::error::FormatError;
 use crate::scan::{Column, Scan};
 
 /// Writes `scan` to `path`, atomically: the header `x,y,z` and the attributes'
-/// names (`nx,ny,nz` for normals), then one point a line.
+/// names (`nx,ny,nz` for normals), then one point a line. Returns the SHA-256 of
+/// the file.
 ///
 /// Numbers are the shortest that read back as the same f32. Text has room for
 /// any coordinate, so that the origin is added to the positions.
 ///
 /// # Errors
 /// An attribute of another length than the positions; what the system reports.
-pub fn write_scan(path: &Path, scan: &Scan) -> Result<(), FormatError> {
+pub fn write_scan(path: &Path, scan: &Scan) -> Result<String, FormatError> {
     scan.check_lengths()?;
-    atomic::write(path, |writer| {
+    atomic::write_hashed(path, |writer| {
         let mut csv = Writer::from_writer(writer);
         csv.write_record(header(scan)).map_err(into_io)?;
         let mut text = String::new();
@@ -39,7 +39,7 @@ fn header(scan: &Scan) -> Vec<&'static str> {
 }
 
 fn write_point(
-    csv: &mut Writer<&mut BufWriter<File>>,
+    csv: &mut Writer<&mut BufWriter<HashingFile>>,
     text: &mut String,
     scan: &Scan,
     i: usize,

@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use std::fmt::Write;
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The SHA-256 of a file's bytes, as `sha256sum` prints it.
 ///
@@ -31,6 +31,15 @@ fn digest(path: &Path) -> io::Result<String> {
             n => hash.update(&block[..n]),
         }
     }
+}
+
+/// A file as it was written, and the SHA-256 of its bytes in hexadecimal digits.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct HashedFile {
+    /// Where the file is.
+    pub path: PathBuf,
+    /// Its hash.
+    pub sha256: String,
 }
 
 /// Lower-case hexadecimal digits, two a byte.

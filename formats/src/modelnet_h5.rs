@@ -14,6 +14,7 @@ use hdf5_pure::{File, FileBuilder};
 
 use crate::atomic;
 use crate::error::FormatError;
+use crate::hash::HashedFile;
 use crate::labelled::LabelledSet;
 pub use crate::modelnet_h5_list::is_one;
 use crate::modelnet_h5_list::list;
@@ -33,6 +34,7 @@ pub struct ModelNetH5Writer {
     n_files: usize,
     data: Vec<f32>,
     labels: Vec<u8>,
+    files: Vec<HashedFile>,
 }
 
 impl ModelNetH5Writer {
@@ -48,6 +50,7 @@ impl ModelNetH5Writer {
             n_files: 0,
             data: Vec::new(),
             labels: Vec::new(),
+            files: Vec::new(),
         }
     }
 
@@ -82,21 +85,27 @@ impl ModelNetH5Writer {
     }
 
     /// Writes the clouds that are left, and the lists. A set without clouds has one file
-    /// that is empty, since readers join what they find.
+    /// that is empty, since readers join what they find. Returns all files of
+    /// the split.
     ///
     /// # Errors
     /// What the system reports.
-    pub fn finish(mut self) -> Result<(), FormatError> {
+    pub fn finish(mut self) -> Result<Vec<HashedFile>, FormatError> {
         if !self.labels.is_empty() || self.n_files == 0 {
             self.write_file()?;
         }
-        atomic::write(&self.folder.join("shape_names.txt"), |writer| {
+        let path = self.folder.join("shape_names.txt");
+        let sha256 = atomic::write_hashed(&path, |writer| {
             self.classes.iter().try_for_each(|class| writeln!(writer, "{class}"))
         })?;
-        atomic::write(&list(&self.folder, self.split), |writer| {
+        self.files.push(HashedFile { path, sha256 });
+        let path = list(&self.folder, self.split);
+        let sha256 = atomic::write_hashed(&path, |writer| {
             (0..self.n_files)
                 .try_for_each(|k| writeln!(writer, "{LISTED_FOLDER}/{}", file_name(self.split, k)))
-        })
+        })?;
+        self.files.push(HashedFile { path, sha256 });
+        Ok(self.files)
     }
 
     fn write_file(&mut self) -> Result<(), FormatError> {
@@ -111,7 +120,8 @@ impl ModelNetH5Writer {
         let path = self.folder.join(file_name(self.split, self.n_files));
         let bytes =
             file.finish().map_err(|error| FormatError::io(&path, io::Error::other(error)))?;
-        atomic::write(&path, |writer| writer.write_all(&bytes))?;
+        let sha256 = atomic::write_hashed(&path, |writer| writer.write_all(&bytes))?;
+        self.files.push(HashedFile { path, sha256 });
         self.n_files += 1;
         self.data.clear();
         self.labels.clear();

@@ -13,7 +13,7 @@
 //! down-sampling and PLY writing fail on a vector. It keeps `origin` as an
 //! attribute too; delete it there before joining or thinning clouds.
 
-use std::io;
+use std::io::{self, Cursor, Write};
 use std::path::Path;
 
 use crate::archive::{NpzReader, NpzWriter, Values};
@@ -22,16 +22,22 @@ use crate::error::FormatError;
 use crate::number::Number;
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 
-/// Writes `scan` to `path`, atomically; the same scan gives the same bytes.
+/// Writes `scan` to `path`, atomically, and returns the SHA-256 of the file; the
+/// same scan gives the same bytes.
 ///
 /// # Errors
 /// An attribute of another length than the positions; what the system reports.
-pub fn write_scan(path: &Path, scan: &Scan) -> Result<(), FormatError> {
+pub fn write_scan(path: &Path, scan: &Scan) -> Result<String, FormatError> {
     scan.check_lengths()?;
-    atomic::write(path, |writer| NpzWriter::write(writer, |npz| write_arrays(npz, scan)))
+    // A zip archive is patched once an entry is complete, and a file that is
+    // hashed while it is written takes its bytes in order.
+    let mut archive = Cursor::new(Vec::new());
+    NpzWriter::write(&mut archive, |npz| write_arrays(npz, scan))
+        .map_err(|source| FormatError::io(path, source))?;
+    atomic::write_hashed(path, |writer| writer.write_all(archive.get_ref()))
 }
 
-fn write_arrays<W: io::Write + io::Seek>(npz: &mut NpzWriter<W>, scan: &Scan) -> io::Result<()> {
+fn write_arrays<W: Write + io::Seek>(npz: &mut NpzWriter<W>, scan: &Scan) -> io::Result<()> {
     write_columns(npz, "positions", scan.positions.as_flattened(), 3)?;
     for (attribute, column) in scan.columns() {
         let key = attribute.name();
@@ -48,7 +54,7 @@ fn write_arrays<W: io::Write + io::Seek>(npz: &mut NpzWriter<W>, scan: &Scan) ->
     Ok(())
 }
 
-fn write_columns<W: io::Write + io::Seek, A: Number>(
+fn write_columns<W: Write + io::Seek, A: Number>(
     npz: &mut NpzWriter<W>,
     key: &str,
     values: &[A],

@@ -76,12 +76,13 @@ impl FromStr for ScanFormat {
 /// What is said to whoever takes packets for points.
 const PACKETS: &str = "packets hold a sensor's ranges, not points";
 
-/// Writes `scan` to `path`, atomically. The name is taken as it is.
+/// Writes `scan` to `path`, atomically, and returns the SHA-256 of the file. The
+/// name is taken as it is.
 ///
 /// # Errors
 /// An attribute of another length than the positions; packets, which are no
 /// points; what the system reports.
-pub fn write_scan(path: &Path, format: ScanFormat, scan: &Scan) -> Result<(), FormatError> {
+pub fn write_scan(path: &Path, format: ScanFormat, scan: &Scan) -> Result<String, FormatError> {
     match format {
         ScanFormat::Npz => npz::write_scan(path, scan),
         ScanFormat::Ply => ply::write_scan(path, scan),

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 
 use crate::atomic;
 use crate::error::FormatError;
+use crate::hash::HashedFile;
 use crate::split::Split;
 
 /// A dataset in yanx27's layout that is being written.
@@ -24,6 +25,7 @@ pub struct Yanx27Writer {
     classes: Vec<String>,
     /// Sorted, so that the lists do not depend on the order of pushing.
     ids: [BTreeSet<String>; Split::ALL.len()],
+    files: Vec<HashedFile>,
 }
 
 impl Yanx27Writer {
@@ -36,7 +38,7 @@ impl Yanx27Writer {
         if let Some(class) = classes.iter().find(|class| !is_folder_name(class)) {
             return Err(FormatError::instance(class, "a class name that can be no folder"));
         }
-        Ok(Self { root: root.to_path_buf(), classes, ids: Default::default() })
+        Ok(Self { root: root.to_path_buf(), classes, ids: Default::default(), files: Vec::new() })
     }
 
     /// Writes one cloud: the `view` of the mesh `name` of `class`. Normals that
@@ -77,46 +79,49 @@ impl Yanx27Writer {
         }
         self.ids[split as usize].insert(id.clone());
         let normals = normals.map_or([].iter(), <[_]>::iter).chain(std::iter::repeat(&[0.0; 3]));
-        atomic::write(&self.root.join(class).join(format!("{id}.txt")), |writer| {
+        let path = self.root.join(class).join(format!("{id}.txt"));
+        let sha256 = atomic::write_hashed(&path, |writer| {
             for ([x, y, z], [nx, ny, nz]) in points.iter().zip(normals) {
                 writeln!(writer, "{x},{y},{z},{nx},{ny},{nz}")?;
             }
             Ok(())
-        })
+        })?;
+        self.files.push(HashedFile { path, sha256 });
+        Ok(())
     }
 
     /// Writes the lists of classes and instances, atomically, in the order of
-    /// the labels and of the ids.
+    /// the labels and of the ids. Returns all files of the dataset.
     ///
     /// # Errors
     /// What the system reports.
-    pub fn finish(self) -> Result<(), FormatError> {
-        write_lists(&self.root, "modelnet40", &self.classes, &self.ids)?;
+    pub fn finish(mut self) -> Result<Vec<HashedFile>, FormatError> {
+        self.write_lists("modelnet40")?;
         if self.classes.len() == 10 {
-            write_lists(&self.root, "modelnet10", &self.classes, &self.ids)?;
+            self.write_lists("modelnet10")?;
+        }
+        Ok(self.files)
+    }
+
+    fn write_lists(&mut self, stem: &str) -> Result<(), FormatError> {
+        let path = self.root.join(format!("{stem}_shape_names.txt"));
+        self.files.push(write_lines(path, &self.classes)?);
+        for split in Split::ALL {
+            let path = self.root.join(format!("{stem}_{split}.txt"));
+            self.files.push(write_lines(path, &self.ids[split as usize])?);
         }
         Ok(())
     }
 }
 
-fn write_lists(
-    root: &Path,
-    stem: &str,
-    classes: &[String],
-    ids: &[BTreeSet<String>],
-) -> Result<(), FormatError> {
-    write_lines(&root.join(format!("{stem}_shape_names.txt")), classes)?;
-    for split in Split::ALL {
-        write_lines(&root.join(format!("{stem}_{split}.txt")), &ids[split as usize])?;
-    }
-    Ok(())
-}
-
 fn write_lines<'a>(
-    path: &Path,
+    path: PathBuf,
     lines: impl IntoIterator<Item = &'a String>,
-) -> Result<(), FormatError> {
-    atomic::write(path, |writer| lines.into_iter().try_for_each(|line| writeln!(writer, "{line}")))
+) -> Result<HashedFile, FormatError> {
+    let sha256 = atomic::write_hashed(&path, |writer| {
+        lines.into_iter().try_for_each(|line| writeln!(writer, "{line}"))
+    })?;
+    Ok(HashedFile { path, sha256 })
 }
 
 /// The id of one view: the class, `_`, and the rest without any `_`, as in

@@ -15,14 +15,14 @@ use crate::atomic;
 use crate::error::FormatError;
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 
-/// Writes `scan` to `path`, atomically.
+/// Writes `scan` to `path`, atomically, and returns the SHA-256 of the file.
 ///
 /// # Errors
 /// An attribute of another length than the positions; what the system reports.
-pub fn write_scan(path: &Path, scan: &Scan) -> Result<(), FormatError> {
+pub fn write_scan(path: &Path, scan: &Scan) -> Result<String, FormatError> {
     scan.check_lengths()?;
     let columns: Vec<_> = scan.columns().map(|(_, column)| column).collect();
-    atomic::write(path, |writer| {
+    atomic::write_hashed(path, |writer| {
         writer.write_all(header(scan).as_bytes())?;
         for (i, position) in scan.positions.iter().enumerate() {
             write_vector(writer, position)?;

@@ -174,7 +174,8 @@ impl FromStr for Returns {
     }
 }
 
-/// Writes the packets of one `revolution` to `path`, atomically.
+/// Writes the packets of one `revolution` to `path`, atomically, and returns the
+/// SHA-256 of the file.
 ///
 /// `scan` has the beam and the range of each point, beam b being laser b % 32
 /// of sequence b / 32; positions are not looked at. An intensity becomes a
@@ -191,10 +192,10 @@ pub fn write(
     revolution: &Revolution,
     returns: Returns,
     scan: &Scan,
-) -> Result<(), FormatError> {
+) -> Result<String, FormatError> {
     let sequences_per_packet = BLOCKS / returns.blocks_per_sequence();
     let fired = measurements(path, revolution, scan)?;
-    atomic::write(path, |writer| {
+    atomic::write_hashed(path, |writer| {
         pcap::write_header(writer)?;
         for (number, fired) in fired.chunks(sequences_per_packet).enumerate() {
             let first = number * sequences_per_packet;

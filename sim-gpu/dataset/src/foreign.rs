@@ -8,11 +8,9 @@ use super::manifest::HashedFile;
 use super::record::{Entry, MeshRecord};
 use formats::yanx27::Yanx27Writer;
 use formats::{Split, hash};
-use rayon::prelude::*;
 use sha2::{Digest, Sha256};
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-use walkdir::WalkDir;
+use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Hexadecimal digits of a hash that set equal names apart.
 const HASH_DIGITS: usize = 12;
@@ -51,18 +49,26 @@ fn refuse_if(unfit: bool, layout: Layout, cause: &'static str) -> Result<(), Dat
 /// file that cannot be written.
 pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<HashedFile>, DatasetError> {
     check_layouts(scans.config, scans.classes)?;
+    let mut files = Vec::new();
     for &layout in &scans.config.layouts {
         for set in &scans.config.sets {
             for &variant in &scans.config.variants {
                 let folder = layout::foreign(scans.out, layout, set, variant);
-                match layout {
+                files.extend(match layout {
                     Layout::Yanx27 => write_yanx27(scans, set, variant, &folder)?,
                     Layout::ModelnetH5 => write_modelnet_h5(scans, set, variant, &folder)?,
-                }
+                });
             }
         }
     }
-    hash_all(scans.out, &layout::foreign_root(scans.out))
+    files.sort();
+    // Both splits of one layout write the same list of classes.
+    files.dedup();
+    let listed = |file: hash::HashedFile| {
+        let path = file.path.strip_prefix(scans.out).unwrap_or(&file.path);
+        HashedFile { file: layout::slashed(path), sha256: file.sha256 }
+    };
+    Ok(files.into_iter().map(listed).collect())
 }
 
 fn write_yanx27(
@@ -70,7 +76,7 @@ fn write_yanx27(
     set: &SetConfig,
     variant: Variant,
     folder: &Path,
-) -> Result<(), DatasetError> {
+) -> Result<Vec<hash::HashedFile>, DatasetError> {
     let names = yanx27_names(scans.records);
     let mut writer = Yanx27Writer::create(folder, scans.classes.to_vec())?;
     for split in Split::ALL {
@@ -110,17 +116,18 @@ fn write_modelnet_h5(
     set: &SetConfig,
     variant: Variant,
     folder: &Path,
-) -> Result<(), DatasetError> {
+) -> Result<Vec<hash::HashedFile>, DatasetError> {
     use formats::modelnet_h5::ModelNetH5Writer;
     let n_points = scans.config.packed_points as usize;
+    let mut files = Vec::new();
     for split in Split::ALL {
         let mut writer = ModelNetH5Writer::create(folder, split, n_points, scans.classes.to_vec());
         scans.for_each_cloud(&Part { set, variant, split }, |cloud| {
             Ok(writer.push(&cloud.points, cloud.label, &cloud.name)?)
         })?;
-        writer.finish()?;
+        files.extend(writer.finish()?);
     }
-    Ok(())
+    Ok(files)
 }
 
 #[cfg(not(feature = "hdf5"))]
@@ -129,22 +136,7 @@ fn write_modelnet_h5(
     _: &SetConfig,
     _: Variant,
     _: &Path,
-) -> Result<(), DatasetError> {
-    check_layouts(scans.config, scans.classes)
-}
-
-/// All files in `folder` and below, sorted, with their hashes.
-fn hash_all(out: &Path, folder: &Path) -> Result<Vec<HashedFile>, DatasetError> {
-    let mut files = BTreeSet::new();
-    for item in WalkDir::new(folder).into_iter().filter(|_| folder.exists()) {
-        let item = item.map_err(|error| DatasetError::io(folder, error.into()))?;
-        if item.file_type().is_file() {
-            files.insert(item.into_path());
-        }
-    }
-    let hashed = |path: &PathBuf| {
-        let file = layout::slashed(path.strip_prefix(out).unwrap_or(path));
-        Ok(HashedFile { file, sha256: hash::of_file(path)? })
-    };
-    files.par_iter().map(hashed).collect::<Result<Vec<_>, _>>()
+) -> Result<Vec<hash::HashedFile>, DatasetError> {
+    check_layouts(scans.config, scans.classes)?;
+    Ok(Vec::new())
 }

@@ -82,11 +82,11 @@ fn write_view(
                 .map(|&format| {
                     let (out, entry) = (output.out, &record.entry);
                     let path = layout::scan(out, &set.name, variant, entry, planned.view, format);
-                    match format {
+                    let sha256 = match format {
                         ScanFormat::Pcap => write_packets(output, &path, &request, &objects)?,
                         _ => write_scan(&path, format, &scan)?,
-                    }
-                    Ok(FileRecord { format, sha256: formats::hash::of_file(&path)? })
+                    };
+                    Ok(FileRecord { format, sha256 })
                 })
                 .collect()
         });
@@ -101,7 +101,7 @@ fn write_packets(
     path: &Path,
     request: &ScanRequest,
     objects: &[ObjectHits],
-) -> Result<(), DatasetError> {
+) -> Result<String, DatasetError> {
     let revolution = packets::revolution(request.sensor)?;
     let effects = request.applied_effects(output.cast_effects)?;
     let mut request = request.clone();

@@ -33,7 +33,7 @@ mod tests;
 
 pub use class::{CLASSES, ShapeClass};
 pub use tree::{TreeSummary, write_tree};
-pub use write::{WriteError, write_obj, write_off};
+pub use write::{write_obj, write_off};
 
 use formats::rng::StreamKey;
 

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::class::ShapeClass;
 use super::generate;
-use super::write::{WriteError, write_off};
+use super::write::write_off;
+use formats::FormatError;
 
 /// What [`write_tree`] has written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,21 +33,20 @@ pub fn write_tree(
     seed: u64,
     train_per_class: u32,
     test_per_class: u32,
-) -> Result<TreeSummary, WriteError> {
+) -> Result<TreeSummary, FormatError> {
     let splits = [("train", 0, train_per_class), ("test", train_per_class, test_per_class)];
     let mut jobs = Vec::new();
     for class in ShapeClass::ALL {
         for (split, first, count) in splits {
             let folder = out.join(class.name()).join(split);
-            fs::create_dir_all(&folder)
-                .map_err(|source| WriteError { path: folder.clone(), source })?;
+            fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
             for instance in first..first.saturating_add(count) {
                 let name = format!("{class}_{:04}.off", u64::from(instance) + 1);
                 jobs.push((class, instance, folder.join(name)));
             }
         }
     }
-    let written: Vec<Result<u64, WriteError>> = jobs
+    let written: Vec<Result<u64, FormatError>> = jobs
         .par_iter()
         .map(|(class, instance, path)| {
             let mesh = generate(*class, seed, *instance);

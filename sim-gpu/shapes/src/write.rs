@@ -1,30 +1,18 @@
 //! Writes a mesh as OFF or OBJ.
 
 use std::fmt::Write as _;
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use formats::{FormatError, atomic};
 use glam::DVec3;
-
 use sim_gpu::mesh::Mesh;
-
-/// A mesh file that could not be written.
-#[derive(Debug, thiserror::Error)]
-#[error("{path}: cannot be written: {source}")]
-pub struct WriteError {
-    /// The file or folder.
-    pub path: PathBuf,
-    /// What the operating system says.
-    pub source: io::Error,
-}
 
 /// Writes `mesh` as ASCII OFF, coordinates as they are and with as few digits
 /// as tell them apart, whole or not at all.
 ///
 /// # Errors
 /// If the file cannot be written; an earlier file of this name then stays.
-pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), WriteError> {
+pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
     let mut text = format!("OFF\n{} {} 0\n", mesh.vertices.len(), mesh.triangles.len());
     for DVec3 { x, y, z } in &mesh.vertices {
         push_line(&mut text, format_args!("{x} {y} {z}"));
@@ -32,7 +20,7 @@ pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), WriteError> {
     for [a, b, c] in &mesh.triangles {
         push_line(&mut text, format_args!("3 {a} {b} {c}"));
     }
-    write_whole(path, &text)
+    atomic::write_bytes(path, text)
 }
 
 /// Writes `mesh` as OBJ, which has y up: (x, y, z) becomes (x, z, -y), an
@@ -40,7 +28,7 @@ pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// As [`write_off`].
-pub fn write_obj(mesh: &Mesh, path: &Path) -> Result<(), WriteError> {
+pub fn write_obj(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
     let mut text = String::new();
     for DVec3 { x, y, z } in &mesh.vertices {
         // 0 - y and not -y: there is no need for a negative zero.
@@ -50,7 +38,7 @@ pub fn write_obj(mesh: &Mesh, path: &Path) -> Result<(), WriteError> {
         let [a, b, c] = triangle.map(|corner| corner + 1);
         push_line(&mut text, format_args!("f {a} {b} {c}"));
     }
-    write_whole(path, &text)
+    atomic::write_bytes(path, text)
 }
 
 fn push_line(text: &mut String, line: std::fmt::Arguments<'_>) {
@@ -58,21 +46,10 @@ fn push_line(text: &mut String, line: std::fmt::Arguments<'_>) {
     let _ = writeln!(text, "{line}");
 }
 
-fn write_whole(path: &Path, text: &str) -> Result<(), WriteError> {
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".part");
-    let temporary = PathBuf::from(temporary);
-    let written = fs::write(&temporary, text).and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|source| {
-        // What is left of a failed attempt is of no use; the cause is reported.
-        let _ = fs::remove_file(&temporary);
-        WriteError { path: path.to_owned(), source }
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn tetrahedron() -> Mesh {
         Mesh {
@@ -103,10 +80,11 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_folder_is_named_in_the_error() {
-        let path = Path::new("no_such_folder").join("t.off");
-        let error = write_off(&tetrahedron(), &path).unwrap_err();
-        assert_eq!(error.path, path);
-        assert_eq!(error.source.kind(), io::ErrorKind::NotFound);
+    fn a_folder_that_cannot_be_made_is_named_in_the_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        let error = write_off(&tetrahedron(), &file.join("t.off")).unwrap_err();
+        assert!(error.to_string().contains(file.to_str().unwrap()), "{error}");
     }
 }
