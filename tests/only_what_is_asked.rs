@@ -45,16 +45,16 @@ struct Asked {
 /// that calls modules, what they answer, the constants that they are set by.
 const MODULES: [&str; 5] = [
     "shader, function finish",
-    "shader, group 1 binding 0: words",
+    "shader, group 1 binding 0: effect_outputs",
     "shader, bind groups",
-    "ray, bytes of words read back",
+    "ray, bytes of effect outputs read back",
     "shader, total ",
 ];
 
 /// And those of every effect that draws random numbers.
 const RANDOM: [&str; 5] = [
     "shader, group 1 binding 1: streams",
-    "shader, function stream_words",
+    "shader, function random_bits",
     "shader, function philox",
     "shader, function multiply_high",
     "ray, bytes of streams sent",
@@ -195,7 +195,7 @@ fn a_plain_scene_pays_for_no_effect() {
         }
     }
     assert_eq!(plain["shader, bind groups"], 1);
-    assert_eq!(plain["ray, bytes of words read back"], 0);
+    assert_eq!(plain["ray, bytes of effect outputs read back"], 0);
     assert_eq!(plain["ray, bytes of codes read back"], 4);
     assert_eq!(plain["point, bytes in npz"], 12);
     assert_eq!(plain["point, bytes in ply"], 12);
