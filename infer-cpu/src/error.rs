@@ -16,7 +16,7 @@ pub enum Error {
     #[error("the cloud has no points")]
     NoPoints,
     /// A coordinate is NaN or infinite.
-    #[error("point {index} is ({x}, {y}, {z})")]
+    #[error("point {index}: expected finite coordinates, found ({x}, {y}, {z})")]
     NotFinite {
         /// The point's place in the cloud, from 0.
         index: usize,
@@ -36,13 +36,13 @@ pub enum Error {
         n_classes: usize,
     },
     /// More points than their indices can count.
-    #[error("{0} points are more than 4,294,967,295")]
+    #[error("expected at most 4,294,967,295 points, found {0}")]
     TooManyPoints(usize),
     /// The kernel that was asked for does not run here.
-    #[error("this machine cannot run kernel {0}; it has {here}", here = names_here())]
+    #[error("this machine cannot run the kernel {0}; it runs {here}", here = names_here())]
     KernelMissing(KernelName),
     /// The kernel that was asked for has no such precision.
-    #[error("kernel {kernel} has no {precision} products")]
+    #[error("the kernel {kernel} does not compute in {precision}")]
     KernelPrecision {
         /// The kernel.
         kernel: KernelName,
@@ -50,13 +50,13 @@ pub enum Error {
         precision: crate::Precision,
     },
     /// Arithmetic left the range of f32.
-    #[error("the network's arithmetic overflows on this cloud: logits are not finite")]
+    #[error("the network overflows on this cloud: its logits are not finite")]
     Overflow,
     /// Points cannot be chosen as asked.
     #[error(transparent)]
     Sampler(#[from] crate::sampler::SamplerError),
     /// The model lacks the front end that a Critical Points Layer was to pool.
-    #[error("sampler cpl cannot pool front end {choice}: the model has {what}")]
+    #[error("the sampler cpl cannot use the front end `{choice}`: the model has {what}")]
     FrontMissing {
         /// What was asked for.
         choice: crate::sampler::FrontChoice,
@@ -64,13 +64,15 @@ pub enum Error {
         what: &'static str,
     },
     /// TestTimeAugmentation draw random subsets; another sampler has one opinion only.
-    #[error("votes need random subsets or rotations: sampler {0} would repeat itself")]
+    #[error(
+        "expected the sampler random or rotations for several votes, found the sampler {0}, whose votes would all be the same"
+    )]
     VotesWithoutDraws(crate::sampler::SamplerKind),
     /// Room for more points than memory could hold.
-    #[error("room for {0} points is asked for; at most {MOST_POINTS} can be made at once")]
+    #[error("expected a capacity of at most {MOST_POINTS} points, found {0}")]
     TooMuchRoom(usize),
     /// More threads than any machine has cores.
-    #[error("{0} threads are asked for; at most {MOST_THREADS} make sense")]
+    #[error("expected at most {MOST_THREADS} threads, found {0}")]
     TooManyThreads(usize),
     /// Workers could not be started.
     #[error("cannot start {threads} threads: {source}")]

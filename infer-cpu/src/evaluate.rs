@@ -17,17 +17,14 @@ pub struct Evaluation {
 /// Classifies every cloud of `set`, whose labels are indices into
 /// [`Classifier::classes`].
 ///
-/// ```
-/// use formats::labelled::LabelledSet;
+/// ```no_run
+/// use std::path::Path;
+///
+/// use formats::labelled::read_labelled;
 /// use infer_cpu::{Classifier, Options, evaluate};
 ///
-/// # let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
-/// # let model = std::path::Path::new(weights).join("untrained-test.safetensors");
-/// let mut classifier = Classifier::load(&model, &Options::default())?;
-/// let points = vec![0.0, 0.0, 0.1, 0.3, 0.0, 0.1, 0.3, 0.2, 0.0];
-/// let set = LabelledSet { points, n_points: 3, labels: vec![2], names: None, classes: None };
-/// let evaluation = evaluate(&mut classifier, &set)?;
-/// assert_eq!(evaluation.total(), 1);
+/// let mut classifier = Classifier::load(Path::new("m.safetensors"), &Options::default())?;
+/// let evaluation = evaluate(&mut classifier, &read_labelled(Path::new("test.npz"))?)?;
 /// println!("{:.2} %", 100.0 * evaluation.instance_accuracy());
 /// # Ok::<(), infer_cpu::Error>(())
 /// ```

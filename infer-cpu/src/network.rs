@@ -147,13 +147,18 @@ impl<M, N> Reader<'_, M, N> {
         let after = card.transform_after;
         let n_trunk = self.count("feat.conv");
         if n_trunk < 2 {
-            return Err(self.error("feat.conv2.weight", "missing: a trunk has two layers or more"));
+            return Err(
+                self.error("feat.conv2.weight", "missing: expected a trunk of two layers or more")
+            );
         }
         let stn = self.has("feat.stn.").then(|| self.t_net("feat.stn", 3, Role::First, 3));
         let stn = stn.transpose()?;
         let has_fstn = self.has("feat.fstn.");
         if has_fstn && !(1..n_trunk).contains(&after) {
-            let cause = format!("{after}, for a trunk of {n_trunk} layers");
+            let cause = format!(
+                "expected 1 to {} for a trunk of {n_trunk} layers, found {after}",
+                n_trunk - 1
+            );
             return Err(self.file_error("metadata `transform_after`", cause));
         }
         let edges = self.edges(card)?;
@@ -187,7 +192,7 @@ impl<M, N> Reader<'_, M, N> {
         let n_classes = last.and_then(|shape| shape.first()).copied().unwrap_or(0);
         let n_names = card.classes.len();
         if n_names != 0 && n_names != n_classes {
-            let cause = format!("names {n_names} for {n_classes} logits");
+            let cause = format!("expected {n_classes} names, one for each logit, found {n_names}");
             return Err(self.file_error("metadata `classes`", cause));
         }
         Ok(())
@@ -213,11 +218,14 @@ impl<M, N> Reader<'_, M, N> {
     fn edges(&mut self, card: &ModelCard) -> Result<Vec<(f32, Dense)>, FormatError> {
         let (n, radii) = (self.count("edge.conv"), &card.edge_radii);
         if radii.len() != n {
-            let cause = format!("names {} for {n} layers `edge.conv`", radii.len());
+            let cause = format!(
+                "expected {n} radii, one for each layer `edge.conv`, found {}",
+                radii.len()
+            );
             return Err(self.file_error("metadata `edge_radii`", cause));
         }
         if let Some(radius) = radii.iter().find(|r| !(r.is_normal() && **r > 0.0)) {
-            let cause = format!("{radius} is no radius");
+            let cause = format!("expected radii above 0, found {radius}");
             return Err(self.file_error("metadata `edge_radii`", cause));
         }
         let numbered = radii.iter().zip(1..);
@@ -238,7 +246,7 @@ impl<M, N> Reader<'_, M, N> {
     {
         let n = self.count(&format!("{prefix}.conv"));
         if n < 2 {
-            let cause = "missing: two layers or more come before a pooling";
+            let cause = "missing: expected two layers or more before a pooling";
             return Err(self.error(&format!("{prefix}.conv2.weight"), cause));
         }
         let mut width = inputs;
@@ -315,7 +323,7 @@ impl<M, N> Reader<'_, M, N> {
         let name = dotted(prefix, &format!("{kind}{number}"));
         let weight_name = format!("{name}.weight");
         if let Some(width) = self.too_wide(&weight_name) {
-            let cause = format!("{width} wide; at most {WIDEST} can be computed");
+            let cause = format!("expected a layer of at most {WIDEST} channels, found {width}");
             return Err(self.error(&weight_name, cause));
         }
         let weight = self.tensor(&weight_name)?;
@@ -339,7 +347,10 @@ impl<M, N> Reader<'_, M, N> {
         }
         let values = dense.weight.iter().chain(&dense.bias);
         if !values.fold(true, |finite, value| finite & value.is_finite()) {
-            return Err(self.error(&weight_name, "not finite once its batch norm is folded in"));
+            return Err(self.error(
+                &weight_name,
+                "expected finite weights after the batch norm is folded in, found others",
+            ));
         }
         Ok(dense)
     }
@@ -354,7 +365,10 @@ impl<M, N> Reader<'_, M, N> {
         };
         match norm.variance.values.iter().position(|&variance| variance < 0.0) {
             Some(at) => {
-                let cause = format!("element {at} is {}, a variance", norm.variance.values[at]);
+                let cause = format!(
+                    "expected variances of at least 0, found {} at element {at}",
+                    norm.variance.values[at]
+                );
                 Err(self.error(&format!("{name}.running_var"), cause))
             }
             None => Ok(norm),
@@ -395,7 +409,10 @@ impl<M, N> Reader<'_, M, N> {
         match left.into_iter().find(|name| !name.ends_with(".num_batches_tracked")) {
             Some(name) => {
                 let shape = self.file.shape(name).unwrap_or_default();
-                Err(self.error(name, format!("extra: no layer takes it (shape {shape:?})")))
+                Err(self.error(
+                    name,
+                    format!("unexpected: no layer takes a tensor of this name (shape {shape:?})"),
+                ))
             }
             None => Ok(()),
         }

@@ -73,7 +73,7 @@ impl fmt::Display for Precision {
 
 /// A word that names no precision.
 #[derive(Debug, thiserror::Error)]
-#[error("`{0}` is no precision; choose one of f32, f32-fc16, f16, i8")]
+#[error("unknown precision `{0}`, expected one of f32, f32-fc16, f16, i8")]
 pub struct NoSuchPrecision(String);
 
 impl FromStr for Precision {

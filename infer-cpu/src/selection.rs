@@ -174,7 +174,7 @@ pub fn front_pass(choice: FrontChoice, parts: &Parts) -> Result<Pass, Error> {
         FrontChoice::Auto if !parts.fstn => Ok(Pass::Trunk),
         FrontChoice::Own => lacks("no front end of its own"),
         FrontChoice::Stn => lacks("no T-Net of coordinates"),
-        FrontChoice::Trunk => lacks("T-Nets, on which its trunk's features depend"),
+        FrontChoice::Trunk => lacks("T-Nets, so that its trunk cannot run before them"),
         FrontChoice::Auto => lacks("neither a front end nor a T-Net of coordinates"),
     }
 }

@@ -19,7 +19,7 @@ thread_local! {
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// A pointer is null or not aligned.
-    #[error("`{0}` is null or not aligned")]
+    #[error("expected `{0}` to be an aligned pointer, found a null or misaligned one")]
     BadPointer(&'static str),
     /// An option makes no sense.
     #[error("option `{option}`: {cause}")]
@@ -30,10 +30,10 @@ pub enum Failure {
         cause: String,
     },
     /// A class name that C cannot take.
-    #[error("class name {0:?} holds a NUL")]
+    #[error("expected class names without NUL, found {0:?}")]
     ClassName(String),
     /// A class that there is none of.
-    #[error("class {index} of {n_classes}")]
+    #[error("expected a class below {n_classes}, found {index}")]
     NoSuchClass {
         /// What was asked for.
         index: usize,
@@ -41,10 +41,10 @@ pub enum Failure {
         n_classes: usize,
     },
     /// More points than an address space holds.
-    #[error("{0} points are more than memory can hold")]
+    #[error("expected a cloud that fits in memory, found {0} points")]
     TooManyPoints(usize),
     /// A buffer is too short for the logits.
-    #[error("{n_classes} logits do not fit in a buffer of {length}")]
+    #[error("expected a buffer for {n_classes} logits, found one of {length}")]
     BufferTooSmall {
         /// How many logits there are.
         n_classes: usize,
@@ -52,7 +52,7 @@ pub enum Failure {
         length: usize,
     },
     /// There are no logits.
-    #[error("no cloud was classified by the last call, if there was one")]
+    #[error("expected a classified cloud, but the last call classified none")]
     NoPrediction,
     /// Loading or classifying failed.
     #[error(transparent)]
@@ -168,7 +168,10 @@ mod tests {
         assert_eq!(last_error(), "");
         guard_status(|| Err(Failure::BadPointer("here")));
         assert_eq!(guard_status(|| Ok(())), EdgepuckStatus::Ok);
-        assert_eq!(last_error(), "`here` is null or not aligned");
+        assert_eq!(
+            last_error(),
+            "expected `here` to be an aligned pointer, found a null or misaligned one"
+        );
         std::thread::spawn(|| assert_eq!(last_error(), "")).join().unwrap();
     }
 

@@ -142,9 +142,10 @@ impl EdgepuckOptions {
         match kind {
             Some(kind) => Ok(Some(SamplerSpec { kind, ..spec })),
             None if spec == default => Ok(None),
-            None => {
-                Err(bad("sampler", "null, but other fields say how it should sample".to_owned()))
-            }
+            None => Err(bad(
+                "sampler",
+                "expected a sampler, since other fields say how it samples, found null".to_owned(),
+            )),
         }
     }
 }

@@ -36,73 +36,73 @@ Examples:
   producer | infer-cpu classify --format ply -
   find scans -name '*.npz' | infer-cpu classify --json --files-from -
 
-A line is a file's name, its class and the network's confidence, between tabs.
-With --json it is an object: file, class (a number), label, confidence (0 to 1),
-logits, points, used (by the network), dropped, clipped (activations, by int8),
-precision (f32 where another one overflowed), ms (without reading the file); or
-file and error. A file that fails does not end the run; the exit code is 1 then.
+Each file gives one line: its name, the class and the confidence, separated by
+tabs. With --json the line is an object with the keys file, class (a number),
+label, confidence (0 to 1), logits, points, used (points that the network saw),
+dropped (points), clipped (activations, with i8), precision (f32 if the chosen
+one overflowed) and ms (without reading the file); if the file fails, the keys
+are file and error. The run goes on after a file that fails and exits with 1.
 
-Formats: PLY, NPZ, NPY, PCD, XYZ, CSV, KITTI's .bin, LAS, as the name tells.")]
+Formats, by file extension: PLY, NPZ, NPY, PCD, XYZ, CSV, KITTI's .bin, LAS.")]
 pub struct Args {
-    /// Clouds; `-` reads one from standard input
+    /// Files of clouds; `-` reads one cloud from standard input
     #[arg(value_name = "FILES", required_unless_present = "files_from")]
     files: Vec<PathBuf>,
 
-    /// Read names of files from this one, one a line; `-` is standard input,
-    /// where each name is answered before the next is read
+    /// Read file names from LIST, one per line; with `-`, from standard input,
+    /// where each name is answered before the next one is read
     #[arg(long, value_name = "LIST", conflicts_with = "files")]
     files_from: Option<PathBuf>,
 
     /// Format of all clouds: ply, npz, npy, pcd, xyz, csv, kitti, las [default:
-    /// as a file's name tells, or the first bytes of standard input]
+    /// by the file extension; by the first bytes of standard input]
     #[arg(long)]
     format: Option<CloudFormat>,
 
-    /// Print one JSON object a line
+    /// Print one JSON object per line
     #[arg(long)]
     json: bool,
 
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Drop points that are not finite instead of refusing the cloud
+    /// Drop points with NaN or infinite coordinates instead of refusing the cloud
     #[arg(long)]
     drop_invalid: bool,
 
-    /// How clouds are moved and scaled: unit-sphere, none [default: as the model
-    /// was trained]
+    /// Normalization of clouds: unit-sphere, none [default: as in training]
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalization>,
 
-    /// Compute in f32, f32-fc16, f16 or i8
+    /// Precision of the network: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
 
     /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default:
-    /// the fastest of this machine]
+    /// the fastest that this machine runs]
     #[arg(long)]
     kernel: Option<KernelName>,
 
-    /// Threads [default: one a core, at most 4]
+    /// Number of threads [default: one per core, at most 4]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 
-    /// Average the log-probabilities of so many random subsets (of sampler
-    /// random, or with --vote-rotations)
+    /// Average the log-probabilities of K passes; needs the sampler random or
+    /// --vote-rotations, so that the passes differ
     #[arg(long, value_name = "K", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
     votes: u32,
 
-    /// Turn the cloud about its up axis from vote to vote
+    /// Rotate the cloud about its up axis between votes
     #[arg(long)]
     vote_rotations: bool,
 
-    /// The axis that points up
+    /// Up axis of the clouds
     #[arg(long, value_enum, default_value_t = Axis::Z)]
     up: Axis,
 
-    /// Which points the network sees: all, first, random, fps, voxel, cpl
-    /// [default: as the model was trained, else all]
+    /// Sampler that chooses the points the network sees: all, first, random,
+    /// fps, voxel, cpl [default: as in training, else all]
     #[arg(long, value_name = "NAME")]
     sampler: Option<SamplerKind>,
 

@@ -30,7 +30,11 @@ pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, F
 /// What cannot be read, or is no cloud.
 pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
     if path.is_dir() {
-        return Err(FormatError::malformed(path, "name", "a folder; name the files in it"));
+        return Err(FormatError::malformed(
+            path,
+            "name",
+            "expected a file, found a folder: name the files in it",
+        ));
     }
     match format {
         None => read_cloud(path),
@@ -49,6 +53,8 @@ pub fn check_names<'a>(names: impl IntoIterator<Item = &'a Path>) -> Result<(), 
     let n = names.into_iter().filter(|name| name.as_os_str() == STANDARD_INPUT).count();
     match n {
         0 | 1 => Ok(()),
-        _ => Err(Usage(format!("`-` is named {n} times: standard input holds one cloud"))),
+        _ => Err(Usage(format!(
+            "expected `-` once, since standard input holds one cloud, found it {n} times"
+        ))),
     }
 }

@@ -19,8 +19,8 @@ pub use failure::{Usage, is_broken_pipe, say, told_once};
 #[derive(Parser)]
 #[command(name = "infer-cpu", version, max_term_width = 100)]
 #[command(after_help = "\
-Exit codes: 0 all went well, 1 some inputs failed and were named, 2 the command
-line asks for something that cannot be.")]
+Exit status: 0 on success, 1 if an input failed (the message names it), 2 if the
+command line is invalid.")]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -28,17 +28,17 @@ pub struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Tell the class of clouds
+    /// Classify clouds
     Classify(Box<classify::Args>),
     /// Write the points of a cloud that a sampler chooses
     Sample(Box<sample::Args>),
-    /// Show what a model file holds, and what it costs
+    /// Show the layers of a model file and what they cost
     Inspect(inspect::Args),
-    /// Measure this machine
+    /// Measure the latency on this machine
     Bench(Box<bench::Args>),
 }
 
-/// How a command that ran to its end ended.
+/// Exit status of a completed command.
 pub enum Outcome {
     /// All inputs were fine.
     Success,

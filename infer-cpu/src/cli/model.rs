@@ -16,13 +16,13 @@ const NAMES: [&str; 2] = ["edge-64.safetensors", "untrained-test.safetensors"];
 /// Flags that name a model.
 #[derive(clap::Args)]
 pub struct ModelArgs {
-    /// Model file, safetensors [default: $EDGEPUCK_MODEL, else
-    /// edge-64.safetensors, for whole objects of ModelNet40, in weights/
-    /// beside this program or in ./assets/weights]
+    /// Model file in safetensors format [default: $EDGEPUCK_MODEL, else
+    /// edge-64.safetensors (for whole objects of ModelNet40) in weights/ beside
+    /// this program or in ./assets/weights]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
-    /// Use a model of random weights all the same, as the bundled test model is
+    /// Accept a model with random weights, such as the bundled test model
     #[arg(long)]
     allow_untrained: bool,
 }
@@ -38,8 +38,8 @@ impl ModelArgs {
         let card = ModelCard::read(&path)?;
         if !card.trained && !self.allow_untrained {
             return Err(Usage(format!(
-                "{} is untrained: its weights are random, and so are its answers; name a \
-                 trained model by --model, or use this one by --allow-untrained",
+                "{} is untrained: its weights and its answers are random; name a trained \
+                 model by --model, or use this one by --allow-untrained",
                 path.display()
             ))
             .into());
@@ -64,7 +64,7 @@ pub fn find(named: Option<&Path>) -> Result<PathBuf, Usage> {
     candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
         let folders: Vec<_> = folders.iter().map(|folder| folder.display().to_string()).collect();
         Usage(format!(
-            "no model: name one by --model or ${VARIABLE}, or put {} into one of {}",
+            "found no model: name one by --model or ${VARIABLE}, or put {} into one of {}",
             NAMES[0],
             folders.join(", ")
         ))

@@ -99,12 +99,14 @@ fn warn(name: &Path, prediction: &Prediction, precision: Precision) {
     }
     if prediction.precision != precision {
         let used = prediction.precision;
-        warn(&format!("{precision} overflows on this cloud; computed in {used}"));
+        warn(&format!(
+            "{precision} overflows on this cloud, which was classified in {used} instead"
+        ));
     }
     if prediction.n_clipped > 0 {
         let n = prediction.n_clipped;
         warn(&format!(
-            "{n} activations were clipped to the range that {precision} is calibrated for"
+            "{n} activations were above the calibrated range of {precision} and were clipped to it"
         ));
     }
 }

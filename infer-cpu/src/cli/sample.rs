@@ -23,34 +23,35 @@ Examples:
   infer-cpu sample --sampler voxel --voxel-size 0.05 in.las thinned.npz
   infer-cpu sample --sampler cpl --points 64 --model model.safetensors in.npz out.xyz
 
-Points are written as they are read: samplers only choose. A voxel size
-is in the cloud's own unit. cpl chooses as the model does, of the cloud as the
-model was trained to see it; where it repeats points to come to M, so does the
-output. The output's name tells its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin, LAS.")]
+The output holds the chosen points with the coordinates of the input. A voxel
+size is in the unit of the cloud. cpl normalizes the cloud as in training before
+it chooses; where it repeats points to reach M, the output repeats them too. The
+extension of the output chooses its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin,
+LAS.")]
 pub struct Args {
-    /// Which points to keep: all, first, random, fps, voxel, cpl
+    /// Sampler that chooses the points: all, first, random, fps, voxel, cpl
     #[arg(long, value_name = "NAME")]
     sampler: SamplerKind,
 
     #[command(flatten)]
     how: SamplerArgs,
 
-    /// Drop points that are not finite instead of refusing the cloud
+    /// Drop points with NaN or infinite coordinates instead of refusing the cloud
     #[arg(long)]
     drop_invalid: bool,
 
     /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, las [default:
-    /// as its name tells, or the first bytes of standard input]
+    /// by the file extension; by the first bytes of standard input]
     #[arg(long)]
     format: Option<CloudFormat>,
 
     #[command(flatten)]
     model: ModelArgs,
 
-    /// The cloud; `-` reads standard input
+    /// File of the cloud; `-` reads standard input
     input: PathBuf,
 
-    /// The file to write
+    /// File to write
     output: PathBuf,
 }
 

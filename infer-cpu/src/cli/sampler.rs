@@ -7,37 +7,37 @@ use super::failure::Usage;
 /// Flags beside the sampler's name.
 #[derive(clap::Args)]
 pub struct SamplerArgs {
-    /// Points to keep [default: as many as the model was trained behind, else 1024]
+    /// How many points to keep [default: as in training, else 1024]
     #[arg(long, value_name = "M")]
     points: Option<usize>,
 
-    /// What random draws depend on [default: 0]
+    /// Seed of random draws [default: 0]
     #[arg(long)]
     seed: Option<u64>,
 
-    /// Where fps begins: at the point farthest from the centroid (farthest),
-    /// whatever the order of the points, or at the first one (first) [default:
-    /// as the model was trained, else farthest]
+    /// First point of fps: the one farthest from the centroid (farthest), which
+    /// does not depend on the order of points, or the first one (first)
+    /// [default: as in training, else farthest]
     #[arg(long, value_name = "WHERE")]
     fps_start: Option<FpsStart>,
 
-    /// Edge of a cell of voxel, in place of --points: for sample in the cloud's
-    /// own unit, for classify in that of the normalised cloud
+    /// Edge of a voxel, in place of --points: in the unit of the cloud for
+    /// sample, in that of the normalized cloud for classify
     #[arg(long, value_name = "LENGTH", conflicts_with = "points")]
     voxel_size: Option<f64>,
 
-    /// How cpl comes to M points: truncate, cyclic, nearest, weighted [default:
-    /// cyclic]
+    /// Rule by which cpl makes its critical points M: truncate, cyclic, nearest,
+    /// weighted [default: cyclic]
     #[arg(long, value_name = "RULE")]
     resize: Option<Resize>,
 
-    /// Secondary poolings of cpl among the points not yet chosen [default: 0]
+    /// Further poolings of cpl among the points not yet chosen [default: 0]
     #[arg(long, value_name = "K")]
     passes: Option<usize>,
 
-    /// What cpl pools: the model's own front end (own), the trunk of its input
-    /// T-Net (stn), its trunk (trunk), or the first of these that there is (auto)
-    /// [default: auto]
+    /// Layers whose features cpl pools: the model's own front end (own), the
+    /// trunk of its input T-Net (stn), its trunk (trunk), or the first of these
+    /// that the model has (auto) [default: auto]
     #[arg(long, value_name = "NET")]
     front: Option<FrontChoice>,
 }
@@ -81,7 +81,7 @@ impl SamplerArgs {
             Some((flag, _, kinds)) => {
                 let kinds: Vec<_> = kinds.iter().map(|kind| kind.name()).collect();
                 Err(Usage(format!(
-                    "{flag} means nothing to sampler {kind}; --sampler may be {}",
+                    "{flag} does not apply to the sampler {kind}; it applies to {}",
                     kinds.join(", ")
                 )))
             }
@@ -127,7 +127,7 @@ mod tests {
         let error = points.apply(None, SamplerSpec::default()).unwrap_err().to_string();
         assert_eq!(
             error,
-            "--points means nothing to sampler all; --sampler may be first, random, fps, voxel, cpl"
+            "--points does not apply to the sampler all; it applies to first, random, fps, voxel, cpl"
         );
         let passes = SamplerArgs { passes: Some(2), ..none() };
         assert!(passes.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());

@@ -330,7 +330,7 @@ impl fmt::Display for KernelName {
 
 /// A word that names no kernel.
 #[derive(Debug, thiserror::Error)]
-#[error("`{0}` is no kernel; choose one of scalar, avx2, avx512, neon, neon_f16, neon_dot")]
+#[error("unknown kernel `{0}`, expected one of scalar, avx2, avx512, neon, neon_f16, neon_dot")]
 pub struct NoSuchKernel(String);
 
 impl FromStr for KernelName {

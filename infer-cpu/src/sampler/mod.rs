@@ -35,16 +35,16 @@ pub use voxel::VoxelGrid;
 #[non_exhaustive]
 pub enum SamplerError {
     /// M is 0.
-    #[error("a sampler is asked for 0 points; it keeps 1 or more")]
+    #[error("expected a sampler that keeps 1 point or more, found 0")]
     NoPointsWanted,
     /// M is so large that its repetitions would fill memory.
-    #[error("a Critical Points Layer is asked for {0} points; it gives at most {MOST_CRITICAL}")]
+    #[error("expected a Critical Points Layer of at most {MOST_CRITICAL} points, found {0}")]
     TooManyCritical(usize),
     /// A voxel has no such edge.
-    #[error("a voxel size of {0} is not a positive length")]
+    #[error("expected a voxel size above 0, found {0}")]
     VoxelSize(f64),
     /// A coordinate is NaN or infinite.
-    #[error("point {index} is ({x}, {y}, {z})")]
+    #[error("point {index}: expected finite coordinates, found ({x}, {y}, {z})")]
     NotFinite {
         /// The point's place in the cloud, from 0.
         index: usize,
@@ -56,10 +56,10 @@ pub enum SamplerError {
         z: f32,
     },
     /// More points than indices can count.
-    #[error("{0} points are more than 4,294,967,295")]
+    #[error("expected at most 4,294,967,295 points, found {0}")]
     TooManyPoints(usize),
     /// Coordinates alone do not tell critical points.
-    #[error("sampler cpl needs the features of a network")]
+    #[error("the sampler cpl needs a model, whose features it pools")]
     NeedsFeatures,
 }
 
@@ -246,7 +246,10 @@ mod tests {
         let cloud = [[0.0; 3], [1.0, f32::NAN, 2.0]];
         for kind in [SamplerKind::Fps, SamplerKind::Voxel] {
             let error = select(&spec(kind, 1), &cloud).unwrap_err();
-            assert_eq!(error.to_string(), "point 1 is (1, NaN, 2)");
+            assert_eq!(
+                error.to_string(),
+                "point 1: expected finite coordinates, found (1, NaN, 2)"
+            );
         }
         let error = select(&spec(SamplerKind::Cpl, 1), &cloud).unwrap_err();
         assert_eq!(error, SamplerError::NeedsFeatures);

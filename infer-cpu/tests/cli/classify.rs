@@ -64,7 +64,7 @@ fn standard_input_holds_one_cloud() {
     let ran = folder.run_with("classify --model m.safetensors --format ply -", &text);
     ran.assert_refused(1, "error: standard input: ");
     let twice = folder.classify("- -");
-    twice.assert_refused(2, "error: `-` is named 2 times");
+    twice.assert_refused(2, "error: expected `-` once");
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn the_sampler_is_the_model_s_own_but_for_what_flags_say() {
     assert_eq!(used("--sampler all"), 100);
     assert_eq!(used("--sampler random"), 24);
     let flags = "--sampler all --points 3 c.xyz";
-    folder.classify(flags).assert_refused(2, "error: --points means nothing to sampler all");
+    folder.classify(flags).assert_refused(2, "error: --points does not apply to the sampler all");
 }
 
 #[test]
@@ -124,7 +124,9 @@ fn votes_are_seeded_and_need_a_sampler_that_draws() {
     };
     assert_eq!(votes(1), votes(1));
     assert_ne!(votes(1), votes(2));
-    folder.classify("--votes 5 c.xyz").assert_refused(2, "error: votes need random subsets");
+    folder
+        .classify("--votes 5 c.xyz")
+        .assert_refused(2, "error: expected the sampler random or rotations");
     assert_eq!(folder.classify("--votes 5 --vote-rotations --up y c.xyz").code, 0);
     // More points than there are are all of them.
     let most = "--sampler random --points 2000000000000000000 c.xyz";
@@ -139,10 +141,16 @@ fn what_makes_no_sense_is_a_usage_error() {
         ("", "error: the following required arguments"),
         ("--sampler fsp c.xyz", "error: invalid value 'fsp' for '--sampler"),
         ("--precision f8 c.xyz", "error: invalid value 'f8' for '--precision"),
-        ("--sampler fps --points 0 c.xyz", "error: a sampler is asked for 0 points"),
-        ("--sampler voxel --voxel-size=-1 c.xyz", "error: a voxel size of -1"),
-        ("--sampler cpl --front own c.xyz", "error: sampler cpl cannot pool front end own"),
-        ("--sampler cpl --front trunk c.xyz", "error: sampler cpl cannot pool front end trunk"),
+        ("--sampler fps --points 0 c.xyz", "error: expected a sampler that keeps 1 point"),
+        ("--sampler voxel --voxel-size=-1 c.xyz", "error: expected a voxel size above 0, found -1"),
+        (
+            "--sampler cpl --front own c.xyz",
+            "error: the sampler cpl cannot use the front end `own`",
+        ),
+        (
+            "--sampler cpl --front trunk c.xyz",
+            "error: the sampler cpl cannot use the front end `trunk`",
+        ),
         ("--threads 0 c.xyz", "error: "),
         ("--threads 5000 c.xyz", "error: invalid value '5000' for '--threads"),
         ("--files-from list c.xyz", "error: the argument"),

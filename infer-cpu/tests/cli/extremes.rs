@@ -21,7 +21,8 @@ fn what_is_not_finite_is_refused_or_dropped_and_counted() {
     let folder = Folder::new();
     for (word, told) in [("nan", "NaN"), ("inf", "inf"), ("-inf", "-inf")] {
         folder.write("c.xyz", format!("0 0 0\n1 2 3\n4 {word} 6\n7 8 10\n{word} 0 0\n"));
-        let error = format!("error: c.xyz: point 2 is (4, {told}, 6)\n");
+        let error =
+            format!("error: c.xyz: point 2: expected finite coordinates, found (4, {told}, 6)\n");
         folder.classify("c.xyz").assert_refused(1, &error);
         let found = &folder.classify_json("--drop-invalid c.xyz")[0];
         assert_eq!((&found["points"], &found["dropped"]), (&3.into(), &2.into()));
@@ -50,7 +51,10 @@ fn what_overflows_f16_is_computed_in_f32() {
     scaled_model(&folder, "feat.conv1.weight", 1e6);
     let ran = folder.classify("--precision f16 c.xyz");
     assert_eq!(ran.code, 0);
-    assert_eq!(ran.err, "warning: c.xyz: f16 overflows on this cloud; computed in f32\n");
+    assert_eq!(
+        ran.err,
+        "warning: c.xyz: f16 overflows on this cloud, which was classified in f32 instead\n"
+    );
     let f16 = &folder.classify_json("--precision f16 c.xyz")[0];
     let f32 = &folder.classify_json("--precision f32 c.xyz")[0];
     assert_eq!(f16["precision"], "f32");
@@ -72,7 +76,7 @@ fn what_overflows_f32_has_no_class() {
         tiny_model::write(&folder.path("m.safetensors"), &tensors, &card());
         for precision in ["f32", "f32-fc16", "f16"] {
             let ran = folder.classify(&format!("--precision {precision} c.xyz"));
-            ran.assert_refused(1, "error: c.xyz: the network's arithmetic overflows");
+            ran.assert_refused(1, "error: c.xyz: the network overflows");
         }
     }
 }
@@ -90,7 +94,7 @@ fn int8_counts_what_its_calibration_clips() {
     let ran = folder.classify("--precision i8 c.xyz");
     assert_eq!(ran.code, 0);
     let expected = format!(
-        "warning: c.xyz: {n} activations were clipped to the range that i8 is calibrated for\n"
+        "warning: c.xyz: {n} activations were above the calibrated range of i8 and were clipped to it\n"
     );
     assert_eq!(ran.err, expected);
 }

@@ -74,7 +74,7 @@ fn tensors_that_do_not_fit_are_named_with_both_shapes() {
     refuses(
         |tensors| drop(tensors.insert("other".to_owned(), tensor(&[2, 3]))),
         &card,
-        "tensor `other`: extra: no layer takes it (shape [2, 3])",
+        "tensor `other`: unexpected: no layer takes a tensor of this name (shape [2, 3])",
     );
     refuses(
         |tensors| drop(tensors.insert("feat.conv2.weight".to_owned(), tensor(&[16, 9, 1]))),
@@ -93,7 +93,8 @@ fn classes_that_do_not_fit_the_logits_are_refused() {
     let folder = Folder::new();
     folder.cloud("c.xyz", &strip(20));
     tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(5), &card());
-    let error = "error: m.safetensors: metadata `classes`: names 4 for 5 logits";
+    let error =
+        "error: m.safetensors: metadata `classes`: expected 5 names, one for each logit, found 4";
     folder.classify("c.xyz").assert_refused(1, error);
 }
 

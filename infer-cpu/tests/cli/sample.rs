@@ -70,7 +70,11 @@ fn what_cannot_be_sampled_leaves_no_file() {
     let none = folder.path("none.npy");
     write_cloud(&none, &[]).unwrap();
     for (code, line, start) in [
-        (1, "--sampler fps --points 2 nan.xyz out.xyz", "error: nan.xyz: point 1 is (NaN, 1, 2)"),
+        (
+            1,
+            "--sampler fps --points 2 nan.xyz out.xyz",
+            "error: nan.xyz: point 1: expected finite coordinates, found (NaN, 1, 2)",
+        ),
         (
             1,
             "--sampler fps --points 2 none.npy out.xyz",
@@ -78,8 +82,8 @@ fn what_cannot_be_sampled_leaves_no_file() {
         ),
         (1, "--sampler fps --points 2 absent.xyz out.xyz", "error: absent.xyz: "),
         (1, "--sampler fps --points 2 c.xyz out.off", "error: out.off: extension: "),
-        (2, "--sampler fps --points 0 c.xyz out.xyz", "error: a sampler is asked for 0 points"),
-        (2, "--sampler all --points 2 c.xyz out.xyz", "error: --points means nothing"),
+        (2, "--sampler fps --points 0 c.xyz out.xyz", "error: expected a sampler that keeps 1 point"),
+        (2, "--sampler all --points 2 c.xyz out.xyz", "error: --points does not apply"),
         (2, "--points 2 c.xyz out.xyz", "error: the following required arguments"),
     ] {
         folder.run(&format!("sample {line}")).assert_refused(code, start);

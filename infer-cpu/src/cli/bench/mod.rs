@@ -23,32 +23,33 @@ Examples:
   infer-cpu bench --json > pi5.json
   infer-cpu bench --points 64,1024 --precision f32,f16 --threads 1,4
 
-Latency is that of a whole classification, from coordinates to class. A sampler
-is a name, perhaps with more behind colons: `fps`, `cpl`, `cpl:stn`,
-`cpl:trunk`, `random:votes5`, `random:votes5:turned`.")]
+The latency is that of a whole classification, from coordinates to class. Options
+of a sampler follow its name after colons: `fps`, `cpl`, `cpl:stn`, `cpl:trunk`,
+`random:votes5`, `random:votes5:turned`.")]
 pub struct Args {
-    /// Model file [default: the bundled weights]
+    /// Model file [default: the bundled model]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
 
-    /// Points that the network sees
+    /// How many points the network sees
     #[arg(long, value_delimiter = ',', value_parser = at_least_one,
           default_value = "16,32,64,128,256,512,1024,2048,4096")]
     points: Vec<usize>,
 
-    /// Precisions
+    /// Precisions to measure
     #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
     precision: Vec<Precision>,
 
-    /// Samplers; `all` takes clouds of as many points as the network is to see
+    /// Samplers to measure; for `all`, the clouds have as many points as the
+    /// network sees
     #[arg(long, value_delimiter = ',', default_value = "all")]
     sampler: Vec<Variant>,
 
-    /// T-Nets: both, input, feature, none
+    /// T-Nets to run: both, input, feature, none
     #[arg(long, value_delimiter = ',', default_value = "both")]
     t_nets: Vec<TNets>,
 
-    /// Threads
+    /// Numbers of threads to measure
     #[arg(long, value_delimiter = ',', default_value = "1,2,4")]
     threads: Vec<usize>,
 
@@ -57,11 +58,11 @@ pub struct Args {
     #[arg(long)]
     kernel: Option<infer_cpu::kernel::KernelName>,
 
-    /// Points of the clouds that samplers choose from
+    /// How many points the samplers choose from
     #[arg(long, default_value_t = 1024, value_name = "N")]
     from: usize,
 
-    /// Classifications of each setting
+    /// How often each setting classifies
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
 
@@ -71,7 +72,7 @@ pub struct Args {
 
     #[cfg(feature = "npz")]
     /// Clouds to calibrate int8 with, a packed NPZ [default: the model's own
-    /// calibration, else shapes made by rule]
+    /// calibration, else built-in procedural shapes]
     #[arg(long, value_name = "NPZ")]
     calibrate: Option<PathBuf>,
 }
@@ -90,7 +91,7 @@ fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<Stri
 }
 
 fn at_least_one(word: &str) -> Result<usize, String> {
-    word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "not a number above 0".to_owned())
+    word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number above 0".to_owned())
 }
 
 /// Measures what `args` ask for.

@@ -64,8 +64,8 @@ impl FromStr for Variant {
                 variant.rotations = true;
             } else {
                 return Err(format!(
-                    "`{word}` says nothing of a sampler; a front end, a rule of resizing, \
-                     votesN or turned does"
+                    "unknown word `{word}` after the sampler, expected a front end, a resize \
+                     rule, votesN or turned"
                 ));
             }
         }
@@ -95,7 +95,7 @@ mod tests {
         assert_eq!(variant.resize, Resize::Truncate);
         let variant: Variant = "random:votes5:turned".parse().unwrap();
         assert_eq!((variant.votes, variant.rotations), (5, true));
-        assert!("fps:votes".parse::<Variant>().unwrap_err().contains("`votes` says nothing"));
+        assert!("fps:votes".parse::<Variant>().unwrap_err().contains("unknown word `votes`"));
         assert!("fsp".parse::<Variant>().is_err());
     }
 }
