@@ -1,7 +1,38 @@
-//! PointNet behind a Critical Points Layer, without a GPU.
+//! Classifies point clouds on a CPU by PointNet, behind a Critical Points Layer
+//! or another sampler.
 //!
-//! [`Classifier`] goes from a cloud to a class; [`sampler`] chooses points,
-//! [`kernel`] multiplies.
+//! A [`Classifier`] takes a cloud to a class. It is loaded once, from a file or
+//! from a program's memory, and then allocates nothing:
+//!
+//! ```
+//! use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+//! use infer_cpu::{Classifier, Options};
+//!
+//! # let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
+//! # let model = std::fs::read(format!("{weights}/edge-64.safetensors")).unwrap();
+//! // A model file's bytes; `Classifier::load` takes a path.
+//! let sampler = SamplerSpec { kind: SamplerKind::Fps, points: 64, ..SamplerSpec::default() };
+//! let options = Options { threads: 2, sampler: Some(sampler), ..Options::default() };
+//! let mut classifier = Classifier::from_bytes(&model, &options)?;
+//!
+//! let cloud: Vec<[f32; 3]> = (0..500u16)
+//!     .map(|i| [f32::from(i).cos(), f32::from(i).sin(), f32::from(i) * 0.01])
+//!     .collect();
+//! let prediction = classifier.classify(&cloud)?;
+//! println!("{} ({:.1} %)", prediction.label, 100.0 * prediction.confidence());
+//! assert_eq!(prediction.n_used, 64);
+//! # Ok::<(), infer_cpu::Error>(())
+//! ```
+//!
+//! [`choose`] thins a cloud without a network, `evaluate` (feature `evaluate`)
+//! measures accuracy on a labelled set, and [`inspect`] tells what a model file
+//! holds. [`sampler`] chooses points; [`kernel`] lists the instruction sets.
+//!
+//! # Features
+//! `npz`, `ply`, `pcd` and `las` read clouds of these formats by
+//! `formats::cloud_file`. `evaluate` adds the evaluation. `cli` builds the
+//! program `infer-cpu`; a library's user can leave it out:
+//! `infer-cpu = { version = "0.1", default-features = false }`.
 
 #![deny(unsafe_code)]
 

@@ -48,7 +48,7 @@ static void loading_fails(const char *model)
     options.sampler = "voxel";
     options.voxel_size = -1.0;
     EXPECT_ERROR(edgepuck_load(model, &options, &classifier), EDGEPUCK_STATUS_BAD_OPTION,
-                 "voxel size of -1");
+                 "voxel size above 0, found -1");
     options = edgepuck_options_default();
     options.up = 3;
     EXPECT_ERROR(edgepuck_load(model, &options, &classifier), EDGEPUCK_STATUS_BAD_OPTION,
@@ -103,10 +103,10 @@ static void logits_are_those_of_the_last_cloud(EdgepuckClassifier *classifier)
     EdgepuckPrediction found;
     float logits[4] = { 7, 7, 7, 7 };
     EXPECT_ERROR(edgepuck_logits(classifier, logits, 4), EDGEPUCK_STATUS_NO_PREDICTION,
-                 "no cloud");
+                 "expected a classified cloud");
     EXPECT(edgepuck_classify(classifier, LONG_IN_Y, 4, &found) == EDGEPUCK_STATUS_OK);
     EXPECT_ERROR(edgepuck_logits(classifier, logits, 2), EDGEPUCK_STATUS_BUFFER_TOO_SMALL,
-                 "3 logits do not fit in a buffer of 2");
+                 "expected a buffer for 3 logits, found one of 2");
     EXPECT_ERROR(edgepuck_logits(classifier, NULL, 3), EDGEPUCK_STATUS_BAD_POINTER, "`out`");
     EXPECT(logits[0] == 7);
     EXPECT(edgepuck_logits(classifier, logits, 4) == EDGEPUCK_STATUS_OK);
