@@ -4,9 +4,9 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use sim_gpu::mesh::census::survey;
 use sim_gpu::mesh::frame::{Normalize, to_world};
 use sim_gpu::mesh::tree::{MeshEntry, discover};
+use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::mesh::{LoadedMesh, load};
 use test_support::{need, shared_data};
 use tests::shared_data::unpacked;
@@ -26,10 +26,10 @@ fn check(entry: &MeshEntry, loaded: &LoadedMesh) {
     let radius = world.mesh.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
     // A quotient and a length, each of a few roundings of 2^-53.
     assert!((radius - 1.0).abs() < 1e-15, "{}: radius {radius}", entry.relative);
-    let survey = survey(&world.mesh);
-    let left_out = survey.census.degenerate + survey.census.duplicate;
-    assert_eq!(survey.kept.len() + left_out, loaded.mesh.triangles.len());
-    assert!(!survey.kept.is_empty(), "{}", entry.relative);
+    let stats = triangle_stats(&world.mesh);
+    let left_out = stats.defects.degenerate + stats.defects.duplicate;
+    assert_eq!(stats.kept.len() + left_out, loaded.mesh.triangles.len());
+    assert!(!stats.kept.is_empty(), "{}", entry.relative);
 }
 
 #[test]
@@ -97,13 +97,13 @@ fn the_time_to_read_modelnet_is_shown() {
             let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::UnitSphere);
             placing = placing.min(start.elapsed());
             let start = Instant::now();
-            n_triangles = survey(&world.mesh).kept.len();
+            n_triangles = triangle_stats(&world.mesh).kept.len();
             surveying = surveying.min(start.elapsed());
         }
         let megabytes = entry.path.metadata().unwrap().len() as f64 / 1e6;
         println!(
             "{:18} {n_triangles:6} triangles kept, {megabytes:5.2} MB: read {:6.2} ms ({:4.0} MB/s), \
-             place {:5.2} ms, survey {:5.2} ms",
+             place {:5.2} ms, stats {:5.2} ms",
             entry.name,
             reading.as_secs_f64() * 1e3,
             megabytes / reading.as_secs_f64(),

@@ -12,14 +12,14 @@ use sim_gpu::caster::Caster;
 use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::Culling;
-use sim_gpu::mesh::census::survey;
 use sim_gpu::mesh::frame::{Normalize, to_world};
 use sim_gpu::mesh::tree::discover;
+use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::mesh::{Mesh, load};
 use sim_gpu::pose::Pose;
 use sim_gpu::scene::{Scene, cast};
 use sim_gpu::sensor::{Sensor, Views};
-use sim_gpu::simplify::{Watcher, distance_to_surface, resolved_m, simplified};
+use sim_gpu::simplify::{Viewpoint, distance_to_surface, resolved_m, simplified};
 use sim_gpu::surface_points::area_uniform;
 use sim_gpu::target::Target;
 use test_support::{need, shared_data};
@@ -39,11 +39,11 @@ fn views() -> Vec<Pose> {
 fn auto_m(mesh: &Mesh) -> f64 {
     let sensor = Sensor::builtin("vlp32c").unwrap();
     let positions = views().iter().map(|view| view.position_m).collect();
-    resolved_m(mesh, 1.0, &[Watcher { sensor: &sensor, positions }])
+    resolved_m(mesh, 1.0, &[Viewpoint { sensor: &sensor, positions }])
 }
 
 fn simplify(mesh: &Mesh, bound_m: f64) -> Option<Mesh> {
-    simplified(mesh, &survey(mesh).kept, bound_m).unwrap()
+    simplified(mesh, &triangle_stats(mesh).kept, bound_m).unwrap()
 }
 
 /// The farthest that any of `points`, in metres, lies from the surface.
@@ -129,14 +129,14 @@ fn hold_to_the_bound(root: &Path, every: usize) {
         let loaded = load(&entry.path).unwrap_or_else(|error| panic!("{error}"));
         let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::UnitSphere);
         let bound_m = auto_m(&world.mesh);
-        let n = survey(&world.mesh).kept.len();
+        let n = triangle_stats(&world.mesh).kept.len();
         before += n;
         let Some(fewer) = simplify(&world.mesh, bound_m) else {
             after += n;
             continue;
         };
         simplified += 1;
-        after += survey(&fewer).kept.len();
+        after += triangle_stats(&fewer).kept.len();
         assert_near(&world.mesh, &fewer, bound_m, &entry.relative);
         let whole = target(&world.mesh);
         let points = scanned(&target(&fewer), &views()[0]);

@@ -22,8 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let sensor = Sensor::resolve("vlp32c")?;
     let pattern = sensor.pattern();
     let noise = Noise { mean_m: 0.0, sigma_m: 0.02, model: NoiseModel::Range };
-    let effects =
-        Effects { noise: Some(noise), intensity: Some(Intensity), ..Effects::default() };
+    let effects = Effects { noise: Some(noise), intensity: Some(Intensity), ..Effects::default() };
     let caster = Caster::open(&AdapterRequest::Auto, &effects)?;
 
     let request = |side: u32| {

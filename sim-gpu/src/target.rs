@@ -1,8 +1,8 @@
 //! A mesh made ready for casting.
 
 use crate::bvh::{Builder, Bvh};
-use crate::mesh::census::survey as triangle_stats;
 use crate::mesh::frame::{Normalize, to_world};
+use crate::mesh::validate::triangle_stats;
 use crate::mesh::{Mesh, MeshError, load};
 use glam::DVec3;
 use std::path::Path;
@@ -84,7 +84,7 @@ impl Surface {
     }
 
     /// The triangles of `mesh` whose indices `kept` lists, ascending;
-    /// `mesh::census::survey` lists those that are neither degenerate nor
+    /// `mesh::validate::triangle_stats` lists those that are neither degenerate nor
     /// duplicates.
     #[must_use]
     pub fn new(mesh: Mesh, kept: Vec<u32>) -> Self {

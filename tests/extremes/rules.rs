@@ -9,7 +9,7 @@ use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::Mesh;
-use sim_gpu::mesh::census::survey;
+use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{MISS, RayFrame};
 use sim_gpu::resolve::Hits;
@@ -154,7 +154,7 @@ fn of_coincident_triangles_the_lowest_index_is_hit() {
                 assert_eq!(hits.hits, alone[0].hits, "{name} at {distance}");
             }
             assert!(alone[0].hits.len() > 1000);
-            assert_eq!(survey(&copies(orders)).census.duplicate, 100);
+            assert_eq!(triangle_stats(&copies(orders)).defects.duplicate, 100);
         }
     }
 }

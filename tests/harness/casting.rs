@@ -7,7 +7,7 @@ use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::Mesh;
-use sim_gpu::mesh::census::survey;
+use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::RayFrame;
 use sim_gpu::resolve::{Hits, resolve};
@@ -23,7 +23,7 @@ pub fn target(mesh: &Mesh) -> Target {
 /// As [`target`], by this builder.
 #[must_use]
 pub fn target_by(builder: Builder, mesh: &Mesh) -> Target {
-    let kept = survey(mesh).kept;
+    let kept = triangle_stats(mesh).kept;
     Target::new(Surface::new(mesh.clone(), kept), builder)
 }
 

@@ -14,8 +14,8 @@ use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::Returns;
 use formats::{Split, hash};
 use sim_gpu::effects::Effects;
-use sim_gpu::mesh::census::Census;
 use sim_gpu::mesh::frame::{Normalize, Up};
+use sim_gpu::mesh::validate::MeshDefects;
 use sim_gpu::scan::Tally;
 use sim_gpu::sensor::{Sensor, Views};
 use std::collections::BTreeMap;
@@ -102,7 +102,7 @@ fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
         scale: 1.0 / 3.0,
         triangles: 12,
         dropped_faces: 0,
-        census: Census::default(),
+        defects: MeshDefects::default(),
         simplified: None,
         scans,
     }

@@ -2,7 +2,7 @@
 
 use super::clouds::Scans;
 use super::error::DatasetError;
-use super::foreign::write_layouts;
+use super::export_layouts::write_layouts;
 use super::journal::{Journal, Terms, unless_absent};
 use super::layout;
 use super::manifest::{self, Manifest, TOOL};
@@ -52,7 +52,7 @@ pub(super) fn complete(out: &Path, mut manifest: Manifest) -> Result<Manifest, D
     manifest.failures.sort_by(|p, q| (&p.entry, &p.source).cmp(&(&q.entry, &q.source)));
     remove(&layout::manifest(out))?;
     remove_folder(&layout::packed_root(out))?;
-    remove_folder(&layout::foreign_root(out))?;
+    remove_folder(&layout::export_root(out))?;
     atomic::sweep_leftovers(out)?;
 
     write_failures(out, &manifest.failures)?;

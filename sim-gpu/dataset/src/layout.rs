@@ -67,14 +67,14 @@ pub fn packed(out: &Path, set: &SetConfig, variant: Variant, split: Split) -> Pa
 
 /// The folder of other projects' layouts.
 #[must_use]
-pub fn foreign_root(out: &Path) -> PathBuf {
+pub fn export_root(out: &Path) -> PathBuf {
     out.join("layouts")
 }
 
 /// A set's variant in another project's layout.
 #[must_use]
-pub fn foreign(out: &Path, layout: Layout, set: &SetConfig, variant: Variant) -> PathBuf {
-    foreign_root(out).join(layout.name()).join(packed_name(set, variant))
+pub fn export(out: &Path, layout: Layout, set: &SetConfig, variant: Variant) -> PathBuf {
+    export_root(out).join(layout.name()).join(packed_name(set, variant))
 }
 
 /// The names of the folders that a dataset of `config` may hold, which are

@@ -5,11 +5,11 @@
 use super::budget::Budget;
 use super::config::DatasetConfig;
 use super::error::DatasetError;
+use super::in_flight::{Held, gather, submit};
 use super::journal::Journal;
 use super::prepare::prepare;
 use super::progress::{Progress, Stage};
 use super::record::{Entry, MeshFailure, MeshRecord};
-use super::under_way::{Held, gather, submit};
 use super::write::{Output, write_mesh};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use sim_gpu::caster::Caster;
@@ -34,7 +34,7 @@ const BYTES_PER_RAY: u64 = 44;
 
 /// Batches on their way through the adapter at once: while one is traced, the
 /// next is uploaded.
-const BATCHES_UNDER_WAY: usize = 2;
+const BATCHES_IN_FLIGHT: usize = 2;
 
 /// One run over a list of meshes.
 pub struct Run<'a> {
@@ -166,22 +166,22 @@ impl Shared<'_> {
         prepared: Receiver<Held<'b>>,
         to_writers: Sender<(Held<'b>, Vec<Cast>)>,
     ) {
-        let mut under_way = VecDeque::new();
+        let mut in_flight = VecDeque::new();
         loop {
-            let batch = gather(&prepared, under_way.is_empty());
+            let batch = gather(&prepared, in_flight.is_empty());
             let nothing_waits = batch.is_empty();
-            if nothing_waits && under_way.is_empty() {
+            if nothing_waits && in_flight.is_empty() {
                 return;
             }
             if !nothing_waits {
                 let run = self.run;
                 match run.progress.time(Stage::Cast, || submit(batch, run.caster, run.progress)) {
-                    Ok(batch) => under_way.push_back(batch),
+                    Ok(batch) => in_flight.push_back(batch),
                     Err(error) => return self.stop(error.into()),
                 }
             }
-            if nothing_waits || under_way.len() >= BATCHES_UNDER_WAY {
-                let Some(oldest) = under_way.pop_front() else { continue };
+            if nothing_waits || in_flight.len() >= BATCHES_IN_FLIGHT {
+                let Some(oldest) = in_flight.pop_front() else { continue };
                 match self.run.progress.time(Stage::Cast, || oldest.wait()) {
                     Ok(meshes) => {
                         for mesh in meshes {

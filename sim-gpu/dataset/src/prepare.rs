@@ -6,14 +6,14 @@ use super::record::{Entry, MeshFailure, MeshRecord};
 use glam::DAffine3;
 use sim_gpu::bvh::Builder;
 use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::census::survey;
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::mesh::{LoadedMesh, Mesh, MeshError, load};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::RayFrame;
 use sim_gpu::sensor::BeamPattern;
-use sim_gpu::simplify::{Simplified, Watcher, resolved_m, simplified_surface};
+use sim_gpu::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
 use sim_gpu::target::{Surface, Target};
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -56,7 +56,7 @@ pub fn prepare(
     let surface = match config.simplify {
         None => Surface::new(mesh, kept),
         Some(simplify) => {
-            let bound_m = simplify.bound_m(|| resolved_m(&mesh, 1.0, &watchers(config, &views)));
+            let bound_m = simplify.bound_m(|| resolved_m(&mesh, 1.0, &viewpoints(config, &views)));
             let surface = progress
                 .time(Stage::Build, || simplified_surface(mesh, kept, bound_m))
                 .map_err(|error| failed(entry, None, error.to_string()))?;
@@ -105,11 +105,11 @@ fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
 }
 
 /// Each set's sensor, where it stands.
-fn watchers<'a>(config: &'a DatasetConfig, views: &[PlannedView]) -> Vec<Watcher<'a>> {
+fn viewpoints<'a>(config: &'a DatasetConfig, views: &[PlannedView]) -> Vec<Viewpoint<'a>> {
     let of_set = |(set, config): (usize, &'a SetConfig)| {
         let its_own = views.iter().filter(|view| view.set == set);
         let positions = its_own.map(|view| view.pose.position_m).collect();
-        Watcher { sensor: &config.sensor, positions }
+        Viewpoint { sensor: &config.sensor, positions }
     };
     config.sets.iter().enumerate().map(of_set).collect()
 }
@@ -122,7 +122,7 @@ pub(super) fn read(
     let LoadedMesh { mesh, format, sha256, dropped_faces } = load(&entry.path)?;
     let up = up.unwrap_or(format.default_up());
     let world = to_world(&mesh, up, normalize);
-    let survey = survey(&world.mesh);
+    let stats = triangle_stats(&world.mesh);
     let record = MeshRecord {
         entry: entry.into(),
         source: entry.relative.clone(),
@@ -132,11 +132,11 @@ pub(super) fn read(
         scale: world.scale,
         triangles: mesh.triangles.len() as u64,
         dropped_faces: dropped_faces as u64,
-        census: survey.census,
+        defects: stats.defects,
         simplified: None,
         scans: Vec::new(),
     };
-    Ok((record, world.mesh, survey.kept))
+    Ok((record, world.mesh, stats.kept))
 }
 
 pub(super) fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// A part of the work on one mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Reading and parsing the file, hashing it, scaling it, its census.
+    /// Reading and parsing the file, hashing it, scaling it, validating it.
     Read,
     /// Simplifying, where that is asked for, and building the hierarchy.
     Build,

@@ -4,8 +4,8 @@ use super::config::Variant;
 use formats::Split;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
-use sim_gpu::mesh::census::Census;
 use sim_gpu::mesh::frame::Up;
+use sim_gpu::mesh::validate::MeshDefects;
 use sim_gpu::scan::Tally;
 use sim_gpu::simplify::Simplified;
 
@@ -42,7 +42,7 @@ pub struct MeshRecord {
     pub dropped_faces: u64,
     /// What was found among the triangles and vertices.
     #[serde(flatten)]
-    pub census: Census,
+    pub defects: MeshDefects,
     /// What simplification made of it, where that was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simplified: Option<Simplified>,

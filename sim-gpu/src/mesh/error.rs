@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use super::load::mesh_extensions;
+use super::format::mesh_extensions;
 
 /// Why a mesh could not be had from a path.
 #[derive(Debug, thiserror::Error)]

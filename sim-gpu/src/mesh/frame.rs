@@ -6,7 +6,7 @@ use std::str::FromStr;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::Mesh;
+use super::triangle_mesh::Mesh;
 
 /// The axis of a file that points up in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]

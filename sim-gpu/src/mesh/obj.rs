@@ -10,10 +10,9 @@ use std::io::{BufRead, BufReader};
 use glam::DVec3;
 use tobj::{LoadError, LoadOptions};
 
-use super::Mesh;
 use super::error::{Malformed, ParseError, excerpt};
 use super::line_feeder::LineFeeder;
-use super::load::Parsed;
+use super::triangle_mesh::{Mesh, Parsed};
 
 /// Reads an OBJ file from its bytes.
 ///

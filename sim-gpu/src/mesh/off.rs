@@ -9,10 +9,9 @@
 
 use glam::DVec3;
 
-use super::Mesh;
 use super::error::{Malformed, ParseError, Part, excerpt};
-use super::load::Parsed;
-use super::words::{Words, short};
+use super::tokens::{Tokens, short};
+use super::triangle_mesh::{Mesh, Parsed};
 
 /// The bytes of the shortest lines that hold a vertex, `0 0 0`, and a triangle,
 /// `3 0 0 0`, with their ends: a file cannot hold more of them than fit.
@@ -24,13 +23,13 @@ const SHORTEST_TRIANGLE: usize = 8;
 /// Polygons become fans around their first corner. Faces of fewer than three
 /// corners are dropped and counted.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let mut words = Words::new(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
-    let (n_vertices, n_faces) = header(&mut words)?;
+    let mut tokens = Tokens::new(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
+    let (n_vertices, n_faces) = header(&mut tokens)?;
     if n_vertices > u64::from(u32::MAX) {
-        return Err(words.fault(Malformed::TooManyVertices(n_vertices)));
+        return Err(tokens.fault(Malformed::TooManyVertices(n_vertices)));
     }
-    let vertices = vertices(&mut words, n_vertices)?;
-    let (triangles, dropped_faces) = faces(&mut words, n_vertices, n_faces)?;
+    let vertices = vertices(&mut tokens, n_vertices)?;
+    let (triangles, dropped_faces) = faces(&mut tokens, n_vertices, n_faces)?;
     if triangles.is_empty() {
         return Err(Malformed::NoTriangle.into());
     }
@@ -38,34 +37,34 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
 }
 
 /// The keyword and the counts of vertices and faces.
-fn header(words: &mut Words<'_>) -> Result<(u64, u64), ParseError> {
-    if !words.seek_data() {
+fn header(tokens: &mut Tokens<'_>) -> Result<(u64, u64), ParseError> {
+    if !tokens.seek_data() {
         return Err(Malformed::Empty.into());
     }
-    let keyword = words.next().unwrap_or_default();
+    let keyword = tokens.next().unwrap_or_default();
     // Before it at most the letters of every variant there is.
     let found = keyword.windows(3).position(|part| part == b"OFF" || part == b"off");
     let Some(at) = found.filter(|&at| at <= "STCN4n".len()) else {
-        return Err(words.fault(Malformed::WrongStart {
+        return Err(tokens.fault(Malformed::WrongStart {
             format: "an OFF file",
             found: excerpt(&keyword[..keyword.len().min(16)]),
         }));
     };
     let (kind, glued) = (&keyword[..at], &keyword[at + 3..]);
-    check_kind(kind).map_err(|cause| words.fault(cause))?;
+    check_kind(kind).map_err(|cause| tokens.fault(cause))?;
 
-    let first = if glued.is_empty() { words.next() } else { Some(glued) };
-    if first.is_some_and(|word| word.eq_ignore_ascii_case(b"BINARY")) {
-        return Err(words.fault(Malformed::Unsupported("binary OFF".into())));
+    let first = if glued.is_empty() { tokens.next() } else { Some(glued) };
+    if first.is_some_and(|token| token.eq_ignore_ascii_case(b"BINARY")) {
+        return Err(tokens.fault(Malformed::Unsupported("binary OFF".into())));
     }
     let first = match first {
-        Some(word) => word,
-        None if words.next_data_line() => words.next().unwrap_or_default(),
-        None => return Err(words.fault(short("counts", 0, 2))),
+        Some(token) => token,
+        None if tokens.next_data_line() => tokens.next().unwrap_or_default(),
+        None => return Err(tokens.fault(short("counts", 0, 2))),
     };
-    let n_vertices = words.count(first, Part::Vertices)?;
-    let second = words.next().ok_or_else(|| words.fault(short("counts", 1, 2)))?;
-    Ok((n_vertices, words.count(second, Part::Faces)?))
+    let n_vertices = tokens.count(first, Part::Vertices)?;
+    let second = tokens.next().ok_or_else(|| tokens.fault(short("counts", 1, 2)))?;
+    Ok((n_vertices, tokens.count(second, Part::Faces)?))
 }
 
 /// Accepts the prefixes of `OFF` that leave x, y, z the first three numbers.
@@ -84,16 +83,16 @@ fn check_kind(kind: &[u8]) -> Result<(), Malformed> {
     }
 }
 
-fn vertices(words: &mut Words<'_>, promised: u64) -> Result<Vec<DVec3>, ParseError> {
-    let mut vertices = Vec::with_capacity(words.room(promised, SHORTEST_VERTEX));
+fn vertices(tokens: &mut Tokens<'_>, promised: u64) -> Result<Vec<DVec3>, ParseError> {
+    let mut vertices = Vec::with_capacity(tokens.room(promised, SHORTEST_VERTEX));
     for held in 0..promised {
-        if !words.next_data_line() {
+        if !tokens.next_data_line() {
             let cause = Malformed::Truncated { part: Part::Vertices, held, promised };
-            return Err(words.fault(cause));
+            return Err(tokens.fault(cause));
         }
         let mut position = [0.0; 3];
         for (axis, coordinate) in position.iter_mut().enumerate() {
-            *coordinate = words.coordinate(axis)?;
+            *coordinate = tokens.coordinate(axis)?;
         }
         vertices.push(DVec3::from_array(position));
     }
@@ -101,26 +100,26 @@ fn vertices(words: &mut Words<'_>, promised: u64) -> Result<Vec<DVec3>, ParseErr
 }
 
 fn faces(
-    words: &mut Words<'_>,
+    tokens: &mut Tokens<'_>,
     n_vertices: u64,
     promised: u64,
 ) -> Result<(Vec<[u32; 3]>, usize), ParseError> {
-    let mut triangles = Vec::with_capacity(words.room(promised, SHORTEST_TRIANGLE));
+    let mut triangles = Vec::with_capacity(tokens.room(promised, SHORTEST_TRIANGLE));
     let mut dropped = 0;
     for held in 0..promised {
-        if !words.next_data_line() {
-            return Err(words.fault(Malformed::Truncated { part: Part::Faces, held, promised }));
+        if !tokens.next_data_line() {
+            return Err(tokens.fault(Malformed::Truncated { part: Part::Faces, held, promised }));
         }
-        let word = words.next().unwrap_or_default();
-        let n_corners = words.integer(word, "a number of corners")?;
+        let token = tokens.next().unwrap_or_default();
+        let n_corners = tokens.integer(token, "a number of corners")?;
         if n_corners < 3 {
             dropped += 1;
             continue;
         }
-        let first = words.corner(0, n_corners, n_vertices)?;
-        let mut last = words.corner(1, n_corners, n_vertices)?;
+        let first = tokens.corner(0, n_corners, n_vertices)?;
+        let mut last = tokens.corner(1, n_corners, n_vertices)?;
         for nth in 2..n_corners {
-            let corner = words.corner(nth, n_corners, n_vertices)?;
+            let corner = tokens.corner(nth, n_corners, n_vertices)?;
             triangles.push([first, last, corner]);
             last = corner;
         }
@@ -174,7 +173,7 @@ mod tests {
         is_the_triangle(&text.replace('\n', "\n\n  \n"));
         is_the_triangle(&text.replace('\n', " # 4 5 6\n# 7\n"));
         is_the_triangle(text.trim_end());
-        is_the_triangle(&format!("{text}\n# the end\n17 trailing words\n"));
+        is_the_triangle(&format!("{text}\n# the end\n17 trailing tokens\n"));
     }
 
     #[test]

@@ -7,9 +7,8 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-use super::Mesh;
 use super::error::{Malformed, ParseError, Part, excerpt};
-use super::load::Parsed;
+use super::triangle_mesh::{Mesh, Parsed};
 
 /// The names that the corners of a face go by.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];

@@ -6,10 +6,9 @@ use std::io::{Cursor, Read, Seek};
 
 use glam::DVec3;
 
-use super::Mesh;
 use super::error::{Malformed, ParseError, Part, excerpt};
 use super::line_feeder::LineFeeder;
-use super::load::Parsed;
+use super::triangle_mesh::{Mesh, Parsed};
 
 /// Binary STL: 80 bytes of any text, the number of triangles (u32), and for
 /// each triangle twelve f32 and a u16. Little-endian throughout.

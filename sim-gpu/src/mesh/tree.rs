@@ -9,7 +9,7 @@ use formats::rng::StreamKey;
 use sha2::{Digest, Sha256};
 use walkdir::WalkDir;
 
-use super::load::{MeshFormat, mesh_extensions};
+use super::format::{MeshFormat, mesh_extensions};
 
 /// The share of meshes that a seeded split trains on.
 const TRAIN_SHARE: f64 = 0.8;

@@ -4,11 +4,11 @@ use super::{Scene, SceneObject, SceneSensor};
 use crate::bvh::Builder;
 use crate::caster::Caster;
 use crate::job::Culling;
-use crate::mesh::census::survey;
 use crate::mesh::frame::{Normalize, to_world};
+use crate::mesh::validate::triangle_stats;
 use crate::mesh::{LoadedMesh, Mesh, MeshError, load};
 use crate::scan::{PlacedTarget, ScanError, ScanRequest, Scanned, Tally, scan_objects};
-use crate::simplify::{NotBuilt, Simplified, Watcher, resolved_m, simplified_surface};
+use crate::simplify::{NotBuilt, Simplified, Viewpoint, resolved_m, simplified_surface};
 use crate::target::{Surface, Target};
 use formats::Scan;
 use formats::rng::StreamKey;
@@ -71,7 +71,7 @@ fn place(scene: &Scene, object: &SceneObject) -> Result<Placed, SceneError> {
     let LoadedMesh { mesh, format, .. } = load(&object.mesh)?;
     let normalize = object.normalize.unwrap_or(Normalize::None);
     let world = to_world(&mesh, object.up.unwrap_or(format.default_up()), normalize);
-    let kept = survey(&world.mesh).kept;
+    let kept = triangle_stats(&world.mesh).kept;
     let mut world_from_object = object.world_from_object();
     if normalize == Normalize::None {
         // The mesh keeps its own origin: undo the recentring.
@@ -97,14 +97,14 @@ fn resolved_by(
     world_from_object: &DAffine3,
 ) -> f64 {
     let object_from_world = world_from_object.inverse();
-    let watchers = scene.sensors.iter().map(|sensor| Watcher {
+    let viewpoints = scene.sensors.iter().map(|sensor| Viewpoint {
         sensor: &sensor.sensor,
         positions: vec![object_from_world.transform_point3(sensor.pose.position_m)],
     });
-    let watchers: Vec<Watcher> = watchers.collect();
+    let viewpoints: Vec<Viewpoint> = viewpoints.collect();
     // No distance in the world is shorter than by the mesh's least factor.
     let least = object.scale.min_element();
-    resolved_m(mesh, least.recip(), &watchers) * least
+    resolved_m(mesh, least.recip(), &viewpoints) * least
 }
 
 fn cast_sensor(

@@ -19,7 +19,7 @@ use crate::target::{Surface, Target, UnitFrame};
 /// of all places.
 const SHARE: f64 = 0.5;
 
-/// How far around a triangle that strays the mesh's own come back, in bounds.
+/// How far around a triangle that outliers the mesh's own come back, in bounds.
 /// They then overlap with what is left: a beam at less than atan(4) = 76 degrees
 /// from the normal cannot slip through between two layers one bound apart.
 const OVERLAP: f64 = 4.0;
@@ -49,13 +49,13 @@ fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
         return None;
     }
     let original = Target::new(surface, Builder::Morton);
-    let corners = put_right(mesh, &welded, &original, corners, bound);
+    let corners = repair(mesh, &welded, &original, corners, bound);
     (corners.len() <= most).then(|| welded.mesh_of(mesh, &corners))
 }
 
 /// `corners` without the triangles that stray from the `original`, and with what
 /// has to come back.
-fn put_right(
+fn repair(
     mesh: &Mesh,
     welded: &Welded,
     original: &Target,
@@ -63,16 +63,16 @@ fn put_right(
     bound: f64,
 ) -> Vec<u32> {
     let collapsed = surface_of(welded.mesh_of(mesh, &corners));
-    let strays = beyond(&collapsed, original, bound);
+    let outliers = beyond(&collapsed, original, bound);
     let corners_of = |&nth: &u32| triangle(&corners, nth as usize);
-    let strayed: Vec<u32> = strays.iter().flat_map(corners_of).collect();
+    let strayed: Vec<u32> = outliers.iter().flat_map(corners_of).collect();
     // Only what the surface keeps was proven: of equal triangles the first.
-    let stays = |nth: &&u32| strays.binary_search(nth).is_err();
+    let stays = |nth: &&u32| outliers.binary_search(nth).is_err();
     let mut left: Vec<u32> = collapsed.kept().iter().filter(stays).flat_map(corners_of).collect();
 
     let rest = target(welded.mesh_of(mesh, &left));
     let mut back = beyond(&original.surface, &rest, bound);
-    if !strays.is_empty() {
+    if !outliers.is_empty() {
         let strayed = target(welded.mesh_of(mesh, &strayed));
         back.extend(around(&original.surface, &strayed, OVERLAP * bound));
         back.sort_unstable();
@@ -184,7 +184,7 @@ impl Welded {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::census::survey;
+    use crate::mesh::validate::triangle_stats;
     use glam::DVec3;
 
     #[test]
@@ -195,7 +195,7 @@ mod tests {
         vertices.push(DVec3::Z);
         let triangles = (0..4).map(|i| [i, (i + 1) % 4, 4]).collect();
         let mesh = Mesh { vertices, triangles };
-        let kept = survey(&mesh).kept;
+        let kept = triangle_stats(&mesh).kept;
         let surface = Surface::new(mesh.clone(), kept.clone());
         let welded = Welded::of(&mesh, &kept, &surface.frame);
         let original = Target::new(surface, Builder::Morton);
@@ -207,7 +207,7 @@ mod tests {
         let floor = [0, 1, 2].map(nth);
         let sides = [0, 1, 2].map(|i| triangle(&welded.corners, i));
         let wrong = [floor.as_slice(), &floor, sides.as_flattened()].concat();
-        let left = put_right(&mesh, &welded, &original, wrong, 0.1);
+        let left = repair(&mesh, &welded, &original, wrong, 0.1);
         let has = |wanted: [u32; 3]| left.as_chunks::<3>().0.contains(&wanted);
         assert!(!has(floor), "{left:?}");
         let all: Vec<bool> = (0..4).map(|i| has(triangle(&welded.corners, i))).collect();

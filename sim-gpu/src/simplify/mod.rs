@@ -34,7 +34,7 @@ use crate::mesh::Mesh;
 use crate::target::Surface;
 
 pub use distance::{distance_to_surface, distance_to_triangle};
-pub use resolution::{FOOTPRINTS_PER_STEP, Watcher, resolved_m};
+pub use resolution::{FOOTPRINTS_PER_STEP, Viewpoint, resolved_m};
 pub use within::lies_within;
 
 /// How far a simplified surface may lie from the mesh's own.

@@ -13,7 +13,7 @@ use crate::sensor::Sensor;
 pub const FOOTPRINTS_PER_STEP: f64 = 2.0;
 
 /// A sensor and the places from which it looks, in the object's frame.
-pub struct Watcher<'a> {
+pub struct Viewpoint<'a> {
     /// The sensor.
     pub sensor: &'a Sensor,
     /// Where it stands.
@@ -21,20 +21,20 @@ pub struct Watcher<'a> {
 }
 
 /// The radius of a beam's footprint where an object is nearest to any of
-/// `watchers`: by that much a surface may be displaced without leaving the beam
+/// `viewpoints`: by that much a surface may be displaced without leaving the beam
 /// that sees it. In the units of `mesh`, of which a metre has `units_per_m`.
 ///
 /// The nearest distance is that to the mesh's bounding box, but not less than
 /// the nearest range that the sensor reports. 0 where a sensor without such a
 /// limit stands in the box; infinite where nothing is to be told apart.
 #[must_use]
-pub fn resolved_m(mesh: &Mesh, units_per_m: f64, watchers: &[Watcher<'_>]) -> f64 {
+pub fn resolved_m(mesh: &Mesh, units_per_m: f64, viewpoints: &[Viewpoint<'_>]) -> f64 {
     let (low, high) = bounding_box(mesh);
-    let radius = |watcher: &Watcher<'_>| {
-        let step_rad = watcher.sensor.angular_step_rad().unwrap_or(f64::INFINITY);
+    let radius = |viewpoint: &Viewpoint<'_>| {
+        let step_rad = viewpoint.sensor.angular_step_rad().unwrap_or(f64::INFINITY);
         let distance = |from: &DVec3| (from.clamp(low, high) - *from).length();
-        let nearest = watcher.positions.iter().map(distance).fold(f64::INFINITY, f64::min);
-        let nearest = nearest.max(watcher.sensor.range.min_m * units_per_m);
+        let nearest = viewpoint.positions.iter().map(distance).fold(f64::INFINITY, f64::min);
+        let nearest = nearest.max(viewpoint.sensor.range.min_m * units_per_m);
         // The tangent of half an angle; a step of a half circle tells nothing.
         let half_footprint_rad = 0.5 * step_rad / FOOTPRINTS_PER_STEP;
         if half_footprint_rad >= std::f64::consts::FRAC_PI_2 {
@@ -42,7 +42,7 @@ pub fn resolved_m(mesh: &Mesh, units_per_m: f64, watchers: &[Watcher<'_>]) -> f6
         }
         nearest * half_footprint_rad.tan()
     };
-    watchers.iter().map(radius).fold(f64::INFINITY, f64::min)
+    viewpoints.iter().map(radius).fold(f64::INFINITY, f64::min)
 }
 
 /// Of the vertices that triangles name.
@@ -62,7 +62,7 @@ mod tests {
 
     fn seen_from(sensor: &str, positions: Vec<DVec3>) -> f64 {
         let sensor = Sensor::builtin(sensor).unwrap();
-        resolved_m(&unit_square(), 1.0, &[Watcher { sensor: &sensor, positions }])
+        resolved_m(&unit_square(), 1.0, &[Viewpoint { sensor: &sensor, positions }])
     }
 
     #[test]

@@ -13,7 +13,7 @@ use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::cpu::trace;
 use sim_gpu::job::{Cast, Culling};
-use sim_gpu::mesh::census;
+use sim_gpu::mesh::validate;
 use sim_gpu::pose::ring_of_views;
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::{Surface, Target};
@@ -60,7 +60,7 @@ pub fn measure(subjects: &[Subject], rounds: usize) -> Result<Ways> {
 }
 
 fn at(subject: &Subject, pattern: &BeamPattern, rays: usize, rounds: usize) -> Vec<Way> {
-    let surface = Surface::new(subject.mesh.clone(), census::survey(&subject.mesh).kept);
+    let surface = Surface::new(subject.mesh.clone(), validate::triangle_stats(&subject.mesh).kept);
     let sah = Target::new(surface.clone(), Builder::Sah);
     let shots = views(&sah, pattern, rays);
     let truth: Vec<_> = shots.iter().map(|shot| shot.ranges(&codes_of(shot))).collect();

@@ -14,10 +14,10 @@ use moved::Moved;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::{Mesh, census};
+use sim_gpu::mesh::{Mesh, validate};
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::{Sensor, Views};
-use sim_gpu::simplify::{Watcher, resolved_m, simplified};
+use sim_gpu::simplify::{Viewpoint, resolved_m, simplified};
 use sim_gpu::target::{Surface, Target};
 use std::hint::black_box;
 
@@ -65,9 +65,9 @@ fn on(subject: &Subject, lanes: &[Lane], rounds: usize) -> Result<Subjected> {
     let sensor = Sensor::builtin("vlp32c").expect("invariant: this profile is built in");
     let views = Views::ROTATING.poses(DVec3::ZERO, formats::rng::StreamKey::new(0, "views", 0));
     let positions = views.iter().map(|view| view.position_m).collect();
-    let bound_m = resolved_m(&subject.mesh, 1.0, &[Watcher { sensor: &sensor, positions }]);
+    let bound_m = resolved_m(&subject.mesh, 1.0, &[Viewpoint { sensor: &sensor, positions }]);
 
-    let kept = census::survey(&subject.mesh).kept;
+    let kept = validate::triangle_stats(&subject.mesh).kept;
     let fewer = simplified(&subject.mesh, &kept, bound_m)?.unwrap_or_else(|| subject.mesh.clone());
     let surfaces = [&subject.mesh, &fewer].map(surface);
     let targets = surfaces.each_ref().map(|surface| Target::new(surface.clone(), Builder::Sah));
@@ -103,7 +103,7 @@ fn on(subject: &Subject, lanes: &[Lane], rounds: usize) -> Result<Subjected> {
 }
 
 fn surface(mesh: &Mesh) -> Surface {
-    Surface::new(mesh.clone(), census::survey(mesh).kept)
+    Surface::new(mesh.clone(), validate::triangle_stats(mesh).kept)
 }
 
 fn shots(target: &Target, views: &[Pose]) -> Vec<Shot> {

@@ -12,7 +12,7 @@ use glam::{DVec3, dvec3};
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::{Mesh, census};
+use sim_gpu::mesh::{Mesh, validate};
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::{BeamPattern, Sensor};
 use sim_gpu::target::{Surface, Target};
@@ -96,12 +96,12 @@ pub fn sweep_pose() -> Result<Pose> {
 
 /// `mesh` as casters want it.
 pub fn target(mesh: Mesh, builder: Builder) -> Target {
-    let kept = census::survey(&mesh).kept;
+    let kept = validate::triangle_stats(&mesh).kept;
     Target::new(Surface::new(mesh, kept), builder)
 }
 
 fn builds(subject: &Subject, rounds: usize, speed: &mut Speed) -> Result<()> {
-    let kept = census::survey(&subject.mesh).kept;
+    let kept = validate::triangle_stats(&subject.mesh).kept;
     let triangles = kept.len();
     let surface = Surface::new(subject.mesh.clone(), kept);
     let builders = [Builder::Sah, Builder::Morton];

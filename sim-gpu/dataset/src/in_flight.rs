@@ -20,7 +20,7 @@ pub struct Held<'b> {
 }
 
 /// Meshes that are being cast at.
-pub struct UnderWay<'b> {
+pub struct InFlight<'b> {
     waiting: Vec<Waiting<'b>>,
     jobs: Vec<CastJob>,
     casting: Casting,
@@ -58,7 +58,7 @@ pub fn submit<'b>(
     batch: Vec<Held<'b>>,
     caster: &Caster,
     progress: &Progress,
-) -> Result<UnderWay<'b>, CastError> {
+) -> Result<InFlight<'b>, CastError> {
     let mut jobs = Vec::new();
     let mut waiting = Vec::with_capacity(batch.len());
     for mut held in batch {
@@ -78,10 +78,10 @@ pub fn submit<'b>(
         }
     }
     let casting = caster.submit(&jobs)?;
-    Ok(UnderWay { waiting, jobs, casting })
+    Ok(InFlight { waiting, jobs, casting })
 }
 
-impl<'b> UnderWay<'b> {
+impl<'b> InFlight<'b> {
     /// The meshes and what was cast at each.
     ///
     /// # Errors

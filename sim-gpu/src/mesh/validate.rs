@@ -3,12 +3,12 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::Mesh;
 use super::frame::named_vertices;
+use super::triangle_mesh::Mesh;
 
 /// What a mesh has that no beam can meet, or can meet elsewhere as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Census {
+pub struct MeshDefects {
     /// Triangles without area once their corners are f32.
     pub degenerate: usize,
     /// Triangles with area whose three f32 corners are those of an earlier
@@ -18,20 +18,14 @@ pub struct Census {
     pub unreferenced: usize,
 }
 
-/// A census and the triangles that remain.
+/// The defects of a mesh, and the triangles that remain.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Survey {
+pub struct TriangleStats {
     /// What was left out, and why.
-    pub census: Census,
+    pub defects: MeshDefects,
     /// Indices of the triangles that are neither degenerate nor duplicate,
     /// ascending; of equal triangles the first is kept.
     pub kept: Vec<u32>,
-}
-
-/// Counts what [`survey`] leaves out of `mesh`.
-#[must_use]
-pub fn census(mesh: &Mesh) -> Census {
-    survey(mesh).census
 }
 
 /// Sorts the triangles of `mesh` into those to cast at and the rest.
@@ -41,7 +35,7 @@ pub fn census(mesh: &Mesh) -> Census {
 /// (0.5, 1]. Vertices at one position are one corner, whatever their indices,
 /// since CAD files often repeat them for each face.
 #[must_use]
-pub fn survey(mesh: &Mesh) -> Survey {
+pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
     let named = named_vertices(mesh);
     let positions = rounded_positions(mesh, &named);
     let corner_ids = lowest_equal(positions.iter().map(|position| key(*position)));
@@ -61,12 +55,12 @@ pub fn survey(mesh: &Mesh) -> Survey {
     let firsts = lowest_equal(sorted_corners);
     let is_first = |(nth, index): (usize, &u32)| (firsts[nth] as usize == nth).then_some(*index);
     let kept: Vec<u32> = solid.iter().enumerate().filter_map(is_first).collect();
-    let census = Census {
+    let defects = MeshDefects {
         degenerate: mesh.triangles.len() - solid.len(),
         duplicate: solid.len() - kept.len(),
         unreferenced: named.iter().filter(|named| !**named).count(),
     };
-    Survey { census, kept }
+    TriangleStats { defects, kept }
 }
 
 /// The vertices in f32, recentred and scaled; those not named at the origin.
@@ -142,16 +136,16 @@ mod tests {
 
     #[test]
     fn a_clean_mesh_is_kept_whole() {
-        let survey = survey(&mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]));
-        assert_eq!(survey, Survey { census: Census::default(), kept: vec![0, 1] });
+        let stats = triangle_stats(&mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(stats, TriangleStats { defects: MeshDefects::default(), kept: vec![0, 1] });
     }
 
     #[test]
     fn a_triangle_in_any_order_is_a_duplicate_and_the_first_is_kept() {
         let triangles = [[0, 2, 3], [2, 1, 0], [0, 1, 2], [1, 2, 0], [3, 2, 0]];
-        let survey = survey(&mesh(&SQUARE, &triangles));
-        assert_eq!(survey.census.duplicate, 3);
-        assert_eq!(survey.kept, [0, 1]);
+        let stats = triangle_stats(&mesh(&SQUARE, &triangles));
+        assert_eq!(stats.defects.duplicate, 3);
+        assert_eq!(stats.kept, [0, 1]);
     }
 
     #[test]
@@ -159,9 +153,9 @@ mod tests {
         let mut vertices = SQUARE.to_vec();
         // The first three again, one with a zero of the other sign.
         vertices.extend([[-0.0, 0.0, -0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]);
-        let survey = survey(&mesh(&vertices, &[[0, 1, 2], [6, 5, 4], [0, 4, 1], [3, 0, 2]]));
-        assert_eq!(survey.census, Census { degenerate: 1, duplicate: 1, unreferenced: 0 });
-        assert_eq!(survey.kept, [0, 3]);
+        let stats = triangle_stats(&mesh(&vertices, &[[0, 1, 2], [6, 5, 4], [0, 4, 1], [3, 0, 2]]));
+        assert_eq!(stats.defects, MeshDefects { degenerate: 1, duplicate: 1, unreferenced: 0 });
+        assert_eq!(stats.kept, [0, 3]);
     }
 
     #[test]
@@ -172,25 +166,26 @@ mod tests {
         // that it becomes 1).
         vertices.extend([[0.5, 0.0, 0.0], [1.0 - 1e-9, 1.0, 0.0]]);
         let triangles = [[0, 4, 1], [0, 2, 5], [0, 1, 1], [0, 1, 2], [0, 4, 2]];
-        let survey = survey(&mesh(&vertices, &triangles));
-        assert_eq!(survey.census, Census { degenerate: 3, duplicate: 0, unreferenced: 1 });
-        assert_eq!(survey.kept, [3, 4]);
+        let stats = triangle_stats(&mesh(&vertices, &triangles));
+        assert_eq!(stats.defects, MeshDefects { degenerate: 3, duplicate: 0, unreferenced: 1 });
+        assert_eq!(stats.kept, [3, 4]);
     }
 
     #[test]
-    fn a_mesh_far_away_is_surveyed_as_if_it_were_here() {
+    fn a_mesh_far_away_is_counted_as_if_it_were_here() {
         let far = SQUARE.map(|position| position.map(|coordinate| coordinate + 1e7));
-        let survey = survey(&mesh(&far, &[[0, 1, 2], [0, 2, 3]]));
-        assert_eq!(survey.census, Census::default());
+        let stats = triangle_stats(&mesh(&far, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(stats.defects, MeshDefects::default());
     }
 
     #[test]
     fn size_does_not_matter() {
         for size in [1e-310, 1e-300, 1e-6, 1.7e12, 1e300, 1.7e308] {
             let scaled = SQUARE.map(|position| position.map(|coordinate| coordinate * size));
-            let survey = survey(&mesh(&scaled, &[[0, 1, 2], [2, 1, 0], [0, 1, 1], [0, 2, 3]]));
-            assert_eq!(survey.census, Census { degenerate: 1, duplicate: 1, unreferenced: 0 });
-            assert_eq!(survey.kept, [0, 3], "{size}");
+            let stats =
+                triangle_stats(&mesh(&scaled, &[[0, 1, 2], [2, 1, 0], [0, 1, 1], [0, 2, 3]]));
+            assert_eq!(stats.defects, MeshDefects { degenerate: 1, duplicate: 1, unreferenced: 0 });
+            assert_eq!(stats.kept, [0, 3], "{size}");
         }
     }
 
@@ -207,8 +202,8 @@ mod tests {
     fn a_stray_vertex_is_counted_and_changes_nothing_else() {
         let mut vertices = SQUARE.to_vec();
         vertices.push([1e300, 0.0, 0.0]);
-        let survey = survey(&mesh(&vertices, &[[0, 1, 2], [0, 2, 3]]));
-        assert_eq!(survey.census, Census { unreferenced: 1, ..Census::default() });
-        assert_eq!(survey.kept, [0, 1]);
+        let stats = triangle_stats(&mesh(&vertices, &[[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(stats.defects, MeshDefects { unreferenced: 1, ..MeshDefects::default() });
+        assert_eq!(stats.kept, [0, 1]);
     }
 }

@@ -53,7 +53,7 @@ pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<HashedFile>, DatasetErr
     for &layout in &scans.config.layouts {
         for set in &scans.config.sets {
             for &variant in &scans.config.variants {
-                let folder = layout::foreign(scans.out, layout, set, variant);
+                let folder = layout::export(scans.out, layout, set, variant);
                 files.extend(match layout {
                     Layout::Yanx27 => write_yanx27(scans, set, variant, &folder)?,
                     Layout::ModelnetH5 => write_modelnet_h5(scans, set, variant, &folder)?,

@@ -1,20 +1,20 @@
-//! The words of a text file of numbers, with their lines.
+//! The tokens of a text file of numbers, with their lines.
 
 use super::error::{Malformed, ParseError, Part, excerpt};
 
-/// The words of a text, line by line, without its comments (from `#` on).
-pub(super) struct Words<'a> {
+/// The tokens of a text, line by line, without its comments (from `#` on).
+pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
     at: usize,
     line: usize,
 }
 
-impl<'a> Words<'a> {
+impl<'a> Tokens<'a> {
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0, line: 1 }
     }
 
-    /// The next word on this line.
+    /// The next token on this line.
     pub fn next(&mut self) -> Option<&'a [u8]> {
         let rest = &self.bytes[self.at..];
         let blank = rest.iter().take_while(|byte| is_blank(**byte)).count();
@@ -23,13 +23,13 @@ impl<'a> Words<'a> {
         (length > 0).then(|| &rest[blank..blank + length])
     }
 
-    /// Leaves this line for the next one that holds a word; false at the end.
+    /// Leaves this line for the next one that holds a token; false at the end.
     pub fn next_data_line(&mut self) -> bool {
         self.skip_line();
         self.seek_data()
     }
 
-    /// Moves to the first word at or after here; false at the end.
+    /// Moves to the first token at or after here; false at the end.
     pub fn seek_data(&mut self) -> bool {
         while let Some(&byte) = self.bytes.get(self.at) {
             match byte {
@@ -58,42 +58,42 @@ impl<'a> Words<'a> {
         usize::try_from(promised).map_or(fit, |promised| promised.min(fit))
     }
 
-    /// The number of vertices or faces that `word` spells.
-    pub fn count(&self, word: &[u8], part: Part) -> Result<u64, ParseError> {
-        let number = self.integer(word, "a count")?;
+    /// The number of vertices or faces that `token` spells.
+    pub fn count(&self, token: &[u8], part: Part) -> Result<u64, ParseError> {
+        let number = self.integer(token, "a count")?;
         u64::try_from(number)
-            .map_err(|_| self.fault(Malformed::NegativeCount { part, found: excerpt(word) }))
+            .map_err(|_| self.fault(Malformed::NegativeCount { part, found: excerpt(token) }))
     }
 
-    /// The whole number that `word` spells.
-    pub fn integer(&self, word: &[u8], expected: &'static str) -> Result<i64, ParseError> {
-        let number = match word {
-            // Nearly every word of a face: a few digits cannot overflow.
-            [b'0'..=b'9', ..] if word.len() <= 9 => word.iter().try_fold(0, |sum, byte| {
+    /// The whole number that `token` spells.
+    pub fn integer(&self, token: &[u8], expected: &'static str) -> Result<i64, ParseError> {
+        let number = match token {
+            // Nearly every token of a face: a few digits cannot overflow.
+            [b'0'..=b'9', ..] if token.len() <= 9 => token.iter().try_fold(0, |sum, byte| {
                 byte.is_ascii_digit().then(|| sum * 10 + i64::from(byte - b'0'))
             }),
-            _ => std::str::from_utf8(word).ok().and_then(|text| text.parse().ok()),
+            _ => std::str::from_utf8(token).ok().and_then(|text| text.parse().ok()),
         };
-        number.ok_or_else(|| self.fault(Malformed::NotANumber { found: excerpt(word), expected }))
+        number.ok_or_else(|| self.fault(Malformed::NotANumber { found: excerpt(token), expected }))
     }
 
     /// The next corner of a face, its `nth` of `n_corners`.
     pub fn corner(&mut self, nth: i64, n_corners: i64, n_vertices: u64) -> Result<u32, ParseError> {
-        let word = self
+        let token = self
             .next()
             .ok_or_else(|| self.fault(short("corners of a face", nth as u64, n_corners as u64)))?;
-        let index = self.integer(word, "a vertex index")?;
+        let index = self.integer(token, "a vertex index")?;
         u32::try_from(index).ok().filter(|&index| u64::from(index) < n_vertices).ok_or_else(|| {
-            self.fault(Malformed::IndexOutOfRange { found: excerpt(word), n_vertices })
+            self.fault(Malformed::IndexOutOfRange { found: excerpt(token), n_vertices })
         })
     }
 
-    /// The next word as a coordinate, its vertex's `axis` of three.
+    /// The next token as a coordinate, its vertex's `axis` of three.
     pub fn coordinate(&mut self, axis: usize) -> Result<f64, ParseError> {
-        let word = self
+        let token = self
             .next()
             .ok_or_else(|| self.fault(short("coordinates of a vertex", axis as u64, 3)))?;
-        finite(word).map_err(|cause| self.fault(cause))
+        finite(token).map_err(|cause| self.fault(cause))
     }
 
     /// `cause`, found on this line.
@@ -115,12 +115,12 @@ pub(super) fn short(what: &'static str, held: u64, expected: u64) -> Malformed {
     Malformed::ShortLine { what, held, expected }
 }
 
-/// The number that `word` spells, if it is finite.
-fn finite(word: &[u8]) -> Result<f64, Malformed> {
-    let number = std::str::from_utf8(word).ok().and_then(|text| text.parse::<f64>().ok());
+/// The number that `token` spells, if it is finite.
+fn finite(token: &[u8]) -> Result<f64, Malformed> {
+    let number = std::str::from_utf8(token).ok().and_then(|text| text.parse::<f64>().ok());
     match number {
         Some(number) if number.is_finite() => Ok(number),
-        Some(_) => Err(Malformed::NotFinite { found: excerpt(word) }),
-        None => Err(Malformed::NotANumber { found: excerpt(word), expected: "a coordinate" }),
+        Some(_) => Err(Malformed::NotFinite { found: excerpt(token) }),
+        None => Err(Malformed::NotANumber { found: excerpt(token), expected: "a coordinate" }),
     }
 }

@@ -1,0 +1,22 @@
+//! The mesh that all formats are read into.
+
+use glam::DVec3;
+
+/// A triangle mesh in f64.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertex positions in the file's units, `[n_vertices]`, all finite.
+    pub vertices: Vec<DVec3>,
+    /// Corners as indices into `vertices`, `[n_triangles, 3]`, in the file's
+    /// order; all in range.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// What a format's parser makes of a file's bytes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Parsed {
+    /// The mesh, with a triangle, finite vertices and indices in range once it was checked.
+    pub mesh: Mesh,
+    /// Faces of fewer than three corners, which were left out.
+    pub dropped_faces: usize,
+}
