@@ -1,6 +1,7 @@
-//! The layers of a model file, and a stand-in for a file that has none
-//! trained: the baseline network with weights drawn at random.
+//! The layers of a model file, and a stand-in for a trained model: the baseline network
+//! with random weights.
 
+use crate::measure::baseline::{PARTS, WIDTHS};
 use anyhow::{Context, ensure};
 use formats::model_card::{ModelCard, Normalization};
 use formats::rng::StreamKey;
@@ -41,30 +42,11 @@ pub struct Network {
     pub front: Net,
 }
 
-/// The parts of a network by the prefix of their tensors' names: point-wise
-/// layers, then vector layers.
-const PARTS: [[&str; 2]; 4] = [
-    ["feat.stn.conv", "feat.stn.fc"],
-    ["feat.fstn.conv", "feat.fstn.fc"],
-    ["feat.conv", "fc"],
-    ["cpl.conv", "cpl.fc"],
-];
-
-/// The baseline, `pointnet_cls` of yanx27/Pointnet_Pointnet2_pytorch for 40
-/// classes, and a front end as wide as its trunk: widths in the order of
-/// [`PARTS`].
-const BASELINE: [[&[usize]; 2]; 4] = [
-    [&[3, 64, 128, 1024], &[1024, 512, 256, 9]],
-    [&[64, 64, 128, 1024], &[1024, 512, 256, 64 * 64]],
-    [&[3, 64, 128, 1024], &[1024, 512, 256, 40]],
-    [&[3, 64, 128, 1024], &[]],
-];
-
 impl Network {
     /// The layers of the model at `path`.
     ///
     /// # Errors
-    /// A file that is no model.
+    /// A file that is not a model.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let file = WeightsFile::open(path)?;
         let card = ModelCard::from_metadata(path, &file.metadata())?;
@@ -74,7 +56,11 @@ impl Network {
             fcs: numbered(&shapes, fcs),
         });
         let is_model = trunk.convs.len() >= 2 && !trunk.fcs.is_empty();
-        ensure!(is_model, "{} holds no PointNet: see `infer-cpu inspect`", path.display());
+        ensure!(
+            is_model,
+            "{}: expected the layers of a PointNet; `infer-cpu inspect` shows those of a model",
+            path.display()
+        );
         Ok(Self { stn, fstn, trunk, transform_after: card.transform_after, front })
     }
 }
@@ -96,7 +82,7 @@ fn numbered(shapes: &BTreeMap<String, Vec<usize>>, prefix: &str) -> Vec<Layer> {
 /// What the system reports.
 pub fn write_stand_in(path: &Path) -> anyhow::Result<()> {
     let mut tensors = BTreeMap::new();
-    for (names, widths) in PARTS.iter().zip(BASELINE) {
+    for (names, widths) in PARTS.iter().zip(WIDTHS) {
         for (name, widths) in names.iter().zip(widths) {
             for (i, pair) in widths.windows(2).enumerate() {
                 let layer = Layer { inputs: pair[0], outputs: pair[1] };
@@ -157,7 +143,7 @@ mod tests {
             layers.iter().take(1).map(|layer| layer.inputs).chain(outputs).collect::<Vec<_>>()
         };
         let nets = [&network.stn, &network.fstn, &network.trunk, &network.front];
-        for (net, [convs, fcs]) in nets.into_iter().zip(BASELINE) {
+        for (net, [convs, fcs]) in nets.into_iter().zip(WIDTHS) {
             assert_eq!(widths(&net.convs), convs);
             assert_eq!(widths(&net.fcs), fcs);
         }
@@ -170,6 +156,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.safetensors");
         write_weights(&path, &BTreeMap::new(), &BTreeMap::new()).unwrap();
-        assert!(Network::read(&path).unwrap_err().to_string().contains("no PointNet"));
+        assert!(
+            Network::read(&path)
+                .unwrap_err()
+                .to_string()
+                .contains("expected the layers of a PointNet")
+        );
     }
 }

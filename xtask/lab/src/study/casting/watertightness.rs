@@ -3,9 +3,9 @@
 
 use crate::measure::accuracy::Accuracy;
 use crate::measure::clock::{Contestant, Costs, interleave, measured};
+use crate::measure::methods;
 use crate::measure::scenes::{closed_sphere, edge_midpoints};
 use crate::measure::shot::Shot;
-use crate::measure::ways;
 use crate::render::table::{Table, digits, millions_per_s};
 use crate::study::casting::speed::target;
 use anyhow::Result;
@@ -19,9 +19,9 @@ use std::hint::black_box;
 type Method = fn(&Shot) -> Vec<Option<f64>>;
 
 const METHODS: [(&str, Method); 3] = [
-    ("cpu f64 oracle", ways::in_f64),
-    ("cpu f32 Möller-Trumbore, f32 range", ways::moller_trumbore),
-    ("cpu f32 watertight, f32 range", ways::watertight_in_f32),
+    ("cpu f64 oracle", methods::in_f64),
+    ("cpu f32 Möller-Trumbore, f32 range", methods::moller_trumbore),
+    ("cpu f32 watertight, f32 range", methods::watertight_in_f32),
 ];
 
 /// One method on one set of rays.
@@ -54,7 +54,7 @@ pub fn measure(rounds: usize) -> Result<Watertightness> {
     let mut settings = Vec::new();
     for (scene, points) in through {
         let rays = Shot::through(&target, &places_within(), &points);
-        let truth = ways::in_f64(&rays);
+        let truth = methods::in_f64(&rays);
         let mut contestants: Vec<Contestant<'_>> = Vec::new();
         for (_, method) in METHODS {
             let rays = &rays;

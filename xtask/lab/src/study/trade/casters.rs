@@ -1,4 +1,4 @@
-//! What finds the hits, and whether beams that cannot hit are left out.
+//! The casters, with and without culling of beams that cannot hit.
 
 use super::objects::{Object, Place, places};
 use super::scans::Cloud;
@@ -6,8 +6,8 @@ use super::sensors::Scanning;
 use crate::measure::accuracy::Accuracy;
 use crate::measure::clock::{Contestant, interleave, measured};
 use crate::measure::lanes::Lane;
+use crate::measure::methods;
 use crate::measure::shot::Shot;
-use crate::measure::ways;
 use crate::study::casting::speed::short;
 use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
@@ -23,7 +23,7 @@ use std::hint::black_box;
 type Ranges = Vec<Option<f64>>;
 
 /// How rays become ranges.
-enum Way<'a> {
+enum Method<'a> {
     /// Everything in f64: the oracle.
     Oracle,
     /// Möller and Trumbore's test in f32.
@@ -42,7 +42,7 @@ struct Aimed {
     jobs: Vec<CastJob>,
 }
 
-/// One way's rows, but for the accuracy of classes, and the clouds that it finds.
+/// One method's row without the accuracy of classes, and the clouds that it finds.
 pub struct Cast {
     /// Costs and errors.
     pub row: Row,
@@ -50,7 +50,7 @@ pub struct Cast {
     pub clouds: Vec<Cloud>,
 }
 
-/// Casts the clean reference scans in every way there is, in turns.
+/// Casts the clean reference scans by every method, in turns.
 ///
 /// # Errors
 /// An adapter that fails.
@@ -61,24 +61,24 @@ pub fn cast_all(
     test_set: &str,
 ) -> Result<Vec<Cast>> {
     let cpu = Caster::Cpu(Effects::default());
-    let mut ways = vec![
-        ("cpu f64".to_owned(), Way::Oracle, false),
-        ("cpu f32 Möller-Trumbore, f32 range".to_owned(), Way::MollerTrumbore, false),
-        ("cpu f32 watertight, f32 range".to_owned(), Way::F32, false),
-        ("cpu f32 watertight, f64 range".to_owned(), Way::Product(&cpu), false),
+    let mut methods = vec![
+        ("cpu f64".to_owned(), Method::Oracle, false),
+        ("cpu f32 Möller-Trumbore, f32 range".to_owned(), Method::MollerTrumbore, false),
+        ("cpu f32 watertight, f32 range".to_owned(), Method::F32, false),
+        ("cpu f32 watertight, f64 range".to_owned(), Method::Product(&cpu), false),
     ];
     let adapters = lanes.iter().filter(|lane| lane.name() != "cpu");
-    ways.extend(adapters.map(|lane| {
+    methods.extend(adapters.map(|lane| {
         let name = format!("{} f32 watertight, f64 range", short(lane.name()));
-        (name, Way::Product(&lane.caster), lane.is_gpu)
+        (name, Method::Product(&lane.caster), lane.is_gpu)
     }));
     let aimed = [Culling::On, Culling::Off].map(|culling| Aimed::at(objects, culling));
     let settings: Vec<_> =
-        aimed.iter().flat_map(|aimed| ways.iter().map(move |way| (way, aimed))).collect();
+        aimed.iter().flat_map(|aimed| methods.iter().map(move |method| (method, aimed))).collect();
     let mut contestants: Vec<Contestant<'_>> = Vec::new();
-    for &((_, way, _), aimed) in &settings {
+    for &((_, method, _), aimed) in &settings {
         contestants.push(Box::new(move || {
-            let (ranges, cost) = measured(|| way.cast(aimed));
+            let (ranges, cost) = measured(|| method.cast(aimed));
             black_box(ranges?);
             Ok(cost)
         }));
@@ -86,12 +86,12 @@ pub fn cast_all(
     let costs = interleave(rounds, &mut contestants)?;
     drop(contestants);
     let fired = &aimed[1].shots;
-    let truth: Vec<Ranges> = fired.par_iter().map(ways::in_f64).collect();
+    let truth: Vec<Ranges> = fired.par_iter().map(methods::in_f64).collect();
     let mut all = Vec::new();
-    for (((name, way, is_gpu), aimed), costs) in settings.into_iter().zip(costs) {
+    for (((name, method, is_gpu), aimed), costs) in settings.into_iter().zip(costs) {
         let culling = word(aimed.culling);
         eprintln!("caster: {name}, culling {culling}");
-        let mut cast = judged(way, aimed, fired, &truth)?;
+        let mut cast = assess(method, aimed, fired, &truth)?;
         let spent = if *is_gpu { costs.wall_s() } else { costs.cpu_s() };
         let seconds = spent.median / cast.clouds.len() as f64;
         let rays = Scanning::reference().sensor.pattern().len() as f64;
@@ -128,12 +128,12 @@ impl Aimed {
     }
 }
 
-impl Way<'_> {
+impl Method<'_> {
     fn cast(&self, Aimed { shots, jobs, .. }: &Aimed) -> Result<Vec<Ranges>> {
         Ok(match self {
-            Self::Oracle => shots.iter().map(ways::in_f64).collect(),
-            Self::MollerTrumbore => shots.iter().map(ways::moller_trumbore).collect(),
-            Self::F32 => shots.iter().map(ways::watertight_in_f32).collect(),
+            Self::Oracle => shots.iter().map(methods::in_f64).collect(),
+            Self::MollerTrumbore => shots.iter().map(methods::moller_trumbore).collect(),
+            Self::F32 => shots.iter().map(methods::watertight_in_f32).collect(),
             Self::Product(caster) => {
                 let casts = caster.cast(jobs)?;
                 shots.par_iter().zip(&casts).map(|(shot, cast)| shot.ranges(cast)).collect()
@@ -142,9 +142,9 @@ impl Way<'_> {
     }
 }
 
-/// What `way` makes of the rays aimed, beside the truth of all that are `fired`.
-fn judged(way: &Way<'_>, aimed: &Aimed, fired: &[Shot], truth: &[Ranges]) -> Result<Cast> {
-    let ranges = way.cast(aimed)?;
+/// The errors of `method` on the rays aimed, against the truth of all that are `fired`.
+fn assess(method: &Method<'_>, aimed: &Aimed, fired: &[Shot], truth: &[Ranges]) -> Result<Cast> {
+    let ranges = method.cast(aimed)?;
     let of_all = aimed.shots.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
     let accuracy = Accuracy::of(&of_all.collect::<Vec<_>>().concat(), &truth.concat());
     let wrong = accuracy.false_hits_per_million() + accuracy.misses_per_million();

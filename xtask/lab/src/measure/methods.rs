@@ -1,14 +1,48 @@
-//! The common way of casting in f32, as a measure of what watertightness and
-//! accuracy cost: Möller and Trumbore, "Fast, minimum storage ray/triangle
-//! intersection", JGT 2(1), 1997, over the same tree, with a plain slab test.
+//! Methods that find the ranges of rays on the CPU, from exact to fast.
 
+use super::shot::Shot;
 use glam::{Vec3, Vec3A};
+use rayon::prelude::*;
 use sim_gpu::bvh::{Bvh, LeafTriangle, MAX_DEPTH};
-use sim_gpu::ray::TraceRay;
+use sim_gpu::cpu::oracle;
+use sim_gpu::cpu::traverse::traverse;
+use sim_gpu::ray::{MISS, TraceRay};
 
-/// Distance to the nearest triangle along `ray` from its origin, unit lengths;
-/// infinite if there is none.
-pub fn nearest(bvh: &Bvh, ray: &TraceRay) -> f32 {
+/// The f64 oracle; `[n_rays]`, metres.
+pub fn in_f64(shot: &Shot) -> Vec<Option<f64>> {
+    let target = &shot.job.target;
+    shot.rays.par_iter().map(|ray| oracle::nearest(target, ray).map(|c| c.range_m)).collect()
+}
+
+/// Möller and Trumbore's test in f32: the common method, as a measure of what
+/// watertightness and accuracy cost.
+pub fn moller_trumbore(shot: &Shot) -> Vec<Option<f64>> {
+    in_f32(shot, |ray| {
+        let t = moller_trumbore_nearest(&shot.job.target.bvh, ray);
+        t.is_finite().then_some(t)
+    })
+}
+
+/// The watertight test in f32, with the range that it finds.
+pub fn watertight_in_f32(shot: &Shot) -> Vec<Option<f64>> {
+    let bvh = &shot.job.target.bvh;
+    in_f32(shot, |ray| {
+        let nearest = traverse(&bvh.nodes, &bvh.triangles, ray);
+        (nearest.index != MISS).then_some(nearest.t)
+    })
+}
+
+/// Ranges in f32: the distance skipped and the distance traced.
+fn in_f32(shot: &Shot, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -> Vec<Option<f64>> {
+    let scale = shot.job.target.surface.frame.scale;
+    let range = |ray: &TraceRay| nearest(ray).map(|t| f64::from(ray.skipped + t) * scale);
+    shot.job.rays.par_iter().map(range).collect()
+}
+
+/// Distance to the nearest triangle along `ray` from its origin, unit lengths; infinite if
+/// there is none: Möller and Trumbore, "Fast, minimum storage ray/triangle intersection",
+/// JGT 2(1), 1997, over the same tree, with a plain slab test.
+fn moller_trumbore_nearest(bvh: &Bvh, ray: &TraceRay) -> f32 {
     let (origin, direction) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
     let (corner, per_direction) = (Vec3A::from(origin), Vec3A::from(direction.recip()));
     let mut nearest = f32::INFINITY;
