@@ -82,7 +82,11 @@ fn what_cannot_be_sampled_leaves_no_file() {
         ),
         (1, "--sampler fps --points 2 absent.xyz out.xyz", "error: absent.xyz: "),
         (1, "--sampler fps --points 2 c.xyz out.off", "error: out.off: extension: "),
-        (2, "--sampler fps --points 0 c.xyz out.xyz", "error: expected a sampler that keeps 1 point"),
+        (
+            2,
+            "--sampler fps --points 0 c.xyz out.xyz",
+            "error: expected a sampler that keeps 1 point",
+        ),
         (2, "--sampler all --points 2 c.xyz out.xyz", "error: --points does not apply"),
         (2, "--points 2 c.xyz out.xyz", "error: the following required arguments"),
     ] {

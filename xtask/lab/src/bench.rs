@@ -6,7 +6,7 @@
 //! what [`simplify`] saves. [`infer`] is about classifying, sampling and learning,
 //! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters.
 
-use crate::measure::{lanes, machine, subject};
+use crate::measure::{backends, bench_mesh, machine};
 use crate::pi5;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
@@ -91,7 +91,7 @@ struct Report {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     datasets: Vec<to_disk::Dataset>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    builders: Option<builders::Ways>,
+    builders: Option<builders::Measurements>,
     #[serde(skip_serializing_if = "Option::is_none")]
     peers: Option<peers::Comparison>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -122,9 +122,9 @@ fn sim(args: &SimArgs) -> Result<Outcome> {
         Some(name) => Some(name.parse()?),
         None => None,
     };
-    let mut subjects = subject::tori(&args.triangles);
+    let mut bench_meshes = bench_mesh::tori(&args.triangles);
     if let Some(meshes) = &args.meshes {
-        subjects.extend(subject::real(meshes, args.limit)?);
+        bench_meshes.extend(bench_mesh::real(meshes, args.limit)?);
     }
     let mut report = Report {
         machine: machine::Machine::here(),
@@ -138,27 +138,28 @@ fn sim(args: &SimArgs) -> Result<Outcome> {
     };
     let rounds = args.rounds.into();
     if args.builders {
-        let measured = builders::measure(&subjects, rounds)?;
+        let measured = builders::measure(&bench_meshes, rounds)?;
         measured.tables().iter().for_each(|table| print!("{table}"));
         report.builders = Some(measured);
     } else if args.peers {
-        report.peers = peers::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
+        report.peers = peers::measure(&bench_meshes, &backends::open(request.as_ref())?, rounds)?;
         report.peers.iter().for_each(|measured| print!("{}", measured.table()));
     } else if args.trade {
         let measured = watertightness::measure(rounds)?;
         print!("{}", measured.table());
         report.trade = Some(measured);
     } else if args.simplify {
-        let measured = simplify::measure(&subjects, &lanes::open(request.as_ref())?, rounds)?;
+        let measured =
+            simplify::measure(&bench_meshes, &backends::open(request.as_ref())?, rounds)?;
         measured.tables().iter().for_each(|table| print!("{table}"));
         report.simplify = Some(measured);
     } else {
-        let lanes = lanes::open(request.as_ref())?;
-        let measured = speed::measure(&subjects, &lanes, rounds)?;
+        let backends = backends::open(request.as_ref())?;
+        let measured = speed::measure(&bench_meshes, &backends, rounds)?;
         measured.tables().iter().for_each(|table| print!("{table}"));
         report.speed = Some(measured);
         if let Some(meshes) = &args.meshes {
-            report.datasets = to_disk::measure(meshes, args.limit, &lanes, rounds)?;
+            report.datasets = to_disk::measure(meshes, args.limit, &backends, rounds)?;
             print!("{}", to_disk::table(&report.datasets));
         }
     }

@@ -41,18 +41,18 @@ pub fn measured<T>(work: impl FnOnce() -> T) -> (T, Cost) {
 }
 
 /// One of several that do comparable work; each call is one repeat.
-pub type Contestant<'a> = Box<dyn FnMut() -> anyhow::Result<Cost> + 'a>;
+pub type Workload<'a> = Box<dyn FnMut() -> anyhow::Result<Cost> + 'a>;
 
-/// Lets all `contestants` have one repeat uncounted, then `rounds` rounds of
+/// Lets all `workloads` have one repeat uncounted, then `rounds` rounds of
 /// one repeat each: what disturbs the machine for a while disturbs them all.
 ///
 /// # Errors
-/// The first that a contestant answers.
-pub fn interleave(rounds: usize, contestants: &mut [Contestant<'_>]) -> anyhow::Result<Vec<Costs>> {
-    let mut costs = vec![Costs::default(); contestants.len()];
+/// The first that a workload answers.
+pub fn interleave(rounds: usize, workloads: &mut [Workload<'_>]) -> anyhow::Result<Vec<Costs>> {
+    let mut costs = vec![Costs::default(); workloads.len()];
     for round in 0..=rounds {
-        for (contestant, costs) in contestants.iter_mut().zip(&mut costs) {
-            let cost = contestant()?;
+        for (workload, costs) in workloads.iter_mut().zip(&mut costs) {
+            let cost = workload()?;
             if round > 0 {
                 costs.0.push(cost);
             }
@@ -90,11 +90,11 @@ mod tests {
     #[test]
     fn the_first_repeat_is_not_counted() {
         let mut calls = 0;
-        let contestant: Contestant<'_> = Box::new(|| {
+        let workload: Workload<'_> = Box::new(|| {
             calls += 1;
             Ok(Cost { wall_s: f64::from(calls), cpu_s: 0.0 })
         });
-        let costs = interleave(3, &mut [contestant]).unwrap();
+        let costs = interleave(3, &mut [workload]).unwrap();
         assert_eq!(costs[0].wall_s(), Spread { median: 3.0, min: 2.0, max: 4.0 });
     }
 

@@ -1,6 +1,6 @@
 //! Methods that find the ranges of rays on the CPU, from exact to fast.
 
-use super::shot::Shot;
+use super::ray_set::RaySet;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 use sim_gpu::bvh::{Bvh, LeafTriangle, MAX_DEPTH};
@@ -9,34 +9,34 @@ use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::ray::{MISS, TraceRay};
 
 /// The f64 oracle; `[n_rays]`, metres.
-pub fn in_f64(shot: &Shot) -> Vec<Option<f64>> {
-    let target = &shot.job.target;
-    shot.rays.par_iter().map(|ray| oracle::nearest(target, ray).map(|c| c.range_m)).collect()
+pub fn in_f64(ray_set: &RaySet) -> Vec<Option<f64>> {
+    let target = &ray_set.job.target;
+    ray_set.rays.par_iter().map(|ray| oracle::nearest(target, ray).map(|c| c.range_m)).collect()
 }
 
 /// Möller and Trumbore's test in f32: the common method, as a measure of what
 /// watertightness and accuracy cost.
-pub fn moller_trumbore(shot: &Shot) -> Vec<Option<f64>> {
-    in_f32(shot, |ray| {
-        let t = moller_trumbore_nearest(&shot.job.target.bvh, ray);
+pub fn moller_trumbore(ray_set: &RaySet) -> Vec<Option<f64>> {
+    in_f32(ray_set, |ray| {
+        let t = moller_trumbore_nearest(&ray_set.job.target.bvh, ray);
         t.is_finite().then_some(t)
     })
 }
 
 /// The watertight test in f32, with the range that it finds.
-pub fn watertight_in_f32(shot: &Shot) -> Vec<Option<f64>> {
-    let bvh = &shot.job.target.bvh;
-    in_f32(shot, |ray| {
+pub fn watertight_in_f32(ray_set: &RaySet) -> Vec<Option<f64>> {
+    let bvh = &ray_set.job.target.bvh;
+    in_f32(ray_set, |ray| {
         let nearest = traverse(&bvh.nodes, &bvh.triangles, ray);
         (nearest.index != MISS).then_some(nearest.t)
     })
 }
 
 /// Ranges in f32: the distance skipped and the distance traced.
-fn in_f32(shot: &Shot, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -> Vec<Option<f64>> {
-    let scale = shot.job.target.surface.frame.scale;
+fn in_f32(ray_set: &RaySet, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -> Vec<Option<f64>> {
+    let scale = ray_set.job.target.surface.frame.scale;
     let range = |ray: &TraceRay| nearest(ray).map(|t| f64::from(ray.skipped + t) * scale);
-    shot.job.rays.par_iter().map(range).collect()
+    ray_set.job.rays.par_iter().map(range).collect()
 }
 
 /// Distance to the nearest triangle along `ray` from its origin, unit lengths; infinite if

@@ -91,7 +91,8 @@ impl<'a> Loop<'a> {
         let counts = |text: &&str| {
             let Some((name, operands)) = text.split_once(char::is_whitespace) else { return false };
             let first = operands.split(',').next().unwrap_or_default().trim();
-            name == mnemonic && first.split_once('.').is_some_and(|(_, lanes)| lanes == arrangement)
+            name == mnemonic
+                && first.split_once('.').is_some_and(|(_, backends)| backends == arrangement)
         };
         self.instructions().filter(counts).count()
     }

@@ -254,7 +254,7 @@ fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
 fn number(value: f64) -> String {
     // Room for the rounding of a logarithm that should be whole.
     let exponent = value.abs().log10() + 1e-9;
-    if value == 0.0 || (-3.5..4.5).contains(&exponent) {
+    if value == 0.0 || (-3.5..5.5).contains(&exponent) {
         let is_large = value.abs() >= 10.0;
         return if is_large { format!("{value:.1}").replace(".0", "") } else { digits(value) };
     }

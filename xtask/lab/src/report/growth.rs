@@ -115,7 +115,7 @@ fn message(parameter: &str, rows: &[&Growth]) -> String {
     let largest = rows.iter().filter_map(share).fold(0.0, f64::max);
     match largest <= 1.0 {
         true => format!(
-            "By {parameter}: no error is above its bound; the nearest is {} % of it.",
+            "By {parameter}: every error is within its bound; the largest is {} % of it.",
             digits(100.0 * largest)
         ),
         false => format!("By {parameter}: an error is {} times its bound.", digits(largest)),

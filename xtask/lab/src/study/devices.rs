@@ -23,10 +23,10 @@ use sim_gpu::resolve::{Hits, resolve};
 use sim_gpu::sensor::{BeamPattern, Sensor};
 use sim_gpu::target::Target;
 
-use crate::measure::lanes::{self, Lane};
-use crate::measure::subject::{self, Subject};
+use crate::measure::backends::{self, Backend};
+use crate::measure::bench_mesh::target;
+use crate::measure::bench_mesh::{self, BenchMesh};
 use crate::render::table::{Table, digits};
-use crate::study::casting::speed::target;
 use xtask::workspace::root;
 
 /// Relative error that is promised of a range.
@@ -78,10 +78,10 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     let model = args.model.clone().unwrap_or_else(weights);
     let mut classifier = Classifier::load(&model, &Options::default())?;
     let meshes = args.meshes.clone().unwrap_or_else(|| root().join("assets/meshes"));
-    let mut subjects = subject::real(&meshes, usize::MAX)?;
-    subjects.extend(ShapeClass::ALL.into_iter().map(shape));
-    let lanes = lanes::open(None)?;
-    let [cpu, others @ ..] = &lanes[..] else { bail!("the CPU is always there") };
+    let mut bench_meshes = bench_mesh::real(&meshes, usize::MAX)?;
+    bench_meshes.extend(ShapeClass::ALL.into_iter().map(shape));
+    let backends = backends::open(None)?;
+    let [cpu, others @ ..] = &backends[..] else { bail!("the CPU is always there") };
     if others.is_empty() {
         bail!(
             "expected an adapter to compare with the CPU, found none; `cargo xtask adapters` lists them"
@@ -89,14 +89,14 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     }
     let pattern = Sensor::builtin("vlp32c").expect("invariant: it is built in").pattern();
     let mut all = Vec::new();
-    for subject in &subjects {
-        let target = target(subject.mesh.clone(), Builder::Sah);
+    for bench_mesh in &bench_meshes {
+        let target = target(bench_mesh.mesh.clone(), Builder::Sah);
         for view in 0..args.views {
             let seen = View::new(&target, &pattern, view, args.views);
             let reference = seen.cast(cpu)?;
-            for lane in others {
-                let found = seen.cast(lane)?;
-                let place = (subject.name.as_str(), view, lane.name());
+            for backend in others {
+                let found = seen.cast(backend)?;
+                let place = (bench_mesh.name.as_str(), view, backend.name());
                 all.push(seen.compare(place, &reference, &found, &mut classifier)?);
             }
         }
@@ -115,9 +115,9 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
 }
 
 /// The first of the parametric shapes of `class`.
-fn shape(class: ShapeClass) -> Subject {
+fn shape(class: ShapeClass) -> BenchMesh {
     let mesh = to_world(&generate(class, 0, 0), Up::Z, Normalize::UnitSphere).mesh;
-    Subject { name: format!("shape {class}"), mesh }
+    BenchMesh { name: format!("shape {class}"), mesh }
 }
 
 /// A sensor's look at a mesh.
@@ -137,11 +137,11 @@ impl<'a> View<'a> {
         Self { job, pose, pattern }
     }
 
-    fn cast(&self, lane: &Lane) -> Result<Hits> {
+    fn cast(&self, backend: &Backend) -> Result<Hits> {
         let jobs = std::slice::from_ref(&self.job);
-        let casts = match lane.caster.fits(&self.job.target) {
-            true => lane.caster.cast(jobs)?,
-            false => lane.caster.cast_on_cpu(jobs),
+        let casts = match backend.caster.fits(&self.job.target) {
+            true => backend.caster.cast(jobs)?,
+            false => backend.caster.cast_on_cpu(jobs),
         };
         Ok(resolve(&self.job, &casts[0], self.pattern, &Effects::default()))
     }
@@ -252,13 +252,13 @@ fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
     Ok(csv.into_inner()?)
 }
 
-fn summary(all: &[Comparison], others: &[Lane]) -> Table {
+fn summary(all: &[Comparison], others: &[Backend]) -> Table {
     let heading = ["adapter", "scans", "points", "silhouette beams", "apart, m", "equal"];
     let mut table = Table::new("Each adapter beside the CPU", &heading);
-    for lane in others {
-        let of: Vec<&Comparison> = all.iter().filter(|c| c.adapter == lane.name()).collect();
+    for backend in others {
+        let of: Vec<&Comparison> = all.iter().filter(|c| c.adapter == backend.name()).collect();
         table.push(vec![
-            lane.name().to_owned(),
+            backend.name().to_owned(),
             of.len().to_string(),
             of.iter().map(|c| c.points[1]).sum::<usize>().to_string(),
             of.iter().map(|c| c.silhouettes.len()).sum::<usize>().to_string(),

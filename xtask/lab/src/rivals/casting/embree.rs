@@ -1,7 +1,7 @@
 //! Embree, through Open3D in a subprocess.
 
 use crate::measure::clock::Cost;
-use crate::measure::shot::Shot;
+use crate::measure::ray_set::RaySet;
 use crate::measure::subprocess::Subprocess;
 use anyhow::{Context, Result};
 use ndarray::{Array1, Array2};
@@ -47,12 +47,12 @@ impl Embree {
         self.ask(&json!({ "mesh": files }))
     }
 
-    /// Prepares to cast the rays of `shot`, `copies` times over, as `key`.
+    /// Prepares to cast the rays of `ray_set`, `copies` times over, as `key`.
     ///
     /// # Errors
     /// If the program ends.
-    pub fn aim(&mut self, key: &str, shot: &Shot, copies: usize) -> Result<()> {
-        let rays = shot
+    pub fn aim(&mut self, key: &str, ray_set: &RaySet, copies: usize) -> Result<()> {
+        let rays = ray_set
             .in_world()
             .flat_map(|(origin, direction)| [origin.as_vec3(), direction.as_vec3()])
             .flat_map(|v| v.to_array())

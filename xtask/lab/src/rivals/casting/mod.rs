@@ -3,13 +3,16 @@
 mod embree;
 
 use crate::measure::accuracy::Accuracy;
-use crate::measure::clock::{Contestant, Costs, interleave, measured};
-use crate::measure::lanes::Lane;
+use crate::measure::backends::Backend;
+use crate::measure::backends::short;
+use crate::measure::bench_mesh::BenchMesh;
+use crate::measure::bench_mesh::target;
+use crate::measure::clock::{Costs, Workload, interleave, measured};
+use crate::measure::ray_set::RaySet;
+use crate::measure::ray_set::{sweep_pose, vlp32c};
 use crate::measure::scenes::in_a_room;
-use crate::measure::shot::Shot;
-use crate::measure::subject::Subject;
 use crate::render::table::{Table, digits, millions_per_s, milliseconds};
-use crate::study::casting::speed::{casting, short, sweep_pose, target, vlp32c};
+use crate::study::casting::speed::casting;
 use anyhow::Result;
 use embree::Embree;
 use glam::DAffine3;
@@ -61,12 +64,16 @@ pub struct Comparison {
     entries: Vec<Entry>,
 }
 
-/// Compares `lanes` with Embree on `subjects`; `None`, with a message, where
+/// Compares `backends` with Embree on `bench_meshes`; `None`, with a message, where
 /// Embree cannot be had.
 ///
 /// # Errors
 /// If an adapter or the peer fails on the way.
-pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Option<Comparison>> {
+pub fn measure(
+    bench_meshes: &[BenchMesh],
+    backends: &[Backend],
+    rounds: usize,
+) -> Result<Option<Comparison>> {
     let embree = match OPEN3D.interpreter() {
         Ok(python) => Embree::start(&python).map_err(|error| format!("{error:#}")),
         Err(cause) => Err(cause),
@@ -80,24 +87,24 @@ pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Op
     };
     let mut entries = Vec::new();
     let pattern = vlp32c();
-    for subject in subjects {
-        eprintln!("{}", subject.name);
-        let room = in_a_room(subject.mesh.clone());
+    for bench_mesh in bench_meshes {
+        eprintln!("{}", bench_mesh.name);
+        let room = in_a_room(bench_mesh.mesh.clone());
         for (mesh, trace, whole) in [
             (&room, "sweep, all hit", "whole, all hit"),
-            (&subject.mesh, "sweep, object", "whole, object"),
+            (&bench_mesh.mesh, "sweep, object", "whole, object"),
         ] {
-            let bench = Bench { subject, mesh, lanes, rounds, embree: &embree };
+            let bench = Bench { bench_mesh, mesh, backends, rounds, embree: &embree };
             let culling = if trace == "sweep, object" { Culling::On } else { Culling::Off };
             let target = bench.load()?;
             let pose = sweep_pose()?;
-            let shot = Shot::sweep(&target, &pose, &pattern, culling);
-            entries.extend(bench.trace(trace, &shot)?);
+            let ray_set = RaySet::sweep(&target, &pose, &pattern, culling);
+            entries.extend(bench.trace(trace, &ray_set)?);
             entries.extend(bench.whole(whole, &target, &pose, &pattern)?);
         }
-        let bench = Bench { subject, mesh: &subject.mesh, lanes, rounds, embree: &embree };
+        let bench = Bench { bench_mesh, mesh: &bench_mesh.mesh, backends, rounds, embree: &embree };
         entries
-            .extend(bench.trace("incoherent", &Shot::incoherent(&bench.load()?, pattern.len()))?);
+            .extend(bench.trace("incoherent", &RaySet::incoherent(&bench.load()?, pattern.len()))?);
     }
     let versions = embree.into_inner().versions.clone();
     Ok(Some(Comparison { versions, entries }))
@@ -105,9 +112,9 @@ pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Op
 
 /// One mesh and who casts at it.
 struct Bench<'a> {
-    subject: &'a Subject,
+    bench_mesh: &'a BenchMesh,
     mesh: &'a Mesh,
-    lanes: &'a [Lane],
+    backends: &'a [Backend],
     rounds: usize,
     embree: &'a RefCell<Embree>,
 }
@@ -119,22 +126,22 @@ impl Bench<'_> {
     }
 
     /// Tracing alone: the same rays, ready in memory.
-    fn trace(&self, name: &'static str, shot: &Shot) -> Result<Vec<Entry>> {
-        let most = self.lanes.iter().map(|lane| lane.rays).max().unwrap_or(0);
-        let copies = most.div_ceil(shot.rays.len().max(1));
-        let jobs = vec![shot.job.clone(); copies];
-        let mut contestants: Vec<Contestant<'_>> =
-            self.lanes.iter().map(|lane| casting(lane, jobs.clone())).collect();
-        self.embree.borrow_mut().aim(OURS, shot, copies)?;
-        self.embree.borrow_mut().aim(FIRED, &shot.in_firing_order(), copies)?;
-        contestants.push(Box::new(|| self.embree.borrow_mut().cast(FIRED)));
-        contestants.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
-        let costs = interleave(self.rounds, &mut contestants)?;
+    fn trace(&self, name: &'static str, ray_set: &RaySet) -> Result<Vec<Entry>> {
+        let most = self.backends.iter().map(|backend| backend.rays).max().unwrap_or(0);
+        let copies = most.div_ceil(ray_set.rays.len().max(1));
+        let jobs = vec![ray_set.job.clone(); copies];
+        let mut workloads: Vec<Workload<'_>> =
+            self.backends.iter().map(|backend| casting(backend, jobs.clone())).collect();
+        self.embree.borrow_mut().aim(OURS, ray_set, copies)?;
+        self.embree.borrow_mut().aim(FIRED, &ray_set.in_firing_order(), copies)?;
+        workloads.push(Box::new(|| self.embree.borrow_mut().cast(FIRED)));
+        workloads.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
+        let costs = interleave(self.rounds, &mut workloads)?;
         let ranges = |caster: &Caster| -> Result<_> {
-            let cast = caster.cast(std::slice::from_ref(&shot.job))?;
-            Ok(shot.ranges(cast.first().unwrap_or(&Cast::default())))
+            let cast = caster.cast(std::slice::from_ref(&ray_set.job))?;
+            Ok(ray_set.ranges(cast.first().unwrap_or(&Cast::default())))
         };
-        self.entries(name, shot, shot.rays.len() * copies, costs, ranges)
+        self.entries(name, ray_set, ray_set.rays.len() * copies, costs, ranges)
     }
 
     /// From beams to ranges: we aim, cast and solve in f64; Embree is handed
@@ -146,7 +153,7 @@ impl Bench<'_> {
         pose: &Pose,
         pattern: &BeamPattern,
     ) -> Result<Vec<Entry>> {
-        let all = Shot::sweep(target, pose, pattern, Culling::Off);
+        let all = RaySet::sweep(target, pose, pattern, Culling::Off);
         let copies = 10;
         let aim = || {
             let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
@@ -160,17 +167,17 @@ impl Bench<'_> {
             }
             Ok(())
         };
-        let mut contestants: Vec<Contestant<'_>> = Vec::new();
-        for lane in self.lanes {
+        let mut workloads: Vec<Workload<'_>> = Vec::new();
+        for backend in self.backends {
             let whole = &whole;
-            contestants.push(Box::new(move || {
-                let (done, cost) = measured(|| whole(&lane.caster));
+            workloads.push(Box::new(move || {
+                let (done, cost) = measured(|| whole(&backend.caster));
                 done.map(|()| cost)
             }));
         }
         self.embree.borrow_mut().aim(OURS, &all, copies)?;
-        contestants.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
-        let costs = interleave(self.rounds, &mut contestants)?;
+        workloads.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
+        let costs = interleave(self.rounds, &mut workloads)?;
         let ranges = |caster: &Caster| -> Result<_> {
             let job = aim();
             let casts = caster.cast(std::slice::from_ref(&job))?;
@@ -188,28 +195,28 @@ impl Bench<'_> {
     fn entries(
         &self,
         rays_from: &'static str,
-        shot: &Shot,
+        ray_set: &RaySet,
         rays: usize,
         costs: Vec<Costs>,
         ranges: impl Fn(&Caster) -> Result<Vec<Option<f64>>>,
     ) -> Result<Vec<Entry>> {
-        let target = &shot.job.target;
+        let target = &ray_set.job.target;
         let nearest = |ray: &Ray| oracle::nearest(target, ray).map(|crossing| crossing.range_m);
-        let truth: Vec<Option<f64>> = shot.rays.iter().map(nearest).collect();
+        let truth: Vec<Option<f64>> = ray_set.rays.iter().map(nearest).collect();
         let mut answers = Vec::new();
-        for lane in self.lanes {
-            answers.push((lane.name().to_owned(), ranges(&lane.caster)?));
+        for backend in self.backends {
+            answers.push((backend.name().to_owned(), ranges(&backend.caster)?));
         }
         let finite = |t: f32| t.is_finite().then_some(f64::from(t));
         let of_embree: Vec<Option<f64>> =
             self.embree.borrow_mut().ranges(OURS)?.into_iter().map(finite).collect();
-        if costs.len() > self.lanes.len() + 1 {
+        if costs.len() > self.backends.len() + 1 {
             // The same rays: only the time depends on their order.
             answers.push(("Embree, firing order".to_owned(), of_embree.clone()));
         }
         answers.push(("Embree".to_owned(), of_embree));
         let entry = |((caster, ranges), costs): ((String, Vec<_>), Costs)| Entry {
-            mesh: self.subject.name.clone(),
+            mesh: self.bench_mesh.name.clone(),
             triangles: target.surface.len(),
             rays_from,
             caster,

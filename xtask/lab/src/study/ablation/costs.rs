@@ -4,7 +4,7 @@
 use super::datasets::make;
 use super::effects::DATASETS;
 use super::plan::Plan;
-use crate::measure::clock::{Contestant, Spread, interleave, measured};
+use crate::measure::clock::{Spread, Workload, interleave, measured};
 use anyhow::Context;
 use formats::atomic;
 use serde::{Deserialize, Serialize};
@@ -37,16 +37,16 @@ pub fn costs(
         return serde_json::from_str(&text).with_context(|| file.display().to_string());
     }
     let some = spread_over(meshes, plan.cost_meshes);
-    let mut contestants: Vec<Contestant<'_>> = Vec::new();
+    let mut workloads: Vec<Workload<'_>> = Vec::new();
     for dataset in DATASETS {
         let some = &some;
-        contestants.push(Box::new(move || {
+        workloads.push(Box::new(move || {
             clear(scratch)?;
             let (made, cost) = measured(|| make(dataset, plan, some, scratch));
             made.map(|_| cost)
         }));
     }
-    let rounds = interleave(plan.cost_rounds, &mut contestants)?;
+    let rounds = interleave(plan.cost_rounds, &mut workloads)?;
     clear(scratch)?;
     let of = |spread: Spread| {
         let [median, least, most] =

@@ -2,12 +2,14 @@
 
 mod moved;
 
-use crate::measure::clock::{Contestant, Costs, interleave, measured};
-use crate::measure::lanes::Lane;
-use crate::measure::shot::Shot;
-use crate::measure::subject::Subject;
+use crate::measure::backends::Backend;
+use crate::measure::backends::short;
+use crate::measure::bench_mesh::BenchMesh;
+use crate::measure::clock::{Costs, Workload, interleave, measured};
+use crate::measure::ray_set::RaySet;
+use crate::measure::ray_set::vlp32c;
 use crate::render::table::{Table, digits, milliseconds};
-use crate::study::casting::speed::{casting, short, vlp32c};
+use crate::study::casting::speed::casting;
 use anyhow::Result;
 use glam::DVec3;
 use moved::Moved;
@@ -23,7 +25,7 @@ use std::hint::black_box;
 
 /// One mesh as it is and as `--simplify auto` has it.
 #[derive(Serialize)]
-pub struct Subjected {
+pub struct SimplifiedMesh {
     mesh: String,
     triangles: usize,
     triangles_left: usize,
@@ -46,59 +48,67 @@ struct Traced {
 
 /// All meshes.
 #[derive(Serialize)]
-pub struct Simplified(Vec<Subjected>);
+pub struct Simplified(Vec<SimplifiedMesh>);
 
-/// Measures `subjects` on `lanes` in `rounds` rounds each, seen as
+/// Measures `bench_meshes` on `backends` in `rounds` rounds each, seen as
 /// `gen-dataset` sees them with the VLP-32C.
 ///
 /// # Errors
 /// If this build cannot simplify or an adapter fails.
-pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Simplified> {
-    let measured = subjects.iter().map(|subject| {
-        eprintln!("{}", subject.name);
-        on(subject, lanes, rounds)
+pub fn measure(
+    bench_meshes: &[BenchMesh],
+    backends: &[Backend],
+    rounds: usize,
+) -> Result<Simplified> {
+    let measured = bench_meshes.iter().map(|bench_mesh| {
+        eprintln!("{}", bench_mesh.name);
+        on(bench_mesh, backends, rounds)
     });
     Ok(Simplified(measured.collect::<Result<_>>()?))
 }
 
-fn on(subject: &Subject, lanes: &[Lane], rounds: usize) -> Result<Subjected> {
+fn on(bench_mesh: &BenchMesh, backends: &[Backend], rounds: usize) -> Result<SimplifiedMesh> {
     let sensor = Sensor::builtin("vlp32c").expect("invariant: this profile is built in");
     let views = Views::ROTATING.poses(DVec3::ZERO, formats::rng::StreamKey::new(0, "views", 0));
     let positions = views.iter().map(|view| view.position_m).collect();
-    let bound_m = resolved_m(&subject.mesh, 1.0, &[Viewpoint { sensor: &sensor, positions }]);
+    let bound_m = resolved_m(&bench_mesh.mesh, 1.0, &[Viewpoint { sensor: &sensor, positions }]);
 
-    let kept = validate::triangle_stats(&subject.mesh).kept;
-    let fewer = simplified(&subject.mesh, &kept, bound_m)?.unwrap_or_else(|| subject.mesh.clone());
-    let surfaces = [&subject.mesh, &fewer].map(surface);
+    let kept = validate::triangle_stats(&bench_mesh.mesh).kept;
+    let fewer =
+        simplified(&bench_mesh.mesh, &kept, bound_m)?.unwrap_or_else(|| bench_mesh.mesh.clone());
+    let surfaces = [&bench_mesh.mesh, &fewer].map(surface);
     let targets = surfaces.each_ref().map(|surface| Target::new(surface.clone(), Builder::Sah));
-    let shots = targets.each_ref().map(|target| shots(target, &views));
+    let ray_sets = targets.each_ref().map(|target| ray_sets(target, &views));
 
-    let mut contestants: Vec<Contestant<'_>> = vec![simplifying(&subject.mesh, &kept, bound_m)];
-    contestants.extend(surfaces.iter().map(building));
-    let lanes: Vec<&Lane> = lanes.iter().filter(|lane| lane.caster.fits(&targets[0])).collect();
-    let jobs = shots.each_ref().map(|shots| shots.iter().map(|shot| shot.job.clone()).collect());
+    let mut workloads: Vec<Workload<'_>> = vec![simplifying(&bench_mesh.mesh, &kept, bound_m)];
+    workloads.extend(surfaces.iter().map(building));
+    let backends: Vec<&Backend> =
+        backends.iter().filter(|backend| backend.caster.fits(&targets[0])).collect();
+    let jobs = ray_sets
+        .each_ref()
+        .map(|ray_sets| ray_sets.iter().map(|ray_set| ray_set.job.clone()).collect());
     let jobs: [Vec<CastJob>; 2] = jobs;
-    for lane in &lanes {
-        contestants.extend(jobs.iter().map(|jobs| casting(lane, jobs.clone())));
+    for backend in &backends {
+        workloads.extend(jobs.iter().map(|jobs| casting(backend, jobs.clone())));
     }
-    let mut costs = interleave(rounds, &mut contestants)?.into_iter();
+    let mut costs = interleave(rounds, &mut workloads)?.into_iter();
     let mut next = || costs.next().unwrap_or_default();
     let (simplify, build) = (next(), [next(), next()]);
     let rays = jobs[0].iter().map(|job| job.rays.len()).sum();
-    let traces = lanes.iter().map(|lane| Traced {
-        adapter: lane.name().to_owned(),
+    let traces = backends.iter().map(|backend| Traced {
+        adapter: backend.name().to_owned(),
         rays,
         trace: [next(), next()],
     });
-    Ok(Subjected {
-        mesh: subject.name.clone(),
+    Ok(SimplifiedMesh {
+        mesh: bench_mesh.name.clone(),
         triangles: surfaces[0].len(),
         triangles_left: surfaces[1].len(),
         bound_m,
         simplify,
         build,
         traces: traces.collect(),
-        moved: Moved::of(&shots, bound_m),
+        moved: Moved::of(&ray_sets, bound_m),
     })
 }
 
@@ -106,12 +116,12 @@ fn surface(mesh: &Mesh) -> Surface {
     Surface::new(mesh.clone(), validate::triangle_stats(mesh).kept)
 }
 
-fn shots(target: &Target, views: &[Pose]) -> Vec<Shot> {
+fn ray_sets(target: &Target, views: &[Pose]) -> Vec<RaySet> {
     let pattern = vlp32c();
-    views.iter().map(|pose| Shot::sweep(target, pose, &pattern, Culling::Off)).collect()
+    views.iter().map(|pose| RaySet::sweep(target, pose, &pattern, Culling::Off)).collect()
 }
 
-fn simplifying<'a>(mesh: &'a Mesh, kept: &'a [u32], bound_m: f64) -> Contestant<'a> {
+fn simplifying<'a>(mesh: &'a Mesh, kept: &'a [u32], bound_m: f64) -> Workload<'a> {
     Box::new(move || {
         let (fewer, cost) = measured(|| simplified(mesh, kept, bound_m));
         black_box(fewer?);
@@ -119,7 +129,7 @@ fn simplifying<'a>(mesh: &'a Mesh, kept: &'a [u32], bound_m: f64) -> Contestant<
     })
 }
 
-fn building(surface: &Surface) -> Contestant<'_> {
+fn building(surface: &Surface) -> Workload<'_> {
     Box::new(move || {
         let surface = surface.clone();
         let (built, cost) = measured(|| Target::new(surface, Builder::Sah));
@@ -150,18 +160,18 @@ impl Simplified {
                 "all three",
             ],
         );
-        for subject in &self.0 {
-            for Traced { adapter, trace, .. } in &subject.traces {
+        for bench_mesh in &self.0 {
+            for Traced { adapter, trace, .. } in &bench_mesh.traces {
                 let cpu_s = |costs: &Costs| costs.cpu_s().median;
-                let [build, fewer_build] = subject.build.each_ref().map(cpu_s);
+                let [build, fewer_build] = bench_mesh.build.each_ref().map(cpu_s);
                 let [trace, fewer_trace] = trace.each_ref().map(cpu_s);
-                let simplify = cpu_s(&subject.simplify);
+                let simplify = cpu_s(&bench_mesh.simplify);
                 let (before, after) = (build + trace, fewer_build + fewer_trace);
                 let arrow = |p: f64, q: f64| format!("{} -> {}", milliseconds(p), milliseconds(q));
                 table.push(vec![
-                    subject.mesh.clone(),
-                    subject.triangles.to_string(),
-                    subject.triangles_left.to_string(),
+                    bench_mesh.mesh.clone(),
+                    bench_mesh.triangles.to_string(),
+                    bench_mesh.triangles_left.to_string(),
                     short(adapter),
                     arrow(build, fewer_build),
                     arrow(trace, fewer_trace),
@@ -189,7 +199,7 @@ impl Simplified {
                 "other hit or miss %",
             ],
         );
-        for Subjected { mesh, bound_m, moved, .. } in &self.0 {
+        for SimplifiedMesh { mesh, bound_m, moved, .. } in &self.0 {
             let mm = |metres: f64| digits(1e3 * metres);
             let percent = |n: usize| digits(100.0 * n as f64 / moved.hits.max(1) as f64);
             table.push(vec![

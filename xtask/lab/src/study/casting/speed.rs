@@ -1,25 +1,19 @@
 //! How fast hierarchies are built and rays are traced.
 
 use super::kernel;
-use crate::measure::clock::{Contestant, Cost, Costs, Spread, interleave, measured};
-use crate::measure::lanes::Lane;
+use crate::measure::backends::{Backend, short};
+use crate::measure::bench_mesh::{BenchMesh, target};
+use crate::measure::clock::{Cost, Costs, Spread, Workload, interleave, measured};
+use crate::measure::ray_set::{RaySet, sweep_pose, vlp32c};
 use crate::measure::scenes::in_a_room;
-use crate::measure::shot::Shot;
-use crate::measure::subject::Subject;
 use crate::render::table::{Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
-use glam::{DVec3, dvec3};
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::{Mesh, validate};
-use sim_gpu::pose::Pose;
-use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::mesh::validate;
 use sim_gpu::target::{Surface, Target};
 use std::hint::black_box;
-
-/// The sweeps stand 5 m away, as those of the published comparisons do.
-const SENSOR_M: DVec3 = dvec3(5.0, 0.0, 0.5);
 
 /// One builder on one mesh.
 #[derive(Serialize)]
@@ -56,116 +50,98 @@ pub struct Speed {
     traces: Vec<Trace>,
 }
 
-/// Measures `subjects` on `lanes` in `rounds` rounds each.
+/// Measures `bench_meshes` on `backends` in `rounds` rounds each.
 ///
 /// # Errors
 /// If an adapter fails.
-pub fn measure(subjects: &[Subject], lanes: &[Lane], rounds: usize) -> Result<Speed> {
+pub fn measure(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
     let mut speed = Speed::default();
     let pattern = vlp32c();
-    for subject in subjects {
-        eprintln!("{}", subject.name);
-        builds(subject, rounds, &mut speed)?;
-        let object = target(subject.mesh.clone(), Builder::Sah);
-        let room = target(in_a_room(subject.mesh.clone()), Builder::Sah);
+    for bench_mesh in bench_meshes {
+        eprintln!("{}", bench_mesh.name);
+        builds(bench_mesh, rounds, &mut speed)?;
+        let object = target(bench_mesh.mesh.clone(), Builder::Sah);
+        let room = target(in_a_room(bench_mesh.mesh.clone()), Builder::Sah);
         let pose = sweep_pose()?;
-        for (name, shot, beams) in [
-            ("sweep, all hit", Shot::sweep(&room, &pose, &pattern, Culling::Off), pattern.len()),
-            ("sweep, object", Shot::sweep(&object, &pose, &pattern, Culling::On), pattern.len()),
-            ("incoherent", Shot::incoherent(&object, pattern.len()), pattern.len()),
+        for (name, ray_set, beams) in [
+            ("sweep, all hit", RaySet::sweep(&room, &pose, &pattern, Culling::Off), pattern.len()),
+            ("sweep, object", RaySet::sweep(&object, &pose, &pattern, Culling::On), pattern.len()),
+            ("incoherent", RaySet::incoherent(&object, pattern.len()), pattern.len()),
         ] {
-            traces(subject, (name, &shot, beams), lanes, rounds, &mut speed)?;
+            traces(bench_mesh, (name, &ray_set, beams), backends, rounds, &mut speed)?;
         }
     }
     Ok(speed)
 }
 
-/// The beams of the true VLP-32C at 600 rpm.
-pub fn vlp32c() -> BeamPattern {
-    let sensor = Sensor::builtin("vlp32c").expect("invariant: this profile is built in");
-    sensor.pattern()
-}
-
-/// Where sweeps are made from.
-///
-/// # Errors
-/// Never: the place is fixed and good.
-pub fn sweep_pose() -> Result<Pose> {
-    Ok(Pose::look_at(SENSOR_M, DVec3::ZERO)?)
-}
-
-/// `mesh` as casters want it.
-pub fn target(mesh: Mesh, builder: Builder) -> Target {
-    let kept = validate::triangle_stats(&mesh).kept;
-    Target::new(Surface::new(mesh, kept), builder)
-}
-
-fn builds(subject: &Subject, rounds: usize, speed: &mut Speed) -> Result<()> {
-    let kept = validate::triangle_stats(&subject.mesh).kept;
+fn builds(bench_mesh: &BenchMesh, rounds: usize, speed: &mut Speed) -> Result<()> {
+    let kept = validate::triangle_stats(&bench_mesh.mesh).kept;
     let triangles = kept.len();
-    let surface = Surface::new(subject.mesh.clone(), kept);
+    let surface = Surface::new(bench_mesh.mesh.clone(), kept);
     let builders = [Builder::Sah, Builder::Morton];
-    let mut contestants: Vec<Contestant<'_>> = builders
+    let mut workloads: Vec<Workload<'_>> = builders
         .iter()
         .map(|&builder| {
             let surface = &surface;
-            let contestant: Contestant<'_> = Box::new(move || {
+            let workload: Workload<'_> = Box::new(move || {
                 let surface = surface.clone();
                 let (built, cost) = measured(|| Target::new(surface, builder));
                 black_box(built);
                 Ok(cost)
             });
-            contestant
+            workload
         })
         .collect();
-    for (costs, builder) in interleave(rounds, &mut contestants)?.into_iter().zip(builders) {
-        let (mesh, builder) = (subject.name.clone(), format!("{builder:?}"));
+    for (costs, builder) in interleave(rounds, &mut workloads)?.into_iter().zip(builders) {
+        let (mesh, builder) = (bench_mesh.name.clone(), format!("{builder:?}"));
         speed.builds.push(Build { mesh, triangles, builder, costs });
     }
     Ok(())
 }
 
 fn traces(
-    subject: &Subject,
-    (rays_from, shot, beams): (&'static str, &Shot, usize),
-    lanes: &[Lane],
+    bench_mesh: &BenchMesh,
+    (rays_from, ray_set, beams): (&'static str, &RaySet, usize),
+    backends: &[Backend],
     rounds: usize,
     speed: &mut Speed,
 ) -> Result<()> {
-    let cast = sim_gpu::cpu::trace::cast(&shot.job, &sim_gpu::effects::Effects::default());
+    let cast = sim_gpu::cpu::trace::cast(&ray_set.job, &sim_gpu::effects::Effects::default());
     let hits = cast.codes.iter().filter(|&&code| code != sim_gpu::ray::MISS).count();
-    let fitting = |lane: &&Lane| {
-        let fits = lane.caster.fits(&shot.job.target);
+    let fitting = |backend: &&Backend| {
+        let fits = backend.caster.fits(&ray_set.job.target);
         if !fits {
-            eprintln!("{}: {} exceeds its bindings", lane.name(), subject.name);
+            eprintln!("{}: {} exceeds its bindings", backend.name(), bench_mesh.name);
         }
         fits
     };
-    let lanes: Vec<&Lane> = lanes.iter().filter(fitting).collect();
-    let copies = |lane: &Lane| lane.rays.div_ceil(shot.job.rays.len().max(1));
-    let mut contestants: Vec<Contestant<'_>> =
-        lanes.iter().map(|lane| casting(lane, vec![shot.job.clone(); copies(lane)])).collect();
-    let costs = interleave(rounds, &mut contestants)?;
-    for (lane, costs) in lanes.iter().zip(costs) {
+    let backends: Vec<&Backend> = backends.iter().filter(fitting).collect();
+    let copies = |backend: &Backend| backend.rays.div_ceil(ray_set.job.rays.len().max(1));
+    let mut workloads: Vec<Workload<'_>> = backends
+        .iter()
+        .map(|backend| casting(backend, vec![ray_set.job.clone(); copies(backend)]))
+        .collect();
+    let costs = interleave(rounds, &mut workloads)?;
+    for (backend, costs) in backends.iter().zip(costs) {
         speed.traces.push(Trace {
-            mesh: subject.name.clone(),
-            triangles: shot.job.target.surface.len(),
+            mesh: bench_mesh.name.clone(),
+            triangles: ray_set.job.target.surface.len(),
             rays_from,
-            adapter: lane.name().to_owned(),
-            rays: copies(lane) * shot.job.rays.len(),
-            beams: copies(lane) * beams,
-            hits: copies(lane) * hits,
+            adapter: backend.name().to_owned(),
+            rays: copies(backend) * ray_set.job.rays.len(),
+            beams: copies(backend) * beams,
+            hits: copies(backend) * hits,
             costs,
-            kernel_s: kernel::measure(lane, &shot.job, copies(lane), rounds)?,
+            kernel_s: kernel::measure(backend, &ray_set.job, copies(backend), rounds)?,
         });
     }
     Ok(())
 }
 
-/// Casts `jobs` on `lane`, all together.
-pub fn casting<'a>(lane: &'a Lane, jobs: Vec<CastJob>) -> Contestant<'a> {
+/// Casts `jobs` on `backend`, all together.
+pub fn casting<'a>(backend: &'a Backend, jobs: Vec<CastJob>) -> Workload<'a> {
     Box::new(move || {
-        let (casts, cost): (_, Cost) = measured(|| lane.caster.cast(&jobs));
+        let (casts, cost): (_, Cost) = measured(|| backend.caster.cast(&jobs));
         black_box(casts?);
         Ok(cost)
     })
@@ -235,9 +211,4 @@ impl Speed {
         }
         traces
     }
-}
-
-/// An adapter's name, short enough for a table.
-pub fn short(name: &str) -> String {
-    name.split(" (").next().unwrap_or(name).to_owned()
 }

@@ -1,10 +1,10 @@
 //! The whole way to disk: the default dataset, as `gen-dataset` makes it, in a
 //! folder that is removed again.
 
+use crate::measure::backends::Backend;
+use crate::measure::backends::short;
 use crate::measure::clock::{Cost, measured};
-use crate::measure::lanes::Lane;
 use crate::render::table::{Table, digits};
-use crate::study::casting::speed::short;
 use anyhow::{Context, Result};
 use edgepuck_dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
 use edgepuck_dataset::journal::{Journal, Terms};
@@ -37,21 +37,26 @@ pub struct Dataset {
 }
 
 /// Makes the default dataset of at most `limit` of the meshes under `root`, on
-/// each of `lanes`, `rounds` times.
+/// each of `backends`, `rounds` times.
 ///
 /// # Errors
 /// If there is no mesh, an adapter fails or the disk does.
-pub fn measure(root: &Path, limit: usize, lanes: &[Lane], rounds: usize) -> Result<Vec<Dataset>> {
+pub fn measure(
+    root: &Path,
+    limit: usize,
+    backends: &[Backend],
+    rounds: usize,
+) -> Result<Vec<Dataset>> {
     let entries = tree::discover(root, 0)?;
     let taken = limit.clamp(1, entries.len());
     let chosen: Vec<MeshEntry> =
         (0..taken).map(|k| entries[k * entries.len() / taken].clone()).collect();
     let config = default_config();
     let mut datasets = Vec::new();
-    for lane in lanes {
-        let request = match &lane.caster {
+    for backend in backends {
+        let request = match &backend.caster {
             Caster::Cpu(_) => AdapterRequest::Cpu,
-            Caster::Gpu(_) => AdapterRequest::Named(lane.name().to_owned()),
+            Caster::Gpu(_) => AdapterRequest::Named(backend.name().to_owned()),
         };
         let caster = Caster::open(&request, &config.cast_effects())?;
         let mut repeats = Vec::with_capacity(rounds);

@@ -2,12 +2,12 @@
 //! loses some of them, the watertight test none.
 
 use crate::measure::accuracy::Accuracy;
-use crate::measure::clock::{Contestant, Costs, interleave, measured};
+use crate::measure::bench_mesh::target;
+use crate::measure::clock::{Costs, Workload, interleave, measured};
 use crate::measure::methods;
+use crate::measure::ray_set::RaySet;
 use crate::measure::scenes::{closed_sphere, edge_midpoints};
-use crate::measure::shot::Shot;
 use crate::render::table::{Table, digits, millions_per_s};
-use crate::study::casting::speed::target;
 use anyhow::Result;
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -16,7 +16,7 @@ use sim_gpu::bvh::Builder;
 use std::hint::black_box;
 
 /// How rays become ranges.
-type Method = fn(&Shot) -> Vec<Option<f64>>;
+type Method = fn(&RaySet) -> Vec<Option<f64>>;
 
 const METHODS: [(&str, Method); 3] = [
     ("cpu f64 oracle", methods::in_f64),
@@ -53,18 +53,18 @@ pub fn measure(rounds: usize) -> Result<Watertightness> {
     let target = target(sphere, Builder::Sah);
     let mut settings = Vec::new();
     for (scene, points) in through {
-        let rays = Shot::through(&target, &places_within(), &points);
+        let rays = RaySet::through(&target, &places_within(), &points);
         let truth = methods::in_f64(&rays);
-        let mut contestants: Vec<Contestant<'_>> = Vec::new();
+        let mut workloads: Vec<Workload<'_>> = Vec::new();
         for (_, method) in METHODS {
             let rays = &rays;
-            contestants.push(Box::new(move || {
+            workloads.push(Box::new(move || {
                 let (ranges, cost) = measured(|| method(rays));
                 black_box(ranges);
                 Ok(cost)
             }));
         }
-        let costs = interleave(rounds, &mut contestants)?;
+        let costs = interleave(rounds, &mut workloads)?;
         settings.extend(METHODS.iter().zip(costs).map(|((knobs, method), costs)| Setting {
             scene,
             knobs,

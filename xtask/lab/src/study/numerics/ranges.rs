@@ -16,8 +16,8 @@ use sim_gpu::sensor::{BeamPattern, Sensor};
 use sim_gpu::target::Target;
 
 use super::Row;
+use crate::measure::bench_mesh::target as target_of;
 use crate::measure::scenes::torus;
-use crate::study::casting::speed::target as target_of;
 
 /// Beams this close to a surface's plane are promised less: 0.1 degree.
 const GRAZING_TANGENT: f64 = 573.0;

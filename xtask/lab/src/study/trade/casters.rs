@@ -4,11 +4,11 @@ use super::objects::{Object, Place, places};
 use super::scans::Cloud;
 use super::sensors::Scanning;
 use crate::measure::accuracy::Accuracy;
-use crate::measure::clock::{Contestant, interleave, measured};
-use crate::measure::lanes::Lane;
+use crate::measure::backends::Backend;
+use crate::measure::backends::short;
+use crate::measure::clock::{Workload, interleave, measured};
 use crate::measure::methods;
-use crate::measure::shot::Shot;
-use crate::study::casting::speed::short;
+use crate::measure::ray_set::RaySet;
 use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
 use glam::DVec3;
@@ -19,7 +19,7 @@ use sim_gpu::job::{CastJob, Culling};
 use std::collections::HashMap;
 use std::hint::black_box;
 
-/// The ranges of one shot's rays, metres.
+/// The ranges of one ray_set's rays, metres.
 type Ranges = Vec<Option<f64>>;
 
 /// How rays become ranges.
@@ -37,8 +37,8 @@ enum Method<'a> {
 /// The rays of every scan.
 struct Aimed {
     culling: Culling,
-    shots: Vec<Shot>,
-    /// Those of the shots, as casters take them.
+    ray_sets: Vec<RaySet>,
+    /// Those of the ray_sets, as casters take them.
     jobs: Vec<CastJob>,
 }
 
@@ -56,7 +56,7 @@ pub struct Cast {
 /// An adapter that fails.
 pub fn cast_all(
     objects: &[Object],
-    lanes: &[Lane],
+    backends: &[Backend],
     rounds: usize,
     test_set: &str,
 ) -> Result<Vec<Cast>> {
@@ -67,25 +67,25 @@ pub fn cast_all(
         ("cpu f32 watertight, f32 range".to_owned(), Method::F32, false),
         ("cpu f32 watertight, f64 range".to_owned(), Method::Product(&cpu), false),
     ];
-    let adapters = lanes.iter().filter(|lane| lane.name() != "cpu");
-    methods.extend(adapters.map(|lane| {
-        let name = format!("{} f32 watertight, f64 range", short(lane.name()));
-        (name, Method::Product(&lane.caster), lane.is_gpu)
+    let adapters = backends.iter().filter(|backend| backend.name() != "cpu");
+    methods.extend(adapters.map(|backend| {
+        let name = format!("{} f32 watertight, f64 range", short(backend.name()));
+        (name, Method::Product(&backend.caster), backend.is_gpu)
     }));
     let aimed = [Culling::On, Culling::Off].map(|culling| Aimed::at(objects, culling));
     let settings: Vec<_> =
         aimed.iter().flat_map(|aimed| methods.iter().map(move |method| (method, aimed))).collect();
-    let mut contestants: Vec<Contestant<'_>> = Vec::new();
+    let mut workloads: Vec<Workload<'_>> = Vec::new();
     for &((_, method, _), aimed) in &settings {
-        contestants.push(Box::new(move || {
+        workloads.push(Box::new(move || {
             let (ranges, cost) = measured(|| method.cast(aimed));
             black_box(ranges?);
             Ok(cost)
         }));
     }
-    let costs = interleave(rounds, &mut contestants)?;
-    drop(contestants);
-    let fired = &aimed[1].shots;
+    let costs = interleave(rounds, &mut workloads)?;
+    drop(workloads);
+    let fired = &aimed[1].ray_sets;
     let truth: Vec<Ranges> = fired.par_iter().map(methods::in_f64).collect();
     let mut all = Vec::new();
     for (((name, method, is_gpu), aimed), costs) in settings.into_iter().zip(costs) {
@@ -121,34 +121,38 @@ impl Aimed {
         let clean = Scanning::clean(Scanning::reference().distance_m);
         let pattern = clean.sensor.pattern();
         let aim =
-            |place: &Place<'_>| Shot::sweep(&place.object.target, &place.pose, &pattern, culling);
-        let shots: Vec<Shot> = places(objects, clean.distance_m).par_iter().map(aim).collect();
-        let jobs = shots.iter().map(|shot| shot.job.clone()).collect();
-        Self { culling, shots, jobs }
+            |place: &Place<'_>| RaySet::sweep(&place.object.target, &place.pose, &pattern, culling);
+        let ray_sets: Vec<RaySet> = places(objects, clean.distance_m).par_iter().map(aim).collect();
+        let jobs = ray_sets.iter().map(|ray_set| ray_set.job.clone()).collect();
+        Self { culling, ray_sets, jobs }
     }
 }
 
 impl Method<'_> {
-    fn cast(&self, Aimed { shots, jobs, .. }: &Aimed) -> Result<Vec<Ranges>> {
+    fn cast(&self, Aimed { ray_sets, jobs, .. }: &Aimed) -> Result<Vec<Ranges>> {
         Ok(match self {
-            Self::Oracle => shots.iter().map(methods::in_f64).collect(),
-            Self::MollerTrumbore => shots.iter().map(methods::moller_trumbore).collect(),
-            Self::F32 => shots.iter().map(methods::watertight_in_f32).collect(),
+            Self::Oracle => ray_sets.iter().map(methods::in_f64).collect(),
+            Self::MollerTrumbore => ray_sets.iter().map(methods::moller_trumbore).collect(),
+            Self::F32 => ray_sets.iter().map(methods::watertight_in_f32).collect(),
             Self::Product(caster) => {
                 let casts = caster.cast(jobs)?;
-                shots.par_iter().zip(&casts).map(|(shot, cast)| shot.ranges(cast)).collect()
+                ray_sets
+                    .par_iter()
+                    .zip(&casts)
+                    .map(|(ray_set, cast)| ray_set.ranges(cast))
+                    .collect()
             }
         })
     }
 }
 
 /// The errors of `method` on the rays aimed, against the truth of all that are `fired`.
-fn assess(method: &Method<'_>, aimed: &Aimed, fired: &[Shot], truth: &[Ranges]) -> Result<Cast> {
+fn assess(method: &Method<'_>, aimed: &Aimed, fired: &[RaySet], truth: &[Ranges]) -> Result<Cast> {
     let ranges = method.cast(aimed)?;
-    let of_all = aimed.shots.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
+    let of_all = aimed.ray_sets.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
     let accuracy = Accuracy::of(&of_all.collect::<Vec<_>>().concat(), &truth.concat());
     let wrong = accuracy.false_hits_per_million() + accuracy.misses_per_million();
-    let clouds: Vec<Cloud> = aimed.shots.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
+    let clouds: Vec<Cloud> = aimed.ray_sets.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
     let points: usize = clouds.iter().map(Vec::len).sum();
     let row = Row {
         part: Part::Caster,
@@ -164,15 +168,15 @@ fn assess(method: &Method<'_>, aimed: &Aimed, fired: &[Shot], truth: &[Ranges]) 
 }
 
 /// The ranges of all rays fired: none where a ray was left out.
-fn of_fired(aimed: &Shot, ranges: &Ranges, fired: &Shot) -> Ranges {
+fn of_fired(aimed: &RaySet, ranges: &Ranges, fired: &RaySet) -> Ranges {
     let by_beam: HashMap<u32, Option<f64>> =
         aimed.job.beams.iter().copied().zip(ranges.iter().copied()).collect();
     fired.job.beams.iter().map(|beam| by_beam.get(beam).copied().flatten()).collect()
 }
 
-/// The points that a shot's rays hit, in the order of its beams.
-fn cloud(shot: &Shot, ranges: &Ranges) -> Cloud {
-    let rays = shot.job.beams.iter().zip(shot.in_world()).zip(ranges);
+/// The points that a ray_set's rays hit, in the order of its beams.
+fn cloud(ray_set: &RaySet, ranges: &Ranges) -> Cloud {
+    let rays = ray_set.job.beams.iter().zip(ray_set.in_world()).zip(ranges);
     let hit = |((&beam, (origin, direction)), range): ((&u32, (DVec3, DVec3)), &Option<f64>)| {
         range.map(|range_m| (beam, (origin + range_m * direction).as_vec3().to_array()))
     };

@@ -16,7 +16,7 @@ mod pareto;
 mod scans;
 mod sensors;
 
-use crate::measure::lanes;
+use crate::measure::backends;
 use crate::measure::machine::Machine;
 use anyhow::{Context, Result, ensure};
 use classes::TestSet;
@@ -153,7 +153,7 @@ fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>,
         ways.extend(sensors::combinations());
     }
     let scanned = scans::scan_all(objects, &ways, rounds, &name)?;
-    let cast = casters::cast_all(objects, &lanes::open(None)?, rounds, &name)?;
+    let cast = casters::cast_all(objects, &backends::open(None)?, rounds, &name)?;
     let reference = scan_set(objects, &name, &scanned[0].clouds);
     let (classifying, summary) = (as_trained(model)?, inspect(model)?);
     // Scans are compared with the reference, casters with the first: f64.

@@ -2,7 +2,7 @@
 
 use super::objects::{Object, Place, places};
 use super::sensors::Scanning;
-use crate::measure::clock::{Contestant, interleave, measured};
+use crate::measure::clock::{Workload, interleave, measured};
 use crate::measure::energy::Energy;
 use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
@@ -51,10 +51,10 @@ pub fn scan_all(
     let patterns: Vec<BeamPattern> = ways.iter().map(|way| way.sensor.pattern()).collect();
     let energy = Energy::here();
     let mut joules: Vec<f64> = vec![0.0; ways.len()];
-    let mut contestants: Vec<Contestant<'_>> = Vec::new();
+    let mut workloads: Vec<Workload<'_>> = Vec::new();
     for ((way, pattern), joules) in ways.iter().zip(&patterns).zip(&mut joules) {
         let (energy, places) = (energy.as_ref(), places(objects, way.distance_m));
-        contestants.push(Box::new(move || {
+        workloads.push(Box::new(move || {
             let before = energy.map(Energy::now);
             let (scans, cost) = measured(|| scan(&places, way, pattern, &AttributeSet::default()));
             if let (Some(energy), Some(before)) = (energy, before) {
@@ -64,8 +64,8 @@ pub fn scan_all(
             Ok(cost)
         }));
     }
-    let costs = interleave(rounds, &mut contestants)?;
-    drop(contestants);
+    let costs = interleave(rounds, &mut workloads)?;
+    drop(workloads);
     let mut truths: BTreeMap<u64, Vec<Made>> = BTreeMap::new();
     let mut all = Vec::new();
     for (i, (way, pattern)) in ways.iter().zip(&patterns).enumerate() {

@@ -1,13 +1,13 @@
 //! Where the points of a simplified scan lie, and how its ranges differ.
 
-use crate::measure::shot::Shot;
+use crate::measure::ray_set::RaySet;
 use rayon::prelude::*;
 use serde::Serialize;
 use sim_gpu::cpu::oracle;
 use sim_gpu::ray::Ray;
 use sim_gpu::simplify::distance_to_surface;
 
-/// Errors over all rays of some shots.
+/// Errors over all rays of some ray_sets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Moved {
     /// Rays that hit the simplified mesh.
@@ -38,7 +38,7 @@ struct Seen {
 
 impl Moved {
     /// Of the same rays against a mesh as it is and simplified.
-    pub fn of([whole, fewer]: &[Vec<Shot>; 2], bound_m: f64) -> Self {
+    pub fn of([whole, fewer]: &[Vec<RaySet>; 2], bound_m: f64) -> Self {
         let pairs = whole.iter().zip(fewer);
         let seen: Vec<Seen> = pairs
             .flat_map(|(whole, fewer)| {
@@ -64,7 +64,7 @@ impl Moved {
 }
 
 /// The ray as `whole` sees it is `of_whole`, as `fewer` sees it `of_fewer`.
-fn one(whole: &Shot, fewer: &Shot, of_whole: &Ray, of_fewer: &Ray) -> Seen {
+fn one(whole: &RaySet, fewer: &RaySet, of_whole: &Ray, of_fewer: &Ray) -> Seen {
     let whole = &whole.job.target;
     let truth = oracle::nearest(whole, of_whole);
     let Some(found) = oracle::nearest(&fewer.job.target, of_fewer) else {

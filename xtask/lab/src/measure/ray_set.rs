@@ -1,20 +1,24 @@
 //! Rays to be cast at one target, as a caster and as the oracle see them.
 
+use anyhow::Result;
 use formats::rng::StreamKey;
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec3, dvec3};
 use sim_gpu::cpu::oracle;
 use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{AMBIGUOUS, MISS, Ray, RayFrame};
-use sim_gpu::sensor::BeamPattern;
+use sim_gpu::sensor::{BeamPattern, Sensor};
 use sim_gpu::target::Target;
 
 /// Numbers the benchmark's own random streams.
 const SEED: u64 = 0x000E_D6E9;
 
+/// The sweeps stand 5 m away, as those of the published comparisons do.
+const SENSOR_M: DVec3 = dvec3(5.0, 0.0, 0.5);
+
 /// Rays against one target. Ray `i` of both lists is the same.
 #[derive(Clone)]
-pub struct Shot {
+pub struct RaySet {
     /// The rays as casters read them; beam `i` is number `i` of a sensor's
     /// pattern, or simply of this list.
     pub job: CastJob,
@@ -22,7 +26,7 @@ pub struct Shot {
     pub rays: Vec<Ray>,
 }
 
-impl Shot {
+impl RaySet {
     /// One revolution or image of a sensor at `pose`.
     pub fn sweep(target: &Target, pose: &Pose, pattern: &BeamPattern, culling: Culling) -> Self {
         let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
@@ -81,11 +85,11 @@ impl Shot {
     pub fn in_firing_order(&self) -> Self {
         let mut order: Vec<usize> = (0..self.rays.len()).collect();
         order.sort_unstable_by_key(|&i| self.job.beams[i]);
-        let mut shot = self.clone();
-        shot.rays = order.iter().map(|&i| self.rays[i]).collect();
-        shot.job.rays = order.iter().map(|&i| self.job.rays[i]).collect();
-        shot.job.beams = order.iter().map(|&i| self.job.beams[i]).collect();
-        shot
+        let mut ray_set = self.clone();
+        ray_set.rays = order.iter().map(|&i| self.rays[i]).collect();
+        ray_set.job.rays = order.iter().map(|&i| self.job.rays[i]).collect();
+        ray_set.job.beams = order.iter().map(|&i| self.job.beams[i]).collect();
+        ray_set
     }
 
     /// Each ray's origin and unit direction in the world, metres.
@@ -110,4 +114,18 @@ impl Shot {
         };
         self.rays.iter().zip(&cast.codes).map(range).collect()
     }
+}
+
+/// The beams of the true VLP-32C at 600 rpm.
+pub fn vlp32c() -> BeamPattern {
+    let sensor = Sensor::builtin("vlp32c").expect("invariant: this profile is built in");
+    sensor.pattern()
+}
+
+/// The pose of the sensor for sweeps.
+///
+/// # Errors
+/// None: the fixed place can be looked at from.
+pub fn sweep_pose() -> Result<Pose> {
+    Ok(Pose::look_at(SENSOR_M, DVec3::ZERO)?)
 }

@@ -1,4 +1,4 @@
-//! The ways of casting that a run compares.
+//! The casters that a run compares.
 
 use anyhow::{Context, Result, bail};
 use sim_gpu::caster::AdapterRequest;
@@ -12,8 +12,8 @@ const RAYS_TO_FILL_A_GPU: usize = 1 << 22;
 /// Rays that keep the cores busy for some tenths of a second.
 const RAYS_TO_FILL_THE_CORES: usize = 1 << 19;
 
-/// One way of casting.
-pub struct Lane {
+/// A caster.
+pub struct Backend {
     /// What casts.
     pub caster: Caster,
     /// Rays that one repeat should cast at least.
@@ -22,48 +22,53 @@ pub struct Lane {
     pub is_gpu: bool,
 }
 
-impl Lane {
-    /// The adapter's name, `cpu` for the twin.
+impl Backend {
+    /// The adapter's name, or `cpu`.
     pub fn name(&self) -> &str {
         self.caster.name()
     }
 }
 
-/// The CPU twin and all adapters, or the one that `request` names.
+/// The CPU and all adapters, or the one that `request` names.
 ///
 /// # Errors
 /// If the adapter asked for is not there or does not open.
-pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Lane>> {
-    let cpu = Lane {
+pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
+    let cpu = Backend {
         caster: Caster::Cpu(Effects::default()),
         rays: RAYS_TO_FILL_THE_CORES,
         is_gpu: false,
     };
-    let mut lanes = Vec::new();
+    let mut backends = Vec::new();
     if matches!(request, None | Some(AdapterRequest::Cpu)) {
-        lanes.push(cpu);
+        backends.push(cpu);
     }
     for adapter in list_adapters() {
         let wanted = match request {
             None => true,
-            Some(AdapterRequest::Auto) => lanes.is_empty(),
+            Some(AdapterRequest::Auto) => backends.is_empty(),
             Some(AdapterRequest::Cpu) => false,
             Some(AdapterRequest::Named(name)) => {
                 adapter.name.to_lowercase().contains(&name.to_lowercase())
             }
         };
-        let known = lanes.iter().any(|lane: &Lane| lane.name() == adapter.name);
+        let known = backends.iter().any(|backend: &Backend| backend.name() == adapter.name);
         if wanted && !known {
             let named = AdapterRequest::Named(adapter.name.clone());
             let caster = Caster::open(&named, &Effects::default())
                 .with_context(|| format!("opening {}", adapter.name))?;
             let software = adapter.kind == AdapterKind::Software;
             let rays = if software { RAYS_TO_FILL_THE_CORES } else { RAYS_TO_FILL_A_GPU };
-            lanes.push(Lane { caster, rays, is_gpu: !software });
+            backends.push(Backend { caster, rays, is_gpu: !software });
         }
     }
-    if lanes.is_empty() {
-        bail!("no adapter answers to that name; `cargo xtask adapters` lists them");
+    if backends.is_empty() {
+        bail!("expected an adapter of that name; `cargo xtask adapters` lists them");
     }
-    Ok(lanes)
+    Ok(backends)
+}
+
+/// An adapter's name, short enough for a table.
+pub fn short(name: &str) -> String {
+    name.split(" (").next().unwrap_or(name).to_owned()
 }
