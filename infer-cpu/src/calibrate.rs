@@ -29,7 +29,7 @@ const CLOUDS_OF_SET: usize = 512;
 /// [`on_clouds`], on some spread over `set`.
 ///
 /// # Errors
-/// A file that is no model.
+/// A file that is not a model.
 #[cfg(feature = "npz")]
 pub fn on_set(path: &Path, set: &LabelledSet) -> Result<BTreeMap<String, f32>, Error> {
     let step = set.len().div_ceil(CLOUDS_OF_SET).max(1);
@@ -40,7 +40,7 @@ pub fn on_set(path: &Path, set: &LabelledSet) -> Result<BTreeMap<String, f32>, E
 /// which are normalised as the network takes them.
 ///
 /// # Errors
-/// A file that is no model.
+/// A file that is not a model.
 pub fn on_clouds<'a>(
     path: &Path,
     clouds: impl IntoIterator<Item = &'a [[f32; 3]]>,
@@ -72,7 +72,7 @@ fn on_clouds_of<'a>(
 /// that brings no calibration and a caller without data.
 ///
 /// # Errors
-/// A file that is no model.
+/// A file that is not a model.
 pub fn on_shapes(path: &Path) -> Result<BTreeMap<String, f32>, Error> {
     on_shapes_of(&ModelSource::File(path.to_path_buf()))
 }

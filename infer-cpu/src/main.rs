@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     match cli::run(&Cli::parse()) {
         Ok(Outcome::Success) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(1),
-        // Whoever read our output has gone, which is no failure of ours.
+        // The reader of the output has gone: that is not a failure.
         Err(error) if cli::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             cli::say(&format!("error: {}", cli::told_once(&error)));

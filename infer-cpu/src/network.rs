@@ -87,7 +87,7 @@ const WIDEST: usize = 1 << 16;
 /// norms folded in.
 ///
 /// # Errors
-/// A file that is no model: what [`crate::Classifier::load`] refuses.
+/// A file that is not a model: what [`crate::Classifier::load`] refuses.
 pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
     read_from(WeightsFile::open(path)?)
 }

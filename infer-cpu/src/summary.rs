@@ -53,7 +53,7 @@ pub struct LayerShape {
 /// Reads the model file at `path`, every tensor of it.
 ///
 /// # Errors
-/// A file that is no model: what [`crate::Classifier::load`] refuses.
+/// A file that is not a model: what [`crate::Classifier::load`] refuses.
 pub fn inspect(path: &Path) -> Result<Summary, Error> {
     let mut file = WeightsFile::open(path)?;
     let card = ModelCard::from_metadata(path, &file.metadata())?;

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 const SPIN: Duration = Duration::from_micros(40);
 
 /// A wait for a worker of this many times a chunk's own time, and
-/// [`LONG_WAIT`] more, is no longer one for its work.
+/// [`LONG_WAIT`] more, is too long to be for its work.
 const LONG_WAIT_CHUNKS: u32 = 3;
 /// A wake-up's time, with room to spare.
 const LONG_WAIT: Duration = Duration::from_micros(200);

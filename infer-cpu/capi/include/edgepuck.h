@@ -46,7 +46,7 @@ typedef enum EdgepuckStatus {
    */
   EDGEPUCK_STATUS_BAD_OPTION = 2,
   /**
-   * The model file cannot be read, or is no model.
+   * The model file cannot be read, or is not a model.
    */
   EDGEPUCK_STATUS_BAD_MODEL = 3,
   /**

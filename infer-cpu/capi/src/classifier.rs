@@ -69,13 +69,13 @@ pub unsafe extern "C" fn edgepuck_load(
 ) -> EdgepuckStatus {
     guard_status(|| {
         pointers::check(out, "out")?;
-        // SAFETY: not null and aligned; the rest is the caller's promise.
+        // SAFETY: not null and aligned; the rest is this function's contract.
         unsafe { out.write(null_mut()) };
-        // SAFETY: the caller's promise.
+        // SAFETY: this function's contract.
         let path = unsafe { pointers::path(path) }?;
         let options = match options.is_null() {
             true => Options::default(),
-            // SAFETY: the caller's promise.
+            // SAFETY: this function's contract.
             false => unsafe { pointers::shared(options, "options")?.read() }?,
         };
         let classifier = Box::new(EdgepuckClassifier::load(&path, &options)?);
@@ -104,12 +104,12 @@ pub unsafe extern "C" fn edgepuck_classify(
 ) -> EdgepuckStatus {
     guard_status(|| {
         pointers::check(out, "out")?;
-        // SAFETY: the caller's promise.
+        // SAFETY: this function's contract.
         let classifier = unsafe { pointers::exclusive(classifier, "classifier") }?;
-        // SAFETY: the caller's promise.
+        // SAFETY: this function's contract.
         let cloud = unsafe { pointers::cloud(xyz, n_points) }?;
         let prediction = classifier.classify(cloud)?;
-        // SAFETY: not null and aligned; the rest is the caller's promise.
+        // SAFETY: not null and aligned; the rest is this function's contract.
         unsafe { out.write(prediction) };
         Ok(())
     })
@@ -131,7 +131,7 @@ pub unsafe extern "C" fn edgepuck_logits(
 ) -> EdgepuckStatus {
     guard_status(|| {
         pointers::check(out, "out")?;
-        // SAFETY: the caller's promise.
+        // SAFETY: this function's contract.
         let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
         let (logits, n_classes) = (&classifier.logits, classifier.class_names.len());
         if logits.is_empty() {
@@ -155,7 +155,7 @@ pub unsafe extern "C" fn edgepuck_logits(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_n_classes(classifier: *const EdgepuckClassifier) -> usize {
     let n_classes = guard(|| {
-        // SAFETY: the caller's promise.
+        // SAFETY: this function's contract.
         let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
         Ok(classifier.class_names.len())
     });
@@ -174,7 +174,7 @@ pub unsafe extern "C" fn edgepuck_class_name(
     index: usize,
 ) -> *const c_char {
     let name = guard(|| {
-        // SAFETY: the caller's promise.
+        // SAFETY: this function's contract.
         let names = unsafe { &pointers::shared(classifier, "classifier")?.class_names };
         let missing = Failure::NoSuchClass { index, n_classes: names.len() };
         names.get(index).map(|name| name.as_ptr()).ok_or(missing)

@@ -102,7 +102,7 @@ impl EdgepuckOptions {
             2 => UpAxis::Z,
             other => return Err(bad("up", format!("expected 0, 1 or 2, found {other}"))),
         };
-        // SAFETY: words are the caller's promise.
+        // SAFETY: words are this function's contract.
         unsafe {
             Ok(Options {
                 precision: word("precision", self.precision)?.unwrap_or_default(),
@@ -125,7 +125,7 @@ impl EdgepuckOptions {
     /// As [`Self::read`].
     unsafe fn sampler(&self) -> Result<Option<SamplerSpec>, Failure> {
         let default = SamplerSpec::default();
-        // SAFETY: words are the caller's promise.
+        // SAFETY: words are this function's contract.
         let (kind, spec) = unsafe {
             let spec = SamplerSpec {
                 kind: default.kind,
@@ -161,7 +161,7 @@ unsafe fn word<T: FromStr<Err: Display>>(
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: not null; the rest is the caller's promise.
+    // SAFETY: not null; the rest is this function's contract.
     let word = unsafe { CStr::from_ptr(pointer) }.to_string_lossy();
     word.parse().map(Some).map_err(|cause: T::Err| bad(option, cause.to_string()))
 }

@@ -12,7 +12,7 @@ use crate::failure::Failure;
 /// during `'a`.
 pub unsafe fn shared<'a, T>(pointer: *const T, name: &'static str) -> Result<&'a T, Failure> {
     check(pointer, name)?;
-    // SAFETY: not null and aligned; the rest is the caller's promise.
+    // SAFETY: not null and aligned; the rest is this function's contract.
     Ok(unsafe { &*pointer })
 }
 
@@ -23,7 +23,7 @@ pub unsafe fn shared<'a, T>(pointer: *const T, name: &'static str) -> Result<&'a
 /// uses during `'a`.
 pub unsafe fn exclusive<'a, T>(pointer: *mut T, name: &'static str) -> Result<&'a mut T, Failure> {
     check(pointer, name)?;
-    // SAFETY: not null and aligned; the rest is the caller's promise.
+    // SAFETY: not null and aligned; the rest is this function's contract.
     Ok(unsafe { &mut *pointer })
 }
 
@@ -61,7 +61,7 @@ pub unsafe fn cloud<'a>(xyz: *const f32, n: usize) -> Result<&'a [[f32; 3]], Fai
 /// If it is not null, it is a NUL-terminated string.
 pub unsafe fn path(pointer: *const c_char) -> Result<PathBuf, Failure> {
     check(pointer, "path")?;
-    // SAFETY: not null; the rest is the caller's promise.
+    // SAFETY: not null; the rest is this function's contract.
     let path = unsafe { CStr::from_ptr(pointer) };
     #[cfg(unix)]
     let path: &std::ffi::OsStr = std::os::unix::ffi::OsStrExt::from_bytes(path.to_bytes());

@@ -11,7 +11,7 @@ pub enum EdgepuckStatus {
     /// An option has a value that nothing can be done with, or that the model
     /// cannot meet.
     BadOption = 2,
-    /// The model file cannot be read, or is no model.
+    /// The model file cannot be read, or is not a model.
     BadModel = 3,
     /// The cloud has no points, too many, or a coordinate that is not finite.
     BadCloud = 4,

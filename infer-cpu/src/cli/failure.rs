@@ -42,7 +42,7 @@ pub fn told_once(error: &anyhow::Error) -> String {
     })
 }
 
-/// Writes a line to standard error. One that is closed is no reason to stop.
+/// Writes a line to standard error. A closed one does not stop the program.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -16,7 +16,7 @@ const STANDARD_INPUT: &str = "-";
 /// a `format`, a file's name tells it, or the first bytes of standard input.
 ///
 /// # Errors
-/// What cannot be read, or is no cloud.
+/// Input that cannot be read or is not a cloud.
 pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
     if name.as_os_str() == STANDARD_INPUT {
         return read_cloud_from(stdin().lock(), format, Path::new("standard input"));
@@ -27,7 +27,7 @@ pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, F
 /// Reads the cloud in the file at `path`.
 ///
 /// # Errors
-/// What cannot be read, or is no cloud.
+/// Input that cannot be read or is not a cloud.
 pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
     if path.is_dir() {
         return Err(FormatError::malformed(

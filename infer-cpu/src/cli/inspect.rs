@@ -33,7 +33,7 @@ pub struct Args {
 /// Shows the model.
 ///
 /// # Errors
-/// A file that is no model.
+/// A file that is not a model.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let path = model::find(args.model.as_deref())?;
     let summary = infer_cpu::inspect(&path)?;

@@ -105,6 +105,7 @@ impl<T: Format> Engine<T> {
         let n_points = read(&self.points).len() / 4;
         let stride = self.width_before_last(pass, &feature, &folded);
         let mut pool = lock(&self.groups[group]);
+        // Later runs of blocks go on with the maxima of those before.
         if first_block == 0 {
             pool.begin::<T>(last, group, winners);
         }
@@ -122,6 +123,8 @@ impl<T: Format> Engine<T> {
                     first_row,
                 )
             };
+            // A block whose products cannot be ruled out cheaply ends the prefilter for
+            // this group: those that follow will hardly be better.
             if !is_pooled {
                 pool.prefilters &= !block.has_levels;
                 let first_row = winners.then_some(first_row as u32);

@@ -186,7 +186,7 @@ impl SamplerSpec {
     /// That the specification can be met.
     ///
     /// # Errors
-    /// M is needed but 0; a voxel size that is no positive length.
+    /// M is needed but 0; a voxel size that is not above 0.
     pub fn check(&self) -> Result<(), SamplerError> {
         let voxel_size = self.voxel_size.filter(|_| self.kind == SamplerKind::Voxel);
         match (self.kind, voxel_size) {

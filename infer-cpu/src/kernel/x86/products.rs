@@ -53,6 +53,8 @@ pub(in crate::kernel) unsafe fn rows<L: Lanes, T: Tile<L>>(
     check::<L, T>(rows, weights, &panels);
     let width = weights.channels(&panels).end;
     assert!(holds_rows(out.len(), rows.n, out_stride, width), "no room for the outputs");
+    // Panels outside, rows inside: a panel stays in the first-level cache while
+    // the rows, which are fewer bytes, stream by.
     for panel in panels {
         let first = panel * weights.nr();
         let data = weights.panel(panel);
@@ -132,6 +134,8 @@ pub(in crate::kernel) unsafe fn max<L: Lanes, T: Tile<L>>(
                 std::array::from_fn(|v| T::load(maxima.as_ptr().add(v * L::N)));
             for_tiles!(L, rows.n, |row, R| {
                 let from = rows.data.as_ptr().add(row * rows.stride);
+                // Maxima stay in registers over all rows: the products, a thousand a
+                // point, are never stored.
                 for sums in T::sums::<R>(from, rows.stride, data) {
                     for v in 0..V {
                         best[v] = T::max(sums[v], best[v]);

@@ -74,6 +74,8 @@ unsafe fn accumulate<L: Lanes, W: Weight, const R: usize>(
         unsafe {
             let w: [L; V] = std::array::from_fn(|v| W::lanes(panel.add((k * V + v) * L::N)));
             for (r, acc) in acc.iter_mut().enumerate() {
+                // One load broadcasts an activation to all lanes, so that rows need
+                // no packing.
                 let a = L::splat(*rows.add(r * stride + k));
                 for v in 0..V {
                     acc[v] = a.fma(w[v], acc[v]);
@@ -148,6 +150,7 @@ impl<L: Lanes> Tile<L> for Half {
             let mut wide = [[0.0f32; WIDENED]; R];
             for (chunk, panel) in panel.chunks(WIDENED * V * L::N).enumerate() {
                 let k = panel.len() / (V * L::N);
+                // Widened once here, not for each panel's vector in the loop below.
                 for (r, wide) in wide.iter_mut().enumerate() {
                     let row = rows.add(r * stride + chunk * WIDENED);
                     for at in (0..k).step_by(L::N) {
