@@ -6,6 +6,7 @@ const show = (id) => {
   for (const tab of tabs) {
     const chosen = tab.dataset.tab === id;
     tab.setAttribute("aria-selected", String(chosen));
+    if (chosen) tab.scrollIntoView({ block: "nearest", inline: "nearest" });
     document.getElementById(tab.dataset.tab).hidden = !chosen;
   }
 };

@@ -72,13 +72,14 @@ fn by_points(comparison: &Comparison) -> Chart<'static> {
         let ms = measured.ms();
         let tip = format!("{}, {} points\n{ms:.3} ms", measured.engine, measured.points);
         let dot = Dot { x: measured.points as f64, y: ms, tip, filled: measured.ours };
-        series.entry(&measured.engine).or_default().push(dot);
+        let name = if measured.ours { &measured.engine } else { "other engines" };
+        series.entry(name).or_default().push(dot);
     }
     let series = series.into_iter();
     let series = series.map(|(name, dots)| Series { name: name.to_owned(), dots, joined: true });
     Chart {
         message: comparison.message(),
-        caption: "PointNet on one cloud with one thread, medians of one run in turns. Filled: Edgepuck.",
+        caption: "PointNet on one cloud with one thread, medians of one run in turns. Filled: Edgepuck, by precision.",
         x: Axis { label: "points", logarithmic: true, percent: false },
         y: Axis { label: "milliseconds", logarithmic: true, percent: false },
         series: series.collect(),
@@ -103,11 +104,14 @@ impl Comparison {
             let of = self.on_one_thread().filter(|m| m.points == POINTS && m.ours == ours);
             of.min_by(|a, b| a.ms().total_cmp(&b.ms()))
         };
-        let words = |m: &Measured| format!("{} takes {} ms", m.engine, digits(m.ms()));
         match fastest(true).zip(fastest(false)) {
-            Some((ours, other)) => {
-                format!("With {POINTS} points {}, {}.", words(ours), words(other))
-            }
+            Some((ours, other)) => format!(
+                "With {POINTS} points {} takes {} ms; the fastest other engine, {}, takes {} ms.",
+                ours.engine,
+                digits(ours.ms()),
+                other.engine,
+                digits(other.ms())
+            ),
             None => "Milliseconds to classify one cloud, by its points.".to_owned(),
         }
     }
