@@ -8,13 +8,14 @@ use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::AMBIGUOUS;
+use sim_gpu::ray::{AMBIGUOUS, MISS};
+use sim_gpu::resolve::resolve;
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
 use test_support::need;
 use tests::adapter::{adapter, casters};
 use tests::casting::{at, beams, builtin, hits, job, job_with, target, target_by};
-use tests::judge::{SILHOUETTE_RAD, Verdict, judge, near_edge};
+use tests::judge::{MOST_AMBIGUOUS, SILHOUETTE_RAD, Verdict, judge, leaves_too_much, near_edge};
 use tests::meshes::{cube, icosphere, soup, together, torus};
 use tests::random::Random;
 
@@ -53,14 +54,30 @@ fn for_all_jobs(mut check: impl FnMut(&str, &Target, &Pose, &BeamPattern)) {
     }
 }
 
+/// A caster that leaves every ray to f64 keeps every promise: it has to fail by the share.
+#[test]
+fn a_caster_that_marks_every_ray_is_found_out() {
+    let pattern = builtin("generic-static");
+    let job = job(&target(&cube()), &at(DVec3::new(0.1, 0.2, 0.3)), &pattern);
+    let mut cast = casters(&Effects::default())[0].cast(std::slice::from_ref(&job)).unwrap();
+    cast[0].codes.iter_mut().filter(|code| **code != MISS).for_each(|code| *code |= AMBIGUOUS);
+    let hits = resolve(&job, &cast[0], &pattern, &Effects::default());
+    judge(&job, &pattern, &hits).assert_kept("all rays marked");
+    assert!(leaves_too_much(&hits, MOST_AMBIGUOUS));
+}
+
 #[test]
 fn every_caster_keeps_the_promise() {
     for caster in casters(&Effects::default()) {
         let mut all = Verdict::default();
         for_all_jobs(|name, target, pose, pattern| {
             let job = job(target, pose, pattern);
-            let verdict = judge(&job, pattern, &hits(caster, &job, pattern));
-            verdict.assert_kept(&format!("{name}, {}", caster.name()));
+            let hits = hits(caster, &job, pattern);
+            let verdict = judge(&job, pattern, &hits);
+            let what = format!("{name}, {}", caster.name());
+            verdict.assert_kept(&what);
+            let (decided, n) = (hits.decided_in_f64, hits.hits.len());
+            assert!(!leaves_too_much(&hits, MOST_AMBIGUOUS), "{what}: {decided} of {n} in f64");
             all = std::mem::take(&mut all).and(verdict);
         });
         println!("{}: {all}", caster.name());

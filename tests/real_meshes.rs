@@ -15,8 +15,18 @@ use sim_gpu::sensor::BeamPattern;
 use test_support::{need, shared_data};
 use tests::adapter::casters;
 use tests::casting::{builtin, job, target};
-use tests::judge::{Verdict, judge};
+use tests::judge::{Verdict, judge, leaves_too_much};
 use tests::shared_data::unpacked;
+
+/// The most of one mesh's hits that a caster may leave to f64. CAD collections
+/// have faces that lie upon one another, where f32 cannot tell which is nearer:
+/// measured on the CPU over 173 meshes of ModelNet and Princeton, it was 19.4 %
+/// of a jet's hits, and more than 5 % of the hits of six meshes. This is 2.5 times
+/// the most.
+const MOST_AMBIGUOUS: f64 = 0.5;
+
+/// The most of all hits of a folder: 0.43 % were measured over those meshes.
+const MOST_AMBIGUOUS_OF_ALL: f64 = 0.02;
 
 /// What a folder of meshes showed on one caster.
 #[derive(Default)]
@@ -61,6 +71,8 @@ fn survey_folder(root: &Path, every: usize) {
             "  {:.2} % decided in f64; cast {cast_s:.2} s, resolve {resolve_s:.2} s",
             100.0 * *decided_in_f64 as f64 / verdict.hits as f64
         );
+        let all = *decided_in_f64 as f64 / verdict.hits as f64;
+        assert!(all <= MOST_AMBIGUOUS_OF_ALL, "{}: {all}", caster.name());
         for (share, name) in shares.iter().take(5) {
             println!("  {:5.1} % of {name}", share * 100.0);
         }
@@ -82,7 +94,10 @@ impl Tally {
         let hits = resolve(job, &casts[0], pattern, &Effects::default());
         self.resolve_s += start.elapsed().as_secs_f64();
         let verdict = judge(job, pattern, &hits);
-        verdict.assert_kept(&format!("{} on {}", entry.relative, caster.name()));
+        let what = format!("{} on {}", entry.relative, caster.name());
+        verdict.assert_kept(&what);
+        let (decided, all) = (hits.decided_in_f64, hits.hits.len());
+        assert!(!leaves_too_much(&hits, MOST_AMBIGUOUS), "{what}: {decided} of {all} in f64");
         let share = hits.decided_in_f64 as f64 / hits.hits.len().max(1) as f64;
         self.shares.push((share, format!("{} ({} hits)", entry.relative, hits.hits.len())));
         self.decided_in_f64 += hits.decided_in_f64;

@@ -23,6 +23,16 @@ pub const GRAZING_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 /// Beams closer than this to a silhouette may see what lies on its other side.
 pub const SILHOUETTE_RAD: f64 = 1e-6;
 
+/// The most of a mesh's hits that a caster may leave to f64, of meshes whose
+/// surfaces do not lie upon one another.
+///
+/// A caster marks a ray that passes an edge by less than its own rounding,
+/// `DISPLACEMENT`, which is 48 * 2^-24 of a unit length: of triangles whose sides
+/// are a fiftieth of the object, whose perimeter is 350 times their area, that is
+/// 350 * 2.9e-6, a thousandth of all hits. This allows twenty times as much, for
+/// triangles that are seen from the side.
+pub const MOST_AMBIGUOUS: f64 = 0.02;
+
 /// How a caster's hits compare with the oracle's.
 #[derive(Clone, Debug, Default)]
 pub struct Verdict {
@@ -37,6 +47,13 @@ pub struct Verdict {
     pub at_silhouettes: usize,
     /// What breaks the promise, in words.
     pub broken: Vec<String>,
+}
+
+/// Whether a caster left more than the share `most` of `hits` to f64, and more
+/// than one. A caster that marks every ray would keep every promise.
+#[must_use]
+pub fn leaves_too_much(hits: &Hits, most: f64) -> bool {
+    hits.decided_in_f64 as f64 > (most * hits.hits.len() as f64).max(1.0)
 }
 
 /// Compares `hits`, which a caster found for `job`, with the oracle on all

@@ -61,7 +61,10 @@ pub struct Simplified {
 
 /// This build has no decimation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("this build cannot simplify: build with `--features simplify`")]
+#[error(
+    "this program was built without simplification: build it with `--features simplify`, which \
+     needs a C++ compiler"
+)]
 pub struct NotBuilt;
 
 impl Simplify {
