@@ -1,16 +1,18 @@
-//! The one crate that every other crate of Edgepuck shares: counter-based
-//! random numbers, scans, clouds and packed datasets, and atomic writes.
+//! The data types and file formats that the crates of Edgepuck share: scans,
+//! clouds, labelled sets, models, and counter-based random numbers.
 //!
-//! Without features it holds what a program needs in memory. Features add files:
+//! Without features the library holds what a program needs in memory. Features
+//! add files:
 //!
 //! | feature | what |
 //! | --- | --- |
 //! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY and KITTI's `.bin` |
-//! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` labelled sets too |
+//! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets too |
 //! | `cloud-files` | all of these |
 //! | `dataset` | scans, packed sets and yanx27's layout, written and read |
 //! | `pcap` | a VLP-32C's packets (`vlp32c`) |
-//! | `weights` | models (`weights`) and what they say about themselves (`model_card`) |
+//! | `weights` | models (`weights`) and what they state about themselves (`model_card`) |
+//! | `chamfer` | the distance of two clouds (`chamfer`) |
 //! | `hdf5` | ModelNet40's HDF5 layout |
 //!
 //! None of them needs a C compiler for its target.
@@ -79,3 +81,8 @@ pub mod yanx27;
 pub use error::FormatError;
 pub use scan::{Attribute, AttributeSet, Scan};
 pub use split::Split;
+
+/// The README's example is compiled.
+#[cfg(all(doctest, feature = "cloud-files"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,9 +1,9 @@
 //! `ablate`: what each effect is worth, on shapes that take no time.
 
-use crate::{LAB, beside, exits, said};
+use crate::{LAB, exits, run, said};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const PLAN: &str = r#"
 about = "a test"
@@ -27,9 +27,8 @@ trunk = [8, 16]
 head = [12]
 "#;
 
-fn ablate(folder: &Path, train: &Path) -> Output {
-    let words = ["ablate", "--plan", "plan.toml", "--out", "out"];
-    Command::new(LAB).current_dir(folder).args(words).env("EDGEPUCK_TRAIN", train).output().unwrap()
+fn ablate(folder: &Path) -> Output {
+    run(Path::new(LAB), folder, "ablate --plan plan.toml --out out")
 }
 
 /// The lines of a CSV file by heading.
@@ -50,11 +49,10 @@ fn timeless(file: &Path) -> Vec<BTreeMap<String, String>> {
 
 #[test]
 fn every_effect_has_its_lines_and_an_interrupted_run_goes_on() {
-    let train = beside("edgepuck-train").expect("`cargo test --workspace` builds edgepuck-train");
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("plan.toml"), PLAN).unwrap();
-    let ran = ablate(at, &train);
+    let ran = ablate(at);
     assert!(ran.status.success(), "{}", said(&ran));
     let csv = at.join("out/ablations.csv");
     let found = lines(&csv);
@@ -100,7 +98,7 @@ fn every_effect_has_its_lines_and_an_interrupted_run_goes_on() {
     std::fs::remove_dir_all(at.join("out/work/data/grid")).unwrap();
     let first = timeless(&csv);
     std::fs::remove_file(&csv).unwrap();
-    let again = ablate(at, &train);
+    let again = ablate(at);
     assert!(again.status.success(), "{}", said(&again));
     assert_eq!(timeless(&csv), first);
 }
@@ -124,5 +122,5 @@ fn what_cannot_be_run_is_refused_before_anything_is_made() {
     std::fs::create_dir(at.join("other")).unwrap();
     std::fs::write(at.join("other/terms.toml"), "version = \"another\"").unwrap();
     let said = exits(1, Path::new(LAB), at, "ablate --quick --out other");
-    assert!(said.contains("an earlier run had another plan or other meshes"), "{said}");
+    assert!(said.contains("an earlier run had another plan or other data"), "{said}");
 }

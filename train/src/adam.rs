@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::layer::Learns;
+use crate::layer::Module;
 use crate::parameter::Parameter;
 
 /// Elements that one thread takes at a time.
@@ -18,9 +18,9 @@ pub struct Adam {
     pub rate: f64,
     /// Decay of the running mean of gradients.
     pub beta1: f64,
-    /// Decay of that of their squares.
+    /// Decay of the running mean of their squares.
     pub beta2: f64,
-    /// Added to the root of the latter.
+    /// Added to the root of the mean square.
     pub epsilon: f64,
     /// Share of each weight added to its gradient.
     pub l2: f64,
@@ -34,8 +34,8 @@ impl Default for Adam {
 }
 
 impl Adam {
-    /// Takes step number `step` (the first is 1) by a `rate`.
-    pub fn step(&self, network: &mut dyn Learns, step: u64, rate: f64) {
+    /// Takes step number `step` (the first is 1) with learning rate `rate`.
+    pub fn step(&self, network: &mut dyn Module, step: u64, rate: f64) {
         network.parameters(&mut |parameter| self.update(parameter, step, rate));
     }
 

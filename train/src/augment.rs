@@ -1,7 +1,7 @@
-//! Clouds as they are drawn for a batch: points chosen, dropped, moved.
+//! Augmentation: the points of a cloud are chosen, dropped and moved.
 //!
-//! Every draw is keyed by the run's seed, the epoch and the cloud, so that a
-//! cloud is the same whichever thread makes it, and in whichever batch it is.
+//! Random numbers are keyed by the run's seed, the epoch and the cloud, so that a
+//! cloud does not depend on the thread or the batch.
 
 use std::borrow::Cow;
 
@@ -11,21 +11,21 @@ use infer_cpu::sampler::{FarthestPoints, FpsStart};
 use crate::clouds::Clouds;
 use crate::recipe::{Augment, Axis, Recipe, Sampling};
 
-/// One cloud as the network sees it.
+/// One augmented cloud, as the network sees it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drawn {
+pub struct TrainingCloud {
     /// Its points.
     pub points: Vec<[f32; 3]>,
-    /// All points that it was chosen from, moved as they were, where the
-    /// network looks around; else none.
-    pub around: Vec<[f32; 3]>,
-    /// How often the first counts: once, and once for each that was dropped.
+    /// All points that these were chosen from, moved in the same way, if the
+    /// network has EdgeConv layers; otherwise empty.
+    pub neighborhood: Vec<[f32; 3]>,
+    /// How often the first point counts: once, and once for each dropped point.
     pub first_weight: f32,
-    /// The share of each class.
+    /// The target share of each class.
     pub target: Vec<f32>,
 }
 
-/// Random numbers of one cloud in one epoch.
+/// The random numbers of one cloud in one epoch.
 struct Draws {
     stream: StreamKey,
     n: u64,
@@ -55,16 +55,16 @@ impl Draws {
 
 /// Cloud `i` of `clouds` in epoch `epoch` of `recipe`.
 #[must_use]
-pub fn draw(clouds: &Clouds, i: usize, epoch: u32, recipe: &Recipe) -> Drawn {
+pub fn augment(clouds: &Clouds, i: usize, epoch: u32, recipe: &Recipe) -> TrainingCloud {
     let stream = StreamKey::new(recipe.seed, &format!("augment {i}"), epoch);
     let mut draws = Draws { stream, n: 0 };
-    let Chosen { mut points, mut around, mut places } =
-        chosen(clouds.set.cloud(i), recipe, &mut draws);
+    let ChosenPoints { mut points, mut neighborhood, mut places } =
+        choose(clouds.set.cloud(i), recipe, &mut draws);
     let n_classes = clouds.classes.len();
     let mut target = one_hot(clouds.set.labels[i], n_classes);
     if recipe.augment.cut_mix > 0.0 && draws.unit() < recipe.augment.cut_mix {
         let other = draws.below(clouds.len());
-        let other_points = chosen(clouds.set.cloud(other), recipe, &mut draws).points;
+        let other_points = choose(clouds.set.cloud(other), recipe, &mut draws).points;
         let replaced = mix(&mut points, &other_points, &mut draws);
         for (share, other) in target.iter_mut().zip(one_hot(clouds.set.labels[other], n_classes)) {
             *share += replaced * (other - *share);
@@ -75,25 +75,25 @@ pub fn draw(clouds: &Clouds, i: usize, epoch: u32, recipe: &Recipe) -> Drawn {
         *share = *share * (1.0 - smoothing) + smoothing / n_classes as f32;
     }
     let n = points.len();
-    if around.is_empty() {
+    if neighborhood.is_empty() {
         drop_points(&mut points, recipe.augment.drop, &mut draws);
         transform(&mut points, &recipe.augment, &mut draws);
     } else {
-        // All are moved once, so that a chosen one is where it is among them.
+        // All points are moved together, so that chosen points stay among them.
         drop_points(&mut places, recipe.augment.drop, &mut draws);
-        transform(&mut around, &recipe.augment, &mut draws);
-        points = places.iter().map(|&place| around[place]).collect();
+        transform(&mut neighborhood, &recipe.augment, &mut draws);
+        points = places.iter().map(|&place| neighborhood[place]).collect();
     }
     let first_weight = (n - points.len() + 1) as f32;
-    Drawn { points, around, first_weight, target }
+    TrainingCloud { points, neighborhood, first_weight, target }
 }
 
-/// Points of a cloud that the network sees.
-struct Chosen {
+/// The points of a cloud that the network sees.
+struct ChosenPoints {
     points: Vec<[f32; 3]>,
-    /// All points, where the network looks around; else none.
-    around: Vec<[f32; 3]>,
-    /// Where each of `points` is in `around`.
+    /// All points, if the network has EdgeConv layers; otherwise empty.
+    neighborhood: Vec<[f32; 3]>,
+    /// The place of each of `points` in `neighborhood`.
     places: Vec<usize>,
 }
 
@@ -101,9 +101,8 @@ fn one_hot(label: usize, n_classes: usize) -> Vec<f32> {
     (0..n_classes).map(|class| f32::from(u8::from(class == label))).collect()
 }
 
-/// As many points of `cloud` as the network sees, and those around them, where
-/// it looks at them.
-fn chosen(cloud: &[[f32; 3]], recipe: &Recipe, draws: &mut Draws) -> Chosen {
+/// Chooses the points of `cloud` that the network sees.
+fn choose(cloud: &[[f32; 3]], recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
     let n = recipe.points.min(cloud.len());
     let (candidates, places): (Cow<'_, [[f32; 3]]>, Vec<usize>) = match recipe.sampling {
         Sampling::First => (cloud.into(), (0..n).collect()),
@@ -121,8 +120,12 @@ fn chosen(cloud: &[[f32; 3]], recipe: &Recipe, draws: &mut Draws) -> Chosen {
         }
     };
     let points = places.iter().map(|&place| candidates[place]).collect();
-    let looks = !recipe.network.edges.is_empty();
-    Chosen { points, around: if looks { candidates.into_owned() } else { Vec::new() }, places }
+    let has_edges = !recipe.network.edges.is_empty();
+    ChosenPoints {
+        points,
+        neighborhood: if has_edges { candidates.into_owned() } else { Vec::new() },
+        places,
+    }
 }
 
 /// The points of `cloud`, of which the first `n` are a random choice in random
@@ -148,8 +151,8 @@ fn mix(points: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
     n as f32 / all as f32
 }
 
-/// Drops each point with a chance that is uniform below `most`. The first
-/// stays: the baseline moves what it drops onto it.
+/// Drops each point with a chance that is uniform below `most`. The first point
+/// stays, because the baseline moves dropped points onto it.
 fn drop_points<T>(points: &mut Vec<T>, most: f64, draws: &mut Draws) {
     let chance = most * draws.unit();
     let mut is_first = true;
@@ -183,7 +186,7 @@ fn transform(points: &mut [[f32; 3]], augment: &Augment, draws: &mut Draws) {
     }
 }
 
-/// The two axes across `up`, and `up`.
+/// The two axes perpendicular to `up`, and `up`.
 fn axes(up: Axis) -> [usize; 3] {
     match up {
         Axis::X => [1, 2, 0],
@@ -192,7 +195,7 @@ fn axes(up: Axis) -> [usize; 3] {
     }
 }
 
-/// Where gen-dataset's sensors stand by default, but from any side.
+/// A sensor's position as in gen-dataset by default, at a random azimuth.
 fn sensor(up: Axis, draws: &mut Draws) -> [f64; 3] {
     const DISTANCE: f64 = 3.0;
     let (elevation, azimuth) = (20f64.to_radians(), draws.between(0.0, std::f64::consts::TAU));

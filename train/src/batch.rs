@@ -1,25 +1,26 @@
-//! Clouds as a network learns from them.
+//! A batch of clouds.
 
 use ndarray::ArrayView2;
 
 use crate::layer::Rows;
 use crate::matrix::Matrix;
 
-/// Some clouds and what they should be called.
+/// Clouds and their targets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
-    /// Points of all clouds, `[rows, 3]`, distinct ones only.
+    /// Points of all clouds, `[rows, 3]`, each once.
     pub coordinates: Vec<[f32; 3]>,
-    /// How often each counts.
+    /// How often each point counts in statistics.
     pub weights: Vec<f32>,
-    /// Where each cloud's rows begin, and where the last one's end.
+    /// Where each cloud's rows begin, and where the last cloud's end.
     pub starts: Vec<usize>,
-    /// All points of the clouds, where the network looks around those above;
-    /// else nothing.
-    pub around: Vec<[f32; 3]>,
-    /// Where each cloud's begin in `around`, and where the last one's end.
-    pub around_starts: Vec<usize>,
-    /// The share of each class, `[clouds, classes]`.
+    /// All points of the clouds, in which EdgeConv layers search neighbors; empty
+    /// without such layers.
+    pub neighborhood: Vec<[f32; 3]>,
+    /// Where each cloud's points begin in `neighborhood`, and where the last
+    /// cloud's end.
+    pub neighborhood_starts: Vec<usize>,
+    /// The target share of each class, `[clouds, classes]`.
     pub targets: Matrix,
 }
 
@@ -36,11 +37,11 @@ impl Batch {
         self.len() == 0
     }
 
-    /// All points of cloud `cloud`.
+    /// The points among which cloud `cloud` searches neighbors.
     #[must_use]
-    pub fn surroundings(&self, cloud: usize) -> &[[f32; 3]] {
-        match self.around_starts.get(cloud..cloud + 2) {
-            Some(&[first, last]) => &self.around[first..last],
+    pub fn neighborhood_of(&self, cloud: usize) -> &[[f32; 3]] {
+        match self.neighborhood_starts.get(cloud..cloud + 2) {
+            Some(&[first, last]) => &self.neighborhood[first..last],
             _ => &[],
         }
     }
@@ -53,7 +54,7 @@ impl Batch {
             .expect("invariant: three coordinates a point")
     }
 
-    /// Their rows.
+    /// The rows of the points, with their weights.
     #[must_use]
     pub fn rows(&self) -> Rows<'_> {
         let total = self.weights.iter().map(|&w| f64::from(w)).sum::<f64>() as f32;

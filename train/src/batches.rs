@@ -1,4 +1,4 @@
-//! An epoch's batches, made ahead of the network on threads of their own.
+//! An epoch's batches, prepared in advance on other threads.
 
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::Scope;
@@ -6,13 +6,13 @@ use std::thread::Scope;
 use formats::rng::StreamKey;
 use rayon::prelude::*;
 
-use crate::augment::{Drawn, draw};
+use crate::augment::{TrainingCloud, augment};
 use crate::batch::Batch;
 use crate::clouds::Clouds;
 use crate::matrix::Matrix;
 use crate::recipe::Recipe;
 
-/// Batches that wait for the network at most.
+/// Prepared batches that wait for the network, at most.
 const AHEAD: usize = 3;
 
 /// How many whole batches `n` clouds make.
@@ -21,7 +21,7 @@ pub fn count(n: usize, recipe: &Recipe) -> usize {
     n / recipe.batch
 }
 
-/// The batches of `epoch`, in an order that seed and epoch decide.
+/// The batches of `epoch`, in an order that depends on seed and epoch.
 pub fn start<'s>(
     scope: &'s Scope<'s, '_>,
     clouds: &'s Clouds,
@@ -32,10 +32,10 @@ pub fn start<'s>(
     scope.spawn(move || {
         let order = order(clouds.len(), epoch, recipe);
         for some in order.chunks_exact(recipe.batch) {
-            let drawn: Vec<Drawn> =
-                some.par_iter().map(|&i| draw(clouds, i, epoch, recipe)).collect();
+            let drawn: Vec<TrainingCloud> =
+                some.par_iter().map(|&i| augment(clouds, i, epoch, recipe)).collect();
             if sender.send(joined(&drawn)).is_err() {
-                // Whoever learns has stopped.
+                // The receiver has stopped after an error.
                 break;
             }
         }
@@ -55,16 +55,16 @@ fn order(n: usize, epoch: u32, recipe: &Recipe) -> Vec<usize> {
 
 /// One batch of some clouds.
 #[must_use]
-pub fn joined(drawn: &[Drawn]) -> Batch {
+pub fn joined(drawn: &[TrainingCloud]) -> Batch {
     let n_classes = drawn.first().map_or(0, |cloud| cloud.target.len());
-    let mut batch = Batch { starts: vec![0], around_starts: vec![0], ..Batch::default() };
+    let mut batch = Batch { starts: vec![0], neighborhood_starts: vec![0], ..Batch::default() };
     for cloud in drawn {
         batch.coordinates.extend(&cloud.points);
         batch.weights.push(cloud.first_weight);
         batch.weights.resize(batch.coordinates.len(), 1.0);
         batch.starts.push(batch.coordinates.len());
-        batch.around.extend(&cloud.around);
-        batch.around_starts.push(batch.around.len());
+        batch.neighborhood.extend(&cloud.neighborhood);
+        batch.neighborhood_starts.push(batch.neighborhood.len());
     }
     let targets = drawn.iter().flat_map(|cloud| cloud.target.iter().copied()).collect();
     batch.targets = Matrix::from_shape_vec((drawn.len(), n_classes), targets)

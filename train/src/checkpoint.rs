@@ -1,5 +1,5 @@
-//! Where a run stands, so that it can go on after any kill: parameters,
-//! running statistics and Adam's moments to the bit, in one safetensors file.
+//! Checkpoint and resume: parameters, running statistics and Adam's moments, to
+//! the bit, in one safetensors file.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,30 +8,28 @@ use formats::FormatError;
 use formats::weights::{Tensor, WeightsFile, write_weights};
 
 use crate::error::Error;
-use crate::layer::Learns;
-use crate::model;
+use crate::layer::Module;
+use crate::model_file;
 use crate::recipe::Recipe;
 use crate::trainer::Trainer;
 
 const MEAN: &str = ".adam_mean";
 const SQUARE: &str = ".adam_square";
 
-/// Writes where `trainer` stands, atomically. `notes` are kept with it.
+/// Writes the state of `trainer` to `path`, atomically, with `notes`.
 ///
 /// # Errors
 /// What the system reports.
 pub fn write(path: &Path, trainer: &mut Trainer, notes: &str) -> Result<(), Error> {
-    let mut tensors = model::tensors(&mut trainer.model);
+    let mut tensors = model_file::tensors(&mut trainer.model);
     trainer.model.parameters(&mut |parameter| {
         for (suffix, values) in [(MEAN, &parameter.mean), (SQUARE, &parameter.square)] {
             let tensor = Tensor { shape: parameter.shape.clone(), values: values.clone() };
             tensors.insert(format!("{}{suffix}", parameter.name), tensor);
         }
     });
-    let recipe = toml::to_string(&trainer.recipe)
-        .map_err(|error| Error::Recipe { key: "recipe", cause: error.to_string() })?;
     let metadata = [
-        ("recipe", recipe),
+        ("recipe", trainer.recipe.to_toml()?),
         ("step", trainer.step.to_string()),
         ("epoch", trainer.epoch.to_string()),
         ("notes", notes.to_owned()),
@@ -40,21 +38,27 @@ pub fn write(path: &Path, trainer: &mut Trainer, notes: &str) -> Result<(), Erro
     Ok(write_weights(path, &tensors, &metadata)?)
 }
 
-/// Takes `trainer` to where the checkpoint at `path` stands; returns its notes.
+/// Sets `trainer` to the state in the checkpoint at `path`; returns its notes.
 ///
 /// # Errors
-/// A file that is none, or that is of a run of another recipe.
+/// A file that is not a checkpoint, or a checkpoint of another recipe.
 pub fn read(path: &Path, trainer: &mut Trainer) -> Result<String, Error> {
     let mut file = WeightsFile::open(path)?;
     let metadata = file.metadata();
     let text = |key: &str| {
         metadata.get(key).cloned().ok_or_else(|| {
-            FormatError::malformed(path, format!("metadata `{key}`"), "missing: no checkpoint")
+            FormatError::malformed(
+                path,
+                format!("metadata `{key}`"),
+                "missing, although every checkpoint has it",
+            )
         })
     };
     let number = |key: &str| -> Result<u64, Error> {
         let value = text(key)?;
-        let bad = |_| FormatError::malformed(path, format!("metadata `{key}`"), "no number");
+        let bad = |_| {
+            FormatError::malformed(path, format!("metadata `{key}`"), "expected a whole number")
+        };
         Ok(value.parse().map_err(bad)?)
     };
     check_recipe(path, &text("recipe")?, &trainer.recipe)?;
@@ -75,7 +79,7 @@ pub fn read(path: &Path, trainer: &mut Trainer) -> Result<String, Error> {
     });
     trainer.model.statistics(&mut |name, values| take(name.to_owned(), values));
     if let Some(name) = missing {
-        let cause = "missing, or of another shape";
+        let cause = "missing or of another shape";
         return Err(FormatError::malformed(path, format!("tensor `{name}`"), cause).into());
     }
     trainer.step = number("step")?;
@@ -83,8 +87,8 @@ pub fn read(path: &Path, trainer: &mut Trainer) -> Result<String, Error> {
     text("notes").map_err(Error::from)
 }
 
-/// A run may be made longer or shorter, but for a schedule that follows its
-/// length; nothing else may change.
+/// Only the number of epochs may change, and only if the schedule does not
+/// depend on it.
 fn check_recipe(path: &Path, before: &str, now: &Recipe) -> Result<(), Error> {
     let before: Recipe = toml::from_str(before)
         .map_err(|error| FormatError::malformed(path, "metadata `recipe`", error.to_string()))?;
@@ -93,7 +97,7 @@ fn check_recipe(path: &Path, before: &str, now: &Recipe) -> Result<(), Error> {
     if (Recipe { epochs, ..before }) != *now {
         return Err(Error::OtherRun {
             path: path.to_path_buf(),
-            cause: "its recipe differs; use another folder, or remove it".to_owned(),
+            cause: "its recipe differs; choose another --out, or remove it".to_owned(),
         });
     }
     Ok(())

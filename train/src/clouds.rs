@@ -20,7 +20,7 @@ pub struct Clouds {
     pub classes: Vec<String>,
 }
 
-/// The packed NPZ of `split` that `path` stands for.
+/// The packed NPZ file of `split` that `path` means.
 fn packed(path: &Path, split: Split) -> Option<PathBuf> {
     let mut beginning = path.as_os_str().to_owned();
     beginning.push(format!("-{split}.npz"));
@@ -35,21 +35,23 @@ fn read_hdf5(path: &Path, split: Split) -> Result<LabelledSet, Error> {
 
 #[cfg(not(feature = "hdf5"))]
 fn read_hdf5(path: &Path, _: Split) -> Result<LabelledSet, Error> {
-    let cause = "HDF5, which this program was built without: build with --features hdf5";
+    let cause = "expected a build with --features hdf5, found a program without HDF5";
     Err(Error::Data { path: path.to_path_buf(), cause: cause.to_owned() })
 }
 
 impl Clouds {
-    /// Reads the `split` of the data at `path`: a packed NPZ; the beginning of
-    /// the names of two, as gen-dataset packs them (`rotational-noisy` for
-    /// `rotational-noisy-train.npz` and `rotational-noisy-test.npz`); a folder
-    /// with `train.npz` and `test.npz`; one of HDF5 files as ModelNet40 comes in
-    /// (`modelnet40_ply_hdf5_2048`), with feature `hdf5`; or one of text files as
-    /// yanx27/Pointnet_Pointnet2_pytorch trains on, of which `most_points`
-    /// points a cloud are read.
+    /// Reads the `split` of the data at `path`, and normalises it. `path` is a
+    /// packed NPZ file; the common start of two names, as gen-dataset packs them
+    /// (`rotational-noisy` for `rotational-noisy-train.npz` and
+    /// `rotational-noisy-test.npz`); a folder with `train.npz` and `test.npz`; a
+    /// folder of ModelNet40's HDF5 files (`modelnet40_ply_hdf5_2048`), with
+    /// feature `hdf5`; or a folder of text files as in
+    /// yanx27/Pointnet_Pointnet2_pytorch, of which the first `most_points` points
+    /// of each cloud are read.
     ///
     /// # Errors
-    /// What cannot be read, no cloud, a coordinate that is not finite.
+    /// Data that cannot be read, a set without clouds, a coordinate that is not
+    /// finite.
     pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
         let set = if let Some(packed) = packed(path, split) {
             read_labelled(&packed)?
@@ -59,7 +61,7 @@ impl Clouds {
             yanx27::read(path, split, most_points)?
         } else {
             let cause = format!(
-                "neither a packed NPZ, nor what {split}.npz or -{split}.npz follows, nor a \
+                "expected a packed NPZ file, a folder or a start of a name with {split}.npz, or a \
                  folder with {split}_files.txt or modelnet40_shape_names.txt"
             );
             return Err(Error::Data { path: path.to_path_buf(), cause });
@@ -90,7 +92,7 @@ impl Clouds {
     fn checked(mut set: LabelledSet, path: &Path) -> Result<Self, Error> {
         let refuse = |cause: String| Err(Error::Data { path: path.to_path_buf(), cause });
         if set.is_empty() || set.n_points == 0 {
-            return refuse("no clouds".to_owned());
+            return refuse("expected clouds, found none".to_owned());
         }
         if let Some(at) = set.points.iter().position(|x| !x.is_finite()) {
             let (cloud, point) = (at / 3 / set.n_points, at / 3 % set.n_points);
@@ -120,21 +122,24 @@ impl Clouds {
 
     /// The clouds at `indices`.
     #[must_use]
-    pub fn some(&self, indices: &[usize]) -> Self {
+    pub fn select(&self, indices: &[usize]) -> Self {
         Self { set: self.set.select(indices), classes: self.classes.clone() }
     }
 
-    /// These clouds and then `others`.
+    /// These clouds followed by `others`.
     ///
     /// # Errors
     /// Clouds of another size or other classes.
-    pub fn and(&self, others: &Self) -> Result<Self, String> {
+    pub fn concat(&self, others: &Self) -> Result<Self, String> {
         let sizes = [self.set.n_points, others.set.n_points];
         if sizes[0] != sizes[1] {
-            return Err(format!("clouds of {} and of {} points", sizes[0], sizes[1]));
+            return Err(format!("expected clouds of {} points, found {}", sizes[0], sizes[1]));
         }
         if self.classes != others.classes {
-            return Err(format!("classes {:?} and {:?}", self.classes, others.classes));
+            return Err(format!(
+                "expected the classes {:?}, found {:?}",
+                self.classes, others.classes
+            ));
         }
         let join = |a: &Vec<String>, b: &Vec<String>| [&a[..], &b[..]].concat();
         let names = self.set.names.as_ref().zip(others.set.names.as_ref());
@@ -156,12 +161,12 @@ impl Clouds {
             seen[self.set.labels[*i]] += 1;
             seen[self.set.labels[*i]] <= most
         };
-        self.some(&(0..self.len()).filter(is_wanted).collect::<Vec<_>>())
+        self.select(&(0..self.len()).filter(is_wanted).collect::<Vec<_>>())
     }
 
-    /// Parts the set in two by instance: what is learnt from, and a `share` by
-    /// which checkpoints are chosen. Views of one mesh stay together, and every
-    /// class has its share.
+    /// Splits the set by instance into training clouds and a `share` of
+    /// validation clouds; returns their indices. Views of one mesh stay together,
+    /// and every class has the share.
     #[must_use]
     pub fn split_validation(&self, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
         let stream = StreamKey::new(seed, "validation", 0);
@@ -193,8 +198,8 @@ impl Clouds {
         (learnt, held)
     }
 
-    /// The mesh that cloud `i` is of: its name without the view's number, which
-    /// gen-dataset puts after the last `_v`.
+    /// The mesh of cloud `i`: the cloud's name without the view's number, which
+    /// gen-dataset writes after the last `_v`.
     fn instance(&self, i: usize) -> String {
         let Some(names) = &self.set.names else { return i.to_string() };
         match names[i].rsplit_once("_v") {

@@ -1,4 +1,4 @@
-//! What can go wrong in training.
+//! The errors of training.
 
 use std::path::PathBuf;
 
@@ -6,11 +6,12 @@ use formats::FormatError;
 
 /// An error of training.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
-    /// A file that cannot be read or written, or is not what it should be.
+    /// A file that cannot be read or written, or is malformed.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// Data that nothing can be learnt from.
+    /// Data that cannot be learnt from.
     #[error("{}: {cause}", path.display())]
     Data {
         /// The file or folder.
@@ -18,7 +19,7 @@ pub enum Error {
         /// What is wrong with it.
         cause: String,
     },
-    /// A recipe that makes no sense.
+    /// A value of a recipe that is out of range.
     #[error("recipe: `{key}`: {cause}")]
     Recipe {
         /// The key in the file.
@@ -26,10 +27,11 @@ pub enum Error {
         /// What is wrong with its value.
         cause: String,
     },
-    /// A loss that is not finite any more.
+    /// A loss that is not finite.
     #[error(
-        "the loss is {loss} at step {step} of epoch {epoch}; the first layer whose output is not \
-         finite is {layer}. Lower `adam.rate`, or look for extreme clouds in that batch"
+        "expected a finite loss, found {loss} at step {step} of epoch {epoch}; {layer} is the first \
+         layer whose output is not finite. Lower `adam.rate`, or look for extreme clouds in that \
+         batch"
     )]
     NotFinite {
         /// The loss.
@@ -41,15 +43,15 @@ pub enum Error {
         /// The layer.
         layer: String,
     },
-    /// A checkpoint of other training.
-    #[error("{} is of another run: {cause}", path.display())]
+    /// A checkpoint of another run.
+    #[error("{}: expected a checkpoint of this run: {cause}", path.display())]
     OtherRun {
         /// The checkpoint.
         path: PathBuf,
         /// What differs.
         cause: String,
     },
-    /// A trained network that infer-cpu refuses.
+    /// A network that infer-cpu refuses.
     #[error(transparent)]
     Infer(#[from] infer_cpu::Error),
 }

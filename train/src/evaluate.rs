@@ -1,4 +1,4 @@
-//! Accuracy, measured by infer-cpu itself: what is reported is what runs.
+//! Accuracy, measured with infer-cpu, which runs the models that are written.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use crate::clouds::Clouds;
 use crate::error::Error;
 
-/// Clouds that one classifier takes.
+/// Clouds that one classifier takes at a time.
 const CHUNK: usize = 128;
 
-/// Lets the model at `path` classify all of `clouds`.
+/// Classifies all of `clouds` with the model at `path`.
 ///
 /// # Errors
 /// A model that infer-cpu refuses, or that has other classes than the clouds.

@@ -1,6 +1,6 @@
-//! A relaxed choice of critical points, so that the network's own loss teaches
-//! the front end which to choose: Gumbel-top-k with a straight-through
-//! estimator (Kool et al. 2019; Bengio et al. 2013), the paper's outlook.
+//! A relaxed selection of critical points, with which the network's own loss trains
+//! the point encoder: Gumbel-top-k with a straight-through estimator (Kool et al.
+//! 2019; Bengio et al. 2013). The paper names it as future work.
 //!
 //! Forward, the k points of the largest ln(score) + Gumbel noise are taken: k
 //! draws without replacement with chances in proportion to the scores. Backward,
@@ -15,7 +15,7 @@ use formats::rng::StreamKey;
 #[must_use]
 pub fn top(rows: &[u32], scores: &[f64], keep: usize, stream: StreamKey) -> Vec<u32> {
     let perturbed = |(place, (&row, &score)): (usize, (&u32, &f64))| {
-        // 0 is among the draws, and its logarithm has none.
+        // The draw can be 0, whose logarithm is not finite.
         let draw = stream.unit(place as u64).max(f64::MIN_POSITIVE);
         (score.ln() - (-draw.ln()).ln(), row)
     };
@@ -26,7 +26,7 @@ pub fn top(rows: &[u32], scores: &[f64], keep: usize, stream: StreamKey) -> Vec<
 }
 
 /// The gradient of each of `scores`, from `weight_gradients`, dL/dw of each
-/// point, 0 for those not taken.
+/// point, which is 0 for points that were not taken.
 #[must_use]
 pub fn score_gradients(scores: &[f64], weight_gradients: &[f64], keep: usize) -> Vec<f64> {
     let total: f64 = scores.iter().sum();

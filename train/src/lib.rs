@@ -1,30 +1,44 @@
-//! Training of PointNet and its Critical Points Layer.
+//! Training of PointNet and its Critical Points Layer, on any CPU.
 //!
-//! Layers carry their own gradients, by hand ([`layer`]), and a step is a
-//! forward and backward pass of [`network::PointNet`] and one of [`adam`].
+//! Layers compute their own gradients ([`layer`]). A step is a forward and
+//! backward pass of [`network::PointNet`] and a step of [`adam`]. A
+//! [`run::Job`] takes a [`recipe::Recipe`] and clouds to a model file that
+//! infer-cpu reads.
 
 #![deny(unsafe_code)]
 
+pub mod accuracy_report;
 pub mod adam;
 pub mod augment;
 pub mod batch;
 pub mod batches;
-pub mod beside_random;
 pub mod checkpoint;
-pub mod chooser;
 pub mod clouds;
+pub mod cpl;
 pub mod error;
 pub mod evaluate;
-pub mod front;
+pub mod explanation_drawing;
 pub mod gumbel;
 pub mod layer;
 pub mod lime;
 pub mod loss;
 pub mod matrix;
+pub mod metrics;
+mod mlp;
 pub mod model;
+pub mod model_file;
 pub mod network;
 pub mod parameter;
+pub mod point_encoder;
+pub mod random_baseline;
 pub mod recipe;
-mod stack;
+pub mod run;
+pub mod selector;
+pub mod shape;
 mod t_net;
 pub mod trainer;
+
+/// The README's example is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,8 +1,8 @@
-//! LIME-3D: which parts of a cloud a network's answer rests on (Tan and
-//! Kotthaus, arXiv 2107.13459; their code, commit of 2021-08-17).
+//! LIME-3D: which parts of a cloud determined a prediction (Tan and Kotthaus, arXiv
+//! 2107.13459; their code, commit of 2021-08-17).
 //!
-//! Parts are taken away at random, and a linear model of what is left tells
-//! how much each part adds to the log-probability of the class.
+//! Parts are removed at random. A linear model of which parts remain estimates how
+//! much each part adds to the log-probability of the class.
 
 use formats::rng::StreamKey;
 use infer_cpu::Classifier;
@@ -17,11 +17,11 @@ use crate::error::Error;
 pub struct Lime {
     /// Parts of the cloud.
     pub clusters: usize,
-    /// Clouds with parts taken away, the whole one among them.
+    /// Clouds with parts removed, including the whole cloud.
     pub samples: usize,
-    /// Width of the kernel that weighs them.
+    /// Width of the kernel that weights them.
     pub sigma: f64,
-    /// What all draws depend on.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -38,12 +38,12 @@ const ROUNDS: usize = 10;
 /// Weight of the ridge.
 const ALPHA: f64 = 1.0;
 
-/// What each part of a cloud adds.
+/// How much each part of a cloud adds to a prediction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
     /// The class that is explained, the most probable of the whole cloud.
     pub class: usize,
-    /// The part that each point is of.
+    /// The part that each point belongs to.
     pub cluster: Vec<usize>,
     /// What each part adds to the class's log-probability.
     pub attribution: Vec<f64>,
@@ -52,7 +52,7 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// The `n` points of the parts that add most, the greatest first.
+    /// The `n` points of the parts that add most, in descending order.
     #[must_use]
     pub fn strongest(&self, n: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.cluster.len()).collect();
@@ -63,10 +63,10 @@ impl Explanation {
     }
 }
 
-/// Explains what `classifier` calls `points`.
+/// Explains the class that `classifier` gives `points`.
 ///
 /// # Errors
-/// What the classifier refuses.
+/// A cloud that the classifier refuses.
 pub fn explain(
     classifier: &mut Classifier,
     points: &[[f32; 3]],
@@ -87,8 +87,8 @@ pub fn explain(
     Ok(Explanation { class, cluster, attribution, r_squared })
 }
 
-/// k-means whose centres are points of the cloud: farthest points at first,
-/// then the one nearest to its cluster's mean.
+/// k-means whose centres are points of the cloud: first the farthest points, then
+/// the point nearest to each cluster's mean.
 fn clusters(points: &[[f32; 3]], k: usize) -> Vec<usize> {
     let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
     let mut centres = Vec::new();
@@ -123,8 +123,8 @@ fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// Which parts are there: all at first, then each with a chance of one half.
-/// None at all leaves no cloud: then it is drawn again.
+/// Which parts remain in each sample: all in the first, then each with a chance of
+/// one half. A sample without any part is drawn again.
 fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
     let stream = StreamKey::new(lime.seed, "lime", 0);
     let mut n = 0;

@@ -4,7 +4,7 @@ use ndarray::parallel::prelude::*;
 
 use crate::matrix::Matrix;
 
-/// What a batch cost.
+/// The loss of a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loss {
     /// What is minimised.
@@ -16,7 +16,7 @@ pub struct Loss {
 }
 
 /// The mean cross entropy of `logits` `[clouds, classes]` with `targets` (rows
-/// that sum to 1), and its gradient, in which the logits' memory is used.
+/// that sum to 1), and its gradient, which reuses the logits' memory.
 #[must_use]
 pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
     let n = logits.nrows() as f64;

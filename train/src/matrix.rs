@@ -1,12 +1,12 @@
-//! Products of matrices, shared out over threads so that no sum's order depends
-//! on how many there are.
+//! Products of matrices on several threads. The order of every sum is the same for
+//! any number of threads.
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::parallel::prelude::*;
 use ndarray::{Array2, ArrayView2, Axis, s};
 use rayon::slice::ParallelSliceMut;
 
-/// A matrix, row by row in memory.
+/// A matrix, stored row by row.
 pub type Matrix = Array2<f32>;
 
 /// Rows that one thread takes at a time.

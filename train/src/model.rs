@@ -1,78 +1,63 @@
-//! A network in training as a model file of infer-cpu's.
+//! A network, perhaps behind a Critical Points Layer.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use crate::batch::Batch;
+use crate::layer::{Folded, Module};
+use crate::loss::Loss;
+use crate::matrix::Matrix;
+use crate::network::{PointNet, Rates};
+use crate::parameter::Parameter;
+use crate::point_encoder::PointEncoder;
 
-use formats::FormatError;
-use formats::model_card::ModelCard;
-use formats::weights::{Tensor, WeightsFile, tensor_part, write_half_weights, write_weights};
-
-use crate::error::Error;
-use crate::front::LEFT_BEHIND;
-use crate::layer::Learns;
-
-/// Parameters and running statistics by name.
-#[must_use]
-pub fn tensors(network: &mut dyn Learns) -> BTreeMap<String, Tensor> {
-    let mut tensors = BTreeMap::new();
-    network.parameters(&mut |parameter| {
-        let tensor = Tensor { shape: parameter.shape.clone(), values: parameter.value.clone() };
-        tensors.insert(parameter.name.clone(), tensor);
-    });
-    network.statistics(&mut |name, values| {
-        let tensor = Tensor { shape: vec![values.len()], values: values.clone() };
-        tensors.insert(name.to_owned(), tensor);
-    });
-    tensors
+/// A network, perhaps behind a point encoder.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// What chooses points.
+    pub encoder: Option<PointEncoder>,
+    /// What classifies them.
+    pub network: PointNet,
 }
 
-/// Writes `network` to `path` as it is learnt, atomically.
-///
-/// # Errors
-/// What the system reports.
-pub fn write(path: &Path, network: &mut dyn Learns, card: &ModelCard) -> Result<(), Error> {
-    let mut tensors = tensors(network);
-    tensors.retain(|name, _| !name.starts_with(LEFT_BEHIND));
-    Ok(write_weights(path, &tensors, &card.to_metadata())?)
+impl Model {
+    /// Takes a batch forward and backward: gradients are left in the
+    /// parameters.
+    pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
+        let Some(encoder) = &mut self.encoder else {
+            return self.network.learn(batch, kept, rates);
+        };
+        let selection = encoder.forward(batch, rates);
+        let wanted = encoder.is_relaxed();
+        let (mut loss, dpoints) = self.network.learn_points(&selection.batch, kept, rates, wanted);
+        loss.total += encoder.backward(batch, &selection, dpoints.as_ref());
+        loss
+    }
+
+    /// The first layer whose last output was not finite.
+    #[must_use]
+    pub fn not_finite(&self) -> &str {
+        let encoder = self.encoder.as_ref().and_then(PointEncoder::not_finite);
+        encoder.unwrap_or_else(|| self.network.not_finite())
+    }
 }
 
-/// Takes `network` to what [`write()`] wrote to `path`; what that left behind is
-/// left as it is.
-///
-/// # Errors
-/// A file that is none, or of a network of another shape.
-pub fn read(path: &Path, network: &mut dyn Learns) -> Result<(), Error> {
-    let mut file = WeightsFile::open(path)?;
-    let mut failed = None;
-    let mut take = |name: &str, into: &mut Vec<f32>| match file.read(name) {
-        Ok(tensor) if tensor.values.len() == into.len() => *into = tensor.values,
-        Ok(tensor) => {
-            let cause = format!("of shape {:?}, in a network of another", tensor.shape);
-            failed = Some(FormatError::malformed(path, tensor_part(name), cause));
+impl Module for Model {
+    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
+        if let Some(encoder) = &mut self.encoder {
+            encoder.parameters(visit);
         }
-        Err(error) => failed = Some(error),
-    };
-    network.parameters(&mut |parameter| {
-        if !parameter.name.starts_with(LEFT_BEHIND) {
-            take(&parameter.name, &mut parameter.value);
-        }
-    });
-    network.statistics(&mut |name, values| take(name, values));
-    failed.map_or(Ok(()), |error| Err(error.into()))
-}
+        self.network.parameters(visit);
+    }
 
-/// Writes `network` to `path` as it is shipped, atomically: batch norms folded,
-/// in f16, half the size.
-///
-/// # Errors
-/// A weight that f16 cannot hold; what the system reports.
-pub fn ship(path: &Path, network: &dyn Learns, card: &ModelCard) -> Result<(), Error> {
-    let mut tensors = BTreeMap::new();
-    network.folded(&mut |layer| {
-        let bias = Tensor { shape: vec![layer.bias.len()], values: layer.bias };
-        let weight = Tensor { shape: layer.shape.to_vec(), values: layer.weight };
-        tensors.insert(format!("{}.bias", layer.name), bias);
-        tensors.insert(format!("{}.weight", layer.name), weight);
-    });
-    Ok(write_half_weights(path, &tensors, &card.to_metadata())?)
+    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
+        if let Some(encoder) = &mut self.encoder {
+            encoder.statistics(visit);
+        }
+        self.network.statistics(visit);
+    }
+
+    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
+        if let Some(encoder) = &self.encoder {
+            encoder.folded(visit);
+        }
+        self.network.folded(visit);
+    }
 }

@@ -4,80 +4,25 @@
 //! reads: `feat.stn.conv1.weight`, `feat.fstn.bn4.bias`, `fc3.weight`, ….
 
 use ndarray::{ArrayView2, Axis, s};
-use serde::{Deserialize, Serialize};
 
 use crate::batch::Batch;
-use crate::chooser::{Chooser, Chosen};
-use crate::layer::{EdgeLayer, Folded, Learns, PointLayer, orthogonality};
+use crate::layer::{EdgeLayer, Folded, Module, PointLayer, orthogonality};
 use crate::loss::{self, Loss};
 use crate::matrix::Matrix;
+use crate::mlp::{DenseHead, SharedMlp};
 use crate::parameter::Parameter;
-use crate::stack::{Points, Vectors};
+use crate::selector::{CriticalPointSelector, Selection};
+use crate::shape::Shape;
 use crate::t_net::TNet;
 
-/// A layer that looks around each point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Edge {
-    /// How far, in the unit of normalised clouds.
-    pub radius: f32,
-    /// Features that it gives a point.
-    pub channels: usize,
-}
-
-/// Which layers a network has, and how wide they are.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Shape {
-    /// The T-Net of the coordinates.
-    pub input_transform: bool,
-    /// The T-Net of the first layer's features.
-    pub feature_transform: bool,
-    /// What a point's surroundings add to its coordinates.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub edges: Vec<Edge>,
-    /// Outputs of the trunk's point-wise layers, the last pooled.
-    pub trunk: Vec<usize>,
-    /// Outputs of a T-Net's point-wise layers, the last pooled.
-    pub t_net: Vec<usize>,
-    /// Outputs of a T-Net's layers after the pooling.
-    pub t_net_head: Vec<usize>,
-    /// Outputs of the layers after the trunk's pooling, but for the last.
-    pub head: Vec<usize>,
-}
-
-impl Default for Shape {
-    /// The baseline's (yanx27/Pointnet_Pointnet2_pytorch, `pointnet_cls`).
-    fn default() -> Self {
-        Self {
-            input_transform: true,
-            feature_transform: true,
-            edges: Vec::new(),
-            trunk: vec![64, 128, 1024],
-            t_net: vec![64, 128, 1024],
-            t_net_head: vec![512, 256],
-            head: vec![512, 256],
-        }
-    }
-}
-
-impl Shape {
-    /// All widths.
-    pub fn widths(&self) -> impl Iterator<Item = usize> {
-        let Self { edges, trunk, t_net, t_net_head, head, .. } = self;
-        let edges = edges.iter().map(|edge| edge.channels);
-        [trunk, t_net, t_net_head, head].into_iter().flatten().copied().chain(edges)
-    }
-}
-
-/// Shares that a pass is run with.
+/// The settings of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// By how much running statistics follow a batch's.
+    /// Share of a batch in the running statistics.
     pub momentum: f32,
     /// Weight of the feature transform's regulariser.
     pub orthogonality: f32,
-    /// The step, by which a relaxed choice of points draws.
+    /// The step's number, which keys the noise of a relaxed selection.
     pub step: u64,
 }
 
@@ -85,13 +30,13 @@ pub struct Rates {
 #[derive(Clone, Debug)]
 pub struct PointNet {
     stn: Option<TNet>,
-    /// What the coordinates' T-Net chooses of the points, where it does.
-    chooser: Option<Chooser>,
+    /// Selects points by the coordinates' T-Net, if `cpl.shared` is set.
+    selector: Option<CriticalPointSelector>,
     edges: Vec<EdgeLayer>,
     stem: PointLayer,
     fstn: Option<TNet>,
-    trunk: Points,
-    head: Vectors,
+    trunk: SharedMlp,
+    head: DenseHead,
 }
 
 impl PointNet {
@@ -111,32 +56,33 @@ impl PointNet {
         let stn = input_transform.then(|| TNet::new("feat.stn.", 3, shape, seed));
         let fstn = feature_transform.then(|| TNet::new("feat.fstn.", trunk[0], shape, seed));
         let pooled = trunk[trunk.len() - 1];
-        let head = Vectors::new("", &[&[pooled], &shape.head[..], &[n_classes]].concat(), 0, seed);
+        let head =
+            DenseHead::new("", &[&[pooled], &shape.head[..], &[n_classes]].concat(), 0, seed);
         Self {
             stn,
-            chooser: None,
+            selector: None,
             edges,
             stem,
             fstn,
-            trunk: Points::new("feat.", trunk, 2, false, seed),
+            trunk: SharedMlp::new("feat.", trunk, 2, false, seed),
             head,
         }
     }
 
-    /// Lets the coordinates' T-Net choose the points that the rest sees.
-    pub fn choose_by_t_net(&mut self, chooser: Chooser) {
-        self.chooser = Some(chooser);
+    /// Lets the coordinates' T-Net select the points that the other layers see.
+    pub fn select_by_t_net(&mut self, selector: CriticalPointSelector) {
+        self.selector = Some(selector);
     }
 
-    /// Takes a batch forward and backward: gradients are left in the
-    /// parameters. `kept` is dropout's mask, `[clouds, last hidden width]`.
+    /// Takes a batch forward and backward, and leaves the gradients in the
+    /// parameters. `kept` is the dropout mask, `[clouds, last hidden width]`.
     pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
         self.learn_points(batch, kept, rates, false).0
     }
 
-    /// The same; returns the gradient of the points' coordinates, too, where it
-    /// is wanted: that which comes through the trunk and the T-Nets, not
-    /// through what surrounds a point.
+    /// As [`PointNet::learn`]; also returns the gradient of the points'
+    /// coordinates, if `wants_points`: the part that flows through the trunk and
+    /// the T-Nets, without that of the neighborhoods.
     pub fn learn_points(
         &mut self,
         batch: &Batch,
@@ -145,21 +91,23 @@ impl PointNet {
         wants_points: bool,
     ) -> (Loss, Option<Matrix>) {
         let (whole, momentum) = (batch, rates.momentum);
-        let chosen = self.choose(whole, rates);
-        let batch = chosen.as_ref().map_or(whole, |chosen| &chosen.batch);
+        let selection = self.select(whole, rates);
+        let batch = selection.as_ref().map_or(whole, |selection| &selection.batch);
         let (x, rows) = (batch.points(), batch.rows());
-        let turned = match (&mut self.stn, &chosen) {
+        let transformed = match (&mut self.stn, &selection) {
             (Some(stn), Some(_)) => Some(stn.transforms.forward(x.view(), rows)),
             (Some(stn), None) => Some(stn.forward(x.view(), rows, momentum)),
             (None, _) => None,
         };
-        let turned = turned.as_ref().map_or(x.view(), |turned| turned.view());
-        let edged = self.look_around(batch, turned, momentum);
-        let entry = edged.as_ref().map_or(turned, |edged| edged.view());
+        let transformed = transformed.as_ref().map_or(x.view(), |transformed| transformed.view());
+        let with_edges = self.edge_features(batch, transformed, momentum);
+        let entry = with_edges.as_ref().map_or(transformed, |with_edges| with_edges.view());
         self.stem.forward(entry, rows, momentum);
         let stem = self.stem.base.output().to_owned();
-        let turned_stem = self.fstn.as_mut().map(|fstn| fstn.forward(stem.view(), rows, momentum));
-        let features = turned_stem.as_ref().map_or(stem.view(), |turned| turned.view());
+        let transformed_stem =
+            self.fstn.as_mut().map(|fstn| fstn.forward(stem.view(), rows, momentum));
+        let features =
+            transformed_stem.as_ref().map_or(stem.view(), |transformed| transformed.view());
         self.trunk.forward(features.view(), rows, momentum);
         let pooled = self.trunk.pooled.base.output().to_owned();
         let logits = self.head.forward(pooled.view(), kept, momentum);
@@ -187,29 +135,29 @@ impl PointNet {
             first = own.end;
             edge.backward(dentry.slice(s![.., own]).to_owned());
         }
-        let dturned = dentry.slice(s![.., ..3]).to_owned();
+        let dtransformed = dentry.slice(s![.., ..3]).to_owned();
         let dpoints = match &mut self.stn {
-            Some(stn) if chosen.is_some() => {
-                let (elements, _) = stn.transforms.backward(x, dturned.view(), rows);
+            Some(stn) if selection.is_some() => {
+                let (elements, _) = stn.transforms.backward(x, dtransformed.view(), rows);
                 stn.backward_prediction(whole.points(), &elements, whole.rows(), false)
             }
-            Some(stn) => stn.backward(x, &dturned, None, rows, wants_points),
-            None => Some(dturned),
+            Some(stn) => stn.backward(x, &dtransformed, None, rows, wants_points),
+            None => Some(dtransformed),
         };
         (loss, dpoints.filter(|_| wants_points))
     }
 
-    /// What the coordinates' T-Net chooses of `whole`, where it does; then it
-    /// has predicted its transforms, too.
-    fn choose(&mut self, whole: &Batch, rates: Rates) -> Option<Chosen> {
-        let (stn, chooser) = (self.stn.as_mut()?, self.chooser?);
+    /// The points of `whole` that the coordinates' T-Net selects, if it does. It
+    /// then has predicted its transforms.
+    fn select(&mut self, whole: &Batch, rates: Rates) -> Option<Selection> {
+        let (stn, selector) = (self.stn.as_mut()?, self.selector?);
         stn.predict(whole.points(), whole.rows(), rates.momentum);
-        Some(chooser.choose(&stn.points.pooled, whole, rates.step))
+        Some(selector.select(&stn.points.pooled, whole, rates.step))
     }
 
-    /// Coordinates `[rows, 3]` with what surrounds each point; none where the
-    /// network does not look.
-    fn look_around(
+    /// The coordinates `[rows, 3]` followed by the EdgeConv features of each
+    /// point; none if the network has no EdgeConv layer.
+    fn edge_features(
         &mut self,
         batch: &Batch,
         coordinates: ArrayView2<'_, f32>,
@@ -224,8 +172,8 @@ impl PointNet {
         Some(ndarray::concatenate(Axis(1), &parts).expect("invariant: a row for each point"))
     }
 
-    /// The first layer whose last output was not finite; the last of all if no
-    /// other.
+    /// The first layer whose last output was not finite; the last layer if all
+    /// were finite.
     #[must_use]
     pub fn not_finite(&self) -> &str {
         let stn = self.stn.as_ref().and_then(TNet::not_finite);
@@ -238,7 +186,7 @@ impl PointNet {
             .unwrap_or("the last")
     }
 
-    /// How wide dropout's mask is; none without a hidden layer after the
+    /// The width of the dropout mask; none without a hidden layer after the
     /// trunk's pooling.
     #[must_use]
     pub fn dropout_width(&self) -> Option<usize> {
@@ -246,7 +194,7 @@ impl PointNet {
     }
 }
 
-impl Learns for PointNet {
+impl Module for PointNet {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
         if let Some(stn) = &mut self.stn {
             stn.parameters(visit);

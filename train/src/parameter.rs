@@ -1,4 +1,4 @@
-//! What is learnt.
+//! Learnt arrays.
 
 use ndarray::ArrayView2;
 
@@ -20,7 +20,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// A parameter of a `value`.
+    /// A parameter with this `value`.
     #[must_use]
     pub fn new(name: String, shape: Vec<usize>, value: Vec<f32>) -> Self {
         let zeros = vec![0.0; value.len()];
@@ -31,7 +31,7 @@ impl Parameter {
     /// A matrix of weights `[outputs, inputs]`.
     ///
     /// # Panics
-    /// If the parameter is no matrix.
+    /// If the parameter is not a matrix.
     #[must_use]
     pub fn matrix(&self) -> ArrayView2<'_, f32> {
         let (outputs, inputs) = (self.shape[0], self.shape[1]);

@@ -1,5 +1,5 @@
-//! What a run does, as a TOML file says it. Every key has a default: the
-//! baseline's (yanx27/Pointnet_Pointnet2_pytorch, `train_classification.py`,
+//! The recipe of a run, a TOML file. Every key has a default: the baseline's
+//! (yanx27/Pointnet_Pointnet2_pytorch, `train_classification.py`,
 //! `provider.py`).
 
 use std::path::Path;
@@ -8,30 +8,30 @@ use formats::FormatError;
 use serde::{Deserialize, Serialize};
 
 use crate::adam::Adam;
+use crate::cpl::Cpl;
 use crate::error::Error;
-use crate::front::Cpl;
-use crate::network::Shape;
+use crate::shape::Shape;
 
-/// A run.
+/// How a network is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Recipe {
-    /// What all random draws depend on.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Passes over the training set.
     pub epochs: u32,
-    /// Clouds of a batch; a rest of fewer at an epoch's end is left out.
+    /// Clouds of a batch; an incomplete batch at an epoch's end is left out.
     pub batch: usize,
     /// Points that the network sees.
     pub points: usize,
-    /// How they are drawn from a cloud that has more.
+    /// How those points are chosen from a cloud that has more.
     pub sampling: Sampling,
-    /// Share of the training set's instances that checkpoints are chosen by;
-    /// with 0 the last is taken.
+    /// Share of the training set's instances that choose the checkpoint; with 0
+    /// the last checkpoint is taken.
     pub validation: f64,
     /// The network's layers.
     pub network: Shape,
-    /// A Critical Points Layer in front, which sees `points`.
+    /// A Critical Points Layer before the network, which then sees `points`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cpl: Option<Cpl>,
     /// Share of the last hidden layer's features that are dropped.
@@ -44,7 +44,7 @@ pub struct Recipe {
     pub adam: Adam,
     /// How the learning rate falls.
     pub schedule: Schedule,
-    /// What is done to clouds.
+    /// How clouds are augmented.
     pub augment: Augment,
 }
 
@@ -69,16 +69,16 @@ impl Default for Recipe {
     }
 }
 
-/// Which of a cloud's points are taken.
+/// Which points of a cloud are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// The first, as the baseline's loader.
     First,
-    /// Others in each epoch, drawn without replacement.
+    /// Drawn without replacement, anew in each epoch.
     Random,
-    /// Farthest point sampling among a random half or more of the cloud: the
-    /// start and the choice differ from epoch to epoch.
+    /// Farthest point sampling of a random half or more of the cloud, anew in
+    /// each epoch.
     Fps,
 }
 
@@ -110,7 +110,8 @@ impl Default for Schedule {
 }
 
 impl Schedule {
-    /// The rate over the first, `progress` epochs into a run of `epochs`.
+    /// The rate divided by the first rate, `progress` epochs into a run of
+    /// `epochs`.
     #[must_use]
     pub fn factor(self, progress: f64, epochs: u32) -> f64 {
         match self {
@@ -129,14 +130,14 @@ impl Schedule {
     }
 }
 
-/// What is done to clouds in training; what is 0 or absent is not.
+/// How clouds are augmented in training. A value of 0 switches its step off.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Augment {
-    /// The largest share of points that are dropped; each cloud's is uniform
-    /// below it.
+    /// The largest share of points that are dropped; each cloud's share is
+    /// uniform below it.
     pub drop: f64,
-    /// Scale, uniform between.
+    /// The range of the scale, which is uniform.
     pub scale: [f64; 2],
     /// The largest shift along each axis.
     pub shift: f64,
@@ -151,7 +152,7 @@ pub struct Augment {
     pub rotate_degrees: f64,
     /// The up axis: x, y or z.
     pub up: Axis,
-    /// Factors of their own for each axis, uniform in 1 ± this.
+    /// Each axis is stretched by a factor that is uniform in 1 ± this.
     pub stretch: f64,
     /// Share of clouds of which a part is replaced by another cloud's
     /// (PointCutMix-R: Zhang et al. 2022).
@@ -161,7 +162,7 @@ pub struct Augment {
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[allow(missing_docs, reason = "they are what they are called")]
+#[allow(missing_docs, reason = "the names say all")]
 pub enum Axis {
     X,
     Y,
@@ -189,7 +190,7 @@ impl Recipe {
     /// Reads the recipe at `path`.
     ///
     /// # Errors
-    /// A file that is no TOML or has unknown keys; as [`Recipe::check`].
+    /// A file that is not TOML or has unknown keys; as [`Recipe::check`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
         let recipe: Self = toml::from_str(&text)
@@ -198,7 +199,16 @@ impl Recipe {
         Ok(recipe)
     }
 
-    /// That its values make sense.
+    /// The recipe as TOML, every default spelled out.
+    ///
+    /// # Errors
+    /// [`Error::Recipe`] with what TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        toml::to_string(self)
+            .map_err(|error| Error::Recipe { key: "recipe", cause: error.to_string() })
+    }
+
+    /// Checks that every value is in its range.
     ///
     /// # Errors
     /// [`Error::Recipe`] with the key.
@@ -208,74 +218,96 @@ impl Recipe {
         let finite = |x: f64| x.is_finite() && x >= 0.0;
         let Self { network, augment, .. } = self;
         match self {
-            _ if self.epochs == 0 => refuse("epochs", "at least 1"),
-            _ if self.batch < 2 => refuse("batch", "a batch norm needs 2 clouds or more"),
-            _ if self.points == 0 => refuse("points", "at least 1"),
-            _ if !share(self.validation) => refuse("validation", "0 or more, below 1"),
-            _ if !share(self.dropout) => refuse("dropout", "0 or more, below 1"),
-            _ if !share(self.label_smoothing) => refuse("label_smoothing", "0 or more, below 1"),
-            _ if !finite(self.orthogonality) => refuse("orthogonality", "finite, 0 or more"),
-            _ if !(self.adam.rate.is_finite() && self.adam.rate > 0.0) => {
-                refuse("adam.rate", "finite and above 0")
+            _ if self.epochs == 0 => refuse("epochs", "expected 1 or more"),
+            _ if self.batch < 2 => {
+                refuse("batch", "expected 2 or more clouds, for the batch norms")
             }
-            _ if network.trunk.len() < 2 => refuse("network.trunk", "2 layers or more"),
-            _ if network.t_net.len() < 2 => refuse("network.t_net", "2 layers or more"),
-            _ if network.t_net_head.is_empty() => refuse("network.t_net_head", "1 layer or more"),
-            _ if network.head.is_empty() => refuse("network.head", "1 layer or more"),
+            _ if self.points == 0 => refuse("points", "expected 1 or more"),
+            _ if !share(self.validation) => {
+                refuse("validation", "expected 0 or more, and less than 1")
+            }
+            _ if !share(self.dropout) => refuse("dropout", "expected 0 or more, and less than 1"),
+            _ if !share(self.label_smoothing) => {
+                refuse("label_smoothing", "expected 0 or more, and less than 1")
+            }
+            _ if !finite(self.orthogonality) => {
+                refuse("orthogonality", "expected a finite number of 0 or more")
+            }
+            _ if !(self.adam.rate.is_finite() && self.adam.rate > 0.0) => {
+                refuse("adam.rate", "expected a finite number above 0")
+            }
+            _ if network.trunk.len() < 2 => refuse("network.trunk", "expected 2 layers or more"),
+            _ if network.t_net.len() < 2 => refuse("network.t_net", "expected 2 layers or more"),
+            _ if network.t_net_head.is_empty() => {
+                refuse("network.t_net_head", "expected 1 layer or more")
+            }
+            _ if network.head.is_empty() => refuse("network.head", "expected 1 layer or more"),
             _ if network.widths().any(|width| width == 0 || width > WIDEST) => {
-                refuse("network", "widths between 1 and 8192")
+                refuse("network", "expected widths of 1 to 8192")
             }
             _ if network
                 .edges
                 .iter()
                 .any(|edge| !(edge.radius.is_normal() && edge.radius > 0.0)) =>
             {
-                refuse("network.edges.radius", "finite, above 0")
+                refuse("network.edges.radius", "expected a finite number above 0")
             }
-            _ if !network.edges.is_empty() && augment.cut_mix > 0.0 => {
-                refuse("augment.cut_mix", "parts of two clouds have no surroundings: no edges then")
-            }
+            _ if !network.edges.is_empty() && augment.cut_mix > 0.0 => refuse(
+                "augment.cut_mix",
+                "expected 0 with edges, because a mixed cloud has no neighborhood",
+            ),
             _ if self.cpl.as_ref().is_some_and(|cpl| cpl.front.len() < 2) => {
-                refuse("cpl.front", "2 layers or more")
+                refuse("cpl.front", "expected 2 layers or more")
             }
             _ if self.cpl.iter().flat_map(|cpl| &cpl.front).any(|w| *w == 0 || *w > WIDEST) => {
-                refuse("cpl.front", "widths between 1 and 8192")
+                refuse("cpl.front", "expected widths of 1 to 8192")
             }
             _ if self.cpl.as_ref().is_some_and(|cpl| cpl.keep == 0 || cpl.keep > self.points) => {
-                refuse("cpl.keep", "between 1 and `points`")
+                refuse("cpl.keep", "expected 1 to `points`")
             }
             _ if self.cpl.as_ref().is_some_and(|cpl| cpl.shared) && !network.input_transform => {
-                refuse("cpl.shared", "there is no T-Net of coordinates to share")
+                refuse("cpl.shared", "expected `network.input_transform`, whose T-Net is shared")
             }
             _ if self.cpl.as_ref().is_some_and(|cpl| cpl.gumbel && cpl.shared) => {
-                refuse("cpl.gumbel", "for a front end of its own, not a shared one")
+                refuse("cpl.gumbel", "expected false with `cpl.shared`")
             }
             _ if self.cpl.as_ref().is_some_and(|cpl| cpl.gumbel && cpl.resize != "truncate") => {
-                refuse("cpl.gumbel", "points are drawn once each: resize is to be truncate")
+                refuse(
+                    "cpl.gumbel",
+                    "expected `cpl.resize` to be truncate, because each point is drawn once",
+                )
             }
             _ if self.cpl.as_ref().is_some_and(|cpl| !finite(cpl.weight)) => {
-                refuse("cpl.weight", "finite, 0 or more")
+                refuse("cpl.weight", "expected a finite number of 0 or more")
             }
-            _ if !(share(augment.drop)) => refuse("augment.drop", "0 or more, below 1"),
+            _ if !(share(augment.drop)) => {
+                refuse("augment.drop", "expected 0 or more, and less than 1")
+            }
             _ if !augment.scale.iter().all(|x| x.is_finite() && *x > 0.0) => {
-                refuse("augment.scale", "two factors above 0")
+                refuse("augment.scale", "expected two finite factors above 0")
             }
-            _ if !finite(augment.shift) => refuse("augment.shift", "finite, 0 or more"),
-            _ if !finite(augment.jitter) => refuse("augment.jitter", "finite, 0 or more"),
+            _ if !finite(augment.shift) => {
+                refuse("augment.shift", "expected a finite number of 0 or more")
+            }
+            _ if !finite(augment.jitter) => {
+                refuse("augment.jitter", "expected a finite number of 0 or more")
+            }
             _ if !finite(augment.sensor_noise) => {
-                refuse("augment.sensor_noise", "finite, 0 or more")
+                refuse("augment.sensor_noise", "expected a finite number of 0 or more")
             }
-            _ if !share(augment.stretch) => refuse("augment.stretch", "0 or more, below 1"),
+            _ if !share(augment.stretch) => {
+                refuse("augment.stretch", "expected 0 or more, and less than 1")
+            }
             _ if !(0.0..=1.0).contains(&augment.cut_mix) => {
-                refuse("augment.cut_mix", "between 0 and 1")
+                refuse("augment.cut_mix", "expected 0 to 1")
             }
             _ if !(0.0..=180.0).contains(&augment.rotate_degrees) => {
-                refuse("augment.rotate_degrees", "between 0 and 180")
+                refuse("augment.rotate_degrees", "expected 0 to 180")
             }
             _ => Ok(()),
         }
     }
 }
 
-/// Layers wider than this are taken for a mistake.
+/// Wider layers are refused as a mistake.
 const WIDEST: usize = 8192;

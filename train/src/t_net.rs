@@ -2,19 +2,19 @@
 
 use ndarray::ArrayView2;
 
-use crate::layer::{Folded, Learns, Rows, Transforms};
+use crate::layer::{Folded, Module, Rows, Transforms};
 use crate::matrix::Matrix;
-use crate::network::Shape;
+use crate::mlp::{DenseHead, SharedMlp};
 use crate::parameter::Parameter;
-use crate::stack::{Points, Vectors};
+use crate::shape::Shape;
 
-/// What predicts a transform.
+/// A T-Net in training.
 #[derive(Clone, Debug)]
 pub struct TNet {
-    /// What is pooled.
-    pub points: Points,
-    vectors: Vectors,
-    /// What it predicted.
+    /// Its point-wise layers and the pooling.
+    pub points: SharedMlp,
+    head: DenseHead,
+    /// The transforms that it predicted last.
     pub transforms: Transforms,
 }
 
@@ -22,29 +22,29 @@ impl TNet {
     pub fn new(prefix: &str, k: usize, shape: &Shape, seed: u64) -> Self {
         let widths = [&[k], &shape.t_net[..]].concat();
         let n_points = shape.t_net.len();
-        let head = [&[widths[n_points]], &shape.t_net_head[..], &[k * k]].concat();
+        let head_widths = [&[widths[n_points]], &shape.t_net_head[..], &[k * k]].concat();
         Self {
-            points: Points::new(prefix, &widths, 1, true, seed),
-            vectors: Vectors::new(prefix, &head, n_points, seed),
+            points: SharedMlp::new(prefix, &widths, 1, true, seed),
+            head: DenseHead::new(prefix, &head_widths, n_points, seed),
             transforms: Transforms { k, ..Transforms::default() },
         }
     }
 
-    /// Returns the rows behind the transforms.
+    /// Predicts the transforms and returns the transformed rows.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) -> Matrix {
         self.predict(x.view(), rows, momentum);
         self.transforms.forward(x, rows)
     }
 
-    /// Predicts the transforms, and transforms nothing.
+    /// Predicts the transforms without applying them.
     pub fn predict(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
         self.points.forward(x.view(), rows, momentum);
-        let elements = self.vectors.forward(self.points.pooled.base.output(), None, momentum);
+        let elements = self.head.forward(self.points.pooled.base.output(), None, momentum);
         self.transforms = Transforms::around_identity(elements, self.transforms.k);
     }
 
-    /// From the gradient of the rows behind the transforms, and one of the
-    /// transforms' own; returns that of `x` where it is wanted.
+    /// Takes the gradients of the transformed rows and, as `own`, of the
+    /// transforms; returns that of `x`, if `wants_input`.
     pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
@@ -57,12 +57,12 @@ impl TNet {
         if let Some(own) = own {
             elements += &own;
         }
-        let around = self.backward_prediction(x, &elements, rows, wants_input)?;
-        Some(through + around)
+        let predicted = self.backward_prediction(x, &elements, rows, wants_input)?;
+        Some(through + predicted)
     }
 
-    /// From the gradient of the transforms' elements; returns that of `x`, as
-    /// far as it comes through the prediction, where it is wanted.
+    /// Takes the gradient of the transforms' elements; returns the part of the
+    /// gradient of `x` that flows through the prediction, if `wants_input`.
     pub fn backward_prediction(
         &mut self,
         x: ArrayView2<'_, f32>,
@@ -71,29 +71,29 @@ impl TNet {
         wants_input: bool,
     ) -> Option<Matrix> {
         let pooled = self.points.pooled.base.output().to_owned();
-        let dy = self.vectors.backward(pooled.view(), elements.view());
+        let dy = self.head.backward(pooled.view(), elements.view());
         self.points.backward(x, dy, rows, wants_input)
     }
 
     /// The first layer whose last output is not finite.
     pub fn not_finite(&self) -> Option<&str> {
-        self.points.not_finite().or_else(|| self.vectors.not_finite())
+        self.points.not_finite().or_else(|| self.head.not_finite())
     }
 }
 
-impl Learns for TNet {
+impl Module for TNet {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
         self.points.parameters(visit);
-        self.vectors.parameters(visit);
+        self.head.parameters(visit);
     }
 
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
         self.points.statistics(visit);
-        self.vectors.statistics(visit);
+        self.head.statistics(visit);
     }
 
     fn folded(&self, visit: &mut dyn FnMut(Folded)) {
         self.points.folded(visit);
-        self.vectors.folded(visit);
+        self.head.folded(visit);
     }
 }

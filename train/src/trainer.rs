@@ -5,23 +5,24 @@ use std::time::{Duration, Instant};
 use formats::rng::StreamKey;
 
 use crate::batches;
-use crate::chooser::Chooser;
 use crate::clouds::Clouds;
 use crate::error::Error;
-use crate::front::{Front, Model};
 use crate::matrix::Matrix;
+use crate::model::Model;
 use crate::network::{PointNet, Rates};
+use crate::point_encoder::PointEncoder;
 use crate::recipe::Recipe;
+use crate::selector::CriticalPointSelector;
 
 /// PyTorch's default share of a batch in running statistics.
 const MOMENTUM: f32 = 0.1;
 
-/// What is being learnt.
+/// A training under way.
 #[derive(Clone, Debug)]
 pub struct Trainer {
     /// The run's recipe.
     pub recipe: Recipe,
-    /// The network, and its front end.
+    /// The network, and its point encoder.
     pub model: Model,
     /// Steps taken.
     pub step: u64,
@@ -29,29 +30,29 @@ pub struct Trainer {
     pub epoch: u32,
 }
 
-/// What an epoch came to.
+/// The result of an epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Learnt {
+pub struct EpochSummary {
     /// Mean loss of its batches.
     pub loss: f64,
-    /// Share of its clouds, as augmented, that were recognised.
+    /// Share of its augmented clouds that were classified correctly.
     pub accuracy: f64,
     /// Clouds learnt from.
     pub clouds: usize,
-    /// Wall clock.
+    /// Wall-clock time.
     pub time: Duration,
 }
 
-/// How far an epoch has come.
+/// The progress of an epoch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Steps of this epoch.
+    /// Steps taken in this epoch.
     pub step: usize,
-    /// Of so many.
+    /// Steps of the whole epoch.
     pub steps: usize,
     /// Mean loss so far.
     pub loss: f64,
-    /// Share recognised so far.
+    /// Share classified correctly so far.
     pub accuracy: f64,
 }
 
@@ -59,22 +60,23 @@ impl Trainer {
     /// A network of random weights for `n_classes`.
     ///
     /// # Errors
-    /// [`Error::Recipe`] of a rule of resizing that there is none of.
+    /// [`Error::Recipe`] for an unknown rule of resizing.
     pub fn new(recipe: Recipe, n_classes: usize) -> Result<Self, Error> {
         let refuse = |cause| Error::Recipe { key: "cpl.resize", cause };
         let mut network = PointNet::new(&recipe.network, n_classes, recipe.seed);
-        let front = match &recipe.cpl {
+        let encoder = match &recipe.cpl {
             Some(cpl) if cpl.shared => {
-                network.choose_by_t_net(Chooser::new(cpl, recipe.seed).map_err(refuse)?);
+                network
+                    .select_by_t_net(CriticalPointSelector::new(cpl, recipe.seed).map_err(refuse)?);
                 None
             }
-            Some(cpl) => Some(Front::new(cpl, n_classes, recipe.seed).map_err(refuse)?),
+            Some(cpl) => Some(PointEncoder::new(cpl, n_classes, recipe.seed).map_err(refuse)?),
             None => None,
         };
-        Ok(Self { recipe, model: Model { front, network }, step: 0, epoch: 0 })
+        Ok(Self { recipe, model: Model { encoder, network }, step: 0, epoch: 0 })
     }
 
-    /// Learns from every cloud once, but for an incomplete last batch.
+    /// Learns from every cloud once, except those of an incomplete last batch.
     ///
     /// # Errors
     /// [`Error::NotFinite`].
@@ -82,7 +84,7 @@ impl Trainer {
         &mut self,
         clouds: &Clouds,
         mut report: impl FnMut(Progress),
-    ) -> Result<Learnt, Error> {
+    ) -> Result<EpochSummary, Error> {
         let begun = Instant::now();
         let recipe = self.recipe.clone();
         let steps = batches::count(clouds.len(), &recipe);
@@ -111,7 +113,7 @@ impl Trainer {
         })?;
         self.epoch += 1;
         let clouds = steps * recipe.batch;
-        Ok(Learnt {
+        Ok(EpochSummary {
             loss: loss / steps as f64,
             accuracy: correct as f64 / clouds as f64,
             clouds,
@@ -119,7 +121,7 @@ impl Trainer {
         })
     }
 
-    /// Which of the last hidden features are kept in the step to come.
+    /// The dropout mask of the last hidden features for the next step.
     fn dropout(&self, clouds: usize) -> Option<Matrix> {
         let width = self.model.network.dropout_width()?;
         let dropped = self.recipe.dropout;

@@ -1,7 +1,9 @@
 //! Starts the repository's other programs, which Cargo builds first if need be.
 
 use anyhow::Context;
+use formats::modelnet_h5_list::is_one;
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitStatus;
 use xtask::workspace::{cargo_command, root};
 
@@ -50,8 +52,17 @@ impl Program {
         if self == Self::Edgepuck && has("--layout") && names("modelnet-h5") {
             features.push("hdf5");
         }
+        if self == Self::Lab && words.iter().any(|word| is_one(path_of(word))) {
+            features.push("hdf5");
+        }
         features
     }
+}
+
+/// The value of a flag `--name=VALUE`, or the whole word.
+fn path_of(word: &OsString) -> &Path {
+    let value = word.to_str().and_then(|word| word.split_once('=')).map(|(_, value)| value);
+    value.map_or(Path::new(word), Path::new)
 }
 
 /// The code that the child ended with; 128 more than its signal, as shells have

@@ -1,4 +1,4 @@
-//! `modelnet40_normal_resampled`: text files, a cloud each.
+//! `modelnet40_normal_resampled`: one text file for each cloud.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::error::Error;
 
 const NAMES: &str = "modelnet40_shape_names.txt";
 
-/// Whether the folder at `path` looks like one.
+/// Whether the folder at `path` has this layout.
 pub fn is_one(path: &Path) -> bool {
     path.join(NAMES).is_file()
 }
@@ -37,7 +37,7 @@ pub fn read(root: &Path, split: Split, n_points: usize) -> Result<LabelledSet, E
         let class = id.rsplit_once('_').map_or("", |(class, _)| class);
         classes.iter().position(|name| name == class).ok_or_else(|| Error::Data {
             path: root.join(&list),
-            cause: format!("`{id}` is of no class of {NAMES}"),
+            cause: format!("expected a class of {NAMES} in the id `{id}`"),
         })
     });
     let labels: Vec<usize> = labels.collect::<Result<_, _>>()?;
@@ -58,14 +58,16 @@ fn cloud(path: &Path, n_points: usize) -> Result<Vec<f32>, FormatError> {
         let bad = |cause: String| FormatError::malformed(path, format!("line {number}"), cause);
         let mut fields = line.split(',');
         for axis in ["x", "y", "z"] {
-            let field = fields.next().ok_or_else(|| bad(format!("no {axis}")))?;
-            let value: f32 =
-                field.trim().parse().map_err(|_| bad(format!("{axis}: `{field}` is no number")))?;
+            let field = fields.next().ok_or_else(|| bad(format!("{axis} is missing")))?;
+            let value: f32 = field
+                .trim()
+                .parse()
+                .map_err(|_| bad(format!("expected a number as {axis}, found `{field}`")))?;
             points.push(value);
         }
     }
     if points.len() < 3 * n_points {
-        let cause = format!("{} points; {n_points} are needed", points.len() / 3);
+        let cause = format!("expected {n_points} points, found {}", points.len() / 3);
         return Err(FormatError::malformed(path, "file", cause));
     }
     Ok(points)

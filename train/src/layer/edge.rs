@@ -1,16 +1,16 @@
-//! What surrounds each point: a linear layer of the offsets to its neighbours,
-//! batch norm, ReLU and the maximum over them. infer-cpu's `edge.rs` has the
-//! definition. It is a pooled layer whose clouds are neighbourhoods.
+//! EdgeConv: a linear layer of the offsets from each point to its neighbors, batch
+//! norm, ReLU and the maximum over the neighbors. infer-cpu's `edge.rs` has the
+//! definition. It is a pooled layer whose clouds are neighborhoods.
 
 use ndarray::ArrayView2;
 use ndarray::parallel::prelude::*;
 
-use super::{Folded, Learns, PooledLayer, Rows};
+use super::{Folded, Module, PooledLayer, Rows};
 use crate::batch::Batch;
 use crate::matrix::Matrix;
 use crate::parameter::Parameter;
 
-/// The layer of one radius.
+/// An EdgeConv layer of one radius.
 #[derive(Clone, Debug)]
 pub struct EdgeLayer {
     /// What it learns, and its last output, `[points, channels]`.
@@ -19,19 +19,19 @@ pub struct EdgeLayer {
     edges: Edges,
 }
 
-/// From each point of a batch to its neighbours.
+/// The edges from each point of a batch to its neighbors.
 #[derive(Clone, Debug, Default)]
 struct Edges {
     /// Offsets over the radius, `[edges, 3]`.
     offsets: Matrix,
-    /// How often each counts in statistics: as its point does.
+    /// How often each edge counts in statistics: as often as its point.
     weights: Vec<f32>,
-    /// Where each point's edges begin, and where the last one's end.
+    /// Where each point's edges begin, and where the last point's end.
     starts: Vec<usize>,
 }
 
 impl EdgeLayer {
-    /// Layer `number` of those that look around, as far as `radius`.
+    /// EdgeConv layer `number`, of neighbors within `radius`.
     #[must_use]
     pub fn new(number: usize, radius: f32, channels: usize, seed: u64) -> Self {
         let (linear, norm) = (format!("edge.conv{number}"), format!("edge.bn{number}"));
@@ -39,25 +39,25 @@ impl EdgeLayer {
         Self { pooled, radius, edges: Edges::default() }
     }
 
-    /// How many features it gives a point.
+    /// Features that it computes for each point.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.pooled.base.linear.size().1
     }
 
-    /// Looks around every point of `batch`.
+    /// Computes the features of every point of `batch`.
     pub fn forward(&mut self, batch: &Batch, momentum: f32) {
         self.edges = Edges::of(batch, self.radius);
         self.pooled.forward(self.edges.offsets.view(), self.edges.rows(), momentum);
     }
 
-    /// What the last forward pass gave.
+    /// The output of the last forward pass.
     #[must_use]
     pub fn output(&self) -> ArrayView2<'_, f32> {
         self.pooled.base.output()
     }
 
-    /// Sets gradients from that of the output.
+    /// Sets the parameters' gradients from that of the output.
     pub fn backward(&mut self, dy: Matrix) {
         self.pooled.backward(dy, self.edges.offsets.view(), self.edges.rows(), false);
     }
@@ -66,19 +66,19 @@ impl EdgeLayer {
 impl Edges {
     fn of(batch: &Batch, radius: f32) -> Self {
         let clouds: Vec<usize> = (0..batch.len()).collect();
-        let around = |&cloud: &usize| {
+        let offsets_of = |&cloud: &usize| {
             let centres = &batch.coordinates[batch.starts[cloud]..batch.starts[cloud + 1]];
-            let others = batch.surroundings(cloud);
-            centres.iter().map(|p| neighbours(p, others, radius)).collect::<Vec<_>>()
+            let others = batch.neighborhood_of(cloud);
+            centres.iter().map(|p| neighbors(p, others, radius)).collect::<Vec<_>>()
         };
-        let around: Vec<Vec<[f32; 3]>> = clouds.par_iter().map(around).flatten().collect();
+        let offsets: Vec<Vec<[f32; 3]>> = clouds.par_iter().map(offsets_of).flatten().collect();
         let mut edges = Self { starts: vec![0], ..Self::default() };
-        for (neighbours, &weight) in around.iter().zip(&batch.weights) {
-            let end = edges.weights.len() + neighbours.len();
+        for (neighbors, &weight) in offsets.iter().zip(&batch.weights) {
+            let end = edges.weights.len() + neighbors.len();
             edges.weights.resize(end, weight);
             edges.starts.push(end);
         }
-        let flat: Vec<f32> = around.into_iter().flatten().flatten().collect();
+        let flat: Vec<f32> = offsets.into_iter().flatten().flatten().collect();
         edges.offsets = Matrix::from_shape_vec((flat.len() / 3, 3), flat)
             .expect("invariant: three coordinates an offset");
         edges
@@ -90,9 +90,9 @@ impl Edges {
     }
 }
 
-/// Offsets over `radius` from `p` to the points within it: p itself first, and
-/// once, however often it is among `others`.
-fn neighbours(p: &[f32; 3], others: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
+/// The offsets, divided by `radius`, from `p` to its neighbors within `radius`: p
+/// itself first, and once, however often `others` hold it.
+fn neighbors(p: &[f32; 3], others: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
     let mut offsets = vec![[0.0; 3]];
     for q in others {
         let offset = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
@@ -104,7 +104,7 @@ fn neighbours(p: &[f32; 3], others: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
     offsets
 }
 
-impl Learns for EdgeLayer {
+impl Module for EdgeLayer {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
         self.pooled.base.parameters(visit);
     }

@@ -3,7 +3,7 @@
 use formats::rng::StreamKey;
 use ndarray::ArrayView2;
 
-use super::{Folded, Learns};
+use super::{Folded, Module};
 use crate::matrix::{self, Matrix};
 use crate::parameter::Parameter;
 
@@ -48,7 +48,7 @@ impl Linear {
         (self.weight.shape[1], self.weight.shape[0])
     }
 
-    /// `z` without the bias, for a batch norm that takes it away again.
+    /// `z` without the bias, for a batch norm, which would subtract it again.
     #[must_use]
     pub fn products(&self, x: ArrayView2<'_, f32>) -> Matrix {
         matrix::forward(x, self.weight.matrix())
@@ -68,14 +68,14 @@ impl Linear {
         matrix::backward(dz, self.weight.matrix())
     }
 
-    /// Sets the weights' gradient alone. In front of a batch norm that of the
-    /// bias is 0.
+    /// Sets only the weights' gradient. Before a batch norm, that of the bias is
+    /// 0.
     pub fn backward_products(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) {
         matrix::gradient(dz, x, &mut self.weight.gradient);
     }
 }
 
-impl Learns for Linear {
+impl Module for Linear {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
         visit(&mut self.weight);
         visit(&mut self.bias);

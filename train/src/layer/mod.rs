@@ -1,15 +1,14 @@
-//! Layers with their gradients, by hand: what PointNet needs, and no more.
+//! The layers of PointNet, with hand-written gradients.
 //!
 //! # Rows with weights
 //! The baseline's augmentation drops points by moving them onto the cloud's
-//! first point. A network that pools by maximum cannot tell such a duplicate
-//! from the original, but for one thing: batch norms count it in mean and
-//! variance. So dropped points are removed here, and the first point's row is
-//! given the weight of all its duplicates. Forward, every layer's statistics
-//! and so its outputs are the same. Backward, a duplicate's gradient is that
-//! of its original: the row's gradient is their sum, in which the batch norm's
-//! share counts once for each. Seven sixteenths of the work are saved on
-//! average, and no result changes but by rounding.
+//! first point. A maximum ignores such duplicates; only batch norms count them, in
+//! mean and variance. Therefore dropped points are removed here, and the first
+//! point's row has the weight of all its duplicates. In the forward pass, every
+//! layer's statistics and outputs are the same. In the backward pass, a duplicate's
+//! gradient is that of its original: the row's gradient is their sum, in which the
+//! batch norm's share counts once for each. This saves seven sixteenths of the work
+//! on average and changes results only by rounding.
 
 mod edge;
 mod linear;
@@ -39,7 +38,7 @@ use crate::parameter::Parameter;
 pub struct Rows<'a> {
     /// How often each row counts in statistics.
     pub weights: &'a [f32],
-    /// Where each cloud's rows begin, and where the last one's end.
+    /// Where each cloud's rows begin, and where the last cloud's end.
     pub starts: &'a [usize],
     /// The sum of all weights.
     pub total: f32,
@@ -78,15 +77,14 @@ pub struct Folded {
     pub bias: Vec<f32>,
 }
 
-/// What owns parameters.
-pub trait Learns {
+/// A part of a network: it owns parameters and running statistics.
+pub trait Module {
     /// Calls `visit` with each parameter, always in the same order.
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter));
 
-    /// Calls `visit` with the name, shape and values of what is not learnt by
-    /// gradients but kept with the parameters.
+    /// Calls `visit` with the name and values of each running statistic.
     fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>));
 
-    /// Calls `visit` with each linear layer as it computes when not learning.
+    /// Calls `visit` with each linear layer, with its batch norm folded in.
     fn folded(&self, visit: &mut dyn FnMut(Folded));
 }

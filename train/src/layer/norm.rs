@@ -26,7 +26,7 @@ pub struct Norm {
     pub variance: Vec<f32>,
 }
 
-/// What backward needs of a forward pass.
+/// The values of a forward pass that the backward pass needs.
 #[derive(Clone, Debug, Default)]
 pub struct Saved {
     /// Values with mean 0 and variance 1.
@@ -51,8 +51,8 @@ impl Norm {
         }
     }
 
-    /// `linear` with this batch norm, as it is when not learning, multiplied
-    /// into weights and biases in f64.
+    /// `linear` with this batch norm folded into its weights and biases, by the
+    /// running statistics and in f64.
     #[must_use]
     pub fn folded_into(&self, linear: &Linear) -> Folded {
         let (inputs, outputs) = linear.size();
@@ -73,9 +73,9 @@ impl Norm {
         }
     }
 
-    /// Counts a batch's statistics in the running ones: `mean` without `bias`,
-    /// variance over `total` values, with PyTorch's `momentum` share.
-    pub fn remember(
+    /// Adds a batch's statistics to the running ones with the share `momentum`, as
+    /// PyTorch does: `mean` without `bias`, variance over `total` values.
+    pub fn update_statistics(
         &mut self,
         (mean, variance): (&[f32], &[f32]),
         bias: &[f32],
@@ -106,7 +106,7 @@ impl Norm {
             let centre = &mean;
             column_sums(&z, weights, |z, c| (z - centre[c]) * (z - centre[c]), total)
         };
-        self.remember((&mean, &variance), bias, total, momentum);
+        self.update_statistics((&mean, &variance), bias, total, momentum);
         let inverse: Vec<f32> = variance.iter().map(|v| 1.0 / (v + EPSILON).sqrt()).collect();
         let (scale, shift) = (&self.scale.value, &self.shift.value);
         let mut out = Matrix::zeros(z.dim());
@@ -119,7 +119,7 @@ impl Norm {
                     for c in 0..z.len() {
                         z[c] = (z[c] - mean[c]) * inverse[c];
                         let y = z[c] * scale[c] + shift[c];
-                        // NaN stays, and is found in the loss.
+                        // NaN is kept, so that the loss shows it.
                         out[c] = if relu && y < 0.0 { 0.0 } else { y };
                     }
                 }

@@ -1,18 +1,18 @@
-//! A linear layer and its batch norm: what every layer with a ReLU or a pooling
-//! behind it learns.
+//! A linear layer and its batch norm, the base of every layer that is followed by a
+//! ReLU or a pooling.
 
 use ndarray::ArrayView2;
 
-use super::{Folded, Learns, Linear, Norm};
+use super::{Folded, Linear, Module, Norm};
 use crate::matrix::Matrix;
 use crate::parameter::Parameter;
 
-/// The two, and what the layer around them gave last.
+/// A linear layer, its batch norm, and the last output.
 #[derive(Clone, Debug)]
 pub struct Normed {
     /// `W x + b`.
     pub linear: Linear,
-    /// What comes behind it.
+    /// The batch norm of its output.
     pub norm: Norm,
     /// The last output.
     pub output: Matrix,
@@ -29,7 +29,7 @@ impl Normed {
         }
     }
 
-    /// What the last forward pass gave.
+    /// The output of the last forward pass.
     #[must_use]
     pub fn output(&self) -> ArrayView2<'_, f32> {
         self.output.view()
@@ -42,7 +42,7 @@ impl Normed {
     }
 }
 
-impl Learns for Normed {
+impl Module for Normed {
     fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
         self.linear.parameters(visit);
         visit(&mut self.norm.scale);

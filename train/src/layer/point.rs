@@ -6,10 +6,10 @@ use super::norm::Saved;
 use super::{Normed, Rows};
 use crate::matrix::{self, Matrix};
 
-/// A layer that takes each point by itself.
+/// A layer that is applied to each point alone.
 #[derive(Clone, Debug)]
 pub struct PointLayer {
-    /// What it learns, and its last output.
+    /// Its parameters and its last output.
     pub base: Normed,
     saved: Saved,
 }
@@ -29,8 +29,8 @@ impl PointLayer {
             self.base.norm.forward(z, (rows.weights, rows.total), bias, (momentum, true));
     }
 
-    /// Sets gradients from that of the output and returns that of the product,
-    /// for [`PointLayer::input_gradient`].
+    /// Sets the parameters' gradients from that of the output; returns that of the
+    /// product, for [`PointLayer::input_gradient`].
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dy: Matrix, rows: Rows<'_>) -> Matrix {
         let weights = (rows.weights, rows.total);
         let dz = self.base.norm.backward(dy, Some(&self.base.output), &self.saved, weights);

@@ -1,14 +1,14 @@
-//! Linear, batch norm and the maximum over each cloud's points, in one.
+//! Linear layer, batch norm and the maximum over each cloud's points, in one.
 //!
-//! The products z = W x, a thousand a point, are never kept:
+//! The products z = W x, a thousand for each point, are never stored:
 //!
-//! - A maximum wants one of each channel and cloud, which infer-cpu's fused
-//!   kernel finds. A batch norm with a scale of at least 0 keeps the order of
-//!   its values, one below 0 turns it: then the sign goes into the weights.
+//! - The maximum needs one product of each channel and cloud, which infer-cpu's
+//!   fused kernel finds. A batch norm with a scale of at least 0 keeps the order of
+//!   its values; one below 0 reverses it, and then the weights change their sign.
 //! - Mean and variance of z follow from those of x: mean(z) = W mean(x), and
 //!   var(z) = w cov(x) wᵀ for each channel's w.
-//! - Backward, a channel's gradient G comes to one point of each cloud, and
-//!   through the batch norm's statistics to all points. With σ, γ of a
+//! - In the backward pass, a channel's gradient G flows to one point of each cloud,
+//!   and through the batch norm's statistics to all points. With σ, γ of a
 //!   channel, n points in all, S = ΣG over clouds and P = ΣG ẑ:
 //!
 //! ```text
@@ -17,7 +17,7 @@
 //! v   =  Σ_channels γ/σ S/n w,      A  =  Σ_channels γ P / (n σ²) w wᵀ
 //! ```
 //!
-//! so all points together cost a product with a matrix of inputs by inputs.
+//! so that all points together cost one product with a matrix of inputs by inputs.
 
 use infer_cpu::kernel::PooledProducts;
 use ndarray::parallel::prelude::*;
@@ -31,13 +31,13 @@ use crate::matrix::{self, Matrix};
 /// The last point-wise layer before a pooling, and the pooling.
 #[derive(Clone, Debug)]
 pub struct PooledLayer {
-    /// What it learns, and its last output.
+    /// Its parameters and its last output.
     pub base: Normed,
     relu: bool,
     saved: Saved,
 }
 
-/// What backward needs of a forward pass.
+/// The values of a forward pass that the backward pass needs.
 #[derive(Clone, Debug, Default)]
 struct Saved {
     /// The row that won, by cloud and channel.
@@ -54,8 +54,8 @@ struct Saved {
 }
 
 impl PooledLayer {
-    /// A layer whose parts are named `linear` and `norm`; with `relu` what is
-    /// pooled is at least 0.
+    /// A layer whose parts are named `linear` and `norm`; with `relu` the output
+    /// is at least 0.
     #[must_use]
     pub fn new(linear: &str, norm: &str, size: (usize, usize), relu: bool, seed: u64) -> Self {
         Self { base: Normed::new(linear, norm, size, seed), relu, saved: Saved::default() }
@@ -86,7 +86,7 @@ impl PooledLayer {
         let mean_product = weights.dot(&ndarray::aview1(&mean)).to_vec();
         let inverse: Vec<f32> = variance.iter().map(|v| 1.0 / (v + EPSILON).sqrt()).collect();
         let bias = &self.base.linear.bias.value;
-        self.base.norm.remember((&mean_product, &variance), bias, rows.total, momentum);
+        self.base.norm.update_statistics((&mean_product, &variance), bias, rows.total, momentum);
 
         let (mut normalised, winners) = self.largest(&x, rows);
         self.base.output = Matrix::zeros(normalised.dim());
@@ -123,7 +123,7 @@ impl PooledLayer {
                 let points = x.slice(ndarray::s![first..last, ..]);
                 let points = points.to_slice().expect("invariant: rows are contiguous");
                 let mut maxima = vec![f32::NEG_INFINITY; outputs];
-                // NaN wins nothing: then the first row counts as the winner.
+                // NaN wins no channel. The first row is then the winner.
                 winners.fill(first as u32);
                 pooled.argmax(points, first as u32, &mut maxima, winners);
                 for c in 0..outputs {
@@ -133,8 +133,8 @@ impl PooledLayer {
         (products, winners)
     }
 
-    /// Sets gradients from that of the output; returns that of `x` where it is
-    /// wanted.
+    /// Sets the parameters' gradients from that of the output; returns that of `x`,
+    /// if `wants_input`.
     pub fn backward(
         &mut self,
         mut dy: Matrix,

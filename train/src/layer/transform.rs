@@ -1,4 +1,4 @@
-//! Transforms that T-Nets predict, one a cloud.
+//! The transforms that T-Nets predict, one for each cloud.
 
 use ndarray::parallel::prelude::*;
 use ndarray::{ArrayView2, Axis, s};
@@ -6,17 +6,17 @@ use ndarray::{ArrayView2, Axis, s};
 use super::{Rows, by_cloud};
 use crate::matrix::Matrix;
 
-/// Square transforms `[clouds, k * k]`; a row vector p goes to p T.
+/// Square transforms `[clouds, k * k]`; a row vector p becomes p T.
 #[derive(Clone, Debug, Default)]
 pub struct Transforms {
-    /// Row by row.
+    /// The elements of each cloud's transform, row by row.
     pub elements: Matrix,
-    /// Rows of a transform.
+    /// Rows of each transform.
     pub k: usize,
 }
 
 impl Transforms {
-    /// Those that differ from the identity by `elements`.
+    /// The transforms that differ from the identity by `elements`.
     #[must_use]
     pub fn around_identity(mut elements: Matrix, k: usize) -> Self {
         for i in 0..k {
@@ -31,7 +31,7 @@ impl Transforms {
         ArrayView2::from_shape((self.k, self.k), row).expect("invariant: k by k")
     }
 
-    /// Each row of `x` behind its cloud's transform.
+    /// Each row of `x`, transformed by its cloud's transform.
     #[must_use]
     pub fn forward(&self, x: ArrayView2<'_, f32>, rows: Rows<'_>) -> Matrix {
         let mut out = Matrix::zeros(x.dim());
@@ -43,7 +43,7 @@ impl Transforms {
     }
 
     /// The gradients of the transforms' elements and of `x`, from that of the
-    /// rows behind them.
+    /// transformed rows.
     #[must_use]
     pub fn backward(
         &self,

@@ -6,10 +6,10 @@ use super::Normed;
 use super::norm::Saved;
 use crate::matrix::{self, Matrix};
 
-/// A layer that takes one vector a cloud.
+/// A layer that is applied to one vector of each cloud.
 #[derive(Clone, Debug)]
 pub struct VectorLayer {
-    /// What it learns, and its last output.
+    /// Its parameters and its last output.
     pub base: Normed,
     saved: Saved,
     kept: Option<Matrix>,
@@ -22,7 +22,7 @@ impl VectorLayer {
         Self { base: Normed::new(linear, norm, size, seed), saved: Saved::default(), kept: None }
     }
 
-    /// Takes `x` `[clouds, inputs]` through the layer. `kept` is dropout's mask
+    /// Takes `x` `[clouds, inputs]` through the layer. `kept` is the dropout mask
     /// between product and batch norm, scaled by 1 / share kept.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, kept: Option<Matrix>, momentum: f32) {
         let mut z = self.base.linear.products(x);
@@ -31,7 +31,7 @@ impl VectorLayer {
         let mut bias = &self.base.linear.bias.value;
         let none = vec![0.0; bias.len()];
         if let Some(kept) = &kept {
-            // What is dropped loses its bias too, so that it matters here.
+            // Dropped features lose their bias too, so that it has to be added here.
             z += &ndarray::aview1(bias);
             z *= kept;
             bias = &none;
@@ -41,7 +41,7 @@ impl VectorLayer {
         self.kept = kept;
     }
 
-    /// Sets gradients from that of the output; returns that of `x`.
+    /// Sets the parameters' gradients from that of the output; returns that of `x`.
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dy: Matrix) -> Matrix {
         let ones = vec![1.0; dy.nrows()];
         let n = dy.nrows() as f32;

@@ -1,16 +1,17 @@
-//! Gradients against the twin's, which are taken by differences.
+//! Gradients, compared with finite differences of the reference network.
 
 use std::collections::BTreeMap;
 
 use formats::rng::StreamKey;
 use train::batch::Batch;
-use train::chooser::Chooser;
-use train::front::Cpl;
-use train::layer::Learns;
+use train::cpl::Cpl;
+use train::layer::Module;
 use train::matrix::Matrix;
-use train::network::{Edge, PointNet, Rates, Shape};
+use train::network::{PointNet, Rates};
+use train::selector::CriticalPointSelector;
+use train::shape::{Edge, Shape};
 
-use crate::twin::{self, Table, Twin};
+use crate::reference::{self, Reference, Table};
 
 const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.02, step: 0 };
 
@@ -47,11 +48,11 @@ fn batch() -> Batch {
         batch.starts.push(batch.coordinates.len());
     }
     // Around each cloud, its own points and some more.
-    batch.around_starts.push(0);
+    batch.neighborhood_starts.push(0);
     for cloud in 0..sizes.len() {
-        batch.around.extend(&batch.coordinates[batch.starts[cloud]..batch.starts[cloud + 1]]);
-        batch.around.extend((0..8).map(|_| [(); 3].map(|()| 2.0 * unit() - 1.0)));
-        batch.around_starts.push(batch.around.len());
+        batch.neighborhood.extend(&batch.coordinates[batch.starts[cloud]..batch.starts[cloud + 1]]);
+        batch.neighborhood.extend((0..8).map(|_| [(); 3].map(|()| 2.0 * unit() - 1.0)));
+        batch.neighborhood_starts.push(batch.neighborhood.len());
     }
     batch.targets = Matrix::from_shape_fn((sizes.len(), CLASSES), |(cloud, class)| {
         // One cloud's target is shared between classes.
@@ -99,22 +100,27 @@ fn check(shape: &Shape) {
         }
     });
     let loss = network.learn(&batch, Some(kept()), RATES);
-    let mut values = twin::values(&mut network);
+    let mut values = reference::values(&mut network);
     let mut gradients = BTreeMap::new();
     network.parameters(&mut |parameter| {
         gradients.insert(parameter.name.clone(), parameter.gradient.clone());
     });
     let clouds = duplicated(&batch);
-    let wide = |cloud| batch.surroundings(cloud).iter().map(|p| p.map(f64::from).to_vec());
+    let wide = |cloud| batch.neighborhood_of(cloud).iter().map(|p| p.map(f64::from).to_vec());
     let around: Vec<Table> = (0..batch.len()).map(|cloud| wide(cloud).collect()).collect();
-    let twin = |values: &twin::Values| {
+    let reference = |values: &reference::Values| {
         let around = around.clone();
-        let twin = Twin { values, clouds: clouds.clone(), around, kept: Some(kept()) };
-        twin.loss(shape, &batch.targets, RATES.orthogonality)
+        let reference = Reference { values, clouds: clouds.clone(), around, kept: Some(kept()) };
+        reference.loss(shape, &batch.targets, RATES.orthogonality)
     };
     // Some 30 layers deep, each of fewer than 100 roundings of relative size
     // 6e-8, magnified by batch norms of four vectors.
-    assert!((loss.total - twin(&values)).abs() < 1e-4, "{} for {}", loss.total, twin(&values));
+    assert!(
+        (loss.total - reference(&values)).abs() < 1e-4,
+        "{} for {}",
+        loss.total,
+        reference(&values)
+    );
     for (name, gradient) in &gradients {
         let largest = gradient.iter().fold(0.0f32, |a, g| a.max(g.abs()));
         let every = gradient.len().div_ceil(12);
@@ -124,7 +130,7 @@ fn check(shape: &Shape) {
             let h = 1e-5;
             let mut at = |by: f64| {
                 values.get_mut(name).expect("it is there").1[i] += by;
-                let loss = twin(&values);
+                let loss = reference(&values);
                 values.get_mut(name).expect("it is there").1[i] -= by;
                 loss
             };
@@ -137,12 +143,12 @@ fn check(shape: &Shape) {
 }
 
 #[test]
-fn gradients_of_the_baseline_are_those_of_its_twin() {
+fn gradients_of_the_baseline_are_those_of_the_reference() {
     check(&shape(true, true));
 }
 
 #[test]
-fn gradients_of_what_looks_around_are_those_of_the_twin() {
+fn gradients_of_edge_convolutions_are_those_of_the_reference() {
     let edge = |radius, channels| Edge { radius, channels };
     for input_transform in [false, true] {
         let edges = vec![edge(1.2, 5), edge(0.7, 3)];
@@ -157,7 +163,7 @@ fn gradients_of_a_shared_t_net_are_its_losses_differences() {
     let shape = shape(true, false);
     let cpl = Cpl { keep: 3, shared: true, ..Cpl::default() };
     let mut network = PointNet::new(&shape, CLASSES, 11);
-    network.choose_by_t_net(Chooser::new(&cpl, 0).unwrap());
+    network.select_by_t_net(CriticalPointSelector::new(&cpl, 0).unwrap());
     let batch = batch();
     network.learn(&batch, Some(kept()), RATES);
     let mut gradients = BTreeMap::new();
@@ -193,7 +199,7 @@ fn gradients_of_a_shared_t_net_are_its_losses_differences() {
 }
 
 #[test]
-fn gradients_without_a_t_net_are_those_of_the_twin() {
+fn gradients_without_a_t_net_are_those_of_the_reference() {
     check(&shape(false, true));
     check(&shape(true, false));
     check(&shape(false, false));

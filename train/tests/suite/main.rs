@@ -3,14 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod augment;
-mod cross;
 mod export;
 mod gradients;
 mod killed;
 mod program;
-mod reproduce;
+mod reference;
 mod resume;
-mod twin;
 
 use formats::labelled::LabelledSet;
 use formats::rng::StreamKey;

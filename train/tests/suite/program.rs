@@ -13,7 +13,7 @@ fn train(folder: &Path, words: &str) -> Output {
     program.unwrap()
 }
 
-fn said(output: &Output) -> String {
+fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -42,7 +42,7 @@ fn write(path: &Path, clouds: &train::clouds::Clouds) {
 fn a_run_leaves_a_model_and_a_folder() {
     let folder = folder();
     let ran = train(folder.path(), "train --data . --recipe small.toml --out m.safetensors");
-    assert!(ran.status.success(), "{}", said(&ran));
+    assert!(ran.status.success(), "{}", stderr(&ran));
     let answer = String::from_utf8_lossy(&ran.stdout).into_owned();
     assert!(answer.contains(" of 30 (") && answer.contains("95 % interval"), "{answer}");
     let run = folder.path().join("m.run");
@@ -52,10 +52,10 @@ fn a_run_leaves_a_model_and_a_folder() {
     assert!(run.join("recipe.toml").is_file());
     // The same again does nothing but read the test half once more.
     let again = train(folder.path(), "train --data . --recipe small.toml --out m.safetensors");
-    assert!(said(&again).contains("going on after epoch 2 of 2"), "{}", said(&again));
+    assert!(stderr(&again).contains("resuming after epoch 2 of 2"), "{}", stderr(&again));
     let csv = "eval --model m.safetensors --data test.npz --csv c.csv --svg c.svg";
     let measured = train(folder.path(), csv);
-    assert!(measured.status.success(), "{}", said(&measured));
+    assert!(measured.status.success(), "{}", stderr(&measured));
     assert_eq!(std::fs::read_to_string(folder.path().join("c.csv")).unwrap().lines().count(), 4);
 }
 
@@ -76,20 +76,76 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
     std::fs::write(folder.path().join("zero.toml"), "epochs = 0").unwrap();
     for (words, expected) in [
         ("--data nan.npz", "point 1 of cloud 7 (disc_0007) is not finite"),
-        ("--data missing.npz", "missing.npz: no cloud of class 1 (disc) to learn from"),
-        ("--data one.npz", "one.npz: one class only"),
-        ("--data few.npz", "fewer than a batch of 10"),
-        ("--data nowhere", "nowhere: neither a packed NPZ"),
-        ("--data . --points 33", "clouds of 32 points; the recipe wants 33"),
+        (
+            "--data missing.npz",
+            "missing.npz: expected clouds of every class, found none of 1 (disc)",
+        ),
+        ("--data one.npz", "one.npz: expected two classes or more, found one"),
+        ("--data few.npz", "few.npz: expected a batch of 10 clouds to learn from, found 9"),
+        ("--data nowhere", "nowhere: expected a packed NPZ"),
+        ("--data . --points 33", ".: expected clouds of 33 points or more, found 32"),
         ("--data . --recipe bad.toml", "unknown field `epoch`"),
-        ("--data . --recipe zero.toml", "`epochs`: at least 1"),
-        ("--data . --keep 9", "--front and --keep are for --arch cpl"),
-        ("--data . --arch cpl --keep 33", "`cpl.keep`: between 1 and `points`"),
-        ("--data . --arch cpl --front 64-128", "widths like 3-64-128-1024 are meant"),
+        ("--data . --recipe zero.toml", "`epochs`: expected 1 or more"),
+        ("--data . --keep 9", "--front and --keep need --arch cpl"),
+        ("--data . --arch cpl --keep 33", "`cpl.keep`: expected 1 to `points`"),
+        ("--data . --arch cpl --front 64-128", "expected widths such as 3-64-128-1024"),
     ] {
         let recipe = if words.contains("--recipe") { "" } else { "--recipe small.toml" };
         let ran = train(folder.path(), &format!("train {recipe} {words} --out m.safetensors"));
-        assert!(!ran.status.success() && said(&ran).contains(expected), "{words}: {}", said(&ran));
+        assert!(
+            !ran.status.success() && stderr(&ran).contains(expected),
+            "{words}: {}",
+            stderr(&ran)
+        );
         assert!(!folder.path().join("m.safetensors").exists());
     }
+}
+
+#[test]
+fn a_wrong_command_line_gives_2_and_a_failure_1() {
+    let folder = folder();
+    for (words, code) in [
+        ("train --recipe small.toml --data . --keep 9 --out m.safetensors", 2),
+        ("train --recipe small.toml --data . --arch dgcnn --out m.safetensors", 2),
+        ("train --recipe small.toml --data nowhere --out m.safetensors", 1),
+        ("explain --model m.safetensors --cloud c.xyz --points 0", 2),
+        ("explain --model m.safetensors --cloud nowhere.xyz", 1),
+        ("compare-points nowhere.xyz nowhere.xyz", 1),
+        ("--version", 0),
+    ] {
+        let ran = train(folder.path(), words);
+        assert_eq!(ran.status.code(), Some(code), "{words}: {}", stderr(&ran));
+    }
+    let version = train(folder.path(), "--version").stdout;
+    let expected = concat!("edgepuck-train ", env!("CARGO_PKG_VERSION"), "\n");
+    assert_eq!(String::from_utf8(version).unwrap(), expected);
+}
+
+#[test]
+fn timed_steps_state_their_own_cpu_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let tensor = |n: usize, width: usize| formats::weights::Tensor {
+        shape: vec![n, width],
+        values: (0..n * width).map(|i| (i as f32 * 0.37).sin()).collect(),
+    };
+    for (name, key, n, width) in
+        [("m.safetensors", "fc3.weight", 3, 256), ("cloud.safetensors", "points", 64, 3)]
+    {
+        let tensors = [(key.to_owned(), tensor(n, width))].into();
+        let none = std::collections::BTreeMap::new();
+        formats::weights::write_weights(&folder.path().join(name), &tensors, &none).unwrap();
+    }
+    std::fs::write(folder.path().join("requests"), "load 16 4\ntime 3\n").unwrap();
+    let requests = std::fs::File::open(folder.path().join("requests")).unwrap();
+    let ran = Command::new(env!("CARGO_BIN_EXE_edgepuck-train"))
+        .args(["serve", "m.safetensors", "."])
+        .current_dir(folder.path())
+        .stdin(requests)
+        .output()
+        .unwrap();
+    let text = String::from_utf8(ran.stdout).unwrap();
+    let times: serde_json::Value = serde_json::from_str(text.lines().nth(2).unwrap()).unwrap();
+    let [wall, cpu] = ["wall_ns", "cpu_ns"].map(|key| times[key].as_array().unwrap());
+    assert_eq!((wall.len(), cpu.len()), (3, 3));
+    assert_ne!(wall, cpu, "CPU time is measured, not copied from the wall clock");
 }

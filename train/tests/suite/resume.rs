@@ -2,9 +2,9 @@
 
 use train::checkpoint;
 use train::error::Error;
-use train::layer::Learns;
-use train::network::Shape;
+use train::layer::Module;
 use train::recipe::{Recipe, Sampling};
+use train::shape::Shape;
 use train::trainer::Trainer;
 
 fn recipe() -> Recipe {
@@ -87,5 +87,5 @@ fn a_loss_that_is_not_finite_names_step_and_layer() {
     let error = Trainer::new(recipe(), 3).unwrap().learn(&clouds, |_| {}).unwrap_err();
     let message = error.to_string();
     assert!(message.contains("at step 1 of epoch 1"), "{message}");
-    assert!(message.contains("is feat.stn.conv1."), "{message}");
+    assert!(message.contains("; feat.stn.conv1 is the first"), "{message}");
 }

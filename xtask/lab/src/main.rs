@@ -11,7 +11,7 @@ mod study;
 use clap::{Parser, Subcommand};
 use edgepuck_program::{Outcome, outcome};
 use std::process::ExitCode;
-use study::{ablation, reproduce, trade};
+use study::{ablation, reproduction, trade};
 
 /// Measures Edgepuck.
 #[derive(Parser)]
@@ -30,7 +30,7 @@ enum Command {
     /// Measure how much each effect of a scan matters to a classifier, and what it costs
     Ablate(ablation::Args),
     /// Repeat the paper's experiments, and write one report
-    Reproduce(reproduce::Args),
+    Reproduce(reproduction::Args),
     /// Gather every record into one page
     Report(report::Args),
 }
@@ -44,7 +44,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Bench(args) => bench::run(args),
         Command::Trade(args) => trade::run(args),
         Command::Ablate(args) => ablation::run(args),
-        Command::Reproduce(args) => reproduce::run(args),
+        Command::Reproduce(args) => reproduction::run(args),
         Command::Report(args) => report::run(args),
     }
 }

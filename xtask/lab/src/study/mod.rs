@@ -4,6 +4,10 @@ pub mod ablation;
 pub mod casting;
 pub mod devices;
 pub mod numerics;
-pub mod reproduce;
+mod plan;
+pub mod reproduction;
+mod resume;
+#[cfg(test)]
+mod test_clouds;
 pub mod trade;
 pub mod uniform_raster;

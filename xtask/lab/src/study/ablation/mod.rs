@@ -1,24 +1,31 @@
-//! `cargo xtask ablate`: what each effect of a scan is worth to a classifier,
-//! and what it costs. Datasets with and without it are made here; networks are
-//! trained on them by `train`.
+//! `cargo xtask ablate`: how much each effect of a scan matters to a classifier,
+//! and what it costs. Datasets are made with and without the effect, and networks
+//! trained on both by the library `train`.
 
 mod costs;
+mod crossing;
 mod datasets;
+mod design;
 mod effects;
-mod plan;
+pub mod plan;
 mod positions;
 mod rows;
 mod summary;
+#[cfg(test)]
+mod tests;
+mod train_test_split;
 
-use anyhow::{Context, ensure};
-use datasets::{Made, bytes_per_cloud, clouds, make};
+use super::{plan as plans, resume};
+use anyhow::Context;
+use datasets::{Made, bytes_per_cloud, make};
+use design::Design;
+use edgepuck_program::Outcome;
 use edgepuck_program::flags::need_folder_of_meshes;
-use edgepuck_program::{Outcome, trainer as train};
 use edgepuck_shapes as shapes;
-use effects::{DATASETS, EFFECTS, Judge, Source};
+use effects::{DATASETS, EFFECTS, Judge};
 use formats::atomic;
 use plan::Plan;
-use rows::{Answer, Cost};
+use rows::Cost;
 use serde::Serialize;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use std::collections::BTreeMap;
@@ -27,19 +34,19 @@ use std::path::{Path, PathBuf};
 /// Flags of `ablate`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A folder of meshes, as gen-dataset takes it [default: shapes of our own]
+    /// A folder of meshes, as gen-dataset takes it [default: built-in shapes]
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
-    /// A look at a few meshes, in two minutes
+    /// Use a few meshes only, which takes two minutes
     #[arg(long, conflicts_with = "plan")]
     quick: bool,
 
-    /// How much is made and trained, as the files in assets/ablations
+    /// The sizes of the study, as in the files of assets/ablations
     #[arg(long, value_name = "TOML")]
     plan: Option<PathBuf>,
 
-    /// Where ablations.csv goes, with all that it is made from; a run goes on from what is there
+    /// The folder of ablations.csv and of all that it is made from; an interrupted run is resumed
     #[arg(long, value_name = "DIR", default_value = "data/ablations")]
     out: PathBuf,
 }
@@ -52,7 +59,7 @@ const SHAPES: [u32; 2] = [40, 10];
 /// `ablations.csv` and `tables.txt`, and prints the latter.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     need_folder_of_meshes(args.meshes.as_deref())?;
-    let plan = Plan::read(args.plan.as_deref(), args.quick)?;
+    let plan: Plan = plans::read(args.plan.as_deref(), args.quick)?;
     let work = args.out.join("work");
     keep_terms(&plan, args.meshes.as_deref(), &args.out)?;
     let meshes = meshes(&plan, args.meshes.as_deref(), &work)?;
@@ -65,7 +72,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         let seconds = *seconds.get(name).with_context(|| format!("no cost of {name}"))?;
         costs.insert(name.to_owned(), Cost { seconds, bytes_per_cloud });
     }
-    let Some(answers) = answers(&plan, &work)? else { return Ok(Outcome::SomeFailed) };
+    let answers = crossing::run(&Design::of(&plan)?, &work, &work.join("trained"))?;
     let rows = rows::rows(&answers, &compared, &costs);
     let summary = summary::of(&rows);
     let mut csv = csv::Writer::from_writer(Vec::new());
@@ -77,7 +84,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(if failed { Outcome::SomeFailed } else { Outcome::Success })
 }
 
-/// Keeps the plan, and which meshes it is run on, beside what comes of it.
+/// Writes the plan and the meshes' folder beside the results, or compares them
+/// with an earlier run's.
 fn keep_terms(plan: &Plan, meshes: Option<&Path>, out: &Path) -> anyhow::Result<()> {
     #[derive(Serialize)]
     struct Terms<'a> {
@@ -90,17 +98,7 @@ fn keep_terms(plan: &Plan, meshes: Option<&Path>, out: &Path) -> anyhow::Result<
         None => "shapes of our own".to_owned(),
     };
     let text = toml::to_string(&Terms { version: env!("CARGO_PKG_VERSION"), meshes, plan })?;
-    let path = out.join("terms.toml");
-    if !path.is_file() {
-        return Ok(atomic::write_bytes(&path, text)?);
-    }
-    let earlier = std::fs::read_to_string(&path)?;
-    ensure!(
-        earlier == text,
-        "{}: an earlier run had another plan or other meshes; choose another --out",
-        path.display()
-    );
-    Ok(())
+    resume::keep_terms(&text, out)
 }
 
 /// The meshes, of each class and split as many as the plan wants.
@@ -157,65 +155,4 @@ fn compare(made: &[Made], work: &Path) -> anyhow::Result<BTreeMap<&'static str, 
         compared.insert(effect.name, n.with_context(|| format!("effect {}", effect.name))?);
     }
     Ok(compared)
-}
-
-/// What networks answer, which `train` finds out; `None` if it failed and said
-/// why.
-fn answers(plan: &Plan, work: &Path) -> anyhow::Result<Option<Vec<Answer>>> {
-    let design = work.join("design.toml");
-    atomic::write_bytes(&design, toml::to_string(&Design::of(plan))?)?;
-    let flags = ["--design".into(), design.into(), "--out".into(), work.join("trained").into()];
-    if let Outcome::SomeFailed = train::run("cross", &train::Args::from(flags.to_vec()))? {
-        return Ok(None);
-    }
-    let path = work.join("trained/answers.csv");
-    let mut csv = csv::Reader::from_path(&path).with_context(|| path.display().to_string())?;
-    let answers = csv.deserialize().collect::<Result<_, _>>();
-    answers.map(Some).with_context(|| path.display().to_string())
-}
-
-/// What `train cross` is asked for. Paths are from the folder it lies in.
-#[derive(Serialize)]
-struct Design<'a> {
-    seeds: &'a [u64],
-    steps: u32,
-    recipe: &'a toml::Table,
-    set: Vec<Set>,
-    test: Vec<Test>,
-}
-
-#[derive(Serialize)]
-struct Set {
-    name: &'static str,
-    path: PathBuf,
-    matched: bool,
-}
-
-#[derive(Serialize)]
-struct Test {
-    trained_on: &'static str,
-    tested_on: &'static str,
-}
-
-impl<'a> Design<'a> {
-    fn of(plan: &'a Plan) -> Self {
-        let tests = rows::tests();
-        let used = |name: &str| tests.iter().any(|(p, q)| [*p, *q].contains(&name));
-        let set = |&(name, source): &(&'static str, Source)| Set {
-            name,
-            path: clouds(source, &folder(Path::new(""), name)),
-            // Whole meshes have no views to be matched by.
-            matched: source != Source::Surface,
-        };
-        Self {
-            seeds: &plan.seeds,
-            steps: plan.steps,
-            recipe: &plan.recipe,
-            set: DATASETS.iter().filter(|(name, _)| used(name)).map(set).collect(),
-            test: tests
-                .iter()
-                .map(|&(trained_on, tested_on)| Test { trained_on, tested_on })
-                .collect(),
-        }
-    }
 }

@@ -3,11 +3,11 @@
 use super::costs::Seconds;
 use super::effects::{EFFECTS, Effect, Judge, REFERENCE};
 use formats::interval::wilson;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// One network's answers on one set, as `train cross` writes them.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+/// One network's answers on one set: a line of `answers.csv`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Answer {
     pub trained_on: String,
     pub tested_on: String,

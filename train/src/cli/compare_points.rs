@@ -1,0 +1,46 @@
+//! `compare-points`: computes the Chamfer distance of two clouds.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::ensure;
+use formats::chamfer::chamfer;
+use formats::cloud_file::read_cloud;
+
+use super::print;
+
+/// Flags of `compare-points`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// One cloud file: PLY, NPZ, NPY, PCD, text, KITTI or LAS
+    #[arg(value_name = "A")]
+    a: PathBuf,
+    /// The other cloud file
+    #[arg(value_name = "B")]
+    b: PathBuf,
+}
+
+/// Compares the clouds that `args` name.
+///
+/// # Errors
+/// As [`read_finite`].
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let (a, b) = (read_finite(&args.a)?, read_finite(&args.b)?);
+    let found = chamfer(&a, &b);
+    print(&format!("{} and {} points", a.len(), b.len()))?;
+    print(&format!("Chamfer distance, squared, sum of both means: {:.9}", found.squared))?;
+    print(&format!("Chamfer distance, plain, sum of both means:   {:.9}", found.plain))
+}
+
+/// Reads the cloud at `path`, which must have points, and finite ones.
+///
+/// # Errors
+/// A cloud that cannot be read, has no points, or has some that are not finite.
+pub fn read_finite(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
+    let cloud = read_cloud(path)?;
+    ensure!(!cloud.is_empty(), "{}: expected points, found none", path.display());
+    let bad = cloud.iter().position(|point| !point.iter().all(|x| x.is_finite()));
+    if let Some(i) = bad {
+        anyhow::bail!("{}: point {i} is not finite", path.display());
+    }
+    Ok(cloud)
+}

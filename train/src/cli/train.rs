@@ -1,0 +1,111 @@
+//! `train`: trains a network.
+
+use std::path::PathBuf;
+
+use formats::split::Split;
+use train::clouds::Clouds;
+use train::recipe::Recipe;
+use train::run::{Job, points_to_read};
+
+use super::Usage;
+
+/// Flags of `train`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// What to learn from: a packed NPZ file; the common start of two names, such
+    /// as `rotational-noisy` for rotational-noisy-train.npz and -test.npz; a
+    /// folder with train.npz and test.npz; a folder of ModelNet40's HDF5 files; or
+    /// a folder of text files as in yanx27/Pointnet_Pointnet2_pytorch
+    #[arg(long, value_name = "PATH")]
+    data: PathBuf,
+    /// What to measure accuracy on, once, at the end [default: the test half of
+    /// --data, if it has two halves]
+    #[arg(long, value_name = "PATH")]
+    test: Option<PathBuf>,
+    /// The recipe as TOML; the flags below override it [default: the baseline's]
+    #[arg(long, value_name = "TOML")]
+    recipe: Option<PathBuf>,
+    /// The network: pointnet, or cpl for one behind a Critical Points Layer
+    /// [default: the recipe's]
+    #[arg(long, value_name = "NAME", value_parser = ["pointnet", "cpl"])]
+    arch: Option<String>,
+    /// Points of each cloud that the network, or its Critical Points Layer, sees
+    #[arg(long, value_name = "N")]
+    points: Option<usize>,
+    /// Widths of the Critical Points Layer's point encoder, the 3 coordinates
+    /// first
+    #[arg(long, value_name = "3-W-W", value_parser = parse_widths)]
+    front: Option<Widths>,
+    /// Points that the Critical Points Layer selects
+    #[arg(long, value_name = "M")]
+    keep: Option<usize>,
+    /// Passes over the training set
+    #[arg(long, value_name = "N")]
+    epochs: Option<u32>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// What the model's card calls the training set [default: the path]
+    #[arg(long, value_name = "TEXT")]
+    data_name: Option<String>,
+    /// The model file to write; the run's folder is beside it, with the
+    /// extension `.run`
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Widths of a point encoder, without the coordinates'.
+#[derive(Clone, Debug)]
+struct Widths(Vec<usize>);
+
+fn parse_widths(word: &str) -> Result<Widths, String> {
+    let widths: Option<Vec<usize>> = word.split('-').map(|width| width.parse().ok()).collect();
+    match widths.as_deref().and_then(<[usize]>::split_first) {
+        Some((3, widths)) if widths.len() >= 2 => Ok(Widths(widths.to_vec())),
+        _ => Err("expected widths such as 3-64-128-1024, the 3 coordinates first".to_owned()),
+    }
+}
+
+/// Trains what `args` describe, from wherever an earlier run was interrupted.
+///
+/// # Errors
+/// As [`Job::run`]; flags that contradict each other.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let recipe = recipe(args)?;
+    let clouds = Clouds::read(&args.data, Split::Train, points_to_read(&recipe))?;
+    // A single file has no test half.
+    let halves = (!args.data.is_file()).then(|| args.data.clone());
+    let name = args.data.display().to_string();
+    let data_name = args.data_name.as_ref().unwrap_or(&name);
+    let test = args.test.clone().or(halves);
+    let job = Job { recipe, clouds: &clouds, data: &name, data_name, out: &args.out };
+    if let Some(accuracy) = job.run(test.as_deref())? {
+        super::print(&accuracy)?;
+    }
+    super::print(&args.out.display().to_string())
+}
+
+fn recipe(args: &Args) -> anyhow::Result<Recipe> {
+    let mut recipe = match &args.recipe {
+        Some(path) => Recipe::read(path)?,
+        None => Recipe::default(),
+    };
+    match args.arch.as_deref() {
+        Some("pointnet") => recipe.cpl = None,
+        Some(_) => recipe.cpl = Some(recipe.cpl.unwrap_or_default()),
+        None => {}
+    }
+    if let Some(cpl) = &mut recipe.cpl {
+        if let Some(Widths(widths)) = &args.front {
+            cpl.front.clone_from(widths);
+        }
+        cpl.keep = args.keep.unwrap_or(cpl.keep);
+    } else if args.front.is_some() || args.keep.is_some() {
+        return Err(Usage("--front and --keep need --arch cpl".to_owned()).into());
+    }
+    recipe.points = args.points.unwrap_or(recipe.points);
+    recipe.epochs = args.epochs.unwrap_or(recipe.epochs);
+    recipe.seed = args.seed.unwrap_or(recipe.seed);
+    recipe.check()?;
+    Ok(recipe)
+}

@@ -1,0 +1,48 @@
+//! The distance of a choice of points to a reference, compared with that of random
+//! choices of the same size.
+
+use formats::chamfer::{Chamfer, chamfer};
+use formats::rng::StreamKey;
+use infer_cpu::sampler::RandomSubset;
+
+/// Chamfer distances to the same reference points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RandomBaseline {
+    /// The distance of the choice.
+    pub ours: Chamfer,
+    /// The distances of random subsets, ascending by squared distance.
+    pub random: Vec<Chamfer>,
+}
+
+impl RandomBaseline {
+    /// Compares `chosen` with `reference`, both indices into `points`, and with
+    /// `draws` random subsets by `seed`.
+    #[must_use]
+    pub fn of(
+        points: &[[f32; 3]],
+        (chosen, reference): (&[usize], &[usize]),
+        draws: u32,
+        seed: u64,
+    ) -> Self {
+        let some = |indices: &[usize]| -> Vec<[f64; 3]> {
+            indices.iter().map(|&i| points[i].map(f64::from)).collect()
+        };
+        let reference = some(reference);
+        let subset = |draw| {
+            let (key, mut drawn) = (StreamKey::new(seed, "random subsets", draw), Vec::new());
+            RandomSubset::default().draw(points.len(), chosen.len(), key, &mut drawn);
+            some(&drawn.into_iter().map(|i| i as usize).collect::<Vec<_>>())
+        };
+        let ours = chamfer(&some(chosen), &reference);
+        let mut random: Vec<_> =
+            (0..draws).map(|draw| chamfer(&subset(draw), &reference)).collect();
+        random.sort_by(|a, b| a.squared.total_cmp(&b.squared));
+        Self { ours, random }
+    }
+
+    /// How many random subsets are nearer.
+    #[must_use]
+    pub fn nearer(&self) -> usize {
+        self.random.iter().filter(|one| one.squared < self.ours.squared).count()
+    }
+}

@@ -1,0 +1,141 @@
+//! Selects the critical points of a batch's clouds, with infer-cpu's own ranking
+//! and resizing.
+
+use formats::rng::StreamKey;
+use infer_cpu::sampler::{CriticalPoints, Resize};
+
+use crate::batch::Batch;
+use crate::cpl::Cpl;
+use crate::gumbel;
+use crate::layer::PooledLayer;
+use crate::matrix::Matrix;
+
+/// Selects the points that win a pooling.
+#[derive(Clone, Copy, Debug)]
+pub struct CriticalPointSelector {
+    keep: usize,
+    resize: Resize,
+    gumbel: bool,
+    seed: u64,
+}
+
+/// The points that were selected from a batch.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// The points.
+    pub batch: Batch,
+    /// The row of the whole batch that each of them is.
+    pub rows: Vec<u32>,
+}
+
+impl CriticalPointSelector {
+    /// A selector as `cpl` states.
+    ///
+    /// # Errors
+    /// An unknown rule of resizing.
+    pub fn new(cpl: &Cpl, seed: u64) -> Result<Self, String> {
+        let resize = cpl.resize.parse().map_err(|error| format!("{error}"))?;
+        Ok(Self { keep: cpl.keep, resize, gumbel: cpl.gumbel, seed })
+    }
+
+    /// Whether the selection has a gradient.
+    #[must_use]
+    pub fn is_relaxed(self) -> bool {
+        self.gumbel
+    }
+
+    /// The points of `batch` that win a channel of `pooled`, which took all of
+    /// them. A point that is repeated counts as often. A relaxed selection draws
+    /// new noise in each `step`.
+    #[must_use]
+    pub fn select(self, pooled: &PooledLayer, batch: &Batch, step: u64) -> Selection {
+        let mut chosen = Batch { starts: vec![0], ..Batch::default() };
+        let mut origin = Vec::new();
+        let mut critical = CriticalPoints::default();
+        let mut rows = Vec::new();
+        for (cloud, maxima) in pooled.base.output().rows().into_iter().enumerate() {
+            let maxima = maxima.to_slice().expect("invariant: rows are contiguous");
+            let first = batch.starts[cloud] as u32;
+            critical.rank(maxima, &within(pooled.winners(cloud), first));
+            if self.gumbel {
+                let stream = StreamKey::new(self.seed, &format!("gumbel {step}"), cloud as u32);
+                rows = gumbel::top(&critical.rows, &critical.scores, self.keep, stream);
+            } else {
+                self.resize.apply(&critical.rows, &critical.scores, self.keep, &mut rows);
+            }
+            rows.sort_unstable();
+            for same in rows.chunk_by(|a, b| a == b) {
+                let row = same[0] + first;
+                chosen.coordinates.push(batch.coordinates[row as usize]);
+                chosen.weights.push(same.len() as f32);
+                origin.push(row);
+            }
+            chosen.starts.push(chosen.coordinates.len());
+        }
+        chosen.neighborhood.clone_from(&batch.neighborhood);
+        chosen.neighborhood_starts.clone_from(&batch.neighborhood_starts);
+        chosen.targets.clone_from(&batch.targets);
+        Selection { batch: chosen, rows: origin }
+    }
+
+    /// Adds to `dpooled`, the gradient of the output of `pooled`, what flows
+    /// through the relaxed selection: `dpoints` is the gradient of the selected
+    /// points' coordinates.
+    pub fn add_gradient(
+        self,
+        pooled: &PooledLayer,
+        selection: &Selection,
+        dpoints: &Matrix,
+        dpooled: &mut Matrix,
+    ) {
+        let mut critical = CriticalPoints::default();
+        for (cloud, maxima) in pooled.base.output().rows().into_iter().enumerate() {
+            let maxima = maxima.to_slice().expect("invariant: rows are contiguous");
+            let winners = pooled.winners(cloud);
+            critical.rank(maxima, winners);
+            let mut weights = vec![0.0; critical.rows.len()];
+            let place = |row| critical.rows.iter().position(|&critical| critical == row);
+            for i in selection.batch.starts[cloud]..selection.batch.starts[cloud + 1] {
+                let point = selection.batch.coordinates[i];
+                let terms = point.iter().zip(dpoints.row(i)).map(|(x, d)| f64::from(x * d));
+                if let Some(place) = place(selection.rows[i]) {
+                    weights[place] = terms.sum();
+                }
+            }
+            let scores = gumbel::score_gradients(&critical.scores, &weights, self.keep);
+            for (channel, &winner) in winners.iter().enumerate().filter(|(c, _)| maxima[*c] > 0.0) {
+                if let Some(place) = place(winner) {
+                    dpooled[(cloud, channel)] += scores[place] as f32;
+                }
+            }
+        }
+    }
+}
+
+/// Rows of the batch as rows of the cloud that begins at `first`, because a
+/// ranking without critical points falls back on row 0.
+fn within(winners: &[u32], first: u32) -> Vec<u32> {
+    winners.iter().map(|winner| winner - first).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layer::Rows;
+
+    #[test]
+    fn a_cloud_without_critical_points_keeps_one_of_its_own() {
+        // A shift far below 0: past its ReLU nothing is left.
+        let mut pooled = PooledLayer::new("a", "b", (3, 4), true, 1);
+        pooled.base.norm.shift.value.fill(-100.0);
+        let coordinates = vec![[0.1, 0.2, 0.3], [0.5, 0.1, 0.0], [0.9, 0.8, 0.7], [0.2, 0.9, 0.4]];
+        let batch =
+            Batch { coordinates, weights: vec![1.0; 4], starts: vec![0, 2, 4], ..Batch::default() };
+        let rows = Rows { weights: &batch.weights, starts: &batch.starts, total: 4.0 };
+        pooled.forward(batch.points(), rows, 0.1);
+        let chosen =
+            CriticalPointSelector::new(&Cpl::default(), 0).unwrap().select(&pooled, &batch, 0);
+        assert_eq!(chosen.rows, [0, 2]);
+        assert_eq!(chosen.batch.coordinates[1], batch.coordinates[2]);
+    }
+}

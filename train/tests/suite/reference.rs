@@ -1,0 +1,198 @@
+//! The reference network: everything in f64 by plain loops, with duplicated points
+//! instead of weights.
+
+use std::collections::BTreeMap;
+
+use train::layer::Module;
+use train::matrix::Matrix;
+use train::shape::Shape;
+
+/// Values by a parameter's name, with its shape.
+pub type Values = BTreeMap<String, (Vec<usize>, Vec<f64>)>;
+
+/// Rows of numbers.
+pub type Table = Vec<Vec<f64>>;
+
+const EPSILON: f64 = 1e-5;
+
+/// A network by its parameters' names.
+pub struct Reference<'a> {
+    /// Parameters, and running statistics.
+    pub values: &'a Values,
+    /// The clouds' points, duplicates and all.
+    pub clouds: Vec<Table>,
+    /// The points among which each cloud searches neighbors, if the network has
+    /// EdgeConv layers.
+    pub around: Vec<Table>,
+    /// The dropout mask. Without it, batch norms use the running statistics.
+    pub kept: Option<Matrix>,
+}
+
+impl Reference<'_> {
+    fn linear(&self, name: &str, x: &Table) -> Table {
+        let (shape, weight) = &self.values[&format!("{name}.weight")];
+        let (_, bias) = &self.values[&format!("{name}.bias")];
+        let row = |x: &Vec<f64>| {
+            let dot = |o: usize| {
+                let weights = &weight[o * shape[1]..][..shape[1]];
+                bias[o] + weights.iter().zip(x).map(|(w, x)| w * x).sum::<f64>()
+            };
+            (0..shape[0]).map(dot).collect()
+        };
+        x.iter().map(row).collect()
+    }
+
+    fn norm(&self, name: &str, z: Table, relu: bool) -> Table {
+        let (_, scale) = &self.values[&format!("{name}.weight")];
+        let (_, shift) = &self.values[&format!("{name}.bias")];
+        let n = z.len() as f64;
+        let channels = scale.len();
+        let (mean, variance): (Vec<f64>, Vec<f64>) = if self.kept.is_some() {
+            let mean: Vec<f64> =
+                (0..channels).map(|c| z.iter().map(|z| z[c]).sum::<f64>() / n).collect();
+            let of = |c: usize| z.iter().map(|z| (z[c] - mean[c]).powi(2)).sum::<f64>() / n;
+            let variance = (0..channels).map(of).collect();
+            (mean, variance)
+        } else {
+            let of = |part: &str| self.values[&format!("{name}.running_{part}")].1.clone();
+            (of("mean"), of("var"))
+        };
+        let row = |z: &Vec<f64>| {
+            let y =
+                |c: usize| (z[c] - mean[c]) / (variance[c] + EPSILON).sqrt() * scale[c] + shift[c];
+            (0..channels).map(|c| if relu { y(c).max(0.0) } else { y(c) }).collect()
+        };
+        z.iter().map(row).collect()
+    }
+
+    /// Point-wise layers from number `first` and the maximum over each cloud.
+    fn points(&self, prefix: &str, mut x: Table, layers: (usize, usize), relu: bool) -> Table {
+        let (first, n) = layers;
+        for i in 0..n {
+            let z = self.linear(&format!("{prefix}conv{}", first + i), &x);
+            x = self.norm(&format!("{prefix}bn{}", first + i), z, relu || i + 1 < n);
+        }
+        let mut rows = x.into_iter();
+        let pool = |cloud: &Table| {
+            let rows: Table = rows.by_ref().take(cloud.len()).collect();
+            let largest = |c| rows.iter().map(|row: &Vec<f64>| row[c]).fold(f64::MIN, f64::max);
+            (0..rows[0].len()).map(largest).collect()
+        };
+        self.clouds.iter().map(pool).collect()
+    }
+
+    /// Rows behind the transforms of a T-Net, and the regulariser.
+    fn turned(&self, prefix: &str, x: &Table, shape: &Shape) -> (Table, f64) {
+        let n = shape.t_net.len();
+        let mut h = self.points(prefix, x.clone(), (1, n), true);
+        for i in 1..=shape.t_net_head.len() {
+            let z = self.linear(&format!("{prefix}fc{i}"), &h);
+            h = self.norm(&format!("{prefix}bn{}", n + i), z, true);
+        }
+        let k = x[0].len();
+        let mut transforms = self.linear(&format!("{prefix}fc{}", shape.t_net_head.len() + 1), &h);
+        for transform in &mut transforms {
+            (0..k).for_each(|i| transform[i * k + i] += 1.0);
+        }
+        let mut out = Vec::new();
+        let mut rows = x.iter();
+        for (cloud, t) in self.clouds.iter().zip(&transforms) {
+            for row in rows.by_ref().take(cloud.len()) {
+                out.push((0..k).map(|j| (0..k).map(|i| row[i] * t[i * k + j]).sum()).collect());
+            }
+        }
+        let error = |t: &Vec<f64>| {
+            let element = |i: usize, j: usize| {
+                let dot: f64 = (0..k).map(|m| t[i * k + m] * t[j * k + m]).sum();
+                dot - f64::from(u8::from(i == j))
+            };
+            (0..k * k).map(|e| element(e / k, e % k).powi(2)).sum::<f64>().sqrt()
+        };
+        let mean = transforms.iter().map(error).sum::<f64>() / transforms.len() as f64;
+        (out, mean)
+    }
+
+    /// What surrounds each point within `radius`.
+    fn edges(&self, number: usize, radius: f32) -> Table {
+        let mut offsets = Table::new();
+        let mut counts = Vec::new();
+        for (cloud, around) in self.clouds.iter().zip(&self.around) {
+            for p in cloud {
+                let offset = |q: &Vec<f64>| -> Vec<f64> {
+                    q.iter().zip(p).map(|(q, p)| (q - p) / f64::from(radius)).collect()
+                };
+                let near = |offset: &Vec<f64>| {
+                    let squared: f64 = offset.iter().map(|x| x * x).sum();
+                    squared > 0.0 && squared <= 1.0
+                };
+                let before = offsets.len();
+                offsets.push(vec![0.0; 3]);
+                offsets.extend(around.iter().map(offset).filter(near));
+                counts.push(offsets.len() - before);
+            }
+        }
+        let z = self.linear(&format!("edge.conv{number}"), &offsets);
+        let mut rows = self.norm(&format!("edge.bn{number}"), z, true).into_iter();
+        let largest = |&n: &usize| {
+            let some: Table = rows.by_ref().take(n).collect();
+            (0..some[0].len()).map(|c| some.iter().map(|r| r[c]).fold(f64::MIN, f64::max)).collect()
+        };
+        counts.iter().map(largest).collect()
+    }
+
+    /// Logits, and the regulariser.
+    pub fn logits(&self, shape: &Shape) -> (Table, f64) {
+        let mut x: Table = self.clouds.iter().flatten().cloned().collect();
+        let mut regulariser = 0.0;
+        if shape.input_transform {
+            x = self.turned("feat.stn.", &x, shape).0;
+        }
+        for (edge, number) in shape.edges.iter().zip(1..) {
+            for (x, features) in x.iter_mut().zip(self.edges(number, edge.radius)) {
+                x.extend(features);
+            }
+        }
+        let z = self.linear("feat.conv1", &x);
+        x = self.norm("feat.bn1", z, true);
+        if shape.feature_transform {
+            (x, regulariser) = self.turned("feat.fstn.", &x, shape);
+        }
+        let mut h = self.points("feat.", x, (2, shape.trunk.len() - 1), false);
+        for i in 1..=shape.head.len() {
+            let mut z = self.linear(&format!("fc{i}"), &h);
+            if let (true, Some(kept)) = (i == shape.head.len(), &self.kept) {
+                for (z, kept) in z.iter_mut().flatten().zip(kept) {
+                    *z *= f64::from(*kept);
+                }
+            }
+            h = self.norm(&format!("bn{i}"), z, true);
+        }
+        (self.linear(&format!("fc{}", shape.head.len() + 1), &h), regulariser)
+    }
+
+    /// The loss, of which `orthogonality` is the regulariser's weight.
+    pub fn loss(&self, shape: &Shape, targets: &Matrix, orthogonality: f32) -> f64 {
+        let (logits, regulariser) = self.logits(shape);
+        let mut loss = 0.0;
+        for (logits, target) in logits.iter().zip(targets.rows()) {
+            let sum: f64 = logits.iter().map(|x| x.exp()).sum();
+            let terms = logits.iter().zip(target);
+            loss -= terms.map(|(x, &t)| f64::from(t) * (x - sum.ln())).sum::<f64>();
+        }
+        loss / logits.len() as f64 + f64::from(orthogonality) * regulariser
+    }
+}
+
+/// A network's parameters and running statistics.
+pub fn values(network: &mut dyn Module) -> Values {
+    let wide = |values: &[f32]| values.iter().map(|&x| f64::from(x)).collect();
+    let mut all = Values::new();
+    network.parameters(&mut |parameter| {
+        let value = (parameter.shape.clone(), wide(&parameter.value));
+        all.insert(parameter.name.clone(), value);
+    });
+    network.statistics(&mut |name, values| {
+        all.insert(name.to_owned(), (vec![values.len()], wide(values)));
+    });
+    all
+}

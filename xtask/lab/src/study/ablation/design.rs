@@ -1,0 +1,81 @@
+//! The sets that networks are trained on, and those that they are tested on.
+
+use super::datasets::clouds;
+use super::effects::{DATASETS, Source};
+use super::plan::Plan;
+use super::{folder, rows};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use train::recipe::Recipe;
+
+/// Trainings and tests.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Design {
+    /// One network of each set is trained with each of these.
+    pub seeds: Vec<u64>,
+    /// Steps of every training, whatever the size of its set.
+    pub steps: u32,
+    /// How all are trained. Seed and epochs are replaced.
+    pub recipe: Recipe,
+    /// The sets.
+    #[serde(rename = "set")]
+    pub sets: Vec<Set>,
+    /// Which network is tested on what.
+    #[serde(rename = "test")]
+    pub tests: Vec<Test>,
+}
+
+/// One set of clouds, split into training and test.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Set {
+    /// What tests call it.
+    pub name: String,
+    /// Where it lies, relative to the study's folder, as `train --data` takes it.
+    pub path: PathBuf,
+    /// Whether only clouds are used whose names all matched sets have.
+    pub matched: bool,
+}
+
+/// One set to train on and one to test on.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Test {
+    /// The set that the network learns from.
+    pub trained_on: String,
+    /// The set that it is tested on.
+    pub tested_on: String,
+}
+
+impl Design {
+    /// The trainings and tests that the effects' comparison needs, by `plan`.
+    ///
+    /// # Errors
+    /// A recipe that is not valid.
+    pub fn of(plan: &Plan) -> anyhow::Result<Self> {
+        let tests = rows::tests();
+        let used = |name: &str| tests.iter().any(|(p, q)| [*p, *q].contains(&name));
+        let set = |&(name, source): &(&'static str, Source)| Set {
+            name: name.to_owned(),
+            path: clouds(source, &folder(Path::new(""), name)),
+            // Whole meshes have no views to be matched by.
+            matched: source != Source::Surface,
+        };
+        let test = |&(trained_on, tested_on): &(&'static str, &'static str)| Test {
+            trained_on: trained_on.to_owned(),
+            tested_on: tested_on.to_owned(),
+        };
+        Ok(Self {
+            seeds: plan.seeds.clone(),
+            steps: plan.steps,
+            recipe: plan.recipe()?,
+            sets: DATASETS.iter().filter(|(name, _)| used(name)).map(set).collect(),
+            tests: tests.iter().map(test).collect(),
+        })
+    }
+
+    /// The recipe for `clouds` clouds: the fewest epochs with at least the steps
+    /// of the design.
+    pub fn recipe(&self, clouds: usize, seed: u64) -> Recipe {
+        let steps_per_epoch = (clouds / self.recipe.batch).max(1) as u32;
+        Recipe { seed, epochs: self.steps.div_ceil(steps_per_epoch), ..self.recipe.clone() }
+    }
+}

@@ -1,0 +1,52 @@
+//! Plans: TOML files with the sizes of a study.
+
+use anyhow::Context;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// The sizes of a study.
+pub trait Plan: DeserializeOwned {
+    /// The bundled plan, as TOML.
+    const FULL: &'static str;
+    /// The bundled plan of a quick look.
+    const QUICK: &'static str;
+
+    /// Checks that every value is in its range.
+    ///
+    /// # Errors
+    /// The first that is not, with its key.
+    fn check(&self) -> anyhow::Result<()>;
+}
+
+/// The plan at `path`, or a bundled one.
+///
+/// # Errors
+/// A file that is not a valid plan, with the key and the cause.
+pub fn read<P: Plan>(path: Option<&Path>, quick: bool) -> anyhow::Result<P> {
+    let (name, text) = match path {
+        Some(path) => {
+            let name = path.display().to_string();
+            let text = std::fs::read_to_string(path);
+            (name.clone(), text.with_context(|| format!("cannot read {name}"))?)
+        }
+        None if quick => ("quick.toml".to_owned(), P::QUICK.to_owned()),
+        None => ("full.toml".to_owned(), P::FULL.to_owned()),
+    };
+    let plan: P = toml::from_str(&text).with_context(|| format!("{name}: not a valid plan"))?;
+    plan.check().with_context(|| name)?;
+    Ok(plan)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ablation, reproduction};
+    use super::*;
+
+    #[test]
+    fn bundled_plans_are_valid() {
+        for quick in [false, true] {
+            read::<ablation::plan::Plan>(None, quick).unwrap();
+            read::<reproduction::plan::Plan>(None, quick).unwrap();
+        }
+    }
+}

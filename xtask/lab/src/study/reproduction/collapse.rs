@@ -1,0 +1,179 @@
+//! Where the collapse from one dataset to another comes from: one step at a
+//! time from uniform samples to noisy scans.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use anyhow::ensure;
+use formats::labelled::read_labelled;
+use formats::rng::StreamKey;
+use formats::split::Split;
+use infer_cpu::{Normalization, Options};
+use train::clouds::Clouds;
+use train::evaluate::confusion;
+
+use super::context::ExperimentContext;
+use super::matrix;
+use super::section::{Cell, Section, Table};
+
+/// Test clouds of one step, and whether they are used where they lie.
+struct Step {
+    name: &'static str,
+    clouds: Rc<Clouds>,
+    unmoved: bool,
+}
+
+pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
+    let steps = steps(context)?;
+    let networks = networks(context)?;
+    let mut table = Table {
+        id: "3 steps".to_owned(),
+        caption: "Instance accuracy after each step, of networks by what they were trained on"
+            .to_owned(),
+        rows_are: "tested on".to_owned(),
+        columns: networks.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        rows: Vec::new(),
+    };
+    for step in &steps {
+        let normalization = step.unmoved.then_some(Normalization::None);
+        let options = Options { normalization, ..Options::default() };
+        let cells = networks
+            .iter()
+            .map(|(_, model)| Ok(Cell::instance(&confusion(model, &step.clouds, &options)?)));
+        let cells = cells.collect::<anyhow::Result<_>>()?;
+        table.rows.push((step.name.to_owned(), cells));
+    }
+    Ok(Section {
+        title: "Where the collapse comes from".to_owned(),
+        about: vec![
+            format!(
+                "Data: {}. The two turned sets are asides; from occlusion on, every step keeps \
+                 those before it.",
+                context.meshes_are
+            ),
+            "Uniform samples have one cloud a mesh, all else one a view. What a view sees is \
+             decided by casting a ray at each sample from where the sensor stands."
+                .to_owned(),
+        ],
+        tables: vec![table],
+        ..Section::default()
+    })
+}
+
+/// Networks by the mix that they were trained on.
+fn networks(context: &ExperimentContext) -> anyhow::Result<Vec<(&'static str, PathBuf)>> {
+    let train = |place: &str| context.scans(place, Split::Train);
+    let (surface, seen) = (train("surfaces/surface")?, train("surfaces/seen")?);
+    let noisy = train("lidar/packed/rotational-noisy")?;
+    let mixed = |name: &str, clouds: &Clouds| {
+        context.network(name, matrix::recipe(context, clouds.len()), clouds)
+    };
+    let turned = {
+        let mut recipe = matrix::recipe(context, surface.len());
+        recipe.augment.rotate_degrees = 180.0;
+        context.network("on-surface-turned", recipe, &surface)?
+    };
+    Ok(vec![
+        ("uniform samples", matrix::network(context, "surfaces/surface")?),
+        ("the same, turned about z in training", turned),
+        ("what each view sees of them", matrix::network(context, "surfaces/seen")?),
+        ("uniform and seen", mixed("on-surface-and-seen", &joined(&surface, &seen)?)?),
+        ("rotational noisy", matrix::network(context, "lidar/packed/rotational-noisy")?),
+        (
+            "uniform and rotational noisy",
+            mixed("on-surface-and-noisy", &joined(&surface, &noisy)?)?,
+        ),
+    ])
+}
+
+fn joined(a: &Clouds, b: &Clouds) -> anyhow::Result<Clouds> {
+    a.concat(b).map_err(|cause| anyhow::anyhow!("surfaces and scans cannot be joined: {cause}"))
+}
+
+fn steps(context: &ExperimentContext) -> anyhow::Result<Vec<Step>> {
+    let test = |place: &str| context.scans(place, Split::Test);
+    let surface = test("surfaces/surface")?;
+    let seen = Clouds::read_unmoved(&context.scans.join("surfaces/seen"), Split::Test)?;
+    let mut normalized = seen.clone();
+    normalized.normalize();
+    let thinned = thinned(context, &seen)?;
+    let step = |name, clouds| Step { name, clouds, unmoved: false };
+    Ok(vec![
+        step("uniform samples of the surface", Rc::clone(&surface)),
+        step("aside: the same, turned about z at random", Rc::new(turned(&surface, false))),
+        step("aside: the same, y up and turned at random", Rc::new(turned(&surface, true))),
+        Step {
+            name: "occlusion: what a view sees, where it lies",
+            clouds: Rc::new(seen),
+            unmoved: true,
+        },
+        step("and normalised by what is seen", Rc::new(normalized)),
+        step("and as few points as the scan has", Rc::new(thinned)),
+        step("and the beam pattern: rotational clean", test("lidar/packed/rotational-clean")?),
+        step("and noise: rotational noisy", test("lidar/packed/rotational-noisy")?),
+    ])
+}
+
+/// Each cloud turned about z by an angle of its own; `y_up` then puts z along y
+/// as the baseline's text files have it.
+fn turned(clouds: &Clouds, y_up: bool) -> Clouds {
+    let mut clouds = clouds.clone();
+    let n_points = clouds.set.n_points;
+    for (i, cloud) in clouds.set.points.chunks_exact_mut(3 * n_points).enumerate() {
+        let angle = std::f64::consts::TAU * StreamKey::new(0, "turned", i as u32).unit(0);
+        let (sin, cos) = (angle.sin() as f32, angle.cos() as f32);
+        for [x, y, z] in cloud.as_chunks_mut::<3>().0 {
+            (*x, *y) = (cos * *x - sin * *y, sin * *x + cos * *y);
+            if y_up {
+                (*y, *z) = (*z, -*y);
+            }
+        }
+    }
+    clouds
+}
+
+/// Of each cloud of `seen` as many points as the scan of the same view has;
+/// the others are repetitions. Views that have no scan are left out.
+fn thinned(context: &ExperimentContext, seen: &Clouds) -> anyhow::Result<Clouds> {
+    let scans = read_labelled(&context.scans.join("lidar/packed/rotational-clean-test.npz"))?;
+    let names = scans.names.iter().flatten().map(String::as_str);
+    let counts: BTreeMap<&str, u32> = names.zip(scans.n_raw.iter().flatten().copied()).collect();
+    let names = seen.set.names.iter().flatten();
+    let kept: Vec<(usize, usize)> = names
+        .enumerate()
+        .filter_map(|(i, name)| Some((i, *counts.get(name.as_str())? as usize)))
+        .collect();
+    ensure!(!kept.is_empty(), "no cloud of seen-test.npz has a scan of its name");
+    let mut clouds = seen.select(&kept.iter().map(|(i, _)| *i).collect::<Vec<_>>());
+    let n_points = clouds.set.n_points;
+    let rows = clouds.set.points.chunks_exact_mut(3 * n_points);
+    for (cloud, (_, count)) in rows.zip(kept) {
+        let points = cloud.as_chunks_mut::<3>().0;
+        let n = count.clamp(1, n_points);
+        for i in n..n_points {
+            points[i] = points[i % n];
+        }
+    }
+    clouds.normalize();
+    Ok(clouds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use formats::labelled::LabelledSet;
+
+    #[test]
+    fn turning_keeps_heights_or_lays_them_along_y() {
+        let points = vec![0.6, 0.0, 0.8, 0.0, 0.0, 1.0];
+        let set = LabelledSet { points, n_points: 2, labels: vec![0], ..LabelledSet::default() };
+        let clouds = Clouds { set, classes: vec!["cup".to_owned()] };
+        let about_z = turned(&clouds, false);
+        assert_eq!(about_z.set.points[2], 0.8);
+        assert_eq!(about_z.set.points[3..], [0.0, 0.0, 1.0]);
+        let y_up = turned(&clouds, true);
+        assert_eq!(y_up.set.points[1], 0.8);
+        assert_eq!(y_up.set.points[3..], [0.0, 1.0, 0.0]);
+    }
+}

@@ -1,0 +1,198 @@
+//! Data and networks that experiments share. A network is trained once and kept
+//! for resumed runs.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use anyhow::ensure;
+use formats::hash;
+use formats::split::Split;
+use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
+use infer_cpu::{Evaluation, Options};
+use serde::Serialize;
+use train::clouds::Clouds;
+use train::evaluate::confusion;
+use train::recipe::Recipe;
+
+use super::plan::Plan;
+use crate::study::resume;
+
+/// The data, networks and sizes of all experiments.
+pub struct ExperimentContext {
+    /// How large they are.
+    pub plan: Plan,
+    /// ModelNet40's clouds, or those that replace them.
+    pub clouds: PathBuf,
+    /// What the report calls those clouds.
+    pub clouds_are: String,
+    /// Scans and surfaces of meshes, as `cargo xtask reproduce` makes them.
+    pub scans: PathBuf,
+    /// What the report calls the meshes.
+    pub meshes_are: String,
+    /// Where networks go.
+    pub models: PathBuf,
+    read: RefCell<BTreeMap<String, Rc<Clouds>>>,
+}
+
+impl ExperimentContext {
+    /// A context that has read nothing yet.
+    pub fn new(
+        plan: Plan,
+        (clouds, clouds_are): (&Path, &str),
+        (scans, meshes_are): (&Path, &str),
+        out: &Path,
+    ) -> Self {
+        Self {
+            plan,
+            clouds: clouds.to_path_buf(),
+            clouds_are: clouds_are.to_owned(),
+            scans: scans.to_path_buf(),
+            meshes_are: meshes_are.to_owned(),
+            models: out.join("models"),
+            read: RefCell::default(),
+        }
+    }
+
+    /// Checks that the data are large enough for the plan.
+    ///
+    /// # Errors
+    /// Data that cannot be used, or not by this plan.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let (train, test) = (self.clouds(Split::Train)?, self.clouds(Split::Test)?);
+        ensure!(
+            train.classes == test.classes,
+            "--clouds: expected the same classes in both halves"
+        );
+        let most = self.plan.points.iter().chain(&self.plan.kept).max().copied().unwrap_or(0);
+        ensure!(
+            most <= train.set.n_points,
+            "--clouds: expected clouds of {most} points or more, found {}",
+            train.set.n_points
+        );
+        let surface = self.scans("surfaces/surface", Split::Train)?;
+        ensure!(
+            self.plan.mesh_points <= surface.set.n_points,
+            "surfaces/surface: expected clouds of {} points or more, found {}",
+            self.plan.mesh_points,
+            surface.set.n_points
+        );
+        Ok(())
+    }
+
+    /// All that a report depends on: the program, the plan, the data.
+    ///
+    /// # Errors
+    /// Data that cannot be read.
+    pub fn terms(&self) -> anyhow::Result<String> {
+        #[derive(Serialize)]
+        struct Terms<'a> {
+            version: &'a str,
+            clouds: &'a str,
+            clouds_sha256: [String; 2],
+            meshes: &'a str,
+            meshes_sha256: [String; 2],
+            plan: &'a Plan,
+        }
+        let digest = |clouds: &Clouds| {
+            let bytes: Vec<u8> = clouds.set.points.iter().flat_map(|x| x.to_le_bytes()).collect();
+            hash::of_bytes(&bytes)
+        };
+        let noisy = "lidar/packed/rotational-noisy";
+        let terms = Terms {
+            version: env!("CARGO_PKG_VERSION"),
+            clouds: &self.clouds_are,
+            clouds_sha256: [
+                digest(&*self.clouds(Split::Train)?),
+                digest(&*self.clouds(Split::Test)?),
+            ],
+            meshes: &self.meshes_are,
+            meshes_sha256: [
+                digest(&*self.scans("surfaces/surface", Split::Train)?),
+                digest(&*self.scans(noisy, Split::Test)?),
+            ],
+            plan: &self.plan,
+        };
+        Ok(toml::to_string(&terms)?)
+    }
+
+    /// One half of ModelNet40's clouds, or of as many as the plan wants.
+    ///
+    /// # Errors
+    /// Data that cannot be used.
+    pub fn clouds(&self, split: Split) -> anyhow::Result<Rc<Clouds>> {
+        self.remember(&format!("clouds {split}"), || {
+            let most = self.plan.most_points();
+            Ok(self.at_most_per_class(Clouds::read(&self.clouds, split, most)?, split))
+        })
+    }
+
+    /// One half of the set `name` of scans or surfaces, such as
+    /// `lidar/packed/rotational-noisy`.
+    ///
+    /// # Errors
+    /// Data that cannot be used.
+    pub fn scans(&self, name: &str, split: Split) -> anyhow::Result<Rc<Clouds>> {
+        self.remember(&format!("{name} {split}"), || {
+            Ok(Clouds::read(&self.scans.join(name), split, self.plan.most_points())?)
+        })
+    }
+
+    fn at_most_per_class(&self, clouds: Clouds, split: Split) -> Clouds {
+        match (self.plan.most_per_class, split) {
+            (None, _) => clouds,
+            (Some([most, _]), Split::Train) | (Some([_, most]), Split::Test) => {
+                clouds.of_each_class(most)
+            }
+        }
+    }
+
+    fn remember(
+        &self,
+        key: &str,
+        read: impl FnOnce() -> anyhow::Result<Clouds>,
+    ) -> anyhow::Result<Rc<Clouds>> {
+        if let Some(clouds) = self.read.borrow().get(key) {
+            return Ok(Rc::clone(clouds));
+        }
+        let clouds = Rc::new(read()?);
+        self.read.borrow_mut().insert(key.to_owned(), Rc::clone(&clouds));
+        Ok(clouds)
+    }
+
+    /// Where the network called `name` lies.
+    pub fn model(&self, name: &str) -> PathBuf {
+        self.models.join(format!("{name}.safetensors"))
+    }
+
+    /// The network called `name`, trained by `recipe` on `clouds` unless it is
+    /// there.
+    ///
+    /// # Errors
+    /// Another recipe under that name; what training reports.
+    pub fn network(&self, name: &str, recipe: Recipe, clouds: &Clouds) -> anyhow::Result<PathBuf> {
+        let out = self.model(name);
+        resume::network(&out, name, recipe, clouds)?;
+        Ok(out)
+    }
+}
+
+/// The sampler `kind` that keeps `points`; a Critical Points Layer keeps what
+/// is distinct.
+pub fn sampler(kind: SamplerKind, points: usize) -> SamplerSpec {
+    SamplerSpec { kind, points, resize: Resize::Truncate, ..SamplerSpec::default() }
+}
+
+/// The confusion of `model` on `clouds`, behind `sampler` or as trained.
+///
+/// # Errors
+/// What infer-cpu refuses.
+pub fn test(
+    model: &Path,
+    clouds: &Clouds,
+    sampler: Option<SamplerSpec>,
+) -> anyhow::Result<Evaluation> {
+    let options = Options { sampler, ..Options::default() };
+    Ok(confusion(model, clouds, &options)?)
+}

@@ -1,0 +1,140 @@
+//! What an answer rests on: LIME-3D's strongest points, critical points, and
+//! random subsets, by Chamfer distance.
+
+use formats::split::Split;
+use infer_cpu::sampler::SamplerKind;
+use infer_cpu::{Classifier, Normalization, Options};
+use train::lime::{Explanation, Lime, explain};
+use train::random_baseline::RandomBaseline;
+
+use super::context::{ExperimentContext, sampler};
+use super::samplers::{cpl_name, wide};
+use super::section::{Cell, Cloud, Section, Table};
+use train::explanation_drawing;
+
+/// Clouds that are shown.
+const SHOWN: usize = 3;
+
+/// One cloud, explained.
+struct Explained {
+    name: String,
+    points: Vec<[f32; 3]>,
+    critical: Vec<usize>,
+    found: Explanation,
+    beside: RandomBaseline,
+}
+
+pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
+    let held = context.clouds(Split::Test)?;
+    let (front, keep) = (&context.plan.fronts[0], context.plan.kept[0]);
+    let model = context.model(&cpl_name(front, keep));
+    let load = |kind, points| {
+        // A part of a cloud is not normalised anew.
+        let normalization = Some(Normalization::None);
+        let sampler = Some(sampler(kind, points));
+        Classifier::load(&model, &Options { sampler, normalization, ..Options::default() })
+    };
+    let mut critical = load(SamplerKind::Cpl, keep)?;
+    let mut whole = load(SamplerKind::All, 1)?;
+    let lime = Lime { samples: context.plan.lime_samples, ..Lime::default() };
+    let n = context.plan.explained.min(held.len());
+    let mut all = Vec::new();
+    for cloud in (0..n).map(|i| i * held.len() / n) {
+        let points = held.set.cloud(cloud).to_vec();
+        let chosen = critical.sample(&wide(&points))?.iter().map(|&i| i as usize).collect();
+        let found = explain(&mut whole, &points, &lime)?;
+        let class = &held.classes[held.set.labels[cloud]];
+        let answer = &held.classes[found.class];
+        let name = format!("cloud {cloud}, a {class} taken for a {answer}");
+        all.push(compare(context, name, points, chosen, found));
+    }
+    let shown = &all[..SHOWN.min(all.len())];
+    Ok(Section {
+        title: "LIME-3D and critical points".to_owned(),
+        about: vec![
+            format!(
+                "Data: {}. LIME-3D: {} parts, {} clouds with parts removed, ridge regression.",
+                context.clouds_are, lime.clusters, lime.samples
+            ),
+            format!(
+                "Critical points of {}, whose network is explained as it answers to all points. \
+                 Chamfer distances are the sum of both directions' means; \
+                 squared as PyTorch3D has it, plain as some papers. Always as many points on one \
+                 side as on the other, since the distance shrinks with the count.",
+                cpl_name(front, keep)
+            ),
+        ],
+        tables: vec![table(&all, context.plan.draws)],
+        drawings: shown
+            .iter()
+            .map(|one| {
+                explanation_drawing::draw(&one.points, &one.found, &one.critical).to_string()
+            })
+            .collect(),
+        clouds: shown.iter().map(coloured).collect(),
+    })
+}
+
+fn compare(
+    context: &ExperimentContext,
+    name: String,
+    points: Vec<[f32; 3]>,
+    critical: Vec<usize>,
+    found: Explanation,
+) -> Explained {
+    let strongest = found.strongest(critical.len());
+    let beside = RandomBaseline::of(&points, (&critical, &strongest), context.plan.draws, 0);
+    Explained { name, points, critical, found, beside }
+}
+
+fn table(all: &[Explained], draws: u32) -> Table {
+    let columns = [
+        "critical points, squared",
+        "random, squared, median",
+        "2.5 %",
+        "97.5 %",
+        "critical points, plain",
+        "random, plain, median",
+        "random draws that are nearer",
+        "R² of LIME",
+    ];
+    let row = |one: &Explained| {
+        let RandomBaseline { ours, random } = &one.beside;
+        let last = random.len().saturating_sub(1);
+        let at = |share: f64| random.get((share * last as f64) as usize);
+        let squared = |share| at(share).map_or(f64::NAN, |found| found.squared);
+        let cells = vec![
+            Cell::number(ours.squared, 4),
+            Cell::number(squared(0.5), 4),
+            Cell::number(squared(0.025), 4),
+            Cell::number(squared(0.975), 4),
+            Cell::number(ours.plain, 4),
+            Cell::number(at(0.5).map_or(f64::NAN, |found| found.plain), 4),
+            Cell::Text(format!("{} of {}", one.beside.nearer(), random.len())),
+            Cell::number(one.found.r_squared, 2),
+        ];
+        (one.name.clone(), cells)
+    };
+    Table {
+        id: "5 chamfer".to_owned(),
+        caption: format!(
+            "Chamfer distance to the points that LIME-3D finds strongest, of critical points and \
+             of {draws} random subsets"
+        ),
+        rows_are: "cloud".to_owned(),
+        columns: columns.map(str::to_owned).into(),
+        rows: all.iter().map(row).collect(),
+    }
+}
+
+fn coloured(one: &Explained) -> Cloud {
+    let mut colours = vec![0u8; one.points.len()];
+    one.critical.iter().for_each(|&i| colours[i] += 1);
+    one.found.strongest(one.critical.len()).iter().for_each(|&i| colours[i] += 2);
+    let thousandths = |x: f32| (1000.0 * x).round() as i16;
+    Cloud {
+        caption: one.name.clone(),
+        points: one.points.iter().map(|point| point.map(thousandths)).collect(),
+        colours,
+    }
+}

@@ -1,0 +1,166 @@
+//! `cargo xtask reproduce`: repeats the paper's experiments (Meyer and Reitmann
+//! 2026, arXiv 2608.07106). Datasets are made by `edgepuck`, networks trained and
+//! measured by the library `train`. The result of each experiment is kept, so that
+//! an interrupted run can be resumed.
+
+mod collapse;
+mod context;
+mod datasets;
+mod lime;
+mod matrix;
+mod noise;
+mod page;
+pub mod plan;
+mod points;
+mod samplers;
+mod section;
+#[cfg(test)]
+mod tests;
+
+use super::{plan as plans, resume};
+use anyhow::Context;
+use context::ExperimentContext;
+use edgepuck_program::Outcome;
+use edgepuck_program::flags::need_folder_of_meshes;
+use formats::atomic;
+use plan::Plan;
+use section::{Section, write_csv};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use xtask::workspace::command_line;
+
+/// Flags of `reproduce`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// ModelNet40's clouds, as `train --data` takes them [default: points of the meshes' surfaces]
+    #[arg(long, value_name = "PATH")]
+    clouds: Option<PathBuf>,
+
+    /// What the report calls them [default: their path]
+    #[arg(long, value_name = "TEXT", requires = "clouds")]
+    clouds_name: Option<String>,
+
+    /// A folder of meshes, as gen-dataset takes it [default: built-in shapes]
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+
+    /// What the report calls those [default: their path]
+    #[arg(long, value_name = "TEXT", requires = "meshes")]
+    meshes_name: Option<String>,
+
+    /// Run a subset, which takes ten minutes on two cores
+    #[arg(long, conflicts_with = "plan")]
+    quick: bool,
+
+    /// The sizes of the experiments, as in the files of assets/reproduce
+    #[arg(long, value_name = "TOML")]
+    plan: Option<PathBuf>,
+
+    /// The folder of the report and of all that it is made from; an interrupted run is resumed
+    #[arg(long, value_name = "DIR", default_value = "data/reproduce")]
+    out: PathBuf,
+}
+
+/// Makes the datasets, runs the experiments that are not done yet, and writes
+/// `report.html` and `report.csv`.
+///
+/// # Errors
+/// Data that cannot be used; another plan than that of an earlier run.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    need_folder_of_meshes(args.meshes.as_deref())?;
+    let plan = plans::read(args.plan.as_deref(), args.quick)?;
+    let scans = args.out.join("data");
+    let meshes = match &args.meshes {
+        Some(folder) => folder.clone(),
+        None => {
+            let folder = scans.join("shapes");
+            datasets::run_edgepuck(&["gen-shapes"], &[("--out", &folder)], &folder.join("vase"))?;
+            folder
+        }
+    };
+    datasets::make(&meshes, &scans)?;
+    let meshes_are = match &args.meshes {
+        Some(folder) => named(args.meshes_name.as_ref(), "meshes of", folder),
+        None => "shapes of our own".to_owned(),
+    };
+    let surfaces = scans.join("surfaces/surface");
+    let (clouds, clouds_are) = match &args.clouds {
+        Some(path) => (path.clone(), named(args.clouds_name.as_ref(), "clouds of", path)),
+        None => (surfaces, format!("surface points of {meshes_are}, in place of ModelNet40's")),
+    };
+    experiments(&Request {
+        plan,
+        clouds: (&clouds, &clouds_are),
+        scans: (&scans, &meshes_are),
+        out: &args.out,
+        command: &command_line(),
+    })?;
+    Ok(Outcome::Success)
+}
+
+fn named(name: Option<&String>, what: &str, path: &Path) -> String {
+    name.cloned().unwrap_or_else(|| format!("{what} {}", path.display()))
+}
+
+/// The experiments to run, on data that are there.
+struct Request<'a> {
+    plan: Plan,
+    /// ModelNet40's clouds, or what replaces them, and what the report calls them.
+    clouds: (&'a Path, &'a str),
+    /// Scans and surfaces of meshes, and what the report calls the meshes.
+    scans: (&'a Path, &'a str),
+    out: &'a Path,
+    /// The command that the report names.
+    command: &'a str,
+}
+
+fn experiments(request: &Request<'_>) -> anyhow::Result<()> {
+    let Request { plan, clouds, scans, out, command } = request;
+    let context = ExperimentContext::new(plan.clone(), *clouds, *scans, out);
+    context.check()?;
+    resume::keep_terms(&context.terms()?, out)?;
+    fs::create_dir_all(&context.models)?;
+    let mut sections = Vec::new();
+    for (name, experiment) in EXPERIMENTS {
+        sections.push(done(&context, name, experiment, out)?);
+    }
+    write_csv(&sections, &out.join("report.csv"))?;
+    let page = page::of(&sections, &context.plan, command)?;
+    let path = out.join("report.html");
+    atomic::write_bytes(&path, &page)?;
+    println!("{}", path.display());
+    Ok(())
+}
+
+type Experiment = fn(&ExperimentContext) -> anyhow::Result<Section>;
+
+/// In this order each finds the networks that it shares with those before it.
+const EXPERIMENTS: [(&str, Experiment); 6] = [
+    ("1-points", points::run),
+    ("2-matrix", matrix::run),
+    ("3-collapse", collapse::run),
+    ("4-samplers", samplers::run),
+    ("5-lime", lime::run),
+    ("6-noise", noise::run),
+];
+
+/// The result of experiment `name`, from an earlier run or from this one.
+fn done(
+    context: &ExperimentContext,
+    name: &str,
+    experiment: Experiment,
+    out: &Path,
+) -> anyhow::Result<Section> {
+    let path = out.join("items").join(format!("{name}.json"));
+    if path.is_file() {
+        let text = fs::read_to_string(&path)?;
+        return serde_json::from_str(&text).with_context(|| path.display().to_string());
+    }
+    let begun = Instant::now();
+    let section = experiment(context).with_context(|| format!("experiment {name}"))?;
+    let json = serde_json::to_string(&section)?;
+    atomic::write_bytes(&path, &json)?;
+    eprintln!("{name}: done in {:.0} s", begun.elapsed().as_secs_f64());
+    Ok(section)
+}

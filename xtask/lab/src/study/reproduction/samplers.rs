@@ -1,0 +1,225 @@
+//! Random, farthest and critical points: what they cost and what they are
+//! worth, each behind a network trained at the same count.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use formats::split::Split;
+use infer_cpu::sampler::{Resize, Sampler, SamplerKind, SamplerSpec};
+use infer_cpu::{Classifier, Options, kernel};
+use train::clouds::Clouds;
+use train::cpl::Cpl;
+use train::recipe::{Recipe, Sampling};
+
+use super::context::{ExperimentContext, sampler, test};
+use super::plan::Plan;
+use super::points;
+use super::section::{Cell, Section, Table};
+
+/// Clouds whose sampling is timed.
+const TIMED: usize = 64;
+
+/// The name of the network behind front end `front` at `keep` points.
+pub fn cpl_name(front: &[usize], keep: usize) -> String {
+    format!("{}-{keep}", front_name(front))
+}
+
+fn front_name(front: &[usize]) -> String {
+    let widths: Vec<String> = front.iter().map(ToString::to_string).collect();
+    format!("cpl-3-{}", widths.join("-"))
+}
+
+/// Its recipe: the front end sees all points of the cloud.
+fn cpl_recipe(plan: &Plan, n_points: usize, front: &[usize], keep: usize) -> Recipe {
+    let cpl = Cpl { front: front.to_vec(), keep, ..Cpl::default() };
+    Recipe { sampling: Sampling::First, cpl: Some(cpl), ..plan.at(n_points) }
+}
+
+pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
+    let held = context.clouds(Split::Test)?;
+    Ok(Section {
+        title: "Samplers".to_owned(),
+        about: vec![
+            format!(
+                "Data: {}. CPL's networks are trained with it, end to end. The one that shares a \
+                 trunk has the input T-Net, the others have what the plan says.",
+                context.clouds_are
+            ),
+            "Latency is the median over clouds on one thread of this machine, another than the \
+             paper's; `cargo xtask bench pi-model` models a Raspberry Pi 5."
+                .to_owned(),
+        ],
+        tables: vec![
+            accuracy(context, &held)?,
+            latency(context, &held)?,
+            unique(context, &held)?,
+            resized(context, &held)?,
+        ],
+        ..Section::default()
+    })
+}
+
+/// A sampler, and by the points that it keeps the networks trained behind it:
+/// their names and recipes.
+type Rival = (String, BTreeMap<usize, (String, Recipe)>);
+
+fn rivals(plan: &Plan, n_points: usize) -> Vec<Rival> {
+    let behind = |name: &str, kept: &[usize], network: &dyn Fn(usize) -> (String, Recipe)| {
+        (name.to_owned(), kept.iter().map(|&keep| (keep, network(keep))).collect())
+    };
+    let cpl = |front: &[usize], keep, change: &dyn Fn(&mut Cpl)| {
+        let mut recipe = cpl_recipe(plan, n_points, front, keep);
+        recipe.cpl.iter_mut().for_each(change);
+        recipe
+    };
+    let mut rivals = vec![
+        behind("random", &plan.kept, &|keep| (points::name(keep), points::recipe(plan, keep))),
+        behind("farthest", &plan.kept, &|keep| {
+            let recipe = Recipe { sampling: Sampling::Fps, ..plan.at(keep) };
+            (format!("farthest-{keep}"), recipe)
+        }),
+    ];
+    for front in &plan.fronts {
+        rivals.push(behind(&front_name(front), &plan.kept, &|keep| {
+            (cpl_name(front, keep), cpl(front, keep, &|_| {}))
+        }));
+    }
+    let first = &plan.kept[..1];
+    // Where a front end has more critical points than are kept, chance has a say.
+    let front = &plan.fronts[plan.fronts.len().min(2) - 1];
+    rivals.push(behind(&format!("{}, Gumbel-top-k", front_name(front)), first, &|keep| {
+        (format!("{}-gumbel", cpl_name(front, keep)), cpl(front, keep, &|cpl| cpl.gumbel = true))
+    }));
+    rivals.push(behind("cpl, trunk shared with the input T-Net", first, &|keep| {
+        let mut recipe = cpl(&plan.fronts[0], keep, &|cpl| cpl.shared = true);
+        recipe.network.input_transform = true;
+        (format!("cpl-shared-{keep}"), recipe)
+    }));
+    rivals
+}
+
+fn accuracy(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
+    let train = context.clouds(Split::Train)?;
+    let mut rows = Vec::new();
+    for (rival, networks) in rivals(&context.plan, train.set.n_points) {
+        let cells = context.plan.kept.iter().map(|keep| {
+            let Some((name, recipe)) = networks.get(keep) else { return Ok(Cell::None) };
+            let model = context.network(name, recipe.clone(), &train)?;
+            Ok(Cell::instance(&test(&model, held, None)?))
+        });
+        rows.push((rival, cells.collect::<anyhow::Result<_>>()?));
+    }
+    Ok(Table {
+        id: "4 accuracy".to_owned(),
+        caption: "Instance accuracy, each network trained behind its sampler at that count"
+            .to_owned(),
+        rows_are: "sampler".to_owned(),
+        columns: context.plan.kept.iter().map(|n| format!("{n} points")).collect(),
+        rows,
+    })
+}
+
+fn latency(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
+    let keep = context.plan.kept[0];
+    let mut table = Table {
+        id: "4 latency".to_owned(),
+        caption: format!("Choosing {keep} of {} points, ms", held.set.n_points),
+        rows_are: "sampler".to_owned(),
+        columns: vec!["ms".to_owned(), "paper (1024 to 128)".to_owned()],
+        rows: Vec::new(),
+    };
+    let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
+    for (name, kind, paper) in
+        [("random", SamplerKind::Random, Cell::None), ("farthest", SamplerKind::Fps, paper("5.73"))]
+    {
+        let mut chosen = Sampler::new(sampler(kind, keep))?;
+        let ms = median(held, |cloud| Ok(chosen.select(cloud, kernels)?.len()))?;
+        table.rows.push((name.to_owned(), vec![Cell::Number(ms, 4), paper]));
+    }
+    for front in &context.plan.fronts {
+        let name = cpl_name(front, keep);
+        let model = context.model(&name);
+        let options =
+            Options { sampler: Some(sampler(SamplerKind::Cpl, keep)), ..Options::default() };
+        let mut classifier = Classifier::load(&model, &options)?;
+        let ms = median(held, |cloud| Ok(classifier.sample(&wide(cloud))?.len()))?;
+        table.rows.push((name, vec![Cell::Number(ms, 4), paper("1.96")]));
+    }
+    Ok(table)
+}
+
+fn paper(ms: &str) -> Cell {
+    Cell::Text(format!("{ms}, Raspberry Pi 5"))
+}
+
+/// The median time of `choose` over some clouds, ms.
+fn median(
+    clouds: &Clouds,
+    mut choose: impl FnMut(&[[f32; 3]]) -> anyhow::Result<usize>,
+) -> anyhow::Result<f64> {
+    let mut times = Vec::new();
+    // The first few find caches and memory as they were.
+    for i in (0..TIMED + 8).map(|i| i % clouds.len()) {
+        let begun = Instant::now();
+        std::hint::black_box(choose(clouds.set.cloud(i))?);
+        times.push(begun.elapsed().as_secs_f64() * 1e3);
+    }
+    let times = &mut times[8..];
+    times.sort_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
+}
+
+/// A cloud in f64.
+pub fn wide(cloud: &[[f32; 3]]) -> Vec<[f64; 3]> {
+    cloud.iter().map(|point| point.map(f64::from)).collect()
+}
+
+fn unique(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
+    let mut table = Table {
+        id: "4 unique".to_owned(),
+        caption: "Distinct critical points of a cloud".to_owned(),
+        rows_are: "front end".to_owned(),
+        columns: ["least", "median", "most", "paper"].map(str::to_owned).into(),
+        rows: Vec::new(),
+    };
+    for front in &context.plan.fronts {
+        let name = cpl_name(front, context.plan.kept[0]);
+        let model = context.model(&name);
+        let all = sampler(SamplerKind::Cpl, held.set.n_points);
+        let options = Options { sampler: Some(all), ..Options::default() };
+        let mut classifier = Classifier::load(&model, &options)?;
+        let mut counts = Vec::new();
+        for i in 0..held.len() {
+            counts.push(classifier.sample(&wide(held.set.cloud(i)))?.len() as f64);
+        }
+        counts.sort_by(f64::total_cmp);
+        let at = |i: usize| Cell::Number(counts[i], 0);
+        let last = counts.len() - 1;
+        let paper = Cell::Text("40 to 60".to_owned());
+        table.rows.push((name, vec![at(0), at(last / 2), at(last), paper]));
+    }
+    Ok(table)
+}
+
+/// Accuracy by how critical points are made as many as are wanted.
+fn resized(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
+    let keep = context.plan.kept[0];
+    let rules = [Resize::Truncate, Resize::Cyclic, Resize::Nearest, Resize::Weighted];
+    let mut rows = Vec::new();
+    for front in &context.plan.fronts {
+        let name = cpl_name(front, keep);
+        let model = context.model(&name);
+        let cells = rules.map(|resize| {
+            let spec = SamplerSpec { resize, ..sampler(SamplerKind::Cpl, keep) };
+            Ok(Cell::instance(&test(&model, held, Some(spec))?))
+        });
+        rows.push((name, cells.into_iter().collect::<anyhow::Result<_>>()?));
+    }
+    Ok(Table {
+        id: "4 resize".to_owned(),
+        caption: format!("Instance accuracy by the rule that makes {keep} points of the ranking"),
+        rows_are: "front end".to_owned(),
+        columns: rules.map(|rule| rule.to_string()).into(),
+        rows,
+    })
+}
