@@ -45,11 +45,12 @@ pub fn run(command: &str, args: &Args) -> anyhow::Result<Outcome> {
     })
 }
 
-/// The code to end with for a child that ended with `status`: its own, or as
-/// shells have it 128 more than the signal that ended it.
-pub fn exit_code(status: ExitStatus) -> u8 {
+/// The code to end with for a training program that ended with `status`: its own,
+/// or as shells have it 128 more than the signal that ended it, which is named.
+fn exit_code(status: ExitStatus) -> u8 {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        eprintln!("error: the training program was ended by signal {signal}");
         return u8::try_from(128 + signal).unwrap_or(1);
     }
     status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)

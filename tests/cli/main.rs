@@ -7,6 +7,8 @@ mod bad_input;
 mod checkpoints;
 mod datasets;
 mod end_to_end;
+#[cfg(unix)]
+mod exit_codes;
 mod export_onnx;
 mod import_weights;
 mod interrupted;
@@ -14,7 +16,6 @@ mod meshes;
 mod packets;
 mod reference;
 mod scenes;
-// Without the feature the binary would build itself anew.
 #[cfg(feature = "simplify")]
 mod simplified;
 mod surfaces;

@@ -13,7 +13,10 @@ const TRIPLE: &str = "x86_64-unknown-linux-gnu";
 const STEPS: [(&str, &[&str]); 3] = [
     ("kernels, sanitized", &["--package", "infer-cpu", "--lib"]),
     ("cloud parsers, sanitized", &["--package", "edgepuck-formats", "--lib", "--tests"]),
-    ("mesh parsers, sanitized", &["--package", "sim-gpu", "--lib", "mesh::"]),
+    (
+        "mesh parsers, sanitized",
+        &["--package", "sim-gpu", "--no-default-features", "--lib", "mesh::"],
+    ),
 ];
 
 /// Runs the steps, on x86-64 Linux.
