@@ -2,7 +2,7 @@
 //! of functions chosen at run time.
 //!
 //! A layer multiplies rows of activations (one row a point) by a matrix packed
-//! into [`Panels`] (one panel a few output channels). A register tile is a few
+//! into `Panels` (one panel a few output channels). A register tile is a few
 //! rows by one panel: vector lanes run along output channels, so that rows need
 //! no packing and the maximum over points is lane by lane. `scalar` is the
 //! reference that every other file is held to by `suite`.

@@ -1,7 +1,6 @@
 //! Studies of building and casting.
 
 pub mod builders;
-pub mod kernel;
 pub mod simplify;
 pub mod speed;
 pub mod to_disk;

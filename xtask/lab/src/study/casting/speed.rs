@@ -1,6 +1,5 @@
 //! How fast hierarchies are built and rays are traced.
 
-use super::kernel;
 use crate::measure::backends::{Backend, short};
 use crate::measure::bench_mesh::{BenchMesh, target};
 use crate::measure::clock::{Cost, Costs, Spread, Workload, interleave, measured};
@@ -10,6 +9,7 @@ use crate::render::table::{Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
+use sim_gpu::caster::Caster;
 use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::validate;
 use sim_gpu::target::{Surface, Target};
@@ -132,10 +132,25 @@ fn traces(
             beams: copies(backend) * beams,
             hits: copies(backend) * hits,
             costs,
-            kernel_s: kernel::measure(backend, &ray_set.job, copies(backend), rounds)?,
+            kernel_s: kernel_seconds(backend, &ray_set.job, copies(backend), rounds)?,
         });
     }
     Ok(())
+}
+
+/// Seconds of the kernel alone in each of `repeats` casts of `copies` copies of `job`, by
+/// the adapter's own clock; `None` if the adapter does not have one.
+fn kernel_seconds(
+    backend: &Backend,
+    job: &CastJob,
+    copies: usize,
+    repeats: usize,
+) -> Result<Option<Vec<f64>>> {
+    let Caster::Gpu(gpu) = &backend.caster else { return Ok(None) };
+    let jobs = vec![job.clone(); copies];
+    // The first cast warms up and is left out.
+    gpu.cast_timed(&jobs)?;
+    (0..repeats).map(|_| Ok(gpu.cast_timed(&jobs)?.1)).collect()
 }
 
 /// Casts `jobs` on `backend`, all together.

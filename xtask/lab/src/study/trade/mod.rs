@@ -148,11 +148,11 @@ fn clouds(args: &Args) -> Result<Option<TestSet>> {
 /// Rows of sensors and of casters, and the reference scans.
 fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>, TestSet)> {
     let (name, rounds) = (name_of_meshes(args), usize::from(args.rounds));
-    let mut ways = sensors::one_at_a_time();
+    let mut settings = sensors::one_at_a_time();
     if !args.quick {
-        ways.extend(sensors::combinations());
+        settings.extend(sensors::combinations());
     }
-    let scanned = scans::scan_all(objects, &ways, rounds, &name)?;
+    let scanned = scans::scan_all(objects, &settings, rounds, &name)?;
     let cast = casters::cast_all(objects, &backends::open(None)?, rounds, &name)?;
     let reference = scan_set(objects, &name, &scanned[0].clouds);
     let (classifying, summary) = (as_trained(model)?, inspect(model)?);

@@ -1,4 +1,4 @@
-//! Scans of all objects in one way, what they cost, and how true they are.
+//! Scans of all objects with one setting: their cost and their errors.
 
 use super::objects::{Object, Place, places};
 use super::sensors::Scanning;
@@ -20,7 +20,7 @@ use std::hint::black_box;
 /// A cloud as the classifier takes it.
 pub type Cloud = Vec<[f32; 3]>;
 
-/// One in so many scans is looked at: of all four sides in turn.
+/// The Chamfer distance is taken of one in so many scans, of all four sides in turn.
 const CHAMFER_EACH: usize = 7;
 
 /// A scan and its ranges without any effect.
@@ -30,7 +30,7 @@ struct Made {
     exact_m: Vec<f64>,
 }
 
-/// Everything about one way of scanning.
+/// The scans of one setting.
 pub struct Scanned {
     /// Costs and geometric errors, without accuracy.
     pub row: Row,
@@ -38,25 +38,27 @@ pub struct Scanned {
     pub clouds: Vec<Cloud>,
 }
 
-/// Scans `objects` in all of `ways`, in turns, `rounds` times each.
+/// Scans `objects` with all of `settings`, in turns, `rounds` times each.
 ///
 /// # Errors
 /// A scan that cannot be written.
 pub fn scan_all(
     objects: &[Object],
-    ways: &[Scanning],
+    settings: &[Scanning],
     rounds: usize,
     test_set: &str,
 ) -> Result<Vec<Scanned>> {
-    let patterns: Vec<BeamPattern> = ways.iter().map(|way| way.sensor.pattern()).collect();
+    let patterns: Vec<BeamPattern> =
+        settings.iter().map(|setting| setting.sensor.pattern()).collect();
     let energy = Energy::here();
-    let mut joules: Vec<f64> = vec![0.0; ways.len()];
+    let mut joules: Vec<f64> = vec![0.0; settings.len()];
     let mut workloads: Vec<Workload<'_>> = Vec::new();
-    for ((way, pattern), joules) in ways.iter().zip(&patterns).zip(&mut joules) {
-        let (energy, places) = (energy.as_ref(), places(objects, way.distance_m));
+    for ((setting, pattern), joules) in settings.iter().zip(&patterns).zip(&mut joules) {
+        let (energy, places) = (energy.as_ref(), places(objects, setting.distance_m));
         workloads.push(Box::new(move || {
             let before = energy.map(Energy::now);
-            let (scans, cost) = measured(|| scan(&places, way, pattern, &AttributeSet::default()));
+            let (scans, cost) =
+                measured(|| scan(&places, setting, pattern, &AttributeSet::default()));
             if let (Some(energy), Some(before)) = (energy, before) {
                 *joules += energy.joules_since(&before) / places.len() as f64;
             }
@@ -68,19 +70,19 @@ pub fn scan_all(
     drop(workloads);
     let mut truths: BTreeMap<u64, Vec<Made>> = BTreeMap::new();
     let mut all = Vec::new();
-    for (i, (way, pattern)) in ways.iter().zip(&patterns).enumerate() {
-        let (noise_m, quantum_m) = (way.noise_m, way.range_quantum_m);
-        let step = way.azimuth_step_deg.map(|step| format!(" {step:.1}°")).unwrap_or_default();
+    for (i, (setting, pattern)) in settings.iter().zip(&patterns).enumerate() {
+        let (noise_m, quantum_m) = (setting.noise_m, setting.range_quantum_m);
+        let step = setting.azimuth_step_deg.map(|step| format!(" {step:.1}°")).unwrap_or_default();
         eprintln!(
             "{}: {}{step}, {} m, noise {noise_m} m, quantum {quantum_m} m",
-            way.parameter, way.name, way.distance_m
+            setting.parameter, setting.name, setting.distance_m
         );
-        let truth = truths.entry(way.distance_m.to_bits());
+        let truth = truths.entry(setting.distance_m.to_bits());
         let truth = match truth {
             Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(place) => place.insert(truth_from(objects, way.distance_m)?),
+            Entry::Vacant(place) => place.insert(truth_from(objects, setting.distance_m)?),
         };
-        let (mut row, clouds) = judged(objects, way, pattern, truth)?;
+        let (mut row, clouds) = assess(objects, setting, pattern, truth)?;
         let cpu_s = costs[i].cpu_s().median / clouds.len() as f64;
         row.test_set = test_set.to_owned();
         row.rays_per_cpu_s = Some(pattern.len() as f64 / cpu_s);
@@ -93,16 +95,16 @@ pub fn scan_all(
     Ok(all)
 }
 
-/// What `way` makes of the ranges, beside the `truth` from there, and its clouds.
-fn judged(
+/// The errors of `setting` against the `truth` from the same places, and its clouds.
+fn assess(
     objects: &[Object],
-    way: &Scanning,
+    setting: &Scanning,
     pattern: &BeamPattern,
     truth: &[Made],
 ) -> Result<(Row, Vec<Cloud>)> {
-    let places = places(objects, way.distance_m);
+    let places = places(objects, setting.distance_m);
     let columns = AttributeSet::from([Attribute::Range, Attribute::Beam]);
-    let made = scan(&places, way, pattern, &columns)?;
+    let made = scan(&places, setting, pattern, &columns)?;
     let (mut sum, mut worst, mut n) = (0.0, 0.0f64, 0usize);
     for made in &made {
         let ranges = made.scan.range_m.iter().flatten();
@@ -114,13 +116,13 @@ fn judged(
     let clouds: Vec<Cloud> = made.into_iter().map(|made| made.scan.positions).collect();
     let row = Row {
         part: Part::Scan,
-        knob: way.parameter.to_owned(),
-        sensor: way.name.clone(),
-        beams: Some(way.beams),
-        azimuth_step_deg: way.azimuth_step_deg,
-        range_quantum_m: Some(way.range_quantum_m),
-        distance_m: Some(way.distance_m),
-        noise_m: Some(way.noise_m),
+        knob: setting.parameter.to_owned(),
+        sensor: setting.name.clone(),
+        beams: Some(setting.beams),
+        azimuth_step_deg: setting.azimuth_step_deg,
+        range_quantum_m: Some(setting.range_quantum_m),
+        distance_m: Some(setting.distance_m),
+        noise_m: Some(setting.noise_m),
         caster: "cpu f32 watertight, f64 range".to_owned(),
         culling: "on".to_owned(),
         megabytes: Some(file_bytes(&clouds)? * 1e-6),
@@ -136,12 +138,12 @@ fn judged(
 /// One scan a place, on the CPU, without files.
 fn scan<'a>(
     places: &[Place<'a>],
-    way: &Scanning,
+    setting: &Scanning,
     pattern: &BeamPattern,
     attributes: &AttributeSet,
 ) -> Result<Vec<Made>> {
     let request = |place: &Place<'a>| {
-        let mut request = ScanRequest::new(&way.sensor, pattern, place.pose);
+        let mut request = ScanRequest::new(&setting.sensor, pattern, place.pose);
         (request.attributes, request.stream) = (attributes.clone(), place.stream);
         (&place.object.target, request)
     };
@@ -155,7 +157,7 @@ fn scan<'a>(
         Made { scan, exact_m }
     };
     let requests: Vec<_> = places.iter().map(request).collect();
-    let scans = scan_many(&Caster::Cpu(way.effects()), &requests)?;
+    let scans = scan_many(&Caster::Cpu(setting.effects()), &requests)?;
     Ok(scans.into_iter().map(made).collect())
 }
 
