@@ -211,9 +211,11 @@ pub fn dominated_table(rows: &[Row]) -> Table {
     table
 }
 
-/// All rows of `part`, the Pareto-optimal ones marked; a column is a heading and a
-/// row's words under it.
-fn table_of(rows: &[Row], part: Part, columns: &[(&str, &dyn Fn(&Row) -> String)]) -> Table {
+/// A column's heading, and what it shows of a row.
+type Column<'a> = (&'a str, &'a dyn Fn(&Row) -> String);
+
+/// All rows of `part`, the Pareto-optimal ones marked.
+fn table_of(rows: &[Row], part: Part, columns: &[Column<'_>]) -> Table {
     let of_part = || rows.iter().filter(|row| row.part == part);
     let caption = of_part().next().map_or_else(String::new, |row| {
         format!("On {}, {} clouds; {}", row.test_set, row.clouds, row.machine)
