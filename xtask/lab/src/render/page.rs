@@ -9,13 +9,20 @@ const CLOUDS: &str = include_str!("../../../../assets/page/cloud.js");
 /// One chapter of a page.
 pub struct Chapter {
     /// Its anchor: letters and hyphens.
-    pub id: &'static str,
-    /// One or two words for its tab.
-    pub tab: &'static str,
+    pub id: String,
+    /// A few words for its tab.
+    pub tab: String,
     /// Its heading: what a reader wants to know.
-    pub title: &'static str,
+    pub title: String,
     /// What it shows.
     pub body: Markup,
+}
+
+impl Chapter {
+    /// A chapter with the anchor `id`.
+    pub fn new(id: &str, tab: &str, title: &str, body: Markup) -> Self {
+        Self { id: id.to_owned(), tab: tab.to_owned(), title: title.to_owned(), body }
+    }
 }
 
 /// A page of `chapters`, one shown at a time, under `lead`.
@@ -56,8 +63,7 @@ mod tests {
     #[test]
     fn a_page_is_self_contained_and_escapes_names() {
         let body = html! { p { "a < b" } };
-        let page =
-            of("T & T", &html! {}, &[Chapter { id: "one", tab: "One", title: "Which one?", body }]);
+        let page = of("T & T", &html! {}, &[Chapter::new("one", "One", "Which one?", body)]);
         assert!(
             page.contains("<h2>Which one?</h2>")
                 && page.contains("a &lt; b")

@@ -13,7 +13,32 @@ pub struct Table {
 
 struct Row {
     is_marked: bool,
-    cells: Vec<String>,
+    cells: Vec<Cell>,
+}
+
+/// A cell of a table.
+#[derive(Default)]
+pub struct Cell {
+    /// Its value.
+    pub text: String,
+    /// A remark, such as the value's interval; may be empty.
+    pub note: String,
+    /// A share that shades the cell on a page.
+    pub share: Option<f64>,
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self { text, ..Self::default() }
+    }
+}
+
+impl Cell {
+    fn html(&self) -> Markup {
+        let opacity = self.share.map(|share| 0.45 * share);
+        let shade = opacity.map(|opacity| format!("background:rgba(23,99,199,{opacity:.2})"));
+        html! { td style=[shade] { (self.text) @if !self.note.is_empty() { small { (self.note) } } } }
+    }
 }
 
 impl Table {
@@ -31,18 +56,19 @@ impl Table {
         let mut csv = csv::Reader::from_reader(bytes);
         let mut table = Self::new(title, &csv.headers()?.iter().collect::<Vec<_>>());
         for record in csv.records() {
-            table.push(record?.iter().map(str::to_owned).collect());
+            table.push::<String>(record?.iter().map(str::to_owned).collect());
         }
         Ok(table)
     }
 
     /// Adds a row, as long as the heading.
-    pub fn push(&mut self, cells: Vec<String>) {
+    pub fn push<C: Into<Cell>>(&mut self, cells: Vec<C>) {
         self.push_marked(false, cells);
     }
 
     /// Adds a row, which is set in bold on a page if it `is_marked`.
-    pub fn push_marked(&mut self, is_marked: bool, cells: Vec<String>) {
+    pub fn push_marked<C: Into<Cell>>(&mut self, is_marked: bool, cells: Vec<C>) {
+        let cells: Vec<Cell> = cells.into_iter().map(Into::into).collect();
         debug_assert_eq!(cells.len(), self.heading.len());
         self.rows.push(Row { is_marked, cells });
     }
@@ -61,8 +87,8 @@ impl Table {
                     thead { tr { @for word in &self.heading { th scope="col" { (word) } } } }
                     tbody { @for row in &self.rows {
                         tr class=[row.is_marked.then_some("marked")] {
-                            @for (i, word) in row.cells.iter().enumerate() {
-                                @if i == 0 { th scope="row" { (word) } } @else { td { (word) } }
+                            @for (i, cell) in row.cells.iter().enumerate() {
+                                @if i == 0 { th scope="row" { (cell.text) } } @else { (cell.html()) }
                             }
                         }
                     } }
@@ -75,11 +101,13 @@ impl Table {
 /// As text: the first column is flush left, the others are flush right.
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rows = || std::iter::once(&self.heading).chain(self.rows.iter().map(|row| &row.cells));
-        let width = |i: usize| rows().map(|row| row[i].chars().count()).max().unwrap_or(0);
+        let words = |row: &Row| row.cells.iter().map(|cell| cell.text.clone()).collect();
+        let body = self.rows.iter().map(words);
+        let rows: Vec<Vec<String>> = std::iter::once(self.heading.clone()).chain(body).collect();
+        let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.heading.len()).map(width).collect();
         writeln!(f, "\n{}", self.title)?;
-        for row in rows() {
+        for row in &rows {
             for (i, (word, &width)) in row.iter().zip(&widths).enumerate() {
                 if i == 0 {
                     write!(f, "  {word:width$}")?;

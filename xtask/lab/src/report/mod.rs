@@ -41,19 +41,23 @@ pub fn run(args: &Args) -> Result<Outcome> {
     let assets = args.assets.clone().unwrap_or_else(|| workspace::root().join("assets"));
     ensure!(assets.is_dir(), "--assets: {} is not a folder", assets.display());
     let reports = assets.join("reports");
-    let chapter = |id, tab, title, body| Chapter { id, tab, title, body };
     let scans = scans::body(&assets)?;
-    let mut chapters = vec![chapter("scans", "Scans", "What does a scan look like?", scans)];
+    let mut chapters = vec![Chapter::new("scans", "Scans", "What does a scan look like?", scans)];
     chapters.extend(trade_chapters(&reports.join("trade/trade.csv"))?);
     let effects = records::ablations(&reports.join("ablations"))?;
     let errors = growth::body(&reports.join("extremes"))?;
     let paper = records::reproduction(&reports)?;
     let speed = benchmarks::body(&assets.join("bench"))?;
     chapters.extend([
-        chapter("effects", "Effects", "Which effects of a scan matter to a classifier?", effects),
-        chapter("extremes", "Errors", "How large can errors get?", errors),
-        chapter("paper", "Paper", "Do the paper's experiments hold?", paper),
-        chapter("benchmarks", "Speed", "How fast is it beside other engines?", speed),
+        Chapter::new(
+            "effects",
+            "Effects",
+            "Which effects of a scan matter to a classifier?",
+            effects,
+        ),
+        Chapter::new("extremes", "Errors", "How large can errors get?", errors),
+        Chapter::new("paper", "Paper", "Do the paper's experiments hold?", paper),
+        Chapter::new("benchmarks", "Speed", "How fast is it beside other engines?", speed),
     ]);
     let lead = html! {
         p { "LiDAR scans of meshes and the networks that classify them: every measurement of edgepuck "
@@ -72,12 +76,12 @@ pub fn run(args: &Args) -> Result<Outcome> {
 fn trade_chapters(record: &Path) -> Result<Vec<Chapter>> {
     if !record.is_file() {
         let body = missing(record, "cargo xtask trade");
-        return Ok(vec![Chapter {
-            id: "classifier",
-            tab: "Settings",
-            title: "Which setting fits my time budget?",
+        return Ok(vec![Chapter::new(
+            "classifier",
+            "Settings",
+            "Which setting fits my time budget?",
             body,
-        }]);
+        )]);
     }
     Ok(trade::page::chapters(&trade_record::read(record)?))
 }

@@ -1,4 +1,4 @@
-//! Clouds to turn: one mesh as several sensors see it.
+//! Clouds that can be rotated: one mesh as several sensors see it.
 
 use anyhow::{Context, Result};
 use formats::rng::StreamKey;
@@ -52,7 +52,7 @@ pub fn body(assets: &Path) -> Result<Markup> {
                     data-colours=("0".repeat(shown(cloud).count())) data-palette="#1763c7" {}
                 figcaption {
                     (sensor) @if *noise_m > 0.0 { ", noise " (noise_m) " m" } ": " (cloud.len()) " points. "
-                    "Drag to turn."
+                    "Drag to rotate."
                 }
             }
         } }

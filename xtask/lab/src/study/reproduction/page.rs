@@ -1,46 +1,30 @@
-//! The report: one HTML file that needs nothing else.
-
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+//! The report: a self-contained page with a chapter for each experiment.
 
 use super::plan::Plan;
-use super::section::{COLOURS, Cell, Section, Table};
+use super::section::{COLOURS, Cell, Cloud, Section, Table};
+use crate::render::page::{self, Chapter};
+use crate::render::table;
+use maud::{Markup, PreEscaped, html};
 
-const STYLE: &str = include_str!("../../../../../assets/page/page.css");
-const SCRIPT: &str = include_str!("../../../../../assets/page/cloud.js");
+const TITLE: &str = "The paper's experiments, repeated";
 
 /// All sections as a page.
 ///
 /// # Errors
-/// A plan that TOML cannot say.
+/// A plan that cannot be written as TOML.
 pub fn of(sections: &[Section], plan: &Plan, command: &str) -> anyhow::Result<String> {
     let plan_text = toml::to_string(plan)?;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "The paper's experiments, run again" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { "The paper's experiments, run again" }
-                p {
-                    "Meyer and Reitmann 2026, arXiv 2608.07106, by edgepuck "
-                    (env!("CARGO_PKG_VERSION")) "; " (machine()) "."
-                }
-                p { strong { (plan.about) } }
-                pre { (command) }
-                details { summary { "The plan" } pre { (plan_text) } }
-                nav { ol { @for (i, section) in sections.iter().enumerate() {
-                    li { a href={ "#s" (i + 1) } { (section.title) } }
-                } } }
-                @for (i, section) in sections.iter().enumerate() { (chapter(i + 1, section)) }
-                script { (PreEscaped(SCRIPT)) }
-            }
+    let lead = html! {
+        p {
+            "Meyer and Reitmann 2026, arXiv 2608.07106, by edgepuck "
+            (env!("CARGO_PKG_VERSION")) "; " (machine()) "."
         }
+        p { strong { (plan.about) } }
+        pre { (command) }
+        details { summary { "The plan" } pre { (plan_text) } }
     };
-    Ok(page.into_string())
+    let chapters: Vec<Chapter> = (1..).zip(sections).map(|(i, s)| chapter(i, s)).collect();
+    Ok(page::of(TITLE, &lead, &chapters))
 }
 
 /// What this ran on.
@@ -51,25 +35,28 @@ fn machine() -> String {
     format!("{cores} cores of {}", name.unwrap_or(std::env::consts::ARCH))
 }
 
-fn chapter(number: usize, section: &Section) -> Markup {
+fn chapter(number: usize, section: &Section) -> Chapter {
+    let body = html! {
+        @for paragraph in &section.about { p { (paragraph) } }
+        @for table in &section.tables { (numbers(table).html()) }
+        @for drawing in &section.drawings { (PreEscaped(drawing)) }
+        @for cloud in &section.clouds { (canvas(cloud)) }
+    };
+    let title = format!("{number}. {}", section.title);
+    Chapter::new(&format!("s{number}"), &title, &title, body)
+}
+
+fn canvas(cloud: &Cloud) -> Markup {
+    let colours: String = cloud.colours.iter().map(|c| char::from(b'0' + c)).collect();
     html! {
-        section id={ "s" (number) } {
-            h2 { (number) ". " (section.title) }
-            @for paragraph in &section.about { p { (paragraph) } }
-            @for table in &section.tables { (numbers(table)) }
-            @for drawing in &section.drawings { figure { (PreEscaped(drawing)) } }
-            @for cloud in &section.clouds {
-                figure {
-                    canvas class="cloud" width="480" height="360" data-points=(joined(&cloud.points))
-                        data-colours=(cloud.colours.iter().map(|c| char::from(b'0' + c)).collect::<String>())
-                        data-palette=(COLOURS.join(" ")) {}
-                    figcaption {
-                        (cloud.caption) ". Drag to turn. "
-                        span style={ "color:" (COLOURS[1]) } { "critical points" } ", "
-                        span style={ "color:" (COLOURS[2]) } { "LIME's strongest" } ", "
-                        span style={ "color:" (COLOURS[3]) } { "both" }
-                    }
-                }
+        figure {
+            canvas class="cloud" width="480" height="360" data-points=(joined(&cloud.points))
+                data-colours=(colours) data-palette=(COLOURS.join(" ")) {}
+            figcaption {
+                (cloud.caption) ". Drag to rotate. "
+                span style={ "color:" (COLOURS[1]) } { "critical points" } ", "
+                span style={ "color:" (COLOURS[2]) } { "LIME's strongest" } ", "
+                span style={ "color:" (COLOURS[3]) } { "both" }
             }
         }
     }
@@ -80,41 +67,30 @@ fn joined(points: &[[i16; 3]]) -> String {
     words.join(" ")
 }
 
-fn numbers(table: &Table) -> Markup {
-    html! {
-        div class="scroll" {
-            table {
-                caption { (table.caption) }
-                thead { tr {
-                    th scope="col" { (table.rows_are) }
-                    @for column in &table.columns { th scope="col" { (column) } }
-                } }
-                tbody { @for (row, cells) in &table.rows {
-                    tr { th scope="row" { (row) } @for cell in cells { (one(cell)) } }
-                } }
-            }
-        }
+fn numbers(table: &Table) -> table::Table {
+    let columns = table.columns.iter().map(String::as_str);
+    let heading: Vec<&str> = std::iter::once(table.rows_are.as_str()).chain(columns).collect();
+    let mut shown = table::Table::new(table.caption.clone(), &heading);
+    for (row, cells) in &table.rows {
+        let first = table::Cell::from(row.clone());
+        shown.push(std::iter::once(first).chain(cells.iter().map(one)).collect());
     }
+    shown
 }
 
 /// A cell; shares are shaded by their size.
-fn one(cell: &Cell) -> Markup {
-    let (value, interval) = cell.words();
-    let share = matches!(cell, Cell::Share(..) | Cell::Mean(..)).then(|| cell.numbers().0);
-    let shade =
-        share.flatten().map(|share| format!("background:rgba(23,99,199,{:.2})", 0.45 * share));
-    html! {
-        td style=[shade] { (value) @if !interval.is_empty() { small { (interval) } } }
-    }
+fn one(cell: &Cell) -> table::Cell {
+    let (text, note) = cell.words();
+    let is_share = matches!(cell, Cell::Share(..) | Cell::Mean(..));
+    table::Cell { text, note, share: cell.numbers().0.filter(|_| is_share) }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::section::Cloud;
     use super::*;
 
     #[test]
-    fn a_page_needs_nothing_else_and_escapes_names() {
+    fn a_page_is_self_contained_and_escapes_names() {
         let table = Table {
             caption: "a < b".to_owned(),
             columns: vec!["x".to_owned()],

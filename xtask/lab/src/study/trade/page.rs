@@ -48,24 +48,14 @@ pub fn chapters(rows: &[Row]) -> Vec<Chapter> {
         (every_setting(&scan_table(rows)))
     };
     vec![
-        Chapter {
-            id: "classifier",
-            tab: "Settings",
-            title: "Which setting fits my time budget?",
-            body: classifier,
-        },
-        Chapter {
-            id: "scan",
-            tab: "Sensors",
-            title: "Which beams and steps can a sensor do without?",
-            body: scan,
-        },
-        Chapter {
-            id: "caster",
-            tab: "Casters",
-            title: "How exact are the ranges, and what does that cost?",
-            body: caster_table(rows).html(),
-        },
+        Chapter::new("classifier", "Settings", "Which setting fits my time budget?", classifier),
+        Chapter::new("scan", "Sensors", "Which beams and steps can a sensor do without?", scan),
+        Chapter::new(
+            "caster",
+            "Casters",
+            "How exact are the ranges, and what does that cost?",
+            caster_table(rows).html(),
+        ),
     ]
 }
 
