@@ -54,7 +54,9 @@ impl Network {
         let mut file = WeightsFile::open(path)?;
         let card = ModelCard::from_metadata(path, &file.metadata())?;
         let mut tensors = BTreeMap::new();
-        for name in file.shapes().into_keys() {
+        // PyTorch counts batches in integers, which inference does not need.
+        let is_needed = |name: &String| !name.ends_with(".num_batches_tracked");
+        for name in file.shapes().into_keys().filter(is_needed) {
             tensors.insert(name.clone(), file.read(&name)?);
         }
         Ok(Self { card, tensors })
