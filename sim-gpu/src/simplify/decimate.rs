@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::NotBuilt;
 use super::distance::distance_to_surface;
-use super::surface_of;
 use super::within::beyond;
 use crate::bvh::Builder;
 use crate::mesh::Mesh;
@@ -62,7 +61,7 @@ fn repair(
     corners: Vec<u32>,
     bound: f64,
 ) -> Vec<u32> {
-    let collapsed = surface_of(welded.mesh_of(mesh, &corners));
+    let collapsed = Surface::of_mesh(welded.mesh_of(mesh, &corners));
     let outliers = beyond(&collapsed, original, bound);
     let corners_of = |&nth: &u32| triangle(&corners, nth as usize);
     let strayed: Vec<u32> = outliers.iter().flat_map(corners_of).collect();
@@ -103,7 +102,7 @@ fn around(surface: &Surface, target: &Target, distance: f64) -> Vec<u32> {
 }
 
 fn target(mesh: Mesh) -> Target {
-    Target::new(surface_of(mesh), Builder::Morton)
+    Target::new(Surface::of_mesh(mesh), Builder::Morton)
 }
 
 /// Triangles whose corners at one position are one vertex: files often repeat
