@@ -14,15 +14,15 @@ fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
     let (names, seen_names) = (whole.names.as_ref().unwrap(), seen.names.as_ref().unwrap());
     assert_eq!((whole.len(), whole.n_points, seen.len()), (10, 200, 40));
     let radius = |p: &[f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
-    for i in 0..whole.len() {
+    for (i, name) in names.iter().enumerate() {
         let largest = whole.cloud(i).iter().map(radius).fold(0.0, f32::max);
         assert!((largest - 1.0).abs() < 1e-6, "{largest}");
-        let of_mesh = |name: &str| name.strip_suffix("_v0") == Some(&names[i]);
+        let of_mesh = |seen: &str| seen.strip_suffix("_v0") == Some(name);
         let view = seen_names.iter().position(|name| of_mesh(name)).unwrap();
         // Views 0 and 2 are from +x and -x: each sees more of its own side.
         let mean = |cloud: &[[f32; 3]]| cloud.iter().map(|p| p[0]).sum::<f32>() / 200.0;
         let [front, back] = [view, view + 2].map(|view| mean(seen.cloud(view)));
-        assert!(front > back, "{}: {front}, {back}", names[i]);
+        assert!(front > back, "{name}: {front}, {back}");
         // In the whole's frame: nothing beyond it but what other samples miss.
         assert!(seen.cloud(view).iter().all(|p| radius(p) < 1.2));
         // Of 1,200 points looked at not all are seen, and not none.

@@ -1,6 +1,5 @@
 //! ModelNet40's HDF5 files as data to learn from.
 #![cfg(feature = "hdf5")]
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use formats::modelnet_h5::ModelNetH5Writer;
 use formats::split::Split;
