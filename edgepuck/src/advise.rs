@@ -256,8 +256,11 @@ mod tests {
         let advice = advise(&asked(Some(5.0), None), &rows()).unwrap();
         assert!(advice.starts_with("large"), "{advice}");
         assert!(advice.contains("1 thread:"), "of equals fewer threads: {advice}");
-        assert!(advice.contains("0.5 points less save 40 % of the time"), "{advice}");
-        assert!(advice.contains("Beyond its interval, for more:\n  huge"), "{advice}");
+        assert!(advice.contains("loses 0.5 points and saves 40 % of the time"), "{advice}");
+        assert!(
+            advice.contains("significantly more accurate, beyond the limits:\n  huge"),
+            "{advice}"
+        );
     }
 
     #[test]

@@ -194,7 +194,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scan.bin");
         // More than one buffer, in pieces of many lengths.
-        let bytes: Vec<u8> = (0..100_000u32).map(|i| ((i * i) >> 3) as u8).collect();
+        let bytes: Vec<u8> = (0..100_000u32).map(|i| (i.wrapping_mul(i) >> 3) as u8).collect();
         let sha256 = write_hashed(&path, |writer| {
             let mut rest = &bytes[..];
             for length in (1..).take_while(|length| length * (length + 1) / 2 <= bytes.len()) {

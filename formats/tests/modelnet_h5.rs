@@ -105,7 +105,7 @@ fn a_bad_file_is_named_with_its_cause() {
     with(&[2, 4], &[0, 0]);
     failed(["dataset `data`", "expected shape [m, n, 3], found [2, 4]"]);
     with(&[2, 4, 3], &[0]);
-    failed(["dataset `label`", "shape [1, 1] for 2 clouds"]);
+    failed(["dataset `label`", "expected 2 labels, one for each cloud, found shape [1, 1]"]);
     with(&[2, 4, 3], &[0, 9]);
     fs::write(at.join("shape_names.txt"), "bowl\nchair\n\n").unwrap();
     failed(["a.h5", "cloud 1: expected a label below 2, found 9"]);

@@ -211,7 +211,7 @@ fn weights_that_make_no_model_are_named() {
         &|tensors| {
             tensors.insert("bn7.bias".into(), vector(&[1.0]));
         },
-        "tensor `bn7.bias`: extra",
+        "tensor `bn7.bias`: unexpected",
     );
     refused(
         &|tensors| tensors.get_mut("feat.conv2.weight").unwrap().shape = vec![4, 5, 1],
@@ -251,7 +251,10 @@ fn bad_tables_and_class_lists_are_named() {
         ("name = \"t\"\nlayer = 1\n", "unknown field `layer`"),
         ("name = \"t\"\n[layers]\n\"a{i}\" = \"b\"\n", "\"a{i}\" = \"b\": {i} may stand once"),
         ("name = \"t\"\n[layers]\n[card]\npoint = 3\n", "card: unknown key `point`"),
-        ("name = \"t\"\n[layers]\n[card]\npoints = -3\n", "metadata `points`: `-3` is no count"),
+        (
+            "name = \"t\"\n[layers]\n[card]\npoints = -3\n",
+            "metadata `points`: expected a count, found `-3`",
+        ),
         ("name = \"t\"\n[layers]\n", "the nearest, `t`, does not know `bn1.bias`, "),
     ] {
         fs::write(folder.path().join("t.toml"), table).unwrap();

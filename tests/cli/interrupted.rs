@@ -33,7 +33,7 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     }
     assert_same_tree(&folder.path().join("unbroken"), &folder.path().join("broken"));
     let again = succeeds(folder.path(), "gen-dataset meshes --out broken --adapter cpu --resume");
-    assert!(said(&again).contains("complete already"), "{}", said(&again));
+    assert!(said(&again).contains("already complete"), "{}", said(&again));
 }
 
 #[test]
