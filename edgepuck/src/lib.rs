@@ -1,22 +1,27 @@
 //! The commands of the program `edgepuck`, a module each.
 
 pub mod adapters;
+#[cfg(feature = "models")]
 pub mod advise;
 pub mod caster;
 pub mod checkout;
+#[cfg(feature = "models")]
 pub mod export_onnx;
 pub mod flags;
 pub mod gen_dataset;
 pub mod gen_shapes;
+#[cfg(feature = "models")]
 pub mod import_weights;
 pub mod merge_dataset;
 pub mod outcome;
 pub mod preview;
 pub mod preview_scan;
 pub mod sample_surfaces;
+#[cfg(feature = "models")]
 pub mod sampler_config;
 pub mod scan;
 pub mod significant_digits;
+#[cfg(feature = "models")]
 pub mod trade_record;
 pub mod trainer;
 

@@ -2,9 +2,11 @@
 
 use clap::{Parser, Subcommand};
 use edgepuck_program::{
-    Outcome, adapters, advise, export_onnx, gen_dataset, gen_shapes, import_weights, merge_dataset,
-    outcome, preview_scan, sample_surfaces, scan, trainer,
+    Outcome, adapters, gen_dataset, gen_shapes, merge_dataset, outcome, preview_scan,
+    sample_surfaces, scan, trainer,
 };
+#[cfg(feature = "models")]
+use edgepuck_program::{advise, export_onnx, import_weights};
 use std::process::ExitCode;
 
 /// Turns CAD meshes into realistic LiDAR training data.
@@ -33,8 +35,10 @@ enum Command {
     /// Merge the shards of a dataset into one dataset
     MergeDataset(merge_dataset::Args),
     /// Convert a PyTorch checkpoint into a model file for infer-cpu
+    #[cfg(feature = "models")]
     ImportWeights(import_weights::Args),
     /// Write a model file as ONNX, for other engines
+    #[cfg(feature = "models")]
     ExportOnnx(export_onnx::Args),
     /// Train a network: `edgepuck train --help`
     #[command(disable_help_flag = true)]
@@ -49,6 +53,7 @@ enum Command {
     #[command(disable_help_flag = true)]
     ComparePoints(trainer::Args),
     /// Recommend one configuration for a device, from what was measured
+    #[cfg(feature = "models")]
     Advise(advise::Args),
 }
 
@@ -65,12 +70,15 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Preview(args) => preview_scan::run(args),
         Command::Adapters => adapters::run(),
         Command::MergeDataset(args) => merge_dataset::run(args),
+        #[cfg(feature = "models")]
         Command::ImportWeights(args) => import_weights::run(args),
+        #[cfg(feature = "models")]
         Command::ExportOnnx(args) => export_onnx::run(args),
         Command::Train(args) => trainer::run("train", args),
         Command::Eval(args) => trainer::run("eval", args),
         Command::Explain(args) => trainer::run("explain", args),
         Command::ComparePoints(args) => trainer::run("compare-points", args),
+        #[cfg(feature = "models")]
         Command::Advise(args) => advise::run(args),
     }
 }
