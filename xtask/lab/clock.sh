@@ -10,8 +10,8 @@
 # usage: xtask/lab/clock.sh [scan | test | all] [flags of `cargo xtask test`]
 #
 # Sources of dependencies come from Cargo's own cache, so that a network's speed
-# does not count. Cargo's reports of where the time goes are left in the clone, whose
-# folder is printed, if CARGO_BUILD_TIMINGS=1 asks for them.
+# does not count. To see where the time of a build goes, run `cargo build --release
+# --timings -p edgepuck --no-default-features` in the clone, whose folder is printed.
 set -euo pipefail
 
 what="${1:-all}"
