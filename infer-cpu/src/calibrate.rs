@@ -7,12 +7,12 @@ use std::path::Path;
 use formats::labelled::LabelledSet;
 use formats::rng::StreamKey;
 
-use crate::engine::{Engine, Input};
+use crate::engine::{Engine, Forward, Input};
 use crate::error::Error;
 use crate::kernel;
 use crate::layers;
 use crate::normalize;
-use crate::precision::{F32, Precision};
+use crate::precision::F32;
 use crate::source::ModelSource;
 use crate::team::Team;
 
@@ -53,13 +53,11 @@ fn on_clouds_of<'a>(
     clouds: impl IntoIterator<Item = &'a [[f32; 3]]>,
 ) -> Result<BTreeMap<String, f32>, Error> {
     let (mut file, card) = model.open()?;
-    let kernels = kernel::available()
-        .find(|kernels| Precision::F32.runs_on(kernels))
-        .ok_or(Error::KernelMissing(kernel::KernelName::Scalar))?;
+    let kernels = kernel::fastest();
     let layers = layers::pack::<F32>(&mut file, &card, kernels)?;
     let team = Team::new(Engine::new(layers, kernels, 1, true), 1)
         .map_err(|source| Error::Threads { threads: 1, source })?;
-    let mut scratch = team.work().scratch();
+    let mut scratch = team.scratch();
     for cloud in clouds {
         let input = Input { points: cloud, cloud, pooled_stn: false };
         Engine::observe(&team, &input, &mut scratch);

@@ -1,7 +1,7 @@
 //! Points of a cloud chosen by their coordinates, without a network.
 
 use crate::error::Error;
-use crate::kernel::{self, KernelName};
+use crate::kernel;
 use crate::normalize;
 use crate::sampler::{Sampler, SamplerKind, SamplerSpec};
 
@@ -30,10 +30,7 @@ pub fn choose(points: &[[f64; 3]], spec: &SamplerSpec) -> Result<Vec<u32>, Error
     if points.is_empty() {
         return Err(Error::NoPoints);
     }
-    if let Some(index) = points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
-        let [x, y, z] = points[index];
-        return Err(Error::NotFinite { index, x, y, z });
-    }
+    check_finite(points)?;
     let mut spec = spec.clone();
     let mut normalized = Vec::new();
     match spec.voxel_size.filter(|_| spec.kind == SamplerKind::Voxel) {
@@ -43,8 +40,18 @@ pub fn choose(points: &[[f64; 3]], spec: &SamplerSpec) -> Result<Vec<u32>, Error
         }
         None => normalize::to_unit_sphere(points, &mut normalized),
     }
-    let kernels = kernel::available().next().ok_or(Error::KernelMissing(KernelName::Scalar))?;
-    Ok(Sampler::new(spec)?.select(&normalized, kernels)?.to_vec())
+    Ok(Sampler::new(spec)?.select(&normalized, kernel::fastest())?.to_vec())
+}
+
+/// That all coordinates are finite.
+pub fn check_finite(points: &[[f64; 3]]) -> Result<(), Error> {
+    match points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
+        Some(index) => {
+            let [x, y, z] = points[index];
+            Err(Error::NotFinite { index, x, y, z })
+        }
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]

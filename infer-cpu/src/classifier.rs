@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use formats::model_card::{ModelCard, Normalization};
 
-use crate::engine::{Input, RangeEvents, Scratch};
+use crate::choose::check_finite;
+use crate::engine::{Forward, Input, RangeEvents, Scratch};
 use crate::error::Error;
-use crate::forward::{self, Forward, Loaded, Setup};
+use crate::forward::{self, Loaded};
 use crate::kernel::{self, KernelName, Kernels};
 use crate::normalize;
 use crate::options::{MOST_POINTS, MOST_THREADS, Options};
@@ -88,8 +89,9 @@ impl Classifier {
         if options.threads > MOST_THREADS {
             return Err(Error::TooManyThreads(options.threads));
         }
-        let setup = setup(options, options.precision)?;
-        let Loaded { card, network, parts } = forward::load(&source, &setup)?;
+        let kernels = choose_kernels(options.precision, options.kernel)?;
+        let Loaded { card, network, parts } =
+            forward::load(&source, options, options.precision, kernels)?;
         let spec = match &options.sampler {
             Some(spec) => spec.clone(),
             None => SamplerSpec::as_trained(source.name(), &card)?,
@@ -105,7 +107,7 @@ impl Classifier {
             augmentation: TestTimeAugmentation::new(options, &spec, classes.len())?,
             classes,
             options: options.clone(),
-            kernels: setup.kernels,
+            kernels,
             scratch: network.scratch(),
             events: RangeEvents::default(),
             network,
@@ -185,10 +187,7 @@ impl Classifier {
     /// # Errors
     /// A cloud without points, or with a coordinate that is not finite.
     pub fn sample(&mut self, points: &[[f64; 3]]) -> Result<&[u32], Error> {
-        if let Some(index) = points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
-            let [x, y, z] = points[index];
-            return Err(Error::NotFinite { index, x, y, z });
-        }
+        check_finite(points)?;
         self.take(points.iter().copied())?;
         self.normalize();
         let Self { selection, normalized, kernels, network, scratch, .. } = self;
@@ -258,8 +257,9 @@ impl Classifier {
     fn forward_in_f32(&mut self) -> Result<(), Error> {
         if self.fallback.is_none() {
             let Some(source) = &self.source else { return Err(Error::Overflow) };
-            let setup = setup(&self.options, Precision::F32)?;
-            self.fallback = Some(forward::load(source, &setup)?.network);
+            let kernels = choose_kernels(Precision::F32, self.options.kernel)?;
+            let loaded = forward::load(source, &self.options, Precision::F32, kernels)?;
+            self.fallback = Some(loaded.network);
         }
         let Some(network) = &self.fallback else { return Err(Error::Overflow) };
         let Self { selection, normalized, kernels, scratch, .. } = self;
@@ -309,17 +309,6 @@ fn class_names(card: &ModelCard, n_classes: usize) -> Vec<Arc<str>> {
         true => (0..n_classes).map(|class| format!("class {class}").into()).collect(),
         false => card.classes.iter().map(|name| name.as_str().into()).collect(),
     }
-}
-
-fn setup(options: &Options, precision: Precision) -> Result<Setup<'_>, Error> {
-    let kernels = choose_kernels(precision, options.kernel)?;
-    Ok(Setup {
-        precision,
-        kernels,
-        threads: options.threads,
-        t_nets: options.t_nets,
-        activation_ranges: options.activation_ranges.as_ref(),
-    })
 }
 
 /// The kernels `forced`, or the fastest here that have products in `precision`.

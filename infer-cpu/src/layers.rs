@@ -7,9 +7,9 @@ use formats::model_card::ModelCard;
 use formats::weights::WeightsFile;
 
 use crate::dense::Dense;
-use crate::kernel::{Columns, Kernels, Panels};
+use crate::kernel::{Kernels, Panels};
 use crate::network::{Network, Role, read_network};
-use crate::precision::{Format, Matrix};
+use crate::precision::{F32, Format, Matrix, Weight};
 use crate::prefilter::Int8Prefilter;
 
 /// A network packed for format `T`.
@@ -75,7 +75,7 @@ impl Largest {
 /// A layer after a pooling.
 pub struct Vector<T: Format> {
     /// Its weights.
-    pub columns: Columns<T::Stored>,
+    pub columns: Panels<T::Stored>,
     /// Whether negative outputs become 0.
     pub relu: bool,
 }
@@ -117,7 +117,7 @@ impl Packer<'_> {
                 Conv::Inner(Packed { prefilter, ..self.packed(&dense) })
             }
             Role::AfterTransform => {
-                let mut plain = empty::<crate::precision::F32>(self.kernels, &dense);
+                let mut plain = empty::<F32>(self.kernels, &dense);
                 plain.fill(|input, output| dense.at(input, output));
                 // Bias and ReLU are for after the product.
                 plain.biases_mut().fill(0.0);
@@ -128,7 +128,7 @@ impl Packer<'_> {
     }
 
     fn first(&self, dense: Dense) -> First {
-        let mut panels = empty::<crate::precision::F32>(self.kernels, &dense);
+        let mut panels = empty::<F32>(self.kernels, &dense);
         panels.fill(|input, output| dense.at(input, output));
         First { panels, range: self.range(&dense.name), dense, seen: Largest::default() }
     }
@@ -136,7 +136,7 @@ impl Packer<'_> {
     fn packed<T: Format>(&self, dense: &Dense) -> Packed<T> {
         let mut panels = empty::<T>(self.kernels, dense);
         let input_range = self.range(&self.before(&dense.name));
-        T::fill(&mut panels, input_range, |input, output| dense.at(input, output));
+        T::Weight::fill(&mut panels, input_range, |input, output| dense.at(input, output));
         Packed {
             name: dense.name.clone(),
             panels,
@@ -196,7 +196,7 @@ impl<T: Format> Packed<T> {
     pub fn zeros(kernels: &Kernels, inputs: usize, outputs: usize) -> Self {
         let mut panels = panels::<T>(kernels, inputs, outputs);
         // Scales too, where the format has them, so that setting allocates nothing.
-        T::fill(&mut panels, UNKNOWN_RANGE, |_, _| 0.0);
+        T::Weight::fill(&mut panels, UNKNOWN_RANGE, |_, _| 0.0);
         Self {
             name: String::new(),
             panels,
@@ -211,7 +211,7 @@ impl<T: Format> Packed<T> {
     /// inputs of at most `range`.
     pub fn set(&mut self, matrix: &Matrix<'_>, range: f32) {
         let at = |input: usize, output: usize| matrix.data[input * matrix.stride + output];
-        T::fill(&mut self.panels, range, at);
+        T::Weight::fill(&mut self.panels, range, at);
         let (inputs, outputs) = (self.panels.inputs(), self.panels.outputs());
         let gain = |output| (0..inputs).map(|input| at(input, output).abs()).sum::<f32>();
         self.gain = (0..outputs).map(gain).fold(0.0, f32::max);

@@ -48,6 +48,7 @@ mod evaluate;
 mod forward;
 pub mod kernel;
 mod layers;
+mod named;
 mod network;
 mod normalize;
 mod options;

@@ -4,9 +4,9 @@
 //! Names are those of yanx27/Pointnet_Pointnet2_pytorch, for any number of
 //! layers: `feat.conv1…`, `feat.bn1…` the trunk, `feat.stn.*` and `feat.fstn.*`
 //! the T-Nets (`conv`, `fc`, and `bn` counted through both), `fc1…`, `bn1…` the
-//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`. The features of a point's neighborhood come from `edge.conv1…`, one layer for each of the card's
-//! `edge_radii`. Where no layer has a batch norm, all are
-//! taken as folded already.
+//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`. The features of a
+//! point's neighborhood come from `edge.conv1…`, one layer for each of the card's
+//! `edge_radii`. Where no layer has a batch norm, all are taken as folded already.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,6 +17,7 @@ use formats::model_card::ModelCard;
 use formats::weights::{Tensor, WeightsFile, tensor_part};
 
 use crate::dense::{BatchNorm, Dense};
+use crate::source::ModelSource;
 
 /// A network whose point-wise layers are `C` and whose vector layers are `F`.
 pub struct Network<C, F> {
@@ -89,7 +90,7 @@ const WIDEST: usize = 1 << 16;
 /// # Errors
 /// A file that is not a model: what [`crate::Classifier::load`] refuses.
 pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    read_from(WeightsFile::open(path)?)
+    read_source(&ModelSource::File(path.to_path_buf()))
 }
 
 /// As [`read`], from the `bytes` of a model file that errors call `name`.
@@ -100,11 +101,11 @@ pub fn read_bytes(
     name: &Path,
     bytes: Arc<[u8]>,
 ) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    read_from(WeightsFile::from_bytes(name, bytes)?)
+    read_source(&ModelSource::Memory { name: name.to_path_buf(), bytes })
 }
 
-fn read_from(mut file: WeightsFile) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    let card = ModelCard::from_metadata(file.path(), &file.metadata())?;
+fn read_source(model: &ModelSource) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
+    let (mut file, card) = model.open()?;
     let network = read_network(&mut file, &card, |dense, _| dense, |dense| dense)?;
     Ok((card, network))
 }
@@ -118,73 +119,56 @@ fn read_from(mut file: WeightsFile) -> Result<(ModelCard, Network<Dense, Dense>)
 pub fn read_network<C, F>(
     file: &mut WeightsFile,
     card: &ModelCard,
-    conv: impl FnMut(Dense, Role) -> C,
-    fc: impl FnMut(Dense) -> F,
+    mut conv: impl FnMut(Dense, Role) -> C,
+    mut fc: impl FnMut(Dense) -> F,
 ) -> Result<Network<C, F>, FormatError> {
     let names: BTreeSet<String> = file.shapes().into_keys().collect();
     let has_norms = names.iter().any(|name| name.ends_with("running_var"));
+    let (conv, fc) = (&mut conv, &mut fc);
     let mut reader = Reader { file, names, used: BTreeSet::new(), has_norms, conv, fc };
     let network = reader.network(card)?;
     reader.check_that_all_is_used()?;
     Ok(network)
 }
 
-struct Reader<'a, M, N> {
+struct Reader<'a, C, F> {
     file: &'a mut WeightsFile,
     names: BTreeSet<String>,
     used: BTreeSet<String>,
     has_norms: bool,
-    conv: M,
-    fc: N,
+    conv: &'a mut dyn FnMut(Dense, Role) -> C,
+    fc: &'a mut dyn FnMut(Dense) -> F,
 }
 
-impl<M, N> Reader<'_, M, N> {
-    fn network<C, F>(&mut self, card: &ModelCard) -> Result<Network<C, F>, FormatError>
-    where
-        M: FnMut(Dense, Role) -> C,
-        N: FnMut(Dense) -> F,
-    {
-        let after = card.transform_after;
-        let n_trunk = self.count("feat.conv");
-        if n_trunk < 2 {
-            return Err(
-                self.error("feat.conv2.weight", "missing: expected a trunk of two layers or more")
-            );
-        }
-        let stn = self.has("feat.stn.").then(|| self.t_net("feat.stn", 3, Role::First, 3));
+impl<C, F> Reader<'_, C, F> {
+    fn network(&mut self, card: &ModelCard) -> Result<Network<C, F>, FormatError> {
+        let stn = self.has("feat.stn.").then(|| self.t_net("feat.stn", 3, Role::First));
         let stn = stn.transpose()?;
-        let has_fstn = self.has("feat.fstn.");
-        if has_fstn && !(1..n_trunk).contains(&after) {
-            let cause = format!(
-                "expected 1 to {} for a trunk of {n_trunk} layers, found {after}",
-                n_trunk - 1
-            );
-            return Err(self.file_error("metadata `transform_after`", cause));
-        }
         let edges = self.edges(card)?;
-        let mut width = 3 + edges.iter().map(|(_, dense)| dense.outputs).sum::<usize>();
-        let mut trunk = Vec::with_capacity(n_trunk);
-        let mut fstn = None;
-        for i in 0..n_trunk {
-            if has_fstn && i == after {
-                fstn = Some(self.t_net("feat.fstn", width, Role::Inner, width)?);
+        let inputs = 3 + edges.iter().map(|(_, dense)| dense.outputs).sum::<usize>();
+        let transform_after = card.transform_after;
+        let turned = self.has("feat.fstn.").then_some(transform_after);
+        let (trunk, widths) =
+            self.point_layers("feat", inputs, Role::First, turned, card.pooled_relu)?;
+        let n_trunk = trunk.len();
+        let fstn = match turned {
+            Some(after) if !(1..n_trunk).contains(&after) => {
+                let most = n_trunk - 1;
+                let cause =
+                    format!("expected 1 to {most} for a trunk of {n_trunk} layers, found {after}");
+                return Err(self.file_error("metadata `transform_after`", cause));
             }
-            let last = i + 1 == n_trunk;
-            let role = match i {
-                0 => Role::First,
-                _ if has_fstn && i == after => Role::AfterTransform,
-                _ if last => Role::Last,
-                _ => Role::Inner,
-            };
-            let relu = !last || card.pooled_relu;
-            let dense = self.dense("feat", ("conv", i + 1), Some(i + 1), width, relu)?;
-            width = dense.outputs;
-            trunk.push((self.conv)(dense, role));
-        }
-        let head = self.vector_layers("", 0, width, None)?;
+            Some(after) => Some(self.t_net("feat.fstn", widths[after], Role::Inner)?),
+            None => None,
+        };
+        let head = self.vector_layers("", 0, widths[n_trunk], None)?;
         self.check_class_names(card, head.len())?;
-        let front = self.front()?;
-        Ok(Network { stn, edges, trunk, fstn, transform_after: after, head, front })
+        let front = self
+            .has("cpl.")
+            .then(|| self.point_layers("cpl", 3, Role::First, None, true))
+            .transpose()?
+            .map(|(layers, _)| layers);
+        Ok(Network { stn, edges, trunk, fstn, transform_after, head, front })
     }
 
     fn check_class_names(&self, card: &ModelCard, n_layers: usize) -> Result<(), FormatError> {
@@ -198,20 +182,16 @@ impl<M, N> Reader<'_, M, N> {
         Ok(())
     }
 
-    fn t_net<C, F>(
+    /// The T-Net that predicts a matrix of as many rows as it has inputs.
+    fn t_net(
         &mut self,
         prefix: &str,
         inputs: usize,
         first: Role,
-        k: usize,
-    ) -> Result<TNet<C, F>, FormatError>
-    where
-        M: FnMut(Dense, Role) -> C,
-        N: FnMut(Dense) -> F,
-    {
-        let (convs, width) = self.point_layers(prefix, inputs, first)?;
-        let fcs = self.vector_layers(prefix, convs.len(), width, Some(k))?;
-        Ok(TNet { k, convs, fcs })
+    ) -> Result<TNet<C, F>, FormatError> {
+        let (convs, widths) = self.point_layers(prefix, inputs, first, None, true)?;
+        let fcs = self.vector_layers(prefix, convs.len(), widths[convs.len()], Some(inputs))?;
+        Ok(TNet { k: inputs, convs, fcs })
     }
 
     /// The EdgeConv layers, each with its radius.
@@ -234,48 +214,48 @@ impl<M, N> Reader<'_, M, N> {
             .collect()
     }
 
-    /// Point-wise layers with a ReLU each, and how wide the last is.
-    fn point_layers<C>(
+    /// Point-wise layers, and the widths before, between and after them. Layer
+    /// `turned` takes what a transform turned; the last has a ReLU if `pooled_relu`.
+    fn point_layers(
         &mut self,
         prefix: &str,
         inputs: usize,
         first: Role,
-    ) -> Result<(Vec<C>, usize), FormatError>
-    where
-        M: FnMut(Dense, Role) -> C,
-    {
+        turned: Option<usize>,
+        pooled_relu: bool,
+    ) -> Result<(Vec<C>, Vec<usize>), FormatError> {
         let n = self.count(&format!("{prefix}.conv"));
         if n < 2 {
             let cause = "missing: expected two layers or more before a pooling";
             return Err(self.error(&format!("{prefix}.conv2.weight"), cause));
         }
-        let mut width = inputs;
+        let mut widths = vec![inputs];
         let mut layers = Vec::with_capacity(n);
         for i in 0..n {
+            let is_last = i + 1 == n;
             let role = match i {
                 0 => first,
-                _ if i + 1 == n => Role::Last,
+                _ if turned == Some(i) => Role::AfterTransform,
+                _ if is_last => Role::Last,
                 _ => Role::Inner,
             };
-            let dense = self.dense(prefix, ("conv", i + 1), Some(i + 1), width, true)?;
-            width = dense.outputs;
+            let relu = !is_last || pooled_relu;
+            let dense = self.dense(prefix, ("conv", i + 1), Some(i + 1), widths[i], relu)?;
+            widths.push(dense.outputs);
             layers.push((self.conv)(dense, role));
         }
-        Ok((layers, width))
+        Ok((layers, widths))
     }
 
     /// The layers after a pooling; `matrix` is the size of the matrix that a
     /// T-Net ends in. `norms_before` counts the batch norms of point layers.
-    fn vector_layers<F>(
+    fn vector_layers(
         &mut self,
         prefix: &str,
         norms_before: usize,
         inputs: usize,
         matrix: Option<usize>,
-    ) -> Result<Vec<F>, FormatError>
-    where
-        N: FnMut(Dense) -> F,
-    {
+    ) -> Result<Vec<F>, FormatError> {
         let n = self.count(&dotted(prefix, "fc")).max(1);
         let mut width = inputs;
         let mut layers = Vec::with_capacity(n);
@@ -286,13 +266,10 @@ impl<M, N> Reader<'_, M, N> {
             width = dense.outputs;
             if let Some(k) = matrix.filter(|_| last) {
                 if width != k * k {
-                    let name = format!("{}.weight", dense.name);
-                    let cause = format!(
-                        "expected shape [{}, {}], found [{width}, {}]",
-                        k * k,
-                        dense.inputs,
-                        dense.inputs
-                    );
+                    let (name, inputs) = (format!("{}.weight", dense.name), dense.inputs);
+                    let expected = k * k;
+                    let cause =
+                        format!("expected shape [{expected}, {inputs}], found [{width}, {inputs}]");
                     return Err(self.error(&name, cause));
                 }
                 (0..k).for_each(|i| dense.bias[i * k + i] += 1.0);
@@ -300,15 +277,6 @@ impl<M, N> Reader<'_, M, N> {
             layers.push((self.fc)(dense));
         }
         Ok(layers)
-    }
-
-    /// The layers of a front end of the model's own, if it has one.
-    fn front<C>(&mut self) -> Result<Option<Vec<C>>, FormatError>
-    where
-        M: FnMut(Dense, Role) -> C,
-    {
-        let layers = self.has("cpl.").then(|| self.point_layers("cpl", 3, Role::First));
-        Ok(layers.transpose()?.map(|(layers, _)| layers))
     }
 
     /// Reads one layer of `inputs` inputs and the batch norm that follows it.

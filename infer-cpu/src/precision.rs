@@ -1,58 +1,46 @@
 //! Number formats of a forward pass: how weights are packed and activations
 //! rounded in each.
 
-use std::fmt;
-use std::str::FromStr;
+use std::marker::PhantomData;
 
 use half::f16;
 
 use crate::dense::Dense;
-use crate::kernel::{Columns, Gemm, Gemv, I8_LARGEST, Kernels, Panels};
+use crate::kernel::{Gemm, Gemv, I8_LARGEST, Kernels, Panels};
+use crate::named::named;
 
 /// The largest finite number of fp16.
 pub const F16_LARGEST: f32 = 65504.0;
 
-/// What a network computes in.
-///
-/// ```
-/// use infer_cpu::{Precision, kernel};
-///
-/// let precision: Precision = "f32-fc16".parse()?;
-/// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Precision {
-    /// fp32 throughout.
-    #[default]
-    F32,
-    /// fp32 arithmetic throughout; the weights of the layers after a pooling,
-    /// whose cost is their traffic, are stored in fp16.
-    F32Fc16,
-    /// fp16 weights and activations, fp16 sums of short chunks; vector layers
-    /// as in [`Precision::F32Fc16`].
-    F16,
-    /// int8 weights (a scale per channel) and seven-bit activations (a
-    /// calibrated scale per layer); the first layer, of coordinates, in fp32;
-    /// vector layers with int8 weights and fp32 arithmetic.
-    I8,
+named! {
+    /// What a network computes in.
+    ///
+    /// ```
+    /// use infer_cpu::{Precision, kernel};
+    ///
+    /// let precision: Precision = "f32-fc16".parse()?;
+    /// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[derive(Default, PartialOrd, Ord)]
+    pub enum Precision: "precision" {
+        /// fp32 throughout.
+        #[default]
+        F32 = "f32",
+        /// fp32 arithmetic throughout; the weights of the layers after a pooling,
+        /// whose cost is their traffic, are stored in fp16.
+        F32Fc16 = "f32-fc16",
+        /// fp16 weights and activations, fp16 sums of short chunks; vector layers
+        /// as in [`Precision::F32Fc16`].
+        F16 = "f16",
+        /// int8 weights (a scale per channel) and seven-bit activations (a
+        /// calibrated scale per layer); the first layer, of coordinates, in fp32;
+        /// vector layers with int8 weights and fp32 arithmetic.
+        I8 = "i8",
+    }
 }
 
 impl Precision {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::F32, Self::F32Fc16, Self::F16, Self::I8];
-
-    /// Its name on command lines.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::F32 => "f32",
-            Self::F32Fc16 => "f32-fc16",
-            Self::F16 => "f16",
-            Self::I8 => "i8",
-        }
-    }
-
     /// Whether `kernels` have its matrix products.
     #[must_use]
     pub fn runs_on(self, kernels: &Kernels) -> bool {
@@ -62,28 +50,6 @@ impl Precision {
             Self::I8 => kernels.i8.is_some(),
         };
         has_products && kernels.f32.is_some()
-    }
-}
-
-impl fmt::Display for Precision {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A word that names no precision.
-#[derive(Debug, thiserror::Error)]
-#[error("unknown precision `{0}`, expected one of f32, f32-fc16, f16, i8")]
-pub struct NoSuchPrecision(String);
-
-impl FromStr for Precision {
-    type Err = NoSuchPrecision;
-
-    fn from_str(word: &str) -> Result<Self, NoSuchPrecision> {
-        Self::ALL
-            .into_iter()
-            .find(|precision| precision.name() == word)
-            .ok_or_else(|| NoSuchPrecision(word.to_owned()))
     }
 }
 
@@ -105,28 +71,76 @@ pub struct Matrix<'a> {
     pub stride: usize,
 }
 
+/// What weights are stored as.
+pub trait Weight: Copy + Default + Send + Sync + 'static {
+    /// The matrix-vector products of `kernels` with such weights.
+    fn gemv(kernels: &Kernels) -> Gemv<Self>;
+    /// Packs the weights `weight(input, output)` of a layer whose inputs are at
+    /// most `range` into `panels`, and sets its scales.
+    fn fill(panels: &mut Panels<Self>, range: f32, weight: impl Fn(usize, usize) -> f32);
+}
+
+impl Weight for f32 {
+    fn gemv(kernels: &Kernels) -> Gemv<f32> {
+        kernels.gemv_f32
+    }
+
+    fn fill(panels: &mut Panels<f32>, _: f32, weight: impl Fn(usize, usize) -> f32) {
+        panels.fill(weight);
+    }
+}
+
+impl Weight for f16 {
+    fn gemv(kernels: &Kernels) -> Gemv<f16> {
+        kernels.gemv_f16
+    }
+
+    fn fill(panels: &mut Panels<f16>, _: f32, weight: impl Fn(usize, usize) -> f32) {
+        panels.fill(|input, output| f16::from_f32(weight(input, output)));
+    }
+}
+
+impl Weight for i8 {
+    fn gemv(kernels: &Kernels) -> Gemv<i8> {
+        kernels.gemv_i8
+    }
+
+    fn fill(panels: &mut Panels<i8>, range: f32, weight: impl Fn(usize, usize) -> f32) {
+        let per_activation = range / f32::from(I8_LARGEST);
+        for output in 0..panels.outputs() {
+            let weights = (0..panels.inputs()).map(|input| weight(input, output));
+            let largest = weights.fold(0.0f32, |largest, weight| largest.max(weight.abs()));
+            // Takes the largest to ±127. Of zeros, or of denormals, any step does.
+            let step = (largest / 127.0).max(f32::MIN_POSITIVE);
+            for input in 0..panels.inputs() {
+                let level = (weight(input, output) / step).round_ties_even() as i8;
+                panels.set(input, output, level);
+            }
+            panels.scales_mut()[output] = step * per_activation;
+        }
+    }
+}
+
 /// One precision's types and roundings.
 pub trait Format: Send + Sync + 'static {
     /// An activation between point-wise layers.
     type Activation: Copy + Default + Send + Sync;
     /// A weight of a point-wise layer.
-    type Weight: Copy + Default + Send + Sync;
+    type Weight: Weight;
     /// A sum of their products.
     type Sum: Copy + PartialOrd + Send + Sync;
     /// A stored weight of a vector layer.
-    type Stored: Copy + Default + Send + Sync;
+    type Stored: Weight;
 
     /// Below every sum.
     const LOWEST: Self::Sum;
     /// Inputs that lie side by side in a panel.
-    const GROUP: usize;
+    const GROUP: usize = 1;
     /// Whether activations may be negative.
-    const SIGNED: bool;
+    const SIGNED: bool = true;
 
     /// The matrix products of `kernels` in this format.
     fn gemm(kernels: &Kernels) -> Option<&Gemm<Self::Activation, Self::Weight, Self::Sum>>;
-    /// The matrix-vector products of `kernels` in this format.
-    fn gemv(kernels: &Kernels) -> Gemv<Self::Stored>;
     /// A sum as f32, before scale and bias.
     fn widen(sum: Self::Sum) -> f32;
     /// Rounds outputs of a layer whose largest activation is `range`.
@@ -136,11 +150,17 @@ pub trait Format: Send + Sync + 'static {
         range: f32,
         out: &mut [Self::Activation],
     ) -> Rounded;
-    /// Packs the weights `weight(input, output)` of a layer whose inputs are at
-    /// most `range` into `panels`, and sets its scales.
-    fn fill(panels: &mut Panels<Self::Weight>, range: f32, weight: impl Fn(usize, usize) -> f32);
+
     /// Packs a vector layer.
-    fn columns(dense: &Dense) -> Columns<Self::Stored>;
+    fn columns(dense: &Dense) -> Panels<Self::Stored> {
+        let mut columns = Panels::columns(dense.inputs, dense.outputs);
+        columns.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
+        // Inputs are fp32: a range of as many units as there are levels leaves the
+        // scales those of the weights.
+        let range = f32::from(I8_LARGEST);
+        Self::Stored::fill(&mut columns, range, |input, output| dense.at(input, output));
+        columns
+    }
 
     /// Activations and maxima as fp32 where they are, so that a
     /// [`Int8Prefilter`](crate::prefilter::Int8Prefilter) can tell the latter from the former.
@@ -152,74 +172,42 @@ pub trait Format: Send + Sync + 'static {
     }
 }
 
+/// fp32, with the weights of vector layers stored as `S`.
+pub struct Single<S>(PhantomData<S>);
 /// [`Precision::F32`].
-pub struct F32;
+pub type F32 = Single<f32>;
 /// [`Precision::F32Fc16`].
-pub struct F32Fc16;
+pub type F32Fc16 = Single<f16>;
 /// [`Precision::F16`].
 pub struct F16;
 /// [`Precision::I8`].
 pub struct I8;
 
-/// What the two fp32 formats share.
-macro_rules! fp32_points {
-    () => {
-        type Activation = f32;
-        type Weight = f32;
-        type Sum = f32;
-        const LOWEST: f32 = f32::NEG_INFINITY;
-        const GROUP: usize = 1;
-        const SIGNED: bool = true;
+impl<S: Weight> Format for Single<S> {
+    type Activation = f32;
+    type Weight = f32;
+    type Sum = f32;
+    type Stored = S;
+    const LOWEST: f32 = f32::NEG_INFINITY;
 
-        fn gemm(kernels: &Kernels) -> Option<&Gemm<f32, f32, f32>> {
-            kernels.f32.as_ref()
-        }
-
-        fn widen(sum: f32) -> f32 {
-            sum
-        }
-
-        fn narrow(_: &Kernels, values: &[f32], _: f32, out: &mut [f32]) -> Rounded {
-            out.copy_from_slice(values);
-            Rounded::default()
-        }
-
-        fn fill(panels: &mut Panels<f32>, _: f32, weight: impl Fn(usize, usize) -> f32) {
-            panels.fill(weight);
-        }
-
-        fn as_f32<'a>(
-            activations: &'a [f32],
-            maxima: &'a mut [f32],
-        ) -> Option<(&'a [f32], &'a mut [f32])> {
-            Some((activations, maxima))
-        }
-    };
-}
-
-impl Format for F32 {
-    type Stored = f32;
-    fp32_points!();
-
-    fn gemv(kernels: &Kernels) -> Gemv<f32> {
-        kernels.gemv_f32
+    fn gemm(kernels: &Kernels) -> Option<&Gemm<f32, f32, f32>> {
+        kernels.f32.as_ref()
     }
 
-    fn columns(dense: &Dense) -> Columns<f32> {
-        columns(dense, |weight| weight)
-    }
-}
-
-impl Format for F32Fc16 {
-    type Stored = f16;
-    fp32_points!();
-
-    fn gemv(kernels: &Kernels) -> Gemv<f16> {
-        kernels.gemv_f16
+    fn widen(sum: f32) -> f32 {
+        sum
     }
 
-    fn columns(dense: &Dense) -> Columns<f16> {
-        columns(dense, f16::from_f32)
+    fn narrow(_: &Kernels, values: &[f32], _: f32, out: &mut [f32]) -> Rounded {
+        out.copy_from_slice(values);
+        Rounded::default()
+    }
+
+    fn as_f32<'a>(
+        activations: &'a [f32],
+        maxima: &'a mut [f32],
+    ) -> Option<(&'a [f32], &'a mut [f32])> {
+        Some((activations, maxima))
     }
 }
 
@@ -229,15 +217,9 @@ impl Format for F16 {
     type Sum = f32;
     type Stored = f16;
     const LOWEST: f32 = f32::NEG_INFINITY;
-    const GROUP: usize = 1;
-    const SIGNED: bool = true;
 
     fn gemm(kernels: &Kernels) -> Option<&Gemm<f16, f16, f32>> {
         kernels.f16.as_ref()
-    }
-
-    fn gemv(kernels: &Kernels) -> Gemv<f16> {
-        kernels.gemv_f16
     }
 
     fn widen(sum: f32) -> f32 {
@@ -246,14 +228,6 @@ impl Format for F16 {
 
     fn narrow(kernels: &Kernels, values: &[f32], _: f32, out: &mut [f16]) -> Rounded {
         Rounded { largest: (kernels.narrow_f16)(values, out), clipped: 0 }
-    }
-
-    fn fill(panels: &mut Panels<f16>, _: f32, weight: impl Fn(usize, usize) -> f32) {
-        panels.fill(|input, output| f16::from_f32(weight(input, output)));
-    }
-
-    fn columns(dense: &Dense) -> Columns<f16> {
-        columns(dense, f16::from_f32)
     }
 }
 
@@ -270,10 +244,6 @@ impl Format for I8 {
         kernels.i8.as_ref()
     }
 
-    fn gemv(kernels: &Kernels) -> Gemv<i8> {
-        kernels.gemv_i8
-    }
-
     fn widen(sum: i32) -> f32 {
         sum as f32
     }
@@ -282,43 +252,4 @@ impl Format for I8 {
         let per_unit = f32::from(I8_LARGEST) / range;
         Rounded { largest: 0.0, clipped: (kernels.narrow_i8)(values, per_unit, out) }
     }
-
-    fn fill(panels: &mut Panels<i8>, range: f32, weight: impl Fn(usize, usize) -> f32) {
-        let per_activation = range / f32::from(I8_LARGEST);
-        for output in 0..panels.outputs() {
-            let step = step_of((0..panels.inputs()).map(|input| weight(input, output)));
-            for input in 0..panels.inputs() {
-                let level = (weight(input, output) / step).round_ties_even() as i8;
-                panels.set(input, output, level);
-            }
-            panels.scales_mut()[output] = step * per_activation;
-        }
-    }
-
-    fn columns(dense: &Dense) -> Columns<i8> {
-        let row = |output: usize| &dense.weight[output * dense.inputs..][..dense.inputs];
-        let steps: Vec<f32> =
-            (0..dense.outputs).map(|output| step_of(row(output).iter().copied())).collect();
-        let mut columns = Columns::zeros(dense.inputs, dense.outputs);
-        columns.fill(|input, output| {
-            (dense.at(input, output) / steps[output]).round_ties_even() as i8
-        });
-        columns.scales_mut()[..dense.outputs].copy_from_slice(&steps);
-        columns.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
-        columns
-    }
-}
-
-/// The step of a channel's int8 weights, which takes the largest to ±127.
-fn step_of(weights: impl Iterator<Item = f32>) -> f32 {
-    let largest = weights.fold(0.0f32, |largest, weight| largest.max(weight.abs()));
-    // Of a channel of zeros, or of denormals, any step does.
-    (largest / 127.0).max(f32::MIN_POSITIVE)
-}
-
-fn columns<W: Copy + Default>(dense: &Dense, store: impl Fn(f32) -> W) -> Columns<W> {
-    let mut columns = Columns::zeros(dense.inputs, dense.outputs);
-    columns.fill(|input, output| store(dense.at(input, output)));
-    columns.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
-    columns
 }

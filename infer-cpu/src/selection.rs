@@ -1,8 +1,7 @@
 //! The points that a network gets to see: what a sampler keeps, each once.
 
-use crate::engine::{Input, Pass, Scratch};
+use crate::engine::{Forward, Input, Pass, Scratch};
 use crate::error::Error;
-use crate::forward::Forward;
 use crate::kernel::Kernels;
 use crate::network::Parts;
 use crate::sampler::{

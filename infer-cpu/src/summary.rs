@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use formats::model_card::ModelCard;
-use formats::weights::WeightsFile;
 
 use crate::dense::Dense;
 use crate::error::Error;
-use crate::network::{Network, read_network};
+use crate::network::{Network, TNet, read_network};
 use crate::precision::Precision;
+use crate::source::ModelSource;
 
 /// A model file's network, layer by layer.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,15 +55,15 @@ pub struct LayerShape {
 /// # Errors
 /// A file that is not a model: what [`crate::Classifier::load`] refuses.
 pub fn inspect(path: &Path) -> Result<Summary, Error> {
-    let mut file = WeightsFile::open(path)?;
-    let card = ModelCard::from_metadata(path, &file.metadata())?;
+    let (mut file, card) = ModelSource::File(path.to_path_buf()).open()?;
     let n_stored = file.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
     let network = read_network(&mut file, &card, |dense, _| shape_of(dense), shape_of)?;
     let Network { stn, edges, trunk, fstn, head, front, .. } = network;
+    let t_net = |TNet { convs, fcs, .. }| NetShape { convs, fcs };
     Ok(Summary {
         card,
-        stn: stn.map(|net| NetShape { convs: net.convs, fcs: net.fcs }),
-        fstn: fstn.map(|net| NetShape { convs: net.convs, fcs: net.fcs }),
+        stn: stn.map(t_net),
+        fstn: fstn.map(t_net),
         edges: edges.into_iter().map(|(radius, dense)| (radius, shape_of(dense))).collect(),
         trunk: NetShape { convs: trunk, fcs: head },
         front,

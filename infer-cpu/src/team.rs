@@ -11,7 +11,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::{self, JoinHandle, Thread};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// How long an idle worker spins: some tasks' length, and no more than a
@@ -36,7 +36,6 @@ pub struct Team<W: Work> {
     work: Arc<W>,
     queue: Arc<TaskQueue>,
     workers: Vec<JoinHandle<()>>,
-    threads: Vec<Thread>,
     backoff: Mutex<Backoff>,
 }
 
@@ -114,19 +113,13 @@ impl<W: Work> Team<W> {
             stop: AtomicBool::new(false),
         });
         // Built first, so that those that did start are stopped if one cannot.
-        let mut team = Self {
-            work,
-            queue,
-            workers: Vec::new(),
-            threads: Vec::new(),
-            backoff: Mutex::new(Backoff::new()),
-        };
+        let mut team =
+            Self { work, queue, workers: Vec::new(), backoff: Mutex::new(Backoff::new()) };
         for worker in 0..n_workers {
             let (work, queue) = (Arc::clone(&team.work), Arc::clone(&team.queue));
             let handle = thread::Builder::new()
                 .name(format!("infer-{}", worker + 1))
                 .spawn(move || queue.serve(&*work, worker))?;
-            team.threads.push(handle.thread().clone());
             team.workers.push(handle);
         }
         // A thread that starts allocates; none does so once the team is there.
@@ -154,10 +147,10 @@ impl<W: Work> Team<W> {
         }
         let queue = &*self.queue;
         queue.announce(n_chunks);
-        let wanted = self.threads.iter().zip(&queue.parked).take(n_chunks - 1);
-        for (thread, parked) in wanted {
+        let wanted = self.workers.iter().zip(&queue.parked).take(n_chunks - 1);
+        for (worker, parked) in wanted {
             if parked.swap(false, Ordering::SeqCst) {
-                thread.unpark();
+                worker.thread().unpark();
             }
         }
         let mut n_own = 0;
@@ -176,7 +169,7 @@ impl<W: Work> Team<W> {
 impl<W: Work> Drop for Team<W> {
     fn drop(&mut self) {
         self.queue.stop.store(true, Ordering::SeqCst);
-        self.threads.iter().for_each(Thread::unpark);
+        self.workers.iter().for_each(|worker| worker.thread().unpark());
         for worker in self.workers.drain(..) {
             // A worker that panicked has said so on standard error.
             let _ = worker.join();

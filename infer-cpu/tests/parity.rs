@@ -1,15 +1,19 @@
 //! The same logits as PyTorch, to 1e-5, at every number of points, threads and
 //! kernel. The reference data is `../shared/data/parity`, where it is present.
 
-mod support;
-
 use std::path::Path;
 
 use formats::model_card::Normalization;
-use formats::weights::WeightsFile;
+use formats::weights::{Tensor, WeightsFile};
 use infer_cpu::kernel;
 use infer_cpu::{Classifier, Options, Precision};
 use test_support::{need, shared_data};
+
+/// The points of a tensor `[1, 3, n]`.
+fn channels_first(tensor: &Tensor) -> Vec<[f32; 3]> {
+    let n = tensor.shape[2];
+    (0..n).map(|i| [0, 1, 2].map(|axis| tensor.values[axis * n + i])).collect()
+}
 
 #[test]
 fn the_baseline_gives_pytorch_s_log_probabilities() {
@@ -26,7 +30,7 @@ fn the_baseline_gives_pytorch_s_log_probabilities() {
             let model = folder.join("pointnet.safetensors");
             let mut classifier = Classifier::load(&model, &options).unwrap();
             for n in [16, 64, 128, 1024] {
-                let cloud = support::channels_first(&golden.read(&format!("x{n}")).unwrap());
+                let cloud = channels_first(&golden.read(&format!("x{n}")).unwrap());
                 let expected = golden.read(&format!("logp{n}")).unwrap().values;
                 let prediction = classifier.classify(&cloud).unwrap();
                 for (class, expected) in expected.iter().enumerate() {
@@ -49,7 +53,7 @@ fn cheaper_precisions_stay_near() {
         let model = folder.join("pointnet.safetensors");
         let mut classifier = Classifier::load(&model, &options).unwrap();
         for n in [16, 64, 128, 1024] {
-            let cloud = support::channels_first(&golden.read(&format!("x{n}")).unwrap());
+            let cloud = channels_first(&golden.read(&format!("x{n}")).unwrap());
             let expected = golden.read(&format!("logp{n}")).unwrap().values;
             let prediction = classifier.classify(&cloud).unwrap();
             let error = expected.iter().enumerate().map(|(class, &expected)| {

@@ -26,7 +26,9 @@ impl EdgepuckClassifier {
     fn load(path: &Path, options: &Options) -> Result<Self, Failure> {
         let classifier = Classifier::load(path, options)?;
         let names = classifier.classes().iter().map(|name| {
-            CString::new(name.as_bytes()).map_err(|_| Failure::ClassName(name.to_string()))
+            let message = || format!("expected class names without NUL, found {name:?}");
+            CString::new(name.as_bytes())
+                .map_err(|_| Failure::new(EdgepuckStatus::BadModel, message()))
         });
         let class_names: Vec<CString> = names.collect::<Result<_, _>>()?;
         let logits = Vec::with_capacity(class_names.len());
@@ -135,10 +137,13 @@ pub unsafe extern "C" fn edgepuck_logits(
         let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
         let (logits, n_classes) = (&classifier.logits, classifier.class_names.len());
         if logits.is_empty() {
-            return Err(Failure::NoPrediction);
+            let message = "expected a classified cloud, but the last call classified none";
+            return Err(Failure::new(EdgepuckStatus::NoPrediction, message));
         }
         if length < n_classes {
-            return Err(Failure::BufferTooSmall { n_classes, length });
+            let message =
+                format!("expected a buffer for {n_classes} logits, found one of {length}");
+            return Err(Failure::new(EdgepuckStatus::BufferTooSmall, message));
         }
         // SAFETY: out is not null, aligned, and as long as is checked above; it
         // is the caller's, so that it does not overlap with ours.
@@ -176,8 +181,10 @@ pub unsafe extern "C" fn edgepuck_class_name(
     let name = guard(|| {
         // SAFETY: this function's contract.
         let names = unsafe { &pointers::shared(classifier, "classifier")?.class_names };
-        let missing = Failure::NoSuchClass { index, n_classes: names.len() };
-        names.get(index).map(|name| name.as_ptr()).ok_or(missing)
+        names.get(index).map(|name| name.as_ptr()).ok_or_else(|| {
+            let message = format!("expected a class below {}, found {index}", names.len());
+            Failure::new(EdgepuckStatus::BadOption, message)
+        })
     });
     name.unwrap_or(null())
 }

@@ -15,65 +15,23 @@ thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
 }
 
-/// Why a call failed.
-#[derive(Debug, thiserror::Error)]
-pub enum Failure {
-    /// A pointer is null or not aligned.
-    #[error("expected `{0}` to be an aligned pointer, found a null or misaligned one")]
-    BadPointer(&'static str),
-    /// An option makes no sense.
-    #[error("option `{option}`: {cause}")]
-    BadOption {
-        /// The field's name.
-        option: &'static str,
-        /// What is wrong with it.
-        cause: String,
-    },
-    /// A class name that C cannot take.
-    #[error("expected class names without NUL, found {0:?}")]
-    ClassName(String),
-    /// A class that there is none of.
-    #[error("expected a class below {n_classes}, found {index}")]
-    NoSuchClass {
-        /// What was asked for.
-        index: usize,
-        /// How many there are.
-        n_classes: usize,
-    },
-    /// More points than an address space holds.
-    #[error("expected a cloud that fits in memory, found {0} points")]
-    TooManyPoints(usize),
-    /// A buffer is too short for the logits.
-    #[error("expected a buffer for {n_classes} logits, found one of {length}")]
-    BufferTooSmall {
-        /// How many logits there are.
-        n_classes: usize,
-        /// How long the buffer is.
-        length: usize,
-    },
-    /// There are no logits.
-    #[error("expected a classified cloud, but the last call classified none")]
-    NoPrediction,
-    /// Loading or classifying failed.
-    #[error(transparent)]
-    Infer(#[from] Error),
-    /// A panic, which is a defect.
-    #[error("a defect in edgepuck: {0}")]
-    Panic(String),
+/// Why a call failed: its status, and what [`edgepuck_last_error`] says of it.
+#[derive(Debug)]
+pub struct Failure {
+    status: EdgepuckStatus,
+    message: String,
 }
 
 impl Failure {
-    fn status(&self) -> EdgepuckStatus {
-        match self {
-            Self::BadPointer(_) => EdgepuckStatus::BadPointer,
-            Self::BadOption { .. } | Self::NoSuchClass { .. } => EdgepuckStatus::BadOption,
-            Self::ClassName(_) => EdgepuckStatus::BadModel,
-            Self::TooManyPoints(_) => EdgepuckStatus::BadCloud,
-            Self::BufferTooSmall { .. } => EdgepuckStatus::BufferTooSmall,
-            Self::NoPrediction => EdgepuckStatus::NoPrediction,
-            Self::Infer(error) => status_of(error),
-            Self::Panic(_) => EdgepuckStatus::Internal,
-        }
+    /// A failure with `status`.
+    pub fn new(status: EdgepuckStatus, message: impl Into<String>) -> Self {
+        Self { status, message: message.into() }
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::new(status_of(&error), error.to_string())
     }
 }
 
@@ -109,10 +67,15 @@ pub fn guard<T>(call: impl FnOnce() -> Result<T, Failure>) -> Result<T, Edgepuck
     let failure = match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(value)) => return Ok(value),
         Ok(Err(failure)) => failure,
-        Err(payload) => Failure::Panic(message_of(&*payload).to_owned()),
+        Err(payload) => {
+            let message = format!("a defect in edgepuck: {}", message_of(&*payload));
+            Failure::new(EdgepuckStatus::Internal, message)
+        }
     };
-    remember(&failure);
-    Err(failure.status())
+    let text = CString::new(failure.message.replace('\0', "\u{fffd}")).unwrap_or_default();
+    // A thread that is ending has nobody left to ask for the message.
+    let _ = LAST_ERROR.try_with(|last| last.replace(text));
+    Err(failure.status)
 }
 
 /// The same for a call that gives nothing but its status.
@@ -130,13 +93,6 @@ pub extern "C" fn edgepuck_last_error() -> *const c_char {
     LAST_ERROR.try_with(|last| last.borrow().as_ptr()).unwrap_or(c"".as_ptr())
 }
 
-fn remember(failure: &Failure) {
-    let text = failure.to_string().replace('\0', "\u{fffd}");
-    let text = CString::new(text).unwrap_or_default();
-    // A thread that is ending has nobody left to ask for the message.
-    let _ = LAST_ERROR.try_with(|last| last.replace(text));
-}
-
 fn message_of(payload: &(dyn Any + Send)) -> &str {
     let literal = payload.downcast_ref::<&str>().copied();
     literal.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic")
@@ -145,6 +101,7 @@ fn message_of(payload: &(dyn Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use std::ffi::CStr;
+    use std::ptr::null;
 
     use super::*;
 
@@ -166,7 +123,8 @@ mod tests {
     #[test]
     fn the_last_error_is_that_of_the_thread_and_outlives_success() {
         assert_eq!(last_error(), "");
-        guard_status(|| Err(Failure::BadPointer("here")));
+        let status = guard_status(|| crate::pointers::check(null::<u8>(), "here"));
+        assert_eq!(status, EdgepuckStatus::BadPointer);
         assert_eq!(guard_status(|| Ok(())), EdgepuckStatus::Ok);
         assert_eq!(
             last_error(),
@@ -177,7 +135,7 @@ mod tests {
 
     #[test]
     fn a_message_keeps_what_follows_a_nul() {
-        guard_status(|| Err(Failure::Panic("a\0b".to_owned())));
-        assert_eq!(last_error(), "a defect in edgepuck: a\u{fffd}b");
+        guard_status(|| Err(Failure::new(EdgepuckStatus::Internal, "a\0b")));
+        assert_eq!(last_error(), "a\u{fffd}b");
     }
 }

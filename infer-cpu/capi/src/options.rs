@@ -9,6 +9,7 @@ use infer_cpu::sampler::SamplerSpec;
 use infer_cpu::{Options, UpAxis};
 
 use crate::failure::Failure;
+use crate::status::EdgepuckStatus;
 
 /// How a classifier computes. Begin with edgepuck_options_default, then change
 /// what you like. Choices are words, the same as on infer-cpu's command line;
@@ -167,5 +168,5 @@ unsafe fn word<T: FromStr<Err: Display>>(
 }
 
 fn bad(option: &'static str, cause: String) -> Failure {
-    Failure::BadOption { option, cause }
+    Failure::new(EdgepuckStatus::BadOption, format!("option `{option}`: {cause}"))
 }

@@ -4,6 +4,7 @@ use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
 use crate::failure::Failure;
+use crate::status::EdgepuckStatus;
 
 /// What `pointer`, the argument called `name`, points at.
 ///
@@ -30,7 +31,12 @@ pub unsafe fn exclusive<'a, T>(pointer: *mut T, name: &'static str) -> Result<&'
 /// That a `T` may lie at `pointer`, the argument called `name`.
 pub fn check<T>(pointer: *const T, name: &'static str) -> Result<(), Failure> {
     match pointer.is_null() || !pointer.is_aligned() {
-        true => Err(Failure::BadPointer(name)),
+        true => {
+            let message = format!(
+                "expected `{name}` to be an aligned pointer, found a null or misaligned one"
+            );
+            Err(Failure::new(EdgepuckStatus::BadPointer, message))
+        }
         false => Ok(()),
     }
 }
@@ -51,7 +57,10 @@ pub unsafe fn cloud<'a>(xyz: *const f32, n: usize) -> Result<&'a [[f32; 3]], Fai
             // rest is the caller's promise.
             Ok(unsafe { std::slice::from_raw_parts(xyz.cast(), n) })
         }
-        _ => Err(Failure::TooManyPoints(n)),
+        _ => {
+            let message = format!("expected a cloud that fits in memory, found {n} points");
+            Err(Failure::new(EdgepuckStatus::BadCloud, message))
+        }
     }
 }
 

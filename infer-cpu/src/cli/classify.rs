@@ -7,7 +7,7 @@ use std::thread::available_parallelism;
 use std::time::Instant;
 
 use anyhow::Context;
-use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use formats::FormatError;
 use formats::cloud_file::CloudFormat;
 use formats::model_card::{ModelCard, Normalization};
@@ -98,8 +98,8 @@ pub struct Args {
     vote_rotations: bool,
 
     /// Up axis of the clouds
-    #[arg(long, value_enum, default_value_t = Axis::Z)]
-    up: Axis,
+    #[arg(long, default_value = "z", value_parser = up_axis())]
+    up: UpAxis,
 
     /// Sampler that chooses the points the network sees: all, first, random,
     /// fps, voxel, cpl [default: as in training, else all]
@@ -110,22 +110,12 @@ pub struct Args {
     how: SamplerArgs,
 }
 
-/// An axis of space.
-#[derive(Clone, Copy, ValueEnum)]
-enum Axis {
-    X,
-    Y,
-    Z,
-}
-
-impl From<Axis> for UpAxis {
-    fn from(axis: Axis) -> Self {
-        match axis {
-            Axis::X => Self::X,
-            Axis::Y => Self::Y,
-            Axis::Z => Self::Z,
-        }
-    }
+fn up_axis() -> impl TypedValueParser<Value = UpAxis> {
+    PossibleValuesParser::new(["x", "y", "z"]).map(|axis| match &*axis {
+        "x" => UpAxis::X,
+        "y" => UpAxis::Y,
+        _ => UpAxis::Z,
+    })
 }
 
 /// Classifies what `args` name, one after the other.
@@ -177,7 +167,7 @@ impl Args {
             drop_invalid: self.drop_invalid,
             votes: self.votes,
             vote_rotations: self.vote_rotations,
-            up: self.up.into(),
+            up: self.up,
             ..Options::default()
         })
     }

@@ -1,11 +1,11 @@
 //! Names of files, one a line.
 
 use std::borrow::Cow;
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Read};
 use std::path::Path;
 
 /// No system has longer paths; a line without end must not fill the memory.
-const LONGEST: usize = 1 << 16;
+const LONGEST: u64 = 1 << 16;
 
 /// Calls `take` with each name in `list`, as soon as its line is there. Empty
 /// lines are passed over, as is a carriage return at a line's end; a line that
@@ -31,26 +31,11 @@ pub fn for_each<E: From<io::Error>>(
 /// There was none if this is false.
 fn read_line(list: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
     line.clear();
-    let mut is_any = false;
-    loop {
-        let bytes = match list.fill_buf() {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            Err(error) => return Err(error),
-        };
-        if bytes.is_empty() {
-            return Ok(is_any);
-        }
-        is_any = true;
-        let end = bytes.iter().position(|&byte| byte == b'\n');
-        let part = &bytes[..end.unwrap_or(bytes.len())];
-        line.extend(&part[..part.len().min(LONGEST - line.len())]);
-        let n_used = part.len() + usize::from(end.is_some());
-        list.consume(n_used);
-        if end.is_some() {
-            return Ok(true);
-        }
+    let n_read = list.by_ref().take(LONGEST).read_until(b'\n', line)?;
+    if line.pop_if(|last| *last == b'\n').is_none() && n_read as u64 == LONGEST {
+        list.skip_until(b'\n')?;
     }
+    Ok(n_read > 0)
 }
 
 #[cfg(unix)]
@@ -89,8 +74,8 @@ mod tests {
 
     #[test]
     fn a_line_without_end_is_cut() {
-        let names = names(&[&[b'x'; 3 * LONGEST][..], b"\nlast\n"].concat());
-        assert_eq!(names[0].len(), LONGEST);
+        let names = names(&[&[b'x'; 3 * LONGEST as usize][..], b"\nlast\n"].concat());
+        assert_eq!(names[0].len() as u64, LONGEST);
         assert_eq!(names[1..], ["last"]);
     }
 }

@@ -5,7 +5,7 @@ use infer_cpu::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec
 use super::failure::Usage;
 
 /// Flags beside the sampler's name.
-#[derive(clap::Args)]
+#[derive(clap::Args, Default)]
 pub struct SamplerArgs {
     /// How many points to keep [default: as in training, else 1024]
     #[arg(long, value_name = "M")]
@@ -94,18 +94,6 @@ impl SamplerArgs {
 mod tests {
     use super::*;
 
-    fn none() -> SamplerArgs {
-        SamplerArgs {
-            points: None,
-            seed: None,
-            fps_start: None,
-            voxel_size: None,
-            resize: None,
-            passes: None,
-            front: None,
-        }
-    }
-
     #[test]
     fn flags_replace_what_the_model_was_trained_behind_and_leave_the_rest() {
         let trained = SamplerSpec {
@@ -114,22 +102,24 @@ mod tests {
             fps_start: FpsStart::First,
             ..SamplerSpec::default()
         };
-        assert_eq!(none().apply(None, trained.clone()).unwrap(), trained);
-        let fewer = SamplerArgs { points: Some(32), ..none() }.apply(None, trained.clone());
+        assert_eq!(SamplerArgs::default().apply(None, trained.clone()).unwrap(), trained);
+        let fewer =
+            SamplerArgs { points: Some(32), ..SamplerArgs::default() }.apply(None, trained.clone());
         assert_eq!(fewer.unwrap(), SamplerSpec { points: 32, ..trained.clone() });
-        let random = none().apply(Some(SamplerKind::Random), trained.clone()).unwrap();
+        let random =
+            SamplerArgs::default().apply(Some(SamplerKind::Random), trained.clone()).unwrap();
         assert_eq!(random, SamplerSpec { kind: SamplerKind::Random, ..trained });
     }
 
     #[test]
     fn a_flag_that_says_nothing_to_the_sampler_is_an_error() {
-        let points = SamplerArgs { points: Some(32), ..none() };
+        let points = SamplerArgs { points: Some(32), ..SamplerArgs::default() };
         let error = points.apply(None, SamplerSpec::default()).unwrap_err().to_string();
         assert_eq!(
             error,
             "--points does not apply to the sampler all; it applies to first, random, fps, voxel, cpl"
         );
-        let passes = SamplerArgs { passes: Some(2), ..none() };
+        let passes = SamplerArgs { passes: Some(2), ..SamplerArgs::default() };
         assert!(passes.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());
         assert!(passes.apply(Some(SamplerKind::Cpl), SamplerSpec::default()).is_ok());
     }

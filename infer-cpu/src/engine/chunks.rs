@@ -9,7 +9,7 @@ use super::{
 use super::{lock, read, write};
 use crate::kernel::{Kernels, Rows};
 use crate::layers::Packed;
-use crate::precision::{F16_LARGEST, Format};
+use crate::precision::{F16_LARGEST, Format, Weight};
 use crate::prefilter::{Best, Levels, PrefilterScratch};
 use crate::team::Work;
 
@@ -45,7 +45,7 @@ impl<T: Format> Engine<T> {
         if self.observing {
             first.seen.observe(&wide[..n * width]);
         }
-        let mut layers = self.places(pass).map(|place| self.place(place, &feature, &folded));
+        let mut layers = self.route(pass, &feature, &folded);
         let mut next = layers.next();
         self.round(&wide[..n * width], first.range, next, from);
         while let Some(layer) = next {
@@ -63,7 +63,7 @@ impl<T: Format> Engine<T> {
             self.round(&wide[..n * width], layer.range, next, to);
             std::mem::swap(from, to);
         }
-        let last = self.place(self.last(pass), &feature, &folded);
+        let last = self.last(pass, &feature, &folded);
         write(&self.blocks[slot]).set(self.kernels, &Rows::new(from, width, n), last);
     }
 
@@ -101,7 +101,7 @@ impl<T: Format> Engine<T> {
     fn pool_group(&self, thread: usize, pass: Pass, run: Run, group: usize) {
         let Run { first_block, n_blocks, winners } = run;
         let (feature, folded) = (read(&self.feature), read(&self.folded));
-        let last = self.place(self.last(pass), &feature, &folded);
+        let last = self.last(pass, &feature, &folded);
         let n_points = read(&self.points).len() / 4;
         let stride = self.width_before_last(pass, &feature, &folded);
         let mut pool = lock(&self.groups[group]);
@@ -135,7 +135,7 @@ impl<T: Format> Engine<T> {
 
     fn width_before_last(&self, pass: Pass, feature: &Packed<T>, folded: &Packed<T>) -> usize {
         let first = self.first(pass).panels.padded_outputs();
-        let widths = self.places(pass).map(|place| self.place(place, feature, folded).width());
+        let widths = self.route(pass, feature, folded).map(Packed::width);
         // The last but one, the first layer counted in.
         std::iter::once(first).chain(widths).fold((0, 0), |(_, before), width| (before, width)).0
     }
@@ -143,10 +143,10 @@ impl<T: Format> Engine<T> {
     fn vector_chunk(&self, head: Head, layer: usize, chunk: usize) {
         let columns = &self.head(head)[layer].columns;
         let first = chunk * VECTOR_CHUNK;
-        let blocks = first..columns.n_blocks().min(first + VECTOR_CHUNK);
+        let blocks = first..columns.n_panels().min(first + VECTOR_CHUNK);
         let mut out = lock(&self.vector_out[chunk]);
         let out = &mut out[..blocks.len() * VECTOR_BLOCK];
-        T::gemv(self.kernels)(&read(&self.vector), columns, blocks, out);
+        T::Stored::gemv(self.kernels)(&read(&self.vector), columns, blocks, out);
     }
 }
 

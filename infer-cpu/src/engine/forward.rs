@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::{
     BLOCK, Engine, GROUP, Head, Interleave, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Task,
-    VECTOR_CHUNK, lock, read, write,
+    VECTOR_BLOCK, VECTOR_CHUNK, lock, read, write,
 };
 use crate::kernel::{Panels, Rows};
 use crate::layers::Conv;
@@ -50,12 +50,60 @@ impl Scratch {
     }
 }
 
-impl<T: Format> Engine<T> {
-    /// Memory that no pass of this engine outgrows.
-    pub fn scratch(&self) -> Scratch {
-        let pooled = self.groups.len() * GROUP;
-        let vector = self.vector_out.len() * VECTOR_CHUNK * super::VECTOR_BLOCK;
-        let product = read(&self.folded).panels.n_weights() * 2;
+/// A network behind whichever format.
+///
+/// A run takes all it needs by its arguments: no call depends on those before.
+pub trait Forward: Send + Sync {
+    /// Makes room for clouds of `n` points.
+    fn reserve(&self, n: usize);
+    /// Takes `input` through the whole network; the logits are left in
+    /// `scratch.values`, and what left the format's range is added to
+    /// `scratch.events`.
+    fn run(&self, input: &Input<'_>, scratch: &mut Scratch);
+    /// Pools the features of `pass` into `scratch.values`, with the points
+    /// that won in `scratch.winners`.
+    fn pool_winners(&self, pass: Pass, input: &Input<'_>, scratch: &mut Scratch);
+    /// How many features `pass` pools.
+    fn channels(&self, pass: Pass) -> usize;
+    /// Memory that no run outgrows.
+    fn scratch(&self) -> Scratch;
+    /// How many classes the network tells apart.
+    fn n_classes(&self) -> usize;
+}
+
+impl<T: Format> Forward for Team<Engine<T>> {
+    fn reserve(&self, n: usize) {
+        let engine = self.work();
+        let mut points = write(&engine.points);
+        let missing = (n * 4).saturating_sub(points.len());
+        points.reserve(missing);
+        if !engine.edges.is_empty() {
+            write(&engine.cloud).reserve(n);
+        }
+    }
+
+    fn run(&self, input: &Input<'_>, scratch: &mut Scratch) {
+        self.work().take(input);
+        Engine::classify(self, input.pooled_stn, scratch);
+        scratch.events.add(self.work().events());
+    }
+
+    fn pool_winners(&self, pass: Pass, input: &Input<'_>, scratch: &mut Scratch) {
+        self.work().take(input);
+        Engine::pool(self, pass, true, scratch);
+        scratch.events.add(self.work().events());
+    }
+
+    fn channels(&self, pass: Pass) -> usize {
+        let engine = self.work();
+        engine.last(pass, &read(&engine.feature), &read(&engine.folded)).panels.outputs()
+    }
+
+    fn scratch(&self) -> Scratch {
+        let engine = self.work();
+        let pooled = engine.groups.len() * GROUP;
+        let vector = engine.vector_out.len() * VECTOR_CHUNK * VECTOR_BLOCK;
+        let product = read(&engine.folded).panels.n_weights() * 2;
         Scratch {
             values: Vec::with_capacity(pooled.max(vector)),
             winners: Vec::with_capacity(pooled),
@@ -64,28 +112,18 @@ impl<T: Format> Engine<T> {
         }
     }
 
-    /// Takes `input` through the whole network; the logits are left in
-    /// `scratch.values`.
-    pub fn run(team: &Team<Self>, input: &Input<'_>, scratch: &mut Scratch) {
-        team.work().take(input);
-        Self::classify(team, input.pooled_stn, scratch);
-        scratch.events.add(team.work().events());
+    fn n_classes(&self) -> usize {
+        self.work().layers.head.last().map_or(0, |layer| layer.columns.outputs())
     }
+}
 
-    /// Takes `input` through `pass`; the pooled vector is left in
-    /// `scratch.values`, and the points that won in `scratch.winners`.
-    pub fn pool_winners(team: &Team<Self>, pass: Pass, input: &Input<'_>, scratch: &mut Scratch) {
-        team.work().take(input);
-        Self::pool(team, pass, true, scratch);
-        scratch.events.add(team.work().events());
-    }
-
+impl<T: Format> Engine<T> {
     /// Takes `input` through every layer that there is.
     pub fn observe(team: &Team<Self>, input: &Input<'_>, scratch: &mut Scratch) {
         if team.work().layers.front.is_some() {
-            Self::pool_winners(team, Pass::Front, input, scratch);
+            team.pool_winners(Pass::Front, input, scratch);
         }
-        Self::run(team, input, scratch);
+        Forward::run(team, input, scratch);
     }
 
     fn classify(team: &Team<Self>, pooled_stn: bool, scratch: &mut Scratch) {
@@ -129,7 +167,7 @@ impl<T: Format> Engine<T> {
     /// Scales, biases and ReLU, once for the maxima: all of them keep order.
     fn collect(&self, pass: Pass, scratch: &mut Scratch) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
-        let panels = &self.place(self.last(pass), &feature, &folded).panels;
+        let panels = &self.last(pass, &feature, &folded).panels;
         let interleave = Interleave::new(read(&self.points).len() / 4);
         scratch.values.clear();
         scratch.winners.clear();
@@ -158,7 +196,7 @@ impl<T: Format> Engine<T> {
             drop(vector);
             engine.begin(Task::Vector { head, layer: i });
             let columns = &layer.columns;
-            let n_chunks = columns.n_blocks().div_ceil(VECTOR_CHUNK);
+            let n_chunks = columns.n_panels().div_ceil(VECTOR_CHUNK);
             if columns.inputs() * columns.outputs() < SMALL_VECTOR {
                 (0..n_chunks).for_each(|chunk| engine.chunk(0, chunk));
             } else {

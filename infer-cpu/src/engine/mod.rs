@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
 use crate::edge_conv::{EdgeConv, Neighborhood};
-use crate::kernel::{Columns, Kernels, Panels};
+use crate::kernel::{GEMV_NR, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
 use crate::precision::Format;
 pub use crate::prefilter::GROUP;
@@ -26,8 +26,9 @@ mod forward;
 mod interleave;
 mod route;
 
-pub use forward::{Input, Scratch, folding_pays};
+pub use forward::{Forward, Input, Scratch, folding_pays};
 use interleave::Interleave;
+use route::stacks;
 
 /// Points of a block: whole tiles of every kernel, and few enough that their
 /// features stay in a first-level cache.
@@ -37,7 +38,7 @@ pub const RUN_BLOCKS: usize = 22;
 /// Blocks of outputs (64 each) of a vector layer that a thread does at a time.
 pub const VECTOR_CHUNK: usize = 2;
 /// Outputs of a block of a vector layer.
-pub const VECTOR_BLOCK: usize = Columns::<f32>::BLOCK;
+pub const VECTOR_BLOCK: usize = GEMV_NR;
 /// A vector layer of fewer products than this is not worth sharing out.
 pub const SMALL_VECTOR: usize = 1 << 15;
 
@@ -222,21 +223,6 @@ impl<T: Format> Engine<T> {
         }
     }
 
-    /// The network.
-    pub fn layers(&self) -> &Layers<T> {
-        &self.layers
-    }
-
-    /// Makes room for clouds of `n` points.
-    pub fn reserve(&self, n: usize) {
-        let mut points = write(&self.points);
-        let missing = (n * 4).saturating_sub(points.len());
-        points.reserve(missing);
-        if !self.edges.is_empty() {
-            write(&self.cloud).reserve(n);
-        }
-    }
-
     /// Takes `input` for the pass that follows, and forgets what earlier ones
     /// met.
     fn take(&self, input: &Input<'_>) {
@@ -253,12 +239,6 @@ impl<T: Format> Engine<T> {
         self.overflow.store(false, Ordering::Relaxed);
     }
 
-    /// How many features `pass` pools.
-    pub fn channels(&self, pass: Pass) -> usize {
-        let (feature, folded) = (read(&self.feature), read(&self.folded));
-        self.place(self.last(pass), &feature, &folded).panels.outputs()
-    }
-
     fn events(&self) -> RangeEvents {
         RangeEvents {
             clipped: self.clipped.load(Ordering::Relaxed),
@@ -268,10 +248,8 @@ impl<T: Format> Engine<T> {
 
     /// The largest activation of each layer that was observed, by its name.
     pub fn observed(&self) -> Vec<(String, f32)> {
-        let nets = [self.layers.stn.as_ref(), self.layers.fstn.as_ref()];
-        let convs = nets.into_iter().flatten().flat_map(|net| &net.convs);
-        let convs = self.layers.trunk.iter().chain(convs).chain(self.front());
-        let mut seen: Vec<_> = convs
+        let mut seen: Vec<_> = stacks(&self.layers)
+            .flatten()
             .map(|conv| match conv {
                 Conv::First(first) => (first.dense.name.clone(), first.seen.get()),
                 _ => (conv.packed().name.clone(), conv.packed().seen.get()),
@@ -313,12 +291,9 @@ struct Widths {
 impl Widths {
     fn of<T: Format>(layers: &Layers<T>) -> Self {
         let nets = [&layers.stn, &layers.fstn].into_iter().flatten();
-        let fcs = nets.clone().flat_map(|net| &net.fcs).chain(&layers.head);
+        let fcs = nets.flat_map(|net| &net.fcs).chain(&layers.head);
         let columns = fcs.map(|layer| &layer.columns);
-        let mut convs: Vec<&[Conv<T>]> = nets.map(|net| &net.convs[..]).collect();
-        convs.push(&layers.trunk);
-        convs.extend(layers.front.as_deref());
-        let hidden = convs.iter().flat_map(|net| &net[..net.len() - 1]).map(Conv::width);
+        let hidden = stacks(layers).flat_map(|convs| &convs[..convs.len() - 1]).map(Conv::width);
         let pooled = pooled_layers(layers).map(Packed::width);
         Self {
             hidden: hidden.max().unwrap_or(0),
@@ -330,9 +305,7 @@ impl Widths {
 
 /// The layers whose outputs are pooled.
 fn pooled_layers<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &Packed<T>> {
-    let nets = [&layers.stn, &layers.fstn].into_iter().flatten().map(|net| &net.convs[..]);
-    let nets = nets.chain([&layers.trunk[..]]).chain(layers.front.as_deref());
-    nets.filter_map(|net| net.last()).map(Conv::packed)
+    stacks(layers).filter_map(<[_]>::last).map(Conv::packed)
 }
 
 /// Locks cannot be poisoned but by a panic, which is a defect that a caller

@@ -2,44 +2,59 @@
 //! registers accumulating. See [`super::x86`] for the loops.
 
 use std::arch::x86_64::*;
-use std::ops::Range;
 
 use half::f16;
 
-use super::x86::{Lanes, implement_lanes};
-use super::{Gemm, PrefilterKernels, declare_kernels};
+use super::x86::{Lanes, Vector, implement};
 
-const NR: usize = 16;
-
-declare_kernels!(
-    Avx2,
+super::x86::declare!(
+    Avx2, __m256, "avx2,fma,f16c",
     runs_here: is_x86_feature_detected!("avx2")
         && is_x86_feature_detected!("fma")
         && is_x86_feature_detected!("f16c"),
-    {
-        f32: Some(Gemm { nr: NR, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
-        f16: Some(Gemm { nr: NR, k_step: 8, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
-        i8: Some(Gemm { nr: NR, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
-        prefilters: false,
-        prefilter: PrefilterKernels { levels, peaks, above_floors, dots },
-        gemv_f32,
-        gemv_f16,
-        gemv_i8,
-        narrow_f16,
-        narrow_i8,
-        fps_step,
-    }
+    prefilters: false
 );
 
-super::x86::entries!(__m256, 8, "avx2,fma,f16c");
-
-implement_lanes!(__m256, int: __m256i, lanes: 8, rows: 6, {
+implement!(Vector for __m256 {
+    type Element = f32;
+    type Float = __m256;
+    type Int = __m256i;
     fn splat(value: f32) -> Self = _mm256_set1_ps(value);
     fn load(from: *const f32) -> Self = _mm256_loadu_ps(from);
+    fn store(self, to: *mut f32) = _mm256_storeu_ps(to, self);
+    fn add(self, other: Self) -> Self = _mm256_add_ps(self, other);
+    fn max(self, other: Self) -> Self = _mm256_max_ps(self, other);
+    fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
+        let greater = _mm256_cmp_ps::<_CMP_GT_OQ>(self, *best);
+        *best = _mm256_blendv_ps(*best, self, greater);
+        *who = _mm256_blendv_epi8(*who, index, _mm256_castps_si256(greater))
+    };
+    fn to_float(self) -> Self = self;
+});
+
+implement!(Vector for __m256i {
+    type Element = i32;
+    type Float = __m256;
+    type Int = __m256i;
+    fn splat(value: i32) -> Self = _mm256_set1_epi32(value);
+    fn load(from: *const i32) -> Self = _mm256_loadu_si256(from.cast());
+    fn store(self, to: *mut i32) = _mm256_storeu_si256(to.cast(), self);
+    fn add(self, other: Self) -> Self = _mm256_add_epi32(self, other);
+    fn max(self, other: Self) -> Self = _mm256_max_epi32(self, other);
+    fn keep_greater(self, best: &mut Self, who: &mut Self, index: Self) = {
+        let greater = _mm256_cmpgt_epi32(self, *best);
+        *best = _mm256_blendv_epi8(*best, self, greater);
+        *who = _mm256_blendv_epi8(*who, index, greater)
+    };
+    fn to_float(self) -> Self::Float = _mm256_cvtepi32_ps(self);
+});
+
+implement!(Lanes for __m256 {
+    const N = 8;
+    const ROWS = 6;
     fn load_f16(from: *const f16) -> Self = _mm256_cvtph_ps(_mm_loadu_si128(from.cast()));
     fn load_i8(from: *const i8) -> Self =
         _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64(from.cast())));
-    fn store(self, to: *mut f32) = _mm256_storeu_ps(to, self);
     fn store_f16(self, to: *mut f16) =
         _mm_storeu_si128(to.cast(), _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self));
     fn store_u8(self, to: *mut u8) = {
@@ -50,9 +65,7 @@ implement_lanes!(__m256, int: __m256i, lanes: 8, rows: 6, {
     };
     fn fma(self, factor: Self, term: Self) -> Self = _mm256_fmadd_ps(self, factor, term);
     fn mul(self, other: Self) -> Self = _mm256_mul_ps(self, other);
-    fn add(self, other: Self) -> Self = _mm256_add_ps(self, other);
     fn sub(self, other: Self) -> Self = _mm256_sub_ps(self, other);
-    fn max(self, other: Self) -> Self = _mm256_max_ps(self, other);
     fn min(self, other: Self) -> Self = _mm256_min_ps(self, other);
     fn abs(self) -> Self = _mm256_andnot_ps(_mm256_set1_ps(-0.0), self);
     fn round(self) -> Self =
@@ -64,30 +77,9 @@ implement_lanes!(__m256, int: __m256i, lanes: 8, rows: 6, {
         let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
         _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
     };
-    fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
-        let greater = _mm256_cmp_ps::<_CMP_GT_OQ>(self, *best);
-        *best = _mm256_blendv_ps(*best, self, greater);
-        *who = _mm256_blendv_epi8(*who, index, _mm256_castps_si256(greater))
-    };
-    fn splat_int(value: i32) -> Self::Int = _mm256_set1_epi32(value);
-    fn load_int(from: *const i32) -> Self::Int = _mm256_loadu_si256(from.cast());
-    fn store_int(int: Self::Int, to: *mut i32) = _mm256_storeu_si256(to.cast(), int);
-    fn add_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm256_add_epi32(a, b);
-    fn max_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm256_max_epi32(a, b);
-    fn keep_greater_int(
-        value: Self::Int,
-        best: &mut Self::Int,
-        who: &mut Self::Int,
-        index: Self::Int,
-    ) = {
-        let greater = _mm256_cmpgt_epi32(value, *best);
-        *best = _mm256_blendv_epi8(*best, value, greater);
-        *who = _mm256_blendv_epi8(*who, index, greater)
-    };
     fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int = {
         // Two products of at most 127 * 127 fit 16 bits: nothing saturates.
         let pairs = _mm256_maddubs_epi16(a, w);
         _mm256_add_epi32(sum, _mm256_madd_epi16(pairs, _mm256_set1_epi16(1)))
     };
-    fn to_float(int: Self::Int) -> Self = _mm256_cvtepi32_ps(int);
 });

@@ -5,80 +5,72 @@
 //! Cascade Lake) take AVX2.
 
 use std::arch::x86_64::*;
-use std::ops::Range;
 
 use half::f16;
 
-use super::x86::{Lanes, implement_lanes};
-use super::{Gemm, PrefilterKernels, declare_kernels};
+use super::x86::{Lanes, Vector, implement};
 
-const NR: usize = 32;
-
-declare_kernels!(
-    Avx512,
+super::x86::declare!(
+    Avx512, __m512, "avx512f,avx512bw,avx512vl,avx512vnni",
     runs_here: is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512vl")
         && is_x86_feature_detected!("avx512vnni"),
-    {
-        f32: Some(Gemm { nr: NR, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
-        f16: Some(Gemm { nr: NR, k_step: 16, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
-        i8: Some(Gemm { nr: NR, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
-        prefilters: true,
-        prefilter: PrefilterKernels { levels, peaks, above_floors, dots },
-        gemv_f32,
-        gemv_f16,
-        gemv_i8,
-        narrow_f16,
-        narrow_i8,
-        fps_step,
-    }
+    prefilters: true
 );
 
-super::x86::entries!(__m512, 4, "avx512f,avx512bw,avx512vl,avx512vnni");
-
-implement_lanes!(__m512, int: __m512i, lanes: 16, rows: 12, {
+implement!(Vector for __m512 {
+    type Element = f32;
+    type Float = __m512;
+    type Int = __m512i;
     fn splat(value: f32) -> Self = _mm512_set1_ps(value);
     fn load(from: *const f32) -> Self = _mm512_loadu_ps(from);
+    fn store(self, to: *mut f32) = _mm512_storeu_ps(to, self);
+    fn add(self, other: Self) -> Self = _mm512_add_ps(self, other);
+    fn max(self, other: Self) -> Self = _mm512_max_ps(self, other);
+    fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
+        let greater = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, *best);
+        *best = _mm512_mask_mov_ps(*best, greater, self);
+        *who = _mm512_mask_mov_epi32(*who, greater, index)
+    };
+    fn to_float(self) -> Self = self;
+});
+
+implement!(Vector for __m512i {
+    type Element = i32;
+    type Float = __m512;
+    type Int = __m512i;
+    fn splat(value: i32) -> Self = _mm512_set1_epi32(value);
+    fn load(from: *const i32) -> Self = _mm512_loadu_si512(from.cast());
+    fn store(self, to: *mut i32) = _mm512_storeu_si512(to.cast(), self);
+    fn add(self, other: Self) -> Self = _mm512_add_epi32(self, other);
+    fn max(self, other: Self) -> Self = _mm512_max_epi32(self, other);
+    fn keep_greater(self, best: &mut Self, who: &mut Self, index: Self) = {
+        let greater = _mm512_cmpgt_epi32_mask(self, *best);
+        *best = _mm512_mask_mov_epi32(*best, greater, self);
+        *who = _mm512_mask_mov_epi32(*who, greater, index)
+    };
+    fn to_float(self) -> Self::Float = _mm512_cvtepi32_ps(self);
+});
+
+implement!(Lanes for __m512 {
+    const N = 16;
+    const ROWS = 12;
     fn load_f16(from: *const f16) -> Self = _mm512_cvtph_ps(_mm256_loadu_si256(from.cast()));
     fn load_i8(from: *const i8) -> Self =
         _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(_mm_loadu_si128(from.cast())));
-    fn store(self, to: *mut f32) = _mm512_storeu_ps(to, self);
     fn store_f16(self, to: *mut f16) =
         _mm256_storeu_si256(to.cast(), _mm512_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self));
     fn store_u8(self, to: *mut u8) =
         _mm_storeu_si128(to.cast(), _mm512_cvtepi32_epi8(_mm512_cvtps_epi32(self)));
     fn fma(self, factor: Self, term: Self) -> Self = _mm512_fmadd_ps(self, factor, term);
     fn mul(self, other: Self) -> Self = _mm512_mul_ps(self, other);
-    fn add(self, other: Self) -> Self = _mm512_add_ps(self, other);
     fn sub(self, other: Self) -> Self = _mm512_sub_ps(self, other);
-    fn max(self, other: Self) -> Self = _mm512_max_ps(self, other);
     fn min(self, other: Self) -> Self = _mm512_min_ps(self, other);
     fn abs(self) -> Self = _mm512_abs_ps(self);
     fn round(self) -> Self = _mm512_roundscale_ps::<_MM_FROUND_TO_NEAREST_INT>(self);
     fn greater(self, other: Self) -> u32 = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, other).into();
     fn total(self) -> f32 = _mm512_reduce_add_ps(self);
-    fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
-        let greater = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, *best);
-        *best = _mm512_mask_mov_ps(*best, greater, self);
-        *who = _mm512_mask_mov_epi32(*who, greater, index)
-    };
-    fn splat_int(value: i32) -> Self::Int = _mm512_set1_epi32(value);
-    fn load_int(from: *const i32) -> Self::Int = _mm512_loadu_si512(from.cast());
-    fn store_int(int: Self::Int, to: *mut i32) = _mm512_storeu_si512(to.cast(), int);
-    fn add_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm512_add_epi32(a, b);
-    fn max_int(a: Self::Int, b: Self::Int) -> Self::Int = _mm512_max_epi32(a, b);
-    fn keep_greater_int(
-        value: Self::Int,
-        best: &mut Self::Int,
-        who: &mut Self::Int,
-        index: Self::Int,
-    ) = {
-        let greater = _mm512_cmpgt_epi32_mask(value, *best);
-        *best = _mm512_mask_mov_epi32(*best, greater, value);
-        *who = _mm512_mask_mov_epi32(*who, greater, index)
-    };
     fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int =
         _mm512_dpbusd_epi32(sum, a, w);
-    fn to_float(int: Self::Int) -> Self = _mm512_cvtepi32_ps(int);
 });

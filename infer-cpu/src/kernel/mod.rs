@@ -15,11 +15,11 @@
 
 #![expect(unsafe_code, reason = "SIMD intrinsics; every block says why it is sound")]
 
-use std::fmt;
 use std::ops::Range;
-use std::str::FromStr;
 
 use half::f16;
+
+use crate::named::named;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -37,7 +37,7 @@ mod panels;
 mod pooled;
 mod scalar;
 #[cfg(test)]
-mod suite;
+pub(crate) mod suite;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -65,12 +65,15 @@ macro_rules! declare_kernels {
 }
 use declare_kernels;
 
-pub(crate) use panels::{Columns, Panels};
+pub(crate) use panels::Panels;
 pub use pooled::PooledProducts;
 
 /// Output channels are padded to a multiple of this, so that the rows of one
 /// layer are whole vectors of any kernel for the next.
 pub const WIDTH_STEP: usize = 64;
+
+/// Output channels of a panel for [`Gemv`]: 16 NEON accumulators of fp32.
+pub(crate) const GEMV_NR: usize = 64;
 
 /// The largest activation of an int8 layer: seven bits, so that kernels for
 /// signed and for unsigned activations take the same bytes.
@@ -165,12 +168,13 @@ pub(crate) struct Gemm<A, W, C> {
 }
 
 /// Products of a sparse vector and a matrix of weights stored as `W`, in f32
-/// arithmetic.
+/// arithmetic. The matrix is packed by [`Panels::columns`]: within a panel, an
+/// input that is left out spares a stretch of memory.
 ///
 /// `nonzero` holds (input, value) in the order of inputs; what is left out
-/// counts as 0 and its column is never read. Writes dot products and biases of
-/// a range of blocks to `out`.
-pub(crate) type Gemv<W> = fn(nonzero: &[(u32, f32)], &Columns<W>, Range<usize>, out: &mut [f32]);
+/// counts as 0 and its column is never read. Writes dot products, scaled and
+/// with biases, of a range of panels to `out`.
+pub(crate) type Gemv<W> = fn(nonzero: &[(u32, f32)], &Panels<W>, Range<usize>, out: &mut [f32]);
 
 /// What rounding a row to levels lost and left, in levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -260,42 +264,27 @@ pub struct Kernels {
     pub(crate) fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
 }
 
-/// An instruction set that kernels are written for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum KernelName {
-    /// Plain Rust, everywhere.
-    Scalar,
-    /// AVX2 with FMA and F16C.
-    Avx2,
-    /// AVX-512 F, BW, VL, and VNNI for int8.
-    Avx512,
-    /// Armv8 NEON, fp32.
-    Neon,
-    /// NEON with FEAT_FP16.
-    NeonF16,
-    /// NEON with FEAT_DotProd.
-    NeonDot,
+named! {
+    /// An instruction set that kernels are written for.
+    #[derive(PartialOrd, Ord)]
+    #[non_exhaustive]
+    pub enum KernelName: "kernel" {
+        /// Plain Rust, everywhere.
+        Scalar = "scalar",
+        /// AVX2 with FMA and F16C.
+        Avx2 = "avx2",
+        /// AVX-512 F, BW, VL, and VNNI for int8.
+        Avx512 = "avx512",
+        /// Armv8 NEON, fp32.
+        Neon = "neon",
+        /// NEON with FEAT_FP16.
+        NeonF16 = "neon_f16",
+        /// NEON with FEAT_DotProd.
+        NeonDot = "neon_dot",
+    }
 }
 
 impl KernelName {
-    /// All, whatever this machine has.
-    pub const ALL: [Self; 6] =
-        [Self::Scalar, Self::Avx2, Self::Avx512, Self::Neon, Self::NeonF16, Self::NeonDot];
-
-    /// Its name on command lines.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Scalar => "scalar",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-            Self::Neon => "neon",
-            Self::NeonF16 => "neon_f16",
-            Self::NeonDot => "neon_dot",
-        }
-    }
-
     /// Its kernels, if this machine can run them.
     #[must_use]
     pub fn kernels(self) -> Option<&'static Kernels> {
@@ -322,26 +311,10 @@ pub fn available() -> impl Iterator<Item = &'static Kernels> {
     KernelName::ALL.into_iter().rev().filter_map(KernelName::kernels)
 }
 
-impl fmt::Display for KernelName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A word that names no kernel.
-#[derive(Debug, thiserror::Error)]
-#[error("unknown kernel `{0}`, expected one of scalar, avx2, avx512, neon, neon_f16, neon_dot")]
-pub struct NoSuchKernel(String);
-
-impl FromStr for KernelName {
-    type Err = NoSuchKernel;
-
-    fn from_str(word: &str) -> Result<Self, NoSuchKernel> {
-        Self::ALL
-            .into_iter()
-            .find(|kernel| kernel.name() == word)
-            .ok_or_else(|| NoSuchKernel(word.to_owned()))
-    }
+/// The fastest kernels that this machine can run.
+#[must_use]
+pub fn fastest() -> &'static Kernels {
+    available().next().expect("invariant: the scalar kernels run everywhere")
 }
 
 #[cfg(test)]

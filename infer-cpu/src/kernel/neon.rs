@@ -19,21 +19,25 @@
 
 use std::arch::aarch64::*;
 
-use super::{Gemm, declare_kernels};
+use super::{KernelName, Kernels, declare_kernels};
 
-pub(super) mod fps;
-pub(super) mod gemv;
+mod fps;
+mod gemv;
 pub(super) mod lanes;
-pub(super) mod narrow;
-pub(super) mod prefilter;
+mod narrow;
+mod prefilter;
 pub(super) mod sink;
 pub(super) mod tile;
 
 use sink::Sink;
 use tile::{Feed, Strip, Tile, VECTOR_BYTES};
 
-declare_kernels!(Neon, runs_here: true, {
-    f32: Some(GEMM_F32),
+declare_kernels!(Neon, runs_here: true, { ..NEON });
+
+/// What all NEON files offer.
+pub(super) const NEON: Kernels = Kernels {
+    name: KernelName::Neon,
+    f32: Some(tile::gemm::<F32, 2>()),
     f16: None,
     i8: None,
     prefilters: false,
@@ -44,10 +48,7 @@ declare_kernels!(Neon, runs_here: true, {
     narrow_f16: narrow::to_f16,
     narrow_i8: narrow::to_i8,
     fps_step: fps::step,
-});
-
-/// The products that all NEON files offer in fp32.
-pub(super) const GEMM_F32: Gemm<f32, f32, f32> = tile::gemm::<F32, 2>();
+};
 
 struct F32;
 

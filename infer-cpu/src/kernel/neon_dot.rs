@@ -19,25 +19,15 @@
 use std::arch::aarch64::*;
 use std::arch::{asm, is_aarch64_feature_detected};
 
-use half::f16;
-
 use super::declare_kernels;
+use super::neon::NEON;
 use super::neon::sink::Sink;
 use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
-use super::neon::{GEMM_F32, fps, gemv, narrow, prefilter};
 
 declare_kernels!(NeonDot, runs_here: is_aarch64_feature_detected!("dotprod"), {
-    f32: Some(GEMM_F32),
-    f16: None,
     i8: Some(gemm::<I8, 2>()),
     prefilters: true,
-    prefilter: prefilter::PREFILTER,
-    gemv_f32: gemv::gemv::<f32>,
-    gemv_f16: gemv::gemv::<f16>,
-    gemv_i8: gemv::gemv::<i8>,
-    narrow_f16: narrow::to_f16,
-    narrow_i8: narrow::to_i8,
-    fps_step: fps::step,
+    ..NEON
 });
 
 struct I8;

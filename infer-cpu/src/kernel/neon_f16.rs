@@ -25,10 +25,10 @@ use std::hint::black_box;
 use half::f16;
 
 use super::declare_kernels;
+use super::neon::NEON;
 use super::neon::lanes::Lanes;
 use super::neon::sink::Sink;
 use super::neon::tile::{Feed, Strip, Tile, VECTOR_BYTES, gemm};
-use super::neon::{GEMM_F32, fps, gemv, narrow, prefilter};
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 
 mod half_sink;
@@ -36,17 +36,8 @@ mod half_sink;
 use half_sink::{Blocks, HalfSink};
 
 declare_kernels!(NeonF16, runs_here: is_aarch64_feature_detected!("fp16"), {
-    f32: Some(GEMM_F32),
     f16: Some(gemm::<F16, 4>()),
-    i8: None,
-    prefilters: false,
-    prefilter: prefilter::PREFILTER,
-    gemv_f32: gemv::gemv::<f32>,
-    gemv_f16: gemv::gemv::<f16>,
-    gemv_i8: gemv::gemv::<i8>,
-    narrow_f16: narrow::to_f16,
-    narrow_i8: narrow::to_i8,
-    fps_step: fps::step,
+    ..NEON
 });
 
 struct F16;

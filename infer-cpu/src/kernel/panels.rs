@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::WIDTH_STEP;
+use super::{GEMV_NR, WIDTH_STEP};
 
-/// A layer's weights for matrix products: panels of `nr` output channels.
+/// A layer's weights: panels of `nr` output channels.
 ///
 /// Within a panel, inputs go in groups of `group` (1, or 4 for int8, whose
 /// instructions take four inputs at once): element (input k, channel o) is at
@@ -66,6 +66,14 @@ impl<W: Copy + Default> Panels<W> {
             bias: vec![0.0; padded_outputs],
             relu: false,
         }
+    }
+
+    /// Panels of zeros for matrix-vector products, [`super::Gemv`].
+    ///
+    /// # Panics
+    /// If the weights would not fit in memory.
+    pub fn columns(inputs: usize, outputs: usize) -> Self {
+        Self::zeros(inputs, outputs, (GEMV_NR, 1, 1))
     }
 
     /// Inputs of the layer.
@@ -174,107 +182,6 @@ impl<W: Copy + Default> Panels<W> {
     }
 }
 
-/// A layer's weights for matrix-vector products: blocks of
-/// [`Columns::BLOCK`] outputs, within a block input by input, so that an
-/// input of 0 spares a stretch of memory. Element (input j, output o) is at
-/// `(o / BLOCK * inputs + j) * BLOCK + o % BLOCK`.
-///
-/// # Invariant
-/// Unsafe kernels rely on these lengths. The fields are private,
-/// [`Columns::zeros`] establishes them, and no method changes the length of a
-/// vector but [`Columns::scales_mut`], which makes it whole.
-///
-/// - The length of `bias` is a multiple of [`Columns::BLOCK`].
-/// - `data` has `inputs` times as many elements.
-/// - `scale` is empty or has as many elements as `bias`.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Columns<W> {
-    inputs: usize,
-    outputs: usize,
-    data: Vec<W>,
-    scale: Vec<f32>,
-    bias: Vec<f32>,
-}
-
-impl<W: Copy + Default> Columns<W> {
-    /// Outputs of a block: 16 NEON accumulators of fp32.
-    pub const BLOCK: usize = 64;
-
-    /// Columns of zeros.
-    ///
-    /// # Panics
-    /// If the weights would not fit in memory.
-    pub fn zeros(inputs: usize, outputs: usize) -> Self {
-        let padded = padded(outputs, Self::BLOCK);
-        Self {
-            inputs,
-            outputs,
-            data: vec![W::default(); product(padded, inputs)],
-            scale: Vec::new(),
-            bias: vec![0.0; padded],
-        }
-    }
-
-    /// Inputs of the layer.
-    pub fn inputs(&self) -> usize {
-        self.inputs
-    }
-
-    /// Outputs of the layer.
-    pub fn outputs(&self) -> usize {
-        self.outputs
-    }
-
-    /// Outputs with those that are padding.
-    pub fn padded_outputs(&self) -> usize {
-        self.bias.len()
-    }
-
-    /// What a dot product is multiplied by, for each padded output; empty
-    /// for 1.
-    pub fn scales(&self) -> &[f32] {
-        &self.scale
-    }
-
-    /// The scales, to be set: one for each padded output, 1 until then.
-    pub fn scales_mut(&mut self) -> &mut [f32] {
-        self.scale.resize(self.bias.len(), 1.0);
-        &mut self.scale
-    }
-
-    /// What is added to a scaled dot product, for each padded output.
-    pub fn biases(&self) -> &[f32] {
-        &self.bias
-    }
-
-    /// The biases, to be set: one for each padded output, 0 until then.
-    pub fn biases_mut(&mut self) -> &mut [f32] {
-        &mut self.bias
-    }
-
-    /// Sets every weight to `weight(input, output)`.
-    pub fn fill(&mut self, weight: impl Fn(usize, usize) -> W) {
-        for output in 0..self.outputs {
-            for input in 0..self.inputs {
-                let block = output / Self::BLOCK;
-                self.data[(block * self.inputs + input) * Self::BLOCK + output % Self::BLOCK] =
-                    weight(input, output);
-            }
-        }
-    }
-
-    /// How many blocks there are.
-    pub fn n_blocks(&self) -> usize {
-        self.bias.len() / Self::BLOCK
-    }
-
-    /// The weights of one block.
-    pub fn block(&self, block: usize) -> &[W] {
-        let size = self.inputs * Self::BLOCK;
-        &self.data[block * size..][..size]
-    }
-}
-
 fn padded(n: usize, step: usize) -> usize {
     n.checked_next_multiple_of(step).expect("a layer's widths fit in memory")
 }
@@ -292,8 +199,7 @@ mod tests {
     fn sizes_that_no_memory_holds_are_refused_instead_of_wrapped() {
         let many = usize::MAX / WIDTH_STEP + 2;
         panics_with("fit in memory", || Panels::<f32>::zeros(many, WIDTH_STEP, (8, 1, 1)));
-        panics_with("fit in memory", || Columns::<f32>::zeros(many, WIDTH_STEP));
-        panics_with("fit in memory", || Columns::<f32>::zeros(1, usize::MAX));
+        panics_with("fit in memory", || Panels::<f32>::columns(1, usize::MAX));
     }
 
     #[test]

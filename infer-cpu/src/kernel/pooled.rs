@@ -1,6 +1,6 @@
 //! The products that a maximum over points takes, for whoever trains.
 
-use super::{Gemm, Panels, Rows, available};
+use super::{Gemm, Panels, Rows, fastest};
 
 /// Weights `[outputs, inputs]` in fp32, packed for the fastest kernels of this
 /// machine, whose products with points are pooled and never stored.
@@ -28,9 +28,7 @@ impl PooledProducts {
     #[must_use]
     pub fn new(inputs: usize, outputs: usize, weight: impl Fn(usize, usize) -> f32) -> Self {
         assert!(inputs > 0, "expected points of one coordinate or more, found 0");
-        let gemm = available()
-            .find_map(|kernels| kernels.f32.as_ref())
-            .expect("invariant: the scalar kernels run everywhere");
+        let gemm = fastest().f32.as_ref().expect("invariant: every set has fp32 products");
         let mut panels = Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, 1));
         panels.fill(weight);
         Self { gemm, panels }

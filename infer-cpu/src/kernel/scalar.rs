@@ -6,8 +6,7 @@ use std::ops::Range;
 use half::f16;
 
 use super::{
-    Candidate, Columns, Gemm, I8_LARGEST, LevelSums, Panels, PrefilterKernels, Rows, Soa,
-    declare_kernels,
+    Candidate, Gemm, I8_LARGEST, LevelSums, Panels, PrefilterKernels, Rows, Soa, declare_kernels,
 };
 
 /// Products of fp16 are summed in fp16 over this many inputs.
@@ -22,121 +21,152 @@ pub(super) const F16_CHUNK: usize = 32;
 pub(super) const F16_BLOCK: usize = 128;
 
 declare_kernels!(Scalar, runs_here: true, {
-    f32: Some(Gemm { nr: 8, k_step: 1, rows: f32_rows, max: f32_max, argmax: f32_argmax }),
-    f16: Some(Gemm { nr: 8, k_step: 1, rows: f16_rows, max: f16_max, argmax: f16_argmax }),
-    i8: Some(Gemm { nr: 8, k_step: 4, rows: i8_rows, max: i8_max, argmax: i8_argmax }),
+    f32: Some(gemm::<f32>(1)),
+    f16: Some(gemm::<f16>(1)),
+    i8: Some(gemm::<u8>(4)),
     prefilters: false,
     prefilter: PrefilterKernels { levels, peaks, above_floors, dots },
-    gemv_f32,
-    gemv_f16,
-    gemv_i8,
+    gemv_f32: gemv::<f32>,
+    gemv_f16: gemv::<f16>,
+    gemv_i8: gemv::<i8>,
     narrow_f16,
     narrow_i8,
     fps_step,
 });
 
-fn dot_f32(row: &[f32], weights: &Panels<f32>, output: usize) -> f32 {
-    let products = row.iter().enumerate();
-    products.fold(0.0, |sum, (k, &a)| sum + a * weights.weight(k, output))
+/// An activation of one number format.
+trait Activation: Copy {
+    type Weight: Copy + Default;
+    type Sum: PartialOrd + Copy;
+    /// The sum of the products of a row and the weights of `output`.
+    fn dot(row: &[Self], weights: &Panels<Self::Weight>, output: usize) -> Self::Sum;
+    /// The nearest number of fp32.
+    fn to_f32(sum: Self::Sum) -> f32;
 }
 
-fn dot_f16(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
-    let chunk_sum = |first: usize, chunk: &[f16]| {
-        let products = chunk.iter().enumerate();
-        products.fold(f16::ZERO, |sum, (k, &a)| {
-            let weight = weights.weight(first + k, output);
-            // The product is exact in f64, and the sum but for the rarest
-            // double rounding: a fused multiply-add in fp16.
-            f16::from_f64(a.to_f64() * weight.to_f64() + sum.to_f64())
-        })
-    };
-    let block_sum = |first: usize, block: &[f16]| {
-        let chunks = block.chunks(F16_CHUNK).zip((first..).step_by(F16_CHUNK));
-        chunks.fold(f16::ZERO, |sum, (chunk, first)| sum + chunk_sum(first, chunk))
-    };
-    let blocks = row.chunks(F16_BLOCK).zip((0..).step_by(F16_BLOCK));
-    blocks.fold(0.0, |sum, (block, first)| sum + block_sum(first, block).to_f32())
+impl Activation for f32 {
+    type Weight = f32;
+    type Sum = f32;
+
+    fn dot(row: &[f32], weights: &Panels<f32>, output: usize) -> f32 {
+        let products = row.iter().enumerate();
+        products.fold(0.0, |sum, (k, &a)| sum + a * weights.weight(k, output))
+    }
+
+    fn to_f32(sum: f32) -> f32 {
+        sum
+    }
 }
 
-fn dot_i8(row: &[u8], weights: &Panels<i8>, output: usize) -> i32 {
-    let products = row.iter().enumerate();
-    products.map(|(k, &a)| i32::from(a) * i32::from(weights.weight(k, output))).sum()
+impl Activation for f16 {
+    type Weight = f16;
+    type Sum = f32;
+
+    fn dot(row: &[f16], weights: &Panels<f16>, output: usize) -> f32 {
+        let chunk_sum = |first: usize, chunk: &[f16]| {
+            let products = chunk.iter().enumerate();
+            products.fold(f16::ZERO, |sum, (k, &a)| {
+                let weight = weights.weight(first + k, output);
+                // The product is exact in f64, and the sum but for the rarest
+                // double rounding: a fused multiply-add in fp16.
+                f16::from_f64(a.to_f64() * weight.to_f64() + sum.to_f64())
+            })
+        };
+        let block_sum = |first: usize, block: &[f16]| {
+            let chunks = block.chunks(F16_CHUNK).zip((first..).step_by(F16_CHUNK));
+            chunks.fold(f16::ZERO, |sum, (chunk, first)| sum + chunk_sum(first, chunk))
+        };
+        let blocks = row.chunks(F16_BLOCK).zip((0..).step_by(F16_BLOCK));
+        blocks.fold(0.0, |sum, (block, first)| sum + block_sum(first, block).to_f32())
+    }
+
+    fn to_f32(sum: f32) -> f32 {
+        sum
+    }
 }
 
-/// Calls `sink(row, output, accumulator)` for every row and every channel of
-/// `panels`.
-fn for_each<A, W: Copy + Default, C>(
+impl Activation for u8 {
+    type Weight = i8;
+    type Sum = i32;
+
+    fn dot(row: &[u8], weights: &Panels<i8>, output: usize) -> i32 {
+        let products = row.iter().enumerate();
+        products.map(|(k, &a)| i32::from(a) * i32::from(weights.weight(k, output))).sum()
+    }
+
+    fn to_f32(sum: i32) -> f32 {
+        sum as f32
+    }
+}
+
+const fn gemm<A: Activation>(k_step: usize) -> Gemm<A, A::Weight, A::Sum> {
+    Gemm { nr: 8, k_step, rows: rows::<A>, max: max::<A>, argmax: argmax::<A> }
+}
+
+fn rows<A: Activation>(
     rows: &Rows<'_, A>,
-    weights: &Panels<W>,
+    weights: &Panels<A::Weight>,
     panels: Range<usize>,
-    dot: impl Fn(&[A], &Panels<W>, usize) -> C,
-    mut sink: impl FnMut(usize, usize, C),
+    out: &mut [f32],
+    out_stride: usize,
+) {
+    for_each(rows, weights, panels, |row, output, sum| {
+        out[row * out_stride + output] = finish(weights, output, A::to_f32(sum));
+    });
+}
+
+fn max<A: Activation>(
+    rows: &Rows<'_, A>,
+    weights: &Panels<A::Weight>,
+    panels: Range<usize>,
+    maxima: &mut [A::Sum],
+) {
+    let first = weights.channels(&panels).start;
+    for_each(rows, weights, panels, |_, output, sum| {
+        if sum > maxima[output - first] {
+            maxima[output - first] = sum;
+        }
+    });
+}
+
+fn argmax<A: Activation>(
+    rows: &Rows<'_, A>,
+    weights: &Panels<A::Weight>,
+    panels: Range<usize>,
+    first_row: u32,
+    maxima: &mut [A::Sum],
+    winners: &mut [u32],
+) {
+    let first = weights.channels(&panels).start;
+    for_each(rows, weights, panels, |row, output, sum| {
+        if sum > maxima[output - first] {
+            maxima[output - first] = sum;
+            winners[output - first] = first_row + row as u32;
+        }
+    });
+}
+
+/// Calls `sink(row, output, sum)` for every row and every channel of `panels`.
+fn for_each<A: Activation>(
+    rows: &Rows<'_, A>,
+    weights: &Panels<A::Weight>,
+    panels: Range<usize>,
+    mut sink: impl FnMut(usize, usize, A::Sum),
 ) {
     rows.check(weights.inputs());
     for row in 0..rows.n {
         let activations = &rows.data[row * rows.stride..][..weights.inputs()];
         for output in weights.channels(&panels) {
-            sink(row, output, dot(activations, weights, output));
+            sink(row, output, A::dot(activations, weights, output));
         }
     }
 }
 
-fn finish<W: Copy + Default>(weights: &Panels<W>, output: usize, accumulator: f32) -> f32 {
+fn finish<W: Copy + Default>(weights: &Panels<W>, output: usize, sum: f32) -> f32 {
     let scale = weights.scales().get(output).copied().unwrap_or(1.0);
-    let value = accumulator * scale + weights.biases()[output];
+    let value = sum * scale + weights.biases()[output];
     if weights.relu() { value.max(0.0) } else { value }
 }
-
-macro_rules! gemm {
-    ($a:ty, $w:ty, $c:ty, $dot:ident, $rows:ident, $max:ident, $argmax:ident) => {
-        fn $rows(
-            rows: &Rows<'_, $a>,
-            weights: &Panels<$w>,
-            panels: Range<usize>,
-            out: &mut [f32],
-            out_stride: usize,
-        ) {
-            for_each(rows, weights, panels, $dot, |row, output, accumulator| {
-                out[row * out_stride + output] = finish(weights, output, accumulator as f32);
-            });
-        }
-
-        fn $max(
-            rows: &Rows<'_, $a>,
-            weights: &Panels<$w>,
-            panels: Range<usize>,
-            maxima: &mut [$c],
-        ) {
-            let first = weights.channels(&panels).start;
-            for_each(rows, weights, panels, $dot, |_, output, accumulator| {
-                if accumulator > maxima[output - first] {
-                    maxima[output - first] = accumulator;
-                }
-            });
-        }
-
-        fn $argmax(
-            rows: &Rows<'_, $a>,
-            weights: &Panels<$w>,
-            panels: Range<usize>,
-            first_row: u32,
-            maxima: &mut [$c],
-            winners: &mut [u32],
-        ) {
-            let first = weights.channels(&panels).start;
-            for_each(rows, weights, panels, $dot, |row, output, accumulator| {
-                if accumulator > maxima[output - first] {
-                    maxima[output - first] = accumulator;
-                    winners[output - first] = first_row + row as u32;
-                }
-            });
-        }
-    };
-}
-
-gemm!(f32, f32, f32, dot_f32, f32_rows, f32_max, f32_argmax);
-gemm!(f16, f16, f32, dot_f16, f16_rows, f16_max, f16_argmax);
-gemm!(u8, i8, i32, dot_i8, i8_rows, i8_max, i8_argmax);
 
 fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
     let mut sums = LevelSums::default();
@@ -181,38 +211,19 @@ fn dots(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &m
     }
 }
 
-/// Dot products of a sparse vector and the columns of a range of blocks.
-fn gemv<W: Copy + Default>(
+fn gemv<W: Copy + Default + Into<f32>>(
     nonzero: &[(u32, f32)],
-    weights: &Columns<W>,
-    blocks: Range<usize>,
+    weights: &Panels<W>,
+    panels: Range<usize>,
     out: &mut [f32],
-    widen: impl Fn(W) -> f32,
 ) {
-    const BLOCK: usize = Columns::<f32>::BLOCK;
-    for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
-        let columns = weights.block(block);
-        for (o, out) in out.iter_mut().enumerate() {
-            let products = nonzero.iter();
-            let dot = products.fold(0.0f32, |sum, &(j, value)| {
-                sum + value * widen(columns[j as usize * BLOCK + o])
-            });
-            let scale = weights.scales().get(block * BLOCK + o).copied().unwrap_or(1.0);
-            *out = dot * scale + weights.biases()[block * BLOCK + o];
-        }
+    for (out, output) in out.iter_mut().zip(weights.channels(&panels)) {
+        let products = nonzero.iter();
+        let dot = products.fold(0.0f32, |sum, &(j, value)| {
+            sum + value * weights.weight(j as usize, output).into()
+        });
+        *out = finish(weights, output, dot);
     }
-}
-
-fn gemv_f32(nonzero: &[(u32, f32)], w: &Columns<f32>, blocks: Range<usize>, out: &mut [f32]) {
-    gemv(nonzero, w, blocks, out, |weight| weight);
-}
-
-fn gemv_f16(nonzero: &[(u32, f32)], w: &Columns<f16>, blocks: Range<usize>, out: &mut [f32]) {
-    gemv(nonzero, w, blocks, out, f16::to_f32);
-}
-
-fn gemv_i8(nonzero: &[(u32, f32)], w: &Columns<i8>, blocks: Range<usize>, out: &mut [f32]) {
-    gemv(nonzero, w, blocks, out, f32::from);
 }
 
 pub(super) fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
@@ -234,7 +245,7 @@ pub(super) fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
     clipped
 }
 
-fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
+pub(super) fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
     let mut farthest = 0;
     let mut largest = -1.0;
     for (i, distance) in distance.iter_mut().enumerate() {

@@ -37,7 +37,7 @@ pub use levels::Levels;
 
 use crate::dense::Dense;
 use crate::kernel::{Candidate, I8_LARGEST, Kernels, Panels, PrefilterKernels, Rows, WIDTH_STEP};
-use crate::precision::{Format, I8};
+use crate::precision::{Format, I8, Weight};
 
 /// Output channels that a thread pools at a time.
 pub const GROUP: usize = 128;
@@ -226,7 +226,7 @@ impl Channels {
         let (inputs, n) = (layer.inputs, range.len());
         let mut panels = Panels::zeros(inputs, n, (gemm.nr, gemm.k_step, I8::GROUP));
         // A range of as many units as there are levels: sums come out in levels.
-        I8::fill(&mut panels, f32::from(I8_LARGEST), |input, output| {
+        i8::fill(&mut panels, f32::from(I8_LARGEST), |input, output| {
             layer.at(input, range.start + output)
         });
         let width = panels.padded_outputs();

@@ -3,6 +3,7 @@ use test_support::need;
 
 use super::*;
 use crate::kernel::available;
+use crate::kernel::suite::{Bounded, F32, dot};
 
 const ROWS: usize = 48;
 
@@ -76,14 +77,16 @@ const KINDS: [&str; 10] = [
     "channels of huge weights",
 ];
 
+/// A product in f64, with the magnitudes it sums.
+fn exact(row: &[f32], weights: &[f32]) -> (f64, f64) {
+    dot(row.iter().zip(weights).map(|(&x, &w)| (x.into(), w.into())))
+}
+
 /// The largest product of a channel, in f64, with the magnitudes it sums.
 fn exact_maximum(case: &Case, output: usize) -> (f64, f64) {
     let weights = &case.layer.weight[output * INPUTS..][..INPUTS];
     let rows = case.blocks.iter().flat_map(|block| block.chunks_exact(STRIDE));
-    let products = rows.map(|row| {
-        let terms = row.iter().zip(weights).map(|(&x, &w)| f64::from(x) * f64::from(w));
-        terms.fold((0.0, 0.0), |(dot, sum), term| (dot + term, sum + term.abs()))
-    });
+    let products = rows.map(|row| exact(row, weights));
     products.fold((f64::NEG_INFINITY, 0.0), |best, next| {
         (best.0.max(next.0), if next.0 > best.0 { next.1 } else { best.1 })
     })
@@ -116,10 +119,9 @@ fn pool(case: &Case, kernels: &Kernels, wants_winners: bool) -> Option<(Vec<f32>
     Some((all_maxima, all_winners))
 }
 
-/// fp32's bound for a product of `INPUTS` terms of either sign whose magnitudes
-/// sum to `sum` (Higham 2002, §3.1), and half a denormal a step.
+/// How far a product of magnitudes that sum to `sum` may be off.
 fn bound(sum: f64) -> f64 {
-    (INPUTS + 3) as f64 * (2f64.powi(-24) * sum + 2f64.powi(-149))
+    F32::bound(INPUTS, sum)
 }
 
 #[test]
@@ -141,8 +143,7 @@ fn maxima_are_those_of_all_products() {
             let winner = winners[output] as usize;
             let row = &case.blocks[winner / ROWS][winner % ROWS * STRIDE..][..INPUTS];
             let weights = &case.layer.weight[output * INPUTS..][..INPUTS];
-            let own: f64 =
-                row.iter().zip(weights).map(|(&x, &w)| f64::from(x) * f64::from(w)).sum();
+            let (own, _) = self::exact(row, weights);
             assert!((own - exact).abs() <= 2.0 * bound(sum), "{kind}, {output}: row {winner}");
         }
     }

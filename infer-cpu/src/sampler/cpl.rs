@@ -6,7 +6,7 @@
 //! before their ReLU: it is what a maximum that is not positive counts as.
 
 use super::SamplerSpec;
-use super::index_map::IndexMap;
+use super::hash::{Map, reset};
 
 /// Ranks critical points; keeps its memory from cloud to cloud.
 ///
@@ -29,7 +29,7 @@ pub struct CriticalPoints {
     /// For each, the sum of the maxima that it won in its pass.
     pub scores: Vec<f64>,
     /// Where a row stands in `ranking`.
-    ranks: IndexMap,
+    ranks: Map<u32>,
     /// Scores and rows of a pass.
     ranking: Vec<(f64, u32)>,
     /// The rows that the secondary pass at hand pools, ascending.
@@ -103,16 +103,17 @@ impl CriticalPoints {
         self.taken.reserve(n_rows);
         self.left.reserve(n_rows);
         self.ranking.reserve(channels);
-        self.ranks.reset(channels);
+        reset(&mut self.ranks, channels);
     }
 
     /// Ranks the winners of one pooling.
     fn pool(&mut self, maxima: &[f32], winners: &[u32]) {
-        self.ranks.reset(maxima.len());
+        reset(&mut self.ranks, maxima.len());
         self.ranking.clear();
         for (&maximum, &winner) in maxima.iter().zip(winners) {
             if maximum > 0.0 {
-                let rank = *self.ranks.value(winner, self.ranking.len() as u32) as usize;
+                let next = self.ranking.len() as u32;
+                let rank = *self.ranks.entry(winner).or_insert(next) as usize;
                 if rank == self.ranking.len() {
                     self.ranking.push((0.0, winner));
                 }

@@ -4,12 +4,12 @@ use std::mem;
 
 use formats::rng::StreamKey;
 
-use super::index_map::IndexMap;
+use super::hash::{Map, reset};
 
 /// Draws subsets without replacement.
 #[derive(Default)]
 pub struct RandomSubset {
-    moved: IndexMap,
+    moved: Map<u32>,
 }
 
 impl RandomSubset {
@@ -28,11 +28,11 @@ impl RandomSubset {
         }
         // The first m steps of a Fisher-Yates shuffle. Only the places that
         // were swapped are remembered.
-        self.moved.reset(m);
+        reset(&mut self.moved, m);
         for i in 0..m as u32 {
             let j = i + key.below((n - i as usize) as u64, u64::from(i)) as u32;
-            let at_i = self.moved.get(i).unwrap_or(i);
-            out.push(mem::replace(self.moved.value(j, j), at_i));
+            let at_i = self.moved.get(&i).copied().unwrap_or(i);
+            out.push(mem::replace(self.moved.entry(j).or_insert(j), at_i));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! One point a cell of a grid of cubes.
 
 use super::canonical::{compare, sort_by_geometry};
+use super::hash::Map;
 
 /// No cell is finer: each number that f32 holds has a cell of its own.
 const FINEST: f64 = f32::from_bits(1) as f64;
@@ -15,9 +16,6 @@ const OCTAVES: u32 = 63;
 /// Parts of a cell's edge in which points are placed for their centroid:
 /// `u32::MAX` of them sum to less than 2^64.
 const PARTS: f64 = 4_294_967_296.0;
-
-/// No cell.
-const EMPTY: u32 = u32::MAX;
 
 /// Thins clouds; keeps its memory from call to call. It grows with the number
 /// of occupied cells, not of points.
@@ -34,10 +32,9 @@ const EMPTY: u32 = u32::MAX;
 #[derive(Default)]
 pub struct VoxelGrid {
     cells: Vec<Cell>,
-    /// Indices into `cells`, by hash; the first `1 << bits` are in use, at
-    /// most half of them.
-    slots: Vec<u32>,
-    bits: u32,
+    /// Indices into `cells` by their places: low corners from the origin, in
+    /// edges, whose bits tell them apart.
+    index: Map<[u64; 3]>,
     /// The points kept, as they are sorted.
     keys: Vec<u64>,
 }
@@ -51,8 +48,6 @@ struct Grid {
 
 /// An occupied cell.
 struct Cell {
-    /// Which one: its low corner from the origin, in edges.
-    place: [f64; 3],
     /// How many points it holds.
     n: u32,
     /// The sum of their offsets from the low corner, in parts of the edge.
@@ -147,51 +142,23 @@ impl VoxelGrid {
     }
 
     fn clear(&mut self) {
-        const BITS: u32 = 8;
         self.cells.clear();
-        self.resize_slots(BITS);
+        self.index.clear();
     }
 
     /// The cell at `place`, which becomes occupied.
     fn cell(&mut self, place: [f64; 3]) -> &mut Cell {
-        let mut slot = self.slot(place);
-        if self.slots[slot] == EMPTY {
-            if 2 * self.cells.len() >= 1 << self.bits {
-                self.resize_slots(self.bits + 1);
-                slot = self.slot(place);
-            }
-            self.slots[slot] = self.cells.len() as u32;
-            self.cells.push(Cell { place, n: 0, sum: [0; 3], nearest: 0, distance: f64::INFINITY });
+        let n = self.cells.len() as u32;
+        let at = *self.index.entry(place.map(f64::to_bits)).or_insert(n);
+        if at == n {
+            self.cells.push(Cell { n: 0, sum: [0; 3], nearest: 0, distance: f64::INFINITY });
         }
-        &mut self.cells[self.slots[slot] as usize]
-    }
-
-    /// Where the index of the cell at `place` is or would be.
-    fn slot(&self, place: [f64; 3]) -> usize {
-        let last = (1 << self.bits) - 1;
-        let mut slot = (hash(place) >> (u64::BITS - self.bits)) as usize;
-        while self.slots[slot] != EMPTY && self.cells[self.slots[slot] as usize].place != place {
-            slot = (slot + 1) & last;
-        }
-        slot
-    }
-
-    fn resize_slots(&mut self, bits: u32) {
-        self.bits = bits;
-        let n_slots = 1 << bits;
-        if self.slots.len() < n_slots {
-            self.slots.resize(n_slots, EMPTY);
-        }
-        self.slots[..n_slots].fill(EMPTY);
-        for i in 0..self.cells.len() {
-            let slot = self.slot(self.cells[i].place);
-            self.slots[slot] = i as u32;
-        }
+        &mut self.cells[at as usize]
     }
 }
 
 impl Grid {
-    /// The cell of a point. Without the sign of zeros, which is hashed.
+    /// The cell of a point. Without the sign of zeros, which bits would tell apart.
     fn place(&self, point: &[f32; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| self.edges(point, axis).floor() + 0.0)
     }
@@ -236,15 +203,6 @@ fn edge(step: u32) -> f64 {
     let octave = 2.0 / (1u64 << (step / STEPS_AN_OCTAVE)) as f64;
     octave * f64::from(2 * STEPS_AN_OCTAVE - step % STEPS_AN_OCTAVE)
         / f64::from(2 * STEPS_AN_OCTAVE)
-}
-
-fn hash(place: [f64; 3]) -> u64 {
-    // The product's halves, folded: every bit of the input reaches the top
-    // (the multiplier is 2^64 over the golden ratio).
-    place.iter().fold(0, |hash, edges| {
-        let product = u128::from(hash ^ edges.to_bits()) * 0x9E37_79B9_7F4A_7C15;
-        (product >> 64) as u64 ^ product as u64
-    })
 }
 
 #[cfg(test)]
@@ -338,10 +296,10 @@ mod tests {
         let mut kept = vec![];
         grid.select_by_size(&cloud, 0.2, &mut kept);
         assert_eq!(kept.len(), 1000);
-        assert!(grid.cells.capacity() <= 1024 && grid.slots.len() <= 2048);
+        assert!(grid.cells.capacity() <= 1024 && grid.index.capacity() <= 2048);
         grid.select_by_count(&cloud[..1_000_000], 1000, &mut kept);
         assert!(kept.len() <= 1000);
-        assert!(grid.cells.capacity() <= 1024 && grid.slots.len() <= 2048);
+        assert!(grid.cells.capacity() <= 1024 && grid.index.capacity() <= 2048);
     }
 
     proptest! {

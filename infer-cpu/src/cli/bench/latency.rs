@@ -7,12 +7,11 @@ use std::time::Instant;
 
 use anyhow::Context;
 use formats::rng::StreamKey;
-use infer_cpu::{Classifier, ModelCard};
+use infer_cpu::{Classifier, ModelCard, Options, Precision, TNets};
 use serde::Serialize;
 
-use super::grid::{Setting, settings};
 use super::machine::Machine;
-use super::statistics::quantile;
+use super::variant::Variant;
 use super::{Args, table};
 
 /// Everything that a run measured.
@@ -39,19 +38,40 @@ struct Row {
     samples_ms: Vec<f64>,
 }
 
-/// Measures every setting and prints it.
+/// What a measurement is of.
+struct Setting<'a> {
+    /// How the points are chosen.
+    sampler: &'a Variant,
+    t_nets: TNets,
+    /// Points that the network sees.
+    points: usize,
+    threads: usize,
+    precision: Precision,
+}
+
+/// Measures every setting that `args` name and prints it.
 ///
 /// # Errors
-/// A model that cannot be loaded, a cloud that cannot be classified.
+/// A model or a set that cannot be read, a cloud that cannot be classified.
 pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
     let ranges = super::calibration(args, model)?;
-    let rows = settings(args);
-    let rows = rows.iter().map(|setting| measure(args, model, setting, &ranges));
-    let record = Record {
-        machine: Machine::here(),
-        model: model.display().to_string(),
-        rows: rows.collect::<anyhow::Result<_>>()?,
-    };
+    // fp32 comes first, since the others are compared with it.
+    let mut precisions = args.precision.clone();
+    precisions.sort_unstable();
+    let mut rows = Vec::new();
+    for sampler in &args.sampler {
+        for &t_nets in &args.t_nets {
+            for &points in &args.points {
+                for &threads in &args.threads {
+                    for &precision in &precisions {
+                        let setting = Setting { sampler, t_nets, points, threads, precision };
+                        rows.push(measure(args, model, &setting, &ranges)?);
+                    }
+                }
+            }
+        }
+    }
+    let record = Record { machine: Machine::here(), model: model.display().to_string(), rows };
     if args.json {
         writeln!(stdout(), "{}", serde_json::to_string(&record)?)?;
         return Ok(());
@@ -90,12 +110,21 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
 fn measure(
     args: &Args,
     model: &Path,
-    setting: &Setting,
+    setting: &Setting<'_>,
     ranges: &Option<BTreeMap<String, f32>>,
 ) -> anyhow::Result<Row> {
-    let from = if setting.sampler.takes_all() { setting.points } else { args.from };
-    let mut options = setting.options(args, from);
-    options.activation_ranges.clone_from(ranges);
+    let &Setting { sampler, t_nets, points, threads, precision } = setting;
+    let from = if sampler.takes_all() { points } else { args.from };
+    let mut options = Options {
+        precision,
+        kernel: args.kernel,
+        threads,
+        t_nets,
+        capacity: from,
+        activation_ranges: ranges.clone(),
+        ..Options::default()
+    };
+    sampler.set(&mut options, points);
     let mut classifier = Classifier::load(model, &options)?;
     let cloud = cloud(from);
     // Once for caches, pages and sleeping threads.
@@ -107,12 +136,12 @@ fn measure(
         samples_ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
     Ok(Row {
-        sampler: setting.sampler.to_string(),
-        t_nets: setting.t_nets.name(),
-        points: setting.points,
+        sampler: sampler.to_string(),
+        t_nets: t_nets.name(),
+        points,
         from,
-        precision: setting.precision.name(),
-        threads: setting.threads,
+        precision: precision.name(),
+        threads,
         kernel: classifier.kernel().name(),
         p50_ms: quantile(&samples_ms, 0.5),
         p99_ms: quantile(&samples_ms, 0.99),
@@ -125,4 +154,24 @@ fn cloud(n: usize) -> Vec<[f32; 3]> {
     let key = StreamKey::new(0, "benchmark cloud", 0);
     let unit = |i: usize| (2.0 * key.unit(i as u64) - 1.0) as f32;
     (0..n).map(|i| [unit(3 * i), unit(3 * i + 1), unit(3 * i + 2)]).collect()
+}
+
+/// The `q` quantile of `samples` by the nearest rank; NaN of none.
+fn quantile(samples: &[f64], q: f64) -> f64 {
+    let mut sorted = samples.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = (q * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_samples() {
+        let samples = [3.0, 1.0, 2.0, 4.0];
+        assert_eq!([0.0, 0.5, 0.99, 1.0].map(|q| quantile(&samples, q)), [1.0, 2.0, 4.0, 4.0]);
+        assert!(quantile(&[], 0.5).is_nan());
+    }
 }

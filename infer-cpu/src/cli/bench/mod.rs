@@ -1,9 +1,7 @@
 //! `infer-cpu bench`: how fast this machine is.
 
-mod grid;
 mod latency;
 mod machine;
-mod statistics;
 mod table;
 mod variant;
 
@@ -14,6 +12,7 @@ use std::path::{Path, PathBuf};
 use formats::labelled::read_labelled;
 use infer_cpu::{Precision, TNets};
 
+pub use latency::run;
 use variant::Variant;
 
 /// Flags of `bench`.
@@ -92,12 +91,4 @@ fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<Stri
 
 fn at_least_one(word: &str) -> Result<usize, String> {
     word.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number above 0".to_owned())
-}
-
-/// Measures what `args` ask for.
-///
-/// # Errors
-/// A model or a set that cannot be read, a file that cannot be written.
-pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
-    latency::run(args, model)
 }

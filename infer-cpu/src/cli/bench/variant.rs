@@ -3,16 +3,15 @@
 use std::fmt;
 use std::str::FromStr;
 
+use formats::FormatError;
 use infer_cpu::Options;
-use infer_cpu::sampler::{FrontChoice, Resize, SamplerKind, SamplerSpec};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 
 /// A sampler and how it is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
     name: String,
-    kind: SamplerKind,
-    front: FrontChoice,
-    resize: Resize,
+    spec: SamplerSpec,
     votes: u32,
     rotations: bool,
 }
@@ -20,18 +19,12 @@ pub struct Variant {
 impl Variant {
     /// Whether the network sees every point of a cloud.
     pub fn takes_all(&self) -> bool {
-        self.kind == SamplerKind::All
+        self.spec.kind == SamplerKind::All
     }
 
     /// Sets this sampler in `options`, to keep `points`.
     pub fn set(&self, options: &mut Options, points: usize) {
-        options.sampler = Some(SamplerSpec {
-            kind: self.kind,
-            points,
-            front: self.front,
-            resize: self.resize,
-            ..SamplerSpec::default()
-        });
+        options.sampler = Some(SamplerSpec { points, ..self.spec.clone() });
         options.votes = self.votes;
         options.vote_rotations = self.rotations;
     }
@@ -43,23 +36,16 @@ impl FromStr for Variant {
     fn from_str(text: &str) -> Result<Self, String> {
         let mut words = text.split(':');
         let kind = words.next().unwrap_or_default();
-        let kind: SamplerKind =
-            kind.parse().map_err(|error: formats::FormatError| error.to_string())?;
-        let mut variant = Self {
-            name: text.to_owned(),
-            kind,
-            front: FrontChoice::Auto,
-            resize: Resize::default(),
-            votes: 1,
-            rotations: false,
-        };
+        let kind = kind.parse().map_err(|error: FormatError| error.to_string())?;
+        let spec = SamplerSpec { kind, ..SamplerSpec::default() };
+        let mut variant = Self { name: text.to_owned(), spec, votes: 1, rotations: false };
         for word in words {
             if let Ok(front) = word.parse() {
-                variant.front = front;
+                variant.spec.front = front;
             } else if let Ok(resize) = word.parse() {
-                variant.resize = resize;
-            } else if let Some(votes) = number_after(word, "votes") {
-                variant.votes = u32::try_from(votes).unwrap_or(u32::MAX);
+                variant.spec.resize = resize;
+            } else if let Some(Ok(votes)) = word.strip_prefix("votes").map(str::parse) {
+                variant.votes = votes;
             } else if word == "turned" {
                 variant.rotations = true;
             } else {
@@ -79,20 +65,18 @@ impl fmt::Display for Variant {
     }
 }
 
-fn number_after(word: &str, prefix: &str) -> Option<usize> {
-    word.strip_prefix(prefix)?.parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
+    use infer_cpu::sampler::{FrontChoice, Resize};
+
     use super::*;
 
     #[test]
     fn a_variant_says_what_follows_the_sampler() {
         let variant: Variant = "cpl:stn:truncate".parse().unwrap();
-        assert_eq!(variant.kind, SamplerKind::Cpl);
-        assert_eq!(variant.front, FrontChoice::Stn);
-        assert_eq!(variant.resize, Resize::Truncate);
+        assert_eq!(variant.spec.kind, SamplerKind::Cpl);
+        assert_eq!(variant.spec.front, FrontChoice::Stn);
+        assert_eq!(variant.spec.resize, Resize::Truncate);
         let variant: Variant = "random:votes5:turned".parse().unwrap();
         assert_eq!((variant.votes, variant.rotations), (5, true));
         assert!("fps:votes".parse::<Variant>().unwrap_err().contains("unknown word `votes`"));

@@ -1,6 +1,6 @@
 //! Sparse vector times matrix, in fp32 whatever the weights are stored as.
 //!
-//! The 64 sums of a block are 16 registers. The column of each input that is
+//! The 64 sums of a panel are 16 registers. The column of each input that is
 //! not 0 is widened in parts of 16 weights and added. Columns come from main
 //! memory, and the gaps of those left out confuse the machine's prefetcher: so
 //! the columns to come are asked for in advance.
@@ -12,10 +12,8 @@ use std::ops::Range;
 
 use half::f16;
 
-use super::super::Columns;
+use super::super::{GEMV_NR, Panels};
 use super::lanes::{Lanes, load, store};
-
-const BLOCK: usize = Columns::<f32>::BLOCK;
 
 const CACHE_LINE_BYTES: usize = 64;
 
@@ -26,16 +24,16 @@ const AHEAD_BYTES: usize = 2048;
 /// [`Gemv`](super::super::Gemv) of weights stored as `W`.
 pub fn gemv<W: Weight>(
     nonzero: &[(u32, f32)],
-    weights: &Columns<W>,
-    blocks: Range<usize>,
+    weights: &Panels<W>,
+    panels: Range<usize>,
     out: &mut [f32],
 ) {
-    for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
-        let sums = dot_products(nonzero, weights.block(block));
-        let bias: [float32x4_t; 16] = load(&weights.biases()[block * BLOCK..]);
+    for (panel, out) in panels.zip(out.chunks_exact_mut(GEMV_NR)) {
+        let sums = dot_products(nonzero, weights.panel(panel));
+        let bias: [float32x4_t; 16] = load(&weights.biases()[panel * GEMV_NR..]);
         let scale = match weights.scales() {
             [] => [float32x4_t::splat(1.0); 16],
-            scale => load(&scale[block * BLOCK..]),
+            scale => load(&scale[panel * GEMV_NR..]),
         };
         let sums = sums.as_flattened();
         // SAFETY: NEON is on every aarch64.
@@ -45,8 +43,8 @@ pub fn gemv<W: Weight>(
 }
 
 fn dot_products<W: Weight>(nonzero: &[(u32, f32)], columns: &[W]) -> [[float32x4_t; 4]; 4] {
-    let (columns, _) = columns.as_chunks::<BLOCK>();
-    let ahead = AHEAD_BYTES / size_of::<[W; BLOCK]>();
+    let (columns, _) = columns.as_chunks::<GEMV_NR>();
+    let ahead = AHEAD_BYTES / size_of::<[W; GEMV_NR]>();
     let mut sums = [[float32x4_t::splat(0.0); 4]; 4];
     for (i, &(input, value)) in nonzero.iter().enumerate() {
         if let Some(&(later, _)) = nonzero.get(i + ahead) {

@@ -7,226 +7,137 @@ mod products;
 mod tile;
 mod vectors;
 
-pub(super) use lanes::{Lanes, Weight, implement_lanes};
+pub(super) use lanes::{Lanes, Vector, Weight, implement};
 pub(super) use products::{argmax, max, rows};
-pub(super) use tile::{Byte, Half, Single};
+pub(super) use tile::{Byte, Half, Single, Tile};
 pub(super) use vectors::{
     above_floors, dots, fps_step, gemv, levels, narrow_f16, narrow_i8, peaks,
 };
 
 /// Vectors of channels in a tile.
-const V: usize = 2;
+pub(super) const V: usize = 2;
 
-/// The safe functions of a table of kernels over vectors `$lanes`, whose
-/// blocks of columns take `$b` vectors.
-///
-/// They enable `$features` without looking: the table that holds them is
-/// given out only where the machine has been found to have them.
-macro_rules! entries {
-    ($lanes:ty, $b:literal, $features:literal) => {
-        use $crate::kernel::x86::{self, Byte, Half, Single};
-        use $crate::kernel::{Candidate, Columns, LevelSums, Panels, Rows, Soa};
+/// Declares the kernels `$name` over vectors `$lanes`.
+macro_rules! declare {
+    (
+        $name:ident, $lanes:ty, $features:literal,
+        runs_here: $runs_here:expr, prefilters: $prefilters:literal
+    ) => {
+        use std::ops::Range;
 
-        $crate::kernel::x86::entries!(@gemm $lanes, $features, Single, f32, f32, f32,
-            f32_rows, f32_max, f32_argmax);
-        $crate::kernel::x86::entries!(@gemm $lanes, $features, Half, f16, f16, f32,
-            f16_rows, f16_max, f16_argmax);
-        $crate::kernel::x86::entries!(@gemm $lanes, $features, Byte, u8, i8, i32,
-            i8_rows, i8_max, i8_argmax);
-        $crate::kernel::x86::entries!(@gemv $lanes, $features, $b, f32, gemv_f32);
-        $crate::kernel::x86::entries!(@gemv $lanes, $features, $b, f16, gemv_f16);
-        $crate::kernel::x86::entries!(@gemv $lanes, $features, $b, i8, gemv_i8);
+        use $crate::kernel::x86::{self, Byte, Half, Single, Tile, Weight};
+        use $crate::kernel::{
+            Candidate, GEMV_NR, Gemm, LevelSums, Panels, PrefilterKernels, Rows, Soa,
+        };
 
-        fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 {
-            #[target_feature(enable = $features)]
-            unsafe fn run(values: &[f32], out: &mut [f16]) -> (usize, f32) {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::narrow_f16::<$lanes>(values, out) }
+        $crate::kernel::declare_kernels!($name, runs_here: $runs_here, {
+            f32: Some(gemm::<Single>()),
+            f16: Some(gemm::<Half>()),
+            i8: Some(gemm::<Byte>()),
+            prefilters: $prefilters,
+            prefilter: PrefilterKernels { levels, peaks, above_floors, dots },
+            gemv_f32: gemv::<f32>,
+            gemv_f16: gemv::<f16>,
+            gemv_i8: gemv::<i8>,
+            narrow_f16,
+            narrow_i8,
+            fps_step,
+        });
+
+        /// The products of one format.
+        const fn gemm<T: Tile<$lanes>>()
+        -> Gemm<T::Activation, T::Weight, <T::Sums as x86::Vector>::Element> {
+            Gemm {
+                nr: x86::V * <$lanes as x86::Lanes>::N,
+                k_step: T::STEP,
+                rows: rows::<T>,
+                max: max::<T>,
+                argmax: argmax::<T>,
             }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            let (whole, largest) = unsafe { run(values, out) };
-            largest.max($crate::kernel::scalar::narrow_f16(&values[whole..], &mut out[whole..]))
         }
 
-        fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
-            #[target_feature(enable = $features)]
-            unsafe fn run(values: &[f32], per_unit: f32, out: &mut [u8]) -> (usize, u64) {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::narrow_i8::<$lanes>(values, per_unit, out) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            let (whole, clipped) = unsafe { run(values, per_unit, out) };
-            let (values, out) = (&values[whole..], &mut out[whole..]);
-            clipped + $crate::kernel::scalar::narrow_i8(values, per_unit, out)
-        }
+        $crate::kernel::x86::enable! { $features;
+            fn rows<T: Tile<$lanes>>(
+                rows: &Rows<'_, T::Activation>,
+                weights: &Panels<T::Weight>,
+                panels: Range<usize>,
+                out: &mut [f32],
+                stride: usize,
+            ) = x86::rows::<$lanes, T>;
 
-        fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
-            #[target_feature(enable = $features)]
-            unsafe fn run(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::levels::<$lanes>(row, per_unit, out) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(row, per_unit, out) }
-        }
+            fn max<T: Tile<$lanes>>(
+                rows: &Rows<'_, T::Activation>,
+                weights: &Panels<T::Weight>,
+                panels: Range<usize>,
+                maxima: &mut [<T::Sums as x86::Vector>::Element],
+            ) = x86::max::<$lanes, T>;
 
-        fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
-            #[target_feature(enable = $features)]
-            unsafe fn run(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::peaks::<$lanes>(values, peaks, rows) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(values, peaks, rows) }
-        }
+            fn argmax<T: Tile<$lanes>>(
+                rows: &Rows<'_, T::Activation>,
+                weights: &Panels<T::Weight>,
+                panels: Range<usize>,
+                first_row: u32,
+                maxima: &mut [<T::Sums as x86::Vector>::Element],
+                winners: &mut [u32],
+            ) = x86::argmax::<$lanes, T>;
 
-        fn above_floors(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
-            #[target_feature(enable = $features)]
-            unsafe fn run(
+            fn gemv<W: Weight>(
+                nonzero: &[(u32, f32)],
+                weights: &Panels<W>,
+                panels: Range<usize>,
+                out: &mut [f32],
+            ) = x86::gemv::<$lanes, W, { GEMV_NR / <$lanes as x86::Lanes>::N }>;
+
+            fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 = x86::narrow_f16::<$lanes>;
+
+            fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 =
+                x86::narrow_i8::<$lanes>;
+
+            fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums =
+                x86::levels::<$lanes>;
+
+            fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) = x86::peaks::<$lanes>;
+
+            fn above_floors(
                 values: &[f32],
                 floors: &[f32],
                 found: &mut [Candidate],
-            ) -> Option<usize> {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::above_floors::<$lanes>(values, floors, found) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(values, floors, found) }
-        }
+            ) -> Option<usize> = x86::above_floors::<$lanes>;
 
-        fn dots(
-            rows: &Rows<'_, f32>,
-            weights: &[f32],
-            candidates: &[Candidate],
-            out: &mut [f32],
-        ) {
-            #[target_feature(enable = $features)]
-            unsafe fn run(
+            fn dots(
                 rows: &Rows<'_, f32>,
                 weights: &[f32],
                 candidates: &[Candidate],
                 out: &mut [f32],
-            ) {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::dots::<$lanes>(rows, weights, candidates, out) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(rows, weights, candidates, out) }
-        }
+            ) = x86::dots::<$lanes>;
 
-        fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
-            #[target_feature(enable = $features)]
-            unsafe fn run(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::fps_step::<$lanes>(cloud, pick, distance) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(cloud, pick, distance) }
-        }
-    };
-    (@gemm $lanes:ty, $features:literal, $tile:ty, $a:ty, $w:ty, $c:ty,
-     $rows:ident, $max:ident, $argmax:ident) => {
-        fn $rows(
-            rows: &Rows<'_, $a>,
-            weights: &Panels<$w>,
-            panels: Range<usize>,
-            out: &mut [f32],
-            stride: usize,
-        ) {
-            #[target_feature(enable = $features)]
-            unsafe fn run(
-                rows: &Rows<'_, $a>,
-                weights: &Panels<$w>,
-                panels: Range<usize>,
-                out: &mut [f32],
-                stride: usize,
-            ) {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::rows::<$lanes, $tile>(rows, weights, panels, out, stride) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(rows, weights, panels, out, stride) }
-        }
-
-        fn $max(
-            rows: &Rows<'_, $a>,
-            weights: &Panels<$w>,
-            panels: Range<usize>,
-            maxima: &mut [$c],
-        ) {
-            #[target_feature(enable = $features)]
-            unsafe fn run(
-                rows: &Rows<'_, $a>,
-                weights: &Panels<$w>,
-                panels: Range<usize>,
-                maxima: &mut [$c],
-            ) {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::max::<$lanes, $tile>(rows, weights, panels, maxima) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(rows, weights, panels, maxima) }
-        }
-
-        fn $argmax(
-            rows: &Rows<'_, $a>,
-            weights: &Panels<$w>,
-            panels: Range<usize>,
-            first_row: u32,
-            maxima: &mut [$c],
-            winners: &mut [u32],
-        ) {
-            #[target_feature(enable = $features)]
-            unsafe fn run(
-                rows: &Rows<'_, $a>,
-                weights: &Panels<$w>,
-                panels: Range<usize>,
-                first_row: u32,
-                maxima: &mut [$c],
-                winners: &mut [u32],
-            ) {
-                // SAFETY: `run` enables the features.
-                unsafe {
-                    x86::argmax::<$lanes, $tile>(
-                        rows, weights, panels, first_row, maxima, winners,
-                    );
-                }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(rows, weights, panels, first_row, maxima, winners) }
-        }
-    };
-    (@gemv $lanes:ty, $features:literal, $b:literal, $w:ty, $gemv:ident) => {
-        fn $gemv(
-            nonzero: &[(u32, f32)],
-            weights: &Columns<$w>,
-            blocks: Range<usize>,
-            out: &mut [f32],
-        ) {
-            #[target_feature(enable = $features)]
-            unsafe fn run(
-                nonzero: &[(u32, f32)],
-                weights: &Columns<$w>,
-                blocks: Range<usize>,
-                out: &mut [f32],
-            ) {
-                // SAFETY: `run` enables the features.
-                unsafe { x86::gemv::<$lanes, $w, $b>(nonzero, weights, blocks, out) }
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(nonzero, weights, blocks, out) }
+            fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize =
+                x86::fps_step::<$lanes>;
         }
     };
 }
-pub(super) use entries;
+pub(super) use declare;
+
+/// Makes a safe function of each loop, compiled with `$features`.
+///
+/// It enables them without looking: the table that holds it is given out only
+/// where the machine has been found to have them.
+macro_rules! enable {
+    ($features:literal; $(
+        fn $name:ident $(<$t:ident: $bound:path>)? (
+            $($argument:ident: $type:ty),* $(,)?
+        ) $(-> $out:ty)? = $call:expr;
+    )*) => {$(
+        fn $name $(<$t: $bound>)? ($($argument: $type),*) $(-> $out)? {
+            #[target_feature(enable = $features)]
+            unsafe fn run $(<$t: $bound>)? ($($argument: $type),*) $(-> $out)? {
+                // SAFETY: `run` enables the features.
+                unsafe { $call($($argument),*) }
+            }
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
+            unsafe { run $(::<$t>)? ($($argument),*) }
+        }
+    )*};
+}
+pub(super) use enable;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::tile::Tile;
-use super::{Lanes, V};
+use super::{Lanes, V, Vector};
 use crate::kernel::{Panels, Rows, holds_rows};
 
 /// Runs `$body` with `$r` rows known when compiling: a full tile, or what is
@@ -67,7 +67,7 @@ pub(in crate::kernel) unsafe fn rows<L: Lanes, T: Tile<L>>(
                 for (r, sums) in sums.into_iter().enumerate() {
                     for (v, sums) in sums.into_iter().enumerate() {
                         let channel = first + v * L::N;
-                        let value = finish::<L, _>(T::float(sums), weights, channel);
+                        let value = finish(sums.to_float(), weights, channel);
                         value.store(out.as_mut_ptr().add((row + r) * out_stride + channel));
                     }
                 }
@@ -98,7 +98,11 @@ fn check<L: Lanes, T: Tile<L>>(
 /// # Safety
 /// The instruction set of `L`; `channel` begins a vector of one of the panels.
 #[inline(always)]
-unsafe fn finish<L: Lanes, W: Copy + Default>(value: L, weights: &Panels<W>, channel: usize) -> L {
+pub(super) unsafe fn finish<L: Lanes, W: Copy + Default>(
+    value: L,
+    weights: &Panels<W>,
+    channel: usize,
+) -> L {
     // SAFETY: `Panels` keeps biases, and scales where there are any, as long as
     // all panels are wide, so that a whole vector begins at `channel`.
     unsafe {
@@ -121,7 +125,7 @@ pub(in crate::kernel) unsafe fn max<L: Lanes, T: Tile<L>>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
     panels: Range<usize>,
-    maxima: &mut [T::Sum],
+    maxima: &mut [<T::Sums as Vector>::Element],
 ) {
     check::<L, T>(rows, weights, &panels);
     assert!(maxima.len() == panels.len() * weights.nr(), "expected a maximum for each channel");
@@ -131,19 +135,19 @@ pub(in crate::kernel) unsafe fn max<L: Lanes, T: Tile<L>>(
         // in each row.
         unsafe {
             let mut best: [T::Sums; V] =
-                std::array::from_fn(|v| T::load(maxima.as_ptr().add(v * L::N)));
+                std::array::from_fn(|v| T::Sums::load(maxima.as_ptr().add(v * L::N)));
             for_tiles!(L, rows.n, |row, R| {
                 let from = rows.data.as_ptr().add(row * rows.stride);
                 // Maxima stay in registers over all rows: the products, a thousand a
                 // point, are never stored.
                 for sums in T::sums::<R>(from, rows.stride, data) {
                     for v in 0..V {
-                        best[v] = T::max(sums[v], best[v]);
+                        best[v] = sums[v].max(best[v]);
                     }
                 }
             });
             for (v, best) in best.into_iter().enumerate() {
-                T::store(best, maxima.as_mut_ptr().add(v * L::N));
+                best.store(maxima.as_mut_ptr().add(v * L::N));
             }
         }
     }
@@ -159,7 +163,7 @@ pub(in crate::kernel) unsafe fn argmax<L: Lanes, T: Tile<L>>(
     weights: &Panels<T::Weight>,
     panels: Range<usize>,
     first_row: u32,
-    maxima: &mut [T::Sum],
+    maxima: &mut [<T::Sums as Vector>::Element],
     winners: &mut [u32],
 ) {
     check::<L, T>(rows, weights, &panels);
@@ -175,21 +179,21 @@ pub(in crate::kernel) unsafe fn argmax<L: Lanes, T: Tile<L>>(
         // in each row.
         unsafe {
             let mut best: [T::Sums; V] =
-                std::array::from_fn(|v| T::load(maxima.as_ptr().add(v * L::N)));
-            let mut who: [L::Int; V] = std::array::from_fn(|v| L::load_int(winners.add(v * L::N)));
+                std::array::from_fn(|v| T::Sums::load(maxima.as_ptr().add(v * L::N)));
+            let mut who: [L::Int; V] = std::array::from_fn(|v| L::Int::load(winners.add(v * L::N)));
             for_tiles!(L, rows.n, |row, R| {
                 let from = rows.data.as_ptr().add(row * rows.stride);
                 let sums = T::sums::<R>(from, rows.stride, data);
                 for (r, sums) in sums.into_iter().enumerate() {
-                    let index = L::splat_int((first_row + (row + r) as u32) as i32);
+                    let index = L::Int::splat((first_row + (row + r) as u32) as i32);
                     for v in 0..V {
-                        T::keep_greater(sums[v], &mut best[v], &mut who[v], index);
+                        sums[v].keep_greater(&mut best[v], &mut who[v], index);
                     }
                 }
             });
             for v in 0..V {
-                T::store(best[v], maxima.as_mut_ptr().add(v * L::N));
-                L::store_int(who[v], winners.add(v * L::N));
+                best[v].store(maxima.as_mut_ptr().add(v * L::N));
+                who[v].store(winners.add(v * L::N));
             }
         }
     }

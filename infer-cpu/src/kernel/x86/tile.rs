@@ -10,7 +10,7 @@
 
 use half::f16;
 
-use super::{Lanes, V, Weight};
+use super::{Lanes, V, Vector, Weight};
 
 /// Inputs of fp16 rows that are widened at a time.
 const WIDENED: usize = 128;
@@ -19,9 +19,8 @@ const WIDENED: usize = 128;
 pub(in crate::kernel) trait Tile<L: Lanes> {
     type Activation: Copy;
     type Weight: Copy + Default;
-    type Sum: Copy;
     /// A vector of sums.
-    type Sums: Copy;
+    type Sums: Vector<Float = L, Int = L::Int>;
     /// Inputs that the loop takes at a time: a panel has a multiple of them.
     const STEP: usize;
 
@@ -36,17 +35,6 @@ pub(in crate::kernel) trait Tile<L: Lanes> {
         stride: usize,
         panel: &[Self::Weight],
     ) -> [[Self::Sums; V]; R];
-    /// Sums as f32. As the functions below, it has the contract of [`Lanes`].
-    unsafe fn float(sums: Self::Sums) -> L;
-    unsafe fn load(from: *const Self::Sum) -> Self::Sums;
-    unsafe fn store(sums: Self::Sums, to: *mut Self::Sum);
-    unsafe fn max(sums: Self::Sums, best: Self::Sums) -> Self::Sums;
-    unsafe fn keep_greater(
-        sums: Self::Sums,
-        best: &mut Self::Sums,
-        who: &mut L::Int,
-        index: L::Int,
-    );
 }
 
 /// fp32 rows and weights.
@@ -85,47 +73,11 @@ unsafe fn accumulate<L: Lanes, W: Weight, const R: usize>(
     }
 }
 
-macro_rules! float_sums {
-    ($activation:ty, $step:expr) => {
-        const STEP: usize = $step;
-        type Activation = $activation;
-        type Weight = $activation;
-        type Sum = f32;
-        type Sums = L;
-
-        #[inline(always)]
-        unsafe fn float(sums: L) -> L {
-            sums
-        }
-
-        #[inline(always)]
-        unsafe fn load(from: *const f32) -> L {
-            // SAFETY: the contract of `Lanes`, which this function passes on.
-            unsafe { L::load(from) }
-        }
-
-        #[inline(always)]
-        unsafe fn store(sums: L, to: *mut f32) {
-            // SAFETY: the contract of `Lanes`, which this function passes on.
-            unsafe { sums.store(to) }
-        }
-
-        #[inline(always)]
-        unsafe fn max(sums: L, best: L) -> L {
-            // SAFETY: the contract of `Lanes`, which this function passes on.
-            unsafe { sums.max(best) }
-        }
-
-        #[inline(always)]
-        unsafe fn keep_greater(sums: L, best: &mut L, who: &mut L::Int, index: L::Int) {
-            // SAFETY: the contract of `Lanes`, which this function passes on.
-            unsafe { sums.keep_greater(best, who, index) }
-        }
-    };
-}
-
 impl<L: Lanes> Tile<L> for Single {
-    float_sums!(f32, 1);
+    type Activation = f32;
+    type Weight = f32;
+    type Sums = L;
+    const STEP: usize = 1;
 
     #[inline(always)]
     unsafe fn sums<const R: usize>(rows: *const f32, stride: usize, panel: &[f32]) -> [[L; V]; R] {
@@ -139,7 +91,10 @@ impl<L: Lanes> Tile<L> for Single {
 }
 
 impl<L: Lanes> Tile<L> for Half {
-    float_sums!(f16, L::N);
+    type Activation = f16;
+    type Weight = f16;
+    type Sums = L;
+    const STEP: usize = L::N;
 
     #[inline(always)]
     unsafe fn sums<const R: usize>(rows: *const f16, stride: usize, panel: &[f16]) -> [[L; V]; R] {
@@ -165,11 +120,10 @@ impl<L: Lanes> Tile<L> for Half {
 }
 
 impl<L: Lanes> Tile<L> for Byte {
-    const STEP: usize = 4;
     type Activation = u8;
     type Weight = i8;
-    type Sum = i32;
     type Sums = L::Int;
+    const STEP: usize = 4;
 
     #[inline(always)]
     unsafe fn sums<const R: usize>(
@@ -180,14 +134,14 @@ impl<L: Lanes> Tile<L> for Byte {
         // SAFETY: by the contract of `Tile::sums`, rows have as many inputs as the panel,
         // and those are whole groups of STEP.
         unsafe {
-            let mut acc = [[L::splat_int(0); V]; R];
+            let mut acc = [[L::Int::splat(0); V]; R];
             let panel_start = panel.as_ptr().cast::<i32>();
             for group in 0..panel.len() / (4 * V * L::N) {
                 let w: [L::Int; V] =
-                    std::array::from_fn(|v| L::load_int(panel_start.add((group * V + v) * L::N)));
+                    std::array::from_fn(|v| L::Int::load(panel_start.add((group * V + v) * L::N)));
                 for (r, acc) in acc.iter_mut().enumerate() {
                     let four = rows.add(r * stride + group * 4).cast::<i32>().read_unaligned();
-                    let a = L::splat_int(four);
+                    let a = L::Int::splat(four);
                     for v in 0..V {
                         acc[v] = L::dot4(acc[v], a, w[v]);
                     }
@@ -195,35 +149,5 @@ impl<L: Lanes> Tile<L> for Byte {
             }
             acc
         }
-    }
-
-    #[inline(always)]
-    unsafe fn float(sums: L::Int) -> L {
-        // SAFETY: the contract of `Lanes`, which this function passes on.
-        unsafe { L::to_float(sums) }
-    }
-
-    #[inline(always)]
-    unsafe fn load(from: *const i32) -> L::Int {
-        // SAFETY: the contract of `Lanes`, which this function passes on.
-        unsafe { L::load_int(from) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(sums: L::Int, to: *mut i32) {
-        // SAFETY: the contract of `Lanes`, which this function passes on.
-        unsafe { L::store_int(sums, to) }
-    }
-
-    #[inline(always)]
-    unsafe fn max(sums: L::Int, best: L::Int) -> L::Int {
-        // SAFETY: the contract of `Lanes`, which this function passes on.
-        unsafe { L::max_int(sums, best) }
-    }
-
-    #[inline(always)]
-    unsafe fn keep_greater(sums: L::Int, best: &mut L::Int, who: &mut L::Int, index: L::Int) {
-        // SAFETY: the contract of `Lanes`, which this function passes on.
-        unsafe { L::keep_greater_int(sums, best, who, index) }
     }
 }

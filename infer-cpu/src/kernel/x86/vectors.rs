@@ -6,49 +6,45 @@ use std::ops::Range;
 
 use half::f16;
 
-use super::{Lanes, Weight};
-use crate::kernel::{Candidate, Columns, I8_LARGEST, LevelSums, Rows, Soa, WIDTH_STEP};
+use super::products::finish;
+use super::{Lanes, Vector, Weight};
+use crate::kernel::{
+    Candidate, GEMV_NR, I8_LARGEST, LevelSums, Panels, Rows, Soa, WIDTH_STEP, scalar,
+};
 
-/// [`crate::kernel::Gemv`]: a block's sums stay in `B` vectors while its columns
+/// [`crate::kernel::Gemv`]: a panel's sums stay in `B` vectors while its columns
 /// stream by, even and odd inputs apart for the sake of latency.
 ///
 /// # Safety
-/// The instruction set of `L`; `B` vectors are a block.
+/// The instruction set of `L`.
 #[inline(always)]
 pub(in crate::kernel) unsafe fn gemv<L: Lanes, W: Weight, const B: usize>(
     nonzero: &[(u32, f32)],
-    weights: &Columns<W>,
-    blocks: Range<usize>,
+    weights: &Panels<W>,
+    panels: Range<usize>,
     out: &mut [f32],
 ) {
-    const BLOCK: usize = Columns::<f32>::BLOCK;
-    assert!(B * L::N == BLOCK && blocks.end <= weights.n_blocks());
+    assert!(B * L::N == GEMV_NR && weights.nr() == GEMV_NR && panels.end <= weights.n_panels());
     assert!(nonzero.iter().all(|&(j, _)| (j as usize) < weights.inputs()));
-    for (block, out) in blocks.zip(out.chunks_exact_mut(BLOCK)) {
-        let columns = weights.block(block).as_ptr();
-        // SAFETY: inputs were checked above; `Columns` keeps a column of BLOCK weights
-        // for each of them, and BLOCK biases, and scales where there are any.
+    for (panel, out) in panels.zip(out.chunks_exact_mut(GEMV_NR)) {
+        let columns = weights.panel(panel).as_ptr();
+        // SAFETY: inputs were checked above; a panel has a column of GEMV_NR weights
+        // for each of them, and as many biases, and scales where there are any.
         unsafe {
             let mut sums = [[L::splat(0.0); B]; 2];
             let pairs = nonzero.chunks_exact(2);
             let last = pairs.remainder();
             for pair in pairs {
                 for (sums, &(j, value)) in sums.iter_mut().zip(pair) {
-                    add_column(sums, columns.add(j as usize * BLOCK), value);
+                    add_column(sums, columns.add(j as usize * GEMV_NR), value);
                 }
             }
             for &(j, value) in last {
-                add_column(&mut sums[0], columns.add(j as usize * BLOCK), value);
+                add_column(&mut sums[0], columns.add(j as usize * GEMV_NR), value);
             }
             for v in 0..B {
-                let channel = block * BLOCK + v * L::N;
-                let bias = L::load(weights.biases().as_ptr().add(channel));
-                let sum = sums[0][v].add(sums[1][v]);
-                let value = if weights.scales().is_empty() {
-                    sum.add(bias)
-                } else {
-                    sum.fma(L::load(weights.scales().as_ptr().add(channel)), bias)
-                };
+                let channel = panel * GEMV_NR + v * L::N;
+                let value = finish(sums[0][v].add(sums[1][v]), weights, channel);
                 value.store(out.as_mut_ptr().add(v * L::N));
             }
         }
@@ -71,18 +67,15 @@ unsafe fn add_column<L: Lanes, W: Weight, const B: usize>(
     }
 }
 
-/// [`crate::kernel::Kernels::narrow_f16`] of whole vectors; returns how many values
-/// that were, and the largest magnitude.
+/// [`crate::kernel::Kernels::narrow_f16`].
 ///
 /// # Safety
 /// The instruction set of `L`.
 #[inline(always)]
-pub(in crate::kernel) unsafe fn narrow_f16<L: Lanes>(
-    values: &[f32],
-    out: &mut [f16],
-) -> (usize, f32) {
+pub(in crate::kernel) unsafe fn narrow_f16<L: Lanes>(values: &[f32], out: &mut [f16]) -> f32 {
     let whole = values.len().min(out.len()) / L::N * L::N;
-    // SAFETY: whole vectors of both.
+    let mut lanes = [0.0f32; 16];
+    // SAFETY: whole vectors of both; 16 lanes at most.
     unsafe {
         let mut largest = L::splat(0.0);
         for at in (0..whole).step_by(L::N) {
@@ -90,14 +83,13 @@ pub(in crate::kernel) unsafe fn narrow_f16<L: Lanes>(
             value.store_f16(out.as_mut_ptr().add(at));
             largest = value.abs().max(largest);
         }
-        let mut lanes = [0.0f32; 16];
         largest.store(lanes.as_mut_ptr());
-        (whole, lanes.into_iter().fold(0.0, f32::max))
     }
+    let rest = scalar::narrow_f16(&values[whole..], &mut out[whole..]);
+    lanes.into_iter().fold(rest, f32::max)
 }
 
-/// [`crate::kernel::Kernels::narrow_i8`] of whole vectors; returns how many values
-/// that were, and how many were clipped.
+/// [`crate::kernel::Kernels::narrow_i8`].
 ///
 /// # Safety
 /// The instruction set of `L`.
@@ -106,19 +98,19 @@ pub(in crate::kernel) unsafe fn narrow_i8<L: Lanes>(
     values: &[f32],
     per_unit: f32,
     out: &mut [u8],
-) -> (usize, u64) {
+) -> u64 {
     let whole = values.len().min(out.len()) / L::N * L::N;
+    let mut clipped = 0;
     // SAFETY: whole vectors of both.
     unsafe {
         let most = L::splat(f32::from(I8_LARGEST));
-        let mut clipped = 0;
         for at in (0..whole).step_by(L::N) {
             let level = L::load(values.as_ptr().add(at)).mul(L::splat(per_unit)).round();
             clipped += u64::from(level.greater(most).count_ones());
             level.max(L::splat(0.0)).min(most).store_u8(out.as_mut_ptr().add(at));
         }
-        (whole, clipped)
     }
+    clipped + scalar::narrow_i8(&values[whole..], per_unit, &mut out[whole..])
 }
 
 /// [`crate::kernel::PrefilterKernels::levels`].
@@ -163,13 +155,13 @@ pub(in crate::kernel) unsafe fn peaks<L: Lanes>(
     // SAFETY: rows and results are `width` long, whole vectors.
     unsafe {
         for at in (0..width).step_by(L::N) {
-            let (mut peak, mut who) = (L::splat(f32::NEG_INFINITY), L::splat_int(0));
+            let (mut peak, mut who) = (L::splat(f32::NEG_INFINITY), L::Int::splat(0));
             for (row, values) in values.chunks_exact(width).enumerate() {
                 let value = L::load(values.as_ptr().add(at));
-                value.keep_greater(&mut peak, &mut who, L::splat_int(row as i32));
+                value.keep_greater(&mut peak, &mut who, L::Int::splat(row as i32));
             }
             peak.store(peaks.as_mut_ptr().add(at));
-            L::store_int(who, rows.as_mut_ptr().add(at).cast());
+            who.store(rows.as_mut_ptr().add(at).cast());
         }
     }
 }
@@ -253,9 +245,9 @@ pub(in crate::kernel) unsafe fn fps_step<L: Lanes>(
     let mut who = [i32::MAX; 16];
     // SAFETY: whole vectors of all; 16 lanes at most.
     unsafe {
-        let (mut most, mut at_most) = (L::splat(-1.0), L::splat_int(0));
+        let (mut most, mut at_most) = (L::splat(-1.0), L::Int::splat(0));
         let mut index =
-            L::load_int([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15].as_ptr());
+            L::Int::load([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15].as_ptr());
         let from = |axis: &[f32], at, pick| L::load(axis.as_ptr().add(at)).sub(L::splat(pick));
         for at in (0..whole).step_by(L::N) {
             let (dx, dy, dz) = (
@@ -267,24 +259,18 @@ pub(in crate::kernel) unsafe fn fps_step<L: Lanes>(
             let nearest = squared.min(L::load(distance.as_ptr().add(at)));
             nearest.store(distance.as_mut_ptr().add(at));
             nearest.keep_greater(&mut most, &mut at_most, index);
-            index = L::add_int(index, L::splat_int(L::N as i32));
+            index = index.add(L::Int::splat(L::N as i32));
         }
         most.store(best.as_mut_ptr());
-        L::store_int(at_most, who.as_mut_ptr());
+        at_most.store(who.as_mut_ptr());
     }
     let lanes = best.into_iter().zip(who);
-    let (mut largest, first) = lanes.fold((-1.0, i32::MAX), |found, lane| {
+    let (largest, first) = lanes.fold((-1.0, i32::MAX), |found, lane| {
         let better = lane.0 > found.0 || (lane.0 == found.0 && lane.1 < found.1);
         if better { lane } else { found }
     });
-    let mut farthest = if whole == 0 { 0 } else { first as usize };
-    for i in whole..n {
-        let [dx, dy, dz] = [cloud.x[i] - pick[0], cloud.y[i] - pick[1], cloud.z[i] - pick[2]];
-        let squared = (dx * dx + dy * dy) + dz * dz;
-        distance[i] = if squared < distance[i] { squared } else { distance[i] };
-        if distance[i] > largest {
-            (largest, farthest) = (distance[i], i);
-        }
-    }
-    farthest
+    let rest = Soa { x: &cloud.x[whole..], y: &cloud.y[whole..], z: &cloud.z[whole..] };
+    let rest = whole + scalar::fps_step(rest, pick, &mut distance[whole..]);
+    let is_farther = distance.get(rest).is_some_and(|&distance| distance > largest);
+    if is_farther || whole == 0 { rest } else { first as usize }
 }

@@ -1,0 +1,36 @@
+//! A hash map that is the same in every run, keeps its memory when it is cleared,
+//! and takes little time beside that of memory.
+
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// Numbers by their keys.
+pub type Map<K> = HashMap<K, u32, BuildHasherDefault<Fold>>;
+
+/// Empties `map` and makes room for `n` keys.
+pub fn reset<K: Eq + std::hash::Hash>(map: &mut Map<K>, n: usize) {
+    map.clear();
+    map.reserve(n);
+}
+
+/// Multiplies words and folds the products' halves, so that every bit of a key
+/// reaches every bit of the hash.
+#[derive(Default)]
+pub struct Fold(u64);
+
+impl Hasher for Fold {
+    #[inline]
+    fn write(&mut self, bytes: &[u8]) {
+        for part in bytes.chunks(size_of::<u64>()) {
+            let mut word = [0; size_of::<u64>()];
+            word[..part.len()].copy_from_slice(part);
+            // 2^64 over the golden ratio (Knuth, TAOCP 3, §6.4).
+            let product = u128::from(self.0 ^ u64::from_le_bytes(word)) * 0x9E37_79B9_7F4A_7C15;
+            self.0 = (product >> 64) as u64 ^ product as u64;
+        }
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
