@@ -1,17 +1,10 @@
-//! Wavefront OBJ, through the crate tobj.
-//!
-//! tobj sees positions and faces only: groups, materials, normals and texture
-//! coordinates have no part in where a beam ends, and yet would split the mesh
-//! into models of their own vertices, or fail it. The lines keep their numbers
-//! on the way, so that an error can name its line.
-
-use std::io::{BufRead, BufReader};
+//! Wavefront OBJ: its positions and its faces. Groups, materials, normals and
+//! texture coordinates have no part in where a beam ends.
 
 use glam::DVec3;
-use tobj::{LoadError, LoadOptions};
 
-use super::error::{Malformed, ParseError, excerpt};
-use super::line_feeder::LineFeeder;
+use super::error::{Malformed, ParseError};
+use super::tokens::{coordinate, integer};
 use super::triangle_mesh::{Mesh, Parsed};
 
 /// Reads an OBJ file from its bytes.
@@ -20,195 +13,131 @@ use super::triangle_mesh::{Mesh, Parsed};
 /// order in which they are first named. Polygons become fans around their
 /// first corner; faces of fewer than three corners are dropped and counted.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let geometry = Geometry::of(bytes)?;
-    let options = LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..LoadOptions::default()
-    };
-    let mut feeder = LineFeeder::new(&geometry.text);
-    let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
-    let models = tobj::load_obj_buf(&mut BufReader::new(&mut feeder), &options, no_materials);
-    let models = match models {
-        Ok((models, _)) => models,
-        Err(error) => return Err(geometry.blame(error, feeder.line())),
-    };
-    let mut parsed = Parsed { dropped_faces: geometry.dropped_faces, ..Parsed::default() };
-    for model in models {
-        append(&mut parsed.mesh, &model.mesh);
-    }
-    Ok(parsed)
-}
-
-fn append(mesh: &mut Mesh, model: &tobj::Mesh) {
-    let base = mesh.vertices.len() as u32;
-    mesh.vertices.extend(model.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
-    let corners = model.indices.as_chunks::<3>().0;
-    mesh.triangles.extend(corners.iter().map(|corners| corners.map(|index| base + index)));
-}
-
-/// The positions and faces of an OBJ file, each on the line it came from.
-struct Geometry {
-    text: Vec<u8>,
-    n_vertices: u64,
-    dropped_faces: usize,
-}
-
-impl Geometry {
-    fn of(bytes: &[u8]) -> Result<Self, ParseError> {
-        let mut geometry =
-            Self { text: Vec::with_capacity(bytes.len()), n_vertices: 0, dropped_faces: 0 };
-        let mut lines = bytes.split(|&byte| byte == b'\n').enumerate();
-        while let Some((number, line)) = lines.next() {
-            let mut line = line.trim_ascii_end();
-            let mut joined = Vec::new();
-            let mut n_lines = 1;
-            // A backslash at its end continues a line on the next one.
-            while let Some(head) = line.strip_suffix(b"\\").filter(|_| !line.starts_with(b"#")) {
-                joined.extend_from_slice(head);
-                joined.push(b' ');
-                line = lines.next().map_or(b"", |(_, line)| line.trim_ascii_end());
-                n_lines += 1;
-            }
-            if !joined.is_empty() {
-                joined.extend_from_slice(line);
-                line = &joined;
-            }
-            geometry.add(line).map_err(|cause| cause.at(number + 1))?;
-            geometry.text.resize(geometry.text.len() + n_lines, b'\n');
+    let mut obj = Obj::default();
+    let mut lines = bytes.split(|&byte| byte == b'\n').zip(1..);
+    while let Some((line, number)) = lines.next() {
+        let mut line = line.trim_ascii_end();
+        let mut joined = Vec::new();
+        // A backslash at its end continues a line on the next one.
+        while let Some(head) = line.strip_suffix(b"\\").filter(|_| !line.starts_with(b"#")) {
+            joined.extend_from_slice(head);
+            joined.push(b' ');
+            line = lines.next().map_or(b"", |(line, _)| line.trim_ascii_end());
         }
-        Ok(geometry)
+        if !joined.is_empty() {
+            joined.extend_from_slice(line);
+            line = &joined;
+        }
+        obj.add(line, number).map_err(|cause| cause.at(number))?;
     }
+    obj.finish()
+}
 
-    fn add(&mut self, line: &[u8]) -> Result<(), Malformed> {
+/// What was read so far.
+#[derive(Default)]
+struct Obj {
+    /// Its vertices are all positions of the file.
+    parsed: Parsed,
+    /// Indices as written that named no position when they were read, with the
+    /// line and the position they stand for: it may still follow.
+    ahead: Vec<(usize, i64, i64)>,
+}
+
+impl Obj {
+    fn add(&mut self, line: &[u8], number: usize) -> Result<(), Malformed> {
         let data = line.split(|&byte| byte == b'#').next().unwrap_or_default();
         let mut words = data.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-        match words.next() {
-            Some(b"v") => self.add_position(&words.collect::<Vec<_>>()),
-            Some(b"f") => {
-                self.add_face(words);
-                Ok(())
-            }
+        let keyword = words.next();
+        let words: Vec<_> = words.collect();
+        match keyword {
+            Some(b"v") => self.add_position(&words),
+            Some(b"f") => self.add_face(&words, number),
             _ => Ok(()),
         }
     }
 
     /// x, y, z and, if nothing but it follows, the weight; colours are left out.
     fn add_position(&mut self, words: &[&[u8]]) -> Result<(), Malformed> {
-        self.n_vertices += 1;
-        let kept = if words.len() == 4 { words } else { &words[..words.len().min(3)] };
-        self.text.push(b'v');
-        for word in kept {
-            // tobj takes words such as "nan" for numbers.
-            if word.iter().any(|byte| matches!(byte, b'n' | b'N')) {
-                return Err(Malformed::NotFinite { found: excerpt(word) });
+        let &[x, y, z, ref others @ ..] = words else {
+            let cause = format!("expected 3 coordinates of a vertex, found {}", words.len());
+            return Err(Malformed::Syntax(cause));
+        };
+        let mut position = DVec3::new(coordinate(x)?, coordinate(y)?, coordinate(z)?);
+        if let [weight] = others {
+            let divisor = coordinate(weight)?;
+            if divisor == 0.0 {
+                return Err(Malformed::expected("a weight other than 0", weight));
             }
-            self.text.push(b' ');
-            self.text.extend_from_slice(word);
+            position /= divisor;
         }
+        self.parsed.mesh.vertices.push(position);
         Ok(())
     }
 
-    /// The indices into the positions: what stands before a slash.
-    fn add_face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>) {
-        let start = self.text.len();
-        self.text.push(b'f');
-        let mut n_corners = 0;
-        for word in words {
-            self.text.push(b' ');
-            let position = word.split(|&byte| byte == b'/').next().unwrap_or_default();
-            // Left out, it would change the number of corners in silence.
-            self.text.extend_from_slice(if position.is_empty() { b"?" } else { position });
-            n_corners += 1;
+    /// A corner's position is what stands before its first slash: counted from
+    /// 1, or from -1 backwards.
+    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), Malformed> {
+        let n_positions = self.parsed.mesh.vertices.len() as i64;
+        let mut corners = Vec::with_capacity(words.len());
+        for word in words.iter().filter(|_| words.len() >= 3) {
+            let index = word.split(|&byte| byte == b'/').next().unwrap_or_default();
+            let index = integer(index, "a vertex index")?;
+            let position = if index < 0 { n_positions.saturating_add(index) } else { index - 1 };
+            if !(0..n_positions).contains(&position) {
+                self.ahead.push((line, index, position));
+            }
+            corners.push(position as u32);
         }
-        if n_corners < 3 {
-            self.text.truncate(start);
-            self.dropped_faces += 1;
-        }
+        self.parsed.add_face(&corners);
+        Ok(())
     }
 
-    /// tobj's error in our words, with the line it is about: `last_line`,
-    /// unless tobj finds out only after the last line.
-    fn blame(&self, error: LoadError, last_line: usize) -> ParseError {
-        match error {
-            LoadError::FaceVertexOutOfBounds => self.first_out_of_range(),
-            _ => {
-                let line = self.text.split(|&byte| byte == b'\n').nth(last_line - 1);
-                let line = excerpt(line.unwrap_or_default());
-                Malformed::Syntax(format!("{error} in {line:?}")).at(last_line)
-            }
+    /// Checks the indices against all positions, and keeps the vertices that
+    /// faces name.
+    fn finish(self) -> Result<Parsed, ParseError> {
+        let Mesh { vertices, triangles } = self.parsed.mesh;
+        let is_missing = |position: i64| !(0..vertices.len() as i64).contains(&position);
+        if let Some(&(line, index, _)) = self.ahead.iter().find(|ahead| is_missing(ahead.2)) {
+            let (found, n_vertices) = (index.to_string(), vertices.len() as u64);
+            return Err(Malformed::IndexOutOfRange { found, n_vertices }.at(line));
         }
-    }
-
-    /// The first face with an index that is 0, or beyond the positions (all of
-    /// the file for one counted from the start, those above it for one counted
-    /// backwards).
-    fn first_out_of_range(&self) -> ParseError {
-        let mut above = 0;
-        for (number, line) in self.text.lines().map_while(Result::ok).enumerate() {
-            above += i128::from(line.starts_with('v'));
-            for word in line.split(' ').skip(1).filter(|_| line.starts_with('f')) {
-                let index: i128 = word.parse().unwrap_or_default();
-                let n_vertices = i128::from(self.n_vertices);
-                if index == 0 || index > n_vertices || -index > above {
-                    let cause = Malformed::IndexOutOfRange {
-                        found: word.to_owned(),
-                        n_vertices: self.n_vertices,
-                    };
-                    return cause.at(number + 1);
-                }
-            }
-        }
-        Malformed::Syntax(LoadError::FaceVertexOutOfBounds.to_string()).into()
+        let mesh = Mesh::of_named(triangles, vertices.len(), |position| vertices[position]);
+        Ok(Parsed { mesh, ..self.parsed })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::{fails, is_the_triangle};
     use super::*;
 
     const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 
-    fn read(text: &str) -> Result<Parsed, ParseError> {
-        parse(text.as_bytes())
-    }
-
-    #[track_caller]
-    fn is_the_triangle(text: &str) {
-        let mesh = read(text).expect(text).mesh;
-        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y], "{text:?}");
-        assert_eq!(mesh.triangles, [[0, 1, 2]], "{text:?}");
-    }
-
-    #[track_caller]
-    fn fails(text: &str, line: usize, message: &str) {
-        let error = read(text).expect_err(text);
-        assert_eq!(error.to_string(), format!("line {line}: {message}"), "{text:?}");
-    }
-
     #[test]
     fn indices_count_from_either_end_and_may_have_companions() {
-        is_the_triangle(&format!("{CORNERS}f 1 2 3\n"));
-        is_the_triangle(&format!("{CORNERS}f -3 -2 -1\n"));
-        is_the_triangle(&format!("{CORNERS}vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\n"));
+        is_the_triangle(parse, format!("{CORNERS}f 1 2 3\n"));
+        is_the_triangle(parse, format!("{CORNERS}f -3 -2 -1\n"));
+        is_the_triangle(parse, format!("{CORNERS}vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\n"));
         // Companions that point nowhere have no part in a beam's way.
-        is_the_triangle(&format!("{CORNERS}vt bad\nf 1/7/-9 2//8 3/-5\n"));
+        is_the_triangle(parse, format!("{CORNERS}vt bad\nf 1/7/-9 2//8 3/-5\n"));
     }
 
     #[test]
     fn weights_divide_and_colours_are_ignored() {
-        is_the_triangle("v 0 0 0 2\nv 2 0 0 2\nv 0 .5 0 .5\nf 1 2 3");
-        is_the_triangle("v 0 0 0 1 .5 0\nv 1 0 0 1 2 3 4\nv 0 1 0 9 9\nf 1 2 3");
+        is_the_triangle(parse, "v 0 0 0 2\nv 2 0 0 2\nv 0 .5 0 .5\nf 1 2 3");
+        is_the_triangle(parse, "v 0 0 0 1 .5 0\nv 1 0 0 1 2 3 4\nv 0 1 0 9 9\nf 1 2 3");
     }
 
     #[test]
     fn line_ends_comments_and_continuations_do_not_matter() {
-        is_the_triangle(&format!("# C:\\meshes\\\n{CORNERS}f 1 2 3 # 4").replace('\n', "\r\n"));
-        is_the_triangle(&format!("{CORNERS}f 1 \\\n2 \\\r\n3\n"));
+        is_the_triangle(
+            parse,
+            format!("# C:\\meshes\\\n{CORNERS}f 1 2 3 # 4").replace('\n', "\r\n"),
+        );
+        is_the_triangle(parse, format!("{CORNERS}f 1 \\\n2 \\\r\n3\n"));
         let mut latin = b"# na\xEFve\no caf\xE9\n".to_vec();
         latin.extend_from_slice(format!("{CORNERS}f 1 2 3\n").as_bytes());
-        assert!(parse(&latin).is_ok());
+        is_the_triangle(parse, latin);
     }
 
     #[test]
@@ -216,7 +145,7 @@ mod tests {
         let text = format!(
             "mtllib none.mtl\no a\n{CORNERS}usemtl red\nf 1 2 3\ng b\nusemtl\nv 0 0 1\nf 1 3 4\n"
         );
-        let mesh = read(&text).unwrap().mesh;
+        let mesh = parse(text.as_bytes()).unwrap().mesh;
         assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
     }
@@ -224,24 +153,26 @@ mod tests {
     #[test]
     fn polygons_become_fans_and_smaller_faces_are_counted() {
         let text = format!("{CORNERS}v 0 0 1\nv 1 1 1\nf 1 2 3 4 5\nf 1\nf 2 3\nl 1 2\np 1\n");
-        let parsed = read(&text).unwrap();
+        let parsed = parse(text.as_bytes()).unwrap();
         assert_eq!(parsed.mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
         assert_eq!(parsed.dropped_faces, 2);
     }
 
     #[test]
     fn errors_name_their_line() {
-        let out_of_range = |index| format!("index {index} is out of range: there are 3 vertices");
-        for index in ["4", "0", "-4"] {
-            let text = format!("{CORNERS}f 1 2 3\n\nf 1 2 {index}\n");
-            fails(&text, 6, &out_of_range(index));
-        }
-        fails(&format!("f -1 -1 -1\n{CORNERS}"), 1, &out_of_range("-1"));
-        fails(&format!("{CORNERS}f 1 /2 3\n"), 4, "face parse error in \"f 1 ? 3\"");
-        fails("v 0 0\n", 1, "position parse error in \"v 0 0\"");
-        fails("#\nv 0 x 0\n", 2, "position parse error in \"v 0 x 0\"");
-        fails("v 1 1 1 0\n", 1, "scaling (w) by zero in \"v 1 1 1 0\"");
-        fails("\n\nv 0 NaN 0\n", 3, "coordinate NaN is not finite");
-        fails("v 0 -inf 0\n", 1, "coordinate -inf is not finite");
+        let bad_lines = [
+            ("\nf 1 2 4\n", "line 5: index 4 is out of range: there are 3 vertices"),
+            ("f 1 2 3\n\nf 1 2 0\n", "line 6: index 0 is out of range: there are 3 vertices"),
+            ("f 1 2 -4\n", "line 4: index -4 is out of range: there are 3 vertices"),
+            ("f 1 /2 3\n", "line 4: expected a vertex index, found \"\""),
+            ("v 0 0\n", "line 4: expected 3 coordinates of a vertex, found 2"),
+            ("#\nv 0 x 0\n", "line 5: expected a finite coordinate, found \"x\""),
+            ("v 1 1 1 0\n", "line 4: expected a weight other than 0, found \"0\""),
+            ("\n\nv 0 NaN 0\n", "line 6: expected a finite coordinate, found \"NaN\""),
+            ("v 0 -inf 0\n", "line 4: expected a finite coordinate, found \"-inf\""),
+        ];
+        fails(parse, bad_lines.map(|(lines, message)| (format!("{CORNERS}{lines}"), message)));
+        let too_early = "line 1: index -1 is out of range: there are 3 vertices";
+        fails(parse, [(format!("f -1 -1 -1\n{CORNERS}"), too_early)]);
     }
 }
