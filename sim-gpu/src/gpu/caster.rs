@@ -116,11 +116,7 @@ impl GpuCaster {
         let mut parts = Vec::new();
         for (at, job) in jobs.iter().enumerate() {
             if !core.limits.holds(&job.target) {
-                return Err(CastError::TooLarge {
-                    name: core.summary.name.clone(),
-                    nodes: job.target.bvh.nodes.len(),
-                    binding_bytes: core.limits.binding_bytes,
-                });
+                return Err(self.too_large(job));
             }
             let mut start = 0;
             while start < job.rays.len() {
@@ -137,6 +133,14 @@ impl GpuCaster {
         pending.dispatch(batch, parts);
         core.check()?;
         Ok(pending)
+    }
+
+    fn too_large(&self, job: &CastJob) -> CastError {
+        CastError::TooLarge {
+            name: self.core.summary.name.clone(),
+            nodes: job.target.bvh.nodes.len(),
+            binding_bytes: self.core.limits.binding_bytes,
+        }
     }
 }
 
@@ -263,25 +267,30 @@ mod tests {
     }
 
     #[test]
-    fn jobs_cut_into_many_dispatches_answer_as_in_one() {
+    fn rays_cut_into_many_dispatches_answer_as_in_one() {
         let mut caster = need!(caster());
         let jobs = jobs();
         let whole = caster.submit(&jobs).unwrap().wait().unwrap();
         assert_eq!(whole.iter().map(|cast| cast.codes.len()).sum::<usize>(), 50_000);
-        let BatchLimits { binding_bytes, rays } = *caster.limits();
-        let mut n_dispatches = |rays, binding_bytes| {
-            Arc::get_mut(&mut caster.core).unwrap().limits = BatchLimits { binding_bytes, rays };
-            let pending = caster.submit(&jobs).unwrap();
-            let n = pending.dispatches.len();
-            assert_eq!(pending.wait().unwrap(), whole, "{rays} rays, {binding_bytes} bytes");
-            n
-        };
         // Less than a workgroup, not a multiple of one, less than a job, more.
         for rays in [40, 1000, 6400, 25_001] {
-            assert!(n_dispatches(rays, binding_bytes) >= 50_000 / rays);
+            Arc::get_mut(&mut caster.core).unwrap().limits.rays = rays;
+            let pending = caster.submit(&jobs).unwrap();
+            assert!(pending.dispatches.len() >= 50_000 / rays);
+            assert_eq!(pending.wait().unwrap(), whole, "{rays} rays a dispatch");
         }
+    }
+
+    #[test]
+    fn targets_that_fill_a_binding_are_parted() {
+        let mut caster = need!(caster());
+        let jobs = jobs();
+        let whole = caster.submit(&jobs).unwrap().wait().unwrap();
         // Four triangles of 48 bytes each: room for two targets.
-        assert_eq!(n_dispatches(rays, 2 * 4 * 48), 3);
+        Arc::get_mut(&mut caster.core).unwrap().limits.binding_bytes = 2 * 4 * 48;
+        let pending = caster.submit(&jobs).unwrap();
+        assert_eq!(pending.dispatches.len(), 3);
+        assert_eq!(pending.wait().unwrap(), whole);
     }
 
     #[test]
