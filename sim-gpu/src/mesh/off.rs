@@ -122,25 +122,25 @@ mod tests {
         for header in
             ["OFF\n3 1 0\n", "OFF3 1 0\n", "OFF 3 1 0\n", "OFF\n3 1\n", "OFF3 1\n", "off\n3 1 3\n"]
         {
-            is_the_triangle(parse, &format!("{header}{TRIANGLE}"));
+            is_the_triangle(parse, format!("{header}{TRIANGLE}"));
         }
-        is_the_triangle(parse, &format!("\u{FEFF}OFF\n3 1 0\n{TRIANGLE}"));
+        is_the_triangle(parse, format!("\u{FEFF}OFF\n3 1 0\n{TRIANGLE}"));
         is_the_triangle(
             parse,
-            &format!("\n # made by hand\n\nOFF # keyword\n\n# counts\n3 1 0\n{TRIANGLE}"),
+            format!("\n # made by hand\n\nOFF # keyword\n\n# counts\n3 1 0\n{TRIANGLE}"),
         );
     }
 
     #[test]
     fn line_ends_comments_and_blank_lines_do_not_matter() {
         let text = format!("OFF\n3 1 0\n{TRIANGLE}");
-        is_the_triangle(parse, &text.replace('\n', "\r\n"));
-        is_the_triangle(parse, &text.replace('\n', "\r"));
-        is_the_triangle(parse, &text.replace('\n', " \t\n"));
-        is_the_triangle(parse, &text.replace('\n', "\n\n  \n"));
-        is_the_triangle(parse, &text.replace('\n', " # 4 5 6\n# 7\n"));
+        is_the_triangle(parse, text.replace('\n', "\r\n"));
+        is_the_triangle(parse, text.replace('\n', "\r"));
+        is_the_triangle(parse, text.replace('\n', " \t\n"));
+        is_the_triangle(parse, text.replace('\n', "\n\n  \n"));
+        is_the_triangle(parse, text.replace('\n', " # 4 5 6\n# 7\n"));
         is_the_triangle(parse, text.trim_end());
-        is_the_triangle(parse, &format!("{text}\n# the end\n17 trailing tokens\n"));
+        is_the_triangle(parse, format!("{text}\n# the end\n17 trailing tokens\n"));
     }
 
     #[test]
