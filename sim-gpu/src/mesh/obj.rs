@@ -1,10 +1,16 @@
-//! Wavefront OBJ: its positions and its faces. Groups, materials, normals and
-//! texture coordinates have no part in where a beam ends.
+//! Wavefront OBJ, through the crate tobj.
+//!
+//! tobj sees positions and faces only: groups, materials, normals and texture
+//! coordinates have no part in where a beam ends, and yet would split the mesh
+//! into models of their own vertices, or fail it. The lines keep their numbers
+//! on the way, so that an error can name its line.
+
+use std::io::{BufRead, Cursor};
 
 use glam::DVec3;
+use tobj::{LoadError, LoadOptions};
 
-use super::error::{Malformed, ParseError};
-use super::tokens::{coordinate, integer};
+use super::error::{Malformed, ParseError, excerpt};
 use super::triangle_mesh::{Mesh, Parsed};
 
 /// Reads an OBJ file from its bytes.
@@ -13,96 +19,147 @@ use super::triangle_mesh::{Mesh, Parsed};
 /// order in which they are first named. Polygons become fans around their
 /// first corner; faces of fewer than three corners are dropped and counted.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let mut obj = Obj::default();
-    let mut lines = bytes.split(|&byte| byte == b'\n').zip(1..);
-    while let Some((line, number)) = lines.next() {
-        let mut line = line.trim_ascii_end();
-        let mut joined = Vec::new();
-        // A backslash at its end continues a line on the next one.
-        while let Some(head) = line.strip_suffix(b"\\").filter(|_| !line.starts_with(b"#")) {
-            joined.extend_from_slice(head);
-            joined.push(b' ');
-            line = lines.next().map_or(b"", |(line, _)| line.trim_ascii_end());
-        }
-        if !joined.is_empty() {
-            joined.extend_from_slice(line);
-            line = &joined;
-        }
-        obj.add(line, number).map_err(|cause| cause.at(number))?;
+    let geometry = Geometry::of(bytes)?;
+    let options = LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..LoadOptions::default()
+    };
+    let mut text = Cursor::new(&geometry.text);
+    let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
+    let models = match tobj::load_obj_buf(&mut text, &options, no_materials) {
+        Ok((models, _)) => models,
+        Err(error) => return Err(geometry.blame(error, text.position() as usize)),
+    };
+    let mut parsed = Parsed { dropped_faces: geometry.dropped_faces, ..Parsed::default() };
+    for model in models {
+        append(&mut parsed.mesh, &model.mesh);
     }
-    obj.finish()
+    Ok(parsed)
 }
 
-/// What was read so far.
-#[derive(Default)]
-struct Obj {
-    /// Its vertices are all positions of the file.
-    parsed: Parsed,
-    /// Indices as written that named no position when they were read, with the
-    /// line and the position they stand for: it may still follow.
-    ahead: Vec<(usize, i64, i64)>,
+fn append(mesh: &mut Mesh, model: &tobj::Mesh) {
+    let base = mesh.vertices.len() as u32;
+    mesh.vertices.extend(model.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
+    let corners = model.indices.as_chunks::<3>().0;
+    mesh.triangles.extend(corners.iter().map(|corners| corners.map(|index| base + index)));
 }
 
-impl Obj {
-    fn add(&mut self, line: &[u8], number: usize) -> Result<(), Malformed> {
+/// The positions and faces of an OBJ file, each on the line it came from.
+struct Geometry {
+    text: Vec<u8>,
+    n_vertices: u64,
+    dropped_faces: usize,
+}
+
+impl Geometry {
+    fn of(bytes: &[u8]) -> Result<Self, ParseError> {
+        let mut geometry =
+            Self { text: Vec::with_capacity(bytes.len()), n_vertices: 0, dropped_faces: 0 };
+        let mut lines = bytes.split(|&byte| byte == b'\n').enumerate();
+        while let Some((number, line)) = lines.next() {
+            let mut line = line.trim_ascii_end();
+            let mut joined = Vec::new();
+            let mut n_lines = 1;
+            // A backslash at its end continues a line on the next one.
+            while let Some(head) = line.strip_suffix(b"\\").filter(|_| !line.starts_with(b"#")) {
+                joined.extend_from_slice(head);
+                joined.push(b' ');
+                line = lines.next().map_or(b"", |(_, line)| line.trim_ascii_end());
+                n_lines += 1;
+            }
+            if !joined.is_empty() {
+                joined.extend_from_slice(line);
+                line = &joined;
+            }
+            geometry.add(line).map_err(|cause| cause.at(number + 1))?;
+            geometry.text.resize(geometry.text.len() + n_lines, b'\n');
+        }
+        Ok(geometry)
+    }
+
+    fn add(&mut self, line: &[u8]) -> Result<(), Malformed> {
         let data = line.split(|&byte| byte == b'#').next().unwrap_or_default();
         let mut words = data.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-        let keyword = words.next();
-        let words: Vec<_> = words.collect();
-        match keyword {
-            Some(b"v") => self.add_position(&words),
-            Some(b"f") => self.add_face(&words, number),
+        match words.next() {
+            Some(b"v") => self.add_position(&words.collect::<Vec<_>>()),
+            Some(b"f") => {
+                self.add_face(words);
+                Ok(())
+            }
             _ => Ok(()),
         }
     }
 
     /// x, y, z and, if nothing but it follows, the weight; colours are left out.
     fn add_position(&mut self, words: &[&[u8]]) -> Result<(), Malformed> {
-        let &[x, y, z, ref others @ ..] = words else {
-            let cause = format!("expected 3 coordinates of a vertex, found {}", words.len());
-            return Err(Malformed::Syntax(cause));
-        };
-        let mut position = DVec3::new(coordinate(x)?, coordinate(y)?, coordinate(z)?);
-        if let [weight] = others {
-            let divisor = coordinate(weight)?;
-            if divisor == 0.0 {
-                return Err(Malformed::expected("a weight other than 0", weight));
+        self.n_vertices += 1;
+        let kept = if words.len() == 4 { words } else { &words[..words.len().min(3)] };
+        self.text.push(b'v');
+        for word in kept {
+            // tobj takes words such as "nan" for numbers.
+            if word.iter().any(|byte| matches!(byte, b'n' | b'N')) {
+                return Err(Malformed::expected("a finite coordinate", word));
             }
-            position /= divisor;
+            self.text.push(b' ');
+            self.text.extend_from_slice(word);
         }
-        self.parsed.mesh.vertices.push(position);
         Ok(())
     }
 
-    /// A corner's position is what stands before its first slash: counted from
-    /// 1, or from -1 backwards.
-    fn add_face(&mut self, words: &[&[u8]], line: usize) -> Result<(), Malformed> {
-        let n_positions = self.parsed.mesh.vertices.len() as i64;
-        let mut corners = Vec::with_capacity(words.len());
-        for word in words.iter().filter(|_| words.len() >= 3) {
-            let index = word.split(|&byte| byte == b'/').next().unwrap_or_default();
-            let index = integer(index, "a vertex index")?;
-            let position = if index < 0 { n_positions.saturating_add(index) } else { index - 1 };
-            if !(0..n_positions).contains(&position) {
-                self.ahead.push((line, index, position));
-            }
-            corners.push(position as u32);
+    /// The indices into the positions: what stands before a slash.
+    fn add_face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>) {
+        let start = self.text.len();
+        self.text.push(b'f');
+        let mut n_corners = 0;
+        for word in words {
+            self.text.push(b' ');
+            let position = word.split(|&byte| byte == b'/').next().unwrap_or_default();
+            // Left out, it would change the number of corners in silence.
+            self.text.extend_from_slice(if position.is_empty() { b"?" } else { position });
+            n_corners += 1;
         }
-        self.parsed.add_face(&corners);
-        Ok(())
+        if n_corners < 3 {
+            self.text.truncate(start);
+            self.dropped_faces += 1;
+        }
     }
 
-    /// Checks the indices against all positions, and keeps the vertices that
-    /// faces name.
-    fn finish(self) -> Result<Parsed, ParseError> {
-        let Mesh { vertices, triangles } = self.parsed.mesh;
-        let is_missing = |position: i64| !(0..vertices.len() as i64).contains(&position);
-        if let Some(&(line, index, _)) = self.ahead.iter().find(|ahead| is_missing(ahead.2)) {
-            let (found, n_vertices) = (index.to_string(), vertices.len() as u64);
-            return Err(Malformed::IndexOutOfRange { found, n_vertices }.at(line));
+    /// tobj's error in our words, with the line it is about: the last of the
+    /// `n_read` bytes that tobj took, unless it finds out only after the last line.
+    fn blame(&self, error: LoadError, n_read: usize) -> ParseError {
+        match error {
+            LoadError::FaceVertexOutOfBounds => self.first_out_of_range(),
+            _ => {
+                let lines = self.text[..n_read].split_inclusive(|&byte| byte == b'\n');
+                let (line, number) = lines.zip(1..).last().unwrap_or_default();
+                let line = excerpt(line.trim_ascii_end());
+                Malformed::Syntax(format!("{error} in {line:?}")).at(number)
+            }
         }
-        let mesh = Mesh::of_named(triangles, vertices.len(), |position| vertices[position]);
-        Ok(Parsed { mesh, ..self.parsed })
+    }
+
+    /// The first face with an index that is 0, or beyond the positions (all of
+    /// the file for one counted from the start, those above it for one counted
+    /// backwards).
+    fn first_out_of_range(&self) -> ParseError {
+        let mut above = 0;
+        for (number, line) in self.text.lines().map_while(Result::ok).enumerate() {
+            above += i128::from(line.starts_with('v'));
+            for word in line.split(' ').skip(1).filter(|_| line.starts_with('f')) {
+                let index: i128 = word.parse().unwrap_or_default();
+                let n_vertices = i128::from(self.n_vertices);
+                if index == 0 || index > n_vertices || -index > above {
+                    let cause = Malformed::IndexOutOfRange {
+                        found: word.to_owned(),
+                        n_vertices: self.n_vertices,
+                    };
+                    return cause.at(number + 1);
+                }
+            }
+        }
+        Malformed::Syntax(LoadError::FaceVertexOutOfBounds.to_string()).into()
     }
 }
 
@@ -164,10 +221,10 @@ mod tests {
             ("\nf 1 2 4\n", "line 5: index 4 is out of range: there are 3 vertices"),
             ("f 1 2 3\n\nf 1 2 0\n", "line 6: index 0 is out of range: there are 3 vertices"),
             ("f 1 2 -4\n", "line 4: index -4 is out of range: there are 3 vertices"),
-            ("f 1 /2 3\n", "line 4: expected a vertex index, found \"\""),
-            ("v 0 0\n", "line 4: expected 3 coordinates of a vertex, found 2"),
-            ("#\nv 0 x 0\n", "line 5: expected a finite coordinate, found \"x\""),
-            ("v 1 1 1 0\n", "line 4: expected a weight other than 0, found \"0\""),
+            ("f 1 /2 3\n", "line 4: face parse error in \"f 1 ? 3\""),
+            ("v 0 0\n", "line 4: position parse error in \"v 0 0\""),
+            ("#\nv 0 x 0\n", "line 5: position parse error in \"v 0 x 0\""),
+            ("v 1 1 1 0\n", "line 4: scaling (w) by zero in \"v 1 1 1 0\""),
             ("\n\nv 0 NaN 0\n", "line 6: expected a finite coordinate, found \"NaN\""),
             ("v 0 -inf 0\n", "line 4: expected a finite coordinate, found \"-inf\""),
         ];
