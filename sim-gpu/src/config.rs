@@ -4,7 +4,9 @@
 //! line and column; an [`InvalidValue`] carries the key's path as one would
 //! write it, `object[2].scale`.
 
+use std::fmt;
 use std::io::Read;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -25,7 +27,7 @@ pub enum ConfigError {
         source: std::io::Error,
     },
     /// The file is longer than any configuration is.
-    #[error("{}: longer than {} MiB, so not a configuration file", file.display(), MAX_FILE_BYTES >> 20)]
+    #[error("{}: expected a configuration file of at most {} MiB", file.display(), MAX_FILE_BYTES >> 20)]
     TooLong {
         /// The file as named by the user.
         file: PathBuf,
@@ -47,7 +49,7 @@ pub enum ConfigError {
         invalid: InvalidValue,
     },
     /// A sensor's name is neither built in nor a file.
-    #[error("no sensor \"{name}\": known are {known}; a path to a TOML profile works too")]
+    #[error("expected the path of a TOML profile or one of the sensors {known}, found \"{name}\"")]
     UnknownSensor {
         /// The name that was asked for.
         name: String,
@@ -99,26 +101,35 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, C
     })
 }
 
-/// `value`, if it is neither infinite nor NaN: TOML can write both.
-pub(crate) fn finite(key: &str, value: f64) -> Result<f64, InvalidValue> {
-    if value.is_finite() {
-        return Ok(value);
-    }
-    Err(InvalidValue::new(key, format!("{value} is not a finite number")))
+/// That `value`, if there is one, is neither infinite nor NaN: TOML can write
+/// both.
+pub(crate) fn finite(key: &str, value: impl Into<Option<f64>>) -> Result<(), InvalidValue> {
+    expect(key, value, format_args!("a finite number"), |_| true)
 }
 
-/// `value`, if it is finite and above 0.
-pub(crate) fn positive(key: &str, value: f64) -> Result<f64, InvalidValue> {
-    if finite(key, value)? > 0.0 {
-        return Ok(value);
-    }
-    Err(InvalidValue::new(key, format!("{value} is not above 0")))
+/// That `value`, if there is one, is finite and above 0.
+pub(crate) fn positive(key: &str, value: impl Into<Option<f64>>) -> Result<(), InvalidValue> {
+    expect(key, value, format_args!("a number above 0"), |value| value > 0.0)
 }
 
-/// `value`, if it is finite and lies in `from..=to`.
-pub(crate) fn within(key: &str, value: f64, from: f64, to: f64) -> Result<f64, InvalidValue> {
-    if (from..=to).contains(&finite(key, value)?) {
-        return Ok(value);
+/// That `value`, if there is one, is finite and lies in `range`.
+pub(crate) fn within(
+    key: &str,
+    value: impl Into<Option<f64>>,
+    range: RangeInclusive<f64>,
+) -> Result<(), InvalidValue> {
+    let expected = format_args!("a number within {range:?}");
+    expect(key, value, expected, |value| range.contains(&value))
+}
+
+fn expect(
+    key: &str,
+    value: impl Into<Option<f64>>,
+    expected: fmt::Arguments<'_>,
+    is_fit: impl Fn(f64) -> bool,
+) -> Result<(), InvalidValue> {
+    match value.into().filter(|&value| !value.is_finite() || !is_fit(value)) {
+        None => Ok(()),
+        Some(found) => Err(InvalidValue::new(key, format!("expected {expected}, found {found}"))),
     }
-    Err(InvalidValue::new(key, format!("{value} is not within {from}..={to}")))
 }

@@ -196,8 +196,8 @@ impl Effects {
             && quantum.step_m.is_none()
         {
             quantum.step_m = Some(sensor.range.quantum_m.ok_or_else(|| {
-                let cause =
-                    format!("sensor \"{}\" has no range.quantum_m; state metres", sensor.name);
+                let name = &sensor.name;
+                let cause = format!("expected metres, as sensor \"{name}\" has no range.quantum_m");
                 InvalidValue::new("effects.quantise_m", cause)
             })?);
         }
@@ -211,17 +211,14 @@ impl Effects {
     /// On the first number that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
         if let Some(noise) = self.noise {
-            within("effects.noise.mean_m", noise.mean_m, -LARGEST_M, LARGEST_M)?;
-            within("effects.noise.sigma_m", noise.sigma_m, 0.0, LARGEST_M)?;
+            within("effects.noise.mean_m", noise.mean_m, -LARGEST_M..=LARGEST_M)?;
+            within("effects.noise.sigma_m", noise.sigma_m, 0.0..=LARGEST_M)?;
         }
-        if let Some(dropout) = self.dropout {
-            within("effects.dropout.probability", dropout.probability, 0.0, 1.0)?;
-        }
-        if let Some(Quantum { step_m: Some(step_m) }) = self.quantum {
-            positive("effects.quantise_m", step_m)?;
-            within("effects.quantise_m", step_m, 0.0, LARGEST_M)?;
-        }
-        Ok(())
+        let probability = self.dropout.map(|dropout| dropout.probability);
+        within("effects.dropout.probability", probability, 0.0..=1.0)?;
+        let step_m = self.quantum.and_then(|quantum| quantum.step_m);
+        positive("effects.quantise_m", step_m)?;
+        within("effects.quantise_m", step_m, 0.0..=LARGEST_M)
     }
 }
 
@@ -240,7 +237,10 @@ struct EffectsTable {
 }
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(untagged, expecting = "quantise_m takes metres, or true for the sensor's own quantum")]
+#[serde(
+    untagged,
+    expecting = "expected metres as quantise_m, or true for the sensor's own quantum"
+)]
 enum SwitchOrMetres {
     Switch(bool),
     Metres(f64),

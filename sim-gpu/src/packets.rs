@@ -19,7 +19,7 @@ pub fn attributes(effects: &Effects) -> AttributeSet {
 /// the axis, at azimuths that are whole units when a sequence starts.
 ///
 /// # Errors
-/// A sensor that is no VLP-32C, or whose scans its packets cannot tell.
+/// A sensor that is not a VLP-32C, or whose scans its packets cannot tell.
 pub fn as_packets_tell(sensor: &Sensor) -> Result<Sensor, InvalidValue> {
     let mut sensor = sensor.clone();
     if let Layout::Rotating(rotating) = &mut sensor.layout {
@@ -49,7 +49,7 @@ pub fn revolution(sensor: &Sensor) -> Result<Revolution, InvalidValue> {
     if sensor.sample.is_some() {
         return Err(no_packets("sample", "draws from the beams"));
     }
-    within("range.max_m", sensor.range.max_m, 0.0, FARTHEST_M)?;
+    within("range.max_m", sensor.range.max_m, 0.0..=FARTHEST_M)?;
     // Fewer than the patterns' limit of 2^26.
     Ok(Revolution { rpm: rotating.rpm, n_beams: rotating.rays_per_revolution() as u32 })
 }
@@ -73,23 +73,22 @@ fn check_head(rotating: &Rotating) -> Result<(), InvalidValue> {
         unreachable!("invariant: the built-in vlp32c rotates");
     };
     if rotating.sequence_us != SEQUENCE_US {
-        let cause = format!("{} is not its {SEQUENCE_US}", rotating.sequence_us);
+        let cause = format!("expected {SEQUENCE_US}, found {}", rotating.sequence_us);
         return Err(no_packets("rotating.sequence_us", cause));
     }
     let (found, expected) = (rotating.firing_order(), vlp32c.firing_order());
     if found.len() != expected.len() {
-        let cause = format!("{} beams, not its {}", found.len(), expected.len());
+        let cause = format!("expected {} beams, found {}", expected.len(), found.len());
         return Err(no_packets("rotating.beam", cause));
     }
     let differs =
         |&(&found, &expected): &(&usize, &usize)| rotating.beam[found] != vlp32c.beam[expected];
     if let Some((found, expected)) = found.iter().zip(&expected).find(differs) {
-        let cause = format!("is not its laser {expected}, which decoders take it for");
+        let cause = format!("expected laser {expected} of a VLP-32C, which decoders take it for");
         return Err(no_packets(format!("rotating.beam[{found}]"), cause));
     }
     // VLP-32C User Manual 63-9325, 8.3.
-    within("rotating.rpm", rotating.rpm, 300.0, 1200.0)?;
-    Ok(())
+    within("rotating.rpm", rotating.rpm, 300.0..=1200.0)
 }
 
 /// That beams start and point as packets tell.
@@ -98,8 +97,9 @@ fn check_aim(rotating: &Rotating) -> Result<(), InvalidValue> {
         if found == expected {
             return Ok(());
         }
-        let said = |value: Option<f64>| value.map_or("none".to_owned(), |value| value.to_string());
-        Err(no_packets(key, format!("{} is not its {}", said(found), said(expected))))
+        let written =
+            |value: Option<f64>| value.map_or("none".to_owned(), |value| value.to_string());
+        Err(no_packets(key, format!("expected {}, found {}", written(expected), written(found))))
     };
     expect("rotating.beam_crossing_m", rotating.beam_crossing_m, Some(BEAM_CROSSING_M))?;
     expect("rotating.azimuth_quantum_deg", rotating.azimuth_quantum_deg, None)?;
@@ -108,5 +108,5 @@ fn check_aim(rotating: &Rotating) -> Result<(), InvalidValue> {
 }
 
 fn no_packets(key: impl Into<String>, cause: impl std::fmt::Display) -> InvalidValue {
-    InvalidValue::new(key, format!("{cause}; packets are written for Velodyne's VLP-32C alone"))
+    InvalidValue::new(key, format!("{cause}; packets can be written for Velodyne's VLP-32C only"))
 }

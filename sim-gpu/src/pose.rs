@@ -6,13 +6,12 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use glam::{DAffine3, DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, ConfigError, InvalidValue};
 
-pub use orientation::OrientationKeys;
-pub(crate) use orientation::vector;
+pub(crate) use orientation::PoseKeys;
 
 mod orientation;
 
@@ -38,16 +37,19 @@ impl Pose {
     /// apart that their distance overflows.
     pub fn look_at(position_m: DVec3, target_m: DVec3) -> Result<Self, InvalidValue> {
         if !position_m.is_finite() {
-            return Err(InvalidValue::new("position_m", "is not finite"));
+            return Err(InvalidValue::new("position_m", "expected finite numbers"));
         }
         let to_target = target_m - position_m;
         if to_target == DVec3::ZERO {
-            return Err(InvalidValue::new("look_at_m", "is the position itself"));
+            return Err(InvalidValue::new("look_at_m", "expected another point than the position"));
         }
         // Scaled first, so that neither a square overflows nor one vanishes.
         let to_target = to_target / to_target.abs().max_element();
         if !to_target.is_finite() {
-            return Err(InvalidValue::new("look_at_m", "is not finite, or too far away"));
+            return Err(InvalidValue::new(
+                "look_at_m",
+                "expected finite numbers and a distance that f64 holds",
+            ));
         }
         let level = to_target.x.hypot(to_target.y);
         let azimuth_rad = if level == 0.0 { 0.0 } else { (-to_target.y).atan2(-to_target.x) };
@@ -60,20 +62,10 @@ impl Pose {
     /// The azimuth decides how it is turned even at elevation +-90 degrees.
     #[must_use]
     pub fn view(distance_m: f64, elevation_rad: f64, azimuth_rad: f64, target_m: DVec3) -> Self {
-        let (sin_elevation, cos_elevation) = elevation_rad.sin_cos();
-        let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
-        let outwards =
-            DVec3::new(cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation);
         Self {
-            position_m: target_m + distance_m * outwards,
+            position_m: target_m + distance_m * outwards(elevation_rad, azimuth_rad),
             world_from_sensor: facing_inwards(elevation_rad, azimuth_rad),
         }
-    }
-
-    /// The map from the sensor frame to the world frame.
-    #[must_use]
-    pub fn world_from_sensor_affine(&self) -> DAffine3 {
-        DAffine3::from_rotation_translation(self.world_from_sensor, self.position_m)
     }
 }
 
@@ -116,55 +108,38 @@ pub fn ring_of_views(
 ///
 /// Names the file, the pose and the cause.
 pub fn load_poses(file: &Path) -> Result<Vec<Pose>, ConfigError> {
-    let poses: PosesFile = config::read(file)?;
-    poses.validate().map_err(|invalid| invalid.in_file(file))
+    poses(config::read(file)?, file)
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PosesFile {
     #[serde(default)]
-    pose: Vec<PoseTable>,
+    pose: Vec<PoseKeys>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PoseTable {
-    position_m: [f64; 3],
-    look_at_m: Option<[f64; 3]>,
-    yaw_deg: Option<f64>,
-    pitch_deg: Option<f64>,
-    roll_deg: Option<f64>,
-    quaternion_xyzw: Option<[f64; 4]>,
-}
-
-impl PosesFile {
-    fn validate(self) -> Result<Vec<Pose>, InvalidValue> {
-        let tables = self.pose.into_iter().enumerate();
-        tables
-            .map(|(i, table)| {
-                let keys = OrientationKeys {
-                    look_at_m: table.look_at_m,
-                    yaw_deg: table.yaw_deg,
-                    pitch_deg: table.pitch_deg,
-                    roll_deg: table.roll_deg,
-                    quaternion_xyzw: table.quaternion_xyzw,
-                };
-                keys.pose(&format!("pose[{i}]"), table.position_m)
-            })
-            .collect()
-    }
+/// The poses of what stands in `file`.
+fn poses(PosesFile { pose }: PosesFile, file: &Path) -> Result<Vec<Pose>, ConfigError> {
+    let tables = pose.iter().enumerate();
+    let poses: Result<_, InvalidValue> =
+        tables.map(|(i, keys)| keys.pose(&format!("pose[{i}]"))).collect();
+    poses.map_err(|invalid| invalid.in_file(file))
 }
 
 /// The rotation of a sensor that stands at this elevation and azimuth as seen
 /// from its target, and looks at the target with a level left axis.
 fn facing_inwards(elevation_rad: f64, azimuth_rad: f64) -> DQuat {
-    let (sin_elevation, cos_elevation) = elevation_rad.sin_cos();
     let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
-    let forward =
-        DVec3::new(-cos_elevation * cos_azimuth, -cos_elevation * sin_azimuth, -sin_elevation);
+    let forward = -outwards(elevation_rad, azimuth_rad);
     let left = DVec3::new(sin_azimuth, -cos_azimuth, 0.0);
     DQuat::from_mat3(&DMat3::from_cols(forward, left, forward.cross(left))).normalize()
+}
+
+/// The unit vector at this elevation and azimuth.
+fn outwards(elevation_rad: f64, azimuth_rad: f64) -> DVec3 {
+    let (sin_elevation, cos_elevation) = elevation_rad.sin_cos();
+    let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
+    DVec3::new(cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation)
 }
 
 #[cfg(test)]

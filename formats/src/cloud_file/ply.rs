@@ -5,18 +5,19 @@ use std::path::Path;
 
 use super::precision::Precision;
 use crate::error::FormatError;
-use crate::ply::read_vertices;
+use crate::ply::read_elements;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Reads the position of every vertex, with the file's `origin` added.
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut points = Vec::new();
-    let origin = read_vertices(
+    let origin = read_elements(
         reader,
         name,
-        |vertex| AXES.iter().map(|axis| vertex.scalar(axis)).collect(),
-        |row| points.push([row[0], row[1], row[2]]),
+        &["vertex"],
+        |_, vertex| AXES.iter().map(|axis| vertex.scalar(axis)).collect(),
+        |_, row| points.push([row[0], row[1], row[2]]),
     )?;
     if let Some([x, y, z]) = origin {
         points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);

@@ -9,7 +9,7 @@ use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
 
 /// What a header says.
-pub(crate) struct Header {
+pub(super) struct Header {
     /// How the elements follow: as text, or in which byte order.
     pub encoding: Encoding,
     /// What to add to every point, from the comment `origin X Y Z` of scans.
@@ -19,8 +19,8 @@ pub(crate) struct Header {
 }
 
 /// How elements follow the header.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Encoding {
+#[derive(Clone, Copy)]
+pub(super) enum Encoding {
     /// A line each.
     Ascii,
     /// Number after number.
@@ -28,14 +28,14 @@ pub(crate) enum Encoding {
 }
 
 /// A kind of element, of which the file has `n`.
-pub(crate) struct Element {
-    pub name: String,
-    pub n: u64,
-    pub properties: Vec<Property>,
+pub struct Element {
+    pub(super) name: String,
+    pub(super) n: u64,
+    pub(super) properties: Vec<Property>,
 }
 
 /// A property that each element of a kind has.
-pub(crate) struct Property {
+pub(super) struct Property {
     pub name: String,
     /// The type of its number, or of its list's numbers.
     pub number: NumberType,
@@ -45,12 +45,15 @@ pub(crate) struct Property {
 
 impl Element {
     /// Whether it has a property of this name.
-    #[cfg(feature = "dataset")]
+    #[must_use]
     pub fn has(&self, name: &str) -> bool {
         self.properties.iter().any(|property| property.name == name)
     }
 
-    /// The place of the property `name`, or what is wrong with it.
+    /// The place of the property `name`, a number.
+    ///
+    /// # Errors
+    /// If there is no such property, or if it is a list.
     pub fn scalar(&self, name: &str) -> Result<usize, String> {
         let at = self.properties.iter().position(|property| property.name == name);
         match at {
@@ -62,8 +65,24 @@ impl Element {
         }
     }
 
+    /// The place of the first list of one of these names.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn list(&self, names: &[&str]) -> Result<usize, String> {
+        let is_wanted = |p: &Property| p.length.is_some() && names.contains(&p.name.as_str());
+        let at = self.properties.iter().position(is_wanted);
+        at.ok_or_else(|| format!("expected a list called {}", names.join(" or ")))
+    }
+
+    /// Whether the numbers of the property at this place are of type `float`.
+    #[must_use]
+    pub fn is_single(&self, at: usize) -> bool {
+        self.properties[at].number == NumberType::F32
+    }
+
     /// Bytes of a binary element; none if it has a list.
-    pub fn size(&self) -> Option<usize> {
+    pub(super) fn size(&self) -> Option<usize> {
         let size = |property: &Property| match property.length {
             Some(_) => None,
             None => Some(property.number.size()),
@@ -73,7 +92,7 @@ impl Element {
 }
 
 /// Reads a header up to its last line, `end_header`.
-pub(crate) fn read_header<R: BufRead>(
+pub(super) fn read_header<R: BufRead>(
     lines: &mut Lines<'_, R>,
     name: &Path,
 ) -> Result<Header, FormatError> {

@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::{BufReader, Write};
 use std::path::Path;
 
-use super::vertices::read_vertices;
+use super::elements::read_elements;
 use crate::atomic;
 use crate::error::FormatError;
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
@@ -74,10 +74,11 @@ fn header(scan: &Scan) -> String {
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     let (mut known, mut values) = (Vec::new(), Vec::new());
-    let origin = read_vertices(
+    let origin = read_elements(
         &mut BufReader::new(file),
         path,
-        |vertex| {
+        &["vertex"],
+        |_, vertex| {
             let has = |attribute: &Attribute| {
                 attribute.column_names().iter().all(|name| vertex.has(name))
             };
@@ -85,7 +86,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
             let names = known.iter().flat_map(|attribute| attribute.column_names());
             ["x", "y", "z"].into_iter().chain(names).map(|name| vertex.scalar(name)).collect()
         },
-        |row| values.extend_from_slice(row),
+        |_, row| values.extend_from_slice(row),
     )?;
     let width = 3 + known.iter().map(|attribute| attribute.column_names().len()).sum::<usize>();
     let rows = Rows { values: &values, width };

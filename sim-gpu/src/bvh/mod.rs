@@ -9,10 +9,12 @@ mod choose;
 mod morton;
 mod node;
 mod sah;
+mod traverse;
 mod validate;
 
 pub use bounds::Bounds;
 pub use node::{LeafTriangle, Node, canonical_corners};
+pub use traverse::traverse;
 pub use validate::assert_well_formed;
 
 /// No path from the root to a leaf is longer; casters size their stacks by it.

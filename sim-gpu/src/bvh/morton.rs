@@ -2,7 +2,7 @@
 //! Triangles are sorted along a Morton curve; each node splits where the
 //! highest differing bit of its codes changes.
 
-use super::node::Child;
+use super::node::{Child, with_root};
 use super::sah::extent;
 use super::{Bounds, HALVING_DEPTH, MAX_LEAF, Node, Primitive};
 use glam::Vec3A;
@@ -25,11 +25,7 @@ pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
 
     let mut nodes = Vec::with_capacity(primitives.len());
     let root = subtree(primitives, &codes, 0, 0, &mut nodes);
-    if root.count > 0 || nodes.is_empty() {
-        let leaf = if primitives.is_empty() { Child::NONE } else { root };
-        nodes.push(Node::new(leaf, Child::NONE));
-    }
-    nodes
+    with_root(nodes, root)
 }
 
 fn subtree(

@@ -90,6 +90,15 @@ impl Node {
     }
 }
 
+/// `nodes`, with one above `root` if that is a leaf or nothing.
+pub(super) fn with_root(mut nodes: Vec<Node>, root: Child) -> Vec<Node> {
+    if nodes.is_empty() {
+        let leaf = if root.count == 0 { Child::NONE } else { root };
+        nodes.push(Node::new(leaf, Child::NONE));
+    }
+    nodes
+}
+
 impl LeafTriangle {
     pub(super) fn new(corners: [[f32; 3]; 3], index: u32) -> Self {
         let [a, b, c] = canonical_corners(corners);

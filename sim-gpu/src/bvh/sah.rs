@@ -1,7 +1,7 @@
 //! Binned surface area heuristic: Wald, "On fast construction of SAH-based
 //! bounding volume hierarchies", RT 2007.
 
-use super::node::Child;
+use super::node::{Child, with_root};
 use super::{Bounds, HALVING_DEPTH, MAX_LEAF, Node, Primitive};
 use glam::Vec3A;
 
@@ -24,11 +24,7 @@ const PARALLEL_ABOVE: usize = 8192;
 pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
     let mut nodes = Vec::with_capacity(primitives.len() / 2 + 1);
     let root = subtree(primitives, 0, 0, &mut nodes);
-    if root.count > 0 || nodes.is_empty() {
-        let leaf = if primitives.is_empty() { Child::NONE } else { root };
-        nodes.push(Node::new(leaf, Child::NONE));
-    }
-    nodes
+    with_root(nodes, root)
 }
 
 /// Appends the subtree over `primitives`, whose first is number `first` of the
@@ -142,34 +138,15 @@ fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
     let (mut best_axis, mut best) = (0, (1, f32::INFINITY));
     for axis in 0..3 {
         sort(primitives, axis);
-        let split = cheapest_prefix(primitives);
-        if split.1 < best.1 {
-            (best_axis, best) = (axis, split);
+        let mut bins = [(Bounds::EMPTY, 1); EXACT];
+        bins.iter_mut().zip(&*primitives).for_each(|(bin, p)| bin.0 = p.bounds);
+        let (last_left, cost) = cheapest_boundary(&bins[..primitives.len()]);
+        if cost < best.1 {
+            (best_axis, best) = (axis, (last_left + 1, cost));
         }
     }
     if best_axis != 2 {
         sort(primitives, best_axis);
-    }
-    best
-}
-
-/// How many of `primitives`, at most [`EXACT`] and in this order, the cheapest
-/// split puts on the left, and its cost.
-fn cheapest_prefix(primitives: &[Primitive]) -> (usize, f32) {
-    let mut right_cost = [0.0; EXACT];
-    let mut bounds = Bounds::EMPTY;
-    for (i, p) in primitives.iter().enumerate().skip(1).rev() {
-        bounds = bounds.union(p.bounds);
-        right_cost[i] = bounds.half_area() * (primitives.len() - i) as f32;
-    }
-    let mut best = (1, f32::INFINITY);
-    let mut bounds = Bounds::EMPTY;
-    for (i, p) in primitives.iter().enumerate().take(primitives.len() - 1) {
-        bounds = bounds.union(p.bounds);
-        let cost = TRIANGLE_COST * (bounds.half_area() * (i + 1) as f32 + right_cost[i + 1]);
-        if cost < best.1 {
-            best = (i + 1, cost);
-        }
     }
     best
 }
@@ -202,18 +179,19 @@ fn best_split<const BINS: usize>(primitives: &[Primitive], centres: Bounds) -> O
 }
 
 /// The last bin on the left of the cheapest boundary, and its cost: area times
-/// triangles, summed over both sides.
-fn cheapest_boundary<const BINS: usize>(bins: &[(Bounds, u32); BINS]) -> (usize, f32) {
+/// triangles, summed over both sides. Of at most [`BINS`] bins.
+#[inline]
+fn cheapest_boundary(bins: &[(Bounds, u32)]) -> (usize, f32) {
     let mut right_cost = [0.0; BINS];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-    for i in (1..BINS).rev() {
+    for i in (1..bins.len()).rev() {
         bounds = bounds.union(bins[i].0);
         count += bins[i].1;
         right_cost[i] = bounds.half_area() * count as f32;
     }
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     let mut best = (0, f32::INFINITY);
-    for i in 0..BINS - 1 {
+    for i in 0..bins.len() - 1 {
         bounds = bounds.union(bins[i].0);
         count += bins[i].1;
         let cost = TRIANGLE_COST * (bounds.half_area() * count as f32 + right_cost[i + 1]);

@@ -1,7 +1,7 @@
 //! The f64 twin: the same test on the same tree, in double precision. Every
 //! range that leaves this crate was solved here, whoever found the triangle.
 
-use crate::bvh::{MAX_DEPTH, Node};
+use crate::bvh::{LeafTriangle, traverse};
 use crate::ray::Ray;
 use crate::target::Target;
 use glam::DVec3;
@@ -26,35 +26,24 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
     let shear = Shear::of(ray.direction);
     let per_direction = reciprocal(ray.direction);
     let mut best: Option<Crossing> = None;
-    let mut stack = [0u32; MAX_DEPTH + 1];
-    let mut height = 1;
-    while height > 0 {
-        height -= 1;
-        let node = &target.bvh.nodes[stack[height] as usize];
-        let farthest = best.map_or(f64::INFINITY, |b| b.range_m);
-        let mut children = both_children(node, ray.origin, per_direction, farthest);
-        if children[0].enters < children[1].enters {
-            children.swap(0, 1);
-        }
-        for child in children.iter().filter(|child| child.enters < f64::INFINITY) {
-            if child.count == 0 {
-                stack[height] = child.first;
-                height += 1;
-                continue;
-            }
-            let leaf = child.first as usize..(child.first + child.count) as usize;
-            for triangle in &target.bvh.triangles[leaf] {
-                let corners = target.surface.corners(triangle.index);
+    traverse(
+        &target.bvh.nodes,
+        0,
+        &mut best,
+        |best, low, high| {
+            let farthest = best.map_or(f64::INFINITY, |best| best.range_m);
+            enter(low, high, ray.origin, per_direction, farthest)
+        },
+        |best, leaf| {
+            for &LeafTriangle { index, .. } in &target.bvh.triangles[leaf] {
+                let corners = target.surface.corners(index);
                 let Some(range_m) = cross(ray.origin, &shear, corners) else { continue };
-                let wins = best.is_none_or(|b| {
-                    range_m < b.range_m || (range_m == b.range_m && triangle.index < b.index)
-                });
-                if wins {
-                    best = Some(Crossing { range_m, index: triangle.index });
+                if best.is_none_or(|best| (range_m, index) < (best.range_m, best.index)) {
+                    *best = Some(Crossing { range_m, index });
                 }
             }
-        }
-    }
+        },
+    );
     best
 }
 
@@ -83,36 +72,16 @@ pub fn normal(target: &Target, index: u32) -> DVec3 {
     (b - a).cross(c - a).normalize_or_zero()
 }
 
-#[derive(Clone, Copy)]
-struct Child {
-    enters: f64,
-    first: u32,
-    count: u32,
-}
-
-fn both_children(node: &Node, origin: DVec3, per_direction: DVec3, farthest: f64) -> [Child; 2] {
-    let enter = |low: [f32; 3], high: [f32; 3]| {
-        let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
-        let t0 = (corner(low) - origin) * per_direction;
-        let t1 = (corner(high) - origin) * per_direction;
-        let near = t0.min(t1).max_element().max(0.0);
-        // Ize 2013, in f64: boxes are padded by 2^-18, which also covers that
-        // they were rounded to f32.
-        let far = t0.max(t1).min_element().min(farthest) * (1.0 + 1e-14);
-        if near <= far { near } else { f64::INFINITY }
-    };
-    [
-        Child {
-            enters: enter(node.left_min, node.left_max),
-            first: node.left,
-            count: node.left_count,
-        },
-        Child {
-            enters: enter(node.right_min, node.right_max),
-            first: node.right,
-            count: node.right_count,
-        },
-    ]
+/// Where the ray enters the box, in its own units; infinity if it does not.
+fn enter(low: [f32; 3], high: [f32; 3], origin: DVec3, per_direction: DVec3, farthest: f64) -> f64 {
+    let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+    let t0 = (corner(low) - origin) * per_direction;
+    let t1 = (corner(high) - origin) * per_direction;
+    let near = t0.min(t1).max_element().max(0.0);
+    // Ize 2013, in f64: boxes are padded by 2^-18, which also covers that they
+    // were rounded to f32.
+    let far = t0.max(t1).min_element().min(farthest) * (1.0 + 1e-14);
+    if near <= far { near } else { f64::INFINITY }
 }
 
 fn reciprocal(direction: DVec3) -> DVec3 {

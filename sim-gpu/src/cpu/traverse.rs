@@ -1,7 +1,7 @@
 //! Finds the nearest triangle along a ray. Twin of `shaders/traverse.wgsl`.
 
 use super::intersect::{Candidate, Shear, intersect};
-use crate::bvh::{LeafTriangle, MAX_DEPTH, Node};
+use crate::bvh::{self, LeafTriangle, Node};
 use crate::ray::{AMBIGUOUS, MISS, NO_HIT, TraceRay};
 use glam::{Vec3, Vec3A};
 
@@ -25,8 +25,6 @@ pub struct Nearest {
     pub t: f32,
     /// How far the true distance may be from `t`.
     pub error: f32,
-    /// Place in the tree's triangles.
-    pub leaf: u32,
     /// The triangle's index in its mesh, or [`MISS`].
     pub index: u32,
     /// No surface that starts beyond this can be the nearest.
@@ -57,29 +55,27 @@ struct Slabs {
     offset: Vec3A,
 }
 
-/// Where the ray enters the box, or `NO_HIT`.
+/// Where the ray enters the box; infinity if it does not.
 #[inline]
 fn enter(low: [f32; 3], high: [f32; 3], slabs: Slabs, farthest: f32) -> f32 {
     let t0 = Vec3A::from_array(low) * slabs.per_direction + slabs.offset;
     let t1 = Vec3A::from_array(high) * slabs.per_direction + slabs.offset;
     let near = t0.min(t1).max_element().max(0.0);
     let far = t0.max(t1).min_element().min(farthest) * FAR_SCALE;
-    if near <= far { near } else { NO_HIT }
+    if near <= far { near } else { f32::INFINITY }
 }
 
 impl Nearest {
-    const NONE: Self =
-        Self { t: NO_HIT, error: 0.0, leaf: 0, index: MISS, farthest: NO_HIT, rival: NO_HIT };
+    const NONE: Self = Self { t: NO_HIT, error: 0.0, index: MISS, farthest: NO_HIT, rival: NO_HIT };
 
     #[inline]
-    fn consider(&mut self, candidate: Candidate, leaf: u32, index: u32) {
+    fn consider(&mut self, candidate: Candidate, index: u32) {
         let wins = candidate.t < self.t || (candidate.t == self.t && index < self.index);
         let loser = if wins { self.t - self.error } else { candidate.t - candidate.error };
         self.rival = self.rival.min(loser).min(candidate.rival);
         self.farthest = self.farthest.min(candidate.t + candidate.error);
         if wins {
-            (self.t, self.error) = (candidate.t, candidate.error);
-            (self.leaf, self.index) = (leaf, index);
+            (self.t, self.error, self.index) = (candidate.t, candidate.error, index);
         }
     }
 
@@ -103,51 +99,18 @@ pub fn traverse(nodes: &[Node], triangles: &[LeafTriangle], ray: &TraceRay) -> N
     let per_direction = reciprocal(direction);
     let slabs = Slabs { per_direction, offset: -(Vec3A::from(origin) * per_direction) };
     let mut nearest = Nearest::NONE;
-    let mut stack = [0u32; MAX_DEPTH];
-    let mut height = 0;
-    let mut at = ray.root;
-    loop {
-        let node = &nodes[at as usize];
-        let mut left = enter(node.left_min, node.left_max, slabs, nearest.farthest);
-        let mut right = enter(node.right_min, node.right_max, slabs, nearest.farthest);
-        if left < NO_HIT && node.left_count > 0 {
-            scan_leaf(&mut nearest, triangles, node.left, node.left_count, origin, &shear);
-            left = NO_HIT;
-        }
-        if right < NO_HIT && node.right_count > 0 {
-            scan_leaf(&mut nearest, triangles, node.right, node.right_count, origin, &shear);
-            right = NO_HIT;
-        }
-        let (near, far) =
-            if left <= right { (node.left, node.right) } else { (node.right, node.left) };
-        if left.min(right) < NO_HIT {
-            at = near;
-            if left.max(right) < NO_HIT {
-                stack[height] = far;
-                height += 1;
+    bvh::traverse(
+        nodes,
+        ray.root,
+        &mut nearest,
+        |nearest, low, high| enter(low, high, slabs, nearest.farthest),
+        |nearest, leaf| {
+            for triangle in &triangles[leaf] {
+                if let Some(candidate) = intersect(origin, &shear, triangle) {
+                    nearest.consider(candidate, triangle.index);
+                }
             }
-        } else if height > 0 {
-            height -= 1;
-            at = stack[height];
-        } else {
-            return nearest;
-        }
-    }
-}
-
-#[inline]
-fn scan_leaf(
-    nearest: &mut Nearest,
-    triangles: &[LeafTriangle],
-    first: u32,
-    count: u32,
-    origin: Vec3,
-    shear: &Shear,
-) {
-    for leaf in first..first + count {
-        let triangle = &triangles[leaf as usize];
-        if let Some(candidate) = intersect(origin, shear, triangle) {
-            nearest.consider(candidate, leaf, triangle.index);
-        }
-    }
+        },
+    );
+    nearest
 }

@@ -1,6 +1,5 @@
 //! What can be wrong with a mesh file.
 
-use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
@@ -18,7 +17,7 @@ pub enum MeshError {
         source: io::Error,
     },
     /// The path names a directory, a pipe or a device.
-    #[error("{}: is {what}, not a mesh file", path.display())]
+    #[error("{}: expected a mesh file, found {what}", path.display())]
     NotAFile {
         /// The path asked for.
         path: PathBuf,
@@ -26,7 +25,7 @@ pub enum MeshError {
         what: &'static str,
     },
     /// The file name ends in no extension that stands for a mesh format.
-    #[error("{}: its extension is none of {}", path.display(), mesh_extensions().join(", "))]
+    #[error("{}: expected one of the extensions {}", path.display(), mesh_extensions().join(", "))]
     UnknownFormat {
         /// The file asked for.
         path: PathBuf,
@@ -43,82 +42,21 @@ pub enum MeshError {
     },
 }
 
-/// Which of a mesh's two lists a message is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// The vertex positions.
-    Vertices,
-    /// The faces: triangles or polygons.
-    Faces,
-}
-
-impl fmt::Display for Part {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Vertices => "vertices",
-            Self::Faces => "faces",
-        })
-    }
-}
-
 /// What is wrong with a mesh file's content.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
     /// The file holds no byte.
     #[error("the file is empty")]
     Empty,
-    /// The file does not begin as its format must.
-    #[error("not {format}: it begins with {found:?}")]
-    WrongStart {
-        /// The format that the file name promises, with its article.
-        format: &'static str,
-        /// The first characters found.
-        found: String,
-    },
-    /// A variant of the format that is not read here.
-    #[error("{0} is not supported")]
-    Unsupported(String),
     /// The file ends, or cannot but end, before all its header promises.
-    #[error("truncated: the header promises {promised} {part}, the file holds {held}")]
+    #[error("truncated: expected {promised} {part}, found {held}")]
     Truncated {
         /// Vertices or faces.
-        part: Part,
+        part: &'static str,
         /// How many were read, or could be at most.
         held: u64,
         /// How many the header promises.
         promised: u64,
-    },
-    /// A word that should be a number is not.
-    #[error("{found:?} is not {expected}")]
-    NotANumber {
-        /// The word found.
-        found: String,
-        /// What it should be, with its article.
-        expected: &'static str,
-    },
-    /// A count below zero.
-    #[error("{found} is a negative number of {part}")]
-    NegativeCount {
-        /// Vertices or faces.
-        part: Part,
-        /// The count as written.
-        found: String,
-    },
-    /// A line ends before all that it must hold.
-    #[error("the line holds {held} of {expected} {what}")]
-    ShortLine {
-        /// What is missing: coordinates, corners, counts.
-        what: &'static str,
-        /// How many the line holds.
-        held: u64,
-        /// How many it must hold.
-        expected: u64,
-    },
-    /// A coordinate that is NaN or infinite, or too large for f64.
-    #[error("coordinate {found} is not finite")]
-    NotFinite {
-        /// The coordinate as written.
-        found: String,
     },
     /// A face names a vertex that is not there.
     #[error("index {found} is out of range: there are {n_vertices} vertices")]
@@ -128,13 +66,10 @@ pub enum Malformed {
         /// The number of vertices.
         n_vertices: u64,
     },
-    /// More vertices than a 32-bit index can name.
-    #[error("{0} vertices are too many: indices have 32 bits")]
-    TooManyVertices(u64),
     /// The file is well formed but has no face of three or more corners.
-    #[error("there is no triangle")]
+    #[error("expected at least one triangle, found none")]
     NoTriangle,
-    /// What the reading crate said.
+    /// Something else than the format has there.
     #[error("{0}")]
     Syntax(String),
 }
@@ -150,6 +85,11 @@ pub struct ParseError {
 }
 
 impl Malformed {
+    /// That `found` stands in a file where its format has `expected`.
+    pub(super) fn expected(expected: &str, found: &[u8]) -> Self {
+        Self::Syntax(format!("expected {expected}, found {:?}", excerpt(found)))
+    }
+
     /// The cause, found at `line`.
     pub(super) fn at(self, line: usize) -> ParseError {
         ParseError { line: Some(line), cause: self }

@@ -4,9 +4,11 @@ use std::fmt;
 use std::str::FromStr;
 
 use glam::DVec3;
+use serde::de::IntoDeserializer;
 use serde::{Deserialize, Serialize};
 
 use super::triangle_mesh::Mesh;
+use super::unit_frame::bounding_box;
 
 /// The axis of a file that points up in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -35,57 +37,26 @@ pub enum Normalize {
     None,
 }
 
-/// No such word in a list of words.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{found:?} is none of {expected}")]
-pub struct UnknownWord {
-    found: String,
-    expected: &'static str,
-}
-
-impl fmt::Display for Up {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Y => "y",
-            Self::Z => "z",
-        })
-    }
-}
-
-impl FromStr for Up {
-    type Err = UnknownWord;
-
-    fn from_str(word: &str) -> Result<Self, UnknownWord> {
-        match word {
-            "y" => Ok(Self::Y),
-            "z" => Ok(Self::Z),
-            _ => Err(UnknownWord { found: word.into(), expected: "y, z" }),
+/// Writes and reads a type without content as `serde` has it.
+macro_rules! as_serde_has_it {
+    ($($word:ty),*) => {$(
+        impl fmt::Display for $word {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.serialize(f)
+            }
         }
-    }
-}
 
-impl fmt::Display for Normalize {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::UnitSphere => "unit-sphere",
-            Self::Bbox => "bbox",
-            Self::None => "none",
-        })
-    }
-}
+        impl FromStr for $word {
+            type Err = serde::de::value::Error;
 
-impl FromStr for Normalize {
-    type Err = UnknownWord;
-
-    fn from_str(word: &str) -> Result<Self, UnknownWord> {
-        match word {
-            "unit-sphere" => Ok(Self::UnitSphere),
-            "bbox" => Ok(Self::Bbox),
-            "none" => Ok(Self::None),
-            _ => Err(UnknownWord { found: word.into(), expected: "unit-sphere, bbox, none" }),
+            fn from_str(word: &str) -> Result<Self, Self::Err> {
+                Self::deserialize(word.into_deserializer())
+            }
         }
-    }
+    )*};
 }
+
+as_serde_has_it!(Up, Normalize);
 
 /// A mesh in the world, and how it came there:
 /// `world = (position - centre) * scale`, `position` being the file's, turned
@@ -115,11 +86,7 @@ pub fn to_world(mesh: &Mesh, up: Up, normalize: Normalize) -> WorldMesh {
 
     let largest = named_positions().map(|vertex| vertex.abs().max_element()).fold(0.0, f64::max);
     let unit = power_of_two_near(largest);
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for vertex in named_positions() {
-        let position = z_up(*vertex, up) / unit;
-        (low, high) = (low.min(position), high.max(position));
-    }
+    let (low, high) = bounding_box(named_positions().map(|vertex| z_up(*vertex, up) / unit));
     let box_centre = if low.x <= high.x { 0.5 * (low + high) } else { DVec3::ZERO };
     let from_box = |vertex: DVec3| z_up(vertex, up) / unit - box_centre;
 
@@ -281,6 +248,7 @@ mod tests {
             assert_eq!(up.to_string().parse(), Ok(up));
         }
         let error = "sphere".parse::<Normalize>().unwrap_err().to_string();
-        assert_eq!(error, "\"sphere\" is none of unit-sphere, bbox, none");
+        let expected = "unknown variant `sphere`, expected one of `unit-sphere`, `bbox`, `none`";
+        assert_eq!(error, expected);
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use super::error::{Malformed, MeshError, ParseError, excerpt};
+use super::error::{Malformed, MeshError, ParseError};
 use super::format::MeshFormat;
 use super::triangle_mesh::{Mesh, Parsed};
 use super::{obj, off, ply, stl};
@@ -73,10 +73,13 @@ fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
 fn check(mesh: &Mesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
     if n_vertices > u64::from(u32::MAX) {
-        return Err(Malformed::TooManyVertices(n_vertices).into());
+        let cause = format!("expected at most {} vertices, found {n_vertices}", u32::MAX);
+        return Err(Malformed::Syntax(cause).into());
     }
     if let Some(vertex) = mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {
-        return Err(Malformed::NotFinite { found: excerpt(vertex.to_string().as_bytes()) }.into());
+        return Err(
+            Malformed::Syntax(format!("expected finite coordinates, found {vertex}")).into()
+        );
     }
     let mut corners = mesh.triangles.iter().flatten();
     if let Some(index) = corners.find(|&&index| u64::from(index) >= n_vertices) {
@@ -117,10 +120,11 @@ mod tests {
         fs::write(folder.path().join("empty.off"), "").unwrap();
         fs::write(folder.path().join("bad.off"), "OFF\n3 1 0\n0 0 nan\n").unwrap();
         fs::write(folder.path().join("notes.txt"), "").unwrap();
-        assert_eq!(message("folder.off"), "folder.off: is a directory, not a mesh file");
+        assert_eq!(message("folder.off"), "folder.off: expected a mesh file, found a directory");
         assert_eq!(message("empty.off"), "empty.off: the file is empty");
-        assert_eq!(message("bad.off"), "bad.off:3: coordinate nan is not finite");
-        assert_eq!(message("notes.txt"), "notes.txt: its extension is none of off, obj, ply, stl");
+        assert_eq!(message("bad.off"), "bad.off:3: expected a finite coordinate, found \"nan\"");
+        let extension = "notes.txt: expected one of the extensions off, obj, ply, stl";
+        assert_eq!(message("notes.txt"), extension);
         assert!(message("missing.off").starts_with("missing.off: cannot be read: "));
     }
 
@@ -130,7 +134,9 @@ mod tests {
                    property float z\nelement face 0\nproperty list uchar int vertex_index\n\
                    end_header\n0 0 0\n";
         for (text, format) in [
+            ("OFF\n0 0 0\n", MeshFormat::Off),
             ("OFF\n1 0 0\n0 0 0\n", MeshFormat::Off),
+            ("OFF\n2 1 0\n0 0 0\n1 0 0\n2 0 1\n", MeshFormat::Off),
             ("v 0 0 0\n", MeshFormat::Obj),
             (ply, MeshFormat::Ply),
             ("solid a\nendsolid a\n", MeshFormat::Stl),
@@ -142,6 +148,6 @@ mod tests {
         stl[80] = 1;
         stl[100..104].copy_from_slice(&f32::NAN.to_le_bytes());
         let error = parse(&stl, MeshFormat::Stl).unwrap_err();
-        assert!(matches!(error.cause, Malformed::NotFinite { .. }), "{error}");
+        assert!(error.to_string().starts_with("expected finite coordinates, found "), "{error}");
     }
 }

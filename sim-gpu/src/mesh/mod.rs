@@ -7,18 +7,20 @@
 mod error;
 mod format;
 pub mod frame;
-mod line_feeder;
 mod load;
 mod obj;
 mod off;
 mod ply;
 mod stl;
+#[cfg(test)]
+mod testing;
 mod tokens;
 pub mod tree;
 mod triangle_mesh;
+pub mod unit_frame;
 pub mod validate;
 
-pub use error::{Malformed, MeshError, ParseError, Part};
+pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
 pub use load::{LoadedMesh, load, parse};
 pub use triangle_mesh::{Mesh, Parsed};

@@ -5,13 +5,12 @@
 //! into models of their own vertices, or fail it. The lines keep their numbers
 //! on the way, so that an error can name its line.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, Cursor};
 
 use glam::DVec3;
 use tobj::{LoadError, LoadOptions};
 
 use super::error::{Malformed, ParseError, excerpt};
-use super::line_feeder::LineFeeder;
 use super::triangle_mesh::{Mesh, Parsed};
 
 /// Reads an OBJ file from its bytes.
@@ -27,12 +26,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
         ignore_lines: true,
         ..LoadOptions::default()
     };
-    let mut feeder = LineFeeder::new(&geometry.text);
+    let mut text = Cursor::new(&geometry.text);
     let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
-    let models = tobj::load_obj_buf(&mut BufReader::new(&mut feeder), &options, no_materials);
-    let models = match models {
+    let models = match tobj::load_obj_buf(&mut text, &options, no_materials) {
         Ok((models, _)) => models,
-        Err(error) => return Err(geometry.blame(error, feeder.line())),
+        Err(error) => return Err(geometry.blame(error, text.position() as usize)),
     };
     let mut parsed = Parsed { dropped_faces: geometry.dropped_faces, ..Parsed::default() };
     for model in models {
@@ -102,7 +100,7 @@ impl Geometry {
         for word in kept {
             // tobj takes words such as "nan" for numbers.
             if word.iter().any(|byte| matches!(byte, b'n' | b'N')) {
-                return Err(Malformed::NotFinite { found: excerpt(word) });
+                return Err(Malformed::expected("a finite coordinate", word));
             }
             self.text.push(b' ');
             self.text.extend_from_slice(word);
@@ -128,15 +126,16 @@ impl Geometry {
         }
     }
 
-    /// tobj's error in our words, with the line it is about: `last_line`,
-    /// unless tobj finds out only after the last line.
-    fn blame(&self, error: LoadError, last_line: usize) -> ParseError {
+    /// tobj's error in our words, with the line it is about: the last of the
+    /// `n_read` bytes that tobj took, unless it finds out only after the last line.
+    fn blame(&self, error: LoadError, n_read: usize) -> ParseError {
         match error {
             LoadError::FaceVertexOutOfBounds => self.first_out_of_range(),
             _ => {
-                let line = self.text.split(|&byte| byte == b'\n').nth(last_line - 1);
-                let line = excerpt(line.unwrap_or_default());
-                Malformed::Syntax(format!("{error} in {line:?}")).at(last_line)
+                let lines = self.text[..n_read].split_inclusive(|&byte| byte == b'\n');
+                let (line, number) = lines.zip(1..).last().unwrap_or_default();
+                let line = excerpt(line.trim_ascii_end());
+                Malformed::Syntax(format!("{error} in {line:?}")).at(number)
             }
         }
     }
@@ -166,49 +165,36 @@ impl Geometry {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::{fails, is_the_triangle};
     use super::*;
 
     const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 
-    fn read(text: &str) -> Result<Parsed, ParseError> {
-        parse(text.as_bytes())
-    }
-
-    #[track_caller]
-    fn is_the_triangle(text: &str) {
-        let mesh = read(text).expect(text).mesh;
-        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y], "{text:?}");
-        assert_eq!(mesh.triangles, [[0, 1, 2]], "{text:?}");
-    }
-
-    #[track_caller]
-    fn fails(text: &str, line: usize, message: &str) {
-        let error = read(text).expect_err(text);
-        assert_eq!(error.to_string(), format!("line {line}: {message}"), "{text:?}");
-    }
-
     #[test]
     fn indices_count_from_either_end_and_may_have_companions() {
-        is_the_triangle(&format!("{CORNERS}f 1 2 3\n"));
-        is_the_triangle(&format!("{CORNERS}f -3 -2 -1\n"));
-        is_the_triangle(&format!("{CORNERS}vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\n"));
+        is_the_triangle(parse, format!("{CORNERS}f 1 2 3\n"));
+        is_the_triangle(parse, format!("{CORNERS}f -3 -2 -1\n"));
+        is_the_triangle(parse, format!("{CORNERS}vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\n"));
         // Companions that point nowhere have no part in a beam's way.
-        is_the_triangle(&format!("{CORNERS}vt bad\nf 1/7/-9 2//8 3/-5\n"));
+        is_the_triangle(parse, format!("{CORNERS}vt bad\nf 1/7/-9 2//8 3/-5\n"));
     }
 
     #[test]
     fn weights_divide_and_colours_are_ignored() {
-        is_the_triangle("v 0 0 0 2\nv 2 0 0 2\nv 0 .5 0 .5\nf 1 2 3");
-        is_the_triangle("v 0 0 0 1 .5 0\nv 1 0 0 1 2 3 4\nv 0 1 0 9 9\nf 1 2 3");
+        is_the_triangle(parse, "v 0 0 0 2\nv 2 0 0 2\nv 0 .5 0 .5\nf 1 2 3");
+        is_the_triangle(parse, "v 0 0 0 1 .5 0\nv 1 0 0 1 2 3 4\nv 0 1 0 9 9\nf 1 2 3");
     }
 
     #[test]
     fn line_ends_comments_and_continuations_do_not_matter() {
-        is_the_triangle(&format!("# C:\\meshes\\\n{CORNERS}f 1 2 3 # 4").replace('\n', "\r\n"));
-        is_the_triangle(&format!("{CORNERS}f 1 \\\n2 \\\r\n3\n"));
+        is_the_triangle(
+            parse,
+            format!("# C:\\meshes\\\n{CORNERS}f 1 2 3 # 4").replace('\n', "\r\n"),
+        );
+        is_the_triangle(parse, format!("{CORNERS}f 1 \\\n2 \\\r\n3\n"));
         let mut latin = b"# na\xEFve\no caf\xE9\n".to_vec();
         latin.extend_from_slice(format!("{CORNERS}f 1 2 3\n").as_bytes());
-        assert!(parse(&latin).is_ok());
+        is_the_triangle(parse, latin);
     }
 
     #[test]
@@ -216,7 +202,7 @@ mod tests {
         let text = format!(
             "mtllib none.mtl\no a\n{CORNERS}usemtl red\nf 1 2 3\ng b\nusemtl\nv 0 0 1\nf 1 3 4\n"
         );
-        let mesh = read(&text).unwrap().mesh;
+        let mesh = parse(text.as_bytes()).unwrap().mesh;
         assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
     }
@@ -224,24 +210,26 @@ mod tests {
     #[test]
     fn polygons_become_fans_and_smaller_faces_are_counted() {
         let text = format!("{CORNERS}v 0 0 1\nv 1 1 1\nf 1 2 3 4 5\nf 1\nf 2 3\nl 1 2\np 1\n");
-        let parsed = read(&text).unwrap();
+        let parsed = parse(text.as_bytes()).unwrap();
         assert_eq!(parsed.mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
         assert_eq!(parsed.dropped_faces, 2);
     }
 
     #[test]
     fn errors_name_their_line() {
-        let out_of_range = |index| format!("index {index} is out of range: there are 3 vertices");
-        for index in ["4", "0", "-4"] {
-            let text = format!("{CORNERS}f 1 2 3\n\nf 1 2 {index}\n");
-            fails(&text, 6, &out_of_range(index));
-        }
-        fails(&format!("f -1 -1 -1\n{CORNERS}"), 1, &out_of_range("-1"));
-        fails(&format!("{CORNERS}f 1 /2 3\n"), 4, "face parse error in \"f 1 ? 3\"");
-        fails("v 0 0\n", 1, "position parse error in \"v 0 0\"");
-        fails("#\nv 0 x 0\n", 2, "position parse error in \"v 0 x 0\"");
-        fails("v 1 1 1 0\n", 1, "scaling (w) by zero in \"v 1 1 1 0\"");
-        fails("\n\nv 0 NaN 0\n", 3, "coordinate NaN is not finite");
-        fails("v 0 -inf 0\n", 1, "coordinate -inf is not finite");
+        let bad_lines = [
+            ("\nf 1 2 4\n", "line 5: index 4 is out of range: there are 3 vertices"),
+            ("f 1 2 3\n\nf 1 2 0\n", "line 6: index 0 is out of range: there are 3 vertices"),
+            ("f 1 2 -4\n", "line 4: index -4 is out of range: there are 3 vertices"),
+            ("f 1 /2 3\n", "line 4: face parse error in \"f 1 ? 3\""),
+            ("v 0 0\n", "line 4: position parse error in \"v 0 0\""),
+            ("#\nv 0 x 0\n", "line 5: position parse error in \"v 0 x 0\""),
+            ("v 1 1 1 0\n", "line 4: scaling (w) by zero in \"v 1 1 1 0\""),
+            ("\n\nv 0 NaN 0\n", "line 6: expected a finite coordinate, found \"NaN\""),
+            ("v 0 -inf 0\n", "line 4: expected a finite coordinate, found \"-inf\""),
+        ];
+        fails(parse, bad_lines.map(|(lines, message)| (format!("{CORNERS}{lines}"), message)));
+        let too_early = "line 1: index -1 is out of range: there are 3 vertices";
+        fails(parse, [(format!("f -1 -1 -1\n{CORNERS}"), too_early)]);
     }
 }

@@ -1,178 +1,95 @@
-//! PLY, ASCII and binary of either byte order, through the crate ply-rs-bw.
+//! PLY, ASCII and binary of either byte order, through the reader of clouds and
+//! scans.
 
+use std::path::Path;
+
+use formats::FormatError;
+use formats::ply::{Element, read_elements};
 use glam::DVec3;
-use ply_rs_bw::parser::{ParseError as PlyError, Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
-    ScalarType,
-};
 
-use super::error::{Malformed, ParseError, Part, excerpt};
-use super::triangle_mesh::{Mesh, Parsed};
+use super::error::{Malformed, ParseError};
+use super::triangle_mesh::Parsed;
 
 /// The names that the corners of a face go by.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+/// The kinds of elements that make a mesh, and the place of the faces.
+const KINDS: [&str; 2] = ["vertex", "face"];
+const FACE: usize = 1;
 
 /// Reads a PLY file from its bytes.
 ///
 /// Of the element `vertex` it takes x, y and z, of `face` the list of vertex
 /// indices; all else is skipped. Polygons become fans around their first
 /// corner; faces of fewer than three corners are dropped and counted.
-pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let mut reader = Reader::new(bytes);
+///
+/// A coordinate of type `float` is rounded to f32 in text too, so that both
+/// encodings of a mesh give the same positions.
+pub(super) fn parse(mut bytes: &[u8]) -> Result<Parsed, ParseError> {
     if !bytes.starts_with(b"ply") {
-        let found = excerpt(&bytes[..bytes.len().min(16)]);
-        return Err(Malformed::WrongStart { format: "a PLY file", found }.at(1));
+        return Err(Malformed::expected("a PLY file", &bytes[..bytes.len().min(16)]).at(1));
     }
-    let parser = Parser::<Element>::new();
-    let header = parser.read_header(&mut reader).map_err(|error| syntax(&error, true))?;
-    check(&header, reader.get_ref().len() as u64)?;
-
-    let is_ascii = header.encoding == Encoding::Ascii;
+    let mut is_single = [false; 3];
+    let choose = |kind, element: &Element| {
+        if kind == FACE {
+            return Ok(vec![element.list(&CORNERS)?]);
+        }
+        let mut places = vec![];
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            places.push(element.scalar(name)?);
+            is_single[axis] = element.is_single(places[axis]);
+        }
+        Ok(places)
+    };
     let mut parsed = Parsed::default();
-    let mut faces = Vec::new();
-    for definition in header.elements.values() {
-        let elements = parser
-            .read_payload_for_element(&mut reader, definition, &header)
-            .map_err(|error| syntax(&error, is_ascii))?;
-        match definition.name.as_str() {
-            "vertex" => {
-                let positions = elements.iter().map(|vertex| DVec3::from_array(vertex.position));
-                parsed.mesh.vertices = positions.collect();
+    let (mut corners, mut bad_index) = (Vec::new(), None);
+    let name = Path::new("");
+    read_elements(&mut bytes, name, &KINDS, choose, |kind, row| {
+        if kind == FACE {
+            corners.clear();
+            for &index in row {
+                let corner = index as u32;
+                if f64::from(corner) != index {
+                    bad_index.get_or_insert(index);
+                }
+                corners.push(corner);
             }
-            "face" => faces = elements,
-            _ => {}
+            parsed.add_face(&corners);
+        } else {
+            parsed.mesh.vertices.push(DVec3::from_slice(row));
+        }
+    })
+    .map_err(syntax)?;
+    // The reader gives every digit of a text, whatever the type.
+    for vertex in &mut parsed.mesh.vertices {
+        for axis in (0..3).filter(|&axis| is_single[axis]) {
+            vertex[axis] = f64::from(vertex[axis] as f32);
         }
     }
-    for face in &faces {
-        add_face(&mut parsed, &face.corners)?;
-    }
-    Ok(parsed)
-}
-
-fn add_face(parsed: &mut Parsed, corners: &[i64]) -> Result<(), ParseError> {
-    let Mesh { vertices, triangles } = &mut parsed.mesh;
-    let corner = |index: i64| {
-        let found = u32::try_from(index).ok().filter(|&corner| (corner as usize) < vertices.len());
-        found.ok_or_else(|| Malformed::IndexOutOfRange {
-            found: index.to_string(),
-            n_vertices: vertices.len() as u64,
-        })
-    };
-    let &[first, second, _, ..] = corners else {
-        parsed.dropped_faces += 1;
-        return Ok(());
-    };
-    let (first, mut last) = (corner(first)?, corner(second)?);
-    for &other in &corners[2..] {
-        let other = corner(other)?;
-        triangles.push([first, last, other]);
-        last = other;
-    }
-    Ok(())
-}
-
-/// Refuses a header that lacks what a mesh needs, or promises more elements
-/// than `n_bytes` can hold.
-fn check(header: &Header, n_bytes: u64) -> Result<(), Malformed> {
-    let element = |name: &'static str| {
-        let missing = || Malformed::Syntax(format!("the header has no element {name}"));
-        header.elements.get(name).ok_or_else(missing)
-    };
-    let (vertex, face) = (element("vertex")?, element("face")?);
-    for axis in ["x", "y", "z"] {
-        let property = vertex.properties.get(axis);
-        if !property.is_some_and(|property| matches!(property.data_type, PropertyType::Scalar(_))) {
-            return Err(Malformed::Syntax(format!("vertices have no coordinate {axis}")));
+    let n_vertices = parsed.mesh.vertices.len() as u64;
+    match bad_index {
+        Some(index) => {
+            Err(Malformed::IndexOutOfRange { found: index.to_string(), n_vertices }.into())
         }
+        None => Ok(parsed),
     }
-    let is_corners = |name: &&str| {
-        let property = face.properties.get(*name);
-        property.is_some_and(|property| matches!(property.data_type, PropertyType::List(..)))
+}
+
+/// The reader's error, with the line that it names, if it names one.
+fn syntax(error: FormatError) -> ParseError {
+    let FormatError::Malformed { part, cause, .. } = error else {
+        return Malformed::Syntax(error.to_string()).into();
     };
-    if !CORNERS.iter().any(is_corners) {
-        return Err(Malformed::Syntax(format!("faces have no list {}", CORNERS.join(" or "))));
-    }
-    for definition in header.elements.values() {
-        let promised = definition.count as u64;
-        // The last line may lack its end.
-        let held = match header.encoding {
-            Encoding::Ascii => n_bytes.saturating_add(1),
-            _ => n_bytes / shortest(definition).max(1),
-        };
-        if promised > held {
-            let part = if definition.name == "vertex" { Part::Vertices } else { Part::Faces };
-            return Err(Malformed::Truncated { part, held, promised });
-        }
-    }
-    Ok(())
-}
-
-/// The fewest bytes that one binary element takes: all of its lists empty.
-fn shortest(definition: &ElementDef) -> u64 {
-    let of_property = |property: &PropertyType| match property {
-        PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => match scalar {
-            ScalarType::Char | ScalarType::UChar => 1,
-            ScalarType::Short | ScalarType::UShort => 2,
-            ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-            ScalarType::Double => 8,
-        },
-    };
-    definition.properties.values().map(|property| of_property(&property.data_type)).sum()
-}
-
-/// The crate's error on one line of text. Only in ASCII does the number it
-/// names count lines of the file.
-fn syntax(error: &PlyError, is_ascii: bool) -> ParseError {
-    let text = error.to_string();
-    let text = text.split_once(": ").filter(|_| error.line().is_some()).map_or(&*text, |p| p.1);
-    let words: Vec<_> = text.split_whitespace().collect();
-    let cause = Malformed::Syntax(words.join(" ").chars().take(300).collect());
-    ParseError { line: error.line().filter(|_| is_ascii), cause }
-}
-
-/// What is wanted of an element of any kind.
-struct Element {
-    position: [f64; 3],
-    corners: Vec<i64>,
-}
-
-impl PropertyAccess for Element {
-    fn new() -> Self {
-        Self { position: [f64::NAN; 3], corners: Vec::new() }
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let axis = ["x", "y", "z"].into_iter().position(|axis| axis == name);
-        if let Some(axis) = axis {
-            self.position[axis] = match property {
-                Property::Float(value) => value.into(),
-                Property::Double(value) => value,
-                Property::Char(value) => value.into(),
-                Property::UChar(value) => value.into(),
-                Property::Short(value) => value.into(),
-                Property::UShort(value) => value.into(),
-                Property::Int(value) => value.into(),
-                Property::UInt(value) => value.into(),
-                _ => return PropertyAccessResult::UnsupportedType,
-            };
-        } else if CORNERS.contains(&name) {
-            self.corners = match property {
-                Property::ListChar(list) => list.into_iter().map(i64::from).collect(),
-                Property::ListUChar(list) => list.into_iter().map(i64::from).collect(),
-                Property::ListShort(list) => list.into_iter().map(i64::from).collect(),
-                Property::ListUShort(list) => list.into_iter().map(i64::from).collect(),
-                Property::ListInt(list) => list.into_iter().map(i64::from).collect(),
-                Property::ListUInt(list) => list.into_iter().map(i64::from).collect(),
-                _ => return PropertyAccessResult::UnsupportedType,
-            };
-        }
-        PropertyAccessResult::Set
+    match part.strip_prefix("line ").and_then(|line| line.parse().ok()) {
+        Some(line) => Malformed::Syntax(cause).at(line),
+        None => Malformed::Syntax(format!("{part}: {cause}")).into(),
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::format::MeshFormat;
+    use super::super::load::parse as parse_any;
+    use super::super::testing::{fails, is_the_triangle};
     use super::*;
 
     const BODY: &str = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
@@ -185,23 +102,10 @@ mod tests {
         )
     }
 
-    #[track_caller]
-    fn is_the_triangle(bytes: &[u8]) {
-        let mesh = parse(bytes).unwrap().mesh;
-        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y]);
-        assert_eq!(mesh.triangles, [[0, 1, 2]]);
-    }
-
-    #[track_caller]
-    fn fails(bytes: &[u8], message: &str) {
-        let error = parse(bytes).expect_err(message).to_string();
-        assert!(error.starts_with(message), "{error}");
-    }
-
     #[test]
     fn text_and_both_byte_orders_are_read_in_either_precision() {
-        is_the_triangle((header("ascii", "float", 3, 1) + BODY).as_bytes());
-        is_the_triangle((header("ascii", "double", 3, 1) + BODY).as_bytes());
+        is_the_triangle(parse, header("ascii", "float", 3, 1) + BODY);
+        is_the_triangle(parse, header("ascii", "double", 3, 1) + BODY);
         let positions = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
         for precision in ["float", "double"] {
             let mut little = header("binary_little_endian", precision, 3, 1).into_bytes();
@@ -221,9 +125,12 @@ mod tests {
                 little.extend(index.to_le_bytes());
                 big.extend(index.to_be_bytes());
             }
-            is_the_triangle(&little);
-            is_the_triangle(&big);
-            fails(&little[..little.len() - 1], "Unexpected end of file");
+            is_the_triangle(parse, &little);
+            is_the_triangle(parse, &big);
+            fails(
+                parse,
+                [(&little[..little.len() - 1], "element face: the file ends after 0 of 1")],
+            );
         }
     }
 
@@ -234,7 +141,7 @@ mod tests {
                     property double y\r\nproperty double z\r\nelement face 1\r\n\
                     property int flags\r\nproperty list uchar uint vertex_index\r\nend_header\r\n\
                     2 .5e0 1\r\n9 0 0 0\r\n9 1 0 0\r\n9 0 1 0\r\n-1 3 0 1 2\r\n";
-        is_the_triangle(text.replace(".5e0", "0.5e0").as_bytes());
+        is_the_triangle(parse, text);
     }
 
     #[test]
@@ -247,32 +154,67 @@ mod tests {
     }
 
     #[test]
-    fn a_promise_of_billions_is_checked_against_the_file() {
-        let message = "truncated: the header promises 4000000000 vertices, the file holds";
-        for encoding in ["ascii", "binary_little_endian"] {
-            fails((header(encoding, "float", 4_000_000_000, 1) + BODY).as_bytes(), message);
+    fn text_is_as_precise_as_the_type_of_its_numbers() {
+        for (number, expected) in [("float", f64::from(0.1f32)), ("double", 0.1)] {
+            let text = header("ascii", number, 3, 1) + &BODY.replace("1 0 0", "0.1 0 0");
+            assert_eq!(parse(text.as_bytes()).unwrap().mesh.vertices[1].x, expected, "{number}");
         }
-        let message = "truncated: the header promises 18446744073709551615 faces, the file holds";
-        fails((header("binary_big_endian", "float", 1, u64::MAX) + BODY).as_bytes(), message);
-        let empty = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n\
-                     property float y\nproperty float z\nelement face 1\n\
-                     property list int int vertex_index\nelement nothing 9000000000\nend_header\n";
-        let message = "truncated: the header promises 9000000000 faces";
-        fails(format!("{empty}{BODY}").as_bytes(), message);
+    }
+
+    #[test]
+    fn a_promise_of_billions_is_an_error() {
+        let nothing = "element nothing 9000000000\nelement face";
+        let cases = [
+            (
+                header("ascii", "float", 4_000_000_000, 1),
+                "line 15: the file ends after 4 of 4000000000",
+            ),
+            (
+                header("binary_little_endian", "float", 4_000_000_000, 1),
+                "element vertex: the file ends after 2 of 4000000000",
+            ),
+            (
+                header("binary_big_endian", "float", 1, u64::MAX),
+                "element face: the file ends after 0 of 18446744073709551615",
+            ),
+            (
+                header("ascii", "float", 3, 2).replace("element face", nothing),
+                "line 16: the file ends after 1 of 2",
+            ),
+        ];
+        fails(parse, cases.map(|(header, message)| (header + BODY, message)));
     }
 
     #[test]
     fn errors_name_their_cause_and_in_text_their_line() {
-        let ascii = |body: &str| (header("ascii", "float", 3, 1) + body).into_bytes();
-        fails(b"plx\n", "line 1: not a PLY file: it begins with \"plx \"");
-        fails(b"ply\nformat ascii 1.0\nend_header\n", "the header has no element vertex");
-        fails(&ascii("0 0 0\n1 0 zero\n"), "line 12: ");
-        fails(&ascii("0 0 0\n"), "line 12: Unexpected end of file");
-        fails(&ascii("0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "index 3 is out of range");
-        fails(&ascii("0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n"), "index -1 is out of range");
-        let no_z = String::from_utf8(ascii(BODY)).unwrap().replace("float z", "float w");
-        fails(no_z.as_bytes(), "vertices have no coordinate z");
-        let no_list = String::from_utf8(ascii(BODY)).unwrap().replace("vertex_indices", "strip");
-        fails(no_list.as_bytes(), "faces have no list vertex_indices or vertex_index");
+        let start = "line 1: expected a PLY file, found \"plx \"";
+        let no_vertex = "ply\nformat ascii 1.0\nend_header\n";
+        let (no_z, no_list) = (
+            "element vertex: property z is missing",
+            "element face: expected a \
+            list called vertex_indices or vertex_index",
+        );
+        let header = header("ascii", "float", 3, 1);
+        let cases = [
+            ("plx\n".to_owned(), start),
+            (no_vertex.to_owned(), "element vertex: missing"),
+            (header.replace("float z", "float w"), no_z),
+            (header.replace("vertex_indices", "strip"), no_list),
+            (format!("{header}0 0 0\n1 0 zero\n"), "line 12: expected a number, found `zero`"),
+            (format!("{header}0 0 0\n"), "line 12: the file ends after 1 of 3"),
+        ];
+        fails(parse, cases);
+        let bad_faces = [
+            ("3 0 1 -1", "index -1 is out of range: there are 3 vertices"),
+            ("3 0 1 0.5", "index 0.5 is out of range: there are 3 vertices"),
+        ];
+        let with = |face: &str| header.clone() + &BODY.replace("3 0 1 2", face);
+        fails(parse, bad_faces.map(|(face, message)| (with(face), message)));
+        // The check that all formats share.
+        let parsed = parse_any(with("3 0 1 3").as_bytes(), MeshFormat::Ply);
+        assert_eq!(
+            parsed.unwrap_err().to_string(),
+            "index 3 is out of range: there are 3 vertices"
+        );
     }
 }

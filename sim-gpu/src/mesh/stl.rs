@@ -1,99 +1,143 @@
-//! STL, binary and ASCII, through the crate stl_io.
+//! STL, binary and ASCII.
 //!
 //! Its corners carry no indices; those of equal position become one vertex.
 
-use std::io::{Cursor, Read, Seek};
+use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::error::{Malformed, ParseError, Part, excerpt};
-use super::line_feeder::LineFeeder;
-use super::triangle_mesh::{Mesh, Parsed};
+use super::error::{Malformed, ParseError};
+use super::triangle_mesh::Parsed;
 
 /// Binary STL: 80 bytes of any text, the number of triangles (u32), and for
-/// each triangle twelve f32 and a u16. Little-endian throughout.
+/// each triangle the normal and the corners as twelve f32, and a u16.
+/// Little-endian throughout.
 const HEADER: usize = 80;
 const PREFIX: usize = HEADER + 4;
 const TRIANGLE: usize = 50;
 
+/// The lines of a facet in ASCII, and how many numbers end each of them.
+const FACET: [(&str, usize); 7] = [
+    ("facet normal", 3),
+    ("outer loop", 0),
+    ("vertex", 3),
+    ("vertex", 3),
+    ("vertex", 3),
+    ("endloop", 0),
+    ("endfacet", 0),
+];
+
 /// Reads an STL file from its bytes.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let begins_solid = begins_with_word(bytes, b"solid");
+    let begins_solid = begins_with_word(bytes, "solid");
     let promised = bytes.as_chunks::<4>().0.get(HEADER / 4).copied().map(u32::from_le_bytes);
     let whole = promised.is_some_and(|promised| binary_length(promised) == bytes.len() as u64);
+    // Some programs begin the header of their binary files with "solid".
     let binary = whole || !begins_solid || bytes[..bytes.len().min(PREFIX)].contains(&0);
     if !binary {
         return parse_ascii(bytes);
     }
     let Some(promised) = promised else {
-        let found = excerpt(&bytes[..bytes.len().min(16)]);
-        return Err(Malformed::WrongStart { format: "an STL file", found }.into());
+        return Err(Malformed::expected("an STL file", bytes).into());
     };
+    let (triangles, _) = bytes[PREFIX..].as_chunks::<TRIANGLE>();
     if binary_length(promised) > bytes.len() as u64 {
-        let held = ((bytes.len() - PREFIX) / TRIANGLE) as u64;
-        let promised = u64::from(promised);
-        return Err(Malformed::Truncated { part: Part::Faces, held, promised }.into());
+        let (held, promised) = (triangles.len() as u64, u64::from(promised));
+        return Err(Malformed::Truncated { part: "faces", held, promised }.into());
     }
-    // stl_io takes any file that begins with "solid" for ASCII, though some
-    // programs begin the header of their binary files so.
-    let mut content = bytes.to_vec();
-    content[..HEADER].fill(0);
-    Ok(read(&mut Cursor::new(content)).map_err(syntax)?)
+    let mut corners = Corners::default();
+    for triangle in &triangles[..promised as usize] {
+        let (numbers, _) = triangle.as_chunks::<4>();
+        let (positions, _) = numbers[3..].as_chunks::<3>();
+        positions.iter().for_each(|position| corners.push(position.map(f32::from_le_bytes)));
+    }
+    Ok(corners.parsed)
 }
 
 fn binary_length(n_triangles: u32) -> u64 {
     PREFIX as u64 + TRIANGLE as u64 * u64::from(n_triangles)
 }
 
+/// Reads all solids of a text, whatever their names, in either case.
 fn parse_ascii(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let text = one_solid(bytes);
-    let mut feeder = LineFeeder::new(&text);
-    let parsed = read(&mut feeder);
-    parsed.map_err(|error| syntax(error).at(feeder.line()))
-}
-
-/// The text as stl_io reads it: in lower case, with all solids in one, its
-/// name replaced, each line in its place.
-fn one_solid(bytes: &[u8]) -> Vec<u8> {
-    let mut text = Vec::with_capacity(bytes.len() + 64);
-    let mut is_open = false;
-    text.extend_from_slice(b"solid mesh");
-    for line in bytes.split(|&byte| byte == b'\n') {
-        let is_start = begins_with_word(line, b"solid");
-        let is_end = begins_with_word(line, b"endsolid");
-        is_open = (is_open || is_start) && !is_end;
-        if !is_start && !is_end {
-            text.extend(line.iter().map(u8::to_ascii_lowercase));
+    let mut corners = Corners::default();
+    // How many lines of a facet were read, and whether a solid is open.
+    let (mut n_read, mut is_open, mut last) = (0, false, 0);
+    for (line, number) in bytes.split(|&byte| byte == b'\n').zip(1..) {
+        let line = line.trim_ascii();
+        if line.is_empty() {
+            continue;
         }
-        text.push(b'\n');
+        last = number;
+        let is_start = begins_with_word(line, "solid");
+        if is_start || begins_with_word(line, "endsolid") {
+            is_open = is_start;
+            continue;
+        }
+        let (keywords, n_numbers) = FACET[n_read];
+        let position = numbers(line, keywords, n_numbers).map_err(|cause| cause.at(number))?;
+        if keywords == "vertex" {
+            corners.push([position[0], position[1], position[2]]);
+        }
+        n_read = (n_read + 1) % FACET.len();
     }
-    if !is_open {
-        text.extend_from_slice(b"endsolid");
+    if n_read > 0 || is_open {
+        let expected = if n_read > 0 { FACET[n_read].0 } else { "endsolid" };
+        let cause = format!("expected `{expected}`, found the end of the file");
+        return Err(Malformed::Syntax(cause).at(last));
     }
-    text
+    Ok(corners.parsed)
 }
 
-fn begins_with_word(line: &[u8], word: &[u8]) -> bool {
+/// The `n` numbers of a line that begins with `keywords`.
+fn numbers(line: &[u8], keywords: &str, n: usize) -> Result<Vec<f32>, Malformed> {
+    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let are_there = keywords
+        .split(' ')
+        .all(|key| words.next().is_some_and(|word| word.eq_ignore_ascii_case(key.as_bytes())));
+    let number =
+        |word| std::str::from_utf8(word).ok()?.parse().ok().filter(|x: &f32| x.is_finite());
+    let numbers: Option<Vec<f32>> = words.map(number).collect();
+    numbers.filter(|numbers| are_there && numbers.len() == n).ok_or_else(|| {
+        let then = if n == 0 { String::new() } else { format!(" and {n} finite numbers") };
+        Malformed::expected(&format!("`{keywords}`{then}"), line)
+    })
+}
+
+fn begins_with_word(line: &[u8], word: &str) -> bool {
     let line = line.trim_ascii_start();
-    line.get(..word.len()).is_some_and(|head| head.eq_ignore_ascii_case(word))
+    line.get(..word.len()).is_some_and(|head| head.eq_ignore_ascii_case(word.as_bytes()))
         && line.get(word.len()).is_none_or(u8::is_ascii_whitespace)
 }
 
-fn read<R: Read + Seek>(source: &mut R) -> std::io::Result<Parsed> {
-    let indexed = stl_io::create_stl_reader(source)?.as_indexed_triangles()?;
-    let vertices =
-        indexed.vertices.iter().map(|vertex| DVec3::from_array(vertex.0.map(f64::from))).collect();
-    let triangles =
-        indexed.faces.iter().map(|face| face.vertices.map(|index| index as u32)).collect();
-    Ok(Parsed { mesh: Mesh { vertices, triangles }, dropped_faces: 0 })
+/// The corners so far.
+#[derive(Default)]
+struct Corners {
+    parsed: Parsed,
+    /// The vertex at each position, by its bits.
+    vertices: HashMap<[u32; 3], u32>,
+    /// Those of the triangle that is not whole yet.
+    open: Vec<u32>,
 }
 
-fn syntax(error: std::io::Error) -> Malformed {
-    Malformed::Syntax(error.to_string())
+impl Corners {
+    fn push(&mut self, position: [f32; 3]) {
+        let vertices = &mut self.parsed.mesh.vertices;
+        let vertex = *self.vertices.entry(position.map(f32::to_bits)).or_insert_with(|| {
+            vertices.push(DVec3::from_array(position.map(f64::from)));
+            vertices.len() as u32 - 1
+        });
+        self.open.push(vertex);
+        if self.open.len() == 3 {
+            self.parsed.add_face(&self.open);
+            self.open.clear();
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::{fails, is_the_triangle};
     use super::*;
 
     const FACET: &str = "facet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  \
@@ -114,25 +158,12 @@ mod tests {
 
     const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-    #[track_caller]
-    fn is_the_triangle(bytes: &[u8]) {
-        let mesh = parse(bytes).unwrap().mesh;
-        assert_eq!(mesh.vertices, [DVec3::ZERO, DVec3::X, DVec3::Y]);
-        assert_eq!(mesh.triangles, [[0, 1, 2]]);
-    }
-
-    #[track_caller]
-    fn fails(bytes: &[u8], message: &str) {
-        let error = parse(bytes).expect_err(message).to_string();
-        assert!(error.starts_with(message), "{error}");
-    }
-
     #[test]
     fn text_is_read_whatever_its_name_case_and_line_ends() {
         for name in [" mesh", "", " two words", " caf\u{e9}"] {
-            is_the_triangle(format!("solid{name}\n{FACET}endsolid{name}\n").as_bytes());
+            is_the_triangle(parse, format!("solid{name}\n{FACET}endsolid{name}\n"));
         }
-        is_the_triangle(format!("SOLID A\r\n{}ENDSOLID A", FACET.to_uppercase()).as_bytes());
+        is_the_triangle(parse, format!("SOLID A\r\n{}ENDSOLID A", FACET.to_uppercase()));
     }
 
     #[test]
@@ -146,8 +177,8 @@ mod tests {
 
     #[test]
     fn a_binary_file_is_known_by_its_length_whatever_it_begins_with() {
-        is_the_triangle(&binary(b"made by a program", 1, &[TRIANGLE]));
-        is_the_triangle(&binary(b"solid made by another", 1, &[TRIANGLE]));
+        is_the_triangle(parse, binary(b"made by a program", 1, &[TRIANGLE]));
+        is_the_triangle(parse, binary(b"solid made by another", 1, &[TRIANGLE]));
     }
 
     #[test]
@@ -160,19 +191,39 @@ mod tests {
 
     #[test]
     fn a_promise_of_billions_is_checked_against_the_file() {
-        let message = "truncated: the header promises 4294967295 faces, the file holds 1";
-        fails(&binary(b"", u32::MAX, &[TRIANGLE]), message);
-        let message = "truncated: the header promises 2 faces, the file holds 1";
-        fails(&binary(b"solid\0", 2, &[TRIANGLE]), message);
+        let cases = [
+            (binary(b"", u32::MAX, &[TRIANGLE]), "truncated: expected 4294967295 faces, found 1"),
+            (binary(b"solid\0", 2, &[TRIANGLE]), "truncated: expected 2 faces, found 1"),
+        ];
+        fails(parse, cases);
     }
 
     #[test]
     fn errors_name_their_cause_and_in_text_their_line() {
-        fails(b"OFF\n", "not an STL file: it begins with \"OFF \"");
         let text = format!("solid a\n{FACET}endsolid a\n");
-        fails(text.replace("1 0 0", "1 0 x").as_bytes(), "line 5: ");
-        fails(text.replace("1 0 0", "1 nan 0").as_bytes(), "line 5: ");
-        fails(&text.as_bytes()[..text.len() - 11], "line 9: EOF while expecting facet");
-        fails(&text.as_bytes()[..60], "line 5: ");
+        let cases = [
+            ("OFF\n".to_owned(), "expected an STL file, found \"OFF \""),
+            (
+                text.replace("1 0 0", "1 0 x"),
+                "line 5: expected `vertex` and 3 finite numbers, found \"vertex 1 0 x\"",
+            ),
+            (
+                text.replace("1 0 0", "1 nan 0"),
+                "line 5: expected `vertex` and 3 finite numbers, found \"vertex 1 nan 0\"",
+            ),
+            (
+                text[..text.len() - 11].to_owned(),
+                "line 8: expected `endsolid`, found the end of the file",
+            ),
+            (
+                text[..60].to_owned(),
+                "line 5: expected `vertex` and 3 finite numbers, found \"vert\"",
+            ),
+            (
+                text[..text.len() - 20].to_owned(),
+                "line 7: expected `endfacet`, found the end of the file",
+            ),
+        ];
+        fails(parse, cases);
     }
 }

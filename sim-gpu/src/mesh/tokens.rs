@@ -1,12 +1,13 @@
 //! The tokens of a text file of numbers, with their lines.
 
-use super::error::{Malformed, ParseError, Part, excerpt};
+use super::error::Malformed;
 
 /// The tokens of a text, line by line, without its comments (from `#` on).
 pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
     at: usize,
-    line: usize,
+    /// The line that it has come to, counted from 1.
+    pub line: usize,
 }
 
 impl<'a> Tokens<'a> {
@@ -21,6 +22,13 @@ impl<'a> Tokens<'a> {
         let length = rest[blank..].iter().take_while(|byte| is_word(**byte)).count();
         self.at += blank + length;
         (length > 0).then(|| &rest[blank..blank + length])
+    }
+
+    /// The next token on this line, its `nth` of the `expected` tokens that are
+    /// `what`.
+    pub fn next_of(&mut self, what: &str, nth: u64, expected: u64) -> Result<&'a [u8], Malformed> {
+        let short = || format!("expected {expected} {what} on the line, found {nth}");
+        self.next().ok_or_else(|| Malformed::Syntax(short()))
     }
 
     /// Leaves this line for the next one that holds a token; false at the end.
@@ -51,55 +59,25 @@ impl<'a> Tokens<'a> {
         self.at += end + 1 + usize::from(rest[end..].starts_with(b"\r\n"));
         self.line += 1;
     }
+}
 
-    /// `promised` items, or as many of `shortest` bytes as can still come.
-    pub fn room(&self, promised: u64, shortest: usize) -> usize {
-        let fit = (self.bytes.len() - self.at) / shortest + 1;
-        usize::try_from(promised).map_or(fit, |promised| promised.min(fit))
-    }
+/// The whole number that `token` spells.
+pub(super) fn integer(token: &[u8], expected: &str) -> Result<i64, Malformed> {
+    let number = match token {
+        // Nearly every token of a face: a few digits cannot overflow.
+        [b'0'..=b'9', ..] if token.len() <= 9 => token.iter().try_fold(0, |sum, byte| {
+            byte.is_ascii_digit().then(|| sum * 10 + i64::from(byte - b'0'))
+        }),
+        _ => std::str::from_utf8(token).ok().and_then(|text| text.parse().ok()),
+    };
+    number.ok_or_else(|| Malformed::expected(expected, token))
+}
 
-    /// The number of vertices or faces that `token` spells.
-    pub fn count(&self, token: &[u8], part: Part) -> Result<u64, ParseError> {
-        let number = self.integer(token, "a count")?;
-        u64::try_from(number)
-            .map_err(|_| self.fault(Malformed::NegativeCount { part, found: excerpt(token) }))
-    }
-
-    /// The whole number that `token` spells.
-    pub fn integer(&self, token: &[u8], expected: &'static str) -> Result<i64, ParseError> {
-        let number = match token {
-            // Nearly every token of a face: a few digits cannot overflow.
-            [b'0'..=b'9', ..] if token.len() <= 9 => token.iter().try_fold(0, |sum, byte| {
-                byte.is_ascii_digit().then(|| sum * 10 + i64::from(byte - b'0'))
-            }),
-            _ => std::str::from_utf8(token).ok().and_then(|text| text.parse().ok()),
-        };
-        number.ok_or_else(|| self.fault(Malformed::NotANumber { found: excerpt(token), expected }))
-    }
-
-    /// The next corner of a face, its `nth` of `n_corners`.
-    pub fn corner(&mut self, nth: i64, n_corners: i64, n_vertices: u64) -> Result<u32, ParseError> {
-        let token = self
-            .next()
-            .ok_or_else(|| self.fault(short("corners of a face", nth as u64, n_corners as u64)))?;
-        let index = self.integer(token, "a vertex index")?;
-        u32::try_from(index).ok().filter(|&index| u64::from(index) < n_vertices).ok_or_else(|| {
-            self.fault(Malformed::IndexOutOfRange { found: excerpt(token), n_vertices })
-        })
-    }
-
-    /// The next token as a coordinate, its vertex's `axis` of three.
-    pub fn coordinate(&mut self, axis: usize) -> Result<f64, ParseError> {
-        let token = self
-            .next()
-            .ok_or_else(|| self.fault(short("coordinates of a vertex", axis as u64, 3)))?;
-        finite(token).map_err(|cause| self.fault(cause))
-    }
-
-    /// `cause`, found on this line.
-    pub fn fault(&self, cause: Malformed) -> ParseError {
-        cause.at(self.line)
-    }
+/// The coordinate that `token` spells.
+pub(super) fn coordinate(token: &[u8]) -> Result<f64, Malformed> {
+    let number = std::str::from_utf8(token).ok().and_then(|text| text.parse::<f64>().ok());
+    let finite = number.filter(|number| number.is_finite());
+    finite.ok_or_else(|| Malformed::expected("a finite coordinate", token))
 }
 
 /// A blank within a line; form feed and vertical tab occur in exports.
@@ -109,18 +87,4 @@ fn is_blank(byte: u8) -> bool {
 
 fn is_word(byte: u8) -> bool {
     !is_blank(byte) && !matches!(byte, b'\n' | b'\r' | b'#')
-}
-
-pub(super) fn short(what: &'static str, held: u64, expected: u64) -> Malformed {
-    Malformed::ShortLine { what, held, expected }
-}
-
-/// The number that `token` spells, if it is finite.
-fn finite(token: &[u8]) -> Result<f64, Malformed> {
-    let number = std::str::from_utf8(token).ok().and_then(|text| text.parse::<f64>().ok());
-    match number {
-        Some(number) if number.is_finite() => Ok(number),
-        Some(_) => Err(Malformed::NotFinite { found: excerpt(token) }),
-        None => Err(Malformed::NotANumber { found: excerpt(token), expected: "a coordinate" }),
-    }
 }

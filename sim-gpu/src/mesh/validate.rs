@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::frame::named_vertices;
 use super::triangle_mesh::Mesh;
+use super::unit_frame::UnitFrame;
 
 /// What a mesh has that no beam can meet, or can meet elsewhere as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,9 +31,8 @@ pub struct TriangleStats {
 
 /// Sorts the triangles of `mesh` into those to cast at and the rest.
 ///
-/// Corners are compared as the casting sees them: f32, about the centre of the
-/// box, in units of a power of two with which half the longest side lies in
-/// (0.5, 1]. Vertices at one position are one corner, whatever their indices,
+/// Corners are compared as the casting sees them: in f32 and in the
+/// [`UnitFrame`]. Vertices at one position are one corner, whatever their indices,
 /// since CAD files often repeat them for each face.
 #[must_use]
 pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
@@ -63,34 +63,13 @@ pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
     TriangleStats { defects, kept }
 }
 
-/// The vertices in f32, recentred and scaled; those not named at the origin.
+/// The vertices in the unit frame of those that are named, in f32; those not
+/// named at the origin.
 fn rounded_positions(mesh: &Mesh, named: &[bool]) -> Vec<Vec3> {
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for (vertex, _) in mesh.vertices.iter().zip(named).filter(|(_, named)| **named) {
-        (low, high) = (low.min(*vertex), high.max(*vertex));
-    }
-    // Halved first: the sum or difference of two finite numbers may not be.
-    let centre = 0.5 * low + 0.5 * high;
-    let inverse = inverse_unit((0.5 * high - 0.5 * low).max_element());
-    let rounded = |(vertex, named): (&DVec3, &bool)| {
-        if *named { ((*vertex - centre) * inverse).as_vec3() } else { Vec3::ZERO }
-    };
-    mesh.vertices.iter().zip(named).map(rounded).collect()
-}
-
-/// The power of two that brings `half_extent` into (0.5, 1], as far as f64 has
-/// one; 1 if there is no extent.
-fn inverse_unit(half_extent: f64) -> f64 {
-    const BIAS: i64 = 1023;
-    const MANTISSA_BITS: u32 = 52;
-    if half_extent.is_nan() || half_extent <= 0.0 {
-        return 1.0;
-    }
-    let bits = half_extent.to_bits();
-    let is_power = bits.trailing_zeros() >= MANTISSA_BITS;
-    let exponent = (bits >> MANTISSA_BITS) as i64 - BIAS + i64::from(!is_power);
-    let exponent = (-exponent).clamp(1 - BIAS, BIAS);
-    f64::from_bits(((exponent + BIAS) as u64) << MANTISSA_BITS)
+    let vertices = || mesh.vertices.iter().copied().zip(named);
+    let frame = UnitFrame::of(vertices().filter(|(_, named)| **named).map(|(vertex, _)| vertex));
+    let rounded = |vertex| frame.to_unit(vertex).as_vec3();
+    vertices().map(|(vertex, &named)| if named { rounded(vertex) } else { Vec3::ZERO }).collect()
 }
 
 /// Whether the cross product of two edges, in f64, is other than zero.
@@ -187,15 +166,6 @@ mod tests {
             assert_eq!(stats.defects, MeshDefects { degenerate: 1, duplicate: 1, unreferenced: 0 });
             assert_eq!(stats.kept, [0, 3], "{size}");
         }
-    }
-
-    #[test]
-    fn the_half_extent_lands_between_a_half_and_one() {
-        for half_extent in [1e-300, 0.4, 0.5, 0.50001, 1.0, 1.5, 2.0, 3e7, 1e300] {
-            let scaled = half_extent * inverse_unit(half_extent);
-            assert!(scaled > 0.5 && scaled <= 1.0, "{half_extent}: {scaled}");
-        }
-        assert_eq!(inverse_unit(0.0), 1.0);
     }
 
     #[test]

@@ -2,12 +2,17 @@
 
 use glam::{DQuat, DVec3};
 
+use serde::Deserialize;
+
 use super::Pose;
 use crate::config::{InvalidValue, finite};
 
-/// The keys that may state an orientation, as read; at most one way at a time.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct OrientationKeys {
+/// The keys of a pose, as read; at most one way of orientation at a time.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PoseKeys {
+    /// Metres.
+    pub position_m: [f64; 3],
     /// The point to look at, metres.
     pub look_at_m: Option<[f64; 3]>,
     /// Angle about z, counterclockwise seen from above, applied last.
@@ -20,34 +25,31 @@ pub struct OrientationKeys {
     pub quaternion_xyzw: Option<[f64; 4]>,
 }
 
-impl OrientationKeys {
+impl PoseKeys {
     /// The pose of a sensor, which must state its orientation. `table` is the
     /// path of the TOML table, for errors.
-    ///
-    /// # Errors
-    ///
-    /// If none or more than one way is used, or a number cannot be.
-    pub fn pose(&self, table: &str, position_m: [f64; 3]) -> Result<Pose, InvalidValue> {
-        let position_m = vector(&format!("{table}.position_m"), position_m)?;
+    pub fn pose(&self, table: &str) -> Result<Pose, InvalidValue> {
+        let position_m = self.position_m(table)?;
         if let Some(target_m) = self.look_at_m {
             self.only_one_way(table)?;
-            let target_m = vector(&format!("{table}.look_at_m"), target_m)?;
+            let target_m = all_finite(&format!("{table}.look_at_m"), target_m)?.into();
             return Pose::look_at(position_m, target_m)
                 .map_err(|e| InvalidValue::new(format!("{table}.{}", e.key), e.cause));
         }
         let world_from_sensor = self.rotation(table)?.ok_or_else(|| {
-            let cause =
-                "no orientation: give look_at_m, yaw_deg/pitch_deg/roll_deg or quaternion_xyzw";
+            let cause = "expected look_at_m, yaw_deg/pitch_deg/roll_deg or quaternion_xyzw, found \
+                         none of them";
             InvalidValue::new(table, cause)
         })?;
         Ok(Pose { position_m, world_from_sensor })
     }
 
+    /// The position, if it is finite.
+    pub fn position_m(&self, table: &str) -> Result<DVec3, InvalidValue> {
+        all_finite(&format!("{table}.position_m"), self.position_m).map(DVec3::from_array)
+    }
+
     /// The rotation by angles or by quaternion, `None` if neither is stated.
-    ///
-    /// # Errors
-    ///
-    /// If both ways are used, or a number cannot be.
     pub fn rotation(&self, table: &str) -> Result<Option<DQuat>, InvalidValue> {
         self.only_one_way(table)?;
         if let Some(xyzw) = self.quaternion_xyzw {
@@ -57,7 +59,8 @@ impl OrientationKeys {
             return Ok(None);
         }
         let radians = |key: &str, degrees: Option<f64>| {
-            Ok(finite(&format!("{table}.{key}"), degrees.unwrap_or(0.0))?.to_radians())
+            finite(&format!("{table}.{key}"), degrees)?;
+            Ok(degrees.unwrap_or(0.0).to_radians())
         };
         let yaw = DQuat::from_rotation_z(radians("yaw_deg", self.yaw_deg)?);
         let pitch = DQuat::from_rotation_y(radians("pitch_deg", self.pitch_deg)?);
@@ -74,26 +77,22 @@ impl OrientationKeys {
         if ways.into_iter().filter(|&used| used).count() < 2 {
             return Ok(());
         }
-        let cause = "look_at_m, yaw_deg/pitch_deg/roll_deg and quaternion_xyzw exclude each other";
+        let cause = "expected look_at_m, yaw_deg/pitch_deg/roll_deg or quaternion_xyzw, found \
+                     several of them";
         Err(InvalidValue::new(table, cause))
     }
 }
 
-/// A vector with three finite coordinates.
-pub(crate) fn vector(key: &str, xyz: [f64; 3]) -> Result<DVec3, InvalidValue> {
-    for value in xyz {
-        finite(key, value)?;
-    }
-    Ok(DVec3::from_array(xyz))
+fn all_finite<const N: usize>(key: &str, values: [f64; N]) -> Result<[f64; N], InvalidValue> {
+    values.into_iter().try_for_each(|value| finite(key, value))?;
+    Ok(values)
 }
 
 fn quaternion(key: &str, xyzw: [f64; 4]) -> Result<DQuat, InvalidValue> {
-    for value in xyzw {
-        finite(key, value)?;
-    }
-    let largest = xyzw.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let largest =
+        all_finite(key, xyzw)?.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     if largest == 0.0 {
-        return Err(InvalidValue::new(key, "is zero, which is no rotation"));
+        return Err(InvalidValue::new(key, "expected a rotation, found 0"));
     }
     // Scaled first, so that no square overflows or vanishes.
     Ok(DQuat::from_array(xyzw.map(|value| value / largest)).normalize())

@@ -158,8 +158,8 @@ impl Scene {
     /// If somebody does.
     pub fn check_triangles(&self) -> Result<(), InvalidValue> {
         if self.simplifies() && self.attributes.contains(&Attribute::Triangle) {
-            let cause = "a simplified mesh's triangles are not the file's, so that attributes \
-                         cannot have their numbers";
+            let cause = "a simplified mesh does not have the file's triangles, so that the \
+                         attribute `triangle` cannot name them";
             return Err(InvalidValue::new("simplify", cause));
         }
         Ok(())
@@ -182,12 +182,15 @@ fn check_names<'a>(
     let mut first_with = std::collections::HashMap::new();
     for (i, name) in names.enumerate() {
         if let Some(first) = first_with.insert(name, i) {
-            let cause = format!("\"{name}\" is also the name of {kind}[{first}]; set `name`");
+            let cause = format!("\"{name}\" is the name of {kind}[{first}] too; set `name`");
             return Err(InvalidValue::new(format!("{kind}[{i}].name"), cause));
         }
     }
     if first_with.is_empty() {
-        return Err(InvalidValue::new(kind, format!("a scene needs at least one [[{kind}]]")));
+        return Err(InvalidValue::new(
+            kind,
+            format!("expected at least one [[{kind}]], found none"),
+        ));
     }
     Ok(())
 }

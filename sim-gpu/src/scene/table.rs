@@ -10,7 +10,7 @@ use super::{SceneObject, SceneSensor};
 use crate::config::{InvalidValue, positive, within};
 use crate::effects::Effects;
 use crate::mesh::frame::{Normalize, Up};
-use crate::pose::{OrientationKeys, vector};
+use crate::pose::PoseKeys;
 use crate::sensor::Sensor;
 use crate::simplify::Simplify;
 
@@ -66,7 +66,7 @@ pub(super) struct SensorTable {
 }
 
 #[derive(Clone, Copy, Deserialize)]
-#[serde(untagged, expecting = "scale takes one number or a list of three")]
+#[serde(untagged, expecting = "expected one number or a list of three as scale")]
 enum Scale {
     Uniform(f64),
     PerAxis([f64; 3]),
@@ -74,7 +74,7 @@ enum Scale {
 
 /// What an object says of its own simplification.
 #[derive(Clone, Copy, Deserialize)]
-#[serde(untagged, expecting = "simplify takes \"auto\", metres above 0, or false")]
+#[serde(untagged, expecting = "expected \"auto\", metres above 0 or false as simplify")]
 enum OwnSimplify {
     Switch(bool),
     Within(Simplify),
@@ -85,16 +85,17 @@ impl ObjectTable {
         let table = format!("object[{index}]");
         let key = |field: &str| format!("{table}.{field}");
         let Some(stem) = self.mesh.file_stem() else {
-            return Err(InvalidValue::new(key("mesh"), "names no file"));
+            return Err(InvalidValue::new(key("mesh"), "expected the path of a file"));
         };
         let scale = match self.scale.unwrap_or(Scale::Uniform(1.0)) {
             Scale::Uniform(factor) => [factor; 3],
             Scale::PerAxis(factors) => factors,
         };
-        for factor in scale {
-            positive(&key("scale"), factor)?;
-        }
-        let orientation = OrientationKeys {
+        scale.into_iter().try_for_each(|factor| positive(&key("scale"), factor))?;
+        let reflectivity = self.reflectivity.unwrap_or(1.0);
+        within(&key("reflectivity"), reflectivity, 0.0..=1.0)?;
+        let keys = PoseKeys {
+            position_m: self.position_m,
             look_at_m: None,
             yaw_deg: self.yaw_deg,
             pitch_deg: self.pitch_deg,
@@ -106,7 +107,10 @@ impl ObjectTable {
             Some(OwnSimplify::Within(simplify)) => Some(Some(simplify)),
             Some(OwnSimplify::Switch(false)) => Some(None),
             Some(OwnSimplify::Switch(true)) => {
-                return Err(InvalidValue::new(key("simplify"), "takes \"auto\", metres or false"));
+                return Err(InvalidValue::new(
+                    key("simplify"),
+                    "expected \"auto\", metres or false, found true",
+                ));
             }
         };
         let name = self.name.unwrap_or_else(|| stem.to_string_lossy().into_owned());
@@ -116,10 +120,10 @@ impl ObjectTable {
             label: self.label,
             up: self.up,
             normalize: self.normalize,
-            position_m: vector(&key("position_m"), self.position_m)?,
-            rotation: orientation.rotation(&table)?.unwrap_or(DQuat::IDENTITY),
+            position_m: keys.position_m(&table)?,
+            rotation: keys.rotation(&table)?.unwrap_or(DQuat::IDENTITY),
             scale: DVec3::from_array(scale),
-            reflectivity: within(&key("reflectivity"), self.reflectivity.unwrap_or(1.0), 0.0, 1.0)?,
+            reflectivity,
             simplify,
         })
     }
@@ -128,14 +132,15 @@ impl ObjectTable {
 impl SensorTable {
     pub fn validate(self, index: usize, sensor: Sensor) -> Result<SceneSensor, InvalidValue> {
         let table = format!("sensor[{index}]");
-        let orientation = OrientationKeys {
+        let keys = PoseKeys {
+            position_m: self.position_m,
             look_at_m: self.look_at_m,
             yaw_deg: self.yaw_deg,
             pitch_deg: self.pitch_deg,
             roll_deg: self.roll_deg,
             quaternion_xyzw: self.quaternion_xyzw,
         };
-        let pose = orientation.pose(&table, self.position_m)?;
+        let pose = keys.pose(&table)?;
         let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
         Ok(SceneSensor { sensor, name, pose })
     }
@@ -154,10 +159,10 @@ pub(super) fn check_attributes(
             Err(error) => return wrong(format!("{error}")),
         };
         if attribute == Attribute::Intensity && effects.intensity.is_none() {
-            return wrong("intensity needs effects.intensity = true".to_owned());
+            return wrong("intensity requires effects.intensity = true".to_owned());
         }
         if !set.insert(attribute) {
-            return wrong(format!("\"{word}\" stands in the list twice"));
+            return wrong(format!("found \"{word}\" in the list twice"));
         }
     }
     Ok(set)
@@ -165,7 +170,7 @@ pub(super) fn check_attributes(
 
 fn named(table: &str, name: String) -> Result<String, InvalidValue> {
     if name.trim().is_empty() {
-        return Err(InvalidValue::new(format!("{table}.name"), "is empty"));
+        return Err(InvalidValue::new(format!("{table}.name"), "expected a name, found none"));
     }
     Ok(name)
 }

@@ -4,8 +4,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::uniform::linear_steps;
-use super::{Rays, checked_ray_count};
-use crate::config::{InvalidValue, finite, positive};
+use super::{MAX_RINGS, Rays, checked_ray_count};
+use crate::config::{InvalidValue, finite, positive, within};
 
 /// An image, row by row from the top left, taken at one time. It states either
 /// its fields of view or its focal lengths and principal point.
@@ -48,8 +48,10 @@ impl Grid {
         match self.optics()? {
             Optics::FieldOfView { x_deg, y_deg } => {
                 for (key, fov_deg) in [("grid.fov_x_deg", x_deg), ("grid.fov_y_deg", y_deg)] {
-                    if positive(key, fov_deg)? >= 180.0 {
-                        return Err(InvalidValue::new(key, format!("{fov_deg} is not below 180")));
+                    positive(key, fov_deg)?;
+                    if fov_deg >= 180.0 {
+                        let cause = format!("expected a number below 180, found {fov_deg}");
+                        return Err(InvalidValue::new(key, cause));
                     }
                 }
             }
@@ -60,9 +62,7 @@ impl Grid {
                 finite("grid.cy", cy)?;
             }
         }
-        if self.height > u32::from(u16::MAX) {
-            return Err(InvalidValue::new("grid.height", "more than 65535 rows"));
-        }
+        within("grid.height", f64::from(self.height), 0.0..=MAX_RINGS)?;
         let n_rays = u64::from(self.width) * u64::from(self.height);
         checked_ray_count("grid.width x grid.height", n_rays)
     }
@@ -76,7 +76,7 @@ impl Grid {
                 Ok(Optics::Pinhole { fx, fy, cx, cy })
             }
             _ => {
-                let cause = "state either fov_x_deg and fov_y_deg, or fx, fy, cx and cy";
+                let cause = "expected either fov_x_deg and fov_y_deg, or fx, fy, cx and cy";
                 Err(InvalidValue::new("grid", cause))
             }
         }

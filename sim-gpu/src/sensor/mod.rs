@@ -45,6 +45,9 @@ pub fn builtin_names() -> impl Iterator<Item = &'static str> {
 /// pattern of so many takes 2.5 GB.
 pub const MAX_RAYS: u64 = 1 << 26;
 
+/// The most rings: a point's ring has 16 bits.
+const MAX_RINGS: f64 = u16::MAX as f64;
+
 /// A sensor, checked: its pattern can be built without error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "profile::Profile")]
@@ -167,7 +170,9 @@ impl Sensor {
             Layout::Uniform(uniform) => uniform.rays(keep_each),
             Layout::Grid(grid) => grid.rays(keep_each),
         };
-        BeamPattern::new(rays.directions, rays.ring, rays.time_s).starting_at(rays.start_z_m)
+        let mut pattern = BeamPattern::new(rays.directions, rays.ring, rays.time_s);
+        pattern.start_z_m = rays.start_z_m;
+        pattern
     }
 
     /// The same sensor with only each `k`-th azimuth step, or column of
@@ -218,8 +223,11 @@ impl Rays {
 /// `n_rays`, if there is at least one and not too many.
 fn checked_ray_count(key: &str, n_rays: u64) -> Result<(), InvalidValue> {
     match n_rays {
-        0 => Err(InvalidValue::new(key, "gives not a single ray")),
+        0 => Err(InvalidValue::new(key, "expected at least one ray, found none")),
         1..=MAX_RAYS => Ok(()),
-        _ => Err(InvalidValue::new(key, format!("gives {n_rays} rays, more than {MAX_RAYS}"))),
+        _ => {
+            let cause = format!("expected at most {MAX_RAYS} rays, found {n_rays}");
+            Err(InvalidValue::new(key, cause))
+        }
     }
 }

@@ -34,7 +34,8 @@ pub struct BeamPattern {
 
 impl BeamPattern {
     /// A pattern of rays in firing order. All three lists must be of one
-    /// length, below 2^32, and all directions of unit length.
+    /// length, below 2^32, and all directions of unit length. All rays start at
+    /// the sensor itself.
     #[must_use]
     pub fn new(directions: Vec<DVec3>, ring: Vec<u16>, time_s: Vec<f64>) -> Self {
         debug_assert!(directions.len() == ring.len() && directions.len() == time_s.len());
@@ -43,14 +44,6 @@ impl BeamPattern {
         let blocks = order.chunks(BLOCK_RAYS).map(bound).collect();
         let groups = order.chunks(BLOCK_RAYS * GROUP_BLOCKS).map(bound).collect();
         Self { directions, ring, time_s, start_z_m: Vec::new(), order, blocks, groups }
-    }
-
-    /// The same rays, started as far above the sensor as `start_z_m` says:
-    /// metres, `[n_rays]`, or empty.
-    #[must_use]
-    pub fn starting_at(self, start_z_m: Vec<f64>) -> Self {
-        debug_assert!(start_z_m.is_empty() || start_z_m.len() == self.len());
-        Self { start_z_m, ..self }
     }
 
     /// Where ray `beam` starts, in the sensor frame, metres; `None` where that

@@ -49,12 +49,11 @@ impl TryFrom<Profile> for Sensor {
 
     fn try_from(profile: Profile) -> Result<Self, InvalidValue> {
         if profile.name.trim().is_empty() {
-            return Err(InvalidValue::new("name", "is empty"));
+            return Err(InvalidValue::new("name", "expected a name, found none"));
         }
         check_range(&profile.range)?;
-        if let Some(noise) = profile.noise {
-            within("noise.typical_sigma_m", noise.typical_sigma_m, 0.0, f64::MAX)?;
-        }
+        let sigma_m = profile.noise.map(|noise| noise.typical_sigma_m);
+        within("noise.typical_sigma_m", sigma_m, 0.0..=f64::MAX)?;
         if let Some(rings) = &profile.rings {
             rings.validate()?;
         }
@@ -69,7 +68,7 @@ impl TryFrom<Profile> for Sensor {
             && rotating.beam_crossing_m.is_some()
         {
             // Rings are cones around one point, which such beams lack.
-            let cause = "excludes [rings]";
+            let cause = "cannot stand beside [rings]";
             return Err(InvalidValue::new("rotating.beam_crossing_m", cause));
         }
         Ok(Self {
@@ -97,11 +96,11 @@ fn layout(
         (None, Some(uniform), None) => Layout::Uniform(uniform),
         (None, None, Some(grid)) => Layout::Grid(grid),
         (None, None, None) => {
-            let cause = "missing: a profile needs one of [rotating], [uniform] and [grid]";
+            let cause = "expected one of [rotating], [uniform] and [grid], found none";
             return Err(InvalidValue::new("rotating", cause));
         }
         _ => {
-            let cause = "[rotating], [uniform] and [grid] exclude each other";
+            let cause = "expected one of [rotating], [uniform] and [grid], found several";
             return Err(InvalidValue::new("rotating, uniform, grid", cause));
         }
     };
@@ -114,15 +113,13 @@ fn layout(
 }
 
 fn check_range(range: &RangeLimits) -> Result<(), InvalidValue> {
-    within("range.min_m", range.min_m, 0.0, f64::MAX)?;
+    within("range.min_m", range.min_m, 0.0..=f64::MAX)?;
     positive("range.max_m", range.max_m)?;
-    within("range.max_m", range.max_m, 0.0, MAX_RANGE_M)?;
+    within("range.max_m", range.max_m, 0.0..=MAX_RANGE_M)?;
     if range.min_m >= range.max_m {
-        let cause = format!("{} is not above range.min_m = {}", range.max_m, range.min_m);
+        let (min_m, max_m) = (range.min_m, range.max_m);
+        let cause = format!("expected a number above range.min_m = {min_m}, found {max_m}");
         return Err(InvalidValue::new("range.max_m", cause));
     }
-    if let Some(quantum_m) = range.quantum_m {
-        positive("range.quantum_m", quantum_m)?;
-    }
-    Ok(())
+    positive("range.quantum_m", range.quantum_m)
 }

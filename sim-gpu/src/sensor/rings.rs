@@ -42,10 +42,10 @@ impl Rings {
 
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
         positive("rings.step_deg", self.step_deg)?;
-        within("rings.keep_from", self.keep_from, 0.0, 1.0)?;
-        within("rings.keep_to", self.keep_to, 0.0, 1.0)?;
+        within("rings.keep_from", self.keep_from, 0.0..=1.0)?;
+        within("rings.keep_to", self.keep_to, 0.0..=1.0)?;
         if self.keep_from >= self.keep_to {
-            let cause = format!("{} is not above rings.keep_from", self.keep_to);
+            let cause = format!("expected a number above rings.keep_from, found {}", self.keep_to);
             return Err(InvalidValue::new("rings.keep_to", cause));
         }
         Ok(())

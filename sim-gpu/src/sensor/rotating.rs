@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Rays, checked_ray_count};
-use crate::config::{InvalidValue, finite, positive, within};
+use super::{MAX_RINGS, Rays, checked_ray_count};
+use crate::config::{InvalidValue, positive, within};
 
 /// A table of beams on a turning head.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,34 +73,23 @@ impl Rotating {
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
         positive("rotating.rpm", self.rpm)?;
         positive("rotating.sequence_us", self.sequence_us)?;
-        if let Some(quantum_deg) = self.azimuth_quantum_deg {
-            positive("rotating.azimuth_quantum_deg", quantum_deg)?;
+        positive("rotating.azimuth_quantum_deg", self.azimuth_quantum_deg)?;
+        positive("rotating.sequence_quantum_deg", self.sequence_quantum_deg)?;
+        if self.azimuth_quantum_deg.and(self.sequence_quantum_deg).is_some() {
+            let cause = "cannot stand beside rotating.azimuth_quantum_deg";
+            return Err(InvalidValue::new("rotating.sequence_quantum_deg", cause));
         }
-        if let Some(quantum_deg) = self.sequence_quantum_deg {
-            positive("rotating.sequence_quantum_deg", quantum_deg)?;
-            if self.azimuth_quantum_deg.is_some() {
-                let cause = "excludes rotating.azimuth_quantum_deg";
-                return Err(InvalidValue::new("rotating.sequence_quantum_deg", cause));
-            }
-        }
-        if let Some(crossing_m) = self.beam_crossing_m {
-            within("rotating.beam_crossing_m", crossing_m, 0.0, 1.0)?;
-        }
-        if self.beam.is_empty() {
-            return Err(InvalidValue::new("rotating.beam", "is empty"));
-        }
-        if self.beam.len() > usize::from(u16::MAX) {
-            return Err(InvalidValue::new("rotating.beam", "more than 65535 beams"));
-        }
+        within("rotating.beam_crossing_m", self.beam_crossing_m, 0.0..=1.0)?;
+        within("number of rotating.beam", self.beam.len() as f64, 1.0..=MAX_RINGS)?;
         for (i, beam) in self.beam.iter().enumerate() {
             let key = |field: &str| format!("rotating.beam[{i}].{field}");
-            within(&key("azimuth_offset_deg"), beam.azimuth_offset_deg, -360.0, 360.0)?;
+            within(&key("azimuth_offset_deg"), beam.azimuth_offset_deg, -360.0..=360.0)?;
             // A beam along the axis would cross nothing in front of it.
             let steepest_deg = if self.beam_crossing_m.is_some() { 89.0 } else { 90.0 };
-            within(&key("elevation_deg"), beam.elevation_deg, -steepest_deg, steepest_deg)?;
-            finite(&key("firing_us"), beam.firing_us)?;
+            within(&key("elevation_deg"), beam.elevation_deg, -steepest_deg..=steepest_deg)?;
             if !(0.0..self.sequence_us).contains(&beam.firing_us) {
-                let cause = format!("{} is not in 0..{}", beam.firing_us, self.sequence_us);
+                let (end, found) = (self.sequence_us, beam.firing_us);
+                let cause = format!("expected a number within 0..{end}, found {found}");
                 return Err(InvalidValue::new(key("firing_us"), cause));
             }
         }

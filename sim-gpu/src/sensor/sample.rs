@@ -3,7 +3,7 @@
 use formats::rng::StreamKey;
 use serde::{Deserialize, Serialize};
 
-use crate::config::InvalidValue;
+use crate::config::{InvalidValue, within};
 
 /// How many points of a scan are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,17 +46,9 @@ impl Sample {
     }
 
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
-        let counts = [
-            ("sample.points", self.points),
-            ("sample.before_rings", self.before_rings.unwrap_or(1)),
-        ];
-        for (key, points) in counts {
-            if !(1..=super::MAX_RAYS as u32).contains(&points) {
-                let cause = format!("{points} is not within 1..={}", super::MAX_RAYS);
-                return Err(InvalidValue::new(key, cause));
-            }
-        }
-        Ok(())
+        let most = super::MAX_RAYS as f64;
+        within("sample.points", f64::from(self.points), 1.0..=most)?;
+        within("sample.before_rings", self.before_rings.map(f64::from), 1.0..=most)
     }
 }
 

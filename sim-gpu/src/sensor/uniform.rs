@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Rays, checked_ray_count};
+use super::{MAX_RINGS, Rays, checked_ray_count};
 use crate::config::{InvalidValue, positive, within};
 
 /// A regular grid of angles. Both ends of each axis belong to it; the azimuth
@@ -31,16 +31,12 @@ pub struct Uniform {
 
 impl Uniform {
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
-        within("uniform.azimuth_from_deg", self.azimuth_from_deg, -360.0, 360.0)?;
-        within("uniform.azimuth_to_deg", self.azimuth_to_deg, -360.0, 360.0)?;
-        within("uniform.elevation_from_deg", self.elevation_from_deg, -90.0, 90.0)?;
-        within("uniform.elevation_to_deg", self.elevation_to_deg, -90.0, 90.0)?;
-        if self.elevation_steps > u32::from(u16::MAX) {
-            return Err(InvalidValue::new("uniform.elevation_steps", "more than 65535 rows"));
-        }
-        if let Some(rpm) = self.rpm {
-            positive("uniform.rpm", rpm)?;
-        }
+        within("uniform.azimuth_from_deg", self.azimuth_from_deg, -360.0..=360.0)?;
+        within("uniform.azimuth_to_deg", self.azimuth_to_deg, -360.0..=360.0)?;
+        within("uniform.elevation_from_deg", self.elevation_from_deg, -90.0..=90.0)?;
+        within("uniform.elevation_to_deg", self.elevation_to_deg, -90.0..=90.0)?;
+        within("uniform.elevation_steps", f64::from(self.elevation_steps), 0.0..=MAX_RINGS)?;
+        positive("uniform.rpm", self.rpm)?;
         let n_rays = u64::from(self.azimuth_steps) * u64::from(self.elevation_steps);
         checked_ray_count("uniform.azimuth_steps x uniform.elevation_steps", n_rays)
     }

@@ -72,13 +72,10 @@ impl Views {
     ///
     /// On the first number that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
-        if self.count > u32::from(u16::MAX) {
-            return Err(InvalidValue::new("views.count", "more than 65535 views"));
-        }
+        within("views.count", f64::from(self.count), 0.0..=f64::from(u16::MAX))?;
         positive("views.distance_m", self.distance_m)?;
-        within("views.elevation_deg", self.elevation_deg, -90.0, 90.0)?;
-        within("views.azimuth_deg", self.azimuth_deg, -360.0, 360.0)?;
-        within("views.azimuth_jitter_deg", self.azimuth_jitter_deg, 0.0, 180.0)?;
-        Ok(())
+        within("views.elevation_deg", self.elevation_deg, -90.0..=90.0)?;
+        within("views.azimuth_deg", self.azimuth_deg, -360.0..=360.0)?;
+        within("views.azimuth_jitter_deg", self.azimuth_jitter_deg, 0.0..=180.0)
     }
 }

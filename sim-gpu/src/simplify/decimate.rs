@@ -6,7 +6,6 @@ use std::collections::hash_map::Entry;
 use meshopt::{SimplifyOptions, simplify_decoder};
 use rayon::prelude::*;
 
-use super::NotBuilt;
 use super::distance::distance_to_surface;
 use super::within::beyond;
 use crate::bvh::Builder;
@@ -26,15 +25,10 @@ const OVERLAP: f64 = 4.0;
 /// A result with more than this part of the triangles is not worth it.
 const WORTH_IT: f64 = 0.75;
 
-/// See [`super::simplified`].
-pub(super) fn decimated(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>, NotBuilt> {
-    Ok(proven(mesh, kept, bound))
-}
-
 /// Decimates, and then puts right where that went too far. Triangles that are
 /// not proven to lie near the mesh are left out, and those of the mesh around
 /// them come back; so do those that are not proven to lie near what is left.
-fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
+pub(super) fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
     if kept.is_empty() || bound.is_nan() || bound <= 0.0 {
         return None;
     }
@@ -163,20 +157,8 @@ impl Welded {
     /// The mesh of triangles with these `corners`, at the f64 positions of
     /// `mesh`, and of no other vertices.
     fn mesh_of(&self, mesh: &Mesh, corners: &[u32]) -> Mesh {
-        const NOT_USED: u32 = u32::MAX;
-        let mut numbers = vec![NOT_USED; self.positions.len()];
-        let mut fewer = Mesh::default();
-        let mut number = |corner: u32| {
-            let number = &mut numbers[corner as usize];
-            if *number == NOT_USED {
-                *number = fewer.vertices.len() as u32;
-                fewer.vertices.push(mesh.vertices[self.sources[corner as usize] as usize]);
-            }
-            *number
-        };
-        fewer.triangles =
-            corners.as_chunks::<3>().0.iter().map(|triangle| triangle.map(&mut number)).collect();
-        fewer
+        let position = |corner: usize| mesh.vertices[self.sources[corner] as usize];
+        Mesh::of_named(corners.as_chunks().0.to_vec(), self.positions.len(), position)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::bvh::MAX_DEPTH;
+use crate::bvh::traverse;
 use crate::target::Target;
 
 /// The distance from `point` to the triangle of these corners, which may be
@@ -38,33 +38,24 @@ fn to_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
 #[must_use]
 pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
     let mut nearest = f64::INFINITY;
-    let mut stack = [0u32; MAX_DEPTH + 1];
-    let mut height = usize::from(!target.surface.is_empty());
-    while height > 0 {
-        height -= 1;
-        let node = &target.bvh.nodes[stack[height] as usize];
-        let mut children = [
-            (to_box(point, node.left_min, node.left_max), node.left, node.left_count),
-            (to_box(point, node.right_min, node.right_max), node.right, node.right_count),
-        ];
-        if children[0].0 < children[1].0 {
-            children.swap(0, 1);
-        }
-        for (distance, first, count) in children {
-            if distance >= nearest {
-                continue;
-            }
-            if count == 0 {
-                stack[height] = first;
-                height += 1;
-                continue;
-            }
-            for triangle in &target.bvh.triangles[first as usize..(first + count) as usize] {
-                let corners = target.surface.corners(triangle.index);
-                nearest = nearest.min(distance_to_triangle(point, corners));
-            }
-        }
+    if target.surface.is_empty() {
+        return nearest;
     }
+    traverse(
+        &target.bvh.nodes,
+        0,
+        &mut nearest,
+        |nearest, low, high| {
+            let distance = to_box(point, low, high);
+            if distance < *nearest { distance } else { f64::INFINITY }
+        },
+        |nearest, leaf| {
+            for triangle in &target.bvh.triangles[leaf] {
+                let corners = target.surface.corners(triangle.index);
+                *nearest = nearest.min(distance_to_triangle(point, corners));
+            }
+        },
+    );
     nearest
 }
 

@@ -19,7 +19,7 @@
 //! compiler has it: the same program gives the same triangles, another
 //! platform's may give others.
 
-#[cfg_attr(not(feature = "simplify"), path = "not_built.rs")]
+#[cfg(feature = "simplify")]
 mod decimate;
 mod distance;
 mod resolution;
@@ -87,8 +87,18 @@ impl Simplify {
 ///
 /// # Errors
 /// If this build has no decimation.
+#[cfg(feature = "simplify")]
 pub fn simplified(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>, NotBuilt> {
-    decimate::decimated(mesh, kept, bound)
+    Ok(decimate::proven(mesh, kept, bound))
+}
+
+/// A build without decimation.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "simplify"))]
+pub fn simplified(_: &Mesh, _: &[u32], _: f64) -> Result<Option<Mesh>, NotBuilt> {
+    Err(NotBuilt)
 }
 
 /// The surface to cast at: that of [`simplified`], or of the `kept` triangles of
@@ -105,7 +115,7 @@ pub fn simplified_surface(mesh: Mesh, kept: Vec<u32>, bound: f64) -> Result<Surf
 
 /// [`Simplify`] as written.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(untagged, expecting = "simplify takes \"auto\" or metres")]
+#[serde(untagged, expecting = "expected \"auto\" or metres as simplify")]
 enum Written {
     Metres(f64),
     Word(String),
@@ -116,10 +126,10 @@ impl TryFrom<Written> for Simplify {
 
     fn try_from(written: Written) -> Result<Self, InvalidValue> {
         match written {
-            Written::Metres(metres) => Ok(Self::Metres(positive("simplify", metres)?)),
+            Written::Metres(metres) => positive("simplify", metres).map(|()| Self::Metres(metres)),
             Written::Word(word) if word == "auto" => Ok(Self::Auto),
             Written::Word(word) => {
-                let cause = format!("{word:?} is neither \"auto\" nor a number of metres");
+                let cause = format!("expected \"auto\" or a number of metres, found {word:?}");
                 Err(InvalidValue::new("simplify", cause))
             }
         }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::mesh::Mesh;
+use crate::mesh::unit_frame::bounding_box;
 use crate::sensor::Sensor;
 
 /// A step between beams holds so many beams' footprints.
@@ -29,7 +30,8 @@ pub struct Viewpoint<'a> {
 /// limit stands in the box; infinite where nothing is to be told apart.
 #[must_use]
 pub fn resolved_m(mesh: &Mesh, units_per_m: f64, viewpoints: &[Viewpoint<'_>]) -> f64 {
-    let (low, high) = bounding_box(mesh);
+    let corners = mesh.triangles.iter().flatten().map(|&v| mesh.vertices[v as usize]);
+    let (low, high) = bounding_box(corners);
     let radius = |viewpoint: &Viewpoint<'_>| {
         let step_rad = viewpoint.sensor.angular_step_rad().unwrap_or(f64::INFINITY);
         let distance = |from: &DVec3| (from.clamp(low, high) - *from).length();
@@ -43,12 +45,6 @@ pub fn resolved_m(mesh: &Mesh, units_per_m: f64, viewpoints: &[Viewpoint<'_>]) -
         nearest * half_footprint_rad.tan()
     };
     viewpoints.iter().map(radius).fold(f64::INFINITY, f64::min)
-}
-
-/// Of the vertices that triangles name.
-fn bounding_box(mesh: &Mesh) -> (DVec3, DVec3) {
-    let named = mesh.triangles.iter().flatten().map(|&v| mesh.vertices[v as usize]);
-    named.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
 }
 
 #[cfg(test)]

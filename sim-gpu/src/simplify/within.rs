@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::distance::distance_to_triangle;
-use crate::bvh::{MAX_DEPTH, Node};
+use crate::bvh::traverse;
 use crate::target::{Surface, Target};
 
 /// Pieces shorter than this part of the bound are not halved any more: the
@@ -104,38 +104,30 @@ impl Proof<'_> {
         .is_some()
     }
 
-    /// The first triangle that is `fit`, of those in boxes that, grown by the
-    /// bound, hold all of `piece`.
+    /// A triangle that is `fit`, of those in boxes that, grown by the bound, hold
+    /// all of `piece`.
     fn search(&self, [a, b, c]: [DVec3; 3], fit: impl Fn(u32) -> bool) -> Option<u32> {
         let (low, high) = (a.min(b).min(c) + self.bound, a.max(b).max(c) - self.bound);
-        let may_hold = |min: [f32; 3], max: [f32; 3]| {
-            let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
-            corner(min).cmple(low).all() && corner(max).cmpge(high).all()
-        };
-        let mut stack = [0u32; MAX_DEPTH + 1];
-        let mut height = usize::from(!self.target.surface.is_empty());
-        while height > 0 {
-            height -= 1;
-            let node: &Node = &self.target.bvh.nodes[stack[height] as usize];
-            for (min, max, first, count) in [
-                (node.left_min, node.left_max, node.left, node.left_count),
-                (node.right_min, node.right_max, node.right, node.right_count),
-            ] {
-                if !may_hold(min, max) {
-                    continue;
-                }
-                if count == 0 {
-                    stack[height] = first;
-                    height += 1;
-                    continue;
-                }
-                let leaf = &self.target.bvh.triangles[first as usize..(first + count) as usize];
-                if let Some(found) = leaf.iter().find(|triangle| fit(triangle.index)) {
-                    return Some(found.index);
-                }
-            }
+        let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+        let Target { surface, bvh } = self.target;
+        let mut found = None;
+        if surface.is_empty() {
+            return found;
         }
-        None
+        traverse(
+            &bvh.nodes,
+            0,
+            &mut found,
+            |found: &Option<u32>, min, max| {
+                let may_hold = corner(min).cmple(low).all() && corner(max).cmpge(high).all();
+                if may_hold && found.is_none() { 0.0 } else { f32::INFINITY }
+            },
+            |found, leaf| {
+                let mut indices = bvh.triangles[leaf].iter().map(|triangle| triangle.index);
+                *found = found.or_else(|| indices.find(|&index| fit(index)));
+            },
+        );
+        found
     }
 }
 

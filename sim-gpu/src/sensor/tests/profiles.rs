@@ -53,29 +53,34 @@ fn bad_profiles_are_named() {
     let recipe = SENSORS[6].1;
     let crossing = &TINY.replace("rpm = 60", "rpm = 60\nbeam_crossing_m = 0.04");
     for (profile, from, to, part) in [
-        (TINY, "name = \"tiny\"", "name = \"\"", "name: is empty"),
+        (TINY, "name = \"tiny\"", "name = \"\"", "name: expected a name"),
         (TINY, "name = \"tiny\"", "", "name"),
         (TINY, "name =", "nam =", "nam"),
-        (TINY, "max_m = 10", "max_m = 0", "range.max_m: 0 is not above 0"),
+        (TINY, "max_m = 10", "max_m = 0", "range.max_m: expected a number above 0, found 0"),
         (TINY, "max_m = 10", "max_m = nan", "range.max_m"),
         (TINY, "max_m = 10", "max_m = inf", "range.max_m"),
         (TINY, "max_m = 10", "max_m = 1e10", "range.max_m"),
-        (TINY, "max_m = 10", "min_m = 10, max_m = 10", "range.max_m: 10 is not above range.min_m"),
+        (
+            TINY,
+            "max_m = 10",
+            "min_m = 10, max_m = 10",
+            "range.max_m: expected a number above range.min_m",
+        ),
         (TINY, "max_m = 10", "min_m = -1, max_m = 10", "range.min_m"),
         (TINY, "max_m = 10", "max_m = 10, quantum_m = 0", "range.quantum_m"),
         (TINY, "max_m = 10", "max_m = \"far\"", "line 3"),
         (TINY, "[rotating]", "[noise]\ntypical_sigma_m = -1\n[rotating]", "noise.typical_sigma_m"),
         (TINY, "rpm = 60", "rmp = 60", "unknown field `rmp`"),
         (TINY, "rpm = 60", "rpm = 0", "rotating.rpm"),
-        (TINY, "rpm = 60", "rpm = 1e300", "rotating: gives not a single ray"),
-        (TINY, "rpm = 60", "rpm = 1e-300", "more than 67108864"),
+        (TINY, "rpm = 60", "rpm = 1e300", "rotating: expected at least one ray"),
+        (TINY, "rpm = 60", "rpm = 1e-300", "expected at most 67108864 rays"),
         (TINY, "rpm = 60", "rpm = 60\nazimuth_quantum_deg = -0.01", "azimuth_quantum_deg"),
         (TINY, "rpm = 60", "rpm = 60\nsequence_quantum_deg = 0", "sequence_quantum_deg"),
         (
             TINY,
             "rpm = 60",
             "rpm = 60\nsequence_quantum_deg = 1\nazimuth_quantum_deg = 1",
-            "rotating.sequence_quantum_deg: excludes rotating.azimuth_quantum_deg",
+            "rotating.sequence_quantum_deg: cannot stand beside rotating",
         ),
         (TINY, "rpm = 60", "rpm = 60\nbeam_crossing_m = -0.1", "rotating.beam_crossing_m"),
         (TINY, "rpm = 60", "rpm = 60\nbeam_crossing_m = nan", "rotating.beam_crossing_m"),
@@ -89,7 +94,7 @@ fn bad_profiles_are_named() {
             crossing.as_str(),
             "[rotating]",
             "rings = { step_deg = 1, keep_from = 0, keep_to = 1 }\n[rotating]",
-            "rotating.beam_crossing_m: excludes [rings]",
+            "rotating.beam_crossing_m: cannot stand beside [rings]",
         ),
         (TINY, "sequence_us = 400_000", "sequence_us = nan", "rotating.sequence_us"),
         (TINY, "firing_us = 100_000", "firing_us = 400_000", "rotating.beam[0].firing_us"),
@@ -97,18 +102,28 @@ fn bad_profiles_are_named() {
         (TINY, "elevation_deg = -5", "elevation_deg = -91", "rotating.beam[1].elevation_deg"),
         (TINY, "azimuth_offset_deg = -90", "azimuth_offset_deg = inf", "beam[1].azimuth_offset"),
         (TINY, "[rotating]", "decimation = 0\n[rotating]", "decimation"),
-        (TINY, "[rotating]", "[grid]\nwidth = 1\nheight = 1\n[rotating]", "exclude each other"),
-        (uniform, "azimuth_steps = 1800", "azimuth_steps = 0", "not a single ray"),
-        (uniform, "azimuth_steps = 1800", "azimuth_steps = 4000000000", "more than 67108864"),
+        (TINY, "[rotating]", "[grid]\nwidth = 1\nheight = 1\n[rotating]", "found several"),
+        (uniform, "azimuth_steps = 1800", "azimuth_steps = 0", "expected at least one ray"),
+        (
+            uniform,
+            "azimuth_steps = 1800",
+            "azimuth_steps = 4000000000",
+            "expected at most 67108864 rays",
+        ),
         (uniform, "elevation_steps = 122", "elevation_steps = 70000", "uniform.elevation_steps"),
         (uniform, "elevation_to_deg = 20.0", "elevation_to_deg = 90.1", "uniform.elevation_to_deg"),
         (uniform, "azimuth_steps = 1800", "azimuth_steps = -1", "line"),
-        (grid, "fov_x_deg = 60.0", "fov_x_deg = 180", "grid.fov_x_deg: 180 is not below 180"),
+        (
+            grid,
+            "fov_x_deg = 60.0",
+            "fov_x_deg = 180",
+            "grid.fov_x_deg: expected a number below 180, found 180",
+        ),
         (grid, "fov_x_deg = 60.0", "fov_x_deg = -60", "grid.fov_x_deg"),
-        (grid, "fov_x_deg = 60.0", "", "grid: state either"),
-        (grid, "fov_x_deg = 60.0", "fov_x_deg = 60\nfx = 3", "grid: state either"),
-        (grid, "width = 100", "width = 4294967295", "more than 67108864"),
-        (grid, "height = 100", "height = 0", "not a single ray"),
+        (grid, "fov_x_deg = 60.0", "", "grid: expected either"),
+        (grid, "fov_x_deg = 60.0", "fov_x_deg = 60\nfx = 3", "grid: expected either"),
+        (grid, "width = 100", "width = 4294967295", "expected at most 67108864 rays"),
+        (grid, "height = 100", "height = 0", "expected at least one ray"),
         (recipe, "fx = 365.0", "fx = 0", "grid.fx"),
         (recipe, "cy = 359.5", "cy = nan", "grid.cy"),
         (recipe, "step_deg = 1.0", "step_deg = 0", "rings.step_deg"),
@@ -124,8 +139,11 @@ fn bad_profiles_are_named() {
         assert!(error.contains(part) && error.contains("my_sensor.toml"), "{to}: {error}");
     }
     let error = parse("name = \"a\"\nrange = { max_m = 1 }").unwrap_err().to_string();
-    assert!(error.contains("needs one of [rotating], [uniform] and [grid]"), "{error}");
+    assert!(
+        error.contains("expected one of [rotating], [uniform] and [grid], found none"),
+        "{error}"
+    );
     let no_beam = "name = \"a\"\nrange = { max_m = 1 }\n\
                    rotating = { rpm = 60, sequence_us = 9, beam = [] }";
-    assert!(parse(no_beam).unwrap_err().to_string().contains("rotating.beam: is empty"));
+    assert!(parse(no_beam).unwrap_err().to_string().contains("number of rotating.beam: "));
 }

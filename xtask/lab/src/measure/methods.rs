@@ -3,7 +3,7 @@
 use super::ray_set::RaySet;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
-use sim_gpu::bvh::{Bvh, LeafTriangle, MAX_DEPTH};
+use sim_gpu::bvh::{self, Bvh, LeafTriangle};
 use sim_gpu::cpu::oracle;
 use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::ray::{MISS, TraceRay};
@@ -46,33 +46,17 @@ fn moller_trumbore_nearest(bvh: &Bvh, ray: &TraceRay) -> f32 {
     let (origin, direction) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
     let (corner, per_direction) = (Vec3A::from(origin), Vec3A::from(direction.recip()));
     let mut nearest = f32::INFINITY;
-    let mut stack = [0u32; MAX_DEPTH + 1];
-    let mut height = 1;
-    while height > 0 {
-        height -= 1;
-        let node = &bvh.nodes[stack[height] as usize];
-        let enter = |low, high| enter(low, high, corner, per_direction, nearest);
-        let mut children = [
-            (enter(node.left_min, node.left_max), node.left, node.left_count),
-            (enter(node.right_min, node.right_max), node.right, node.right_count),
-        ];
-        if children[0].0 < children[1].0 {
-            children.swap(0, 1);
-        }
-        for (enters, first, count) in children {
-            if enters == f32::INFINITY {
-                continue;
+    bvh::traverse(
+        &bvh.nodes,
+        ray.root,
+        &mut nearest,
+        |&nearest, low, high| enter(low, high, corner, per_direction, nearest),
+        |nearest, leaf| {
+            for triangle in &bvh.triangles[leaf] {
+                *nearest = nearest.min(intersect(origin, direction, triangle));
             }
-            if count == 0 {
-                stack[height] = first;
-                height += 1;
-                continue;
-            }
-            for triangle in &bvh.triangles[first as usize..(first + count) as usize] {
-                nearest = nearest.min(intersect(origin, direction, triangle));
-            }
-        }
-    }
+        },
+    );
     nearest
 }
 
