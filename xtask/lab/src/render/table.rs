@@ -27,6 +27,9 @@ pub struct Cell {
     pub share: Option<f64>,
 }
 
+/// A column of a table: its heading, and what it says of an item.
+pub type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> String);
+
 impl From<String> for Cell {
     fn from(text: String) -> Self {
         Self { text, ..Self::default() }
@@ -46,6 +49,16 @@ impl Table {
     pub fn new(title: impl Into<String>, heading: &[&str]) -> Self {
         let heading = heading.iter().map(|&word| word.to_owned()).collect();
         Self { title: title.into(), heading, rows: Vec::new() }
+    }
+
+    /// A table with a row for each of `items`.
+    pub fn of<T>(title: impl Into<String>, items: &[T], columns: &[Column<'_, T>]) -> Self {
+        let mut table =
+            Self::new(title, &columns.iter().map(|column| column.0).collect::<Vec<_>>());
+        for item in items {
+            table.push(columns.iter().map(|(_, says)| says(item)).collect::<Vec<_>>());
+        }
+        table
     }
 
     /// The rows of a CSV file.
@@ -76,6 +89,16 @@ impl Table {
     /// How many rows there are.
     pub fn len(&self) -> usize {
         self.rows.len()
+    }
+
+    /// The heading and the rows as a CSV file.
+    pub fn to_csv(&self) -> anyhow::Result<Vec<u8>> {
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        csv.write_record(&self.heading)?;
+        for row in &self.rows {
+            csv.write_record(row.cells.iter().map(|cell| &cell.text))?;
+        }
+        Ok(csv.into_inner()?)
     }
 
     /// The table as HTML.
