@@ -31,10 +31,7 @@ pub fn some_of(root: &Path, limit: usize) -> Result<Vec<tree::MeshEntry>> {
 }
 
 /// The meshes of [`some_of`], each scaled to the unit sphere. A file that cannot be read
-/// is named and skipped.
-///
-/// # Errors
-/// There is no mesh that can be read.
+/// is named and skipped; one at least must be readable.
 pub fn real(root: &Path, limit: usize) -> Result<Vec<BenchMesh>> {
     let mut bench_meshes = Vec::new();
     for entry in some_of(root, limit)? {

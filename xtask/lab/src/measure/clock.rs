@@ -55,9 +55,6 @@ pub fn workload<'a, T>(mut work: impl FnMut() -> anyhow::Result<T> + 'a) -> Work
 
 /// Lets all `workloads` have one repeat uncounted, then `rounds` rounds of
 /// one repeat each: what disturbs the machine for a while disturbs them all.
-///
-/// # Errors
-/// The error of the first workload that fails.
 pub fn interleave(rounds: usize, workloads: &mut [Workload<'_>]) -> anyhow::Result<Vec<Costs>> {
     let mut costs = vec![Costs::default(); workloads.len()];
     for round in 0..=rounds {

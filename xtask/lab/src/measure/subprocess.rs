@@ -23,10 +23,8 @@ enum Message<T> {
 }
 
 impl Subprocess {
-    /// Starts `command`, and returns what it says unasked.
-    ///
-    /// # Errors
-    /// The program does not start, or says that it cannot work here.
+    /// Starts `command`, and returns what it says unasked. Fails if it does not start, or says
+    /// that it cannot work here.
     pub fn start<T: DeserializeOwned>(command: &mut Command) -> Result<(Self, T)> {
         let starting = format!("starting {}", command.get_program().display());
         let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -38,10 +36,7 @@ impl Subprocess {
         Ok((process, greeting))
     }
 
-    /// Sends `request`, a line, and waits for the answer.
-    ///
-    /// # Errors
-    /// The program has ended, or its answer is an error.
+    /// Sends `request`, a line, and waits for the answer, which may be an error.
     pub fn ask<T: DeserializeOwned>(&mut self, request: impl Display) -> Result<T> {
         let input = self.input.as_mut().context("it has ended")?;
         writeln!(input, "{request}").context("it has ended")?;

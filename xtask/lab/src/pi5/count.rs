@@ -28,10 +28,8 @@ pub struct Counter {
 pub struct Counts(BTreeMap<String, f64>);
 
 impl Counter {
-    /// Builds QEMU's plugin in `folder`, and tries it on `binary`.
-    ///
-    /// # Errors
-    /// No emulator, no C compiler, or an emulator that takes no plugins.
+    /// Builds QEMU's plugin in `folder`, and tries it on `binary`. Needs a C compiler and an
+    /// emulator that takes plugins.
     pub fn new(folder: &Path, binary: &Path, model: &Path) -> anyhow::Result<Self> {
         let plugin = folder.join("insn_count.so");
         let mut cc = Command::new("cc");
@@ -102,11 +100,8 @@ impl Counts {
     }
 
     /// What is outside the inner loops of `stages`, and the share of the
-    /// vector layers' columns that were read, the others' inputs being 0.
-    ///
-    /// # Errors
-    /// Fewer instructions in a kernel than the plan has in its loops: the plan
-    /// is not what the binary did.
+    /// vector layers' columns that were read, the others' inputs being 0. Fails if a kernel has
+    /// fewer instructions than the plan has in its loops: the binary did something else.
     pub fn outside_loops(
         &self,
         stages: &[Stage],

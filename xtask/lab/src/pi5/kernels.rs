@@ -54,10 +54,8 @@ pub struct Kernels {
 }
 
 impl Kernels {
-    /// Finds the kernels in an assembly listing and has their loops analysed.
-    ///
-    /// # Errors
-    /// A kernel that is not there, or has no such loop.
+    /// Finds the kernels in an assembly listing, all of which must be there, and has their
+    /// loops analysed.
     pub fn of(listing: &str, mca: &Mca) -> anyhow::Result<Self> {
         let functions: Vec<(String, Function<'_>)> = functions(listing)
             .map(|function| (demangled(function.symbol), function))

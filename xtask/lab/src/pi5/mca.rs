@@ -53,10 +53,7 @@ impl std::iter::Sum for Cost {
 }
 
 impl Mca {
-    /// `given`, or the newest that there is.
-    ///
-    /// # Errors
-    /// There is none that models the core.
+    /// `given`, or the newest that there is, which must model the core.
     pub fn find(given: Option<&str>) -> anyhow::Result<Self> {
         let names: Vec<String> = match given {
             Some(given) => vec![given.to_owned()],
@@ -95,10 +92,7 @@ impl Mca {
         Ok(())
     }
 
-    /// What one repetition of `code` costs.
-    ///
-    /// # Errors
-    /// Code that cannot be assembled, with what the analyser said.
+    /// What one repetition of `code` costs. An error has what the analyser said.
     pub fn cost(&self, code: &str) -> anyhow::Result<Cost> {
         let file = tempfile::NamedTempFile::new()?;
         std::fs::write(&file, code)?;

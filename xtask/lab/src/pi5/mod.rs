@@ -89,12 +89,8 @@ impl PiModelArgs {
     }
 }
 
-/// Models what `args` ask for and prints it.
-///
-/// # Errors
-/// No llvm-mca that knows the core, a build that fails, a kernel without the
-/// loop that is looked for or below the share of peak asked for, a file that
-/// cannot be read or written.
+/// Models what `args` ask for and prints it. Fails without an llvm-mca that knows the core, and
+/// if a kernel is below the share of peak asked for.
 pub fn run(args: &PiModelArgs) -> Result<()> {
     let board = Board::open(args.llvm_mca.as_deref())?;
     print!("{}", report::kernels(&board.kernels, &board.llvm_mca));
@@ -166,11 +162,8 @@ pub struct Modelled {
 }
 
 impl Modelled {
-    /// Analyses the build and the model file at `model`.
-    ///
-    /// # Errors
-    /// What [`run`] reports, and an emulator that cannot count: times without
-    /// what is outside the inner loops would be too good.
+    /// Analyses the build and the model file at `model`. Fails without an emulator that can
+    /// count: times without what is outside the inner loops would be too good.
     pub fn open(model: &Path) -> Result<Self> {
         let board = Board::open(None)?;
         let counter = board.counter(model)?;

@@ -61,9 +61,6 @@ impl Setting {
 }
 
 /// All rows that `args` ask for.
-///
-/// # Errors
-/// A binary that cannot be counted, or that does not do what is planned.
 pub fn rows(
     args: &PiModelArgs,
     network: &Network,
@@ -113,10 +110,7 @@ pub struct Counted {
 }
 
 /// Counts one setting; one that is too large for QEMU is extrapolated from two
-/// that are not.
-///
-/// # Errors
-/// A binary that cannot be counted, or that does not do what is planned.
+/// that are not. Fails if the binary does not do what is planned.
 pub fn count(
     counter: &Counter,
     network: &Network,

@@ -165,8 +165,9 @@ mod tests {
 
     #[test]
     fn the_same_rows_are_text_and_html() {
-        let mut table = Table::new("title", &["name", "ms"]);
-        table.push(vec!["a < b".to_owned(), "1".to_owned()]);
+        let columns: [Column<'_, u8>; 2] =
+            [("name", &|_| "a < b".to_owned()), ("ms", &|ms| ms.to_string())];
+        let mut table = Table::of("title", &[1], &columns);
         table.push_marked(true, vec!["c".to_owned(), "10".to_owned()]);
         assert_eq!(table.to_string(), "\ntitle\n  name   ms\n  a < b   1\n  c      10\n");
         let html = table.html().into_string();
@@ -176,7 +177,10 @@ mod tests {
 
     #[test]
     fn a_csv_file_becomes_rows() {
-        let found = Table::from_csv("caption", b"a,b\n1,\"x, y\"\n").unwrap().html().into_string();
+        let csv = b"a,b\n1,\"x, y\"\n";
+        let table = Table::from_csv("caption", csv).unwrap();
+        assert_eq!(table.to_csv().unwrap(), csv);
+        let found = table.html().into_string();
         assert!(found.contains("<th scope=\"col\">a</th>"));
         assert!(found.contains("<th scope=\"row\">1</th>") && found.contains("<td>x, y</td>"));
         assert!(Table::from_csv("caption", b"a,b\n1\n").is_err());

@@ -119,10 +119,9 @@ impl Affine {
     /// With weights as `precision` stores them for a layer of `kind`: off by as
     /// much as each of them is rounded.
     fn stored(mut self, precision: Precision, kind: Kind) -> Self {
-        let is_first = matches!(kind, Kind::First);
         let is_vector = matches!(kind, Kind::Vector);
         match precision {
-            _ if is_first => {}
+            _ if matches!(kind, Kind::First) => {}
             Precision::F32 => {}
             Precision::F32Fc16 if !is_vector => {}
             Precision::F32Fc16 | Precision::F16 => {

@@ -15,10 +15,7 @@ pub struct Points {
 }
 
 /// The outputs of each layer of `chain` for `points`, in `precision`: pooled over the
-/// points, or of the pooled vector.
-///
-/// # Errors
-/// A tensor that is missing, or layers whose sizes do not follow each other.
+/// points, or of the pooled vector. Fails where layers do not follow each other.
 pub fn outputs(
     network: &Network,
     chain: &Chain,

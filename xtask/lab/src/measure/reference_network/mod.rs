@@ -96,9 +96,6 @@ impl Network {
     }
 
     /// The layer `name`, its batch norm folded in; `relu` says whether it ends in a ReLU.
-    ///
-    /// # Errors
-    /// A tensor that is missing or does not have the size of the layer.
     pub fn affine(&self, name: &str, relu: bool) -> Result<Affine> {
         let mut b = self.values(&format!("{name}.bias"))?;
         let mut w = self.values(&format!("{name}.weight"))?;

@@ -22,10 +22,7 @@ pub struct Embree {
 }
 
 impl Embree {
-    /// Starts the program with `python`.
-    ///
-    /// # Errors
-    /// It does not start, which includes packages that do not load here.
+    /// Starts the program with `python`, which fails where its packages do not load.
     pub fn start(python: &Path) -> Result<Self> {
         let mut command = Command::new(python);
         let program = command.arg(venv::programs().join("embree.py"));

@@ -48,10 +48,7 @@ impl Material {
         self.folder.join("cloud.safetensors")
     }
 
-    /// Writes the model in every form.
-    ///
-    /// # Errors
-    /// The cause, for the user.
+    /// Writes the model in every form. An error is the cause, for the user.
     pub fn prepare(&self) -> Result<(), String> {
         let mut command = command(&python(&GENERAL, "infer/prepare.py")?);
         succeeds(command.arg(&self.model).arg(self.cloud()).arg(&self.folder))
@@ -69,10 +66,7 @@ impl Host {
         matches!(self, Self::Torch | Self::Training)
     }
 
-    /// Its program, installed or built if need be.
-    ///
-    /// # Errors
-    /// The cause, for the user.
+    /// Its program, installed or built if need be. An error is the cause, for the user.
     pub fn program(self, material: &Material) -> Result<Program, String> {
         let Material { model, folder } = material;
         let (model, folder) = (model.clone(), folder.clone());

@@ -4,10 +4,7 @@
 use anyhow::{Result, ensure};
 
 /// How far `answer` is from `truth`: the greatest difference, or the greatest that is
-/// `relative` to the true number.
-///
-/// # Errors
-/// They are of different lengths, or a number is not finite.
+/// `relative` to the true number. All numbers must be finite.
 pub fn worst(answer: &[f64], truth: &[f64], relative: bool) -> Result<f64> {
     let (expected, found) = (truth.len(), answer.len());
     ensure!(expected == found, "expected {expected} numbers, found {found}");
@@ -16,12 +13,9 @@ pub fn worst(answer: &[f64], truth: &[f64], relative: bool) -> Result<f64> {
     Ok(answer.iter().zip(truth).map(apart).fold(0.0, f64::max))
 }
 
-/// By how much the points at `indices` fall short of being farthest points of
-/// `points` `[n, 3]`, in that order and from the first of them on: 1 minus
-/// their squared distance over the greatest there was.
-///
-/// # Errors
-/// There are not `keep` different points.
+/// By how much the `keep` different points at `indices` fall short of being farthest
+/// points of `points` `[n, 3]`, in that order and from the first of them on: 1 minus their
+/// squared distance over the greatest there was.
 pub fn shortfall(points: &[[f32; 3]], indices: &[f64], keep: usize) -> Result<f64> {
     ensure!(indices.len() == keep, "expected {keep} points, found {}", indices.len());
     let mut squared_m2 = vec![f64::INFINITY; points.len()];

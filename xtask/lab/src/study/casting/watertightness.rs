@@ -95,9 +95,9 @@ mod tests {
 
     #[test]
     fn the_watertight_test_loses_no_ray() {
+        let measured = measure(1).unwrap();
         let misses = |name: &str| {
-            let measured = measure(1).unwrap();
-            let of = measured.settings.into_iter().filter(|setting| setting.knobs.contains(name));
+            let of = measured.settings.iter().filter(|setting| setting.knobs.contains(name));
             of.map(|setting| setting.accuracy.misses).collect::<Vec<_>>()
         };
         assert_eq!(misses("watertight"), [0, 0]);

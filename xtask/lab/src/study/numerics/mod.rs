@@ -94,11 +94,8 @@ impl Row {
     }
 }
 
-/// Measures, writes the CSV, and names the layers for which f16 is not exact enough.
-///
-/// # Errors
-/// A model that cannot be read or has batch norms, a file that cannot be written,
-/// an error above its bound.
+/// Measures, writes the CSV, and names the layers for which f16 is not exact enough. Fails if
+/// an error is above its bound.
 pub fn run(args: &GrowthArgs) -> Result<()> {
     let mut rows = ranges::measure();
     rows.extend(widths::measure()?);
