@@ -8,8 +8,10 @@ mod summary;
 use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, flags, gen_shapes};
 use anyhow::Context;
+use clap::Parser;
 use edgepuck_dataset::MeshFailure;
 use edgepuck_dataset::check_layouts;
+use edgepuck_dataset::config::DatasetConfig;
 use edgepuck_dataset::finish::finish;
 use edgepuck_dataset::journal::Terms;
 use edgepuck_dataset::manifest::Manifest;
@@ -65,6 +67,14 @@ pub struct Args {
 
     #[command(flatten)]
     caster: CasterArgs,
+}
+
+/// The configuration of a dataset that is made without flags.
+///
+/// # Errors
+/// A built-in sensor is missing.
+pub fn default_config() -> anyhow::Result<DatasetConfig> {
+    Settings::parse_from(["gen-dataset"]).config()
 }
 
 /// Part `number` (from 0) of `of` parts.

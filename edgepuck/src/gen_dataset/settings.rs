@@ -15,7 +15,7 @@ use sim_gpu::simplify::Simplify;
 use std::path::PathBuf;
 
 /// Flags that decide what a dataset holds.
-#[derive(clap::Args)]
+#[derive(clap::Parser)]
 #[command(next_help_heading = "What the dataset holds")]
 pub struct Settings {
     /// A built-in sensor or a TOML profile [default: vlp32c and generic-static, a set each]

@@ -6,14 +6,17 @@
 //! what [`simplify`] saves. [`infer`] is about classifying, sampling and learning,
 //! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters.
 
-use crate::measure::{backends, bench_mesh, machine};
+use crate::measure::machine::{self, Machine};
+use crate::measure::{backends, bench_mesh};
 use crate::pi5;
+use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
 use crate::study::{devices, numerics};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
+use formats::atomic;
 use serde::Serialize;
 use sim_gpu::caster::AdapterRequest;
 use std::path::PathBuf;
@@ -84,27 +87,40 @@ struct SimArgs {
 /// All figures of a run.
 #[derive(Serialize)]
 struct Report {
-    machine: machine::Machine,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    speed: Option<speed::Speed>,
+    machine: Machine,
+    /// `None` where what was to be measured cannot be had.
+    #[serde(flatten)]
+    figures: Option<Figures>,
     /// Empty unless meshes were given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     datasets: Vec<to_disk::Dataset>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    builders: Option<builders::Measurements>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    peers: Option<peers::Comparison>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    trade: Option<watertightness::Watertightness>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    simplify: Option<simplify::Simplified>,
     peak_memory_bytes: Option<u64>,
 }
 
+/// What was measured, by its name in the report.
+#[derive(Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Figures {
+    Speed(speed::Speed),
+    Builders(builders::Measurements),
+    Peers(peers::Comparison),
+    Trade(watertightness::Watertightness),
+    Simplify(simplify::Simplified),
+}
+
+impl Figures {
+    fn tables(&self) -> Vec<Table> {
+        match self {
+            Self::Speed(measured) => measured.tables(),
+            Self::Builders(measured) => measured.tables(),
+            Self::Peers(measured) => vec![measured.table()],
+            Self::Trade(measured) => vec![measured.table()],
+            Self::Simplify(measured) => measured.tables(),
+        }
+    }
+}
+
 /// Runs the benchmark that `args` ask for.
-///
-/// # Errors
-/// If no mesh can be read, an adapter fails or the report cannot be written.
 pub fn run(args: &BenchArgs) -> Result<Outcome> {
     match &args.what {
         Benchmark::Sim(args) => return sim(args),
@@ -122,51 +138,34 @@ fn sim(args: &SimArgs) -> Result<Outcome> {
         Some(name) => Some(name.parse()?),
         None => None,
     };
-    let mut bench_meshes = bench_mesh::tori(&args.triangles);
-    if let Some(meshes) = &args.meshes {
-        bench_meshes.extend(bench_mesh::real(meshes, args.limit)?);
+    let mut meshes = bench_mesh::tori(&args.triangles);
+    if let Some(given) = &args.meshes {
+        meshes.extend(bench_mesh::real(given, args.limit)?);
     }
-    let mut report = Report {
-        machine: machine::Machine::here(),
-        speed: None,
-        datasets: Vec::new(),
-        builders: None,
-        peers: None,
-        trade: None,
-        simplify: None,
-        peak_memory_bytes: None,
-    };
+    let machine = Machine::here();
+    let backends = || backends::open(request.as_ref());
     let rounds = args.rounds.into();
-    if args.builders {
-        let measured = builders::measure(&bench_meshes, rounds)?;
-        measured.tables().iter().for_each(|table| print!("{table}"));
-        report.builders = Some(measured);
+    let figures = if args.builders {
+        Some(Figures::Builders(builders::measure(&meshes, rounds)?))
     } else if args.peers {
-        report.peers = peers::measure(&bench_meshes, &backends::open(request.as_ref())?, rounds)?;
-        report.peers.iter().for_each(|measured| print!("{}", measured.table()));
+        peers::measure(&meshes, &backends()?, rounds)?.map(Figures::Peers)
     } else if args.trade {
-        let measured = watertightness::measure(rounds)?;
-        print!("{}", measured.table());
-        report.trade = Some(measured);
+        Some(Figures::Trade(watertightness::measure(rounds)?))
     } else if args.simplify {
-        let measured =
-            simplify::measure(&bench_meshes, &backends::open(request.as_ref())?, rounds)?;
-        measured.tables().iter().for_each(|table| print!("{table}"));
-        report.simplify = Some(measured);
+        Some(Figures::Simplify(simplify::measure(&meshes, &backends()?, rounds)?))
     } else {
-        let backends = backends::open(request.as_ref())?;
-        let measured = speed::measure(&bench_meshes, &backends, rounds)?;
-        measured.tables().iter().for_each(|table| print!("{table}"));
-        report.speed = Some(measured);
-        if let Some(meshes) = &args.meshes {
-            report.datasets = to_disk::measure(meshes, args.limit, &backends, rounds)?;
-            print!("{}", to_disk::table(&report.datasets));
-        }
+        Some(Figures::Speed(speed::measure(&meshes, &backends()?, rounds)?))
+    };
+    figures.iter().flat_map(Figures::tables).for_each(|table| print!("{table}"));
+    let mut datasets = Vec::new();
+    if let (Some(Figures::Speed(_)), Some(given)) = (&figures, &args.meshes) {
+        datasets = to_disk::measure(given, args.limit, &backends()?, rounds)?;
+        print!("{}", to_disk::table(&datasets));
     }
-    report.peak_memory_bytes = machine::peak_memory_bytes();
+    let peak_memory_bytes = machine::peak_memory_bytes();
     if let Some(file) = &args.json {
-        let text = serde_json::to_string_pretty(&report)?;
-        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
+        let report = Report { machine, figures, datasets, peak_memory_bytes };
+        atomic::write_bytes(file, serde_json::to_string_pretty(&report)? + "\n")?;
     }
     Ok(Outcome::Success)
 }

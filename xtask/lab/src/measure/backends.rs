@@ -29,10 +29,7 @@ impl Backend {
     }
 }
 
-/// The CPU and all adapters, or the one that `request` names.
-///
-/// # Errors
-/// If the adapter asked for is not there or does not open.
+/// The CPU and all adapters, or the one that `request` names, which must be there.
 pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
     let cpu = Backend {
         caster: Caster::Cpu(Effects::default()),

@@ -1,19 +1,24 @@
-//! The names and widths of the baseline network.
+//! The layers of the baseline network, and tensors of random numbers for them.
 
-/// The parts of a network by the prefix of their layers' names: point-wise layers, then
-/// dense layers. The last part is the front end of a Critical Points Layer.
-pub const PARTS: [[&str; 2]; 4] = [
-    ["feat.stn.conv", "feat.stn.fc"],
-    ["feat.fstn.conv", "feat.fstn.fc"],
-    ["feat.conv", "fc"],
-    ["cpl.conv", "cpl.fc"],
+use formats::rng::StreamKey;
+use formats::weights::Tensor;
+
+/// The stacks of `pointnet_cls` of yanx27/Pointnet_Pointnet2_pytorch for 40 classes: what
+/// the names of their layers begin with, and their widths. The last is the front end of a
+/// Critical Points Layer, as wide as the trunk.
+pub const STACKS: [(&str, &[usize]); 7] = [
+    ("feat.stn.conv", &[3, 64, 128, 1024]),
+    ("feat.stn.fc", &[1024, 512, 256, 9]),
+    ("feat.fstn.conv", &[64, 64, 128, 1024]),
+    ("feat.fstn.fc", &[1024, 512, 256, 64 * 64]),
+    ("feat.conv", &[3, 64, 128, 1024]),
+    ("fc", &[1024, 512, 256, 40]),
+    ("cpl.conv", &[3, 64, 128, 1024]),
 ];
 
-/// `pointnet_cls` of yanx27/Pointnet_Pointnet2_pytorch for 40 classes, and a front end as
-/// wide as its trunk: widths in the order of [`PARTS`].
-pub const WIDTHS: [[&[usize]; 2]; 4] = [
-    [&[3, 64, 128, 1024], &[1024, 512, 256, 9]],
-    [&[64, 64, 128, 1024], &[1024, 512, 256, 64 * 64]],
-    [&[3, 64, 128, 1024], &[1024, 512, 256, 40]],
-    [&[3, 64, 128, 1024], &[]],
-];
+/// A tensor of the random numbers of `key`, each of which `number` makes of one in [0, 1).
+pub fn drawn(key: StreamKey, shape: &[usize], number: impl Fn(f64) -> f64) -> Tensor {
+    let count = shape.iter().product::<usize>() as u64;
+    let values = (0..count).map(|i| number(key.unit(i)) as f32).collect();
+    Tensor { shape: shape.to_vec(), values }
+}

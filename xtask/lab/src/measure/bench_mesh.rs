@@ -4,7 +4,7 @@ use super::scenes;
 use anyhow::{Result, bail};
 use sim_gpu::bvh::Builder;
 use sim_gpu::mesh::frame::{Normalize, to_world};
-use sim_gpu::mesh::{Mesh, load, tree, validate};
+use sim_gpu::mesh::{Mesh, load, tree};
 use sim_gpu::target::{Surface, Target};
 use std::path::Path;
 
@@ -22,23 +22,25 @@ pub fn tori(sizes: &[usize]) -> Vec<BenchMesh> {
     sizes.iter().map(torus).collect()
 }
 
-/// At most `limit` of the meshes under `root`, spread evenly over its list,
-/// each scaled to the unit sphere. A file that cannot be read is named and skipped.
-///
-/// # Errors
-/// If there is no mesh that can be read.
-pub fn real(root: &Path, limit: usize) -> Result<Vec<BenchMesh>> {
+/// At least one and at most `limit` of the mesh files under `root`, spread evenly over
+/// their list.
+pub fn some_of(root: &Path, limit: usize) -> Result<Vec<tree::MeshEntry>> {
     let entries = tree::discover(root, 0)?;
     let taken = limit.clamp(1, entries.len());
-    let mut bench_meshes = Vec::with_capacity(taken);
-    for k in 0..taken {
-        let entry = &entries[k * entries.len() / taken];
+    Ok((0..taken).map(|k| entries[k * entries.len() / taken].clone()).collect())
+}
+
+/// The meshes of [`some_of`], each scaled to the unit sphere. A file that cannot be read
+/// is named and skipped; one at least must be readable.
+pub fn real(root: &Path, limit: usize) -> Result<Vec<BenchMesh>> {
+    let mut bench_meshes = Vec::new();
+    for entry in some_of(root, limit)? {
         match load(&entry.path) {
-            Ok(loaded) => bench_meshes.push(BenchMesh {
-                name: entry.name.clone(),
-                mesh: to_world(&loaded.mesh, loaded.format.default_up(), Normalize::UnitSphere)
-                    .mesh,
-            }),
+            Ok(loaded) => {
+                let up = loaded.format.default_up();
+                let mesh = to_world(&loaded.mesh, up, Normalize::UnitSphere).mesh;
+                bench_meshes.push(BenchMesh { name: entry.name, mesh });
+            }
             Err(error) => eprintln!("skipped: {error}"),
         }
     }
@@ -50,6 +52,5 @@ pub fn real(root: &Path, limit: usize) -> Result<Vec<BenchMesh>> {
 
 /// The target of casters for `mesh`.
 pub fn target(mesh: Mesh, builder: Builder) -> Target {
-    let kept = validate::triangle_stats(&mesh).kept;
-    Target::new(Surface::new(mesh, kept), builder)
+    Target::new(Surface::of_mesh(mesh), builder)
 }

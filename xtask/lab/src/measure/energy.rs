@@ -40,11 +40,9 @@ impl Energy {
 
     /// Joules of all packages since `then`, of everything that ran.
     pub fn joules_since(&self, then: &[u64]) -> f64 {
-        let of = |(package, (&then, now)): (&Package, (&u64, u64))| {
-            since(then, now, package.wraps_at_uj)
-        };
         let all = self.packages.iter().zip(then.iter().zip(self.now()));
-        all.map(of).sum::<u64>() as f64 * 1e-6
+        let spent = all.map(|(package, (&then, now))| since(then, now, package.wraps_at_uj));
+        spent.sum::<u64>() as f64 * 1e-6
     }
 }
 

@@ -1,6 +1,5 @@
 //! Rays to be cast at one target, as a caster and as the oracle see them.
 
-use anyhow::Result;
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3, dvec3};
 use sim_gpu::cpu::oracle;
@@ -85,10 +84,15 @@ impl RaySet {
     pub fn in_firing_order(&self) -> Self {
         let mut order: Vec<usize> = (0..self.rays.len()).collect();
         order.sort_unstable_by_key(|&i| self.job.beams[i]);
+        self.only(&order)
+    }
+
+    /// The rays of these numbers, in this order.
+    pub fn only(&self, numbers: &[usize]) -> Self {
         let mut ray_set = self.clone();
-        ray_set.rays = order.iter().map(|&i| self.rays[i]).collect();
-        ray_set.job.rays = order.iter().map(|&i| self.job.rays[i]).collect();
-        ray_set.job.beams = order.iter().map(|&i| self.job.beams[i]).collect();
+        ray_set.rays = numbers.iter().map(|&i| self.rays[i]).collect();
+        ray_set.job.rays = numbers.iter().map(|&i| self.job.rays[i]).collect();
+        ray_set.job.beams = numbers.iter().map(|&i| self.job.beams[i]).collect();
         ray_set
     }
 
@@ -116,16 +120,12 @@ impl RaySet {
     }
 }
 
-/// The beams of the true VLP-32C at 600 rpm.
-pub fn vlp32c() -> BeamPattern {
-    let sensor = Sensor::builtin("vlp32c").expect("invariant: this profile is built in");
-    sensor.pattern()
+/// The VLP-32C at 600 rpm.
+pub fn vlp32c() -> Sensor {
+    Sensor::builtin("vlp32c").expect("invariant: this profile is built in")
 }
 
 /// The pose of the sensor for sweeps.
-///
-/// # Errors
-/// None: the fixed place can be looked at from.
-pub fn sweep_pose() -> Result<Pose> {
-    Ok(Pose::look_at(SENSOR_M, DVec3::ZERO)?)
+pub fn sweep_pose() -> Pose {
+    Pose::look_at(SENSOR_M, DVec3::ZERO).expect("invariant: the sensor is not at the origin")
 }

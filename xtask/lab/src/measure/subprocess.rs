@@ -1,6 +1,9 @@
-//! A subprocess that answers each line of input with a line of output.
+//! A program that takes requests, one a line, and answers each with a line of JSON.
 
 use anyhow::{Context, Result, bail};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Display;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
@@ -11,39 +14,41 @@ pub struct Subprocess {
     output: BufReader<ChildStdout>,
 }
 
+/// What a line of the program's output says.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Message<T> {
+    Failed { error: String },
+    Answered(T),
+}
+
 impl Subprocess {
-    /// Starts `command`.
-    ///
-    /// # Errors
-    /// If it does not start.
-    pub fn start(command: &mut Command) -> Result<Self> {
+    /// Starts `command`, and returns what it says unasked. Fails if it does not start, or says
+    /// that it cannot work here.
+    pub fn start<T: DeserializeOwned>(command: &mut Command) -> Result<(Self, T)> {
         let starting = format!("starting {}", command.get_program().display());
         let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = piped.spawn().context(starting)?;
         let input = child.stdin.take();
         let output = BufReader::new(child.stdout.take().context("it has no output")?);
-        Ok(Self { child, input, output })
+        let mut process = Self { child, input, output };
+        let greeting = process.answer()?;
+        Ok((process, greeting))
     }
 
-    /// Sends `line`.
-    ///
-    /// # Errors
-    /// If the process has ended.
-    pub fn send(&mut self, line: &str) -> Result<()> {
+    /// Sends `request`, a line, and waits for the answer, which may be an error.
+    pub fn ask<T: DeserializeOwned>(&mut self, request: impl Display) -> Result<T> {
         let input = self.input.as_mut().context("it has ended")?;
-        writeln!(input, "{line}").context("it has ended")
+        writeln!(input, "{request}").context("it has ended")?;
+        self.answer()
     }
 
-    /// Waits for the next line, which is returned without its end.
-    ///
-    /// # Errors
-    /// If the process has ended.
-    pub fn receive(&mut self) -> Result<String> {
+    fn answer<T: DeserializeOwned>(&mut self) -> Result<T> {
         let mut line = String::new();
         if self.output.read_line(&mut line)? == 0 {
             bail!("it has ended");
         }
-        Ok(line.trim_end().to_owned())
+        parse(line.trim_end())
     }
 }
 
@@ -52,5 +57,26 @@ impl Drop for Subprocess {
         self.input = None;
         // Closing its input ends the process; its exit status does not matter.
         let _ = self.child.wait();
+    }
+}
+
+fn parse<T: DeserializeOwned>(line: &str) -> Result<T> {
+    match serde_json::from_str(line) {
+        Ok(Message::Answered(answer)) => Ok(answer),
+        Ok(Message::Failed { error }) => bail!("{error}"),
+        Err(_) => bail!("expected JSON, found {line}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_has_the_programs_words() {
+        let error_of = |line: &str| parse::<Vec<u8>>(line).unwrap_err().to_string();
+        assert_eq!(error_of(r#"{"error": "no such request: x"}"#), "no such request: x");
+        assert_eq!(error_of("Segmentation fault"), "expected JSON, found Segmentation fault");
+        assert_eq!(error_of("{}"), "expected JSON, found {}");
     }
 }

@@ -5,14 +5,8 @@
 pub struct Function<'a> {
     /// Its symbol, mangled.
     pub symbol: &'a str,
-    /// Labels and instructions; directives and comments are left out.
-    lines: Vec<Line<'a>>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Line<'a> {
-    Label(&'a str),
-    Instruction(&'a str),
+    /// Labels, which end in a colon, and instructions.
+    lines: Vec<&'a str>,
 }
 
 /// The functions of `listing`.
@@ -30,14 +24,15 @@ pub fn functions(listing: &str) -> impl Iterator<Item = Function<'_>> {
     })
 }
 
-/// What one line of a body says, if anything.
-fn line(text: &str) -> Option<Line<'_>> {
+/// The label or the instruction of one line of a body, which may have neither.
+fn line(text: &str) -> Option<&str> {
     let text = text.split("//").next().unwrap_or_default().trim();
-    if let Some(label) = text.strip_suffix(':') {
-        return Some(Line::Label(label));
-    }
-    let silent = text.is_empty() || text.starts_with('.') || text.starts_with("/*");
-    (!silent).then_some(Line::Instruction(text))
+    let is_directive = text.starts_with('.') && !is_label(text);
+    (!text.is_empty() && !is_directive && !text.starts_with("/*")).then_some(text)
+}
+
+fn is_label(line: &str) -> bool {
+    line.ends_with(':')
 }
 
 impl<'a> Function<'a> {
@@ -46,12 +41,9 @@ impl<'a> Function<'a> {
     pub fn innermost_loops(&self) -> Vec<Loop<'a>> {
         let mut ranges: Vec<(usize, usize)> = Vec::new();
         for (end, line) in self.lines.iter().enumerate() {
-            let Line::Instruction(text) = line else { continue };
-            let Some(target) = branch_target(text) else { continue };
-            let Some(start) = self.lines[..end].iter().position(|l| *l == Line::Label(target))
-            else {
-                continue;
-            };
+            let Some(target) = branch_target(line) else { continue };
+            let is_target = |line: &&str| line.strip_suffix(':') == Some(target);
+            let Some(start) = self.lines[..end].iter().position(is_target) else { continue };
             match ranges.iter_mut().find(|range| range.0 == start) {
                 Some(range) => range.1 = end,
                 None => ranges.push((start, end)),
@@ -74,15 +66,12 @@ fn branch_target(instruction: &str) -> Option<&str> {
 
 /// A loop, from its label to the branch back.
 #[derive(Clone, Debug)]
-pub struct Loop<'a>(Vec<Line<'a>>);
+pub struct Loop<'a>(Vec<&'a str>);
 
 impl<'a> Loop<'a> {
     /// Its instructions.
     pub fn instructions(&self) -> impl Iterator<Item = &'a str> {
-        self.0.iter().filter_map(|line| match line {
-            Line::Instruction(text) => Some(*text),
-            Line::Label(_) => None,
-        })
+        self.0.iter().copied().filter(|line| !is_label(line))
     }
 
     /// How many of its instructions have this mnemonic and, in their first
@@ -91,8 +80,7 @@ impl<'a> Loop<'a> {
         let counts = |text: &&str| {
             let Some((name, operands)) = text.split_once(char::is_whitespace) else { return false };
             let first = operands.split(',').next().unwrap_or_default().trim();
-            name == mnemonic
-                && first.split_once('.').is_some_and(|(_, backends)| backends == arrangement)
+            name == mnemonic && first.split_once('.').is_some_and(|(_, lanes)| lanes == arrangement)
         };
         self.instructions().filter(counts).count()
     }
@@ -104,11 +92,7 @@ impl<'a> Loop<'a> {
 
     /// Its text, for an assembler.
     pub fn text(&self) -> String {
-        let lines = self.0.iter().map(|line| match line {
-            Line::Label(label) => format!("{label}:\n"),
-            Line::Instruction(text) => format!("\t{text}\n"),
-        });
-        lines.collect()
+        self.0.join("\n") + "\n"
     }
 }
 
@@ -162,8 +146,8 @@ _ZN5otherE:
         let loops = tile.innermost_loops();
         assert_eq!(loops.len(), 1);
         let text = loops[0].text();
-        assert!(text.starts_with(".LBB0_2:\n\tldr\tq0"), "{text}");
-        assert!(text.ends_with("\tb.lo\t.LBB0_2\n"), "{text}");
+        assert!(text.starts_with(".LBB0_2:\nldr\tq0"), "{text}");
+        assert!(text.ends_with("\nb.lo\t.LBB0_2\n"), "{text}");
         assert_eq!(loops[0].instructions().count(), 7);
     }
 

@@ -4,9 +4,9 @@ use super::kernels::{Kernels, demangled};
 use super::load::{load, tile_instructions};
 use super::model::Other;
 use super::number::Number;
-use super::plan::{Sampler, Stage};
+use super::plan::Stage;
+use super::rows::Setting;
 use anyhow::{Context, ensure};
-use infer_cpu::Precision;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -28,10 +28,8 @@ pub struct Counter {
 pub struct Counts(BTreeMap<String, f64>);
 
 impl Counter {
-    /// Builds QEMU's plugin in `folder`, and tries it on `binary`.
-    ///
-    /// # Errors
-    /// No emulator, no C compiler, or an emulator that takes no plugins.
+    /// Builds QEMU's plugin in `folder`, and tries it on `binary`. Needs a C compiler and an
+    /// emulator that takes plugins.
     pub fn new(folder: &Path, binary: &Path, model: &Path) -> anyhow::Result<Self> {
         let plugin = folder.join("insn_count.so");
         let mut cc = Command::new("cc");
@@ -39,50 +37,31 @@ impl Counter {
         workspace::output(&mut cc).context("the plugin that counts needs a C compiler")?;
         let (binary, model) = (binary.to_owned(), model.to_owned());
         let counter = Self { plugin, folder: folder.to_owned(), binary, model };
-        counter.run(&["--version"]).context("this QEMU takes no plugins (7.2 does)")?;
+        counter.run("--version", None).context("this QEMU takes no plugins (7.2 does)")?;
         Ok(counter)
     }
 
-    /// Counts one classification of a cloud of `from` points by `points`.
-    ///
-    /// # Errors
-    /// A binary that fails.
-    pub fn classification(
-        &self,
-        sampler: Sampler,
-        (from, points): (usize, usize),
-        precision: Precision,
-    ) -> anyhow::Result<Counts> {
-        let repeated = |repeats: &str| {
-            let (from, points) = (from.to_string(), points.to_string());
-            let model = self.model.display().to_string();
-            self.run(&[
-                "bench",
-                "--json",
-                "--threads",
-                "1",
-                "--repeats",
-                repeats,
-                "--model",
-                &model,
-                "--sampler",
-                sampler.word(),
-                "--from",
-                &from,
-                "--points",
-                &points,
-                "--precision",
-                precision.name(),
-            ])
+    /// Counts one classification.
+    pub fn classification(&self, setting: Setting) -> anyhow::Result<Counts> {
+        let Setting { sampler, from, points, precision } = setting;
+        let sampler = sampler.word();
+        eprintln!("counting {sampler} {points} of {from} in {precision}");
+        let repeated = |repeats: usize| {
+            let flags = format!(
+                "bench --json --threads 1 --repeats {repeats} --sampler {sampler} --from {from} \
+                 --points {points} --precision {precision} --model"
+            );
+            self.run(&flags, Some(&self.model))
         };
-        Ok(repeated("2")?.less(&repeated("1")?))
+        Ok(repeated(2)?.less(&repeated(1)?))
     }
 
-    fn run(&self, words: &[&str]) -> anyhow::Result<Counts> {
+    /// Counts a run of the binary with these flags, then `more`.
+    fn run(&self, flags: &str, more: Option<&PathBuf>) -> anyhow::Result<Counts> {
         let mut qemu = pi_target::emulator().context(pi_target::NO_EMULATOR)?;
         let log = tempfile::NamedTempFile::new_in(&self.folder)?;
         qemu.arg("-plugin").arg(&self.plugin).args(["-d", "plugin", "-D"]).arg(log.path());
-        workspace::output(qemu.arg(&self.binary).args(words))?;
+        workspace::output(qemu.arg(&self.binary).args(flags.split(' ')).args(more))?;
         let log = std::fs::read_to_string(log.path())
             .with_context(|| format!("cannot read {}", log.path().display()))?;
         let counts = Counts::parse(&log);
@@ -121,11 +100,8 @@ impl Counts {
     }
 
     /// What is outside the inner loops of `stages`, and the share of the
-    /// vector layers' columns that were read, the others' inputs being 0.
-    ///
-    /// # Errors
-    /// Fewer instructions in a kernel than the plan has in its loops: the plan
-    /// is not what the binary did.
+    /// vector layers' columns that were read, the others' inputs being 0. Fails if a kernel has
+    /// fewer instructions than the plan has in its loops: the binary did something else.
     pub fn outside_loops(
         &self,
         stages: &[Stage],
@@ -151,39 +127,24 @@ impl Counts {
         let columns_read = (self.of("gemv::gemv") / columns).min(1.0);
         let farthest = loops(|stage| matches!(stage, Stage::Farthest { .. }));
         other.alone += (self.of("fps::step") - farthest).max(0.0);
-        for (name, count) in &self.0 {
-            match place(name) {
-                Place::Kernel => {}
-                Place::Shared => other.shared += count,
-                Place::Alone => other.alone += count,
-            }
+        for (name, count) in self.0.iter().filter(|(name, _)| !is_kernel(name)) {
+            let place = if is_shared(name) { &mut other.shared } else { &mut other.alone };
+            *place += count;
         }
         Ok((other, columns_read))
     }
 }
 
-/// On which threads a function runs.
-enum Place {
-    /// It is a kernel with a loop of its own.
-    Kernel,
-    /// On all.
-    Shared,
-    /// On the caller's.
-    Alone,
+/// Whether the function is a kernel with a loop of its own.
+fn is_kernel(name: &str) -> bool {
+    let tiles = Number::ALL.map(Number::tile_prefix);
+    ["gemv::gemv", "fps::step"].iter().chain(&tiles).any(|part| name.contains(part))
 }
 
-fn place(name: &str) -> Place {
-    let is = |parts: &[&str]| parts.iter().any(|part| name.contains(part));
-    if is(&["gemv::gemv", "fps::step"]) || is(&Number::ALL.map(Number::tile_prefix)) {
-        Place::Kernel
-    } else if is(&["kernel::", "engine::chunks", "edge_conv::"])
-        || name == "memcpy"
-        || name == "memset"
-    {
-        Place::Shared
-    } else {
-        Place::Alone
-    }
+/// Whether the function runs on all threads, rather than on the caller's.
+fn is_shared(name: &str) -> bool {
+    let parts = ["kernel::", "engine::chunks", "edge_conv::"];
+    matches!(name, "memcpy" | "memset") || parts.iter().any(|part| name.contains(part))
 }
 
 #[cfg(test)]

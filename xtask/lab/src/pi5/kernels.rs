@@ -16,10 +16,9 @@ pub struct Kernel {
     pub name: String,
     /// Products of a round; of farthest point sampling, points.
     pub work: usize,
-    /// Cycles of a round, by llvm-mca.
-    pub cycles: f64,
-    /// Instructions of a round.
-    pub instructions: f64,
+    /// What a round costs, by llvm-mca.
+    #[serde(flatten)]
+    pub cost: Cost,
     /// The core's most products a cycle in the format computed in.
     pub peak: Option<usize>,
 }
@@ -27,7 +26,7 @@ pub struct Kernel {
 impl Kernel {
     /// Products a cycle over the core's most.
     pub fn share_of_peak(&self) -> Option<f64> {
-        self.peak.map(|peak| self.work as f64 / self.cycles / peak as f64)
+        self.peak.map(|peak| self.work as f64 / self.cost.cycles / peak as f64)
     }
 }
 
@@ -55,10 +54,8 @@ pub struct Kernels {
 }
 
 impl Kernels {
-    /// Finds the kernels in an assembly listing and has their loops analysed.
-    ///
-    /// # Errors
-    /// A kernel that is not there, or has no such loop.
+    /// Finds the kernels in an assembly listing, all of which must be there, and has their
+    /// loops analysed.
     pub fn of(listing: &str, mca: &Mca) -> anyhow::Result<Self> {
         let functions: Vec<(String, Function<'_>)> = functions(listing)
             .map(|function| (demangled(function.symbol), function))
@@ -112,11 +109,11 @@ fn tile(functions: &[(String, Function<'_>)], number: Number, mca: &Mca) -> anyh
     let work = |inner: &Loop<'_>| products * inner.count(mnemonic, arrangement);
     let kernel = slowest(functions, prefix, work, mca)?;
     let (rows, channels) = shape(&kernel.name, prefix)
-        .with_context(|| format!("`{}` does not say its rows x channels", kernel.name))?;
+        .with_context(|| format!("{}: expected a name that ends in ROWSxCHANNELS", kernel.name))?;
     let name = format!("{prefix}{rows}x{channels}");
     ensure!(
         kernel.work.is_multiple_of(rows * channels),
-        "the inner loop of {name} has {} products, which are no whole inputs",
+        "the inner loop of {name}: expected products of whole inputs, found {}",
         kernel.work
     );
     let inputs = kernel.work / (rows * channels);
@@ -141,22 +138,16 @@ fn slowest(
     mca: &Mca,
 ) -> anyhow::Result<Kernel> {
     let named = functions.iter().filter(|(name, _)| name.contains(part));
-    let loops: Vec<(&str, Loop<'_>, usize)> = named
-        .flat_map(|(name, function)| {
-            let loops = function.innermost_loops().into_iter();
-            loops.map(|inner| (name.as_str(), work(&inner), inner))
-        })
-        .map(|(name, work, inner)| (name, inner, work))
+    let loops: Vec<(&String, Loop<'_>)> = named
+        .flat_map(|(name, function)| function.innermost_loops().into_iter().map(move |l| (name, l)))
         .collect();
-    let most = loops.iter().map(|(.., work)| *work).max().unwrap_or(0);
-    ensure!(most > 0, "no inner loop of `{part}` is among the binary's NEON kernels");
+    let most = loops.iter().map(|(_, inner)| work(inner)).max().unwrap_or(0);
+    ensure!(most > 0, "expected an inner loop of `{part}` among the binary's NEON kernels");
     let mut slowest: Option<Kernel> = None;
-    for (name, inner, work) in loops.into_iter().filter(|(.., work)| *work == most) {
-        let Cost { cycles, instructions } =
-            mca.cost(&inner.text()).with_context(|| format!("the inner loop of {name}"))?;
-        if slowest.as_ref().is_none_or(|kernel| cycles > kernel.cycles) {
-            let name = name.to_owned();
-            slowest = Some(Kernel { name, work, cycles, instructions, peak: None });
+    for (name, inner) in loops.into_iter().filter(|(_, inner)| work(inner) == most) {
+        let cost = mca.cost(&inner.text()).with_context(|| format!("the inner loop of {name}"))?;
+        if slowest.as_ref().is_none_or(|kernel| cost.cycles > kernel.cost.cycles) {
+            slowest = Some(Kernel { name: name.clone(), work: most, cost, peak: None });
         }
     }
     slowest.context("invariant: one loop has most work")
@@ -170,8 +161,8 @@ pub mod tests {
     /// and two instructions for each input of a tile, each input of a block
     /// and each four points.
     pub fn round_kernels() -> Kernels {
-        let kernel =
-            |work| Kernel { name: String::new(), work, cycles: 1.0, instructions: 2.0, peak: None };
+        let cost = Cost { cycles: 1.0, instructions: 2.0 };
+        let kernel = |work| Kernel { name: String::new(), work, cost, peak: None };
         let tile = || Tile { kernel: kernel(64), rows: 8, channels: 8, inputs: 1 };
         Kernels {
             tiles: Number::ALL.map(|_| tile()).to_vec(),
@@ -197,8 +188,8 @@ pub mod tests {
 
     #[test]
     fn shares_of_peak_are_of_products_a_cycle() {
-        let name = String::new();
-        let kernel = Kernel { name, work: 256, cycles: 40.0, instructions: 80.0, peak: Some(8) };
+        let cost = Cost { cycles: 40.0, instructions: 80.0 };
+        let kernel = Kernel { name: String::new(), work: 256, cost, peak: Some(8) };
         assert_eq!(kernel.share_of_peak(), Some(0.8));
     }
 }

@@ -1,6 +1,7 @@
 //! What a stage of infer-cpu asks of the machine, as its threads share it out.
 
 use super::kernels::Kernels;
+use super::mca::Cost;
 use super::number::Number;
 use super::plan::{Product, Stage};
 use infer_cpu::kernel::WIDTH_STEP;
@@ -25,83 +26,47 @@ pub fn load(stage: &Stage, kernels: &Kernels, threads: usize) -> Load {
         Stage::Hidden { rows, products } => {
             let blocks = (0..*rows).step_by(BLOCK).map(|first| BLOCK.min(rows - first));
             let block = |rows: usize| products.iter().map(|p| tiles(p, rows, kernels)).sum();
-            let mut load = shared(blocks.map(block), threads);
-            load.bytes = products.iter().map(weight_bytes).sum();
-            load
+            shared(blocks.map(block), threads, products.iter().map(weight_bytes).sum())
         }
         Stage::Pool { rows, product, screened } => {
             let width = product.layer.outputs.next_multiple_of(WIDTH_STEP);
             let whole = tiles(product, *rows, kernels);
             let group = |first: usize| whole * (GROUP.min(width - first) as f64 / width as f64);
-            let mut load = shared((0..width).step_by(GROUP).map(group), threads);
-            load.bytes = weight_bytes(product);
-            if *screened {
-                // Nearly every channel has a product to be computed in fp32.
-                load.bytes += weight_bytes(&Product { number: Number::F32, ..*product });
-            }
-            load
+            // Nearly every channel has a product to be computed in fp32.
+            let in_f32 = screened.then_some(Product { number: Number::F32, ..*product });
+            let bytes = weight_bytes(product) + in_f32.iter().map(weight_bytes).sum::<f64>();
+            shared((0..width).step_by(GROUP).map(group), threads, bytes)
         }
         Stage::Alone { rows, product } => {
-            let mut load = shared([tiles(product, *rows, kernels)], 1);
-            load.bytes = weight_bytes(product);
-            load
+            shared([tiles(product, *rows, kernels)], 1, weight_bytes(product))
         }
         Stage::Vector { layer, stored } => {
             let n_blocks = layer.outputs.div_ceil(VECTOR_BLOCK);
             let kernel = kernels.gemv(*stored);
             let rounds = layer.inputs as f64 * (VECTOR_BLOCK as f64 / kernel.work as f64);
-            let block =
-                Rounds { cycles: kernel.cycles, instructions: kernel.instructions } * rounds;
+            let block = kernel.cost * rounds;
             let chunks = (0..n_blocks).step_by(VECTOR_CHUNK);
             let chunks = chunks.map(|first| block * VECTOR_CHUNK.min(n_blocks - first) as f64);
             let is_small = layer.inputs * layer.outputs < SMALL_VECTOR;
-            let mut load = shared(chunks, if is_small { 1 } else { threads });
-            load.bytes = (layer.inputs * n_blocks * VECTOR_BLOCK * stored.bytes()) as f64;
-            load
+            let bytes = layer.inputs * n_blocks * VECTOR_BLOCK * stored.bytes();
+            shared(chunks, if is_small { 1 } else { threads }, bytes as f64)
         }
         Stage::Farthest { points, picks } => {
             let kernel = &kernels.farthest;
             // One pass a pick: the first is farthest from the centroid.
             let rounds = (points * picks) as f64 / kernel.work as f64;
-            let rounds =
-                Rounds { cycles: kernel.cycles, instructions: kernel.instructions } * rounds;
-            shared([rounds], 1)
+            shared([kernel.cost * rounds], 1, 0.0)
         }
     }
 }
 
-/// Some rounds of an inner loop.
-#[derive(Clone, Copy, Debug, Default)]
-struct Rounds {
-    cycles: f64,
-    instructions: f64,
-}
-
-impl std::ops::Mul<f64> for Rounds {
-    type Output = Self;
-
-    fn mul(self, n: f64) -> Self {
-        Self { cycles: self.cycles * n, instructions: self.instructions * n }
-    }
-}
-
-impl std::iter::Sum for Rounds {
-    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
-        all.fold(Self::default(), |a, b| Self {
-            cycles: a.cycles + b.cycles,
-            instructions: a.instructions + b.instructions,
-        })
-    }
-}
-
-/// The rounds of taking `rows` through `product`, by whole tiles.
-fn tiles(product: &Product, rows: usize, kernels: &Kernels) -> Rounds {
+/// The cost of taking `rows` through `product`, by whole tiles.
+fn tiles(product: &Product, rows: usize, kernels: &Kernels) -> Cost {
     let tile = kernels.tile(product.number);
     let panels = product.layer.outputs.next_multiple_of(WIDTH_STEP) / tile.channels;
     let n_tiles = rows.div_ceil(tile.rows) * panels;
     let rounds = n_tiles * product.layer.inputs.div_ceil(tile.inputs);
-    let kernel = &tile.kernel;
-    Rounds { cycles: kernel.cycles, instructions: kernel.instructions } * rounds as f64
+    tile.kernel.cost * rounds as f64
 }
 
 fn weight_bytes(product: &Product) -> f64 {
@@ -109,9 +74,10 @@ fn weight_bytes(product: &Product) -> f64 {
     (product.layer.inputs * width * product.number.bytes()) as f64
 }
 
-/// Chunks that threads claim one after the other, each whichever is free.
-fn shared(chunks: impl IntoIterator<Item = Rounds>, threads: usize) -> Load {
-    let mut load = Load::default();
+/// Chunks that threads claim one after the other, each whichever is free, and the bytes of
+/// their weights.
+fn shared(chunks: impl IntoIterator<Item = Cost>, threads: usize, bytes: f64) -> Load {
+    let mut load = Load { bytes, ..Load::default() };
     let mut busy_until = vec![0.0; threads.max(1)];
     for chunk in chunks {
         load.cycles += chunk.cycles;
@@ -125,16 +91,12 @@ fn shared(chunks: impl IntoIterator<Item = Rounds>, threads: usize) -> Load {
 
 /// Instructions of the inner loops of tiles that compute in `number`.
 pub fn tile_instructions(stages: &[Stage], kernels: &Kernels, number: Number) -> f64 {
-    let of = |product: &Product, rows: usize| match product.number == number {
-        true => tiles(product, rows, kernels).instructions,
-        false => 0.0,
+    let of_stage = |stage: &Stage| -> f64 {
+        let (rows, products) = stage.products();
+        let products = products.iter().filter(|product| product.number == number);
+        products.map(|product| tiles(product, rows, kernels).instructions).sum()
     };
-    let stages = stages.iter().map(|stage| match stage {
-        Stage::Hidden { rows, products } => products.iter().map(|product| of(product, *rows)).sum(),
-        Stage::Pool { rows, product, .. } | Stage::Alone { rows, product } => of(product, *rows),
-        _ => 0.0,
-    });
-    stages.sum()
+    stages.iter().map(of_stage).sum()
 }
 
 #[cfg(test)]

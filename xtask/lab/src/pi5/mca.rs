@@ -5,9 +5,10 @@
 //! alias of the Cortex-A57, which has half the throughput.
 
 use anyhow::{Context, bail};
+use serde::Serialize;
 use serde_json::Value;
-use std::io::Write;
-use std::process::{Command, Stdio};
+use std::process::Command;
+use xtask::workspace;
 
 /// The first release that models Neoverse N1.
 const LEAST_VERSION: u32 = 19;
@@ -25,8 +26,8 @@ pub struct Mca {
     pub version: String,
 }
 
-/// One repetition of some code.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What some code costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Cost {
     /// Cycles, when repeated for long.
     pub cycles: f64,
@@ -34,29 +35,43 @@ pub struct Cost {
     pub instructions: f64,
 }
 
+impl std::ops::Mul<f64> for Cost {
+    type Output = Self;
+
+    fn mul(self, n: f64) -> Self {
+        Self { cycles: self.cycles * n, instructions: self.instructions * n }
+    }
+}
+
+impl std::iter::Sum for Cost {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |a, b| Self {
+            cycles: a.cycles + b.cycles,
+            instructions: a.instructions + b.instructions,
+        })
+    }
+}
+
 impl Mca {
-    /// `given`, or the newest that there is.
-    ///
-    /// # Errors
-    /// None, or none that models the core; with what to do about it.
+    /// `given`, or the newest that there is, which must model the core.
     pub fn find(given: Option<&str>) -> anyhow::Result<Self> {
-        let mut names: Vec<String> = VERSIONS.rev().map(|n| format!("llvm-mca-{n}")).collect();
-        names.push("llvm-mca".to_owned());
-        if let Some(given) = given {
-            names = vec![given.to_owned()];
-        }
+        let names: Vec<String> = match given {
+            Some(given) => vec![given.to_owned()],
+            None => {
+                VERSIONS.rev().map(|n| format!("llvm-mca-{n}")).chain(["llvm-mca".into()]).collect()
+            }
+        };
         let found = names.into_iter().find_map(|program| {
-            let output = Command::new(&program).arg("--version").output().ok()?;
-            let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+            let said = workspace::output(Command::new(&program).arg("--version")).ok()?;
             let version =
-                stdout.lines().find(|line| line.contains("LLVM version"))?.trim().to_owned();
+                said.lines().find(|line| line.contains("LLVM version"))?.trim().to_owned();
             (major(&version)? >= LEAST_VERSION).then_some(Self { program, version })
         });
         let Some(mca) = found else {
             let which = given.unwrap_or("llvm-mca");
             bail!(
-                "there is no {which} of LLVM {LEAST_VERSION} or newer, which knows {CORE}: install \
-                 a package such as llvm-22 or llvm-19 (Debian, Ubuntu), or give --llvm-mca"
+                "expected {which} of LLVM {LEAST_VERSION} or newer, which knows {CORE}, found none: \
+                 install a package such as llvm-22 or llvm-19 (Debian, Ubuntu), or give --llvm-mca"
             );
         };
         mca.check()?;
@@ -69,32 +84,22 @@ impl Mca {
         let fmla = |n: usize| format!("\tfmla\tv{n}.4s, v30.4s, v31.s[0]\n");
         let cycles = self.cost(&(0..16).map(fmla).collect::<String>())?.cycles;
         if (cycles - 8.0).abs() > 0.1 {
-            bail!("{} takes {cycles:.2} cycles for 16 FMLA, {CORE} takes 8", self.program);
+            bail!(
+                "{}: expected 8 cycles for 16 FMLA, as {CORE} takes, found {cycles:.2}",
+                self.program
+            );
         }
         Ok(())
     }
 
-    /// What one repetition of `code` costs.
-    ///
-    /// # Errors
-    /// Code that cannot be assembled, with what the analyser said.
+    /// What one repetition of `code` costs. An error has what the analyser said.
     pub fn cost(&self, code: &str) -> anyhow::Result<Cost> {
+        let file = tempfile::NamedTempFile::new()?;
+        std::fs::write(&file, code)?;
         let mut command = Command::new(&self.program);
         command.args(["-mtriple=aarch64-linux-gnu", "-mattr=+fullfp16,+dotprod", "--json"]);
         command.args([format!("-mcpu={CORE}"), format!("-iterations={ITERATIONS}")]);
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().with_context(|| format!("cannot run {}", self.program))?;
-        let mut input = child.stdin.take().context("a pipe to the analyser")?;
-        // One that refuses the code early says why on its standard error.
-        let written = input.write_all(code.as_bytes());
-        drop(input);
-        let output = child.wait_with_output()?;
-        if !output.status.success() {
-            let stderr = String::from_utf8_lossy(&output.stderr);
-            bail!("{} refuses the code: {}", self.program, stderr.trim());
-        }
-        written?;
-        parse(&String::from_utf8_lossy(&output.stdout))
+        parse(&workspace::output(command.arg(file.path()))?)
     }
 }
 
@@ -106,7 +111,7 @@ fn major(version: &str) -> Option<u32> {
 
 /// Reads llvm-mca's JSON of one region.
 fn parse(json: &str) -> anyhow::Result<Cost> {
-    let report: Value = serde_json::from_str(json).context("llvm-mca's answer is no JSON")?;
+    let report: Value = serde_json::from_str(json).context("expected JSON from llvm-mca")?;
     let summary = &report["CodeRegions"][0]["SummaryView"];
     let number = |key: &str| {
         summary[key].as_f64().with_context(|| format!("llvm-mca's answer has no {key}"))

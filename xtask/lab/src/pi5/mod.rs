@@ -8,6 +8,7 @@
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use edgepuck_program::flags::positive;
+use formats::atomic;
 use infer_cpu::Precision;
 use std::path::{Path, PathBuf};
 use xtask::{build_pi, pi_target};
@@ -76,30 +77,49 @@ pub struct PiModelArgs {
     csv: Option<PathBuf>,
 }
 
-/// Models what `args` ask for and prints it.
-///
-/// # Errors
-/// No llvm-mca that knows the core, a build that fails, a kernel without the
-/// loop that is looked for or below the share of peak asked for, a file that
-/// cannot be read or written.
+impl PiModelArgs {
+    /// The machine that they describe.
+    fn machine(&self) -> model::Machine {
+        model::Machine {
+            threads: self.threads.into(),
+            hertz: self.clock * 1e9,
+            bytes_per_s: self.bandwidth * 1e9,
+            instructions_per_cycle: self.other_ipc,
+        }
+    }
+}
+
+/// Models what `args` ask for and prints it. Fails without an llvm-mca that knows the core, and
+/// if a kernel is below the share of peak asked for.
 pub fn run(args: &PiModelArgs) -> Result<()> {
     let board = Board::open(args.llvm_mca.as_deref())?;
     print!("{}", report::kernels(&board.kernels, &board.llvm_mca));
     check_peaks(&board.kernels, args.least_peak)?;
 
-    let model = model_file(args, &board.folder)?;
+    let model = match &args.model {
+        Some(model) => model.clone(),
+        None => {
+            let stand_in = board.folder.join("untrained-baseline.safetensors");
+            network::write_stand_in(&stand_in)?;
+            stand_in
+        }
+    };
     let network = network::Network::read(&model)?;
-    let counter = if args.no_counts { None } else { board.counter(&model) };
+    let warn = |error: &anyhow::Error| {
+        eprintln!("instructions outside inner loops are not counted: {error:#}");
+    };
+    let counter = match args.no_counts {
+        true => None,
+        false => board.counter(&model).inspect_err(warn).ok(),
+    };
     let rows = rows::rows(args, &network, &board.kernels, counter.as_ref())?;
     let report = report::Report::new(args, &board.llvm_mca, &board.kernels, rows);
     print!("{report}");
     if let Some(file) = &args.json {
-        let text = serde_json::to_string_pretty(&report)? + "\n";
-        std::fs::write(file, text).with_context(|| format!("writing {}", file.display()))?;
+        atomic::write_bytes(file, serde_json::to_string_pretty(&report)? + "\n")?;
     }
     if let Some(file) = &args.csv {
-        let text = report.csv();
-        std::fs::write(file, text).with_context(|| format!("writing {}", file.display()))?;
+        atomic::write_bytes(file, report.csv()?)?;
     }
     Ok(())
 }
@@ -128,44 +148,31 @@ impl Board {
         Ok(Self { llvm_mca: mca.version, folder, binary, kernels })
     }
 
-    /// Counts instructions, where that is possible.
-    fn counter(&self, model: &Path) -> Option<count::Counter> {
-        match count::Counter::new(&self.folder, &self.binary, model) {
-            Ok(counter) => Some(counter),
-            Err(error) => {
-                eprintln!("instructions outside inner loops are not counted: {error:#}");
-                None
-            }
-        }
+    /// What counts instructions, where that is possible.
+    fn counter(&self, model: &Path) -> Result<count::Counter> {
+        count::Counter::new(&self.folder, &self.binary, model)
     }
 }
 
 /// The model of one model file on a Raspberry Pi 5.
 pub struct Modelled {
     board: Board,
-    machine: model::Machine,
     network: network::Network,
     counter: count::Counter,
 }
 
 impl Modelled {
-    /// Analyses the build and the model file at `model`.
-    ///
-    /// # Errors
-    /// What [`run`] reports, and an emulator that cannot count: times without
-    /// what is outside the inner loops would be too good.
+    /// Analyses the build and the model file at `model`. Fails without an emulator that can
+    /// count: times without what is outside the inner loops would be too good.
     pub fn open(model: &Path) -> Result<Self> {
         let board = Board::open(None)?;
-        let counter = count::Counter::new(&board.folder, &board.binary, model)?;
+        let counter = board.counter(model)?;
         let network = network::Network::read(model)?;
-        Ok(Self { board, machine: model::Machine::PI_5, network, counter })
+        Ok(Self { board, network, counter })
     }
 
     /// Milliseconds to a class of `points` of a cloud of `from`, by threads;
     /// `None` if the network lacks what the sampler needs.
-    ///
-    /// # Errors
-    /// A binary that cannot be counted.
     pub fn total_ms(
         &self,
         sampler: Sampler,
@@ -178,7 +185,7 @@ impl Modelled {
         let (network, kernels) = (&self.network, &self.board.kernels);
         let counted = rows::count(&self.counter, network, kernels, setting)?;
         let of = |&threads: &usize| {
-            let machine = model::Machine { threads, ..self.machine };
+            let machine = model::Machine { threads, ..model::Machine::PI_5 };
             let other = Some(counted.other);
             model::time(&machine, kernels, &stages, counted.columns_read, other).total_ms
         };
@@ -195,16 +202,6 @@ fn check_peaks(kernels: &kernels::Kernels, least_percent: Option<f64>) -> Result
         }
     }
     Ok(())
-}
-
-/// The model asked for, or a stand-in that is written for the purpose.
-fn model_file(args: &PiModelArgs, folder: &Path) -> Result<PathBuf> {
-    if let Some(model) = &args.model {
-        return Ok(model.clone());
-    }
-    let path = folder.join("untrained-baseline.safetensors");
-    network::write_stand_in(&path)?;
-    Ok(path)
 }
 
 fn eights(word: &str) -> Result<usize, String> {

@@ -1,11 +1,12 @@
 //! The layers of a model file, and a stand-in for a trained model: the baseline network
 //! with random weights.
 
-use crate::measure::baseline::{PARTS, WIDTHS};
-use anyhow::{Context, ensure};
+use crate::measure::baseline::{STACKS, drawn};
+use anyhow::{Context, Result};
 use formats::model_card::{ModelCard, Normalization};
 use formats::rng::StreamKey;
-use formats::weights::{Tensor, WeightsFile, write_weights};
+use formats::weights::{Tensor, write_weights};
+use infer_cpu::{LayerShape, NetShape, inspect};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -44,56 +45,44 @@ pub struct Network {
 
 impl Network {
     /// The layers of the model at `path`.
-    ///
-    /// # Errors
-    /// A file that is not a model.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let file = WeightsFile::open(path)?;
-        let card = ModelCard::from_metadata(path, &file.metadata())?;
-        let shapes = file.shapes();
-        let [stn, fstn, trunk, front] = PARTS.map(|[convs, fcs]| Net {
-            convs: numbered(&shapes, convs),
-            fcs: numbered(&shapes, fcs),
-        });
-        let is_model = trunk.convs.len() >= 2 && !trunk.fcs.is_empty();
-        ensure!(
-            is_model,
-            "{}: expected the layers of a PointNet; `infer-cpu inspect` shows those of a model",
-            path.display()
-        );
-        Ok(Self { stn, fstn, trunk, transform_after: card.transform_after, front })
+    pub fn read(path: &Path) -> Result<Self> {
+        let model = inspect(path)?;
+        let front = NetShape { convs: model.front.unwrap_or_default(), fcs: Vec::new() };
+        Ok(Self {
+            stn: model.stn.map(net).unwrap_or_default(),
+            fstn: model.fstn.map(net).unwrap_or_default(),
+            trunk: net(model.trunk),
+            transform_after: model.card.transform_after,
+            front: net(front),
+        })
     }
 }
 
-/// The layers `prefix1`, `prefix2`, … as long as they go on.
-fn numbered(shapes: &BTreeMap<String, Vec<usize>>, prefix: &str) -> Vec<Layer> {
-    let layers = (1..).map_while(|number: usize| {
-        match shapes.get(&format!("{prefix}{number}.weight")).map(Vec::as_slice) {
-            Some(&[outputs, inputs] | &[outputs, inputs, 1]) => Some(Layer { inputs, outputs }),
-            _ => None,
-        }
-    });
-    layers.collect()
+fn net(NetShape { convs, fcs }: NetShape) -> Net {
+    let layer = |LayerShape { inputs, outputs, .. }| Layer { inputs, outputs };
+    let [convs, fcs] = [convs, fcs].map(|layers| layers.into_iter().map(layer).collect());
+    Net { convs, fcs }
 }
 
 /// Writes a stand-in to `path`, calibrated for int8.
-///
-/// # Errors
-/// What the system reports.
-pub fn write_stand_in(path: &Path) -> anyhow::Result<()> {
+pub fn write_stand_in(path: &Path) -> Result<()> {
     let mut tensors = BTreeMap::new();
-    for (names, widths) in PARTS.iter().zip(WIDTHS) {
-        for (name, widths) in names.iter().zip(widths) {
-            for (i, pair) in widths.windows(2).enumerate() {
-                let layer = Layer { inputs: pair[0], outputs: pair[1] };
-                let name = format!("{name}{}", i + 1);
+    for (stack, widths) in STACKS {
+        for (i, pair) in (1..).zip(widths.windows(2)) {
+            let (inputs, outputs) = (pair[0], pair[1]);
+            let mut bias = Tensor { shape: vec![outputs], values: vec![0.0; outputs] };
+            // Uniform with the variance that keeps activations' (He et al. 2015).
+            let mut bound = (6.0 / inputs as f64).sqrt();
+            if stack.ends_with("stn.fc") && i + 1 == widths.len() {
                 // T-Nets predict nearly the identity, so that nothing overflows.
-                let ends_t_net = name.contains("stn.fc") && i + 2 == widths.len();
-                insert(&mut tensors, &name, layer, if ends_t_net { 0.01 } else { 1.0 });
-                if ends_t_net {
-                    add_identity(&mut tensors, &format!("{name}.bias"));
-                }
+                bound *= 0.01;
+                let diagonal = bias.values.iter_mut().step_by(outputs.isqrt() + 1);
+                diagonal.for_each(|value| *value += 1.0);
             }
+            let key = StreamKey::new(0, &format!("{stack}{i}"), 0);
+            let weight = drawn(key, &[outputs, inputs], |unit| bound * (2.0 * unit - 1.0));
+            tensors.insert(format!("{stack}{i}.weight"), weight);
+            tensors.insert(format!("{stack}{i}.bias"), bias);
         }
     }
     let mut card = ModelCard {
@@ -107,46 +96,30 @@ pub fn write_stand_in(path: &Path) -> anyhow::Result<()> {
     Ok(write_weights(path, &tensors, &card.to_metadata())?)
 }
 
-/// Weights uniform with the variance that keeps activations' (He et al. 2015),
-/// times `gain`.
-fn insert(tensors: &mut BTreeMap<String, Tensor>, name: &str, layer: Layer, gain: f64) {
-    let Layer { inputs, outputs } = layer;
-    let key = StreamKey::new(0, name, 0);
-    let bound = gain * (6.0 / inputs as f64).sqrt();
-    let weight = |i: u64| (bound * (2.0 * key.unit(i) - 1.0)) as f32;
-    let values = (0..(inputs * outputs) as u64).map(weight).collect();
-    tensors.insert(format!("{name}.weight"), Tensor { shape: vec![outputs, inputs], values });
-    let bias = Tensor { shape: vec![outputs], values: vec![0.0; outputs] };
-    tensors.insert(format!("{name}.bias"), bias);
-}
-
-/// Adds the identity to the biases `name` of a layer that predicts a matrix.
-fn add_identity(tensors: &mut BTreeMap<String, Tensor>, name: &str) {
-    if let Some(bias) = tensors.get_mut(name) {
-        let k = bias.values.len().isqrt();
-        bias.values.iter_mut().step_by(k + 1).for_each(|value| *value += 1.0);
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
+
+    /// The layers of the baseline.
+    pub fn baseline() -> Network {
+        let layer = |pair: &[usize]| Layer { inputs: pair[0], outputs: pair[1] };
+        let [stn, stn_fcs, fstn, fstn_fcs, trunk, head, front] =
+            STACKS.map(|(_, widths)| widths.windows(2).map(layer).collect());
+        Network {
+            stn: Net { convs: stn, fcs: stn_fcs },
+            fstn: Net { convs: fstn, fcs: fstn_fcs },
+            trunk: Net { convs: trunk, fcs: head },
+            transform_after: 1,
+            front: Net { convs: front, fcs: Vec::new() },
+        }
+    }
 
     #[test]
     fn the_stand_in_is_the_baseline() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("stand-in.safetensors");
         write_stand_in(&path).unwrap();
-        let network = Network::read(&path).unwrap();
-        let widths = |layers: &[Layer]| {
-            let outputs = layers.iter().map(|layer| layer.outputs);
-            layers.iter().take(1).map(|layer| layer.inputs).chain(outputs).collect::<Vec<_>>()
-        };
-        let nets = [&network.stn, &network.fstn, &network.trunk, &network.front];
-        for (net, [convs, fcs]) in nets.into_iter().zip(WIDTHS) {
-            assert_eq!(widths(&net.convs), convs);
-            assert_eq!(widths(&net.fcs), fcs);
-        }
+        assert_eq!(Network::read(&path).unwrap(), baseline());
         let classifier = infer_cpu::Classifier::load(&path, &infer_cpu::Options::default());
         assert_eq!(classifier.unwrap().classes().len(), 40);
     }
@@ -156,11 +129,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.safetensors");
         write_weights(&path, &BTreeMap::new(), &BTreeMap::new()).unwrap();
-        assert!(
-            Network::read(&path)
-                .unwrap_err()
-                .to_string()
-                .contains("expected the layers of a PointNet")
-        );
+        let refused = Network::read(&path).unwrap_err().to_string();
+        assert!(refused.contains("x.safetensors") && refused.contains("trunk"), "{refused}");
     }
 }

@@ -5,6 +5,7 @@ use super::number::Number;
 use infer_cpu::Precision;
 use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays, prefilter_pays};
 use serde::Serialize;
+use std::slice::from_ref;
 
 /// Where the points that a network sees come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -63,19 +64,23 @@ pub enum Stage {
 }
 
 impl Stage {
+    /// The layers that tiles multiply, and how many rows go through each.
+    pub fn products(&self) -> (usize, &[Product]) {
+        match self {
+            Self::Hidden { rows, products } => (*rows, products),
+            Self::Pool { rows, product, .. } | Self::Alone { rows, product } => {
+                (*rows, from_ref(product))
+            }
+            Self::Vector { .. } | Self::Farthest { .. } => (0, &[]),
+        }
+    }
+
     /// Multiplications with an addition, padding left out.
     pub fn macs(&self) -> usize {
         let of = |layer: &Layer| layer.inputs * layer.outputs;
-        match self {
-            Self::Hidden { rows, products } => {
-                rows * products.iter().map(|product| of(&product.layer)).sum::<usize>()
-            }
-            Self::Pool { rows, product, .. } | Self::Alone { rows, product } => {
-                rows * of(&product.layer)
-            }
-            Self::Vector { layer, .. } => of(layer),
-            Self::Farthest { .. } => 0,
-        }
+        let (rows, products) = self.products();
+        let of_vector = if let Self::Vector { layer, .. } = self { of(layer) } else { 0 };
+        rows * products.iter().map(|product| of(&product.layer)).sum::<usize>() + of_vector
     }
 }
 
@@ -184,24 +189,8 @@ impl Formats {
 
 #[cfg(test)]
 mod tests {
+    use super::super::network::tests::baseline;
     use super::*;
-
-    fn net(convs: &[usize], fcs: &[usize]) -> Net {
-        let layers = |widths: &[usize]| {
-            widths.windows(2).map(|pair| Layer { inputs: pair[0], outputs: pair[1] }).collect()
-        };
-        Net { convs: layers(convs), fcs: layers(fcs) }
-    }
-
-    fn baseline() -> Network {
-        Network {
-            stn: net(&[3, 64, 128, 1024], &[1024, 512, 256, 9]),
-            fstn: net(&[64, 64, 128, 1024], &[1024, 512, 256, 4096]),
-            trunk: net(&[3, 64, 128, 1024], &[1024, 512, 256, 40]),
-            transform_after: 1,
-            front: net(&[3, 64, 128, 1024], &[]),
-        }
-    }
 
     fn macs(sampler: Sampler, from: usize, points: usize) -> usize {
         let stages = stages(&baseline(), sampler, (from, points), Precision::F32).unwrap();
@@ -243,28 +232,26 @@ mod tests {
         assert!(stages.iter().any(|stage| matches!(stage, Stage::Alone { rows: 64, .. })));
     }
 
+    /// The poolings over all of `points`.
+    fn pools(points: usize, precision: Precision) -> Vec<(usize, Number, bool)> {
+        let stages = stages(&baseline(), Sampler::All, (points, points), precision).unwrap();
+        let pools = stages.into_iter().filter_map(|stage| match stage {
+            Stage::Pool { rows, product, screened } => Some((rows, product.number, screened)),
+            _ => None,
+        });
+        pools.collect()
+    }
+
     #[test]
     fn poolings_of_fp32_are_screened_by_int8() {
-        let pooled = |precision| {
-            let stages = stages(&baseline(), Sampler::All, (64, 64), precision).unwrap();
-            let pools = stages.into_iter().filter_map(|stage| match stage {
-                Stage::Pool { product, screened, .. } => Some((product.number, screened)),
-                _ => None,
-            });
-            pools.collect::<Vec<_>>()
-        };
-        assert_eq!(pooled(Precision::F32), [(Number::I8, true); 3]);
-        assert_eq!(pooled(Precision::F16), [(Number::F16, false); 3]);
-        assert_eq!(pooled(Precision::I8), [(Number::I8, false); 3]);
+        assert_eq!(pools(64, Precision::F32), [(64, Number::I8, true); 3]);
+        assert_eq!(pools(64, Precision::F16), [(64, Number::F16, false); 3]);
+        assert_eq!(pools(64, Precision::I8), [(64, Number::I8, false); 3]);
     }
 
     #[test]
     fn long_clouds_go_in_runs() {
-        let stages = stages(&baseline(), Sampler::All, (2048, 2048), Precision::F32).unwrap();
-        let rows = stages.iter().filter_map(|stage| match stage {
-            Stage::Pool { rows, .. } => Some(*rows),
-            _ => None,
-        });
-        assert_eq!(rows.collect::<Vec<_>>(), [1056, 992, 1056, 992, 1056, 992]);
+        let rows: Vec<usize> = pools(2048, Precision::F32).iter().map(|pool| pool.0).collect();
+        assert_eq!(rows, [1056, 992, 1056, 992, 1056, 992]);
     }
 }

@@ -3,12 +3,12 @@
 use super::PiModelArgs;
 use super::count::Counter;
 use super::kernels::Kernels;
-use super::model::{Machine, Other, Time, time};
+use super::model::{Other, Time, time};
 use super::network::Network;
 use super::plan::{Sampler, Stage, stages};
 use anyhow::Result;
 use infer_cpu::Precision;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Clouds of more points are not run under QEMU: what is counted grows by the
 /// same amount with every run of blocks.
@@ -20,14 +20,9 @@ const NAMED_FUNCTIONS: usize = 12;
 /// One modelled classification.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Where the points come from.
-    pub sampler: Sampler,
-    /// Points of the cloud.
-    pub from: usize,
-    /// Points that the network sees.
-    pub points: usize,
-    /// `infer-cpu`'s name of the precision.
-    pub precision: &'static str,
+    /// What is modelled.
+    #[serde(flatten)]
+    pub setting: Setting,
     /// Multiplications with an addition, of sampler and network.
     pub macs: usize,
     /// Modelled time.
@@ -41,7 +36,7 @@ pub struct Row {
 }
 
 /// What is modelled: `points` of a cloud of `from` points to a class.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct Setting {
     /// Where the points come from.
     pub sampler: Sampler,
@@ -50,7 +45,12 @@ pub struct Setting {
     /// Points that the network sees.
     pub points: usize,
     /// What it computes in.
+    #[serde(serialize_with = "by_name")]
     pub precision: Precision,
+}
+
+fn by_name<S: Serializer>(precision: &Precision, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(precision.name())
 }
 
 impl Setting {
@@ -61,9 +61,6 @@ impl Setting {
 }
 
 /// All rows that `args` ask for.
-///
-/// # Errors
-/// A binary that cannot be counted, or that does not do what is planned.
 pub fn rows(
     args: &PiModelArgs,
     network: &Network,
@@ -73,23 +70,18 @@ pub fn rows(
     let mut rows = Vec::new();
     for setting in settings(args) {
         let Some(stages) = setting.stages(network) else { continue };
-        let counted = match counter {
-            Some(counter) => Some(count(counter, network, kernels, setting)?),
-            None => None,
-        };
+        let count = |counter| count(counter, network, kernels, setting);
+        let counted = counter.map(count).transpose()?;
         let columns_read = counted.as_ref().map(|counted| counted.columns_read);
         let other = counted.as_ref().map(|counted| counted.other);
         let share = columns_read.unwrap_or(1.0);
         rows.push(Row {
-            sampler: setting.sampler,
-            from: setting.from,
-            points: setting.points,
-            precision: setting.precision.name(),
+            setting,
             macs: stages.iter().map(Stage::macs).sum(),
-            time: time(&machine(args), kernels, &stages, share, other),
+            time: time(&args.machine(), kernels, &stages, share, other),
             columns_read,
             other,
-            functions: counted.map_or_else(Vec::new, |counted| counted.functions),
+            functions: counted.map(|counted| counted.functions).unwrap_or_default(),
         });
     }
     Ok(rows)
@@ -108,16 +100,6 @@ fn settings(args: &PiModelArgs) -> impl Iterator<Item = Setting> {
     })
 }
 
-/// The machine that `args` describe.
-pub fn machine(args: &PiModelArgs) -> Machine {
-    Machine {
-        threads: args.threads.into(),
-        hertz: args.clock * 1e9,
-        bytes_per_s: args.bandwidth * 1e9,
-        instructions_per_cycle: args.other_ipc,
-    }
-}
-
 /// What counting gave.
 pub struct Counted {
     /// Instructions outside the inner loops.
@@ -128,10 +110,7 @@ pub struct Counted {
 }
 
 /// Counts one setting; one that is too large for QEMU is extrapolated from two
-/// that are not.
-///
-/// # Errors
-/// A binary that cannot be counted, or that does not do what is planned.
+/// that are not. Fails if the binary does not do what is planned.
 pub fn count(
     counter: &Counter,
     network: &Network,
@@ -140,9 +119,7 @@ pub fn count(
 ) -> Result<Counted> {
     let Setting { sampler, from, points, .. } = setting;
     let measure = |setting: Setting| -> Result<Counted> {
-        let Setting { sampler, from, points, precision } = setting;
-        eprintln!("counting {} {points} of {from} in {}", sampler.word(), precision.name());
-        let counts = counter.classification(sampler, (from, points), precision)?;
+        let counts = counter.classification(setting)?;
         let stages = setting.stages(network).unwrap_or_default();
         let (other, columns_read) = counts.outside_loops(&stages, kernels)?;
         Ok(Counted { other, columns_read, functions: counts.largest(NAMED_FUNCTIONS) })

@@ -27,6 +27,9 @@ pub struct Cell {
     pub share: Option<f64>,
 }
 
+/// A column of a table: its heading, and what it says of an item.
+pub type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> String);
+
 impl From<String> for Cell {
     fn from(text: String) -> Self {
         Self { text, ..Self::default() }
@@ -46,6 +49,16 @@ impl Table {
     pub fn new(title: impl Into<String>, heading: &[&str]) -> Self {
         let heading = heading.iter().map(|&word| word.to_owned()).collect();
         Self { title: title.into(), heading, rows: Vec::new() }
+    }
+
+    /// A table with a row for each of `items`.
+    pub fn of<T>(title: impl Into<String>, items: &[T], columns: &[Column<'_, T>]) -> Self {
+        let mut table =
+            Self::new(title, &columns.iter().map(|column| column.0).collect::<Vec<_>>());
+        for item in items {
+            table.push(columns.iter().map(|(_, says)| says(item)).collect::<Vec<_>>());
+        }
+        table
     }
 
     /// The rows of a CSV file.
@@ -76,6 +89,16 @@ impl Table {
     /// How many rows there are.
     pub fn len(&self) -> usize {
         self.rows.len()
+    }
+
+    /// The heading and the rows as a CSV file.
+    pub fn to_csv(&self) -> anyhow::Result<Vec<u8>> {
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        csv.write_record(&self.heading)?;
+        for row in &self.rows {
+            csv.write_record(row.cells.iter().map(|cell| &cell.text))?;
+        }
+        Ok(csv.into_inner()?)
     }
 
     /// The table as HTML.
@@ -142,8 +165,9 @@ mod tests {
 
     #[test]
     fn the_same_rows_are_text_and_html() {
-        let mut table = Table::new("title", &["name", "ms"]);
-        table.push(vec!["a < b".to_owned(), "1".to_owned()]);
+        let columns: [Column<'_, u8>; 2] =
+            [("name", &|_| "a < b".to_owned()), ("ms", &|ms| ms.to_string())];
+        let mut table = Table::of("title", &[1], &columns);
         table.push_marked(true, vec!["c".to_owned(), "10".to_owned()]);
         assert_eq!(table.to_string(), "\ntitle\n  name   ms\n  a < b   1\n  c      10\n");
         let html = table.html().into_string();
@@ -153,7 +177,10 @@ mod tests {
 
     #[test]
     fn a_csv_file_becomes_rows() {
-        let found = Table::from_csv("caption", b"a,b\n1,\"x, y\"\n").unwrap().html().into_string();
+        let csv = b"a,b\n1,\"x, y\"\n";
+        let table = Table::from_csv("caption", csv).unwrap();
+        assert_eq!(table.to_csv().unwrap(), csv);
+        let found = table.html().into_string();
         assert!(found.contains("<th scope=\"col\">a</th>"));
         assert!(found.contains("<th scope=\"row\">1</th>") && found.contains("<td>x, y</td>"));
         assert!(Table::from_csv("caption", b"a,b\n1\n").is_err());

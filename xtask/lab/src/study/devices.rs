@@ -9,24 +9,21 @@ use anyhow::{Result, bail};
 use clap::Args;
 use edgepuck_shapes::{ShapeClass, generate};
 use formats::atomic;
-use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
 use infer_cpu::{Classifier, Options};
 use sim_gpu::bvh::Builder;
 use sim_gpu::cpu::oracle;
-use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{Ray, RayFrame};
-use sim_gpu::resolve::{Hits, resolve};
-use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::resolve::{Hit, Hits};
+use sim_gpu::scan::{ScanRequest, scan_many};
 use sim_gpu::target::Target;
 
 use crate::measure::backends::{self, Backend};
-use crate::measure::bench_mesh::target;
-use crate::measure::bench_mesh::{self, BenchMesh};
-use crate::render::table::{Table, digits};
+use crate::measure::bench_mesh::{self, BenchMesh, target};
+use crate::measure::ray_set::vlp32c;
+use crate::render::table::{Column, Table, digits};
 use xtask::workspace::root;
 
 /// Relative error that is promised of a range.
@@ -68,11 +65,7 @@ struct Comparison {
     classes: [String; 2],
 }
 
-/// Compares all adapters with the CPU.
-///
-/// # Errors
-/// If a mesh or the model cannot be read, an adapter fails, the file cannot be
-/// written, or something is unequal.
+/// Compares all adapters with the CPU. Fails if something is unequal.
 pub fn run(args: &DevicesArgs) -> Result<()> {
     let weights = || root().join("assets/weights/edge-64.safetensors");
     let model = args.model.clone().unwrap_or_else(weights);
@@ -87,12 +80,16 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
             "expected an adapter to compare with the CPU, found none; `cargo xtask adapters` lists them"
         );
     }
-    let pattern = Sensor::builtin("vlp32c").expect("invariant: it is built in").pattern();
+    let sensor = vlp32c();
+    let pattern = sensor.pattern();
     let mut all = Vec::new();
     for bench_mesh in &bench_meshes {
         let target = target(bench_mesh.mesh.clone(), Builder::Sah);
         for view in 0..args.views {
-            let seen = View::new(&target, &pattern, view, args.views);
+            let azimuth = std::f64::consts::TAU * f64::from(view) / f64::from(args.views) + 0.3;
+            let pose = Pose::view(DISTANCE_M, 20f64.to_radians(), azimuth, DVec3::ZERO);
+            let request = ScanRequest::new(&sensor, &pattern, pose);
+            let seen = View { target: &target, request };
             let reference = seen.cast(cpu)?;
             for backend in others {
                 let found = seen.cast(backend)?;
@@ -122,28 +119,14 @@ fn shape(class: ShapeClass) -> BenchMesh {
 
 /// A sensor's look at a mesh.
 struct View<'a> {
-    job: CastJob,
-    pose: Pose,
-    pattern: &'a BeamPattern,
+    target: &'a Target,
+    request: ScanRequest<'a>,
 }
 
-impl<'a> View<'a> {
-    fn new(target: &Target, pattern: &'a BeamPattern, view: u32, of: u32) -> Self {
-        let azimuth = std::f64::consts::TAU * f64::from(view) / f64::from(of) + 0.3;
-        let pose = Pose::view(DISTANCE_M, 20f64.to_radians(), azimuth, DVec3::ZERO);
-        let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
-        let stream = StreamKey::new(0, "devices", view);
-        let job = CastJob::aim(target.clone(), frame, pattern, Culling::On, stream, 1.0);
-        Self { job, pose, pattern }
-    }
-
+impl View<'_> {
     fn cast(&self, backend: &Backend) -> Result<Hits> {
-        let jobs = std::slice::from_ref(&self.job);
-        let casts = match backend.caster.fits(&self.job.target) {
-            true => backend.caster.cast(jobs)?,
-            false => backend.caster.cast_on_cpu(jobs),
-        };
-        Ok(resolve(&self.job, &casts[0], self.pattern, &Effects::default()))
+        let mut scans = scan_many(&backend.caster, &[(self.target, self.request.clone())])?;
+        Ok(scans.swap_remove(0).hits.swap_remove(0))
     }
 
     fn compare(
@@ -153,7 +136,7 @@ impl<'a> View<'a> {
         other: &Hits,
         classifier: &mut Classifier,
     ) -> Result<Comparison> {
-        let mut ranges = vec![[None; 2]; self.pattern.len()];
+        let mut ranges = vec![[None; 2]; self.request.pattern.len()];
         for (side, hits) in [cpu, other].into_iter().enumerate() {
             hits.hits.iter().for_each(|hit| ranges[hit.beam as usize][side] = Some(hit.range_m));
         }
@@ -191,15 +174,18 @@ impl<'a> View<'a> {
         })
     }
 
-    fn position(&self, hit: &sim_gpu::resolve::Hit) -> [f64; 3] {
-        let direction = self.pose.world_from_sensor * self.pattern.directions[hit.beam as usize];
-        (self.pose.position_m + direction * hit.range_m).to_array()
+    fn position(&self, hit: &Hit) -> [f64; 3] {
+        let ScanRequest { pose, pattern, .. } = &self.request;
+        let direction = pose.world_from_sensor * pattern.directions[hit.beam as usize];
+        (pose.position_m + direction * hit.range_m).to_array()
     }
 
     /// Whether one of eight beams around `beam` sees another triangle, or none.
     fn is_near_edge(&self, beam: u32) -> bool {
-        let ray = self.job.frame.ray(self.pattern.directions[beam as usize]);
-        let seen = |ray: &Ray| oracle::nearest(&self.job.target, ray).map(|found| found.index);
+        let surface = &self.target.surface;
+        let frame = RayFrame::new(surface, &DAffine3::IDENTITY, &self.request.pose);
+        let ray = frame.ray(self.request.pattern.directions[beam as usize]);
+        let seen = |ray: &Ray| oracle::nearest(self.target, ray).map(|found| found.index);
         let length = ray.direction.length();
         let (across, up) = (ray.direction / length).any_orthonormal_pair();
         let own = seen(&ray);
@@ -219,52 +205,38 @@ impl Comparison {
 }
 
 fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record([
-        "mesh",
-        "view",
-        "adapter",
-        "points_cpu",
-        "points",
-        "silhouette_beams",
-        "largest_difference_m",
-        "bound_m",
-        "class_cpu",
-        "class",
-        "equal",
-    ])?;
-    for c in all {
-        let beams: Vec<String> = c.silhouettes.iter().map(u32::to_string).collect();
-        csv.write_record([
-            c.mesh.clone(),
-            c.view.to_string(),
-            c.adapter.clone(),
-            c.points[0].to_string(),
-            c.points[1].to_string(),
-            beams.join(" "),
-            format!("{:e}", c.apart_m),
-            format!("{:.3e}", c.bound_m),
-            c.classes[0].clone(),
-            c.classes[1].clone(),
-            c.is_equal().to_string(),
-        ])?;
-    }
-    Ok(csv.into_inner()?)
+    let beams = |all: &[u32]| all.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+    let columns: [Column<'_, Comparison>; 11] = [
+        ("mesh", &|c| c.mesh.clone()),
+        ("view", &|c| c.view.to_string()),
+        ("adapter", &|c| c.adapter.clone()),
+        ("points_cpu", &|c| c.points[0].to_string()),
+        ("points", &|c| c.points[1].to_string()),
+        ("silhouette_beams", &|c| beams(&c.silhouettes)),
+        ("largest_difference_m", &|c| format!("{:e}", c.apart_m)),
+        ("bound_m", &|c| format!("{:.3e}", c.bound_m)),
+        ("class_cpu", &|c| c.classes[0].clone()),
+        ("class", &|c| c.classes[1].clone()),
+        ("equal", &|c| c.is_equal().to_string()),
+    ];
+    Table::of("", all, &columns).to_csv()
 }
 
 fn summary(all: &[Comparison], others: &[Backend]) -> Table {
-    let heading = ["adapter", "scans", "points", "silhouette beams", "apart, m", "equal"];
-    let mut table = Table::new("Each adapter beside the CPU", &heading);
-    for backend in others {
-        let of: Vec<&Comparison> = all.iter().filter(|c| c.adapter == backend.name()).collect();
-        table.push(vec![
-            backend.name().to_owned(),
-            of.len().to_string(),
-            of.iter().map(|c| c.points[1]).sum::<usize>().to_string(),
-            of.iter().map(|c| c.silhouettes.len()).sum::<usize>().to_string(),
-            digits(of.iter().map(|c| c.apart_m).fold(0.0, f64::max)),
-            of.iter().filter(|c| c.is_equal()).count().to_string(),
-        ]);
-    }
-    table
+    let scans = |backend: &Backend| {
+        all.iter().filter(|c| c.adapter == backend.name()).collect::<Vec<&Comparison>>()
+    };
+    let sum = |backend: &Backend, of: fn(&Comparison) -> usize| {
+        scans(backend).into_iter().map(of).sum::<usize>().to_string()
+    };
+    let apart_m = |backend: &Backend| scans(backend).iter().map(|c| c.apart_m).fold(0.0, f64::max);
+    let columns: [Column<'_, Backend>; 6] = [
+        ("adapter", &|backend| backend.name().to_owned()),
+        ("scans", &|backend| scans(backend).len().to_string()),
+        ("points", &|backend| sum(backend, |c| c.points[1])),
+        ("silhouette beams", &|backend| sum(backend, |c| c.silhouettes.len())),
+        ("apart, m", &|backend| digits(apart_m(backend))),
+        ("equal", &|backend| sum(backend, |c| usize::from(c.is_equal()))),
+    ];
+    Table::of("Each adapter beside the CPU", others, &columns)
 }

@@ -12,9 +12,6 @@ use std::sync::Arc;
 pub const VERSION: &str = "0.27.0";
 
 /// See [`crate::turns::Ready`].
-///
-/// # Errors
-/// If rten does not take the model.
 pub fn ready(file: &Path, x: &[f32], threads: usize) -> Result<Run> {
     let model = ModelOptions::with_all_ops().prepack_weights(true).load_file(file)?;
     let (input, output) = (model.node_id("x")?, model.node_id("logp")?);

@@ -10,9 +10,6 @@ use tract_onnx::prelude::*;
 pub const VERSION: &str = "0.23.9";
 
 /// See [`crate::turns::Ready`].
-///
-/// # Errors
-/// If tract does not take the model.
 pub fn ready(file: &Path, x: &[f32], threads: usize) -> Result<Run> {
     set_default_executor(match threads {
         1 => Executor::SingleThread,

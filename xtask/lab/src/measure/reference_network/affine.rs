@@ -29,7 +29,7 @@ pub fn gamma(n: usize) -> f64 {
 }
 
 /// Rows of values, each with its bound; `[n, width]`.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Rows {
     pub width: usize,
     pub value: Vec<f64>,
@@ -85,7 +85,7 @@ impl Rows {
     }
 
     /// As a layer of `kind` takes them in `precision`.
-    pub fn taken(mut self, precision: Precision, kind: Kind) -> Self {
+    fn taken(mut self, precision: Precision, kind: Kind) -> Self {
         let Kind::Point { range } = kind else { return self };
         for (x, e) in self.value.iter().zip(&mut self.bound) {
             let size = x.abs() + *e;
@@ -118,11 +118,10 @@ impl Affine {
 
     /// With weights as `precision` stores them for a layer of `kind`: off by as
     /// much as each of them is rounded.
-    pub fn stored(mut self, precision: Precision, kind: Kind) -> Self {
-        let is_first = matches!(kind, Kind::First);
+    fn stored(mut self, precision: Precision, kind: Kind) -> Self {
         let is_vector = matches!(kind, Kind::Vector);
         match precision {
-            _ if is_first => {}
+            _ if matches!(kind, Kind::First) => {}
             Precision::F32 => {}
             Precision::F32Fc16 if !is_vector => {}
             Precision::F32Fc16 | Precision::F16 => {
@@ -144,20 +143,17 @@ impl Affine {
         self
     }
 
-    /// `rows` through the layer, which must be `stored` and take rows as `taken`.
-    pub fn through(&self, rows: &Rows, precision: Precision, kind: Kind) -> Rows {
-        let (part, least) = self.roundings(precision, kind);
-        let outputs: Vec<(f64, f64)> = rows
-            .value
-            .par_chunks_exact(self.inputs)
-            .zip(rows.bound.par_chunks_exact(self.inputs))
-            .flat_map_iter(|(x, e)| {
-                (0..self.outputs).map(move |o| self.output(o, x, e, part, least))
-            })
-            .collect();
-        let (value, bound) = outputs.into_iter().unzip();
-        let out = Rows { width: self.outputs, value, bound };
-        if self.relu { out.relu() } else { out }
+    /// `rows` through this layer of `kind`, computed in `precision`.
+    pub fn through(self, rows: Rows, precision: Precision, kind: Kind) -> Rows {
+        let layer = &self.stored(precision, kind);
+        let rows = rows.taken(precision, kind);
+        let (part, least) = layer.roundings(precision, kind);
+        let value = rows.value.par_chunks_exact(layer.inputs);
+        let pairs = value.zip(rows.bound.par_chunks_exact(layer.inputs));
+        let output = |(x, e)| (0..layer.outputs).map(move |o| layer.output(o, x, e, part, least));
+        let (value, bound) = pairs.flat_map_iter(output).unzip();
+        let out = Rows { width: layer.outputs, value, bound };
+        if layer.relu { out.relu() } else { out }
     }
 
     fn output(&self, output: usize, x: &[f64], e: &[f64], part: f64, least: f64) -> (f64, f64) {

@@ -14,22 +14,14 @@ pub struct Points {
     pub rounded: Vec<[f32; 3]>,
 }
 
-/// A layer's outputs: pooled over the points, or of the pooled vector.
-pub struct Output {
-    pub layer: String,
-    pub values: Rows,
-}
-
-/// The outputs of `chain` for `points`, layer by layer, in `precision`.
-///
-/// # Errors
-/// A tensor that is missing, or layers whose sizes do not follow each other.
+/// The outputs of each layer of `chain` for `points`, in `precision`: pooled over the
+/// points, or of the pooled vector. Fails where layers do not follow each other.
 pub fn outputs(
     network: &Network,
     chain: &Chain,
     points: &Points,
     precision: Precision,
-) -> Result<Vec<Output>> {
+) -> Result<Vec<Rows>> {
     let mut rows = points.exact.clone();
     let turn = match chain.stn {
         true => Some(transform(network, "feat.stn.", points, precision)?),
@@ -52,41 +44,35 @@ pub fn outputs(
             if precision == Precision::I8 || folding_pays(points.rounded.len(), layer.outputs) {
                 layer = layer.after(&t, k);
             } else {
-                let turn = Affine::transform(&t, k).stored(precision, kind);
-                rows = turn.through(&rows.taken(precision, kind), precision, kind);
+                rows = Affine::transform(&t, k).through(rows, precision, kind);
             }
         }
-        ensure!(
-            layer.inputs == rows.width,
-            "{name}: expected {} inputs, found {}",
-            layer.inputs,
-            rows.width
-        );
-        rows = rows.taken(precision, kind);
-        rows = layer.stored(precision, kind).through(&rows, precision, kind);
-        let seen = if i == 0 { as_taken(network, chain, &rows, precision) } else { rows.clone() };
-        all.push(Output { layer: name.clone(), values: seen.pooled() });
+        check(name, &layer, &rows)?;
+        rows = layer.through(rows, precision, kind);
+        let seen = rows.clone();
+        let seen = if i == 0 { as_taken(network, chain, seen, precision) } else { seen };
+        all.push(seen.pooled());
     }
     rows = rows.pooled();
     for (i, name) in chain.fcs.iter().enumerate() {
-        let layer = network.affine(name, i + 1 < chain.fcs.len())?.stored(precision, Kind::Vector);
-        ensure!(
-            layer.inputs == rows.width,
-            "{name}: expected {} inputs, found {}",
-            layer.inputs,
-            rows.width
-        );
-        rows = layer.through(&rows, precision, Kind::Vector);
-        all.push(Output { layer: name.clone(), values: rows.clone() });
+        let layer = network.affine(name, i + 1 < chain.fcs.len())?;
+        check(name, &layer, &rows)?;
+        rows = layer.through(rows, precision, Kind::Vector);
+        all.push(rows.clone());
     }
     Ok(all)
 }
 
+/// That layer `name` takes as many inputs as there are.
+fn check(name: &str, layer: &Affine, rows: &Rows) -> Result<()> {
+    let (expected, found) = (layer.inputs, rows.width);
+    ensure!(expected == found, "{name}: expected {expected} inputs, found {found}");
+    Ok(())
+}
+
 /// The first layer as the second takes it: through an identity, as it is measured.
-fn as_taken(network: &Network, chain: &Chain, rows: &Rows, precision: Precision) -> Rows {
-    let kind = kind(network, chain, 1);
-    let identity = Affine::identity(rows.width).stored(precision, kind);
-    identity.through(&rows.clone().taken(precision, kind), precision, kind)
+fn as_taken(network: &Network, chain: &Chain, rows: Rows, precision: Precision) -> Rows {
+    Affine::identity(rows.width).through(rows, precision, kind(network, chain, 1))
 }
 
 /// What layer `i` of a chain takes.
@@ -108,8 +94,8 @@ fn transform(
     let chain =
         chains.iter().find(|chain| chain.fcs.first().is_some_and(|fc| fc.starts_with(prefix)));
     let chain = chain.with_context(|| format!("{prefix}: expected a T-Net"))?;
-    let all = outputs(network, chain, points, precision)?;
-    let mut matrix = all.last().context("a T-Net has layers")?.values.clone();
+    let mut all = outputs(network, chain, points, precision)?;
+    let mut matrix = all.pop().context("a T-Net has layers")?;
     let k = matrix.width.isqrt();
     ensure!(k * k == matrix.width, "{prefix}: expected a square, found {} values", matrix.width);
     (0..k).for_each(|i| matrix.value[i * k + i] += 1.0);
@@ -119,25 +105,19 @@ fn transform(
 /// Points with their EdgeConv features. Neighbours are found in f32, as `infer-cpu`
 /// finds them; a maximum over the same neighbours is off by no more than its operands.
 fn with_edges(network: &Network, points: &Points, rows: Rows) -> Result<Rows> {
-    let layers: Result<Vec<(f32, Affine)>> = network
-        .card
-        .edge_radii
-        .iter()
-        .zip(1..)
-        .map(|(&radius, i): (&f32, usize)| {
-            Ok((radius, network.affine(&format!("edge.conv{i}"), true)?))
-        })
-        .collect();
-    let layers = layers?;
+    let mut layers: Vec<(f32, Affine)> = Vec::new();
+    for (radius, i) in network.card.edge_radii.iter().zip(1..) {
+        layers.push((*radius, network.affine(&format!("edge.conv{i}"), true)?));
+    }
     let width = 3 + layers.iter().map(|(_, layer)| layer.outputs).sum::<usize>();
-    let mut out = Rows { width, value: Vec::new(), bound: Vec::new() };
+    let mut out = Rows { width, ..Rows::default() };
     for i in 0..rows.n() {
         out.value.extend(&rows.value[3 * i..3 * i + 3]);
         out.bound.extend(&rows.bound[3 * i..3 * i + 3]);
         for (radius, layer) in &layers {
             let near = neighbours(&points.rounded, i, *radius);
             let offsets = offsets(&rows, i, &near, f64::from(*radius));
-            let features = layer.through(&offsets, Precision::F32, Kind::First).pooled();
+            let features = layer.clone().through(offsets, Precision::F32, Kind::First).pooled();
             out.value.extend(features.value);
             out.bound.extend(features.bound);
         }
@@ -156,7 +136,7 @@ fn neighbours(points: &[[f32; 3]], i: usize, radius: f32) -> Vec<usize> {
 
 /// From point `i` to each of `near`, in radii.
 fn offsets(rows: &Rows, i: usize, near: &[usize], radius: f64) -> Rows {
-    let mut out = Rows { width: 3, value: Vec::new(), bound: Vec::new() };
+    let mut out = Rows { width: 3, ..Rows::default() };
     for &j in near {
         for k in 0..3 {
             let (p, q) = (3 * i + k, 3 * j + k);

@@ -6,7 +6,7 @@
 pub mod affine;
 mod forward;
 
-pub use forward::{Output, Points, outputs};
+pub use forward::{Points, outputs};
 
 use affine::{Affine, Rows};
 use anyhow::{Context, Result, ensure};
@@ -29,7 +29,7 @@ pub struct Network {
 
 /// Layers that points go through one after the other, a pooling, and layers that
 /// the pooled vector goes through: the trunk and head, or those of a T-Net.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Chain {
     /// Names of point-wise layers.
     pub convs: Vec<String>,
@@ -47,9 +47,6 @@ pub struct Chain {
 
 impl Network {
     /// Reads the model at `path`.
-    ///
-    /// # Errors
-    /// A file that cannot be read as a model.
     pub fn read(path: &Path) -> Result<Self> {
         let mut file = WeightsFile::open(path)?;
         let card = ModelCard::from_metadata(path, &file.metadata())?;
@@ -76,21 +73,16 @@ impl Network {
         let (has_stn, has_fstn) = (!stn.is_empty(), !fstn.is_empty());
         let trunk = self.layers("feat.conv");
         let edges = !self.card.edge_radii.is_empty();
-        let t_net = |prefix: &str, convs: Vec<String>, has_stn: bool, edges: bool| Chain {
-            convs,
-            fcs: self.layers(&format!("{prefix}fc")),
-            pooled_relu: true,
-            stn: has_stn,
-            fstn_after: None,
-            edges,
-        };
         let mut chains = Vec::new();
         if has_stn {
-            chains.push(t_net("feat.stn.", stn, false, false));
+            let fcs = self.layers("feat.stn.fc");
+            chains.push(Chain { convs: stn, fcs, pooled_relu: true, ..Chain::default() });
         }
         if has_fstn {
             let convs = trunk[..after].iter().cloned().chain(fstn).collect();
-            chains.push(t_net("feat.fstn.", convs, has_stn, edges));
+            let fcs = self.layers("feat.fstn.fc");
+            let own = Chain { convs, fcs, pooled_relu: true, ..Chain::default() };
+            chains.push(Chain { stn: has_stn, edges, ..own });
         }
         chains.push(Chain {
             convs: trunk,
@@ -104,9 +96,6 @@ impl Network {
     }
 
     /// The layer `name`, its batch norm folded in; `relu` says whether it ends in a ReLU.
-    ///
-    /// # Errors
-    /// A tensor that is missing or does not have the size of the layer.
     pub fn affine(&self, name: &str, relu: bool) -> Result<Affine> {
         let mut b = self.values(&format!("{name}.bias"))?;
         let mut w = self.values(&format!("{name}.weight"))?;
@@ -153,16 +142,13 @@ impl Network {
     }
 
     /// The log-probabilities of `points`, which are taken as they are.
-    ///
-    /// # Errors
-    /// Layers that do not follow each other.
     pub fn log_probabilities(&self, points: &[[f32; 3]]) -> Result<Vec<f64>> {
         let value: Vec<f64> = points.as_flattened().iter().map(|&x| f64::from(x)).collect();
         let exact = Rows { width: 3, bound: vec![0.0; value.len()], value };
         let points = Points { exact, rounded: points.to_vec() };
         let trunk = self.chains().pop().context("a network has a trunk")?;
         let all = outputs(self, &trunk, &points, Precision::F32)?;
-        let logits = &all.last().context("a network has layers")?.values.value;
+        let logits = &all.last().context("a network has layers")?.value;
         let top = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let total: f64 = logits.iter().map(|x| (x - top).exp()).sum();
         Ok(logits.iter().map(|x| x - top - total.ln()).collect())

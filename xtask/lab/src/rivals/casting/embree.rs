@@ -4,8 +4,8 @@ use crate::measure::clock::Cost;
 use crate::measure::ray_set::RaySet;
 use crate::measure::subprocess::Subprocess;
 use anyhow::{Context, Result};
+use glam::DVec3;
 use ndarray::{Array1, Array2};
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sim_gpu::mesh::Mesh;
 use std::path::Path;
@@ -13,7 +13,7 @@ use std::process::Command;
 use tempfile::TempDir;
 use xtask::venv;
 
-/// A running `peers/embree.py`.
+/// A running `peers/embree.py`. Every method fails if the program ends.
 pub struct Embree {
     process: Subprocess,
     files: TempDir,
@@ -22,75 +22,49 @@ pub struct Embree {
 }
 
 impl Embree {
-    /// Starts the program with `python`.
-    ///
-    /// # Errors
-    /// If it does not start, which includes packages that do not load here.
+    /// Starts the program with `python`, which fails where its packages do not load.
     pub fn start(python: &Path) -> Result<Self> {
         let mut command = Command::new(python);
-        let process = Subprocess::start(command.arg(venv::programs().join("embree.py")))?;
-        let mut peer = Self { process, files: tempfile::tempdir()?, versions: Value::Null };
-        peer.versions = peer.answer()?;
-        Ok(peer)
+        let program = command.arg(venv::programs().join("embree.py"));
+        let (process, versions) = Subprocess::start(program)?;
+        Ok(Self { process, files: tempfile::tempdir()?, versions })
     }
 
     /// Builds a scene of `mesh`; what the build cost.
-    ///
-    /// # Errors
-    /// If the program ends.
     pub fn load(&mut self, mesh: &Mesh) -> Result<Cost> {
-        let vertices = mesh.vertices.iter().flat_map(|v| v.as_vec3().to_array()).collect();
-        let triangles = mesh.triangles.iter().flatten().copied().collect();
-        let files = [self.files.path().join("vertices.npy"), self.files.path().join("corners.npy")];
+        let vertices = mesh.vertices.iter().flat_map(in_f32).collect();
+        let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+        let files = ["vertices.npy", "corners.npy"].map(|name| self.files.path().join(name));
         write(&files[0], vertices, 3)?;
-        write::<u32>(&files[1], triangles, 3)?;
-        self.ask(&json!({ "mesh": files }))
+        write(&files[1], triangles, 3)?;
+        self.process.ask(json!({ "mesh": files }))
     }
 
     /// Prepares to cast the rays of `ray_set`, `copies` times over, as `key`.
-    ///
-    /// # Errors
-    /// If the program ends.
     pub fn aim(&mut self, key: &str, ray_set: &RaySet, copies: usize) -> Result<()> {
-        let rays = ray_set
-            .in_world()
-            .flat_map(|(origin, direction)| [origin.as_vec3(), direction.as_vec3()])
-            .flat_map(|v| v.to_array())
-            .collect();
+        let rays = ray_set.in_world().flat_map(|(origin, direction)| [origin, direction]);
         let file = self.files.path().join("rays.npy");
-        write(&file, rays, 6)?;
-        self.ask::<Cost>(&json!({ "rays": file, "copies": copies, "as": key }))?;
+        write(&file, rays.flat_map(|v| in_f32(&v)).collect(), 6)?;
+        self.process.ask::<Cost>(json!({ "rays": file, "copies": copies, "as": key }))?;
         Ok(())
     }
 
     /// Casts the rays of `key` once; what it cost.
-    ///
-    /// # Errors
-    /// If the program ends.
     pub fn cast(&mut self, key: &str) -> Result<Cost> {
-        self.ask(&json!({ "cast": key }))
+        self.process.ask(json!({ "cast": key }))
     }
 
     /// The ranges of one copy of the rays of `key`, metres; infinite where nothing is hit.
-    ///
-    /// # Errors
-    /// If the program ends.
     pub fn ranges(&mut self, key: &str) -> Result<Vec<f32>> {
         let file = self.files.path().join("ranges.npy");
-        self.ask::<Cost>(&json!({ "answers": file, "of": key }))?;
+        self.process.ask::<Cost>(json!({ "answers": file, "of": key }))?;
         let ranges: Array1<f32> = ndarray_npy::read_npy(&file)?;
         Ok(ranges.to_vec())
     }
+}
 
-    fn ask<T: DeserializeOwned>(&mut self, request: &Value) -> Result<T> {
-        self.process.send(&request.to_string())?;
-        self.answer()
-    }
-
-    fn answer<T: DeserializeOwned>(&mut self) -> Result<T> {
-        let line = self.process.receive()?;
-        serde_json::from_str(&line).with_context(|| format!("expected JSON, found {line}"))
-    }
+fn in_f32(v: &DVec3) -> [f32; 3] {
+    v.as_vec3().to_array()
 }
 
 fn write<T: ndarray_npy::WritableElement>(

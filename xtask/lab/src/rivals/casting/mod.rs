@@ -3,33 +3,28 @@
 mod embree;
 
 use crate::measure::accuracy::Accuracy;
-use crate::measure::backends::Backend;
-use crate::measure::backends::short;
-use crate::measure::bench_mesh::BenchMesh;
-use crate::measure::bench_mesh::target;
-use crate::measure::clock::{Costs, Workload, interleave, measured};
-use crate::measure::ray_set::RaySet;
-use crate::measure::ray_set::{sweep_pose, vlp32c};
+use crate::measure::backends::{Backend, short};
+use crate::measure::bench_mesh::{BenchMesh, target};
+use crate::measure::clock::{Costs, Workload, interleave, workload};
+use crate::measure::methods;
+use crate::measure::ray_set::{RaySet, sweep_pose, vlp32c};
 use crate::measure::scenes::in_a_room;
-use crate::render::table::{Table, digits, millions_per_s, milliseconds};
+use crate::render::table::{Column, Table, digits, millions_per_s, milliseconds};
 use crate::study::casting::speed::casting;
 use anyhow::Result;
 use embree::Embree;
-use glam::DAffine3;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{Cast, CastJob, Culling};
+use sim_gpu::job::{CastJob, Culling};
 use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::ray::{Ray, RayFrame};
-use sim_gpu::resolve::resolve;
-use sim_gpu::sensor::BeamPattern;
+use sim_gpu::resolve::{Hits, resolve};
+use sim_gpu::scan::{PlacedTarget, ScanRequest};
 use sim_gpu::target::Target;
 use std::cell::RefCell;
-use std::hint::black_box;
+use std::iter::{repeat, zip};
+use std::slice::from_ref;
 use xtask::venv::Environment;
 
 const OPEN3D: Environment<'_> = Environment {
@@ -38,11 +33,14 @@ const OPEN3D: Environment<'_> = Environment {
     size: "some 700 MB",
 };
 
-/// Rays in the order in which we cast them: neighbours traverse alike.
-const OURS: &str = "our order";
+/// Embree with rays in the order in which we cast them: neighbours traverse alike.
+const EMBREE: &str = "Embree";
 
-/// The same rays in the order in which the sensor fires them.
-const FIRED: &str = "firing order";
+/// Embree with the same rays in the order in which the sensor fires them.
+const EMBREE_FIRED: &str = "Embree, firing order";
+
+/// How often the rays of a revolution are aimed, cast and solved in one repeat.
+const REVOLUTIONS: usize = 10;
 
 /// One caster on one set of rays.
 #[derive(Serialize)]
@@ -66,45 +64,36 @@ pub struct Comparison {
 
 /// Compares `backends` with Embree on `bench_meshes`; `None`, with a message, where
 /// Embree cannot be had.
-///
-/// # Errors
-/// If an adapter or the peer fails on the way.
 pub fn measure(
     bench_meshes: &[BenchMesh],
     backends: &[Backend],
     rounds: usize,
 ) -> Result<Option<Comparison>> {
-    let embree = match OPEN3D.interpreter() {
-        Ok(python) => Embree::start(&python).map_err(|error| format!("{error:#}")),
-        Err(cause) => Err(cause),
-    };
-    let embree = match embree {
+    let started = OPEN3D.interpreter().map_err(anyhow::Error::msg);
+    let embree = match started.and_then(|python| Embree::start(&python)) {
         Ok(embree) => RefCell::new(embree),
         Err(cause) => {
-            println!("skipped the comparison with Embree: {cause}");
+            println!("skipped the comparison with Embree: {cause:#}");
             return Ok(None);
         }
     };
+    let sensor = vlp32c();
+    let pattern = sensor.pattern();
+    let request = ScanRequest::new(&sensor, &pattern, sweep_pose());
     let mut entries = Vec::new();
-    let pattern = vlp32c();
     for bench_mesh in bench_meshes {
         eprintln!("{}", bench_mesh.name);
-        let room = in_a_room(bench_mesh.mesh.clone());
-        for (mesh, trace, whole) in [
-            (&room, "sweep, all hit", "whole, all hit"),
-            (&bench_mesh.mesh, "sweep, object", "whole, object"),
-        ] {
-            let bench = Bench { bench_mesh, mesh, backends, rounds, embree: &embree };
-            let culling = if trace == "sweep, object" { Culling::On } else { Culling::Off };
-            let target = bench.load()?;
-            let pose = sweep_pose()?;
-            let ray_set = RaySet::sweep(&target, &pose, &pattern, culling);
-            entries.extend(bench.trace(trace, &ray_set)?);
-            entries.extend(bench.whole(whole, &target, &pose, &pattern)?);
-        }
-        let bench = Bench { bench_mesh, mesh: &bench_mesh.mesh, backends, rounds, embree: &embree };
-        entries
-            .extend(bench.trace("incoherent", &RaySet::incoherent(&bench.load()?, pattern.len()))?);
+        let bench = Bench { mesh: &bench_mesh.name, backends, rounds, embree: &embree };
+        let room = bench.load(&in_a_room(bench_mesh.mesh.clone()))?;
+        let sweep = RaySet::sweep(&room, &request.pose, &pattern, Culling::Off);
+        entries.extend(bench.trace("sweep, all hit", &sweep)?);
+        entries.extend(bench.whole("whole, all hit", &room, &request)?);
+        let object = bench.load(&bench_mesh.mesh)?;
+        let sweep = RaySet::sweep(&object, &request.pose, &pattern, Culling::On);
+        entries.extend(bench.trace("sweep, object", &sweep)?);
+        entries.extend(bench.whole("whole, object", &object, &request)?);
+        let incoherent = RaySet::incoherent(&object, pattern.len());
+        entries.extend(bench.trace("incoherent", &incoherent)?);
     }
     let versions = embree.into_inner().versions.clone();
     Ok(Some(Comparison { versions, entries }))
@@ -112,115 +101,93 @@ pub fn measure(
 
 /// One mesh and who casts at it.
 struct Bench<'a> {
-    bench_mesh: &'a BenchMesh,
-    mesh: &'a Mesh,
+    mesh: &'a str,
     backends: &'a [Backend],
     rounds: usize,
     embree: &'a RefCell<Embree>,
 }
 
 impl Bench<'_> {
-    fn load(&self) -> Result<Target> {
-        self.embree.borrow_mut().load(self.mesh)?;
-        Ok(target(self.mesh.clone(), Builder::Sah))
+    fn load(&self, mesh: &Mesh) -> Result<Target> {
+        self.embree.borrow_mut().load(mesh)?;
+        Ok(target(mesh.clone(), Builder::Sah))
     }
 
     /// Tracing alone: the same rays, ready in memory.
-    fn trace(&self, name: &'static str, ray_set: &RaySet) -> Result<Vec<Entry>> {
+    fn trace(&self, rays_from: &'static str, ray_set: &RaySet) -> Result<Vec<Entry>> {
         let most = self.backends.iter().map(|backend| backend.rays).max().unwrap_or(0);
         let copies = most.div_ceil(ray_set.rays.len().max(1));
+        self.embree.borrow_mut().aim(EMBREE_FIRED, &ray_set.in_firing_order(), copies)?;
+        self.embree.borrow_mut().aim(EMBREE, ray_set, copies)?;
         let jobs = vec![ray_set.job.clone(); copies];
-        let mut workloads: Vec<Workload<'_>> =
-            self.backends.iter().map(|backend| casting(backend, jobs.clone())).collect();
-        self.embree.borrow_mut().aim(OURS, ray_set, copies)?;
-        self.embree.borrow_mut().aim(FIRED, &ray_set.in_firing_order(), copies)?;
-        workloads.push(Box::new(|| self.embree.borrow_mut().cast(FIRED)));
-        workloads.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
-        let costs = interleave(self.rounds, &mut workloads)?;
+        let ours = self.backends.iter().map(|backend| casting(backend, jobs.clone())).collect();
         let ranges = |caster: &Caster| -> Result<_> {
-            let cast = caster.cast(std::slice::from_ref(&ray_set.job))?;
-            Ok(ray_set.ranges(cast.first().unwrap_or(&Cast::default())))
+            Ok(ray_set.ranges(&caster.cast(from_ref(&ray_set.job))?.swap_remove(0)))
         };
-        self.entries(name, ray_set, ray_set.rays.len() * copies, costs, ranges)
+        self.entries(rays_from, (ray_set, copies), ours, &[EMBREE_FIRED, EMBREE], ranges)
     }
 
     /// From beams to ranges: we aim, cast and solve in f64; Embree is handed
     /// all rays of the revolution and answers in f32.
     fn whole(
         &self,
-        name: &'static str,
+        rays_from: &'static str,
         target: &Target,
-        pose: &Pose,
-        pattern: &BeamPattern,
+        request: &ScanRequest<'_>,
     ) -> Result<Vec<Entry>> {
-        let all = RaySet::sweep(target, pose, pattern, Culling::Off);
-        let copies = 10;
-        let aim = || {
-            let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
-            let stream = all.job.stream;
-            CastJob::aim(target.clone(), frame, pattern, Culling::On, stream, 1.0)
+        let pattern = request.pattern;
+        let solve = |caster: &Caster, revolutions: usize| -> Result<Vec<Hits>> {
+            let aim = |_| request.aim(&PlacedTarget::new(target));
+            let jobs: Vec<CastJob> = (0..revolutions).map(aim).collect();
+            let pairs = jobs.iter().zip(caster.cast(&jobs)?);
+            let hits = pairs.map(|(job, cast)| resolve(job, &cast, pattern, &Effects::default()));
+            Ok(hits.collect())
         };
-        let whole = |caster: &Caster| -> Result<()> {
-            let jobs: Vec<CastJob> = (0..copies).map(|_| aim()).collect();
-            for (job, cast) in jobs.iter().zip(caster.cast(&jobs)?) {
-                black_box(resolve(job, &cast, pattern, &Effects::default()));
-            }
-            Ok(())
-        };
-        let mut workloads: Vec<Workload<'_>> = Vec::new();
-        for backend in self.backends {
-            let whole = &whole;
-            workloads.push(Box::new(move || {
-                let (done, cost) = measured(|| whole(&backend.caster));
-                done.map(|()| cost)
-            }));
-        }
-        self.embree.borrow_mut().aim(OURS, &all, copies)?;
-        workloads.push(Box::new(|| self.embree.borrow_mut().cast(OURS)));
-        let costs = interleave(self.rounds, &mut workloads)?;
+        let all = RaySet::sweep(target, &request.pose, pattern, Culling::Off);
+        self.embree.borrow_mut().aim(EMBREE, &all, REVOLUTIONS)?;
+        let ours = self.backends.iter();
+        let ours = ours.map(|ours| workload(move || solve(&ours.caster, REVOLUTIONS))).collect();
         let ranges = |caster: &Caster| -> Result<_> {
-            let job = aim();
-            let casts = caster.cast(std::slice::from_ref(&job))?;
             let mut by_beam = vec![None; pattern.len()];
-            for cast in &casts {
-                for hit in resolve(&job, cast, pattern, &Effects::default()).hits {
-                    by_beam[hit.beam as usize] = Some(hit.range_m);
-                }
+            for hit in &solve(caster, 1)?[0].hits {
+                by_beam[hit.beam as usize] = Some(hit.range_m);
             }
             Ok(all.job.beams.iter().map(|&beam| by_beam[beam as usize]).collect())
         };
-        self.entries(name, &all, all.rays.len() * copies, costs, ranges)
+        self.entries(rays_from, (&all, REVOLUTIONS), ours, &[EMBREE], ranges)
     }
 
+    /// Times `ours`, one workload for each backend, and Embree's rays of these keys, which
+    /// are all of `copies` copies of `ray_set`; `ranges` is what a backend finds for one.
     fn entries(
         &self,
         rays_from: &'static str,
-        ray_set: &RaySet,
-        rays: usize,
-        costs: Vec<Costs>,
+        (ray_set, copies): (&RaySet, usize),
+        ours: Vec<Workload<'_>>,
+        keys: &[&str],
         ranges: impl Fn(&Caster) -> Result<Vec<Option<f64>>>,
     ) -> Result<Vec<Entry>> {
-        let target = &ray_set.job.target;
-        let nearest = |ray: &Ray| oracle::nearest(target, ray).map(|crossing| crossing.range_m);
-        let truth: Vec<Option<f64>> = ray_set.rays.iter().map(nearest).collect();
+        let mut workloads: Vec<Workload<'_>> = ours;
+        for &key in keys {
+            workloads.push(Box::new(move || self.embree.borrow_mut().cast(key)));
+        }
+        let costs = interleave(self.rounds, &mut workloads)?;
+        let truth = methods::in_f64(ray_set);
         let mut answers = Vec::new();
         for backend in self.backends {
-            answers.push((backend.name().to_owned(), ranges(&backend.caster)?));
+            answers.push((backend.name(), ranges(&backend.caster)?));
         }
-        let finite = |t: f32| t.is_finite().then_some(f64::from(t));
+        // Only the time depends on the order of Embree's rays.
+        let in_our_order = self.embree.borrow_mut().ranges(EMBREE)?.into_iter();
         let of_embree: Vec<Option<f64>> =
-            self.embree.borrow_mut().ranges(OURS)?.into_iter().map(finite).collect();
-        if costs.len() > self.backends.len() + 1 {
-            // The same rays: only the time depends on their order.
-            answers.push(("Embree, firing order".to_owned(), of_embree.clone()));
-        }
-        answers.push(("Embree".to_owned(), of_embree));
-        let entry = |((caster, ranges), costs): ((String, Vec<_>), Costs)| Entry {
-            mesh: self.bench_mesh.name.clone(),
-            triangles: target.surface.len(),
+            in_our_order.map(|t| t.is_finite().then_some(f64::from(t))).collect();
+        answers.extend(keys.iter().map(|&key| (key, of_embree.clone())));
+        let entry = |((caster, ranges), costs): ((&str, Vec<_>), Costs)| Entry {
+            mesh: self.mesh.to_owned(),
+            triangles: ray_set.job.target.surface.len(),
             rays_from,
-            caster,
-            rays,
+            caster: caster.to_owned(),
+            rays: ray_set.rays.len() * copies,
             costs,
             accuracy: Accuracy::of(&ranges, &truth),
         };
@@ -231,41 +198,30 @@ impl Bench<'_> {
 impl Comparison {
     /// The figures for people.
     pub fn table(&self) -> Table {
-        let mut table = Table::new(
-            format!(
-                "Against Embree (Open3D {}), million rays a second; `whole` is aiming, casting and \
-                 solving ranges in f64, the beams that culling spares counted",
-                self.versions["open3d"].as_str().unwrap_or("?")
-            ),
-            &[
-                "mesh",
-                "rays",
-                "caster",
-                "per CPU-s",
-                "per wall s",
-                "CPU ms",
-                "x Embree",
-                "hit mismatches",
-                "worst range error m",
-            ],
+        let same_rays = |a: &Entry, b: &Entry| a.mesh == b.mesh && a.rays_from == b.rays_from;
+        let groups = self.entries.chunk_by(same_rays);
+        // Embree is the last of each group.
+        let rows: Vec<(&Entry, &Entry)> =
+            groups.flat_map(|group| zip(group, repeat(&group[group.len() - 1]))).collect();
+        let cpu_s = |entry: &Entry| entry.costs.cpu_s().median;
+        let wall_s = |entry: &Entry| entry.costs.wall_s().median;
+        let mismatches = |of: &Accuracy| of.false_hits + of.misses;
+        let columns: [Column<'_, (&Entry, &Entry)>; 9] = [
+            ("mesh", &|(entry, _)| entry.mesh.clone()),
+            ("rays", &|(entry, _)| entry.rays_from.to_owned()),
+            ("caster", &|(entry, _)| short(&entry.caster)),
+            ("per CPU-s", &|(entry, _)| millions_per_s(entry.rays, cpu_s(entry))),
+            ("per wall s", &|(entry, _)| millions_per_s(entry.rays, wall_s(entry))),
+            ("CPU ms", &|(entry, _)| milliseconds(cpu_s(entry))),
+            ("x Embree", &|(entry, embree)| digits(cpu_s(embree) / cpu_s(entry))),
+            ("hit mismatches", &|(entry, _)| mismatches(&entry.accuracy).to_string()),
+            ("worst range error m", &|(entry, _)| digits(entry.accuracy.worst_m)),
+        ];
+        let title = format!(
+            "Against Embree (Open3D {}), million rays a second; `whole` is aiming, casting and \
+             solving ranges in f64, the beams that culling spares counted",
+            self.versions["open3d"].as_str().unwrap_or("?")
         );
-        for group in self.entries.chunk_by(|a, b| a.mesh == b.mesh && a.rays_from == b.rays_from) {
-            let Some(embree) = group.last() else { continue };
-            for entry in group {
-                let cpu_s = entry.costs.cpu_s().median;
-                table.push(vec![
-                    entry.mesh.clone(),
-                    entry.rays_from.to_owned(),
-                    short(&entry.caster),
-                    millions_per_s(entry.rays, cpu_s),
-                    millions_per_s(entry.rays, entry.costs.wall_s().median),
-                    milliseconds(cpu_s),
-                    digits(embree.costs.cpu_s().median / cpu_s),
-                    (entry.accuracy.false_hits + entry.accuracy.misses).to_string(),
-                    digits(entry.accuracy.worst_m),
-                ]);
-            }
-        }
-        table
+        Table::of(title, &rows, &columns)
     }
 }

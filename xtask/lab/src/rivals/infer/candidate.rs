@@ -3,28 +3,18 @@
 use crate::measure::clock::Cost;
 use anyhow::Result;
 use serde::Serialize;
-use std::fmt;
 
-/// Does the work that is timed.
+/// Does the work that is timed. Every method fails if the work cannot be done.
 pub trait Engine {
     /// Prepares `job`.
-    ///
-    /// # Errors
-    /// If it cannot be done.
     fn load(&mut self, job: Job) -> Result<()>;
 
-    /// Does the loaded job once and returns its answer: log-probabilities, or the
-    /// indices of the points kept.
-    ///
-    /// # Errors
-    /// If it cannot be done.
+    /// Does the loaded job once and returns its answer: log-probabilities, the indices of
+    /// the points kept, or losses.
     fn answer(&mut self) -> Result<Vec<f64>>;
 
     /// Does the loaded job a few times uncounted and then `repeats` times; the cost of
     /// each of the latter.
-    ///
-    /// # Errors
-    /// If it cannot be done.
     fn time(&mut self, repeats: usize) -> Result<Vec<Cost>>;
 }
 
@@ -33,7 +23,7 @@ pub trait Engine {
 pub struct Job {
     /// Points of the cloud.
     pub points: usize,
-    /// Threads of a classifier, points that a sampler keeps.
+    /// Threads of a classifier, points that a sampler keeps, clouds of a batch.
     pub setting: usize,
 }
 
@@ -49,26 +39,32 @@ pub enum Arithmetic {
     I8,
 }
 
-impl fmt::Display for Arithmetic {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::F32 => "f32",
-            Self::Half => "half",
-            Self::I8 => "i8",
-        })
-    }
-}
-
-/// An engine and its description in tables.
-pub struct Candidate {
+/// What tables and records say of an engine.
+#[derive(Clone, Debug, Serialize)]
+pub struct Label {
     /// Its name, which `--engines` takes.
+    #[serde(rename = "engine")]
     pub name: String,
     /// What it computes with.
     pub arithmetic: Arithmetic,
     /// Whether it is ours.
     pub ours: bool,
+}
+
+/// An engine that takes part in a comparison.
+pub struct Candidate {
+    /// What tables say of it.
+    pub label: Label,
     /// Version of its package.
     pub version: String,
     /// The engine itself.
     pub engine: Box<dyn Engine>,
+}
+
+impl Candidate {
+    /// One of our own engines.
+    pub fn ours(name: String, arithmetic: Arithmetic, engine: impl Engine + 'static) -> Self {
+        let label = Label { name, arithmetic, ours: true };
+        Self { label, version: env!("CARGO_PKG_VERSION").to_owned(), engine: Box::new(engine) }
+    }
 }

@@ -1,10 +1,9 @@
 //! Classifying: by points, at each number of threads.
 
 use super::candidate::{Arithmetic, Candidate, Job};
-use super::cloud::Cloud;
 use super::comparison::{Entry, compare};
 use super::reference::worst;
-use super::speed_tables::SpeedTables;
+use super::speed_tables::show;
 use crate::measure::clock::Spread;
 use crate::measure::reference_network::Network;
 use anyhow::Result;
@@ -20,37 +19,29 @@ const REDUCED_TOLERANCE: f64 = 0.25;
 
 /// Lets `candidates` classify parts of `cloud` of all sizes in `points` with each
 /// number of `threads`, and shows how they did.
-///
-/// # Errors
-/// If the reference network cannot be run.
 pub fn compare_all(
     candidates: &mut [Candidate],
     points: &[usize],
     threads: &[usize],
     rounds: usize,
-    (reference, cloud): (&Network, &Cloud),
+    (reference, cloud): (&Network, &[[f32; 3]]),
 ) -> Result<Vec<Entry>> {
     let mut entries = Vec::new();
     for &threads in threads {
         let jobs: Vec<Job> = points.iter().map(|&n| Job { points: n, setting: threads }).collect();
         for &job in &jobs {
             eprintln!("{} points, {}", job.points, in_words(threads));
-            let truth = reference.log_probabilities(cloud.first(job.points))?;
+            let truth = reference.log_probabilities(&cloud[..job.points])?;
             let range = Spread::of(truth.iter().copied());
             let tolerance = |arithmetic| match arithmetic {
                 Arithmetic::F32 => F32_TOLERANCE,
                 Arithmetic::Half | Arithmetic::I8 => REDUCED_TOLERANCE * (range.max - range.min),
             };
-            entries.extend(compare(
-                candidates,
-                job,
-                rounds,
-                |given| worst(given, &truth),
-                tolerance,
-            ));
+            let error_of = |given: &[f64]| worst(given, &truth, false);
+            entries.extend(compare(candidates, job, rounds, error_of, tolerance));
         }
         let title = format!("PointNet by points, {}", in_words(threads));
-        SpeedTables::new(title, &entries, jobs, |job| job.points.to_string()).show();
+        show(&title, &entries, &jobs, |job| job.points.to_string());
     }
     Ok(entries)
 }

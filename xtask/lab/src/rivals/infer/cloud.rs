@@ -13,40 +13,22 @@ const SEED: u64 = 3;
 /// a normalised cloud.
 const RADII_M: [f64; 2] = [0.7, 0.3];
 
-/// Points in a fixed order; a cloud of n is the first n of them.
-pub struct Cloud(Vec<[f32; 3]>);
+/// `n` points in a fixed order; a cloud of fewer is the first of them.
+pub fn cloud(n: usize) -> Vec<[f32; 3]> {
+    let stream = StreamKey::new(SEED, "bench infer", 0);
+    let point = |i: u64| {
+        let angle = |k| TAU * stream.unit(2 * i + k);
+        let (around, along) = (angle(0), angle(1));
+        let radius_m = RADII_M[0] + RADII_M[1] * along.cos();
+        let x = [radius_m * around.cos(), radius_m * around.sin(), RADII_M[1] * along.sin()];
+        x.map(|x| x as f32)
+    };
+    (0..n as u64).map(point).collect()
+}
 
-impl Cloud {
-    /// `n` points.
-    pub fn new(n: usize) -> Self {
-        let stream = StreamKey::new(SEED, "bench infer", 0);
-        let point = |i: u64| {
-            let angle = |k| TAU * stream.unit(2 * i + k);
-            let (around, along) = (angle(0), angle(1));
-            let radius_m = RADII_M[0] + RADII_M[1] * along.cos();
-            let x = [radius_m * around.cos(), radius_m * around.sin(), RADII_M[1] * along.sin()];
-            x.map(|x| x as f32)
-        };
-        Self((0..n as u64).map(point).collect())
-    }
-
-    /// The first `n` points.
-    pub fn first(&self, n: usize) -> &[[f32; 3]] {
-        &self.0[..n]
-    }
-
-    /// All points.
-    pub fn points(&self) -> Vec<[f32; 3]> {
-        self.0.clone()
-    }
-
-    /// Writes the cloud for other programs, as tensor `points`.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub fn write(&self, file: &Path) -> Result<()> {
-        let points = Tensor { shape: vec![self.0.len(), 3], values: self.0.concat() };
-        let tensors = BTreeMap::from([("points".to_owned(), points)]);
-        Ok(write_weights(file, &tensors, &BTreeMap::new())?)
-    }
+/// Writes `cloud` for other programs, as tensor `points`.
+pub fn write(cloud: &[[f32; 3]], file: &Path) -> Result<()> {
+    let points = Tensor { shape: vec![cloud.len(), 3], values: cloud.concat() };
+    let tensors = BTreeMap::from([("points".to_owned(), points)]);
+    Ok(write_weights(file, &tensors, &BTreeMap::new())?)
 }

@@ -1,6 +1,6 @@
 //! One job, done by all candidates in turns.
 
-use super::candidate::{Arithmetic, Candidate, Job};
+use super::candidate::{Arithmetic, Candidate, Job, Label};
 use crate::measure::clock::{Cost, Costs, Spread};
 use anyhow::{Result, ensure};
 use serde::ser::SerializeMap as _;
@@ -21,12 +21,9 @@ const PAUSE: Duration = Duration::from_millis(30);
 /// What a candidate did on one job.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
-    /// The candidate's name.
-    pub engine: String,
-    /// What it computes with.
-    pub arithmetic: Arithmetic,
-    /// Whether it is ours.
-    pub ours: bool,
+    /// Who it is.
+    #[serde(flatten)]
+    pub engine: Label,
     /// The job.
     #[serde(flatten)]
     pub job: Job,
@@ -58,38 +55,28 @@ pub fn compare(
     tolerance: impl Fn(Arithmetic) -> f64,
 ) -> Vec<Entry> {
     let mut participants = Vec::new();
-    for candidate in candidates {
+    for (place, candidate) in candidates.iter_mut().enumerate() {
         match enter(candidate, job, &error_of, &tolerance) {
-            Ok((repeats, entry)) => {
-                participants.push(Participant { candidate, repeats, is_out: false, entry })
-            }
-            Err(cause) => refuse(&candidate.name, job, &cause),
+            Ok((repeats, entry)) => participants.push((place, candidate, repeats, entry)),
+            Err(cause) => refuse(&candidate.label.name, job, &cause),
         }
     }
-    for round in 0..rounds {
-        let count = participants.len();
-        for k in 0..count {
-            let participant = &mut participants[(round + k) % count];
-            if let Err(cause) = participant.turn() {
-                refuse(&participant.candidate.name, job, &cause);
-                participant.is_out = true;
-            }
+    for _ in 0..rounds {
+        participants.retain_mut(|(_, candidate, repeats, entry)| {
+            sleep(PAUSE);
+            let turn = candidate.engine.time(*repeats).map(|costs| entry.costs.0.extend(costs));
+            turn.inspect_err(|cause| refuse(&entry.engine.name, job, cause)).is_ok()
+        });
+        if !participants.is_empty() {
+            participants.rotate_left(1);
         }
-        participants.retain(|participant| !participant.is_out);
     }
-    participants.into_iter().map(|participant| participant.entry).collect()
+    participants.sort_by_key(|participant| participant.0);
+    participants.into_iter().map(|(.., entry)| entry).collect()
 }
 
 fn refuse(name: &str, job: Job, cause: &anyhow::Error) {
     println!("left out {name} at {} points, {}: {cause:#}", job.points, job.setting);
-}
-
-/// A candidate that takes part.
-struct Participant<'a> {
-    candidate: &'a mut Candidate,
-    repeats: usize,
-    is_out: bool,
-    entry: Entry,
 }
 
 /// Lets `candidate` try `job`: repeats that fill a turn, and an entry without
@@ -100,29 +87,15 @@ fn enter(
     error_of: impl Fn(&[f64]) -> Result<f64>,
     tolerance: impl Fn(Arithmetic) -> f64,
 ) -> Result<(usize, Entry)> {
-    candidate.engine.load(job)?;
-    let error = error_of(&candidate.engine.answer()?)?;
-    let allowed = tolerance(candidate.arithmetic);
+    let Candidate { label, engine, .. } = candidate;
+    engine.load(job)?;
+    let error = error_of(&engine.answer()?)?;
+    let allowed = tolerance(label.arithmetic);
     ensure!(error <= allowed, "its answer is off by {error:.1e}, more than {allowed:.1e}");
-    let trial = candidate.engine.time(REPEATS[0])?;
+    let trial = engine.time(REPEATS[0])?;
     let least_s = Spread::of(trial.iter().map(|cost| cost.wall_s)).min;
-    let entry = Entry {
-        engine: candidate.name.clone(),
-        arithmetic: candidate.arithmetic,
-        ours: candidate.ours,
-        job,
-        error,
-        costs: Costs::default(),
-    };
+    let entry = Entry { engine: label.clone(), job, error, costs: Costs::default() };
     Ok((repeats(least_s), entry))
-}
-
-impl Participant<'_> {
-    fn turn(&mut self) -> Result<()> {
-        sleep(PAUSE);
-        self.entry.costs.0.extend(self.candidate.engine.time(self.repeats)?);
-        Ok(())
-    }
 }
 
 /// Repeats that fill a turn, of work that takes `each_s`.
@@ -168,12 +141,9 @@ mod tests {
 
     fn play(rounds: usize, cast: &[(char, f64, usize)]) -> (String, Vec<Entry>) {
         let notes = Rc::new(RefCell::new(String::new()));
-        let candidate = |&(name, answer, turns): &(char, f64, usize)| Candidate {
-            name: name.to_string(),
-            arithmetic: Arithmetic::F32,
-            ours: false,
-            version: String::new(),
-            engine: Box::new(Scripted { name, answer, turns, notes: Rc::clone(&notes) }),
+        let candidate = |&(name, answer, turns): &(char, f64, usize)| {
+            let engine = Scripted { name, answer, turns, notes: Rc::clone(&notes) };
+            Candidate::ours(name.to_string(), Arithmetic::F32, engine)
         };
         let mut candidates: Vec<Candidate> = cast.iter().map(candidate).collect();
         let job = Job { points: 16, setting: 1 };
@@ -187,7 +157,7 @@ mod tests {
         // The trials, then three rounds.
         assert_eq!(notes, "abcabcbcacab");
         assert_eq!(entries[0].costs.0.len(), 9);
-        assert_eq!(entries.iter().map(|e| &e.engine[..]).collect::<String>(), "abc");
+        assert_eq!(entries.iter().map(|e| &e.engine.name[..]).collect::<String>(), "abc");
     }
 
     #[test]
@@ -201,7 +171,7 @@ mod tests {
     fn a_failing_candidate_is_left_out_and_the_others_go_on() {
         let (notes, entries) = play(2, &[('a', 1.0, 99), ('b', 1.0, 2)]);
         assert_eq!(notes, "ababa");
-        assert_eq!(entries.iter().map(|e| &e.engine[..]).collect::<String>(), "a");
+        assert_eq!(entries.iter().map(|e| &e.engine.name[..]).collect::<String>(), "a");
     }
 
     #[test]

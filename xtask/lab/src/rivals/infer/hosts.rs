@@ -1,6 +1,6 @@
 //! The programs that run rivals, and the files that they need.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use xtask::venv::{Environment, cache_dir, programs, succeeds};
 
@@ -16,9 +16,6 @@ const TORCH: Environment<'_> = Environment {
     size: "about 3 GB",
 };
 
-/// Keeps Python from writing compiled files beside its programs.
-const NO_CACHE: &str = "-B";
-
 /// What runs a rival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Host {
@@ -26,6 +23,8 @@ pub enum Host {
     Python,
     /// The same, in the environment that holds PyTorch.
     Torch,
+    /// `peers/train/train.py`, in that environment.
+    Training,
     /// `peers/infer/fps.py`.
     Sampling,
     /// The package `peers/engines`.
@@ -40,11 +39,8 @@ pub struct Material {
     pub folder: PathBuf,
 }
 
-/// An installed program, and its arguments after the engine's name.
-pub struct Program {
-    words: Vec<PathBuf>,
-    arguments: Vec<PathBuf>,
-}
+/// The words before an engine's name on a command line, and the words after it.
+pub type Program = [Vec<PathBuf>; 2];
 
 impl Material {
     /// The file of the cloud.
@@ -52,13 +48,9 @@ impl Material {
         self.folder.join("cloud.safetensors")
     }
 
-    /// Writes the model in every form.
-    ///
-    /// # Errors
-    /// The cause, for the user.
+    /// Writes the model in every form. An error is the cause, for the user.
     pub fn prepare(&self) -> Result<(), String> {
-        let mut command = Command::new(GENERAL.interpreter()?);
-        command.arg(NO_CACHE).arg(programs().join("infer/prepare.py"));
+        let mut command = command(&python(&GENERAL, "infer/prepare.py")?);
         succeeds(command.arg(&self.model).arg(self.cloud()).arg(&self.folder))
     }
 }
@@ -69,45 +61,35 @@ impl Host {
         matches!(self, Self::Python | Self::Rust)
     }
 
-    /// Its program, installed or built if need be.
-    ///
-    /// # Errors
-    /// The cause, for the user.
+    /// Whether it runs PyTorch.
+    pub fn is_torch(self) -> bool {
+        matches!(self, Self::Torch | Self::Training)
+    }
+
+    /// Its program, installed or built if need be. An error is the cause, for the user.
     pub fn program(self, material: &Material) -> Result<Program, String> {
-        let python = |environment: Environment, script: &str, arguments: &[&PathBuf]| {
-            let words = vec![environment.interpreter()?, NO_CACHE.into(), programs().join(script)];
-            let arguments = arguments.iter().map(|&path| path.clone()).collect();
-            Ok(Program { words, arguments })
-        };
         let Material { model, folder } = material;
-        match self {
-            Self::Python => python(GENERAL, "infer/infer.py", &[model, folder]),
-            Self::Torch => python(TORCH, "infer/infer.py", &[model, folder]),
-            Self::Sampling => python(GENERAL, "infer/fps.py", &[folder]),
-            Self::Rust => Ok(Program { words: vec![build()?], arguments: vec![folder.clone()] }),
-        }
+        let (model, folder) = (model.clone(), folder.clone());
+        Ok(match self {
+            Self::Python => [python(&GENERAL, "infer/infer.py")?, vec![model, folder]],
+            Self::Torch => [python(&TORCH, "infer/infer.py")?, vec![model, folder]],
+            Self::Training => [python(&TORCH, "train/train.py")?, vec![model, folder]],
+            Self::Sampling => [python(&GENERAL, "infer/fps.py")?, vec![folder]],
+            Self::Rust => [vec![build()?], vec![folder]],
+        })
     }
 }
 
-/// The command that trains in PyTorch, beginning with `model`, on the clouds in
-/// `folder`.
-///
-/// # Errors
-/// The cause, for the user.
-pub fn trainer(model: &Path, folder: &Path) -> Result<Command, String> {
-    let mut command = Command::new(TORCH.interpreter()?);
-    command.arg(NO_CACHE).arg(programs().join("train/train.py")).arg("torch");
-    command.arg(model).arg(folder);
-    Ok(command)
+/// The interpreter, which writes no compiled files beside its programs, and the script.
+fn python(environment: &Environment<'_>, script: &str) -> Result<Vec<PathBuf>, String> {
+    Ok(vec![environment.interpreter()?, "-B".into(), programs().join(script)])
 }
 
-impl Program {
-    /// The command that runs `engine`.
-    pub fn of(&self, engine: &str) -> Command {
-        let mut command = Command::new(&self.words[0]);
-        command.args(&self.words[1..]).arg(engine).args(&self.arguments);
-        command
-    }
+/// The command of these words.
+pub fn command(words: &[PathBuf]) -> Command {
+    let mut command = Command::new(&words[0]);
+    command.args(&words[1..]);
+    command
 }
 
 /// Builds the Rust engines; cargo knows whether there is anything to do.

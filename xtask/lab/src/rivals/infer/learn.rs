@@ -1,18 +1,20 @@
 //! `cargo xtask bench train`: times one step of training the baseline with our program
 //! and with PyTorch, in turns.
 
-use super::candidate::{Arithmetic, Candidate, Job};
-use super::cloud::Cloud;
+use super::candidate::{Arithmetic, Candidate, Job, Label};
+use super::cloud;
 use super::comparison::{Entry, compare};
-use super::hosts;
+use super::hosts::Material;
 use super::model;
-use super::server::Server;
-use super::speed_tables::SpeedTables;
+use super::reference::worst;
+use super::roster::{TRAINERS, served, start};
+use super::speed_tables::show;
 use crate::measure::machine::Machine;
-use anyhow::{Context, Result, ensure};
+use anyhow::Result;
 use clap::Args;
+use formats::atomic;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use xtask::venv::cache_dir;
 use xtask::workspace;
 
@@ -49,25 +51,15 @@ struct Report {
 }
 
 /// Runs the benchmark that `args` ask for.
-///
-/// # Errors
-/// If our own program cannot be built or started, or a file not written.
 pub fn run(args: &TrainArgs) -> Result<()> {
     let folder = cache_dir().join("train");
-    std::fs::create_dir_all(&folder)?;
-    let model = folder.join("random.safetensors");
-    model::write_random(&model)?;
+    let material = Material { model: folder.join("random.safetensors"), folder };
+    model::write_random(&material.model)?;
     let most = args.points.iter().max().copied().unwrap_or(0) * args.batch;
-    Cloud::new(most).write(&folder.join("cloud.safetensors"))?;
+    cloud::write(&cloud::cloud(most), &material.cloud())?;
 
-    let mut candidates = vec![ours(&model, &folder)?];
-    if !args.no_torch {
-        match hosts::trainer(&model, &folder).map(|mut command| Server::start(&mut command)) {
-            Ok(Ok(server)) => candidates.push(candidate("torch", false, server)),
-            Ok(Err(cause)) => println!("skipped torch: {cause:#}"),
-            Err(cause) => println!("skipped torch: {cause}"),
-        }
-    }
+    let mut candidates = vec![ours(&material)?];
+    candidates.extend(start(&TRAINERS, |_| true, !args.no_torch, &material));
     let jobs: Vec<Job> =
         args.points.iter().map(|&points| Job { points, setting: args.batch }).collect();
     let mut steps = Vec::new();
@@ -76,35 +68,22 @@ pub fn run(args: &TrainArgs) -> Result<()> {
         let engine = &mut candidates[0].engine;
         engine.load(job)?;
         let truth = engine.answer()?;
-        let error_of = |given: &[f64]| {
-            ensure!(given.len() == truth.len(), "{} losses", given.len());
-            let apart = |(a, b): (&f64, &f64)| ((a - b) / b).abs();
-            Ok(given.iter().zip(&truth).map(apart).fold(0.0, f64::max))
-        };
+        let error_of = |given: &[f64]| worst(given, &truth, true);
         steps.extend(compare(&mut candidates, job, args.rounds, error_of, |_| TOLERANCE));
     }
     let title = format!("A step of training, batch {}", args.batch);
-    SpeedTables::new(title, &steps, jobs, |job| job.points.to_string()).show();
+    show(&title, &steps, &jobs, |job| job.points.to_string());
     if let Some(file) = &args.json {
-        let text = serde_json::to_string(&Report { machine: Machine::here(), steps })?;
-        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
+        let report = Report { machine: Machine::here(), steps };
+        atomic::write_bytes(file, serde_json::to_string(&report)? + "\n")?;
     }
     Ok(())
 }
 
 /// Our own program, built if need be.
-fn ours(model: &Path, folder: &Path) -> Result<Candidate> {
+fn ours(material: &Material) -> Result<Candidate> {
     let mut command = workspace::cargo(&["run", "--quiet", "--release", "--package", "train"]);
-    command.args(["--", "serve"]).arg(model).arg(folder);
-    Ok(candidate("ours", true, Server::start(&mut command)?))
-}
-
-fn candidate(name: &str, ours: bool, server: Server) -> Candidate {
-    Candidate {
-        name: name.to_owned(),
-        arithmetic: Arithmetic::F32,
-        ours,
-        version: server.version.clone(),
-        engine: Box::new(server),
-    }
+    command.args(["--", "serve"]).args([&material.model, &material.folder]);
+    let label = Label { name: "ours".to_owned(), arithmetic: Arithmetic::F32, ours: true };
+    served(label, &mut command)
 }

@@ -17,11 +17,12 @@ mod speed_tables;
 
 use crate::measure::machine::Machine;
 use crate::measure::reference_network::Network;
-use anyhow::{Context, Result};
+use anyhow::Result;
+use candidate::Candidate;
 use clap::Args;
-use cloud::Cloud;
 use comparison::Entry;
 use edgepuck_program::Usage;
+use formats::atomic;
 use hosts::Material;
 use roster::{CLASSIFIERS, SAMPLERS};
 use serde::Serialize;
@@ -38,22 +39,12 @@ pub struct InferArgs {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Sizes of the clouds to classify, in points.
-    #[arg(
-        long,
-        value_name = "N,...",
-        value_delimiter = ',',
-        default_value = "16,32,64,128,256,512,1024,2048,4096",
-        value_parser = positive
-    )]
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive,
+          default_value = "16,32,64,128,256,512,1024,2048,4096")]
     points: Vec<usize>,
     /// Numbers of threads to classify with.
-    #[arg(
-        long,
-        value_name = "N,...",
-        value_delimiter = ',',
-        default_value = "1,2",
-        value_parser = positive
-    )]
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive,
+          default_value = "1,2")]
     threads: Vec<usize>,
     /// Turns of each engine at each job, of several repeats each; the median of all
     /// repeats is shown.
@@ -83,26 +74,27 @@ struct Report {
 }
 
 /// Runs the benchmark that `args` ask for.
-///
-/// # Errors
-/// If an engine is unknown, the model cannot be read or a file not written.
 pub fn run(args: &InferArgs) -> Result<()> {
     check(&args.engines)?;
     let is_wanted = |name: &str| {
         let by = |wanted: &String| is_named(name, wanted);
         args.engines.is_empty() || args.engines.iter().any(by)
     };
-    let material = Material { model: args.model()?, folder: cache_dir().join("infer") };
+    let folder = cache_dir().join("infer");
+    let random = folder.join("random.safetensors");
+    if args.model.is_none() {
+        model::write_random(&random)?;
+    }
+    let material = Material { model: args.model.clone().unwrap_or(random), folder };
     let reference = Network::read(&material.model)?;
-    let cloud = Cloud::new(args.points.iter().copied().fold(sample::MOST_POINTS, usize::max));
-    cloud.write(&material.cloud())?;
+    let cloud = cloud::cloud(args.points.iter().copied().fold(sample::MOST_POINTS, usize::max));
+    cloud::write(&cloud, &material.cloud())?;
 
     let mut classifiers = ours::classifiers(&material.model, &cloud, is_wanted);
     classifiers.extend(roster::start(&CLASSIFIERS, is_wanted, args.torch, &material));
     let mut samplers: Vec<_> = ours::sampler(&cloud, is_wanted).into_iter().collect();
     samplers.extend(roster::start(&SAMPLERS, is_wanted, args.torch, &material));
-    let version =
-        |candidate: &candidate::Candidate| (candidate.name.clone(), candidate.version.clone());
+    let version = |candidate: &Candidate| (candidate.label.name.clone(), candidate.version.clone());
     let mut report = Report {
         machine: Machine::here(),
         versions: classifiers.iter().chain(&samplers).map(version).collect(),
@@ -112,7 +104,7 @@ pub fn run(args: &InferArgs) -> Result<()> {
     };
     if !classifiers.is_empty() {
         let (points, threads) = (&args.points, &args.threads);
-        let reference = (&reference, &cloud);
+        let reference = (&reference, &cloud[..]);
         report.classifying =
             classify::compare_all(&mut classifiers, points, threads, args.rounds, reference)?;
     }
@@ -120,22 +112,9 @@ pub fn run(args: &InferArgs) -> Result<()> {
         report.sampling = sample::compare_all(&mut samplers, args.rounds, &cloud);
     }
     if let Some(file) = &args.json {
-        let text = serde_json::to_string(&report)?;
-        std::fs::write(file, text + "\n").with_context(|| format!("writing {}", file.display()))?;
+        atomic::write_bytes(file, serde_json::to_string(&report)? + "\n")?;
     }
     Ok(())
-}
-
-impl InferArgs {
-    /// The model given, or the random one, written.
-    fn model(&self) -> Result<PathBuf> {
-        if let Some(model) = &self.model {
-            return Ok(model.clone());
-        }
-        let model = cache_dir().join("infer/random.safetensors");
-        model::write_random(&model)?;
-        Ok(model)
-    }
 }
 
 /// Whether `word` names `engine`.
@@ -144,7 +123,7 @@ fn is_named(engine: &str, word: &str) -> bool {
 }
 
 fn check(words: &[String]) -> Result<(), Usage> {
-    let rivals = CLASSIFIERS.iter().chain(&SAMPLERS).map(|rival| rival.name.to_owned());
+    let rivals = CLASSIFIERS.iter().chain(&SAMPLERS).map(|rival| rival.0.to_owned());
     let known: Vec<String> = ours::names().into_iter().chain(rivals).collect();
     let is_unknown = |word: &&String| !known.iter().any(|engine| is_named(engine, word));
     match words.iter().find(is_unknown) {

@@ -1,7 +1,6 @@
-//! Our own engine, in this process.
+//! Our own engines, in this process.
 
 use super::candidate::{Arithmetic, Candidate, Engine, Job};
-use super::cloud::Cloud;
 use crate::measure::clock::{Cost, measured};
 use anyhow::{Context, Result};
 use infer_cpu::kernel::{self, Kernels};
@@ -13,13 +12,13 @@ use std::path::{Path, PathBuf};
 /// Runs before those that count, as the rivals' programs have.
 const UNCOUNTED: usize = 3;
 
-/// Its name with the precision's behind it.
+/// Our sampler's name.
+const SAMPLER: &str = "ours";
+
+/// The name of our classifier in `precision`.
 fn name(precision: Precision) -> String {
     format!("ours-{precision}")
 }
-
-/// Our sampler's name.
-const SAMPLER: &str = "ours";
 
 /// What `--engines` can call us.
 pub fn names() -> Vec<String> {
@@ -27,22 +26,48 @@ pub fn names() -> Vec<String> {
 }
 
 /// Our farthest point sampling, if it `is_wanted`.
-pub fn sampler(cloud: &Cloud, is_wanted: impl Fn(&str) -> bool) -> Option<Candidate> {
+pub fn sampler(cloud: &[[f32; 3]], is_wanted: impl Fn(&str) -> bool) -> Option<Candidate> {
     let kernels = kernel::available().next().filter(|_| is_wanted(SAMPLER))?;
     let engine = Sampling {
         kernels,
         sampler: FarthestPoints::default(),
-        cloud: cloud.points(),
+        cloud: cloud.to_vec(),
         job: Job { points: 0, setting: 0 },
         picked: Vec::new(),
     };
-    Some(Candidate {
-        name: SAMPLER.to_owned(),
-        arithmetic: Arithmetic::F32,
-        ours: true,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        engine: Box::new(engine),
-    })
+    Some(Candidate::ours(SAMPLER.to_owned(), Arithmetic::F32, engine))
+}
+
+/// Our classifier in each precision that `is_wanted` by its name.
+pub fn classifiers(
+    model: &Path,
+    cloud: &[[f32; 3]],
+    is_wanted: impl Fn(&str) -> bool,
+) -> Vec<Candidate> {
+    let wanted = Precision::ALL.into_iter().filter(|&precision| is_wanted(&name(precision)));
+    let candidate = |precision| {
+        let arithmetic = match precision {
+            Precision::F32 => Arithmetic::F32,
+            Precision::F32Fc16 | Precision::F16 => Arithmetic::Half,
+            Precision::I8 => Arithmetic::I8,
+        };
+        let (model, cloud) = (model.to_path_buf(), cloud.to_vec());
+        let engine = Classifying { model, precision, cloud, loaded: None };
+        Candidate::ours(name(precision), arithmetic, engine)
+    };
+    wanted.map(candidate).collect()
+}
+
+/// The cost of each of `repeats` runs of `once`.
+fn timed(repeats: usize, mut once: impl FnMut() -> Result<()>) -> Result<Vec<Cost>> {
+    for _ in 0..UNCOUNTED {
+        once()?;
+    }
+    let costs = std::iter::repeat_with(|| {
+        let (done, cost) = measured(&mut once);
+        done.map(|()| cost)
+    });
+    costs.take(repeats).collect()
 }
 
 struct Sampling {
@@ -58,6 +83,7 @@ impl Sampling {
         let points = &self.cloud[..self.job.points];
         let (n, start) = (self.job.setting, FpsStart::First);
         self.sampler.select(points, n, start, self.kernels, &mut self.picked);
+        black_box(&self.picked);
     }
 }
 
@@ -73,43 +99,14 @@ impl Engine for Sampling {
     }
 
     fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
-        (0..UNCOUNTED).for_each(|_| self.sample());
-        let once = |_| {
-            let ((), cost) = measured(|| self.sample());
-            black_box(&self.picked);
-            cost
-        };
-        Ok((0..repeats).map(once).collect())
+        timed(repeats, || {
+            self.sample();
+            Ok(())
+        })
     }
 }
 
-/// Our classifier in each precision that `is_wanted` by its name.
-pub fn classifiers(
-    model: &Path,
-    cloud: &Cloud,
-    is_wanted: impl Fn(&str) -> bool,
-) -> Vec<Candidate> {
-    let wanted = Precision::ALL.into_iter().filter(|&precision| is_wanted(&name(precision)));
-    let candidate = |precision: Precision| Candidate {
-        name: name(precision),
-        arithmetic: match precision {
-            Precision::F32 => Arithmetic::F32,
-            Precision::F32Fc16 | Precision::F16 => Arithmetic::Half,
-            Precision::I8 => Arithmetic::I8,
-        },
-        ours: true,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        engine: Box::new(Ours {
-            model: model.to_path_buf(),
-            precision,
-            cloud: cloud.points(),
-            loaded: None,
-        }),
-    };
-    wanted.map(candidate).collect()
-}
-
-struct Ours {
+struct Classifying {
     model: PathBuf,
     precision: Precision,
     cloud: Vec<[f32; 3]>,
@@ -117,14 +114,14 @@ struct Ours {
     loaded: Option<(Classifier, usize)>,
 }
 
-impl Ours {
+impl Classifying {
     fn loaded(&mut self) -> Result<(&mut Classifier, &[[f32; 3]])> {
         let (classifier, points) = self.loaded.as_mut().context("nothing is loaded")?;
         Ok((classifier, &self.cloud[..*points]))
     }
 }
 
-impl Engine for Ours {
+impl Engine for Classifying {
     fn load(&mut self, job: Job) -> Result<()> {
         let options = Options {
             precision: self.precision,
@@ -147,14 +144,9 @@ impl Engine for Ours {
 
     fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
         let (classifier, points) = self.loaded()?;
-        let mut once = || -> Result<Cost> {
-            let (prediction, cost) = measured(|| classifier.classify(points).map(|_| ()));
-            black_box(prediction?);
-            Ok(cost)
-        };
-        for _ in 0..UNCOUNTED {
-            once()?;
-        }
-        (0..repeats).map(|_| once()).collect()
+        timed(repeats, || {
+            black_box(classifier.classify(points)?);
+            Ok(())
+        })
     }
 }

@@ -1,49 +1,42 @@
 //! The engines of other projects.
 
-use super::candidate::{Arithmetic, Candidate};
-use super::hosts::{Host, Material, Program};
+use super::candidate::{Arithmetic, Candidate, Label};
+use super::hosts::{Host, Material, command};
 use super::server::Server;
 use Arithmetic::{F32, Half, I8};
 use std::cell::LazyCell;
+use std::process::Command;
 
-/// Another engine, or another arithmetic of one.
-#[derive(Clone, Copy, Debug)]
-pub struct Rival {
-    /// Its name in tables, for `--engines` and for its program.
-    pub name: &'static str,
-    /// What it computes with.
-    pub arithmetic: Arithmetic,
-    /// What runs it.
-    pub host: Host,
-}
-
-const fn rival(name: &'static str, arithmetic: Arithmetic, host: Host) -> Rival {
-    Rival { name, arithmetic, host }
-}
+/// Another engine, or another arithmetic of one: its name in tables, for `--engines` and
+/// for its program, what it computes with, and what runs it.
+pub type Rival = (&'static str, Arithmetic, Host);
 
 /// Engines that classify.
 pub const CLASSIFIERS: [Rival; 13] = [
-    rival("onnxruntime", F32, Host::Python),
-    rival("openvino", F32, Host::Python),
-    rival("ncnn", F32, Host::Python),
-    rival("tract", F32, Host::Rust),
-    rival("rten", F32, Host::Rust),
-    rival("torch", F32, Host::Torch),
-    rival("torchscript", F32, Host::Torch),
-    rival("openvino-bf16", Half, Host::Python),
-    rival("ncnn-f16", Half, Host::Python),
-    rival("ncnn-bf16", Half, Host::Python),
-    rival("onnxruntime-i8", I8, Host::Python),
-    rival("openvino-i8", I8, Host::Python),
-    rival("ncnn-i8", I8, Host::Python),
+    ("onnxruntime", F32, Host::Python),
+    ("openvino", F32, Host::Python),
+    ("ncnn", F32, Host::Python),
+    ("tract", F32, Host::Rust),
+    ("rten", F32, Host::Rust),
+    ("torch", F32, Host::Torch),
+    ("torchscript", F32, Host::Torch),
+    ("openvino-bf16", Half, Host::Python),
+    ("ncnn-f16", Half, Host::Python),
+    ("ncnn-bf16", Half, Host::Python),
+    ("onnxruntime-i8", I8, Host::Python),
+    ("openvino-i8", I8, Host::Python),
+    ("ncnn-i8", I8, Host::Python),
 ];
 
 /// Engines that sample farthest points.
 pub const SAMPLERS: [Rival; 3] = [
-    rival("numpy", F32, Host::Sampling),
-    rival("fpsample", F32, Host::Sampling),
-    rival("fpsample-tree", F32, Host::Sampling),
+    ("numpy", F32, Host::Sampling),
+    ("fpsample", F32, Host::Sampling),
+    ("fpsample-tree", F32, Host::Sampling),
 ];
+
+/// Engines that train.
+pub const TRAINERS: [Rival; 1] = [("torch", F32, Host::Training)];
 
 /// Starts those of `rivals` whose names are wanted, those in PyTorch only if `torch`. A
 /// message names those that cannot be started, and the cause.
@@ -53,36 +46,34 @@ pub fn start(
     torch: bool,
     material: &Material,
 ) -> Vec<Candidate> {
-    let may = |rival: &&Rival| is_wanted(rival.name) && (torch || rival.host != Host::Torch);
+    let may = |(name, _, host): &&Rival| is_wanted(name) && (torch || !host.is_torch());
     let rivals: Vec<&Rival> = rivals.iter().filter(may).collect();
     let prepared = LazyCell::new(|| material.prepare());
     let mut candidates = Vec::new();
-    for group in rivals.chunk_by(|a, b| a.host == b.host) {
-        let host = group[0].host;
+    for group in rivals.chunk_by(|a, b| a.2 == b.2) {
+        let host = group[0].2;
         let ready = if host.needs_preparing() { prepared.clone() } else { Ok(()) };
-        match ready.and_then(|()| host.program(material)) {
-            Ok(program) => candidates.extend(group.iter().filter_map(|r| candidate(r, &program))),
+        let [words, arguments] = match ready.and_then(|()| host.program(material)) {
+            Ok(program) => program,
             Err(cause) => {
-                let names: Vec<&str> = group.iter().map(|rival| rival.name).collect();
+                let names: Vec<&str> = group.iter().map(|rival| rival.0).collect();
                 println!("skipped {}: {cause}", names.join(", "));
+                continue;
+            }
+        };
+        for &&(name, arithmetic, _) in group {
+            let label = Label { name: name.to_owned(), arithmetic, ours: false };
+            match served(label, command(&words).arg(name).args(&arguments)) {
+                Ok(candidate) => candidates.push(candidate),
+                Err(cause) => println!("skipped {name}: {cause:#}"),
             }
         }
     }
     candidates
 }
 
-fn candidate(rival: &Rival, program: &Program) -> Option<Candidate> {
-    match Server::start(&mut program.of(rival.name)) {
-        Ok(server) => Some(Candidate {
-            name: rival.name.to_owned(),
-            arithmetic: rival.arithmetic,
-            ours: false,
-            version: server.version.clone(),
-            engine: Box::new(server),
-        }),
-        Err(cause) => {
-            println!("skipped {}: {cause:#}", rival.name);
-            None
-        }
-    }
+/// A candidate that `command` serves.
+pub fn served(label: Label, command: &mut Command) -> anyhow::Result<Candidate> {
+    let (server, version) = Server::start(command)?;
+    Ok(Candidate { label, version, engine: Box::new(server) })
 }

@@ -1,10 +1,9 @@
 //! Farthest point sampling, one thread.
 
 use super::candidate::{Candidate, Job};
-use super::cloud::Cloud;
 use super::comparison::{Entry, compare};
 use super::reference::shortfall;
-use super::speed_tables::SpeedTables;
+use super::speed_tables::show;
 
 /// From so many points to so many.
 const JOBS: [Job; 3] = [
@@ -22,14 +21,14 @@ pub const MOST_POINTS: usize = 4096;
 const TOLERANCE: f64 = 1e-4;
 
 /// Lets `candidates` sample parts of `cloud`, and shows how they did.
-pub fn compare_all(candidates: &mut [Candidate], rounds: usize, cloud: &Cloud) -> Vec<Entry> {
+pub fn compare_all(candidates: &mut [Candidate], rounds: usize, cloud: &[[f32; 3]]) -> Vec<Entry> {
     let mut entries = Vec::new();
     for job in JOBS {
         eprintln!("sampling {} of {} points", job.setting, job.points);
-        let error_of = |kept: &[f64]| shortfall(cloud.first(job.points), kept, job.setting);
+        let error_of = |kept: &[f64]| shortfall(&cloud[..job.points], kept, job.setting);
         entries.extend(compare(candidates, job, rounds, error_of, |_| TOLERANCE));
     }
     let heading = |job: &Job| format!("{}->{}", job.points, job.setting);
-    SpeedTables::new("Farthest point sampling".to_owned(), &entries, JOBS.into(), heading).show();
+    show("Farthest point sampling", &entries, &JOBS, heading);
     entries
 }

@@ -1,26 +1,15 @@
-//! A rival in a subprocess, so that its threads and its memory are separate from ours. The protocol is described in `peers/infer/turns.py`.
+//! A rival in a subprocess, so that its threads and its memory are separate from ours.
+//! `peers/infer/turns.py` describes the protocol.
 
 use super::candidate::{Engine, Job};
 use crate::measure::clock::Cost;
 use crate::measure::subprocess::Subprocess;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 use std::process::Command;
 
 /// A running rival.
-pub struct Server {
-    process: Subprocess,
-    /// Of its package.
-    pub version: String,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Message<T> {
-    Failed { error: String },
-    Answered(T),
-}
+pub struct Server(Subprocess);
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,27 +32,10 @@ struct Times {
 }
 
 impl Server {
-    /// Starts `command`.
-    ///
-    /// # Errors
-    /// If it does not start, or reports that its engine is not available.
-    pub fn start(command: &mut Command) -> Result<Self> {
-        let mut process = Subprocess::start(command)?;
-        let Hello { version } = parse(&process.receive()?)?;
-        Ok(Self { process, version })
-    }
-
-    fn ask<T: DeserializeOwned>(&mut self, request: &str) -> Result<T> {
-        self.process.send(request)?;
-        parse(&self.process.receive()?)
-    }
-}
-
-fn parse<T: DeserializeOwned>(line: &str) -> Result<T> {
-    match serde_json::from_str(line) {
-        Ok(Message::Answered(answer)) => Ok(answer),
-        Ok(Message::Failed { error }) => bail!("{error}"),
-        Err(_) => bail!("expected JSON, found {line}"),
+    /// Starts `command`; returns the version of its engine, too.
+    pub fn start(command: &mut Command) -> Result<(Self, String)> {
+        let (process, Hello { version }) = Subprocess::start(command)?;
+        Ok((Self(process), version))
     }
 }
 
@@ -76,50 +48,38 @@ impl Times {
 }
 
 impl Engine for Server {
-    fn load(&mut self, job: Job) -> Result<()> {
-        self.ask(&format!("load {} {}", job.points, job.setting)).map(|Done {}| ())
+    fn load(&mut self, Job { points, setting }: Job) -> Result<()> {
+        self.0.ask(format_args!("load {points} {setting}")).map(|Done {}| ())
     }
 
     fn answer(&mut self) -> Result<Vec<f64>> {
-        self.ask("answer").map(|Answer { answer }| answer)
+        self.0.ask("answer").map(|Answer { answer }| answer)
     }
 
     fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
-        self.ask(&format!("time {repeats}")).map(Times::costs)
+        self.0.ask(format_args!("time {repeats}")).map(Times::costs)
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
 
     #[test]
-    fn times_are_seconds() {
-        let times: Times = parse(r#"{"wall_ns": [1500000, 7], "cpu_ns": [3000000, 6]}"#).unwrap();
-        let costs = times.costs();
-        assert!((costs[0].wall_s - 1.5e-3).abs() < 1e-15);
-        assert!((costs[0].cpu_s - 3e-3).abs() < 1e-15);
-        assert_eq!(costs.len(), 2);
-    }
-
-    #[test]
-    fn an_error_has_the_rivals_words() {
-        let error_of = |line: &str| parse::<Answer>(line).map(|_| ()).unwrap_err().to_string();
-        assert_eq!(error_of(r#"{"error": "no such request: x"}"#), "no such request: x");
-        assert_eq!(error_of("Segmentation fault"), "expected JSON, found Segmentation fault");
-        assert_eq!(error_of("{}"), "expected JSON, found {}");
-        assert!(parse::<Done>("{}").is_ok());
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_rival_that_ends_is_an_error() {
-        let ended = Server::start(&mut Command::new("true"));
-        assert_eq!(ended.err().map(|error| error.to_string()).as_deref(), Some("it has ended"));
-        let script = r#"echo '{"version": "1"}'; read request; echo '{}'"#;
-        let mut server = Server::start(Command::new("sh").args(["-c", script])).unwrap();
-        assert_eq!(server.version, "1");
+    fn a_rival_answers_until_it_ends() {
+        let error_of =
+            |started: Result<_>| started.map(|_: (Server, _)| ()).unwrap_err().to_string();
+        assert_eq!(error_of(Server::start(&mut Command::new("true"))), "it has ended");
+        let script = r#"echo '{"version": "1"}'; read request; echo '{}'; read request
+            echo '{"wall_ns": [1500000, 7], "cpu_ns": [3000000, 6]}'; read request; echo '{}'"#;
+        let (mut server, version) = Server::start(Command::new("sh").args(["-c", script])).unwrap();
+        assert_eq!(version, "1");
         server.load(Job { points: 4, setting: 1 }).unwrap();
-        assert!(server.answer().is_err());
+        let costs = server.time(2).unwrap();
+        assert!((costs[0].wall_s - 1.5e-3).abs() < 1e-15, "{costs:?}");
+        assert!((costs[0].cpu_s - 3e-3).abs() < 1e-15, "{costs:?}");
+        assert_eq!(costs.len(), 2);
+        assert_eq!(server.answer().unwrap_err().to_string(), "expected JSON, found {}");
+        assert_eq!(server.answer().unwrap_err().to_string(), "it has ended");
     }
 }

@@ -2,124 +2,84 @@
 
 use super::candidate::{Arithmetic, Job};
 use super::comparison::Entry;
+use crate::measure::clock::Costs;
 use crate::render::table::{Table, digits, milliseconds};
 
-/// Which of an entry's figures a table shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Figure {
-    /// What a user waits.
-    WallMedian,
-    /// What a user of an idle machine would wait.
-    WallLeast,
-    /// What the work costs, whatever the neighbours do.
-    CpuMedian,
-}
+/// What a table shows of an entry, in words and in seconds.
+type Figure = (&'static str, fn(&Costs) -> f64);
 
-impl Figure {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::WallMedian, Self::WallLeast, Self::CpuMedian];
+/// What a user waits, what a user of an idle machine would wait, and what the work costs
+/// whatever the neighbours do.
+const FIGURES: [Figure; 3] = [
+    ("median of the wall clock", |costs| costs.wall_s().median),
+    ("least of the wall clock", |costs| costs.wall_s().min),
+    ("median of CPU time, all threads", |costs| costs.cpu_s().median),
+];
 
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::WallMedian => "median of the wall clock",
-            Self::WallLeast => "least of the wall clock",
-            Self::CpuMedian => "median of CPU time, all threads",
-        }
+/// Prints all tables of those of `entries` that did one of `jobs`, each of which has a
+/// column under its `heading`.
+pub fn show(title: &str, entries: &[Entry], jobs: &[Job], heading: fn(&Job) -> String) {
+    let tables = SpeedTables { title, entries, jobs, heading };
+    for figure in FIGURES {
+        print!("{}", tables.milliseconds(figure));
     }
-
-    /// In seconds.
-    fn of(self, entry: &Entry) -> f64 {
-        match self {
-            Self::WallMedian => entry.costs.wall_s().median,
-            Self::WallLeast => entry.costs.wall_s().min,
-            Self::CpuMedian => entry.costs.cpu_s().median,
-        }
+    for table in FIGURES.into_iter().filter_map(|figure| tables.ratios(figure)) {
+        print!("{table}");
     }
 }
 
-/// Entries in the order of their engines, and the jobs that make the columns.
-pub struct SpeedTables<'a> {
-    title: String,
+struct SpeedTables<'a> {
+    title: &'a str,
     entries: &'a [Entry],
-    jobs: Vec<Job>,
-    /// How a job is headed.
+    jobs: &'a [Job],
     heading: fn(&Job) -> String,
 }
 
 impl<'a> SpeedTables<'a> {
-    /// Of those of `entries` that did one of `jobs`.
-    pub fn new(
-        title: String,
-        entries: &'a [Entry],
-        jobs: Vec<Job>,
-        heading: fn(&Job) -> String,
-    ) -> Self {
-        Self { title, entries, jobs, heading }
-    }
-
-    /// Prints all tables.
-    pub fn show(&self) {
-        for figure in Figure::ALL {
-            print!("{}", self.milliseconds(figure));
-        }
-        for table in Figure::ALL.into_iter().filter_map(|figure| self.ratios(figure)) {
-            print!("{table}");
-        }
-    }
-
     /// Milliseconds of every engine; a star marks the fastest rival of each
     /// arithmetic.
-    pub fn milliseconds(&self, figure: Figure) -> Table {
-        let mut table = self.table(
-            format!("{}: ms, {}; * the fastest rival", self.title, figure.name()),
-            &["engine", "arithmetic", "error"],
-        );
+    fn milliseconds(&self, figure: Figure) -> Table {
+        let (words, seconds) = figure;
+        let title = format!("{}: ms, {words}; * the fastest rival", self.title);
+        let mut table = self.table(title, &["engine", "arithmetic", "error"]);
         for engine in self.engines() {
             let error = engine.iter().map(|entry| entry.error).fold(0.0, f64::max);
-            let Entry { engine: name, arithmetic, .. } = engine[0];
-            let mut row = vec![name.clone(), arithmetic.to_string(), format!("{error:.0e}")];
-            for &job in &self.jobs {
-                row.push(engine.iter().find(|entry| entry.job == job).map_or(
-                    "-".into(),
-                    |entry| {
-                        let best = self.fastest_rival(job, *arithmetic, figure);
-                        let star = best.is_some_and(|best| best.engine == *name);
-                        milliseconds(figure.of(entry)) + if star { "*" } else { "" }
-                    },
-                ));
-            }
-            table.push(row);
+            let own = &engine[0].engine;
+            let first = [own.name.clone(), word(own.arithmetic), format!("{error:.0e}")];
+            let cell = |&job: &Job| {
+                let entry = engine.iter().find(|entry| entry.job == job)?;
+                let best = self.fastest_rival(job, own.arithmetic, figure);
+                let star =
+                    if best.is_some_and(|best| best.engine.name == own.name) { "*" } else { "" };
+                Some(milliseconds(seconds(&entry.costs)) + star)
+            };
+            table.push(self.row(first.into(), cell));
         }
         table
     }
 
     /// How many times as fast each engine of ours is as the fastest rival in
     /// f32, and as the fastest in its own arithmetic; `None` if none is ours.
-    pub fn ratios(&self, figure: Figure) -> Option<Table> {
-        let mut table = self.table(
-            format!("{}: ours, times as fast, {}", self.title, figure.name()),
-            &["engine", "as the fastest rival in"],
-        );
-        let mut any = false;
-        for engine in self.engines().into_iter().filter(|engine| engine[0].ours) {
-            any = true;
-            let own = engine[0].arithmetic;
-            let reduced = (own != Arithmetic::F32).then_some(own);
+    fn ratios(&self, figure: Figure) -> Option<Table> {
+        let (words, seconds) = figure;
+        let title = format!("{}: ours, times as fast, {words}", self.title);
+        let mut table = self.table(title, &["engine", "as the fastest rival in"]);
+        for engine in self.engines().into_iter().filter(|engine| engine[0].engine.ours) {
+            let own = &engine[0].engine;
+            let reduced = (own.arithmetic != Arithmetic::F32).then_some(own.arithmetic);
             for arithmetic in std::iter::once(Arithmetic::F32).chain(reduced) {
-                let mut row = vec![engine[0].engine.clone(), arithmetic.to_string()];
-                for &job in &self.jobs {
-                    let ours = engine.iter().find(|entry| entry.job == job);
-                    let pair = ours.zip(self.fastest_rival(job, arithmetic, figure));
-                    let ratio = pair.map(|(ours, rival)| figure.of(rival) / figure.of(ours));
-                    row.push(ratio.map_or("-".into(), digits));
-                }
-                table.push(row);
+                let ratio = |&job: &Job| {
+                    let ours = engine.iter().find(|entry| entry.job == job)?;
+                    let rival = self.fastest_rival(job, arithmetic, figure)?;
+                    Some(digits(seconds(&rival.costs) / seconds(&ours.costs)))
+                };
+                table.push(self.row(vec![own.name.clone(), word(arithmetic)], ratio));
             }
         }
-        any.then_some(table)
+        (table.len() > 0).then_some(table)
     }
 
+    /// A table of these columns and one for each job.
     fn table(&self, title: String, first: &[&str]) -> Table {
         let jobs: Vec<String> = self.jobs.iter().map(self.heading).collect();
         let heading: Vec<&str> =
@@ -127,39 +87,54 @@ impl<'a> SpeedTables<'a> {
         Table::new(title, &heading)
     }
 
-    fn fastest_rival(&self, job: Job, arithmetic: Arithmetic, figure: Figure) -> Option<&'a Entry> {
-        let rivals = self
-            .entries
-            .iter()
-            .filter(|entry| !entry.ours && entry.job == job && entry.arithmetic == arithmetic);
-        rivals.min_by(|a, b| figure.of(a).total_cmp(&figure.of(b)))
+    /// A row that begins with `first` and says of each job what `cell` does.
+    fn row(&self, first: Vec<String>, cell: impl Fn(&Job) -> Option<String>) -> Vec<String> {
+        let cells = self.jobs.iter().map(|job| cell(job).unwrap_or_else(|| "-".to_owned()));
+        first.into_iter().chain(cells).collect()
+    }
+
+    fn fastest_rival(
+        &self,
+        job: Job,
+        arithmetic: Arithmetic,
+        (_, seconds): Figure,
+    ) -> Option<&'a Entry> {
+        let is_rival = |entry: &&Entry| {
+            !entry.engine.ours && entry.job == job && entry.engine.arithmetic == arithmetic
+        };
+        let rivals = self.entries.iter().filter(is_rival);
+        rivals.min_by(|a, b| seconds(&a.costs).total_cmp(&seconds(&b.costs)))
     }
 
     /// The entries of each engine that did one of the jobs.
     fn engines(&self) -> Vec<Vec<&'a Entry>> {
         let mut engines: Vec<Vec<&Entry>> = Vec::new();
         for entry in self.entries.iter().filter(|entry| self.jobs.contains(&entry.job)) {
-            match engines.iter_mut().find(|engine| engine[0].engine == entry.engine) {
+            match engines.iter_mut().find(|engine| engine[0].engine.name == entry.engine.name) {
                 Some(engine) => engine.push(entry),
                 None => engines.push(vec![entry]),
             }
         }
-        engines.sort_by_key(|engine| engine[0].arithmetic);
+        engines.sort_by_key(|engine| engine[0].engine.arithmetic);
         engines
     }
 }
 
+fn word(arithmetic: Arithmetic) -> String {
+    format!("{arithmetic:?}").to_lowercase()
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::candidate::Label;
     use super::*;
-    use crate::measure::clock::{Cost, Costs};
+    use crate::measure::clock::Cost;
 
     fn entry(engine: &str, arithmetic: Arithmetic, points: usize, wall_ms: &[f64]) -> Entry {
         let cost = |ms: &f64| Cost { wall_s: ms * 1e-3, cpu_s: 2e-3 * ms };
+        let (name, ours) = (engine.to_owned(), engine.starts_with("ours"));
         Entry {
-            engine: engine.to_owned(),
-            arithmetic,
-            ours: engine.starts_with("ours"),
+            engine: Label { name, arithmetic, ours },
             job: Job { points, setting: 1 },
             error: 2e-7,
             costs: Costs(wall_ms.iter().map(cost).collect()),
@@ -172,9 +147,10 @@ mod tests {
         text.lines().skip(3).map(words).collect()
     }
 
-    fn grid(entries: &[Entry]) -> SpeedTables<'_> {
-        let jobs = [16, 64].map(|points| Job { points, setting: 1 });
-        SpeedTables::new("Speed".to_owned(), entries, jobs.into(), |job| job.points.to_string())
+    const JOBS: [Job; 2] = [Job { points: 16, setting: 1 }, Job { points: 64, setting: 1 }];
+
+    fn tables(entries: &[Entry]) -> SpeedTables<'_> {
+        SpeedTables { title: "Speed", entries, jobs: &JOBS, heading: |job| job.points.to_string() }
     }
 
     #[test]
@@ -185,13 +161,10 @@ mod tests {
             entry("b", Arithmetic::F32, 16, &[2.0, 3.0, 3.0]),
             entry("b", Arithmetic::F32, 64, &[2.0]),
         ];
-        let shown = |figure| rows(&grid(&entries).milliseconds(figure));
-        assert_eq!(
-            shown(Figure::WallMedian),
-            ["a f32 2e-7 4 -", "b f32 2e-7 3* 2*", "a-i8 i8 2e-7 1* -"]
-        );
-        assert_eq!(shown(Figure::WallLeast)[..2], ["a f32 2e-7 1* -", "b f32 2e-7 2 2*"]);
-        assert_eq!(shown(Figure::CpuMedian)[1], "b f32 2e-7 6* 4*");
+        let shown = |figure| rows(&tables(&entries).milliseconds(FIGURES[figure]));
+        assert_eq!(shown(0), ["a f32 2e-7 4 -", "b f32 2e-7 3* 2*", "a-i8 i8 2e-7 1* -"]);
+        assert_eq!(shown(1)[..2], ["a f32 2e-7 1* -", "b f32 2e-7 2 2*"]);
+        assert_eq!(shown(2)[1], "b f32 2e-7 6* 4*");
     }
 
     #[test]
@@ -204,14 +177,13 @@ mod tests {
             entry("b", Arithmetic::F32, 64, &[8.0]),
             entry("b-i8", Arithmetic::I8, 16, &[0.5]),
         ];
-        let table = grid(&entries).ratios(Figure::WallMedian).unwrap();
+        let table = tables(&entries).ratios(FIGURES[0]).unwrap();
         assert_eq!(rows(&table), ["ours-f32 f32 1.5 -", "ours-i8 f32 3 8", "ours-i8 i8 0.5 -"]);
     }
 
     #[test]
     fn without_ours_there_are_no_ratios() {
-        assert!(
-            grid(&[entry("a", Arithmetic::F32, 16, &[1.0])]).ratios(Figure::WallLeast).is_none()
-        );
+        let entries = [entry("a", Arithmetic::F32, 16, &[1.0])];
+        assert!(tables(&entries).ratios(FIGURES[1]).is_none());
     }
 }

@@ -2,22 +2,20 @@
 //!
 //! [`sim_gpu::bvh::Builder::for_rays`] rests on these figures.
 
+use super::speed::building;
 use crate::measure::bench_mesh::BenchMesh;
-use crate::measure::clock::{Cost, Costs, measured};
-use crate::measure::ray_set::RaySet;
-use crate::measure::ray_set::vlp32c;
-use crate::render::table::{Table, digits, milliseconds};
+use crate::measure::clock::{Costs, interleave, workload};
+use crate::measure::ray_set::{RaySet, vlp32c};
+use crate::render::table::{Column, Table, digits, milliseconds};
 use anyhow::Result;
 use glam::DVec3;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::cpu::trace;
 use sim_gpu::job::{Cast, Culling};
-use sim_gpu::mesh::validate;
 use sim_gpu::pose::ring_of_views;
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::{Surface, Target};
-use std::hint::black_box;
 
 /// Rays cast at each mesh, in turn.
 const RAYS: [usize; 5] = [1_000, 10_000, 30_000, 100_000, 1_000_000];
@@ -45,16 +43,13 @@ pub struct Measurement {
 pub struct Measurements(Vec<Measurement>);
 
 /// Measures each of `bench_meshes` in `rounds` rounds on the CPU.
-///
-/// # Errors
-/// None: the CPU caster cannot fail.
 pub fn measure(bench_meshes: &[BenchMesh], rounds: usize) -> Result<Measurements> {
-    let pattern = vlp32c();
+    let pattern = vlp32c().pattern();
     let mut measurements = Vec::new();
     for bench_mesh in bench_meshes {
         eprintln!("{}", bench_mesh.name);
         for rays in RAYS {
-            measurements.extend(at(bench_mesh, &pattern, rays, rounds));
+            measurements.extend(at(bench_mesh, &pattern, rays, rounds)?);
         }
     }
     Ok(Measurements(measurements))
@@ -65,38 +60,39 @@ fn at(
     pattern: &BeamPattern,
     rays: usize,
     rounds: usize,
-) -> Vec<Measurement> {
-    let surface =
-        Surface::new(bench_mesh.mesh.clone(), validate::triangle_stats(&bench_mesh.mesh).kept);
-    let sah = Target::new(surface.clone(), Builder::Sah);
+) -> Result<[Measurement; 2]> {
+    let surface = Surface::of_mesh(bench_mesh.mesh.clone());
+    let builders = [Builder::Sah, Builder::Morton];
+    let [sah, morton] = builders.map(|builder| Target::new(surface.clone(), builder));
     let ray_sets = views(&sah, pattern, rays);
-    let truth: Vec<_> = ray_sets.iter().map(|ray_set| ray_set.ranges(&codes_of(ray_set))).collect();
-    let mut measurements =
-        [("Sah", Builder::Sah), ("Morton", Builder::Morton)].map(|(name, builder)| {
-            let measurement = Measurement {
-                mesh: bench_mesh.name.clone(),
-                triangles: surface.kept().len(),
-                rays: ray_sets.iter().map(|ray_set| ray_set.rays.len()).sum(),
-                builder: name,
-                build: Costs::default(),
-                trace: Costs::default(),
-                different: 0,
-            };
-            (builder, measurement)
-        });
-    for round in 0..=rounds {
-        for (builder, measurement) in &mut measurements {
-            let (build, trace, casts) = through_tree(surface.clone(), *builder, &ray_sets);
-            if round == 0 {
-                measurement.different = different(&ray_sets, &casts, &truth);
-            } else {
-                measurement.build.0.push(build);
-                measurement.trace.0.push(trace);
-            }
-            black_box(casts);
-        }
-    }
-    measurements.map(|(_, measurement)| measurement).into()
+    let through = |target: &Target| {
+        let bvh = &target.bvh;
+        let codes = |set: &RaySet| trace::trace(&bvh.nodes, &bvh.triangles, &set.job.rays);
+        ray_sets.iter().map(codes).collect::<Vec<_>>()
+    };
+    let mut workloads = [
+        building(&surface, builders[0]),
+        workload(|| Ok(through(&sah))),
+        building(&surface, builders[1]),
+        workload(|| Ok(through(&morton))),
+    ];
+    let mut costs = interleave(rounds, &mut workloads)?.into_iter();
+    let mut next = || costs.next().unwrap_or_default();
+    let ranges = |target: &Target| -> Vec<Option<f64>> {
+        let cast = |codes| Cast { codes, effect_outputs: Vec::new() };
+        let casts = ray_sets.iter().zip(through(target));
+        casts.flat_map(|(set, codes)| set.ranges(&cast(codes))).collect()
+    };
+    let truth = ranges(&sah);
+    Ok([("Sah", &sah), ("Morton", &morton)].map(|(builder, target)| Measurement {
+        mesh: bench_mesh.name.clone(),
+        triangles: surface.len(),
+        rays: truth.len(),
+        builder,
+        build: next(),
+        trace: next(),
+        different: ranges(target).iter().zip(&truth).filter(|(a, b)| a != b).count(),
+    }))
 }
 
 /// About `rays` rays from at least four views, as the default set has them.
@@ -105,45 +101,11 @@ fn views(target: &Target, pattern: &BeamPattern, rays: usize) -> Vec<RaySet> {
     let poses = ring_of_views(n_views as u32, 3.0, 20f64.to_radians(), 0.0, DVec3::ZERO);
     let share = rays / n_views;
     let view = |pose| {
-        let mut ray_set = RaySet::sweep(target, pose, pattern, Culling::On);
+        let ray_set = RaySet::sweep(target, pose, pattern, Culling::On);
         let keep_each = ray_set.rays.len().div_ceil(share).max(1);
-        let thinned = |i: &usize| i.is_multiple_of(keep_each);
-        let chosen: Vec<usize> = (0..ray_set.rays.len()).filter(thinned).collect();
-        ray_set.rays = chosen.iter().map(|&i| ray_set.rays[i]).collect();
-        ray_set.job.rays = chosen.iter().map(|&i| ray_set.job.rays[i]).collect();
-        ray_set.job.beams = chosen.iter().map(|&i| ray_set.job.beams[i]).collect();
-        ray_set
+        ray_set.only(&(0..ray_set.rays.len()).step_by(keep_each).collect::<Vec<_>>())
     };
     poses.iter().map(view).collect()
-}
-
-fn codes_of(ray_set: &RaySet) -> Cast {
-    let bvh = &ray_set.job.target.bvh;
-    Cast {
-        codes: trace::trace(&bvh.nodes, &bvh.triangles, &ray_set.job.rays),
-        effect_outputs: Vec::new(),
-    }
-}
-
-fn through_tree(
-    surface: Surface,
-    builder: Builder,
-    ray_sets: &[RaySet],
-) -> (Cost, Cost, Vec<Cast>) {
-    let (target, build) = measured(|| Target::new(surface, builder));
-    let bvh = &target.bvh;
-    let (codes, cost) = measured(|| -> Vec<_> {
-        ray_sets.iter().map(|s| trace::trace(&bvh.nodes, &bvh.triangles, &s.job.rays)).collect()
-    });
-    let casts = codes.into_iter().map(|codes| Cast { codes, effect_outputs: Vec::new() });
-    (build, cost, casts.collect())
-}
-
-fn different(ray_sets: &[RaySet], casts: &[Cast], truth: &[Vec<Option<f64>>]) -> usize {
-    let of_view = |((ray_set, cast), truth): ((&RaySet, &Cast), &Vec<Option<f64>>)| {
-        ray_set.ranges(cast).iter().zip(truth).filter(|(a, b)| a != b).count()
-    };
-    ray_sets.iter().zip(casts).zip(truth).map(of_view).sum()
 }
 
 impl Measurement {
@@ -155,68 +117,55 @@ impl Measurement {
 impl Measurements {
     /// The figures for people.
     pub fn tables(&self) -> Vec<Table> {
-        vec![self.per_mesh(), self.regret()]
+        let same_rays = |a: &Measurement, b: &Measurement| a.mesh == b.mesh && a.rays == b.rays;
+        let groups: Vec<&[Measurement]> = self.0.chunk_by(same_rays).collect();
+        vec![per_mesh(&groups), regret(&groups)]
     }
+}
 
-    /// The builders of one mesh and number of rays.
-    fn groups(&self) -> impl Iterator<Item = &[Measurement]> {
-        self.0.chunk_by(|a, b| a.mesh == b.mesh && a.rays == b.rays)
-    }
+fn per_mesh(groups: &[&[Measurement]]) -> Table {
+    let costs = |Measurement { build, trace, .. }: &Measurement| {
+        let [build, trace] = [build, trace].map(|costs| milliseconds(costs.cpu_s().median));
+        format!("{build} + {trace}")
+    };
+    let break_even = |group: &[Measurement]| match break_even_rays(&group[0], &group[1]) {
+        Some(rays) => digits(rays / group[0].triangles as f64),
+        None => "never".to_owned(),
+    };
+    let different = |group: &[Measurement]| group.iter().map(|m| m.different).sum::<usize>();
+    let columns: [Column<'_, &[Measurement]>; 7] = [
+        ("mesh", &|group| group[0].mesh.clone()),
+        ("triangles", &|group| group[0].triangles.to_string()),
+        ("rays", &|group| group[0].rays.to_string()),
+        ("Sah", &|group| costs(&group[0])),
+        ("Morton", &|group| costs(&group[1])),
+        ("break-even / triangle", &|group| break_even(group)),
+        ("different", &|group| different(group).to_string()),
+    ];
+    let title = "Build + trace, CPU ms (rays to break even: where SAH's slower build is paid back)";
+    Table::of(title, groups, &columns)
+}
 
-    fn per_mesh(&self) -> Table {
-        let mut table = Table::new(
-            "Build + trace, CPU ms (rays to break even: where SAH's slower build is paid back)",
-            &["mesh", "triangles", "rays", "Sah", "Morton", "break-even / triangle", "different"],
-        );
-        for group in self.groups() {
-            let [sah, morton] = group else { continue };
-            let measurements = |measurement: &Measurement| {
-                let (build, trace) =
-                    (measurement.build.cpu_s().median, measurement.trace.cpu_s().median);
-                format!("{} + {}", milliseconds(build), milliseconds(trace))
-            };
-            table.push(vec![
-                sah.mesh.clone(),
-                sah.triangles.to_string(),
-                sah.rays.to_string(),
-                measurements(sah),
-                measurements(morton),
-                break_even_rays(sah, morton)
-                    .map_or("never".to_owned(), |rays| digits(rays / sah.triangles as f64)),
-                group.iter().map(|measurement| measurement.different).sum::<usize>().to_string(),
-            ]);
-        }
-        table
-    }
-
-    /// What each rule costs over all meshes, against the best choice for each.
-    fn regret(&self) -> Table {
-        let mut table = Table::new(
-            "All meshes together, CPU ms, by what chooses",
-            &["rays", "always Sah", "always Morton", "Builder::for_rays", "best of both"],
-        );
-        for rays in RAYS {
-            let near = |group: &&[Measurement]| nearest_count(group[0].rays) == rays;
-            let sum = |choose: &dyn Fn(&[Measurement]) -> f64| {
-                milliseconds(self.groups().filter(near).map(choose).sum())
-            };
-            let by_rule = |group: &[Measurement]| match Builder::for_rays(
-                group[0].triangles,
-                group[0].rays,
-            ) {
-                Builder::Sah => group[0].total_s(),
-                Builder::Morton => group[1].total_s(),
-            };
-            table.push(vec![
-                rays.to_string(),
-                sum(&|group| group[0].total_s()),
-                sum(&|group| group[1].total_s()),
-                sum(&by_rule),
-                sum(&|group| group[0].total_s().min(group[1].total_s())),
-            ]);
-        }
-        table
-    }
+/// What each rule costs over all meshes, against the best choice for each.
+fn regret(groups: &[&[Measurement]]) -> Table {
+    let sum = |rays: usize, choose: fn(&[Measurement]) -> f64| {
+        let near = groups.iter().filter(|group| nearest_count(group[0].rays) == rays);
+        milliseconds(near.map(|group| choose(group)).sum())
+    };
+    let by_rule = |group: &[Measurement]| match Builder::for_rays(group[0].triangles, group[0].rays)
+    {
+        Builder::Sah => group[0].total_s(),
+        Builder::Morton => group[1].total_s(),
+    };
+    let best = |group: &[Measurement]| group[0].total_s().min(group[1].total_s());
+    let columns: [Column<'_, usize>; 5] = [
+        ("rays", &|rays| rays.to_string()),
+        ("always Sah", &|rays| sum(*rays, |group| group[0].total_s())),
+        ("always Morton", &|rays| sum(*rays, |group| group[1].total_s())),
+        ("Builder::for_rays", &|rays| sum(*rays, by_rule)),
+        ("best of both", &|rays| sum(*rays, best)),
+    ];
+    Table::of("All meshes together, CPU ms, by what chooses", &RAYS, &columns)
 }
 
 /// Which of [`RAYS`] was asked for where `rays` were cast.
@@ -238,6 +187,7 @@ fn break_even_rays(sah: &Measurement, morton: &Measurement) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::clock::Cost;
 
     fn measurement(build_s: f64, trace_s: f64) -> Measurement {
         let costs = |s: f64| Costs(vec![Cost { wall_s: s, cpu_s: s }]);

@@ -2,26 +2,21 @@
 
 mod moved;
 
-use crate::measure::backends::Backend;
-use crate::measure::backends::short;
+use super::speed::{building, casting};
+use crate::measure::backends::{Backend, short};
 use crate::measure::bench_mesh::BenchMesh;
-use crate::measure::clock::{Costs, Workload, interleave, measured};
-use crate::measure::ray_set::RaySet;
-use crate::measure::ray_set::vlp32c;
-use crate::render::table::{Table, digits, milliseconds};
-use crate::study::casting::speed::casting;
+use crate::measure::clock::{Costs, Workload, interleave, workload};
+use crate::measure::ray_set::{RaySet, vlp32c};
+use crate::render::table::{Column, Table, digits, milliseconds};
 use anyhow::Result;
 use glam::DVec3;
 use moved::Moved;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::{Mesh, validate};
-use sim_gpu::pose::Pose;
-use sim_gpu::sensor::{Sensor, Views};
-use sim_gpu::simplify::{Viewpoint, resolved_m, simplified};
+use sim_gpu::sensor::Views;
+use sim_gpu::simplify::{Viewpoint, resolved_m, simplified, simplified_surface};
 use sim_gpu::target::{Surface, Target};
-use std::hint::black_box;
 
 /// One mesh as it is and as `--simplify auto` has it.
 #[derive(Serialize)]
@@ -52,42 +47,41 @@ pub struct Simplified(Vec<SimplifiedMesh>);
 
 /// Measures `bench_meshes` on `backends` in `rounds` rounds each, seen as
 /// `gen-dataset` sees them with the VLP-32C.
-///
-/// # Errors
-/// If this build cannot simplify or an adapter fails.
 pub fn measure(
     bench_meshes: &[BenchMesh],
     backends: &[Backend],
     rounds: usize,
 ) -> Result<Simplified> {
-    let measured = bench_meshes.iter().map(|bench_mesh| {
-        eprintln!("{}", bench_mesh.name);
-        on(bench_mesh, backends, rounds)
-    });
+    let measured = bench_meshes.iter().map(|bench_mesh| on(bench_mesh, backends, rounds));
     Ok(Simplified(measured.collect::<Result<_>>()?))
 }
 
 fn on(bench_mesh: &BenchMesh, backends: &[Backend], rounds: usize) -> Result<SimplifiedMesh> {
-    let sensor = Sensor::builtin("vlp32c").expect("invariant: this profile is built in");
+    eprintln!("{}", bench_mesh.name);
+    let sensor = vlp32c();
+    let pattern = sensor.pattern();
     let views = Views::ROTATING.poses(DVec3::ZERO, formats::rng::StreamKey::new(0, "views", 0));
     let positions = views.iter().map(|view| view.position_m).collect();
-    let bound_m = resolved_m(&bench_mesh.mesh, 1.0, &[Viewpoint { sensor: &sensor, positions }]);
+    let mesh = &bench_mesh.mesh;
+    let bound_m = resolved_m(mesh, 1.0, &[Viewpoint { sensor: &sensor, positions }]);
 
-    let kept = validate::triangle_stats(&bench_mesh.mesh).kept;
-    let fewer =
-        simplified(&bench_mesh.mesh, &kept, bound_m)?.unwrap_or_else(|| bench_mesh.mesh.clone());
-    let surfaces = [&bench_mesh.mesh, &fewer].map(surface);
+    let whole = Surface::of_mesh(mesh.clone());
+    let fewer = simplified_surface(mesh.clone(), whole.kept().to_vec(), bound_m)?;
+    let surfaces = [whole, fewer];
     let targets = surfaces.each_ref().map(|surface| Target::new(surface.clone(), Builder::Sah));
-    let ray_sets = targets.each_ref().map(|target| ray_sets(target, &views));
+    let ray_sets = targets.each_ref().map(|target| -> Vec<RaySet> {
+        let sweep = |pose| RaySet::sweep(target, pose, &pattern, Culling::Off);
+        views.iter().map(sweep).collect()
+    });
+    let jobs = ray_sets.each_ref().map(|ray_sets| -> Vec<CastJob> {
+        ray_sets.iter().map(|ray_set| ray_set.job.clone()).collect()
+    });
 
-    let mut workloads: Vec<Workload<'_>> = vec![simplifying(&bench_mesh.mesh, &kept, bound_m)];
-    workloads.extend(surfaces.iter().map(building));
+    let mut workloads: Vec<Workload<'_>> =
+        vec![workload(|| Ok(simplified(mesh, surfaces[0].kept(), bound_m)?))];
+    workloads.extend(surfaces.iter().map(|surface| building(surface, Builder::Sah)));
     let backends: Vec<&Backend> =
         backends.iter().filter(|backend| backend.caster.fits(&targets[0])).collect();
-    let jobs = ray_sets
-        .each_ref()
-        .map(|ray_sets| ray_sets.iter().map(|ray_set| ray_set.job.clone()).collect());
-    let jobs: [Vec<CastJob>; 2] = jobs;
     for backend in &backends {
         workloads.extend(jobs.iter().map(|jobs| casting(backend, jobs.clone())));
     }
@@ -112,107 +106,60 @@ fn on(bench_mesh: &BenchMesh, backends: &[Backend], rounds: usize) -> Result<Sim
     })
 }
 
-fn surface(mesh: &Mesh) -> Surface {
-    Surface::new(mesh.clone(), validate::triangle_stats(mesh).kept)
-}
-
-fn ray_sets(target: &Target, views: &[Pose]) -> Vec<RaySet> {
-    let pattern = vlp32c();
-    views.iter().map(|pose| RaySet::sweep(target, pose, &pattern, Culling::Off)).collect()
-}
-
-fn simplifying<'a>(mesh: &'a Mesh, kept: &'a [u32], bound_m: f64) -> Workload<'a> {
-    Box::new(move || {
-        let (fewer, cost) = measured(|| simplified(mesh, kept, bound_m));
-        black_box(fewer?);
-        Ok(cost)
-    })
-}
-
-fn building(surface: &Surface) -> Workload<'_> {
-    Box::new(move || {
-        let surface = surface.clone();
-        let (built, cost) = measured(|| Target::new(surface, Builder::Sah));
-        black_box(built);
-        Ok(cost)
-    })
+/// CPU seconds of some work on the mesh as it is, and on what is left of it.
+fn both(costs: &[Costs; 2]) -> [f64; 2] {
+    costs.each_ref().map(|costs| costs.cpu_s().median)
 }
 
 impl Simplified {
     /// The figures for people.
-    pub fn tables(&self) -> [Table; 2] {
-        [self.cost_table(), self.moved_table()]
+    pub fn tables(&self) -> Vec<Table> {
+        vec![self.cost_table(), self.moved_table()]
     }
 
     fn cost_table(&self) -> Table {
-        let mut table = Table::new(
-            "--simplify auto, CPU ms: as it is -> simplified (VLP-32C, 4 revolutions from 3 m, \
-             no culling; SAH)",
-            &[
-                "mesh",
-                "triangles",
-                "left",
-                "adapter",
-                "build",
-                "trace",
-                "both faster",
-                "simplify itself",
-                "all three",
-            ],
-        );
-        for bench_mesh in &self.0 {
-            for Traced { adapter, trace, .. } in &bench_mesh.traces {
-                let cpu_s = |costs: &Costs| costs.cpu_s().median;
-                let [build, fewer_build] = bench_mesh.build.each_ref().map(cpu_s);
-                let [trace, fewer_trace] = trace.each_ref().map(cpu_s);
-                let simplify = cpu_s(&bench_mesh.simplify);
-                let (before, after) = (build + trace, fewer_build + fewer_trace);
-                let arrow = |p: f64, q: f64| format!("{} -> {}", milliseconds(p), milliseconds(q));
-                table.push(vec![
-                    bench_mesh.mesh.clone(),
-                    bench_mesh.triangles.to_string(),
-                    bench_mesh.triangles_left.to_string(),
-                    short(adapter),
-                    arrow(build, fewer_build),
-                    arrow(trace, fewer_trace),
-                    format!("{}x", digits(before / after)),
-                    milliseconds(simplify),
-                    format!("{}x", digits(before / (simplify + after))),
-                ]);
-            }
-        }
-        table
+        type Row<'a> = (&'a SimplifiedMesh, &'a Traced);
+        let pairs =
+            self.0.iter().flat_map(|mesh| mesh.traces.iter().map(move |trace| (mesh, trace)));
+        let arrow = |[p, q]: [f64; 2]| format!("{} -> {}", milliseconds(p), milliseconds(q));
+        // How many times as fast, if what is left takes `more_s` seconds more.
+        let gain = |(mesh, traced): &Row<'_>, more_s: f64| {
+            let ([build, fewer_build], [trace, fewer_trace]) =
+                (both(&mesh.build), both(&traced.trace));
+            format!("{}x", digits((build + trace) / (fewer_build + fewer_trace + more_s)))
+        };
+        let simplify = |mesh: &SimplifiedMesh| mesh.simplify.cpu_s().median;
+        let columns: [Column<'_, Row<'_>>; 9] = [
+            ("mesh", &|(mesh, _)| mesh.mesh.clone()),
+            ("triangles", &|(mesh, _)| mesh.triangles.to_string()),
+            ("left", &|(mesh, _)| mesh.triangles_left.to_string()),
+            ("adapter", &|(_, traced)| short(&traced.adapter)),
+            ("build", &|(mesh, _)| arrow(both(&mesh.build))),
+            ("trace", &|(_, traced)| arrow(both(&traced.trace))),
+            ("both faster", &|row| gain(row, 0.0)),
+            ("simplify itself", &|(mesh, _)| milliseconds(simplify(mesh))),
+            ("all three", &|row| gain(row, simplify(row.0))),
+        ];
+        let title = "--simplify auto, CPU ms: as it is -> simplified (VLP-32C, 4 revolutions from \
+                     3 m, no culling; SAH)";
+        Table::of(title, &pairs.collect::<Vec<_>>(), &columns)
     }
 
     fn moved_table(&self) -> Table {
-        let mut table = Table::new(
-            "What it moves: points of the simplified scan against the mesh as it is, mm; range \
-             errors of beams without width",
-            &[
-                "mesh",
-                "hits",
-                "bound",
-                "farthest",
-                "range median",
-                "99 %",
-                "within bound/cos %",
-                "other hit or miss %",
-            ],
-        );
-        for SimplifiedMesh { mesh, bound_m, moved, .. } in &self.0 {
-            let mm = |metres: f64| digits(1e3 * metres);
-            let percent = |n: usize| digits(100.0 * n as f64 / moved.hits.max(1) as f64);
-            table.push(vec![
-                mesh.clone(),
-                moved.hits.to_string(),
-                mm(*bound_m),
-                mm(moved.farthest_m),
-                mm(moved.median_m),
-                mm(moved.most_m),
-                percent(moved.within_oblique),
-                percent(moved.hit_by_one),
-            ]);
-        }
-        table
+        let mm = |metres: f64| digits(1e3 * metres);
+        let percent = |n: usize, of: &Moved| digits(100.0 * n as f64 / of.hits.max(1) as f64);
+        let columns: [Column<'_, SimplifiedMesh>; 8] = [
+            ("mesh", &|mesh| mesh.mesh.clone()),
+            ("hits", &|mesh| mesh.moved.hits.to_string()),
+            ("bound", &|mesh| mm(mesh.bound_m)),
+            ("farthest", &|mesh| mm(mesh.moved.farthest_m)),
+            ("range median", &|mesh| mm(mesh.moved.median_m)),
+            ("99 %", &|mesh| mm(mesh.moved.most_m)),
+            ("within bound/cos %", &|mesh| percent(mesh.moved.within_oblique, &mesh.moved)),
+            ("other hit or miss %", &|mesh| percent(mesh.moved.hit_by_one, &mesh.moved)),
+        ];
+        let title = "What it moves: points of the simplified scan against the mesh as it is, mm; \
+                     range errors of beams without width";
+        Table::of(title, &self.0, &columns)
     }
 }

@@ -2,16 +2,17 @@
 
 use crate::measure::backends::{Backend, short};
 use crate::measure::bench_mesh::{BenchMesh, target};
-use crate::measure::clock::{Cost, Costs, Spread, Workload, interleave, measured};
+use crate::measure::clock::{Costs, Spread, Workload, interleave, measured, workload};
 use crate::measure::ray_set::{RaySet, sweep_pose, vlp32c};
 use crate::measure::scenes::in_a_room;
-use crate::render::table::{Table, digits, millions_per_s, milliseconds};
+use crate::render::table::{Column, Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
+use sim_gpu::effects::Effects;
 use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::validate;
+use sim_gpu::ray::MISS;
 use sim_gpu::target::{Surface, Target};
 use std::hint::black_box;
 
@@ -51,52 +52,38 @@ pub struct Speed {
 }
 
 /// Measures `bench_meshes` on `backends` in `rounds` rounds each.
-///
-/// # Errors
-/// If an adapter fails.
 pub fn measure(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
     let mut speed = Speed::default();
-    let pattern = vlp32c();
+    let pattern = vlp32c().pattern();
+    let pose = sweep_pose();
     for bench_mesh in bench_meshes {
         eprintln!("{}", bench_mesh.name);
-        builds(bench_mesh, rounds, &mut speed)?;
+        speed.builds.extend(builds(bench_mesh, rounds)?);
         let object = target(bench_mesh.mesh.clone(), Builder::Sah);
         let room = target(in_a_room(bench_mesh.mesh.clone()), Builder::Sah);
-        let pose = sweep_pose()?;
-        for (name, ray_set, beams) in [
-            ("sweep, all hit", RaySet::sweep(&room, &pose, &pattern, Culling::Off), pattern.len()),
-            ("sweep, object", RaySet::sweep(&object, &pose, &pattern, Culling::On), pattern.len()),
-            ("incoherent", RaySet::incoherent(&object, pattern.len()), pattern.len()),
+        for (rays_from, ray_set) in [
+            ("sweep, all hit", RaySet::sweep(&room, &pose, &pattern, Culling::Off)),
+            ("sweep, object", RaySet::sweep(&object, &pose, &pattern, Culling::On)),
+            ("incoherent", RaySet::incoherent(&object, pattern.len())),
         ] {
-            traces(bench_mesh, (name, &ray_set, beams), backends, rounds, &mut speed)?;
+            let rays = (rays_from, &ray_set, pattern.len());
+            speed.traces.extend(traces(bench_mesh, rays, backends, rounds)?);
         }
     }
     Ok(speed)
 }
 
-fn builds(bench_mesh: &BenchMesh, rounds: usize, speed: &mut Speed) -> Result<()> {
-    let kept = validate::triangle_stats(&bench_mesh.mesh).kept;
-    let triangles = kept.len();
-    let surface = Surface::new(bench_mesh.mesh.clone(), kept);
+fn builds(bench_mesh: &BenchMesh, rounds: usize) -> Result<Vec<Build>> {
+    let surface = Surface::of_mesh(bench_mesh.mesh.clone());
     let builders = [Builder::Sah, Builder::Morton];
-    let mut workloads: Vec<Workload<'_>> = builders
-        .iter()
-        .map(|&builder| {
-            let surface = &surface;
-            let workload: Workload<'_> = Box::new(move || {
-                let surface = surface.clone();
-                let (built, cost) = measured(|| Target::new(surface, builder));
-                black_box(built);
-                Ok(cost)
-            });
-            workload
-        })
-        .collect();
-    for (costs, builder) in interleave(rounds, &mut workloads)?.into_iter().zip(builders) {
-        let (mesh, builder) = (bench_mesh.name.clone(), format!("{builder:?}"));
-        speed.builds.push(Build { mesh, triangles, builder, costs });
-    }
-    Ok(())
+    let costs = interleave(rounds, &mut builders.map(|builder| building(&surface, builder)))?;
+    let build = |(builder, costs)| Build {
+        mesh: bench_mesh.name.clone(),
+        triangles: surface.len(),
+        builder: format!("{builder:?}"),
+        costs,
+    };
+    Ok(builders.into_iter().zip(costs).map(build).collect())
 }
 
 fn traces(
@@ -104,126 +91,98 @@ fn traces(
     (rays_from, ray_set, beams): (&'static str, &RaySet, usize),
     backends: &[Backend],
     rounds: usize,
-    speed: &mut Speed,
-) -> Result<()> {
-    let cast = sim_gpu::cpu::trace::cast(&ray_set.job, &sim_gpu::effects::Effects::default());
-    let hits = cast.codes.iter().filter(|&&code| code != sim_gpu::ray::MISS).count();
+) -> Result<Vec<Trace>> {
+    let job = &ray_set.job;
+    let cast = sim_gpu::cpu::trace::cast(job, &Effects::default());
+    let hits = cast.codes.iter().filter(|&&code| code != MISS).count();
     let fitting = |backend: &&Backend| {
-        let fits = backend.caster.fits(&ray_set.job.target);
+        let fits = backend.caster.fits(&job.target);
         if !fits {
             eprintln!("{}: {} exceeds its bindings", backend.name(), bench_mesh.name);
         }
         fits
     };
     let backends: Vec<&Backend> = backends.iter().filter(fitting).collect();
-    let copies = |backend: &Backend| backend.rays.div_ceil(ray_set.job.rays.len().max(1));
-    let mut workloads: Vec<Workload<'_>> = backends
-        .iter()
-        .map(|backend| casting(backend, vec![ray_set.job.clone(); copies(backend)]))
-        .collect();
+    let copies = |backend: &Backend| backend.rays.div_ceil(job.rays.len().max(1));
+    let copied = |backend: &Backend| vec![job.clone(); copies(backend)];
+    let mut workloads: Vec<Workload<'_>> =
+        backends.iter().map(|backend| casting(backend, copied(backend))).collect();
     let costs = interleave(rounds, &mut workloads)?;
-    for (backend, costs) in backends.iter().zip(costs) {
-        speed.traces.push(Trace {
+    let trace = |(backend, costs): (&&Backend, Costs)| {
+        Ok(Trace {
             mesh: bench_mesh.name.clone(),
-            triangles: ray_set.job.target.surface.len(),
+            triangles: job.target.surface.len(),
             rays_from,
             adapter: backend.name().to_owned(),
-            rays: copies(backend) * ray_set.job.rays.len(),
+            rays: copies(backend) * job.rays.len(),
             beams: copies(backend) * beams,
             hits: copies(backend) * hits,
             costs,
-            kernel_s: kernel_seconds(backend, &ray_set.job, copies(backend), rounds)?,
-        });
-    }
-    Ok(())
+            kernel_s: kernel_seconds(backend, &copied(backend), rounds)?,
+        })
+    };
+    backends.iter().zip(costs).map(trace).collect()
 }
 
-/// Seconds of the kernel alone in each of `repeats` casts of `copies` copies of `job`, by
-/// the adapter's own clock; `None` if the adapter does not have one.
-fn kernel_seconds(
-    backend: &Backend,
-    job: &CastJob,
-    copies: usize,
-    repeats: usize,
-) -> Result<Option<Vec<f64>>> {
+/// Seconds of the kernel alone in each of `repeats` casts of `jobs`, by the adapter's own
+/// clock; `None` if the adapter does not have one.
+fn kernel_seconds(backend: &Backend, jobs: &[CastJob], repeats: usize) -> Result<Option<Vec<f64>>> {
     let Caster::Gpu(gpu) = &backend.caster else { return Ok(None) };
-    let jobs = vec![job.clone(); copies];
     // The first cast warms up and is left out.
-    gpu.cast_timed(&jobs)?;
-    (0..repeats).map(|_| Ok(gpu.cast_timed(&jobs)?.1)).collect()
+    gpu.cast_timed(jobs)?;
+    (0..repeats).map(|_| Ok(gpu.cast_timed(jobs)?.1)).collect()
 }
 
-/// Casts `jobs` on `backend`, all together.
-pub fn casting<'a>(backend: &'a Backend, jobs: Vec<CastJob>) -> Workload<'a> {
+/// Builds the hierarchy over `surface`.
+pub fn building(surface: &Surface, builder: Builder) -> Workload<'_> {
     Box::new(move || {
-        let (casts, cost): (_, Cost) = measured(|| backend.caster.cast(&jobs));
-        black_box(casts?);
+        let surface = surface.clone();
+        let (built, cost) = measured(|| Target::new(surface, builder));
+        black_box(built);
         Ok(cost)
     })
 }
 
+/// Casts `jobs` on `backend`, all together.
+pub fn casting(backend: &Backend, jobs: Vec<CastJob>) -> Workload<'_> {
+    workload(move || Ok(backend.caster.cast(&jobs)?))
+}
+
 impl Speed {
     /// The figures for people.
-    pub fn tables(&self) -> [Table; 2] {
-        let mut builds = Table::new(
-            "Building the hierarchy",
-            &["mesh", "triangles", "builder", "CPU ms", "min", "max", "wall ms", "M tri/CPU-s"],
-        );
-        for build in &self.builds {
-            let (cpu, wall) = (build.costs.cpu_s(), build.costs.wall_s());
-            builds.push(vec![
-                build.mesh.clone(),
-                build.triangles.to_string(),
-                build.builder.clone(),
-                milliseconds(cpu.median),
-                milliseconds(cpu.min),
-                milliseconds(cpu.max),
-                milliseconds(wall.median),
-                millions_per_s(build.triangles, cpu.median),
-            ]);
-        }
-        [builds, self.trace_table()]
-    }
-
-    fn trace_table(&self) -> Table {
-        let mut traces = Table::new(
-            "Tracing, million rays a second (upload and read-back included; \
-             beams count those that culling spared)",
-            &[
-                "mesh",
-                "rays",
-                "adapter",
-                "batch",
-                "hits %",
-                "per CPU-s",
-                "min",
-                "max",
-                "per wall s",
-                "beams per CPU-s",
-                "kernel alone",
-            ],
-        );
-        for trace in &self.traces {
-            let (cpu, wall) = (trace.costs.cpu_s(), trace.costs.wall_s());
-            traces.push(vec![
-                trace.mesh.clone(),
-                trace.rays_from.to_owned(),
-                short(&trace.adapter),
-                trace.rays.to_string(),
-                digits(100.0 * trace.hits as f64 / trace.rays.max(1) as f64),
-                millions_per_s(trace.rays, cpu.median),
-                millions_per_s(trace.rays, cpu.max),
-                millions_per_s(trace.rays, cpu.min),
-                millions_per_s(trace.rays, wall.median),
-                millions_per_s(trace.beams, cpu.median),
-                match &trace.kernel_s {
-                    Some(seconds) => {
-                        millions_per_s(trace.rays, Spread::of(seconds.iter().copied()).median)
-                    }
-                    None => "-".to_owned(),
-                },
-            ]);
-        }
-        traces
+    pub fn tables(&self) -> Vec<Table> {
+        let of_build: [Column<Build>; 8] = [
+            ("mesh", &|build| build.mesh.clone()),
+            ("triangles", &|build| build.triangles.to_string()),
+            ("builder", &|build| build.builder.clone()),
+            ("CPU ms", &|build| milliseconds(build.costs.cpu_s().median)),
+            ("min", &|build| milliseconds(build.costs.cpu_s().min)),
+            ("max", &|build| milliseconds(build.costs.cpu_s().max)),
+            ("wall ms", &|build| milliseconds(build.costs.wall_s().median)),
+            ("M tri/CPU-s", &|build| millions_per_s(build.triangles, build.costs.cpu_s().median)),
+        ];
+        let kernel = |trace: &Trace| {
+            let seconds = trace.kernel_s.as_ref()?.iter().copied();
+            Some(millions_per_s(trace.rays, Spread::of(seconds).median))
+        };
+        let of_trace: [Column<Trace>; 11] = [
+            ("mesh", &|trace| trace.mesh.clone()),
+            ("rays", &|trace| trace.rays_from.to_owned()),
+            ("adapter", &|trace| short(&trace.adapter)),
+            ("batch", &|trace| trace.rays.to_string()),
+            ("hits %", &|trace| digits(100.0 * trace.hits as f64 / trace.rays.max(1) as f64)),
+            ("per CPU-s", &|trace| millions_per_s(trace.rays, trace.costs.cpu_s().median)),
+            ("min", &|trace| millions_per_s(trace.rays, trace.costs.cpu_s().max)),
+            ("max", &|trace| millions_per_s(trace.rays, trace.costs.cpu_s().min)),
+            ("per wall s", &|trace| millions_per_s(trace.rays, trace.costs.wall_s().median)),
+            ("beams per CPU-s", &|trace| millions_per_s(trace.beams, trace.costs.cpu_s().median)),
+            ("kernel alone", &|trace| kernel(trace).unwrap_or_else(|| "-".to_owned())),
+        ];
+        let tracing = "Tracing, million rays a second (upload and read-back included; beams \
+                       count those that culling spared)";
+        vec![
+            Table::of("Building the hierarchy", &self.builds, &of_build),
+            Table::of(tracing, &self.traces, &of_trace),
+        ]
     }
 }

@@ -1,23 +1,20 @@
 //! The whole way to disk: the default dataset, as `gen-dataset` makes it, in a
 //! folder that is removed again.
 
-use crate::measure::backends::Backend;
-use crate::measure::backends::short;
+use crate::measure::backends::{Backend, short};
+use crate::measure::bench_mesh::some_of;
 use crate::measure::clock::{Cost, measured};
 use crate::render::table::{Table, digits};
 use anyhow::{Context, Result};
-use edgepuck_dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
+use edgepuck_dataset::config::DatasetConfig;
 use edgepuck_dataset::journal::{Journal, Terms};
 use edgepuck_dataset::pipeline::{Run, scan_all};
 use edgepuck_dataset::progress::{Progress, Stage};
+use edgepuck_program::gen_dataset::default_config;
 use serde::Serialize;
-use sim_gpu::caster::AdapterRequest;
-use sim_gpu::caster::Caster;
-use sim_gpu::effects::{Effects, Noise, NoiseModel};
+use sim_gpu::caster::{AdapterRequest, Caster};
 use sim_gpu::job::Culling;
-use sim_gpu::mesh::frame::Normalize;
-use sim_gpu::mesh::tree::{self, MeshEntry};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::mesh::tree::MeshEntry;
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -38,20 +35,14 @@ pub struct Dataset {
 
 /// Makes the default dataset of at most `limit` of the meshes under `root`, on
 /// each of `backends`, `rounds` times.
-///
-/// # Errors
-/// If there is no mesh, an adapter fails or the disk does.
 pub fn measure(
     root: &Path,
     limit: usize,
     backends: &[Backend],
     rounds: usize,
 ) -> Result<Vec<Dataset>> {
-    let entries = tree::discover(root, 0)?;
-    let taken = limit.clamp(1, entries.len());
-    let chosen: Vec<MeshEntry> =
-        (0..taken).map(|k| entries[k * entries.len() / taken].clone()).collect();
-    let config = default_config();
+    let meshes = some_of(root, limit)?;
+    let config = default_config()?;
     let mut datasets = Vec::new();
     for backend in backends {
         let request = match &backend.caster {
@@ -59,10 +50,8 @@ pub fn measure(
             Caster::Gpu(_) => AdapterRequest::Named(backend.name().to_owned()),
         };
         let caster = Caster::open(&request, &config.cast_effects())?;
-        let mut repeats = Vec::with_capacity(rounds);
-        for _ in 0..rounds {
-            repeats.push(once(&config, &caster, &chosen)?);
-        }
+        let once = |_| once(&config, &caster, &meshes);
+        let mut repeats = (0..rounds).map(once).collect::<Result<Vec<_>>>()?;
         repeats.sort_by(|a, b| a.cost.cpu_s.total_cmp(&b.cost.cpu_s));
         datasets.extend(repeats.into_iter().nth(rounds / 2));
     }
@@ -87,31 +76,6 @@ fn once(config: &DatasetConfig, caster: &Caster, meshes: &[MeshEntry]) -> Result
         cost,
         stages: Stage::ALL.map(|s| (s.name(), progress.spent(s).as_secs_f64())).to_vec(),
     })
-}
-
-/// What `gen-dataset` makes without flags.
-fn default_config() -> DatasetConfig {
-    let noise = Noise { mean_m: 0.0, sigma_m: 0.01, model: NoiseModel::Range };
-    let set = |name: &str, sensor: &str| {
-        let sensor = Sensor::builtin(sensor).expect("invariant: this profile is built in");
-        let viewpoints = Viewpoints::Views(sensor.default_views());
-        SetConfig { name: name.to_owned(), sensor, viewpoints }
-    };
-    DatasetConfig {
-        seed: 0,
-        normalize: Normalize::UnitSphere,
-        up: None,
-        simplify: None,
-        attributes: [].into_iter().collect(),
-        formats: vec![formats::scan_file::ScanFormat::Npz],
-        effects: Effects { noise: Some(noise), ..Effects::default() },
-        variants: vec![Variant::Clean, Variant::Noisy],
-        sets: vec![set("rotational", "vlp32c"), set("static", "generic-static")],
-        packed_points: 1024,
-        min_points: 64,
-        layouts: vec![],
-        returns: Default::default(),
-    }
 }
 
 /// The figures for people.

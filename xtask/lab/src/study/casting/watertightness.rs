@@ -3,17 +3,16 @@
 
 use crate::measure::accuracy::Accuracy;
 use crate::measure::bench_mesh::target;
-use crate::measure::clock::{Costs, Workload, interleave, measured};
+use crate::measure::clock::{Costs, interleave, workload};
 use crate::measure::methods;
 use crate::measure::ray_set::RaySet;
 use crate::measure::scenes::{closed_sphere, edge_midpoints};
-use crate::render::table::{Table, digits, millions_per_s};
+use crate::render::table::{Column, Table, digits, millions_per_s};
 use anyhow::Result;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
-use std::hint::black_box;
 
 /// How rays become ranges.
 type Method = fn(&RaySet) -> Vec<Option<f64>>;
@@ -44,26 +43,15 @@ pub struct Watertightness {
 }
 
 /// Casts rays from within a closed sphere through its vertices and its edges' midpoints.
-///
-/// # Errors
-/// None: no method can fail.
 pub fn measure(rounds: usize) -> Result<Watertightness> {
     let sphere = closed_sphere(5);
     let through = [("at vertices", sphere.vertices.clone()), ("at edges", edge_midpoints(&sphere))];
     let target = target(sphere, Builder::Sah);
     let mut settings = Vec::new();
     for (scene, points) in through {
-        let rays = RaySet::through(&target, &places_within(), &points);
-        let truth = methods::in_f64(&rays);
-        let mut workloads: Vec<Workload<'_>> = Vec::new();
-        for (_, method) in METHODS {
-            let rays = &rays;
-            workloads.push(Box::new(move || {
-                let (ranges, cost) = measured(|| method(rays));
-                black_box(ranges);
-                Ok(cost)
-            }));
-        }
+        let rays = &RaySet::through(&target, &places_within(), &points);
+        let truth = methods::in_f64(rays);
+        let mut workloads = METHODS.map(|(_, method)| workload(move || Ok(method(rays))));
         let costs = interleave(rounds, &mut workloads)?;
         settings.extend(METHODS.iter().zip(costs).map(|((knobs, method), costs)| Setting {
             scene,
@@ -71,7 +59,7 @@ pub fn measure(rounds: usize) -> Result<Watertightness> {
             rays: truth.len(),
             hits: truth.iter().flatten().count(),
             costs,
-            accuracy: Accuracy::of(&method(&rays), &truth),
+            accuracy: Accuracy::of(&method(rays), &truth),
         }));
     }
     Ok(Watertightness { settings })
@@ -89,18 +77,15 @@ fn places_within() -> Vec<DVec3> {
 impl Watertightness {
     /// The figures as a table.
     pub fn table(&self) -> Table {
-        let heading = ["rays", "method", "lost %", "M rays/CPU-s", "worst error m"];
-        let mut table = Table::new("Rays lost at vertices and edges of a closed sphere", &heading);
-        for Setting { scene, knobs, rays, costs, accuracy, .. } in &self.settings {
-            table.push(vec![
-                (*scene).to_owned(),
-                (*knobs).to_owned(),
-                digits(1e-4 * accuracy.misses_per_million()),
-                millions_per_s(*rays, costs.cpu_s().median),
-                digits(accuracy.worst_m),
-            ]);
-        }
-        table
+        let columns: [Column<'_, Setting>; 5] = [
+            ("rays", &|setting| setting.scene.to_owned()),
+            ("method", &|setting| setting.knobs.to_owned()),
+            ("lost %", &|setting| digits(1e-4 * setting.accuracy.misses_per_million())),
+            ("M rays/CPU-s", &|s| millions_per_s(s.rays, s.costs.cpu_s().median)),
+            ("worst error m", &|setting| digits(setting.accuracy.worst_m)),
+        ];
+        let title = "Rays lost at vertices and edges of a closed sphere";
+        Table::of(title, &self.settings, &columns)
     }
 }
 
@@ -110,9 +95,9 @@ mod tests {
 
     #[test]
     fn the_watertight_test_loses_no_ray() {
+        let measured = measure(1).unwrap();
         let misses = |name: &str| {
-            let measured = measure(1).unwrap();
-            let of = measured.settings.into_iter().filter(|setting| setting.knobs.contains(name));
+            let of = measured.settings.iter().filter(|setting| setting.knobs.contains(name));
             of.map(|setting| setting.accuracy.misses).collect::<Vec<_>>()
         };
         assert_eq!(misses("watertight"), [0, 0]);

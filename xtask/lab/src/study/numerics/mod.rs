@@ -17,6 +17,8 @@ use anyhow::Result;
 use clap::Args;
 use formats::atomic;
 
+use crate::measure::clock::Spread;
+use crate::render::table::{Column, Table};
 use xtask::workspace::root;
 
 /// Flags of `bench growth`.
@@ -34,6 +36,31 @@ pub struct GrowthArgs {
     clouds: u32,
 }
 
+/// Half a unit in the last place of f64, relative.
+const U64: f64 = 1.0 / (1u64 << 53) as f64;
+
+/// One value of one parameter, the others being as they are by default.
+#[derive(Clone, Copy)]
+pub struct Setting {
+    /// The parameter: scale, offset, distance, N (points or triangles), K (inputs).
+    pub parameter: &'static str,
+    /// Its value.
+    pub value: f64,
+}
+
+/// Every value of some parameters.
+fn settings(all: &[(&'static str, &[f64])]) -> Vec<Setting> {
+    let values = all.iter().flat_map(|&(name, values)| values.iter().map(move |&v| (name, v)));
+    values.map(|(parameter, value)| Setting { parameter, value }).collect()
+}
+
+impl Setting {
+    /// The value of `parameter`, which is `default` unless the setting is of it.
+    fn of(&self, parameter: &str, default: f64) -> f64 {
+        if self.parameter == parameter { self.value } else { default }
+    }
+}
+
 /// One quantity at one setting.
 pub struct Row {
     /// `range`, `activation` or `logit`.
@@ -42,10 +69,8 @@ pub struct Row {
     pub layer: String,
     /// What it was computed in.
     pub precision: String,
-    /// The parameter: scale, offset, distance, N (points or triangles), K (inputs).
-    pub parameter: &'static str,
-    /// Its value.
-    pub value: f64,
+    /// What it was measured at.
+    pub setting: Setting,
     /// The errors found.
     pub errors: Vec<f64>,
     /// No error may be above this.
@@ -57,26 +82,20 @@ pub struct Row {
 }
 
 impl Row {
-    /// The middle and the largest error.
-    fn summary(&self) -> (f64, f64) {
-        let mut errors = self.errors.clone();
-        errors.sort_by(f64::total_cmp);
-        let middle = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
-        (middle, errors.last().copied().unwrap_or(0.0))
+    /// The middle and the ends of the errors.
+    fn spread(&self) -> Spread {
+        Spread::of(self.errors.iter().copied())
     }
 
     /// Whether there are errors, and none is above the bound; NaN, the last of
     /// all, is.
     fn holds(&self) -> bool {
-        !self.errors.is_empty() && self.summary().1 <= self.bound
+        !self.errors.is_empty() && self.spread().max <= self.bound
     }
 }
 
-/// Measures, writes the CSV, and names the layers for which f16 is not exact enough.
-///
-/// # Errors
-/// A model that cannot be read or has batch norms, a file that cannot be written,
-/// an error above its bound.
+/// Measures, writes the CSV, and names the layers for which f16 is not exact enough. Fails if
+/// an error is above its bound.
 pub fn run(args: &GrowthArgs) -> Result<()> {
     let mut rows = ranges::measure();
     rows.extend(widths::measure()?);
@@ -91,14 +110,14 @@ pub fn run(args: &GrowthArgs) -> Result<()> {
     match over {
         None => Ok(()),
         Some(row) => anyhow::bail!(
-            "{} {} in {} at {} {:e}: error {:e}, above its bound {:e}",
+            "{} {} in {} at {} {:e}: expected errors of at most {:e}, found {:e}",
             row.quantity,
             row.layer,
             row.precision,
-            row.parameter,
-            row.value,
-            row.summary().1,
-            row.bound
+            row.setting.parameter,
+            row.setting.value,
+            row.bound,
+            row.spread().max
         ),
     }
 }
@@ -115,19 +134,18 @@ impl GrowthArgs {
 }
 
 fn csv(rows: &[Row]) -> Result<Vec<u8>> {
-    const HEADING: &str =
-        "quantity,layer,precision,knob,value,median_error,largest_error,bound,unit";
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record(HEADING.split(','))?;
-    for row in rows {
-        let (median, largest) = row.summary();
-        let numbers = [median, largest, row.bound].map(|x| format!("{x:.3e}"));
-        let value = format!("{:e}", row.value);
-        let words = [row.quantity, &row.layer, &row.precision, row.parameter, &value];
-        let words = words.into_iter().chain(numbers.iter().map(String::as_str));
-        csv.write_record(words.chain([row.unit]))?;
-    }
-    Ok(csv.into_inner()?)
+    let columns: [Column<'_, Row>; 9] = [
+        ("quantity", &|row| row.quantity.to_owned()),
+        ("layer", &|row| row.layer.clone()),
+        ("precision", &|row| row.precision.clone()),
+        ("knob", &|row| row.setting.parameter.to_owned()),
+        ("value", &|row| format!("{:e}", row.setting.value)),
+        ("median_error", &|row| format!("{:.3e}", row.spread().median)),
+        ("largest_error", &|row| format!("{:.3e}", row.spread().max)),
+        ("bound", &|row| format!("{:.3e}", row.bound)),
+        ("unit", &|row| row.unit.to_owned()),
+    ];
+    Table::of("", rows, &columns).to_csv()
 }
 
 /// A layer needs more than f16 where f16 overflows, or where its error is above
@@ -135,8 +153,8 @@ fn csv(rows: &[Row]) -> Result<Vec<u8>> {
 /// good as the precision below it.
 fn verdict(rows: &[Row]) -> String {
     const HALF_A_STEP: f64 = 1.0 / 254.0;
-    let in_f16 = |row: &&Row| row.precision.starts_with("f16") && row.parameter != "K";
-    let part = |row: &Row| row.summary().1 / row.magnitude;
+    let in_f16 = |row: &&Row| row.precision.starts_with("f16") && row.setting.parameter != "K";
+    let part = |row: &Row| row.spread().max / row.magnitude;
     let mut needy: Vec<&str> = rows
         .iter()
         .filter(in_f16)
@@ -154,8 +172,8 @@ fn verdict(rows: &[Row]) -> String {
             "no layer needs more than f16; the worst, {}, is off by {:.2e} of its largest value at {} {:e}",
             row.layer,
             part(row),
-            row.parameter,
-            row.value
+            row.setting.parameter,
+            row.setting.value
         )
     })
 }

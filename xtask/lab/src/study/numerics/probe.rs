@@ -10,24 +10,10 @@ use formats::weights::{Tensor, write_weights};
 
 use crate::measure::reference_network::{Chain, Network};
 
-/// A part of a chain.
-#[derive(Clone, Copy)]
-pub enum Part {
-    /// So many of its point-wise layers.
-    Points(usize),
-    /// All of these, and so many vector layers.
-    Vectors(usize),
-}
-
-/// Writes the model that gives what `part` of `chain` does.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write(network: &Network, chain: &Chain, part: Part, path: &Path) -> Result<()> {
-    let (n_convs, n_fcs) = match part {
-        Part::Points(n) => (n, 0),
-        Part::Vectors(n) => (chain.convs.len(), n),
-    };
+/// Writes the model that gives what the first `n_layers` of `chain` do.
+pub fn write(network: &Network, chain: &Chain, n_layers: usize, path: &Path) -> Result<()> {
+    let n_convs = n_layers.min(chain.convs.len());
+    let n_fcs = n_layers - n_convs;
     let mut model = Model { network, tensors: BTreeMap::new(), ranges: BTreeMap::new() };
     for (i, name) in chain.convs[..n_convs].iter().enumerate() {
         model.copy(name, &format!("feat.conv{}", i + 1));

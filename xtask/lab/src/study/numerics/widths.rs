@@ -6,32 +6,23 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
-use formats::weights::Tensor;
 
-use super::Row;
-use super::layers::{measure_chain, of_parameter};
+use super::layers::measure_chain;
+use super::{Row, Setting};
+use crate::measure::baseline::drawn;
 use crate::measure::reference_network::{Chain, Network};
 
 const WIDTHS: [usize; 5] = [16, 64, 256, 1024, 4096];
 const OUTPUTS: usize = 64;
 
 /// Measures a layer of each width behind one of coordinates.
-///
-/// # Errors
-/// If a probe cannot be written.
 pub fn measure() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for k in WIDTHS {
         let network = random(k);
-        let chain = Chain {
-            convs: vec!["feat.conv1".to_owned(), "feat.conv2".to_owned()],
-            fcs: Vec::new(),
-            pooled_relu: false,
-            stn: false,
-            fstn_after: None,
-            edges: false,
-        };
-        let setting = of_parameter("K", k as f64);
+        let convs = vec!["feat.conv1".to_owned(), "feat.conv2".to_owned()];
+        let chain = Chain { convs, ..Chain::default() };
+        let setting = Setting { parameter: "K", value: k as f64 };
         let measured = measure_chain(&network, "random", &chain, false, &[setting], 2)?;
         // The first layer has three inputs whatever the width.
         rows.extend(measured.into_iter().filter(|row| row.layer.ends_with("conv2")));
@@ -44,15 +35,13 @@ pub fn measure() -> Result<Vec<Row>> {
 fn random(k: usize) -> Network {
     let mut tensors = BTreeMap::new();
     for (name, inputs, outputs) in [("feat.conv1", 3, k), ("feat.conv2", k, OUTPUTS)] {
-        let mut add = |part: &str, shape: Vec<usize>, largest: f64| {
+        let mut add = |part: &str, shape: &[usize], largest: f64| {
             let name = format!("{name}.{part}");
             let key = StreamKey::new(0, &name, k as u32);
-            let n = shape.iter().product::<usize>() as u64;
-            let draw = |i| (largest * (2.0 * key.unit(i) - 1.0)) as f32;
-            tensors.insert(name, Tensor { shape, values: (0..n).map(draw).collect() });
+            tensors.insert(name, drawn(key, shape, |unit| largest * (2.0 * unit - 1.0)));
         };
-        add("weight", vec![outputs, inputs], (6.0 / inputs as f64).sqrt());
-        add("bias", vec![outputs], 0.1);
+        add("weight", &[outputs, inputs], (6.0 / inputs as f64).sqrt());
+        add("bias", &[outputs], 0.1);
     }
     // Of weights of at most 1.42 and coordinates of a unit sphere.
     let largest = (1.42 * 3f64.sqrt() + 0.1) as f32;
