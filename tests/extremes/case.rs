@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use libtest_mimic::Trial;
 use serde::Deserialize;
 
-use crate::chain::Chain;
 use crate::classify::Classify;
 use crate::sample::Sample;
 use crate::scan::Scan;
@@ -28,7 +27,6 @@ struct File {
     scan: Option<Scan>,
     classify: Option<Classify>,
     sample: Option<Sample>,
-    chain: Option<Chain>,
     scene: Option<ManyObjects>,
 }
 
@@ -42,15 +40,13 @@ pub fn trials() -> Vec<Trial> {
     for path in files(&root) {
         let place = path.strip_prefix(&root).unwrap_or(&path);
         let name = place.with_extension("").to_string_lossy().replace('\\', "/");
-        let (heavy, test) = match read(&path) {
-            Ok((heavy, check)) => (heavy, Ok(check)),
-            Err(error) => (false, Err(error)),
-        };
+        let test = read(&path);
+        let heavy = test.as_ref().is_ok_and(|(heavy, _)| *heavy);
         let skipped = heavy && !std::env::var(HEAVY).is_ok_and(|value| value == "1");
         if skipped {
             eprintln!("SKIPPED: {name} takes gigabytes or minutes; {HEAVY}=1 runs it");
         }
-        let trial = Trial::test(name, move || Ok(test.map(|check| check())?));
+        let trial = Trial::test(name, move || Ok(test.map(|(_, check)| check())?));
         trials.push(trial.with_ignored_flag(skipped));
     }
     trials
@@ -78,16 +74,15 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     if file.derivation.trim().is_empty() {
         return Err("`derivation` is empty".to_owned());
     }
-    let kinds: [(&str, Option<Check>); 5] = [
+    let kinds: [(&str, Option<Check>); 4] = [
         ("scan", file.scan.map(|case| Box::new(move || case.check()) as Check)),
         ("classify", file.classify.map(|case| Box::new(move || case.check()) as Check)),
         ("sample", file.sample.map(|case| Box::new(move || case.check()) as Check)),
-        ("chain", file.chain.map(|case| Box::new(move || case.check()) as Check)),
         ("scene", file.scene.map(|case| Box::new(move || case.check()) as Check)),
     ];
     let mut named = kinds.into_iter().filter_map(|(kind, check)| Some((kind, check?)));
     let (Some((kind, check)), None) = (named.next(), named.next()) else {
-        return Err("a case is one table: scan, classify, sample, chain or scene".to_owned());
+        return Err("a case is one table: scan, classify, sample or scene".to_owned());
     };
     match path.parent().and_then(Path::file_name) {
         Some(folder) if folder == kind => Ok((file.heavy, check)),
