@@ -157,13 +157,13 @@ fn culling_changes_no_hit() {
 #[test]
 fn both_builders_give_the_same_hits() {
     let pattern = builtin("vlp32c");
-    for caster in casters(&Effects::default()) {
-        for (name, mesh) in surfaces() {
+    for (name, mesh) in surfaces() {
+        let targets = [Builder::Sah, Builder::Morton].map(|builder| target_by(builder, &mesh));
+        for caster in casters(&Effects::default()) {
             for pose in &poses() {
-                let [sah, morton] = [Builder::Sah, Builder::Morton].map(|builder| {
-                    let target = target_by(builder, &mesh);
-                    hits(caster, &job(&target, pose, &pattern), &pattern)
-                });
+                let [sah, morton] = targets
+                    .each_ref()
+                    .map(|target| hits(caster, &job(target, pose, &pattern), &pattern));
                 assert_eq!(sah.hits, morton.hits, "{name}, {}", caster.name());
             }
         }

@@ -41,12 +41,6 @@ impl Folder {
         self.succeeds(&words(checkpoint, flags));
         read(&self.at("m.safetensors"))
     }
-
-    /// Expects that the file `c.pth` is refused for this cause.
-    fn refuses_checkpoint(&self, cause: &str) {
-        let said = self.exits(1, &words(Path::new("c.pth"), ""));
-        assert!(said.starts_with("error: c.pth: ") && said.contains(cause), "{cause} in {said}");
-    }
 }
 
 #[test]
@@ -164,7 +158,8 @@ fn a_file_that_is_no_checkpoint_is_refused_and_the_old_output_stays() {
         (&legacy[..legacy.len() - 1], "extends beyond the end of the file"),
     ] {
         folder.write("c.pth", content);
-        folder.refuses_checkpoint(cause);
+        let said = folder.exits(1, &words(Path::new("c.pth"), ""));
+        assert!(said.starts_with("error: c.pth: ") && said.contains(cause), "{cause} in {said}");
     }
     let said = folder.exits(1, &words(Path::new("absent.pth"), ""));
     assert!(said.contains("absent.pth: ") && said.contains("No such file"), "{said}");
@@ -208,7 +203,8 @@ fn weights_that_make_no_model_are_named() {
         let mut tensors = good.clone();
         change(&mut tensors);
         checkpoints::write(&folder.at("c.pth"), &tensors);
-        folder.refuses_checkpoint(&format!("error: c.pth: {cause}"));
+        let message = format!("error: c.pth: {cause}");
+        folder.refuses(1, &[(&words(Path::new("c.pth"), ""), &message)]);
     }
 }
 

@@ -39,8 +39,6 @@ pub const MOST_AMBIGUOUS: f64 = 0.02;
 /// How a caster's hits compare with the oracle's.
 #[derive(Clone, Debug, Default)]
 pub struct Verdict {
-    /// Beams compared, whether or not they were cast.
-    beams: usize,
     /// Rays that the caster left to f64.
     pub decided_in_f64: usize,
     /// Hits of the oracle.
@@ -72,7 +70,9 @@ pub fn judge(job: &CastJob, pattern: &BeamPattern, hits: &Hits) -> Verdict {
         .enumerate()
         .map(|(beam, hit)| {
             let ray = job.frame.beam(pattern, beam as u32);
-            judge_beam(&job.target, &ray, *hit).named(beam)
+            let mut verdict = judge_beam(&job.target, &ray, *hit);
+            verdict.broken.iter_mut().for_each(|broken| *broken = format!("beam {beam}: {broken}"));
+            verdict
         })
         .reduce(Verdict::default, Verdict::and);
     Verdict { decided_in_f64: hits.decided_in_f64, ..verdict }
@@ -98,7 +98,7 @@ pub fn assert_promise(
 
 fn judge_beam(target: &Target, ray: &Ray, found: Option<&Hit>) -> Verdict {
     let truth = oracle::nearest(target, ray);
-    let mut verdict = Verdict { beams: 1, hits: truth.iter().count(), ..Verdict::default() };
+    let mut verdict = Verdict { hits: truth.iter().count(), ..Verdict::default() };
     let differs = match (truth, found) {
         (None, None) => return verdict,
         (Some(truth), Some(found)) => {
@@ -166,14 +166,8 @@ fn jumps(target: &Target, ray: &Ray, truth: Option<Crossing>, beside: &Ray) -> b
 }
 
 impl Verdict {
-    fn named(mut self, beam: usize) -> Self {
-        self.broken.iter_mut().for_each(|broken| *broken = format!("beam {beam}: {broken}"));
-        self
-    }
-
     /// Both together.
     pub fn and(mut self, mut other: Self) -> Self {
-        self.beams += other.beams;
         self.decided_in_f64 += other.decided_in_f64;
         self.hits += other.hits;
         self.worst = self.worst.max(other.worst);
@@ -193,9 +187,8 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} beams, {} hits, {} decided in f64, worst range error {:.1e}, {} differ at \
+            "{} hits, {} decided in f64, worst range error {:.1e}, {} differ at \
              silhouettes, {} broken",
-            self.beams,
             self.hits,
             self.decided_in_f64,
             self.worst,
