@@ -5,9 +5,10 @@
 @group(0) @binding(1) var<storage, read> triangles: array<LeafTriangle>;
 @group(0) @binding(2) var<storage, read> rays: array<TraceRay>;
 @group(0) @binding(3) var<storage, read_write> codes: array<u32>;
-// Buffers are used again by batches of other sizes: their lengths do not tell
-// how many rays there are.
-@group(0) @binding(4) var<uniform> ray_count: u32;
+// Buffers are used again by batches of other sizes, so their lengths do not tell
+// how many rays there are. This number comes with each dispatch, so that the
+// bindings stay as they are.
+var<immediate> ray_count: u32;
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(

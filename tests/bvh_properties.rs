@@ -3,15 +3,13 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use sim_gpu::bvh::{Builder, Bvh, LeafTriangle, assert_well_formed};
-use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
 use sim_gpu::target::Target;
-use tests::casting::{beams, hits, job, target_by};
+use tests::casting::{at, beams, hits, job, target_by, tree_bytes};
 use tests::judge::judge;
+use tests::meshes::unconnected;
 use tests::random::Random;
 
 const BUILDERS: [Builder; 2] = [Builder::Sah, Builder::Morton];
@@ -46,11 +44,6 @@ fn soups() -> impl Strategy<Value = Vec<[DVec3; 3]>> {
 
 fn rounded(soup: &[[DVec3; 3]]) -> Vec<Corners> {
     soup.iter().map(|t| t.map(|v| v.as_vec3().to_array())).collect()
-}
-
-fn mesh(soup: &[[DVec3; 3]]) -> Mesh {
-    let triangles = (0..soup.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    Mesh { vertices: soup.iter().flatten().copied().collect(), triangles }
 }
 
 /// The triangles of a tree, as sets of corners with their index.
@@ -95,15 +88,14 @@ proptest! {
 
     #[test]
     fn a_tree_hides_no_hit(soup in soups(), seed in 0..1000u32) {
-        let mesh = mesh(&soup);
+        let mesh = unconnected(soup.into_iter().flatten().collect());
         let mut random = Random::new(&format!("brute force {seed}"));
         let sensor = random.in_cube() * 2.0;
         let pattern = beams((0..64).map(|_| random.in_cube() * 0.7 - sensor));
-        let cpu = Caster::open(&AdapterRequest::Cpu, &Effects::default()).unwrap();
-        let pose = Pose { position_m: sensor, world_from_sensor: glam::DQuat::IDENTITY };
+        let cpu = Caster::Cpu(Effects::default());
         for builder in BUILDERS {
             let target = target_by(builder, &mesh);
-            let job = job(&target, &pose, &pattern);
+            let job = job(&target, &at(sensor), &pattern);
             // One triangle is a tree of its own: no box of others can hide it.
             let alone: Vec<_> = target.bvh.triangles.iter().map(|t| one_of(&target, t)).collect();
             for &direction in &pattern.directions {
@@ -162,20 +154,12 @@ fn shrinking_triangles_make_no_deep_tree() {
 #[test]
 fn a_tree_is_the_same_on_every_run_and_number_of_threads() {
     let mesh = tests::meshes::torus(160);
-    let build = |threads: usize, builder| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| target_by(builder, &mesh).bvh.clone())
-    };
     for builder in BUILDERS {
-        let (one, four) = (build(1, builder), build(4, builder));
-        assert_eq!(
-            bytemuck::cast_slice::<_, u8>(&one.nodes),
-            bytemuck::cast_slice::<_, u8>(&four.nodes)
-        );
-        assert_eq!(
-            bytemuck::cast_slice::<_, u8>(&one.triangles),
-            bytemuck::cast_slice::<_, u8>(&four.triangles)
-        );
+        let [one, four] = [1, 4].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| target_by(builder, &mesh).bvh)
+        });
+        assert!(tree_bytes(&one) == tree_bytes(&four), "{builder:?}");
         assert_well_formed(&one);
     }
 }

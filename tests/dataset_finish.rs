@@ -13,9 +13,8 @@ use formats::labelled::read_labelled;
 use sim_gpu::sensor::{Sensor, builtin_names};
 use std::fs;
 use std::path::Path;
-use tests::written_dataset::{
-    MIN_POINTS, PACKED_POINTS, config, entry, failure, files, terms, write,
-};
+use tests::tree::files;
+use tests::written_dataset::{MIN_POINTS, PACKED_POINTS, config, entry, failure, terms, write};
 
 /// Eleven meshes of two classes, one name in both splits.
 fn entries() -> Vec<Entry> {
@@ -58,6 +57,8 @@ fn a_finished_dataset_is_what_its_manifest_says() {
     let left_out: usize = manifest.packed.iter().map(|packed| packed.left_out.len()).sum();
     assert_eq!(report.clouds + left_out as u64, 66);
 
+    assert!(left_out > 0, "the datasets of this test hold small scans");
+
     fs::write(out.join("notes.txt"), "mine").unwrap();
     assert!(verify(out).unwrap().is_sound(), "beside the manifest files are the user's");
 
@@ -65,13 +66,24 @@ fn a_finished_dataset_is_what_its_manifest_says() {
     let first =
         r#"{"class":"bowl","split":"train","name":"bowl_2","source":"bowl/train/bowl_2.off","#;
     assert!(lines.starts_with(first) && lines.lines().count() == 2, "{lines}");
+
+    // The rotating sensor stands at the same places for every mesh; the camera's
+    // places are jittered.
+    let config = config();
+    let Poses::EveryMesh(poses) = &manifest.poses[0].poses else { panic!("not jittered") };
+    assert_eq!(*poses, config.sets[0].poses(config.seed, "any"));
+    let Poses::EachMesh(meshes) = &manifest.poses[1].poses else { panic!("jittered") };
+    // Eleven meshes, of which cup/cup_1 is in both splits.
+    assert_eq!(meshes.len(), 10);
+    for mesh in meshes {
+        assert_eq!(mesh.poses, config.sets[1].poses(config.seed, &mesh.id));
+    }
 }
 
 #[test]
 fn packed_sets_hold_all_scans_of_enough_points() {
     let folder = tempfile::tempdir().unwrap();
     let manifest = make(folder.path());
-    let mut all_left_out = 0;
     // Two sets, two variants, two splits.
     assert_eq!(manifest.packed.len(), 8);
     for packed in &manifest.packed {
@@ -82,7 +94,6 @@ fn packed_sets_hold_all_scans_of_enough_points() {
         assert_eq!(classes[..], ["bowl", "chair", "cup"]);
         assert!(set.n_raw.as_ref().unwrap().iter().all(|&n| n >= MIN_POINTS));
         assert!(packed.left_out.iter().all(|scan| scan.points < MIN_POINTS.into()));
-        all_left_out += packed.left_out.len();
         for (name, &label) in names.iter().zip(&set.labels) {
             let class = &classes[label];
             assert!(name.starts_with(&format!("{class}/")), "{name}: {class}");
@@ -96,7 +107,6 @@ fn packed_sets_hold_all_scans_of_enough_points() {
             assert!((largest - 1.0).abs() <= f32::EPSILON, "{largest}");
         }
     }
-    assert!(all_left_out > 0, "the datasets of this test hold small scans");
 }
 
 #[test]
@@ -190,25 +200,20 @@ fn what_was_done_to_a_dataset_is_named() {
 }
 
 #[test]
-fn a_manifest_that_miscounts_is_found_out() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path();
-    let mut manifest = make(out);
-    let points = &mut manifest.meshes[0].scans[0].variants[0].tally.points;
-    *points += 1;
-    let expected = format!("holds {} points, not {} as recorded", *points - 1, points);
-    manifest.write(&layout::manifest(out)).unwrap();
-    let problems = verify(out).unwrap().problems;
-    assert!(problems.iter().all(|problem| problem.what == expected), "{problems:?}");
-    assert_eq!(problems.len(), 3, "one for each format");
-}
-
-#[test]
-fn what_is_no_finished_dataset_is_an_error() {
+fn what_is_no_finished_dataset_is_found_out() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     assert!(matches!(verify(out), Err(DatasetError::NoManifest { .. })));
     let manifest = make(out);
+    let mut miscounting = manifest.clone();
+    let points = &mut miscounting.meshes[0].scans[0].variants[0].tally.points;
+    *points += 1;
+    let expected = format!("holds {} points, not {} as recorded", *points - 1, points);
+    miscounting.write(&layout::manifest(out)).unwrap();
+    let problems = verify(out).unwrap().problems;
+    assert!(problems.iter().all(|problem| problem.what == expected), "{problems:?}");
+    assert_eq!(problems.len(), 3, "one for each format");
+
     let refused = |change: &dyn Fn(&mut Manifest)| {
         let mut changed = manifest.clone();
         change(&mut changed);
@@ -218,25 +223,12 @@ fn what_is_no_finished_dataset_is_an_error() {
     let message = refused(&|manifest| manifest.tool = "other".to_owned());
     assert!(message.ends_with("made by `other`, not by `edgepuck`"), "{message}");
     for name in ["..", "a/b", "/etc", r"a\b", ""] {
-        let message = refused(&|manifest| manifest.meshes[0].entry.name = name.to_owned());
-        assert!(message.ends_with("is no name of a file or folder"), "{message}");
-        let message = refused(&|manifest| manifest.config.sets[1].name = name.to_owned());
-        assert!(message.ends_with("is no name of a file or folder"), "{message}");
-    }
-}
-
-#[test]
-fn poses_are_in_full_once_where_they_are_equal() {
-    let folder = tempfile::tempdir().unwrap();
-    let manifest = make(folder.path());
-    let config = config();
-    let Poses::EveryMesh(poses) = &manifest.poses[0].poses else { panic!("not jittered") };
-    assert_eq!(*poses, config.sets[0].poses(config.seed, "any"));
-    let Poses::EachMesh(meshes) = &manifest.poses[1].poses else { panic!("jittered") };
-    // Eleven meshes, of which cup/cup_1 is in both splits.
-    assert_eq!(meshes.len(), 10);
-    for mesh in meshes {
-        assert_eq!(mesh.poses, config.sets[1].poses(config.seed, &mesh.id));
+        for message in [
+            refused(&|manifest| manifest.meshes[0].entry.name = name.to_owned()),
+            refused(&|manifest| manifest.config.sets[1].name = name.to_owned()),
+        ] {
+            assert!(message.ends_with("is no name of a file or folder"), "{message}");
+        }
     }
 }
 

@@ -9,7 +9,8 @@ use edgepuck_dataset::{DatasetError, MeshFailure, layout};
 use formats::Split::{Test, Train};
 use std::fs;
 use std::path::{Path, PathBuf};
-use tests::written_dataset::{config, entry, failure, files, terms, write};
+use tests::tree::{assert_same, files};
+use tests::written_dataset::{config, entry, failure, terms, write};
 
 fn entries() -> Vec<Entry> {
     let split = |i| if i % 4 == 0 { Test } else { Train };
@@ -50,11 +51,7 @@ fn merged_shards_are_one_run_byte_for_byte() {
     let reversed: Vec<_> = shards.iter().rev().cloned().collect();
     let manifest = merge(&reversed, &merged).unwrap();
     assert_eq!(manifest.shard, None);
-    let (merged_files, whole_files) = (files(&merged), files(&whole));
-    assert!(merged_files.keys().eq(whole_files.keys()));
-    for (path, bytes) in &whole_files {
-        assert!(merged_files[path] == *bytes, "{}", path.display());
-    }
+    assert_same(&whole, &merged);
     assert!(verify(&merged).unwrap().is_sound());
     let after: Vec<_> = shards.iter().map(|shard| files(shard)).collect();
     assert!(before == after, "shards stay as they were");

@@ -3,17 +3,18 @@
 //! `shaders/shared/{stream,normal_deviate}.wgsl` and `sim-gpu/src/cpu/effects.rs`.
 
 use formats::rng::StreamKey;
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
+use sim_gpu::caster::Caster;
 use sim_gpu::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
-use sim_gpu::job::{Cast, CastJob, Culling};
+use sim_gpu::job::{Cast, CastJob};
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::{AMBIGUOUS, MISS, RayFrame};
+use sim_gpu::ray::{AMBIGUOUS, MISS};
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
 use test_support::need;
 use tests::adapter::{adapter, casters};
-use tests::casting::{at, beams, builtin, hits_with, job, target};
+use tests::casting::{at, beams, builtin, cast, hits, job, target};
 use tests::meshes::{cube, icosphere, soup, torus};
 use tests::random::Random;
 
@@ -32,6 +33,10 @@ fn noise(model: NoiseModel, mean_m: f64, sigma_m: f64) -> Noise {
     Noise { mean_m, sigma_m, model }
 }
 
+fn noisy(noise: Noise) -> Effects {
+    Effects { noise: Some(noise), ..Effects::default() }
+}
+
 /// Mean and sigma in f32, their product and their sum: 2^-24 each.
 fn noise_tolerance(noise: &Noise) -> f64 {
     let largest = noise.mean_m.abs() + 7.0 * noise.sigma_m;
@@ -40,60 +45,47 @@ fn noise_tolerance(noise: &Noise) -> f64 {
 
 /// A job of which every ray hits: a sensor in a cube.
 fn all_hit(stream: StreamKey, pattern: &BeamPattern) -> CastJob {
-    let target = target(&cube());
-    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &at(DVec3::new(0.1, 0.2, 0.3)));
-    CastJob::aim(target, frame, pattern, Culling::On, stream, 0.5)
+    CastJob { stream, ..job(&target(&cube()), &at(DVec3::new(0.1, 0.2, 0.3)), pattern) }
 }
 
-fn streams() -> Vec<StreamKey> {
+/// What `caster` answers for jobs of several streams, in all of which every ray hits.
+fn cast_all_hit(caster: &Caster) -> Vec<(CastJob, Cast)> {
+    let pattern = builtin("vlp32c");
     let names = ["", "chair_0001", "chair_0002"];
-    let key = |(i, name): (usize, &&str)| StreamKey::new(i as u64 * 0x1_0000_0001, name, i as u32);
-    names.iter().enumerate().map(key).collect()
-}
-
-fn cast_all_hit(caster: &sim_gpu::caster::Caster, job: &CastJob) -> Cast {
-    let mut casts = caster.cast(std::slice::from_ref(job)).expect("the adapter casts");
-    let cast = casts.remove(0);
-    assert!(cast.codes.iter().all(|&code| code != MISS));
-    cast
+    let answer = |(i, name)| {
+        let job = all_hit(StreamKey::new(u64::from(i) * 0x1_0000_0001, name, i), &pattern);
+        let cast = cast(caster, &job);
+        assert!(cast.codes.iter().all(|&code| code != MISS));
+        (job, cast)
+    };
+    (0..).zip(names).map(answer).collect()
 }
 
 #[test]
-fn range_noise_is_the_twins() {
-    let pattern = builtin("vlp32c");
+fn noise_is_its_counterparts() {
     for noise in [
         noise(NoiseModel::Range, 0.0, 1.0),
         noise(NoiseModel::Range, 0.0, 0.0),
         noise(NoiseModel::Range, 0.0, 1e-6),
         noise(NoiseModel::Range, -0.3, 0.01),
         noise(NoiseModel::Range, 5.0, 1e3),
+        noise(NoiseModel::Xyz, 0.0, 1.0),
+        noise(NoiseModel::Xyz, 0.25, 0.02),
     ] {
-        let effects = Effects { noise: Some(noise), ..Effects::default() };
+        let effects = noisy(noise);
         let gpu = need!(adapter(&effects));
-        for stream in streams() {
-            let job = all_hit(stream, &pattern);
-            let cast = cast_all_hit(gpu, &job);
-            for (&beam, &word) in job.beams.iter().zip(&cast.effect_outputs) {
-                let error = (f64::from(word) - noise_range(&noise, stream, beam)).abs();
-                assert!(error <= noise_tolerance(&noise), "beam {beam}: {error:.2e} of {noise:?}");
-            }
-        }
-    }
-}
-
-#[test]
-fn point_noise_is_the_twins() {
-    let pattern = builtin("vlp32c");
-    for noise in [noise(NoiseModel::Xyz, 0.0, 1.0), noise(NoiseModel::Xyz, 0.25, 0.02)] {
-        let effects = Effects { noise: Some(noise), ..Effects::default() };
-        let gpu = need!(adapter(&effects));
-        for stream in streams() {
-            let job = all_hit(stream, &pattern);
-            let cast = cast_all_hit(gpu, &job);
-            for (&beam, word) in job.beams.iter().zip(cast.effect_outputs.chunks_exact(3)) {
-                let word = DVec3::new(word[0].into(), word[1].into(), word[2].into());
-                let error = (word - noise_xyz(&noise, stream, beam)).abs().max_element();
-                assert!(error <= noise_tolerance(&noise), "beam {beam}: {error:.2e} of {noise:?}");
+        for (job, cast) in cast_all_hit(gpu) {
+            let outputs = cast.effect_outputs.chunks_exact(effects.outputs_per_ray());
+            for (&beam, outputs) in job.beams.iter().zip(outputs) {
+                let expected = match noise.model {
+                    NoiseModel::Range => vec![noise_range(&noise, job.stream, beam)],
+                    NoiseModel::Xyz => noise_xyz(&noise, job.stream, beam).to_array().to_vec(),
+                };
+                for (&output, expected) in outputs.iter().zip(expected) {
+                    let error = (f64::from(output) - expected).abs();
+                    let is_near = error <= noise_tolerance(&noise);
+                    assert!(is_near, "beam {beam}: {error:.2e} of {noise:?}");
+                }
             }
         }
     }
@@ -101,17 +93,14 @@ fn point_noise_is_the_twins() {
 
 #[test]
 fn the_same_returns_drop_out_everywhere() {
-    let pattern = builtin("vlp32c");
     for probability in [0.0, 1e-4, 0.05, 1.0 / 3.0, 0.999, 1.0] {
         let model = Dropout { probability };
         let effects = Effects { dropout: Some(model), ..Effects::default() };
         for caster in casters(&effects) {
-            for stream in streams() {
-                let job = all_hit(stream, &pattern);
-                let cast = cast_all_hit(caster, &job);
+            for (job, cast) in cast_all_hit(caster) {
                 let mut dropped = 0;
                 for (&beam, &word) in job.beams.iter().zip(&cast.effect_outputs) {
-                    assert_eq!(word == 1.0, dropout(&model, stream, beam), "beam {beam}");
+                    assert_eq!(word == 1.0, dropout(&model, job.stream, beam), "beam {beam}");
                     assert!(word == 0.0 || word == 1.0);
                     dropped += usize::from(word == 1.0);
                 }
@@ -143,14 +132,10 @@ fn intensity_is_the_twins() {
             let target: Target = target(&mesh);
             let pose = Pose::look_at(DVec3::new(2.5, 1.0, 0.7), DVec3::ZERO).unwrap();
             let job = job(&target, &pose, &pattern);
-            let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
+            let cast = cast(caster, &job);
             let mut n = 0;
-            for ((&code, &beam), &word) in
-                casts[0].codes.iter().zip(&job.beams).zip(&casts[0].effect_outputs)
-            {
-                if code == MISS {
-                    continue;
-                }
+            let answers = cast.codes.iter().zip(&job.beams).zip(&cast.effect_outputs);
+            for ((&code, &beam), &word) in answers.filter(|((code, _), _)| **code != MISS) {
                 let triangle = code & !AMBIGUOUS;
                 let ray = job.frame.ray(pattern.directions[beam as usize]);
                 let truth = intensity(&target, &ray, triangle, 0.75);
@@ -176,7 +161,7 @@ fn the_outputs_of_all_effects_stand_side_by_side() {
         quantum: None,
     };
     let singles = [
-        Effects { noise: Some(noise), ..Effects::default() },
+        noisy(noise),
         Effects { dropout: Some(dropout), ..Effects::default() },
         Effects { intensity: Some(Intensity), ..Effects::default() },
     ];
@@ -184,10 +169,7 @@ fn the_outputs_of_all_effects_stand_side_by_side() {
     let pattern = beams((0..5000).map(|_| random.direction()));
     let on = |effects: &Effects| -> Vec<Vec<f32>> {
         let job = all_hit(StreamKey::new(3, "x", 1), &pattern);
-        casters(effects)
-            .iter()
-            .map(|caster| hits_with(caster, &job, &pattern, effects).effect_outputs)
-            .collect()
+        casters(effects).iter().map(|caster| hits(caster, &job, &pattern).effect_outputs).collect()
     };
     let together = on(&all);
     let [noises, dropouts, intensities] = singles.map(|effects| on(&effects));

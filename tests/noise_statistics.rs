@@ -10,11 +10,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::cpu::random::{normal_deviate, random_bits};
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
-use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::ray::RayFrame;
 use test_support::need;
 use tests::adapter::adapter;
-use tests::casting::{at, beams, target};
+use tests::casting::{at, beams, cast, job, target};
 use tests::meshes::cube;
 use tests::random::Random;
 
@@ -193,13 +191,10 @@ fn a_million_deviates_of_the_adapter_are_normal() {
     let gpu = need!(adapter(&effects));
     let mut random = Random::new("directions");
     let pattern = beams((0..1_000_000).map(|_| random.direction()));
-    let target = target(&cube());
-    let pose = at(DVec3::new(0.1, 0.2, 0.3));
-    let frame = RayFrame::new(&target.surface, &glam::DAffine3::IDENTITY, &pose);
-    let stream = StreamKey::new(1, "chair_0001", 2);
-    let job = CastJob::aim(target, frame, &pattern, Culling::On, stream, 1.0);
-    let casts = gpu.cast(std::slice::from_ref(&job)).unwrap();
-    let mut deviates: Vec<f64> = casts[0].effect_outputs.iter().map(|&word| word.into()).collect();
+    let mut job = job(&target(&cube()), &at(DVec3::new(0.1, 0.2, 0.3)), &pattern);
+    job.stream = StreamKey::new(1, "chair_0001", 2);
+    let outputs = cast(gpu, &job).effect_outputs;
+    let mut deviates: Vec<f64> = outputs.into_iter().map(f64::from).collect();
     assert_eq!(deviates.len(), 1_000_000);
     assert_normal(&mut deviates);
 }

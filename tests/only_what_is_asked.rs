@@ -2,7 +2,7 @@
 //! for adds to the shader, to the bytes that travel per ray and to the bytes of
 //! a point on disk, against a table.
 //!
-//! `UPDATE_GOLDEN=1 cargo test -p tests --test only_what_is_asked` rewrites
+//! `UPDATE_GOLDEN=1 cargo test -p tests --test suite only_what_is_asked` rewrites
 //! `golden/only_what_is_asked.toml` after a change that is meant. What else
 //! than its own a thing may change stands here, in [`Asked::own`], and is not
 //! rewritten.
@@ -19,6 +19,7 @@ mod travel;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use formats::scan::{Attribute, AttributeSet};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
@@ -35,15 +36,18 @@ const PLAIN: &str = "plain";
 /// One thing that a scene may ask for.
 struct Asked {
     name: &'static str,
+    /// The effects that are there without it.
+    without: Effects,
+    /// The effects that are there with it.
     effects: Effects,
     attributes: AttributeSet,
     /// Beginnings of the rows that it may change.
-    own: &'static [&'static str],
+    own: Vec<&'static str>,
 }
 
 /// The rows that every effect with a module of its own changes: the function
 /// that calls modules, what they answer, the constants that they are set by.
-const MODULES: [&str; 5] = [
+const MODULE: &[&str] = &[
     "shader, function finish",
     "shader, group 1 binding 0: effect_outputs",
     "shader, bind groups",
@@ -52,7 +56,7 @@ const MODULES: [&str; 5] = [
 ];
 
 /// And those of every effect that draws random numbers.
-const RANDOM: [&str; 5] = [
+const RANDOM: &[&str] = &[
     "shader, group 1 binding 1: streams",
     "shader, function random_bits",
     "shader, function philox",
@@ -60,64 +64,65 @@ const RANDOM: [&str; 5] = [
     "ray, bytes of streams sent",
 ];
 
+/// And those of every noise.
+const NOISE: &[&str] = &["shader, function normal_deviate", "shader, constant noise_"];
+
 fn asked() -> Vec<Asked> {
-    let noise = |model| Noise { mean_m: 0.0, sigma_m: 0.01, model };
-    let effect = |name, effects, own| Asked { name, effects, attributes: AttributeSet::new(), own };
-    let mut asked = vec![
-        effect(
+    let plain = Effects::default;
+    let noise = |model| Some(Noise { mean_m: 0.0, sigma_m: 0.01, model });
+    let dropout = Some(Dropout { probability: 0.1 });
+    let quantum = Some(Quantum { step_m: Some(0.004) });
+    let effects: [(_, _, &[&[&str]]); 5] = [
+        (
             "noise along the ray",
-            Effects { noise: Some(noise(NoiseModel::Range)), ..Effects::default() },
-            &["module", "random", "shader, function noise_range", NORMAL_DEVIATE, NOISE] as &[_],
+            Effects { noise: noise(NoiseModel::Range), ..plain() },
+            &[MODULE, RANDOM, NOISE, &["shader, function noise_range"]],
         ),
-        effect(
+        (
             "noise of each coordinate",
-            Effects { noise: Some(noise(NoiseModel::Xyz)), ..Effects::default() },
-            &["module", "random", "shader, function noise_xyz", NORMAL_DEVIATE, NOISE],
+            Effects { noise: noise(NoiseModel::Xyz), ..plain() },
+            &[MODULE, RANDOM, NOISE, &["shader, function noise_xyz"]],
         ),
-        effect(
+        (
             "dropout",
-            Effects { dropout: Some(Dropout { probability: 0.1 }), ..Effects::default() },
-            &["module", "random", "shader, function dropout", "shader, constant dropout_"],
+            Effects { dropout, ..plain() },
+            &[MODULE, RANDOM, &["shader, function dropout", "shader, constant dropout_"]],
         ),
-        effect(
-            "quantum",
-            Effects { quantum: Some(Quantum { step_m: Some(0.004) }), ..Effects::default() },
-            &[],
-        ),
-        effect(
+        ("quantum", Effects { quantum, ..plain() }, &[]),
+        (
             "intensity effect",
-            Effects { intensity: Some(Intensity), ..Effects::default() },
+            with_intensity(),
             &[
-                "module",
-                "shader, function intensity",
-                "shader, group 1 binding 2: reflectivities",
-                "ray, bytes of reflectivities sent",
+                MODULE,
+                &[
+                    "shader, function intensity",
+                    "shader, group 1 binding 2: reflectivities",
+                    "ray, bytes of reflectivities sent",
+                ],
             ],
         ),
     ];
-    // Intensity is there only where its effect is: its own column is asked
-    // for, and what it adds to the effect's rows is the file's alone.
-    let stored = Attribute::ALL.into_iter().filter(|&a| a != Attribute::Intensity);
-    asked.extend(stored.map(|attribute| Asked {
-        name: attribute.name(),
-        effects: Effects::default(),
-        attributes: [attribute].into(),
-        own: &["point, "],
-    }));
-    asked
+    let asked = effects.into_iter().map(|(name, effects, own)| {
+        let attributes = AttributeSet::new();
+        Asked { name, without: plain(), effects, attributes, own: own.concat() }
+    });
+    // Intensity is there only where its effect is: what its column adds to the
+    // effect's rows is the file's alone.
+    let stored = Attribute::ALL.into_iter().map(|attribute| {
+        let needed = if attribute == Attribute::Intensity { with_intensity() } else { plain() };
+        Asked {
+            name: attribute.name(),
+            without: needed.clone(),
+            effects: needed,
+            attributes: [attribute].into(),
+            own: vec!["point, "],
+        }
+    });
+    asked.chain(stored).collect()
 }
 
-const NORMAL_DEVIATE: &str = "shader, function normal_deviate";
-const NOISE: &str = "shader, constant noise_";
-
-impl Asked {
-    fn owns(&self, row: &str) -> bool {
-        self.own.iter().any(|own| match *own {
-            "module" => MODULES.iter().any(|module| row.starts_with(module)),
-            "random" => RANDOM.iter().any(|random| row.starts_with(random)),
-            own => row.starts_with(own),
-        })
-    }
+fn with_intensity() -> Effects {
+    Effects { intensity: Some(Intensity), ..Effects::default() }
 }
 
 fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
@@ -139,20 +144,18 @@ fn difference(plain: &Rows, other: &Rows) -> Rows {
     differ
 }
 
-fn measured() -> Table {
-    let plain = rows(&Effects::default(), &AttributeSet::new());
-    let mut table = Table::new();
-    for asked in asked() {
-        let differ = difference(&plain, &rows(&asked.effects, &asked.attributes));
-        table.insert(asked.name.to_owned(), differ);
-    }
-    let with_intensity = Effects { intensity: Some(Intensity), ..Effects::default() };
-    let without = rows(&with_intensity, &AttributeSet::new());
-    let stored = rows(&with_intensity, &[Attribute::Intensity].into());
-    table.insert(Attribute::Intensity.name().to_owned(), difference(&without, &stored));
-    table.insert(PLAIN.to_owned(), plain);
+/// What was measured, once for all tests.
+static MEASURED: LazyLock<Table> = LazyLock::new(|| {
+    let none = AttributeSet::new();
+    let cost = |asked: Asked| {
+        let without = rows(&asked.without, &none);
+        let differ = difference(&without, &rows(&asked.effects, &asked.attributes));
+        (asked.name.to_owned(), differ)
+    };
+    let mut table: Table = asked().into_iter().map(cost).collect();
+    table.insert(PLAIN.to_owned(), rows(&Effects::default(), &none));
     table
-}
+});
 
 fn golden() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/only_what_is_asked.toml")
@@ -160,38 +163,26 @@ fn golden() -> PathBuf {
 
 #[test]
 fn costs_are_those_of_the_table() {
-    let measured = measured();
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         let heading = "# What a scan costs and what each thing asked for adds to it. Written by \
                        `UPDATE_GOLDEN=1 cargo test -p tests --test only_what_is_asked`.\n\n";
-        fs::write(golden(), heading.to_owned() + &toml::to_string(&measured).unwrap()).unwrap();
+        fs::write(golden(), heading.to_owned() + &toml::to_string(&*MEASURED).unwrap()).unwrap();
     }
     let expected: Table = toml::from_str(&fs::read_to_string(golden()).unwrap()).unwrap();
     for (name, rows) in &expected {
-        assert_eq!(measured.get(name), Some(rows), "{name}; if that is meant, UPDATE_GOLDEN=1");
+        assert_eq!(MEASURED.get(name), Some(rows), "{name}; if that is meant, UPDATE_GOLDEN=1");
     }
-    assert_eq!(measured.len(), expected.len(), "the table holds all that can be asked for");
+    assert_eq!(MEASURED.len(), expected.len(), "the table holds all that can be asked for");
 }
 
 #[test]
-fn each_thing_asked_for_changes_its_own_rows_only() {
-    let measured = measured();
-    for asked in asked() {
-        for row in measured[asked.name].keys() {
-            assert!(asked.owns(row), "{} changes {row:?}", asked.name);
-        }
-    }
-    let stored = &measured[Attribute::Intensity.name()];
-    assert!(stored.keys().all(|row| row.starts_with("point, ")), "{stored:?}");
-}
-
-#[test]
-fn a_plain_scene_pays_for_no_effect() {
-    let plain = rows(&Effects::default(), &AttributeSet::new());
-    for asked in asked().iter().filter(|asked| asked.attributes.is_empty()) {
-        let with_it = rows(&asked.effects, &AttributeSet::new());
-        for (row, cost) in difference(&with_it, &plain) {
-            assert!(cost < *with_it.get(&row).unwrap_or(&0), "{}: {row:?}", asked.name);
+fn each_thing_asked_for_changes_its_own_rows_only_and_adds_to_them() {
+    let plain = &MEASURED[PLAIN];
+    for Asked { name, own, .. } in asked() {
+        for (row, cost) in &MEASURED[name] {
+            assert!(own.iter().any(|own| row.starts_with(own)), "{name} changes {row:?}");
+            let least = plain.get(row).unwrap_or(&0);
+            assert!(cost > least, "{name}: {row:?} costs {cost}, of a plain scene {least}");
         }
     }
     assert_eq!(plain["shader, bind groups"], 1);

@@ -8,15 +8,13 @@ use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use formats::vlp32c::{BEAM_CROSSING_M, Returns, Revolution, write};
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
-use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::packets::{as_packets_tell, check_effects, revolution};
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::RayFrame;
-use sim_gpu::resolve::resolve;
 use sim_gpu::scan::ScanRequest;
 use sim_gpu::sensor::{Layout, Rotating, Sensor};
 use tests::{adapter, casting, judge, meshes};
@@ -25,11 +23,6 @@ const STREAM: StreamKey = StreamKey([3, 5]);
 
 fn vlp32c() -> Sensor {
     Sensor::builtin("vlp32c").unwrap()
-}
-
-fn head(sensor: &Sensor) -> &Rotating {
-    let Layout::Rotating(rotating) = &sensor.layout else { panic!("it turns") };
-    rotating
 }
 
 fn head_of(sensor: &mut Sensor) -> &mut Rotating {
@@ -108,7 +101,7 @@ fn packets_of(sensor: &Sensor, returns: Returns, scan: &Scan) -> Vec<Decoded> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.pcap");
     write(&path, &revolution(sensor).unwrap(), returns, scan).unwrap();
-    decode(&std::fs::read(&path).unwrap(), returns, head(sensor))
+    decode(&std::fs::read(&path).unwrap(), returns, head_of(&mut sensor.clone()))
 }
 
 /// The scan's points in the sensor's frame.
@@ -173,18 +166,16 @@ fn around_a_sensor_inside_a_box_every_beam_comes_back() {
 #[test]
 fn culling_loses_no_beam_that_starts_beside_the_sensor() {
     let sensor = turning(600.0);
-    let pattern = sensor.pattern();
     let steepest_m = BEAM_CROSSING_M * 25f64.to_radians().tan();
-    assert!((pattern.farthest_start_m() - steepest_m).abs() < 1e-15);
+    assert!((sensor.pattern().farthest_start_m() - steepest_m).abs() < 1e-15);
     for distance_m in [1.05, 2.0, 20.0] {
         // Near, 12 mm are a tenth of it.
-        let mut mesh = meshes::icosphere(2);
-        mesh.vertices.iter_mut().for_each(|v| *v *= 0.1 * distance_m);
-        let pose = pose(distance_m);
-        let caster = Caster::Cpu(Effects::default());
-        let culled = scan(&caster, &sensor, &mesh, &pose, Culling::On);
+        let mesh = meshes::mapped(&meshes::icosphere(2), |v| v * 0.1 * distance_m);
+        let [culled, all] = [Culling::On, Culling::Off].map(|culling| {
+            scan(&Caster::Cpu(Effects::default()), &sensor, &mesh, &pose(distance_m), culling)
+        });
         assert!(culled.len() > 20, "{}", culled.len());
-        assert_eq!(culled, scan(&caster, &sensor, &mesh, &pose, Culling::Off));
+        assert_eq!(culled, all, "{distance_m} m");
     }
 }
 
@@ -193,64 +184,41 @@ fn the_oracle_agrees_on_beams_that_start_beside_the_sensor() {
     let (sensor, pose) = (turning(600.0), pose(3.0));
     let pattern = sensor.pattern();
     let target = casting::target(&meshes::icosphere(3));
-    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
+    let job = casting::job(&target, &pose, &pattern);
     for caster in adapter::casters(&Effects::default()) {
-        let job = CastJob::aim(target.clone(), frame, &pattern, Culling::On, STREAM, 1.0);
-        let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
-        let hits = resolve(&job, &casts[0], &pattern, &Effects::default());
-        let verdict = judge::judge(&job, &pattern, &hits);
+        let verdict = judge::judge(&job, &pattern, &casting::hits(caster, &job, &pattern));
         assert!(verdict.hits > 1000 && verdict.broken.is_empty(), "{verdict:?}");
     }
 }
 
 #[test]
 fn a_sensor_that_packets_cannot_tell_is_refused() {
-    let changed = |change: &dyn Fn(&mut Sensor)| {
-        let mut sensor = vlp32c();
-        change(&mut sensor);
-        as_packets_tell(&sensor).unwrap_err().to_string()
-    };
     for name in ["kinect-v2", "generic-static", "blainder-ultrapuck", "vlp16", "hdl64e"] {
         let error = as_packets_tell(&Sensor::builtin(name).unwrap()).unwrap_err().to_string();
         assert!(error.contains("VLP-32C only"), "{name}: {error}");
     }
-    for (error, key) in [
-        (
-            changed(&|s| head_of(s).beam[7].elevation_deg += 0.001),
-            "rotating.beam[7]: expected laser 7",
-        ),
-        (
-            changed(&|s| head_of(s).beam[7].azimuth_offset_deg = 0.0),
-            "rotating.beam[7]: expected laser 7",
-        ),
-        (changed(&|s| head_of(s).beam.swap(0, 1)), "rotating.beam[0]: expected laser 0"),
-        (changed(&|s| head_of(s).beam.truncate(31)), "rotating.beam: expected 32 beams, found 31"),
-        (
-            changed(&|s| head_of(s).sequence_us = 60.0),
-            "rotating.sequence_us: expected 55.296, found 60",
-        ),
-        (
-            changed(&|s| head_of(s).rpm = 299.0),
-            "rotating.rpm: expected a number within 300.0..=1200.0",
-        ),
-        (changed(&|s| head_of(s).azimuth_quantum_deg = Some(0.01)), "rotating.azimuth_quantum_deg"),
-        (
-            changed(&|s| head_of(s).beam_crossing_m = Some(0.0)),
-            "beam_crossing_m: expected 0.0424, found 0",
-        ),
-        (
-            changed(&|s| head_of(s).sequence_quantum_deg = Some(0.1)),
-            "sequence_quantum_deg: expected 0.01",
-        ),
-        (changed(&|s| s.decimation = NonZeroU32::new(2).unwrap()), "decimation"),
-        (changed(&|s| s.range.max_m = 263.0), "range.max_m: expected a number within 0.0..=262.14"),
-        (
-            revolution(&vlp32c()).unwrap_err().to_string(),
-            "rotating.beam_crossing_m: expected 0.0424, found none",
-        ),
-    ] {
-        assert!(error.starts_with(key) || error.contains(key), "{error}");
+    type Change = fn(&mut Sensor);
+    let changes: [(Change, &str); 11] = [
+        (|s| head_of(s).beam[7].elevation_deg += 0.001, "rotating.beam[7]: expected laser 7"),
+        (|s| head_of(s).beam[7].azimuth_offset_deg = 0.0, "rotating.beam[7]: expected laser 7"),
+        (|s| head_of(s).beam.swap(0, 1), "rotating.beam[0]: expected laser 0"),
+        (|s| head_of(s).beam.truncate(31), "rotating.beam: expected 32 beams, found 31"),
+        (|s| head_of(s).sequence_us = 60.0, "rotating.sequence_us: expected 55.296, found 60"),
+        (|s| head_of(s).rpm = 299.0, "rotating.rpm: expected a number within 300.0..=1200.0"),
+        (|s| head_of(s).azimuth_quantum_deg = Some(0.01), "rotating.azimuth_quantum_deg"),
+        (|s| head_of(s).beam_crossing_m = Some(0.0), "beam_crossing_m: expected 0.0424, found 0"),
+        (|s| head_of(s).sequence_quantum_deg = Some(0.1), "sequence_quantum_deg: expected 0.01"),
+        (|s| s.decimation = NonZeroU32::new(2).unwrap(), "decimation"),
+        (|s| s.range.max_m = 263.0, "range.max_m: expected a number within 0.0..=262.14"),
+    ];
+    for (change, key) in changes {
+        let mut sensor = vlp32c();
+        change(&mut sensor);
+        let error = as_packets_tell(&sensor).unwrap_err().to_string();
+        assert!(error.contains(key), "{key}: {error}");
     }
+    let error = revolution(&vlp32c()).unwrap_err().to_string();
+    assert!(error.contains("rotating.beam_crossing_m: expected 0.0424, found none"), "{error}");
     let noise = Noise { mean_m: 0.0, sigma_m: 0.01, model: NoiseModel::Xyz };
     let error = check_effects(&Effects { noise: Some(noise), ..Effects::default() }).unwrap_err();
     assert!(error.to_string().starts_with("effects.noise.model: "), "{error}");

@@ -5,7 +5,7 @@
 use glam::DVec3;
 use sim_gpu::bvh::Builder;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{AMBIGUOUS, MISS};
@@ -14,8 +14,10 @@ use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
 use test_support::need;
 use tests::adapter::{adapter, casters};
-use tests::casting::{at, beams, builtin, hits, job, job_with, target, target_by};
-use tests::judge::{MOST_AMBIGUOUS, SILHOUETTE_RAD, Verdict, judge, leaves_too_much, near_edge};
+use tests::casting::{at, beams, builtin, cast, hits, job, job_with, target, target_by};
+use tests::judge::{
+    MOST_AMBIGUOUS, SILHOUETTE_RAD, Verdict, assert_promise, judge, leaves_too_much, near_edge,
+};
 use tests::meshes::{cube, icosphere, soup, together, torus};
 use tests::random::Random;
 
@@ -38,12 +40,8 @@ fn poses() -> Vec<Pose> {
     from.iter().map(|&p| Pose::look_at(p, DVec3::ZERO).expect("two places")).collect()
 }
 
-fn sensors() -> [BeamPattern; 2] {
-    [builtin("vlp32c"), builtin("generic-static")]
-}
-
 fn for_all_jobs(mut check: impl FnMut(&str, &Target, &Pose, &BeamPattern)) {
-    let sensors = sensors();
+    let sensors = ["vlp32c", "generic-static"].map(builtin);
     for (name, mesh) in surfaces() {
         let target = target(&mesh);
         for pose in &poses() {
@@ -59,9 +57,9 @@ fn for_all_jobs(mut check: impl FnMut(&str, &Target, &Pose, &BeamPattern)) {
 fn a_caster_that_marks_every_ray_is_found_out() {
     let pattern = builtin("generic-static");
     let job = job(&target(&cube()), &at(DVec3::new(0.1, 0.2, 0.3)), &pattern);
-    let mut cast = casters(&Effects::default())[0].cast(std::slice::from_ref(&job)).unwrap();
-    cast[0].codes.iter_mut().filter(|code| **code != MISS).for_each(|code| *code |= AMBIGUOUS);
-    let hits = resolve(&job, &cast[0], &pattern, &Effects::default());
+    let mut cast = cast(casters(&Effects::default())[0], &job);
+    cast.codes.iter_mut().filter(|code| **code != MISS).for_each(|code| *code |= AMBIGUOUS);
+    let hits = resolve(&job, &cast, &pattern, &Effects::default());
     judge(&job, &pattern, &hits).assert_kept("all rays marked");
     assert!(leaves_too_much(&hits, MOST_AMBIGUOUS));
 }
@@ -72,12 +70,7 @@ fn every_caster_keeps_the_promise() {
         let mut all = Verdict::default();
         for_all_jobs(|name, target, pose, pattern| {
             let job = job(target, pose, pattern);
-            let hits = hits(caster, &job, pattern);
-            let verdict = judge(&job, pattern, &hits);
-            let what = format!("{name}, {}", caster.name());
-            verdict.assert_kept(&what);
-            let (decided, n) = (hits.decided_in_f64, hits.hits.len());
-            assert!(!leaves_too_much(&hits, MOST_AMBIGUOUS), "{what}: {decided} of {n} in f64");
+            let verdict = assert_promise(caster, &job, pattern, MOST_AMBIGUOUS, name);
             all = std::mem::take(&mut all).and(verdict);
         });
         println!("{}: {all}", caster.name());
@@ -132,10 +125,9 @@ fn the_adapter_names_the_triangles_of_its_twin() {
     let (mut rays, mut differing) = (0, 0);
     for_all_jobs(|name, target, pose, pattern| {
         let job = job(target, pose, pattern);
-        let jobs = std::slice::from_ref(&job);
-        let (on_cpu, on_gpu) = (cpu.cast(jobs).unwrap(), gpu.cast(jobs).unwrap());
+        let [on_cpu, on_gpu] = [cpu, gpu].map(|caster| cast(caster, &job));
         rays += job.rays.len();
-        for (i, (&a, &b)) in on_cpu[0].codes.iter().zip(&on_gpu[0].codes).enumerate() {
+        for (i, (&a, &b)) in on_cpu.codes.iter().zip(&on_gpu.codes).enumerate() {
             if a & !AMBIGUOUS == b & !AMBIGUOUS {
                 continue;
             }
@@ -152,11 +144,10 @@ fn the_adapter_names_the_triangles_of_its_twin() {
 fn culling_changes_no_hit() {
     for caster in casters(&Effects::default()) {
         for_all_jobs(|name, target, pose, pattern| {
-            let cast = |culling| {
+            let [(few, culled), (all, unculled)] = [Culling::On, Culling::Off].map(|culling| {
                 let job = job_with(target, pose, pattern, culling);
                 (job.rays.len(), hits(caster, &job, pattern))
-            };
-            let ((few, culled), (all, unculled)) = (cast(Culling::On), cast(Culling::Off));
+            });
             assert!(few <= all && all == pattern.len());
             assert_eq!(culled, unculled, "{name}, {}", caster.name());
         });
@@ -166,57 +157,40 @@ fn culling_changes_no_hit() {
 #[test]
 fn both_builders_give_the_same_hits() {
     let pattern = builtin("vlp32c");
-    for caster in casters(&Effects::default()) {
-        for (name, mesh) in surfaces() {
+    for (name, mesh) in surfaces() {
+        let targets = [Builder::Sah, Builder::Morton].map(|builder| target_by(builder, &mesh));
+        for caster in casters(&Effects::default()) {
             for pose in &poses() {
-                let [sah, morton] = [Builder::Sah, Builder::Morton].map(|builder| {
-                    let target = target_by(builder, &mesh);
-                    hits(caster, &job(&target, pose, &pattern), &pattern)
-                });
+                let [sah, morton] = targets
+                    .each_ref()
+                    .map(|target| hits(caster, &job(target, pose, &pattern), &pattern));
                 assert_eq!(sah.hits, morton.hits, "{name}, {}", caster.name());
             }
         }
     }
 }
 
-fn all_jobs() -> Vec<CastJob> {
+#[test]
+fn jobs_answer_alike_cast_together_alone_and_while_others_are_in_flight() {
     let mut jobs = Vec::new();
     for_all_jobs(|_, target, pose, pattern| jobs.push(job(target, pose, pattern)));
-    jobs
-}
-
-#[test]
-fn jobs_cast_together_answer_as_each_alone() {
-    let jobs = all_jobs();
-    for caster in casters(&Effects::default()) {
-        let together = caster.cast(&jobs).unwrap();
-        assert_eq!(together.len(), jobs.len());
-        for (job, cast) in jobs.iter().zip(&together) {
-            let alone = caster.cast(std::slice::from_ref(job)).unwrap();
-            assert_eq!(&alone[0], cast, "{}", caster.name());
-        }
-        assert!(caster.cast(&[]).unwrap().is_empty());
-    }
-}
-
-#[test]
-fn batches_under_way_together_do_not_mix() {
-    let jobs = all_jobs();
     for caster in casters(&Effects::default()) {
         let expected = caster.cast(&jobs).unwrap();
+        assert_eq!(expected.len(), jobs.len());
         std::thread::scope(|scope| {
             for thread in 0..4 {
                 let (jobs, expected) = (&jobs, &expected);
                 scope.spawn(move || {
-                    for i in (0..jobs.len()).cycle().skip(thread * 7).take(3 * jobs.len()) {
+                    for i in (0..jobs.len()).cycle().skip(thread * 7).take(jobs.len()) {
                         let first = caster.submit(&jobs[i..=i]).unwrap();
                         let next = (i + 1) % jobs.len();
                         let second = caster.submit(&jobs[next..=next]).unwrap();
-                        assert_eq!(second.wait().unwrap()[0], expected[next]);
-                        assert_eq!(first.wait().unwrap()[0], expected[i]);
+                        assert_eq!(second.wait().unwrap()[0], expected[next], "job {next}");
+                        assert_eq!(first.wait().unwrap()[0], expected[i], "job {i}");
                     }
                 });
             }
         });
+        assert!(caster.cast(&[]).unwrap().is_empty());
     }
 }

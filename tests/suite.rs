@@ -5,7 +5,6 @@ mod bvh_properties;
 mod dataset_finish;
 mod dataset_merge;
 mod effects_parity;
-mod meshes_read;
 mod noise_statistics;
 mod off_properties;
 mod only_what_is_asked;

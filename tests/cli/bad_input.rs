@@ -1,14 +1,11 @@
 //! Bad input: a clear error, the right exit code, nothing half-written.
 
-use crate::{exits, meshes, said, succeeds};
+use crate::Folder;
 use std::fs;
 
 #[test]
 fn bad_meshes_are_named_and_the_others_go_on() {
-    let folder = tempfile::tempdir().unwrap();
-    meshes::write_tree(&folder.path().join("meshes"));
-    let bad = folder.path().join("meshes/bad/train");
-    fs::create_dir_all(&bad).unwrap();
+    let folder = Folder::with_meshes();
     for (name, text) in [
         ("truncated.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n"),
         ("index.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"),
@@ -20,82 +17,78 @@ fn bad_meshes_are_named_and_the_others_go_on() {
         ("short.ply", "ply\nformat ascii 1.0\nelement vertex 9\n"),
         ("short.stl", "solid x\nfacet normal 0 0 1\n"),
     ] {
-        fs::write(bad.join(name), text).unwrap();
+        folder.write(&format!("meshes/bad/train/{name}"), text);
     }
-    let said = exits(1, folder.path(), "gen-dataset meshes --out out --adapter cpu");
+    let said = folder.exits(1, "gen-dataset meshes --out out --adapter cpu");
     assert!(said.contains("9 meshes, 9 failed"), "{said}");
-    let listed = fs::read_to_string(folder.path().join("out/failures.jsonl")).unwrap();
+    let listed = folder.text("out/failures.jsonl");
     assert_eq!(listed.lines().count(), 9, "{listed}");
     for part in ["bad/train/index.off", "\"line\":6", "bad/train/nan.obj"] {
         assert!(listed.contains(part), "{part} in {listed}");
     }
-    assert!(folder.path().join("out/rotational/clean/ring/train").exists());
-    succeeds(folder.path(), "gen-dataset --verify out");
+    assert!(folder.at("out/rotational/clean/ring/train").exists());
+    folder.succeeds("gen-dataset --verify out");
 }
 
 #[test]
 fn a_mesh_of_zero_area_is_scanned_to_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::create_dir_all(folder.path().join("m/flat")).unwrap();
-    fs::write(folder.path().join("m/flat/a.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n")
-        .unwrap();
-    let output = succeeds(folder.path(), "gen-dataset m --out out --adapter cpu");
-    assert!(said(&output).contains("No scan holds a point"), "{}", said(&output));
+    let folder = Folder::new();
+    folder.write("m/flat/a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
+    let said = folder.succeeds("gen-dataset m --out out --adapter cpu");
+    assert!(said.contains("No scan holds a point"), "{said}");
 }
 
 #[test]
 fn commands_that_cannot_be_are_usage_errors() {
-    let folder = tempfile::tempdir().unwrap();
-    meshes::write_tree(&folder.path().join("meshes"));
-    for (words, part) in [
-        ("gen-dataset meshes --views 0", "--views"),
-        ("gen-dataset meshes --noise -1", "sigma"),
-        ("gen-dataset meshes --noise=nan", "sigma"),
-        ("gen-dataset meshes --dropout 2", "probability"),
-        ("gen-dataset meshes --distance 0", "distance"),
-        ("gen-dataset meshes --elevation 91", "elevation"),
-        ("gen-dataset meshes --shard 4/3", "--shard"),
-        ("gen-dataset meshes --up x", "--up"),
-        ("gen-dataset meshes --attributes colour", "colour"),
-        ("gen-dataset meshes --format stl", "stl"),
-        ("gen-dataset meshes --points 0", "--points"),
-        ("gen-dataset meshes --format pcap", "sensor \"generic-static\": rotating: missing"),
-        ("gen-dataset meshes --sensor vlp16 --format pcap", "VLP-32C alone"),
-        ("gen-dataset meshes --sensor vlp32c --format pcap --noise-model xyz", "noise.model"),
-        ("gen-dataset meshes --returns dual", "add --format pcap"),
-        ("gen-dataset meshes --returns both", "strongest, last, dual"),
-        ("gen-dataset meshes --sensor kinect-v2 --quantise", "kinect-v2"),
-        ("no-such-command", "no-such-command"),
-    ] {
-        let said = exits(2, folder.path(), words);
-        assert!(said.contains(part), "{words}: {said}");
-    }
-    assert!(!folder.path().join("data").exists(), "nothing was written");
+    let folder = Folder::with_meshes();
+    folder.refuses(
+        2,
+        &[
+            ("gen-dataset meshes --views 0", "--views"),
+            ("gen-dataset meshes --noise -1", "sigma"),
+            ("gen-dataset meshes --noise=nan", "sigma"),
+            ("gen-dataset meshes --dropout 2", "probability"),
+            ("gen-dataset meshes --distance 0", "distance"),
+            ("gen-dataset meshes --elevation 91", "elevation"),
+            ("gen-dataset meshes --shard 4/3", "--shard"),
+            ("gen-dataset meshes --up x", "--up"),
+            ("gen-dataset meshes --attributes colour", "colour"),
+            ("gen-dataset meshes --format stl", "stl"),
+            ("gen-dataset meshes --points 0", "--points"),
+            ("gen-dataset meshes --format pcap", "sensor \"generic-static\": rotating: missing"),
+            ("gen-dataset meshes --sensor vlp16 --format pcap", "VLP-32C alone"),
+            ("gen-dataset meshes --sensor vlp32c --format pcap --noise-model xyz", "noise.model"),
+            ("gen-dataset meshes --returns dual", "add --format pcap"),
+            ("gen-dataset meshes --returns both", "strongest, last, dual"),
+            ("gen-dataset meshes --sensor kinect-v2 --quantise", "kinect-v2"),
+            ("no-such-command", "no-such-command"),
+        ],
+    );
+    assert!(!folder.at("data").exists(), "nothing was written");
 }
 
 #[test]
 fn what_is_not_there_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::create_dir(folder.path().join("empty")).unwrap();
-    fs::write(folder.path().join("bad.toml"), "name = \"x\"\n").unwrap();
-    fs::write(folder.path().join("bad.npz"), "PK\u{3}\u{4}").unwrap();
-    for (words, part) in [
-        ("gen-dataset nowhere", "nowhere"),
-        ("gen-dataset empty", "empty"),
-        ("gen-dataset empty --sensor vlp99", "vlp32c"),
-        ("gen-dataset empty --sensor ./bad.toml", "bad.toml"),
-        ("gen-dataset empty --adapter no-such-adapter", "no"),
-        ("gen-dataset --verify nowhere", "nowhere"),
-        ("merge-dataset nowhere --out x", "nowhere"),
-        ("scan nowhere.toml --out x.npz", "nowhere.toml"),
-        ("scan bad.toml --out x.npz", "bad.toml"),
-        ("scan bad.toml --out x.las", "x.las"),
-        ("preview nowhere.npz", "nowhere.npz"),
-        ("preview bad.npz", "bad.npz"),
-    ] {
-        let said = exits(1, folder.path(), words);
-        assert!(said.contains(part), "{words}: {said}");
-        assert!(!said.contains("panicked"), "{words}: {said}");
-    }
-    assert!(!folder.path().join("x.npz").exists());
+    let folder = Folder::new();
+    fs::create_dir(folder.at("empty")).unwrap();
+    folder.write("bad.toml", "name = \"x\"\n");
+    folder.write("bad.npz", "PK\u{3}\u{4}");
+    folder.refuses(
+        1,
+        &[
+            ("gen-dataset nowhere", "nowhere"),
+            ("gen-dataset empty", "empty"),
+            ("gen-dataset empty --sensor vlp99", "vlp32c"),
+            ("gen-dataset empty --sensor ./bad.toml", "bad.toml"),
+            ("gen-dataset empty --adapter no-such-adapter", "no"),
+            ("gen-dataset --verify nowhere", "nowhere"),
+            ("merge-dataset nowhere --out x", "nowhere"),
+            ("scan nowhere.toml --out x.npz", "nowhere.toml"),
+            ("scan bad.toml --out x.npz", "bad.toml"),
+            ("scan bad.toml --out x.las", "x.las"),
+            ("preview nowhere.npz", "nowhere.npz"),
+            ("preview bad.npz", "bad.npz"),
+        ],
+    );
+    assert!(!folder.at("x.npz").exists());
 }

@@ -1,21 +1,19 @@
 //! From a mesh to a scan to its class, by the programs and the weights that ship.
 
-use crate::succeeds;
+use crate::{Folder, in_repository};
 use formats::cloud_file::read_cloud;
 use infer_cpu::{Classifier, Options};
-use std::path::Path;
 
 /// Shapes that no bundled network was trained on: of another seed.
 #[test]
 fn scans_of_new_shapes_are_recognised_by_the_weights_that_ship() {
-    let folder = tempfile::tempdir().unwrap();
-    succeeds(folder.path(), "gen-shapes --out shapes --seed 9 --train 1 --test 2");
-    succeeds(folder.path(), "gen-dataset shapes --adapter cpu --out scans");
-    let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/weights");
-    let model = weights.join("shapes-rotational-64.safetensors");
+    let folder = Folder::new();
+    folder.succeeds("gen-shapes --out shapes --seed 9 --train 1 --test 2");
+    folder.succeeds("gen-dataset shapes --adapter cpu --out scans");
+    let model = in_repository("assets/weights/shapes-rotational-64.safetensors");
     let mut classifier = Classifier::load(&model, &Options::default()).unwrap();
     let (mut right, mut all) = (0, 0);
-    for class in std::fs::read_dir(folder.path().join("scans/rotational/noisy")).unwrap() {
+    for class in std::fs::read_dir(folder.at("scans/rotational/noisy")).unwrap() {
         let class = class.unwrap();
         for scan in std::fs::read_dir(class.path().join("test")).unwrap() {
             let path = scan.unwrap().path();

@@ -1,6 +1,6 @@
 //! From PyTorch's checkpoints to model files.
 
-use crate::{checkpoints, exits, said, succeeds};
+use crate::{Folder, checkpoints, in_repository};
 use formats::model_card::{ModelCard, Normalization};
 use formats::weights::{Tensor, WeightsFile};
 use std::collections::BTreeMap;
@@ -10,6 +10,8 @@ use test_support::{need, shared_data};
 
 type Tensors = BTreeMap<String, Tensor>;
 
+type Change<'a> = &'a dyn Fn(&mut Tensors);
+
 /// What `tests/golden/checkpoints/make.py` wrote under our name `name`.
 fn golden_value(name: &str, element: usize) -> f32 {
     let step = (name.bytes().map(usize::from).sum::<usize>() + 7 * element) % 61;
@@ -18,12 +20,7 @@ fn golden_value(name: &str, element: usize) -> f32 {
 }
 
 fn golden(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/golden/checkpoints").join(name)
-}
-
-fn import(folder: &Path, checkpoint: &Path, flags: &str) -> String {
-    let words = format!("import-weights {} --out m.safetensors {flags}", checkpoint.display());
-    said(&succeeds(folder, &words))
+    in_repository("tests/golden/checkpoints").join(name)
 }
 
 fn read(path: &Path) -> (Tensors, ModelCard) {
@@ -33,18 +30,24 @@ fn read(path: &Path) -> (Tensors, ModelCard) {
     (names.map(|name| (name.clone(), file.read(&name).unwrap())).collect(), card)
 }
 
-/// The small checkpoint of full PointNet, imported.
-fn small_model(folder: &Path) -> Tensors {
-    import(folder, &golden("yanx27.pth"), "");
-    read(&folder.join("m.safetensors")).0
+/// The words that import a checkpoint.
+fn words(checkpoint: &Path, flags: &str) -> String {
+    format!("import-weights {} --out m.safetensors {flags}", checkpoint.display())
+}
+
+impl Folder {
+    /// Imports a checkpoint with these flags; its tensors and its card.
+    fn imports(&self, checkpoint: &Path, flags: &str) -> (Tensors, ModelCard) {
+        self.succeeds(&words(checkpoint, flags));
+        read(&self.at("m.safetensors"))
+    }
 }
 
 #[test]
 fn every_storage_type_layout_and_wrapper_becomes_the_same_f32() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     for (name, n_layers, n_norms) in [("yanx27.pth", 18, 15), ("3dcertify_legacy.pth", 8, 7)] {
-        import(folder.path(), &golden(name), "");
-        let (tensors, _) = read(&folder.path().join("m.safetensors"));
+        let (tensors, _) = folder.imports(&golden(name), "");
         assert_eq!(tensors.len(), 2 * n_layers + 4 * n_norms);
         for (name, tensor) in &tensors {
             let expected = (0..tensor.values.len()).map(|element| golden_value(name, element));
@@ -55,9 +58,8 @@ fn every_storage_type_layout_and_wrapper_becomes_the_same_f32() {
 
 #[test]
 fn a_card_holds_what_table_and_checkpoint_say() {
-    let folder = tempfile::tempdir().unwrap();
-    import(folder.path(), &golden("3dcertify_legacy.pth"), "");
-    let (_, card) = read(&folder.path().join("m.safetensors"));
+    let folder = Folder::new();
+    let (_, card) = folder.imports(&golden("3dcertify_legacy.pth"), "");
     let digest = formats::hash::of_file(&golden("3dcertify_legacy.pth")).unwrap();
     let expected = ModelCard {
         sampler: Some("fps".into()),
@@ -70,11 +72,11 @@ fn a_card_holds_what_table_and_checkpoint_say() {
         ..ModelCard::default()
     };
     assert_eq!(card, expected);
-    let file = WeightsFile::open(&folder.path().join("m.safetensors")).unwrap();
+    let file = WeightsFile::open(&folder.at("m.safetensors")).unwrap();
     assert_eq!(file.metadata()["widths"], "3-4-4-4-5-6 | 6-5-4-3");
 
-    let said = import(folder.path(), &golden("yanx27.pth"), "");
-    let (_, card) = read(&folder.path().join("m.safetensors"));
+    let said = folder.succeeds(&words(&golden("yanx27.pth"), ""));
+    let (_, card) = read(&folder.at("m.safetensors"));
     assert_eq!((card.sampler.as_deref(), card.points), (Some("all"), None));
     assert_eq!((card.pooled_relu, card.accuracy), (false, None));
     for part in [
@@ -88,11 +90,11 @@ fn a_card_holds_what_table_and_checkpoint_say() {
 
 #[test]
 fn flags_overrule_table_and_checkpoint() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("names.txt"), "cup\r\nbowl\nvase\n\n").unwrap();
+    let folder = Folder::new();
+    folder.write("names.txt", "cup\r\nbowl\nvase\n\n");
     let flags = "--classes names.txt --sampler cpl --points 48 --normalization none \
                  --training-set ours --accuracy 99% --provenance me";
-    import(folder.path(), &golden("3dcertify_legacy.pth"), flags);
+    let (_, card) = folder.imports(&golden("3dcertify_legacy.pth"), flags);
     let expected = ModelCard {
         classes: ["cup", "bowl", "vase"].map(str::to_owned).to_vec(),
         normalization: Normalization::None,
@@ -104,27 +106,27 @@ fn flags_overrule_table_and_checkpoint() {
         provenance: Some("me".into()),
         ..ModelCard::default()
     };
-    assert_eq!(read(&folder.path().join("m.safetensors")).1, expected);
+    assert_eq!(card, expected);
 }
 
 #[test]
 fn the_same_checkpoint_gives_the_same_bytes_in_place_of_an_old_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("m.safetensors");
-    fs::write(&out, "old").unwrap();
-    import(folder.path(), &golden("yanx27.pth"), "");
-    let first = fs::read(&out).unwrap();
-    import(folder.path(), &golden("yanx27.pth"), "");
-    assert!(first == fs::read(&out).unwrap());
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    let folder = Folder::new();
+    folder.write("m.safetensors", "old");
+    let [first, second] = [(); 2].map(|()| {
+        folder.imports(&golden("yanx27.pth"), "");
+        folder.bytes("m.safetensors")
+    });
+    assert!(first == second);
+    assert_eq!(fs::read_dir(folder.at("")).unwrap().count(), 1);
 }
 
 #[test]
 fn a_table_of_ones_own_renames_layers() {
-    let folder = tempfile::tempdir().unwrap();
-    let tensors = small_model(folder.path());
+    let folder = Folder::new();
+    let (tensors, _) = folder.imports(&golden("yanx27.pth"), "");
     let theirs = tensors.iter().map(|(name, tensor)| (format!("net.{name}"), tensor.clone()));
-    checkpoints::write(&folder.path().join("c.pth"), &theirs.collect());
+    checkpoints::write(&folder.at("c.pth"), &theirs.collect());
     let layers: Vec<String> = tensors
         .keys()
         .filter_map(|name| name.strip_suffix(".weight"))
@@ -134,17 +136,16 @@ fn a_table_of_ones_own_renames_layers() {
         "name = \"mine\"\ndefault_classes = [\"a\", \"b\", \"c\"]\n[layers]\n{}[card]\npoints = 7\n",
         layers.concat()
     );
-    fs::write(folder.path().join("mine.toml"), table).unwrap();
-    import(folder.path(), &folder.path().join("c.pth"), "--table mine.toml");
-    let (imported, card) = read(&folder.path().join("m.safetensors"));
+    folder.write("mine.toml", table);
+    let (imported, card) = folder.imports(Path::new("c.pth"), "--table mine.toml");
     assert_eq!(imported, tensors);
     assert_eq!((card.classes.join(" ").as_str(), card.points), ("a b c", Some(7)));
 }
 
 #[test]
 fn a_file_that_is_no_checkpoint_is_refused_and_the_old_output_stays() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("m.safetensors"), "old").unwrap();
+    let folder = Folder::new();
+    folder.write("m.safetensors", "old");
     let zip = fs::read(golden("yanx27.pth")).unwrap();
     let legacy = fs::read(golden("3dcertify_legacy.pth")).unwrap();
     for (content, cause) in [
@@ -156,95 +157,76 @@ fn a_file_that_is_no_checkpoint_is_refused_and_the_old_output_stays() {
         (&legacy[..100], "legacy format"),
         (&legacy[..legacy.len() - 1], "extends beyond the end of the file"),
     ] {
-        fs::write(folder.path().join("c.pth"), content).unwrap();
-        let said = exits(1, folder.path(), "import-weights c.pth --out m.safetensors");
+        folder.write("c.pth", content);
+        let said = folder.exits(1, &words(Path::new("c.pth"), ""));
         assert!(said.starts_with("error: c.pth: ") && said.contains(cause), "{cause} in {said}");
     }
-    let said = exits(1, folder.path(), "import-weights absent.pth --out m.safetensors");
+    let said = folder.exits(1, &words(Path::new("absent.pth"), ""));
     assert!(said.contains("absent.pth: ") && said.contains("No such file"), "{said}");
-    assert_eq!(fs::read_to_string(folder.path().join("m.safetensors")).unwrap(), "old");
+    assert_eq!(folder.text("m.safetensors"), "old");
 }
 
 #[test]
 fn weights_that_make_no_model_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let good = small_model(folder.path());
-    let refused = |change: &dyn Fn(&mut Tensors), message: &str| {
+    let folder = Folder::new();
+    let (good, _) = folder.imports(&golden("yanx27.pth"), "");
+    let add = |name: &'static str| {
+        let tensor = Tensor { shape: vec![1], values: vec![1.0] };
+        move |tensors: &mut Tensors| drop(tensors.insert(name.into(), tensor.clone()))
+    };
+    let unknown =
+        "no importer table knows all of its tensors; the nearest, `yanx27`, does not know";
+    let table = "Write a table like assets/importers/3dcertify.toml";
+    let changes: [(Change<'_>, String); 8] = [
+        (
+            &|tensors| tensors.get_mut("fc2.bias").unwrap().values[3] = f32::NAN,
+            "tensor `fc2.bias`: element 3 is NaN".into(),
+        ),
+        (&add("encoder.0.weight"), format!("{unknown} `encoder.0.weight`. {table}")),
+        (&add("fc1.scale"), format!("{unknown} `fc1.scale`.")),
+        (
+            &|tensors| drop(tensors.remove("feat.bn2.running_mean")),
+            "tensor `feat.bn2.running_mean`: missing".into(),
+        ),
+        (&add("fc4.bias"), "tensor `bn3.weight`: missing".into()),
+        (&add("bn7.bias"), "tensor `bn7.bias`: unexpected".into()),
+        (
+            &|tensors| tensors.get_mut("feat.conv2.weight").unwrap().shape = vec![4, 5, 1],
+            "tensor `feat.conv2.weight`: expected shape [4, 4, 1], found [4, 5, 1]".into(),
+        ),
+        (
+            &|tensors| tensors.retain(|name, _| name.starts_with("fc")),
+            "tensor `feat.conv2.weight`: missing".into(),
+        ),
+    ];
+    for (change, cause) in changes {
         let mut tensors = good.clone();
         change(&mut tensors);
-        checkpoints::write(&folder.path().join("c.pth"), &tensors);
-        let said = exits(1, folder.path(), "import-weights c.pth --out m.safetensors");
-        assert!(said.contains(&format!("error: c.pth: {message}")), "{message} in {said}");
-    };
-    let vector = |values: &[f32]| Tensor { shape: vec![values.len()], values: values.to_vec() };
-    refused(
-        &|tensors| tensors.get_mut("fc2.bias").unwrap().values[3] = f32::NAN,
-        "tensor `fc2.bias`: element 3 is NaN",
-    );
-    refused(
-        &|tensors| {
-            tensors.insert("encoder.0.weight".into(), vector(&[1.0]));
-        },
-        "no importer table knows all of its tensors; the nearest, `yanx27`, does not know \
-         `encoder.0.weight`. Write a table like assets/importers/3dcertify.toml",
-    );
-    refused(
-        &|tensors| {
-            tensors.insert("fc1.scale".into(), vector(&[1.0]));
-        },
-        "no importer table knows all of its tensors; the nearest, `yanx27`, does not know \
-         `fc1.scale`.",
-    );
-    refused(
-        &|tensors| {
-            tensors.remove("feat.bn2.running_mean");
-        },
-        "tensor `feat.bn2.running_mean`: missing",
-    );
-    refused(
-        &|tensors| {
-            tensors.insert("fc4.bias".into(), vector(&[1.0]));
-        },
-        "tensor `bn3.weight`: missing",
-    );
-    refused(
-        &|tensors| {
-            tensors.insert("bn7.bias".into(), vector(&[1.0]));
-        },
-        "tensor `bn7.bias`: unexpected",
-    );
-    refused(
-        &|tensors| tensors.get_mut("feat.conv2.weight").unwrap().shape = vec![4, 5, 1],
-        "tensor `feat.conv2.weight`: expected shape [4, 4, 1], found [4, 5, 1]",
-    );
-    refused(
-        &|tensors| tensors.retain(|name, _| name.starts_with("fc")),
-        "tensor `feat.conv2.weight`: missing",
-    );
+        checkpoints::write(&folder.at("c.pth"), &tensors);
+        let message = format!("error: c.pth: {cause}");
+        folder.refuses(1, &[(&words(Path::new("c.pth"), ""), &message)]);
+    }
 }
 
 #[test]
 fn a_tensor_that_was_renamed_is_told_by_both_names() {
-    let folder = tempfile::tempdir().unwrap();
-    import(folder.path(), &golden("3dcertify_legacy.pth"), "");
-    let (mut tensors, _) = read(&folder.path().join("m.safetensors"));
+    let folder = Folder::new();
+    let (mut tensors, _) = folder.imports(&golden("3dcertify_legacy.pth"), "");
     tensors.get_mut("fc2.bias").unwrap().shape = vec![1, 4];
     let theirs = tensors.into_iter().map(|(name, tensor)| (format!("net.{name}"), tensor));
-    checkpoints::write(&folder.path().join("c.pth"), &theirs.collect());
+    checkpoints::write(&folder.at("c.pth"), &theirs.collect());
     let table = ["feat.conv", "feat.bn", "fc", "bn"]
         .map(|layer| format!("\"net.{layer}{{i}}\" = \"{layer}{{i}}\"\n"));
     let table = format!("name = \"t\"\n[layers]\n{}", table.concat());
-    fs::write(folder.path().join("t.toml"), table).unwrap();
-    let said = exits(1, folder.path(), "import-weights c.pth --table t.toml --out m.safetensors");
+    folder.write("t.toml", table);
     let message = "error: c.pth: tensor `fc2.bias` (there `net.fc2.bias`): expected shape [4]";
-    assert!(said.contains(message), "{said}");
+    folder.refuses(1, &[(&words(Path::new("c.pth"), "--table t.toml"), message)]);
 }
 
 #[test]
 fn bad_tables_and_class_lists_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let checkpoint = golden("yanx27.pth");
-    let words = format!("import-weights {} --out m.safetensors", checkpoint.display());
+    let folder = Folder::new();
+    let words = |flags: &str| words(&golden("yanx27.pth"), flags);
     for (table, message) in [
         ("", "missing field `name`"),
         ("name = 3\n", "line 1"),
@@ -257,23 +239,20 @@ fn bad_tables_and_class_lists_are_named() {
         ),
         ("name = \"t\"\n[layers]\n", "the nearest, `t`, does not know `bn1.bias`, "),
     ] {
-        fs::write(folder.path().join("t.toml"), table).unwrap();
-        let said = exits(1, folder.path(), &format!("{words} --table t.toml"));
-        assert!(said.contains(message), "{message} in {said}");
+        folder.write("t.toml", table);
+        folder.refuses(1, &[(&words("--table t.toml"), message)]);
     }
-    fs::write(folder.path().join("names.txt"), "cup\nbowl\n").unwrap();
-    let said = exits(1, folder.path(), &format!("{words} --classes names.txt"));
-    assert!(said.contains("names.txt: 2 class names for 3 logits"), "{said}");
-    exits(2, folder.path(), &format!("{words} --normalization box"));
-    assert!(!folder.path().join("m.safetensors").exists());
+    folder.write("names.txt", "cup\nbowl\n");
+    let message = "names.txt: 2 class names for 3 logits";
+    folder.refuses(1, &[(&words("--classes names.txt"), message)]);
+    folder.exits(2, &words("--normalization box"));
+    assert!(!folder.at("m.safetensors").exists());
 }
 
 #[test]
 fn an_imported_baseline_equals_the_same_weights_saved_as_safetensors() {
     let checkpoint = need!(shared_data("parity/pointnet.pth"));
-    let folder = tempfile::tempdir().unwrap();
-    import(folder.path(), &checkpoint, "");
-    let (imported, card) = read(&folder.path().join("m.safetensors"));
+    let (imported, card) = Folder::new().imports(&checkpoint, "");
     let mut peer = WeightsFile::open(&checkpoint.with_extension("safetensors")).unwrap();
     let names = peer.shapes().into_keys().filter(|name| !name.ends_with("num_batches_tracked"));
     let expected: Tensors = names.map(|name| (name.clone(), peer.read(&name).unwrap())).collect();
@@ -284,9 +263,7 @@ fn an_imported_baseline_equals_the_same_weights_saved_as_safetensors() {
 #[test]
 fn weights_that_others_trained_without_t_nets_come_whole() {
     let checkpoint = need!(shared_data("checkpoints/3dcertify_64p_natural.pth"));
-    let folder = tempfile::tempdir().unwrap();
-    import(folder.path(), &checkpoint, "");
-    let (tensors, card) = read(&folder.path().join("m.safetensors"));
+    let (tensors, card) = Folder::new().imports(&checkpoint, "");
     let shape = |name: &str| tensors[name].shape.clone();
     let mut inputs = 3;
     for (i, width) in (1..).zip([64, 64, 64, 128, 1024]) {

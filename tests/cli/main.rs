@@ -20,33 +20,84 @@ mod scenes;
 mod simplified;
 mod surfaces;
 
-use std::collections::BTreeMap;
+use formats::Scan;
+use formats::scan_file::read_scan;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use tempfile::TempDir;
 
-/// `edgepuck` with these words, run in `folder`.
-fn edgepuck(folder: &Path, words: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_edgepuck"));
-    command.current_dir(folder).args(words);
-    command
-}
+/// A folder in which `edgepuck` runs; it is removed when dropped.
+struct Folder(TempDir);
 
-/// Runs the words, separated by spaces, and expects success.
-fn succeeds(folder: &Path, words: &str) -> Output {
-    let output = run(folder, words);
-    assert!(output.status.success(), "{words}\n{}", said(&output));
-    output
-}
+impl Folder {
+    /// An empty folder.
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
 
-/// Runs the words and expects this exit code; what was said.
-fn exits(code: i32, folder: &Path, words: &str) -> String {
-    let output = run(folder, words);
-    assert_eq!(output.status.code(), Some(code), "{words}\n{}", said(&output));
-    said(&output)
-}
+    /// A folder with nine small meshes in `meshes`.
+    fn with_meshes() -> Self {
+        let folder = Self::new();
+        meshes::write_tree(&folder);
+        folder
+    }
 
-fn run(folder: &Path, words: &str) -> Output {
-    edgepuck(folder, &words.split_whitespace().collect::<Vec<_>>()).output().unwrap()
+    fn at(&self, file: &str) -> PathBuf {
+        self.0.path().join(file)
+    }
+
+    /// Writes a file and makes the folders that it is in.
+    fn write(&self, file: &str, content: impl AsRef<[u8]>) {
+        let path = self.at(file);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+
+    fn bytes(&self, file: &str) -> Vec<u8> {
+        fs::read(self.at(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
+    }
+
+    fn text(&self, file: &str) -> String {
+        String::from_utf8(self.bytes(file)).unwrap()
+    }
+
+    fn scan(&self, file: &str) -> Scan {
+        read_scan(&self.at(file)).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// `edgepuck` with these words, which spaces separate.
+    fn edgepuck(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_edgepuck"));
+        command.current_dir(&self.0).args(words.split_whitespace());
+        command
+    }
+
+    /// Runs the words and expects success; returns what the program said.
+    fn succeeds(&self, words: &str) -> String {
+        self.exits(0, words)
+    }
+
+    /// Runs the words and expects this exit code; returns what the program said.
+    fn exits(&self, code: i32, words: &str) -> String {
+        let output = self.edgepuck(words).output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{words}\n{}", said(&output));
+        said(&output)
+    }
+
+    /// Expects of each of `cases`, words and a part of the message, that the words
+    /// end with this exit code and the message.
+    fn refuses(&self, code: i32, cases: &[(&str, &str)]) {
+        for (words, part) in cases {
+            let said = self.exits(code, words);
+            assert!(said.contains(part), "{words}: {said}");
+            assert!(!said.contains("panicked"), "{words}: {said}");
+        }
+    }
+
+    fn assert_same_tree(&self, left: &str, right: &str) {
+        tests::tree::assert_same(&self.at(left), &self.at(right));
+    }
 }
 
 fn said(output: &Output) -> String {
@@ -54,30 +105,7 @@ fn said(output: &Output) -> String {
     text(&output.stdout) + &text(&output.stderr)
 }
 
-/// Every file below `folder` and its bytes.
-fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(at) = folders.pop() {
-        for entry in std::fs::read_dir(&at).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let inside = path.strip_prefix(folder).unwrap().to_owned();
-                files.insert(inside, std::fs::read(&path).unwrap());
-            }
-        }
-    }
-    files
-}
-
-/// That two folders hold the same files with the same bytes; names the first
-/// that differs.
-fn assert_same_tree(p: &Path, q: &Path) {
-    let (p, q) = (tree(p), tree(q));
-    assert_eq!(p.keys().collect::<Vec<_>>(), q.keys().collect::<Vec<_>>());
-    for (path, bytes) in &p {
-        assert!(bytes == &q[path], "{} differs", path.display());
-    }
+/// A file of the repository.
+fn in_repository(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file)
 }

@@ -1,18 +1,15 @@
 //! Small meshes to scan.
 
+use crate::Folder;
 use std::fmt::Write;
-use std::path::Path;
 
-/// Nine tori of different thickness in three classes, as OFF, OBJ and OFF in a
-/// ModelNet tree.
-pub fn write_tree(folder: &Path) {
+/// Writes nine tori of different thickness in three classes to `meshes`, as a
+/// tree like ModelNet's.
+pub fn write_tree(folder: &Folder) {
     for (class, thickness) in [("ring", 0.1), ("donut", 0.3), ("ball", 0.6)] {
         for (i, split) in [(1, "train"), (2, "train"), (3, "test")] {
-            let folder = folder.join(class).join(split);
-            std::fs::create_dir_all(&folder).unwrap();
-            let segments = 8 + 8 * i;
-            let text = off(segments, thickness);
-            std::fs::write(folder.join(format!("{class}_{i:04}.off")), text).unwrap();
+            let file = format!("meshes/{class}/{split}/{class}_{i:04}.off");
+            folder.write(&file, off(8 + 8 * i, thickness));
         }
     }
 }
@@ -29,8 +26,7 @@ pub fn off(segments: usize, thickness: f64) -> String {
     }
     for (i, j) in (0..n * n).map(|k| (k / n, k % n)) {
         let at = |i: usize, j: usize| (i % n) * n + j % n;
-        let corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-        let [a, b, c, d] = corners;
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
         writeln!(text, "4 {a} {b} {c} {d}").unwrap();
     }
     text

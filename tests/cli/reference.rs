@@ -2,28 +2,31 @@
 //!
 //! References: `../shared/data/reference`, where it is present.
 
-use crate::succeeds;
+use crate::Folder;
 use formats::labelled::{LabelledSet, read_labelled};
 use infer_cpu::sampler::{FpsStart, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options, Precision};
 use ndarray::Array2;
-use std::path::{Path, PathBuf};
 use test_support::{need, shared_data};
 
-/// The clouds that references are of, and a checkpoint imported into `folder`.
-fn imported(folder: &Path, checkpoint: &str) -> Result<(LabelledSet, PathBuf), String> {
+/// The clouds that references are of, and a checkpoint imported into a folder.
+fn imported(checkpoint: &str) -> Result<(LabelledSet, Folder), String> {
     let checkpoint = shared_data(&format!("checkpoints/{checkpoint}.pth"))?;
     let clouds = shared_data("modelnet40-clouds/dev.npz")?;
-    succeeds(folder, &format!("import-weights {} --out m.safetensors", checkpoint.display()));
-    Ok((read_labelled(&clouds).unwrap(), folder.join("m.safetensors")))
+    let folder = Folder::new();
+    folder.succeeds(&format!("import-weights {} --out m.safetensors", checkpoint.display()));
+    Ok((read_labelled(&clouds).unwrap(), folder))
+}
+
+fn loaded(folder: &Folder, options: &Options) -> Classifier {
+    Classifier::load(&folder.at("m.safetensors"), options).unwrap()
 }
 
 /// 64 points from the first by farthest point sampling, as that network was
 /// trained. 1020 of 1234 is 82.66 %.
 #[test]
 fn the_network_of_3dcertify_gives_its_reference_logits_and_accuracy() {
-    let folder = tempfile::tempdir().unwrap();
-    let (set, model) = need!(imported(folder.path(), "3dcertify_64p_natural"));
+    let (set, folder) = need!(imported("3dcertify_64p_natural"));
     let reference = need!(shared_data("reference/3dcertify_64p/logits_fps64.npy"));
     let reference: Array2<f32> = ndarray_npy::read_npy(reference).unwrap();
     let sampler = SamplerSpec {
@@ -38,7 +41,7 @@ fn the_network_of_3dcertify_gives_its_reference_logits_and_accuracy() {
         normalization: Some(Normalization::None),
         ..Options::default()
     };
-    let mut classifier = Classifier::load(&model, &options).unwrap();
+    let mut classifier = loaded(&folder, &options);
     let mut right = 0;
     for (i, expected) in reference.rows().into_iter().enumerate() {
         let prediction = classifier.classify(set.cloud(i)).unwrap();
@@ -54,12 +57,11 @@ fn the_network_of_3dcertify_gives_its_reference_logits_and_accuracy() {
 
 #[test]
 fn the_baseline_s_network_gives_its_reference_log_probabilities() {
-    let folder = tempfile::tempdir().unwrap();
-    let (set, model) = need!(imported(folder.path(), "pointnet_cls_modelnet40"));
+    let (set, folder) = need!(imported("pointnet_cls_modelnet40"));
     let reference = need!(shared_data("reference/pointnet_cls/logp_1024.npy"));
     let reference: Array2<f32> = ndarray_npy::read_npy(reference).unwrap();
     let options = Options { normalization: Some(Normalization::None), ..Options::default() };
-    let mut classifier = Classifier::load(&model, &options).unwrap();
+    let mut classifier = loaded(&folder, &options);
     for (i, expected) in reference.rows().into_iter().enumerate().step_by(12) {
         let prediction = classifier.classify(set.cloud(i)).unwrap();
         for (class, expected) in expected.iter().enumerate() {
@@ -74,11 +76,10 @@ fn the_baseline_s_network_gives_its_reference_log_probabilities() {
 /// fault, not rounding. 95 % agreement of 300 clouds is six sigma from 90 %.
 #[test]
 fn cheaper_precisions_agree_with_fp32_on_trained_weights() {
-    let folder = tempfile::tempdir().unwrap();
-    let (set, model) = need!(imported(folder.path(), "3dcertify_64p_natural"));
+    let (set, folder) = need!(imported("3dcertify_64p_natural"));
     let classes = |precision| {
         let options = Options { precision, ..Options::default() };
-        let mut classifier = Classifier::load(&model, &options).unwrap();
+        let mut classifier = loaded(&folder, &options);
         let classes = (0..set.len()).step_by(4).map(|i| {
             let prediction = classifier.classify(set.cloud(i)).unwrap();
             assert_eq!(prediction.precision, precision);

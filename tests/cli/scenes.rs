@@ -1,11 +1,8 @@
 //! `scan` and `preview`.
 
-use crate::{meshes, said, succeeds};
-use formats::scan_file::read_scan;
-use std::fs;
-use std::path::Path;
+use crate::{Folder, in_repository, meshes};
 
-fn scene_at(folder: &Path, name: &str, x_m: f64) {
+fn scene_at(folder: &Folder, name: &str, x_m: f64) {
     let scene = format!(
         "attributes = [\"range\", \"object\"]\n\
          [[object]]\nmesh = \"torus.off\"\nname = \"near\"\nposition_m = [{x_m}, 0, 0]\n\
@@ -14,20 +11,18 @@ fn scene_at(folder: &Path, name: &str, x_m: f64) {
         x_m + 3.0,
         x_m - 4.0
     );
-    fs::write(folder.join(name), scene).unwrap();
+    folder.write(name, scene);
 }
 
 #[test]
 fn a_scene_moved_by_1e7_m_gives_the_same_scan_to_a_micrometre() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("torus.off"), meshes::off(40, 0.3)).unwrap();
-    scene_at(folder.path(), "here.toml", 0.0);
-    scene_at(folder.path(), "there.toml", 1e7);
-    for name in ["here", "there"] {
-        succeeds(folder.path(), &format!("scan {name}.toml --out {name}.npz"));
-    }
-    let here = read_scan(&folder.path().join("here.npz")).unwrap();
-    let there = read_scan(&folder.path().join("there.npz")).unwrap();
+    let folder = Folder::new();
+    folder.write("torus.off", meshes::off(40, 0.3));
+    let [here, there] = [("here", 0.0), ("there", 1e7)].map(|(name, x_m)| {
+        scene_at(&folder, &format!("{name}.toml"), x_m);
+        folder.succeeds(&format!("scan {name}.toml --out {name}.npz"));
+        folder.scan(&format!("{name}.npz"))
+    });
     assert!(here.len() > 500, "{}", here.len());
     assert_eq!(here.object, there.object);
     assert!(here.object.unwrap().contains(&1), "the far torus shows beside the near one");
@@ -46,25 +41,24 @@ fn a_scene_moved_by_1e7_m_gives_the_same_scan_to_a_micrometre() {
 
 #[test]
 fn the_scene_that_ships_is_scanned_and_drawn() {
-    let folder = tempfile::tempdir().unwrap();
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes");
+    let folder = Folder::new();
     for scene in ["two_chairs", "plain"] {
-        let file = scenes.join(scene).with_extension("toml");
-        let output = succeeds(folder.path(), &format!("scan {} --out {scene}.npz", file.display()));
-        assert!(said(&output).contains("points"), "{}", said(&output));
-        assert!(read_scan(&folder.path().join(format!("{scene}.npz"))).unwrap().len() > 100);
-        succeeds(folder.path(), &format!("preview {scene}.npz --out {scene}.png"));
-        let png = fs::read(folder.path().join(format!("{scene}.png"))).unwrap();
+        let file = in_repository("assets/scenes").join(scene).with_extension("toml");
+        let said = folder.succeeds(&format!("scan {} --out {scene}.npz", file.display()));
+        assert!(said.contains("points"), "{said}");
+        assert!(folder.scan(&format!("{scene}.npz")).len() > 100);
+        folder.succeeds(&format!("preview {scene}.npz --out {scene}.png"));
+        let png = folder.bytes(&format!("{scene}.png"));
         assert!(png.starts_with(b"\x89PNG") && png.len() > 5_000);
     }
-    let plain = read_scan(&folder.path().join("plain.npz")).unwrap();
+    let plain = folder.scan("plain.npz");
     assert_eq!(plain.columns().count(), 0, "what was not asked for is not there");
 }
 
 #[test]
 fn without_a_scene_the_default_one_is_written_and_scanned() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = succeeds(folder.path(), "scan --adapter cpu --out scan.npz");
-    assert!(folder.path().join("data/default-scene/scenes/two_chairs.toml").is_file());
-    assert!(!said(&output).contains(" 0 points") && folder.path().join("scan.npz").is_file());
+    let folder = Folder::new();
+    let said = folder.succeeds("scan --adapter cpu --out scan.npz");
+    assert!(folder.at("data/default-scene/scenes/two_chairs.toml").is_file());
+    assert!(!said.contains(" 0 points") && folder.at("scan.npz").is_file(), "{said}");
 }

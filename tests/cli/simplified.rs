@@ -1,27 +1,21 @@
 //! `gen-dataset --simplify`: fewer triangles within a bound, and the manifest says so.
 
-use crate::{assert_same_tree, meshes, said, succeeds};
-use formats::scan_file::read_scan;
+use crate::{Folder, meshes};
 use serde_json::Value;
-use std::path::Path;
 
-/// 20,000 triangles, most of them smaller than the VLP-32C can tell apart from 3 m.
-fn fine_torus(folder: &Path) {
-    let folder = folder.join("meshes/ring/test");
-    std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join("ring_0001.off"), meshes::off(100, 0.3)).unwrap();
-}
-
-fn manifest(out: &Path) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap()
+/// A mesh of 20,000 triangles, most of them smaller than the VLP-32C can tell
+/// apart from 3 m.
+fn with_fine_torus() -> Folder {
+    let folder = Folder::new();
+    folder.write("meshes/ring/test/ring_0001.off", meshes::off(100, 0.3));
+    folder
 }
 
 #[test]
 fn the_manifest_says_what_was_simplified_and_how_far() {
-    let folder = tempfile::tempdir().unwrap();
-    fine_torus(folder.path());
-    let output = succeeds(folder.path(), "gen-dataset meshes --simplify auto --out out");
-    let manifest = manifest(&folder.path().join("out"));
+    let folder = with_fine_torus();
+    let said = folder.succeeds("gen-dataset meshes --simplify auto --out out");
+    let manifest: Value = serde_json::from_str(&folder.text("out/manifest.json")).unwrap();
     assert_eq!(manifest["config"]["simplify"], "auto");
     let mesh = &manifest["meshes"][0];
     let (before, after) = (&mesh["triangles"], &mesh["simplified"]["triangles"]);
@@ -32,36 +26,26 @@ fn the_manifest_says_what_was_simplified_and_how_far() {
     let bound_m = mesh["simplified"]["bound_m"].as_f64().unwrap();
     assert!((0.001..0.003).contains(&bound_m), "{bound_m}");
     let told = format!("simplified: {after} triangles cast at for {before} in the files");
-    assert!(said(&output).contains(&told), "{}", said(&output));
-    succeeds(folder.path(), "gen-dataset --verify out");
+    assert!(said.contains(&told), "{said}");
+    folder.succeeds("gen-dataset --verify out");
 }
 
 #[test]
 fn a_dataset_of_simplified_meshes_is_the_same_again_and_keeps_its_hits() {
-    let folder = tempfile::tempdir().unwrap();
-    fine_torus(folder.path());
-    for (words, threads) in [("one --simplify 0.001", "1"), ("many --simplify 0.001", "5")] {
-        let words: Vec<&str> =
-            "gen-dataset meshes --out".split(' ').chain(words.split(' ')).collect();
-        let mut command = crate::edgepuck(folder.path(), &words);
+    let folder = with_fine_torus();
+    for (out, threads) in [("one", "1"), ("many", "5")] {
+        let words = format!("gen-dataset meshes --simplify 0.001 --out {out}");
+        let mut command = folder.edgepuck(&words);
         assert!(command.env("RAYON_NUM_THREADS", threads).status().unwrap().success());
     }
-    succeeds(folder.path(), "gen-dataset meshes --out whole");
-    let [one, many, whole] = ["one", "many", "whole"].map(|out| folder.path().join(out));
-    assert_same_tree(&one, &many);
-    let points = |out: &Path| {
-        read_scan(&out.join("rotational/clean/ring/test/ring_0001_v0.npz")).unwrap().len() as f64
-    };
+    folder.assert_same_tree("one", "many");
+    folder.succeeds("gen-dataset meshes --out whole");
+    let [simplified, whole] = ["one", "whole"].map(|out| {
+        folder.scan(&format!("{out}/rotational/clean/ring/test/ring_0001_v0.npz")).len() as f64
+    });
     // A millimetre of 1 m moves the silhouette by as much: of a ring as thick as
     // this, less than 1 point in 100.
-    assert!((points(&one) / points(&whole) - 1.0).abs() < 0.01);
-}
-
-#[test]
-fn without_the_flag_the_manifest_does_not_know_the_word() {
-    let folder = tempfile::tempdir().unwrap();
-    fine_torus(folder.path());
-    succeeds(folder.path(), "gen-dataset meshes --out out");
-    let text = std::fs::read_to_string(folder.path().join("out/manifest.json")).unwrap();
-    assert!(!text.contains("simplif"), "{text}");
+    assert!((simplified / whole - 1.0).abs() < 0.01);
+    let manifest = folder.text("whole/manifest.json");
+    assert!(!manifest.contains("simplif"), "without the flag: {manifest}");
 }

@@ -1,16 +1,21 @@
 //! `sample-surfaces`: what scans are compared with.
 
-use crate::{exits, succeeds, tree};
+use crate::Folder;
 use formats::labelled::read_labelled;
+
+fn with_shapes() -> Folder {
+    let folder = Folder::new();
+    folder.succeeds("gen-shapes --out shapes --train 1 --test 1");
+    folder
+}
 
 #[test]
 fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    succeeds(at, "gen-shapes --out shapes --train 1 --test 1");
-    succeeds(at, "sample-surfaces shapes --out a --points 200");
-    let whole = read_labelled(&at.join("a/surface-test.npz")).unwrap();
-    let seen = read_labelled(&at.join("a/seen-test.npz")).unwrap();
+    let folder = with_shapes();
+    folder.succeeds("sample-surfaces shapes --out a --points 200");
+    let [whole, seen] =
+        ["surface", "seen"].map(|set| read_labelled(&folder.at(&format!("a/{set}-test.npz"))));
+    let (whole, seen) = (whole.unwrap(), seen.unwrap());
     let (names, seen_names) = (whole.names.as_ref().unwrap(), seen.names.as_ref().unwrap());
     assert_eq!((whole.len(), whole.n_points, seen.len()), (10, 200, 40));
     let radius = |p: &[f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
@@ -29,22 +34,21 @@ fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
         let n_raw = seen.n_raw.as_ref().unwrap()[view];
         assert!((64..1200).contains(&n_raw), "{n_raw}");
     }
-    succeeds(at, "sample-surfaces shapes --out b --points 200");
-    assert_eq!(tree(&at.join("a")), tree(&at.join("b")));
+    folder.succeeds("sample-surfaces shapes --out b --points 200");
+    folder.assert_same_tree("a", "b");
 }
 
 #[test]
 fn a_bad_mesh_is_named_and_the_others_go_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    succeeds(at, "gen-shapes --out shapes --train 1 --test 1");
-    std::fs::write(at.join("shapes/cup/test/flat.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2")
-        .unwrap();
-    std::fs::write(at.join("shapes/cup/test/torn.off"), "OFF\n3 1 0\n0 0 0\n1 0").unwrap();
-    let said = exits(1, at, "sample-surfaces shapes --out out --points 50");
-    assert!(said.contains("cup/test/flat.off: no triangle with an area"), "{said}");
-    assert!(said.contains("cup/test/torn.off:4"), "{said}");
-    assert!(said.contains("20 meshes: out"), "{said}");
-    let missing = exits(1, at, "sample-surfaces nowhere --out other");
-    assert!(missing.contains("nowhere") && !at.join("other").exists(), "{missing}");
+    let folder = with_shapes();
+    folder.write("shapes/cup/test/flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2");
+    folder.write("shapes/cup/test/torn.off", "OFF\n3 1 0\n0 0 0\n1 0");
+    let said = folder.exits(1, "sample-surfaces shapes --out out --points 50");
+    for part in
+        ["cup/test/flat.off: no triangle with an area", "cup/test/torn.off:4", "20 meshes: out"]
+    {
+        assert!(said.contains(part), "{part} in {said}");
+    }
+    folder.refuses(1, &[("sample-surfaces nowhere --out other", "nowhere")]);
+    assert!(!folder.at("other").exists());
 }

@@ -1,13 +1,11 @@
 //! The files of cases: found, read, checked.
 
 use std::ffi::OsStr;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use libtest_mimic::Trial;
 use serde::Deserialize;
 
-use crate::chain::Chain;
 use crate::classify::Classify;
 use crate::sample::Sample;
 use crate::scan::Scan;
@@ -28,46 +26,30 @@ struct File {
     scan: Option<Scan>,
     classify: Option<Classify>,
     sample: Option<Sample>,
-    chain: Option<Chain>,
     scene: Option<ManyObjects>,
 }
 
 /// A case of whichever kind, as the test that it is.
 type Check = Box<dyn FnOnce() + Send>;
 
-/// A test for each file; a file that cannot be read is a test that fails.
+/// A test for each file, whatever its name; a file that cannot be read is a test
+/// that fails.
 pub fn trials() -> Vec<Trial> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("extremes/cases");
     let mut trials = vec![Trial::test("what_is_misspelt_is_named", what_is_misspelt_is_named)];
-    for path in files(&root) {
-        let place = path.strip_prefix(&root).unwrap_or(&path);
-        let name = place.with_extension("").to_string_lossy().replace('\\', "/");
-        let (heavy, test) = match read(&path) {
-            Ok((heavy, check)) => (heavy, Ok(check)),
-            Err(error) => (false, Err(error)),
-        };
+    for (path, content) in tests::tree::files(&root) {
+        let name = path.with_extension("").to_string_lossy().replace('\\', "/");
+        let test = parse(&String::from_utf8_lossy(&content), &path)
+            .map_err(|cause| format!("{}: {cause}", path.display()));
+        let heavy = test.as_ref().is_ok_and(|(heavy, _)| *heavy);
         let skipped = heavy && !std::env::var(HEAVY).is_ok_and(|value| value == "1");
         if skipped {
             eprintln!("SKIPPED: {name} takes gigabytes or minutes; {HEAVY}=1 runs it");
         }
-        let trial = Trial::test(name, move || Ok(test.map(|check| check())?));
+        let trial = Trial::test(name, move || Ok(test.map(|(_, check)| check())?));
         trials.push(trial.with_ignored_flag(skipped));
     }
     trials
-}
-
-/// Every file below `folder`, whatever its name: none is passed over.
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let items = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
-    let mut paths: Vec<PathBuf> = items.map(|item| item.expect("an entry").path()).collect();
-    paths.sort();
-    let below = |path: PathBuf| if path.is_dir() { files(&path) } else { vec![path] };
-    paths.into_iter().flat_map(below).collect()
-}
-
-fn read(path: &Path) -> Result<(bool, Check), String> {
-    let text = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    parse(&text, path).map_err(|cause| format!("{}: {cause}", path.display()))
 }
 
 fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
@@ -78,16 +60,15 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     if file.derivation.trim().is_empty() {
         return Err("`derivation` is empty".to_owned());
     }
-    let kinds: [(&str, Option<Check>); 5] = [
+    let kinds: [(&str, Option<Check>); 4] = [
         ("scan", file.scan.map(|case| Box::new(move || case.check()) as Check)),
         ("classify", file.classify.map(|case| Box::new(move || case.check()) as Check)),
         ("sample", file.sample.map(|case| Box::new(move || case.check()) as Check)),
-        ("chain", file.chain.map(|case| Box::new(move || case.check()) as Check)),
         ("scene", file.scene.map(|case| Box::new(move || case.check()) as Check)),
     ];
     let mut named = kinds.into_iter().filter_map(|(kind, check)| Some((kind, check?)));
     let (Some((kind, check)), None) = (named.next(), named.next()) else {
-        return Err("a case is one table: scan, classify, sample, chain or scene".to_owned());
+        return Err("a case is one table: scan, classify, sample or scene".to_owned());
     };
     match path.parent().and_then(Path::file_name) {
         Some(folder) if folder == kind => Ok((file.heavy, check)),
@@ -115,7 +96,5 @@ fn what_is_misspelt_is_named() -> Result<(), libtest_mimic::Failed> {
         let found = message(&text, name);
         assert!(found.contains(expected), "{expected}: {found}");
     }
-    let missing = Path::new("no/such/case.toml");
-    assert!(read(missing).err().is_some_and(|told| told.starts_with("no/such/case.toml: ")));
     Ok(())
 }

@@ -88,18 +88,22 @@ impl Classify {
 
     /// The other cloud, and the cloud at each value of the knob.
     fn turned(&self, cloud: &[[f64; 3]]) -> Vec<(String, Vec<[f64; 3]>)> {
-        let mapped = |map: &dyn Fn([f64; 3]) -> [f64; 3]| cloud.iter().copied().map(map).collect();
+        let mapped = |name: String, map: &dyn Fn([f64; 3]) -> [f64; 3]| {
+            (name, cloud.iter().copied().map(map).collect())
+        };
         let other = self.other.iter().map(|other| ("the other".to_owned(), other.points()));
-        let by_knob: Vec<(String, Vec<[f64; 3]>)> = match &self.knob {
+        let by_knob: Vec<_> = match &self.knob {
             None => Vec::new(),
-            Some(Knob::Scale(values)) => values
-                .iter()
-                .map(|s| (format!("scale {s:e}"), mapped(&|p| p.map(|x| x * s))))
-                .collect(),
-            Some(Knob::Offset(values)) => values
-                .iter()
-                .map(|o| (format!("offset {o:?}"), mapped(&|p| [0, 1, 2].map(|k| p[k] + o[k]))))
-                .collect(),
+            Some(Knob::Scale(values)) => {
+                let scaled = |s: &f64| mapped(format!("scale {s:e}"), &|p| p.map(|x| x * s));
+                values.iter().map(scaled).collect()
+            }
+            Some(Knob::Offset(values)) => {
+                let moved = |o: &[f64; 3]| {
+                    mapped(format!("offset {o:?}"), &|p| [0, 1, 2].map(|k| p[k] + o[k]))
+                };
+                values.iter().map(moved).collect()
+            }
         };
         other.chain(by_knob).collect()
     }
@@ -167,7 +171,8 @@ impl Expect {
     }
 }
 
-fn assert_same(what: &str, part: f64, one: &[f32], other: &[f32]) {
+/// Asserts that logits differ by at most this part of the largest.
+pub fn assert_same(what: &str, part: f64, one: &[f32], other: &[f32]) {
     let largest = one.iter().fold(0.0f32, |most, x| most.max(x.abs()));
     let error = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).abs();
     let worst = one.iter().zip(other).map(error).fold(0.0, f64::max);

@@ -51,9 +51,12 @@ impl Model {
             let tensor = tensors.get_mut(name).unwrap_or_else(|| panic!("`scale`: no {name}"));
             tensor.values.iter_mut().for_each(|value| *value *= factor);
         }
-        self.variance.iter().for_each(|&variance| add_norms(&mut tensors, variance));
+        if let Some(variance) = self.variance {
+            add_norms(&mut tensors, variance);
+        }
         if let Some(range) = self.activation_range {
-            card.activation_ranges = layers(&tensors).map(|layer| (layer, range)).collect();
+            let layers = tensors.keys().filter_map(|name| name.strip_suffix(".weight"));
+            card.activation_ranges = layers.map(|layer| (layer.to_owned(), range)).collect();
         }
         let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
         let path = folder.path().join("m.safetensors");
@@ -67,50 +70,30 @@ fn small() -> (ModelCard, BTreeMap<String, Tensor>) {
 }
 
 fn whole(path: &Path) -> (ModelCard, BTreeMap<String, Tensor>) {
-    let mut file = WeightsFile::open(path).unwrap_or_else(|error| panic!("{error}"));
-    let card = ModelCard::from_metadata(path, &file.metadata());
-    let names: Vec<String> = file.shapes().into_keys().collect();
-    let mut read = |name: String| {
-        let tensor = file.read(&name).unwrap_or_else(|error| panic!("{error}"));
-        (name, tensor)
-    };
-    let tensors = names.into_iter().map(&mut read).collect();
-    (card.unwrap_or_else(|error| panic!("{error}")), tensors)
+    let mut file = WeightsFile::open(path).unwrap();
+    let card = ModelCard::from_metadata(path, &file.metadata()).unwrap();
+    let names = file.shapes().into_keys();
+    (card, names.map(|name| (name.clone(), file.read(&name).unwrap())).collect())
 }
 
-/// The names of the layers that have weights.
-fn layers(tensors: &BTreeMap<String, Tensor>) -> impl Iterator<Item = String> {
-    tensors.keys().filter_map(|name| name.strip_suffix(".weight").map(str::to_owned))
-}
-
-/// Norms that leave activations alone but for their variance: each stack's last
-/// vector layer has none, the others count through point and vector layers.
+/// Adds norms that leave activations alone but for their variance: each stack's
+/// last vector layer has none, the others count through point and vector layers.
 fn add_norms(tensors: &mut BTreeMap<String, Tensor>, variance: f32) {
-    let all: Vec<String> = layers(tensors).collect();
-    for layer in &all {
-        let Some((prefix, kind, number)) = parts(layer) else { continue };
-        let last = |kind: &str| {
-            let count =
-                |name: &&String| parts(name).is_some_and(|(p, k, _)| p == prefix && k == kind);
-            all.iter().filter(count).count()
+    for prefix in ["feat.stn.", "feat.fstn.", "feat.", ""] {
+        let layers = |kind: &str| -> Vec<String> {
+            let names = (1..).map(|i| format!("{prefix}{kind}{i}.bias"));
+            names.take_while(|name| tensors.contains_key(name)).collect()
         };
-        if kind == "fc" && number == last("fc") {
-            continue;
-        }
-        let norm = if kind == "fc" { last("conv") + number } else { number };
-        let width = tensors[&format!("{layer}.bias")].values.len();
-        for (part, value) in
-            [("weight", 1.0), ("bias", 0.0), ("running_mean", 0.0), ("running_var", variance)]
-        {
-            let tensor = Tensor { shape: vec![width], values: vec![value; width] };
-            tensors.insert(format!("{prefix}bn{norm}.{part}"), tensor);
+        let (point_layers, mut vector_layers) = (layers("conv"), layers("fc"));
+        vector_layers.pop();
+        for (norm, bias) in (1..).zip(point_layers.into_iter().chain(vector_layers)) {
+            let width = tensors[&bias].values.len();
+            for (part, value) in
+                [("weight", 1.0), ("bias", 0.0), ("running_mean", 0.0), ("running_var", variance)]
+            {
+                let tensor = Tensor { shape: vec![width], values: vec![value; width] };
+                tensors.insert(format!("{prefix}bn{norm}.{part}"), tensor);
+            }
         }
     }
-}
-
-/// `feat.stn.conv2` as `feat.stn.`, `conv`, 2.
-fn parts(layer: &str) -> Option<(&str, &str, usize)> {
-    let stem = layer.trim_end_matches(|letter: char| letter.is_ascii_digit());
-    let (prefix, kind) = stem.split_at(stem.rfind('.').map_or(0, |dot| dot + 1));
-    Some((prefix, kind, layer[stem.len()..].parse().ok()?))
 }

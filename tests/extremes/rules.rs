@@ -1,51 +1,47 @@
 //! Relations between several scans, which no table of one says plainly.
 
-use formats::rng::StreamKey;
 use glam::{DAffine3, DMat3, DVec3, dvec3};
 use libtest_mimic::Trial;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
 use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::{MISS, RayFrame};
+use sim_gpu::ray::MISS;
 use sim_gpu::resolve::Hits;
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::{Surface, Target};
 use tests::adapter::casters;
-use tests::casting::{at, beams, builtin, hits, job, job_with, target};
+use tests::casting::{at, beams, builtin, hits, job, job_with, placed_job, ranges, target};
 use tests::judge::judge;
 use tests::meshes::{cube, mapped, soup, together, torus};
 use tests::random::Random;
 
+use crate::chain::a_chair_far_away_and_noisy_is_classified_as_at_the_origin;
+
+/// Tests by the names of their functions.
+macro_rules! trials {
+    ($($rule:path),* $(,)?) => {
+        vec![$(Trial::test(stringify!($rule), || {
+            $rule();
+            Ok(())
+        })),*]
+    };
+}
+
 /// A test for each relation.
 pub fn trials() -> Vec<Trial> {
-    let rules: [(&str, fn()); 5] = [
-        (
-            "a_sensor_on_a_surface_is_blind_or_looks_past_it",
-            a_sensor_on_a_surface_is_blind_or_looks_past_it,
-        ),
-        ("an_empty_object_in_a_batch_has_no_hits", an_empty_object_in_a_batch_has_no_hits),
-        (
-            "of_coincident_triangles_the_lowest_index_is_hit",
-            of_coincident_triangles_the_lowest_index_is_hit,
-        ),
-        (
-            "a_squeezed_object_is_seen_as_its_squeezed_mesh",
-            a_squeezed_object_is_seen_as_its_squeezed_mesh,
-        ),
-        ("an_object_flattened_to_nothing_is_not_seen", an_object_flattened_to_nothing_is_not_seen),
-    ];
-    let trial = |(name, rule): (&str, fn())| {
-        Trial::test(name, move || {
-            rule();
-            Ok(())
-        })
-    };
-    rules.into_iter().map(trial).collect()
+    trials![
+        a_sensor_on_a_surface_is_blind_or_looks_past_it,
+        an_empty_object_in_a_batch_has_no_hits,
+        of_coincident_triangles_the_lowest_index_is_hit,
+        a_squeezed_object_is_seen_as_its_squeezed_mesh,
+        an_object_flattened_to_nothing_is_not_seen,
+        a_chair_far_away_and_noisy_is_classified_as_at_the_origin,
+    ]
 }
 
 /// Casts on all casters, holds each to the oracle, and returns what all found.
@@ -59,8 +55,8 @@ fn scan(name: &str, target: &Target, pose: &Pose, pattern: &BeamPattern) -> Vec<
     casters(&Effects::default()).iter().map(cast).collect()
 }
 
-fn view(scale: f64, centre: DVec3) -> Pose {
-    Pose::view(3.0 * scale, 20f64.to_radians(), 0.3, centre)
+fn view(centre: DVec3) -> Pose {
+    Pose::view(3.0, 20f64.to_radians(), 0.3, centre)
 }
 
 /// Where a ray from within leaves the cube.
@@ -79,9 +75,7 @@ fn a_sensor_on_a_surface_is_blind_or_looks_past_it() {
     for place in [dvec3(0.3, 0.2, 1.0), dvec3(0.3, 1.0, 1.0), DVec3::ONE] {
         let job = job(&cube, &at(place), &pattern);
         for caster in casters(&Effects::default()) {
-            let mut ranges = vec![None; pattern.len()];
-            let found = hits(caster, &job, &pattern);
-            found.hits.iter().for_each(|h| ranges[h.beam as usize] = Some(h.range_m));
+            let ranges = ranges(&hits(caster, &job, &pattern), &pattern);
             let (mut blind, mut differing) = (0, 0);
             for (&direction, range) in pattern.directions.iter().zip(ranges) {
                 let is_blind = |range: f64| range < 1e-15;
@@ -108,7 +102,7 @@ fn a_sensor_on_a_surface_is_blind_or_looks_past_it() {
 fn an_empty_object_in_a_batch_has_no_hits() {
     let pattern = builtin("generic-static");
     let [empty, full] = [Mesh::default(), torus(20)].map(|mesh| target(&mesh));
-    let pose = view(1.0, DVec3::ZERO);
+    let pose = view(DVec3::ZERO);
     let cast = |target| job_with(target, &pose, &pattern, Culling::Off);
     let jobs = [cast(&empty), cast(&full), cast(&empty)];
     for caster in casters(&Effects::default()) {
@@ -170,24 +164,20 @@ fn a_squeezed_object_is_seen_as_its_squeezed_mesh() {
             dvec3(5.0, -3.0, 1.0),
         );
         let baked = target(&mapped(&mesh, |v| world_from_object.transform_point3(v)));
-        let pose = view(1.0, world_from_object.translation);
+        let pose = view(world_from_object.translation);
         let truth = scan("baked", &baked, &pose, &pattern);
+        let truth = ranges(&truth[0], &pattern);
         let plain = target(&mesh);
-        let frame = RayFrame::new(&plain.surface, &world_from_object, &pose);
         for culling in [Culling::On, Culling::Off] {
-            let stream = StreamKey::new(0, "", 0);
-            let job = CastJob::aim(plain.clone(), frame, &pattern, culling, stream, 1.0);
+            let job = placed_job(&plain, &world_from_object, &pose, &pattern, culling);
             for caster in casters(&Effects::default()) {
                 let found = hits(caster, &job, &pattern);
                 judge(&job, &pattern, &found).assert_kept("squeezed");
-                let mut ranges = vec![[None; 2]; pattern.len()];
-                for (side, hits) in [&truth[0], &found].into_iter().enumerate() {
-                    hits.hits.iter().for_each(|h| ranges[h.beam as usize][side] = Some(h.range_m));
-                }
-                let differing = ranges.iter().filter(|pair| match pair {
+                let found = ranges(&found, &pattern);
+                let differing = truth.iter().zip(&found).filter(|pair| match pair {
                     // The squeeze's inverse amplifies roundings by 10^3.
-                    [Some(a), Some(b)] => (a - b).abs() > 1e-9,
-                    [a, b] => a.is_some() != b.is_some(),
+                    (Some(a), Some(b)) => (a - b).abs() > 1e-9,
+                    (a, b) => a.is_some() != b.is_some(),
                 });
                 assert!(differing.count() <= 2);
             }
@@ -200,10 +190,8 @@ fn an_object_flattened_to_nothing_is_not_seen() {
     let pattern = builtin("vlp32c");
     for stretch in [dvec3(1.0, 1.0, 0.0), DVec3::ZERO, DVec3::NAN] {
         let flat = DAffine3::from_scale(stretch);
-        let frame = RayFrame::new(&target.surface, &flat, &view(1.0, DVec3::ZERO));
-        let stream = StreamKey::new(0, "", 0);
         for culling in [Culling::On, Culling::Off] {
-            let job = CastJob::aim(target.clone(), frame, &pattern, culling, stream, 1.0);
+            let job = placed_job(&target, &flat, &view(DVec3::ZERO), &pattern, culling);
             for caster in casters(&Effects::default()) {
                 assert!(hits(caster, &job, &pattern).hits.is_empty(), "{stretch}");
             }

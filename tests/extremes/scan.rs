@@ -7,13 +7,14 @@ use sim_gpu::bvh::{Builder, assert_well_formed};
 use sim_gpu::caster::Caster;
 use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::Culling;
+use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::resolve::{Hits, resolve};
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
 use tests::adapter::casters;
-use tests::casting::{beams, builtin, job_with, target_by};
+use tests::casting::{beams, builtin, job_with, ranges, target_by};
 use tests::judge::{judge, near_silhouette};
 use tests::meshes::mapped;
 use tests::random::Random;
@@ -25,27 +26,19 @@ use crate::shape::Shape;
 #[serde(deny_unknown_fields)]
 pub struct Scan {
     mesh: Shape,
-    #[serde(default)]
-    builder: Build,
+    /// `morton`; the surface area heuristic, if absent.
+    builder: Option<String>,
     sensor: Place,
     beams: Beams,
     knob: Option<Knob>,
     expect: Expect,
 }
 
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Build {
-    #[default]
-    Sah,
-    Morton,
-}
-
 /// Where the sensor stands.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "a sensor has `at_m` or `distance_m`", deny_unknown_fields)]
 enum Place {
-    At { at_m: [f64; 3], quaternion_xyzw: Option<[f64; 4]> },
+    At { at_m: DVec3, quaternion_xyzw: Option<DQuat> },
     View { distance_m: f64, elevation_deg: f64, azimuth_deg: f64 },
 }
 
@@ -55,15 +48,15 @@ enum Beams {
     /// Those of a sensor that comes with the program.
     Sensor(String),
     /// In these directions.
-    Directions(Vec<[f64; 3]>),
+    Directions(Vec<DVec3>),
     /// So many, anywhere.
     Random(usize),
     /// At these points.
-    AtPoints(Vec<[f64; 3]>),
+    AtPoints(Vec<DVec3>),
     /// At random points of a box.
-    AtBox { n: usize, low: [f64; 3], high: [f64; 3] },
+    AtBox { n: usize, low: DVec3, high: DVec3 },
     /// At points spread evenly from one to another, both included.
-    AtSegment { n: u32, from: [f64; 3], to: [f64; 3] },
+    AtSegment { n: u32, from: DVec3, to: DVec3 },
     /// At the mesh's vertices and at the middles of its edges.
     AtCornersAndEdges {},
 }
@@ -75,7 +68,7 @@ enum Knob {
     /// Everything is so many times as large.
     Scale(Vec<f64>),
     /// Everything stands elsewhere, metres.
-    OffsetM(Vec<[f64; 3]>),
+    OffsetM(Vec<DVec3>),
     /// The sensor stands so far back along its own place, metres.
     DistanceM(Vec<f64>),
 }
@@ -99,10 +92,11 @@ struct Expect {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "`aim`, `leaves-cube`, `miss`, or a list of ranges and `miss`")]
+#[serde(untagged, expecting = "`aim`, `leaves-cube`, `miss`, or a list of ranges")]
 enum Ranges {
     All(Rule),
-    Each(Vec<Range>),
+    /// One a beam, metres; `inf` for a beam that misses.
+    Each(Vec<f64>),
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -113,19 +107,6 @@ enum Rule {
     /// Every beam leaves the cube from -1 to 1, in which the sensor is.
     LeavesCube,
     /// No beam finds anything.
-    Miss,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(untagged, expecting = "a range in metres or `miss`")]
-enum Range {
-    Metres(f64),
-    Miss(Miss),
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Miss {
     Miss,
 }
 
@@ -149,11 +130,12 @@ fn yes() -> bool {
 }
 
 /// One setting of the knob.
-#[derive(Clone, Copy)]
-struct Setting {
-    scale: f64,
-    offset: DVec3,
-    distance: Option<f64>,
+#[derive(Clone, Copy, Debug)]
+enum Setting {
+    Plain,
+    Scale(f64),
+    OffsetM(DVec3),
+    DistanceM(f64),
 }
 
 /// A setting made ready to be cast, and what each beam must find, if told.
@@ -167,9 +149,8 @@ struct Scene {
 impl Scan {
     /// Casts every setting on every caster.
     pub fn check(&self) {
-        let plain = Setting { scale: 1.0, offset: DVec3::ZERO, distance: None };
-        let settings = self.knob.as_ref().map_or(vec![plain], Knob::settings);
-        let reference = self.expect.same.as_ref().map(|same| (same, self.cast_all(plain)));
+        let settings = self.knob.as_ref().map_or(vec![Setting::Plain], Knob::settings);
+        let reference = self.expect.same.as_ref().map(|same| (same, self.cast_all(Setting::Plain)));
         for setting in settings {
             let (scene, found) = self.cast_all(setting);
             if let Some((same, (first, reference))) = &reference {
@@ -184,12 +165,11 @@ impl Scan {
     fn cast_all(&self, setting: Setting) -> (Scene, Vec<Hits>) {
         let scene = self.scene(setting);
         let check = |caster: &&Caster| {
-            let what = format!("{} on {}", setting.name(), caster.name());
+            let what = format!("{setting:?} on {}", caster.name());
             let [hits, unculled] = [Culling::On, Culling::Off].map(|c| scene.cast(caster, c));
             assert_eq!(hits, unculled, "{what}: culling");
             if self.expect.judged {
-                let job = job_with(&scene.target, &scene.pose, &scene.pattern, Culling::On);
-                judge(&job, &scene.pattern, &hits).assert_kept(&what);
+                judge(&scene.job(Culling::On), &scene.pattern, &hits).assert_kept(&what);
             }
             self.expect.check(&what, &scene, &hits);
             hits
@@ -198,23 +178,23 @@ impl Scan {
         (scene, found)
     }
 
-    fn scene(&self, Setting { scale, offset, distance }: Setting) -> Scene {
-        let builder = match self.builder {
-            Build::Sah => Builder::Sah,
-            Build::Morton => Builder::Morton,
+    fn scene(&self, setting: Setting) -> Scene {
+        let builder = match self.builder.as_deref() {
+            None => Builder::Sah,
+            Some("morton") => Builder::Morton,
+            Some(other) => panic!("`builder`: expected `morton`, found `{other}`"),
         };
         let mesh = self.mesh.mesh();
-        let pose = self.sensor.pose(distance);
+        let pose = self.sensor.pose(setting);
         let mut random = Random::new("aims");
         let (pattern, aims) = self.beams.pattern(&mesh, pose.position_m, &mut random);
         let ranges = self.expect.ranges.as_ref().map(|ranges| {
             let told = ranges.of(pose.position_m, &pattern, aims.as_deref());
-            told.into_iter().map(|range| range.map(|range| range * scale)).collect()
+            told.into_iter().map(|range| range.map(|range| range * setting.scale())).collect()
         });
-        let moved = |v: DVec3| v * scale + offset;
-        let target = target_by(builder, &mapped(&mesh, moved));
+        let target = target_by(builder, &mapped(&mesh, |v| setting.moved(v)));
         assert_well_formed(&target.bvh);
-        let pose = Pose { position_m: moved(pose.position_m), ..pose };
+        let pose = Pose { position_m: setting.moved(pose.position_m), ..pose };
         Scene { target, pose, pattern, ranges }
     }
 }
@@ -222,7 +202,7 @@ impl Scan {
 impl Scene {
     /// As a scan does: a target too large for the adapter goes to the CPU.
     fn cast(&self, caster: &Caster, culling: Culling) -> Hits {
-        let job = job_with(&self.target, &self.pose, &self.pattern, culling);
+        let job = self.job(culling);
         let jobs = std::slice::from_ref(&job);
         let casts = match caster.fits(&self.target) {
             true => caster.cast(jobs).unwrap_or_else(|error| panic!("{error}")),
@@ -231,21 +211,21 @@ impl Scene {
         resolve(&job, &casts[0], &self.pattern, &Effects::default())
     }
 
-    fn ranges(&self, hits: &Hits) -> Vec<Option<f64>> {
-        let mut ranges = vec![None; self.pattern.len()];
-        hits.hits.iter().for_each(|hit| ranges[hit.beam as usize] = Some(hit.range_m));
-        ranges
+    fn job(&self, culling: Culling) -> CastJob {
+        job_with(&self.target, &self.pose, &self.pattern, culling)
     }
 }
 
 impl Place {
-    fn pose(&self, distance: Option<f64>) -> Pose {
+    fn pose(&self, setting: Setting) -> Pose {
+        let distance = if let Setting::DistanceM(metres) = setting { Some(metres) } else { None };
         match self {
             Self::At { at_m, quaternion_xyzw } => {
-                let at = DVec3::from_array(*at_m);
-                let turned = quaternion_xyzw.map_or(DQuat::IDENTITY, DQuat::from_array);
-                let position_m = distance.map_or(at, |distance| at.normalize() * distance);
-                Pose { position_m, world_from_sensor: turned }
+                let back = |distance| at_m.normalize() * distance;
+                Pose {
+                    position_m: distance.map_or(*at_m, back),
+                    world_from_sensor: quaternion_xyzw.unwrap_or(DQuat::IDENTITY),
+                }
             }
             Self::View { distance_m, elevation_deg, azimuth_deg } => {
                 let distance = distance.unwrap_or(*distance_m);
@@ -260,26 +240,22 @@ impl Beams {
     /// The pattern, and the points that its beams are aimed at, if any.
     fn pattern(
         &self,
-        mesh: &sim_gpu::mesh::Mesh,
+        mesh: &Mesh,
         sensor: DVec3,
         random: &mut Random,
     ) -> (BeamPattern, Option<Vec<DVec3>>) {
-        let vectors = |list: &[[f64; 3]]| list.iter().copied().map(DVec3::from_array).collect();
         let points: Vec<DVec3> = match self {
             Self::Sensor(name) => return (builtin(name), None),
-            Self::Directions(list) => return (beams(vectors(list) as Vec<DVec3>), None),
-            Self::Random(n) => {
-                return (beams((0..*n).map(|_| random.direction()).collect::<Vec<_>>()), None);
-            }
-            Self::AtPoints(list) => vectors(list),
+            Self::Directions(list) => return (beams(list.iter().copied()), None),
+            Self::Random(n) => return (beams((0..*n).map(|_| random.direction())), None),
+            Self::AtPoints(list) => list.clone(),
             Self::AtBox { n, low, high } => {
-                let (low, high) = (DVec3::from_array(*low), DVec3::from_array(*high));
-                (0..*n).map(|_| low + (high - low) * (random.in_cube() * 0.5 + 0.5)).collect()
+                let within = |at: DVec3| low + (high - low) * (at * 0.5 + 0.5);
+                (0..*n).map(|_| within(random.in_cube())).collect()
             }
             Self::AtSegment { n, from, to } => {
-                let (from, to) = (DVec3::from_array(*from), DVec3::from_array(*to));
-                let last = f64::from(n - 1);
-                (0..*n).map(|i| from + (to - from) * (f64::from(i) / last)).collect()
+                let along = |i| f64::from(i) / f64::from(n - 1);
+                (0..*n).map(|i| from + (to - from) * along(i)).collect()
             }
             Self::AtCornersAndEdges {} => corners_and_edges(mesh),
         };
@@ -287,7 +263,7 @@ impl Beams {
     }
 }
 
-fn corners_and_edges(mesh: &sim_gpu::mesh::Mesh) -> Vec<DVec3> {
+fn corners_and_edges(mesh: &Mesh) -> Vec<DVec3> {
     let of = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
         [a, b, c, a.midpoint(b), b.midpoint(c), c.midpoint(a)]
@@ -297,28 +273,21 @@ fn corners_and_edges(mesh: &sim_gpu::mesh::Mesh) -> Vec<DVec3> {
 
 impl Knob {
     fn settings(&self) -> Vec<Setting> {
-        let plain = Setting { scale: 1.0, offset: DVec3::ZERO, distance: None };
         match self {
-            Self::Scale(values) => values.iter().map(|&scale| Setting { scale, ..plain }).collect(),
-            Self::OffsetM(values) => {
-                let at = |&offset| Setting { offset: DVec3::from_array(offset), ..plain };
-                values.iter().map(at).collect()
-            }
-            Self::DistanceM(values) => {
-                values.iter().map(|&d| Setting { distance: Some(d), ..plain }).collect()
-            }
+            Self::Scale(values) => values.iter().copied().map(Setting::Scale).collect(),
+            Self::OffsetM(values) => values.iter().copied().map(Setting::OffsetM).collect(),
+            Self::DistanceM(values) => values.iter().copied().map(Setting::DistanceM).collect(),
         }
     }
 }
 
 impl Setting {
-    fn name(&self) -> String {
-        let Self { scale, offset, distance } = self;
-        match distance {
-            Some(distance) => format!("distance {distance:e} m"),
-            None if *scale != 1.0 => format!("scale {scale:e}"),
-            None => format!("offset {offset}"),
-        }
+    fn scale(self) -> f64 {
+        if let Self::Scale(factor) = self { factor } else { 1.0 }
+    }
+
+    fn moved(self, place: DVec3) -> DVec3 {
+        if let Self::OffsetM(offset) = self { place + offset } else { place * self.scale() }
     }
 }
 
@@ -327,7 +296,10 @@ impl Ranges {
         let rule = match self {
             Self::Each(list) => {
                 assert_eq!(list.len(), pattern.len(), "`expect.ranges`: one a beam");
-                return list.iter().map(|range| range.metres()).collect();
+                return list
+                    .iter()
+                    .map(|&range| (range < f64::INFINITY).then_some(range))
+                    .collect();
             }
             Self::All(rule) => *rule,
         };
@@ -345,15 +317,6 @@ impl Ranges {
     }
 }
 
-impl Range {
-    fn metres(self) -> Option<f64> {
-        match self {
-            Self::Metres(range) => Some(range),
-            Self::Miss(Miss::Miss) => None,
-        }
-    }
-}
-
 impl Expect {
     fn check(&self, what: &str, scene: &Scene, hits: &Hits) {
         let (n, in_f64) = (hits.hits.len(), hits.decided_in_f64);
@@ -365,7 +328,7 @@ impl Expect {
             assert!(says, "`expect` says nothing");
             return;
         };
-        for (beam, pair) in scene.ranges(hits).into_iter().zip(expected).enumerate() {
+        for (beam, pair) in ranges(hits, &scene.pattern).into_iter().zip(expected).enumerate() {
             let same = match pair {
                 (Some(found), Some(expected)) => {
                     (found - expected).abs() <= self.relative * expected
@@ -381,18 +344,17 @@ impl Same {
     fn check(&self, setting: Setting, first: (&Scene, &Hits), second: (&Scene, &Hits)) {
         match self {
             Self::Relative(tolerance) => {
-                let what = setting.name();
-                assert_eq!(first.1.hits.len(), second.1.hits.len(), "{what}");
+                assert_eq!(first.1.hits.len(), second.1.hits.len(), "{setting:?}");
                 for (one, other) in first.1.hits.iter().zip(&second.1.hits) {
                     let [a, b] = [one, other].map(|hit| (hit.beam, hit.triangle));
-                    assert_eq!(a, b, "{what}");
-                    let error = (other.range_m / setting.scale / one.range_m - 1.0).abs();
-                    assert!(error < *tolerance, "{what}: {error:e}");
+                    assert_eq!(a, b, "{setting:?}");
+                    let error = (other.range_m / setting.scale() / one.range_m - 1.0).abs();
+                    assert!(error < *tolerance, "{setting:?}: {error:e}");
                 }
             }
             Self::Metres { within, silhouettes } => {
                 let differing = differing(first, second, *within);
-                assert!(differing <= *silhouettes, "{}: {differing} beams", setting.name());
+                assert!(differing <= *silhouettes, "{setting:?}: {differing} beams");
             }
         }
     }
@@ -400,8 +362,8 @@ impl Same {
 
 /// How many beams find another range, each of which must be at a silhouette.
 fn differing(first: (&Scene, &Hits), second: (&Scene, &Hits), within: f64) -> usize {
-    let (here, there) = (first.0.ranges(first.1), second.0.ranges(second.1));
-    let job = job_with(&first.0.target, &first.0.pose, &first.0.pattern, Culling::On);
+    let [here, there] = [first, second].map(|(scene, hits)| ranges(hits, &scene.pattern));
+    let job = first.0.job(Culling::On);
     let mut differing = 0;
     for (beam, pair) in here.into_iter().zip(there).enumerate() {
         let same = match pair {

@@ -9,6 +9,7 @@ use sim_gpu::effects::Effects;
 use sim_gpu::job::Culling;
 use sim_gpu::scene::{Scene, SceneScan, cast};
 use tests::adapter::casters;
+use tests::meshes::cuboid;
 
 /// Cubes of 1 m on a square lattice, seen from above its middle.
 #[derive(Deserialize)]
@@ -41,10 +42,8 @@ impl ManyObjects {
     /// Scans the scene on every caster.
     pub fn check(&self) {
         let folder = tempfile::tempdir().expect("a folder");
-        let cube = "OFF\n8 6 0\n-0.5 -0.5 -0.5\n0.5 -0.5 -0.5\n0.5 0.5 -0.5\n-0.5 0.5 -0.5\n\
-                    -0.5 -0.5 0.5\n0.5 -0.5 0.5\n0.5 0.5 0.5\n-0.5 0.5 0.5\n\
-                    4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n";
-        std::fs::write(folder.path().join("cube.off"), cube).expect("a mesh");
+        let cube = cuboid(DVec3::splat(-0.5), DVec3::splat(0.5));
+        edgepuck_shapes::write_off(&cube, &folder.path().join("cube.off")).expect("a mesh");
         let file = folder.path().join("scene.toml");
         let scene = Scene::parse(&self.text(), &file).unwrap_or_else(|error| panic!("{error}"));
         for caster in casters(&Effects::default()) {

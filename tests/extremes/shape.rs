@@ -24,7 +24,7 @@ pub enum Shape {
     /// n triangles anywhere in the cube.
     Soup { n: u32, size: f64 },
     /// As they are listed.
-    Triangles { vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]> },
+    Triangles { vertices: Vec<DVec3>, triangles: Vec<[u32; 3]> },
     /// So many slivers from one apex at -x to tips at x = 1, so far apart.
     Fan { slivers: u32, apart: f64 },
     /// Squares that overlap in a plane, none alike.
@@ -46,10 +46,9 @@ impl Shape {
             Self::Torus { n } => meshes::torus(*n),
             Self::Icosphere { level } => meshes::icosphere(*level),
             Self::Soup { n, size } => meshes::soup(*n, *size),
-            Self::Triangles { vertices, triangles } => Mesh {
-                vertices: vertices.iter().copied().map(DVec3::from_array).collect(),
-                triangles: triangles.clone(),
-            },
+            Self::Triangles { vertices, triangles } => {
+                Mesh { vertices: vertices.clone(), triangles: triangles.clone() }
+            }
             Self::Fan { slivers, apart } => fan(*slivers, *apart),
             Self::Layers {} => layers(),
             Self::Together { parts } => {
@@ -61,7 +60,7 @@ impl Shape {
 }
 
 /// Two triangles in the plane z = 0.
-pub fn square() -> Mesh {
+fn square() -> Mesh {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let vertices = corners.map(|(x, y)| dvec3(x, y, 0.0)).to_vec();
     Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] }

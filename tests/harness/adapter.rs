@@ -7,7 +7,6 @@ use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
 
 /// The CPU twin, and the adapter if there is one.
-#[must_use]
 pub fn casters(effects: &Effects) -> Vec<&'static Caster> {
     [Some(open(&AdapterRequest::Cpu, effects)), adapter(effects).ok()]
         .into_iter()
@@ -19,9 +18,6 @@ pub fn casters(effects: &Effects) -> Vec<&'static Caster> {
 ///
 /// # Errors
 /// If there is none.
-///
-/// # Panics
-/// If there is none and the environment requires one.
 pub fn adapter(effects: &Effects) -> Result<&'static Caster, String> {
     let caster = open(&AdapterRequest::Auto, effects);
     test_support::adapter(matches!(caster, Caster::Gpu(_)).then_some(caster))

@@ -2,10 +2,9 @@
 
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3};
-use sim_gpu::bvh::Builder;
+use sim_gpu::bvh::{Builder, Bvh};
 use sim_gpu::caster::Caster;
-use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::mesh::Mesh;
 use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::pose::Pose;
@@ -15,29 +14,28 @@ use sim_gpu::sensor::{BeamPattern, Sensor};
 use sim_gpu::target::{Surface, Target};
 
 /// `mesh` without its degenerate and duplicate triangles, ready for casting.
-#[must_use]
 pub fn target(mesh: &Mesh) -> Target {
     target_by(Builder::Sah, mesh)
 }
 
 /// As [`target`], by this builder.
-#[must_use]
 pub fn target_by(builder: Builder, mesh: &Mesh) -> Target {
     let kept = triangle_stats(mesh).kept;
     Target::new(Surface::new(mesh.clone(), kept), builder)
 }
 
+/// A tree as it is uploaded: its nodes, then its triangles.
+pub fn tree_bytes(bvh: &Bvh) -> Vec<u8> {
+    let Bvh { nodes, triangles } = bvh;
+    [bytemuck::cast_slice::<_, u8>(nodes), bytemuck::cast_slice(triangles)].concat()
+}
+
 /// The beams of a sensor that comes with the program.
-///
-/// # Panics
-/// If there is no such sensor.
-#[must_use]
 pub fn builtin(name: &str) -> BeamPattern {
     Sensor::builtin(name).unwrap_or_else(|| panic!("no sensor {name}")).pattern()
 }
 
 /// Beams in these directions, which are brought to unit length.
-#[must_use]
 pub fn beams(directions: impl IntoIterator<Item = DVec3>) -> BeamPattern {
     let directions: Vec<DVec3> = directions.into_iter().map(DVec3::normalize).collect();
     let n = directions.len();
@@ -45,40 +43,47 @@ pub fn beams(directions: impl IntoIterator<Item = DVec3>) -> BeamPattern {
 }
 
 /// A sensor at `position_m` whose axes are the world's.
-#[must_use]
 pub fn at(position_m: DVec3) -> Pose {
     Pose { position_m, world_from_sensor: DQuat::IDENTITY }
 }
 
 /// `pattern` from `pose` at a target whose frame is the world's.
-#[must_use]
 pub fn job(target: &Target, pose: &Pose, pattern: &BeamPattern) -> CastJob {
     job_with(target, pose, pattern, Culling::On)
 }
 
 /// As [`job`], with or without culling.
-#[must_use]
 pub fn job_with(target: &Target, pose: &Pose, pattern: &BeamPattern, culling: Culling) -> CastJob {
-    let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
+    placed_job(target, &DAffine3::IDENTITY, pose, pattern, culling)
+}
+
+/// As [`job_with`], at a target that stands elsewhere.
+pub fn placed_job(
+    target: &Target,
+    world_from_object: &DAffine3,
+    pose: &Pose,
+    pattern: &BeamPattern,
+    culling: Culling,
+) -> CastJob {
+    let frame = RayFrame::new(&target.surface, world_from_object, pose);
     let stream = StreamKey::new(7, "object", 0);
     CastJob::aim(target.clone(), frame, pattern, culling, stream, 0.75)
 }
 
-/// What `caster` finds for `job`, without effects.
-///
-/// # Panics
-/// If casting fails.
-#[must_use]
-pub fn hits(caster: &Caster, job: &CastJob, pattern: &BeamPattern) -> Hits {
-    hits_with(caster, job, pattern, &Effects::default())
+/// What `caster` answers for `job` alone.
+pub fn cast(caster: &Caster, job: &CastJob) -> Cast {
+    let casts = caster.cast(std::slice::from_ref(job)).unwrap_or_else(|error| panic!("{error}"));
+    casts.into_iter().next().expect("invariant: one job has one answer")
 }
 
-/// What `caster`, which was opened for `effects`, finds for `job`.
-///
-/// # Panics
-/// If casting fails.
-#[must_use]
-pub fn hits_with(caster: &Caster, job: &CastJob, pattern: &BeamPattern, effects: &Effects) -> Hits {
-    let casts = caster.cast(std::slice::from_ref(job)).unwrap_or_else(|error| panic!("{error}"));
-    resolve(job, &casts[0], pattern, effects)
+/// What `caster` finds for `job`.
+pub fn hits(caster: &Caster, job: &CastJob, pattern: &BeamPattern) -> Hits {
+    resolve(job, &cast(caster, job), pattern, caster.effects())
+}
+
+/// The range of each beam of `pattern`; `None` for a beam that misses.
+pub fn ranges(hits: &Hits, pattern: &BeamPattern) -> Vec<Option<f64>> {
+    let mut ranges = vec![None; pattern.len()];
+    hits.hits.iter().for_each(|hit| ranges[hit.beam as usize] = Some(hit.range_m));
+    ranges
 }

@@ -8,12 +8,15 @@ use std::fmt;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use sim_gpu::caster::Caster;
 use sim_gpu::cpu::oracle::{self, Crossing};
 use sim_gpu::job::CastJob;
 use sim_gpu::ray::Ray;
 use sim_gpu::resolve::{Hit, Hits};
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::target::Target;
+
+use crate::casting::hits;
 
 /// Relative error allowed of a range.
 pub const RANGE_TOLERANCE: f64 = 1e-6;
@@ -36,8 +39,8 @@ pub const MOST_AMBIGUOUS: f64 = 0.02;
 /// How a caster's hits compare with the oracle's.
 #[derive(Clone, Debug, Default)]
 pub struct Verdict {
-    /// Beams compared, whether or not they were cast.
-    pub beams: usize,
+    /// Rays that the caster left to f64.
+    pub decided_in_f64: usize,
     /// Hits of the oracle.
     pub hits: usize,
     /// Largest relative error of a range where the same surface was found, not
@@ -51,32 +54,51 @@ pub struct Verdict {
 
 /// Whether a caster left more than the share `most` of `hits` to f64, and more
 /// than one. A caster that marks every ray would keep every promise.
-#[must_use]
 pub fn leaves_too_much(hits: &Hits, most: f64) -> bool {
     hits.decided_in_f64 as f64 > (most * hits.hits.len() as f64).max(1.0)
 }
 
 /// Compares `hits`, which a caster found for `job`, with the oracle on all
 /// beams of `pattern`, cast or not.
-#[must_use]
 pub fn judge(job: &CastJob, pattern: &BeamPattern, hits: &Hits) -> Verdict {
     let mut found = vec![None; pattern.len()];
     for hit in &hits.hits {
         found[hit.beam as usize] = Some(hit);
     }
-    found
+    let verdict = found
         .par_iter()
         .enumerate()
         .map(|(beam, hit)| {
             let ray = job.frame.beam(pattern, beam as u32);
-            judge_beam(&job.target, &ray, *hit).named(beam)
+            let mut verdict = judge_beam(&job.target, &ray, *hit);
+            verdict.broken.iter_mut().for_each(|broken| *broken = format!("beam {beam}: {broken}"));
+            verdict
         })
-        .reduce(Verdict::default, Verdict::and)
+        .reduce(Verdict::default, Verdict::and);
+    Verdict { decided_in_f64: hits.decided_in_f64, ..verdict }
+}
+
+/// Asserts that `caster` keeps the promise on `job`, and leaves at most the share
+/// `most_ambiguous` of its hits to f64.
+pub fn assert_promise(
+    caster: &Caster,
+    job: &CastJob,
+    pattern: &BeamPattern,
+    most_ambiguous: f64,
+    what: &str,
+) -> Verdict {
+    let hits = hits(caster, job, pattern);
+    let verdict = judge(job, pattern, &hits);
+    let what = format!("{what} on {}", caster.name());
+    verdict.assert_kept(&what);
+    let (decided, n) = (hits.decided_in_f64, hits.hits.len());
+    assert!(!leaves_too_much(&hits, most_ambiguous), "{what}: {decided} of {n} in f64");
+    verdict
 }
 
 fn judge_beam(target: &Target, ray: &Ray, found: Option<&Hit>) -> Verdict {
     let truth = oracle::nearest(target, ray);
-    let mut verdict = Verdict { beams: 1, hits: truth.iter().count(), ..Verdict::default() };
+    let mut verdict = Verdict { hits: truth.iter().count(), ..Verdict::default() };
     let differs = match (truth, found) {
         (None, None) => return verdict,
         (Some(truth), Some(found)) => {
@@ -100,20 +122,17 @@ fn judge_beam(target: &Target, ray: &Ray, found: Option<&Hit>) -> Verdict {
 }
 
 /// The angle between the beam and the triangle's plane.
-#[must_use]
 pub fn incidence_rad(target: &Target, ray: &Ray, triangle: u32) -> f64 {
     oracle::normal(target, triangle).dot(ray.direction.normalize()).abs().min(1.0).asin()
 }
 
 /// Whether the surface breaks off, or another comes before it, within
 /// [`SILHOUETTE_RAD`] of the beam: one of eight beams around it jumps.
-#[must_use]
 pub fn near_silhouette(target: &Target, ray: &Ray, truth: Option<Crossing>) -> bool {
     around(ray, SILHOUETTE_RAD).any(|beside| jumps(target, ray, truth, &beside))
 }
 
 /// Whether the oracle sees another triangle, or none, within `angle_rad`.
-#[must_use]
 pub fn near_edge(target: &Target, ray: &Ray, angle_rad: f64) -> bool {
     let index = |ray: &Ray| oracle::nearest(target, ray).map(|crossing| crossing.index);
     let own = index(ray);
@@ -147,15 +166,9 @@ fn jumps(target: &Target, ray: &Ray, truth: Option<Crossing>, beside: &Ray) -> b
 }
 
 impl Verdict {
-    fn named(mut self, beam: usize) -> Self {
-        self.broken.iter_mut().for_each(|broken| *broken = format!("beam {beam}: {broken}"));
-        self
-    }
-
     /// Both together.
-    #[must_use]
     pub fn and(mut self, mut other: Self) -> Self {
-        self.beams += other.beams;
+        self.decided_in_f64 += other.decided_in_f64;
         self.hits += other.hits;
         self.worst = self.worst.max(other.worst);
         self.at_silhouettes += other.at_silhouettes;
@@ -164,9 +177,6 @@ impl Verdict {
     }
 
     /// Asserts that the promise holds.
-    ///
-    /// # Panics
-    /// With the first beams that break it.
     pub fn assert_kept(&self, what: &str) {
         let first: Vec<_> = self.broken.iter().take(5).map(String::as_str).collect();
         assert!(first.is_empty(), "{what}: {} beams:\n{}", self.broken.len(), first.join("\n"));
@@ -177,9 +187,10 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} beams, {} hits, worst range error {:.1e}, {} differ at silhouettes, {} broken",
-            self.beams,
+            "{} hits, {} decided in f64, worst range error {:.1e}, {} differ at \
+             silhouettes, {} broken",
             self.hits,
+            self.decided_in_f64,
             self.worst,
             self.at_silhouettes,
             self.broken.len()

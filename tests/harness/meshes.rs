@@ -9,7 +9,6 @@ use sim_gpu::mesh::Mesh;
 use crate::random::Random;
 
 /// A unit sphere of `20 * 4^level` triangles, all vertices on the sphere.
-#[must_use]
 pub fn icosphere(level: u32) -> Mesh {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     let mut vertices = Vec::new();
@@ -60,7 +59,6 @@ fn subdivided(mesh: &Mesh) -> Mesh {
 }
 
 /// A box of twelve triangles between two corners.
-#[must_use]
 pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
     let vertices = (0..8)
         .map(|i| {
@@ -76,14 +74,12 @@ pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
 }
 
 /// The cube from -1 to 1.
-#[must_use]
 pub fn cube() -> Mesh {
     cuboid(DVec3::NEG_ONE, DVec3::ONE)
 }
 
 /// The cube from -1 to 1, each face of `n` x `n` squares: boxes of its triangles
 /// are flat and touch without overlap.
-#[must_use]
 pub fn tiled_cube(n: u32) -> Mesh {
     let at = |i: u32| f64::from(i) / f64::from(n) * 2.0 - 1.0;
     let mut mesh = Mesh::default();
@@ -107,7 +103,6 @@ pub fn tiled_cube(n: u32) -> Mesh {
 }
 
 /// A wavy torus about z, within 1.1 of the origin, of `2 n^2` triangles.
-#[must_use]
 pub fn torus(n: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..n {
@@ -126,20 +121,22 @@ pub fn torus(n: u32) -> Mesh {
 
 /// `n` triangles anywhere in the cube from -1 to 1, their corners within
 /// `size` of each other.
-#[must_use]
 pub fn soup(n: u32, size: f64) -> Mesh {
     let mut random = Random::new("soup");
-    let mut mesh = Mesh::default();
-    for i in 0..n {
+    let mut corners = |_| {
         let place = random.in_cube();
-        mesh.vertices.extend((0..3).map(|_| place + random.in_cube() * size));
-        mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
-    }
-    mesh
+        [(); 3].map(|()| place + random.in_cube() * size)
+    };
+    unconnected((0..n).flat_map(&mut corners).collect())
+}
+
+/// Triangles of three vertices each, in their order.
+pub fn unconnected(vertices: Vec<DVec3>) -> Mesh {
+    let n = vertices.len() as u32 / 3;
+    Mesh { vertices, triangles: (0..n).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect() }
 }
 
 /// The meshes side by side in one.
-#[must_use]
 pub fn together(meshes: &[Mesh]) -> Mesh {
     let mut all = Mesh::default();
     for mesh in meshes {
@@ -151,16 +148,12 @@ pub fn together(meshes: &[Mesh]) -> Mesh {
 }
 
 /// The same surface with three vertices of its own for each triangle.
-#[must_use]
 pub fn unmerged(mesh: &Mesh) -> Mesh {
     let corners = mesh.triangles.iter().flatten();
-    let vertices: Vec<DVec3> = corners.map(|&v| mesh.vertices[v as usize]).collect();
-    let triangles = (0..mesh.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
-    Mesh { triangles: triangles.collect(), vertices }
+    unconnected(corners.map(|&v| mesh.vertices[v as usize]).collect())
 }
 
 /// The mesh with each vertex mapped.
-#[must_use]
 pub fn mapped(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
     let vertices = mesh.vertices.iter().map(|&v| map(v)).collect();
     Mesh { vertices, triangles: mesh.triangles.clone() }

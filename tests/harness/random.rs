@@ -12,7 +12,6 @@ pub struct Random {
 
 impl Random {
     /// The sequence of this name.
-    #[must_use]
     pub fn new(name: &str) -> Self {
         Self { key: StreamKey::new(0, name, 0), next: 0 }
     }

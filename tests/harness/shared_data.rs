@@ -9,9 +9,6 @@ use test_support::shared_data;
 ///
 /// # Errors
 /// If it is missing or cannot be unpacked here.
-///
-/// # Panics
-/// If no temporary folder can be made.
 pub fn unpacked(relative: &str) -> Result<TempDir, String> {
     let archive = shared_data(relative)?;
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -18,9 +18,7 @@ use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::mesh::validate::MeshDefects;
 use sim_gpu::scan::Tally;
 use sim_gpu::sensor::{Sensor, Views};
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Points of each packed cloud.
 pub const PACKED_POINTS: u32 = 32;
@@ -136,22 +134,4 @@ fn scan(key: StreamKey) -> Scan {
     let n = key.below(100, 0);
     let positions: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, 0.0, 0.0]).collect();
     Scan { normal: Some(positions.clone()), positions, ..Scan::default() }
-}
-
-/// All files in `folder` and below, by their path from it.
-pub fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(next) = folders.pop() {
-        for item in fs::read_dir(next).expect("a folder") {
-            let path = item.expect("a file").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let relative = path.strip_prefix(folder).expect("below").to_path_buf();
-                files.insert(relative, fs::read(&path).expect("a file"));
-            }
-        }
-    }
-    files
 }

@@ -9,19 +9,20 @@ use sim_gpu::effects::Effects;
 use sim_gpu::pose::Pose;
 use sim_gpu::scan::ScanRequest;
 use sim_gpu::sensor::Sensor;
+use tests::{casting, meshes};
 
 use super::Rows;
-use super::travel::sphere;
 
 /// Bytes of a point in binary formats, and the columns of text.
 pub fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
-    let scan = scan(effects, attributes);
+    let [few, many] = [4.0, 3.0].map(|distance_m| scan(distance_m, effects, attributes));
     // Both of four digits, so that headers are of one length.
-    let [few, many] = [1024, 2048].map(|points| cut(&scan, points));
+    assert!(1000 <= few.len() && few.len() < many.len() && many.len() < 10_000);
     let per_point = |format| {
         let more = bytes(&many, format).len() - bytes(&few, format).len();
-        assert_eq!(more % 1024, 0, "every point takes the same");
-        (more / 1024) as u64
+        let points = many.len() - few.len();
+        assert_eq!(more % points, 0, "every point takes the same");
+        (more / points) as u64
     };
     let text = String::from_utf8(bytes(&few, ScanFormat::Csv)).unwrap();
     let columns = text.lines().next_back().unwrap().split(',').count() as u64;
@@ -34,32 +35,15 @@ pub fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
     .into()
 }
 
-fn scan(effects: &Effects, attributes: &AttributeSet) -> Scan {
-    let (job, pattern) = sphere();
+/// The scan of a unit sphere from this far.
+fn scan(distance_m: f64, effects: &Effects, attributes: &AttributeSet) -> Scan {
     let sensor = Sensor::builtin("vlp32c").unwrap();
-    let pose = Pose::look_at(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO).unwrap();
+    let pattern = sensor.pattern();
+    let pose = Pose::look_at(DVec3::X * distance_m, DVec3::ZERO).unwrap();
     let mut request = ScanRequest::new(&sensor, &pattern, pose);
-    (request.attributes, request.stream) = (attributes.clone(), job.stream);
-    sim_gpu::scan(&Caster::Cpu(effects.clone()), &job.target, &request).unwrap()
-}
-
-/// The first points of `scan`.
-fn cut(scan: &Scan, points: usize) -> Scan {
-    fn head<T: Clone>(column: &Option<Vec<T>>, points: usize) -> Option<Vec<T>> {
-        column.as_ref().map(|column| column[..points].to_vec())
-    }
-    Scan {
-        origin: scan.origin,
-        positions: scan.positions[..points].to_vec(),
-        range_m: head(&scan.range_m, points),
-        beam: head(&scan.beam, points),
-        ring: head(&scan.ring, points),
-        time_s: head(&scan.time_s, points),
-        triangle: head(&scan.triangle, points),
-        object: head(&scan.object, points),
-        intensity: head(&scan.intensity, points),
-        normal: head(&scan.normal, points),
-    }
+    request.attributes = attributes.clone();
+    let target = casting::target(&meshes::icosphere(4));
+    sim_gpu::scan(&Caster::Cpu(effects.clone()), &target, &request).unwrap()
 }
 
 fn bytes(scan: &Scan, format: ScanFormat) -> Vec<u8> {

@@ -3,34 +3,23 @@
 use glam::DVec3;
 use sim_gpu::effects::Effects;
 use sim_gpu::gpu::Batch;
-use sim_gpu::job::CastJob;
-use sim_gpu::pose::Pose;
-use sim_gpu::sensor::BeamPattern;
 use tests::{adapter, casting, meshes};
 
 use super::Rows;
 
-/// A unit sphere seen from 3 m, and the beams.
-pub fn sphere() -> (CastJob, BeamPattern) {
-    let pattern = casting::builtin("vlp32c");
-    let target = casting::target(&meshes::icosphere(4));
-    let pose = Pose::look_at(DVec3::new(3.0, 0.0, 0.0), DVec3::ZERO).unwrap();
-    (casting::job(&target, &pose, &pattern), pattern)
-}
-
 /// Bytes sent and read back for each ray: as batches are laid out, and as every
 /// caster that there is answers.
 pub fn rows(effects: &Effects) -> Rows {
-    let (job, _) = sphere();
+    let target = casting::target(&meshes::icosphere(4));
+    let job = casting::job(&target, &casting::at(DVec3::X * 3.0), &casting::builtin("vlp32c"));
     let mut batch = Batch::default();
     batch.push(&job, 0..job.rays.len(), effects);
     let n = job.rays.len() as u64;
     let codes = n * size_of::<u32>() as u64;
     let outputs = n * (effects.outputs_per_ray() * size_of::<f32>()) as u64;
     for caster in adapter::casters(effects) {
-        let casts = caster.cast(std::slice::from_ref(&job)).unwrap();
-        let answered =
-            [size_of_val(&casts[0].codes[..]), size_of_val(&casts[0].effect_outputs[..])];
+        let cast = casting::cast(caster, &job);
+        let answered = [size_of_val(&cast.codes[..]), size_of_val(&cast.effect_outputs[..])];
         assert_eq!(answered.map(|bytes| bytes as u64), [codes, outputs], "{}", caster.name());
     }
     let per_ray = |bytes: u64| {

@@ -51,7 +51,10 @@ impl GpuCaster {
         let summary = adapter::summary(adapter);
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("edgepuck"),
-            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            // The number of rays comes as immediate data, which wgpu's Vulkan,
+            // Metal and Direct3D 12 always have. A clock is taken where there is one.
+            required_features: wgpu::Features::IMMEDIATES
+                | adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: adapter.limits(),
             ..Default::default()
         };

@@ -25,8 +25,7 @@ impl Pipeline {
             })
         };
         let trace = [storage(0, true), storage(1, true), storage(2, true), storage(3, false)];
-        let ray_count = entry(4, wgpu::BufferBindingType::Uniform);
-        let trace_layout = layout("trace", &[&trace[..], &[ray_count]].concat());
+        let trace_layout = layout("trace", &trace);
         let effects_layout = effects.per_ray().next().map(|_| {
             let mut entries = vec![storage(0, false)];
             entries.extend(reads_random_bits(effects).then(|| storage(1, true)));
@@ -43,7 +42,8 @@ impl Pipeline {
             layout: Some(&device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some("trace"),
                 bind_group_layouts: &groups,
-                immediate_size: 0,
+                // The number of rays.
+                immediate_size: size_of::<u32>() as u32,
             })),
             module: &device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some("trace"),
@@ -63,14 +63,14 @@ impl Pipeline {
 }
 
 fn storage(binding: u32, read_only: bool) -> wgpu::BindGroupLayoutEntry {
-    entry(binding, wgpu::BufferBindingType::Storage { read_only })
-}
-
-fn entry(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
         count: None,
     }
 }

@@ -10,7 +10,6 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 const INPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST);
 const OUTPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC);
-const UNIFORM: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM.union(wgpu::BufferUsages::COPY_DST);
 const READBACK: wgpu::BufferUsages =
     wgpu::BufferUsages::MAP_READ.union(wgpu::BufferUsages::COPY_DST);
 
@@ -67,7 +66,6 @@ pub(super) struct Slot {
     nodes: Growing,
     triangles: Growing,
     rays: Growing,
-    ray_count: Growing,
     codes: Growing,
     outputs: Growing,
     streams: Growing,
@@ -105,7 +103,6 @@ impl Slot {
             nodes: Growing::new("nodes", INPUT),
             triangles: Growing::new("triangles", INPUT),
             rays: Growing::new("rays", INPUT),
-            ray_count: Growing::new("ray count", UNIFORM),
             codes: Growing::new("codes", OUTPUT),
             outputs: Growing::new("effect outputs", OUTPUT),
             streams: Growing::new("streams", INPUT),
@@ -139,7 +136,10 @@ impl Slot {
         if let Some(effects) = effects {
             pass.set_bind_group(1, effects, &[]);
         }
-        let [x, y] = workgroups(batch.rays.len(), &device.limits());
+        let n_rays = batch.rays.len();
+        let ray_count = u32::try_from(n_rays).expect("invariant: a batch holds at most 2^22 rays");
+        pass.set_immediates(0, bytemuck::bytes_of(&ray_count));
+        let [x, y] = workgroups(n_rays, &device.limits());
         pass.dispatch_workgroups(x, y, 1);
         drop(pass);
         self.read_back(pipeline, encoder);
@@ -152,11 +152,9 @@ impl Slot {
         let n_rays = batch.rays.len();
         self.answer.codes = (n_rays * size_of::<u32>()) as u64;
         self.answer.outputs = (n_rays * effects.outputs_per_ray() * size_of::<f32>()) as u64;
-        let count = u32::try_from(n_rays).expect("invariant: a batch holds at most 2^22 rays");
         let mut grown = self.nodes.upload(pipeline, bytemuck::cast_slice(&batch.nodes));
         grown |= self.triangles.upload(pipeline, bytemuck::cast_slice(&batch.triangles));
         grown |= self.rays.upload(pipeline, bytemuck::cast_slice(&batch.rays));
-        grown |= self.ray_count.upload(pipeline, bytemuck::bytes_of(&count));
         grown |= self.codes.reserve(device, self.answer.codes);
         if self.answer.outputs > 0 {
             grown |= self.outputs.reserve(device, self.answer.outputs);
@@ -184,7 +182,7 @@ impl Slot {
                 entries: &entries,
             })
         };
-        let trace = [&self.nodes, &self.triangles, &self.rays, &self.codes, &self.ray_count];
+        let trace = [&self.nodes, &self.triangles, &self.rays, &self.codes];
         let trace: Vec<_> = (0..).zip(trace).collect();
         let effects = &pipeline.effects;
         let mut read_by_effects = vec![(0, &self.outputs)];
