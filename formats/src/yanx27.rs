@@ -105,23 +105,13 @@ impl Yanx27Writer {
 
     fn write_lists(&mut self, stem: &str) -> Result<(), FormatError> {
         let path = self.root.join(format!("{stem}_shape_names.txt"));
-        self.files.push(write_lines(path, &self.classes)?);
+        self.files.push(atomic::write_lines(path, &self.classes)?);
         for split in Split::ALL {
             let path = self.root.join(format!("{stem}_{split}.txt"));
-            self.files.push(write_lines(path, &self.ids[split as usize])?);
+            self.files.push(atomic::write_lines(path, &self.ids[split as usize])?);
         }
         Ok(())
     }
-}
-
-fn write_lines<'a>(
-    path: PathBuf,
-    lines: impl IntoIterator<Item = &'a String>,
-) -> Result<HashedFile, FormatError> {
-    let sha256 = atomic::write_hashed(&path, |writer| {
-        lines.into_iter().try_for_each(|line| writeln!(writer, "{line}"))
-    })?;
-    Ok(HashedFile { path, sha256 })
 }
 
 /// The id of one view: the class, `_`, and the rest without any `_`, as in
