@@ -2,7 +2,7 @@
 //! that a sensor could see: what lies between ModelNet40's clouds and scans.
 
 use super::error::DatasetError;
-use super::prepare::{failure, read};
+use super::mesh::{failure, read};
 use super::record::{Entry, MeshFailure};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};

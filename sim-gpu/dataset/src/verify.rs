@@ -95,22 +95,12 @@ enum Holds {
 }
 
 fn expected_files(manifest: &Manifest) -> Vec<Expected<'_>> {
-    let mut expected = Vec::new();
-    for mesh in &manifest.meshes {
-        for scan in &mesh.scans {
-            for written in &scan.variants {
-                let in_format = |format| {
-                    let (entry, root) = (&mesh.entry, Path::new(""));
-                    layout::scan(root, &scan.set, written.variant, entry, scan.view, format)
-                };
-                expected.extend(written.files.iter().map(|file| Expected {
-                    path: in_format(file.format),
-                    sha256: &file.sha256,
-                    holds: Holds::Points(file.format, written.tally.points),
-                }));
-            }
-        }
-    }
+    let scans = manifest.scan_files().map(|(path, file, written)| Expected {
+        path,
+        sha256: &file.sha256,
+        holds: Holds::Points(file.format, written.tally.points),
+    });
+    let mut expected: Vec<Expected> = scans.collect();
     expected.extend(manifest.packed.iter().map(|packed| Expected {
         path: PathBuf::from(&packed.file),
         sha256: &packed.sha256,
