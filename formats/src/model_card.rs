@@ -93,7 +93,7 @@ impl ModelCard {
     /// Reads the card of the model file at `path`, and none of its weights.
     ///
     /// # Errors
-    /// A file that is no safetensors; as [`ModelCard::from_metadata`].
+    /// A file that is not safetensors; as [`ModelCard::from_metadata`].
     pub fn read(path: &Path) -> Result<Self, FormatError> {
         Self::from_metadata(path, &WeightsFile::open(path)?.metadata())
     }

@@ -286,31 +286,26 @@ mod tests {
     }
 
     #[test]
-    fn elements_come_in_c_order() {
-        let header = |is_fortran_order, shape: &[usize]| Header {
-            descr: "|u1".to_owned(),
+    fn elements_come_in_c_order_or_are_an_error() {
+        let header = |descr: &str, is_fortran_order, shape: &[usize]| Header {
+            descr: descr.to_owned(),
             is_fortran_order,
             shape: shape.to_vec(),
             n_bytes: 0,
         };
-        let read = |header| read_elements::<u8>(&mut &[0, 1, 2, 3, 4, 5][..], &header).unwrap();
-        assert_eq!(read(header(false, &[2, 3])), [0, 1, 2, 3, 4, 5]);
-        assert_eq!(read(header(true, &[2, 3])), [0, 2, 4, 1, 3, 5]);
-        assert_eq!(read(header(true, &[3, 1, 2])), [0, 3, 1, 4, 2, 5]);
-        assert!(read(header(true, &[0, usize::MAX, usize::MAX])).is_empty());
-    }
-
-    #[test]
-    fn elements_that_cannot_be_counted_are_an_error() {
-        let header = Header {
-            descr: "<f4".to_owned(),
-            is_fortran_order: false,
-            shape: vec![usize::MAX, usize::MAX],
-            n_bytes: 0,
+        let read = |is_fortran_order, shape: &[usize]| {
+            let header = header("|u1", is_fortran_order, shape);
+            read_elements::<u8>(&mut &[0, 1, 2, 3, 4, 5][..], &header).unwrap()
         };
-        let error = read_elements::<f32>(&mut io::empty(), &header).unwrap_err();
+        assert_eq!(read(false, &[2, 3]), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(read(true, &[2, 3]), [0, 2, 4, 1, 3, 5]);
+        assert_eq!(read(true, &[3, 1, 2]), [0, 3, 1, 4, 2, 5]);
+        assert!(read(true, &[0, usize::MAX, usize::MAX]).is_empty());
+
+        let endless = header("<f4", false, &[usize::MAX, usize::MAX]);
+        let error = read_elements::<f32>(&mut io::empty(), &endless).unwrap_err();
         assert_eq!(error.to_string(), "the shape has more elements than memory can hold");
-        let error = read_elements::<f64>(&mut io::empty(), &header).unwrap_err();
+        let error = read_elements::<f64>(&mut io::empty(), &endless).unwrap_err();
         assert_eq!(error.to_string(), "expected elements of type <f8, found <f4");
     }
 

@@ -79,21 +79,13 @@ pub enum Column<'a> {
 }
 
 impl Column<'_> {
-    /// How many values there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    fn len(&self) -> usize {
         match self {
             Self::F32(values) => values.len(),
             Self::U16(values) => values.len(),
             Self::U32(values) => values.len(),
             Self::Vector(values) => values.len(),
         }
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 

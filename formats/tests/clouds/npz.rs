@@ -20,7 +20,6 @@ fn a_scan_of_ours_is_read_with_its_origin() {
     use formats::scan_file::{ScanFormat, write_scan};
 
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scan.npz");
     let scan = Scan {
         origin: [1e7, -0.25, 0.0],
         positions: vec![[0.5, 0.25, -1.0], [1e-3, 0.0, 3.0]],
@@ -29,14 +28,11 @@ fn a_scan_of_ours_is_read_with_its_origin() {
         ..Scan::default()
     };
     let expected = [[1e7 + 0.5, 0.0, -1.0], [1e7 + f64::from(1e-3f32), -0.25, 3.0]];
-    write_scan(&path, ScanFormat::Npz, &scan).unwrap();
-    assert_eq!(read_cloud(&path).unwrap(), expected);
-    let path = path.with_extension("ply");
-    write_scan(&path, ScanFormat::Ply, &scan).unwrap();
-    assert_eq!(read_cloud(&path).unwrap(), expected);
-    let path = path.with_extension("csv");
-    write_scan(&path, ScanFormat::Csv, &scan).unwrap();
-    assert_eq!(read_cloud(&path).unwrap(), expected);
+    for format in ScanFormat::POINTS {
+        let path = folder.path().join("scan").with_extension(format.name());
+        write_scan(&path, format, &scan).unwrap();
+        assert_eq!(read_cloud(&path).unwrap(), expected, "{format}");
+    }
 }
 
 #[test]

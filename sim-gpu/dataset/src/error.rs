@@ -27,7 +27,7 @@ pub enum DatasetError {
         path: PathBuf,
     },
     /// No manifest where a finished dataset has one.
-    #[error("{}: is not there, so this is no finished dataset", path.display())]
+    #[error("{}: expected a finished dataset's manifest, found no file", path.display())]
     NoManifest {
         /// The manifest's place.
         path: PathBuf,

@@ -190,7 +190,7 @@ impl Manifest {
         folders
             .chain(names)
             .find(|name| !is_plain(name))
-            .map(|name| format!("`{name}` is no name of a file or folder"))
+            .map(|name| format!("expected the name of a file or folder, found `{name}`"))
     }
 }
 

@@ -54,7 +54,10 @@ impl Part {
         }
         let manifest = Manifest::read(&layout::manifest(path))?;
         let Some((number, of)) = manifest.shard else {
-            return Err(shard_error(path, "is no shard: it was made without --shard"));
+            return Err(shard_error(
+                path,
+                "expected a shard, found a dataset that was made without --shard",
+            ));
         };
         Ok(Self { path: path.into(), manifest, number, of })
     }
