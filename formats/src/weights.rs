@@ -294,12 +294,12 @@ mod tests {
     fn a_checkpoint_of_pytorch_s_is_named_as_such() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("best_model.pth");
-        std::fs::write(&path, b"PK\x03\x04 and more that follows").unwrap();
-        let error = WeightsFile::open(&path).err().unwrap().to_string();
-        assert!(error.contains("a PyTorch checkpoint"), "{error}");
-        std::fs::write(&path, b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46 and more").unwrap();
-        let error = WeightsFile::open(&path).err().unwrap().to_string();
-        assert!(error.contains("a PyTorch checkpoint"), "{error}");
+        for bytes in [&b"PK\x03\x04 and more that follows"[..], b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46"]
+        {
+            std::fs::write(&path, bytes).unwrap();
+            let error = WeightsFile::open(&path).err().unwrap().to_string();
+            assert!(error.contains("a PyTorch checkpoint"), "{error}");
+        }
         let error = WeightsFile::open(folder.path()).err().unwrap().to_string();
         assert!(error.contains("a folder"), "{error}");
     }

@@ -61,68 +61,6 @@ pub struct Scanned {
     pub failures: Vec<MeshFailure>,
 }
 
-/// A mesh on its way, with its share of the memory budget.
-struct Held<'b> {
-    /// The mesh.
-    prepared: Prepared,
-    /// Given back once its scans are written.
-    _share: Share<'b>,
-}
-
-/// Meshes that are being cast at together.
-struct Batch<'b> {
-    /// Each mesh; with what was cast at it already, if it was too large for the
-    /// adapter.
-    meshes: Vec<(Held<'b>, Option<Vec<Cast>>)>,
-    /// The jobs of the others, mesh by mesh.
-    jobs: Vec<CastJob>,
-    casting: Casting,
-}
-
-impl<'b> Batch<'b> {
-    /// Starts casting at all of `meshes`. The CPU casts at once at a mesh that is too
-    /// large for the adapter, and a note says so.
-    fn submit(
-        meshes: Vec<Held<'b>>,
-        caster: &Caster,
-        progress: &Progress,
-    ) -> Result<Self, CastError> {
-        let mut jobs = Vec::new();
-        let submitted = meshes.into_iter().map(|mut held| {
-            let of_mesh = &mut held.prepared.jobs;
-            if of_mesh.iter().all(|job| caster.fits(&job.target)) {
-                jobs.append(of_mesh);
-                return (held, None);
-            }
-            progress.note(format!(
-                "{}: too large for one binding of {}: the CPU cast it",
-                held.prepared.record.source,
-                caster.name()
-            ));
-            let casts = caster.cast_on_cpu(of_mesh);
-            (held, Some(casts))
-        });
-        let meshes = submitted.collect();
-        let casting = caster.submit(&jobs)?;
-        Ok(Self { meshes, jobs, casting })
-    }
-
-    /// The meshes and what was cast at each.
-    fn wait(self) -> Result<Vec<(Held<'b>, Vec<Cast>)>, CastError> {
-        let mut casts = self.casting.wait()?.into_iter();
-        let mut jobs = self.jobs.into_iter();
-        let finish = |(mut held, done): (Held<'b>, Option<Vec<Cast>>)| {
-            let casts = done.unwrap_or_else(|| {
-                let n_jobs = held.prepared.views.len();
-                held.prepared.jobs = jobs.by_ref().take(n_jobs).collect();
-                casts.by_ref().take(n_jobs).collect()
-            });
-            (held, casts)
-        };
-        Ok(self.meshes.into_iter().map(finish).collect())
-    }
-}
-
 struct Shared<'a> {
     run: &'a Run<'a>,
     meshes: &'a [MeshEntry],
@@ -296,6 +234,68 @@ impl Shared<'_> {
     fn stop(&self, error: DatasetError) {
         self.stopped.store(true, SeqCst);
         lock(&self.error).get_or_insert(error);
+    }
+}
+
+/// A mesh on its way, with its share of the memory budget.
+struct Held<'b> {
+    /// The mesh.
+    prepared: Prepared,
+    /// Given back once its scans are written.
+    _share: Share<'b>,
+}
+
+/// Meshes that are being cast at together.
+struct Batch<'b> {
+    /// Each mesh; with what was cast at it already, if it was too large for the
+    /// adapter.
+    meshes: Vec<(Held<'b>, Option<Vec<Cast>>)>,
+    /// The jobs of the others, mesh by mesh.
+    jobs: Vec<CastJob>,
+    casting: Casting,
+}
+
+impl<'b> Batch<'b> {
+    /// Starts casting at all of `meshes`. The CPU casts at once at a mesh that is too
+    /// large for the adapter, and a note says so.
+    fn submit(
+        meshes: Vec<Held<'b>>,
+        caster: &Caster,
+        progress: &Progress,
+    ) -> Result<Self, CastError> {
+        let mut jobs = Vec::new();
+        let submitted = meshes.into_iter().map(|mut held| {
+            let of_mesh = &mut held.prepared.jobs;
+            if of_mesh.iter().all(|job| caster.fits(&job.target)) {
+                jobs.append(of_mesh);
+                return (held, None);
+            }
+            progress.note(format!(
+                "{}: too large for one binding of {}: the CPU cast it",
+                held.prepared.record.source,
+                caster.name()
+            ));
+            let casts = caster.cast_on_cpu(of_mesh);
+            (held, Some(casts))
+        });
+        let meshes = submitted.collect();
+        let casting = caster.submit(&jobs)?;
+        Ok(Self { meshes, jobs, casting })
+    }
+
+    /// The meshes and what was cast at each.
+    fn wait(self) -> Result<Vec<(Held<'b>, Vec<Cast>)>, CastError> {
+        let mut casts = self.casting.wait()?.into_iter();
+        let mut jobs = self.jobs.into_iter();
+        let finish = |(mut held, done): (Held<'b>, Option<Vec<Cast>>)| {
+            let casts = done.unwrap_or_else(|| {
+                let n_jobs = held.prepared.views.len();
+                held.prepared.jobs = jobs.by_ref().take(n_jobs).collect();
+                casts.by_ref().take(n_jobs).collect()
+            });
+            (held, casts)
+        };
+        Ok(self.meshes.into_iter().map(finish).collect())
     }
 }
 
