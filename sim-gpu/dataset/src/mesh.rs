@@ -103,16 +103,11 @@ pub fn prepare(
 }
 
 fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
-    let mut views = Vec::new();
-    for (set, set_config) in config.sets.iter().enumerate() {
-        let poses = set_config.poses(config.seed, id);
-        views.extend(poses.into_iter().zip(0..).map(|(pose, view)| PlannedView {
-            set,
-            view,
-            pose,
-        }));
-    }
-    views
+    let of_set = |(set, set_config): (usize, &SetConfig)| {
+        let poses = set_config.poses(config.seed, id).into_iter().zip(0..);
+        poses.map(move |(pose, view)| PlannedView { set, view, pose })
+    };
+    config.sets.iter().enumerate().flat_map(of_set).collect()
 }
 
 /// Each set's sensor, where it stands.
@@ -160,7 +155,7 @@ pub(super) fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {
     failed(entry, line, cause)
 }
 
-fn failed(entry: &MeshEntry, line: Option<u64>, cause: String) -> MeshFailure {
+pub(super) fn failed(entry: &MeshEntry, line: Option<u64>, cause: String) -> MeshFailure {
     MeshFailure { entry: entry.into(), source: entry.relative.clone(), line, cause }
 }
 

@@ -10,7 +10,6 @@ use formats::scan_file::{ScanFormat, read_scan};
 use formats::{FormatError, hash, vlp32c};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use std::fmt;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
@@ -29,18 +28,13 @@ pub struct Report {
 }
 
 /// What is wrong with one file.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[error("{}: {what}", path.display())]
 pub struct Problem {
     /// The file, from the dataset's folder.
     pub path: PathBuf,
     /// What is wrong.
     pub what: String,
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.path.display(), self.what)
-    }
 }
 
 impl Report {
