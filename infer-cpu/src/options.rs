@@ -2,37 +2,70 @@
 
 use std::collections::BTreeMap;
 
+use formats::FormatError;
 use formats::model_card::Normalization;
 
 use crate::kernel::KernelName;
 use crate::precision::Precision;
 use crate::sampler::SamplerSpec;
 
-formats::named! {
-    /// Which of a model's T-Nets are run; one that is left out counts as the
-    /// identity.
-    #[derive(Default)]
-    #[non_exhaustive]
-    pub enum TNets: "choice of T-Nets" {
-        /// All that the model has.
-        #[default]
-        Both = "both",
-        /// That of the coordinates alone.
-        Input = "input",
-        /// That of the features alone.
-        Feature = "feature",
-        /// None.
-        Neither = "none",
-    }
+/// Which of a model's T-Nets are run; one that is left out counts as the
+/// identity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum TNets {
+    /// All that the model has.
+    #[default]
+    Both,
+    /// That of the coordinates alone.
+    Input,
+    /// That of the features alone.
+    Feature,
+    /// None.
+    Neither,
 }
 
 impl TNets {
+    /// All choices.
+    pub const ALL: [Self; 4] = [Self::Both, Self::Input, Self::Feature, Self::Neither];
+
+    /// Its name on command lines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Both => "both",
+            Self::Input => "input",
+            Self::Feature => "feature",
+            Self::Neither => "none",
+        }
+    }
+
     pub(crate) fn runs_input(self) -> bool {
         matches!(self, Self::Both | Self::Input)
     }
 
     pub(crate) fn runs_feature(self) -> bool {
         matches!(self, Self::Both | Self::Feature)
+    }
+}
+
+impl std::fmt::Display for TNets {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl std::str::FromStr for TNets {
+    type Err = FormatError;
+
+    fn from_str(word: &str) -> Result<Self, FormatError> {
+        Self::ALL.into_iter().find(|one| one.name() == word).ok_or_else(|| {
+            FormatError::UnknownName {
+                word: word.to_owned(),
+                what: "choice of T-Nets",
+                choices: Self::ALL.map(Self::name).join(", "),
+            }
+        })
     }
 }
 

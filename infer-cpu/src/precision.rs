@@ -1,6 +1,9 @@
 //! Number formats of a forward pass: how weights are packed and activations
 //! rounded in each.
 
+use std::fmt;
+use std::str::FromStr;
+
 use half::f16;
 
 use crate::dense::Dense;
@@ -9,35 +12,47 @@ use crate::kernel::{Columns, Gemm, Gemv, I8_LARGEST, Kernels, Panels};
 /// The largest finite number of fp16.
 pub const F16_LARGEST: f32 = 65504.0;
 
-formats::named! {
-    /// What a network computes in.
-    ///
-    /// ```
-    /// use infer_cpu::{Precision, kernel};
-    ///
-    /// let precision: Precision = "f32-fc16".parse()?;
-    /// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[derive(Default)]
-    pub enum Precision: "precision" {
-        /// fp32 throughout.
-        #[default]
-        F32 = "f32",
-        /// fp32 arithmetic throughout; the weights of the layers after a pooling,
-        /// whose cost is their traffic, are stored in fp16.
-        F32Fc16 = "f32-fc16",
-        /// fp16 weights and activations, fp16 sums of short chunks; vector layers
-        /// as in [`Precision::F32Fc16`].
-        F16 = "f16",
-        /// int8 weights (a scale per channel) and seven-bit activations (a
-        /// calibrated scale per layer); the first layer, of coordinates, in fp32;
-        /// vector layers with int8 weights and fp32 arithmetic.
-        I8 = "i8",
-    }
+/// What a network computes in.
+///
+/// ```
+/// use infer_cpu::{Precision, kernel};
+///
+/// let precision: Precision = "f32-fc16".parse()?;
+/// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Precision {
+    /// fp32 throughout.
+    #[default]
+    F32,
+    /// fp32 arithmetic throughout; the weights of the layers after a pooling,
+    /// whose cost is their traffic, are stored in fp16.
+    F32Fc16,
+    /// fp16 weights and activations, fp16 sums of short chunks; vector layers
+    /// as in [`Precision::F32Fc16`].
+    F16,
+    /// int8 weights (a scale per channel) and seven-bit activations (a
+    /// calibrated scale per layer); the first layer, of coordinates, in fp32;
+    /// vector layers with int8 weights and fp32 arithmetic.
+    I8,
 }
 
 impl Precision {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::F32, Self::F32Fc16, Self::F16, Self::I8];
+
+    /// Its name on command lines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F32Fc16 => "f32-fc16",
+            Self::F16 => "f16",
+            Self::I8 => "i8",
+        }
+    }
+
     /// Whether `kernels` have its matrix products.
     #[must_use]
     pub fn runs_on(self, kernels: &Kernels) -> bool {
@@ -47,6 +62,28 @@ impl Precision {
             Self::I8 => kernels.i8.is_some(),
         };
         has_products && kernels.f32.is_some()
+    }
+}
+
+impl fmt::Display for Precision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A word that names no precision.
+#[derive(Debug, thiserror::Error)]
+#[error("unknown precision `{0}`, expected one of f32, f32-fc16, f16, i8")]
+pub struct NoSuchPrecision(String);
+
+impl FromStr for Precision {
+    type Err = NoSuchPrecision;
+
+    fn from_str(word: &str) -> Result<Self, NoSuchPrecision> {
+        Self::ALL
+            .into_iter()
+            .find(|precision| precision.name() == word)
+            .ok_or_else(|| NoSuchPrecision(word.to_owned()))
     }
 }
 

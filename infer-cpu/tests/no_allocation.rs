@@ -82,9 +82,9 @@ fn main() {
     let model = tiny_model::write(&path, &tiny_model::tensors(4), &ModelCard::default());
     let clouds = clouds();
     let spec = |kind| SamplerSpec { kind, points: 32, ..SamplerSpec::default() };
-    let mut specs = SamplerKind::ALL.map(spec).to_vec();
+    let mut specs: Vec<_> = SamplerKind::ALL.iter().map(|&kind| spec(kind)).collect();
     specs.push(SamplerSpec { voxel_size: Some(0.1), ..spec(SamplerKind::Voxel) });
-    specs.extend(Resize::ALL.map(|resize| SamplerSpec {
+    specs.extend(Resize::ALL.iter().map(|&resize| SamplerSpec {
         resize,
         passes: 2,
         // More than there are points, at times.

@@ -15,7 +15,9 @@
 
 #![expect(unsafe_code, reason = "SIMD intrinsics; every block says why it is sound")]
 
+use std::fmt;
 use std::ops::Range;
+use std::str::FromStr;
 
 use half::f16;
 
@@ -258,27 +260,42 @@ pub struct Kernels {
     pub(crate) fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
 }
 
-formats::named! {
-    /// An instruction set that kernels are written for, whether or not this machine
-    /// has it.
-    #[non_exhaustive]
-    pub enum KernelName: "kernel" {
-        /// Plain Rust, everywhere.
-        Scalar = "scalar",
-        /// AVX2 with FMA and F16C.
-        Avx2 = "avx2",
-        /// AVX-512 F, BW, VL, and VNNI for int8.
-        Avx512 = "avx512",
-        /// Armv8 NEON, fp32.
-        Neon = "neon",
-        /// NEON with FEAT_FP16.
-        NeonF16 = "neon_f16",
-        /// NEON with FEAT_DotProd.
-        NeonDot = "neon_dot",
-    }
+/// An instruction set that kernels are written for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum KernelName {
+    /// Plain Rust, everywhere.
+    Scalar,
+    /// AVX2 with FMA and F16C.
+    Avx2,
+    /// AVX-512 F, BW, VL, and VNNI for int8.
+    Avx512,
+    /// Armv8 NEON, fp32.
+    Neon,
+    /// NEON with FEAT_FP16.
+    NeonF16,
+    /// NEON with FEAT_DotProd.
+    NeonDot,
 }
 
 impl KernelName {
+    /// All, whatever this machine has.
+    pub const ALL: [Self; 6] =
+        [Self::Scalar, Self::Avx2, Self::Avx512, Self::Neon, Self::NeonF16, Self::NeonDot];
+
+    /// Its name on command lines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+            Self::NeonF16 => "neon_f16",
+            Self::NeonDot => "neon_dot",
+        }
+    }
+
     /// Its kernels, if this machine can run them.
     #[must_use]
     pub fn kernels(self) -> Option<&'static Kernels> {
@@ -303,6 +320,28 @@ impl KernelName {
 /// All kernels that this machine can run, the fastest first.
 pub fn available() -> impl Iterator<Item = &'static Kernels> {
     KernelName::ALL.into_iter().rev().filter_map(KernelName::kernels)
+}
+
+impl fmt::Display for KernelName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A word that names no kernel.
+#[derive(Debug, thiserror::Error)]
+#[error("unknown kernel `{0}`, expected one of scalar, avx2, avx512, neon, neon_f16, neon_dot")]
+pub struct NoSuchKernel(String);
+
+impl FromStr for KernelName {
+    type Err = NoSuchKernel;
+
+    fn from_str(word: &str) -> Result<Self, NoSuchKernel> {
+        Self::ALL
+            .into_iter()
+            .find(|kernel| kernel.name() == word)
+            .ok_or_else(|| NoSuchKernel(word.to_owned()))
+    }
 }
 
 #[cfg(test)]

@@ -185,7 +185,7 @@ mod tests {
 
     /// The samplers that need no features.
     fn kinds() -> impl Iterator<Item = SamplerKind> {
-        SamplerKind::ALL.into_iter().filter(|&kind| kind != SamplerKind::Cpl)
+        SamplerKind::ALL.iter().copied().filter(|&kind| kind != SamplerKind::Cpl)
     }
 
     #[test]

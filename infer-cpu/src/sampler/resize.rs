@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn one_row_or_none_is_no_special_case() {
-        for rule in Resize::ALL {
+        for &rule in Resize::ALL {
             assert!(resize(rule, &[], &[], 4).is_empty(), "{rule}");
             let expected: &[u32] = if rule == Resize::Truncate { &[5] } else { &[5; 3] };
             assert_eq!(resize(rule, &[5], &[0.0], 3), expected, "{rule}");

@@ -2,18 +2,65 @@
 
 use std::path::Path;
 
+use formats::FormatError;
 use formats::model_card::ModelCard;
-use formats::{FormatError, named};
 
 use super::SamplerError;
 
 /// The largest M of a Critical Points Layer, which repeats points to reach it.
 pub const MOST_CRITICAL: usize = 1 << 24;
 
+/// Declares an enum whose variants have names on command lines.
+macro_rules! named {
+    (
+        $(#[$meta:meta])*
+        pub enum $name:ident: $what:literal {
+            $($(#[$variant_meta:meta])* $variant:ident = $word:literal,)+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum $name {
+            $($(#[$variant_meta])* $variant,)+
+        }
+
+        impl $name {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$variant,)+];
+
+            /// Its name on command lines.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = FormatError;
+
+            fn from_str(word: &str) -> Result<Self, FormatError> {
+                let named = Self::ALL.iter().find(|one| one.name() == word);
+                named.copied().ok_or_else(|| FormatError::UnknownName {
+                    word: word.to_owned(),
+                    what: $what,
+                    choices: [$($word,)+].join(", "),
+                })
+            }
+        }
+    };
+}
+
 named! {
     /// A way to choose points of a cloud.
-    #[derive(Default)]
-    #[non_exhaustive]
     pub enum SamplerKind: "sampler" {
         /// Every point.
         #[default]
@@ -33,8 +80,6 @@ named! {
 
 named! {
     /// Where farthest point sampling begins.
-    #[derive(Default)]
-    #[non_exhaustive]
     pub enum FpsStart: "start of farthest point sampling" {
         /// At the point farthest from the mean of all points, so that the result does
         /// not depend on the order of the points.
@@ -47,8 +92,6 @@ named! {
 
 named! {
     /// How a Critical Points Layer turns its ranked points into M.
-    #[derive(Default)]
-    #[non_exhaustive]
     pub enum Resize: "rule of resizing" {
         /// The M best; fewer, if there are fewer.
         Truncate = "truncate",
@@ -66,8 +109,6 @@ named! {
 
 named! {
     /// The network whose features a Critical Points Layer pools.
-    #[derive(Default)]
-    #[non_exhaustive]
     pub enum FrontChoice: "front end" {
         /// The model's own front end if it brings one, else the trunk of its
         /// input transform, else its trunk.
@@ -179,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_specification_that_cannot_be_met_is_an_error() {
-        for kind in SamplerKind::ALL {
+        for &kind in SamplerKind::ALL {
             let spec = SamplerSpec { kind, points: 0, ..SamplerSpec::default() };
             assert_eq!(spec.check().is_ok(), kind == SamplerKind::All, "{kind}");
             assert_eq!(SamplerSpec { points: 1, ..spec }.check(), Ok(()));
