@@ -5,11 +5,16 @@ use edgepuck_dataset::config::Layout;
 use edgepuck_dataset::finish::finish;
 use edgepuck_dataset::journal::{Journal, Terms};
 use edgepuck_dataset::manifest::{Manifest, Poses};
+use edgepuck_dataset::pipeline::{Run, scan_all};
+use edgepuck_dataset::progress::Progress;
 use edgepuck_dataset::record::Entry;
 use edgepuck_dataset::verify::verify;
 use edgepuck_dataset::{DatasetError, MeshFailure, check_layouts, layout};
 use formats::Split::{Test, Train};
 use formats::labelled::read_labelled;
+use sim_gpu::caster::Caster;
+use sim_gpu::job::Culling;
+use sim_gpu::mesh::tree::discover;
 use sim_gpu::sensor::{Sensor, builtin_names};
 use std::fs;
 use std::path::Path;
@@ -155,6 +160,34 @@ fn finishing_again_gives_the_same_bytes_wherever_it_was_stopped() {
 }
 
 #[test]
+fn clouds_that_a_run_keeps_are_those_that_its_files_give() {
+    let folder = tempfile::tempdir().unwrap();
+    let (meshes, out) = (folder.path().join("meshes"), folder.path().join("out"));
+    let tetrahedron =
+        "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+    for name in ["cup/train/cup_1.off", "cup/test/cup_2.off", "bowl/train/bowl_1.off"] {
+        let file = meshes.join(name);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(file, tetrahedron).unwrap();
+    }
+    let terms = terms(config(), None);
+    let config = &terms.config;
+    let caster = Caster::Cpu(config.cast_effects());
+    let (culling, progress) = (Culling::On, &Progress::default());
+    let run = Run { out: &out, config, caster: &caster, culling, progress };
+    let records = scan_all(&run, &discover(&meshes, config.seed).unwrap()).unwrap().records;
+    let mut read_again = records.clone();
+    let scans = read_again.iter_mut().flat_map(|mesh| &mut mesh.scans);
+    for written in scans.flat_map(|scan| &mut scan.variants) {
+        assert!(written.cloud.take().is_some(), "{} points", written.tally.points);
+    }
+    finish(&out, &terms, records, Vec::new()).unwrap();
+    let kept = files(&out);
+    finish(&out, &terms, read_again, Vec::new()).unwrap();
+    assert!(files(&out) == kept);
+}
+
+#[test]
 fn what_was_done_to_a_dataset_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
@@ -227,7 +260,7 @@ fn what_is_no_finished_dataset_is_found_out() {
             refused(&|manifest| manifest.meshes[0].entry.name = name.to_owned()),
             refused(&|manifest| manifest.config.sets[1].name = name.to_owned()),
         ] {
-            assert!(message.ends_with("is no name of a file or folder"), "{message}");
+            assert!(message.contains("expected the name of a file or folder, found"), "{message}");
         }
     }
 }

@@ -94,7 +94,10 @@ fn shards_that_make_no_dataset_are_refused() {
         (vec![], "part 1/1 is not among the shards"),
         (vec![first, third], "part 2/3 is not among the shards"),
         (vec![first, second, third, second], "is the same part as"),
-        (vec![first, &whole, third], "is no shard: it was made without --shard"),
+        (
+            vec![first, &whole, third],
+            "expected a shard, found a dataset that was made without --shard",
+        ),
         (vec![first, &of_two, third], "is one of 2; "),
         (vec![first, &reseeded, third], "shard0: seed: 8 against 7"),
         (vec![first, &old, third], "was made by version 0.0.1; this is "),

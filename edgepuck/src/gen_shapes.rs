@@ -35,7 +35,8 @@ pub const TEST_PER_CLASS: u32 = 10;
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     shapes::write_tree(&args.out, args.seed, args.train, args.test)
         .context("cannot write the shapes")?;
-    let meshes = shapes::CLASSES.len() as u32 * (args.train + args.test);
-    eprintln!("{meshes} meshes of {} classes: {}", shapes::CLASSES.len(), args.out.display());
+    let classes = shapes::ShapeClass::ALL.len() as u32;
+    let meshes = classes * (args.train + args.test);
+    eprintln!("{meshes} meshes of {classes} classes: {}", args.out.display());
     Ok(Outcome::Success)
 }

@@ -13,7 +13,6 @@ pub mod gen_shapes;
 #[cfg(feature = "models")]
 pub mod import_weights;
 pub mod merge_dataset;
-pub mod outcome;
 pub mod preview;
 pub mod preview_scan;
 pub mod sample_surfaces;
@@ -25,4 +24,4 @@ pub mod significant_digits;
 pub mod trade_record;
 pub mod trainer;
 
-pub use outcome::{Outcome, Usage};
+pub use formats::outcome::{self, Outcome, Usage};

@@ -20,27 +20,15 @@ pub enum Part {
     Classifier,
 }
 
-/// A device that was measured or modelled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Device {
-    /// A Raspberry Pi 5, modelled.
-    Pi5,
-    /// The machine that made the record.
-    Here,
-}
-
-impl fmt::Display for Device {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Pi5 => "pi5",
-            Self::Here => "here",
-        })
+formats::named! {
+    /// A device that was measured or modelled.
+    #[derive(clap::ValueEnum)]
+    pub enum Device: "device" {
+        /// A Raspberry Pi 5, modelled.
+        Pi5 = "pi5",
+        /// The machine that made the record.
+        Here = "here",
     }
-}
-
-impl Device {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Pi5, Self::Here];
 }
 
 /// One setting of all knobs. A field that a part does not have is empty.

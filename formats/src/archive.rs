@@ -4,13 +4,14 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use tempfile::SpooledTempFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 
+use crate::atomic;
 use crate::decoding::invalid;
 use crate::error::FormatError;
-use crate::npy;
-use crate::npy_header::{self, Header};
+use crate::npy::{self, Header};
 use crate::number::Number;
 
 /// An archive that is being written: uncompressed, and with the same bytes
@@ -65,7 +66,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     pub fn text(&mut self, key: &str, lines: &[String]) -> io::Result<()> {
         // NumPy has no text of width 0.
         let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0).max(1);
-        let header = npy_header::header_bytes(&format!("<U{width}"), &[lines.len()]);
+        let header = npy::header_bytes(&format!("<U{width}"), &[lines.len()]);
         let n_bytes = header.len() as u64 + (lines.len() * width * 4) as u64;
         let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
         writer.write_all(&header)?;
@@ -76,6 +77,33 @@ impl<W: Write + Seek> NpzWriter<W> {
         }
         writer.flush()
     }
+}
+
+/// Bytes of an archive that wait in memory; a longer one waits in a file.
+const IN_MEMORY: usize = 32 << 20;
+
+/// Memory for a file that is made before it can be written, which goes over into a
+/// file without a name in `folder` when it grows beyond [`IN_MEMORY`]. The system
+/// removes that file however the process ends.
+pub(crate) fn waiting_room(folder: &Path) -> SpooledTempFile {
+    tempfile::spooled_tempfile_in(IN_MEMORY, folder)
+}
+
+/// Writes the archive whose arrays `fill` writes to `path`, atomically, and returns
+/// the SHA-256 of the file.
+///
+/// The head of an entry is patched once the entry is complete, while a file that is
+/// hashed as it is written takes its bytes in order: the archive waits till it is
+/// whole.
+pub(crate) fn write_archive(
+    path: &Path,
+    fill: impl FnOnce(&mut NpzWriter<&mut SpooledTempFile>) -> io::Result<()>,
+) -> Result<String, FormatError> {
+    let here = |source| FormatError::io(path, source);
+    let mut archive = waiting_room(atomic::make_folder_of(path)?);
+    NpzWriter::write(&mut archive, fill).map_err(here)?;
+    archive.rewind().map_err(here)?;
+    atomic::write_hashed(path, |writer| io::copy(&mut archive, writer).map(drop))
 }
 
 /// An archive that is being read. Its errors name the file and the key.
@@ -184,8 +212,7 @@ impl<R: Read + Seek> NpzReader<R> {
             )));
         }
         let size = entry.size();
-        let header =
-            npy_header::read_header(&mut entry).map_err(|error| here(error.to_string()))?;
+        let header = npy::read_header(&mut entry).map_err(|error| here(error.to_string()))?;
         let size = size.saturating_sub(header.n_bytes as u64);
         let value = read(header, size, &mut entry.by_ref().take(size));
         let value = value.map_err(|error| here(error.to_string()))?;

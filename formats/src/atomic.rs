@@ -5,15 +5,16 @@
 //! file under its final name. Nothing is synced to the disk: that guards
 //! against a power cut, and would cost more than writing a small scan.
 
+use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
 use crate::error::FormatError;
-use crate::hash::hexadecimal;
+use crate::hash::{HashedFile, hexadecimal};
 
 const PREFIX: &str = ".edgepuck-";
 const SUFFIX: &str = ".tmp";
@@ -88,6 +89,17 @@ fn write_through<W: Write, T>(
 /// As [`write()`].
 pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FormatError> {
     write(path, |writer| writer.write_all(bytes.as_ref()))
+}
+
+/// Writes `lines` to `path`, atomically.
+pub(crate) fn write_lines(
+    path: PathBuf,
+    lines: impl IntoIterator<Item = impl Display>,
+) -> Result<HashedFile, FormatError> {
+    let sha256 = write_hashed(&path, |writer| {
+        lines.into_iter().try_for_each(|line| writeln!(writer, "{line}"))
+    })?;
+    Ok(HashedFile { path, sha256 })
 }
 
 /// The folder that holds `path`, made if it is missing.

@@ -14,6 +14,7 @@
 //! | `weights` | models (`weights`) and what they state about themselves (`model_card`) |
 //! | `chamfer` | the distance of two clouds (`chamfer`) |
 //! | `hdf5` | ModelNet40's HDF5 layout |
+//! | `cli` | how programs end (`outcome`) |
 //!
 //! None of them needs a C compiler for its target.
 
@@ -31,6 +32,7 @@ pub mod error;
 pub mod hash;
 pub mod interval;
 pub mod modelnet_h5_list;
+mod named;
 pub mod rng;
 pub mod scan;
 pub mod split;
@@ -54,11 +56,9 @@ pub mod modelnet_h5;
 #[cfg(feature = "files")]
 mod npy;
 #[cfg(feature = "files")]
-mod npy_header;
-#[cfg(feature = "dataset")]
-pub mod npz;
-#[cfg(feature = "files")]
 mod number;
+#[cfg(feature = "cli")]
+pub mod outcome;
 #[cfg(feature = "dataset")]
 pub mod packed;
 #[cfg(feature = "pcap")]

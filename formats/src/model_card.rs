@@ -16,7 +16,11 @@
 //! | `widths` | for the reader; the tensors decide | |
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use serde_json::json;
 
 use crate::error::FormatError;
 use crate::weights::WeightsFile;
@@ -52,41 +56,15 @@ pub struct ModelCard {
     pub provenance: Option<String>,
 }
 
-/// How a cloud is moved and scaled before a network sees it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Normalization {
-    /// Mean to 0, largest radius to 1.
-    #[default]
-    UnitSphere,
-    /// As it comes.
-    None,
-}
-
-impl Normalization {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::UnitSphere, Self::None];
-
-    /// Its name on command lines and in model files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::UnitSphere => "unit-sphere",
-            Self::None => "none",
-        }
-    }
-}
-
-impl std::str::FromStr for Normalization {
-    type Err = FormatError;
-
-    fn from_str(word: &str) -> Result<Self, FormatError> {
-        Self::ALL.into_iter().find(|one| one.name() == word).ok_or_else(|| {
-            FormatError::UnknownName {
-                word: word.to_owned(),
-                what: "normalization",
-                choices: Self::ALL.map(Self::name).join(", "),
-            }
-        })
+crate::named! {
+    /// How a cloud is moved and scaled before a network sees it.
+    #[derive(Default)]
+    pub enum Normalization: "normalization" {
+        /// Mean to 0, largest radius to 1.
+        #[default]
+        UnitSphere = "unit-sphere",
+        /// As it comes.
+        None = "none",
     }
 }
 
@@ -95,7 +73,7 @@ impl Default for ModelCard {
     fn default() -> Self {
         Self {
             classes: Vec::new(),
-            normalization: Normalization::UnitSphere,
+            normalization: Normalization::default(),
             sampler: None,
             points: None,
             fps_start: None,
@@ -115,7 +93,7 @@ impl ModelCard {
     /// Reads the card of the model file at `path`, and none of its weights.
     ///
     /// # Errors
-    /// A file that is no safetensors; as [`ModelCard::from_metadata`].
+    /// A file that is not safetensors; as [`ModelCard::from_metadata`].
     pub fn read(path: &Path) -> Result<Self, FormatError> {
         Self::from_metadata(path, &WeightsFile::open(path)?.metadata())
     }
@@ -129,45 +107,21 @@ impl ModelCard {
         path: &Path,
         metadata: &BTreeMap<String, String>,
     ) -> Result<Self, FormatError> {
-        let bad = |key: &str, cause: String| {
-            FormatError::malformed(path, format!("metadata `{key}`"), cause)
-        };
         let text = |key: &str| metadata.get(key).cloned();
-        let number = |key: &str| {
-            let parse = |value: String| {
-                value
-                    .parse::<usize>()
-                    .map_err(|_| bad(key, format!("expected a count, found `{value}`")))
-            };
-            text(key).map(parse).transpose()
-        };
-        let choice = |key: &str, yes: &str, no: &str| match metadata.get(key) {
-            None => Ok(None),
-            Some(value) if value == yes => Ok(Some(true)),
-            Some(value) if value == no => Ok(Some(false)),
-            Some(value) => Err(bad(key, format!("expected `{yes}` or `{no}`, found `{value}`"))),
-        };
+        let entries = Entries { path, metadata };
         let default = Self::default();
-        let classes = text("classes").map(|value| serde_json::from_str(&value)).transpose();
-        let ranges = text("activation_ranges").map(|value| serde_json::from_str(&value));
-        let radii = text("edge_radii").map(|value| serde_json::from_str(&value)).transpose();
-        let normalization = text("normalization").map(|value| value.parse()).transpose();
+        let either = |no, yes| move |word: &str| choice(word, no, yes);
         Ok(Self {
-            classes: classes.map_err(|e| bad("classes", e.to_string()))?.unwrap_or_default(),
-            normalization: normalization
-                .map_err(|e: FormatError| bad("normalization", e.to_string()))?
-                .unwrap_or_default(),
+            classes: entries.get("classes", json, default.classes)?,
+            normalization: entries.get("normalization", str::parse, default.normalization)?,
             sampler: text("sampler"),
-            points: number("points")?,
+            points: entries.get("points", |word| count(word).map(Some), None)?,
             fps_start: text("fps_start"),
-            transform_after: number("transform_after")?.unwrap_or(default.transform_after),
-            pooled_relu: choice("pooled", "relu", "linear")?.unwrap_or(default.pooled_relu),
-            edge_radii: radii.map_err(|e| bad("edge_radii", e.to_string()))?.unwrap_or_default(),
-            activation_ranges: ranges
-                .transpose()
-                .map_err(|e| bad("activation_ranges", e.to_string()))?
-                .unwrap_or_default(),
-            trained: choice("trained", "true", "false")?.unwrap_or(default.trained),
+            transform_after: entries.get("transform_after", count, default.transform_after)?,
+            pooled_relu: entries.get("pooled", either("linear", "relu"), default.pooled_relu)?,
+            edge_radii: entries.get("edge_radii", json, default.edge_radii)?,
+            activation_ranges: entries.get("activation_ranges", json, BTreeMap::new())?,
+            trained: entries.get("trained", either("false", "true"), default.trained)?,
             training_set: text("training_set"),
             accuracy: text("accuracy"),
             provenance: text("provenance"),
@@ -177,14 +131,10 @@ impl ModelCard {
     /// The card as metadata; what is unknown is left out.
     #[must_use]
     pub fn to_metadata(&self) -> BTreeMap<String, String> {
-        let json = |names: &[String]| serde_json::Value::from(names.to_vec()).to_string();
-        let ranges: serde_json::Map<_, _> = self
-            .activation_ranges
-            .iter()
-            .map(|(layer, &range)| (layer.clone(), f64::from(range).into()))
-            .collect();
+        let ranges = self.activation_ranges.iter();
+        let ranges: BTreeMap<_, _> = ranges.map(|(layer, &r)| (layer, f64::from(r))).collect();
         let entries = [
-            ("classes", (!self.classes.is_empty()).then(|| json(&self.classes))),
+            ("classes", (!self.classes.is_empty()).then(|| json!(self.classes).to_string())),
             ("normalization", Some(self.normalization.name().to_owned())),
             ("sampler", self.sampler.clone()),
             ("points", self.points.map(|points| points.to_string())),
@@ -192,10 +142,7 @@ impl ModelCard {
             ("transform_after", Some(self.transform_after.to_string())),
             ("pooled", Some(if self.pooled_relu { "relu" } else { "linear" }.to_owned())),
             ("edge_radii", (!self.edge_radii.is_empty()).then(|| format!("{:?}", self.edge_radii))),
-            (
-                "activation_ranges",
-                (!ranges.is_empty()).then(|| serde_json::Value::from(ranges).to_string()),
-            ),
+            ("activation_ranges", (!ranges.is_empty()).then(|| json!(ranges).to_string())),
             ("trained", Some(self.trained.to_string())),
             ("training_set", self.training_set.clone()),
             ("accuracy", self.accuracy.clone()),
@@ -203,6 +150,42 @@ impl ModelCard {
         ];
         let known = entries.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
         known.collect()
+    }
+}
+
+/// A model file's metadata.
+struct Entries<'a> {
+    path: &'a Path,
+    metadata: &'a BTreeMap<String, String>,
+}
+
+impl Entries<'_> {
+    /// What `parse` makes of the value of `key`; `if_absent` where there is none.
+    fn get<T, E: Display>(
+        &self,
+        key: &str,
+        parse: impl FnOnce(&str) -> Result<T, E>,
+        if_absent: T,
+    ) -> Result<T, FormatError> {
+        let Some(value) = self.metadata.get(key) else { return Ok(if_absent) };
+        let part = || format!("metadata `{key}`");
+        parse(value).map_err(|cause| FormatError::malformed(self.path, part(), cause))
+    }
+}
+
+fn json<T: DeserializeOwned>(value: &str) -> Result<T, serde_json::Error> {
+    serde_json::from_str(value)
+}
+
+fn count(value: &str) -> Result<usize, String> {
+    value.parse().map_err(|_| format!("expected a count, found `{value}`"))
+}
+
+fn choice(value: &str, no: &str, yes: &str) -> Result<bool, String> {
+    match value {
+        _ if value == yes => Ok(true),
+        _ if value == no => Ok(false),
+        _ => Err(format!("expected `{yes}` or `{no}`, found `{value}`")),
     }
 }
 

@@ -18,6 +18,7 @@ use crate::hash::HashedFile;
 use crate::labelled::LabelledSet;
 pub use crate::modelnet_h5_list::is_one;
 use crate::modelnet_h5_list::list;
+use crate::packed::check_cloud;
 use crate::split::Split;
 
 /// Clouds in a file, as in the original.
@@ -65,22 +66,11 @@ impl ModelNetH5Writer {
         label: usize,
         name: &str,
     ) -> Result<(), FormatError> {
-        if points.len() != self.n_points {
-            let cause = format!("expected {} points, found {}", self.n_points, points.len());
-            return Err(FormatError::instance(name, cause));
-        }
-        let label = u8::try_from(label)
-            .ok()
-            .filter(|&label| usize::from(label) < self.classes.len())
-            .ok_or_else(|| {
-                let cause = format!("expected a label below {}, found {label}", self.classes.len());
-                FormatError::instance(
-                    name,
-                    format!("{cause}; the layout holds at most 256 classes"),
-                )
-            })?;
+        // A label is one byte.
+        let classes = self.classes.len().min(256);
+        check_cloud(name, points.len(), self.n_points, label, classes)?;
         self.data.extend_from_slice(points.as_flattened());
-        self.labels.push(label);
+        self.labels.push(label as u8);
         if self.labels.len() == CLOUDS_PER_FILE { self.write_file() } else { Ok(()) }
     }
 
@@ -94,17 +84,11 @@ impl ModelNetH5Writer {
         if !self.labels.is_empty() || self.n_files == 0 {
             self.write_file()?;
         }
-        let path = self.folder.join("shape_names.txt");
-        let sha256 = atomic::write_hashed(&path, |writer| {
-            self.classes.iter().try_for_each(|class| writeln!(writer, "{class}"))
-        })?;
-        self.files.push(HashedFile { path, sha256 });
-        let path = list(&self.folder, self.split);
-        let sha256 = atomic::write_hashed(&path, |writer| {
-            (0..self.n_files)
-                .try_for_each(|k| writeln!(writer, "{LISTED_FOLDER}/{}", file_name(self.split, k)))
-        })?;
-        self.files.push(HashedFile { path, sha256 });
+        let names = self.folder.join("shape_names.txt");
+        self.files.push(atomic::write_lines(names, &self.classes)?);
+        let listed = |k| format!("{LISTED_FOLDER}/{}", file_name(self.split, k));
+        let list = list(&self.folder, self.split);
+        self.files.push(atomic::write_lines(list, (0..self.n_files).map(listed))?);
         Ok(self.files)
     }
 

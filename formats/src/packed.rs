@@ -13,26 +13,27 @@
 //! fixed-width kind, which `np.load` reads without `allow_pickle`.
 //! [`crate::labelled`] reads these sets.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use crate::archive::NpzWriter;
+use tempfile::SpooledTempFile;
+
+use crate::archive::{waiting_room, write_archive};
 use crate::atomic;
 use crate::error::FormatError;
-use crate::npy_header;
+use crate::npy;
 
 /// A packed set that is being written.
 ///
-/// Points wait in a file without a name in the set's folder, which the system
-/// removes however the process ends; memory grows by the names alone, some
-/// 100 bytes a cloud. Nothing lies under the set's name before
-/// [`PackedWriter::finish`].
+/// The first 32 MiB of points wait in memory; more wait in a file without a name in
+/// the set's folder, which the system removes however the process ends. Memory then
+/// grows by the names alone, some 100 bytes a cloud. Nothing lies under the set's
+/// name before [`PackedWriter::finish`].
 pub struct PackedWriter {
     path: PathBuf,
     n_points: usize,
     classes: Vec<String>,
-    points: BufWriter<File>,
+    points: BufWriter<SpooledTempFile>,
     labels: Vec<i64>,
     names: Vec<String>,
     n_raw: Vec<u32>,
@@ -45,14 +46,11 @@ impl PackedWriter {
     /// # Errors
     /// The folder cannot be made or written.
     pub fn create(path: &Path, n_points: usize, classes: Vec<String>) -> Result<Self, FormatError> {
-        let folder = atomic::make_folder_of(path)?;
-        let points =
-            tempfile::tempfile_in(folder).map_err(|source| FormatError::io(folder, source))?;
         Ok(Self {
             path: path.to_path_buf(),
             n_points,
             classes,
-            points: BufWriter::new(points),
+            points: BufWriter::new(waiting_room(atomic::make_folder_of(path)?)),
             labels: Vec::new(),
             names: Vec::new(),
             n_raw: Vec::new(),
@@ -84,14 +82,7 @@ impl PackedWriter {
         name: &str,
         n_raw: u32,
     ) -> Result<(), FormatError> {
-        if points.len() != self.n_points {
-            let cause = format!("expected {} points, found {}", self.n_points, points.len());
-            return Err(FormatError::instance(name, cause));
-        }
-        if label >= self.classes.len() {
-            let cause = format!("expected a label below {}, found {label}", self.classes.len());
-            return Err(FormatError::instance(name, cause));
-        }
+        check_cloud(name, points.len(), self.n_points, label, self.classes.len())?;
         for coordinate in points.as_flattened() {
             self.points
                 .write_all(&coordinate.to_le_bytes())
@@ -103,28 +94,45 @@ impl PackedWriter {
         Ok(())
     }
 
-    /// Writes the set, atomically; the same clouds in the same order give the
-    /// same bytes. A set may be empty.
+    /// Writes the set, atomically, and returns the SHA-256 of the file; the same
+    /// clouds in the same order give the same bytes. A set may be empty.
     ///
     /// # Errors
     /// What the system reports.
-    pub fn finish(self) -> Result<(), FormatError> {
+    pub fn finish(self) -> Result<String, FormatError> {
         let Self { path, n_points, classes, points, labels, names, n_raw } = self;
         let here = |source| FormatError::io(&path, source);
         let mut points = points.into_inner().map_err(|error| here(error.into_error()))?;
+        let size = points.stream_position().map_err(here)?;
         points.rewind().map_err(here)?;
-        atomic::write(&path, |writer| {
-            NpzWriter::write(writer, |npz| {
-                let header = npy_header::header_bytes("<f4", &[labels.len(), n_points, 3]);
-                let n_bytes = header.len() as u64 + points.metadata()?.len();
-                let entry = npz.begin("points", n_bytes)?;
-                entry.write_all(&header)?;
-                io::copy(&mut points, entry)?;
-                npz.array("labels", &[labels.len()], labels.iter().copied())?;
-                npz.text("names", &names)?;
-                npz.array("n_raw", &[n_raw.len()], n_raw.iter().copied())?;
-                npz.text("classes", &classes)
-            })
+        write_archive(&path, |npz| {
+            let header = npy::header_bytes("<f4", &[labels.len(), n_points, 3]);
+            let entry = npz.begin("points", header.len() as u64 + size)?;
+            entry.write_all(&header)?;
+            io::copy(&mut points, entry)?;
+            npz.array("labels", &[labels.len()], labels.iter().copied())?;
+            npz.text("names", &names)?;
+            npz.array("n_raw", &[n_raw.len()], n_raw.iter().copied())?;
+            npz.text("classes", &classes)
         })
     }
+}
+
+/// Checks that the cloud `name` has the points of its set's clouds, and a class.
+pub(crate) fn check_cloud(
+    name: &str,
+    points: usize,
+    expected: usize,
+    label: usize,
+    classes: usize,
+) -> Result<(), FormatError> {
+    if points != expected {
+        let cause = format!("expected {expected} points, found {points}");
+        return Err(FormatError::instance(name, cause));
+    }
+    if label >= classes {
+        let cause = format!("expected a label below {classes}, found {label}");
+        return Err(FormatError::instance(name, cause));
+    }
+    Ok(())
 }

@@ -1,8 +1,6 @@
 //! What one sensor saw from one place.
 
 use std::collections::BTreeSet;
-use std::fmt;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
@@ -39,26 +37,29 @@ pub struct Scan {
     pub normal: Option<Vec<[f32; 3]>>,
 }
 
-/// Something that may be known of each point besides its position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Attribute {
-    /// [`Scan::range_m`].
-    Range,
-    /// [`Scan::beam`].
-    Beam,
-    /// [`Scan::ring`].
-    Ring,
-    /// [`Scan::time_s`].
-    Time,
-    /// [`Scan::triangle`].
-    Triangle,
-    /// [`Scan::object`].
-    Object,
-    /// [`Scan::intensity`].
-    Intensity,
-    /// [`Scan::normal`].
-    Normal,
+crate::named! {
+    /// Something that may be known of each point besides its position, in the
+    /// order in which files hold it.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Attribute: "attribute" {
+        /// [`Scan::range_m`].
+        Range = "range",
+        /// [`Scan::beam`].
+        Beam = "beam",
+        /// [`Scan::ring`].
+        Ring = "ring",
+        /// [`Scan::time_s`].
+        Time = "time",
+        /// [`Scan::triangle`].
+        Triangle = "triangle",
+        /// [`Scan::object`].
+        Object = "object",
+        /// [`Scan::intensity`].
+        Intensity = "intensity",
+        /// [`Scan::normal`].
+        Normal = "normal",
+    }
 }
 
 /// The attributes that are wanted, in the order in which files hold them.
@@ -78,21 +79,13 @@ pub enum Column<'a> {
 }
 
 impl Column<'_> {
-    /// How many values there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    fn len(&self) -> usize {
         match self {
             Self::F32(values) => values.len(),
             Self::U16(values) => values.len(),
             Self::U32(values) => values.len(),
             Self::Vector(values) => values.len(),
         }
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
@@ -175,18 +168,6 @@ impl Scan {
 }
 
 impl Attribute {
-    /// All attributes, in the order in which files hold them.
-    pub const ALL: [Self; 8] = [
-        Self::Range,
-        Self::Beam,
-        Self::Ring,
-        Self::Time,
-        Self::Triangle,
-        Self::Object,
-        Self::Intensity,
-        Self::Normal,
-    ];
-
     /// The names of the attribute's columns in PLY and CSV files: its own, or
     /// three for a vector.
     #[cfg(feature = "dataset")]
@@ -196,58 +177,11 @@ impl Attribute {
             other => vec![other.name()],
         }
     }
-
-    /// The attribute's name on the command line and in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Range => "range",
-            Self::Beam => "beam",
-            Self::Ring => "ring",
-            Self::Time => "time",
-            Self::Triangle => "triangle",
-            Self::Object => "object",
-            Self::Intensity => "intensity",
-            Self::Normal => "normal",
-        }
-    }
-}
-
-impl fmt::Display for Attribute {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Attribute {
-    type Err = FormatError;
-
-    fn from_str(word: &str) -> Result<Self, FormatError> {
-        Self::ALL.into_iter().find(|attribute| attribute.name() == word).ok_or_else(|| {
-            FormatError::UnknownName {
-                word: word.to_owned(),
-                what: "attribute",
-                choices: Self::ALL.map(Self::name).join(", "),
-            }
-        })
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_attribute_is_found_by_its_name() {
-        for attribute in Attribute::ALL {
-            assert_eq!(attribute.to_string().parse::<Attribute>().unwrap(), attribute);
-        }
-        let error = "colour".parse::<Attribute>().unwrap_err().to_string();
-        assert!(
-            error.starts_with("unknown attribute `colour`, expected one of range, beam,"),
-            "{error}"
-        );
-    }
 
     #[test]
     fn a_column_of_another_length_is_named() {

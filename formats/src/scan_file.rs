@@ -1,47 +1,50 @@
-//! Scans on disk, in whichever format the user asked for.
+//! Scans on disk: as PLY ([`ply`]), as CSV ([`csv`]), or as NPZ files that NumPy
+//! and Open3D load as they are:
+//!
+//! | key | type | shape |
+//! | --- | --- | --- |
+//! | `positions` | f32 | `[n, 3]` |
+//! | `range`, `time`, `intensity` | f32 | `[n, 1]` |
+//! | `beam`, `triangle`, `object` | u32 | `[n, 1]` |
+//! | `ring` | u16 | `[n, 1]` |
+//! | `normal` | f32 | `[n, 3]` |
+//! | `origin`, only if it is not 0 | f64 | `[3]` |
+//!
+//! Attributes are columns, not vectors: Open3D 0.20 loads either, but voxel
+//! down-sampling and PLY writing fail on a vector. It keeps `origin` as an
+//! attribute too; delete it there before joining or thinning clouds.
 
-use std::fmt;
+use std::io::{self, Seek, Write};
 use std::path::Path;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::archive::{NpzReader, NpzWriter, Values, write_archive};
 use crate::error::FormatError;
-use crate::scan::Scan;
-use crate::{csv, npz, ply};
+use crate::number::Number;
+use crate::scan::{Attribute, Column, ColumnSlot, Scan};
+use crate::{csv, ply};
 
-/// A format in which scans are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ScanFormat {
-    /// NumPy archive: see [`npz`].
-    Npz,
-    /// Binary PLY: see [`ply`].
-    Ply,
-    /// Text: see [`csv`]. It is written, not read.
-    Csv,
-    /// A sensor's packets: see `vlp32c`. They hold ranges along beams, not
-    /// points, so that writing them takes the sensor, too.
-    Pcap,
+crate::named! {
+    /// A format in which scans are written; its name is the file's extension.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum ScanFormat: "scan format" {
+        /// NumPy archive: see the module.
+        Npz = "npz",
+        /// Binary PLY: see [`ply`].
+        Ply = "ply",
+        /// Text: see [`csv`]. It is written, not read.
+        Csv = "csv",
+        /// A sensor's packets: see `vlp32c`. They hold ranges along beams, not
+        /// points, so that writing them takes the sensor, too.
+        Pcap = "pcap",
+    }
 }
 
 impl ScanFormat {
-    /// All formats.
-    pub const ALL: [Self; 4] = [Self::Npz, Self::Ply, Self::Csv, Self::Pcap];
-
     /// The formats of points, which [`write_scan`] writes.
     pub const POINTS: [Self; 3] = [Self::Npz, Self::Ply, Self::Csv];
-
-    /// The file name's extension, without the dot.
-    #[must_use]
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Npz => "npz",
-            Self::Ply => "ply",
-            Self::Csv => "csv",
-            Self::Pcap => "pcap",
-        }
-    }
 
     /// The format that `path`'s extension names, in whichever case.
     ///
@@ -53,38 +56,21 @@ impl ScanFormat {
     }
 }
 
-impl fmt::Display for ScanFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.extension())
-    }
-}
-
-impl FromStr for ScanFormat {
-    type Err = FormatError;
-
-    fn from_str(word: &str) -> Result<Self, FormatError> {
-        Self::ALL.into_iter().find(|format| format.extension() == word).ok_or_else(|| {
-            FormatError::UnknownName {
-                word: word.to_owned(),
-                what: "scan format",
-                choices: Self::ALL.map(Self::extension).join(", "),
-            }
-        })
-    }
-}
-
 /// What is said to whoever takes packets for points.
 const PACKETS: &str = "packets hold a sensor's ranges, not points";
 
-/// Writes `scan` to `path`, atomically, and returns the SHA-256 of the file. The
-/// name is taken as it is.
+/// Writes `scan` to `path`, atomically, and returns the SHA-256 of the file; the
+/// same scan gives the same bytes. The name is taken as it is.
 ///
 /// # Errors
-/// An attribute of another length than the positions; packets, which are no
-/// points; what the system reports.
+/// An attribute of another length than the positions; [`ScanFormat::Pcap`], whose
+/// packets hold no points; what the system reports.
 pub fn write_scan(path: &Path, format: ScanFormat, scan: &Scan) -> Result<String, FormatError> {
     match format {
-        ScanFormat::Npz => npz::write_scan(path, scan),
+        ScanFormat::Npz => {
+            scan.check_lengths()?;
+            write_archive(path, |npz| write_npz(npz, scan))
+        }
         ScanFormat::Ply => ply::write_scan(path, scan),
         ScanFormat::Csv => csv::write_scan(path, scan),
         ScanFormat::Pcap => Err(FormatError::malformed(path, "extension", PACKETS)),
@@ -94,14 +80,98 @@ pub fn write_scan(path: &Path, format: ScanFormat, scan: &Scan) -> Result<String
 /// Reads the scan at `path`, an NPZ or PLY file by its extension.
 ///
 /// # Errors
-/// A file that cannot be read or is not what its extension says.
+/// A file that cannot be read or is not what its extension says:
+/// [`FormatError::Malformed`] with the file and the key, element or line at fault.
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
+    let refuse = |cause: &str| Err(FormatError::malformed(path, "extension", cause));
     match ScanFormat::of(path)? {
-        ScanFormat::Npz => npz::read_scan(path),
+        ScanFormat::Npz => read_npz(path),
         ScanFormat::Ply => ply::read_scan(path),
-        ScanFormat::Csv => {
-            Err(FormatError::malformed(path, "extension", "CSV is written but not read"))
-        }
-        ScanFormat::Pcap => Err(FormatError::malformed(path, "extension", PACKETS)),
+        ScanFormat::Csv => refuse("CSV is written but not read"),
+        ScanFormat::Pcap => refuse(PACKETS),
     }
+}
+
+fn write_npz<W: Write + Seek>(npz: &mut NpzWriter<W>, scan: &Scan) -> io::Result<()> {
+    write_columns(npz, "positions", scan.positions.as_flattened(), 3)?;
+    for (attribute, column) in scan.columns() {
+        let key = attribute.name();
+        match column {
+            Column::F32(values) => write_columns(npz, key, values, 1)?,
+            Column::U16(values) => write_columns(npz, key, values, 1)?,
+            Column::U32(values) => write_columns(npz, key, values, 1)?,
+            Column::Vector(values) => write_columns(npz, key, values.as_flattened(), 3)?,
+        }
+    }
+    if scan.origin != [0.0; 3] {
+        npz.array("origin", &[3], scan.origin.into_iter())?;
+    }
+    Ok(())
+}
+
+fn write_columns<W: Write + Seek, A: Number>(
+    npz: &mut NpzWriter<W>,
+    key: &str,
+    values: &[A],
+    width: usize,
+) -> io::Result<()> {
+    npz.array(key, &[values.len() / width, width], values.iter().copied())
+}
+
+/// Attributes may be columns or vectors, compressed or not; keys of other names are
+/// passed over.
+fn read_npz(path: &Path) -> Result<Scan, FormatError> {
+    let mut npz = NpzReader::open(path)?;
+    let positions = read_columns::<f32>(&mut npz, "positions", 3, None)?;
+    let n = positions.len() / 3;
+    let mut scan = Scan { positions: as_vectors(&positions), ..Scan::default() };
+    if npz.has("origin") {
+        let origin = npz.array::<f64>("origin")?.elements;
+        scan.origin =
+            origin.try_into().map_err(|_| npz.error("origin", "expected three numbers"))?;
+    }
+    for attribute in Attribute::ALL {
+        let key = attribute.name();
+        if !npz.has(key) {
+            continue;
+        }
+        match scan.slot(attribute) {
+            ColumnSlot::F32(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
+            ColumnSlot::U16(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
+            ColumnSlot::U32(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
+            ColumnSlot::Vector(slot) => {
+                *slot = Some(as_vectors(&read_columns(&mut npz, key, 3, Some(n))?));
+            }
+        }
+    }
+    Ok(scan)
+}
+
+/// The elements of an array of shape `[n, width]`, or `[n]` if `width` is 1.
+fn read_columns<A: Number>(
+    npz: &mut NpzReader,
+    key: &str,
+    width: usize,
+    expected: Option<usize>,
+) -> Result<Vec<A>, FormatError> {
+    let Values { shape, elements } = npz.array(key)?;
+    let n = match shape[..] {
+        [n] if width == 1 => n,
+        [n, columns] if columns == width => n,
+        _ => {
+            let cause = format!("expected shape [n, {width}], found {shape:?}");
+            return Err(npz.error(key, cause));
+        }
+    };
+    match expected {
+        Some(expected) if n != expected => {
+            Err(npz
+                .error(key, format!("expected {expected} values, one for each point, found {n}")))
+        }
+        _ => Ok(elements),
+    }
+}
+
+fn as_vectors(elements: &[f32]) -> Vec<[f32; 3]> {
+    elements.as_chunks::<3>().0.to_vec()
 }

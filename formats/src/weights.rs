@@ -47,11 +47,15 @@ impl WeightsFile {
     /// Opens the file at `path` and checks its header against its size.
     ///
     /// # Errors
-    /// A file that cannot be read, is no safetensors, or is cut short.
+    /// A file that cannot be read, is not safetensors, or is cut short.
     pub fn open(path: &Path) -> Result<Self, FormatError> {
         let here = |source| FormatError::io(path, source);
         if path.is_dir() {
-            return Err(FormatError::malformed(path, "file", "a folder, no safetensors"));
+            return Err(FormatError::malformed(
+                path,
+                "file",
+                "expected safetensors, found a folder",
+            ));
         }
         let file = File::open(path).map_err(here)?;
         let file_size = file.metadata().map_err(here)?.len();
@@ -62,7 +66,7 @@ impl WeightsFile {
     /// number; errors call it `name`.
     ///
     /// # Errors
-    /// Bytes that are no safetensors, or cut short.
+    /// Bytes that are not safetensors, or cut short.
     pub fn from_bytes(name: &Path, bytes: Arc<[u8]>) -> Result<Self, FormatError> {
         let size = bytes.len() as u64;
         Self::new(name, Box::new(Cursor::new(bytes)), size)
@@ -79,21 +83,21 @@ impl WeightsFile {
             // Zip archives, and pickles of protocol 2 from before PyTorch 1.6. Only of
             // what is no length: a header of 640 bytes begins with 80 02, too.
             if start.starts_with(b"PK\x03\x04") || start.starts_with(b"\x80\x02") {
-                let cause = "a PyTorch checkpoint, no safetensors: import its weights";
+                let cause = "expected safetensors, found a PyTorch checkpoint: import its weights";
                 return Err(bad(cause.to_owned()));
             }
             return Err(bad(format!(
-                "no safetensors: a header of {length} bytes in a file of {file_size}"
+                "expected safetensors, found a header of {length} bytes in a file of {file_size}"
             )));
         }
         let mut json = Vec::new();
         (&mut file).take(length).read_to_end(&mut json).map_err(here)?;
         let header: Metadata = serde_json::from_slice(&json)
-            .map_err(|cause| bad(format!("no safetensors: {cause}")))?;
+            .map_err(|cause| bad(format!("expected safetensors: {cause}")))?;
         let data_offset = LENGTH_SIZE + length;
         let promised = data_offset + header.data_len() as u64;
         if promised != file_size {
-            return Err(bad(format!("tensors need {promised} bytes, the file has {file_size}")));
+            return Err(bad(format!("expected {promised} bytes by the header, found {file_size}")));
         }
         Ok(Self { path: path.to_path_buf(), file, data_offset, header })
     }
@@ -290,12 +294,12 @@ mod tests {
     fn a_checkpoint_of_pytorch_s_is_named_as_such() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("best_model.pth");
-        std::fs::write(&path, b"PK\x03\x04 and more that follows").unwrap();
-        let error = WeightsFile::open(&path).err().unwrap().to_string();
-        assert!(error.contains("a PyTorch checkpoint"), "{error}");
-        std::fs::write(&path, b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46 and more").unwrap();
-        let error = WeightsFile::open(&path).err().unwrap().to_string();
-        assert!(error.contains("a PyTorch checkpoint"), "{error}");
+        for bytes in [&b"PK\x03\x04 and more that follows"[..], b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46"]
+        {
+            std::fs::write(&path, bytes).unwrap();
+            let error = WeightsFile::open(&path).err().unwrap().to_string();
+            assert!(error.contains("a PyTorch checkpoint"), "{error}");
+        }
         let error = WeightsFile::open(folder.path()).err().unwrap().to_string();
         assert!(error.contains("a folder"), "{error}");
     }
@@ -341,6 +345,6 @@ mod tests {
             assert!(WeightsFile::open(&path).is_err(), "{length}");
         }
         std::fs::write(&path, [b"PK\x03\x04", &[0xff; 60][..]].concat()).unwrap();
-        assert!(message(&path, "a").contains("no safetensors"));
+        assert!(message(&path, "a").contains("expected safetensors"));
     }
 }

@@ -33,10 +33,13 @@ impl Yanx27Writer {
     /// `classes`.
     ///
     /// # Errors
-    /// [`FormatError::Instance`] for a class whose name can be no folder.
+    /// [`FormatError::Instance`] for a class whose name cannot be a folder's.
     pub fn create(root: &Path, classes: Vec<String>) -> Result<Self, FormatError> {
         if let Some(class) = classes.iter().find(|class| !is_folder_name(class)) {
-            return Err(FormatError::instance(class, "a class name that can be no folder"));
+            return Err(FormatError::instance(
+                class,
+                "expected a class name that can be a folder's",
+            ));
         }
         Ok(Self { root: root.to_path_buf(), classes, ids: Default::default(), files: Vec::new() })
     }
@@ -47,8 +50,8 @@ impl Yanx27Writer {
     /// # Errors
     /// [`FormatError::Instance`] for fewer than two points (NumPy reads a lone
     /// line as a vector, and the loader fails), for another number of normals
-    /// than of points, for a class that is none of the set's, for a name that
-    /// can be no file's or that was written before; what the system reports.
+    /// than of points, for a class that the set lacks, for a name that
+    /// cannot be a file's or that was written before; what the system reports.
     pub fn push(
         &mut self,
         class: &str,
@@ -60,19 +63,23 @@ impl Yanx27Writer {
     ) -> Result<(), FormatError> {
         let refuse = |cause: String| Err(FormatError::instance(name, cause));
         if points.len() < 2 {
-            return refuse(format!("{} points, the loader needs two", points.len()));
+            return refuse(format!("expected two points or more, found {}", points.len()));
         }
         if let Some(normals) = normals
             && normals.len() != points.len()
         {
-            return refuse(format!("{} normals for {} points", normals.len(), points.len()));
+            return refuse(format!(
+                "expected {} normals, one for each point, found {}",
+                points.len(),
+                normals.len()
+            ));
         }
         if !self.classes.iter().any(|known| known == class) {
-            return refuse(format!("class `{class}` is none of the set's"));
+            return refuse(format!("expected a class of the set, found `{class}`"));
         }
         let id = instance_id(class, name, view);
         if !is_folder_name(&id) {
-            return refuse("a name that can be no file's".to_owned());
+            return refuse("expected a name that can be a file's".to_owned());
         }
         if self.ids.iter().any(|ids| ids.contains(&id)) {
             return refuse(format!("another instance is called {id} already"));
@@ -105,23 +112,13 @@ impl Yanx27Writer {
 
     fn write_lists(&mut self, stem: &str) -> Result<(), FormatError> {
         let path = self.root.join(format!("{stem}_shape_names.txt"));
-        self.files.push(write_lines(path, &self.classes)?);
+        self.files.push(atomic::write_lines(path, &self.classes)?);
         for split in Split::ALL {
             let path = self.root.join(format!("{stem}_{split}.txt"));
-            self.files.push(write_lines(path, &self.ids[split as usize])?);
+            self.files.push(atomic::write_lines(path, &self.ids[split as usize])?);
         }
         Ok(())
     }
-}
-
-fn write_lines<'a>(
-    path: PathBuf,
-    lines: impl IntoIterator<Item = &'a String>,
-) -> Result<HashedFile, FormatError> {
-    let sha256 = atomic::write_hashed(&path, |writer| {
-        lines.into_iter().try_for_each(|line| writeln!(writer, "{line}"))
-    })?;
-    Ok(HashedFile { path, sha256 })
 }
 
 /// The id of one view: the class, `_`, and the rest without any `_`, as in

@@ -1,35 +1,22 @@
 //! Labelled sets under either convention of keys, and what is wrong with others.
-#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
-use std::fs::File;
-use std::io::Write;
-use std::path::Path;
+use std::fs;
 
 use formats::labelled::{LabelledSet, read_labelled};
-use formats::packed::PackedWriter;
-use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
+
+use crate::numpy::{npy, npz};
 
 /// An array as NumPy writes it: key, type, shape, data.
 type Array<'a> = (&'a str, &'a str, &'a str, &'a [u8]);
 
-fn write(path: &Path, arrays: &[Array<'_>]) {
-    let mut zip = ZipWriter::new(File::create(path).unwrap());
-    for (key, descr, shape, data) in arrays {
-        zip.start_file(format!("{key}.npy"), SimpleFileOptions::default()).unwrap();
-        let dictionary =
-            format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
-        let length = (dictionary.len() as u16).to_le_bytes();
-        let header = [b"\x93NUMPY\x01\0", &length[..], dictionary.as_bytes()].concat();
-        zip.write_all(&[&header, *data].concat()).unwrap();
-    }
-    zip.finish().unwrap();
-}
-
 fn read(arrays: &[Array<'_>]) -> Result<LabelledSet, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("set.npz");
-    write(&path, arrays);
+    let arrays = arrays.iter().map(|(key, descr, shape, data)| {
+        let array = npy(descr, "False", shape, data);
+        (*key, array)
+    });
+    fs::write(&path, npz(&arrays.collect::<Vec<_>>())).unwrap();
     read_labelled(&path).map_err(|error| {
         let message = error.to_string();
         message.split_once("set.npz: ").unwrap().1.to_owned()
@@ -69,18 +56,6 @@ fn names_and_classes_may_be_absent_and_labels_of_any_type() {
         assert_eq!(set.labels, [1, 0]);
         assert_eq!((set.names, set.classes), (None, None));
     }
-}
-
-#[test]
-fn a_packed_set_is_a_labelled_set() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("set.npz");
-    let mut writer = PackedWriter::create(&path, 2, vec!["bowl".into(), "cup".into()]).unwrap();
-    writer.push(&[[0.5, 0.25, 1.0], [-1.0, 1e-30, 0.0]], 1, "cup_7", 900).unwrap();
-    writer.finish().unwrap();
-    let set = read_labelled(&path).unwrap();
-    assert_eq!(set.cloud(0), [[0.5, 0.25, 1.0], [-1.0, 1e-30, 0.0]]);
-    assert_eq!((set.labels, set.names.unwrap()), (vec![1], vec!["cup_7".to_owned()]));
 }
 
 #[test]

@@ -1,5 +1,4 @@
 //! ModelNet40's HDF5 layout, read back.
-#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 use std::fs;
 

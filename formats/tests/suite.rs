@@ -1,4 +1,5 @@
 //! Files are read and written as their formats say, a module for each kind.
+#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 #[cfg(feature = "cloud-files")]
 mod clouds;
@@ -6,6 +7,8 @@ mod clouds;
 mod labelled_sets;
 #[cfg(feature = "hdf5")]
 mod modelnet_h5;
+#[cfg(feature = "npz")]
+mod numpy;
 #[cfg(feature = "dataset")]
 mod packed_sets;
 #[cfg(feature = "dataset")]

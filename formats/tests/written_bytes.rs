@@ -1,13 +1,12 @@
 //! What datasets consist of is written as it ever was, to the byte: manifests
 //! list the hashes.
-#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 use formats::packed::PackedWriter;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::{Scan, hash};
 
 /// A scan of `n` points with every attribute.
-fn scan(n: usize, origin: [f64; 3]) -> Scan {
+pub fn scan(n: usize, origin: [f64; 3]) -> Scan {
     let real = |scale: f32| Some((0..n).map(|i| i as f32 * scale).collect());
     let whole = |first: u32| Some((0..n as u32).map(|i| first + i).collect());
     Scan {
@@ -29,8 +28,9 @@ fn a_scan_is_written_as_it_ever_was() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan");
     let hash_of = |format, n, origin| {
-        write_scan(&path, format, &scan(n, origin)).unwrap();
-        hash::of_file(&path).unwrap()
+        let told = write_scan(&path, format, &scan(n, origin)).unwrap();
+        assert_eq!(told, hash::of_file(&path).unwrap(), "{format} of {n} points");
+        told
     };
     let far = [1e7, -0.5, 0.0];
     for (format, n, origin, hash) in [
@@ -80,8 +80,9 @@ fn a_packed_set_is_written_as_it_ever_was() {
             let cloud: Vec<_> = (0..64).map(|j| [i as f32, j as f32, 0.5]).collect();
             writer.push(&cloud, i % 2, &format!("mesh_{i}_v0"), 10 + i as u32).unwrap();
         }
-        writer.finish().unwrap();
-        hash::of_file(&path).unwrap()
+        let told = writer.finish().unwrap();
+        assert_eq!(told, hash::of_file(&path).unwrap(), "{m} clouds");
+        told
     };
     for (m, hash) in [
         (0, "2c32501de24f92aeb91e6a6130a89f382200b2eab2fbed12e120064c76fcdd88"),

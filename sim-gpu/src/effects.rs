@@ -48,15 +48,17 @@ pub struct Noise {
     pub model: NoiseModel,
 }
 
-/// What Gaussian noise is added to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum NoiseModel {
-    /// The range, along the ray: BLAINDER's model (`scanners/lidar.py`).
-    #[default]
-    Range,
-    /// Each coordinate of the point, independently.
-    Xyz,
+formats::named! {
+    /// What Gaussian noise is added to.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum NoiseModel: "noise model" {
+        /// The range, along the ray: BLAINDER's model (`scanners/lidar.py`).
+        #[default]
+        Range = "range",
+        /// Each coordinate of the point, independently.
+        Xyz = "xyz",
+    }
 }
 
 /// Random loss of returns, each on its own.

@@ -118,13 +118,13 @@ fn write_variant(
     let scan = scan(StreamKey::new(config.seed, &name, view));
     let write = |&format: &ScanFormat| {
         let path = layout::scan(out, &set.name, variant, entry, view, format);
-        write_scan(&path, format, &scan).expect("a scan");
-        FileRecord { format, sha256: hash::of_file(&path).expect("a hash") }
+        FileRecord { format, sha256: write_scan(&path, format, &scan).expect("a scan") }
     };
     VariantRecord {
         variant,
         tally: Tally { points: scan.len() as u64, ..Tally::default() },
         files: config.formats.iter().map(write).collect(),
+        cloud: None,
     }
 }
 

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use cli::{compare_points, eval, explain, serve, train};
+use formats::outcome::{Outcome, exit_code};
 
 /// Trains PointNets and measures them.
 #[derive(Parser)]
@@ -32,11 +33,12 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    cli::exit_code(match Cli::parse().command {
+    let done = match Cli::parse().command {
         Command::Train(args) => train::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::ComparePoints(args) => compare_points::run(&args),
         Command::Serve(args) => serve::run(&args),
-    })
+    };
+    exit_code(done.map(|()| Outcome::Success))
 }

@@ -43,7 +43,7 @@ pub struct Settings {
     noise: f64,
 
     /// What the noise is added to: `range` (along the ray) or `xyz` (each coordinate)
-    #[arg(long, default_value = "range", value_name = "MODEL", value_parser = noise_model)]
+    #[arg(long, default_value = "range", value_name = "MODEL")]
     noise_model: NoiseModel,
 
     /// Mean of the noise, metres
@@ -100,7 +100,7 @@ pub struct Settings {
     min_points: u32,
 
     /// Additional layouts, which other projects read: yanx27, modelnet-h5
-    #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = layout)]
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
     layout: Vec<Layout>,
 }
 
@@ -224,20 +224,4 @@ fn cast_as_packets_tell(sets: &mut [SetConfig], effects: &Effects) -> anyhow::Re
 
 fn builtin(name: &str) -> anyhow::Result<Sensor> {
     Sensor::builtin(name).with_context(|| format!("no built-in sensor {name}"))
-}
-
-fn noise_model(word: &str) -> Result<NoiseModel, String> {
-    match word {
-        "range" => Ok(NoiseModel::Range),
-        "xyz" => Ok(NoiseModel::Xyz),
-        _ => Err("expected range or xyz".to_owned()),
-    }
-}
-
-fn layout(word: &str) -> Result<Layout, String> {
-    match word {
-        "yanx27" => Ok(Layout::Yanx27),
-        "modelnet-h5" => Ok(Layout::ModelnetH5),
-        _ => Err("expected yanx27 or modelnet-h5".to_owned()),
-    }
 }

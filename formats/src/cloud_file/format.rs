@@ -1,57 +1,37 @@
 //! The file formats of clouds, recognised by name or by first bytes.
 
-use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
 
 use crate::error::FormatError;
-use crate::npy_header;
+use crate::npy;
 
 /// How many first bytes [`CloudFormat::of_content`] looks at.
 pub(super) const SNIFFED_SIZE: usize = 512;
 
-/// A file format of clouds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum CloudFormat {
-    /// Stanford's polygon format.
-    Ply,
-    /// NumPy's archive of arrays.
-    Npz,
-    /// NumPy's array.
-    Npy,
-    /// The Point Cloud Library's format.
-    Pcd,
-    /// Text, a point a line.
-    Text,
-    /// Text with commas and a line of column names.
-    Csv,
-    /// KITTI's raw little-endian f32: x, y, z, intensity.
-    Kitti,
-    /// The ASPRS's format of airborne scans.
-    Las,
+crate::named! {
+    /// A file format of clouds, whether or not this build reads it.
+    #[non_exhaustive]
+    pub enum CloudFormat: "cloud format" {
+        /// Stanford's polygon format.
+        Ply = "ply",
+        /// NumPy's archive of arrays.
+        Npz = "npz",
+        /// NumPy's array.
+        Npy = "npy",
+        /// The Point Cloud Library's format.
+        Pcd = "pcd",
+        /// Text, a point a line.
+        Text = "xyz",
+        /// Text with commas and a line of column names.
+        Csv = "csv",
+        /// KITTI's raw little-endian f32: x, y, z, intensity.
+        Kitti = "kitti",
+        /// The ASPRS's format of airborne scans.
+        Las = "las",
+    }
 }
 
 impl CloudFormat {
-    /// All formats, whether or not this build reads them.
-    pub const ALL: [Self; 8] =
-        [Self::Ply, Self::Npz, Self::Npy, Self::Pcd, Self::Text, Self::Csv, Self::Kitti, Self::Las];
-
-    /// The format's name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ply => "ply",
-            Self::Npz => "npz",
-            Self::Npy => "npy",
-            Self::Pcd => "pcd",
-            Self::Text => "xyz",
-            Self::Csv => "csv",
-            Self::Kitti => "kitti",
-            Self::Las => "las",
-        }
-    }
-
     /// The format that `path`'s extension names, in whichever case.
     ///
     /// # Errors
@@ -88,7 +68,7 @@ impl CloudFormat {
             () if begins(b"ply\n") || begins(b"ply\r") => Ok(Self::Ply),
             // An archive without entries begins with the end of its contents.
             () if begins(b"PK\x03\x04") || begins(b"PK\x05\x06") => Ok(Self::Npz),
-            () if begins(npy_header::MAGIC) => Ok(Self::Npy),
+            () if begins(npy::MAGIC) => Ok(Self::Npy),
             () if begins(b"# .PCD") || begins(b"VERSION") => Ok(Self::Pcd),
             () if begins(b"LASF") => Ok(Self::Las),
             () if begins(b"OFF") || begins(b"solid ") => refuse(MESH),
@@ -105,38 +85,9 @@ const MESH: &str = "expected a cloud, found a mesh: scan it first";
 const UNKNOWN: &str = "the first bytes are of no known binary format; name the format";
 const EXTENSIONS: &str = "ply, npz, npy, pcd, xyz, txt, asc, tsv, csv, bin, las";
 
-impl fmt::Display for CloudFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for CloudFormat {
-    type Err = FormatError;
-
-    fn from_str(word: &str) -> Result<Self, FormatError> {
-        Self::ALL.into_iter().find(|format| format.name() == word).ok_or_else(|| {
-            FormatError::UnknownName {
-                word: word.to_owned(),
-                what: "cloud format",
-                choices: Self::ALL.map(Self::name).join(", "),
-            }
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_format_is_found_by_its_name() {
-        for format in CloudFormat::ALL {
-            assert_eq!(format.to_string().parse::<CloudFormat>().unwrap(), format);
-        }
-        let error = "e57".parse::<CloudFormat>().unwrap_err().to_string();
-        assert!(error.starts_with("unknown cloud format `e57`, expected one of ply, npz,"));
-    }
 
     #[test]
     fn a_name_tells_the_format() {

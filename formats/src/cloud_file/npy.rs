@@ -6,15 +6,13 @@ use std::path::Path;
 use super::precision::Precision;
 use crate::decoding::{error_in, invalid};
 use crate::error::FormatError;
-use crate::npy;
-use crate::npy_header::{self, Header};
+use crate::npy::{self, Header};
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
 /// Reads the array that `reader` holds.
 pub(super) fn read(reader: &mut impl Read, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
-    let header =
-        npy_header::read_header(reader).map_err(|error| error_in(name, "header", error))?;
+    let header = npy::read_header(reader).map_err(|error| error_in(name, "header", error))?;
     read_points(&header, reader).map_err(|error| error_in(name, "array", error))
 }
 

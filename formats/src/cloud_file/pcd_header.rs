@@ -62,19 +62,24 @@ pub(super) fn read_header<R: BufRead>(
         let Some(key) = words.next() else { continue };
         match key.to_ascii_uppercase().as_str() {
             "FIELDS" => fields = words.map(Field::named).collect(),
-            "SIZE" => each(&line, &mut fields, words, |field, word| {
-                field.size = line.count(word)?;
-                Ok(())
-            })?,
-            "COUNT" => each(&line, &mut fields, words, |field, word| {
-                // The library reads 0 as 1.
-                field.count = line.count(word)?.max(1);
-                Ok(())
-            })?,
-            "TYPE" => each(&line, &mut fields, words, |field, word| {
-                field.kind = word.chars().next().unwrap_or_default();
-                Ok(())
-            })?,
+            what @ ("SIZE" | "COUNT" | "TYPE") => {
+                let words: Vec<_> = words.collect();
+                if words.len() != fields.len() {
+                    return Err(line.error(format!(
+                        "expected {} words, one for each of FIELDS, found {}",
+                        fields.len(),
+                        words.len()
+                    )));
+                }
+                for (field, word) in fields.iter_mut().zip(words) {
+                    match what {
+                        "SIZE" => field.size = line.count(word)?,
+                        // The library reads 0 as 1.
+                        "COUNT" => field.count = line.count(word)?.max(1),
+                        _ => field.kind = word.chars().next().unwrap_or_default(),
+                    }
+                }
+            }
             "POINTS" => points = Some(line.count(words.next().unwrap_or_default())?),
             "WIDTH" => width = Some(line.count(words.next().unwrap_or_default())?),
             "HEIGHT" => height = Some(line.count(words.next().unwrap_or_default())?),
@@ -88,24 +93,6 @@ pub(super) fn read_header<R: BufRead>(
         }
     }
     Err(missing("DATA"))
-}
-
-/// Sets one thing of each field by its word on `line`.
-fn each<'a>(
-    line: &Line<'_>,
-    fields: &mut [Field],
-    words: impl Iterator<Item = &'a str>,
-    mut set: impl FnMut(&mut Field, &str) -> Result<(), FormatError>,
-) -> Result<(), FormatError> {
-    let words: Vec<_> = words.collect();
-    if words.len() != fields.len() {
-        return Err(line.error(format!(
-            "expected {} words, one for each of FIELDS, found {}",
-            fields.len(),
-            words.len()
-        )));
-    }
-    fields.iter_mut().zip(words).try_for_each(|(field, word)| set(field, word))
 }
 
 impl Header {

@@ -50,7 +50,6 @@ mod packet;
 
 use std::io::Write;
 use std::path::Path;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
@@ -98,18 +97,20 @@ pub struct Revolution {
     pub n_beams: u32,
 }
 
-/// Which returns of a beam a sensor sends.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Returns {
-    /// The strongest, as sensors do by default.
-    #[default]
-    Strongest,
-    /// The last.
-    Last,
-    /// The last and the strongest: two blocks of each sequence. A scan has one
-    /// return of each beam, so they are identical.
-    Dual,
+crate::named! {
+    /// Which returns of a beam a sensor sends.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Returns: "return mode" {
+        /// The strongest, as sensors do by default.
+        #[default]
+        Strongest = "strongest",
+        /// The last.
+        Last = "last",
+        /// The last and the strongest: two blocks of each sequence. A scan has one
+        /// return of each beam, so they are identical.
+        Dual = "dual",
+    }
 }
 
 impl Revolution {
@@ -129,19 +130,6 @@ impl Revolution {
 }
 
 impl Returns {
-    /// All modes.
-    pub const ALL: [Self; 3] = [Self::Strongest, Self::Last, Self::Dual];
-
-    /// The mode's name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Strongest => "strongest",
-            Self::Last => "last",
-            Self::Dual => "dual",
-        }
-    }
-
     /// Blocks of each firing sequence.
     fn blocks_per_sequence(self) -> usize {
         if self == Self::Dual { 2 } else { 1 }
@@ -157,20 +145,6 @@ impl Returns {
 
     fn of_byte(byte: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|returns| returns.byte() == byte)
-    }
-}
-
-impl FromStr for Returns {
-    type Err = FormatError;
-
-    fn from_str(word: &str) -> Result<Self, FormatError> {
-        Self::ALL.into_iter().find(|returns| returns.name() == word).ok_or_else(|| {
-            FormatError::UnknownName {
-                word: word.to_owned(),
-                what: "return mode",
-                choices: Self::ALL.map(Self::name).join(", "),
-            }
-        })
     }
 }
 

@@ -1,5 +1,4 @@
 //! Clouds as files: what is read, what is written, what is refused.
-#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod damaged;
 mod kitti;

@@ -1,16 +1,8 @@
 //! NumPy's arrays: every type of number, either order, and headers that lie.
 
 use super::{MANY, error, read};
+use crate::numpy::npy;
 use proptest::prelude::*;
-
-/// An NPY file whose header is the dictionary `{'descr': ..., ...}`.
-pub(crate) fn npy(descr: &str, is_fortran_order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
-    let dictionary = format!(
-        "{{'descr': '{descr}', 'fortran_order': {is_fortran_order}, 'shape': {shape}, }}\n"
-    );
-    let length = (dictionary.len() as u16).to_le_bytes();
-    [b"\x93NUMPY\x01\0", &length[..], dictionary.as_bytes(), data].concat()
-}
 
 fn c_order(descr: &str, shape: &str, data: &[u8]) -> Vec<[f64; 3]> {
     read("a.npy", npy(descr, "False", shape, data))
@@ -19,10 +11,9 @@ fn c_order(descr: &str, shape: &str, data: &[u8]) -> Vec<[f64; 3]> {
 /// The bytes of 1, 2, 3 as every type of number that NumPy has.
 #[test]
 fn numbers_of_every_type_are_read() {
-    let one_two_three = |bytes: [&[u8]; 3]| bytes.concat();
     macro_rules! of {
         ($number:ty, $order:ident) => {
-            one_two_three([1, 2, 3].map(|i| (i as $number).$order()).each_ref().map(|b| &b[..]))
+            [1, 2, 3].map(|i| (i as $number).$order()).as_flattened().to_vec()
         };
     }
     for (descr, data) in [

@@ -1,24 +1,12 @@
 //! NumPy's archives: which array holds the points, and what is added to them.
 
-use std::io::{Cursor, Write};
 use std::path::Path;
 
 use formats::cloud_file::read_cloud_from;
-use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use super::npy::npy;
 use super::{MANY, error, read};
-
-/// An archive of arrays, deflated as `np.savez_compressed` does.
-fn npz(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    for (key, bytes) in arrays {
-        zip.start_file(format!("{key}.npy"), SimpleFileOptions::default()).unwrap();
-        zip.write_all(bytes).unwrap();
-    }
-    zip.finish().unwrap().into_inner()
-}
+use crate::numpy::{archive, npy, npz};
 
 fn bytes_of(shape: &str, data: &[u8]) -> Vec<u8> {
     npy("|u1", "False", shape, data)
@@ -32,7 +20,6 @@ fn a_scan_of_ours_is_read_with_its_origin() {
     use formats::scan_file::{ScanFormat, write_scan};
 
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scan.npz");
     let scan = Scan {
         origin: [1e7, -0.25, 0.0],
         positions: vec![[0.5, 0.25, -1.0], [1e-3, 0.0, 3.0]],
@@ -41,14 +28,11 @@ fn a_scan_of_ours_is_read_with_its_origin() {
         ..Scan::default()
     };
     let expected = [[1e7 + 0.5, 0.0, -1.0], [1e7 + f64::from(1e-3f32), -0.25, 3.0]];
-    write_scan(&path, ScanFormat::Npz, &scan).unwrap();
-    assert_eq!(read_cloud(&path).unwrap(), expected);
-    let path = path.with_extension("ply");
-    write_scan(&path, ScanFormat::Ply, &scan).unwrap();
-    assert_eq!(read_cloud(&path).unwrap(), expected);
-    let path = path.with_extension("csv");
-    write_scan(&path, ScanFormat::Csv, &scan).unwrap();
-    assert_eq!(read_cloud(&path).unwrap(), expected);
+    for format in ScanFormat::POINTS {
+        let path = folder.path().join("scan").with_extension(format.name());
+        write_scan(&path, format, &scan).unwrap();
+        assert_eq!(read_cloud(&path).unwrap(), expected, "{format}");
+    }
 }
 
 #[test]
@@ -105,14 +89,9 @@ fn what_is_no_cloud_is_refused_with_its_key() {
 
 #[test]
 fn a_byte_that_changed_on_the_way_is_noticed() {
-    let mut archive = npz(&[("points", bytes_of("(1, 3)", &[7; 3]))]);
     let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    zip.start_file("points.npy", options).unwrap();
-    zip.write_all(&bytes_of("(1, 3)", &[7; 3])).unwrap();
-    let stored = zip.finish().unwrap().into_inner();
-    archive.clone_from(&stored);
+    let mut stored = archive(&[("points", bytes_of("(1, 3)", &[7; 3]))], options);
     let at = stored.windows(3).position(|window| window == [7; 3]).unwrap();
-    archive[at] = 8;
-    assert_eq!(error("a.npz", archive), "points: Invalid checksum");
+    stored[at] = 8;
+    assert_eq!(error("a.npz", stored), "points: Invalid checksum");
 }

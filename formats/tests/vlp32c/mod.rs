@@ -1,5 +1,4 @@
 //! Packets are what the sensor's manual says, byte by byte.
-#![expect(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod capture;
 mod damaged;

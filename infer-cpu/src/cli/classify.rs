@@ -11,17 +11,17 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use formats::FormatError;
 use formats::cloud_file::CloudFormat;
 use formats::model_card::{ModelCard, Normalization};
+use formats::outcome::joined_causes;
 use infer_cpu::kernel::KernelName;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, Precision, UpAxis};
 
-use super::Outcome;
-use super::failure::{of_setup, told_once};
 use super::input;
 use super::model::ModelArgs;
 use super::names;
 use super::report::Style;
 use super::sampler::SamplerArgs;
+use super::{Outcome, of_setup};
 
 /// More threads than a Raspberry Pi has cores were never measured to help.
 const MOST_THREADS_BY_DEFAULT: usize = 4;
@@ -202,6 +202,6 @@ impl Session {
 
     fn fail(&mut self, name: &Path, error: anyhow::Error) -> io::Result<()> {
         self.failed = true;
-        self.style.failed(name, &told_once(&error))
+        self.style.failed(name, &joined_causes(&error))
     }
 }

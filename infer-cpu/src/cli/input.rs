@@ -7,7 +7,7 @@ use std::path::Path;
 use formats::FormatError;
 use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from};
 
-use super::failure::Usage;
+use super::Usage;
 
 /// What stands for standard input among names of files.
 const STANDARD_INPUT: &str = "-";

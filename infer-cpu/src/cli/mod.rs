@@ -2,7 +2,6 @@
 
 mod bench;
 mod classify;
-mod failure;
 mod input;
 mod inspect;
 mod model;
@@ -12,8 +11,7 @@ mod sample;
 mod sampler;
 
 use clap::{Parser, Subcommand};
-
-pub use failure::{Usage, is_broken_pipe, say, told_once};
+use formats::outcome::{Outcome, Usage};
 
 /// Classify point clouds on a CPU: PointNet behind a Critical Points Layer.
 #[derive(Parser)]
@@ -38,14 +36,6 @@ enum Command {
     Bench(Box<bench::Args>),
 }
 
-/// Exit status of a completed command.
-pub enum Outcome {
-    /// All inputs were fine.
-    Success,
-    /// Some inputs failed and were named.
-    SomeFailed,
-}
-
 /// Does what the command line asks for.
 ///
 /// # Errors
@@ -58,5 +48,21 @@ pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Bench(args) => {
             bench::run(args, &model::find(args.model.as_deref())?).map(|()| Outcome::Success)
         }
+    }
+}
+
+/// The error of a model or of options, as a [`Usage`] where only another
+/// command line can help.
+fn of_setup(error: infer_cpu::Error) -> anyhow::Error {
+    use infer_cpu::Error;
+    match error {
+        Error::KernelMissing(_)
+        | Error::KernelPrecision { .. }
+        | Error::Sampler(_)
+        | Error::FrontMissing { .. }
+        | Error::VotesWithoutDraws(_)
+        | Error::TooManyThreads(_)
+        | Error::Threads { .. } => Usage(error.to_string()).into(),
+        _ => error.into(),
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use formats::model_card::ModelCard;
 
-use super::failure::Usage;
+use super::Usage;
 
 /// Names a model file where `--model` does not.
 const VARIABLE: &str = "EDGEPUCK_MODEL";

@@ -4,10 +4,9 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
 
+use formats::outcome::say;
 use infer_cpu::{Precision, Prediction};
 use serde::Serialize;
-
-use super::failure::say;
 
 /// How lines are written.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -82,7 +81,7 @@ impl Style {
         match self {
             Self::Json => json_line(&Failed { file: &name.to_string_lossy(), error }),
             Self::Text => {
-                say(&format!("error: {error}"));
+                say(format!("error: {error}"));
                 Ok(())
             }
         }
@@ -91,7 +90,7 @@ impl Style {
 
 /// Says on standard error what a line of text has no place for.
 fn warn(name: &Path, prediction: &Prediction, precision: Precision) {
-    let warn = |what: &str| say(&format!("warning: {}: {what}", name.display()));
+    let warn = |what: &str| say(format!("warning: {}: {what}", name.display()));
     match prediction.n_dropped {
         0 => {}
         1 => warn("1 point that is not finite was dropped"),

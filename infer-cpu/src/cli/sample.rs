@@ -6,14 +6,14 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use formats::cloud_file::{CloudFormat, write_cloud};
+use formats::outcome::say;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options};
 
-use super::Outcome;
-use super::failure::{of_setup, say};
 use super::input;
 use super::model::ModelArgs;
 use super::sampler::SamplerArgs;
+use super::{Outcome, of_setup};
 
 /// Flags of `sample`.
 #[derive(clap::Args)]
@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         points.retain(|point| point.iter().all(|x| x.is_finite()));
         if points.len() < n {
             let n_dropped = n - points.len();
-            say(&format!("{}: dropped {n_dropped} of {n} points", args.input.display()));
+            say(format!("{}: dropped {n_dropped} of {n} points", args.input.display()));
         }
     }
     let indices = choose(args, &points)?;

@@ -2,7 +2,7 @@
 
 use infer_cpu::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
 
-use super::failure::Usage;
+use super::Usage;
 
 /// Flags beside the sampler's name.
 #[derive(clap::Args, Default)]

@@ -124,5 +124,7 @@ fn a_model_that_is_cut_short_or_none_is_refused() {
         folder.classify("c.xyz").assert_refused(1, "error: m.safetensors: header: ");
     }
     fs::write(&path, strip(20).iter().map(|p| format!("{p:?}\n")).collect::<String>()).unwrap();
-    folder.classify("c.xyz").assert_refused(1, "error: m.safetensors: header: no safetensors");
+    folder
+        .classify("c.xyz")
+        .assert_refused(1, "error: m.safetensors: header: expected safetensors");
 }

@@ -1,20 +1,85 @@
-//! From scans on disk to clouds as networks take them: one size, one scale.
+//! From scans to clouds as networks take them: one size, one scale.
+//!
+//! A cloud is drawn as its scan is written, and waits in memory until it is packed.
+//! Clouds of an earlier run and of shards, and those that memory has no room for, are
+//! drawn from the files of their scans.
 
-use super::config::{DatasetConfig, SetConfig, Variant};
+use super::config::{DatasetConfig, Layout, SetConfig, Variant};
 use super::error::DatasetError;
 use super::layout;
 use super::manifest::LeftOut;
-use super::record::{Entry, MeshRecord};
-use formats::Split;
+use super::record::{Entry, MeshRecord, VariantRecord};
 use formats::cloud::{normalize_unit_sphere, resample};
-use formats::npz;
 use formats::rng::StreamKey;
-use formats::scan_file::ScanFormat;
+use formats::scan_file::{ScanFormat, read_scan};
+use formats::{Scan, Split};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// Bytes of all clouds that wait in memory from when their scans are written: 1 GiB,
+/// some 89,000 clouds of 1024 points.
+const KEPT_BYTES: usize = 1 << 30;
 
 /// Points of all clouds that wait to be taken, in one part: 12 MiB.
 const POINTS_AT_ONCE: u32 = 1 << 20;
+
+/// A scan at the size and scale of packed clouds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloud {
+    /// [`DatasetConfig::packed_points`] points, mean 0 and largest radius 1.
+    pub points: Vec<[f32; 3]>,
+    /// The surface's normal at each point, if a layout asks for normals and the scan
+    /// has them.
+    pub normals: Option<Vec<[f32; 3]>>,
+}
+
+/// Which scan a cloud is drawn from.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    pub set: &'a SetConfig,
+    pub variant: Variant,
+    pub entry: &'a Entry,
+    pub view: u32,
+}
+
+impl Cloud {
+    /// The cloud of `scan`; `None` if it has fewer than
+    /// [`DatasetConfig::min_points`] points, or none.
+    fn draw(config: &DatasetConfig, source: Source, scan: &Scan) -> Option<Self> {
+        if (scan.len() as u64) < u64::from(config.min_points) {
+            return None;
+        }
+        let Source { set, variant, entry, view } = source;
+        let stream = format!("pack/{}/{variant}/{}", set.name, entry.id());
+        let key = StreamKey::new(config.seed, &stream, view);
+        let n = config.packed_points as usize;
+        let mut points = resample(&scan.positions, n, key)?;
+        normalize_unit_sphere(&mut points);
+        // One key draws the same places from lists of one length.
+        let normals = scan.normal.as_ref().filter(|_| config.layouts.contains(&Layout::Yanx27));
+        let normals = normals.and_then(|normals| resample(normals, n, key));
+        Some(Self { points, normals })
+    }
+
+    /// The cloud of a scan that was just written, unless the clouds that are kept,
+    /// whose bytes are counted in `kept`, leave no room for it.
+    pub(super) fn keep(
+        kept: &AtomicUsize,
+        config: &DatasetConfig,
+        source: Source,
+        scan: &Scan,
+    ) -> Option<Self> {
+        if kept.load(Relaxed) >= KEPT_BYTES {
+            return None;
+        }
+        let cloud = Self::draw(config, source, scan)?;
+        let numbers = cloud.points.len() + cloud.normals.as_ref().map_or(0, Vec::len);
+        kept.fetch_add(numbers * size_of::<[f32; 3]>(), Relaxed);
+        Some(cloud)
+    }
+}
 
 /// The scans that clouds are drawn from.
 #[derive(Clone, Copy)]
@@ -37,8 +102,8 @@ pub(super) struct Part<'a> {
     pub split: Split,
 }
 
-/// One cloud.
-pub(super) struct Cloud<'a> {
+/// A cloud and what it is called.
+pub(super) struct Packed<'a> {
     /// The mesh.
     pub entry: &'a Entry,
     /// The view's number.
@@ -47,90 +112,75 @@ pub(super) struct Cloud<'a> {
     pub name: String,
     /// The class's index.
     pub label: usize,
-    /// [`DatasetConfig::packed_points`] points, mean 0 and largest radius 1.
-    pub points: Vec<[f32; 3]>,
-    /// The surface's normal at each point, if the scan has them.
-    pub normals: Option<Vec<[f32; 3]>>,
     /// Points of the scan.
     pub n_raw: u32,
-}
-
-/// A scan as its record has it.
-struct Recorded<'a> {
-    entry: &'a Entry,
-    view: u32,
-    points: u64,
-}
-
-enum Drawn<'a> {
-    Cloud(Cloud<'a>),
-    TooFew(LeftOut),
+    /// The points themselves.
+    pub cloud: Cow<'a, Cloud>,
 }
 
 impl<'a> Scans<'a> {
-    /// Hands the clouds of `part` to `take`: by mesh, then by view. They are
-    /// read on all cores, some at a time. Returns the scans that have too few
-    /// points.
+    /// Hands the clouds of `part` to `take`: by mesh, then by view. Those that are not
+    /// in memory are read on all cores, some at a time. Returns the scans that have too
+    /// few points.
     ///
     /// # Errors
     /// A scan that cannot be read or is not as recorded; what `take` returns.
     pub fn for_each_cloud(
         &self,
-        part: &Part,
-        mut take: impl FnMut(Cloud<'a>) -> Result<(), DatasetError>,
+        part: &Part<'a>,
+        mut take: impl FnMut(Packed<'a>) -> Result<(), DatasetError>,
     ) -> Result<Vec<LeftOut>, DatasetError> {
-        let recorded: Vec<Recorded> = self.recorded(*part).collect();
+        let scans: Vec<_> = self.scans_of(*part).collect();
         let at_once = POINTS_AT_ONCE / self.config.packed_points.max(1);
         let mut left_out = Vec::new();
-        for some in recorded.chunks(at_once.clamp(1, 256) as usize) {
-            let drawn: Result<Vec<Drawn>, DatasetError> =
-                some.par_iter().map(|recorded| self.draw(part, recorded)).collect();
-            for drawn in drawn? {
-                match drawn {
-                    Drawn::Cloud(cloud) => take(cloud)?,
-                    Drawn::TooFew(scan) => left_out.push(scan),
-                }
+        for some in scans.chunks(at_once.clamp(1, 256) as usize) {
+            let clouds = some.par_iter().map(|(source, written)| self.cloud(*source, written));
+            let clouds: Vec<Option<Cow<Cloud>>> = clouds.collect::<Result<_, DatasetError>>()?;
+            for (&(Source { entry, view, .. }, written), cloud) in some.iter().zip(clouds) {
+                let (name, points) = (format!("{}_v{view}", entry.id()), written.tally.points);
+                let Some(cloud) = cloud else {
+                    left_out.push(LeftOut { name, points });
+                    continue;
+                };
+                let label = self.classes.partition_point(|class| *class < entry.class);
+                take(Packed { entry, view, name, label, n_raw: points as u32, cloud })?;
             }
         }
         Ok(left_out)
     }
 
-    fn recorded(&self, part: Part<'_>) -> impl Iterator<Item = Recorded<'a>> {
-        let records = self.records.iter().filter(move |record| record.entry.split == part.split);
-        records.flat_map(move |record| {
-            let scans = record.scans.iter().filter(move |scan| scan.set == part.set.name);
+    fn scans_of(&self, part: Part<'a>) -> impl Iterator<Item = (Source<'a>, &'a VariantRecord)> {
+        let Part { set, variant, split } = part;
+        let records = self.records.iter().filter(move |record| record.entry.split == split);
+        records.flat_map(move |MeshRecord { entry, scans, .. }| {
+            let scans = scans.iter().filter(move |scan| scan.set == set.name);
             scans.filter_map(move |scan| {
-                let written =
-                    scan.variants.iter().find(|written| written.variant == part.variant)?;
-                let points = written.tally.points;
-                Some(Recorded { entry: &record.entry, view: scan.view, points })
+                let written = scan.variants.iter().find(|written| written.variant == variant)?;
+                Some((Source { set, variant, entry, view: scan.view }, written))
             })
         })
     }
 
-    fn draw(&self, part: &Part, recorded: &Recorded<'a>) -> Result<Drawn<'a>, DatasetError> {
-        let &Recorded { entry, view, points: n_raw } = recorded;
-        let name = format!("{}_v{view}", entry.id());
-        if n_raw < u64::from(self.config.min_points) {
-            return Ok(Drawn::TooFew(LeftOut { name, points: n_raw }));
+    /// The cloud of one scan, `None` if it has too few points.
+    fn cloud(
+        &self,
+        source: Source,
+        written: &'a VariantRecord,
+    ) -> Result<Option<Cow<'a, Cloud>>, DatasetError> {
+        let points = written.tally.points;
+        if let Some(cloud) = &written.cloud {
+            return Ok(Some(Cow::Borrowed(cloud)));
         }
-        let set = &part.set.name;
-        let path = layout::scan(self.out, set, part.variant, entry, view, ScanFormat::Npz);
-        let scan = npz::read_scan(&path)?;
-        if scan.len() as u64 != n_raw {
-            let cause = format!("holds {} points, its record says {n_raw}", scan.len());
+        if points < u64::from(self.config.min_points) {
+            return Ok(None);
+        }
+        let Source { set, variant, entry, view } = source;
+        let path = layout::scan(self.out, &set.name, variant, entry, view, ScanFormat::Npz);
+        let scan = read_scan(&path)?;
+        if scan.len() as u64 != points {
+            let cause = format!("expected {points} points as recorded, found {}", scan.len());
             return Err(DatasetError::Malformed { path, cause });
         }
-        let stream = format!("pack/{set}/{}/{}", part.variant.name(), entry.id());
-        let key = StreamKey::new(self.config.seed, &stream, view);
-        let n = self.config.packed_points as usize;
-        let Some(mut points) = resample(&scan.positions, n, key) else {
-            return Ok(Drawn::TooFew(LeftOut { name, points: n_raw }));
-        };
-        normalize_unit_sphere(&mut points);
-        // One key draws the same places from lists of one length.
-        let normals = scan.normal.and_then(|normals| resample(&normals, n, key));
-        let label = self.classes.partition_point(|class| *class < entry.class);
-        Ok(Drawn::Cloud(Cloud { entry, view, name, label, points, normals, n_raw: n_raw as u32 }))
+        Ok(Cloud::draw(self.config, source, &scan).map(Cow::Owned))
     }
 }

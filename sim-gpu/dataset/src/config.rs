@@ -72,24 +72,28 @@ pub enum Viewpoints {
     Poses(Vec<Pose>),
 }
 
-/// Which effects a scan has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Variant {
-    /// Exact ranges.
-    Clean,
-    /// All the effects asked for.
-    Noisy,
+formats::named! {
+    /// Which effects a scan has; its name is the folder's.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Variant: "variant" {
+        /// Exact ranges.
+        Clean = "clean",
+        /// All the effects asked for.
+        Noisy = "noisy",
+    }
 }
 
-/// A layout that another project reads as it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Layout {
-    /// Text files of yanx27/Pointnet_Pointnet2_pytorch.
-    Yanx27,
-    /// ModelNet40's HDF5 files.
-    ModelnetH5,
+formats::named! {
+    /// A layout that another project reads as it is; its name is the folder's.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Layout: "layout" {
+        /// Text files of yanx27/Pointnet_Pointnet2_pytorch.
+        Yanx27 = "yanx27",
+        /// ModelNet40's HDF5 files.
+        ModelnetH5 = "modelnet-h5",
+    }
 }
 
 impl DatasetConfig {
@@ -142,27 +146,5 @@ impl SetConfig {
     #[must_use]
     pub fn stream(&self, seed: u64, id: &str, view: u32) -> StreamKey {
         StreamKey::new(seed, &format!("{}/{id}", self.name), view)
-    }
-}
-
-impl Layout {
-    /// The layout's name on the command line, and its folder.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Yanx27 => "yanx27",
-            Self::ModelnetH5 => "modelnet-h5",
-        }
-    }
-}
-
-impl Variant {
-    /// The variant's folder.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Clean => "clean",
-            Self::Noisy => "noisy",
-        }
     }
 }

@@ -2,9 +2,8 @@
 
 use formats::FormatError;
 use sim_gpu::cast_error::CastError;
-use sim_gpu::config::{ConfigError, InvalidValue};
-use sim_gpu::mesh::tree::TreeError;
-use std::path::PathBuf;
+use sim_gpu::config::InvalidValue;
+use std::path::{Path, PathBuf};
 
 /// Why a dataset cannot be made, merged or verified. A bad mesh is no such
 /// error: it is a [`super::MeshFailure`].
@@ -28,7 +27,7 @@ pub enum DatasetError {
         path: PathBuf,
     },
     /// No manifest where a finished dataset has one.
-    #[error("{}: is not there, so this is no finished dataset", path.display())]
+    #[error("{}: expected a finished dataset's manifest, found no file", path.display())]
     NoManifest {
         /// The manifest's place.
         path: PathBuf,
@@ -65,24 +64,10 @@ pub enum DatasetError {
         /// Why.
         cause: String,
     },
-    /// A file cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
     /// A setting is bad.
     #[error(transparent)]
     Invalid(#[from] InvalidValue),
-    /// A configuration file is bad.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The meshes cannot be listed.
-    #[error(transparent)]
-    Tree(#[from] TreeError),
-    /// A scan or packed file cannot be read or written.
+    /// A file cannot be read or written.
     #[error(transparent)]
     Format(#[from] FormatError),
     /// The adapter failed.
@@ -91,9 +76,8 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
-    /// An error of `source` on `path`.
-    #[must_use]
-    pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
-        Self::Io { path: path.into(), source }
+    /// The system's error `source` on `path`.
+    pub(super) fn io(path: &Path, source: std::io::Error) -> Self {
+        FormatError::io(path, source).into()
     }
 }

@@ -1,7 +1,7 @@
 //! The layouts of other projects, beside our own.
 
-use super::clouds::{Part, Scans};
-use super::config::{DatasetConfig, Layout, SetConfig, Variant};
+use super::clouds::{Packed, Part, Scans};
+use super::config::{DatasetConfig, Layout};
 use super::error::DatasetError;
 use super::layout;
 use super::manifest::HashedFile;
@@ -54,9 +54,13 @@ pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<HashedFile>, DatasetErr
         for set in &scans.config.sets {
             for &variant in &scans.config.variants {
                 let folder = layout::export(scans.out, layout, set, variant);
+                let parts = Split::ALL.map(|split| Part { set, variant, split });
                 files.extend(match layout {
-                    Layout::Yanx27 => write_yanx27(scans, set, variant, &folder)?,
-                    Layout::ModelnetH5 => write_modelnet_h5(scans, set, variant, &folder)?,
+                    Layout::Yanx27 => write_yanx27(scans, &parts, &folder)?,
+                    #[cfg(feature = "hdf5")]
+                    Layout::ModelnetH5 => write_modelnet_h5(scans, &parts, &folder)?,
+                    #[cfg(not(feature = "hdf5"))]
+                    Layout::ModelnetH5 => unreachable!("invariant: check_layouts refuses it"),
                 });
             }
         }
@@ -71,19 +75,18 @@ pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<HashedFile>, DatasetErr
     Ok(files.into_iter().map(listed).collect())
 }
 
-fn write_yanx27(
-    scans: &Scans,
-    set: &SetConfig,
-    variant: Variant,
+fn write_yanx27<'a>(
+    scans: &Scans<'a>,
+    parts: &[Part<'a>],
     folder: &Path,
 ) -> Result<Vec<hash::HashedFile>, DatasetError> {
     let names = yanx27_names(scans.records);
     let mut writer = Yanx27Writer::create(folder, scans.classes.to_vec())?;
-    for split in Split::ALL {
-        scans.for_each_cloud(&Part { set, variant, split }, |cloud| {
-            let name = names.get(&cloud.entry).unwrap_or(&cloud.entry.name);
-            let (class, normals) = (&cloud.entry.class, cloud.normals.as_deref());
-            Ok(writer.push(class, split, name, cloud.view, &cloud.points, normals)?)
+    for part in parts {
+        scans.for_each_cloud(part, |Packed { entry, view, cloud, .. }| {
+            let name = names.get(entry).unwrap_or(&entry.name);
+            let normals = cloud.normals.as_deref();
+            Ok(writer.push(&entry.class, part.split, name, view, &cloud.points, normals)?)
         })?;
     }
     Ok(writer.finish()?)
@@ -111,32 +114,21 @@ fn yanx27_names(records: &[MeshRecord]) -> BTreeMap<&Entry, String> {
 }
 
 #[cfg(feature = "hdf5")]
-fn write_modelnet_h5(
-    scans: &Scans,
-    set: &SetConfig,
-    variant: Variant,
+fn write_modelnet_h5<'a>(
+    scans: &Scans<'a>,
+    parts: &[Part<'a>],
     folder: &Path,
 ) -> Result<Vec<hash::HashedFile>, DatasetError> {
     use formats::modelnet_h5::ModelNetH5Writer;
     let n_points = scans.config.packed_points as usize;
     let mut files = Vec::new();
-    for split in Split::ALL {
-        let mut writer = ModelNetH5Writer::create(folder, split, n_points, scans.classes.to_vec());
-        scans.for_each_cloud(&Part { set, variant, split }, |cloud| {
-            Ok(writer.push(&cloud.points, cloud.label, &cloud.name)?)
+    for part in parts {
+        let classes = scans.classes.to_vec();
+        let mut writer = ModelNetH5Writer::create(folder, part.split, n_points, classes);
+        scans.for_each_cloud(part, |Packed { label, name, cloud, .. }| {
+            Ok(writer.push(&cloud.points, label, &name)?)
         })?;
         files.extend(writer.finish()?);
     }
     Ok(files)
-}
-
-#[cfg(not(feature = "hdf5"))]
-fn write_modelnet_h5(
-    scans: &Scans,
-    _: &SetConfig,
-    _: Variant,
-    _: &Path,
-) -> Result<Vec<hash::HashedFile>, DatasetError> {
-    check_layouts(scans.config, scans.classes)?;
-    Ok(Vec::new())
 }

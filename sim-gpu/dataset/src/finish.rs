@@ -3,7 +3,7 @@
 use super::clouds::Scans;
 use super::error::DatasetError;
 use super::export_layouts::write_layouts;
-use super::journal::{Journal, Terms, unless_absent};
+use super::journal::{Journal, Terms};
 use super::layout;
 use super::manifest::{self, Manifest, TOOL};
 use super::pack::pack;
@@ -50,9 +50,9 @@ pub fn finish(
 pub(super) fn complete(out: &Path, mut manifest: Manifest) -> Result<Manifest, DatasetError> {
     manifest.meshes.sort_by(|p, q| p.entry.cmp(&q.entry));
     manifest.failures.sort_by(|p, q| (&p.entry, &p.source).cmp(&(&q.entry, &q.source)));
-    remove(&layout::manifest(out))?;
-    remove_folder(&layout::packed_root(out))?;
-    remove_folder(&layout::export_root(out))?;
+    layout::remove(&layout::manifest(out))?;
+    layout::remove(&layout::packed_root(out))?;
+    layout::remove(&layout::export_root(out))?;
     atomic::sweep_leftovers(out)?;
 
     write_failures(out, &manifest.failures)?;
@@ -63,6 +63,8 @@ pub(super) fn complete(out: &Path, mut manifest: Manifest) -> Result<Manifest, D
     let layout_files = write_layouts(&scans)?;
     manifest.poses = manifest::poses(config, records);
     (manifest.packed, manifest.layout_files) = (packed, layout_files);
+    let scans = manifest.meshes.iter_mut().flat_map(|mesh| &mut mesh.scans);
+    scans.flat_map(|scan| &mut scan.variants).for_each(|written| written.cloud = None);
     manifest.write(&layout::manifest(out))?;
     Journal::of(out).remove()?;
     Ok(manifest)
@@ -72,7 +74,7 @@ pub(super) fn complete(out: &Path, mut manifest: Manifest) -> Result<Manifest, D
 fn write_failures(out: &Path, failures: &[MeshFailure]) -> Result<(), DatasetError> {
     let path = layout::failures(out);
     if failures.is_empty() {
-        return remove(&path);
+        return layout::remove(&path);
     }
     Ok(atomic::write(&path, |file| file.write_all(&failure_lines(failures)?))?)
 }
@@ -85,12 +87,4 @@ pub(super) fn failure_lines(failures: &[MeshFailure]) -> io::Result<Vec<u8>> {
         lines.push(b'\n');
     }
     Ok(lines)
-}
-
-fn remove(path: &Path) -> Result<(), DatasetError> {
-    unless_absent(path, std::fs::remove_file(path))
-}
-
-fn remove_folder(path: &Path) -> Result<(), DatasetError> {
-    unless_absent(path, std::fs::remove_dir_all(path))
 }

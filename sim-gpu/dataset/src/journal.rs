@@ -115,9 +115,8 @@ impl Journal {
     /// # Errors
     /// If a file cannot be removed.
     pub fn remove(&self) -> Result<(), DatasetError> {
-        let terms = self.terms_file();
-        unless_absent(&terms, std::fs::remove_file(&terms))?;
-        unless_absent(&self.folder, std::fs::remove_dir_all(&self.folder))
+        layout::remove(&self.terms_file())?;
+        layout::remove(&self.folder)
     }
 
     fn terms_file(&self) -> PathBuf {
@@ -146,14 +145,4 @@ pub(super) fn write_json<T: Serialize>(file: &Path, value: &T) -> Result<(), Dat
         out.write_all(b"\n")
     })?;
     Ok(())
-}
-
-/// The outcome of removing `path`, which need not have been there.
-pub(super) fn unless_absent(path: &Path, outcome: std::io::Result<()>) -> Result<(), DatasetError> {
-    match outcome {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(DatasetError::io(path, error))
-        }
-        _ => Ok(()),
-    }
 }

@@ -1,10 +1,12 @@
 //! Where everything lies in a dataset's folder.
 
 use super::config::{DatasetConfig, Layout, SetConfig, Variant};
+use super::error::DatasetError;
 use super::record::Entry;
 use formats::Split;
 use formats::scan_file::ScanFormat;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// The manifest.
 #[must_use]
@@ -40,11 +42,9 @@ pub fn scan(
     view: u32,
     format: ScanFormat,
 ) -> PathBuf {
-    out.join(set).join(variant.name()).join(&entry.class).join(entry.split.name()).join(format!(
-        "{}_v{view}.{}",
-        entry.name,
-        format.extension()
-    ))
+    let Entry { class, split, name } = entry;
+    let folder = out.join(set).join(variant.name()).join(class).join(split.name());
+    folder.join(format!("{name}_v{view}.{format}"))
 }
 
 /// The name of a set's variant in packed files, such as `rotational-noisy`.
@@ -92,6 +92,15 @@ pub fn top_level(config: &DatasetConfig) -> Vec<String> {
     let mut names = folders(config);
     names.extend(["manifest.json", "failures.jsonl", "example.png"].map(String::from));
     names
+}
+
+/// Removes the file or folder at `path`, which need not be there.
+pub(super) fn remove(path: &Path) -> Result<(), DatasetError> {
+    let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    match removed {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(DatasetError::io(path, error)),
+        _ => Ok(()),
+    }
 }
 
 /// A relative path as manifests have it: with forward slashes.

@@ -6,11 +6,12 @@
 use super::config::{DatasetConfig, SetConfig, Viewpoints};
 use super::error::DatasetError;
 use super::journal::{Terms, digest, read_json, write_json};
-use super::record::{Entry, MeshFailure, MeshRecord};
+use super::layout;
+use super::record::{Entry, FileRecord, MeshFailure, MeshRecord, VariantRecord};
 use serde::{Deserialize, Serialize};
 use sim_gpu::pose::Pose;
 use std::collections::BTreeSet;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 /// What made the dataset; the manifest of anything else is refused.
 pub const TOOL: &str = "edgepuck";
@@ -153,6 +154,24 @@ impl Manifest {
         self.meshes.iter().map(|record| &record.entry).chain(failed)
     }
 
+    /// The files of all scans: the path from the dataset's folder, what is recorded of
+    /// the file, and of its scan.
+    pub(super) fn scan_files(
+        &self,
+    ) -> impl Iterator<Item = (PathBuf, &FileRecord, &VariantRecord)> {
+        let scans = self.meshes.iter().flat_map(|mesh| mesh.scans.iter().map(move |s| (mesh, s)));
+        let variants = scans.flat_map(|(mesh, scan)| {
+            scan.variants.iter().map(move |written| (&mesh.entry, scan, written))
+        });
+        variants.flat_map(|(entry, scan, written)| {
+            written.files.iter().map(move |file| {
+                let (root, variant) = (Path::new(""), written.variant);
+                let path = layout::scan(root, &scan.set, variant, entry, scan.view, file.format);
+                (path, file, written)
+            })
+        })
+    }
+
     /// Every mesh and its file, scanned or failed.
     fn sources(&self) -> impl Iterator<Item = (Entry, &str)> {
         let failed = self.failures.iter().map(|f| (f.entry.clone(), f.source.as_str()));
@@ -171,17 +190,15 @@ impl Manifest {
         folders
             .chain(names)
             .find(|name| !is_plain(name))
-            .map(|name| format!("`{name}` is no name of a file or folder"))
+            .map(|name| format!("expected the name of a file or folder, found `{name}`"))
     }
 }
 
 /// Whether `name` leads to a file of that name in the folder it is joined to.
-fn is_plain(name: &str) -> bool {
+pub(super) fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components();
-    let first = parts.next();
     !name.contains(['/', '\\'])
-        && matches!(first, Some(Component::Normal(_)))
-        && parts.next().is_none()
+        && matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
 }
 
 /// The poses of all sets around the meshes of `records`.

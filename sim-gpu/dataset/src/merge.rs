@@ -54,7 +54,10 @@ impl Part {
         }
         let manifest = Manifest::read(&layout::manifest(path))?;
         let Some((number, of)) = manifest.shard else {
-            return Err(shard_error(path, "is no shard: it was made without --shard"));
+            return Err(shard_error(
+                path,
+                "expected a shard, found a dataset that was made without --shard",
+            ));
         };
         Ok(Self { path: path.into(), manifest, number, of })
     }
@@ -129,20 +132,8 @@ fn check_empty(out: &Path) -> Result<(), DatasetError> {
 
 /// Puts all scans of one shard into `out`.
 fn link_scans(part: &Part, out: &Path) -> Result<(), DatasetError> {
-    part.manifest.meshes.par_iter().try_for_each(|mesh| {
-        for scan in &mesh.scans {
-            for written in &scan.variants {
-                for file in &written.files {
-                    let (entry, format) = (&mesh.entry, file.format);
-                    let place = |root: &Path| {
-                        layout::scan(root, &scan.set, written.variant, entry, scan.view, format)
-                    };
-                    link(&place(&part.path), &place(out))?;
-                }
-            }
-        }
-        Ok(())
-    })
+    let files: Vec<PathBuf> = part.manifest.scan_files().map(|(file, ..)| file).collect();
+    files.par_iter().try_for_each(|file| link(&part.path.join(file), &out.join(file)))
 }
 
 fn link(from: &Path, to: &Path) -> Result<(), DatasetError> {
@@ -171,14 +162,10 @@ fn union(parts: Vec<Part>) -> Manifest {
     whole
 }
 
-fn empty(out: &Path) -> io::Result<()> {
-    for item in fs::read_dir(out)? {
-        let item = item?;
-        if item.file_type()?.is_dir() {
-            fs::remove_dir_all(item.path())?;
-        } else {
-            fs::remove_file(item.path())?;
-        }
+fn empty(out: &Path) -> Result<(), DatasetError> {
+    let here = |error| DatasetError::io(out, error);
+    for item in fs::read_dir(out).map_err(here)? {
+        layout::remove(&item.map_err(here)?.path())?;
     }
     Ok(())
 }

@@ -4,8 +4,8 @@ use super::clouds::{Part, Scans};
 use super::error::DatasetError;
 use super::layout;
 use super::manifest::PackedRecord;
+use formats::Split;
 use formats::packed::PackedWriter;
-use formats::{Split, hash};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -25,16 +25,15 @@ pub(super) fn pack(scans: &Scans) -> Result<Vec<PackedRecord>, DatasetError> {
     parts.par_iter().map(|part| pack_part(scans, part)).collect()
 }
 
-fn pack_part(scans: &Scans, part: &Part) -> Result<PackedRecord, DatasetError> {
+fn pack_part<'a>(scans: &Scans<'a>, part: &Part<'a>) -> Result<PackedRecord, DatasetError> {
     let place = |out: &Path| layout::packed(out, part.set, part.variant, part.split);
     let path = place(scans.out);
     let n_points = scans.config.packed_points as usize;
     let mut writer = PackedWriter::create(&path, n_points, scans.classes.to_vec())?;
-    let left_out = scans.for_each_cloud(part, |cloud| {
-        Ok(writer.push(&cloud.points, cloud.label, &cloud.name, cloud.n_raw)?)
+    let left_out = scans.for_each_cloud(part, |packed| {
+        Ok(writer.push(&packed.cloud.points, packed.label, &packed.name, packed.n_raw)?)
     })?;
     let clouds = writer.len() as u64;
-    writer.finish()?;
     let file = layout::slashed(&place(Path::new("")));
-    Ok(PackedRecord { file, sha256: hash::of_file(&path)?, clouds, left_out })
+    Ok(PackedRecord { file, sha256: writer.finish()?, clouds, left_out })
 }

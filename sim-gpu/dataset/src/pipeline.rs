@@ -2,18 +2,17 @@
 //! thread that keeps the adapter busy. Queues are bounded and a budget bounds
 //! the meshes under way, so memory does not grow with their number.
 
-use super::budget::Budget;
+use super::budget::{Budget, Share};
 use super::config::DatasetConfig;
 use super::error::DatasetError;
-use super::in_flight::{Held, gather, submit};
 use super::journal::Journal;
-use super::prepare::prepare;
+use super::mesh::{Output, Prepared, prepare, write_mesh};
 use super::progress::{Progress, Stage};
 use super::record::{Entry, MeshFailure, MeshRecord};
-use super::write::{Output, write_mesh};
 use crossbeam_channel::{Receiver, Sender, bounded};
-use sim_gpu::caster::Caster;
-use sim_gpu::job::{Cast, Culling};
+use sim_gpu::cast_error::CastError;
+use sim_gpu::caster::{Caster, Casting};
+use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::sensor::BeamPattern;
 use std::collections::VecDeque;
@@ -31,6 +30,9 @@ const BYTES_PER_FILE_BYTE: u64 = 12;
 
 /// Bytes of a ray on its way: its record, beam, code and words.
 const BYTES_PER_RAY: u64 = 44;
+
+/// Rays gathered before a batch is sent, unless no mesh is waiting.
+const RAYS_PER_BATCH: usize = 1 << 20;
 
 /// Batches on their way through the adapter at once: while one is traced, the
 /// next is uploaded.
@@ -66,6 +68,8 @@ struct Shared<'a> {
     patterns: Vec<BeamPattern>,
     next: AtomicUsize,
     stopped: AtomicBool,
+    /// Bytes of the clouds that are kept for packing.
+    kept: AtomicUsize,
     scanned: Mutex<Scanned>,
     error: Mutex<Option<DatasetError>>,
 }
@@ -83,6 +87,7 @@ pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError
         patterns: run.config.sets.iter().map(|set| set.sensor.pattern()).collect(),
         next: AtomicUsize::new(0),
         stopped: AtomicBool::new(false),
+        kept: AtomicUsize::new(0),
         scanned: Mutex::default(),
         error: Mutex::default(),
     };
@@ -175,7 +180,10 @@ impl Shared<'_> {
             }
             if !nothing_waits {
                 let run = self.run;
-                match run.progress.time(Stage::Cast, || submit(batch, run.caster, run.progress)) {
+                match run
+                    .progress
+                    .time(Stage::Cast, || Batch::submit(batch, run.caster, run.progress))
+                {
                     Ok(batch) => in_flight.push_back(batch),
                     Err(error) => return self.stop(error.into()),
                 }
@@ -205,6 +213,7 @@ impl Shared<'_> {
             patterns: &self.patterns,
             cast_effects: &cast_effects,
             progress: self.run.progress,
+            kept: &self.kept,
         };
         for (held, casts) in cast {
             if self.stopped.load(SeqCst) {
@@ -226,4 +235,83 @@ impl Shared<'_> {
         self.stopped.store(true, SeqCst);
         lock(&self.error).get_or_insert(error);
     }
+}
+
+/// A mesh on its way, with its share of the memory budget.
+struct Held<'b> {
+    /// The mesh.
+    prepared: Prepared,
+    /// Given back once its scans are written.
+    _share: Share<'b>,
+}
+
+/// Meshes that are being cast at together.
+struct Batch<'b> {
+    /// Each mesh; with what was cast at it already, if it was too large for the
+    /// adapter.
+    meshes: Vec<(Held<'b>, Option<Vec<Cast>>)>,
+    /// The jobs of the others, mesh by mesh.
+    jobs: Vec<CastJob>,
+    casting: Casting,
+}
+
+impl<'b> Batch<'b> {
+    /// Starts casting at all of `meshes`. The CPU casts at once at a mesh that is too
+    /// large for the adapter, and a note says so.
+    fn submit(
+        meshes: Vec<Held<'b>>,
+        caster: &Caster,
+        progress: &Progress,
+    ) -> Result<Self, CastError> {
+        let mut jobs = Vec::new();
+        let submitted = meshes.into_iter().map(|mut held| {
+            let of_mesh = &mut held.prepared.jobs;
+            if of_mesh.iter().all(|job| caster.fits(&job.target)) {
+                jobs.append(of_mesh);
+                return (held, None);
+            }
+            progress.note(format!(
+                "{}: too large for one binding of {}: the CPU cast it",
+                held.prepared.record.source,
+                caster.name()
+            ));
+            let casts = caster.cast_on_cpu(of_mesh);
+            (held, Some(casts))
+        });
+        let meshes = submitted.collect();
+        let casting = caster.submit(&jobs)?;
+        Ok(Self { meshes, jobs, casting })
+    }
+
+    /// The meshes and what was cast at each.
+    fn wait(self) -> Result<Vec<(Held<'b>, Vec<Cast>)>, CastError> {
+        let mut casts = self.casting.wait()?.into_iter();
+        let mut jobs = self.jobs.into_iter();
+        let finish = |(mut held, done): (Held<'b>, Option<Vec<Cast>>)| {
+            let casts = done.unwrap_or_else(|| {
+                let n_jobs = held.prepared.views.len();
+                held.prepared.jobs = jobs.by_ref().take(n_jobs).collect();
+                casts.by_ref().take(n_jobs).collect()
+            });
+            (held, casts)
+        };
+        Ok(self.meshes.into_iter().map(finish).collect())
+    }
+}
+
+/// The meshes that wait to be cast at, up to a batch; waits for the first if
+/// `wait_for_one`. Empty if there are none, or will be none.
+fn gather<'b>(prepared: &Receiver<Held<'b>>, wait_for_one: bool) -> Vec<Held<'b>> {
+    let mut batch: Vec<Held> = Vec::new();
+    if wait_for_one {
+        batch.extend(prepared.recv());
+    }
+    let rays = |held: &Held| held.prepared.jobs.iter().map(|job| job.rays.len()).sum::<usize>();
+    let mut gathered: usize = batch.iter().map(rays).sum();
+    while gathered < RAYS_PER_BATCH {
+        let Ok(held) = prepared.try_recv() else { break };
+        gathered += rays(&held);
+        batch.push(held);
+    }
+    batch
 }

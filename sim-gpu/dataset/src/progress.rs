@@ -4,39 +4,21 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A part of the work on one mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Reading and parsing the file, hashing it, scaling it, validating it.
-    Read,
-    /// Simplifying, where that is asked for, and building the hierarchy.
-    Build,
-    /// Aiming beams.
-    Aim,
-    /// Casting: upload, trace, read back.
-    Cast,
-    /// Ranges in f64, effects, points.
-    Resolve,
-    /// Writing files and records.
-    Write,
-}
-
-impl Stage {
-    /// All stages, in the order of the work.
-    pub const ALL: [Self; 6] =
-        [Self::Read, Self::Build, Self::Aim, Self::Cast, Self::Resolve, Self::Write];
-
-    /// The stage's name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Read => "read",
-            Self::Build => "build",
-            Self::Aim => "aim",
-            Self::Cast => "cast",
-            Self::Resolve => "resolve",
-            Self::Write => "write",
-        }
+formats::named! {
+    /// A part of the work on one mesh, in the order of the work.
+    pub enum Stage: "stage" {
+        /// Reading and parsing the file, hashing it, scaling it, validating it.
+        Read = "read",
+        /// Simplifying, where that is asked for, and building the hierarchy.
+        Build = "build",
+        /// Aiming beams.
+        Aim = "aim",
+        /// Casting: upload, trace, read back.
+        Cast = "cast",
+        /// Ranges in f64, effects, points.
+        Resolve = "resolve",
+        /// Writing files and records.
+        Write = "write",
     }
 }
 

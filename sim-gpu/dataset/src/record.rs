@@ -1,10 +1,12 @@
 //! What is known of each mesh once its scans are written.
 
+use super::clouds::Cloud;
 use super::config::Variant;
 use formats::Split;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
 use sim_gpu::mesh::frame::Up;
+use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::mesh::validate::MeshDefects;
 use sim_gpu::scan::Tally;
 use sim_gpu::simplify::Simplified;
@@ -71,6 +73,10 @@ pub struct VariantRecord {
     pub tally: Tally,
     /// The files, in the configuration's order of formats.
     pub files: Vec<FileRecord>,
+    /// Its cloud, from when it was written to when it is packed. Files of records lack
+    /// it, and so do scans beyond the memory for clouds, which are read again.
+    #[serde(skip)]
+    pub cloud: Option<Cloud>,
 }
 
 /// One file as written.
@@ -94,6 +100,12 @@ pub struct MeshFailure {
     pub line: Option<u64>,
     /// Why.
     pub cause: String,
+}
+
+impl From<&MeshEntry> for Entry {
+    fn from(entry: &MeshEntry) -> Self {
+        Self { class: entry.class.clone(), split: entry.split, name: entry.name.clone() }
+    }
 }
 
 impl Entry {

@@ -4,9 +4,9 @@ use super::difference::difference;
 use super::error::DatasetError;
 use super::journal::{Journal, Terms};
 use super::layout;
-use super::manifest::Manifest;
+use super::manifest::{Manifest, is_plain};
 use formats::atomic;
-use std::path::{Component, Path};
+use std::path::Path;
 
 /// What to do where the folder holds a dataset already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,21 +85,7 @@ fn remove(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
         names.extend(layout::top_level(&begun.config));
     }
     // What a damaged journal calls a set must not lead out of the folder.
-    let inside = |name: &&String| {
-        let mut parts = Path::new(name.as_str()).components();
-        matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
-    };
-    for path in names.iter().filter(inside).map(|name| out.join(name)) {
-        let removed = if path.is_dir() {
-            std::fs::remove_dir_all(&path)
-        } else if path.exists() {
-            std::fs::remove_file(&path)
-        } else {
-            Ok(())
-        };
-        removed.map_err(|error| DatasetError::io(&path, error))?;
-    }
-    Ok(())
+    names.iter().filter(|name| is_plain(name)).try_for_each(|name| layout::remove(&out.join(name)))
 }
 
 /// Names the first setting that differs.

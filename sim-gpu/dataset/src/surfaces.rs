@@ -2,7 +2,7 @@
 //! that a sensor could see: what lies between ModelNet40's clouds and scans.
 
 use super::error::DatasetError;
-use super::prepare::{failure, read};
+use super::mesh::{failed, failure, read};
 use super::record::{Entry, MeshFailure};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
@@ -112,9 +112,7 @@ fn draw(mesh: &MeshEntry, config: &SurfaceConfig) -> Result<Drawn, MeshFailure> 
     let key = |name: &str, index| StreamKey::new(config.seed, &format!("{name}/{id}"), index);
     let points = area_uniform(&surface, n * (1 + LOOKED_AT), key("surface", 0));
     let Some(points) = points else {
-        let cause = "no triangle with an area".to_owned();
-        let source = record.source.clone();
-        return Err(MeshFailure { entry: record.entry, source, line: None, cause });
+        return Err(failed(mesh, None, "no triangle with an area".to_owned()));
     };
     let (own, looked_at) = points.split_at(n);
     let rounded = |points: &[DVec3]| -> Vec<[f32; 3]> {

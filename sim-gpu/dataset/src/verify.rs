@@ -10,7 +10,6 @@ use formats::scan_file::{ScanFormat, read_scan};
 use formats::{FormatError, hash, vlp32c};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use std::fmt;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
@@ -29,18 +28,13 @@ pub struct Report {
 }
 
 /// What is wrong with one file.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[error("{}: {what}", path.display())]
 pub struct Problem {
     /// The file, from the dataset's folder.
     pub path: PathBuf,
     /// What is wrong.
     pub what: String,
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.path.display(), self.what)
-    }
 }
 
 impl Report {
@@ -95,22 +89,12 @@ enum Holds {
 }
 
 fn expected_files(manifest: &Manifest) -> Vec<Expected<'_>> {
-    let mut expected = Vec::new();
-    for mesh in &manifest.meshes {
-        for scan in &mesh.scans {
-            for written in &scan.variants {
-                let in_format = |format| {
-                    let (entry, root) = (&mesh.entry, Path::new(""));
-                    layout::scan(root, &scan.set, written.variant, entry, scan.view, format)
-                };
-                expected.extend(written.files.iter().map(|file| Expected {
-                    path: in_format(file.format),
-                    sha256: &file.sha256,
-                    holds: Holds::Points(file.format, written.tally.points),
-                }));
-            }
-        }
-    }
+    let scans = manifest.scan_files().map(|(path, file, written)| Expected {
+        path,
+        sha256: &file.sha256,
+        holds: Holds::Points(file.format, written.tally.points),
+    });
+    let mut expected: Vec<Expected> = scans.collect();
     expected.extend(manifest.packed.iter().map(|packed| Expected {
         path: PathBuf::from(&packed.file),
         sha256: &packed.sha256,

@@ -1,70 +1,40 @@
 //! The classes and which file builds each.
 
-use std::fmt;
-
 use super::builder::Builder;
 use super::sampler::Sampler;
 use super::{airplane, bottle, bowl, chair, cone, cup, lamp, monitor, table, vase};
 
-/// The class names in the order of their labels: ModelNet40's, alphabetical.
-pub const CLASSES: [&str; 10] =
-    ["airplane", "bottle", "bowl", "chair", "cone", "cup", "lamp", "monitor", "table", "vase"];
-
 /// Builds one make of a class.
 pub(super) type Make = fn(&mut Builder, &mut Sampler);
 
-/// One of the ten shape families.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum ShapeClass {
-    /// Airliners, light aircraft, biplanes, jets, gliders, flying wings.
-    Airplane,
-    /// Wine and beer bottles, flasks, jars, jugs, dispensers.
-    Bottle,
-    /// Round, oval, square and scalloped bowls.
-    Bowl,
-    /// Chairs on legs, stars, discs, sledges and cantilevers; armchairs.
-    Chair,
-    /// Cones, frusta, traffic cones, party hats, ice-cream cones.
-    Cone,
-    /// Mugs, tea cups, tumblers, goblets, steins.
-    Cup,
-    /// Table, floor, desk, tripod, arc and pendant lamps.
-    Lamp,
-    /// Flat panels on several stands, tubes, pairs, televisions.
-    Monitor,
-    /// Tables on legs, pedestals, trestles, panels; desks with drawers.
-    Table,
-    /// Amphorae, trumpets, globes, cylinders, square and fluted vases.
-    Vase,
+formats::named! {
+    /// One of the ten shape families, in the order of their labels. Their names are
+    /// ModelNet40's.
+    pub enum ShapeClass: "class of shapes" {
+        /// Airliners, light aircraft, biplanes, jets, gliders, flying wings.
+        Airplane = "airplane",
+        /// Wine and beer bottles, flasks, jars, jugs, dispensers.
+        Bottle = "bottle",
+        /// Round, oval, square and scalloped bowls.
+        Bowl = "bowl",
+        /// Chairs on legs, stars, discs, sledges and cantilevers; armchairs.
+        Chair = "chair",
+        /// Cones, frusta, traffic cones, party hats, ice-cream cones.
+        Cone = "cone",
+        /// Mugs, tea cups, tumblers, goblets, steins.
+        Cup = "cup",
+        /// Table, floor, desk, tripod, arc and pendant lamps.
+        Lamp = "lamp",
+        /// Flat panels on several stands, tubes, pairs, televisions.
+        Monitor = "monitor",
+        /// Tables on legs, pedestals, trestles, panels; desks with drawers.
+        Table = "table",
+        /// Amphorae, trumpets, globes, cylinders, square and fluted vases.
+        Vase = "vase",
+    }
 }
 
 impl ShapeClass {
-    /// All classes in the order of their labels.
-    pub const ALL: [Self; 10] = [
-        Self::Airplane,
-        Self::Bottle,
-        Self::Bowl,
-        Self::Chair,
-        Self::Cone,
-        Self::Cup,
-        Self::Lamp,
-        Self::Monitor,
-        Self::Table,
-        Self::Vase,
-    ];
-
-    /// The class's name, as in [`CLASSES`].
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        CLASSES[self as usize]
-    }
-
-    /// The class of this name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|class| class.name() == name)
-    }
-
     /// Builds the shape that `s` draws, in the class's own frame.
     pub(super) fn build(self, b: &mut Builder, s: &mut Sampler) {
         match self {
@@ -94,23 +64,13 @@ impl ShapeClass {
     }
 }
 
-impl fmt::Display for ShapeClass {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Readers of folders sort the classes, and a label is a place among them.
     #[test]
-    fn names_and_labels_agree() {
-        for (label, class) in ShapeClass::ALL.into_iter().enumerate() {
-            assert_eq!(class as usize, label);
-            assert_eq!(ShapeClass::from_name(CLASSES[label]), Some(class));
-        }
-        assert_eq!(ShapeClass::from_name("sofa"), None);
-        assert!(CLASSES.is_sorted());
+    fn labels_follow_the_order_of_names() {
+        assert!(ShapeClass::ALL.map(ShapeClass::name).is_sorted());
     }
 }

@@ -31,7 +31,7 @@ mod write;
 #[cfg(test)]
 mod tests;
 
-pub use class::{CLASSES, ShapeClass};
+pub use class::ShapeClass;
 pub use tree::{TreeSummary, write_tree};
 pub use write::{write_obj, write_off};
 

@@ -3,9 +3,16 @@
 pub mod compare_points;
 pub mod eval;
 pub mod explain;
-mod failure;
 pub mod serve;
 pub mod train;
 
-use failure::print;
-pub use failure::{Usage, exit_code};
+use formats::outcome::Usage;
+use std::io::Write;
+
+/// Writes a line to standard output.
+///
+/// # Errors
+/// What the system reports.
+fn print(line: &str) -> anyhow::Result<()> {
+    Ok(writeln!(std::io::stdout(), "{line}")?)
+}

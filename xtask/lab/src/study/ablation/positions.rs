@@ -3,7 +3,7 @@
 use super::datasets::scan_files;
 use anyhow::{bail, ensure};
 use edgepuck_dataset::manifest::Manifest;
-use formats::npz::read_scan;
+use formats::scan_file::read_scan;
 use std::path::Path;
 
 /// Compares all positions of two datasets of the same meshes and views, bit by

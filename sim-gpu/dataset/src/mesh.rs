@@ -1,21 +1,32 @@
-//! From a mesh's file to the rays that will be cast at it.
+//! One mesh: from its file to the rays that are cast at it, and from what was cast
+//! to its scans on disk.
 
+use super::clouds::{Cloud, Source};
 use super::config::{DatasetConfig, SetConfig};
+use super::error::DatasetError;
+use super::layout;
 use super::progress::{Progress, Stage};
-use super::record::{Entry, MeshFailure, MeshRecord};
+use super::record::{FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+use formats::scan_file::{ScanFormat, write_scan};
+use formats::vlp32c;
 use glam::DAffine3;
 use sim_gpu::bvh::Builder;
-use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::effects::Effects;
+use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::mesh::{LoadedMesh, Mesh, MeshError, load};
+use sim_gpu::packets;
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::RayFrame;
+use sim_gpu::resolve::{Hits, resolve};
+use sim_gpu::scan::{ObjectHits, ScanRequest, assemble};
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
 use sim_gpu::target::{Surface, Target};
-use std::sync::atomic::Ordering::Relaxed;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A mesh and everything that is to be cast at it.
 pub struct Prepared {
@@ -78,7 +89,7 @@ pub fn prepare(
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {
         let aim = |(view, frame): (&PlannedView, RayFrame)| {
-            let set: &SetConfig = &config.sets[view.set];
+            let set = &config.sets[view.set];
             let stream = set.stream(config.seed, &id, view.view);
             CastJob::aim(target.clone(), frame, &patterns[view.set], culling, stream, 1.0)
         };
@@ -92,16 +103,11 @@ pub fn prepare(
 }
 
 fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
-    let mut views = Vec::new();
-    for (set, set_config) in config.sets.iter().enumerate() {
-        let poses = set_config.poses(config.seed, id);
-        views.extend(poses.into_iter().zip(0..).map(|(pose, view)| PlannedView {
-            set,
-            view,
-            pose,
-        }));
-    }
-    views
+    let of_set = |(set, set_config): (usize, &SetConfig)| {
+        let poses = set_config.poses(config.seed, id).into_iter().zip(0..);
+        poses.map(move |(pose, view)| PlannedView { set, view, pose })
+    };
+    config.sets.iter().enumerate().flat_map(of_set).collect()
 }
 
 /// Each set's sensor, where it stands.
@@ -149,12 +155,99 @@ pub(super) fn failure(entry: &MeshEntry, error: &MeshError) -> MeshFailure {
     failed(entry, line, cause)
 }
 
-fn failed(entry: &MeshEntry, line: Option<u64>, cause: String) -> MeshFailure {
+pub(super) fn failed(entry: &MeshEntry, line: Option<u64>, cause: String) -> MeshFailure {
     MeshFailure { entry: entry.into(), source: entry.relative.clone(), line, cause }
 }
 
-impl From<&MeshEntry> for Entry {
-    fn from(entry: &MeshEntry) -> Self {
-        Self { class: entry.class.clone(), split: entry.split, name: entry.name.clone() }
+/// What all meshes of a run share.
+pub struct Output<'a> {
+    /// The dataset's folder.
+    pub out: &'a Path,
+    /// What it is to hold.
+    pub config: &'a DatasetConfig,
+    /// Each set's beams.
+    pub patterns: &'a [BeamPattern],
+    /// The effects that are cast.
+    pub cast_effects: &'a Effects,
+    /// Counters.
+    pub progress: &'a Progress,
+    /// Bytes of the clouds that are kept for packing.
+    pub kept: &'a AtomicUsize,
+}
+
+/// Writes every scan of one mesh; returns its record, complete.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_mesh(
+    output: &Output,
+    prepared: Prepared,
+    casts: &[Cast],
+) -> Result<MeshRecord, DatasetError> {
+    let Prepared { mut record, views, jobs } = prepared;
+    for ((planned, job), cast) in views.iter().zip(&jobs).zip(casts) {
+        let hits = output.progress.time(Stage::Resolve, || {
+            resolve(job, cast, &output.patterns[planned.set], output.cast_effects)
+        });
+        output.progress.rays_decided_in_f64.fetch_add(hits.decided_in_f64 as u64, Relaxed);
+        let scan = write_view(output, &record, planned, job, &hits)?;
+        record.scans.push(scan);
     }
+    Ok(record)
+}
+
+fn write_view(
+    output: &Output,
+    record: &MeshRecord,
+    planned: &PlannedView,
+    job: &CastJob,
+    hits: &Hits,
+) -> Result<ScanRecord, DatasetError> {
+    let config = output.config;
+    let set = &config.sets[planned.set];
+    let world_from_object = DAffine3::IDENTITY;
+    let objects = [ObjectHits { object: 0, world_from_object, job, hits }];
+    let mut variants = Vec::new();
+    for &variant in &config.variants {
+        let mut request =
+            ScanRequest::new(&set.sensor, &output.patterns[planned.set], planned.pose);
+        request.effects = Some(config.effects_of(set, variant)?);
+        (request.attributes, request.stream) = (config.attributes.clone(), job.stream);
+        let (scan, tally) = output
+            .progress
+            .time(Stage::Resolve, || assemble(&request, output.cast_effects, &objects))?;
+        output.progress.scans.fetch_add(1, Relaxed);
+        output.progress.points.fetch_add(tally.points, Relaxed);
+        let (entry, view) = (&record.entry, planned.view);
+        let write = |&format: &ScanFormat| -> Result<FileRecord, DatasetError> {
+            let path = layout::scan(output.out, &set.name, variant, entry, view, format);
+            let sha256 = match format {
+                ScanFormat::Pcap => write_packets(output, &path, &request, &objects)?,
+                _ => write_scan(&path, format, &scan)?,
+            };
+            Ok(FileRecord { format, sha256 })
+        };
+        let files = output
+            .progress
+            .time(Stage::Write, || config.formats.iter().map(write).collect::<Result<_, _>>())?;
+        let source = Source { set, variant, entry, view };
+        let cloud = Cloud::keep(output.kept, config, source, &scan);
+        variants.push(VariantRecord { variant, tally, files, cloud });
+    }
+    Ok(ScanRecord { set: set.name.clone(), view: planned.view, variants })
+}
+
+/// Writes the packets of one view, whatever attributes its points have.
+fn write_packets(
+    output: &Output,
+    path: &Path,
+    request: &ScanRequest,
+    objects: &[ObjectHits],
+) -> Result<String, DatasetError> {
+    let revolution = packets::revolution(request.sensor)?;
+    let effects = request.applied_effects(output.cast_effects)?;
+    let mut request = request.clone();
+    request.attributes = packets::attributes(&effects);
+    let (scan, _) = assemble(&request, output.cast_effects, objects)?;
+    Ok(vlp32c::write(path, &revolution, output.config.returns, &scan)?)
 }

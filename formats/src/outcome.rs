@@ -1,6 +1,7 @@
-//! How a command ends, and the exit code that says so.
+//! How a program ends: its exit code, and what it says of an error.
 
-use std::fmt;
+use std::fmt::Display;
+use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
 
 /// The exit status of a completed command.
@@ -15,19 +16,13 @@ pub enum Outcome {
 }
 
 /// A command line that asks for something impossible.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub struct Usage(pub String);
 
-impl fmt::Display for Usage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Usage {}
-
 /// Prints the error, if there is one, and gives the program's exit code: 0 for
-/// success, 1 for a failure, 2 for a wrong command line.
+/// success, 1 for a failure, 2 for a [`Usage`]. When the reader of the output has
+/// gone, the command succeeds.
 pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Success) => ExitCode::SUCCESS,
@@ -35,14 +30,15 @@ pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
         Ok(Outcome::ChildExit(code)) => ExitCode::from(code),
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", joined_causes(&error));
+            say(format_args!("error: {}", joined_causes(&error)));
             ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }
     }
 }
 
 /// The error and its causes, without those that an outer one already spells out.
-fn joined_causes(error: &anyhow::Error) -> String {
+#[must_use]
+pub fn joined_causes(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |message, cause| {
         if message.is_empty() {
             cause
@@ -54,10 +50,12 @@ fn joined_causes(error: &anyhow::Error) -> String {
     })
 }
 
-/// Whether the reader of our output has gone, which counts as success.
+/// Writes a line to standard error. A closed one does not stop the program.
+pub fn say(line: impl Display) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
-        .any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
+    let mut causes = error.chain().filter_map(|cause| cause.downcast_ref::<io::Error>());
+    causes.any(|cause| cause.kind() == ErrorKind::BrokenPipe)
 }
