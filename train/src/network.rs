@@ -6,11 +6,10 @@
 use ndarray::{ArrayView2, Axis, s};
 
 use crate::batch::Batch;
-use crate::layer::{EdgeLayer, Folded, Module, PointLayer, orthogonality};
+use crate::layer::{EdgeLayer, HiddenLayer, LayerMut, Module, orthogonality};
 use crate::loss::{self, Loss};
 use crate::matrix::Matrix;
 use crate::mlp::{DenseHead, SharedMlp};
-use crate::parameter::Parameter;
 use crate::selector::{CriticalPointSelector, Selection};
 use crate::shape::Shape;
 use crate::t_net::TNet;
@@ -33,7 +32,7 @@ pub struct PointNet {
     /// Selects points by the coordinates' T-Net, if `cpl.shared` is set.
     selector: Option<CriticalPointSelector>,
     edges: Vec<EdgeLayer>,
-    stem: PointLayer,
+    stem: HiddenLayer,
     fstn: Option<TNet>,
     trunk: SharedMlp,
     head: DenseHead,
@@ -52,7 +51,7 @@ impl PointNet {
             .map(|(edge, number)| EdgeLayer::new(number, edge.radius, edge.channels, seed))
             .collect();
         let inputs = 3 + edges.iter().map(EdgeLayer::channels).sum::<usize>();
-        let stem = PointLayer::new("feat.conv1", "feat.bn1", (inputs, trunk[0]), seed);
+        let stem = HiddenLayer::new("feat.conv1", "feat.bn1", (inputs, trunk[0]), seed);
         let stn = input_transform.then(|| TNet::new("feat.stn.", 3, shape, seed));
         let fstn = feature_transform.then(|| TNet::new("feat.fstn.", trunk[0], shape, seed));
         let pooled = trunk[trunk.len() - 1];
@@ -102,7 +101,7 @@ impl PointNet {
         let transformed = transformed.as_ref().map_or(x.view(), |transformed| transformed.view());
         let with_edges = self.edge_features(batch, transformed, momentum);
         let entry = with_edges.as_ref().map_or(transformed, |with_edges| with_edges.view());
-        self.stem.forward(entry, rows, momentum);
+        self.stem.forward(entry, rows, None, momentum);
         let stem = self.stem.base.output().to_owned();
         let transformed_stem =
             self.fstn.as_mut().map(|fstn| fstn.forward(stem.view(), rows, momentum));
@@ -128,7 +127,7 @@ impl PointNet {
         if self.stn.is_none() && self.edges.is_empty() && !wants_points {
             return (loss, None);
         }
-        let dentry = self.stem.input_gradient(&dz);
+        let dentry = self.stem.base.linear.input_gradient(dz.view());
         let mut first = 3;
         for edge in &mut self.edges {
             let own = first..first + edge.channels();
@@ -172,65 +171,21 @@ impl PointNet {
         Some(ndarray::concatenate(Axis(1), &parts).expect("invariant: a row for each point"))
     }
 
-    /// The first layer whose last output was not finite; the last layer if all
-    /// were finite.
-    #[must_use]
-    pub fn not_finite(&self) -> &str {
-        let stn = self.stn.as_ref().and_then(TNet::not_finite);
-        let edges = || self.edges.iter().find_map(|edge| edge.pooled.base.not_finite());
-        stn.or_else(edges)
-            .or_else(|| self.stem.base.not_finite())
-            .or_else(|| self.fstn.as_ref().and_then(TNet::not_finite))
-            .or_else(|| self.trunk.not_finite())
-            .or_else(|| self.head.not_finite())
-            .unwrap_or("the last")
-    }
-
     /// The width of the dropout mask; none without a hidden layer after the
     /// trunk's pooling.
     #[must_use]
     pub fn dropout_width(&self) -> Option<usize> {
-        self.head.hidden.last().map(|layer| layer.base.output().ncols())
+        self.head.hidden_width()
     }
 }
 
 impl Module for PointNet {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        if let Some(stn) = &mut self.stn {
-            stn.parameters(visit);
-        }
-        self.edges.iter_mut().for_each(|edge| edge.parameters(visit));
-        self.stem.base.parameters(visit);
-        if let Some(fstn) = &mut self.fstn {
-            fstn.parameters(visit);
-        }
-        self.trunk.parameters(visit);
-        self.head.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        if let Some(stn) = &mut self.stn {
-            stn.statistics(visit);
-        }
-        self.edges.iter_mut().for_each(|edge| edge.statistics(visit));
-        self.stem.base.statistics(visit);
-        if let Some(fstn) = &mut self.fstn {
-            fstn.statistics(visit);
-        }
-        self.trunk.statistics(visit);
-        self.head.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        if let Some(stn) = &self.stn {
-            stn.folded(visit);
-        }
-        self.edges.iter().for_each(|edge| edge.folded(visit));
-        self.stem.base.folded(visit);
-        if let Some(fstn) = &self.fstn {
-            fstn.folded(visit);
-        }
-        self.trunk.folded(visit);
-        self.head.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        let Self { stn, edges, stem, fstn, trunk, head, .. } = self;
+        let stn = stn.iter_mut().flat_map(Module::layers);
+        let edges = edges.iter_mut().map(|edge| edge.pooled.base.layer());
+        let fstn = fstn.iter_mut().flat_map(Module::layers);
+        let points = stn.chain(edges).chain([stem.base.layer()]).chain(fstn);
+        points.chain(trunk.layers()).chain(head.layers()).collect()
     }
 }

@@ -2,10 +2,9 @@
 
 use ndarray::ArrayView2;
 
-use crate::layer::{Folded, Module, Rows, Transforms};
+use crate::layer::{LayerMut, Module, Rows, Transforms};
 use crate::matrix::Matrix;
 use crate::mlp::{DenseHead, SharedMlp};
-use crate::parameter::Parameter;
 use crate::shape::Shape;
 
 /// A T-Net in training.
@@ -74,26 +73,10 @@ impl TNet {
         let dy = self.head.backward(pooled.view(), elements.view());
         self.points.backward(x, dy, rows, wants_input)
     }
-
-    /// The first layer whose last output is not finite.
-    pub fn not_finite(&self) -> Option<&str> {
-        self.points.not_finite().or_else(|| self.head.not_finite())
-    }
 }
 
 impl Module for TNet {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.points.parameters(visit);
-        self.head.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.points.statistics(visit);
-        self.head.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.points.folded(visit);
-        self.head.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        self.points.layers().into_iter().chain(self.head.layers()).collect()
     }
 }

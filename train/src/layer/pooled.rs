@@ -24,7 +24,7 @@ use ndarray::parallel::prelude::*;
 use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
 
-use super::norm::{EPSILON, column_sums};
+use super::norm::{EPSILON, column_sums, relu_gradient};
 use super::{Normed, Rows, by_cloud};
 use crate::matrix::{self, Matrix};
 
@@ -143,23 +143,12 @@ impl PooledLayer {
         wants_input: bool,
     ) -> Option<Matrix> {
         if self.relu {
-            dy.zip_mut_with(&self.base.output, |dy, &y| {
-                if y <= 0.0 {
-                    *dy = 0.0;
-                }
-            });
+            relu_gradient(&mut dy, &self.base.output);
         }
         let sum = dy.sum_axis(Axis(0)).to_vec();
         let with_normalised = (&dy * &self.saved.normalised).sum_axis(Axis(0)).to_vec();
-        let slope: Vec<f32> = self
-            .base
-            .norm
-            .scale
-            .value
-            .iter()
-            .zip(&self.saved.inverse)
-            .map(|(s, i)| s * i)
-            .collect();
+        let scale = &self.base.norm.scale.value;
+        let slope: Vec<f32> = scale.iter().zip(&self.saved.inverse).map(|(s, i)| s * i).collect();
         self.weight_gradient(&dy, x, (&sum, &with_normalised), &slope);
         let dx =
             wants_input.then(|| self.input_gradient(&dy, rows, (&sum, &with_normalised), &slope));
