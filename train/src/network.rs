@@ -93,18 +93,16 @@ impl PointNet {
         let selection = self.select(whole, rates);
         let batch = selection.as_ref().map_or(whole, |selection| &selection.batch);
         let (x, rows) = (batch.points(), batch.rows());
-        let transformed = match (&mut self.stn, &selection) {
-            (Some(stn), Some(_)) => Some(stn.transforms.forward(x.view(), rows)),
-            (Some(stn), None) => Some(stn.forward(x.view(), rows, momentum)),
-            (None, _) => None,
-        };
+        let transformed = self.stn.as_ref().map(|stn| stn.transforms.forward(x, rows));
         let transformed = transformed.as_ref().map_or(x.view(), |transformed| transformed.view());
         let with_edges = self.edge_features(batch, transformed, momentum);
         let entry = with_edges.as_ref().map_or(transformed, |with_edges| with_edges.view());
         self.stem.forward(entry, rows, None, momentum);
         let stem = self.stem.base.output().to_owned();
-        let transformed_stem =
-            self.fstn.as_mut().map(|fstn| fstn.forward(stem.view(), rows, momentum));
+        let transformed_stem = self.fstn.as_mut().map(|fstn| {
+            fstn.predict(stem.view(), rows, momentum);
+            fstn.transforms.forward(stem.view(), rows)
+        });
         let features =
             transformed_stem.as_ref().map_or(stem.view(), |transformed| transformed.view());
         self.trunk.forward(features.view(), rows, momentum);
@@ -119,9 +117,10 @@ impl PointNet {
             let (norm, own) = orthogonality(&fstn.transforms);
             loss.orthogonality = norm;
             loss.total += f64::from(rates.orthogonality) * norm;
-            let own = own * rates.orthogonality;
-            let dx = fstn.backward(stem.view(), &dstem, Some(own), rows, true);
-            dstem = dx.expect("invariant: it was asked for");
+            let (mut elements, through) = fstn.transforms.backward(stem.view(), dstem.view(), rows);
+            elements += &(own * rates.orthogonality);
+            let predicted = fstn.backward(stem.view(), &elements, rows, true);
+            dstem = through + predicted.expect("invariant: it was asked for");
         }
         let dz = self.stem.backward(entry, dstem, rows);
         if self.stn.is_none() && self.edges.is_empty() && !wants_points {
@@ -136,22 +135,24 @@ impl PointNet {
         }
         let dtransformed = dentry.slice(s![.., ..3]).to_owned();
         let dpoints = match &mut self.stn {
-            Some(stn) if selection.is_some() => {
-                let (elements, _) = stn.transforms.backward(x, dtransformed.view(), rows);
-                stn.backward_prediction(whole.points(), &elements, whole.rows(), false)
+            Some(stn) => {
+                let (elements, through) = stn.transforms.backward(x, dtransformed.view(), rows);
+                // A selection, which sees all points, has no gradient of theirs.
+                let wanted = wants_points && selection.is_none();
+                let predicted = stn.backward(whole.points(), &elements, whole.rows(), wanted);
+                predicted.map(|predicted| through + predicted)
             }
-            Some(stn) => stn.backward(x, &dtransformed, None, rows, wants_points),
             None => Some(dtransformed),
         };
         (loss, dpoints.filter(|_| wants_points))
     }
 
-    /// The points of `whole` that the coordinates' T-Net selects, if it does. It
-    /// then has predicted its transforms.
+    /// Lets the coordinates' T-Net predict its transforms from all points; returns
+    /// those that it selects, if it does.
     fn select(&mut self, whole: &Batch, rates: Rates) -> Option<Selection> {
-        let (stn, selector) = (self.stn.as_mut()?, self.selector?);
+        let stn = self.stn.as_mut()?;
         stn.predict(whole.points(), whole.rows(), rates.momentum);
-        Some(selector.select(&stn.points.pooled, whole, rates.step))
+        Some(self.selector?.select(&stn.points.pooled, whole, rates.step))
     }
 
     /// The coordinates `[rows, 3]` followed by the EdgeConv features of each

@@ -29,40 +29,16 @@ impl TNet {
         }
     }
 
-    /// Predicts the transforms and returns the transformed rows.
-    pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) -> Matrix {
-        self.predict(x.view(), rows, momentum);
-        self.transforms.forward(x, rows)
-    }
-
-    /// Predicts the transforms without applying them.
+    /// Predicts the transforms.
     pub fn predict(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
-        self.points.forward(x.view(), rows, momentum);
+        self.points.forward(x, rows, momentum);
         let elements = self.head.forward(self.points.pooled.base.output(), None, momentum);
         self.transforms = Transforms::around_identity(elements, self.transforms.k);
     }
 
-    /// Takes the gradients of the transformed rows and, as `own`, of the
-    /// transforms; returns that of `x`, if `wants_input`.
-    pub fn backward(
-        &mut self,
-        x: ArrayView2<'_, f32>,
-        dy: &Matrix,
-        own: Option<Matrix>,
-        rows: Rows<'_>,
-        wants_input: bool,
-    ) -> Option<Matrix> {
-        let (mut elements, through) = self.transforms.backward(x.view(), dy.view(), rows);
-        if let Some(own) = own {
-            elements += &own;
-        }
-        let predicted = self.backward_prediction(x, &elements, rows, wants_input)?;
-        Some(through + predicted)
-    }
-
     /// Takes the gradient of the transforms' elements; returns the part of the
     /// gradient of `x` that flows through the prediction, if `wants_input`.
-    pub fn backward_prediction(
+    pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
         elements: &Matrix,

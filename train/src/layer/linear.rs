@@ -51,7 +51,7 @@ impl Linear {
     /// `z` without the bias, for a batch norm, which would subtract it again.
     #[must_use]
     pub fn products(&self, x: ArrayView2<'_, f32>) -> Matrix {
-        matrix::forward(x, self.weight.matrix())
+        matrix::product(x, self.weight.matrix().t())
     }
 
     /// `z`.
@@ -82,7 +82,7 @@ impl Linear {
     /// The gradient of `x`.
     #[must_use]
     pub fn input_gradient(&self, dz: ArrayView2<'_, f32>) -> Matrix {
-        matrix::backward(dz, self.weight.matrix())
+        matrix::product(dz, self.weight.matrix())
     }
 
     /// The layer itself, for a model file.
