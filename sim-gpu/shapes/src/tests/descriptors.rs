@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
+use super::soundness::corners;
+use crate::sampler::Sampler;
 use crate::tessellation::bounds;
 use formats::rng::StreamKey;
 use sim_gpu::mesh::Mesh;
-use sim_gpu::surface_points::area_uniform;
-use sim_gpu::target::Surface;
 
 /// Bins of the distance histogram.
 const BINS: usize = 24;
@@ -58,6 +58,21 @@ pub fn height_profile(mesh: &Mesh) -> Vec<f64> {
 
 /// Points spread evenly over the surface's area.
 fn surface_points(mesh: &Mesh, n: usize) -> Vec<DVec3> {
-    let key = StreamKey::new(0, "surface points", 0);
-    area_uniform(&Surface::of_mesh(mesh.clone()), n, key).unwrap()
+    let mut sums = Vec::with_capacity(mesh.triangles.len());
+    let mut sum = 0.0;
+    for &triangle in &mesh.triangles {
+        let [a, b, c] = corners(mesh, triangle);
+        sum += (b - a).cross(c - a).length();
+        sums.push(sum);
+    }
+    let mut s = Sampler::new(StreamKey::new(0, "surface points", 0));
+    (0..n)
+        .map(|_| {
+            let area = s.uniform(0.0, sum);
+            let at = sums.partition_point(|&up_to| up_to <= area).min(sums.len() - 1);
+            let [a, b, c] = corners(mesh, mesh.triangles[at]);
+            let (root, v) = (s.uniform(0.0, 1.0).sqrt(), s.uniform(0.0, 1.0));
+            a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v)
+        })
+        .collect()
 }

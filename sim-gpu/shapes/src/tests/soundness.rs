@@ -9,7 +9,7 @@ use super::{SEED, ShapeClass, for_all, generate};
 use crate::tessellation::bounds;
 use sim_gpu::mesh::Mesh;
 
-fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 3] {
+pub fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 3] {
     triangle.map(|i| mesh.vertices[i as usize])
 }
 
