@@ -15,13 +15,13 @@ pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let legs_half = seat.legs_half(0.0);
     // Five of fourteen draws give legs, two a star, one a disc, and so on.
     match s.count(1, 14) {
-        ..=5 => legged(b, s, seat),
-        ..=7 => star_pedestal(b, s, seat.half.x * 1.15, under_m),
-        ..=8 => disc_pedestal(b, s, seat.half.x * 0.95, under_m),
-        ..=10 => cantilever(b, seat, tube_m),
-        ..=11 => sledge(b, legs_half * DVec2::new(1.0, 0.85), under_m, tube_m),
-        ..=12 => crossed_legs(b, 0.92 * legs_half, under_m, 2.2 * tube_m),
-        ..=13 => side_panels(b, legs_half, under_m, 2.0 * tube_m),
+        1..=5 => legged(b, s, seat),
+        6..=7 => star_pedestal(b, s, seat.half.x * 1.15, under_m),
+        8 => disc_pedestal(b, s, seat.half.x * 0.95, under_m),
+        9..=10 => cantilever(b, seat, tube_m),
+        11 => sledge(b, legs_half * DVec2::new(1.0, 0.85), under_m, tube_m),
+        12 => crossed_legs(b, 0.92 * legs_half, under_m, 2.2 * tube_m),
+        13 => side_panels(b, legs_half, under_m, 2.0 * tube_m),
         _ => rocker(b, s, seat),
     }
 }
