@@ -36,7 +36,7 @@ impl Default for Adam {
 impl Adam {
     /// Takes step number `step` (the first is 1) with learning rate `rate`.
     pub fn step(&self, network: &mut dyn Module, step: u64, rate: f64) {
-        network.parameters(&mut |parameter| self.update(parameter, step, rate));
+        network.parameters().into_iter().for_each(|p| self.update(p, step, rate));
     }
 
     fn update(&self, parameter: &mut Parameter, step: u64, rate: f64) {

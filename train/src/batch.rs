@@ -57,7 +57,6 @@ impl Batch {
     /// The rows of the points, with their weights.
     #[must_use]
     pub fn rows(&self) -> Rows<'_> {
-        let total = self.weights.iter().map(|&w| f64::from(w)).sum::<f64>() as f32;
-        Rows { weights: &self.weights, starts: &self.starts, total }
+        Rows::new(&self.weights, &self.starts)
     }
 }

@@ -15,20 +15,9 @@ pub const ROWS: usize = 192;
 /// Outputs whose gradients one thread takes at a time.
 const COLUMNS: usize = 64;
 
-/// `x` `[n, inputs]` times the transpose of `weights` `[outputs, inputs]`.
+/// `x` times `right`.
 #[must_use]
-pub fn forward(x: ArrayView2<'_, f32>, weights: ArrayView2<'_, f32>) -> Matrix {
-    by_rows(x, weights.t())
-}
-
-/// `dz` `[n, outputs]` times `weights` `[outputs, inputs]`: the gradient of the
-/// inputs.
-#[must_use]
-pub fn backward(dz: ArrayView2<'_, f32>, weights: ArrayView2<'_, f32>) -> Matrix {
-    by_rows(dz, weights)
-}
-
-fn by_rows(x: ArrayView2<'_, f32>, right: ArrayView2<'_, f32>) -> Matrix {
+pub fn product(x: ArrayView2<'_, f32>, right: ArrayView2<'_, f32>) -> Matrix {
     let mut out = Matrix::zeros((x.nrows(), right.ncols()));
     out.axis_chunks_iter_mut(Axis(0), ROWS)
         .into_par_iter()
@@ -48,4 +37,13 @@ pub fn gradient(dz: ArrayView2<'_, f32>, x: ArrayView2<'_, f32>, out: &mut [f32]
             .expect("invariant: a chunk is whole rows");
         general_mat_mul(1.0, &columns.t(), &x, 0.0, &mut out);
     });
+}
+
+/// The transpose of `left` `[n, k]` times `right` `[n, k]`, `[k, k]`.
+#[must_use]
+pub fn square(left: ArrayView2<'_, f32>, right: ArrayView2<'_, f32>) -> Matrix {
+    let k = right.ncols();
+    let mut out = vec![0.0; k * k];
+    gradient(left, right, &mut out);
+    Matrix::from_shape_vec((k, k), out).expect("invariant: square")
 }

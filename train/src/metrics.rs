@@ -74,38 +74,24 @@ impl Metrics {
     /// # Errors
     /// What the system reports.
     pub fn write(&self, folder: &Path) -> Result<(), FormatError> {
-        let path = folder.join("metrics.csv");
-        let csv = self.to_csv().map_err(|cause| FormatError::malformed(&path, "rows", cause))?;
-        atomic::write_bytes(&path, csv)?;
+        atomic::write_bytes(&folder.join("metrics.csv"), self.to_csv())?;
         atomic::write_bytes(&folder.join("curve.svg"), self.curve().to_string())
     }
 
-    fn to_csv(&self) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        csv.write_record([
-            "epoch",
-            "rate",
-            "loss",
-            "accuracy",
-            "validation_instance",
-            "validation_class",
-            "seconds",
-            "clouds_per_second",
-        ])?;
-        for row in &self.rows {
-            let optional = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
-            csv.write_record([
-                row.epoch.to_string(),
-                row.rate.to_string(),
-                row.loss.to_string(),
-                row.accuracy.to_string(),
-                optional(row.validation_instance),
-                optional(row.validation_class),
-                format!("{:.3}", row.seconds),
-                format!("{:.1}", row.clouds_per_second),
-            ])?;
-        }
-        Ok(csv.into_inner()?)
+    /// A header and one line for each epoch. Numbers need no quotes.
+    fn to_csv(&self) -> String {
+        const HEADER: &str = "epoch,rate,loss,accuracy,validation_instance,validation_class,\
+                              seconds,clouds_per_second\n";
+        let line = |row: &Row| {
+            let Row { epoch, rate, loss, accuracy, seconds, clouds_per_second, .. } = row;
+            let [instance, class] = [row.validation_instance, row.validation_class]
+                .map(|share| share.map_or(String::new(), |share| share.to_string()));
+            format!(
+                "{epoch},{rate},{loss},{accuracy},{instance},{class},{seconds:.3},\
+                 {clouds_per_second:.1}\n"
+            )
+        };
+        self.rows.iter().map(line).fold(HEADER.to_owned(), |csv, line| csv + &line)
     }
 
     /// Accuracy by epoch: of training and of validation.

@@ -2,14 +2,66 @@
 
 use ndarray::ArrayView2;
 
-use crate::layer::{Folded, Linear, Module, PointLayer, PooledLayer, Rows, VectorLayer};
+use crate::layer::{HiddenLayer, LayerMut, Linear, Module, PooledLayer, Rows};
 use crate::matrix::Matrix;
-use crate::parameter::Parameter;
+
+/// Hidden layers, each of which takes the output of the one before it.
+#[derive(Clone, Debug)]
+struct Stack(Vec<HiddenLayer>);
+
+impl Stack {
+    /// The input of layer `i`, of which the first takes `x`.
+    fn input<'a>(&'a self, i: usize, x: ArrayView2<'a, f32>) -> ArrayView2<'a, f32> {
+        if i == 0 { x } else { self.0[i - 1].base.output() }
+    }
+
+    /// Takes `x` through all layers and returns the output of the last. `kept` is
+    /// the dropout mask of the last layer.
+    fn forward<'a>(
+        &'a mut self,
+        x: ArrayView2<'a, f32>,
+        rows: Rows<'_>,
+        mut kept: Option<Matrix>,
+        momentum: f32,
+    ) -> ArrayView2<'a, f32> {
+        let n = self.0.len();
+        for i in 0..n {
+            let (before, layer) = self.0.split_at_mut(i);
+            let x = before.last().map_or(x, |layer| layer.base.output());
+            layer[0].forward(x, rows, kept.take_if(|_| i + 1 == n), momentum);
+        }
+        self.input(n, x)
+    }
+
+    /// Takes the gradient of the output; returns that of `x`, if `wants_input`.
+    fn backward(
+        &mut self,
+        x: ArrayView2<'_, f32>,
+        mut dy: Matrix,
+        rows: Rows<'_>,
+        wants_input: bool,
+    ) -> Option<Matrix> {
+        for i in (0..self.0.len()).rev() {
+            let (before, layer) = self.0.split_at_mut(i);
+            let input = before.last().map_or(x, |layer| layer.base.output());
+            let dz = layer[0].backward(input, dy, rows);
+            if i == 0 && !wants_input {
+                return None;
+            }
+            dy = layer[0].base.linear.input_gradient(dz.view());
+        }
+        Some(dy)
+    }
+
+    fn layers(&mut self) -> impl Iterator<Item = LayerMut<'_>> {
+        self.0.iter_mut().map(|layer| layer.base.layer())
+    }
+}
 
 /// Point-wise layers, the last of which is pooled.
 #[derive(Clone, Debug)]
 pub struct SharedMlp {
-    hidden: Vec<PointLayer>,
+    hidden: Stack,
     /// The last layer.
     pub pooled: PooledLayer,
 }
@@ -17,28 +69,19 @@ pub struct SharedMlp {
 impl SharedMlp {
     /// `widths` with the inputs first. Layers are named from number `first`.
     pub fn new(prefix: &str, widths: &[usize], first: usize, relu: bool, seed: u64) -> Self {
-        let pairs: Vec<_> = widths.windows(2).map(|pair| (pair[0], pair[1])).collect();
-        let names = |i: usize| {
-            let number = first + i;
-            (format!("{prefix}conv{number}"), format!("{prefix}bn{number}"))
-        };
-        let last = pairs.len() - 1;
-        let hidden = pairs[..last].iter().enumerate().map(|(i, &size)| {
-            let (linear, norm) = names(i);
-            PointLayer::new(&linear, &norm, size, seed)
-        });
-        let (linear, norm) = names(last);
-        let pooled = PooledLayer::new(&linear, &norm, pairs[last], relu, seed);
-        Self { hidden: hidden.collect(), pooled }
+        let n = widths.len() - 1;
+        let size = |i: usize| (widths[i], widths[i + 1]);
+        let name = |part: &str, i: usize| format!("{prefix}{part}{}", first + i);
+        let hidden = |i| HiddenLayer::new(&name("conv", i), &name("bn", i), size(i), seed);
+        let (linear, norm) = (name("conv", n - 1), name("bn", n - 1));
+        Self {
+            hidden: Stack((0..n - 1).map(hidden).collect()),
+            pooled: PooledLayer::new(&linear, &norm, size(n - 1), relu, seed),
+        }
     }
 
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
-        for i in 0..self.hidden.len() {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let x = before.last().map_or(x.view(), |layer| layer.base.output());
-            layer[0].forward(x, rows, momentum);
-        }
-        let x = self.hidden.last().map_or(x, |layer| layer.base.output());
+        let x = self.hidden.forward(x, rows, None, momentum);
         self.pooled.forward(x, rows, momentum);
     }
 
@@ -50,50 +93,23 @@ impl SharedMlp {
         rows: Rows<'_>,
         wants_input: bool,
     ) -> Option<Matrix> {
-        let input = self.hidden.last().map_or(x.view(), |layer| layer.base.output());
-        let wanted = wants_input || !self.hidden.is_empty();
-        let mut dy = self.pooled.backward(dy, input, rows, wanted)?;
-        for i in (0..self.hidden.len()).rev() {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let input = before.last().map_or(x.view(), |layer| layer.base.output());
-            let dz = layer[0].backward(input, dy, rows);
-            if i == 0 && !wants_input {
-                return None;
-            }
-            dy = layer[0].input_gradient(&dz);
-        }
-        Some(dy)
-    }
-
-    /// The first layer whose last output is not finite.
-    pub fn not_finite(&self) -> Option<&str> {
-        let hidden = self.hidden.iter().find_map(|layer| layer.base.not_finite());
-        hidden.or_else(|| self.pooled.base.not_finite())
+        let n = self.hidden.0.len();
+        let input = self.hidden.input(n, x);
+        let dy = self.pooled.backward(dy, input, rows, wants_input || n > 0)?;
+        self.hidden.backward(x, dy, rows, wants_input)
     }
 }
 
 impl Module for SharedMlp {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.hidden.iter_mut().for_each(|layer| layer.base.parameters(visit));
-        self.pooled.base.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.hidden.iter_mut().for_each(|layer| layer.base.statistics(visit));
-        self.pooled.base.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.hidden.iter().for_each(|layer| layer.base.folded(visit));
-        self.pooled.base.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        self.hidden.layers().chain([self.pooled.base.layer()]).collect()
     }
 }
 
 /// Dense layers after a pooling.
 #[derive(Clone, Debug)]
 pub struct DenseHead {
-    /// All layers except the last.
-    pub hidden: Vec<VectorLayer>,
+    hidden: Stack,
     last: Linear,
 }
 
@@ -104,58 +120,38 @@ impl DenseHead {
         let n = widths.len() - 1;
         let hidden = widths.windows(2).take(n - 1).zip(1..).map(|(pair, i)| {
             let (linear, norm) = (format!("{prefix}fc{i}"), format!("{prefix}bn{}", n_points + i));
-            VectorLayer::new(&linear, &norm, (pair[0], pair[1]), seed)
+            HiddenLayer::new(&linear, &norm, (pair[0], pair[1]), seed)
         });
         let last = Linear::new(&format!("{prefix}fc{n}"), widths[n - 1], widths[n], seed);
-        Self { hidden: hidden.collect(), last }
+        Self { hidden: Stack(hidden.collect()), last }
     }
 
     /// `kept` is the dropout mask of the last layer but one.
     pub fn forward(
         &mut self,
         x: ArrayView2<'_, f32>,
-        mut kept: Option<Matrix>,
+        kept: Option<Matrix>,
         momentum: f32,
     ) -> Matrix {
-        let n = self.hidden.len();
-        for i in 0..n {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let x = before.last().map_or(x.view(), |layer| layer.base.output());
-            let kept = if i + 1 == n { kept.take() } else { None };
-            layer[0].forward(x, kept, momentum);
-        }
-        self.last.forward(self.hidden.last().map_or(x, |layer| layer.base.output()))
+        let ones = vec![1.0; x.nrows()];
+        self.last.forward(self.hidden.forward(x, Rows::new(&ones, &[]), kept, momentum))
     }
 
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) -> Matrix {
-        let input = self.hidden.last().map_or(x.view(), |layer| layer.base.output());
-        let mut dy = self.last.backward(input, dz);
-        for i in (0..self.hidden.len()).rev() {
-            let (before, layer) = self.hidden.split_at_mut(i);
-            let input = before.last().map_or(x.view(), |layer| layer.base.output());
-            dy = layer[0].backward(input, dy);
-        }
-        dy
+        let ones = vec![1.0; x.nrows()];
+        let dy = self.last.backward(self.hidden.input(self.hidden.0.len(), x), dz);
+        let dx = self.hidden.backward(x, dy, Rows::new(&ones, &[]), true);
+        dx.expect("invariant: it was asked for")
     }
 
-    /// The first layer whose last output is not finite.
-    pub fn not_finite(&self) -> Option<&str> {
-        self.hidden.iter().find_map(|layer| layer.base.not_finite())
+    /// How many features the last hidden layer has; none without such a layer.
+    pub fn hidden_width(&self) -> Option<usize> {
+        self.hidden.0.last().map(|layer| layer.base.output.ncols())
     }
 }
 
 impl Module for DenseHead {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.hidden.iter_mut().for_each(|layer| layer.base.parameters(visit));
-        self.last.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.hidden.iter_mut().for_each(|layer| layer.base.statistics(visit));
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.hidden.iter().for_each(|layer| layer.base.folded(visit));
-        self.last.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        self.hidden.layers().chain([self.last.layer()]).collect()
     }
 }

@@ -1,11 +1,10 @@
 //! A network, perhaps behind a Critical Points Layer.
 
 use crate::batch::Batch;
-use crate::layer::{Folded, Module};
+use crate::layer::{LayerMut, Module};
 use crate::loss::Loss;
 use crate::matrix::Matrix;
 use crate::network::{PointNet, Rates};
-use crate::parameter::Parameter;
 use crate::point_encoder::PointEncoder;
 
 /// A network, perhaps behind a point encoder.
@@ -30,34 +29,11 @@ impl Model {
         loss.total += encoder.backward(batch, &selection, dpoints.as_ref());
         loss
     }
-
-    /// The first layer whose last output was not finite.
-    #[must_use]
-    pub fn not_finite(&self) -> &str {
-        let encoder = self.encoder.as_ref().and_then(PointEncoder::not_finite);
-        encoder.unwrap_or_else(|| self.network.not_finite())
-    }
 }
 
 impl Module for Model {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        if let Some(encoder) = &mut self.encoder {
-            encoder.parameters(visit);
-        }
-        self.network.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        if let Some(encoder) = &mut self.encoder {
-            encoder.statistics(visit);
-        }
-        self.network.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        if let Some(encoder) = &self.encoder {
-            encoder.folded(visit);
-        }
-        self.network.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        let encoder = self.encoder.iter_mut().flat_map(Module::layers);
+        encoder.chain(self.network.layers()).collect()
     }
 }

@@ -15,14 +15,13 @@ use crate::point_encoder::TRAINING_ONLY;
 #[must_use]
 pub fn tensors(network: &mut dyn Module) -> BTreeMap<String, Tensor> {
     let mut tensors = BTreeMap::new();
-    network.parameters(&mut |parameter| {
+    for parameter in network.parameters() {
         let tensor = Tensor { shape: parameter.shape.clone(), values: parameter.value.clone() };
         tensors.insert(parameter.name.clone(), tensor);
-    });
-    network.statistics(&mut |name, values| {
-        let tensor = Tensor { shape: vec![values.len()], values: values.clone() };
-        tensors.insert(name.to_owned(), tensor);
-    });
+    }
+    for (name, values) in network.statistics() {
+        tensors.insert(name, Tensor { shape: vec![values.len()], values: values.clone() });
+    }
     tensors
 }
 
@@ -43,22 +42,31 @@ pub fn write(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<
 /// A file that is not a model, or a model of another shape.
 pub fn read(path: &Path, network: &mut dyn Module) -> Result<(), Error> {
     let mut file = WeightsFile::open(path)?;
-    let mut failed = None;
-    let mut take = |name: &str, into: &mut Vec<f32>| match file.read(name) {
-        Ok(tensor) if tensor.values.len() == into.len() => *into = tensor.values,
-        Ok(tensor) => {
-            let cause = format!("expected {} values, found shape {:?}", into.len(), tensor.shape);
-            failed = Some(FormatError::malformed(path, tensor_part(name), cause));
-        }
-        Err(error) => failed = Some(error),
-    };
-    network.parameters(&mut |parameter| {
+    for parameter in network.parameters() {
         if !parameter.name.starts_with(TRAINING_ONLY) {
-            take(&parameter.name, &mut parameter.value);
+            read_into(&mut file, &parameter.name, &mut parameter.value)?;
         }
-    });
-    network.statistics(&mut |name, values| take(name, values));
-    failed.map_or(Ok(()), |error| Err(error.into()))
+    }
+    let mut statistics = network.statistics().into_iter();
+    Ok(statistics.try_for_each(|(name, values)| read_into(&mut file, &name, values))?)
+}
+
+/// Sets `values` to the tensor `name` of `file`.
+///
+/// # Errors
+/// A tensor that is missing, cannot be read or has another number of elements.
+pub fn read_into(
+    file: &mut WeightsFile,
+    name: &str,
+    values: &mut Vec<f32>,
+) -> Result<(), FormatError> {
+    let tensor = file.read(name)?;
+    if tensor.values.len() != values.len() {
+        let cause = format!("expected {} values, found shape {:?}", values.len(), tensor.shape);
+        return Err(FormatError::malformed(file.path(), tensor_part(name), cause));
+    }
+    *values = tensor.values;
+    Ok(())
 }
 
 /// Writes `network` to `path` for release, atomically: in f16, with the batch
@@ -66,13 +74,14 @@ pub fn read(path: &Path, network: &mut dyn Module) -> Result<(), Error> {
 ///
 /// # Errors
 /// A weight that f16 cannot hold; what the system reports.
-pub fn ship(path: &Path, network: &dyn Module, card: &ModelCard) -> Result<(), Error> {
+pub fn ship(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<(), Error> {
     let mut tensors = BTreeMap::new();
-    network.folded(&mut |layer| {
+    for layer in network.folded() {
         let bias = Tensor { shape: vec![layer.bias.len()], values: layer.bias };
         let weight = Tensor { shape: layer.shape.to_vec(), values: layer.weight };
         tensors.insert(format!("{}.bias", layer.name), bias);
         tensors.insert(format!("{}.weight", layer.name), weight);
-    });
+    }
+    tensors.retain(|name, _| !name.starts_with(TRAINING_ONLY));
     Ok(write_half_weights(path, &tensors, &card.to_metadata())?)
 }

@@ -6,11 +6,10 @@
 use ndarray::{ArrayView2, Axis, s};
 
 use crate::batch::Batch;
-use crate::layer::{EdgeLayer, Folded, Module, PointLayer, orthogonality};
+use crate::layer::{EdgeLayer, HiddenLayer, LayerMut, Module, orthogonality};
 use crate::loss::{self, Loss};
 use crate::matrix::Matrix;
 use crate::mlp::{DenseHead, SharedMlp};
-use crate::parameter::Parameter;
 use crate::selector::{CriticalPointSelector, Selection};
 use crate::shape::Shape;
 use crate::t_net::TNet;
@@ -33,7 +32,7 @@ pub struct PointNet {
     /// Selects points by the coordinates' T-Net, if `cpl.shared` is set.
     selector: Option<CriticalPointSelector>,
     edges: Vec<EdgeLayer>,
-    stem: PointLayer,
+    stem: HiddenLayer,
     fstn: Option<TNet>,
     trunk: SharedMlp,
     head: DenseHead,
@@ -52,7 +51,7 @@ impl PointNet {
             .map(|(edge, number)| EdgeLayer::new(number, edge.radius, edge.channels, seed))
             .collect();
         let inputs = 3 + edges.iter().map(EdgeLayer::channels).sum::<usize>();
-        let stem = PointLayer::new("feat.conv1", "feat.bn1", (inputs, trunk[0]), seed);
+        let stem = HiddenLayer::new("feat.conv1", "feat.bn1", (inputs, trunk[0]), seed);
         let stn = input_transform.then(|| TNet::new("feat.stn.", 3, shape, seed));
         let fstn = feature_transform.then(|| TNet::new("feat.fstn.", trunk[0], shape, seed));
         let pooled = trunk[trunk.len() - 1];
@@ -94,18 +93,16 @@ impl PointNet {
         let selection = self.select(whole, rates);
         let batch = selection.as_ref().map_or(whole, |selection| &selection.batch);
         let (x, rows) = (batch.points(), batch.rows());
-        let transformed = match (&mut self.stn, &selection) {
-            (Some(stn), Some(_)) => Some(stn.transforms.forward(x.view(), rows)),
-            (Some(stn), None) => Some(stn.forward(x.view(), rows, momentum)),
-            (None, _) => None,
-        };
+        let transformed = self.stn.as_ref().map(|stn| stn.transforms.forward(x, rows));
         let transformed = transformed.as_ref().map_or(x.view(), |transformed| transformed.view());
         let with_edges = self.edge_features(batch, transformed, momentum);
         let entry = with_edges.as_ref().map_or(transformed, |with_edges| with_edges.view());
-        self.stem.forward(entry, rows, momentum);
+        self.stem.forward(entry, rows, None, momentum);
         let stem = self.stem.base.output().to_owned();
-        let transformed_stem =
-            self.fstn.as_mut().map(|fstn| fstn.forward(stem.view(), rows, momentum));
+        let transformed_stem = self.fstn.as_mut().map(|fstn| {
+            fstn.predict(stem.view(), rows, momentum);
+            fstn.transforms.forward(stem.view(), rows)
+        });
         let features =
             transformed_stem.as_ref().map_or(stem.view(), |transformed| transformed.view());
         self.trunk.forward(features.view(), rows, momentum);
@@ -120,15 +117,16 @@ impl PointNet {
             let (norm, own) = orthogonality(&fstn.transforms);
             loss.orthogonality = norm;
             loss.total += f64::from(rates.orthogonality) * norm;
-            let own = own * rates.orthogonality;
-            let dx = fstn.backward(stem.view(), &dstem, Some(own), rows, true);
-            dstem = dx.expect("invariant: it was asked for");
+            let (mut elements, through) = fstn.transforms.backward(stem.view(), dstem.view(), rows);
+            elements += &(own * rates.orthogonality);
+            let predicted = fstn.backward(stem.view(), &elements, rows, true);
+            dstem = through + predicted.expect("invariant: it was asked for");
         }
         let dz = self.stem.backward(entry, dstem, rows);
         if self.stn.is_none() && self.edges.is_empty() && !wants_points {
             return (loss, None);
         }
-        let dentry = self.stem.input_gradient(&dz);
+        let dentry = self.stem.base.linear.input_gradient(dz.view());
         let mut first = 3;
         for edge in &mut self.edges {
             let own = first..first + edge.channels();
@@ -137,22 +135,24 @@ impl PointNet {
         }
         let dtransformed = dentry.slice(s![.., ..3]).to_owned();
         let dpoints = match &mut self.stn {
-            Some(stn) if selection.is_some() => {
-                let (elements, _) = stn.transforms.backward(x, dtransformed.view(), rows);
-                stn.backward_prediction(whole.points(), &elements, whole.rows(), false)
+            Some(stn) => {
+                let (elements, through) = stn.transforms.backward(x, dtransformed.view(), rows);
+                // A selection, which sees all points, has no gradient of theirs.
+                let wanted = wants_points && selection.is_none();
+                let predicted = stn.backward(whole.points(), &elements, whole.rows(), wanted);
+                predicted.map(|predicted| through + predicted)
             }
-            Some(stn) => stn.backward(x, &dtransformed, None, rows, wants_points),
             None => Some(dtransformed),
         };
         (loss, dpoints.filter(|_| wants_points))
     }
 
-    /// The points of `whole` that the coordinates' T-Net selects, if it does. It
-    /// then has predicted its transforms.
+    /// Lets the coordinates' T-Net predict its transforms from all points; returns
+    /// those that it selects, if it does.
     fn select(&mut self, whole: &Batch, rates: Rates) -> Option<Selection> {
-        let (stn, selector) = (self.stn.as_mut()?, self.selector?);
+        let stn = self.stn.as_mut()?;
         stn.predict(whole.points(), whole.rows(), rates.momentum);
-        Some(selector.select(&stn.points.pooled, whole, rates.step))
+        Some(self.selector?.select(&stn.points.pooled, whole, rates.step))
     }
 
     /// The coordinates `[rows, 3]` followed by the EdgeConv features of each
@@ -172,65 +172,21 @@ impl PointNet {
         Some(ndarray::concatenate(Axis(1), &parts).expect("invariant: a row for each point"))
     }
 
-    /// The first layer whose last output was not finite; the last layer if all
-    /// were finite.
-    #[must_use]
-    pub fn not_finite(&self) -> &str {
-        let stn = self.stn.as_ref().and_then(TNet::not_finite);
-        let edges = || self.edges.iter().find_map(|edge| edge.pooled.base.not_finite());
-        stn.or_else(edges)
-            .or_else(|| self.stem.base.not_finite())
-            .or_else(|| self.fstn.as_ref().and_then(TNet::not_finite))
-            .or_else(|| self.trunk.not_finite())
-            .or_else(|| self.head.not_finite())
-            .unwrap_or("the last")
-    }
-
     /// The width of the dropout mask; none without a hidden layer after the
     /// trunk's pooling.
     #[must_use]
     pub fn dropout_width(&self) -> Option<usize> {
-        self.head.hidden.last().map(|layer| layer.base.output().ncols())
+        self.head.hidden_width()
     }
 }
 
 impl Module for PointNet {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        if let Some(stn) = &mut self.stn {
-            stn.parameters(visit);
-        }
-        self.edges.iter_mut().for_each(|edge| edge.parameters(visit));
-        self.stem.base.parameters(visit);
-        if let Some(fstn) = &mut self.fstn {
-            fstn.parameters(visit);
-        }
-        self.trunk.parameters(visit);
-        self.head.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        if let Some(stn) = &mut self.stn {
-            stn.statistics(visit);
-        }
-        self.edges.iter_mut().for_each(|edge| edge.statistics(visit));
-        self.stem.base.statistics(visit);
-        if let Some(fstn) = &mut self.fstn {
-            fstn.statistics(visit);
-        }
-        self.trunk.statistics(visit);
-        self.head.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        if let Some(stn) = &self.stn {
-            stn.folded(visit);
-        }
-        self.edges.iter().for_each(|edge| edge.folded(visit));
-        self.stem.base.folded(visit);
-        if let Some(fstn) = &self.fstn {
-            fstn.folded(visit);
-        }
-        self.trunk.folded(visit);
-        self.head.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        let Self { stn, edges, stem, fstn, trunk, head, .. } = self;
+        let stn = stn.iter_mut().flat_map(Module::layers);
+        let edges = edges.iter_mut().map(|edge| edge.pooled.base.layer());
+        let fstn = fstn.iter_mut().flat_map(Module::layers);
+        let points = stn.chain(edges).chain([stem.base.layer()]).chain(fstn);
+        points.chain(trunk.layers()).chain(head.layers()).collect()
     }
 }

@@ -11,12 +11,11 @@
 
 use crate::batch::Batch;
 use crate::cpl::Cpl;
-use crate::layer::{Folded, Linear, Module};
+use crate::layer::{LayerMut, Linear, Module};
 use crate::loss;
 use crate::matrix::Matrix;
 use crate::mlp::SharedMlp;
 use crate::network::Rates;
-use crate::parameter::Parameter;
 use crate::selector::{CriticalPointSelector, Selection};
 
 /// The prefix of the parameters that model files leave out.
@@ -78,25 +77,10 @@ impl PointEncoder {
     pub fn is_relaxed(&self) -> bool {
         self.selector.is_relaxed()
     }
-
-    /// The first layer whose last output is not finite.
-    #[must_use]
-    pub fn not_finite(&self) -> Option<&str> {
-        self.mlp.not_finite()
-    }
 }
 
 impl Module for PointEncoder {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.mlp.parameters(visit);
-        self.classes.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.mlp.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.mlp.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        self.mlp.layers().into_iter().chain([self.classes.layer()]).collect()
     }
 }

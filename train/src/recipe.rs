@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::adam::Adam;
 use crate::cpl::Cpl;
 use crate::error::Error;
-use crate::shape::Shape;
+use crate::shape::{Edge, Shape};
 
 /// How a network is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -213,98 +213,77 @@ impl Recipe {
     /// # Errors
     /// [`Error::Recipe`] with the key.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |key, cause: &str| Err(Error::Recipe { key, cause: cause.to_owned() });
+        const SHARE: &str = "expected 0 or more, and less than 1";
+        const FINITE: &str = "expected a finite number of 0 or more";
+        const WIDTHS: &str = "expected widths of 1 to 8192";
         let share = |x: f64| (0.0..1.0).contains(&x);
         let finite = |x: f64| x.is_finite() && x >= 0.0;
-        let Self { network, augment, .. } = self;
-        match self {
-            _ if self.epochs == 0 => refuse("epochs", "expected 1 or more"),
-            _ if self.batch < 2 => {
-                refuse("batch", "expected 2 or more clouds, for the batch norms")
-            }
-            _ if self.points == 0 => refuse("points", "expected 1 or more"),
-            _ if !share(self.validation) => {
-                refuse("validation", "expected 0 or more, and less than 1")
-            }
-            _ if !share(self.dropout) => refuse("dropout", "expected 0 or more, and less than 1"),
-            _ if !share(self.label_smoothing) => {
-                refuse("label_smoothing", "expected 0 or more, and less than 1")
-            }
-            _ if !finite(self.orthogonality) => {
-                refuse("orthogonality", "expected a finite number of 0 or more")
-            }
-            _ if !(self.adam.rate.is_finite() && self.adam.rate > 0.0) => {
-                refuse("adam.rate", "expected a finite number above 0")
-            }
-            _ if network.trunk.len() < 2 => refuse("network.trunk", "expected 2 layers or more"),
-            _ if network.t_net.len() < 2 => refuse("network.t_net", "expected 2 layers or more"),
-            _ if network.t_net_head.is_empty() => {
-                refuse("network.t_net_head", "expected 1 layer or more")
-            }
-            _ if network.head.is_empty() => refuse("network.head", "expected 1 layer or more"),
-            _ if network.widths().any(|width| width == 0 || width > WIDEST) => {
-                refuse("network", "expected widths of 1 to 8192")
-            }
-            _ if network
-                .edges
-                .iter()
-                .any(|edge| !(edge.radius.is_normal() && edge.radius > 0.0)) =>
-            {
-                refuse("network.edges.radius", "expected a finite number above 0")
-            }
-            _ if !network.edges.is_empty() && augment.cut_mix > 0.0 => refuse(
+        let width = |width: usize| (1..=WIDEST).contains(&width);
+        let Self { network, augment, adam, .. } = self;
+        let radius = |edge: &Edge| edge.radius.is_normal() && edge.radius > 0.0;
+        let mut checks = vec![
+            (self.epochs > 0, "epochs", "expected 1 or more"),
+            (self.batch > 1, "batch", "expected 2 or more clouds, for the batch norms"),
+            (self.points > 0, "points", "expected 1 or more"),
+            (share(self.validation), "validation", SHARE),
+            (share(self.dropout), "dropout", SHARE),
+            (share(self.label_smoothing), "label_smoothing", SHARE),
+            (finite(self.orthogonality), "orthogonality", FINITE),
+            (finite(adam.rate) && adam.rate > 0.0, "adam.rate", "expected a finite number above 0"),
+            (network.trunk.len() > 1, "network.trunk", "expected 2 layers or more"),
+            (network.t_net.len() > 1, "network.t_net", "expected 2 layers or more"),
+            (!network.t_net_head.is_empty(), "network.t_net_head", "expected 1 layer or more"),
+            (!network.head.is_empty(), "network.head", "expected 1 layer or more"),
+            (network.widths().all(width), "network", WIDTHS),
+            (
+                network.edges.iter().all(radius),
+                "network.edges.radius",
+                "expected a finite number above 0",
+            ),
+            (
+                network.edges.is_empty() || augment.cut_mix <= 0.0,
                 "augment.cut_mix",
                 "expected 0 with edges, because a mixed cloud has no neighborhood",
             ),
-            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.front.len() < 2) => {
-                refuse("cpl.front", "expected 2 layers or more")
-            }
-            _ if self.cpl.iter().flat_map(|cpl| &cpl.front).any(|w| *w == 0 || *w > WIDEST) => {
-                refuse("cpl.front", "expected widths of 1 to 8192")
-            }
-            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.keep == 0 || cpl.keep > self.points) => {
-                refuse("cpl.keep", "expected 1 to `points`")
-            }
-            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.shared) && !network.input_transform => {
-                refuse("cpl.shared", "expected `network.input_transform`, whose T-Net is shared")
-            }
-            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.gumbel && cpl.shared) => {
-                refuse("cpl.gumbel", "expected false with `cpl.shared`")
-            }
-            _ if self.cpl.as_ref().is_some_and(|cpl| cpl.gumbel && cpl.resize != "truncate") => {
-                refuse(
+        ];
+        if let Some(cpl) = &self.cpl {
+            checks.extend([
+                (cpl.front.len() > 1, "cpl.front", "expected 2 layers or more"),
+                (cpl.front.iter().copied().all(width), "cpl.front", WIDTHS),
+                ((1..=self.points).contains(&cpl.keep), "cpl.keep", "expected 1 to `points`"),
+                (
+                    !cpl.shared || network.input_transform,
+                    "cpl.shared",
+                    "expected `network.input_transform`, whose T-Net is shared",
+                ),
+                (!(cpl.gumbel && cpl.shared), "cpl.gumbel", "expected false with `cpl.shared`"),
+                (
+                    !cpl.gumbel || cpl.resize == "truncate",
                     "cpl.gumbel",
                     "expected `cpl.resize` to be truncate, because each point is drawn once",
-                )
-            }
-            _ if self.cpl.as_ref().is_some_and(|cpl| !finite(cpl.weight)) => {
-                refuse("cpl.weight", "expected a finite number of 0 or more")
-            }
-            _ if !(share(augment.drop)) => {
-                refuse("augment.drop", "expected 0 or more, and less than 1")
-            }
-            _ if !augment.scale.iter().all(|x| x.is_finite() && *x > 0.0) => {
-                refuse("augment.scale", "expected two finite factors above 0")
-            }
-            _ if !finite(augment.shift) => {
-                refuse("augment.shift", "expected a finite number of 0 or more")
-            }
-            _ if !finite(augment.jitter) => {
-                refuse("augment.jitter", "expected a finite number of 0 or more")
-            }
-            _ if !finite(augment.sensor_noise) => {
-                refuse("augment.sensor_noise", "expected a finite number of 0 or more")
-            }
-            _ if !share(augment.stretch) => {
-                refuse("augment.stretch", "expected 0 or more, and less than 1")
-            }
-            _ if !(0.0..=1.0).contains(&augment.cut_mix) => {
-                refuse("augment.cut_mix", "expected 0 to 1")
-            }
-            _ if !(0.0..=180.0).contains(&augment.rotate_degrees) => {
-                refuse("augment.rotate_degrees", "expected 0 to 180")
-            }
-            _ => Ok(()),
+                ),
+                (finite(cpl.weight), "cpl.weight", FINITE),
+            ]);
+        }
+        let positive = |x: &f64| x.is_finite() && *x > 0.0;
+        let angle = augment.rotate_degrees;
+        checks.extend([
+            (share(augment.drop), "augment.drop", SHARE),
+            (
+                augment.scale.iter().all(positive),
+                "augment.scale",
+                "expected two finite factors above 0",
+            ),
+            (finite(augment.shift), "augment.shift", FINITE),
+            (finite(augment.jitter), "augment.jitter", FINITE),
+            (finite(augment.sensor_noise), "augment.sensor_noise", FINITE),
+            (share(augment.stretch), "augment.stretch", SHARE),
+            ((0.0..=1.0).contains(&augment.cut_mix), "augment.cut_mix", "expected 0 to 1"),
+            ((0.0..=180.0).contains(&angle), "augment.rotate_degrees", "expected 0 to 180"),
+        ]);
+        match checks.into_iter().find(|(holds, ..)| !holds) {
+            Some((_, key, cause)) => Err(Error::Recipe { key, cause: cause.to_owned() }),
+            None => Ok(()),
         }
     }
 }

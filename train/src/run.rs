@@ -146,12 +146,13 @@ impl Run {
     /// Learns for one epoch, with a progress bar on standard error.
     fn learn(&mut self, clouds: &Clouds) -> Result<EpochSummary, Error> {
         let (epoch, epochs) = (self.trainer.epoch + 1, self.trainer.recipe.epochs);
+        let batch = self.trainer.recipe.batch;
         let bar = ProgressBar::new(batches::count(clouds.len(), &self.trainer.recipe) as u64);
         let template = "epoch {prefix} {bar:30} {pos}/{len} {msg} {eta} left";
         bar.set_style(ProgressStyle::with_template(template).expect("invariant: a valid template"));
         bar.set_prefix(format!("{epoch}/{epochs}"));
         let learnt = self.trainer.learn(clouds, |progress| {
-            bar.set_position(progress.step as u64);
+            bar.set_position((progress.clouds / batch) as u64);
             let accuracy = 100.0 * progress.accuracy;
             bar.set_message(format!("loss {:.3}, {accuracy:.1} %", progress.loss));
         })?;
@@ -206,11 +207,12 @@ impl Run {
     ) -> Result<Option<String>, Error> {
         model_file::read(&self.folder.join("best.safetensors"), &mut self.trainer.model)?;
         let shipped = self.folder.join("shipped.safetensors");
-        model_file::ship(&shipped, &self.trainer.model, &self.card(None))?;
+        let card = self.card(None);
+        model_file::ship(&shipped, &mut self.trainer.model, &card)?;
         let accuracy = test.map(|path| self.test(&shipped, path, job.data)).transpose()?;
         let activation_ranges = infer_cpu::activation_ranges_of_set(&shipped, &clouds.set)?;
         let card = ModelCard { activation_ranges, ..self.card(accuracy.clone()) };
-        model_file::ship(&shipped, &self.trainer.model, &card)?;
+        model_file::ship(&shipped, &mut self.trainer.model, &card)?;
         // A kill before this line leaves files in the run's folder alone, which
         // the next run sweeps.
         fs::rename(&shipped, job.out).map_err(|source| FormatError::io(job.out, source))?;

@@ -121,7 +121,6 @@ fn within(winners: &[u32], first: u32) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layer::Rows;
 
     #[test]
     fn a_cloud_without_critical_points_keeps_one_of_its_own() {
@@ -131,8 +130,7 @@ mod tests {
         let coordinates = vec![[0.1, 0.2, 0.3], [0.5, 0.1, 0.0], [0.9, 0.8, 0.7], [0.2, 0.9, 0.4]];
         let batch =
             Batch { coordinates, weights: vec![1.0; 4], starts: vec![0, 2, 4], ..Batch::default() };
-        let rows = Rows { weights: &batch.weights, starts: &batch.starts, total: 4.0 };
-        pooled.forward(batch.points(), rows, 0.1);
+        pooled.forward(batch.points(), batch.rows(), 0.1);
         let chosen =
             CriticalPointSelector::new(&Cpl::default(), 0).unwrap().select(&pooled, &batch, 0);
         assert_eq!(chosen.rows, [0, 2]);

@@ -2,10 +2,9 @@
 
 use ndarray::ArrayView2;
 
-use crate::layer::{Folded, Module, Rows, Transforms};
+use crate::layer::{LayerMut, Module, Rows, Transforms};
 use crate::matrix::Matrix;
 use crate::mlp::{DenseHead, SharedMlp};
-use crate::parameter::Parameter;
 use crate::shape::Shape;
 
 /// A T-Net in training.
@@ -30,40 +29,16 @@ impl TNet {
         }
     }
 
-    /// Predicts the transforms and returns the transformed rows.
-    pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) -> Matrix {
-        self.predict(x.view(), rows, momentum);
-        self.transforms.forward(x, rows)
-    }
-
-    /// Predicts the transforms without applying them.
+    /// Predicts the transforms.
     pub fn predict(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
-        self.points.forward(x.view(), rows, momentum);
+        self.points.forward(x, rows, momentum);
         let elements = self.head.forward(self.points.pooled.base.output(), None, momentum);
         self.transforms = Transforms::around_identity(elements, self.transforms.k);
     }
 
-    /// Takes the gradients of the transformed rows and, as `own`, of the
-    /// transforms; returns that of `x`, if `wants_input`.
-    pub fn backward(
-        &mut self,
-        x: ArrayView2<'_, f32>,
-        dy: &Matrix,
-        own: Option<Matrix>,
-        rows: Rows<'_>,
-        wants_input: bool,
-    ) -> Option<Matrix> {
-        let (mut elements, through) = self.transforms.backward(x.view(), dy.view(), rows);
-        if let Some(own) = own {
-            elements += &own;
-        }
-        let predicted = self.backward_prediction(x, &elements, rows, wants_input)?;
-        Some(through + predicted)
-    }
-
     /// Takes the gradient of the transforms' elements; returns the part of the
     /// gradient of `x` that flows through the prediction, if `wants_input`.
-    pub fn backward_prediction(
+    pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
         elements: &Matrix,
@@ -74,26 +49,10 @@ impl TNet {
         let dy = self.head.backward(pooled.view(), elements.view());
         self.points.backward(x, dy, rows, wants_input)
     }
-
-    /// The first layer whose last output is not finite.
-    pub fn not_finite(&self) -> Option<&str> {
-        self.points.not_finite().or_else(|| self.head.not_finite())
-    }
 }
 
 impl Module for TNet {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.points.parameters(visit);
-        self.head.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.points.statistics(visit);
-        self.head.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.points.folded(visit);
-        self.head.folded(visit);
+    fn layers(&mut self) -> Vec<LayerMut<'_>> {
+        self.points.layers().into_iter().chain(self.head.layers()).collect()
     }
 }

@@ -7,6 +7,7 @@ use formats::rng::StreamKey;
 use crate::batches;
 use crate::clouds::Clouds;
 use crate::error::Error;
+use crate::layer::Module;
 use crate::matrix::Matrix;
 use crate::model::Model;
 use crate::network::{PointNet, Rates};
@@ -30,7 +31,7 @@ pub struct Trainer {
     pub epoch: u32,
 }
 
-/// The result of an epoch.
+/// The result of an epoch, or of its steps so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EpochSummary {
     /// Mean loss of its batches.
@@ -41,19 +42,6 @@ pub struct EpochSummary {
     pub clouds: usize,
     /// Wall-clock time.
     pub time: Duration,
-}
-
-/// The progress of an epoch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
-    /// Steps taken in this epoch.
-    pub step: usize,
-    /// Steps of the whole epoch.
-    pub steps: usize,
-    /// Mean loss so far.
-    pub loss: f64,
-    /// Share classified correctly so far.
-    pub accuracy: f64,
 }
 
 impl Trainer {
@@ -77,18 +65,19 @@ impl Trainer {
     }
 
     /// Learns from every cloud once, except those of an incomplete last batch.
+    /// `report` is called after each step.
     ///
     /// # Errors
     /// [`Error::NotFinite`].
     pub fn learn(
         &mut self,
         clouds: &Clouds,
-        mut report: impl FnMut(Progress),
+        mut report: impl FnMut(&EpochSummary),
     ) -> Result<EpochSummary, Error> {
         let begun = Instant::now();
         let recipe = self.recipe.clone();
         let steps = batches::count(clouds.len(), &recipe);
-        let (mut loss, mut correct) = (0.0, 0);
+        let (mut loss, mut correct, mut summary) = (0.0, 0, EpochSummary::default());
         std::thread::scope(|scope| {
             let batches = batches::start(scope, clouds, &recipe, self.epoch);
             for (batch, step) in batches.iter().zip(1..) {
@@ -105,20 +94,19 @@ impl Trainer {
                 recipe.adam.step(&mut self.model, self.step, recipe.adam.rate * factor);
                 loss += cost.total;
                 correct += cost.correct;
-                let n = step as f64;
-                let accuracy = correct as f64 / (n * recipe.batch as f64);
-                report(Progress { step, steps, loss: loss / n, accuracy });
+                let clouds = step * recipe.batch;
+                summary = EpochSummary {
+                    loss: loss / step as f64,
+                    accuracy: correct as f64 / clouds as f64,
+                    clouds,
+                    time: begun.elapsed(),
+                };
+                report(&summary);
             }
             Ok(())
         })?;
         self.epoch += 1;
-        let clouds = steps * recipe.batch;
-        Ok(EpochSummary {
-            loss: loss / steps as f64,
-            accuracy: correct as f64 / clouds as f64,
-            clouds,
-            time: begun.elapsed(),
-        })
+        Ok(summary)
     }
 
     /// The dropout mask of the last hidden features for the next step.
@@ -138,8 +126,8 @@ impl Trainer {
         }))
     }
 
-    fn not_finite(&self, loss: f64, step: u64) -> Error {
-        let layer = self.model.not_finite().to_owned();
+    fn not_finite(&mut self, loss: f64, step: u64) -> Error {
+        let layer = self.model.not_finite().unwrap_or("the last").to_owned();
         Error::NotFinite { loss, step, epoch: self.epoch + 1, layer }
     }
 }

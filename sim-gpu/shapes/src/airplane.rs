@@ -5,11 +5,10 @@ mod fuselage;
 mod jet;
 mod wing;
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
-use super::builder::Builder;
-use super::class::Make;
-use super::sampler::Sampler;
+use crate::class::Make;
+use crate::primitives::{Builder, Sampler};
 use details::{gear, jet_engine, propeller, struts};
 use fuselage::Fuselage;
 use jet::{delta, fighter};
@@ -219,7 +218,7 @@ fn flying_wing(b: &mut Builder, s: &mut Sampler) {
         upsweep: 0.0,
     };
     let middle = wing.root + 0.5 * wing.root_chord_m * DVec3::Y;
-    b.place(DAffine3::from_translation(middle), |b| body.build(b));
+    b.shifted(middle, |b| body.build(b));
     let hump = wing.leading_edge(0.16) + DVec3::new(0.0, 0.1, 0.04) * half_span_m;
     b.mirrored(|b| details::nacelle(b, hump, 0.04 * half_span_m, 0.35 * half_span_m));
     if s.chance(0.4) {

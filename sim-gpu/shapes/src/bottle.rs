@@ -2,31 +2,9 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::builder::Builder;
-use super::primitives::block::block;
-use super::primitives::revolve::{Profile, Section, cylinder, frustum};
-use super::primitives::spline::smooth;
-use super::primitives::sweep::tube;
-use super::primitives::vessel::{Vessel, Wall};
-use super::sampler::Sampler;
-
-/// The outline of a bottle's side.
-#[derive(Clone, Copy)]
-enum Side {
-    Straight,
-    Waisted,
-    Ribbed,
-    Bellied,
-    Tapered,
-}
-
-/// The outline between side and neck.
-#[derive(Clone, Copy)]
-enum Shoulder {
-    Round,
-    Sloping,
-    Straight,
-}
+use crate::primitives::{
+    Builder, Profile, Sampler, Section, Vessel, Wall, block, cylinder, frustum, smooth_tube,
+};
 
 /// Radii and heights of a bottle.
 struct Form {
@@ -70,11 +48,10 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
 }
 
 fn section(s: &mut Sampler) -> Section {
-    let round = Section::Round;
     let oval = Section::Oval(s.uniform(0.4, 0.8));
     let square = Section::Square(s.uniform(3.0, 8.0));
     let polygon = Section::Polygon(s.pick(&[6, 8]));
-    s.pick(&[round, round, round, round, round, round, oval, square, square, polygon])
+    s.weighted(&[(6, Section::Round), (1, oval), (2, square), (1, polygon)])
 }
 
 fn outside(s: &mut Sampler, f: &Form) -> Profile {
@@ -85,36 +62,23 @@ fn outside(s: &mut Sampler, f: &Form) -> Profile {
         profile = Profile::from(0.0, 0.3 * f.body_m).curve(&[(0.5 * f.body_m, 0.15 * f.body_m)]);
     }
     profile = profile.line(f.body_m - edge_m, 0.0).line(f.body_m, edge_m);
-    let side_m = f.shoulder_at_m - edge_m;
-    let side = s.pick(&[
-        Side::Straight,
-        Side::Straight,
-        Side::Waisted,
-        Side::Ribbed,
-        Side::Bellied,
-        Side::Tapered,
-    ]);
-    profile = match side {
-        Side::Waisted => profile.curve(&[
-            (f.body_m, edge_m + 0.2 * side_m),
-            (waist * f.body_m, edge_m + 0.5 * side_m),
-            (f.body_m, f.shoulder_at_m),
-        ]),
-        Side::Ribbed => ribs(profile, f, edge_m, side_m),
-        Side::Bellied => profile.curve(&[
-            (1.2 * f.body_m, edge_m + 0.35 * side_m),
-            (1.15 * f.body_m, edge_m + 0.7 * side_m),
-            (f.body_m, f.shoulder_at_m),
-        ]),
-        Side::Tapered => profile.line(waist * f.body_m, f.shoulder_at_m),
-        Side::Straight => profile.line(f.body_m, f.shoulder_at_m),
-    };
+    let at = |share: f64| edge_m + share * (f.shoulder_at_m - edge_m);
+    let top = (f.body_m, f.shoulder_at_m);
+    let straight = profile.clone().line(f.body_m, f.shoulder_at_m);
+    let waisted = profile.clone().curve(&[(f.body_m, at(0.2)), (waist * f.body_m, at(0.5)), top]);
+    let bellied =
+        profile.clone().curve(&[(1.2 * f.body_m, at(0.35)), (1.15 * f.body_m, at(0.7)), top]);
+    let tapered = profile.clone().line(waist * f.body_m, f.shoulder_at_m);
+    let ribbed = ribs(profile, f, at);
+    let profile =
+        s.weighted(&[(2, straight), (1, waisted), (1, ribbed), (1, bellied), (1, tapered)]);
     shoulder(s, profile, f)
 }
 
-fn ribs(mut profile: Profile, f: &Form, edge_m: f64, side_m: f64) -> Profile {
+/// A side with four ribs; `at` gives the height at a share of the side.
+fn ribs(mut profile: Profile, f: &Form, at: impl Fn(f64) -> f64) -> Profile {
     for rib in 0..4 {
-        let at = |share: f64| edge_m + (rib as f64 + share) / 4.0 * side_m;
+        let at = |share: f64| at((rib as f64 + share) / 4.0);
         profile = profile
             .line(f.body_m, at(0.7))
             .line(0.94 * f.body_m, at(0.8))
@@ -128,19 +92,11 @@ fn ribs(mut profile: Profile, f: &Form, edge_m: f64, side_m: f64) -> Profile {
 fn shoulder(s: &mut Sampler, profile: Profile, f: &Form) -> Profile {
     let between = |share: f64| f.shoulder_at_m + share * (f.neck_at_m - f.shoulder_at_m);
     let radius = |share: f64| f.neck_m + share * (f.body_m - f.neck_m);
-    let profile = match s.pick(&[Shoulder::Round, Shoulder::Sloping, Shoulder::Straight]) {
-        Shoulder::Round => profile.curve(&[
-            (radius(0.9), between(0.35)),
-            (radius(0.5), between(0.75)),
-            (f.neck_m, f.neck_at_m),
-        ]),
-        Shoulder::Sloping => profile.curve(&[
-            (radius(0.6), between(0.4)),
-            (radius(0.2), between(0.75)),
-            (f.neck_m, f.neck_at_m),
-        ]),
-        Shoulder::Straight => profile.line(f.neck_m, f.neck_at_m),
-    };
+    let neck = (f.neck_m, f.neck_at_m);
+    let round = [(radius(0.9), between(0.35)), (radius(0.5), between(0.75)), neck];
+    let sloping = [(radius(0.6), between(0.4)), (radius(0.2), between(0.75)), neck];
+    let [round, sloping] = [round, sloping].map(|through| profile.clone().curve(&through));
+    let profile = s.pick(&[round, sloping, profile.line(f.neck_m, f.neck_at_m)]);
     let lip_m = 0.06 * f.height_m;
     let profile = profile.line(0.96 * f.neck_m, f.height_m - lip_m);
     if s.chance(0.6) {
@@ -173,8 +129,7 @@ fn pump(b: &mut Builder, s: &mut Sampler, f: &Form) {
     cylinder(b, f.height_m * DVec3::Z, thin_m, top_m - f.height_m);
     let points = [(0.4 * thin_m, 0.0), (-0.6 * reach_m, 0.01), (-reach_m, -0.05)];
     let points = points.map(|(y, z)| DVec3::new(0.0, y, top_m + z * f.height_m));
-    let path = smooth(b, &points, 2);
-    tube(b, &path, 1.3 * thin_m);
+    smooth_tube(b, &points, 2, 1.3 * thin_m);
 }
 
 /// A spray head with a nozzle and a trigger.
@@ -186,8 +141,7 @@ fn trigger(b: &mut Builder, s: &mut Sampler, f: &Form) {
     block(b, DVec3::new(0.0, -0.3 * size_m, z), head);
     let lever = [(-0.7, -0.1), (-0.8, -0.6), (-1.05, -1.0)];
     let lever = lever.map(|(y, dz)| DVec3::new(0.0, y * size_m, z + dz * size_m));
-    let path = smooth(b, &lever, 2);
-    tube(b, &path, 0.1 * size_m);
+    smooth_tube(b, &lever, 2, 0.1 * size_m);
     let nozzle = DAffine3::from_translation(DVec3::new(0.0, -1.1 * size_m, z))
         * DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
     b.place(nozzle, |b| cylinder(b, DVec3::ZERO, 0.15 * size_m, 0.25 * size_m));
@@ -204,6 +158,5 @@ fn handle(b: &mut Builder, s: &mut Sampler, f: &Form) {
         (reach_m, 0.5 * (high_m + low_m)),
         (0.92 * f.body_m, low_m),
     ];
-    let path = smooth(b, &points.map(|(x, z)| DVec3::new(x, 0.0, z)), 3);
-    tube(b, &path, 0.12 * f.body_m);
+    smooth_tube(b, &points.map(|(x, z)| DVec3::new(x, 0.0, z)), 3, 0.12 * f.body_m);
 }

@@ -2,21 +2,7 @@
 
 use glam::DVec3;
 
-use super::builder::Builder;
-use super::primitives::revolve::{Profile, Section};
-use super::primitives::spline::smooth;
-use super::primitives::sweep::tube;
-use super::primitives::vessel::{Vessel, Wall};
-use super::sampler::Sampler;
-
-/// The outline of a bowl.
-#[derive(Clone, Copy)]
-enum Kind {
-    Round,
-    Conical,
-    Flared,
-    Closing,
-}
+use crate::primitives::{Builder, Profile, Sampler, Section, Vessel, Wall, smooth, tube};
 
 /// Builds a bowl; deep ones have a cup's or a vase's proportions.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
@@ -34,26 +20,17 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
 }
 
 fn section(s: &mut Sampler) -> Section {
-    let round = Section::Round;
     let oval = Section::Oval(s.uniform(0.55, 0.9));
     let square = Section::Square(s.uniform(3.0, 7.0));
     let polygon = Section::Polygon(s.count(6, 10));
     let fluted = Section::Fluted { count: s.count(8, 20), depth: s.uniform(0.02, 0.06) };
-    s.pick(&[round, round, round, round, round, round, oval, square, polygon, fluted])
+    s.weighted(&[(6, Section::Round), (1, oval), (1, square), (1, polygon), (1, fluted)])
 }
 
 /// The outside, from radii at the rim and the foot, and the heights of the
 /// rim and of the ring it stands on.
 fn outside(s: &mut Sampler, [rim_m, foot_m]: [f64; 2], [height_m, ring_m]: [f64; 2]) -> Profile {
     let ring_foot_m = foot_m * s.uniform(0.9, 1.3);
-    let kind = s.pick(&[
-        Kind::Round,
-        Kind::Round,
-        Kind::Round,
-        Kind::Conical,
-        Kind::Flared,
-        Kind::Closing,
-    ]);
     let depth_m = height_m - ring_m;
     let at = |share: f64| ring_m + share * depth_m;
     let mut profile = Profile::from(0.0, 0.0);
@@ -62,27 +39,22 @@ fn outside(s: &mut Sampler, [rim_m, foot_m]: [f64; 2], [height_m, ring_m]: [f64;
     }
     let profile = profile.line(foot_m, ring_m);
     let between = |share: f64| foot_m + share * (rim_m - foot_m);
-    match kind {
-        Kind::Conical => profile.line(rim_m, height_m),
-        Kind::Flared => {
-            profile.curve(&[(between(0.45), at(0.25)), (between(0.6), at(0.75)), (rim_m, height_m)])
-        }
-        Kind::Closing => {
-            let profile = profile.curve(&[
-                (between(0.75), at(0.25)),
-                (rim_m, at(0.6)),
-                (0.85 * rim_m, height_m),
-            ]);
-            if s.chance(0.4) { profile.line(0.95 * rim_m, 1.03 * height_m) } else { profile }
-        }
-        Kind::Round => {
-            let profile = profile.curve(&[
-                (between(0.55), at(0.17)),
-                (between(0.87), at(0.52)),
-                (rim_m, height_m),
-            ]);
-            if s.chance(0.3) { profile.line(1.15 * rim_m, 1.01 * height_m) } else { profile }
-        }
+    let rim = (rim_m, height_m);
+    let curve = |through: [(f64, f64); 3]| profile.clone().curve(&through);
+    let round = curve([(between(0.55), at(0.17)), (between(0.87), at(0.52)), rim]);
+    let flared = curve([(between(0.45), at(0.25)), (between(0.6), at(0.75)), rim]);
+    let closing = curve([(between(0.75), at(0.25)), (rim_m, at(0.6)), (0.85 * rim_m, height_m)]);
+    let conical = profile.line(rim_m, height_m);
+    // The chance of a lip, and where it ends over the rim's radius and height.
+    let (profile, lip) = s.weighted(&[
+        (3, (round, Some((0.3, 1.15, 1.01)))),
+        (1, (conical, None)),
+        (1, (flared, None)),
+        (1, (closing, Some((0.4, 0.95, 1.03)))),
+    ]);
+    match lip {
+        Some((chance, out, up)) if s.chance(chance) => profile.line(out * rim_m, up * height_m),
+        _ => profile,
     }
 }
 

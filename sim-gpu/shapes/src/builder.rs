@@ -53,6 +53,11 @@ impl Builder {
         self.placement = outer;
     }
 
+    /// Runs `build` in a frame whose origin is at `origin`.
+    pub fn shifted(&mut self, origin: DVec3, build: impl FnOnce(&mut Self)) {
+        self.place(DAffine3::from_translation(origin), build);
+    }
+
     /// Runs `build` as it is and once more mirrored at the plane x = 0.
     pub fn mirrored(&mut self, build: impl Fn(&mut Self)) {
         build(self);
@@ -92,6 +97,14 @@ impl Builder {
             }
             below = Some((start, len));
         }
+    }
+
+    /// Adds the surface `at(u, v)`, u and v in 0..=1, in `n_u` by `n_v` segments.
+    pub fn surface(&mut self, [n_u, n_v]: [usize; 2], at: impl Fn(f64, f64) -> DVec3) {
+        let share = |k: usize, n: usize| k as f64 / n as f64;
+        let row = |j| (0..=n_u).map(|i| at(share(i, n_u), share(j, n_v))).collect();
+        let rows: Vec<Vec<DVec3>> = (0..=n_v).map(row).collect();
+        self.grid(&rows, false);
     }
 
     /// Joins two rows, each given as (first vertex, length).

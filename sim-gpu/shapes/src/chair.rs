@@ -5,13 +5,9 @@ mod base;
 
 use glam::{DVec2, DVec3};
 
-use super::builder::Builder;
-use super::primitives::block::{block_between, cushion};
-use super::primitives::loft::prism;
-use super::primitives::outline;
-use super::primitives::spline::smooth;
-use super::primitives::sweep::{bar, rod, tube};
-use super::sampler::Sampler;
+use crate::primitives::{
+    Builder, Sampler, bar, block_between, cushion, outline, prism, rod, smooth, tube,
+};
 
 /// The seat, which everything else is fitted to. The chair faces -y.
 struct Seat {
@@ -44,20 +40,13 @@ enum Arms {
 
 impl Seat {
     fn draw(s: &mut Sampler) -> Self {
+        use Shape::{Board, Cushion, Round, Rounded};
         let width_m = s.uniform(0.36, 0.58);
         let depth_m = width_m * s.uniform(0.82, 1.15);
         let tall = s.chance(0.12);
         let top_m = if tall { s.uniform(0.6, 0.8) } else { s.uniform(0.34, 0.52) };
-        let shape = s.pick(&[
-            Shape::Board,
-            Shape::Board,
-            Shape::Rounded,
-            Shape::Cushion,
-            Shape::Cushion,
-            Shape::Round,
-        ]);
-        let thick_m =
-            if shape == Shape::Cushion { s.uniform(0.06, 0.14) } else { s.uniform(0.015, 0.05) };
+        let shape = s.pick(&[Board, Board, Rounded, Cushion, Cushion, Round]);
+        let thick_m = if shape == Cushion { s.uniform(0.06, 0.14) } else { s.uniform(0.015, 0.05) };
         Self { half: DVec2::new(width_m, depth_m) / 2.0, top_m, thick_m, shape }
     }
 
@@ -158,23 +147,17 @@ fn club_chair(b: &mut Builder, s: &mut Sampler) {
     let back_top_m = arm_top_m + s.uniform(0.0, 0.4);
     let soft_m = s.uniform(0.015, 0.06);
     let half_m = inner_m + arm_m;
-    let soft = |b: &mut Builder, low: DVec3, high: DVec3| {
+    let soft = |b: &mut Builder, low: [f64; 3], high: [f64; 3]| {
+        let [low, high] = [low, high].map(DVec3::from);
         cushion(b, (low + high) / 2.0, high - low, soft_m);
     };
     let base_top_m = seat_m - 0.12;
-    block_between(
-        b,
-        DVec3::new(-half_m, -0.95 * deep_m, feet_m),
-        DVec3::new(half_m, 0.95 * deep_m, base_top_m),
-    );
-    soft(b, DVec3::new(-inner_m, -deep_m, base_top_m), DVec3::new(inner_m, 0.6 * deep_m, seat_m));
-    soft(
-        b,
-        DVec3::new(-half_m, 0.55 * deep_m, feet_m),
-        DVec3::new(half_m, deep_m + 0.06, back_top_m),
-    );
+    let base = DVec3::new(half_m, 0.95 * deep_m, base_top_m);
+    block_between(b, DVec3::new(-base.x, -base.y, feet_m), base);
+    soft(b, [-inner_m, -deep_m, base_top_m], [inner_m, 0.6 * deep_m, seat_m]);
+    soft(b, [-half_m, 0.55 * deep_m, feet_m], [half_m, deep_m + 0.06, back_top_m]);
     b.mirrored(|b| {
-        soft(b, DVec3::new(inner_m, -deep_m, feet_m), DVec3::new(half_m, deep_m, arm_top_m));
+        soft(b, [inner_m, -deep_m, feet_m], [half_m, deep_m, arm_top_m]);
         for y in [-0.8 * deep_m, 0.8 * deep_m] {
             let x = half_m - 0.06;
             rod(b, DVec3::new(x, y, 0.0), DVec3::new(x, y, feet_m + 0.02), [0.015, 0.025]);

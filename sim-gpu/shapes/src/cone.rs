@@ -4,13 +4,10 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::builder::Builder;
-use super::class::Make;
-use super::primitives::loft::prism;
-use super::primitives::outline;
-use super::primitives::revolve::{Profile, Section, ellipsoid, revolve};
-use super::primitives::vessel::{Vessel, Wall};
-use super::sampler::Sampler;
+use crate::class::Make;
+use crate::primitives::{
+    Builder, Profile, Sampler, Section, Vessel, Wall, ellipsoid, outline, prism,
+};
 
 /// The makes, some of them more frequent.
 const MAKES: [Make; 8] =
@@ -28,7 +25,7 @@ fn plain(b: &mut Builder, s: &mut Sampler) {
     let height_m = base_m * s.log_uniform(0.6, 5.0);
     let tip_m = if s.chance(0.4) { base_m * s.uniform(0.1, 0.6) } else { 0.0 };
     let polygon = Section::Polygon(s.pick(&[4, 6, 8, 12]));
-    let section = s.pick(&[Section::Round, Section::Round, Section::Round, polygon]);
+    let section = s.weighted(&[(3, Section::Round), (1, polygon)]);
     let closed_below = s.chance(0.6);
     let closed_above = tip_m == 0.0 || s.chance(0.5);
     let mut profile = Profile::from(if closed_below { 0.0 } else { base_m }, 0.0);
@@ -39,19 +36,9 @@ fn plain(b: &mut Builder, s: &mut Sampler) {
     if closed_above && tip_m > 0.0 {
         profile = profile.line(0.0, height_m);
     }
-    let points = profile.sample(b);
     let on_tip = s.chance(0.12);
     let pose = if on_tip { DAffine3::from_rotation_x(PI) } else { DAffine3::IDENTITY };
-    b.place(pose, |b| revolve(b, &points, section));
-}
-
-/// The outline of a traffic cone's plate.
-#[derive(Clone, Copy)]
-enum Plate {
-    Square,
-    Rounded,
-    Octagon,
-    Disc,
+    b.place(pose, |b| profile.revolve(b, section));
 }
 
 /// A truncated cone with collars on a plate.
@@ -62,16 +49,12 @@ fn traffic_cone(b: &mut Builder, s: &mut Sampler) {
     let plate_m = foot_m * s.uniform(1.15, 1.6);
     let thick_m = height_m * s.uniform(0.02, 0.06);
     let half = DVec2::splat(plate_m);
-    let plate = s.pick(&[Plate::Square, Plate::Rounded, Plate::Octagon, Plate::Disc]);
-    let outline = match plate {
-        Plate::Square => outline::rectangle(half),
-        Plate::Rounded => {
-            outline::rounded_rectangle(half, 0.3 * plate_m, b.around(0.3 * plate_m, 12) / 4)
-        }
-        Plate::Octagon => outline::ellipse(half * 1.08, 8),
-        Plate::Disc => outline::ellipse(half, b.around(plate_m, 12)),
-    };
-    prism(b, &outline, 0.0, thick_m, s.uniform(0.85, 1.0));
+    let square = outline::rectangle(half);
+    let rounded = outline::rounded_rectangle(half, 0.3 * plate_m, b.around(0.3 * plate_m, 12) / 4);
+    let octagon = outline::ellipse(half * 1.08, 8);
+    let disc = outline::ellipse(half, b.around(plate_m, 12));
+    let plate = s.pick(&[square, rounded, octagon, disc]);
+    prism(b, &plate, 0.0, thick_m, s.uniform(0.85, 1.0));
     let radius = |share: f64| foot_m + share * (tip_m - foot_m);
     let mut profile = Profile::from(foot_m, 0.9 * thick_m);
     for collar in 0..s.count(0, 3) {
@@ -85,8 +68,7 @@ fn traffic_cone(b: &mut Builder, s: &mut Sampler) {
     if s.chance(0.4) {
         profile = profile.line(0.0, thick_m + height_m);
     }
-    let points = profile.sample(b);
-    revolve(b, &points, Section::Round);
+    profile.revolve(b, Section::Round);
 }
 
 /// A paper cone, open below, with or without a brim and a ball on top.
@@ -95,15 +77,12 @@ fn party_hat(b: &mut Builder, s: &mut Sampler) {
     let height_m = base_m * s.uniform(1.3, 4.0);
     let brim_m = if s.chance(0.5) { base_m * s.uniform(1.15, 1.9) } else { base_m };
     let ball_m = base_m * s.uniform(0.12, 0.25);
-    let curved = s.chance(0.3);
-    let profile = Profile::from(brim_m, 0.0).line(base_m, 0.02 * height_m);
-    let profile = if curved {
-        profile.curve(&[(0.6 * base_m, 0.3 * height_m), (0.28 * base_m, 0.65 * height_m)])
-    } else {
-        profile
-    };
-    let points = profile.line(0.0, height_m).sample(b);
-    revolve(b, &points, Section::Round);
+    let mut profile = Profile::from(brim_m, 0.0).line(base_m, 0.02 * height_m);
+    if s.chance(0.3) {
+        profile =
+            profile.curve(&[(0.6 * base_m, 0.3 * height_m), (0.28 * base_m, 0.65 * height_m)]);
+    }
+    profile.line(0.0, height_m).revolve(b, Section::Round);
     if s.chance(0.6) {
         ellipsoid(b, height_m * DVec3::Z, DVec3::splat(ball_m));
     }

@@ -1,14 +1,8 @@
 //! Cups, mugs, tumblers, goblets.
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
-use super::builder::Builder;
-use super::primitives::outline;
-use super::primitives::revolve::{Profile, Section, revolve};
-use super::primitives::spline::smooth;
-use super::primitives::sweep::sweep;
-use super::primitives::vessel::{Vessel, Wall};
-use super::sampler::Sampler;
+use crate::primitives::{Builder, Profile, Sampler, Section, Vessel, Wall, outline, smooth, sweep};
 
 /// The body of a cup.
 struct Body {
@@ -79,14 +73,13 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     let body = Body::draw(s);
     let wall = Wall::draw(s, body.rim_m);
     let polygon = Section::Polygon(s.count(6, 10));
-    let section =
-        s.pick(&[Section::Round, Section::Round, Section::Round, Section::Round, polygon]);
+    let section = s.weighted(&[(4, Section::Round), (1, polygon)]);
     let bottomless = s.chance(0.1);
     let mut vessel = Vessel::new(body.outside(bottomless), wall, section);
     vessel.hollow_from_m = body.stem_m;
     let with_saucer = body.stem_m == 0.0 && body.height_m < 2.0 * body.rim_m && s.chance(0.4);
     let lift_m = if with_saucer { saucer(b, s, &body) } else { 0.0 };
-    b.place(DAffine3::from_translation(lift_m * DVec3::Z), |b| {
+    b.shifted(lift_m * DVec3::Z, |b| {
         vessel.build(b);
         if body.stem_m == 0.0 && s.chance(0.7) {
             handle(b, s, &body);
@@ -98,23 +91,14 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
 fn saucer(b: &mut Builder, s: &mut Sampler, body: &Body) -> f64 {
     let rim_m = body.rim_m * s.uniform(1.45, 2.0);
     let lift_m = 0.06 * rim_m;
-    let profile = Profile::from(0.0, lift_m)
+    Profile::from(0.0, lift_m)
         .line(0.8 * body.base_m, lift_m)
         .curve(&[(0.6 * rim_m, 1.4 * lift_m), (rim_m, 3.2 * lift_m)])
         .line(0.98 * rim_m, 2.9 * lift_m)
         .curve(&[(0.6 * rim_m, 0.6 * lift_m), (0.9 * body.base_m, 0.0)])
-        .line(0.0, 0.0);
-    let points = profile.sample(b);
-    revolve(b, &points, Section::Round);
+        .line(0.0, 0.0)
+        .revolve(b, Section::Round);
     lift_m
-}
-
-/// The outline of a handle.
-#[derive(Clone, Copy)]
-enum Handle {
-    Round,
-    Ear,
-    Angular,
 }
 
 /// A round, ear-shaped or angular handle of round or flat section.
@@ -125,28 +109,22 @@ fn handle(b: &mut Builder, s: &mut Sampler, body: &Body) {
     let out_m = above.0.max(below.0) + reach_m;
     let root = |(radius, z): (f64, f64)| (0.96 * radius, z);
     let fall = (above.1 - below.1) * s.uniform(0.0, 0.2);
-    let kinds = [Handle::Round, Handle::Round, Handle::Ear, Handle::Angular];
-    let points = match s.pick(&kinds) {
-        Handle::Ear => vec![
-            root(above),
-            (0.8 * out_m + 0.2 * above.0, above.1 + fall),
-            (out_m, above.1 - fall),
-            (0.5 * (out_m + below.0), below.1 + 1.5 * fall),
-            root(below),
-        ],
-        Handle::Angular => {
-            vec![root(above), (out_m, above.1), (out_m, below.1 + fall), root(below)]
-        }
-        Handle::Round => vec![
-            root(above),
-            (0.7 * out_m + 0.3 * above.0, above.1 + 0.02 * body.height_m),
-            (out_m, 0.5 * (above.1 + below.1)),
-            (0.7 * out_m + 0.3 * below.0, below.1 - 0.02 * body.height_m),
-            root(below),
-        ],
-    };
+    let round = vec![
+        (0.7 * out_m + 0.3 * above.0, above.1 + 0.02 * body.height_m),
+        (out_m, 0.5 * (above.1 + below.1)),
+        (0.7 * out_m + 0.3 * below.0, below.1 - 0.02 * body.height_m),
+    ];
+    let ear = vec![
+        (0.8 * out_m + 0.2 * above.0, above.1 + fall),
+        (out_m, above.1 - fall),
+        (0.5 * (out_m + below.0), below.1 + 1.5 * fall),
+    ];
+    let angular = vec![(out_m, above.1), (out_m, below.1 + fall)];
+    let (is_smooth, between) =
+        s.weighted(&[(2, (true, round)), (1, (true, ear)), (1, (false, angular))]);
+    let points = [vec![root(above)], between, vec![root(below)]].concat();
     let points: Vec<_> = points.iter().map(|&(r, z)| DVec3::new(r, 0.0, z)).collect();
-    let path = if points.len() == 4 { points } else { smooth(b, &points, 3) };
+    let path = if is_smooth { smooth(b, &points, 3) } else { points };
     let thick_m = body.rim_m * s.uniform(0.07, 0.14);
     let wide_m = thick_m * s.uniform(1.0, 2.0);
     // The path lies in the plane y = 0, so a section's x is level across it.

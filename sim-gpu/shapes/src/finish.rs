@@ -5,9 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DQuat, DVec3};
 
-use super::builder::Builder;
 use super::class::ShapeClass;
-use super::sampler::Sampler;
+use crate::primitives::{Builder, Sampler};
 use sim_gpu::mesh::Mesh;
 
 /// The fewest triangles of a shape.
@@ -52,6 +51,7 @@ impl Finish {
     /// meshes: two in three have some doubled faces, one in seven all; nearly
     /// all have inconsistent winding.
     pub fn draw(class: ShapeClass, s: &mut Sampler) -> Self {
+        use Vertices::{EachCornerItsOwn, Merged, SharedWithinParts};
         use Winding::{AsBuilt, Inverted, SomePartsInverted, SomeTrianglesInverted};
         let doubled_share = s.pick(&[0.0, 0.0, 0.0, 0.05, 0.2, 0.5, 1.0]);
         let wanted = s.log_uniform(1.1 * MIN_TRIANGLES as f64, MAX_TRIANGLES as f64);
@@ -63,11 +63,7 @@ impl Finish {
             yaw_rad: turns * FRAC_PI_2 + s.uniform(-15.0, 15.0).to_radians(),
             winding: s.pick(&[AsBuilt, Inverted, SomePartsInverted, SomeTrianglesInverted]),
             doubled_share,
-            vertices: s.pick(&[
-                Vertices::SharedWithinParts,
-                Vertices::Merged,
-                Vertices::EachCornerItsOwn,
-            ]),
+            vertices: s.pick(&[SharedWithinParts, Merged, EachCornerItsOwn]),
         }
     }
 
@@ -79,9 +75,9 @@ impl Finish {
         drop_slivers(&mut mesh);
         self.double(&mut mesh);
         match self.vertices {
-            Vertices::SharedWithinParts => merge(&mut mesh, |corner, _| corner),
-            Vertices::Merged => merge(&mut mesh, |_, place| place),
-            Vertices::EachCornerItsOwn => split(&mut mesh),
+            Vertices::SharedWithinParts => merge(&mut mesh, |_, vertex, _| [vertex, 0, 0]),
+            Vertices::Merged => merge(&mut mesh, |_, _, place| place),
+            Vertices::EachCornerItsOwn => merge(&mut mesh, |corner, _, _| [corner, 0, 0]),
         }
         mesh
     }
@@ -129,28 +125,20 @@ fn drop_slivers(mesh: &mut Mesh) {
     });
 }
 
-/// Numbers vertices by first use. Corners whose `key` (of their index and
-/// their place in micrometres) is equal share a vertex.
-fn merge<K: Ord>(mesh: &mut Mesh, key: impl Fn([i64; 3], [i64; 3]) -> K) {
+/// Numbers vertices by first use. Corners whose `key` (of their number, their
+/// vertex, and their place in micrometres) is equal share a vertex.
+fn merge(mesh: &mut Mesh, key: impl Fn(i64, i64, [i64; 3]) -> [i64; 3]) {
     let mut numbers = BTreeMap::new();
     let mut vertices = Vec::new();
-    for corner in mesh.triangles.as_flattened_mut() {
+    for (corner, number_of_corner) in mesh.triangles.as_flattened_mut().iter_mut().zip(0..) {
         let vertex = mesh.vertices[*corner as usize];
         let place = (vertex * STEPS_PER_METRE).round().to_array().map(|c| c as i64);
-        let number = numbers.entry(key([i64::from(*corner); 3], place)).or_insert_with(|| {
+        let key = key(number_of_corner, i64::from(*corner), place);
+        let number = numbers.entry(key).or_insert_with(|| {
             vertices.push(vertex);
             vertices.len() as u32 - 1
         });
         *corner = *number;
     }
     mesh.vertices = vertices;
-}
-
-/// Gives each corner of each triangle a vertex of its own.
-fn split(mesh: &mut Mesh) {
-    let corners = mesh.triangles.as_flattened();
-    mesh.vertices = corners.iter().map(|&i| mesh.vertices[i as usize]).collect();
-    for (number, corner) in mesh.triangles.as_flattened_mut().iter_mut().enumerate() {
-        *corner = number as u32;
-    }
 }

@@ -6,14 +6,11 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::builder::Builder;
-use super::class::Make;
-use super::primitives::block::block;
-use super::primitives::revolve::{Profile, Section, cylinder, ellipsoid, frustum, revolve};
-use super::primitives::spline::smooth;
-use super::primitives::sweep::{rod, tube};
-use super::primitives::vessel::{Vessel, Wall};
-use super::sampler::Sampler;
+use crate::class::Make;
+use crate::primitives::{
+    Builder, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, frustum, rod,
+    smooth_tube,
+};
 use shade::shade;
 
 /// The makes, some of them more frequent.
@@ -46,9 +43,7 @@ fn table_lamp(b: &mut Builder, s: &mut Sampler) {
         ])
         .line(0.0, body_top_m);
     let square = Section::Square(s.uniform(3.0, 7.0));
-    let section = s.pick(&[Section::Round, Section::Round, Section::Round, square]);
-    let points = profile.sample(b);
-    revolve(b, &points, section);
+    profile.revolve(b, s.weighted(&[(3, Section::Round), (1, square)]));
     cylinder(b, 0.95 * body_top_m * DVec3::Z, 0.4 * thin_m, height_m - 0.95 * body_top_m);
     let radius_m = height_m * s.uniform(0.2, 0.42);
     let high_m = s.uniform(0.85, 1.15) * (height_m - body_top_m);
@@ -74,7 +69,7 @@ fn floor_lamp(b: &mut Builder, s: &mut Sampler) {
             (radius_m, rise_m),
         ]);
         let vessel = Vessel::new(bowl, Wall::draw(s, radius_m), Section::Round);
-        b.place(DAffine3::from_translation(0.96 * height_m * DVec3::Z), |b| vessel.build(b));
+        b.shifted(0.96 * height_m * DVec3::Z, |b| vessel.build(b));
     }
 }
 
@@ -102,11 +97,10 @@ fn arc_lamp(b: &mut Builder, s: &mut Sampler) {
     let drop_m = height_m * s.uniform(0.15, 0.35);
     let shapes = [(0.0, 0.0), (0.02, 0.5), (0.25, 0.9), (0.6, 1.0), (1.0, 1.0 - drop_m / height_m)];
     let points = shapes.map(|(y, z)| DVec3::new(0.0, -y * reach_m, z * height_m));
-    let path = smooth(b, &points, 3);
-    tube(b, &path, height_m * s.uniform(0.006, 0.012));
+    smooth_tube(b, &points, 3, height_m * s.uniform(0.006, 0.012));
     cylinder(b, DVec3::ZERO, 0.1 * height_m, 0.04 * height_m);
     let radius_m = height_m * s.uniform(0.08, 0.14);
-    b.place(DAffine3::from_translation(DVec3::new(0.0, -reach_m, 0.0)), |b| {
+    b.shifted(DVec3::new(0.0, -reach_m, 0.0), |b| {
         shade(b, s, height_m - drop_m, radius_m, 0.9 * radius_m);
     });
 }
@@ -115,9 +109,8 @@ fn arc_lamp(b: &mut Builder, s: &mut Sampler) {
 fn head(b: &mut Builder, s: &mut Sampler, size_m: f64) {
     let wide_m = size_m * s.uniform(0.6, 0.9);
     let neck_m = size_m * s.uniform(0.2, 0.3);
-    let curve = s.chance(0.4);
     let profile = Profile::from(wide_m, -1.2 * size_m);
-    let profile = if curve {
+    let profile = if s.chance(0.4) {
         profile.curve(&[(0.8 * wide_m, -0.7 * size_m), (neck_m, -0.3 * size_m)])
     } else {
         profile.line(neck_m, -0.3 * size_m)
@@ -171,8 +164,7 @@ fn gooseneck(b: &mut Builder, s: &mut Sampler) {
         let (sin, cos) = (k as f64 / 4.0 * 0.85 * PI).sin_cos();
         points.push(DVec3::new(0.0, -bend_m * (1.0 - cos), height_m - bend_m + bend_m * sin));
     }
-    let path = smooth(b, &points, 2);
-    tube(b, &path, 0.012 * height_m + 0.003);
+    smooth_tube(b, &points, 2, 0.012 * height_m + 0.003);
     frustum(b, DVec3::ZERO, [foot_m, foot_m * s.uniform(0.6, 1.0)], 0.2 * foot_m);
     let frame = DAffine3::from_translation(points[6]) * DAffine3::from_rotation_x(-0.4);
     b.place(frame, |b| head(b, s, 0.35 * reach_m));
@@ -189,7 +181,7 @@ fn pendant(b: &mut Builder, s: &mut Sampler) {
     for lamp in 0..n {
         let out = DVec2::from_angle(lamp as f64 / n as f64 * TAU) * spread_m;
         let shift_m = if n > 1 { 0.3 * drop_m * lamp as f64 / n as f64 } else { 0.0 };
-        b.place(DAffine3::from_translation(out.extend(shift_m)), |b| {
+        b.shifted(out.extend(shift_m), |b| {
             let hook = (-0.8 * out).extend(drop_m - shift_m + 0.01);
             rod(b, -0.1 * DVec3::Z, hook, [0.006, 0.006]);
             if globe {

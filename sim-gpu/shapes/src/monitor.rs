@@ -4,28 +4,15 @@ mod screen;
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::builder::Builder;
-use super::class::Make;
-use super::primitives::block::block;
-use super::primitives::loft::{Caps, loft, prism};
-use super::primitives::outline;
-use super::primitives::revolve::cylinder;
-use super::primitives::sheet::sheet;
-use super::primitives::sweep::{bar, rod};
-use super::sampler::Sampler;
+use crate::class::Make;
+use crate::primitives::{
+    Builder, Sampler, bar, block, cap_start, cylinder, loft, outline, prism, rod, sheet, skin,
+};
 use screen::Screen;
 
-/// What a flat screen stands on.
-#[derive(Clone, Copy)]
-enum Stand {
-    Disc,
-    Plate,
-    Feet,
-    BentSheet,
-    Wedge,
-    /// Screens for the wall.
-    Nothing,
-}
+/// Builds what a flat screen stands on, up to the gap below the screen; the last
+/// argument is half the size of the foot.
+type Stand = fn(&mut Builder, &mut Sampler, &Screen, f64, DVec2);
 
 /// The makes, some of them more frequent.
 const MAKES: [Make; 7] = [flat, flat, flat, flat, tube_monitor, tube_monitor, pair];
@@ -48,33 +35,23 @@ fn flat(b: &mut Builder, s: &mut Sampler) {
 }
 
 fn stand(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64) {
-    let stand = s.pick(&[
-        Stand::Disc,
-        Stand::Disc,
-        Stand::Plate,
-        Stand::Plate,
-        Stand::Feet,
-        Stand::BentSheet,
-        Stand::Wedge,
-        Stand::Nothing,
-    ]);
+    // The last are screens for the wall.
+    let stand: Stand =
+        s.pick(&[disc, disc, plate, plate, feet, bent_foot, wedge, |_, _, _, _, _| {}]);
     let foot = DVec2::new(0.35 * screen.height_m, screen.width_m * s.uniform(0.2, 0.35));
+    stand(b, s, screen, gap_m, foot);
+}
+
+fn disc(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64, foot: DVec2) {
+    let oval = outline::ellipse(foot * DVec2::new(0.7, 0.8), b.around(foot.y, 16));
+    prism(b, &oval, 0.0, 0.03 * screen.height_m, 0.9);
+    neck(b, s, screen, gap_m);
+}
+
+fn plate(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64, foot: DVec2) {
     let thick_m = 0.03 * screen.height_m;
-    match stand {
-        Stand::Disc => {
-            let oval = outline::ellipse(foot * DVec2::new(0.7, 0.8), b.around(foot.y, 16));
-            prism(b, &oval, 0.0, thick_m, 0.9);
-            neck(b, s, screen, gap_m);
-        }
-        Stand::Plate => {
-            block(b, 0.5 * thick_m * DVec3::Z, DVec3::new(1.2 * foot.x, 1.5 * foot.y, thick_m));
-            neck(b, s, screen, gap_m);
-        }
-        Stand::Feet => feet(b, screen, gap_m, foot),
-        Stand::BentSheet => bent_foot(b, screen, gap_m, foot),
-        Stand::Wedge => wedge(b, screen, gap_m, foot),
-        Stand::Nothing => {}
-    }
+    block(b, 0.5 * thick_m * DVec3::Z, DVec3::new(1.2 * foot.x, 1.5 * foot.y, thick_m));
+    neck(b, s, screen, gap_m);
 }
 
 /// A round or flat neck from the foot to the back of the screen.
@@ -94,7 +71,7 @@ fn neck(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64) {
 }
 
 /// Two splayed feet near the ends, as under a television.
-fn feet(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
+fn feet(b: &mut Builder, _: &mut Sampler, screen: &Screen, gap_m: f64, foot: DVec2) {
     let wide_m = 0.03 * screen.width_m;
     for side in [-1.0, 1.0] {
         let y = side * 0.35 * screen.width_m;
@@ -107,7 +84,7 @@ fn feet(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
 }
 
 /// One bent sheet of metal: foot, bow and back support.
-fn bent_foot(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
+fn bent_foot(b: &mut Builder, _: &mut Sampler, screen: &Screen, gap_m: f64, foot: DVec2) {
     let half_m = 0.6 * foot.y;
     let top_m = gap_m + 0.4 * screen.height_m;
     let back_m = -0.5 * screen.depth_m;
@@ -120,12 +97,11 @@ fn bent_foot(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
 }
 
 /// A solid foot that narrows upwards.
-fn wedge(b: &mut Builder, screen: &Screen, gap_m: f64, foot: DVec2) {
+fn wedge(b: &mut Builder, _: &mut Sampler, screen: &Screen, gap_m: f64, foot: DVec2) {
     let low = outline::rectangle(DVec2::new(0.6 * foot.x, foot.y));
     let high = outline::rectangle(DVec2::new(0.5 * screen.depth_m, 0.5 * foot.y));
     let top_m = gap_m + 0.05 * screen.height_m;
-    let sections = [outline::at_height(&low, 0.0), outline::at_height(&high, top_m)];
-    loft(b, &sections, Caps::BOTH);
+    loft(b, &[outline::at_height(&low, 0.0), outline::at_height(&high, top_m)]);
 }
 
 /// A deep housing that narrows to the back, on a swivel foot.
@@ -155,9 +131,9 @@ fn tube_monitor(b: &mut Builder, s: &mut Sampler) {
         section(0.0, 0.86),
         section(-0.03 * depth_m, 0.82),
     ];
-    let centred = DAffine3::from_translation(0.45 * depth_m * DVec3::X);
-    b.place(centred, |b| {
-        loft(b, &sections, Caps { start: true, end: false });
+    b.shifted(0.45 * depth_m * DVec3::X, |b| {
+        skin(b, &sections);
+        cap_start(b, &sections[0]);
         let glass = DVec3::new(-0.03 * depth_m, 0.0, foot_m + half.x);
         picture(b, glass, 1.64 * half, s.uniform(0.0, 0.05) * depth_m);
     });

@@ -1,5 +1,7 @@
 //! Draws a shape's proportions from its own random stream.
 
+use std::iter::repeat_n;
+
 use formats::rng::StreamKey;
 
 /// Consecutive numbers of one stream.
@@ -40,8 +42,14 @@ impl Sampler {
     }
 
     /// One of `choices`, each as likely as the others; not empty.
-    pub fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[self.count(0, choices.len() - 1)]
+    pub fn pick<T: Clone>(&mut self, choices: &[T]) -> T {
+        choices[self.count(0, choices.len() - 1)].clone()
+    }
+
+    /// One of `choices`, each as likely as its weight says; not empty.
+    pub fn weighted<T: Clone>(&mut self, choices: &[(usize, T)]) -> T {
+        let copies = choices.iter().flat_map(|(weight, choice)| repeat_n(choice, *weight));
+        self.pick(&copies.collect::<Vec<_>>()).clone()
     }
 }
 

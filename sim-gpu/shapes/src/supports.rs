@@ -2,16 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
-use super::builder::Builder;
-use super::primitives::block::block_between;
-use super::primitives::loft::{Caps, loft};
-use super::primitives::outline;
-use super::primitives::revolve::{Profile, Section, cylinder, ellipsoid, revolve};
-use super::primitives::spline::smooth;
-use super::primitives::sweep::{bar, rod, sweep, tube};
-use super::sampler::Sampler;
+use crate::primitives::{
+    Builder, Profile, Sampler, Section, bar, block_between, cylinder, ellipsoid, loft, outline,
+    rod, smooth_tube, tube,
+};
 
 /// The make of a set of legs.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +34,7 @@ impl Legs {
     /// Draws the legs of a piece `height_m` high.
     pub fn draw(s: &mut Sampler, height_m: f64) -> Self {
         use LegKind::{Curved, Hairpin, Round, Square, Turned};
-        let kind = s.pick(&[Square, Square, Square, Round, Round, Round, Turned, Curved, Hairpin]);
+        let kind = s.weighted(&[(3, Square), (3, Round), (1, Turned), (1, Curved), (1, Hairpin)]);
         let splayed = s.chance(0.4);
         let steep = s.uniform(0.05, 0.22);
         let taper = s.uniform(0.4, 1.0);
@@ -80,7 +76,7 @@ fn square_leg(b: &mut Builder, top: DVec3, wide: f64, narrow: f64) {
         let outline = outline::rectangle(DVec2::splat(half));
         outline.iter().map(|p| (p + top.truncate()).extend(z)).collect()
     };
-    loft(b, &[section(narrow, 0.0), section(wide, top.z)], Caps::BOTH);
+    loft(b, &[section(narrow, 0.0), section(wide, top.z)]);
 }
 
 fn turned_leg(b: &mut Builder, top: DVec3, r: f64) {
@@ -91,19 +87,15 @@ fn turned_leg(b: &mut Builder, top: DVec3, r: f64) {
         .line(1.1 * r, 0.72 * h)
         .line(1.1 * r, h)
         .line(0.0, h);
-    let points = profile.sample(b);
-    b.place(DAffine3::from_translation(top.with_z(0.0)), |b| {
-        revolve(b, &points, Section::Round);
-    });
+    b.shifted(top.with_z(0.0), |b| profile.revolve(b, Section::Round));
 }
 
 /// A leg that bows outwards at the knee and inwards above its foot.
 fn curved_leg(b: &mut Builder, top: DVec3, r: f64) {
     let out = top.with_z(0.0).normalize_or_zero() * top.z * 0.07;
     let at = |side: f64, height: f64| top.with_z(height * top.z) + side * out;
-    let path =
-        smooth(b, &[at(0.0, 1.0), at(0.9, 0.8), at(0.2, 0.4), at(0.1, 0.1), at(1.0, 0.0)], 2);
-    tube(b, &path, 0.8 * r);
+    let points = [(0.0, 1.0), (0.9, 0.8), (0.2, 0.4), (0.1, 0.1), (1.0, 0.0)];
+    smooth_tube(b, &points.map(|(side, height)| at(side, height)), 2, 0.8 * r);
 }
 
 fn hairpin(b: &mut Builder, top: DVec3, foot: DVec3, r: f64) {
@@ -146,8 +138,7 @@ pub fn disc_pedestal(b: &mut Builder, s: &mut Sampler, foot_m: f64, height_m: f6
     } else {
         profile.line(column_m, 1.5 * thick_m).line(column_m, height_m)
     };
-    let points = profile.line(0.0, height_m).sample(b);
-    revolve(b, &points, Section::Round);
+    profile.line(0.0, height_m).revolve(b, Section::Round);
 }
 
 /// Arms from a hub to the floor, with castors or without, and a column.
@@ -174,29 +165,20 @@ pub fn star_pedestal(b: &mut Builder, s: &mut Sampler, reach_m: f64, height_m: f
 /// Two crossed pairs of boards, front and back or left and right, whose
 /// tops stand `half` from the middle.
 pub fn crossed_legs(b: &mut Builder, half: DVec2, top_m: f64, width_m: f64) {
-    for side in [-1.0, 1.0] {
-        for lean in [-1.0, 1.0] {
-            let x = side * half.x + lean * 0.3 * width_m;
-            let from = DVec3::new(x, -lean * half.y, 0.0);
-            bar(b, from, DVec3::new(x, lean * half.y, top_m), width_m, width_m);
-        }
+    for [side, lean] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
+        let x = side * half.x + lean * 0.3 * width_m;
+        let from = DVec3::new(x, -lean * half.y, 0.0);
+        bar(b, from, DVec3::new(x, lean * half.y, top_m), width_m, width_m);
     }
-    let middle = 0.5 * top_m;
-    let r = 0.3 * width_m;
-    rod(b, DVec3::new(-half.x, 0.0, middle), DVec3::new(half.x, 0.0, middle), [r, r]);
+    let end = DVec3::new(half.x, 0.0, 0.5 * top_m);
+    rod(b, end * DVec3::new(-1.0, 1.0, 1.0), end, [0.3 * width_m; 2]);
 }
 
 /// Two closed loops of tube, left and right, that lie on the floor.
 pub fn sledge(b: &mut Builder, half: DVec2, top_m: f64, radius_m: f64) {
-    let section = outline::ellipse(DVec2::splat(radius_m), b.around(radius_m, 6));
-    b.mirrored(|b| {
-        let at = |y: f64, z: f64| DVec3::new(half.x, y * half.y, z);
-        let r = radius_m;
-        let corners = [(1.0, top_m), (1.08, r), (-1.08, r), (-1.0, top_m)];
-        for pair in corners.windows(2) {
-            sweep(b, &[at(pair[0].0, pair[0].1), at(pair[1].0, pair[1].1)], &section);
-        }
-    });
+    let corners = [(1.0, top_m), (1.08, radius_m), (-1.08, radius_m), (-1.0, top_m)]
+        .map(|(y, z)| DVec3::new(half.x, y * half.y, z));
+    b.mirrored(|b| corners.windows(2).for_each(|ends| tube(b, ends, radius_m)));
 }
 
 /// Two side panels across the whole depth.

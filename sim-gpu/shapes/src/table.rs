@@ -6,13 +6,8 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use desk::desk;
 
-use super::builder::Builder;
-use super::primitives::block::{block, block_between};
-use super::primitives::loft::{cap, prism};
-use super::primitives::outline;
-use super::primitives::sweep::bar;
-use super::sampler::Sampler;
-use super::supports::{
+use crate::primitives::{Builder, Sampler, bar, block, block_between, cap, outline, prism};
+use crate::supports::{
     Legs, crossed_legs, disc_pedestal, four_legs, side_panels, sledge, star_pedestal,
 };
 
@@ -51,18 +46,11 @@ enum Support {
 impl Top {
     /// From a stool's size to a banquet's; the long side lies along y.
     fn draw(s: &mut Sampler) -> Self {
+        use Shape::{Oval, Rectangle, Round, Rounded, Soft};
         let height_m = s.log_uniform(0.32, 1.05);
         let width_m = s.log_uniform(0.35, 1.0);
-        let shape = s.pick(&[
-            Shape::Rectangle,
-            Shape::Rectangle,
-            Shape::Rectangle,
-            Shape::Rounded,
-            Shape::Soft,
-            Shape::Round,
-            Shape::Oval,
-        ]);
-        let ratio = if shape == Shape::Round { 1.0 } else { s.log_uniform(1.0, 2.6) };
+        let shape = s.weighted(&[(3, Rectangle), (1, Rounded), (1, Soft), (1, Round), (1, Oval)]);
+        let ratio = if shape == Round { 1.0 } else { s.log_uniform(1.0, 2.6) };
         let half = DVec2::new(0.5 * width_m, 0.5 * width_m * ratio);
         let thick_m = s.log_uniform(0.01, 0.07);
         let glass = s.chance(0.12);
@@ -97,47 +85,35 @@ impl Top {
     }
 }
 
-/// What angular tops stand on.
-const UNDER_ANGULAR: [Support; 9] = [
-    Support::Legs,
-    Support::Legs,
-    Support::Legs,
-    Support::Panels,
-    Support::Trestle,
-    Support::Desk,
-    Support::Crossed,
-    Support::Sledge,
-    Support::Disc,
-];
-
-/// What tops without corners stand on.
-const UNDER_ROUND: [Support; 6] =
-    [Support::Legs, Support::Legs, Support::Disc, Support::Disc, Support::Star, Support::Crossed];
-
 /// Builds a table.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
+    use Support::{Crossed, Desk, Disc, Legs, Panels, Sledge, Star, Trestle};
     let top = Top::draw(s);
     build_top(b, s, &top);
-    let support = if top.angular() { s.pick(&UNDER_ANGULAR) } else { s.pick(&UNDER_ROUND) };
+    let support = s.pick(if top.angular() {
+        &[Legs, Legs, Legs, Panels, Trestle, Desk, Crossed, Sledge, Disc][..]
+    } else {
+        &[Legs, Legs, Disc, Disc, Star, Crossed]
+    });
     let reach_m = top.half.x * s.uniform(0.5, 0.85);
     let thick_m = top.half.x * s.uniform(0.04, 0.12);
     let inner = top.legs_half(thick_m);
     match support {
-        Support::Panels => {
+        Panels => {
             side_panels_across(b, &top, thick_m);
             back_panel(b, s, &top, inner.y);
         }
-        Support::Trestle => trestle(b, s, &top),
-        Support::Desk => desk(b, s, &top),
-        Support::Crossed => turned(b, |b| {
+        Trestle => trestle(b, s, &top),
+        Desk => desk(b, s, &top),
+        Crossed => turned(b, |b| {
             crossed_legs(b, DVec2::new(0.8 * inner.y, inner.x), top.under_m(), thick_m);
         }),
-        Support::Sledge => turned(b, |b| {
+        Sledge => turned(b, |b| {
             sledge(b, DVec2::new(inner.y, 0.9 * inner.x), top.under_m(), 0.5 * thick_m);
         }),
-        Support::Disc => disc_pedestal(b, s, reach_m, top.under_m()),
-        Support::Star => star_pedestal(b, s, reach_m, top.under_m()),
-        Support::Legs => legged(b, s, &top),
+        Disc => disc_pedestal(b, s, reach_m, top.under_m()),
+        Star => star_pedestal(b, s, reach_m, top.under_m()),
+        Legs => legged(b, s, &top),
     }
 }
 
@@ -210,13 +186,8 @@ fn trestle(b: &mut Builder, s: &mut Sampler, top: &Top) {
             for lean in [-1.0, 1.0] {
                 let rung = at(lean * reach_m * (1.0 - 0.7 * z / top.under_m()), z);
                 bar(b, at(0.0, z), rung, 0.6 * wide_m, 0.6 * wide_m);
-                bar(
-                    b,
-                    at(lean * reach_m, 0.0),
-                    at(0.3 * lean * reach_m, top.under_m()),
-                    wide_m,
-                    wide_m,
-                );
+                let high = at(0.3 * lean * reach_m, top.under_m());
+                bar(b, at(lean * reach_m, 0.0), high, wide_m, wide_m);
             }
         } else {
             block(b, at(0.0, 0.5 * wide_m), DVec3::new(2.0 * reach_m, wide_m, wide_m));

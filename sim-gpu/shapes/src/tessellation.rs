@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::builder::Builder;
 use super::finish::{Finish, MIN_TRIANGLES};
+use crate::primitives::Builder;
 use sim_gpu::mesh::Mesh;
 
 /// Trials before the best mesh so far is good enough.
@@ -23,7 +23,8 @@ pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
     };
     let target = finish.target_triangles as f64;
     let mut best = at(f64::INFINITY);
-    let mut edge_m = diagonal_m(best.mesh()) / 10.0;
+    let [low, high] = bounds(best.mesh());
+    let mut edge_m = low.distance(high) / 10.0;
     for _ in 0..MAX_TRIALS {
         if best.n_triangles() as f64 >= CLOSE_ENOUGH * target {
             break;
@@ -44,8 +45,8 @@ pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
     best
 }
 
-fn diagonal_m(mesh: &Mesh) -> f64 {
-    let low = mesh.vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-    let high = mesh.vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-    low.distance(high)
+/// The box of the vertices: its lowest and highest corner.
+pub fn bounds(mesh: &Mesh) -> [DVec3; 2] {
+    let vertices = || mesh.vertices.iter().copied();
+    [vertices().fold(DVec3::INFINITY, DVec3::min), vertices().fold(-DVec3::INFINITY, DVec3::max)]
 }

@@ -4,13 +4,9 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::builder::Builder;
-use super::primitives::revolve::{Profile, Section};
-use super::primitives::sheet::sheet;
-use super::primitives::spline::smooth;
-use super::primitives::sweep::tube;
-use super::primitives::vessel::{Vessel, Wall};
-use super::sampler::Sampler;
+use crate::primitives::{
+    Builder, Profile, Sampler, Section, Vessel, Wall, sheet, smooth, smooth_tube, tube,
+};
 
 /// The outline of a vase.
 #[derive(Clone, Copy, PartialEq)]
@@ -57,15 +53,9 @@ impl Form {
 
 /// Builds a vase.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
+    use Kind::{Bellied, Cylinder, Shouldered, Trumpet};
     let form = Form::draw(s);
-    let kind = s.pick(&[
-        Kind::Bellied,
-        Kind::Bellied,
-        Kind::Bellied,
-        Kind::Trumpet,
-        Kind::Cylinder,
-        Kind::Shouldered,
-    ]);
+    let kind = s.weighted(&[(3, Bellied), (1, Trumpet), (1, Cylinder), (1, Shouldered)]);
     let closed = s.chance(0.85);
     let bottom = Profile::from(if closed { 0.0 } else { form.foot_m }, 0.0);
     let outside = outside(bottom, &form, kind);
@@ -75,7 +65,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
     vessel.build(b);
     let round = matches!(vessel.section, Section::Round);
-    if round && kind == Kind::Bellied && s.chance(0.35) {
+    if round && kind == Bellied && s.chance(0.35) {
         handles(b, s, &form);
     }
     if closed && s.chance(0.17) {
@@ -84,23 +74,11 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
 }
 
 fn section(s: &mut Sampler) -> Section {
-    let (sides, flutes) = (s.count(4, 8), s.count(6, 16));
-    let (exponent, depth) = (s.uniform(3.0, 7.0), s.uniform(0.02, 0.08));
-    let fluted = Section::Fluted { count: flutes, depth };
-    let round = Section::Round;
-    let ratio = s.uniform(0.5, 0.9);
-    s.pick(&[
-        round,
-        round,
-        round,
-        round,
-        round,
-        round,
-        Section::Polygon(sides),
-        Section::Square(exponent),
-        fluted,
-        Section::Oval(ratio),
-    ])
+    let (polygon, count) = (Section::Polygon(s.count(4, 8)), s.count(6, 16));
+    let (square, depth) = (Section::Square(s.uniform(3.0, 7.0)), s.uniform(0.02, 0.08));
+    let fluted = Section::Fluted { count, depth };
+    let oval = Section::Oval(s.uniform(0.5, 0.9));
+    s.weighted(&[(6, Section::Round), (1, polygon), (1, square), (1, fluted), (1, oval)])
 }
 
 fn outside(bottom: Profile, form: &Form, kind: Kind) -> Profile {
@@ -153,8 +131,7 @@ fn flowers(b: &mut Builder, s: &mut Sampler, form: &Form) {
         let base = (0.2 * form.foot_m * out).extend(form.at(0.01));
         let mouth = (0.6 * form.neck_m * out).extend(form.at(form.neck_at));
         let tip = ((0.6 * form.neck_m + spread_m) * out).extend(height_m);
-        let path = smooth(b, &[base, mouth, tip], 3);
-        tube(b, &path, r);
+        smooth_tube(b, &[base, mouth, tip], 3, r);
         let size_m = form.height_m * s.uniform(0.12, 0.3);
         let turn = DAffine3::from_translation(tip)
             * DAffine3::from_rotation_z(out.to_angle() + s.uniform(-1.0, 1.0));

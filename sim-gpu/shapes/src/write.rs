@@ -59,24 +59,18 @@ mod tests {
     }
 
     #[test]
-    fn off_holds_every_digit_that_matters_and_no_more() {
+    fn files_hold_every_digit_that_matters_and_obj_is_y_up_and_counts_from_one() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("t.off");
+        let path = folder.path().join("mesh");
         write_off(&tetrahedron(), &path).unwrap();
-        let expected = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 0.1 0\n0 0 0.000001\n\
-                        3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
-        assert_eq!(fs::read_to_string(path).unwrap(), expected);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
-
-    #[test]
-    fn obj_is_y_up_and_counts_from_one() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("t.obj");
+        let off = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 0.1 0\n0 0 0.000001\n\
+                   3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
+        assert_eq!(fs::read_to_string(&path).unwrap(), off);
         write_obj(&tetrahedron(), &path).unwrap();
-        let expected = "v 0 0 0\nv 1 0 0\nv 0 0 -0.1\nv 0 0.000001 0\n\
-                        f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
-        assert_eq!(fs::read_to_string(path).unwrap(), expected);
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 0 -0.1\nv 0 0.000001 0\n\
+                   f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+        assert_eq!(fs::read_to_string(&path).unwrap(), obj);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]

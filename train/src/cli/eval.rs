@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::ensure;
 use formats::atomic;
 use formats::split::Split;
 use infer_cpu::{Classifier, Options, Precision};
@@ -43,21 +42,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let classifier = Classifier::load(&args.model, &options)?;
         classifier.classes().iter().map(ToString::to_string).collect()
     };
-    ensure!(
-        names.len() == clouds.classes.len(),
-        "{}: expected {} classes, as the model {} has, found {}",
-        args.data.display(),
-        names.len(),
-        args.model.display(),
-        clouds.classes.len()
-    );
-    if let Some(class) = (0..names.len()).find(|&i| names[i] != clouds.classes[i]) {
+    // Also checks that model and data have equally many classes.
+    let found = confusion(&args.model, &clouds, &options)?;
+    let mut pairs = names.iter().zip(&clouds.classes).enumerate();
+    if let Some((class, (model, data))) = pairs.find(|(_, (model, data))| model != data) {
         eprintln!(
-            "warning: class {class} is called `{}` by the model and `{}` by the data",
-            names[class], clouds.classes[class]
+            "warning: class {class} is called `{model}` by the model and `{data}` by the data"
         );
     }
-    let found = confusion(&args.model, &clouds, &options)?;
     super::print(&accuracy_report::summary(&found, &args.data))?;
     if let Some(path) = &args.csv {
         atomic::write_bytes(path, accuracy_report::to_csv(&found, &names))?;

@@ -1,4 +1,4 @@
-//! The commands of `edgepuck-train`.
+//! The commands of `edgepuck-train`, what ends them, and the exit code it gives.
 
 pub mod compare_points;
 pub mod eval;

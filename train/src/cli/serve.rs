@@ -110,11 +110,11 @@ impl Session {
         self.network = PointNet::new(&Shape::default(), self.n_classes, 0);
         self.step = 0;
         let values = &self.values;
-        self.network.parameters(&mut |parameter| {
+        for parameter in self.network.parameters() {
             if let Some(values) = values.get(&parameter.name) {
                 parameter.value.copy_from_slice(values);
             }
-        });
+        }
     }
 
     fn learn(&mut self) -> f64 {

@@ -5,10 +5,9 @@
 use ndarray::ArrayView2;
 use ndarray::parallel::prelude::*;
 
-use super::{Folded, Module, PooledLayer, Rows};
+use super::{PooledLayer, Rows};
 use crate::batch::Batch;
 use crate::matrix::Matrix;
-use crate::parameter::Parameter;
 
 /// An EdgeConv layer of one radius.
 #[derive(Clone, Debug)]
@@ -85,8 +84,7 @@ impl Edges {
     }
 
     fn rows(&self) -> Rows<'_> {
-        let total = self.weights.iter().map(|&w| f64::from(w)).sum::<f64>() as f32;
-        Rows { weights: &self.weights, starts: &self.starts, total }
+        Rows::new(&self.weights, &self.starts)
     }
 }
 
@@ -102,18 +100,4 @@ fn neighbors(p: &[f32; 3], others: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
         }
     }
     offsets
-}
-
-impl Module for EdgeLayer {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.pooled.base.parameters(visit);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        self.pooled.base.statistics(visit);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        self.pooled.base.folded(visit);
-    }
 }

@@ -3,7 +3,7 @@
 use formats::rng::StreamKey;
 use ndarray::ArrayView2;
 
-use super::{Folded, Module};
+use super::{Folded, LayerMut};
 use crate::matrix::{self, Matrix};
 use crate::parameter::Parameter;
 
@@ -51,7 +51,7 @@ impl Linear {
     /// `z` without the bias, for a batch norm, which would subtract it again.
     #[must_use]
     pub fn products(&self, x: ArrayView2<'_, f32>) -> Matrix {
-        matrix::forward(x, self.weight.matrix())
+        matrix::product(x, self.weight.matrix().t())
     }
 
     /// `z`.
@@ -62,10 +62,15 @@ impl Linear {
 
     /// Sets the gradients, and returns that of `x`.
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) -> Matrix {
+        self.backward_bias(dz);
+        self.backward_products(x, dz);
+        self.input_gradient(dz)
+    }
+
+    /// Sets only the bias's gradient.
+    pub fn backward_bias(&mut self, dz: ArrayView2<'_, f32>) {
         let bias = dz.sum_axis(ndarray::Axis(0));
         self.bias.gradient.copy_from_slice(bias.as_slice().expect("invariant: contiguous"));
-        self.backward_products(x, dz);
-        matrix::backward(dz, self.weight.matrix())
     }
 
     /// Sets only the weights' gradient. Before a batch norm, that of the bias is
@@ -73,22 +78,26 @@ impl Linear {
     pub fn backward_products(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) {
         matrix::gradient(dz, x, &mut self.weight.gradient);
     }
-}
 
-impl Module for Linear {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        visit(&mut self.weight);
-        visit(&mut self.bias);
+    /// The gradient of `x`.
+    #[must_use]
+    pub fn input_gradient(&self, dz: ArrayView2<'_, f32>) -> Matrix {
+        matrix::product(dz, self.weight.matrix())
     }
 
-    fn statistics(&mut self, _: &mut dyn FnMut(&str, &mut Vec<f32>)) {}
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        visit(Folded {
+    /// The layer itself, for a model file.
+    #[must_use]
+    pub fn folded(&self) -> Folded {
+        Folded {
             name: self.name().to_owned(),
             shape: [self.weight.shape[0], self.weight.shape[1]],
             weight: self.weight.value.clone(),
             bias: self.bias.value.clone(),
-        });
+        }
+    }
+
+    /// The layer, without a batch norm.
+    pub fn layer(&mut self) -> LayerMut<'_> {
+        LayerMut { linear: self, norm: None, output: None }
     }
 }

@@ -11,22 +11,20 @@
 //! on average and changes results only by rounding.
 
 mod edge;
+mod hidden;
 mod linear;
 mod norm;
 mod normed;
-mod point;
 mod pooled;
 mod transform;
-mod vector;
 
 pub use edge::EdgeLayer;
+pub use hidden::HiddenLayer;
 pub use linear::Linear;
 pub use norm::Norm;
 pub use normed::Normed;
-pub use point::PointLayer;
 pub use pooled::PooledLayer;
 pub use transform::{Transforms, orthogonality};
-pub use vector::VectorLayer;
 
 use ndarray::{ArrayViewMut2, Axis};
 
@@ -44,7 +42,14 @@ pub struct Rows<'a> {
     pub total: f32,
 }
 
-impl Rows<'_> {
+impl<'a> Rows<'a> {
+    /// Rows of these weights, in clouds that begin at `starts`.
+    #[must_use]
+    pub fn new(weights: &'a [f32], starts: &'a [usize]) -> Self {
+        let total = weights.iter().map(|&w| f64::from(w)).sum::<f64>() as f32;
+        Self { weights, starts, total }
+    }
+
     /// How many clouds there are.
     #[must_use]
     pub fn n_clouds(&self) -> usize {
@@ -77,14 +82,52 @@ pub struct Folded {
     pub bias: Vec<f32>,
 }
 
-/// A part of a network: it owns parameters and running statistics.
+/// A layer of a network, with everything that it keeps between steps.
+#[derive(Debug)]
+pub struct LayerMut<'a> {
+    /// The linear layer.
+    pub linear: &'a mut Linear,
+    /// The batch norm of its output, if there is one.
+    pub norm: Option<&'a mut Norm>,
+    /// The last output behind that norm.
+    pub output: Option<&'a Matrix>,
+}
+
+/// A part of a network: it owns layers.
 pub trait Module {
-    /// Calls `visit` with each parameter, always in the same order.
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter));
+    /// The layers, always in the same order: that of the forward pass.
+    fn layers(&mut self) -> Vec<LayerMut<'_>>;
 
-    /// Calls `visit` with the name and values of each running statistic.
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>));
+    /// The parameters of all layers.
+    fn parameters(&mut self) -> Vec<&mut Parameter> {
+        let mut parameters = Vec::new();
+        for LayerMut { linear, norm, .. } in self.layers() {
+            parameters.extend([&mut linear.weight, &mut linear.bias]);
+            parameters.extend(norm.into_iter().flat_map(|norm| [&mut norm.scale, &mut norm.shift]));
+        }
+        parameters
+    }
 
-    /// Calls `visit` with each linear layer, with its batch norm folded in.
-    fn folded(&self, visit: &mut dyn FnMut(Folded));
+    /// The running statistics of all batch norms, with their names.
+    fn statistics(&mut self) -> Vec<(String, &mut Vec<f32>)> {
+        let norms = self.layers().into_iter().filter_map(|layer| layer.norm);
+        norms.flat_map(Norm::statistics).collect()
+    }
+
+    /// Every linear layer, with its batch norm folded in.
+    fn folded(&mut self) -> Vec<Folded> {
+        let fold = |layer: LayerMut<'_>| match layer.norm {
+            Some(norm) => norm.folded_into(layer.linear),
+            None => layer.linear.folded(),
+        };
+        self.layers().into_iter().map(fold).collect()
+    }
+
+    /// The name of the first layer whose last output is not finite.
+    fn not_finite(&mut self) -> Option<&str> {
+        let is_broken = |layer: &LayerMut<'_>| {
+            layer.output.is_some_and(|output| !output.iter().all(|x| x.is_finite()))
+        };
+        self.layers().into_iter().find(is_broken).map(|layer| layer.linear.name())
+    }
 }

@@ -4,7 +4,7 @@ use ndarray::Axis;
 use ndarray::parallel::prelude::*;
 use rayon::slice::ParallelSlice;
 
-use super::{Folded, Linear};
+use super::{Folded, Linear, Rows};
 use crate::matrix::{Matrix, ROWS};
 use crate::parameter::Parameter;
 
@@ -91,15 +91,20 @@ impl Norm {
         }
     }
 
-    /// Normalises `z`, of which row i counts `weights[i]` times, scales and
-    /// shifts it; with `relu` negative results become 0. `z` lacks the bias,
-    /// which changes nothing but the running mean.
+    /// The running statistics, with their names.
+    pub fn statistics(&mut self) -> [(String, &mut Vec<f32>); 2] {
+        let Self { name, mean, variance, .. } = self;
+        [(format!("{name}.running_mean"), mean), (format!("{name}.running_var"), variance)]
+    }
+
+    /// Normalises, scales and shifts `z`, and makes negative results 0. `z` lacks
+    /// the bias, which changes nothing but the running mean.
     pub fn forward(
         &mut self,
         mut z: Matrix,
-        (weights, total): (&[f32], f32),
+        Rows { weights, total, .. }: Rows<'_>,
         bias: &[f32],
-        (momentum, relu): (f32, bool),
+        momentum: f32,
     ) -> (Matrix, Saved) {
         let mean = column_sums(&z, weights, |z, _| z, total);
         let variance = {
@@ -120,7 +125,7 @@ impl Norm {
                         z[c] = (z[c] - mean[c]) * inverse[c];
                         let y = z[c] * scale[c] + shift[c];
                         // NaN is kept, so that the loss shows it.
-                        out[c] = if relu && y < 0.0 { 0.0 } else { y };
+                        out[c] = if y < 0.0 { 0.0 } else { y };
                     }
                 }
             });
@@ -128,21 +133,15 @@ impl Norm {
     }
 
     /// Turns the gradient of the outputs into that of `z`, and sets those of
-    /// scale and shift. `y` are the outputs if a ReLU made them.
+    /// scale and shift. `y` are the outputs.
     pub fn backward(
         &mut self,
         mut dy: Matrix,
-        y: Option<&Matrix>,
+        y: &Matrix,
         saved: &Saved,
-        (weights, total): (&[f32], f32),
+        Rows { weights, total, .. }: Rows<'_>,
     ) -> Matrix {
-        if let Some(y) = y {
-            dy.zip_mut_with(y, |dy, &y| {
-                if y <= 0.0 {
-                    *dy = 0.0;
-                }
-            });
-        }
+        relu_gradient(&mut dy, y);
         let ones = vec![1.0; dy.nrows()];
         let sum = column_sums(&dy, &ones, |dy, _| dy, 1.0);
         let product = &dy * &saved.normalised;
@@ -168,6 +167,15 @@ impl Norm {
         self.shift.gradient.copy_from_slice(&sum);
         dy
     }
+}
+
+/// Turns the gradient of the outputs `y` of a ReLU into that of its inputs.
+pub fn relu_gradient(dy: &mut Matrix, y: &Matrix) {
+    dy.zip_mut_with(y, |dy, &y| {
+        if y <= 0.0 {
+            *dy = 0.0;
+        }
+    });
 }
 
 fn slice<'a>(row: &'a mut ndarray::ArrayViewMut1<'_, f32>) -> &'a mut [f32] {

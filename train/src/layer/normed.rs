@@ -3,9 +3,8 @@
 
 use ndarray::ArrayView2;
 
-use super::{Folded, Linear, Module, Norm};
+use super::{LayerMut, Linear, Norm};
 use crate::matrix::Matrix;
-use crate::parameter::Parameter;
 
 /// A linear layer, its batch norm, and the last output.
 #[derive(Clone, Debug)]
@@ -35,27 +34,9 @@ impl Normed {
         self.output.view()
     }
 
-    /// The layer's name, if its last output is not finite.
-    #[must_use]
-    pub fn not_finite(&self) -> Option<&str> {
-        (!self.output.iter().all(|x| x.is_finite())).then(|| self.linear.name())
-    }
-}
-
-impl Module for Normed {
-    fn parameters(&mut self, visit: &mut dyn FnMut(&mut Parameter)) {
-        self.linear.parameters(visit);
-        visit(&mut self.norm.scale);
-        visit(&mut self.norm.shift);
-    }
-
-    fn statistics(&mut self, visit: &mut dyn FnMut(&str, &mut Vec<f32>)) {
-        let Norm { name, mean, variance, .. } = &mut self.norm;
-        visit(&format!("{name}.running_mean"), mean);
-        visit(&format!("{name}.running_var"), variance);
-    }
-
-    fn folded(&self, visit: &mut dyn FnMut(Folded)) {
-        visit(self.norm.folded_into(&self.linear));
+    /// The linear layer and its batch norm.
+    pub fn layer(&mut self) -> LayerMut<'_> {
+        let Self { linear, norm, output } = self;
+        LayerMut { linear, norm: Some(norm), output: Some(output) }
     }
 }

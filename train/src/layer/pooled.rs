@@ -24,7 +24,7 @@ use ndarray::parallel::prelude::*;
 use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
 
-use super::norm::{EPSILON, column_sums};
+use super::norm::{EPSILON, column_sums, relu_gradient};
 use super::{Normed, Rows, by_cloud};
 use crate::matrix::{self, Matrix};
 
@@ -76,7 +76,7 @@ impl PooledLayer {
         let covariance = covariance(&centred, rows);
         let weights = self.base.linear.weight.matrix();
         // [outputs, inputs]; a covariance is its own transpose.
-        let covariant = matrix::forward(weights, covariance.view());
+        let covariant = matrix::product(weights, covariance.t());
         let products = |row: usize| {
             let (a, w) = (covariant.row(row), weights.row(row));
             a.iter().zip(w).map(|(a, w)| f64::from(*a) * f64::from(*w)).sum::<f64>()
@@ -143,23 +143,12 @@ impl PooledLayer {
         wants_input: bool,
     ) -> Option<Matrix> {
         if self.relu {
-            dy.zip_mut_with(&self.base.output, |dy, &y| {
-                if y <= 0.0 {
-                    *dy = 0.0;
-                }
-            });
+            relu_gradient(&mut dy, &self.base.output);
         }
         let sum = dy.sum_axis(Axis(0)).to_vec();
         let with_normalised = (&dy * &self.saved.normalised).sum_axis(Axis(0)).to_vec();
-        let slope: Vec<f32> = self
-            .base
-            .norm
-            .scale
-            .value
-            .iter()
-            .zip(&self.saved.inverse)
-            .map(|(s, i)| s * i)
-            .collect();
+        let scale = &self.base.norm.scale.value;
+        let slope: Vec<f32> = scale.iter().zip(&self.saved.inverse).map(|(s, i)| s * i).collect();
         self.weight_gradient(&dy, x, (&sum, &with_normalised), &slope);
         let dx =
             wants_input.then(|| self.input_gradient(&dy, rows, (&sum, &with_normalised), &slope));
@@ -198,7 +187,7 @@ impl PooledLayer {
         slope: &[f32],
     ) -> Matrix {
         let Saved { winners, centred, inverse, .. } = &self.saved;
-        let (inputs, outputs) = self.base.linear.size();
+        let (_, outputs) = self.base.linear.size();
         let weights = self.base.linear.weight.matrix();
         // A = Wᵀ (D W), D = γ P / (n σ²), and v = Wᵀ (γ/σ S/n).
         let scaled = |factor: &dyn Fn(usize) -> f32| {
@@ -209,12 +198,10 @@ impl PooledLayer {
             scaled
         };
         let curved = scaled(&|c| slope[c] * inverse[c] * with_normalised[c] / rows.total);
-        let mut a = vec![0.0; inputs * inputs];
-        matrix::gradient(curved.view(), weights, &mut a);
-        let a = Matrix::from_shape_vec((inputs, inputs), a).expect("invariant: square");
+        let a = matrix::square(curved.view(), weights);
         let shares: Vec<f32> = (0..outputs).map(|c| slope[c] * sum[c] / rows.total).collect();
         let v = weights.t().dot(&ndarray::aview1(&shares));
-        let mut dx = matrix::forward(centred.view(), a.view());
+        let mut dx = matrix::product(centred.view(), a.t());
         for (mut dx, weight) in dx.rows_mut().into_iter().zip(rows.weights) {
             dx.zip_mut_with(&v, |dx, v| *dx = -weight * (*dx + v));
         }
@@ -244,8 +231,5 @@ fn covariance(centred: &Matrix, rows: Rows<'_>) -> Matrix {
     for (mut row, weight) in weighted.rows_mut().into_iter().zip(rows.weights) {
         row *= weight / rows.total;
     }
-    let n = centred.ncols();
-    let mut out = vec![0.0; n * n];
-    matrix::gradient(weighted.view(), centred.view(), &mut out);
-    Matrix::from_shape_vec((n, n), out).expect("invariant: square")
+    matrix::square(weighted.view(), centred.view())
 }

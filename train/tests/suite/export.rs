@@ -84,7 +84,7 @@ fn shipped_weights_are_those_that_were_learnt() {
     let [learnt, shipped] = ["learnt", "shipped"].map(|name| folder.path().join(name));
     let card = ModelCard { classes: clouds.classes.clone(), ..ModelCard::default() };
     model_file::write(&learnt, &mut trainer.model, &card).unwrap();
-    model_file::ship(&shipped, &trainer.model, &card).unwrap();
+    model_file::ship(&shipped, &mut trainer.model, &card).unwrap();
     let size = |path: &Path| std::fs::metadata(path).unwrap().len();
     assert!(size(&shipped) < size(&learnt) * 6 / 10);
     let mut again = Trainer::new(recipe(true, true), clouds.classes.len()).unwrap();
@@ -153,8 +153,9 @@ fn learns_by_few_points(cpl: Cpl) {
     let first = trainer.learn(&clouds, |_| {}).unwrap();
     let last = (1..12).map(|_| trainer.learn(&clouds, |_| {}).unwrap()).last().unwrap();
     assert!(last.loss < 0.7 * first.loss, "{first:?}, {last:?}");
-    let found =
-        by_eight_points(&test, |path, card| model_file::ship(path, &trainer.model, card).unwrap());
+    let found = by_eight_points(&test, |path, card| {
+        model_file::ship(path, &mut trainer.model, card).unwrap()
+    });
     assert!(found.instance_accuracy() > 0.9, "{found:?}");
 }
 

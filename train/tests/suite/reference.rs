@@ -186,13 +186,6 @@ impl Reference<'_> {
 /// A network's parameters and running statistics.
 pub fn values(network: &mut dyn Module) -> Values {
     let wide = |values: &[f32]| values.iter().map(|&x| f64::from(x)).collect();
-    let mut all = Values::new();
-    network.parameters(&mut |parameter| {
-        let value = (parameter.shape.clone(), wide(&parameter.value));
-        all.insert(parameter.name.clone(), value);
-    });
-    network.statistics(&mut |name, values| {
-        all.insert(name.to_owned(), (vec![values.len()], wide(values)));
-    });
-    all
+    let tensors = train::model_file::tensors(network).into_iter();
+    tensors.map(|(name, tensor)| (name, (tensor.shape, wide(&tensor.values)))).collect()
 }

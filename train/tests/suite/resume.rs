@@ -27,10 +27,12 @@ fn recipe() -> Recipe {
 
 fn parameters(trainer: &mut Trainer) -> Vec<u32> {
     let mut bits = Vec::new();
-    trainer.model.parameters(&mut |parameter| {
+    for parameter in trainer.model.parameters() {
         bits.extend(parameter.value.iter().chain(&parameter.square).map(|x| x.to_bits()));
-    });
-    trainer.model.statistics(&mut |_, values| bits.extend(values.iter().map(|x| x.to_bits())));
+    }
+    for (_, values) in trainer.model.statistics() {
+        bits.extend(values.iter().map(|x| x.to_bits()));
+    }
     bits
 }
 

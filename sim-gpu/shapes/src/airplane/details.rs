@@ -4,13 +4,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DAffine3, DVec3};
 
-use super::super::builder::Builder;
-use super::super::primitives::revolve::{Profile, Section, cylinder, ellipsoid, revolve};
-use super::super::primitives::sheet::sheet;
-use super::super::primitives::sweep::rod;
-use super::super::primitives::vessel::{Vessel, Wall};
 use super::fuselage::Fuselage;
 use super::wing::Wing;
+use crate::primitives::{Builder, Profile, Section, Vessel, Wall, cylinder, ellipsoid, rod, sheet};
 
 /// A frame at `front` whose z axis looks to the rear (+y).
 fn rearwards(front: DVec3) -> DAffine3 {
@@ -27,10 +23,9 @@ pub fn jet_engine(b: &mut Builder, front: DVec3, radius_m: f64, length_m: f64) {
     let core = Profile::from(0.0, 0.2 * length_m)
         .curve(&[(0.35 * radius_m, 0.35 * length_m), (0.6 * radius_m, 0.7 * length_m)])
         .line(0.0, 1.1 * length_m);
-    let core = core.sample(b);
     b.place(rearwards(front), |b| {
         Vessel::new(ring, Wall::Sheet, Section::Round).build(b);
-        revolve(b, &core, Section::Round);
+        core.revolve(b, Section::Round);
     });
     let low = front + DVec3::new(0.0, 0.25 * length_m, 0.9 * radius_m);
     sheet(b, [0.9 * length_m, 0.3 * radius_m], |u, v| {
@@ -45,8 +40,8 @@ pub fn nacelle(b: &mut Builder, front: DVec3, radius_m: f64, length_m: f64) {
         (0.9 * radius_m, 0.65 * length_m),
         (0.25 * radius_m, length_m),
     ]);
-    let points = profile.line(0.0, length_m).sample(b);
-    b.place(rearwards(front), |b| revolve(b, &points, Section::Round));
+    let profile = profile.line(0.0, length_m);
+    b.place(rearwards(front), |b| profile.revolve(b, Section::Round));
 }
 
 /// A spinner and twisted blades of no thickness.

@@ -2,9 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::super::builder::Builder;
-use super::super::primitives::loft::{Caps, loft};
-use super::super::primitives::outline;
+use crate::primitives::{Builder, loft, outline};
 
 /// A body from its nose at y = -length / 2 to its tail at y = length / 2.
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +70,7 @@ impl Fuselage {
                 circle.iter().map(|p| centre + radius * DVec3::new(-p.x, 0.0, p.y)).collect()
             })
             .collect();
-        loft(b, &sections, Caps::BOTH);
+        loft(b, &sections);
     }
 }
 

@@ -2,11 +2,10 @@
 
 use glam::DVec3;
 
-use super::super::builder::Builder;
-use super::super::sampler::Sampler;
 use super::details;
 use super::fuselage::Fuselage;
 use super::wing::{Wing, fin};
+use crate::primitives::{Builder, Sampler};
 
 /// A fighter with swept wings and a tail.
 pub fn fighter(b: &mut Builder, s: &mut Sampler) {

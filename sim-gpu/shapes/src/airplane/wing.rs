@@ -2,9 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::super::builder::Builder;
-use super::super::primitives::loft::{Caps, loft};
-use super::super::primitives::outline;
+use crate::primitives::{Builder, cap, outline, skin};
 
 /// A pair of wings. Slopes are per metre of span.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +42,7 @@ impl Wing {
             let (nose, chord) = (self.leading_edge(share), self.chord_m(share));
             section.iter().map(|p| nose + chord * DVec3::new(0.0, p.x, p.y)).collect()
         });
-        b.mirrored(|b| loft(b, &ends, Caps { start: false, end: true }));
+        b.mirrored(|b| open_at_root(b, &ends));
     }
 
     /// Adds small fins at both tips.
@@ -64,5 +62,11 @@ pub fn fin(b: &mut Builder, root: DVec3, high_m: f64, chord_m: f64, sweep: f64) 
     });
     // (y, x) as (x, y) runs clockwise; mirrored, it looks outwards.
     let frame = DAffine3::from_translation(root) * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-    b.place(frame, |b| loft(b, &ends, Caps { start: false, end: true }));
+    b.place(frame, |b| open_at_root(b, &ends));
+}
+
+/// The surface from the first section, at the root, to the last, which is closed.
+fn open_at_root(b: &mut Builder, ends: &[Vec<DVec3>; 2]) {
+    skin(b, ends);
+    cap(b, &ends[1]);
 }

@@ -4,15 +4,11 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::super::builder::Builder;
-use super::super::primitives::block::{block, cushion};
-use super::super::primitives::outline;
-use super::super::primitives::revolve::ellipsoid;
-use super::super::primitives::sheet::{board, sheet};
-use super::super::primitives::spline::smooth;
-use super::super::primitives::sweep::{rod, sweep, tube};
-use super::super::sampler::Sampler;
 use super::Seat;
+use crate::primitives::{
+    Builder, Sampler, block, board, cushion, ellipsoid, outline, rod, sheet, smooth, smooth_tube,
+    sweep,
+};
 
 /// A back's frame of reference: x across, y to the rear, z up along the back
 /// from the rear edge of the seat.
@@ -24,18 +20,7 @@ struct Back {
 
 /// The makes, some of them more frequent.
 const MAKES: [fn(&mut Builder, &mut Sampler, Back); 13] = [
-    panel,
-    panel,
-    upholstered,
-    shell,
-    shell,
-    slats,
-    slats,
-    ladder,
-    ladder,
-    railed,
-    hooped,
-    medallion,
+    panel, panel, padded, shell, shell, slats, slats, ladder, ladder, railed, hooped, medallion,
     headrest,
 ];
 
@@ -64,7 +49,8 @@ fn posts(b: &mut Builder, back: Back, r: f64) {
     b.mirrored(|b| rod(b, x * DVec3::X, DVec3::new(x, 0.0, back.high_m), [r, r]));
 }
 
-fn upholstered(b: &mut Builder, s: &mut Sampler, back: Back) {
+/// A thick cushion before two short posts.
+fn padded(b: &mut Builder, s: &mut Sampler, back: Back) {
     let thick_m = s.uniform(0.05, 0.12);
     let gap_m = s.pick(&[0.0, 0.08]);
     let size = DVec3::new(2.0 * back.half_m, thick_m, back.high_m - gap_m);
@@ -143,8 +129,7 @@ fn hooped(b: &mut Builder, s: &mut Sampler, back: Back) {
         .map(|k| (k as f64 / 8.0 * PI).sin_cos())
         .map(|(sin, cos)| DVec3::new(cos * back.half_m, 0.0, sin * back.high_m))
         .collect();
-    let path = smooth(b, &arch, 2);
-    tube(b, &path, 1.8 * r);
+    smooth_tube(b, &arch, 2, 1.8 * r);
 }
 
 /// Rods in a fan, as high as `height` says of where they end across.
@@ -167,8 +152,7 @@ fn medallion(b: &mut Builder, s: &mut Sampler, back: Back) {
         .map(|k| (k as f64 / 16.0 * TAU).sin_cos())
         .map(|(sin, cos)| DVec3::new(cos * half.x, 0.0, middle_m + sin * half.y))
         .collect();
-    let path = smooth(b, &ring, 1);
-    tube(b, &path, s.uniform(0.012, 0.025));
+    smooth_tube(b, &ring, 1, s.uniform(0.012, 0.025));
     let radii = DVec3::new(half.x, s.uniform(0.015, 0.05), half.y);
     ellipsoid(b, middle_m * DVec3::Z, radii);
 }

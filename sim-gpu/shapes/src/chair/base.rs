@@ -2,60 +2,27 @@
 
 use glam::{DVec2, DVec3};
 
-use super::super::builder::Builder;
-use super::super::primitives::outline;
-use super::super::primitives::spline::smooth;
-use super::super::primitives::sweep::{sweep, tube};
-use super::super::sampler::Sampler;
-use super::super::supports::{
+use super::Seat;
+use crate::primitives::{Builder, Sampler, outline, smooth, sweep, tube};
+use crate::supports::{
     Legs, crossed_legs, disc_pedestal, four_legs, side_panels, sledge, star_pedestal,
 };
-use super::Seat;
-
-#[derive(Clone, Copy)]
-enum Base {
-    Legs,
-    Star,
-    Disc,
-    Cantilever,
-    Sledge,
-    Crossed,
-    Panels,
-    Rocker,
-}
-
-/// The bases, some of them more frequent.
-const BASES: [Base; 14] = [
-    Base::Legs,
-    Base::Legs,
-    Base::Legs,
-    Base::Legs,
-    Base::Legs,
-    Base::Star,
-    Base::Star,
-    Base::Disc,
-    Base::Cantilever,
-    Base::Cantilever,
-    Base::Sledge,
-    Base::Crossed,
-    Base::Panels,
-    Base::Rocker,
-];
 
 /// Adds what carries the seat.
 pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let under_m = seat.under_m();
     let tube_m = s.uniform(0.01, 0.016);
     let legs_half = seat.legs_half(0.0);
-    match s.pick(&BASES) {
-        Base::Star => star_pedestal(b, s, seat.half.x * 1.15, under_m),
-        Base::Disc => disc_pedestal(b, s, seat.half.x * 0.95, under_m),
-        Base::Cantilever => cantilever(b, seat, tube_m),
-        Base::Sledge => sledge(b, legs_half * DVec2::new(1.0, 0.85), under_m, tube_m),
-        Base::Crossed => crossed_legs(b, 0.92 * legs_half, under_m, 2.2 * tube_m),
-        Base::Panels => side_panels(b, legs_half, under_m, 2.0 * tube_m),
-        Base::Rocker => rocker(b, s, seat),
-        Base::Legs => legged(b, s, seat),
+    // Five of fourteen draws give legs, two a star, one a disc, and so on.
+    match s.count(1, 14) {
+        1..=5 => legged(b, s, seat),
+        6..=7 => star_pedestal(b, s, seat.half.x * 1.15, under_m),
+        8 => disc_pedestal(b, s, seat.half.x * 0.95, under_m),
+        9..=10 => cantilever(b, seat, tube_m),
+        11 => sledge(b, legs_half * DVec2::new(1.0, 0.85), under_m, tube_m),
+        12 => crossed_legs(b, 0.92 * legs_half, under_m, 2.2 * tube_m),
+        13 => side_panels(b, legs_half, under_m, 2.0 * tube_m),
+        _ => rocker(b, s, seat),
     }
 }
 

@@ -2,19 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::builder::Builder;
-use super::super::primitives::revolve::{Profile, Section, ellipsoid};
-use super::super::primitives::sweep::rod;
-use super::super::primitives::vessel::{Vessel, Wall};
-use super::super::sampler::Sampler;
-
-/// The outline of a shade.
-#[derive(Clone, Copy)]
-enum Cut {
-    Frustum,
-    Bell,
-    Dome,
-}
+use crate::primitives::{Builder, Profile, Sampler, Section, Vessel, Wall, ellipsoid, rod};
 
 /// A shade that hangs from `top_m`, `high_m` tall and `radius_m` wide below,
 /// with the bulb inside; most are open at both ends.
@@ -22,31 +10,20 @@ pub fn shade(b: &mut Builder, s: &mut Sampler, top_m: f64, radius_m: f64, high_m
     let narrow_m = radius_m * s.uniform(0.35, 1.0);
     let low_m = top_m - high_m;
     let below = Profile::from(radius_m, low_m);
-    let frustum = Cut::Frustum;
-    let cut = s.pick(&[frustum, frustum, frustum, Cut::Bell, Cut::Dome]);
-    let neck_m = match cut {
-        Cut::Frustum => narrow_m,
-        Cut::Bell => 0.9 * narrow_m,
-        Cut::Dome => 0.1 * radius_m,
+    let at = |share: f64| low_m + share * high_m;
+    let bell = [(0.5 * (radius_m + narrow_m), at(0.25)), (narrow_m, at(0.7))];
+    let dome = [(0.92 * radius_m, at(0.4)), (0.65 * radius_m, at(0.77))];
+    let curve = |[low, high]: [(f64, f64); 2], neck_m: f64| {
+        (below.clone().curve(&[low, high, (neck_m, top_m)]), neck_m)
     };
-    let profile = match cut {
-        Cut::Bell => below.curve(&[
-            (0.5 * (radius_m + narrow_m), low_m + 0.25 * high_m),
-            (narrow_m, low_m + 0.7 * high_m),
-            (neck_m, top_m),
-        ]),
-        Cut::Dome => below.curve(&[
-            (0.92 * radius_m, low_m + 0.4 * high_m),
-            (0.65 * radius_m, low_m + 0.77 * high_m),
-            (neck_m, top_m),
-        ]),
-        Cut::Frustum => below.line(neck_m, top_m),
-    };
+    let (profile, neck_m) = s.weighted(&[
+        (3, (below.clone().line(narrow_m, top_m), narrow_m)),
+        (1, curve(bell, 0.9 * narrow_m)),
+        (1, curve(dome, 0.1 * radius_m)),
+    ]);
     let pleats = Section::Fluted { count: s.count(16, 32), depth: 0.03 };
-    let section =
-        s.pick(&[Section::Round, Section::Round, Section::Round, Section::Polygon(4), pleats]);
-    let thin = Wall::Solid(0.02 * radius_m);
-    let wall = s.pick(&[Wall::Sheet, Wall::Sheet, thin]);
+    let section = s.weighted(&[(3, Section::Round), (1, Section::Polygon(4)), (1, pleats)]);
+    let wall = s.weighted(&[(2, Wall::Sheet), (1, Wall::Solid(0.02 * radius_m))]);
     Vessel::new(profile, wall, section).build(b);
     let bulb_m = 0.22 * narrow_m.min(high_m);
     let bulb = (low_m + 0.5 * high_m) * DVec3::Z;

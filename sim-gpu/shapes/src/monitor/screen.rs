@@ -2,10 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::builder::Builder;
-use super::super::primitives::block::{block, block_between, cushion};
-use super::super::primitives::sheet::board;
-use super::super::sampler::Sampler;
+use crate::primitives::{Builder, Sampler, block, block_between, board, cushion};
 
 /// A screen: it looks to +x, is as wide as y, its middle at the origin.
 #[derive(Clone, Copy)]
@@ -19,15 +16,8 @@ pub struct Screen {
     housing: Housing,
 }
 
-/// What a screen sits in.
-#[derive(Clone, Copy)]
-enum Housing {
-    Framed,
-    FramedWithBox,
-    Slab,
-    Rounded,
-    Bent,
-}
+/// Builds what a screen of this size sits in.
+type Housing = fn(&mut Builder, &mut Sampler, DVec3);
 
 impl Screen {
     /// Draws a screen of some size and make.
@@ -37,14 +27,7 @@ impl Screen {
         let portrait = width_m < 0.6 && s.chance(0.1);
         let height_m = width_m / ratio;
         let depth_m = width_m * s.log_uniform(0.015, 0.12);
-        let housing = s.pick(&[
-            Housing::Framed,
-            Housing::Framed,
-            Housing::FramedWithBox,
-            Housing::Slab,
-            Housing::Rounded,
-            Housing::Bent,
-        ]);
+        let housing = s.pick(&[framed, framed, framed_with_box, slab, rounded, bent]);
         if portrait {
             Self { width_m: height_m, height_m: width_m, depth_m, housing }
         } else {
@@ -54,19 +37,16 @@ impl Screen {
 
     /// Adds the screen.
     pub fn build(self, b: &mut Builder, s: &mut Sampler) {
-        let Self { width_m, height_m, depth_m, housing } = self;
-        let size = DVec3::new(depth_m, width_m, height_m);
-        match housing {
-            Housing::Framed => framed(b, s, size),
-            Housing::FramedWithBox => {
-                framed(b, s, size);
-                back_box(b, s, size);
-            }
-            Housing::Rounded => cushion(b, DVec3::ZERO, size, 0.4 * depth_m),
-            Housing::Bent => bent(b, size),
-            Housing::Slab => block(b, DVec3::ZERO, size),
-        }
+        (self.housing)(b, s, DVec3::new(self.depth_m, self.width_m, self.height_m));
     }
+}
+
+fn slab(b: &mut Builder, _: &mut Sampler, size: DVec3) {
+    block(b, DVec3::ZERO, size);
+}
+
+fn rounded(b: &mut Builder, _: &mut Sampler, size: DVec3) {
+    cushion(b, DVec3::ZERO, size, 0.4 * size.x);
 }
 
 /// A frame about a screen that lies a little behind it.
@@ -88,14 +68,15 @@ fn framed(b: &mut Builder, s: &mut Sampler, size: DVec3) {
     block_between(b, DVec3::new(back, -inner_m, -half.z + chin_m), glass);
 }
 
-/// The housing of the electronics behind a flat screen.
-fn back_box(b: &mut Builder, s: &mut Sampler, size: DVec3) {
+/// A framed screen and, behind it, the housing of its electronics.
+fn framed_with_box(b: &mut Builder, s: &mut Sampler, size: DVec3) {
+    framed(b, s, size);
     let inner = size * DVec3::new(1.0, s.uniform(0.4, 0.75), s.uniform(0.4, 0.7));
     cushion(b, -0.8 * size.x * DVec3::X, inner, 0.2 * size.x);
 }
 
 /// A screen bent about an upright axis, its ends towards the viewer.
-fn bent(b: &mut Builder, size: DVec3) {
+fn bent(b: &mut Builder, _: &mut Sampler, size: DVec3) {
     let sag_m = 0.12 * size.y;
     board(b, [size.y, size.z], -size.x * DVec3::X, |u, v| {
         let across = 2.0 * u - 1.0;

@@ -2,28 +2,21 @@
 
 use glam::{DVec2, DVec3};
 
-use super::super::builder::Builder;
-use super::outline;
+use super::{Builder, outline};
 
-/// Which ends of a loft are closed.
-#[derive(Clone, Copy, Debug)]
-pub struct Caps {
-    /// Closes the first section.
-    pub start: bool,
-    /// Closes the last section.
-    pub end: bool,
-}
-
-impl Caps {
-    /// Both ends closed.
-    pub const BOTH: Self = Self { start: true, end: true };
-}
-
-/// The surface through closed `sections` of equally many points.
+/// The surface through closed `sections` of equally many points, and the two
+/// ends that close it.
 ///
 /// Sections counter-clockwise about the direction from the first to the last
 /// give front faces that look outwards.
-pub fn loft(b: &mut Builder, sections: &[Vec<DVec3>], caps: Caps) {
+pub fn loft(b: &mut Builder, sections: &[Vec<DVec3>]) {
+    skin(b, sections);
+    cap_start(b, &sections[0]);
+    cap(b, &sections[sections.len() - 1]);
+}
+
+/// As [`loft`], open at both ends.
+pub fn skin(b: &mut Builder, sections: &[Vec<DVec3>]) {
     let mut rows = Vec::new();
     for (section, next) in sections.iter().zip(&sections[1..]) {
         let longest = section.iter().zip(next).map(|(p, q)| p.distance(*q)).fold(0.0, f64::max);
@@ -32,21 +25,19 @@ pub fn loft(b: &mut Builder, sections: &[Vec<DVec3>], caps: Caps) {
     }
     rows.extend(sections.last().cloned());
     b.grid(&rows, true);
-    if caps.start {
-        let reversed: Vec<_> = sections[0].iter().rev().copied().collect();
-        cap(b, &reversed);
-    }
-    if let (true, Some(last)) = (caps.end, sections.last()) {
-        cap(b, last);
-    }
+}
+
+/// Closes the first of a loft's sections, so that it looks outwards.
+pub fn cap_start(b: &mut Builder, section: &[DVec3]) {
+    let reversed: Vec<_> = section.iter().rev().copied().collect();
+    cap(b, &reversed);
 }
 
 /// An upright prism over `outline` from `low` to `high`, whose top is `taper`
 /// times as wide as its bottom.
 pub fn prism(b: &mut Builder, outline: &[DVec2], low: f64, high: f64, taper: f64) {
     let top: Vec<_> = outline.iter().map(|&p| p * taper).collect();
-    let sections = [outline::at_height(outline, low), outline::at_height(&top, high)];
-    loft(b, &sections, Caps::BOTH);
+    loft(b, &[outline::at_height(outline, low), outline::at_height(&top, high)]);
 }
 
 /// Fills a closed ring that is star-shaped about the mean of its points.
@@ -63,20 +54,4 @@ pub fn cap(b: &mut Builder, ring: &[DVec3]) {
 
 fn between(section: &[DVec3], next: &[DVec3], t: f64) -> Vec<DVec3> {
     section.iter().zip(next).map(|(p, q)| p.lerp(*q, t)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::measure::volume_m3;
-    use super::*;
-
-    #[test]
-    fn a_prism_is_closed_and_looks_outwards() {
-        let square = outline::rectangle(DVec2::splat(0.5));
-        let volume = volume_m3(0.2, |b| prism(b, &square, 1.0, 4.0, 1.0));
-        assert!((volume - 3.0).abs() < 1e-12);
-        // A frustum of a pyramid: h / 3 (A + sqrt(A B) + B) = 1.75 at taper 1/2.
-        let volume = volume_m3(f64::INFINITY, |b| prism(b, &square, 0.0, 3.0, 0.5));
-        assert!((volume - 1.75).abs() < 1e-12);
-    }
 }

@@ -1,13 +1,24 @@
-//! The surfaces that shapes are put together from.
+//! The surfaces that shapes are put together from. A class file imports all of
+//! its tools from here, the builder and the sampler among them.
 
-pub mod block;
-pub mod loft;
+mod block;
+mod loft;
 pub mod outline;
-pub mod revolve;
-pub mod sheet;
-pub mod spline;
-pub mod sweep;
-pub mod vessel;
+mod revolve;
+mod sheet;
+mod spline;
+mod sweep;
+mod vessel;
 
 #[cfg(test)]
-mod measure;
+mod tests;
+
+pub use super::builder::Builder;
+pub use super::sampler::Sampler;
+pub use block::{block, block_between, cushion};
+pub use loft::{cap, cap_start, loft, prism, skin};
+pub use revolve::{Profile, Section, cylinder, ellipsoid, frustum};
+pub use sheet::{board, sheet};
+pub use spline::smooth;
+pub use sweep::{bar, rod, smooth_tube, sweep, tube};
+pub use vessel::{Vessel, Wall};

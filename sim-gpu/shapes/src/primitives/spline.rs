@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::builder::Builder;
+use super::Builder;
 
 /// Points along the Catmull-Rom spline through `points` (two or more), with at
 /// least `least` segments between neighbours.

@@ -2,14 +2,19 @@
 
 use glam::{DVec2, DVec3};
 
-use super::super::builder::Builder;
-use super::loft::{Caps, loft};
-use super::outline;
+use super::{Builder, loft, outline, smooth};
 
 /// A round tube of `radius_m` along `path`, closed at its ends.
 pub fn tube(b: &mut Builder, path: &[DVec3], radius_m: f64) {
     let section = outline::ellipse(DVec2::splat(radius_m), b.around(radius_m, 6));
     sweep(b, path, &section);
+}
+
+/// As [`tube`], along the smooth curve through `points` with at least `least`
+/// segments between neighbours.
+pub fn smooth_tube(b: &mut Builder, points: &[DVec3], least: usize, radius_m: f64) {
+    let path = smooth(b, points, least);
+    tube(b, &path, radius_m);
 }
 
 /// A round rod whose radius goes from `radii_m[0]` to `radii_m[1]`.
@@ -19,7 +24,7 @@ pub fn rod(b: &mut Builder, from: DVec3, to: DVec3, radii_m: [f64; 2]) {
     let frame = Frame::towards(to - from);
     let ends = [(from, radii_m[0]), (to, radii_m[1])];
     let sections = ends.map(|(at, radius)| frame.place(&unit, at, radius));
-    loft(b, &sections, Caps::BOTH);
+    loft(b, &sections);
 }
 
 /// A bar of rectangular section: `width_m` across, level where it can be, and
@@ -40,7 +45,7 @@ pub fn sweep(b: &mut Builder, path: &[DVec3], section: &[DVec2]) {
             frame.place(section, path[i], 1.0)
         })
         .collect();
-    loft(b, &sections, Caps::BOTH);
+    loft(b, &sections);
 }
 
 /// The plane across a path: x and y of the section, z along the path.
@@ -68,30 +73,5 @@ impl Frame {
 
     fn place(self, section: &[DVec2], at: DVec3, scale: f64) -> Vec<DVec3> {
         section.iter().map(|p| at + scale * (p.x * self.x + p.y * self.y)).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::measure::volume_m3;
-    use super::*;
-
-    #[test]
-    fn a_rod_is_closed_whichever_way_it_points() {
-        for to in [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Z, DVec3::new(0.6, 0.0, 0.8)] {
-            let volume = volume_m3(0.01, |b| rod(b, DVec3::ZERO, to, [0.1, 0.1]));
-            // Sixty-three sides lack (2 pi / 63)^2 / 6 = 0.17 % of the disc.
-            let exact = std::f64::consts::PI * 0.01;
-            assert!((volume / exact - 1.0).abs() < 2e-3, "{to} {volume}");
-        }
-    }
-
-    #[test]
-    fn a_level_bar_is_as_wide_and_high_as_asked() {
-        let mut b = Builder::new(f64::INFINITY, 1.0);
-        bar(&mut b, DVec3::ZERO, DVec3::X, 0.4, 0.1);
-        let (mesh, _) = b.finish();
-        let high = mesh.vertices.iter().copied().reduce(DVec3::max);
-        assert!(high.is_some_and(|h| h.distance(DVec3::new(1.0, 0.2, 0.05)) < 1e-12));
     }
 }

@@ -2,9 +2,8 @@
 
 use glam::DVec2;
 
-use super::super::builder::Builder;
-use super::super::sampler::Sampler;
-use super::revolve::{Profile, Section, revolve_twisted};
+use super::revolve::revolve;
+use super::{Builder, Profile, Sampler, Section};
 
 /// What the side of a vessel is made of.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +53,7 @@ impl Vessel {
             let inside = inside(&profile, thickness_m, floor_m);
             profile.extend(inside);
         }
-        revolve_twisted(b, &profile, self.section, self.twist_rad);
+        revolve(b, &profile, self.section, self.twist_rad);
     }
 }
 
@@ -85,30 +84,4 @@ fn inside(outside: &[DVec2], thickness_m: f64, floor_m: f64) -> Vec<DVec2> {
         points.push(DVec2::new(0.0, points.last().map_or(floor_m, |lowest| lowest.y)));
     }
     points
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::measure::{area_m2, volume_m3};
-    use super::*;
-
-    #[test]
-    fn a_thick_wall_holds_the_volume_of_its_material() {
-        let outside = Profile::from(0.0, 0.0).line(1.0, 0.0).line(1.0, 2.0);
-        let pot = Vessel::new(outside, Wall::Solid(0.1), Section::Polygon(4));
-        // A square of area 2 over a height of 2, less one of 2 * 0.9^2 over
-        // 1.9; the inner edge of the floor is cut by at most the thickness.
-        for edge_m in [0.1, f64::INFINITY] {
-            let volume = volume_m3(edge_m, |b| pot.build(b));
-            assert!((volume / 0.922 - 1.0).abs() < 0.12, "{volume}");
-        }
-    }
-
-    #[test]
-    fn a_sheet_has_one_side_only() {
-        let outside = Profile::from(1.0, 0.0).line(1.0, 1.0);
-        let ring = Vessel::new(outside, Wall::Sheet, Section::Polygon(4));
-        let area = area_m2(0.1, |b| ring.build(b));
-        assert!((area - 4.0 * 2f64.sqrt()).abs() < 1e-9, "{area}");
-    }
 }

@@ -2,10 +2,8 @@
 
 use glam::DVec3;
 
-use super::super::builder::Builder;
-use super::super::primitives::block::{block, block_between};
-use super::super::sampler::Sampler;
 use super::Top;
+use crate::primitives::{Builder, Sampler, block, block_between};
 
 /// A cabinet with drawers at one end or both, a panel at the other.
 pub fn desk(b: &mut Builder, s: &mut Sampler, top: &Top) {

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use super::super::sampler::Sampler;
-use super::soundness::{bounds, corners};
+use super::soundness::corners;
+use crate::sampler::Sampler;
+use crate::tessellation::bounds;
 use formats::rng::StreamKey;
 use sim_gpu::mesh::Mesh;
 

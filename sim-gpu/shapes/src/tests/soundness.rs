@@ -6,13 +6,8 @@ use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::{SEED, ShapeClass, for_all, generate};
+use crate::tessellation::bounds;
 use sim_gpu::mesh::Mesh;
-
-/// The box of the vertices: its lowest and highest corner.
-pub fn bounds(mesh: &Mesh) -> [DVec3; 2] {
-    let low = mesh.vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-    [low, mesh.vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max)]
-}
 
 pub fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 3] {
     triangle.map(|i| mesh.vertices[i as usize])
