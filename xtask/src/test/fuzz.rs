@@ -23,13 +23,11 @@ const COVERAGE: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-l
 /// Fuzzes every target for `seconds`, as many at a time as there are cores.
 pub fn run(summary: &mut Summary, seconds: u32) {
     summary.step("fuzzing", |summary| {
-        let n = TARGETS.len() as u64;
         let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
         if seconds == 0 || !is_known {
             let reason =
                 if is_known { "--fuzz-seconds 0" } else { "its flags are for x86-64 Linux" };
-            summary.remark(format!("fuzzing: {n} SKIPPED, {reason}"));
-            return Ok(Counts { skipped: n, ..Counts::default() });
+            return Ok(summary.skip("fuzzing", TARGETS.len(), reason));
         }
         build()?;
         let mut counts = Counts::default();
