@@ -2,6 +2,7 @@
 
 use super::effects::{REFERENCE, Source, packed, scans, surfaces};
 use super::plan::Plan;
+use crate::study::resume;
 use anyhow::Context;
 use edgepuck_dataset::finish::finish;
 use edgepuck_dataset::journal::Terms;
@@ -13,6 +14,7 @@ use edgepuck_dataset::start::{Begin, Start, begin};
 use edgepuck_dataset::surfaces::write_surfaces;
 use edgepuck_program::gen_dataset::report_failures;
 use formats::atomic;
+use formats::labelled::read_labelled;
 use formats::scan_file::ScanFormat;
 use formats::split::Split;
 use sim_gpu::caster::AdapterRequest;
@@ -46,7 +48,12 @@ pub fn make(
             let terms = Terms::new(config, &caster, meshes, None);
             let manifest = match begin(out, &terms, Begin::Resume)? {
                 Start::Complete(manifest) => *manifest,
-                Start::Go => scan(&terms, &caster, meshes, out)?,
+                Start::Go => {
+                    let (config, caster, progress) = (&terms.config, &caster, &Progress::default());
+                    let run = Run { out, config, caster, culling: Culling::On, progress };
+                    let scanned = scan_all(&run, meshes)?;
+                    finish(out, &terms, scanned.records, scanned.failures)?
+                }
             };
             // Every dataset is of the same meshes: the first names the failures.
             if name == REFERENCE {
@@ -61,31 +68,13 @@ pub fn make(
     }
 }
 
-fn scan(
-    terms: &Terms,
-    caster: &Caster,
-    meshes: &[MeshEntry],
-    out: &Path,
-) -> anyhow::Result<Manifest> {
-    let progress = Progress::default();
-    let (config, culling) = (&terms.config, Culling::On);
-    let run = Run { out, config, caster, culling, progress: &progress };
-    let scanned = scan_all(&run, meshes)?;
-    Ok(finish(out, terms, scanned.records, scanned.failures)?)
-}
-
 /// Draws points of surfaces; a note of how many meshes failed is written when
 /// all else is.
 fn draw(source: Source, plan: &Plan, meshes: &[MeshEntry], out: &Path) -> anyhow::Result<usize> {
-    let done = out.join("failures.txt");
-    if done.is_file() {
-        let text = std::fs::read_to_string(&done)?;
-        return text.trim().parse().with_context(|| format!("{}: no number", done.display()));
-    }
-    atomic::sweep_leftovers(out)?;
-    let failures = write_surfaces(out, &surfaces(plan, source), meshes)?;
-    atomic::write_bytes(&done, failures.len().to_string())?;
-    Ok(failures.len())
+    resume::result(&out.join("failures.txt"), || {
+        atomic::sweep_leftovers(out)?;
+        Ok(write_surfaces(out, &surfaces(plan, source), meshes)?.len())
+    })
 }
 
 /// Where the packed clouds of the dataset in `folder` lie, as `train --data`
@@ -120,7 +109,7 @@ pub fn bytes_per_cloud(made: &Made, source: Source, folder: &Path) -> anyhow::Re
             path.push(format!("-{split}.npz"));
             let path = PathBuf::from(path);
             bytes += size(&path)?;
-            n += formats::labelled::read_labelled(&path)?.len();
+            n += read_labelled(&path)?.len();
         }
     }
     Ok(bytes as f64 / n.max(1) as f64)

@@ -21,15 +21,8 @@ fn folder() -> tempfile::TempDir {
 fn design() -> Design {
     let recipe = "points = 16\nbatch = 10\nvalidation = 0.0\n[network]\n\
          input_transform = false\nfeature_transform = false\ntrunk = [8, 16]\nhead = [12]\n";
-    let set = |name: &str| Set {
-        name: name.to_owned(),
-        path: Path::new("sets").join(name),
-        matched: true,
-    };
-    let test = |(trained_on, tested_on): (&str, &str)| Test {
-        trained_on: trained_on.to_owned(),
-        tested_on: tested_on.to_owned(),
-    };
+    let set = |name| Set { name, path: Path::new("sets").join(name), matched: true };
+    let test = |(trained_on, tested_on)| Test { trained_on, tested_on };
     Design {
         seeds: vec![0, 7],
         steps: 150,
