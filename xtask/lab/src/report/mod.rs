@@ -40,7 +40,7 @@ pub struct Args {
 /// A record that is not what its name says; what the system reports.
 pub fn run(args: &Args) -> Result<Outcome> {
     let assets = args.assets.clone().unwrap_or_else(|| workspace::root().join("assets"));
-    ensure!(assets.is_dir(), "--assets: {} is not a folder", assets.display());
+    ensure!(assets.is_dir(), "--assets: expected a folder, found {}", assets.display());
     let reports = assets.join("reports");
     let scans = scans::body(&assets)?;
     let mut chapters = vec![Chapter::new("scans", "Scans", "What does a scan look like?", scans)];

@@ -21,7 +21,7 @@ use datasets::{Made, bytes_per_cloud, make};
 use design::Design;
 use edgepuck_program::Outcome;
 use edgepuck_program::flags::need_folder_of_meshes;
-use effects::{DATASETS, EFFECTS, Judge};
+use effects::{DATASETS, EFFECTS, Effect, Judge};
 use formats::atomic;
 use plan::Plan;
 use serde::Serialize;
@@ -67,11 +67,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         meshes::keep_at_most(most, &mut meshes);
     }
     let made = make_all(&plan, &meshes, &work)?;
-    let compared = compare(&made, &work)?;
+    let compared = compare(&made)?;
     let seconds = costs::costs(&plan, &meshes, &work.join("scratch"), &work.join("costs.json"))?;
     let mut costs = BTreeMap::new();
     for (&(name, source), made) in DATASETS.iter().zip(&made) {
-        let bytes_per_cloud = bytes_per_cloud(made, source, &folder(&work, name))?;
+        let bytes_per_cloud = bytes_per_cloud(made, source)?;
         let seconds = *seconds.get(name).with_context(|| format!("no cost of {name}"))?;
         costs.insert(name, (seconds, bytes_per_cloud));
     }
@@ -126,19 +126,15 @@ fn make_all(plan: &Plan, meshes: &[MeshEntry], work: &Path) -> anyhow::Result<Ve
 }
 
 /// How many scans are equal in all positions, of each effect that reaches none.
-fn compare(made: &[Made], work: &Path) -> anyhow::Result<BTreeMap<&'static str, usize>> {
-    let manifest = |name: &str| {
-        let at = DATASETS.iter().position(|(known, _)| *known == name);
-        at.and_then(|at| made[at].manifest.as_ref()).with_context(|| format!("{name}: no scans"))
+fn compare(made: &[Made]) -> anyhow::Result<BTreeMap<&'static str, usize>> {
+    let made = |name: &str| {
+        let made = made.iter().find(|made| made.name == name);
+        made.with_context(|| format!("no dataset {name}"))
     };
-    let mut compared = BTreeMap::new();
-    for effect in EFFECTS.iter().filter(|effect| effect.judged_by == Judge::Positions) {
-        let (with, without) = (effect.with, effect.without);
-        let n = positions::compare(
-            (manifest(with)?, &folder(work, with)),
-            (manifest(without)?, &folder(work, without)),
-        );
-        compared.insert(effect.name, n.with_context(|| format!("effect {}", effect.name))?);
-    }
-    Ok(compared)
+    let compared = EFFECTS.iter().filter(|effect| effect.judged_by == Judge::Positions);
+    let compared = compared.map(|Effect { name, with, without, .. }| {
+        let n = positions::compare(made(with)?, made(without)?);
+        Ok((*name, n.with_context(|| format!("effect {name}"))?))
+    });
+    compared.collect()
 }

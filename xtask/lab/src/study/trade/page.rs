@@ -82,7 +82,7 @@ fn chart(rows: &[Row], part: Part) -> Chart<'static> {
         series.entry(series_key(row, noise_m)).or_default().push(dot);
     }
     let series = series.into_iter();
-    let series = series.map(|(SeriesKey { name, joined, .. }, dots)| Series { name, dots, joined });
+    let series = series.map(|((_, name, joined), dots)| Series { name, dots, joined });
     let label = match (part, device) {
         (Part::Classifier, Device::Pi5) => "milliseconds a cloud on a Raspberry Pi 5, modelled",
         (Part::Classifier, Device::Here) => "milliseconds a cloud on this machine",
@@ -131,15 +131,10 @@ fn message(rows: &[Row], part: Part, device: Device) -> String {
     }
 }
 
-/// Rows of one colour, in the order of distances and then of names.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct SeriesKey {
-    /// Bits of a number that is not negative: they order as it does.
-    distance: u64,
-    name: String,
-    /// Whether a line joins the Pareto-optimal ones.
-    joined: bool,
-}
+/// Rows of one colour, in the order of distances and then of names: the bits of the
+/// distance, which order as the number does because it is not negative, the name, and
+/// whether a line joins the Pareto-optimal rows.
+type SeriesKey = (u64, String, bool);
 
 /// Scans with other noise than `noise_m` are a series of their own: noise is not a
 /// choice, so they are not compared with the others.
@@ -148,10 +143,9 @@ fn series_key(row: &Row, noise_m: Option<f64>) -> SeriesKey {
         (Part::Scan, Some(distance_m)) => {
             let joined = row.noise_m == noise_m;
             let rest = if joined { "" } else { ", other noise" };
-            let name = format!("from {distance_m} m{rest}");
-            SeriesKey { distance: distance_m.to_bits(), name, joined }
+            (distance_m.to_bits(), format!("from {distance_m} m{rest}"), joined)
         }
-        _ => SeriesKey { distance: 0, name: row.model.clone(), joined: false },
+        _ => (0, row.model.clone(), false),
     }
 }
 
