@@ -5,7 +5,6 @@ use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Instant;
 
 /// The workspace's root.
 pub fn root() -> &'static Path {
@@ -42,23 +41,6 @@ pub fn standard_library(target: &str) -> anyhow::Result<PathBuf> {
     let mut ask = Command::new(rustc);
     let folder = output(ask.args(["--print", "target-libdir", "--target", target]))?;
     Ok(PathBuf::from(folder.trim()))
-}
-
-/// Runs one command after naming it, and says how long it took; its output goes
-/// to the terminal.
-///
-/// # Errors
-/// If it cannot be started or fails.
-pub fn step(name: &str, command: &mut Command) -> anyhow::Result<()> {
-    let shown = words(command);
-    eprintln!("== {name}: {shown}");
-    let start = Instant::now();
-    let status = command.status().with_context(|| format!("cannot run {shown}"))?;
-    if !status.success() {
-        bail!("{name} failed ({status}): {shown}");
-    }
-    eprintln!("== {name}: {:.0} s", start.elapsed().as_secs_f64());
-    Ok(())
 }
 
 /// What a command prints.

@@ -1,12 +1,12 @@
 //! Feeds each hand-written parser with mutated input for a while.
 
-use crate::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary, check};
 use anyhow::Context;
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Child, Command};
 use std::thread::available_parallelism;
-use xtask::workspace::{cargo, root, step};
+use xtask::workspace::{cargo, root};
 
 /// The targets, a program each.
 const TARGETS: [&str; 4] = ["off", "mesh", "clouds", "model"];
@@ -29,7 +29,8 @@ pub fn run(summary: &mut Summary, seconds: u32) {
                 if is_known { "--fuzz-seconds 0" } else { "its flags are for x86-64 Linux" };
             return Ok(summary.skip("fuzzing", TARGETS.len(), reason));
         }
-        build()?;
+        let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
+        check("fuzzing", build.current_dir(folder()).env("RUSTFLAGS", COVERAGE))?;
         let mut counts = Counts::default();
         for targets in TARGETS.chunks(available_parallelism()?.get()) {
             let started = targets.iter().map(|target| start(target, seconds));
@@ -54,11 +55,6 @@ fn folder() -> std::path::PathBuf {
 
 fn log(target: &str) -> std::path::PathBuf {
     folder().join("target").join(format!("{target}.log"))
-}
-
-fn build() -> anyhow::Result<()> {
-    let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
-    step("fuzzing", build.current_dir(folder()).env("RUSTFLAGS", COVERAGE))
 }
 
 /// Starts fuzzing `target`; what it says goes to a file of its own.

@@ -62,7 +62,8 @@ fn costs(rows: &[Row]) -> Table {
             let Some(row) = row else { continue };
             let ms = [row.scan_seconds_cpu, row.scan_seconds_cpu_low, row.scan_seconds_cpu_high];
             let equal = if row.seed.is_none() { row.n.to_string() } else { "-".to_owned() };
-            let words = [&format!("{} {direction}", effect.name), row.judged_by, row.trained_set];
+            let effect = format!("{} {direction}", effect.name);
+            let words = [effect.as_str(), row.judged_by, row.trained_set];
             let numbers = ms.map(|seconds| digits(1e3 * seconds));
             let last = [format!("{:.0}", row.bytes_per_cloud), equal];
             table.push(words.map(str::to_owned).into_iter().chain(numbers).chain(last).collect());

@@ -83,13 +83,15 @@ pub fn cast_all(
     for (((name, method, is_gpu), aimed), costs) in settings.into_iter().zip(costs) {
         let culling = if aimed.culling == Culling::On { "on" } else { "off" };
         eprintln!("caster: {name}, culling {culling}");
-        let seconds = if *is_gpu { costs.wall_s() } else { costs.cpu_s() };
-        let mut cast = assess(method, aimed, fired, &truth)?.timed(test_set, rays, seconds);
-        (cast.row.caster, cast.row.culling) = (name.clone(), culling.to_owned());
+        let Scanned { row, clouds } = assess(method, aimed, fired, &truth)?;
+        let spent = if *is_gpu { costs.wall_s() } else { costs.cpu_s() };
+        let mut row = row.with_time(rays, spent.median / clouds.len() as f64);
+        (row.caster, row.culling) = (name.clone(), culling.to_owned());
+        row.test_set = test_set.to_owned();
         if *is_gpu {
-            (cast.row.rays_per_cpu_s, cast.row.scans_per_cpu_s) = (None, None);
+            (row.rays_per_cpu_s, row.scans_per_cpu_s) = (None, None);
         }
-        all.push(cast);
+        all.push(Scanned { row, clouds });
     }
     Ok(all)
 }

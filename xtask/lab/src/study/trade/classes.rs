@@ -6,8 +6,8 @@ use anyhow::{Context, Result, ensure};
 use edgepuck_program::sampler_config::SamplerConfig;
 use edgepuck_program::trade_record::{Part, Row};
 use formats::labelled::read_labelled;
-use infer_cpu::sampler::SamplerSpec;
-use infer_cpu::{Classifier, Options, Precision, Prediction, Summary, TNets};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+use infer_cpu::{Classifier, Options, Precision, Prediction, Summary, TNets, inspect};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -15,6 +15,9 @@ use xtask::workspace::{file_name, recorded};
 
 /// Clouds whose classification is timed, a round.
 const TIMED: usize = 100;
+
+/// Points of the baseline's clouds.
+const AS_THE_BASELINE: usize = 1024;
 
 /// Labelled clouds.
 pub struct TestSet {
@@ -124,6 +127,24 @@ impl TestSet {
 }
 
 impl Classifying {
+    /// The sampler and the points that a model was trained with, or random points
+    /// where it names none to choose by, in fp32.
+    ///
+    /// # Errors
+    /// A model that cannot be read.
+    pub fn as_trained(model: &Path) -> Result<Self> {
+        let card = inspect(model)?.card;
+        let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
+        Ok(Self {
+            model: model.to_owned(),
+            sampler: SamplerConfig::of(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
+            points: card.points.unwrap_or(AS_THE_BASELINE),
+            precision: Precision::F32,
+            t_nets: TNets::Both,
+            threads: 1,
+        })
+    }
+
     /// Whether both choose the same points of a cloud.
     pub fn chooses_as(&self, other: &Self) -> bool {
         (self.sampler, self.points) == (other.sampler, other.points)

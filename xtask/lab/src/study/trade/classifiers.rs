@@ -7,13 +7,9 @@ use crate::pi5::{Modelled, Sampler};
 use anyhow::{Context, Result};
 use edgepuck_program::sampler_config::SamplerConfig;
 use edgepuck_program::trade_record::Row;
-use infer_cpu::sampler::SamplerKind;
 use infer_cpu::{Precision, Summary, TNets, inspect};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// Points of the baseline's clouds.
-const AS_THE_BASELINE: usize = 1024;
 
 /// Threads whose times on a Raspberry Pi 5 are modelled: it has four cores.
 const PI_THREADS: [usize; 3] = [1, 2, 4];
@@ -53,24 +49,6 @@ impl Sweep {
     }
 }
 
-/// The sampler and the points that a model was trained with, or random points
-/// where it names none to choose by, in fp32.
-///
-/// # Errors
-/// A model that cannot be read.
-pub fn as_trained(model: &Path) -> Result<Classifying> {
-    let card = inspect(model)?.card;
-    let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
-    Ok(Classifying {
-        model: model.to_owned(),
-        sampler: SamplerConfig::of(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
-        points: card.points.unwrap_or(AS_THE_BASELINE),
-        precision: Precision::F32,
-        t_nets: TNets::Both,
-        threads: 1,
-    })
-}
-
 /// Rows of one parameter at a time, then of combinations of the promising ones, for
 /// `model` on `set`, with modelled times of a Raspberry Pi 5 unless the run is `quick`;
 /// what the model or the clouds do not allow is left out.
@@ -82,7 +60,7 @@ pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<V
     let sweep = if quick { Sweep::quick() } else { Sweep::whole() };
     let say = |error: &anyhow::Error| eprintln!("No modelled times of a Raspberry Pi: {error:#}");
     let pi = if quick { None } else { Modelled::open(model).inspect_err(say).ok() };
-    let (trained, summary) = (as_trained(model)?, inspect(model)?);
+    let (trained, summary) = (Classifying::as_trained(model)?, inspect(model)?);
     let measured = |setting: Classifying, answers: Answers, reference: Option<&Answers>| {
         let mut row = setting.row(set, &summary, &answers, reference.unwrap_or(&answers));
         row.knob = varied(&setting, &trained);

@@ -20,8 +20,8 @@ use super::meshes;
 use crate::measure::backends;
 use crate::measure::machine::Machine;
 use anyhow::{Context, Result, ensure};
-use classes::{TestSet, agreement};
-use classifiers::{as_trained, bundled};
+use classes::{Classifying, TestSet, agreement};
+use classifiers::bundled;
 use edgepuck_program::flags::need_folder_of_meshes;
 use edgepuck_program::trade_record::{self, Part, Row};
 use edgepuck_program::{Outcome, gen_shapes};
@@ -151,7 +151,7 @@ fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>,
     let scanned = scans::scan_all(objects, &settings, rounds, &name)?;
     let cast = casters::cast_all(objects, &backends::open(None)?, rounds, &name)?;
     let reference = scan_set(objects, &name, &scanned[0].clouds);
-    let (classifying, summary) = (as_trained(model)?, inspect(model)?);
+    let (classifying, summary) = (Classifying::as_trained(model)?, inspect(model)?);
     // Scans are compared with the reference, casters with the first: f64.
     let noisy = classifying.answers(&reference.clouds)?;
     let exact = classifying.answers(&cast[0].clouds)?;

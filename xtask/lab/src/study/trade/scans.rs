@@ -2,7 +2,7 @@
 
 use super::objects::{Object, Place, places};
 use super::sensors::Scanning;
-use crate::measure::clock::{Spread, Workload, interleave, measured};
+use crate::measure::clock::{Workload, interleave, measured};
 use crate::measure::energy::Energy;
 use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
@@ -36,18 +36,6 @@ pub struct Scanned {
     pub row: Row,
     /// One cloud a place.
     pub clouds: Vec<Cloud>,
-}
-
-impl Scanned {
-    /// With the time that all its scans, of so many `rays` each, have taken.
-    pub fn timed(mut self, test_set: &str, rays: usize, seconds: Spread) -> Self {
-        let each_s = seconds.median / self.clouds.len() as f64;
-        self.row.test_set = test_set.to_owned();
-        self.row.rays_per_cpu_s = Some(rays as f64 / each_s);
-        self.row.scans_per_cpu_s = Some(1.0 / each_s);
-        self.row.ms_here = Some(each_s * 1e3);
-        self
-    }
 }
 
 /// Scans `objects` with all of `settings`, in turns, `rounds` times each.
@@ -93,14 +81,13 @@ pub fn scan_all(
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(place) => place.insert(truth_from(objects, setting.distance_m)?),
         };
-        let mut scanned = assess(objects, setting, pattern, truth)?.timed(
-            test_set,
-            pattern.len(),
-            costs[i].cpu_s(),
-        );
+        let Scanned { row, clouds } = assess(objects, setting, pattern, truth)?;
+        let cpu_s = costs[i].cpu_s().median / clouds.len() as f64;
+        let mut row = row.with_time(pattern.len(), cpu_s);
+        row.test_set = test_set.to_owned();
         // The repeat that is not counted has its joules in the sum, too.
-        scanned.row.joules = energy.is_some().then(|| joules[i] / (rounds + 1) as f64);
-        all.push(scanned);
+        row.joules = energy.is_some().then(|| joules[i] / (rounds + 1) as f64);
+        all.push(Scanned { row, clouds });
     }
     Ok(all)
 }
