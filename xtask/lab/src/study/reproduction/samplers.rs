@@ -1,7 +1,6 @@
 //! Random, farthest and critical points: what they cost and what they are
 //! worth, each behind a network trained at the same count.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use formats::split::Split;
@@ -56,42 +55,38 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     Ok(Section::new("Samplers", about, tables))
 }
 
-/// A sampler, and by the points that it keeps the networks trained behind it:
-/// their names and recipes.
-type Rival = (String, BTreeMap<usize, (String, Recipe)>);
+/// A sampler, and the networks trained behind it: a name and a recipe for each count of
+/// points in the plan's order, or for the first alone.
+type Rival = (String, Vec<(String, Recipe)>);
 
 fn rivals(plan: &Plan, n_points: usize) -> Vec<Rival> {
-    let behind = |name: &str, kept: &[usize], network: &dyn Fn(usize) -> (String, Recipe)| {
-        (name.to_owned(), kept.iter().map(|&keep| (keep, network(keep))).collect())
+    let at_each_count = |network: &dyn Fn(usize) -> (String, Recipe)| {
+        plan.kept.iter().map(|&keep| network(keep)).collect::<Vec<_>>()
     };
     let cpl = |front: &[usize], keep, change: &dyn Fn(&mut Cpl)| {
         let mut recipe = cpl_recipe(plan, n_points, front, keep);
         recipe.cpl.iter_mut().for_each(change);
         recipe
     };
-    let mut rivals = vec![
-        behind("random", &plan.kept, &|keep| (points::name(keep), points::recipe(plan, keep))),
-        behind("farthest", &plan.kept, &|keep| {
-            let recipe = Recipe { sampling: Sampling::Fps, ..plan.at(keep) };
-            (format!("farthest-{keep}"), recipe)
-        }),
-    ];
+    let random = at_each_count(&|keep| (points::name(keep), points::recipe(plan, keep)));
+    let farthest = at_each_count(&|keep| {
+        (format!("farthest-{keep}"), Recipe { sampling: Sampling::Fps, ..plan.at(keep) })
+    });
+    let mut rivals = vec![("random".to_owned(), random), ("farthest".to_owned(), farthest)];
     for front in &plan.fronts {
-        rivals.push(behind(&front_name(front), &plan.kept, &|keep| {
-            (cpl_name(front, keep), cpl(front, keep, &|_| {}))
-        }));
+        let networks = at_each_count(&|keep| (cpl_name(front, keep), cpl(front, keep, &|_| {})));
+        rivals.push((front_name(front), networks));
     }
-    let first = &plan.kept[..1];
+    let keep = plan.kept[0];
     // Where a front end has more critical points than are kept, chance has a say.
     let front = &plan.fronts[plan.fronts.len().min(2) - 1];
-    rivals.push(behind(&format!("{}, Gumbel-top-k", front_name(front)), first, &|keep| {
-        (format!("{}-gumbel", cpl_name(front, keep)), cpl(front, keep, &|cpl| cpl.gumbel = true))
-    }));
-    rivals.push(behind("cpl, trunk shared with the input T-Net", first, &|keep| {
-        let mut recipe = cpl(&plan.fronts[0], keep, &|cpl| cpl.shared = true);
-        recipe.network.input_transform = true;
-        (format!("cpl-shared-{keep}"), recipe)
-    }));
+    let gumbel = cpl(front, keep, &|cpl| cpl.gumbel = true);
+    let network = (format!("{}-gumbel", cpl_name(front, keep)), gumbel);
+    rivals.push((format!("{}, Gumbel-top-k", front_name(front)), vec![network]));
+    let mut shared = cpl(&plan.fronts[0], keep, &|cpl| cpl.shared = true);
+    shared.network.input_transform = true;
+    let network = (format!("cpl-shared-{keep}"), shared);
+    rivals.push(("cpl, trunk shared with the input T-Net".to_owned(), vec![network]));
     rivals
 }
 
@@ -105,12 +100,12 @@ fn accuracy(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table>
         kept.iter().map(|n| format!("{n} points")),
     );
     for (rival, networks) in rivals(&context.plan, train.set.n_points) {
-        let trained = |keep: &usize| {
-            let Some((name, recipe)) = networks.get(keep) else { return Ok(Cell::None) };
+        let trained = |i: usize| {
+            let Some((name, recipe)) = networks.get(i) else { return Ok(Cell::None) };
             let model = context.network(name, recipe.clone(), &train)?;
             Ok(Cell::instance(&test(&model, held, None)?))
         };
-        table.measure(rival, kept.iter().map(trained))?;
+        table.measure(rival, (0..kept.len()).map(trained))?;
     }
     Ok(table)
 }
