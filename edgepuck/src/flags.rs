@@ -3,10 +3,21 @@
 use crate::Usage;
 use std::path::Path;
 
-/// Why `--simplify` fails in a program that was built without it.
-pub const BUILT_WITHOUT_SIMPLIFY: &str = "--simplify: this program was built without mesh \
-     simplification; released programs have it, and `cargo install --path edgepuck --features \
-     simplify` builds it, which takes a C++ compiler";
+/// Fails if meshes are to be simplified and this program was built without that.
+///
+/// # Errors
+/// A usage error that says how to get a program that simplifies.
+pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
+    if !wanted || cfg!(feature = "simplify") {
+        return Ok(());
+    }
+    Err(Usage(
+        "--simplify: this program was built without mesh simplification; released programs have \
+         it, and `cargo install --path edgepuck --features simplify` builds it, which takes a C++ \
+         compiler"
+            .to_owned(),
+    ))
+}
 
 /// Fails unless `--meshes`, where it is given, names a folder.
 ///

@@ -46,9 +46,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut scene = Scene::load(&scene_file)?;
     scene.simplify = args.simplify.or(scene.simplify);
     scene.check_triangles().map_err(|error| Usage(error.to_string()))?;
-    if scene.simplifies() && cfg!(not(feature = "simplify")) {
-        return Err(Usage(flags::BUILT_WITHOUT_SIMPLIFY.to_owned()).into());
-    }
+    flags::need_simplification(scene.simplifies())?;
     if format == ScanFormat::Pcap {
         cast_as_packets_tell(&mut scene).with_context(|| format!("{}", scene_file.display()))?;
     } else if args.returns.is_some() {

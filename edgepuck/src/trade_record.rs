@@ -131,6 +131,15 @@ impl Row {
         self
     }
 
+    /// The row with the CPU time of a scan of so many `rays`.
+    #[must_use]
+    pub fn with_time(mut self, rays: usize, seconds: f64) -> Self {
+        self.rays_per_cpu_s = Some(rays as f64 / seconds);
+        self.scans_per_cpu_s = Some(1.0 / seconds);
+        self.ms_here = Some(seconds * 1e3);
+        self
+    }
+
     /// Milliseconds on `device`.
     #[must_use]
     pub fn ms(&self, device: Device) -> Option<f64> {

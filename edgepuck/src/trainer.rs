@@ -4,8 +4,8 @@
 
 use crate::{Outcome, checkout};
 use anyhow::Context;
-use formats::modelnet_h5_list::is_one;
-use std::ffi::{OsStr, OsString};
+use formats::modelnet_h5_list::is_among;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 
@@ -20,12 +20,6 @@ const OVERRIDE: &str = "EDGEPUCK_TRAIN";
 pub struct Args {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
     flags: Vec<OsString>,
-}
-
-impl From<Vec<OsString>> for Args {
-    fn from(flags: Vec<OsString>) -> Self {
-        Self { flags }
-    }
 }
 
 /// Runs `command` of the training program in the caller's folder.
@@ -80,15 +74,9 @@ fn built_by_cargo(root: &Path, flags: &[OsString]) -> Command {
     cargo.args(["run", "--release", "--package", "train", "--bin", PROGRAM, "--manifest-path"]);
     cargo.arg(root.join("Cargo.toml"));
     // The HDF5 reader takes long to build, so only such data asks for it.
-    if flags.iter().any(|flag| is_one(Path::new(&value(flag)))) {
+    if is_among(flags) {
         cargo.args(["--features", "hdf5"]);
     }
     cargo.arg("--");
     cargo
-}
-
-/// What stands behind the last `=` of a flag, or all of it.
-fn value(flag: &OsStr) -> String {
-    let flag = flag.to_string_lossy();
-    flag.rsplit('=').next().unwrap_or_default().to_owned()
 }

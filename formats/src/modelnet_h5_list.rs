@@ -1,6 +1,7 @@
 //! The lists by which a folder of ModelNet40's HDF5 files is known, without the
 //! library that reads those.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::split::Split;
@@ -15,4 +16,12 @@ pub fn list(folder: &Path, split: Split) -> PathBuf {
 #[must_use]
 pub fn is_one(folder: &Path) -> bool {
     Split::ALL.iter().any(|split| list(folder, *split).is_file())
+}
+
+/// Whether one of a command line's words is such a folder, alone or as the value
+/// in `--flag=FOLDER`.
+#[must_use]
+pub fn is_among(words: &[OsString]) -> bool {
+    let value = |word: &OsString| Some(PathBuf::from(word.to_str()?.split_once('=')?.1));
+    words.iter().any(|word| is_one(Path::new(word)) || value(word).is_some_and(|v| is_one(&v)))
 }

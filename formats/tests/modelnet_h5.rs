@@ -1,11 +1,14 @@
 //! ModelNet40's HDF5 layout, read back.
 
+use std::ffi::OsString;
 use std::fs;
+use std::path::Path;
 
 use formats::Split;
 use formats::modelnet_h5::{self, CLOUDS_PER_FILE, ModelNetH5Writer};
+use formats::modelnet_h5_list;
 
-fn write(folder: &std::path::Path, m: usize) {
+fn write(folder: &Path, m: usize) {
     let classes = vec!["bowl".to_owned(), "chair".to_owned()];
     let mut writer = ModelNetH5Writer::create(folder, Split::Train, 2, classes);
     for i in 0..m {
@@ -58,6 +61,11 @@ fn what_is_written_is_read_as_a_labelled_set() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), CLOUDS_PER_FILE + 3);
     assert!(modelnet_h5::is_one(folder.path()));
+    let named = |path: &Path| -> [OsString; 2] {
+        ["train".into(), format!("--data={}", path.display()).into()]
+    };
+    assert!(modelnet_h5_list::is_among(&named(folder.path())));
+    assert!(!modelnet_h5_list::is_among(&named(&folder.path().join("elsewhere"))));
     let set = modelnet_h5::read(folder.path(), Split::Train).unwrap();
     assert_eq!((set.len(), set.n_points), (CLOUDS_PER_FILE + 3, 2));
     assert_eq!(set.cloud(2049), [[2049.0, 0.0, 1.0], [0.5, 0.25, 2049.0]]);

@@ -94,41 +94,27 @@ fn fp32_is_the_reference(rows: &[Row]) {
 }
 
 #[test]
-fn bad_input_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    assert!(
-        exits(2, lab(), at, "trade --meshes nowhere").contains("expected a folder, found nowhere")
-    );
-    fs::create_dir(at.join("empty")).unwrap();
-    assert!(exits(1, lab(), at, "trade --meshes empty").contains("empty"));
-}
-
-#[test]
-fn what_trade_cannot_use_is_found_before_it_scans_and_nothing_is_written() {
+fn what_cannot_be_used_is_named_before_anything_is_scanned_or_written() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     shapes(at);
+    fs::create_dir(at.join("empty")).unwrap();
     fs::write(at.join("clouds.npz"), "no clouds").unwrap();
-    let refused =
-        exits(1, lab(), at, "trade --quick --meshes shapes --clouds clouds.npz --out out");
-    assert!(refused.contains("clouds.npz"), "{refused}");
     for class in ["yak", "zebra"] {
         let test = at.join("animals").join(class).join("test");
         fs::create_dir_all(&test).unwrap();
         fs::write(test.join(format!("{class}.off")), TETRAHEDRON).unwrap();
     }
-    let refused = exits(1, lab(), at, "trade --quick --meshes animals --out out");
-    assert!(refused.contains("no bundled model knows the classes"), "{refused}");
-    assert!(!refused.contains("reference:"), "nothing was scanned: {refused}");
-    assert!(!at.join("out").exists());
-}
-
-#[test]
-fn a_missing_folder_of_records_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let refused = exits(1, lab(), at, "report --assets gone --out report.html");
-    assert!(refused.contains("gone is not a folder"), "{refused}");
-    assert!(!at.join("report.html").exists());
+    for (code, words, expected) in [
+        (2, "trade --meshes nowhere", "expected a folder, found nowhere"),
+        (1, "trade --meshes empty", "empty"),
+        (1, "trade --quick --meshes shapes --clouds clouds.npz", "clouds.npz"),
+        (1, "trade --quick --meshes animals", "no bundled model knows the classes"),
+        (1, "report --assets gone", "--assets: expected a folder, found gone"),
+    ] {
+        let refused = exits(code, lab(), at, &format!("{words} --out out"));
+        assert!(refused.contains(expected), "{words}: {refused}");
+        assert!(!refused.contains("reference:"), "{words}: it scanned: {refused}");
+        assert!(!at.join("out").exists(), "{words}");
+    }
 }

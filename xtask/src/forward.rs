@@ -1,76 +1,80 @@
 //! Starts the repository's other programs, which Cargo builds first if need be.
 
 use anyhow::Context;
-use formats::modelnet_h5_list::is_one;
+use formats::modelnet_h5_list;
 use std::ffi::OsString;
-use std::path::Path;
-use std::process::ExitStatus;
-use xtask::workspace::{cargo_command, root};
+use std::process::Command;
+use xtask::workspace::cargo_run;
 
-/// A program of the repository.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Program {
-    /// The product.
-    Edgepuck,
-    /// The laboratory, which measures.
-    Lab,
-}
+/// The product.
+pub const EDGEPUCK: &str = "edgepuck";
 
-/// Runs `program` in the caller's folder and gives the exit code that it ended with.
+/// The laboratory, which measures.
+pub const LAB: &str = "edgepuck-lab";
+
+/// Runs the program of `package` with `words` in the caller's folder and gives
+/// the exit code that it ended with.
 ///
 /// # Errors
 /// Cargo cannot be started.
-pub fn run(program: Program, command: Option<&str>, words: &[OsString]) -> anyhow::Result<u8> {
-    let mut cargo = cargo_command();
-    cargo.args(["run", "--release", "--package", program.package(), "--bin", program.package()]);
-    cargo.arg("--manifest-path").arg(root().join("Cargo.toml"));
-    for feature in program.features(words) {
+pub fn run(package: &str, words: &[OsString]) -> anyhow::Result<u8> {
+    let mut cargo = cargo_run(package);
+    for feature in features(package, words) {
         cargo.args(["--features", feature]);
     }
-    cargo.arg("--").args(command).args(words);
-    let status = cargo.status().context("cannot start cargo")?;
-    Ok(exit_code(status))
+    cargo.arg("--").args(words);
+    become_process(&mut cargo).context("cannot start cargo")
 }
 
-impl Program {
-    fn package(self) -> &'static str {
-        match self {
-            Self::Edgepuck => "edgepuck",
-            Self::Lab => "edgepuck-lab",
-        }
-    }
-
-    /// The features that a command line needs beyond the default ones, which
-    /// leave out what takes long to build: meshoptimizer and HDF5.
-    fn features(self, words: &[OsString]) -> Vec<&'static str> {
-        let has = |flag: &str| words.iter().any(|word| word.to_string_lossy().starts_with(flag));
-        let names = |name: &str| words.iter().any(|word| word.to_string_lossy().contains(name));
-        let mut features = Vec::new();
-        if has("--simplify") {
-            features.push("simplify");
-        }
-        if self == Self::Edgepuck && has("--layout") && names("modelnet-h5") {
-            features.push("hdf5");
-        }
-        if self == Self::Lab && words.iter().any(|word| is_one(path_of(word))) {
-            features.push("hdf5");
-        }
-        features
-    }
-}
-
-/// The value of a flag `--name=VALUE`, or the whole word.
-fn path_of(word: &OsString) -> &Path {
-    let value = word.to_str().and_then(|word| word.split_once('=')).map(|(_, value)| value);
-    value.map_or(Path::new(word), Path::new)
-}
-
-/// The code that the child ended with; 128 more than its signal, as shells have
-/// it, where a signal ended it.
-fn exit_code(status: ExitStatus) -> u8 {
+/// Replaces this process where the system allows it, so that a signal ends what
+/// the caller sees; elsewhere waits for the child and returns its exit code.
+fn become_process(command: &mut Command) -> std::io::Result<u8> {
     #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        return u8::try_from(128 + signal).unwrap_or(1);
+    return Err(std::os::unix::process::CommandExt::exec(command));
+    #[cfg(not(unix))]
+    Ok(command.status()?.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
+}
+
+/// The features that a command line needs beyond the default ones, which leave
+/// out what takes long to build: meshoptimizer and HDF5.
+fn features(package: &str, words: &[OsString]) -> Vec<&'static str> {
+    let any = |is: fn(&str) -> bool| words.iter().any(|word| is(&word.to_string_lossy()));
+    let simplifies = any(|word| word.starts_with("--simplify"))
+        || package == EDGEPUCK && any(|word| word.ends_with(".toml") && is_simplified(word));
+    let needs_hdf5 = match package {
+        LAB => modelnet_h5_list::is_among(words),
+        _ => any(|word| word.starts_with("--layout")) && any(|word| word.contains("modelnet-h5")),
+    };
+    let features = [(simplifies, "simplify"), (needs_hdf5, "hdf5")];
+    features.into_iter().filter(|(is_needed, _)| *is_needed).map(|(_, name)| name).collect()
+}
+
+/// Whether the scene file has a key `simplify` that is not `false`. Where the word
+/// stands for something else, a longer build is all that it costs.
+fn is_simplified(scene: &str) -> bool {
+    std::fs::read_to_string(scene).is_ok_and(|text| has_simplify_key(&text))
+}
+
+fn has_simplify_key(scene: &str) -> bool {
+    let mut code = scene.lines().map(|line| line.split('#').next().unwrap_or_default());
+    code.any(|code| code.contains("simplify") && !code.contains("false"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_simplifies_is_built_with_the_feature() {
+        let flags = ["gen-dataset", "--simplify=auto", "--layout", "modelnet-h5"];
+        assert_eq!(features(EDGEPUCK, &flags.map(OsString::from)), ["simplify", "hdf5"]);
+        for (scene, expected) in [
+            ("simplify = \"auto\"", true),
+            ("[[object]]\n  simplify = 0.01 # metres", true),
+            ("simplify = false", false),
+            ("# simplify = \"auto\"", false),
+        ] {
+            assert_eq!(has_simplify_key(scene), expected, "{scene}");
+        }
     }
-    status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
 }

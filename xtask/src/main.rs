@@ -6,7 +6,7 @@ mod summary;
 mod test;
 
 use clap::{Parser, Subcommand};
-use forward::Program;
+use forward::{EDGEPUCK, LAB};
 use std::ffi::OsString;
 use std::process::ExitCode;
 use xtask::build_pi;
@@ -63,17 +63,19 @@ struct Forwarded {
 }
 
 fn main() -> ExitCode {
+    // The laboratory's commands have the same names there.
+    let typed: Vec<OsString> = std::env::args_os().skip(1).collect();
     let done = match Cli::parse().command {
         Command::Test(args) => test::run(&args),
         Command::ReleaseCheck => release_check::run(),
         Command::BuildPi(args) => build_pi::run(&args).map(|()| 0),
-        Command::Bench(args) => forward::run(Program::Lab, Some("bench"), &args.words),
-        Command::Trade(args) => forward::run(Program::Lab, Some("trade"), &args.words),
-        Command::Ablate(args) => forward::run(Program::Lab, Some("ablate"), &args.words),
-        Command::Reproduce(args) => forward::run(Program::Lab, Some("reproduce"), &args.words),
-        Command::Report(args) => forward::run(Program::Lab, Some("report"), &args.words),
-        Command::Edgepuck(args) => forward::run(Program::Edgepuck, None, &args.words),
-        Command::Product(words) => forward::run(Program::Edgepuck, None, &words),
+        Command::Bench(_)
+        | Command::Trade(_)
+        | Command::Ablate(_)
+        | Command::Reproduce(_)
+        | Command::Report(_) => forward::run(LAB, &typed),
+        Command::Edgepuck(args) => forward::run(EDGEPUCK, &args.words),
+        Command::Product(words) => forward::run(EDGEPUCK, &words),
     };
     match done {
         Ok(code) => ExitCode::from(code),

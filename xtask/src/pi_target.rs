@@ -3,7 +3,6 @@
 
 use crate::workspace;
 use anyhow::{Context, bail};
-use std::path::Path;
 use std::process::Command;
 
 /// Static binaries that run on any 64-bit Raspberry Pi, whatever its system.
@@ -27,17 +26,13 @@ const CORE: &str = "cortex-a76";
 /// # Errors
 /// If there is no rustc to ask.
 pub fn has_standard_library() -> anyhow::Result<bool> {
-    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let mut ask = Command::new(rustc);
-    ask.args(["--print", "target-libdir", "--target", TRIPLE]);
-    let folder = workspace::output(&mut ask)?;
-    Ok(Path::new(folder.trim()).is_dir())
+    Ok(workspace::standard_library(TRIPLE)?.is_dir())
 }
 
 /// Fetches the target's standard library through rustup unless it is there.
 ///
 /// # Errors
-/// If it cannot be had.
+/// There is no rustup, or it cannot fetch the library.
 pub fn need_standard_library() -> anyhow::Result<()> {
     if has_standard_library()? {
         return Ok(());

@@ -1,20 +1,10 @@
 //! `cargo xtask release-check`: what a release must pass besides the tests.
 
-use crate::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary, check};
 use anyhow::{Context, bail};
 use serde_json::Value;
 use std::process::Command;
-use xtask::workspace::{cargo, output, root, step};
-
-/// A program that checks, and the package that installs it.
-struct Tool {
-    program: &'static str,
-    package: &'static str,
-}
-
-const DIST: Tool = Tool { program: "dist", package: "cargo-dist" };
-const DENY: Tool = Tool { program: "cargo-deny", package: "cargo-deny" };
-const SEMVER: Tool = Tool { program: "cargo-semver-checks", package: "cargo-semver-checks" };
+use xtask::workspace::{cargo, output, root};
 
 /// Runs every check, whether or not one before it failed, and ends with a table.
 pub fn run() -> anyhow::Result<u8> {
@@ -22,15 +12,14 @@ pub fn run() -> anyhow::Result<u8> {
     summary.step("packages", |_| packages());
     summary.step("binaries", binaries);
     summary.step("dependencies", |_| {
-        let mut deny = DENY.command()?;
+        let mut deny = tool("cargo-deny", "cargo-deny")?;
         check("dependencies", deny.args(["check", "--hide-inclusion-graph"]))
     });
     summary.step("semantic versions", semantic_versions);
-    println!("{summary}");
-    Ok(u8::from(summary.total().failed > 0))
+    Ok(summary.end())
 }
 
-/// That every crate for crates.io builds from what its package holds.
+/// Checks that every crate for crates.io builds from what its package holds.
 fn packages() -> anyhow::Result<Counts> {
     let mut package = cargo(&["package", "--allow-dirty"]);
     for crate_ in crates()?.iter().filter(|crate_| crate_["publish"].is_null()) {
@@ -39,32 +28,25 @@ fn packages() -> anyhow::Result<Counts> {
     check("packages", &mut package)
 }
 
-/// What a release would hold for each system.
+/// Checks what a release would hold for each system.
 fn binaries(summary: &mut Summary) -> anyhow::Result<Counts> {
     let is_known = crates()?.iter().any(|crate_| crate_["repository"].is_string());
     if !is_known {
-        return Ok(skip(summary, "binaries", "no manifest names the `repository` to release from"));
+        let reason = "no manifest names the `repository` to release from";
+        return Ok(summary.skip("binaries", 1, reason));
     }
-    check("binaries", DIST.command()?.arg("plan"))
+    check("binaries", tool("dist", "cargo-dist")?.arg("plan"))
 }
 
-/// That the public interface changes as the versions say.
+/// Checks that the public interface changes as the versions say.
 fn semantic_versions(summary: &mut Summary) -> anyhow::Result<Counts> {
     let mut git = Command::new("git");
     let tags = output(git.args(["tag", "--list", "v*"]).current_dir(root()))?;
     if tags.trim().is_empty() {
-        return Ok(skip(summary, "semantic versions", "no version has been released yet"));
+        return Ok(summary.skip("semantic versions", 1, "no version has been released yet"));
     }
-    check("semantic versions", SEMVER.command()?.args(["semver-checks", "--workspace"]))
-}
-
-fn check(name: &str, command: &mut Command) -> anyhow::Result<Counts> {
-    step(name, command).map(|()| Counts::PASSED)
-}
-
-fn skip(summary: &mut Summary, name: &str, reason: &str) -> Counts {
-    summary.remark(format!("{name}: SKIPPED, {reason}"));
-    Counts::SKIPPED
+    let mut semver = tool("cargo-semver-checks", "cargo-semver-checks")?;
+    check("semantic versions", semver.args(["semver-checks", "--workspace"]))
 }
 
 /// The workspace's crates as `cargo metadata` describes them.
@@ -74,20 +56,17 @@ fn crates() -> anyhow::Result<Vec<Value>> {
     Ok(metadata["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
 }
 
-impl Tool {
-    /// The program, at the workspace's root.
-    ///
-    /// # Errors
-    /// It is not installed; the error says what installs it.
-    fn command(&self) -> anyhow::Result<Command> {
-        let Self { program, package } = self;
-        if Command::new(program).arg("--version").output().is_err() {
-            bail!("{program} is missing: `cargo install --locked {package}` installs it");
-        }
-        let mut command = Command::new(program);
-        command.current_dir(root());
-        Ok(command)
+/// The program, at the workspace's root.
+///
+/// # Errors
+/// It is not installed; the error says which package installs it.
+fn tool(program: &str, package: &str) -> anyhow::Result<Command> {
+    if Command::new(program).arg("--version").output().is_err() {
+        bail!("{program} is missing: `cargo install --locked {package}` installs it");
     }
+    let mut command = Command::new(program);
+    command.current_dir(root());
+    Ok(command)
 }
 
 #[cfg(test)]
@@ -96,8 +75,7 @@ mod tests {
 
     #[test]
     fn a_missing_tool_is_named_with_what_installs_it() {
-        let tool = Tool { program: "edgepuck-no-such-tool", package: "a-package" };
-        let error = tool.command().unwrap_err().to_string();
+        let error = tool("edgepuck-no-such-tool", "a-package").unwrap_err().to_string();
         assert_eq!(
             error,
             "edgepuck-no-such-tool is missing: `cargo install --locked a-package` installs it"
@@ -111,11 +89,11 @@ mod tests {
             let crate_ = crates.iter().find(|crate_| crate_["name"] == name).unwrap();
             crate_["publish"].is_null()
         };
-        assert!(
-            ["edgepuck", "edgepuck-formats", "sim-gpu", "infer-cpu"]
-                .iter()
-                .all(|n| is_published(n))
-        );
-        assert!(!["xtask", "tests", "edgepuck-lab"].iter().any(|n| is_published(n)));
+        for name in ["edgepuck", "edgepuck-formats", "sim-gpu", "infer-cpu"] {
+            assert!(is_published(name), "{name}");
+        }
+        for name in ["xtask", "tests", "edgepuck-lab"] {
+            assert!(!is_published(name), "{name}");
+        }
     }
 }

@@ -1,7 +1,10 @@
 //! What became of the checks of a run: counts by step, and the table that ends it.
 
+use anyhow::{Context, ensure};
 use std::fmt;
+use std::process::Command;
 use std::time::{Duration, Instant};
+use xtask::workspace::words;
 
 /// How many checks passed, failed and were skipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,8 +22,6 @@ impl Counts {
     pub const PASSED: Self = Self { passed: 1, failed: 0, skipped: 0 };
     /// One check that failed.
     pub const FAILED: Self = Self { passed: 0, failed: 1, skipped: 0 };
-    /// One check that was skipped.
-    pub const SKIPPED: Self = Self { passed: 0, failed: 0, skipped: 1 };
 
     /// The counts in the line that closes a test program's output; `None` for
     /// any other line. Rust's own harness and libtest-mimic write the same line:
@@ -85,6 +86,17 @@ impl Summary {
         self.steps.push((name.to_owned(), start.elapsed(), counts));
     }
 
+    /// Runs one step that is a single command.
+    pub fn command(&mut self, name: &str, command: &mut Command) {
+        self.step(name, |_| check(name, command));
+    }
+
+    /// Counts `n` checks as skipped, and keeps the reason for the end of the run.
+    pub fn skip(&mut self, name: &str, n: usize, reason: &str) -> Counts {
+        self.remark(format!("{name}: SKIPPED, {reason}"));
+        Counts { skipped: n as u64, ..Counts::default() }
+    }
+
     /// Keeps a sentence for the end of the run.
     pub fn remark(&mut self, remark: String) {
         self.remarks.push(remark);
@@ -94,6 +106,24 @@ impl Summary {
     pub fn total(&self) -> Counts {
         self.steps.iter().fold(Counts::default(), |total, (.., counts)| total.and(*counts))
     }
+
+    /// Prints the table, and gives the exit code: 1 if a check failed, 0 otherwise.
+    pub fn end(&self) -> u8 {
+        println!("{self}");
+        u8::from(self.total().failed > 0)
+    }
+}
+
+/// Runs a command that is one check, after naming it; its output goes to the terminal.
+///
+/// # Errors
+/// If it cannot be started or fails.
+pub fn check(name: &str, command: &mut Command) -> anyhow::Result<Counts> {
+    let shown = words(command);
+    eprintln!("== {name}: {shown}");
+    let status = command.status().with_context(|| format!("cannot run {shown}"))?;
+    ensure!(status.success(), "it ended with {status}: {shown}");
+    Ok(Counts::PASSED)
 }
 
 impl fmt::Display for Summary {
@@ -121,30 +151,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn closing_lines_of_test_programs_are_counted() {
-        let ok = "test result: ok. 59 passed; 0 failed; 1 ignored; 0 measured; 3 filtered out; \
-                  finished in 0.31s";
-        assert_eq!(Counts::of_closing_line(ok), Some(Counts { passed: 59, failed: 0, skipped: 1 }));
-        let failed = "test result: FAILED. 1 passed; 22 failed; 0 ignored; 0 measured; 0 filtered \
-                      out; finished in 1.00s\n";
-        assert_eq!(
-            Counts::of_closing_line(failed),
-            Some(Counts { passed: 1, failed: 22, skipped: 0 })
-        );
-    }
-
-    #[test]
-    fn other_lines_hold_no_counts() {
-        for line in [
-            "",
-            "running 3 tests",
-            "test a::b ... ok",
-            "test result: ok. many passed; 0 failed; 0 ignored; 0 measured",
-            "test result: ok. 1 passed; 0 failed",
-            "found test result: ok. 1 passed; 0 failed; 0 ignored; 0 measured",
+    fn closing_lines_of_test_programs_are_counted_and_others_are_not() {
+        for (line, expected) in [
+            (
+                "ok. 59 passed; 0 failed; 1 ignored; 0 measured; 3 filtered out; finished in 0.31s",
+                Some([59, 0, 1]),
+            ),
+            (
+                "FAILED. 1 passed; 22 failed; 0 ignored; 0 measured; 0 filtered out\n",
+                Some([1, 22, 0]),
+            ),
+            ("", None),
+            ("ok. many passed; 0 failed; 0 ignored; 0 measured", None),
+            ("ok. 1 passed; 0 failed", None),
         ] {
-            assert_eq!(Counts::of_closing_line(line), None, "{line}");
+            let expected =
+                expected.map(|[passed, failed, skipped]| Counts { passed, failed, skipped });
+            assert_eq!(
+                Counts::of_closing_line(&format!("test result: {line}")),
+                expected,
+                "{line}"
+            );
+            assert_eq!(Counts::of_closing_line(&format!("found test result: {line}")), None);
         }
+        assert_eq!(Counts::of_closing_line("test a::b ... ok"), None);
     }
 
     #[test]

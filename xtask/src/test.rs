@@ -7,9 +7,9 @@ mod sanitize;
 mod test_programs;
 
 use crate::summary::{Counts, Summary};
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use std::process::Command;
-use xtask::workspace::{cargo, root, step};
+use xtask::workspace::{cargo, output, root};
 
 /// The script that lists and installs the packages that tests need.
 const PACKAGES: &str = "xtask/packages.sh";
@@ -43,37 +43,25 @@ pub fn run(args: &Args) -> anyhow::Result<u8> {
     } else {
         run_all(args, &mut summary);
     }
-    println!("{summary}");
-    Ok(u8::from(summary.total().failed > 0))
+    Ok(summary.end())
 }
 
 fn run_all(args: &Args, summary: &mut Summary) {
     let install = !args.no_install;
     if install {
-        summary.step("packages", |_| {
-            check("packages", Command::new("sh").arg(PACKAGES).current_dir(root()))
-        });
+        summary.command("packages", Command::new("sh").arg(PACKAGES).current_dir(root()));
     }
     let packages = peers::Packages::fetch_meanwhile(args.peers, install);
-    summary.step("format", |_| check("format", &mut cargo(&["fmt", "--all", "--check"])));
-    summary.step("lints", |_| {
-        let mut lints = cargo_on_all(&["clippy", "--all-targets"]);
-        check("lints", lints.args(["--", "--deny", "warnings"]))
-    });
+    summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
+    let mut lints = cargo_on_all(&["clippy", "--all-targets"]);
+    summary.command("lints", lints.args(["--", "--deny", "warnings"]));
     summary.step("tests", |summary| tests(summary, install));
-    summary.step("documentation", |_| {
-        let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
-        check("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"))
-    });
+    let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
+    summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
     pi::run(summary, install);
     peers::run(summary, packages);
     fuzz::run(summary, args.fuzz_seconds);
-}
-
-/// A command that is one check.
-fn check(name: &str, command: &mut Command) -> anyhow::Result<Counts> {
-    step(name, command).map(|()| Counts::PASSED)
 }
 
 /// A check that cannot run here, which fails where it is `required`.
@@ -83,11 +71,8 @@ fn go_without(
     lack: &str,
     required: bool,
 ) -> anyhow::Result<Counts> {
-    if required {
-        bail!("it cannot run: {lack}");
-    }
-    summary.remark(format!("{name}: SKIPPED, {lack}"));
-    Ok(Counts::SKIPPED)
+    ensure!(!required, "it cannot run: {lack}");
+    Ok(summary.skip(name, 1, lack))
 }
 
 /// A command of Cargo on every crate, with the features that all such commands
@@ -122,15 +107,11 @@ fn has_cpp_compiler() -> bool {
     cfg!(windows) || std::env::var_os("CXX").is_some() || answers("c++")
 }
 
-/// That the Raspberry Pi's crate drags in nothing of GPUs or training.
+/// Checks that the Raspberry Pi's crate depends on nothing for GPUs or training.
 fn infer_cpu_is_light() -> anyhow::Result<Counts> {
     const TOO_HEAVY: [&str; 7] = ["wgpu", "naga", "tokio", "ndarray", "rayon", "sim-gpu", "train"];
-    let tree = cargo(&["tree", "--package", "infer-cpu", "--edges", "normal", "--prefix", "none"])
-        .output()?;
-    if !tree.status.success() {
-        bail!("cargo tree failed: {}", String::from_utf8_lossy(&tree.stderr));
-    }
-    let tree = String::from_utf8_lossy(&tree.stdout);
+    let tree = ["tree", "--package", "infer-cpu", "--edges", "normal", "--prefix", "none"];
+    let tree = output(&mut cargo(&tree))?;
     let heavy = tree.lines().find(|line| TOO_HEAVY.iter().any(|name| line.starts_with(name)));
     match heavy {
         Some(line) => bail!("infer-cpu must stay light, but depends on {line}"),

@@ -1,10 +1,10 @@
 //! The workspace that this program is part of, and commands run in it.
 
 use anyhow::{Context, bail};
+use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Instant;
 
 /// The workspace's root.
 pub fn root() -> &'static Path {
@@ -19,25 +19,28 @@ pub fn cargo(args: &[&str]) -> Command {
 }
 
 /// The Cargo that runs us.
-pub fn cargo_command() -> Command {
+fn cargo_command() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Runs one command after naming it, and says how long it took; its output goes
-/// to the terminal.
+/// Cargo, which builds the program of `package` if need be and then runs it in the
+/// caller's folder; features, `--` and the program's words are still to be added.
+pub fn cargo_run(package: &str) -> Command {
+    let mut command = cargo_command();
+    command.args(["run", "--release", "--package", package, "--bin", package]);
+    command.arg("--manifest-path").arg(root().join("Cargo.toml"));
+    command
+}
+
+/// The folder of Rust's standard library for `target`; it need not be there.
 ///
 /// # Errors
-/// If it cannot be started or fails.
-pub fn step(name: &str, command: &mut Command) -> anyhow::Result<()> {
-    let shown = words(command);
-    eprintln!("== {name}: {shown}");
-    let start = Instant::now();
-    let status = command.status().with_context(|| format!("cannot run {shown}"))?;
-    if !status.success() {
-        bail!("{name} failed ({status}): {shown}");
-    }
-    eprintln!("== {name}: {:.0} s", start.elapsed().as_secs_f64());
-    Ok(())
+/// If there is no rustc to ask.
+pub fn standard_library(target: &str) -> anyhow::Result<PathBuf> {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let mut ask = Command::new(rustc);
+    let folder = output(ask.args(["--print", "target-libdir", "--target", target]))?;
+    Ok(PathBuf::from(folder.trim()))
 }
 
 /// What a command prints.
@@ -59,15 +62,20 @@ pub fn words(command: &Command) -> String {
     words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")
 }
 
-/// The last executable that Cargo's `messages` name, one JSON object a line.
+/// The program `name` among those that Cargo's `messages`, one JSON object a line,
+/// say were built.
 ///
 /// # Errors
 /// There is none.
-pub fn executable(messages: &str) -> anyhow::Result<PathBuf> {
-    let messages = messages.lines().rev();
-    let mut messages = messages.filter_map(|m| serde_json::from_str::<serde_json::Value>(m).ok());
-    let last = messages.find_map(|message| Some(message["executable"].as_str()?.into()));
-    last.context("Cargo names no executable")
+pub fn executable(messages: &str, name: &str) -> anyhow::Result<PathBuf> {
+    let messages = messages.lines().filter_map(|m| serde_json::from_str::<Value>(m).ok());
+    let mut programs = messages.filter(|message| {
+        let target = &message["target"];
+        let is_test = message["profile"]["test"].as_bool().unwrap_or(false);
+        target["name"] == name && target["kind"][0] == "bin" && !is_test
+    });
+    let program = programs.find_map(|message| Some(message["executable"].as_str()?.into()));
+    program.with_context(|| format!("Cargo has not built the program {name}"))
 }
 
 /// The command line as records and pages show it.
@@ -117,11 +125,13 @@ mod tests {
     }
 
     #[test]
-    fn finds_the_executable_among_cargos_messages() {
-        let messages = "{\"reason\":\"compiler-artifact\",\"executable\":null}\n\
-             {\"reason\":\"compiler-artifact\",\"executable\":\"/t/pi/infer-cpu\"}\n\
-             {\"reason\":\"build-finished\",\"success\":true}\n";
-        assert_eq!(executable(messages).unwrap(), Path::new("/t/pi/infer-cpu"));
-        assert!(executable("not json\n").is_err());
+    fn a_program_is_found_among_tests_and_libraries_of_its_name() {
+        let messages = r#"{"reason":"build-script-executed"}
+{"target":{"kind":["lib"],"name":"a"},"profile":{"test":false},"executable":null}
+{"target":{"kind":["bin"],"name":"a"},"profile":{"test":true},"executable":"/t/deps/a-1"}
+{"target":{"kind":["bin"],"name":"a"},"profile":{"test":false},"executable":"/t/a"}
+not JSON"#;
+        assert_eq!(executable(messages, "a").unwrap(), Path::new("/t/a"));
+        assert!(executable(messages, "b").is_err());
     }
 }

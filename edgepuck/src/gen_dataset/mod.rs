@@ -104,9 +104,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         return check(folder);
     }
     let config = args.settings.config()?;
-    if config.simplify.is_some() && cfg!(not(feature = "simplify")) {
-        return Err(usage(flags::BUILT_WITHOUT_SIMPLIFY));
-    }
+    flags::need_simplification(config.simplify.is_some())?;
     let (meshes_folder, default_out) = match &args.meshes {
         Some(folder) => (folder.clone(), default_out(folder)),
         None => (write_default_shapes(config.seed)?, PathBuf::from(DEFAULT_OUT)),

@@ -23,16 +23,19 @@ struct Headers {
 /// Which of these it is not.
 pub fn check_static_stripped_aarch64(file: &[u8]) -> anyhow::Result<()> {
     // Class 2 is 64-bit, data 1 is little endian.
-    ensure!(file.starts_with(b"\x7fELF\x02\x01"), "it is no 64-bit little-endian ELF file");
+    ensure!(file.starts_with(b"\x7fELF\x02\x01"), "expected a 64-bit little-endian ELF file");
     let machine = u16_at(file, 18)?;
-    ensure!(machine == MACHINE_AARCH64, "it is for ELF machine {machine}, not for aarch64");
+    ensure!(
+        machine == MACHINE_AARCH64,
+        "expected a program for aarch64, found ELF machine {machine}"
+    );
     let segments = Headers::read(file, 32, 54)?;
     if segments.types(file, 0)?.contains(&SEGMENT_INTERPRETER) {
-        bail!("it is linked dynamically: it asks for an interpreter");
+        bail!("expected a static program, found one that is linked dynamically");
     }
     let sections = Headers::read(file, 40, 58)?;
     if sections.types(file, 4)?.contains(&SECTION_SYMBOLS) {
-        bail!("it is not stripped: it has a table of symbols");
+        bail!("expected a stripped program, found a table of symbols");
     }
     Ok(())
 }
@@ -85,10 +88,10 @@ mod tests {
         let verdict =
             |file: &[u8]| check_static_stripped_aarch64(file).map_err(|error| error.to_string());
         assert_eq!(verdict(&elf(183, 1, 1)), Ok(()));
-        assert!(verdict(&elf(62, 1, 1)).unwrap_err().contains("machine 62"));
+        assert!(verdict(&elf(62, 1, 1)).unwrap_err().contains("found ELF machine 62"));
         assert!(verdict(&elf(183, 3, 1)).unwrap_err().contains("dynamically"));
-        assert!(verdict(&elf(183, 1, 2)).unwrap_err().contains("not stripped"));
-        assert!(verdict(b"MZ").unwrap_err().contains("no 64-bit"));
+        assert!(verdict(&elf(183, 1, 2)).unwrap_err().contains("table of symbols"));
+        assert!(verdict(b"MZ").unwrap_err().contains("expected a 64-bit"));
         assert!(verdict(&elf(183, 1, 1)[..100]).unwrap_err().contains("cut short"));
         let mut astray = elf(183, 1, 1);
         astray[32..40].fill(0xff);

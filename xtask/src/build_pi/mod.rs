@@ -29,8 +29,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     };
     let shown = binary.display();
     let file = fs::read(binary).with_context(|| format!("cannot read {shown}"))?;
-    elf::check_static_stripped_aarch64(&file)
-        .with_context(|| format!("{shown} is not as meant"))?;
+    elf::check_static_stripped_aarch64(&file).with_context(|| shown.to_string())?;
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let (size, limit) = (mebibytes(file.len() as u64), mebibytes(MOST_BYTES));
     if file.len() as u64 > MOST_BYTES {
@@ -62,7 +61,7 @@ pub fn build(for_rustc: &[&str]) -> anyhow::Result<PathBuf> {
     let mut cargo = pi_target::cargo(&words);
     cargo.args(["--message-format", "json-render-diagnostics", "--"]).args(for_rustc);
     let messages = workspace::output(cargo.stderr(Stdio::inherit()))?;
-    workspace::executable(&messages)
+    workspace::executable(&messages, "infer-cpu")
 }
 
 /// Copies the program, its permissions as well; appears whole or not at all.

@@ -1,12 +1,12 @@
 //! Feeds each hand-written parser with mutated input for a while.
 
-use crate::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary, check};
 use anyhow::Context;
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Child, Command};
 use std::thread::available_parallelism;
-use xtask::workspace::{cargo, root, step};
+use xtask::workspace::{cargo, root};
 
 /// The targets, a program each.
 const TARGETS: [&str; 4] = ["off", "mesh", "clouds", "model"];
@@ -23,15 +23,14 @@ const COVERAGE: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-l
 /// Fuzzes every target for `seconds`, as many at a time as there are cores.
 pub fn run(summary: &mut Summary, seconds: u32) {
     summary.step("fuzzing", |summary| {
-        let n = TARGETS.len() as u64;
         let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
         if seconds == 0 || !is_known {
             let reason =
                 if is_known { "--fuzz-seconds 0" } else { "its flags are for x86-64 Linux" };
-            summary.remark(format!("fuzzing: {n} SKIPPED, {reason}"));
-            return Ok(Counts { skipped: n, ..Counts::default() });
+            return Ok(summary.skip("fuzzing", TARGETS.len(), reason));
         }
-        build()?;
+        let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
+        check("fuzzing", build.current_dir(folder()).env("RUSTFLAGS", COVERAGE))?;
         let mut counts = Counts::default();
         for targets in TARGETS.chunks(available_parallelism()?.get()) {
             let started = targets.iter().map(|target| start(target, seconds));
@@ -56,11 +55,6 @@ fn folder() -> std::path::PathBuf {
 
 fn log(target: &str) -> std::path::PathBuf {
     folder().join("target").join(format!("{target}.log"))
-}
-
-fn build() -> anyhow::Result<()> {
-    let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
-    step("fuzzing", build.current_dir(folder()).env("RUSTFLAGS", COVERAGE))
 }
 
 /// Starts fuzzing `target`; what it says goes to a file of its own.

@@ -1,22 +1,21 @@
-//! Proof against software nobody here wrote: the scripts in `tests/peers`.
+//! The scripts in `tests/peers`, which compare our programs with other software.
 //!
-//! Each runs alone, by Python, in an environment of pinned packages from PyPI,
-//! and is told by `EDGEPUCK_PROGRAM`, `EDGEPUCK_LAB` and `EDGEPUCK_INFER` where our programs are,
-//! by `EDGEPUCK_ROOT` where the workspace is, and by `EDGEPUCK_OUT` an empty
+//! Python runs each alone, in an environment of pinned packages from PyPI.
+//! `EDGEPUCK_PROGRAM`, `EDGEPUCK_LAB` and `EDGEPUCK_INFER` tell it where our
+//! programs are, `EDGEPUCK_ROOT` names the workspace, and `EDGEPUCK_OUT` an empty
 //! folder. It ends with 0 if all is well and with [`SKIPPED`] if it cannot run
-//! here. A script `x.py` shares the packages of `requirements.txt`, unless there
-//! is an `x-requirements.txt`: packages too large for every run.
+//! here. A script `x.py` uses the packages of `requirements.txt`, unless there is an
+//! `x-requirements.txt` with packages that are too large for every run.
 
 use super::cargo_on_all;
 use crate::summary::{Counts, Summary};
 use anyhow::Context;
-use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use xtask::venv::{Environment, cache_dir};
-use xtask::workspace::{output, root};
+use xtask::workspace::{executable, output, root};
 
 /// The folder of the scripts.
 const SCRIPTS: &str = "tests/peers";
@@ -42,13 +41,16 @@ pub enum Which {
     All,
 }
 
-/// The environments of packages: what scripts are run by.
+/// The interpreter that has a script's packages, or why there is none.
+type Python = Result<PathBuf, String>;
+
+/// The environments of packages by which scripts are run.
 pub struct Packages {
     which: Which,
     /// Whether packages may be fetched.
     install: bool,
-    /// Fetches those that most scripts share.
-    shared: JoinHandle<Result<PathBuf, String>>,
+    /// Fetches the packages that most scripts share.
+    shared: JoinHandle<Python>,
 }
 
 impl Packages {
@@ -61,39 +63,23 @@ impl Packages {
         };
         Self { which, install, shared: std::thread::spawn(fetch) }
     }
+}
 
-    /// The interpreter that has the packages of most scripts, or why there is none.
-    fn shared(self) -> (Result<PathBuf, String>, Large) {
-        let large = Large { which: self.which, install: self.install };
-        (self.shared.join().unwrap_or_else(|_| Err("fetching them panicked".to_owned())), large)
+/// The interpreter that has what script `name` imports; `None` if the script needs
+/// only what most scripts share.
+fn python_of(name: &str, which: Which, install: bool) -> Option<Python> {
+    let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
+    if !root().join(&requirements).exists() {
+        return None;
     }
-}
-
-/// The packages that single scripts need.
-struct Large {
-    which: Which,
-    install: bool,
-}
-
-impl Large {
-    /// The interpreter that has what script `name` imports; `None` if it needs
-    /// what most scripts do.
-    fn of(&self, name: &str) -> Option<Result<PathBuf, String>> {
-        let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
-        if !root().join(&requirements).exists() {
-            return None;
-        }
-        if self.which != Which::All {
-            return Some(Err("its packages are large; --peers all runs it".to_owned()));
-        }
-        let folder = format!("tests-{name}-venv");
-        let size = "some 5 GB";
-        let environment = Environment { name: &folder, requirements: &requirements, size };
-        Some(interpreter(&environment, self.install))
+    if which != Which::All {
+        return Some(Err("its packages are large; --peers all runs it".to_owned()));
     }
+    let (folder, size) = (format!("tests-{name}-venv"), "some 5 GB");
+    Some(interpreter(&Environment { name: &folder, requirements: &requirements, size }, install))
 }
 
-fn interpreter(environment: &Environment<'_>, install: bool) -> Result<PathBuf, String> {
+fn interpreter(environment: &Environment<'_>, install: bool) -> Python {
     match install {
         true => environment.interpreter(),
         false => environment.made()?.ok_or_else(|| "its packages are missing".to_owned()),
@@ -104,23 +90,19 @@ fn interpreter(environment: &Environment<'_>, install: bool) -> Result<PathBuf, 
 pub fn run(summary: &mut Summary, packages: Packages) {
     summary.step("peers", |summary| {
         let scripts = scripts()?;
-        if packages.which == Which::None {
-            let n = scripts.len() as u64;
-            summary.remark(format!("peers: {n} SKIPPED, as --peers none asks for"));
-            return Ok(Counts { skipped: n, ..Counts::default() });
+        let Packages { which, install, shared } = packages;
+        if which == Which::None {
+            return Ok(summary.skip("peers", scripts.len(), "--peers none asks for none"));
         }
         let programs = programs()?;
-        let (shared, large) = packages.shared();
+        let shared = shared.join().unwrap_or_else(|_| Err("fetching them panicked".to_owned()));
         let mut counts = Counts::default();
         for script in scripts {
             let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let python = large.of(&name).unwrap_or_else(|| shared.clone());
+            let python = python_of(&name, which, install).unwrap_or_else(|| shared.clone());
             counts = counts.and(match python {
                 Ok(python) => check(summary, &name, &script, &python, &programs)?,
-                Err(cause) => {
-                    summary.remark(format!("peer {name}: SKIPPED, {cause}"));
-                    Counts::SKIPPED
-                }
+                Err(cause) => summary.skip(&format!("peer {name}"), 1, &cause),
             });
         }
         Ok(counts)
@@ -135,7 +117,10 @@ fn check(
     programs: &Programs,
 ) -> anyhow::Result<Counts> {
     let out = cache_dir().join("tests").join(name);
-    empty(&out)?;
+    if out.exists() {
+        fs::remove_dir_all(&out).with_context(|| out.display().to_string())?;
+    }
+    fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
     eprintln!("== peer {name}: {SCRIPTS}/{name}.py");
     // -B keeps compiled files from lying beside the scripts.
     let mut command = Command::new(python);
@@ -149,10 +134,7 @@ fn check(
     let status = command.status().with_context(|| format!("cannot run {}", script.display()))?;
     Ok(match status.code() {
         Some(0) => Counts::PASSED,
-        Some(SKIPPED) => {
-            summary.remark(format!("peer {name}: SKIPPED, it said why"));
-            Counts::SKIPPED
-        }
+        Some(SKIPPED) => summary.skip(&format!("peer {name}"), 1, "it said why"),
         _ => {
             summary.remark(format!("peer {name}: FAILED, {status}"));
             Counts::FAILED
@@ -172,14 +154,6 @@ fn scripts() -> anyhow::Result<Vec<PathBuf>> {
     Ok(scripts)
 }
 
-fn empty(folder: &Path) -> anyhow::Result<()> {
-    let here = || folder.display().to_string();
-    if folder.exists() {
-        fs::remove_dir_all(folder).with_context(here)?;
-    }
-    fs::create_dir_all(folder).with_context(here)
-}
-
 /// The variables that tell scripts of our programs, and the programs.
 type Programs = [(&'static str, PathBuf); 3];
 
@@ -188,38 +162,9 @@ fn programs() -> anyhow::Result<Programs> {
     let mut cargo = cargo_on_all(&["test", "--no-run"]);
     cargo.args(["--message-format", "json-render-diagnostics"]);
     let messages = output(cargo.stderr(Stdio::inherit()))?;
-    let built =
-        |name: &str| program(&messages, name).with_context(|| format!("no test has built {name}"));
     Ok([
-        ("EDGEPUCK_PROGRAM", built("edgepuck")?),
-        ("EDGEPUCK_LAB", built("edgepuck-lab")?),
-        ("EDGEPUCK_INFER", built("infer-cpu")?),
+        ("EDGEPUCK_PROGRAM", executable(&messages, "edgepuck")?),
+        ("EDGEPUCK_LAB", executable(&messages, "edgepuck-lab")?),
+        ("EDGEPUCK_INFER", executable(&messages, "infer-cpu")?),
     ])
-}
-
-/// The program `name` among Cargo's `messages`, one JSON object a line.
-fn program(messages: &str, name: &str) -> Option<PathBuf> {
-    let messages = messages.lines().filter_map(|m| serde_json::from_str::<Value>(m).ok());
-    let mut programs = messages.filter(|message| {
-        let target = &message["target"];
-        let is_test = message["profile"]["test"].as_bool().unwrap_or(false);
-        target["name"] == name && target["kind"][0] == "bin" && !is_test
-    });
-    programs.find_map(|message| Some(message["executable"].as_str()?.into()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_program_is_found_among_tests_and_libraries_of_its_name() {
-        let messages = r#"{"reason":"build-script-executed"}
-{"target":{"kind":["lib"],"name":"a"},"profile":{"test":false},"executable":null}
-{"target":{"kind":["bin"],"name":"a"},"profile":{"test":true},"executable":"/t/deps/a-1"}
-{"target":{"kind":["bin"],"name":"a"},"profile":{"test":false},"executable":"/t/a"}
-not JSON"#;
-        assert_eq!(program(messages, "a"), Some(PathBuf::from("/t/a")));
-        assert_eq!(program(messages, "b"), None);
-    }
 }

@@ -1,35 +1,36 @@
 //! What is compiled for the Raspberry Pi: lints, tests under an emulator, the binary.
 
-use super::{check, go_without, test_programs};
-use crate::summary::{Counts, Summary};
+use super::{go_without, test_programs};
+use crate::summary::{Counts, Summary, check};
 use xtask::{build_pi, pi_target};
+
+/// A check: its name, and whether it fails where it cannot run.
+type Check = fn(&mut Summary, &str, bool) -> anyhow::Result<Counts>;
+
+const CHECKS: [(&str, Check); 3] =
+    [("Raspberry Pi lints", lints), ("Raspberry Pi tests", tests), ("Raspberry Pi binary", binary)];
 
 /// Runs the three checks; those that cannot run here fail where they are `required`.
 pub fn run(summary: &mut Summary, required: bool) {
-    summary.step("Raspberry Pi lints", |summary| lints(summary, required));
-    summary.step("Raspberry Pi tests", |summary| tests(summary, required));
-    summary.step("Raspberry Pi binary", |summary| binary(summary, required));
+    for (name, check) in CHECKS {
+        summary.step(name, |summary| match pi_target::has_standard_library()? {
+            true => check(summary, name, required),
+            false => go_without(summary, name, pi_target::NO_STANDARD_LIBRARY, required),
+        });
+    }
 }
 
 /// Lints the code that is compiled for the Raspberry Pi alone.
-fn lints(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
-    let name = "Raspberry Pi lints";
-    if !pi_target::has_standard_library()? {
-        return go_without(summary, name, pi_target::NO_STANDARD_LIBRARY, required);
-    }
+fn lints(_: &mut Summary, name: &str, _: bool) -> anyhow::Result<Counts> {
     let mut lints = pi_target::cargo(&["clippy", "--package", "infer-cpu", "--all-targets"]);
     check(name, lints.args(["--", "--deny", "warnings"]))
 }
 
 /// Tests infer-cpu with the Raspberry Pi's instructions.
-fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
-    let name = "Raspberry Pi tests";
+fn tests(summary: &mut Summary, name: &str, required: bool) -> anyhow::Result<Counts> {
     if cfg!(target_arch = "aarch64") {
         let reason = "this processor is of its kind, so the tests above were these";
-        return go_without(summary, name, reason, false);
-    }
-    if !pi_target::has_standard_library()? {
-        return go_without(summary, name, pi_target::NO_STANDARD_LIBRARY, required);
+        return Ok(summary.skip(name, 1, reason));
     }
     if pi_target::emulator().is_none() {
         // QEMU emulates single programs on Linux only.
@@ -40,12 +41,8 @@ fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
     test_programs::run(summary, &mut pi_target::cargo(&tests))
 }
 
-/// That a binary for the Raspberry Pi can be made, and is as small as promised.
-fn binary(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
-    let name = "Raspberry Pi binary";
-    if !pi_target::has_standard_library()? {
-        return go_without(summary, name, pi_target::NO_STANDARD_LIBRARY, required);
-    }
+/// Checks that a binary for the Raspberry Pi can be made, and is as small as promised.
+fn binary(_: &mut Summary, name: &str, _: bool) -> anyhow::Result<Counts> {
     eprintln!("== {name}: cargo xtask build-pi");
-    build_pi::run(&build_pi::Args::default()).map(|_| Counts::PASSED)
+    build_pi::run(&build_pi::Args::default()).map(|()| Counts::PASSED)
 }

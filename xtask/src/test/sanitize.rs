@@ -3,8 +3,7 @@
 
 use super::{go_without, test_programs};
 use crate::summary::Summary;
-use std::process::Command;
-use xtask::workspace::{cargo, output};
+use xtask::workspace::{cargo, standard_library};
 
 /// Its runtime comes with Rust for this target.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";
@@ -39,10 +38,8 @@ pub fn run(summary: &mut Summary) {
 /// # Errors
 /// If it has not, in words for the user.
 fn runtime() -> Result<(), String> {
-    let mut ask = Command::new("rustc");
-    ask.args(["--print", "target-libdir", "--target", TRIPLE]);
-    let folder = output(&mut ask).map_err(|error| format!("{error:#}"))?;
-    let files = std::fs::read_dir(folder.trim()).map_err(|error| format!("{TRIPLE}: {error}"))?;
+    let folder = standard_library(TRIPLE).map_err(|error| format!("{error:#}"))?;
+    let files = std::fs::read_dir(folder).map_err(|error| format!("{TRIPLE}: {error}"))?;
     let is_runtime = |name: &str| name.ends_with("_rt.asan.a");
     let mut names = files.flatten().map(|file| file.file_name());
     match names.any(|name| name.to_str().is_some_and(is_runtime)) {

@@ -23,7 +23,7 @@ pub struct Cost {
 pub struct Costs(pub Vec<Cost>);
 
 /// The middle and the ends of some figures.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// The upper median.
     pub median: f64,

@@ -78,7 +78,7 @@ pub fn peak_memory_bytes() -> Option<u64> {
 }
 
 /// The value of the first line `key : value` in one of Linux's own files.
-fn field(file: &str, key: &str) -> Option<String> {
+pub fn field(file: &str, key: &str) -> Option<String> {
     let text = fs::read_to_string(file).ok()?;
     let line = text.lines().find(|line| line.starts_with(key))?;
     Some(line.split_once(':')?.1.trim().to_owned())

@@ -3,16 +3,15 @@
 
 use super::table::digits;
 use maud::{Markup, PreEscaped, html};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// An axis.
-pub struct Axis<'a> {
-    /// What it shows, with its unit.
-    pub label: &'a str,
-    /// Whether equal steps are equal factors.
-    pub logarithmic: bool,
-    /// Whether values are shares, which are written in percent.
-    pub percent: bool,
+/// An axis and what it shows, with its unit.
+pub enum Axis<'a> {
+    /// Equal steps are equal factors.
+    Logarithmic(&'a str),
+    /// Values are shares, which are written in percent.
+    Percent(&'a str),
 }
 
 /// One measurement.
@@ -37,6 +36,14 @@ pub struct Series {
     pub dots: Vec<Dot>,
     /// Whether a line joins the filled ones.
     pub joined: bool,
+}
+
+impl Series {
+    /// A series of each name.
+    pub fn by_name(dots: BTreeMap<&str, Vec<Dot>>, joined: bool) -> Vec<Self> {
+        let series = |(name, dots): (&str, _)| Self { name: name.to_owned(), dots, joined };
+        dots.into_iter().map(series).collect()
+    }
 }
 
 const COLOURS: [&str; 8] =
@@ -149,9 +156,9 @@ fn grid(x: &Scale<'_>, y: &Scale<'_>) -> Markup {
                 text x=(PLOT_X.start - 8.0) y=(at) dy="0.35em" text-anchor="end" { (label) }
             }
             text x=((PLOT_X.start + PLOT_X.end) / 2.0) y=(SIZE[1] - 14.0) text-anchor="middle" {
-                (x.axis.label)
+                (x.axis.label())
             }
-            text x="4" y="24" { (y.axis.label) }
+            text x="4" y="24" { (y.axis.label()) }
         }
     }
 }
@@ -184,10 +191,21 @@ fn tip(dot: &Dot, x: &Scale<'_>, y: &Scale<'_>) -> Markup {
     html! { circle cx=(x) cy=(y) r="9" fill="transparent" data-tip=(dot.tip) {} }
 }
 
+impl Axis<'_> {
+    fn label(&self) -> &str {
+        let (Self::Logarithmic(label) | Self::Percent(label)) = self;
+        label
+    }
+
+    /// What is drawn in proportion: powers of ten, or the value itself.
+    fn unit(&self, value: f64) -> f64 {
+        if matches!(self, Self::Logarithmic(_)) { value.log10() } else { value }
+    }
+}
+
 impl<'a> Scale<'a> {
     fn new(axis: &'a Axis<'a>, values: impl Iterator<Item = f64>, drawn: Range<f64>) -> Self {
-        let unit = |value: f64| if axis.logarithmic { value.log10() } else { value };
-        let units = values.map(unit).filter(|unit| unit.is_finite());
+        let units = values.map(|value| axis.unit(value)).filter(|unit| unit.is_finite());
         let (low, high) = units
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         let range = if low > high {
@@ -201,24 +219,24 @@ impl<'a> Scale<'a> {
 
     /// Where `value` is drawn; `None` if it has no place on the axis.
     fn place(&self, value: f64) -> Option<f64> {
-        let unit = if self.axis.logarithmic { value.log10() } else { value };
-        let share = (unit - self.range.start) / (self.range.end - self.range.start);
+        let share =
+            (self.axis.unit(value) - self.range.start) / (self.range.end - self.range.start);
         let at = self.drawn.start + share * (self.drawn.end - self.drawn.start);
         at.is_finite().then_some(at)
     }
 
     /// Round values on the axis: where they are drawn, and their labels.
     fn ticks(&self) -> Vec<(f64, String)> {
-        let values = if self.axis.logarithmic {
-            logarithmic_ticks(&self.range)
-        } else {
-            linear_ticks(&self.range)
+        let ticks: Vec<(f64, String)> = match self.axis {
+            Axis::Logarithmic(_) => {
+                logarithmic_ticks(&self.range).into_iter().map(|x| (x, number(x))).collect()
+            }
+            Axis::Percent(_) => {
+                let label = |x: f64| format!("{} %", number(100.0 * x));
+                linear_ticks(&self.range).into_iter().map(|x| (x, label(x))).collect()
+            }
         };
-        let label = |value: f64| match self.axis.percent {
-            true => format!("{} %", number(100.0 * value)),
-            false => number(value),
-        };
-        values.into_iter().filter_map(|value| Some((self.place(value)?, label(value)))).collect()
+        ticks.into_iter().filter_map(|(value, label)| Some((self.place(value)?, label))).collect()
     }
 }
 
@@ -258,12 +276,9 @@ fn number(value: f64) -> String {
         let is_large = value.abs() >= 10.0;
         return if is_large { format!("{value:.1}").replace(".0", "") } else { digits(value) };
     }
-    let superscript = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    let superscript = |c: char| match c.to_digit(10) {
+        Some(digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize).unwrap_or(c),
+        None => '⁻',
     };
     let power: String = format!("{:.0}", exponent.floor()).chars().map(superscript).collect();
     match (value / 10f64.powf(exponent.floor())).round() {
@@ -276,18 +291,11 @@ fn number(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn axis(logarithmic: bool) -> Axis<'static> {
-        Axis { label: "axis", logarithmic, percent: false }
-    }
-
-    fn chart(series: Vec<Series>) -> Chart<'static> {
-        let message = "message".to_owned();
-        Chart { message, caption: "", x: axis(true), y: axis(false), series }
-    }
-
     fn drawn(dots: Vec<Dot>) -> String {
-        let series = Series { name: "s".to_owned(), dots, joined: true };
-        chart(vec![series]).figure().into_string()
+        let series = vec![Series { name: "s".to_owned(), dots, joined: true }];
+        let (x, y) = (Axis::Logarithmic("x"), Axis::Percent("y"));
+        let message = "message".to_owned();
+        Chart { message, caption: "", x, y, series }.figure().into_string()
     }
 
     fn dot(x: f64, y: f64, tip: &str) -> Dot {
@@ -311,15 +319,16 @@ mod tests {
 
     #[test]
     fn ticks_are_numbers_that_a_person_would_choose() {
-        let labels = |logarithmic, range: Range<f64>| {
-            let axis = axis(logarithmic);
+        let labels = |axis: Axis<'_>, range: Range<f64>| {
             let ticks = Scale { axis: &axis, range, drawn: PLOT_X }.ticks();
             ticks.into_iter().map(|(_, label)| label).collect::<Vec<_>>().join(" ")
         };
-        assert_eq!(labels(true, 0.2f64.log10()..15f64.log10()), "0.3 1 3 10");
-        assert_eq!(labels(true, 0.9f64.log10()..25f64.log10()), "1 2 5 10 20");
-        assert_eq!(labels(true, -12.5..3.0), "10⁻¹² 10⁻⁹ 10⁻⁶ 0.001 1");
-        assert_eq!(labels(false, 0.0..1.0), "0 0.2 0.4 0.6 0.8 1");
-        assert_eq!(labels(false, -30.0..1100.0), "0 200 400 600 800 1000");
+        let powers = |range| labels(Axis::Logarithmic(""), range);
+        assert_eq!(powers(0.2f64.log10()..15f64.log10()), "0.3 1 3 10");
+        assert_eq!(powers(0.9f64.log10()..25f64.log10()), "1 2 5 10 20");
+        assert_eq!(powers(-12.5..3.0), "10⁻¹² 10⁻⁹ 10⁻⁶ 0.001 1");
+        let shares = |range| labels(Axis::Percent(""), range);
+        assert_eq!(shares(0.0..1.0), "0 % 20 % 40 % 60 % 80 % 100 %");
+        assert_eq!(shares(-0.3..11.0), "0 % 200 % 400 % 600 % 800 % 1000 %");
     }
 }

@@ -56,6 +56,18 @@ pub fn of(title: &str, lead: &Markup, chapters: &[Chapter]) -> String {
     page.into_string()
 }
 
+/// A cloud that a reader can rotate: coordinates in thousandths, a digit for the colour
+/// of each point, and the colours that the digits mean.
+pub fn cloud(points: &str, colours: &str, palette: &str, caption: &Markup) -> Markup {
+    html! {
+        figure {
+            canvas class="cloud" width="480" height="360" data-points=(points)
+                data-colours=(colours) data-palette=(palette) {}
+            figcaption { (caption) }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -51,16 +51,14 @@ fn one(folder: &Path) -> Result<Markup> {
         }
         None => None,
     };
-    let texts =
-        entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|x| x == "txt"));
-    let texts: Result<Vec<(String, Option<String>)>> =
-        texts.map(|path| Ok((file_name(&path), text(&path)?))).collect();
+    let mut texts = entries(folder)?;
+    texts.retain(|path| path.extension().is_some_and(|extension| extension == "txt"));
     Ok(html! {
         h3 { (file_name(folder)) }
         (remarks(folder)?)
         @if let Some(drawing) = drawing { (drawing) }
-        @for (name, text) in texts? {
-            details { summary { (name) } pre { (text.unwrap_or_default()) } }
+        @for path in texts {
+            details { summary { (file_name(&path)) } pre { (text(&path)?.unwrap_or_default()) } }
         }
     })
 }
@@ -75,14 +73,12 @@ fn by_points(comparison: &Comparison) -> Chart<'static> {
         let name = if measured.ours { &measured.engine } else { "other engines" };
         series.entry(name).or_default().push(dot);
     }
-    let series = series.into_iter();
-    let series = series.map(|(name, dots)| Series { name: name.to_owned(), dots, joined: true });
     Chart {
         message: comparison.message(),
         caption: "PointNet on one cloud with one thread, medians of one run in turns. Filled: Edgepuck, by precision.",
-        x: Axis { label: "points", logarithmic: true, percent: false },
-        y: Axis { label: "milliseconds", logarithmic: true, percent: false },
-        series: series.collect(),
+        x: Axis::Logarithmic("points"),
+        y: Axis::Logarithmic("milliseconds"),
+        series: Series::by_name(series, true),
     }
 }
 

@@ -1,6 +1,6 @@
 //! How errors grow towards the extremes, beside the bounds derived for them.
 
-use super::{missing, remarks, text};
+use super::{lines, missing, remarks, text};
 use crate::render::chart::{Axis, Chart, Dot, Series};
 use crate::render::table::{Table, digits};
 use anyhow::{Context, Result};
@@ -30,13 +30,9 @@ struct Growth {
 /// A file that `bench growth` did not write.
 pub fn body(folder: &Path) -> Result<Markup> {
     let path = folder.join("growth.csv");
-    if !path.is_file() {
+    let Some(rows) = lines::<Growth>(&path)? else {
         return Ok(missing(&path, "cargo xtask bench growth"));
-    }
-    let mut csv =
-        csv::Reader::from_path(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let rows: Result<Vec<Growth>, csv::Error> = csv.deserialize().collect();
-    let rows = rows.with_context(|| format!("reading {}", path.display()))?;
+    };
     let mut groups: BTreeMap<(&str, &str), BTreeMap<&str, Vec<&Growth>>> = BTreeMap::new();
     for row in &rows {
         let group = groups.entry((row.model(), &row.quantity)).or_default();
@@ -91,21 +87,14 @@ fn chart<'a>(parameter: &'a str, rows: &[&'a Growth]) -> Chart<'a> {
         }));
     }
     let is_one_layer = rows.iter().all(|row| row.layer == rows[0].layer);
-    let series = series.into_iter();
-    let series =
-        series.map(|(name, dots)| Series { name: name.to_owned(), dots, joined: is_one_layer });
     // Activations and logits have no unit: their errors are differences.
     let in_metres = rows.iter().any(|row| row.unit == "m");
     Chart {
         message: message(parameter, rows),
         caption: "",
-        x: Axis { label: parameter, logarithmic: true, percent: false },
-        y: Axis {
-            label: if in_metres { "error, metres" } else { "error" },
-            logarithmic: true,
-            percent: false,
-        },
-        series: series.collect(),
+        x: Axis::Logarithmic(parameter),
+        y: Axis::Logarithmic(if in_metres { "error, metres" } else { "error" }),
+        series: Series::by_name(series, is_one_layer),
     }
 }
 

@@ -17,6 +17,7 @@ use edgepuck_program::Outcome;
 use edgepuck_program::trade_record;
 use formats::atomic;
 use maud::{Markup, html};
+use serde::de::DeserializeOwned;
 use std::fs;
 use std::path::{Path, PathBuf};
 use xtask::workspace;
@@ -39,26 +40,21 @@ pub struct Args {
 /// A record that is not what its name says; what the system reports.
 pub fn run(args: &Args) -> Result<Outcome> {
     let assets = args.assets.clone().unwrap_or_else(|| workspace::root().join("assets"));
-    ensure!(assets.is_dir(), "--assets: {} is not a folder", assets.display());
+    ensure!(assets.is_dir(), "--assets: expected a folder, found {}", assets.display());
     let reports = assets.join("reports");
     let scans = scans::body(&assets)?;
     let mut chapters = vec![Chapter::new("scans", "Scans", "What does a scan look like?", scans)];
     chapters.extend(trade_chapters(&reports.join("trade/trade.csv"))?);
     let effects = records::ablations(&reports.join("ablations"))?;
+    let question = "Which effects of a scan matter to a classifier?";
+    chapters.push(Chapter::new("effects", "Effects", question, effects));
     let errors = growth::body(&reports.join("extremes"))?;
+    chapters.push(Chapter::new("extremes", "Errors", "How large can errors get?", errors));
     let paper = records::reproduction(&reports)?;
+    chapters.push(Chapter::new("paper", "Paper", "Do the paper's experiments hold?", paper));
     let speed = benchmarks::body(&assets.join("bench"))?;
-    chapters.extend([
-        Chapter::new(
-            "effects",
-            "Effects",
-            "Which effects of a scan matter to a classifier?",
-            effects,
-        ),
-        Chapter::new("extremes", "Errors", "How large can errors get?", errors),
-        Chapter::new("paper", "Paper", "Do the paper's experiments hold?", paper),
-        Chapter::new("benchmarks", "Speed", "How fast is it beside other engines?", speed),
-    ]);
+    let question = "How fast is it beside other engines?";
+    chapters.push(Chapter::new("benchmarks", "Speed", question, speed));
     let lead = html! {
         p { "LiDAR scans of meshes and the networks that classify them: every measurement of edgepuck "
             (env!("CARGO_PKG_VERSION")) " in one file that works offline. Touch or point at a dot for its "
@@ -76,12 +72,7 @@ pub fn run(args: &Args) -> Result<Outcome> {
 fn trade_chapters(record: &Path) -> Result<Vec<Chapter>> {
     if !record.is_file() {
         let body = missing(record, "cargo xtask trade");
-        return Ok(vec![Chapter::new(
-            "classifier",
-            "Settings",
-            "Which setting fits my time budget?",
-            body,
-        )]);
+        return Ok(vec![trade::page::classifier_chapter(body)]);
     }
     Ok(trade::page::chapters(&trade_record::read(record)?))
 }
@@ -103,6 +94,17 @@ fn text(path: &Path) -> Result<Option<String>> {
     }
 }
 
+/// The lines of a record; nothing where there is no file.
+///
+/// # Errors
+/// A file that is there and is not such a record.
+fn lines<T: DeserializeOwned>(csv: &Path) -> Result<Option<Vec<T>>> {
+    let Some(text) = text(csv)? else { return Ok(None) };
+    let lines: Result<Vec<T>, csv::Error> =
+        csv::Reader::from_reader(text.as_bytes()).into_deserialize().collect();
+    lines.map(Some).with_context(|| format!("reading {}", csv.display()))
+}
+
 /// What stands in `folder`, sorted; nothing where there is no such folder.
 ///
 /// # Errors
@@ -111,10 +113,10 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
-    let unread = || format!("cannot read {}", folder.display());
-    let entries = fs::read_dir(folder).with_context(unread)?;
-    let paths: std::io::Result<Vec<PathBuf>> = entries.map(|entry| Ok(entry?.path())).collect();
-    let mut paths = paths.with_context(unread)?;
+    let paths = fs::read_dir(folder).and_then(|entries| {
+        entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<PathBuf>>>()
+    });
+    let mut paths = paths.with_context(|| format!("cannot read {}", folder.display()))?;
     paths.sort();
     Ok(paths)
 }

@@ -1,8 +1,8 @@
 //! Records that are tables: the ablations, and the paper's experiments.
 
-use super::{entries, missing, remarks, text};
+use super::{entries, lines, missing, remarks, text};
 use crate::render::table::{Table, percent};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use maud::{Markup, html};
 use serde::Deserialize;
 use std::path::Path;
@@ -14,12 +14,11 @@ use xtask::workspace::file_name;
 /// A file that is not CSV.
 pub fn ablations(folder: &Path) -> Result<Markup> {
     let path = folder.join("ablations.csv");
-    let Some(csv) = text(&path)? else { return Ok(missing(&path, "cargo xtask ablate")) };
-    let reading = || format!("reading {}", path.display());
-    let rows: Result<Vec<Ablation>, csv::Error> =
-        csv::Reader::from_reader(csv.as_bytes()).deserialize().collect();
-    let (message, gains) = gains(&rows.with_context(reading)?);
-    let every_row = Table::from_csv("", csv.as_bytes()).with_context(reading)?;
+    let (Some(rows), Some(csv)) = (lines(&path)?, text(&path)?) else {
+        return Ok(missing(&path, "cargo xtask ablate"));
+    };
+    let (message, gains) = gains(&rows);
+    let every_row = Table::from_csv("", csv.as_bytes())?;
     Ok(html! {
         h3 { (message) }
         p { "Networks are trained with and without each effect of a scan, all else equal, and tested on "
@@ -90,17 +89,8 @@ pub fn reproduction(reports: &Path) -> Result<Markup> {
     let Some(folder) = records.iter().rev().find(|path| path.join("report.csv").is_file()) else {
         return Ok(missing(&reports.join("DATE/report.csv"), "cargo xtask reproduce"));
     };
-    let path = folder.join("report.csv");
-    let mut csv =
-        csv::Reader::from_path(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let cells: Result<Vec<Cell>, csv::Error> = csv.deserialize().collect();
-    let cells = cells.with_context(|| format!("reading {}", path.display()))?;
-    let mut names: Vec<&str> = Vec::new();
-    for cell in &cells {
-        if !names.contains(&cell.table.as_str()) {
-            names.push(&cell.table);
-        }
-    }
+    let cells: Vec<Cell> = lines(&folder.join("report.csv"))?.unwrap_or_default();
+    let names = distinct(cells.iter().map(|cell| &cell.table));
     Ok(html! {
         p { "Meyer and Reitmann 2026, by " code { "cargo xtask reproduce" } "; the record "
             (file_name(folder)) " has the same with drawings and clouds. The number before a table's name is "
@@ -110,17 +100,21 @@ pub fn reproduction(reports: &Path) -> Result<Markup> {
     })
 }
 
-fn one_table(name: &str, cells: &[Cell]) -> Markup {
-    let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.table == name).collect();
-    let (mut rows, mut columns): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
-    for cell in &cells {
-        if !rows.contains(&cell.row.as_str()) {
-            rows.push(&cell.row);
-        }
-        if !columns.contains(&cell.column.as_str()) {
-            columns.push(&cell.column);
+/// Each once, in the order in which it comes first.
+fn distinct<'a>(words: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
+    let mut found: Vec<&str> = Vec::new();
+    for word in words {
+        if !found.contains(&word.as_str()) {
+            found.push(word);
         }
     }
+    found
+}
+
+fn one_table(name: &str, cells: &[Cell]) -> Markup {
+    let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.table == name).collect();
+    let rows = distinct(cells.iter().map(|cell| &cell.row));
+    let columns = distinct(cells.iter().map(|cell| &cell.column));
     let heading: Vec<&str> = std::iter::once("").chain(columns.iter().copied()).collect();
     let mut table = Table::new("", &heading);
     for row in rows {

@@ -1,5 +1,6 @@
 //! Clouds that can be rotated: one mesh as several sensors see it.
 
+use crate::render::page;
 use anyhow::{Context, Result};
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -47,14 +48,10 @@ pub fn body(assets: &Path) -> Result<Markup> {
         p { (file_name(&entry.path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
             (ELEVATION_DEG) "° below it. Made now, on the CPU." }
         div class="clouds" { @for (sensor, noise_m, cloud) in &clouds {
-            figure {
-                canvas class="cloud" width="480" height="360" data-points=(thousandths(cloud))
-                    data-colours=("0".repeat(shown(cloud).count())) data-palette="#1763c7" {}
-                figcaption {
-                    (sensor) @if *noise_m > 0.0 { ", noise " (noise_m) " m" } ": " (cloud.len()) " points. "
-                    "Drag to rotate."
-                }
-            }
+            (page::cloud(&thousandths(cloud), &"0".repeat(shown(cloud).count()), "#1763c7", &html! {
+                (sensor) @if *noise_m > 0.0 { ", noise " (noise_m) " m" } ": " (cloud.len()) " points. "
+                "Drag to rotate."
+            }))
         } }
     })
 }

@@ -3,6 +3,7 @@
 pub mod ablation;
 pub mod casting;
 pub mod devices;
+mod meshes;
 pub mod numerics;
 mod plan;
 pub mod reproduction;

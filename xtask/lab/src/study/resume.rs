@@ -1,11 +1,13 @@
 //! What a study keeps, so that an interrupted run can be resumed: networks, which
-//! are trained once, and the terms of the study.
+//! are trained once, results, and the terms of the study.
 
 use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
 use formats::atomic;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use train::clouds::Clouds;
 use train::recipe::Recipe;
 use train::run::Job;
@@ -30,21 +32,37 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
     job.run(None).map(|_| ()).with_context(|| format!("cannot train {name}"))
 }
 
-/// Writes `terms`, all that the results in the folder `out` depend on, unless an
-/// earlier run has written the same.
+/// The result in the JSON file at `path`, or else the one that `make` gives, which
+/// is then written there.
+///
+/// # Errors
+/// A file that holds something else; what `make` reports.
+pub fn result<T: Serialize + DeserializeOwned>(
+    path: &Path,
+    make: impl FnOnce() -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    if path.is_file() {
+        let text = fs::read_to_string(path)?;
+        return serde_json::from_str(&text).with_context(|| path.display().to_string());
+    }
+    let result = make()?;
+    atomic::write_bytes(path, serde_json::to_string(&result)?)?;
+    Ok(result)
+}
+
+/// Writes `terms`, all that the results depend on, to `path`, unless an earlier run
+/// has written the same.
 ///
 /// # Errors
 /// Terms that differ from those of an earlier run.
-pub fn keep_terms(terms: &str, out: &Path) -> anyhow::Result<()> {
-    let path = out.join("terms.toml");
+pub fn keep_terms(terms: &str, path: &Path) -> anyhow::Result<()> {
     if path.is_file() {
-        let earlier = fs::read_to_string(&path)?;
         ensure!(
-            earlier == terms,
+            fs::read_to_string(path)? == terms,
             "{}: an earlier run had another plan or other data; choose another --out",
             path.display()
         );
         return Ok(());
     }
-    Ok(atomic::write_bytes(&path, terms)?)
+    Ok(atomic::write_bytes(path, terms)?)
 }

@@ -1,11 +1,12 @@
 //! Networks by the set that they were trained on, each tested on several sets.
 
-use super::design::{Design, Test};
+use super::design::{Design, Set, Test};
 use super::rows::Answer;
-use super::train_test_split::{self, TrainTestSplit};
+use super::sets::{self, Sets};
+use super::write_csv;
 use crate::study::resume;
 use anyhow::Context;
-use formats::atomic;
+use formats::split::Split;
 use infer_cpu::Options;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,31 +20,29 @@ use train::evaluate::confusion;
 /// # Errors
 /// A design or data that cannot be used, or that differ from an earlier run's.
 pub fn run(design: &Design, folder: &Path, out: &Path) -> anyhow::Result<Vec<Answer>> {
-    let sets = train_test_split::read(design, folder)?;
-    resume::keep_terms(&terms(design, &sets)?, out)?;
+    let sets = sets::read(design, folder)?;
+    resume::keep_terms(&terms(design, &sets)?, &out.join("terms.toml"))?;
     let networks = out.join("networks");
     fs::create_dir_all(&networks).with_context(|| format!("cannot make {}", networks.display()))?;
-    let learnt: BTreeSet<&str> = design.tests.iter().map(|test| &*test.trained_on).collect();
+    let learnt: BTreeSet<&str> = design.tests.iter().map(|test| test.trained_on).collect();
     let mut answers = Vec::new();
     for &seed in &design.seeds {
         for &trained_on in &learnt {
             answers.extend(answers_of(design, &sets, (trained_on, seed), &networks)?);
         }
     }
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    answers.iter().try_for_each(|answer| csv.serialize(answer))?;
-    atomic::write_bytes(&out.join("answers.csv"), csv.into_inner()?)?;
+    write_csv(&answers, &out.join("answers.csv"))?;
     Ok(answers)
 }
 
 /// The answers of the network of one set and seed.
 fn answers_of(
     design: &Design,
-    sets: &BTreeMap<String, TrainTestSplit>,
-    (trained_on, seed): (&str, u64),
+    sets: &Sets,
+    (trained_on, seed): (&'static str, u64),
     networks: &Path,
 ) -> anyhow::Result<Vec<Answer>> {
-    let clouds = &sets[trained_on].train;
+    let clouds = &sets[&(trained_on, Split::Train)];
     let recipe = design.recipe(clouds.len(), seed);
     let epochs = recipe.epochs;
     let name = format!("{trained_on}-seed-{seed}");
@@ -51,29 +50,23 @@ fn answers_of(
     resume::network(&model, &name, recipe, clouds)?;
     let tests: BTreeSet<&Test> =
         design.tests.iter().filter(|test| test.trained_on == trained_on).collect();
-    let answer = |test: &Test| {
-        let found = confusion(&model, &sets[&test.tested_on].test, &Options::default())?;
-        Ok(Answer {
-            trained_on: trained_on.to_owned(),
-            tested_on: test.tested_on.clone(),
-            seed,
-            correct: found.correct(),
-            n: found.total(),
-            train_clouds: clouds.len(),
-            epochs,
-        })
+    let answer = |&Test { tested_on, .. }: &Test| {
+        let found = confusion(&model, &sets[&(tested_on, Split::Test)], &Options::default())?;
+        let (correct, n, train_clouds) = (found.correct(), found.total(), clouds.len());
+        Ok(Answer { trained_on, tested_on, seed, correct, n, train_clouds, epochs })
     };
     tests.into_iter().map(answer).collect()
 }
 
 /// All that the answers depend on.
-fn terms(design: &Design, sets: &BTreeMap<String, TrainTestSplit>) -> anyhow::Result<String> {
+fn terms(design: &Design, sets: &Sets) -> anyhow::Result<String> {
     #[derive(Serialize)]
     struct Terms<'a> {
         version: &'a str,
         sha256: BTreeMap<&'a str, String>,
         design: &'a Design,
     }
-    let sha256 = sets.iter().map(|(name, set)| (name.as_str(), set.sha256())).collect();
+    let digest = |set: &Set| (set.name, sets::sha256(sets, set.name));
+    let sha256 = design.sets.iter().map(digest).collect();
     Ok(toml::to_string(&Terms { version: env!("CARGO_PKG_VERSION"), sha256, design })?)
 }

@@ -1,7 +1,8 @@
 //! Makes one dataset, on the CPU, whose time is what costs are measured in.
 
-use super::effects::{REFERENCE, Source, packed, scans, surfaces};
+use super::effects::{self, REFERENCE, Source, packed, surfaces};
 use super::plan::Plan;
+use crate::study::resume;
 use anyhow::Context;
 use edgepuck_dataset::finish::finish;
 use edgepuck_dataset::journal::Terms;
@@ -13,19 +14,24 @@ use edgepuck_dataset::start::{Begin, Start, begin};
 use edgepuck_dataset::surfaces::write_surfaces;
 use edgepuck_program::gen_dataset::report_failures;
 use formats::atomic;
+use formats::labelled::read_labelled;
 use formats::scan_file::ScanFormat;
 use formats::split::Split;
-use sim_gpu::caster::AdapterRequest;
-use sim_gpu::caster::Caster;
+use sim_gpu::caster::{AdapterRequest, Caster};
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::tree::MeshEntry;
 use std::path::{Path, PathBuf};
 
 /// A dataset on disk.
 pub struct Made {
-    /// Its manifest, if it is of scans.
-    pub manifest: Option<Manifest>,
-    /// Its meshes that could not be used.
+    /// Its name.
+    pub name: &'static str,
+    /// Where it lies.
+    pub folder: PathBuf,
+    /// The NPZ files of its scans, in one order for all datasets of the same meshes and
+    /// views.
+    pub scans: Vec<PathBuf>,
+    /// How many meshes could not be used.
     pub failures: usize,
 }
 
@@ -34,58 +40,43 @@ pub struct Made {
 /// # Errors
 /// A folder that holds another dataset; a file that cannot be written.
 pub fn make(
-    (name, source): (&str, Source),
+    (name, source): (&'static str, Source),
     plan: &Plan,
     meshes: &[MeshEntry],
     out: &Path,
 ) -> anyhow::Result<Made> {
-    match source {
+    let (scans, failures) = match source {
         Source::Scans(switches) => {
-            let config = scans(plan, switches)?;
+            let config = effects::scans(plan, switches)?;
             let caster = Caster::open(&AdapterRequest::Cpu, &config.cast_effects())?;
             let terms = Terms::new(config, &caster, meshes, None);
             let manifest = match begin(out, &terms, Begin::Resume)? {
                 Start::Complete(manifest) => *manifest,
-                Start::Go => scan(&terms, &caster, meshes, out)?,
+                Start::Go => {
+                    let (config, caster, progress) = (&terms.config, &caster, &Progress::default());
+                    let run = Run { out, config, caster, culling: Culling::On, progress };
+                    let scanned = scan_all(&run, meshes)?;
+                    finish(out, &terms, scanned.records, scanned.failures)?
+                }
             };
             // Every dataset is of the same meshes: the first names the failures.
             if name == REFERENCE {
                 report_failures(&manifest.failures);
             }
-            let failures = manifest.failures.len();
-            Ok(Made { manifest: Some(manifest), failures })
+            (scan_files(&manifest, out), manifest.failures.len())
         }
-        Source::Surface | Source::Seen => {
-            Ok(Made { manifest: None, failures: draw(source, plan, meshes, out)? })
-        }
-    }
-}
-
-fn scan(
-    terms: &Terms,
-    caster: &Caster,
-    meshes: &[MeshEntry],
-    out: &Path,
-) -> anyhow::Result<Manifest> {
-    let progress = Progress::default();
-    let (config, culling) = (&terms.config, Culling::On);
-    let run = Run { out, config, caster, culling, progress: &progress };
-    let scanned = scan_all(&run, meshes)?;
-    Ok(finish(out, terms, scanned.records, scanned.failures)?)
+        Source::Surface | Source::Seen => (Vec::new(), draw(source, plan, meshes, out)?),
+    };
+    Ok(Made { name, folder: out.to_owned(), scans, failures })
 }
 
 /// Draws points of surfaces; a note of how many meshes failed is written when
 /// all else is.
 fn draw(source: Source, plan: &Plan, meshes: &[MeshEntry], out: &Path) -> anyhow::Result<usize> {
-    let done = out.join("failures.txt");
-    if done.is_file() {
-        let text = std::fs::read_to_string(&done)?;
-        return text.trim().parse().with_context(|| format!("{}: no number", done.display()));
-    }
-    atomic::sweep_leftovers(out)?;
-    let failures = write_surfaces(out, &surfaces(plan, source), meshes)?;
-    atomic::write_bytes(&done, failures.len().to_string())?;
-    Ok(failures.len())
+    resume::result(&out.join("failures.txt"), || {
+        atomic::sweep_leftovers(out)?;
+        Ok(write_surfaces(out, &surfaces(plan, source), meshes)?.len())
+    })
 }
 
 /// Where the packed clouds of the dataset in `folder` lie, as `train --data`
@@ -103,32 +94,24 @@ pub fn clouds(source: Source, folder: &Path) -> PathBuf {
 ///
 /// # Errors
 /// A file that cannot be looked at.
-pub fn bytes_per_cloud(made: &Made, source: Source, folder: &Path) -> anyhow::Result<f64> {
-    let size = |path: &Path| {
-        let data = path.metadata().with_context(|| path.display().to_string());
-        data.map(|data| data.len())
-    };
-    let (mut bytes, mut n) = (0, 0);
-    if let Some(manifest) = &made.manifest {
-        for path in scan_files(manifest, folder) {
-            bytes += size(&path)?;
-            n += 1;
-        }
-    } else {
+pub fn bytes_per_cloud(made: &Made, source: Source) -> anyhow::Result<f64> {
+    let (mut files, mut n) = (made.scans.clone(), made.scans.len());
+    if files.is_empty() {
         for split in Split::ALL {
-            let mut path = clouds(source, folder).into_os_string();
+            let mut path = clouds(source, &made.folder).into_os_string();
             path.push(format!("-{split}.npz"));
-            let path = PathBuf::from(path);
-            bytes += size(&path)?;
-            n += formats::labelled::read_labelled(&path)?.len();
+            n += read_labelled(path.as_ref())?.len();
+            files.push(path.into());
         }
+    }
+    let mut bytes = 0;
+    for path in files {
+        bytes += path.metadata().with_context(|| path.display().to_string())?.len();
     }
     Ok(bytes as f64 / n.max(1) as f64)
 }
 
-/// The NPZ files of all scans of the dataset in `folder`, in one order for all
-/// datasets of the same meshes and views.
-pub fn scan_files(manifest: &Manifest, folder: &Path) -> Vec<PathBuf> {
+fn scan_files(manifest: &Manifest, folder: &Path) -> Vec<PathBuf> {
     let files = manifest.meshes.iter().flat_map(|mesh| {
         mesh.scans.iter().flat_map(|scan| {
             scan.variants.iter().map(|written| {

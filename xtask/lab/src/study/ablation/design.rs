@@ -29,7 +29,7 @@ pub struct Design {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Set {
     /// What tests call it.
-    pub name: String,
+    pub name: &'static str,
     /// Where it lies, relative to the study's folder, as `train --data` takes it.
     pub path: PathBuf,
     /// Whether only clouds are used whose names all matched sets have.
@@ -40,36 +40,30 @@ pub struct Set {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Test {
     /// The set that the network learns from.
-    pub trained_on: String,
+    pub trained_on: &'static str,
     /// The set that it is tested on.
-    pub tested_on: String,
+    pub tested_on: &'static str,
 }
 
 impl Design {
     /// The trainings and tests that the effects' comparison needs, by `plan`.
-    ///
-    /// # Errors
-    /// A recipe that is not valid.
-    pub fn of(plan: &Plan) -> anyhow::Result<Self> {
+    pub fn of(plan: &Plan) -> Self {
         let tests = rows::tests();
-        let used = |name: &str| tests.iter().any(|(p, q)| [*p, *q].contains(&name));
+        let used =
+            |name| tests.iter().any(|test| [test.trained_on, test.tested_on].contains(&name));
         let set = |&(name, source): &(&'static str, Source)| Set {
-            name: name.to_owned(),
+            name,
             path: clouds(source, &folder(Path::new(""), name)),
             // Whole meshes have no views to be matched by.
             matched: source != Source::Surface,
         };
-        let test = |&(trained_on, tested_on): &(&'static str, &'static str)| Test {
-            trained_on: trained_on.to_owned(),
-            tested_on: tested_on.to_owned(),
-        };
-        Ok(Self {
+        Self {
             seeds: plan.seeds.clone(),
             steps: plan.steps,
-            recipe: plan.recipe()?,
+            recipe: plan.recipe.clone(),
             sets: DATASETS.iter().filter(|(name, _)| used(name)).map(set).collect(),
-            tests: tests.iter().map(test).collect(),
-        })
+            tests,
+        }
     }
 
     /// The recipe for `clouds` clouds: the fewest epochs with at least the steps

@@ -114,39 +114,32 @@ const SET: &str = "rotational";
 /// Key of all random numbers of the datasets.
 const SEED: u64 = 0;
 
-/// The sensor of all scans.
-fn sensor() -> anyhow::Result<Sensor> {
-    Sensor::builtin("vlp32c").context("no built-in sensor vlp32c")
-}
-
 /// A dataset of scans with `switches`.
 ///
 /// # Errors
 /// A sensor that states no noise where the plan has none.
 pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
-    let sensor = sensor()?;
+    let sensor = Sensor::builtin("vlp32c").context("no built-in sensor vlp32c")?;
     let stated = sensor.noise.map(|noise| noise.typical_sigma_m);
-    let sigma_m = plan.noise_m.or(stated).context("no noise: state noise_m")?;
+    let sigma_m = plan
+        .noise_m
+        .or(stated)
+        .context("noise_m: expected a value, because the sensor states none")?;
     let effects = Effects {
         noise: switches.noise.map(|model| Noise { mean_m: 0.0, sigma_m, model }),
         dropout: switches.dropout.then_some(Dropout { probability: plan.dropout }),
         quantum: switches.quantum.then_some(Quantum { step_m: None }),
         intensity: switches.intensity.then_some(Intensity),
     };
-    let kept = |wanted: bool, attribute| wanted.then_some(attribute);
+    let attributes = [(switches.intensity, Attribute::Intensity), (switches.time, Attribute::Time)];
+    let attributes = attributes.into_iter().filter(|(is_wanted, _)| *is_wanted);
     let sensor = if switches.beams { sensor } else { as_even_grid(sensor)? };
     Ok(DatasetConfig {
         seed: SEED,
         normalize: Normalize::default(),
         up: None,
         simplify: None,
-        attributes: [
-            kept(switches.intensity, Attribute::Intensity),
-            kept(switches.time, Attribute::Time),
-        ]
-        .into_iter()
-        .flatten()
-        .collect(),
+        attributes: attributes.map(|(_, attribute)| attribute).collect(),
         formats: vec![ScanFormat::Npz],
         effects,
         // Of all datasets, so that points are drawn by one key.

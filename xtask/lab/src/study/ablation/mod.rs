@@ -10,22 +10,20 @@ mod effects;
 pub mod plan;
 mod positions;
 mod rows;
+mod sets;
 mod summary;
 #[cfg(test)]
 mod tests;
-mod train_test_split;
 
-use super::{plan as plans, resume};
+use super::{meshes, plan as plans, resume};
 use anyhow::Context;
 use datasets::{Made, bytes_per_cloud, make};
 use design::Design;
 use edgepuck_program::Outcome;
 use edgepuck_program::flags::need_folder_of_meshes;
-use edgepuck_shapes as shapes;
-use effects::{DATASETS, EFFECTS, Judge};
+use effects::{DATASETS, EFFECTS, Effect, Judge};
 use formats::atomic;
 use plan::Plan;
-use rows::Cost;
 use serde::Serialize;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use std::collections::BTreeMap;
@@ -62,26 +60,37 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let plan: Plan = plans::read(args.plan.as_deref(), args.quick)?;
     let work = args.out.join("work");
     keep_terms(&plan, args.meshes.as_deref(), &args.out)?;
-    let meshes = meshes(&plan, args.meshes.as_deref(), &work)?;
+    let per_class = plan.most_per_class.unwrap_or(SHAPES);
+    let folder_of_meshes = meshes::folder(args.meshes.as_deref(), &work.join("shapes"), per_class)?;
+    let mut meshes = discover(&folder_of_meshes, 0)?;
+    if let Some(most) = plan.most_per_class {
+        meshes::keep_at_most(most, &mut meshes);
+    }
     let made = make_all(&plan, &meshes, &work)?;
-    let compared = compare(&made, &work)?;
+    let compared = compare(&made)?;
     let seconds = costs::costs(&plan, &meshes, &work.join("scratch"), &work.join("costs.json"))?;
     let mut costs = BTreeMap::new();
     for (&(name, source), made) in DATASETS.iter().zip(&made) {
-        let bytes_per_cloud = bytes_per_cloud(made, source, &folder(&work, name))?;
+        let bytes_per_cloud = bytes_per_cloud(made, source)?;
         let seconds = *seconds.get(name).with_context(|| format!("no cost of {name}"))?;
-        costs.insert(name.to_owned(), Cost { seconds, bytes_per_cloud });
+        costs.insert(name, (seconds, bytes_per_cloud));
     }
-    let answers = crossing::run(&Design::of(&plan)?, &work, &work.join("trained"))?;
+    let answers = crossing::run(&Design::of(&plan), &work, &work.join("trained"))?;
     let rows = rows::rows(&answers, &compared, &costs);
     let summary = summary::of(&rows);
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    rows.iter().try_for_each(|row| csv.serialize(row))?;
     atomic::write_bytes(&args.out.join("tables.txt"), summary.trim_start())?;
-    atomic::write_bytes(&args.out.join("ablations.csv"), csv.into_inner()?)?;
-    println!("{summary}\n{}", args.out.join("ablations.csv").display());
+    let csv = args.out.join("ablations.csv");
+    write_csv(&rows, &csv)?;
+    println!("{summary}\n{}", csv.display());
     let failed = made.iter().any(|made| made.failures > 0);
     Ok(if failed { Outcome::SomeFailed } else { Outcome::Success })
+}
+
+/// Writes `rows` as CSV.
+fn write_csv(rows: &[impl Serialize], path: &Path) -> anyhow::Result<()> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    rows.iter().try_for_each(|row| csv.serialize(row))?;
+    Ok(atomic::write_bytes(path, csv.into_inner()?)?)
 }
 
 /// Writes the plan and the meshes' folder beside the results, or compares them
@@ -98,30 +107,7 @@ fn keep_terms(plan: &Plan, meshes: Option<&Path>, out: &Path) -> anyhow::Result<
         None => "shapes of our own".to_owned(),
     };
     let text = toml::to_string(&Terms { version: env!("CARGO_PKG_VERSION"), meshes, plan })?;
-    resume::keep_terms(&text, out)
-}
-
-/// The meshes, of each class and split as many as the plan wants.
-fn meshes(plan: &Plan, folder: Option<&Path>, work: &Path) -> anyhow::Result<Vec<MeshEntry>> {
-    let folder = match folder {
-        Some(folder) => folder.to_owned(),
-        None => {
-            let [train, test] = plan.most_per_class.unwrap_or(SHAPES);
-            let folder = work.join("shapes");
-            shapes::write_tree(&folder, 0, train, test).context("cannot write the shapes")?;
-            folder
-        }
-    };
-    let mut meshes = discover(&folder, 0)?;
-    let Some([train, test]) = plan.most_per_class else { return Ok(meshes) };
-    let mut seen = BTreeMap::new();
-    meshes.retain(|mesh| {
-        let most = if mesh.split == formats::split::Split::Train { train } else { test };
-        let n = seen.entry((mesh.class.clone(), mesh.split)).or_insert(0);
-        *n += 1;
-        *n <= most
-    });
-    Ok(meshes)
+    resume::keep_terms(&text, &out.join("terms.toml"))
 }
 
 /// Where the dataset `name` lies.
@@ -140,19 +126,15 @@ fn make_all(plan: &Plan, meshes: &[MeshEntry], work: &Path) -> anyhow::Result<Ve
 }
 
 /// How many scans are equal in all positions, of each effect that reaches none.
-fn compare(made: &[Made], work: &Path) -> anyhow::Result<BTreeMap<&'static str, usize>> {
-    let manifest = |name: &str| {
-        let at = DATASETS.iter().position(|(known, _)| *known == name);
-        at.and_then(|at| made[at].manifest.as_ref()).with_context(|| format!("{name}: no scans"))
+fn compare(made: &[Made]) -> anyhow::Result<BTreeMap<&'static str, usize>> {
+    let made = |name: &str| {
+        let made = made.iter().find(|made| made.name == name);
+        made.with_context(|| format!("no dataset {name}"))
     };
-    let mut compared = BTreeMap::new();
-    for effect in EFFECTS.iter().filter(|effect| effect.judged_by == Judge::Positions) {
-        let (with, without) = (effect.with, effect.without);
-        let n = positions::compare(
-            (manifest(with)?, &folder(work, with)),
-            (manifest(without)?, &folder(work, without)),
-        );
-        compared.insert(effect.name, n.with_context(|| format!("effect {}", effect.name))?);
-    }
-    Ok(compared)
+    let compared = EFFECTS.iter().filter(|effect| effect.judged_by == Judge::Positions);
+    let compared = compared.map(|Effect { name, with, without, .. }| {
+        let n = positions::compare(made(with)?, made(without)?);
+        Ok((*name, n.with_context(|| format!("effect {name}"))?))
+    });
+    compared.collect()
 }

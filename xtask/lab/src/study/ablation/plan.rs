@@ -36,7 +36,7 @@ pub struct Plan {
     /// Meshes on which costs are measured.
     pub cost_meshes: usize,
     /// How all networks are trained, as `train --recipe` takes it.
-    pub recipe: toml::Table,
+    pub recipe: Recipe,
 }
 
 impl plan::Plan for Plan {
@@ -52,7 +52,7 @@ impl plan::Plan for Plan {
             *cost_rounds > 0 && *cost_meshes > 0,
             "cost_rounds, cost_meshes: expected 1 or more"
         );
-        self.recipe()?;
+        self.recipe.check()?;
         let distinct: BTreeSet<u64> = self.seeds.iter().copied().collect();
         let is_valid = !distinct.is_empty() && distinct.len() == self.seeds.len();
         ensure!(is_valid, "seeds: expected one or more, all distinct");
@@ -67,18 +67,6 @@ impl plan::Plan for Plan {
             "dropout: expected a share above 0 and below 1"
         );
         Ok(())
-    }
-}
-
-impl Plan {
-    /// How all networks are trained.
-    ///
-    /// # Errors
-    /// A table that is not a valid recipe.
-    pub fn recipe(&self) -> anyhow::Result<Recipe> {
-        let recipe: Recipe = self.recipe.clone().try_into()?;
-        recipe.check()?;
-        Ok(recipe)
     }
 }
 
@@ -98,8 +86,8 @@ mod tests {
         refused(Plan { noise_m: Some(f64::NAN), ..plan.clone() }, "noise_m");
         refused(Plan { seeds: Vec::new(), ..plan.clone() }, "seeds");
         refused(Plan { seeds: vec![7, 7], ..plan.clone() }, "seeds");
-        let lone = toml::Table::from_iter([("batch".to_owned(), 1.into())]);
-        refused(Plan { recipe: lone, ..plan.clone() }, "batch");
+        let alone = Recipe { batch: 1, ..plan.recipe.clone() };
+        refused(Plan { recipe: alone, ..plan.clone() }, "batch");
         refused(Plan { views: 0, ..plan }, "views");
     }
 }

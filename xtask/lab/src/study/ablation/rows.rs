@@ -1,16 +1,17 @@
 //! The lines of `ablations.csv`.
 
-use super::costs::Seconds;
+use super::design::Test;
 use super::effects::{EFFECTS, Effect, Judge, REFERENCE};
+use crate::measure::clock::Spread;
 use formats::interval::wilson;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One network's answers on one set: a line of `answers.csv`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Answer {
-    pub trained_on: String,
-    pub tested_on: String,
+    pub trained_on: &'static str,
+    pub tested_on: &'static str,
     pub seed: u64,
     pub correct: usize,
     pub n: usize,
@@ -18,16 +19,13 @@ pub struct Answer {
     pub epochs: u32,
 }
 
-/// What a dataset costs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cost {
-    pub seconds: Seconds,
-    pub bytes_per_cloud: f64,
-}
+/// What a dataset costs: CPU seconds of a mesh with all its views, and the bytes of
+/// a cloud.
+pub type Cost = (Spread, f64);
 
 /// A line: an effect, a direction and a seed. Where positions were compared,
 /// nothing was trained, and `n` is the number of scans that are equal.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
     pub effect: &'static str,
     pub judged_by: &'static str,
@@ -63,19 +61,15 @@ fn tested_on(effect: &Effect) -> Vec<(&'static str, &'static str)> {
 }
 
 /// All pairs of a set to train on and one to test on, each once, sorted.
-pub fn tests() -> Vec<(&'static str, &'static str)> {
-    let of = |effect: &Effect| {
-        let tested = tested_on(effect);
-        let pairs = [effect.with, effect.without]
-            .into_iter()
-            .flat_map(|trained| tested.iter().map(move |(_, tested)| (trained, *tested)));
-        pairs.collect::<Vec<_>>()
-    };
-    let mut tests: Vec<_> =
-        EFFECTS.iter().filter(|effect| effect.judged_by == Judge::Networks).flat_map(of).collect();
-    tests.sort_unstable();
-    tests.dedup();
-    tests
+pub fn tests() -> Vec<Test> {
+    let mut tests = BTreeSet::new();
+    for effect in EFFECTS.iter().filter(|effect| effect.judged_by == Judge::Networks) {
+        for trained_on in [effect.with, effect.without] {
+            let tested = tested_on(effect).into_iter();
+            tests.extend(tested.map(|(_, tested_on)| Test { trained_on, tested_on }));
+        }
+    }
+    tests.into_iter().collect()
 }
 
 /// The lines of all effects, in their order. `compared` is the number of equal
@@ -83,71 +77,47 @@ pub fn tests() -> Vec<(&'static str, &'static str)> {
 pub fn rows(
     answers: &[Answer],
     compared: &BTreeMap<&str, usize>,
-    costs: &BTreeMap<String, Cost>,
+    costs: &BTreeMap<&str, Cost>,
 ) -> Vec<Row> {
     let mut rows = Vec::new();
     for effect in &EFFECTS {
         for (direction, set) in [("with", effect.with), ("without", effect.without)] {
-            let Some(cost) = costs.get(set) else { continue };
-            let blank = blank(effect, (direction, set), cost);
-            match effect.judged_by {
-                Judge::Positions => {
-                    let n = compared.get(effect.name).copied().unwrap_or(0);
-                    rows.push(Row { n, ..blank });
-                }
-                Judge::Networks => {
-                    for (tested, tested_set) in tested_on(effect) {
-                        let answers = answers
-                            .iter()
-                            .filter(|a| a.trained_on == set && a.tested_on == tested_set);
-                        rows.extend(answers.map(|answer| Row {
-                            tested_on: Some(tested),
-                            tested_set: Some(tested_set),
-                            ..answered(answer, &blank)
-                        }));
+            let Some((seconds, bytes_per_cloud)) = costs.get(set) else { continue };
+            let row = Row {
+                effect: effect.name,
+                trained_on: direction,
+                trained_set: set,
+                scan_seconds_cpu: seconds.median,
+                scan_seconds_cpu_low: seconds.min,
+                scan_seconds_cpu_high: seconds.max,
+                bytes_per_cloud: *bytes_per_cloud,
+                ..Row::default()
+            };
+            if effect.judged_by == Judge::Positions {
+                let n = compared.get(effect.name).copied().unwrap_or(0);
+                rows.push(Row { judged_by: "identical positions", n, ..row });
+                continue;
+            }
+            for (tested, tested_set) in tested_on(effect) {
+                let of_test = |a: &&Answer| a.trained_on == set && a.tested_on == tested_set;
+                rows.extend(answers.iter().filter(of_test).map(|answer| {
+                    let (low, high) = wilson(answer.correct, answer.n);
+                    Row {
+                        judged_by: "networks",
+                        tested_on: Some(tested),
+                        tested_set: Some(tested_set),
+                        seed: Some(answer.seed),
+                        accuracy: Some(answer.correct as f64 / answer.n.max(1) as f64),
+                        accuracy_low: Some(low),
+                        accuracy_high: Some(high),
+                        n: answer.n,
+                        train_clouds: Some(answer.train_clouds),
+                        epochs: Some(answer.epochs),
+                        ..row.clone()
                     }
-                }
+                }));
             }
         }
     }
     rows
-}
-
-fn blank(effect: &Effect, (direction, set): (&'static str, &'static str), cost: &Cost) -> Row {
-    Row {
-        effect: effect.name,
-        judged_by: match effect.judged_by {
-            Judge::Networks => "networks",
-            Judge::Positions => "identical positions",
-        },
-        trained_on: direction,
-        tested_on: None,
-        trained_set: set,
-        tested_set: None,
-        seed: None,
-        accuracy: None,
-        accuracy_low: None,
-        accuracy_high: None,
-        n: 0,
-        train_clouds: None,
-        epochs: None,
-        scan_seconds_cpu: cost.seconds.median,
-        scan_seconds_cpu_low: cost.seconds.least,
-        scan_seconds_cpu_high: cost.seconds.most,
-        bytes_per_cloud: cost.bytes_per_cloud,
-    }
-}
-
-fn answered(answer: &Answer, blank: &Row) -> Row {
-    let (low, high) = wilson(answer.correct, answer.n);
-    Row {
-        seed: Some(answer.seed),
-        accuracy: Some(answer.correct as f64 / answer.n.max(1) as f64),
-        accuracy_low: Some(low),
-        accuracy_high: Some(high),
-        n: answer.n,
-        train_clouds: Some(answer.train_clouds),
-        epochs: Some(answer.epochs),
-        ..blank.clone()
-    }
 }

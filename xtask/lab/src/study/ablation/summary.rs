@@ -35,14 +35,11 @@ fn gains(rows: &[Row]) -> Table {
             });
             let gain: Vec<f64> = pairs.collect();
             let ends = Spread::of(gain.iter().copied());
-            let accuracies = [&with, &without]
-                .map(|found| mean(found.iter().map(|(_, accuracy)| *accuracy)))
-                .map(|mean| format!("{mean:.1}"));
-            let [p, q] = accuracies;
+            let mean_of = |found: &[(u64, f64)]| mean(found.iter().map(|(_, accuracy)| *accuracy));
+            let accuracies = [mean_of(&with), mean_of(&without)].map(|x| format!("{x:.1}"));
             let points = [mean(gain.into_iter()), ends.min, ends.max].map(|x| format!("{x:+.1}"));
-            let [gain, least, most] = points;
             let row = [effect.name, tested].map(str::to_owned);
-            table.push(row.into_iter().chain([p, q, gain, least, most]).collect());
+            table.push(row.into_iter().chain(accuracies).chain(points).collect());
         }
     }
     table
@@ -65,11 +62,11 @@ fn costs(rows: &[Row]) -> Table {
             let Some(row) = row else { continue };
             let ms = [row.scan_seconds_cpu, row.scan_seconds_cpu_low, row.scan_seconds_cpu_high];
             let equal = if row.seed.is_none() { row.n.to_string() } else { "-".to_owned() };
-            let words = [format!("{} {direction}", effect.name), row.judged_by.to_owned()];
+            let effect = format!("{} {direction}", effect.name);
+            let words = [effect.as_str(), row.judged_by, row.trained_set];
             let numbers = ms.map(|seconds| digits(1e3 * seconds));
             let last = [format!("{:.0}", row.bytes_per_cloud), equal];
-            let words = words.into_iter().chain([row.trained_set.to_owned()]);
-            table.push(words.chain(numbers).chain(last).collect());
+            table.push(words.map(str::to_owned).into_iter().chain(numbers).chain(last).collect());
         }
     }
     table

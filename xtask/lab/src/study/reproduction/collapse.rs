@@ -27,38 +27,31 @@ struct Step {
 pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     let steps = steps(context)?;
     let networks = networks(context)?;
-    let mut table = Table {
-        id: "3 steps".to_owned(),
-        caption: "Instance accuracy after each step, of networks by what they were trained on"
-            .to_owned(),
-        rows_are: "tested on".to_owned(),
-        columns: networks.iter().map(|(name, _)| (*name).to_owned()).collect(),
-        rows: Vec::new(),
-    };
+    let mut table = Table::new(
+        "3 steps",
+        "Instance accuracy after each step, of networks by what they were trained on",
+        "tested on",
+        networks.iter().map(|(name, _)| *name),
+    );
     for step in &steps {
         let normalization = step.unmoved.then_some(Normalization::None);
         let options = Options { normalization, ..Options::default() };
-        let cells = networks
-            .iter()
-            .map(|(_, model)| Ok(Cell::instance(&confusion(model, &step.clouds, &options)?)));
-        let cells = cells.collect::<anyhow::Result<_>>()?;
-        table.rows.push((step.name.to_owned(), cells));
+        let tested = |(_, model): &(&str, PathBuf)| {
+            Ok(Cell::instance(&confusion(model, &step.clouds, &options)?))
+        };
+        table.measure(step.name, networks.iter().map(tested))?;
     }
-    Ok(Section {
-        title: "Where the collapse comes from".to_owned(),
-        about: vec![
-            format!(
-                "Data: {}. The two turned sets are asides; from occlusion on, every step keeps \
-                 those before it.",
-                context.meshes_are
-            ),
-            "Uniform samples have one cloud a mesh, all else one a view. What a view sees is \
-             decided by casting a ray at each sample from where the sensor stands."
-                .to_owned(),
-        ],
-        tables: vec![table],
-        ..Section::default()
-    })
+    let about = [
+        format!(
+            "Data: {}. The two turned sets are asides; from occlusion on, every step keeps \
+             those before it.",
+            context.meshes_are
+        ),
+        "Uniform samples have one cloud a mesh, all else one a view. What a view sees is \
+         decided by casting a ray at each sample from where the sensor stands."
+            .to_owned(),
+    ];
+    Ok(Section::new("Where the collapse comes from", about, vec![table]))
 }
 
 /// Networks by the mix that they were trained on.
@@ -66,8 +59,11 @@ fn networks(context: &ExperimentContext) -> anyhow::Result<Vec<(&'static str, Pa
     let train = |place: &str| context.scans(place, Split::Train);
     let (surface, seen) = (train("surfaces/surface")?, train("surfaces/seen")?);
     let noisy = train("lidar/packed/rotational-noisy")?;
-    let mixed = |name: &str, clouds: &Clouds| {
-        context.network(name, matrix::recipe(context, clouds.len()), clouds)
+    let mixed = |name: &str, other: &Clouds| {
+        let joined = surface.concat(other);
+        let clouds = joined
+            .map_err(|cause| anyhow::anyhow!("surfaces and scans cannot be joined: {cause}"))?;
+        context.network(name, matrix::recipe(context, clouds.len()), &clouds)
     };
     let turned = {
         let mut recipe = matrix::recipe(context, surface.len());
@@ -78,17 +74,10 @@ fn networks(context: &ExperimentContext) -> anyhow::Result<Vec<(&'static str, Pa
         ("uniform samples", matrix::network(context, "surfaces/surface")?),
         ("the same, turned about z in training", turned),
         ("what each view sees of them", matrix::network(context, "surfaces/seen")?),
-        ("uniform and seen", mixed("on-surface-and-seen", &joined(&surface, &seen)?)?),
+        ("uniform and seen", mixed("on-surface-and-seen", &seen)?),
         ("rotational noisy", matrix::network(context, "lidar/packed/rotational-noisy")?),
-        (
-            "uniform and rotational noisy",
-            mixed("on-surface-and-noisy", &joined(&surface, &noisy)?)?,
-        ),
+        ("uniform and rotational noisy", mixed("on-surface-and-noisy", &noisy)?),
     ])
-}
-
-fn joined(a: &Clouds, b: &Clouds) -> anyhow::Result<Clouds> {
-    a.concat(b).map_err(|cause| anyhow::anyhow!("surfaces and scans cannot be joined: {cause}"))
 }
 
 fn steps(context: &ExperimentContext) -> anyhow::Result<Vec<Step>> {

@@ -31,30 +31,13 @@ pub struct ExperimentContext {
     pub scans: PathBuf,
     /// What the report calls the meshes.
     pub meshes_are: String,
-    /// Where networks go.
-    pub models: PathBuf,
-    read: RefCell<BTreeMap<String, Rc<Clouds>>>,
+    /// The folder of the report and of the networks.
+    pub out: PathBuf,
+    /// What has been read so far, by name and split.
+    pub read: RefCell<BTreeMap<String, Rc<Clouds>>>,
 }
 
 impl ExperimentContext {
-    /// A context that has read nothing yet.
-    pub fn new(
-        plan: Plan,
-        (clouds, clouds_are): (&Path, &str),
-        (scans, meshes_are): (&Path, &str),
-        out: &Path,
-    ) -> Self {
-        Self {
-            plan,
-            clouds: clouds.to_path_buf(),
-            clouds_are: clouds_are.to_owned(),
-            scans: scans.to_path_buf(),
-            meshes_are: meshes_are.to_owned(),
-            models: out.join("models"),
-            read: RefCell::default(),
-        }
-    }
-
     /// Checks that the data are large enough for the plan.
     ///
     /// # Errors
@@ -66,18 +49,16 @@ impl ExperimentContext {
             "--clouds: expected the same classes in both halves"
         );
         let most = self.plan.points.iter().chain(&self.plan.kept).max().copied().unwrap_or(0);
-        ensure!(
-            most <= train.set.n_points,
-            "--clouds: expected clouds of {most} points or more, found {}",
-            train.set.n_points
-        );
         let surface = self.scans("surfaces/surface", Split::Train)?;
-        ensure!(
-            self.plan.mesh_points <= surface.set.n_points,
-            "surfaces/surface: expected clouds of {} points or more, found {}",
-            self.plan.mesh_points,
-            surface.set.n_points
-        );
+        for (what, clouds, most) in
+            [("--clouds", train, most), ("surfaces/surface", surface, self.plan.mesh_points)]
+        {
+            let n_points = clouds.set.n_points;
+            ensure!(
+                most <= n_points,
+                "{what}: expected clouds of {most} points or more, found {n_points}"
+            );
+        }
         Ok(())
     }
 
@@ -95,23 +76,18 @@ impl ExperimentContext {
             meshes_sha256: [String; 2],
             plan: &'a Plan,
         }
-        let digest = |clouds: &Clouds| {
+        let digest = |clouds: Rc<Clouds>| {
             let bytes: Vec<u8> = clouds.set.points.iter().flat_map(|x| x.to_le_bytes()).collect();
             hash::of_bytes(&bytes)
         };
-        let noisy = "lidar/packed/rotational-noisy";
+        let surface = self.scans("surfaces/surface", Split::Train)?;
+        let noisy = self.scans("lidar/packed/rotational-noisy", Split::Test)?;
         let terms = Terms {
             version: env!("CARGO_PKG_VERSION"),
             clouds: &self.clouds_are,
-            clouds_sha256: [
-                digest(&*self.clouds(Split::Train)?),
-                digest(&*self.clouds(Split::Test)?),
-            ],
+            clouds_sha256: [self.clouds(Split::Train)?, self.clouds(Split::Test)?].map(digest),
             meshes: &self.meshes_are,
-            meshes_sha256: [
-                digest(&*self.scans("surfaces/surface", Split::Train)?),
-                digest(&*self.scans(noisy, Split::Test)?),
-            ],
+            meshes_sha256: [surface, noisy].map(digest),
             plan: &self.plan,
         };
         Ok(toml::to_string(&terms)?)
@@ -124,7 +100,13 @@ impl ExperimentContext {
     pub fn clouds(&self, split: Split) -> anyhow::Result<Rc<Clouds>> {
         self.remember(&format!("clouds {split}"), || {
             let most = self.plan.most_points();
-            Ok(self.at_most_per_class(Clouds::read(&self.clouds, split, most)?, split))
+            let clouds = Clouds::read(&self.clouds, split, most)?;
+            Ok(match (self.plan.most_per_class, split) {
+                (None, _) => clouds,
+                (Some([most, _]), Split::Train) | (Some([_, most]), Split::Test) => {
+                    clouds.of_each_class(most)
+                }
+            })
         })
     }
 
@@ -137,15 +119,6 @@ impl ExperimentContext {
         self.remember(&format!("{name} {split}"), || {
             Ok(Clouds::read(&self.scans.join(name), split, self.plan.most_points())?)
         })
-    }
-
-    fn at_most_per_class(&self, clouds: Clouds, split: Split) -> Clouds {
-        match (self.plan.most_per_class, split) {
-            (None, _) => clouds,
-            (Some([most, _]), Split::Train) | (Some([_, most]), Split::Test) => {
-                clouds.of_each_class(most)
-            }
-        }
     }
 
     fn remember(
@@ -161,9 +134,14 @@ impl ExperimentContext {
         Ok(clouds)
     }
 
+    /// The folder of all networks.
+    pub fn models(&self) -> PathBuf {
+        self.out.join("models")
+    }
+
     /// Where the network called `name` lies.
     pub fn model(&self, name: &str) -> PathBuf {
-        self.models.join(format!("{name}.safetensors"))
+        self.models().join(format!("{name}.safetensors"))
     }
 
     /// The network called `name`, trained by `recipe` on `clouds` unless it is
@@ -175,6 +153,14 @@ impl ExperimentContext {
         let out = self.model(name);
         resume::network(&out, name, recipe, clouds)?;
         Ok(out)
+    }
+
+    /// The confusion of `model` on the test clouds of the set `name`.
+    ///
+    /// # Errors
+    /// Data that cannot be used; what infer-cpu refuses.
+    pub fn test_on(&self, name: &str, model: &Path) -> anyhow::Result<Evaluation> {
+        test(model, &*self.scans(name, Split::Test)?, None)
     }
 }
 

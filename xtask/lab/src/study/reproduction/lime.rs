@@ -20,6 +20,7 @@ struct Explained {
     name: String,
     points: Vec<[f32; 3]>,
     critical: Vec<usize>,
+    strongest: Vec<usize>,
     found: Explanation,
     beside: RandomBaseline,
 }
@@ -34,76 +35,72 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
         let sampler = Some(sampler(kind, points));
         Classifier::load(&model, &Options { sampler, normalization, ..Options::default() })
     };
-    let mut critical = load(SamplerKind::Cpl, keep)?;
+    let mut by_cpl = load(SamplerKind::Cpl, keep)?;
     let mut whole = load(SamplerKind::All, 1)?;
     let lime = Lime { samples: context.plan.lime_samples, ..Lime::default() };
     let n = context.plan.explained.min(held.len());
     let mut all = Vec::new();
     for cloud in (0..n).map(|i| i * held.len() / n) {
         let points = held.set.cloud(cloud).to_vec();
-        let chosen = critical.sample(&wide(&points))?.iter().map(|&i| i as usize).collect();
+        let critical: Vec<usize> =
+            by_cpl.sample(&wide(&points))?.iter().map(|&i| i as usize).collect();
         let found = explain(&mut whole, &points, &lime)?;
         let class = &held.classes[held.set.labels[cloud]];
         let answer = &held.classes[found.class];
         let name = format!("cloud {cloud}, a {class} taken for a {answer}");
-        all.push(compare(context, name, points, chosen, found));
+        let strongest = found.strongest(critical.len());
+        let beside = RandomBaseline::of(&points, (&critical, &strongest), context.plan.draws, 0);
+        all.push(Explained { name, points, critical, strongest, found, beside });
     }
     let shown = &all[..SHOWN.min(all.len())];
+    let about = [
+        format!(
+            "Data: {}. LIME-3D: {} parts, {} clouds with parts removed, ridge regression.",
+            context.clouds_are, lime.clusters, lime.samples
+        ),
+        format!(
+            "Critical points of {}, whose network is explained as it answers to all points. \
+             Chamfer distances are the sum of both directions' means; \
+             squared as PyTorch3D has it, plain as some papers. Always as many points on one \
+             side as on the other, since the distance shrinks with the count.",
+            cpl_name(front, keep)
+        ),
+    ];
+    let draw = |one: &Explained| {
+        explanation_drawing::draw(&one.points, &one.found, &one.critical).to_string()
+    };
     Ok(Section {
-        title: "LIME-3D and critical points".to_owned(),
-        about: vec![
-            format!(
-                "Data: {}. LIME-3D: {} parts, {} clouds with parts removed, ridge regression.",
-                context.clouds_are, lime.clusters, lime.samples
-            ),
-            format!(
-                "Critical points of {}, whose network is explained as it answers to all points. \
-                 Chamfer distances are the sum of both directions' means; \
-                 squared as PyTorch3D has it, plain as some papers. Always as many points on one \
-                 side as on the other, since the distance shrinks with the count.",
-                cpl_name(front, keep)
-            ),
-        ],
-        tables: vec![table(&all, context.plan.draws)],
-        drawings: shown
-            .iter()
-            .map(|one| {
-                explanation_drawing::draw(&one.points, &one.found, &one.critical).to_string()
-            })
-            .collect(),
+        drawings: shown.iter().map(draw).collect(),
         clouds: shown.iter().map(coloured).collect(),
+        ..Section::new("LIME-3D and critical points", about, vec![table(&all, context.plan.draws)])
     })
 }
 
-fn compare(
-    context: &ExperimentContext,
-    name: String,
-    points: Vec<[f32; 3]>,
-    critical: Vec<usize>,
-    found: Explanation,
-) -> Explained {
-    let strongest = found.strongest(critical.len());
-    let beside = RandomBaseline::of(&points, (&critical, &strongest), context.plan.draws, 0);
-    Explained { name, points, critical, found, beside }
-}
-
 fn table(all: &[Explained], draws: u32) -> Table {
-    let columns = [
-        "critical points, squared",
-        "random, squared, median",
-        "2.5 %",
-        "97.5 %",
-        "critical points, plain",
-        "random, plain, median",
-        "random draws that are nearer",
-        "R² of LIME",
-    ];
-    let row = |one: &Explained| {
+    let mut table = Table::new(
+        "5 chamfer",
+        format!(
+            "Chamfer distance to the points that LIME-3D finds strongest, of critical points and \
+             of {draws} random subsets"
+        ),
+        "cloud",
+        [
+            "critical points, squared",
+            "random, squared, median",
+            "2.5 %",
+            "97.5 %",
+            "critical points, plain",
+            "random, plain, median",
+            "random draws that are nearer",
+            "R² of LIME",
+        ],
+    );
+    for one in all {
         let RandomBaseline { ours, random } = &one.beside;
         let last = random.len().saturating_sub(1);
         let at = |share: f64| random.get((share * last as f64) as usize);
         let squared = |share| at(share).map_or(f64::NAN, |found| found.squared);
-        let cells = vec![
+        let cells = [
             Cell::number(ours.squared, 4),
             Cell::number(squared(0.5), 4),
             Cell::number(squared(0.025), 4),
@@ -113,24 +110,15 @@ fn table(all: &[Explained], draws: u32) -> Table {
             Cell::Text(format!("{} of {}", one.beside.nearer(), random.len())),
             Cell::number(one.found.r_squared, 2),
         ];
-        (one.name.clone(), cells)
-    };
-    Table {
-        id: "5 chamfer".to_owned(),
-        caption: format!(
-            "Chamfer distance to the points that LIME-3D finds strongest, of critical points and \
-             of {draws} random subsets"
-        ),
-        rows_are: "cloud".to_owned(),
-        columns: columns.map(str::to_owned).into(),
-        rows: all.iter().map(row).collect(),
+        table.push(&one.name, cells);
     }
+    table
 }
 
 fn coloured(one: &Explained) -> Cloud {
     let mut colours = vec![0u8; one.points.len()];
     one.critical.iter().for_each(|&i| colours[i] += 1);
-    one.found.strongest(one.critical.len()).iter().for_each(|&i| colours[i] += 2);
+    one.strongest.iter().for_each(|&i| colours[i] += 2);
     let thousandths = |x: f32| (1000.0 * x).round() as i16;
     Cloud {
         caption: one.name.clone(),

@@ -3,7 +3,7 @@
 use formats::split::Split;
 use train::recipe::{Recipe, Sampling};
 
-use super::context::{ExperimentContext, test};
+use super::context::ExperimentContext;
 use super::section::{Cell, Section, Table};
 
 /// The datasets: a name, and where they lie.
@@ -28,41 +28,29 @@ pub fn network(context: &ExperimentContext, place: &str) -> anyhow::Result<std::
 }
 
 pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
-    let table = |id: &str, caption: &str| Table {
-        id: id.to_owned(),
-        caption: caption.to_owned(),
-        rows_are: "trained on".to_owned(),
-        columns: SETS.map(|(name, _)| format!("tested on {name}")).into(),
-        rows: Vec::new(),
-    };
-    let mut instance = table("2 instance", "Instance accuracy");
-    let mut class = table("2 class", "Class accuracy");
+    let columns = SETS.map(|(name, _)| format!("tested on {name}"));
+    let mut instance = Table::new("2 instance", "Instance accuracy", "trained on", &columns);
+    let mut class = Table::new("2 class", "Class accuracy", "trained on", &columns);
     for (name, place) in SETS {
         let model = network(context, place)?;
-        let mut found = Vec::new();
-        for (_, place) in SETS {
-            found.push(test(&model, &*context.scans(place, Split::Test)?, None)?);
-        }
-        instance.rows.push((name.to_owned(), found.iter().map(Cell::instance).collect()));
-        class.rows.push((name.to_owned(), found.iter().map(Cell::class).collect()));
+        let found = SETS.map(|(_, place)| context.test_on(place, &model));
+        let found = found.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+        instance.push(name, found.iter().map(Cell::instance));
+        class.push(name, found.iter().map(Cell::class));
     }
     let n_classes = context.scans(SETS[0].1, Split::Train)?.classes.len();
-    Ok(Section {
-        title: "Five datasets by five".to_owned(),
-        about: vec![
-            format!(
-                "Data: {}, the same meshes and the same split in all five. {} points; as many \
-                 epochs each as come nearest above {} steps. A guess is right in {:.1} %.",
-                context.meshes_are,
-                context.plan.mesh_points,
-                context.plan.mesh_steps,
-                100.0 / n_classes as f64
-            ),
-            "The paper's accuracy across datasets falls to 2 to 17 %. Its uniform samples are the \
-             baseline's text files, in a frame of their own; here all five share one frame."
-                .to_owned(),
-        ],
-        tables: vec![instance, class],
-        ..Section::default()
-    })
+    let about = [
+        format!(
+            "Data: {}, the same meshes and the same split in all five. {} points; as many \
+             epochs each as come nearest above {} steps. A guess is right in {:.1} %.",
+            context.meshes_are,
+            context.plan.mesh_points,
+            context.plan.mesh_steps,
+            100.0 / n_classes as f64
+        ),
+        "The paper's accuracy across datasets falls to 2 to 17 %. Its uniform samples are the \
+         baseline's text files, in a frame of their own; here all five share one frame."
+            .to_owned(),
+    ];
+    Ok(Section::new("Five datasets by five", about, vec![instance, class]))
 }

@@ -17,18 +17,17 @@ mod section;
 #[cfg(test)]
 mod tests;
 
-use super::{plan as plans, resume};
+use super::{meshes, plan as plans, resume};
 use anyhow::Context;
 use context::ExperimentContext;
-use edgepuck_program::Outcome;
 use edgepuck_program::flags::need_folder_of_meshes;
+use edgepuck_program::{Outcome, gen_shapes};
 use formats::atomic;
-use plan::Plan;
 use section::{Section, write_csv};
+use std::cell::RefCell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use xtask::workspace::command_line;
 
 /// Flags of `reproduce`.
 #[derive(clap::Args)]
@@ -71,30 +70,29 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     need_folder_of_meshes(args.meshes.as_deref())?;
     let plan = plans::read(args.plan.as_deref(), args.quick)?;
     let scans = args.out.join("data");
-    let meshes = match &args.meshes {
-        Some(folder) => folder.clone(),
-        None => {
-            let folder = scans.join("shapes");
-            datasets::run_edgepuck(&["gen-shapes"], &[("--out", &folder)], &folder.join("vase"))?;
-            folder
-        }
-    };
+    let per_class = [gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS];
+    let meshes = meshes::folder(args.meshes.as_deref(), &scans.join("shapes"), per_class)?;
     datasets::make(&meshes, &scans)?;
     let meshes_are = match &args.meshes {
         Some(folder) => named(args.meshes_name.as_ref(), "meshes of", folder),
         None => "shapes of our own".to_owned(),
     };
-    let surfaces = scans.join("surfaces/surface");
     let (clouds, clouds_are) = match &args.clouds {
         Some(path) => (path.clone(), named(args.clouds_name.as_ref(), "clouds of", path)),
-        None => (surfaces, format!("surface points of {meshes_are}, in place of ModelNet40's")),
+        None => (
+            scans.join("surfaces/surface"),
+            format!("surface points of {meshes_are}, in place of ModelNet40's"),
+        ),
     };
-    experiments(&Request {
+    let out = args.out.clone();
+    experiments(&ExperimentContext {
         plan,
-        clouds: (&clouds, &clouds_are),
-        scans: (&scans, &meshes_are),
-        out: &args.out,
-        command: &command_line(),
+        clouds,
+        clouds_are,
+        scans,
+        meshes_are,
+        out,
+        read: RefCell::default(),
     })?;
     Ok(Outcome::Success)
 }
@@ -103,32 +101,25 @@ fn named(name: Option<&String>, what: &str, path: &Path) -> String {
     name.cloned().unwrap_or_else(|| format!("{what} {}", path.display()))
 }
 
-/// The experiments to run, on data that are there.
-struct Request<'a> {
-    plan: Plan,
-    /// ModelNet40's clouds, or what replaces them, and what the report calls them.
-    clouds: (&'a Path, &'a str),
-    /// Scans and surfaces of meshes, and what the report calls the meshes.
-    scans: (&'a Path, &'a str),
-    out: &'a Path,
-    /// The command that the report names.
-    command: &'a str,
-}
-
-fn experiments(request: &Request<'_>) -> anyhow::Result<()> {
-    let Request { plan, clouds, scans, out, command } = request;
-    let context = ExperimentContext::new(plan.clone(), *clouds, *scans, out);
+/// Runs the experiments on data that are there, and writes the report.
+fn experiments(context: &ExperimentContext) -> anyhow::Result<()> {
+    let out = &context.out;
     context.check()?;
-    resume::keep_terms(&context.terms()?, out)?;
-    fs::create_dir_all(&context.models)?;
-    let mut sections = Vec::new();
+    resume::keep_terms(&context.terms()?, &out.join("terms.toml"))?;
+    fs::create_dir_all(context.models())?;
+    let mut sections: Vec<Section> = Vec::new();
     for (name, experiment) in EXPERIMENTS {
-        sections.push(done(&context, name, experiment, out)?);
+        let path = out.join("items").join(format!("{name}.json"));
+        sections.push(resume::result(&path, || {
+            let begun = Instant::now();
+            let section = experiment(context).with_context(|| format!("experiment {name}"))?;
+            eprintln!("{name}: done in {:.0} s", begun.elapsed().as_secs_f64());
+            Ok(section)
+        })?);
     }
     write_csv(&sections, &out.join("report.csv"))?;
-    let page = page::of(&sections, &context.plan, command)?;
     let path = out.join("report.html");
-    atomic::write_bytes(&path, &page)?;
+    atomic::write_bytes(&path, page::of(&sections, &context.plan)?)?;
     println!("{}", path.display());
     Ok(())
 }
@@ -144,23 +135,3 @@ const EXPERIMENTS: [(&str, Experiment); 6] = [
     ("5-lime", lime::run),
     ("6-noise", noise::run),
 ];
-
-/// The result of experiment `name`, from an earlier run or from this one.
-fn done(
-    context: &ExperimentContext,
-    name: &str,
-    experiment: Experiment,
-    out: &Path,
-) -> anyhow::Result<Section> {
-    let path = out.join("items").join(format!("{name}.json"));
-    if path.is_file() {
-        let text = fs::read_to_string(&path)?;
-        return serde_json::from_str(&text).with_context(|| path.display().to_string());
-    }
-    let begun = Instant::now();
-    let section = experiment(context).with_context(|| format!("experiment {name}"))?;
-    let json = serde_json::to_string(&section)?;
-    atomic::write_bytes(&path, &json)?;
-    eprintln!("{name}: done in {:.0} s", begun.elapsed().as_secs_f64());
-    Ok(section)
-}

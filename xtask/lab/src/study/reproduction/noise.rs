@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use formats::split::Split;
+use std::path::Path;
 use train::accuracy_report;
 use train::clouds::Clouds;
 
@@ -27,75 +28,49 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     let model = matrix::network(context, noisy)?;
     let held = context.scans(noisy, Split::Test)?;
     let found = test(&model, &held, None)?;
+    let about = [
+        format!("Data: {}, scans of a VLP-32C from four sides.", context.meshes_are),
+        "The matrix: a row a true class, a column an answer; darker for more, red for wrong. \
+         The threshold filter: scans of fewer points are left out of the test."
+            .to_owned(),
+    ];
+    let caption = "Confusion on rotational noisy scans";
+    let mut confusion = Table::new("6 confusion", caption, "class", &held.classes);
+    for (class, answers) in held.classes.iter().zip(&found.confusion) {
+        confusion.push(class, answers.iter().map(|&n| Cell::Number(n as f64, 0)));
+    }
+    let tables = vec![confusion, thresholds(&held, &model)?, sweep(context)?];
     Ok(Section {
-        title: "Confusion, few points, noise".to_owned(),
-        about: vec![
-            format!("Data: {}, scans of a VLP-32C from four sides.", context.meshes_are),
-            "The matrix: a row a true class, a column an answer; darker for more, red for wrong. \
-             The threshold filter: scans of fewer points are left out of the test."
-                .to_owned(),
-        ],
-        tables: vec![
-            confusion(&found.confusion, &held.classes),
-            thresholds(context, &model)?,
-            sweep(context)?,
-        ],
         drawings: vec![accuracy_report::drawing(&found, &held.classes).to_string()],
-        ..Section::default()
+        ..Section::new("Confusion, few points, noise", about, tables)
     })
 }
 
-fn confusion(matrix: &[Vec<usize>], classes: &[String]) -> Table {
-    let row = |(class, answers): (&String, &Vec<usize>)| {
-        (class.clone(), answers.iter().map(|&n| Cell::Number(n as f64, 0)).collect())
-    };
-    Table {
-        id: "6 confusion".to_owned(),
-        caption: "Confusion on rotational noisy scans".to_owned(),
-        rows_are: "class".to_owned(),
-        columns: classes.to_vec(),
-        rows: classes.iter().zip(matrix).map(row).collect(),
-    }
-}
-
-fn thresholds(context: &ExperimentContext, model: &std::path::Path) -> anyhow::Result<Table> {
-    let noisy = SIGMAS[1].1;
-    let held = context.scans(noisy, Split::Test)?;
+fn thresholds(held: &Clouds, model: &Path) -> anyhow::Result<Table> {
     let n_raw = held.set.n_raw.as_ref();
-    let n_raw = n_raw.with_context(|| format!("{noisy}-test.npz does not list n_raw"))?;
-    let mut rows = Vec::new();
+    let n_raw = n_raw.with_context(|| format!("{}-test.npz does not list n_raw", SIGMAS[1].1))?;
+    let caption = "Rotational noisy scans of at least so many points";
+    let columns = ["scans kept", "instance accuracy"];
+    let mut table = Table::new("6 threshold", caption, "points", columns);
     for least in THRESHOLDS {
         let kept: Vec<usize> = (0..held.len()).filter(|&i| n_raw[i] >= least).collect();
-        let some: Clouds = held.select(&kept);
-        let accuracy = match some.is_empty() {
+        let accuracy = match kept.is_empty() {
             true => Cell::None,
-            false => Cell::instance(&test(model, &some, None)?),
+            false => Cell::instance(&test(model, &held.select(&kept), None)?),
         };
-        rows.push((least.to_string(), vec![Cell::Share(kept.len(), held.len()), accuracy]));
+        table.push(least.to_string(), [Cell::Share(kept.len(), held.len()), accuracy]);
     }
-    Ok(Table {
-        id: "6 threshold".to_owned(),
-        caption: "Rotational noisy scans of at least so many points".to_owned(),
-        rows_are: "points".to_owned(),
-        columns: vec!["scans kept".to_owned(), "instance accuracy".to_owned()],
-        rows,
-    })
+    Ok(table)
 }
 
 fn sweep(context: &ExperimentContext) -> anyhow::Result<Table> {
-    let mut rows = Vec::new();
+    let caption = "Instance accuracy by noise along the ray";
+    let columns = SIGMAS.map(|(sigma, _)| format!("tested with {sigma}"));
+    let mut table = Table::new("6 noise", caption, "trained with", columns);
     for (sigma, place) in SIGMAS {
         let model = matrix::network(context, place)?;
-        let cells = SIGMAS.map(|(_, place)| {
-            Ok(Cell::instance(&test(&model, &*context.scans(place, Split::Test)?, None)?))
-        });
-        rows.push((sigma.to_owned(), cells.into_iter().collect::<anyhow::Result<_>>()?));
+        let tested = |(_, place)| Ok(Cell::instance(&context.test_on(place, &model)?));
+        table.measure(sigma, SIGMAS.map(tested))?;
     }
-    Ok(Table {
-        id: "6 noise".to_owned(),
-        caption: "Instance accuracy by noise along the ray".to_owned(),
-        rows_are: "trained with".to_owned(),
-        columns: SIGMAS.map(|(sigma, _)| format!("tested with {sigma}")).into(),
-        rows,
-    })
+    Ok(table)
 }

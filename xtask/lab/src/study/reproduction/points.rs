@@ -21,58 +21,47 @@ pub fn recipe(plan: &Plan, n: usize) -> Recipe {
 
 pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     let (train, held) = (context.clouds(Split::Train)?, context.clouds(Split::Test)?);
-    let mut trained = Table {
-        id: "1 trained at N".to_owned(),
-        caption: "Networks trained and tested at N points, drawn at random".to_owned(),
-        rows_are: "points".to_owned(),
-        columns: ["instance accuracy", "class accuracy", "paper"].map(str::to_owned).into(),
-        rows: Vec::new(),
-    };
+    let caption = "Networks trained and tested at N points, drawn at random";
+    let columns = ["instance accuracy", "class accuracy", "paper"];
+    let mut trained = Table::new("1 trained at N", caption, "points", columns);
     for &n in &context.plan.points {
         let model = context.network(&name(n), recipe(&context.plan, n), &train)?;
         let found = test(&model, &held, None)?;
-        let cells = vec![Cell::instance(&found), Cell::class(&found), paper(n)];
-        trained.rows.push((n.to_string(), cells));
+        trained.push(n.to_string(), [Cell::instance(&found), Cell::class(&found), paper(n)]);
     }
     let most = context.plan.points.iter().copied().max().unwrap_or(1);
     let model = context.network(&name(most), recipe(&context.plan, most), &train)?;
-    let mut tested = Table {
-        id: "1 tested at N".to_owned(),
-        caption: format!("The network of {most} points, tested at others"),
-        columns: ["random points", "farthest points"].map(str::to_owned).into(),
-        rows_are: "points".to_owned(),
-        rows: Vec::new(),
-    };
+    let caption = format!("The network of {most} points, tested at others");
+    let columns = ["random points", "farthest points"];
+    let mut tested = Table::new("1 tested at N", caption, "points", columns);
     for &n in &context.plan.tested_points {
-        let at = |kind| -> anyhow::Result<Cell> {
+        let at = |kind| {
             if n > held.set.n_points {
                 return Ok(Cell::Text(format!("clouds have {} points", held.set.n_points)));
             }
             Ok(Cell::instance(&test(&model, &held, Some(sampler(kind, n)))?))
         };
-        tested.rows.push((n.to_string(), vec![at(SamplerKind::Random)?, at(SamplerKind::Fps)?]));
+        tested.measure(n.to_string(), [SamplerKind::Random, SamplerKind::Fps].map(at))?;
     }
     let chart = Chart {
         message: "Instance accuracy by the number of points".to_owned(),
         caption: "",
-        x: Axis { label: "points", logarithmic: true, percent: false },
-        y: Axis { label: "instance accuracy", logarithmic: false, percent: true },
+        x: Axis::Logarithmic("points"),
+        y: Axis::Percent("instance accuracy"),
         series: vec![
             line("trained at N", &trained, 0),
             line(&format!("trained at {most}, random"), &tested, 0),
             line(&format!("trained at {most}, farthest"), &tested, 1),
         ],
     };
+    let about = [
+        format!("Data: {}.", context.clouds_are),
+        "The first table has a network for each count; the second one network for all.".to_owned(),
+    ];
+    let title = "Accuracy by the number of points (table 1)";
     Ok(Section {
-        title: "Accuracy by the number of points (table 1)".to_owned(),
-        about: vec![
-            format!("Data: {}.", context.clouds_are),
-            "The first table has a network for each count; the second one network for all."
-                .to_owned(),
-        ],
-        tables: vec![trained, tested],
         drawings: vec![chart.figure().into_string()],
-        clouds: Vec::new(),
+        ..Section::new(title, about, vec![trained, tested])
     })
 }
 

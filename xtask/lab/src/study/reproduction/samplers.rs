@@ -1,7 +1,6 @@
 //! Random, farthest and critical points: what they cost and what they are
 //! worth, each behind a network trained at the same count.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use formats::split::Split;
@@ -37,115 +36,111 @@ fn cpl_recipe(plan: &Plan, n_points: usize, front: &[usize], keep: usize) -> Rec
 
 pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     let held = context.clouds(Split::Test)?;
-    Ok(Section {
-        title: "Samplers".to_owned(),
-        about: vec![
-            format!(
-                "Data: {}. CPL's networks are trained with it, end to end. The one that shares a \
-                 trunk has the input T-Net, the others have what the plan says.",
-                context.clouds_are
-            ),
-            "Latency is the median over clouds on one thread of this machine, another than the \
-             paper's; `cargo xtask bench pi-model` models a Raspberry Pi 5."
-                .to_owned(),
-        ],
-        tables: vec![
-            accuracy(context, &held)?,
-            latency(context, &held)?,
-            unique(context, &held)?,
-            resized(context, &held)?,
-        ],
-        ..Section::default()
-    })
+    let about = [
+        format!(
+            "Data: {}. CPL's networks are trained with it, end to end. The one that shares a \
+             trunk has the input T-Net, the others have what the plan says.",
+            context.clouds_are
+        ),
+        "Latency is the median over clouds on one thread of this machine, another than the \
+         paper's; `cargo xtask bench pi-model` models a Raspberry Pi 5."
+            .to_owned(),
+    ];
+    let tables = vec![
+        accuracy(context, &held)?,
+        latency(context, &held)?,
+        unique(context, &held)?,
+        resized(context, &held)?,
+    ];
+    Ok(Section::new("Samplers", about, tables))
 }
 
-/// A sampler, and by the points that it keeps the networks trained behind it:
-/// their names and recipes.
-type Rival = (String, BTreeMap<usize, (String, Recipe)>);
+/// A sampler, and the networks trained behind it: a name and a recipe for each count of
+/// points in the plan's order, or for the first alone.
+type Rival = (String, Vec<(String, Recipe)>);
 
 fn rivals(plan: &Plan, n_points: usize) -> Vec<Rival> {
-    let behind = |name: &str, kept: &[usize], network: &dyn Fn(usize) -> (String, Recipe)| {
-        (name.to_owned(), kept.iter().map(|&keep| (keep, network(keep))).collect())
+    let at_each_count = |network: &dyn Fn(usize) -> (String, Recipe)| {
+        plan.kept.iter().map(|&keep| network(keep)).collect::<Vec<_>>()
     };
     let cpl = |front: &[usize], keep, change: &dyn Fn(&mut Cpl)| {
         let mut recipe = cpl_recipe(plan, n_points, front, keep);
         recipe.cpl.iter_mut().for_each(change);
         recipe
     };
-    let mut rivals = vec![
-        behind("random", &plan.kept, &|keep| (points::name(keep), points::recipe(plan, keep))),
-        behind("farthest", &plan.kept, &|keep| {
-            let recipe = Recipe { sampling: Sampling::Fps, ..plan.at(keep) };
-            (format!("farthest-{keep}"), recipe)
-        }),
-    ];
+    let random = at_each_count(&|keep| (points::name(keep), points::recipe(plan, keep)));
+    let farthest = at_each_count(&|keep| {
+        (format!("farthest-{keep}"), Recipe { sampling: Sampling::Fps, ..plan.at(keep) })
+    });
+    let mut rivals = vec![("random".to_owned(), random), ("farthest".to_owned(), farthest)];
     for front in &plan.fronts {
-        rivals.push(behind(&front_name(front), &plan.kept, &|keep| {
-            (cpl_name(front, keep), cpl(front, keep, &|_| {}))
-        }));
+        let networks = at_each_count(&|keep| (cpl_name(front, keep), cpl(front, keep, &|_| {})));
+        rivals.push((front_name(front), networks));
     }
-    let first = &plan.kept[..1];
+    let keep = plan.kept[0];
     // Where a front end has more critical points than are kept, chance has a say.
     let front = &plan.fronts[plan.fronts.len().min(2) - 1];
-    rivals.push(behind(&format!("{}, Gumbel-top-k", front_name(front)), first, &|keep| {
-        (format!("{}-gumbel", cpl_name(front, keep)), cpl(front, keep, &|cpl| cpl.gumbel = true))
-    }));
-    rivals.push(behind("cpl, trunk shared with the input T-Net", first, &|keep| {
-        let mut recipe = cpl(&plan.fronts[0], keep, &|cpl| cpl.shared = true);
-        recipe.network.input_transform = true;
-        (format!("cpl-shared-{keep}"), recipe)
-    }));
+    let gumbel = cpl(front, keep, &|cpl| cpl.gumbel = true);
+    let network = (format!("{}-gumbel", cpl_name(front, keep)), gumbel);
+    rivals.push((format!("{}, Gumbel-top-k", front_name(front)), vec![network]));
+    let mut shared = cpl(&plan.fronts[0], keep, &|cpl| cpl.shared = true);
+    shared.network.input_transform = true;
+    let network = (format!("cpl-shared-{keep}"), shared);
+    rivals.push(("cpl, trunk shared with the input T-Net".to_owned(), vec![network]));
     rivals
 }
 
 fn accuracy(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let train = context.clouds(Split::Train)?;
-    let mut rows = Vec::new();
+    let kept = &context.plan.kept;
+    let mut table = Table::new(
+        "4 accuracy",
+        "Instance accuracy, each network trained behind its sampler at that count",
+        "sampler",
+        kept.iter().map(|n| format!("{n} points")),
+    );
     for (rival, networks) in rivals(&context.plan, train.set.n_points) {
-        let cells = context.plan.kept.iter().map(|keep| {
-            let Some((name, recipe)) = networks.get(keep) else { return Ok(Cell::None) };
+        let trained = |i: usize| {
+            let Some((name, recipe)) = networks.get(i) else { return Ok(Cell::None) };
             let model = context.network(name, recipe.clone(), &train)?;
             Ok(Cell::instance(&test(&model, held, None)?))
-        });
-        rows.push((rival, cells.collect::<anyhow::Result<_>>()?));
+        };
+        table.measure(rival, (0..kept.len()).map(trained))?;
     }
-    Ok(Table {
-        id: "4 accuracy".to_owned(),
-        caption: "Instance accuracy, each network trained behind its sampler at that count"
-            .to_owned(),
-        rows_are: "sampler".to_owned(),
-        columns: context.plan.kept.iter().map(|n| format!("{n} points")).collect(),
-        rows,
-    })
+    Ok(table)
 }
 
 fn latency(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let keep = context.plan.kept[0];
-    let mut table = Table {
-        id: "4 latency".to_owned(),
-        caption: format!("Choosing {keep} of {} points, ms", held.set.n_points),
-        rows_are: "sampler".to_owned(),
-        columns: vec!["ms".to_owned(), "paper (1024 to 128)".to_owned()],
-        rows: Vec::new(),
-    };
+    let caption = format!("Choosing {keep} of {} points, ms", held.set.n_points);
+    let mut table = Table::new("4 latency", caption, "sampler", ["ms", "paper (1024 to 128)"]);
     let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
     for (name, kind, paper) in
         [("random", SamplerKind::Random, Cell::None), ("farthest", SamplerKind::Fps, paper("5.73"))]
     {
         let mut chosen = Sampler::new(sampler(kind, keep))?;
         let ms = median(held, |cloud| Ok(chosen.select(cloud, kernels)?.len()))?;
-        table.rows.push((name.to_owned(), vec![Cell::Number(ms, 4), paper]));
+        table.push(name, [Cell::Number(ms, 4), paper]);
     }
     for front in &context.plan.fronts {
-        let name = cpl_name(front, keep);
-        let model = context.model(&name);
-        let options =
-            Options { sampler: Some(sampler(SamplerKind::Cpl, keep)), ..Options::default() };
-        let mut classifier = Classifier::load(&model, &options)?;
+        let (name, mut classifier) = with_cpl(context, front, keep)?;
         let ms = median(held, |cloud| Ok(classifier.sample(&wide(cloud))?.len()))?;
-        table.rows.push((name, vec![Cell::Number(ms, 4), paper("1.96")]));
+        table.push(name, [Cell::Number(ms, 4), paper("1.96")]);
     }
     Ok(table)
+}
+
+/// The network behind front end `front`, by name, which keeps `points` points.
+fn with_cpl(
+    context: &ExperimentContext,
+    front: &[usize],
+    points: usize,
+) -> anyhow::Result<(String, Classifier)> {
+    let name = cpl_name(front, context.plan.kept[0]);
+    let sampler = Some(sampler(SamplerKind::Cpl, points));
+    let options = Options { sampler, ..Options::default() };
+    let classifier = Classifier::load(&context.model(&name), &options)?;
+    Ok((name, classifier))
 }
 
 fn paper(ms: &str) -> Cell {
@@ -175,19 +170,11 @@ pub fn wide(cloud: &[[f32; 3]]) -> Vec<[f64; 3]> {
 }
 
 fn unique(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
-    let mut table = Table {
-        id: "4 unique".to_owned(),
-        caption: "Distinct critical points of a cloud".to_owned(),
-        rows_are: "front end".to_owned(),
-        columns: ["least", "median", "most", "paper"].map(str::to_owned).into(),
-        rows: Vec::new(),
-    };
+    let caption = "Distinct critical points of a cloud";
+    let columns = ["least", "median", "most", "paper"];
+    let mut table = Table::new("4 unique", caption, "front end", columns);
     for front in &context.plan.fronts {
-        let name = cpl_name(front, context.plan.kept[0]);
-        let model = context.model(&name);
-        let all = sampler(SamplerKind::Cpl, held.set.n_points);
-        let options = Options { sampler: Some(all), ..Options::default() };
-        let mut classifier = Classifier::load(&model, &options)?;
+        let (name, mut classifier) = with_cpl(context, front, held.set.n_points)?;
         let mut counts = Vec::new();
         for i in 0..held.len() {
             counts.push(classifier.sample(&wide(held.set.cloud(i)))?.len() as f64);
@@ -196,7 +183,7 @@ fn unique(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
         let at = |i: usize| Cell::Number(counts[i], 0);
         let last = counts.len() - 1;
         let paper = Cell::Text("40 to 60".to_owned());
-        table.rows.push((name, vec![at(0), at(last / 2), at(last), paper]));
+        table.push(name, [at(0), at(last / 2), at(last), paper]);
     }
     Ok(table)
 }
@@ -205,21 +192,17 @@ fn unique(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
 fn resized(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let keep = context.plan.kept[0];
     let rules = [Resize::Truncate, Resize::Cyclic, Resize::Nearest, Resize::Weighted];
-    let mut rows = Vec::new();
+    let caption = format!("Instance accuracy by the rule that makes {keep} points of the ranking");
+    let columns = rules.map(|rule| rule.to_string());
+    let mut table = Table::new("4 resize", caption, "front end", columns);
     for front in &context.plan.fronts {
         let name = cpl_name(front, keep);
         let model = context.model(&name);
-        let cells = rules.map(|resize| {
+        let tested = |resize| {
             let spec = SamplerSpec { resize, ..sampler(SamplerKind::Cpl, keep) };
             Ok(Cell::instance(&test(&model, held, Some(spec))?))
-        });
-        rows.push((name, cells.into_iter().collect::<anyhow::Result<_>>()?));
+        };
+        table.measure(name, rules.map(tested))?;
     }
-    Ok(Table {
-        id: "4 resize".to_owned(),
-        caption: format!("Instance accuracy by the rule that makes {keep} points of the ranking"),
-        rows_are: "front end".to_owned(),
-        columns: rules.map(|rule| rule.to_string()).into(),
-        rows,
-    })
+    Ok(table)
 }

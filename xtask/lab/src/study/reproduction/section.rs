@@ -36,6 +36,50 @@ pub struct Table {
     pub rows: Vec<(String, Vec<Cell>)>,
 }
 
+impl Section {
+    /// A section of `tables`, without drawings and clouds.
+    pub fn new(title: &str, about: [String; 2], tables: Vec<Table>) -> Self {
+        Self { title: title.to_owned(), about: about.into(), tables, ..Self::default() }
+    }
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(
+        id: &str,
+        caption: impl Into<String>,
+        rows_are: &str,
+        columns: impl IntoIterator<Item = impl Into<String>>,
+    ) -> Self {
+        Self {
+            id: id.to_owned(),
+            caption: caption.into(),
+            rows_are: rows_are.to_owned(),
+            columns: columns.into_iter().map(Into::into).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, name: impl Into<String>, cells: impl IntoIterator<Item = Cell>) {
+        self.rows.push((name.into(), cells.into_iter().collect()));
+    }
+
+    /// Adds a row of cells that are measured one after another.
+    ///
+    /// # Errors
+    /// The first cell that could not be measured.
+    pub fn measure(
+        &mut self,
+        name: impl Into<String>,
+        cells: impl IntoIterator<Item = anyhow::Result<Cell>>,
+    ) -> anyhow::Result<()> {
+        let cells = cells.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+        self.push(name, cells);
+        Ok(())
+    }
+}
+
 /// A cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Cell {

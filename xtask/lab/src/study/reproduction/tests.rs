@@ -1,9 +1,11 @@
 //! The paper's experiments on shapes that take no time.
 
+use super::context::ExperimentContext;
+use super::experiments;
 use super::plan::Plan;
-use super::{Request, experiments};
 use crate::study::plan::Plan as _;
 use crate::study::test_clouds;
+use std::cell::RefCell;
 use std::path::Path;
 
 const PLAN: &str = r#"
@@ -58,12 +60,14 @@ fn plan(text: &str) -> anyhow::Result<Plan> {
 }
 
 fn reproduce(folder: &Path, plan: Plan) -> anyhow::Result<()> {
-    experiments(&Request {
+    experiments(&ExperimentContext {
         plan,
-        clouds: (&folder.join("surfaces/surface"), "shapes <of ours>"),
-        scans: (folder, "shapes"),
-        out: &folder.join("out"),
-        command: "a test",
+        clouds: folder.join("surfaces/surface"),
+        clouds_are: "shapes <of ours>".to_owned(),
+        scans: folder.to_owned(),
+        meshes_are: "shapes".to_owned(),
+        out: folder.join("out"),
+        read: RefCell::default(),
     })
 }
 

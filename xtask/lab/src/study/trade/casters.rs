@@ -1,11 +1,10 @@
 //! The casters, with and without culling of beams that cannot hit.
 
 use super::objects::{Object, Place, places};
-use super::scans::Cloud;
+use super::scans::{Cloud, Scanned};
 use super::sensors::Scanning;
 use crate::measure::accuracy::Accuracy;
-use crate::measure::backends::Backend;
-use crate::measure::backends::short;
+use crate::measure::backends::{Backend, short};
 use crate::measure::clock::{Workload, interleave, measured};
 use crate::measure::methods;
 use crate::measure::ray_set::RaySet;
@@ -42,14 +41,6 @@ struct Aimed {
     jobs: Vec<CastJob>,
 }
 
-/// One method's row without the accuracy of classes, and the clouds that it finds.
-pub struct Cast {
-    /// Costs and errors.
-    pub row: Row,
-    /// One cloud a place.
-    pub clouds: Vec<Cloud>,
-}
-
 /// Casts the clean reference scans by every method, in turns.
 ///
 /// # Errors
@@ -59,7 +50,7 @@ pub fn cast_all(
     backends: &[Backend],
     rounds: usize,
     test_set: &str,
-) -> Result<Vec<Cast>> {
+) -> Result<Vec<Scanned>> {
     let cpu = Caster::Cpu(Effects::default());
     let mut methods = vec![
         ("cpu f64".to_owned(), Method::Oracle, false),
@@ -87,33 +78,22 @@ pub fn cast_all(
     drop(workloads);
     let fired = &aimed[1].ray_sets;
     let truth: Vec<Ranges> = fired.par_iter().map(methods::in_f64).collect();
+    let rays = Scanning::reference().sensor.pattern().len();
     let mut all = Vec::new();
     for (((name, method, is_gpu), aimed), costs) in settings.into_iter().zip(costs) {
-        let culling = word(aimed.culling);
+        let culling = if aimed.culling == Culling::On { "on" } else { "off" };
         eprintln!("caster: {name}, culling {culling}");
-        let mut cast = assess(method, aimed, fired, &truth)?;
+        let Scanned { row, clouds } = assess(method, aimed, fired, &truth)?;
         let spent = if *is_gpu { costs.wall_s() } else { costs.cpu_s() };
-        let seconds = spent.median / cast.clouds.len() as f64;
-        let rays = Scanning::reference().sensor.pattern().len() as f64;
-        cast.row = Row {
-            test_set: test_set.to_owned(),
-            caster: name.clone(),
-            culling: culling.to_owned(),
-            rays_per_cpu_s: Some(rays / seconds).filter(|_| !is_gpu),
-            scans_per_cpu_s: Some(1.0 / seconds).filter(|_| !is_gpu),
-            ms_here: Some(seconds * 1e3),
-            ..cast.row
-        };
-        all.push(cast);
+        let mut row = row.with_time(rays, spent.median / clouds.len() as f64);
+        (row.caster, row.culling) = (name.clone(), culling.to_owned());
+        row.test_set = test_set.to_owned();
+        if *is_gpu {
+            (row.rays_per_cpu_s, row.scans_per_cpu_s) = (None, None);
+        }
+        all.push(Scanned { row, clouds });
     }
     Ok(all)
-}
-
-fn word(culling: Culling) -> &'static str {
-    match culling {
-        Culling::On => "on",
-        Culling::Off => "off",
-    }
 }
 
 impl Aimed {
@@ -147,7 +127,12 @@ impl Method<'_> {
 }
 
 /// The errors of `method` on the rays aimed, against the truth of all that are `fired`.
-fn assess(method: &Method<'_>, aimed: &Aimed, fired: &[RaySet], truth: &[Ranges]) -> Result<Cast> {
+fn assess(
+    method: &Method<'_>,
+    aimed: &Aimed,
+    fired: &[RaySet],
+    truth: &[Ranges],
+) -> Result<Scanned> {
     let ranges = method.cast(aimed)?;
     let of_all = aimed.ray_sets.iter().zip(&ranges).zip(fired).map(|((a, r), f)| of_fired(a, r, f));
     let accuracy = Accuracy::of(&of_all.collect::<Vec<_>>().concat(), &truth.concat());
@@ -164,7 +149,7 @@ fn assess(method: &Method<'_>, aimed: &Aimed, fired: &[RaySet], truth: &[Ranges]
         wrong_rays_per_million: Some(wrong),
         ..Row::default()
     };
-    Ok(Cast { row, clouds })
+    Ok(Scanned { row, clouds })
 }
 
 /// The ranges of all rays fired: none where a ray was left out.

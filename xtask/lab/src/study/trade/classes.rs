@@ -1,14 +1,13 @@
 //! The classes that a classifier finds for clouds, and the time it takes.
 
 use super::scans::Cloud;
-use crate::measure::clock::Spread;
 use crate::measure::energy::Energy;
 use anyhow::{Context, Result, ensure};
 use edgepuck_program::sampler_config::SamplerConfig;
 use edgepuck_program::trade_record::{Part, Row};
 use formats::labelled::read_labelled;
-use infer_cpu::sampler::SamplerSpec;
-use infer_cpu::{Classifier, Options, Precision, Summary, TNets};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+use infer_cpu::{Classifier, Options, Precision, Prediction, Summary, TNets, inspect};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -16,6 +15,9 @@ use xtask::workspace::{file_name, recorded};
 
 /// Clouds whose classification is timed, a round.
 const TIMED: usize = 100;
+
+/// Points of the baseline's clouds.
+const AS_THE_BASELINE: usize = 1024;
 
 /// Labelled clouds.
 pub struct TestSet {
@@ -44,13 +46,26 @@ pub struct Classifying {
     pub threads: usize,
 }
 
-/// The classes found.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Answers {
-    /// The class of each cloud; `None` for a cloud without points.
-    pub classes: Vec<Option<String>>,
-    /// All logits, one cloud after another.
-    pub logits: Vec<f32>,
+/// What a classifier answers to each cloud; `None` for a cloud without points.
+pub type Answers = Vec<Option<Prediction>>;
+
+/// The name of each answer's class.
+fn labels(answers: &Answers) -> impl Iterator<Item = Option<&str>> {
+    answers.iter().map(|answer| answer.as_ref().map(|prediction| &*prediction.label))
+}
+
+/// The share of clouds of which both say the same.
+pub fn agreement(a: &Answers, b: &Answers) -> f64 {
+    labels(a).zip(labels(b)).filter(|(a, b)| a == b).count() as f64 / a.len().max(1) as f64
+}
+
+/// The largest difference of two logits.
+fn largest_error(a: &Answers, b: &Answers) -> f64 {
+    let logits = |answers: &Answers| -> Vec<f32> {
+        answers.iter().flatten().flat_map(|answer| answer.logits.clone()).collect()
+    };
+    let pairs = logits(a).into_iter().zip(logits(b));
+    pairs.map(|(a, b)| (f64::from(a) - f64::from(b)).abs()).fold(0.0, f64::max)
 }
 
 /// What classifications cost.
@@ -58,8 +73,8 @@ pub struct Answers {
 pub struct Costs {
     /// Wall time of each, milliseconds.
     pub ms: Vec<f64>,
-    /// Of all together, if the machine measures it.
-    pub joules: Option<f64>,
+    /// Of all together; 0 where the machine does not measure it.
+    pub joules: f64,
 }
 
 impl TestSet {
@@ -83,13 +98,13 @@ impl TestSet {
 
     /// Points of its largest cloud.
     pub fn most_points(&self) -> usize {
-        self.clouds.iter().map(Vec::len).max().unwrap_or_default()
+        most_points(&self.clouds)
     }
 
     /// How many are answered as labelled.
     pub fn right(&self, answers: &Answers) -> usize {
-        let pairs = self.labels.iter().zip(&answers.classes);
-        pairs.filter(|(label, class)| class.as_ref() == Some(label)).count()
+        let pairs = self.labels.iter().zip(labels(answers));
+        pairs.filter(|(label, answer)| *answer == Some(label.as_str())).count()
     }
 
     /// Fails if `model` does not know one of the classes.
@@ -99,30 +114,35 @@ impl TestSet {
     pub fn fits(&self, model: &Path) -> Result<()> {
         let classifier = Classifier::load(model, &Options::default())?;
         let known = classifier.classes();
-        let unknown = self.labels.iter().find(|label| !known.iter().any(|name| **name == ***label));
-        match unknown {
-            None => Ok(()),
-            Some(class) => anyhow::bail!(
+        for class in &self.labels {
+            ensure!(
+                known.iter().any(|name| **name == **class),
                 "{}: expected a model with the class `{class}` of {}; name another with --model",
                 model.display(),
                 self.name
-            ),
+            );
         }
+        Ok(())
     }
 }
 
 impl Classifying {
-    fn options(&self, capacity: usize) -> Options {
-        let SamplerConfig { kind, front, .. } = self.sampler;
-        let sampler = SamplerSpec { kind, front, points: self.points, ..SamplerSpec::default() };
-        Options {
-            precision: self.precision,
-            threads: self.threads,
-            t_nets: self.t_nets,
-            sampler: Some(sampler),
-            capacity,
-            ..Options::default()
-        }
+    /// The sampler and the points that a model was trained with, or random points
+    /// where it names none to choose by, in fp32.
+    ///
+    /// # Errors
+    /// A model that cannot be read.
+    pub fn as_trained(model: &Path) -> Result<Self> {
+        let card = inspect(model)?.card;
+        let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
+        Ok(Self {
+            model: model.to_owned(),
+            sampler: SamplerConfig::of(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
+            points: card.points.unwrap_or(AS_THE_BASELINE),
+            precision: Precision::F32,
+            t_nets: TNets::Both,
+            threads: 1,
+        })
     }
 
     /// Whether both choose the same points of a cloud.
@@ -130,12 +150,22 @@ impl Classifying {
         (self.sampler, self.points) == (other.sampler, other.points)
     }
 
-    /// Loads the model as asked for.
+    /// Loads the model as asked for, for clouds of at most `capacity` points.
     ///
     /// # Errors
     /// A model that cannot be read, or that lacks what the sampler needs.
     pub fn load(&self, capacity: usize) -> Result<Classifier> {
-        Ok(Classifier::load(&self.model, &self.options(capacity))?)
+        let SamplerConfig { kind, front, .. } = self.sampler;
+        let sampler = SamplerSpec { kind, front, points: self.points, ..SamplerSpec::default() };
+        let options = Options {
+            precision: self.precision,
+            threads: self.threads,
+            t_nets: self.t_nets,
+            sampler: Some(sampler),
+            capacity,
+            ..Options::default()
+        };
+        Ok(Classifier::load(&self.model, &options)?)
     }
 
     /// Classifies `clouds`.
@@ -143,20 +173,20 @@ impl Classifying {
     /// # Errors
     /// As [`Self::load`]; a cloud that cannot be classified.
     pub fn answers(&self, clouds: &[Cloud]) -> Result<Answers> {
-        let capacity = clouds.iter().map(Vec::len).max().unwrap_or_default();
+        let capacity = most_points(clouds);
         // Answers do not depend on the number of threads.
         let alone = Self { threads: 1, ..self.clone() };
-        let some = clouds.len().div_ceil(rayon::current_num_threads()).max(1);
-        let parts: Result<Vec<Answers>> = clouds
-            .par_chunks(some)
-            .map(|some| classified(&mut alone.load(capacity)?, some))
-            .collect();
-        let mut answers = Answers::default();
-        for part in parts? {
-            answers.classes.extend(part.classes);
-            answers.logits.extend(part.logits);
-        }
-        Ok(answers)
+        let share = clouds.len().div_ceil(rayon::current_num_threads()).max(1);
+        let classified = |clouds: &[Cloud]| -> Result<Answers> {
+            let mut classifier = alone.load(capacity)?;
+            let answer = |cloud: &Cloud| match cloud.is_empty() {
+                true => Ok(None),
+                false => Ok(Some(classifier.classify(cloud)?.clone())),
+            };
+            clouds.iter().map(answer).collect()
+        };
+        let parts: Result<Vec<Answers>> = clouds.par_chunks(share).map(classified).collect();
+        Ok(parts?.into_iter().flatten().collect())
     }
 
     /// Times some of `clouds`, spread over all, one after another, and adds them to
@@ -165,7 +195,7 @@ impl Classifying {
     /// # Errors
     /// As [`Self::answers`].
     pub fn time(&self, clouds: &[Cloud], energy: Option<&Energy>, costs: &mut Costs) -> Result<()> {
-        let mut classifier = self.load(clouds.iter().map(Vec::len).max().unwrap_or_default())?;
+        let mut classifier = self.load(most_points(clouds))?;
         let each = clouds.len().div_ceil(TIMED).max(1);
         let timed: Vec<_> = clouds.iter().step_by(each).filter(|cloud| !cloud.is_empty()).collect();
         let Some(first) = timed.first() else { return Ok(()) };
@@ -176,8 +206,7 @@ impl Classifying {
             classifier.classify(cloud)?;
             costs.ms.push(start.elapsed().as_secs_f64() * 1e3);
         }
-        let joules = energy.zip(before).map(|(energy, before)| energy.joules_since(&before));
-        costs.joules = joules.map(|joules| joules + costs.joules.unwrap_or_default());
+        costs.joules += energy.zip(before).map_or(0.0, |(energy, then)| energy.joules_since(&then));
         Ok(())
     }
 
@@ -194,8 +223,8 @@ impl Classifying {
             part: Part::Classifier,
             test_set: set.name.clone(),
             megabytes: Some(model.bytes(self.precision) as f64 * 1e-6),
-            agreement: Some(answers.agreement(reference)),
-            logit_error: Some(answers.largest_error(reference)),
+            agreement: Some(agreement(answers, reference)),
+            logit_error: Some(largest_error(answers, reference)),
             ..Row::default()
         };
         self.named_in(row, model).with_accuracy(set.right(answers), set.clouds.len())
@@ -205,7 +234,7 @@ impl Classifying {
     pub fn named_in(&self, row: Row, model: &Summary) -> Row {
         let has_t_nets = model.stn.is_some() || model.fstn.is_some();
         Row {
-            model: self.model_name(),
+            model: self.model.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             model_file: recorded(&self.model),
             sampler: self.sampler.name.to_owned(),
             points: Some(self.points),
@@ -215,49 +244,9 @@ impl Classifying {
             ..row
         }
     }
-
-    /// The model's name, without folder and extension.
-    fn model_name(&self) -> String {
-        self.model.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
-    }
 }
 
-fn classified(classifier: &mut Classifier, clouds: &[Cloud]) -> Result<Answers> {
-    let mut answers = Answers::default();
-    for cloud in clouds {
-        if cloud.is_empty() {
-            answers.classes.push(None);
-            continue;
-        }
-        let prediction = classifier.classify(cloud)?;
-        answers.classes.push(Some(prediction.label.to_string()));
-        answers.logits.extend(&prediction.logits);
-    }
-    Ok(answers)
-}
-
-impl Costs {
-    /// The median of one, milliseconds; none without a cloud to time.
-    pub fn median_ms(&self) -> Option<f64> {
-        (!self.ms.is_empty()).then(|| Spread::of(self.ms.clone()).median)
-    }
-
-    /// Of one, if the machine measures it.
-    pub fn joules_each(&self) -> Option<f64> {
-        self.joules.map(|all| all / self.ms.len().max(1) as f64)
-    }
-}
-
-impl Answers {
-    /// Share of clouds of which both say the same.
-    pub fn agreement(&self, other: &Self) -> f64 {
-        let pairs = self.classes.iter().zip(&other.classes);
-        pairs.filter(|(a, b)| a == b).count() as f64 / self.classes.len().max(1) as f64
-    }
-
-    /// The largest difference of two logits.
-    fn largest_error(&self, other: &Self) -> f64 {
-        let pairs = self.logits.iter().zip(&other.logits);
-        pairs.map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs()).fold(0.0, f64::max)
-    }
+/// Points of the largest of `clouds`.
+fn most_points(clouds: &[Cloud]) -> usize {
+    clouds.iter().map(Vec::len).max().unwrap_or_default()
 }

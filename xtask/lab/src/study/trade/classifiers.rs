@@ -1,37 +1,34 @@
 //! Models, samplers, points, precisions, T-Nets and threads on one test set.
 
 use super::classes::{Answers, Classifying, Costs, TestSet};
+use crate::measure::clock::Spread;
 use crate::measure::energy::Energy;
 use crate::pi5::{Modelled, Sampler};
 use anyhow::{Context, Result};
 use edgepuck_program::sampler_config::SamplerConfig;
 use edgepuck_program::trade_record::Row;
-use infer_cpu::sampler::SamplerKind;
 use infer_cpu::{Precision, Summary, TNets, inspect};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// Points of the baseline's clouds.
-const AS_THE_BASELINE: usize = 1024;
 
 /// Threads whose times on a Raspberry Pi 5 are modelled: it has four cores.
 const PI_THREADS: [usize; 3] = [1, 2, 4];
 
 /// The values that are swept.
-pub struct Sweep {
+struct Sweep {
     /// Points that networks see.
-    pub points: Vec<usize>,
+    points: Vec<usize>,
     /// How they are chosen.
-    pub samplers: Vec<SamplerConfig>,
+    samplers: Vec<SamplerConfig>,
     /// What to compute in besides fp32.
-    pub precisions: Vec<Precision>,
+    precisions: Vec<Precision>,
     /// Threads of the network as its card has it, besides one.
-    pub threads: Vec<usize>,
+    threads: Vec<usize>,
 }
 
 impl Sweep {
     /// Everything that a user can choose.
-    pub fn whole() -> Self {
+    fn whole() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Self {
             points: vec![16, 64, 256, 1024],
@@ -42,7 +39,7 @@ impl Sweep {
     }
 
     /// A few of them.
-    pub fn quick() -> Self {
+    fn quick() -> Self {
         Self {
             points: vec![16, 64],
             samplers: vec![SamplerConfig::RANDOM, SamplerConfig::FPS],
@@ -52,38 +49,18 @@ impl Sweep {
     }
 }
 
-/// The sampler and the points that a model was trained with, or random points
-/// where it names none to choose by, in fp32.
-///
-/// # Errors
-/// A model that cannot be read.
-pub fn as_trained(model: &Path) -> Result<Classifying> {
-    let card = inspect(model)?.card;
-    let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
-    Ok(Classifying {
-        model: model.to_owned(),
-        sampler: SamplerConfig::of(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
-        points: card.points.unwrap_or(AS_THE_BASELINE),
-        precision: Precision::F32,
-        t_nets: TNets::Both,
-        threads: 1,
-    })
-}
-
 /// Rows of one parameter at a time, then of combinations of the promising ones, for
-/// `model` on `set`; what the model or the clouds do not allow is left out.
+/// `model` on `set`, with modelled times of a Raspberry Pi 5 unless the run is `quick`;
+/// what the model or the clouds do not allow is left out.
 ///
 /// # Errors
 /// A model that cannot be read or does not know the classes; a set that does
 /// not fit.
-pub fn rows(
-    model: &Path,
-    set: &TestSet,
-    sweep: &Sweep,
-    rounds: usize,
-    pi: Option<&Modelled>,
-) -> Result<Vec<Row>> {
-    let (trained, summary) = (as_trained(model)?, inspect(model)?);
+pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<Vec<Row>> {
+    let sweep = if quick { Sweep::quick() } else { Sweep::whole() };
+    let say = |error: &anyhow::Error| eprintln!("No modelled times of a Raspberry Pi: {error:#}");
+    let pi = if quick { None } else { Modelled::open(model).inspect_err(say).ok() };
+    let (trained, summary) = (Classifying::as_trained(model)?, inspect(model)?);
     let measured = |setting: Classifying, answers: Answers, reference: Option<&Answers>| {
         let mut row = setting.row(set, &summary, &answers, reference.unwrap_or(&answers));
         row.knob = varied(&setting, &trained);
@@ -91,12 +68,12 @@ pub fn rows(
         Measured { setting, answers, row }
     };
     let mut first: Vec<Measured> = Vec::new();
-    for setting in sampled(&trained, set, sweep) {
+    for setting in sampled(&trained, set, &sweep) {
         let answers = setting.answers(&set.clouds)?;
         first.push(measured(setting, answers, None));
     }
     let more: Vec<Measured> = promising(&first, &trained)
-        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, sweep, &summary))
+        .flat_map(|sampled| with_precisions(&sampled.setting, &trained, &sweep, &summary))
         .map(|setting| {
             let reference = first.iter().find(|sampled| sampled.setting.chooses_as(&setting));
             let answers = setting.answers(&set.clouds)?;
@@ -106,7 +83,8 @@ pub fn rows(
     let mut all: Vec<Measured> = first.into_iter().chain(more).collect();
     time(&mut all, set, rounds)?;
     let from = set.most_points();
-    let with_pi = |Measured { setting, row, .. }: Measured| with_pi(row, &setting, from, pi);
+    let with_pi =
+        |Measured { setting, row, .. }: Measured| with_pi(row, &setting, from, pi.as_ref());
     let rows: Vec<Vec<Row>> = all.into_par_iter().map(with_pi).collect();
     Ok(rows.concat())
 }
@@ -128,7 +106,11 @@ fn time(all: &mut [Measured], set: &TestSet, rounds: usize) -> Result<()> {
         }
     }
     for (Measured { row, .. }, costs) in all.iter_mut().zip(costs) {
-        (row.ms_here, row.joules) = (costs.median_ms(), costs.joules_each());
+        let n = costs.ms.len();
+        if n > 0 {
+            row.joules = energy.as_ref().map(|_| costs.joules / n as f64);
+            row.ms_here = Some(Spread::of(costs.ms).median);
+        }
     }
     Ok(())
 }
@@ -183,17 +165,13 @@ fn sampled(trained: &Classifying, set: &TestSet, sweep: &Sweep) -> Vec<Classifyi
     if trained.points < most && !all.iter().any(|setting| setting.chooses_as(trained)) {
         all.insert(0, trained.clone());
     }
-    all.retain(|setting| loads(setting, most));
+    // The model may lack what a sampler needs.
+    all.retain(|setting| {
+        let (name, points) = (setting.sampler.name, setting.points);
+        let say = |error: &anyhow::Error| eprintln!("left out: {name} {points}: {error:#}");
+        setting.load(most).inspect_err(say).is_ok()
+    });
     all
-}
-
-/// Whether the model has what the sampler needs; if not, says so.
-fn loads(setting: &Classifying, most: usize) -> bool {
-    let loaded = setting.load(most);
-    if let Err(error) = &loaded {
-        eprintln!("left out: {} {}: {error:#}", setting.sampler.name, setting.points);
-    }
-    loaded.is_ok()
 }
 
 /// One way to choose points in every precision but fp32; as trained, also with
@@ -245,27 +223,13 @@ fn pi_ms(setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Option<Ve
         SamplerConfig::CPL_STN => Sampler::CplStn,
         _ => return None,
     };
-    let sizes = (from, setting.points);
-    match pi.total_ms(sampler, sizes, setting.precision, &PI_THREADS) {
-        Ok(ms) => ms,
-        // A front end of few channels keeps fewer points than it is asked for.
-        Err(error) => {
-            let (name, points) = (setting.sampler.name, setting.points);
-            eprintln!("not modelled: {name} {points} in {}: {error:#}", setting.precision);
-            None
-        }
-    }
-}
-
-/// The modelled times of `model` on a Raspberry Pi; a message says why there are none.
-pub fn on_a_pi(model: &Path) -> Option<Modelled> {
-    match Modelled::open(model) {
-        Ok(modelled) => Some(modelled),
-        Err(error) => {
-            eprintln!("No modelled times of a Raspberry Pi: {error:#}");
-            None
-        }
-    }
+    let ms = pi.total_ms(sampler, (from, setting.points), setting.precision, &PI_THREADS);
+    // A front end of few channels keeps fewer points than it is asked for.
+    ms.inspect_err(|error| {
+        let (name, points) = (setting.sampler.name, setting.points);
+        eprintln!("not modelled: {name} {points} in {}: {error:#}", setting.precision);
+    })
+    .unwrap_or_default()
 }
 
 /// The bundled models that know the classes of `set`, of those the ones with the fewest

@@ -16,20 +16,20 @@ mod pareto;
 mod scans;
 mod sensors;
 
+use super::meshes;
 use crate::measure::backends;
 use crate::measure::machine::Machine;
 use anyhow::{Context, Result, ensure};
-use classes::TestSet;
-use classifiers::{Sweep, as_trained, bundled, on_a_pi};
+use classes::{Classifying, TestSet, agreement};
+use classifiers::bundled;
 use edgepuck_program::flags::need_folder_of_meshes;
 use edgepuck_program::trade_record::{self, Part, Row};
 use edgepuck_program::{Outcome, gen_shapes};
-use edgepuck_shapes as shapes;
 use formats::cloud::resample;
 use formats::rng::StreamKey;
 use infer_cpu::inspect;
 use objects::Object;
-use scans::Cloud;
+use scans::{Cloud, Scanned};
 use std::path::{Path, PathBuf};
 use xtask::workspace::file_name;
 
@@ -73,10 +73,10 @@ pub struct Args {
 }
 
 /// Meshes of a class that a whole run scans at most.
-const MOST_PER_CLASS: usize = 5;
+const MOST_PER_CLASS: u32 = 5;
 
 /// The same of a quick run.
-const FEW_PER_CLASS: usize = 2;
+const FEW_PER_CLASS: u32 = 2;
 
 /// Clouds of a quick run.
 const FEW_CLOUDS: usize = 100;
@@ -87,7 +87,9 @@ pub fn run(args: &Args) -> Result<Outcome> {
     let clouds = clouds(args)?;
     let of_clouds = clouds.as_ref().map(|set| models_for(args, set)).transpose()?;
     let per_class = if args.quick { FEW_PER_CLASS } else { MOST_PER_CLASS };
-    let objects = objects::read(&meshes(args)?, per_class)?;
+    let shapes = [gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS];
+    let meshes = meshes::folder(args.meshes.as_deref(), &args.out.join("shapes"), shapes)?;
+    let objects = objects::read(&meshes, per_class)?;
     let unseen = vec![Cloud::new(); objects.len()];
     let of_scans = models_for(args, &scan_set(&objects, &name_of_meshes(args), &unseen))?;
     std::fs::create_dir_all(&args.out)
@@ -95,25 +97,19 @@ pub fn run(args: &Args) -> Result<Outcome> {
     let (mut rows, reference) = scan_rows(args, &objects, &of_scans[0])?;
     let models = of_clouds.unwrap_or(of_scans);
     rows.extend(classifier_rows(args, &models, clouds, reference)?);
-    let machine = machine();
+    let Machine { cpu, threads, system, .. } = Machine::here();
+    let cpu = cpu.as_deref().unwrap_or("unknown processor");
+    let machine = format!("{cpu}, {threads} threads, {system}");
     rows.iter_mut().for_each(|row| row.machine.clone_from(&machine));
     pareto::mark(&mut rows);
     trade_record::write(&rows, &args.out.join("trade.csv"))?;
     page::write(&rows, &args.out)?;
-    print(&rows);
+    for part in [Part::Classifier, Part::Scan, Part::Caster] {
+        print!("{}", page::pareto_table(&rows, part));
+    }
+    print!("{}", page::dominated_table(&rows));
     eprintln!("A page to look at: {}", args.out.join("trade.html").display());
     Ok(Outcome::Success)
-}
-
-/// The meshes asked for, or shapes of our own.
-fn meshes(args: &Args) -> Result<PathBuf> {
-    if let Some(folder) = &args.meshes {
-        return Ok(folder.clone());
-    }
-    let folder = args.out.join("shapes");
-    let (train, test) = (gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS);
-    shapes::write_tree(&folder, objects::SEED, train, test).context("cannot write the shapes")?;
-    Ok(folder)
 }
 
 fn name_of_meshes(args: &Args) -> String {
@@ -155,17 +151,16 @@ fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>,
     let scanned = scans::scan_all(objects, &settings, rounds, &name)?;
     let cast = casters::cast_all(objects, &backends::open(None)?, rounds, &name)?;
     let reference = scan_set(objects, &name, &scanned[0].clouds);
-    let (classifying, summary) = (as_trained(model)?, inspect(model)?);
+    let (classifying, summary) = (Classifying::as_trained(model)?, inspect(model)?);
     // Scans are compared with the reference, casters with the first: f64.
     let noisy = classifying.answers(&reference.clouds)?;
     let exact = classifying.answers(&cast[0].clouds)?;
-    let all = scanned.into_iter().map(|scanned| (scanned.row, scanned.clouds));
-    let all = all.chain(cast.into_iter().map(|cast| (cast.row, cast.clouds)));
+    let all = scanned.into_iter().chain(cast);
     let rows: Result<Vec<Row>> = all
-        .map(|(row, clouds)| {
+        .map(|Scanned { row, clouds }| {
             let found = classifying.answers(&clouds)?;
             let answers = if row.part == Part::Caster { &exact } else { &noisy };
-            let row = Row { agreement: Some(found.agreement(answers)), ..row };
+            let row = Row { agreement: Some(agreement(&found, answers)), ..row };
             let row = classifying.named_in(row, &summary);
             Ok(row.with_accuracy(reference.right(&found), clouds.len()))
         })
@@ -192,31 +187,13 @@ fn classifier_rows(
         let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
         TestSet { clouds, ..reference }
     });
-    let sweep = if args.quick { Sweep::quick() } else { Sweep::whole() };
-    let mut rows = Vec::new();
-    for model in models {
-        let pi = if args.quick { None } else { on_a_pi(model) };
-        rows.extend(classifiers::rows(model, &set, &sweep, usize::from(args.rounds), pi.as_ref())?);
-    }
-    Ok(rows)
-}
-
-/// What measures: the processor, and how many of its threads.
-fn machine() -> String {
-    let Machine { cpu, threads, system, .. } = Machine::here();
-    format!("{}, {threads} threads, {system}", cpu.as_deref().unwrap_or("unknown processor"))
+    let rounds = usize::from(args.rounds);
+    let rows = models.iter().map(|model| classifiers::rows(model, &set, args.quick, rounds));
+    Ok(rows.collect::<Result<Vec<_>>>()?.concat())
 }
 
 /// As many points as gen-dataset packs: the Raspberry Pi's model wants one size.
 fn packed(cloud: &[[f32; 3]]) -> Cloud {
     const POINTS: usize = 1024;
     resample(cloud, POINTS, StreamKey::new(objects::SEED, "trade", 0)).unwrap_or_default()
-}
-
-/// The Pareto-optimal settings, and the dominated ones.
-fn print(rows: &[Row]) {
-    for part in [Part::Classifier, Part::Scan, Part::Caster] {
-        print!("{}", page::pareto_table(rows, part));
-    }
-    print!("{}", page::dominated_table(rows));
 }

@@ -1,7 +1,7 @@
 //! The objects that are scanned, and the places they are scanned from.
 
+use crate::study::meshes;
 use anyhow::{Context, Result, ensure};
-use formats::Split;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use sim_gpu::mesh::frame::Normalize;
@@ -9,7 +9,7 @@ use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::Views;
 use sim_gpu::target::Target;
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Keys all random numbers of the chain.
@@ -40,38 +40,34 @@ pub struct Place<'a> {
 /// # Errors
 /// A folder without test meshes of at least two classes, a mesh that cannot be
 /// read.
-pub fn read(folder: &Path, per_class: usize) -> Result<Vec<Object>> {
+pub fn read(folder: &Path, per_class: u32) -> Result<Vec<Object>> {
     let mut entries = discover(folder, SEED)?;
-    entries.retain(|entry| entry.split == Split::Test);
-    let mut taken: BTreeMap<String, usize> = BTreeMap::new();
-    entries.retain(|entry| {
-        let taken = taken.entry(entry.class.clone()).or_default();
-        *taken += 1;
-        *taken <= per_class
-    });
-    ensure!(taken.len() > 1, "{}: expected test meshes of at least two classes", folder.display());
+    meshes::keep_at_most([0, per_class], &mut entries);
+    let classes: BTreeSet<&str> = entries.iter().map(|entry| entry.class.as_str()).collect();
+    ensure!(
+        classes.len() > 1,
+        "{}: expected test meshes of at least two classes",
+        folder.display()
+    );
+    let object = |entry: &MeshEntry| {
+        let target = Target::load(&entry.path, Normalize::default())
+            .with_context(|| format!("cannot scan {}", entry.relative))?;
+        let id = format!("{}/{}", entry.class, entry.name);
+        Ok(Object { class: entry.class.clone(), id, target })
+    };
     entries.iter().map(object).collect()
-}
-
-fn object(entry: &MeshEntry) -> Result<Object> {
-    let id = format!("{}/{}", entry.class, entry.name);
-    let target = Target::load(&entry.path, Normalize::default())
-        .with_context(|| format!("cannot scan {}", entry.relative))?;
-    Ok(Object { class: entry.class.clone(), id, target })
 }
 
 /// The four sides of gen-dataset's rotating set, from `distance_m`.
 pub fn places(objects: &[Object], distance_m: f64) -> Vec<Place<'_>> {
     let views = Views { distance_m, ..Views::ROTATING };
-    let of = |object| {
+    let of_object = objects.iter().flat_map(|object| {
         let poses = views.poses(DVec3::ZERO, StreamKey::new(SEED, "trade", 0));
-        poses.into_iter().zip(0..).map(move |(pose, view)| place(object, pose, view))
-    };
-    objects.iter().flat_map(of).collect()
-}
-
-fn place(object: &Object, pose: Pose, view: u32) -> Place<'_> {
-    // As gen-dataset keys its set `rotational`.
-    let stream = StreamKey::new(SEED, &format!("rotational/{}", object.id), view);
-    Place { object, pose, stream }
+        poses.into_iter().zip(0..).map(move |(pose, view)| {
+            // As gen-dataset keys its set `rotational`.
+            let stream = StreamKey::new(SEED, &format!("rotational/{}", object.id), view);
+            Place { object, pose, stream }
+        })
+    });
+    of_object.collect()
 }

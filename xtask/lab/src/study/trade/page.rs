@@ -40,26 +40,32 @@ pub fn chapters(rows: &[Row]) -> Vec<Chapter> {
         (pareto_table(rows, Part::Classifier).html())
         p { "For each dominated setting, wherever it was measured, another is as fast and as accurate." }
         (dominated_table(rows).html())
-        (every_setting(&classifier_table(rows)))
+        (every_setting(rows, Part::Classifier, CLASSIFIER_COLUMNS))
     };
     let scan = html! {
         (chart(rows, Part::Scan).figure())
         (pareto_table(rows, Part::Scan).html())
-        (every_setting(&scan_table(rows)))
+        (every_setting(rows, Part::Scan, SCAN_COLUMNS))
     };
     vec![
-        Chapter::new("classifier", "Settings", "Which setting fits my time budget?", classifier),
+        classifier_chapter(classifier),
         Chapter::new("scan", "Sensors", "Which beams and steps can a sensor do without?", scan),
         Chapter::new(
             "caster",
             "Casters",
             "How exact are the ranges, and what does that cost?",
-            caster_table(rows).html(),
+            table_of(rows, Part::Caster, CASTER_COLUMNS).html(),
         ),
     ]
 }
 
-fn every_setting(table: &Table) -> Markup {
+/// The chapter on classifiers, which tells even where there is no record.
+pub fn classifier_chapter(body: Markup) -> Chapter {
+    Chapter::new("classifier", "Settings", "Which setting fits my time budget?", body)
+}
+
+fn every_setting(rows: &[Row], part: Part, columns: &[Column]) -> Markup {
+    let table = table_of(rows, part, columns);
     html! { details { summary { "All " (table.len()) " settings" } (table.html()) } }
 }
 
@@ -76,7 +82,7 @@ fn chart(rows: &[Row], part: Part) -> Chart<'static> {
         series.entry(series_key(row, noise_m)).or_default().push(dot);
     }
     let series = series.into_iter();
-    let series = series.map(|(SeriesKey { name, joined, .. }, dots)| Series { name, dots, joined });
+    let series = series.map(|((_, name, joined), dots)| Series { name, dots, joined });
     let label = match (part, device) {
         (Part::Classifier, Device::Pi5) => "milliseconds a cloud on a Raspberry Pi 5, modelled",
         (Part::Classifier, Device::Here) => "milliseconds a cloud on this machine",
@@ -85,8 +91,8 @@ fn chart(rows: &[Row], part: Part) -> Chart<'static> {
     Chart {
         message: message(rows, part, device),
         caption: CAPTION,
-        x: Axis { label, logarithmic: true, percent: false },
-        y: Axis { label: "classified correctly", logarithmic: false, percent: true },
+        x: Axis::Logarithmic(label),
+        y: Axis::Percent("classified correctly"),
         series: series.collect(),
     }
 }
@@ -125,15 +131,10 @@ fn message(rows: &[Row], part: Part, device: Device) -> String {
     }
 }
 
-/// Rows of one colour, in the order of distances and then of names.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct SeriesKey {
-    /// Bits of a number that is not negative: they order as it does.
-    distance: u64,
-    name: String,
-    /// Whether a line joins the Pareto-optimal ones.
-    joined: bool,
-}
+/// Rows of one colour, in the order of distances and then of names: the bits of the
+/// distance, which order as the number does because it is not negative, the name, and
+/// whether a line joins the Pareto-optimal rows.
+type SeriesKey = (u64, String, bool);
 
 /// Scans with other noise than `noise_m` are a series of their own: noise is not a
 /// choice, so they are not compared with the others.
@@ -142,10 +143,9 @@ fn series_key(row: &Row, noise_m: Option<f64>) -> SeriesKey {
         (Part::Scan, Some(distance_m)) => {
             let joined = row.noise_m == noise_m;
             let rest = if joined { "" } else { ", other noise" };
-            let name = format!("from {distance_m} m{rest}");
-            SeriesKey { distance: distance_m.to_bits(), name, joined }
+            (distance_m.to_bits(), format!("from {distance_m} m{rest}"), joined)
         }
-        _ => SeriesKey { distance: 0, name: row.model.clone(), joined: false },
+        _ => (0, row.model.clone(), false),
     }
 }
 
@@ -170,6 +170,14 @@ fn count(n: Option<usize>) -> String {
 fn accuracy(row: &Row) -> String {
     let [value, low, high] = [row.accuracy, row.accuracy_low, row.accuracy_high].map(percent);
     format!("{value} ({low} to {high})")
+}
+
+fn agreement(row: &Row) -> String {
+    row.agreement.map(percent).unwrap_or_default()
+}
+
+fn millions_of_rays(row: &Row) -> String {
+    number(row.rays_per_cpu_s.map(|rays| rays * 1e-6))
 }
 
 /// The Pareto-optimal rows of `part`, the fastest first.
@@ -202,10 +210,10 @@ pub fn dominated_table(rows: &[Row]) -> Table {
 }
 
 /// A column's heading, and what it shows of a row.
-type Column<'a> = (&'a str, &'a dyn Fn(&Row) -> String);
+type Column = (&'static str, fn(&Row) -> String);
 
 /// All rows of `part`, the Pareto-optimal ones marked.
-fn table_of(rows: &[Row], part: Part, columns: &[Column<'_>]) -> Table {
+fn table_of(rows: &[Row], part: Part, columns: &[Column]) -> Table {
     let of_part = || rows.iter().filter(|row| row.part == part);
     let caption = of_part().next().map_or_else(String::new, |row| {
         format!("On {}, {} clouds; {}", row.test_set, row.clouds, row.machine)
@@ -219,69 +227,49 @@ fn table_of(rows: &[Row], part: Part, columns: &[Column<'_>]) -> Table {
     table
 }
 
-fn classifier_table(rows: &[Row]) -> Table {
-    table_of(
-        rows,
-        Part::Classifier,
-        &[
-            ("model", &|row| row.model.clone()),
-            ("sampler", &|row| row.sampler.clone()),
-            ("points", &|row| count(row.points)),
-            ("precision", &|row| row.precision.clone()),
-            ("T-Nets", &|row| row.t_nets.clone()),
-            ("threads", &|row| count(row.threads)),
-            ("ms here", &|row| number(row.ms_here)),
-            ("ms on a Pi 5", &|row| number(row.ms_pi5)),
-            ("J", &|row| number(row.joules)),
-            ("MB", &|row| number(row.megabytes)),
-            ("accuracy %", &accuracy),
-            ("same class as fp32 %", &|row| row.agreement.map(percent).unwrap_or_default()),
-            ("largest error of a logit", &|row| number(row.logit_error)),
-            ("changed", &|row| row.knob.clone()),
-        ],
-    )
-}
+const CLASSIFIER_COLUMNS: &[Column] = &[
+    ("model", |row| row.model.clone()),
+    ("sampler", |row| row.sampler.clone()),
+    ("points", |row| count(row.points)),
+    ("precision", |row| row.precision.clone()),
+    ("T-Nets", |row| row.t_nets.clone()),
+    ("threads", |row| count(row.threads)),
+    ("ms here", |row| number(row.ms_here)),
+    ("ms on a Pi 5", |row| number(row.ms_pi5)),
+    ("J", |row| number(row.joules)),
+    ("MB", |row| number(row.megabytes)),
+    ("accuracy %", accuracy),
+    ("same class as fp32 %", agreement),
+    ("largest error of a logit", |row| number(row.logit_error)),
+    ("changed", |row| row.knob.clone()),
+];
 
-fn scan_table(rows: &[Row]) -> Table {
-    table_of(
-        rows,
-        Part::Scan,
-        &[
-            ("sensor", &|row| row.sensor.clone()),
-            ("changed", &|row| row.knob.clone()),
-            ("azimuth step °", &|row| number(row.azimuth_step_deg)),
-            ("distance m", &|row| number(row.distance_m)),
-            ("noise m", &|row| number(row.noise_m)),
-            ("quantum m", &|row| number(row.range_quantum_m)),
-            ("CPU ms a scan", &|row| number(row.ms_here)),
-            ("M rays/CPU-s", &|row| number(row.rays_per_cpu_s.map(|rays| rays * 1e-6))),
-            ("J", &|row| number(row.joules)),
-            ("kB", &|row| number(row.megabytes.map(|mb| mb * 1e3))),
-            ("points", &|row| row.points_per_scan.map(|n| format!("{n:.0}")).unwrap_or_default()),
-            ("range error m, RMS", &|row| number(row.range_rms_m)),
-            ("worst", &|row| number(row.range_worst_m)),
-            ("Chamfer m", &|row| number(row.chamfer_m)),
-            ("accuracy %", &accuracy),
-            ("same class as the reference %", &|row| {
-                row.agreement.map(percent).unwrap_or_default()
-            }),
-        ],
-    )
-}
+const SCAN_COLUMNS: &[Column] = &[
+    ("sensor", |row| row.sensor.clone()),
+    ("changed", |row| row.knob.clone()),
+    ("azimuth step °", |row| number(row.azimuth_step_deg)),
+    ("distance m", |row| number(row.distance_m)),
+    ("noise m", |row| number(row.noise_m)),
+    ("quantum m", |row| number(row.range_quantum_m)),
+    ("CPU ms a scan", |row| number(row.ms_here)),
+    ("M rays/CPU-s", millions_of_rays),
+    ("J", |row| number(row.joules)),
+    ("kB", |row| number(row.megabytes.map(|mb| mb * 1e3))),
+    ("points", |row| row.points_per_scan.map(|n| format!("{n:.0}")).unwrap_or_default()),
+    ("range error m, RMS", |row| number(row.range_rms_m)),
+    ("worst", |row| number(row.range_worst_m)),
+    ("Chamfer m", |row| number(row.chamfer_m)),
+    ("accuracy %", accuracy),
+    ("same class as the reference %", agreement),
+];
 
-fn caster_table(rows: &[Row]) -> Table {
-    table_of(
-        rows,
-        Part::Caster,
-        &[
-            ("caster", &|row| row.caster.clone()),
-            ("culling", &|row| row.culling.clone()),
-            ("CPU ms a scan", &|row| number(row.ms_here)),
-            ("M rays/CPU-s", &|row| number(row.rays_per_cpu_s.map(|rays| rays * 1e-6))),
-            ("range error m, RMS", &|row| number(row.range_rms_m)),
-            ("worst", &|row| number(row.range_worst_m)),
-            ("wrong rays in a million", &|row| number(row.wrong_rays_per_million)),
-            ("accuracy %", &accuracy),
-        ],
-    )
-}
+const CASTER_COLUMNS: &[Column] = &[
+    ("caster", |row| row.caster.clone()),
+    ("culling", |row| row.culling.clone()),
+    ("CPU ms a scan", |row| number(row.ms_here)),
+    ("M rays/CPU-s", millions_of_rays),
+    ("range error m, RMS", |row| number(row.range_rms_m)),
+    ("worst", |row| number(row.range_worst_m)),
+    ("wrong rays in a million", |row| number(row.wrong_rays_per_million)),
+    ("accuracy %", accuracy),
+];

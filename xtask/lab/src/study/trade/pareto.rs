@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 /// Which of `points` are Pareto-optimal: no other is at most as large in every coordinate
 /// and smaller in one.
-pub fn optimal<const N: usize>(points: &[[f64; N]]) -> Vec<bool> {
+fn optimal<const N: usize>(points: &[[f64; N]]) -> Vec<bool> {
     let dominates = |other: &[f64; N], own: &[f64; N]| {
         other != own && other.iter().zip(own).all(|(other, own)| other <= own)
     };

@@ -32,7 +32,7 @@ struct Made {
 
 /// The scans of one setting.
 pub struct Scanned {
-    /// Costs and geometric errors, without accuracy.
+    /// Costs and geometric errors, without the accuracy of classes.
     pub row: Row,
     /// One cloud a place.
     pub clouds: Vec<Cloud>,
@@ -59,9 +59,8 @@ pub fn scan_all(
             let before = energy.map(Energy::now);
             let (scans, cost) =
                 measured(|| scan(&places, setting, pattern, &AttributeSet::default()));
-            if let (Some(energy), Some(before)) = (energy, before) {
-                *joules += energy.joules_since(&before) / places.len() as f64;
-            }
+            let spent = energy.zip(before).map_or(0.0, |(energy, then)| energy.joules_since(&then));
+            *joules += spent / places.len() as f64;
             black_box(scans?);
             Ok(cost)
         }));
@@ -72,22 +71,20 @@ pub fn scan_all(
     let mut all = Vec::new();
     for (i, (setting, pattern)) in settings.iter().zip(&patterns).enumerate() {
         let (noise_m, quantum_m) = (setting.noise_m, setting.range_quantum_m);
-        let step = setting.azimuth_step_deg.map(|step| format!(" {step:.1}°")).unwrap_or_default();
+        let step =
+            setting.azimuth_step_deg().map(|step| format!(" {step:.1}°")).unwrap_or_default();
         eprintln!(
             "{}: {}{step}, {} m, noise {noise_m} m, quantum {quantum_m} m",
             setting.parameter, setting.name, setting.distance_m
         );
-        let truth = truths.entry(setting.distance_m.to_bits());
-        let truth = match truth {
+        let truth = match truths.entry(setting.distance_m.to_bits()) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(place) => place.insert(truth_from(objects, setting.distance_m)?),
         };
-        let (mut row, clouds) = assess(objects, setting, pattern, truth)?;
+        let Scanned { row, clouds } = assess(objects, setting, pattern, truth)?;
         let cpu_s = costs[i].cpu_s().median / clouds.len() as f64;
+        let mut row = row.with_time(pattern.len(), cpu_s);
         row.test_set = test_set.to_owned();
-        row.rays_per_cpu_s = Some(pattern.len() as f64 / cpu_s);
-        row.scans_per_cpu_s = Some(1.0 / cpu_s);
-        row.ms_here = Some(cpu_s * 1e3);
         // The repeat that is not counted has its joules in the sum, too.
         row.joules = energy.is_some().then(|| joules[i] / (rounds + 1) as f64);
         all.push(Scanned { row, clouds });
@@ -101,7 +98,7 @@ fn assess(
     setting: &Scanning,
     pattern: &BeamPattern,
     truth: &[Made],
-) -> Result<(Row, Vec<Cloud>)> {
+) -> Result<Scanned> {
     let places = places(objects, setting.distance_m);
     let columns = AttributeSet::from([Attribute::Range, Attribute::Beam]);
     let made = scan(&places, setting, pattern, &columns)?;
@@ -118,8 +115,8 @@ fn assess(
         part: Part::Scan,
         knob: setting.parameter.to_owned(),
         sensor: setting.name.clone(),
-        beams: Some(setting.beams),
-        azimuth_step_deg: setting.azimuth_step_deg,
+        beams: Some(setting.beams()),
+        azimuth_step_deg: setting.azimuth_step_deg(),
         range_quantum_m: Some(setting.range_quantum_m),
         distance_m: Some(setting.distance_m),
         noise_m: Some(setting.noise_m),
@@ -132,7 +129,7 @@ fn assess(
         chamfer_m: mean_chamfer(truth, &clouds),
         ..Row::default()
     };
-    Ok((row, clouds))
+    Ok(Scanned { row, clouds })
 }
 
 /// One scan a place, on the CPU, without files.

@@ -14,10 +14,6 @@ pub struct Scanning {
     pub name: String,
     /// The sensor.
     pub sensor: Sensor,
-    /// Its beams, one above the other.
-    pub beams: usize,
-    /// From one firing to the next; a camera has none.
-    pub azimuth_step_deg: Option<f64>,
     /// To the object's centre.
     pub distance_m: f64,
     /// Along the ray.
@@ -37,8 +33,6 @@ impl Scanning {
         Self {
             parameter: "reference",
             name: sensor.name.clone(),
-            beams: 32,
-            azimuth_step_deg: azimuth_step_deg(&sensor),
             sensor,
             distance_m: DISTANCE_M,
             noise_m: NOISE_M,
@@ -62,14 +56,44 @@ impl Scanning {
         }
     }
 
+    /// The sensor's beams, one above the other.
+    pub fn beams(&self) -> usize {
+        match &self.sensor.layout {
+            Layout::Rotating(rotating) => rotating.beam.len(),
+            Layout::Uniform(uniform) => uniform.elevation_steps as usize,
+            Layout::Grid(camera) => camera.height as usize,
+        }
+    }
+
+    /// From one firing to the next; a camera has none.
+    pub fn azimuth_step_deg(&self) -> Option<f64> {
+        let step_deg = match &self.sensor.layout {
+            Layout::Rotating(rotating) => 360.0 * rotating.sequence_us * 1e-6 / rotating.period_s(),
+            Layout::Uniform(uniform) => {
+                let span_deg = uniform.azimuth_to_deg - uniform.azimuth_from_deg;
+                span_deg / f64::from(uniform.azimuth_steps.max(2) - 1)
+            }
+            Layout::Grid(_) => return None,
+        };
+        Some(step_deg * f64::from(self.sensor.decimation.get()))
+    }
+
     fn varying(self, parameter: &'static str) -> Self {
         Self { parameter, ..self }
     }
 
-    fn with_beams(self, keep_each: usize) -> Self {
-        let sensor = fewer_beams(&self.sensor, keep_each);
-        let beams = self.beams / keep_each;
-        Self { name: format!("{}, {beams} beams", self.name), beams, sensor, ..self }
+    /// Each `keep_each`-th beam by elevation, from below.
+    fn with_beams(mut self, keep_each: usize) -> Self {
+        if let Layout::Rotating(rotating) = &mut self.sensor.layout {
+            let mut by_elevation: Vec<usize> = (0..rotating.beam.len()).collect();
+            let elevation = |&i: &usize| rotating.beam[i].elevation_deg;
+            by_elevation.sort_by(|a, b| elevation(a).total_cmp(&elevation(b)));
+            let kept: Vec<usize> = by_elevation.into_iter().step_by(keep_each).collect();
+            let mut place = 0..;
+            rotating.beam.retain(|_| place.next().is_some_and(|i: usize| kept.contains(&i)));
+        }
+        let name = format!("{}, {} beams", self.name, self.beams());
+        Self { name, ..self }
     }
 
     /// One firing each 0.1° times `k`: 300 rpm, of which each `k`-th is kept.
@@ -78,9 +102,8 @@ impl Scanning {
         if let Layout::Rotating(rotating) = &mut sensor.layout {
             rotating.rpm = 300.0;
         }
-        let azimuth_step_deg = azimuth_step_deg(&sensor).map(|step| step * f64::from(k));
         let sensor = sensor.decimated(NonZeroU32::new(k).unwrap_or(NonZeroU32::MIN));
-        Self { azimuth_step_deg, sensor, ..self }
+        Self { sensor, ..self }
     }
 }
 
@@ -89,7 +112,13 @@ pub fn one_at_a_time() -> Vec<Scanning> {
     let reference = Scanning::reference;
     let mut all = vec![reference()];
     all.extend([2, 4].map(|keep_each| reference().with_beams(keep_each).varying("beams")));
-    all.extend([even_grid(), blainder()]);
+    // As many rays as the VLP-32C has, on an even grid of the same field of view.
+    let grid = as_even_grid(vlp32c()).expect("invariant: the VLP-32C has a table of beams");
+    let name = "even grid of 32 rows".to_owned();
+    all.push(Scanning { name, sensor: grid, ..reference().varying("beam table") });
+    let blainder = Sensor::builtin("blainder-ultrapuck").expect("invariant: it is built in");
+    let name = blainder.name.clone();
+    all.push(Scanning { name, sensor: blainder, ..reference().varying("beam table") });
     all.extend([1, 4, 8].map(|k| reference().with_azimuth(k).varying("azimuth step")));
     all.extend([0.004, 0.02].map(|range_quantum_m| Scanning {
         range_quantum_m,
@@ -111,15 +140,10 @@ pub fn one_at_a_time() -> Vec<Scanning> {
 pub fn combinations() -> Vec<Scanning> {
     let mut all = Vec::new();
     for distance_m in [3.0, 5.0, 10.0, 20.0] {
-        for keep_each in [1, 2, 4] {
-            for k in [2, 4, 8] {
-                let scanning = Scanning { distance_m, ..Scanning::reference() };
-                let scanning = match keep_each {
-                    1 => scanning,
-                    _ => scanning.with_beams(keep_each),
-                };
-                all.push(scanning.with_azimuth(k).varying("combination"));
-            }
+        let whole = Scanning { distance_m, ..Scanning::reference() }.varying("combination");
+        let [half, quarter] = [2, 4].map(|keep_each| whole.clone().with_beams(keep_each));
+        for beams in [whole, half, quarter] {
+            all.extend([2, 4, 8].map(|k| beams.clone().with_azimuth(k)));
         }
     }
     all
@@ -127,49 +151,6 @@ pub fn combinations() -> Vec<Scanning> {
 
 fn vlp32c() -> Sensor {
     Sensor::builtin("vlp32c").expect("invariant: this profile is built in")
-}
-
-fn azimuth_step_deg(sensor: &Sensor) -> Option<f64> {
-    match &sensor.layout {
-        Layout::Rotating(rotating) => {
-            Some(360.0 * rotating.sequence_us * 1e-6 / rotating.period_s())
-        }
-        Layout::Uniform(uniform) => {
-            let span = uniform.azimuth_to_deg - uniform.azimuth_from_deg;
-            Some(span / f64::from(uniform.azimuth_steps.max(2) - 1))
-        }
-        Layout::Grid(_) => None,
-    }
-}
-
-/// Each `keep_each`-th beam by elevation, from below.
-fn fewer_beams(sensor: &Sensor, keep_each: usize) -> Sensor {
-    let mut sensor = sensor.clone();
-    if let Layout::Rotating(rotating) = &mut sensor.layout {
-        let mut by_elevation: Vec<usize> = (0..rotating.beam.len()).collect();
-        let elevation = |&i: &usize| rotating.beam[i].elevation_deg;
-        by_elevation.sort_by(|a, b| elevation(a).total_cmp(&elevation(b)));
-        let kept: Vec<usize> = by_elevation.into_iter().step_by(keep_each).collect();
-        let mut place = 0..;
-        rotating.beam.retain(|_| place.next().is_some_and(|i: usize| kept.contains(&i)));
-    }
-    sensor
-}
-
-/// As many rays as the VLP-32C has, on an even grid of the same field of view.
-fn even_grid() -> Scanning {
-    let sensor = as_even_grid(vlp32c()).expect("invariant: the VLP-32C has a table of beams");
-    of_another("beam table", "even grid of 32 rows".to_owned(), sensor, 32)
-}
-
-fn blainder() -> Scanning {
-    let sensor = Sensor::builtin("blainder-ultrapuck").expect("invariant: it is built in");
-    of_another("beam table", sensor.name.clone(), sensor, 122)
-}
-
-fn of_another(parameter: &'static str, name: String, sensor: Sensor, beams: usize) -> Scanning {
-    let azimuth_step_deg = azimuth_step_deg(&sensor);
-    Scanning { parameter, name, beams, azimuth_step_deg, sensor, ..Scanning::reference() }
 }
 
 #[cfg(test)]
@@ -180,7 +161,7 @@ mod tests {
     fn fewer_beams_span_the_same_field() {
         let sixteen = Scanning::reference().with_beams(2);
         let Layout::Rotating(rotating) = &sixteen.sensor.layout else { panic!("it turns") };
-        assert_eq!((rotating.beam.len(), sixteen.beams), (16, 16));
+        assert_eq!((rotating.beam.len(), sixteen.name.as_str()), (16, "vlp32c, 16 beams"));
         let lowest = rotating.beam.iter().map(|beam| beam.elevation_deg).fold(90.0, f64::min);
         assert_eq!(lowest, -25.0);
     }
@@ -188,7 +169,7 @@ mod tests {
     #[test]
     fn azimuth_steps_are_those_of_the_sensor() {
         // SIMULATORS' table: 0.09953° at 300 rpm, 0.19907° at 600.
-        let step_deg = |scanning: &Scanning| scanning.azimuth_step_deg.unwrap();
+        let step_deg = |scanning: &Scanning| scanning.azimuth_step_deg().unwrap();
         assert!((step_deg(&Scanning::reference()) - 0.19907).abs() < 1e-5);
         let fine = Scanning::reference().with_azimuth(1);
         assert!((step_deg(&fine) - 0.09953).abs() < 1e-5);
@@ -201,7 +182,7 @@ mod tests {
     #[test]
     fn one_parameter_varies_at_a_time() {
         let values = |s: &Scanning| {
-            (s.name.clone(), s.azimuth_step_deg, s.distance_m, s.noise_m, s.range_quantum_m)
+            (s.name.clone(), s.azimuth_step_deg(), s.distance_m, s.noise_m, s.range_quantum_m)
         };
         let reference = values(&Scanning::reference());
         for scanning in &one_at_a_time()[1..] {
