@@ -48,7 +48,6 @@ mod evaluate;
 mod forward;
 pub mod kernel;
 mod layers;
-mod named;
 mod network;
 mod normalize;
 mod options;

@@ -5,11 +5,10 @@ use std::collections::BTreeMap;
 use formats::model_card::Normalization;
 
 use crate::kernel::KernelName;
-use crate::named::named;
 use crate::precision::Precision;
 use crate::sampler::SamplerSpec;
 
-named! {
+formats::named! {
     /// Which of a model's T-Nets are run; one that is left out counts as the
     /// identity.
     #[derive(Default)]

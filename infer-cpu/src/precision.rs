@@ -7,12 +7,11 @@ use half::f16;
 
 use crate::dense::Dense;
 use crate::kernel::{Gemm, Gemv, I8_LARGEST, Kernels, Panels};
-use crate::named::named;
 
 /// The largest finite number of fp16.
 pub const F16_LARGEST: f32 = 65504.0;
 
-named! {
+formats::named! {
     /// What a network computes in.
     ///
     /// ```
@@ -22,7 +21,7 @@ named! {
     /// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[derive(Default, PartialOrd, Ord)]
+    #[derive(Default)]
     pub enum Precision: "precision" {
         /// fp32 throughout.
         #[default]

@@ -55,6 +55,12 @@ fn run_all(args: &Args, summary: &mut Summary) {
     summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
     let mut lints = cargo_on_all(&["clippy", "--all-targets"]);
     summary.command("lints", lints.args(["--", "--deny", "warnings"]));
+    // What a first build leaves out, and what a machine without a GPU can.
+    for package in ["edgepuck", "sim-gpu"] {
+        let mut lints = cargo(&["clippy", "--package", package, "--no-default-features"]);
+        let name = format!("lints of the smallest {package}");
+        summary.command(&name, lints.args(["--", "--deny", "warnings"]));
+    }
     summary.step("tests", |summary| tests(summary, install));
     let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));

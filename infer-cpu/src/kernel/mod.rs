@@ -19,8 +19,6 @@ use std::ops::Range;
 
 use half::f16;
 
-use crate::named::named;
-
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -264,9 +262,8 @@ pub struct Kernels {
     pub(crate) fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
 }
 
-named! {
+formats::named! {
     /// An instruction set that kernels are written for.
-    #[derive(PartialOrd, Ord)]
     #[non_exhaustive]
     pub enum KernelName: "kernel" {
         /// Plain Rust, everywhere.

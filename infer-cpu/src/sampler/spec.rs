@@ -6,12 +6,11 @@ use formats::FormatError;
 use formats::model_card::ModelCard;
 
 use super::SamplerError;
-use crate::named::named;
 
 /// The largest M of a Critical Points Layer, which repeats points to reach it.
 pub const MOST_CRITICAL: usize = 1 << 24;
 
-named! {
+formats::named! {
     /// A way to choose points of a cloud.
     #[derive(Default)]
     #[non_exhaustive]
@@ -32,7 +31,7 @@ named! {
     }
 }
 
-named! {
+formats::named! {
     /// Where farthest point sampling begins.
     #[derive(Default)]
     #[non_exhaustive]
@@ -46,7 +45,7 @@ named! {
     }
 }
 
-named! {
+formats::named! {
     /// How a Critical Points Layer turns its ranked points into M.
     #[derive(Default)]
     #[non_exhaustive]
@@ -65,7 +64,7 @@ named! {
     }
 }
 
-named! {
+formats::named! {
     /// The network whose features a Critical Points Layer pools.
     #[derive(Default)]
     #[non_exhaustive]

@@ -12,30 +12,6 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-impl Mesh {
-    /// The mesh of `triangles`, whose corners are indices below `n` of vertices
-    /// at `position`. It has those that are named, in the order in which they
-    /// are first named.
-    pub(crate) fn of_named(
-        mut triangles: Vec<[u32; 3]>,
-        n: usize,
-        position: impl Fn(usize) -> DVec3,
-    ) -> Self {
-        const NOT_NAMED: u32 = u32::MAX;
-        let mut numbers = vec![NOT_NAMED; n];
-        let mut vertices = Vec::new();
-        for corner in triangles.as_flattened_mut() {
-            let number = &mut numbers[*corner as usize];
-            if *number == NOT_NAMED {
-                *number = vertices.len() as u32;
-                vertices.push(position(*corner as usize));
-            }
-            *corner = *number;
-        }
-        Self { vertices, triangles }
-    }
-}
-
 /// What a format's parser makes of a file's bytes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parsed {

@@ -158,8 +158,30 @@ impl Welded {
     /// `mesh`, and of no other vertices.
     fn mesh_of(&self, mesh: &Mesh, corners: &[u32]) -> Mesh {
         let position = |corner: usize| mesh.vertices[self.sources[corner] as usize];
-        Mesh::of_named(corners.as_chunks().0.to_vec(), self.positions.len(), position)
+        of_named(corners.as_chunks().0.to_vec(), self.positions.len(), position)
     }
+}
+
+/// The mesh of `triangles`, whose corners are indices below `n` of vertices
+/// at `position`. It has those that are named, in the order in which they
+/// are first named.
+fn of_named(
+    mut triangles: Vec<[u32; 3]>,
+    n: usize,
+    position: impl Fn(usize) -> glam::DVec3,
+) -> Mesh {
+    const NOT_NAMED: u32 = u32::MAX;
+    let mut numbers = vec![NOT_NAMED; n];
+    let mut vertices = Vec::new();
+    for corner in triangles.as_flattened_mut() {
+        let number = &mut numbers[*corner as usize];
+        if *number == NOT_NAMED {
+            *number = vertices.len() as u32;
+            vertices.push(position(*corner as usize));
+        }
+        *corner = *number;
+    }
+    Mesh { vertices, triangles }
 }
 
 #[cfg(test)]
