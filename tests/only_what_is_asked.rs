@@ -165,7 +165,7 @@ fn golden() -> PathBuf {
 fn costs_are_those_of_the_table() {
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         let heading = "# What a scan costs and what each thing asked for adds to it. Written by \
-                       `UPDATE_GOLDEN=1 cargo test -p tests --test only_what_is_asked`.\n\n";
+                       `UPDATE_GOLDEN=1 cargo test -p tests --test suite only_what_is_asked`.\n\n";
         fs::write(golden(), heading.to_owned() + &toml::to_string(&*MEASURED).unwrap()).unwrap();
     }
     let expected: Table = toml::from_str(&fs::read_to_string(golden()).unwrap()).unwrap();

@@ -15,19 +15,19 @@ use std::path::PathBuf;
 /// Flags of `advise`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Device that runs the classifier: pi5 (modelled) or here (the machine of the record)
+    /// Device that runs the classifier
     #[arg(long, value_enum)]
     device: Device,
 
-    /// Longest time from a raw cloud to its class, milliseconds
+    /// Longest acceptable time from a raw cloud to its class, milliseconds
     #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     max_ms: Option<f64>,
 
-    /// Lowest accuracy, a share from 0 to 1
+    /// Lowest acceptable accuracy, from 0 to 1
     #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true)]
     min_accuracy: Option<f64>,
 
-    /// Largest size of the weights, megabytes
+    /// Largest acceptable size of the weights, megabytes
     #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
     max_mb: Option<f64>,
 
@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     max_threads: Option<usize>,
 
-    /// Record that `cargo xtask trade` wrote [default: the built-in record]
+    /// CSV file of measurements that `cargo xtask trade` wrote [default: the built-in record]
     #[arg(long, value_name = "CSV")]
     record: Option<PathBuf>,
 }

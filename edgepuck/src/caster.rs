@@ -13,11 +13,12 @@ pub const HOW_TO_GET_VULKAN: &str =
 /// Flags of every command that casts.
 #[derive(clap::Args)]
 pub struct CasterArgs {
-    /// Adapter that casts: auto (GPU, then software Vulkan, then CPU), cpu, or part of a name
+    /// Adapter that casts the rays: auto (the first available of GPU, software Vulkan and CPU),
+    /// cpu, or part of an adapter's name
     #[arg(long, default_value = "auto", value_name = "ADAPTER")]
     pub adapter: AdapterRequest,
 
-    /// Also cast the beams that cannot hit; this is slower and gives the same output
+    /// Also cast the beams that cannot hit any object; this is slower and gives the same output
     #[arg(long)]
     no_cull: bool,
 }

@@ -24,20 +24,20 @@ enum Command {
     GenDataset(Box<gen_dataset::Args>),
     /// Write the procedural shapes that gen-dataset uses by default as OFF files
     GenShapes(gen_shapes::Args),
-    /// Sample points uniformly from the surfaces of meshes, as ModelNet40's clouds are
+    /// Sample points uniformly from the surfaces of meshes, as in ModelNet40's point clouds
     SampleSurfaces(sample_surfaces::Args),
     /// Scan one scene
     Scan(scan::Args),
-    /// Draw a scan from the side, from above and from the front
+    /// Draw a picture of a scan from the side, from above and from the front
     Preview(preview_scan::Args),
-    /// List the adapters that can cast
+    /// List the adapters (GPUs and CPU) that can cast rays
     Adapters,
     /// Merge the shards of a dataset into one dataset
     MergeDataset(merge_dataset::Args),
     /// Convert a PyTorch checkpoint into a model file for infer-cpu
     #[cfg(feature = "models")]
     ImportWeights(import_weights::Args),
-    /// Write a model file as ONNX, for other engines
+    /// Convert a model file to ONNX, for other inference engines
     #[cfg(feature = "models")]
     ExportOnnx(export_onnx::Args),
     /// Train a network: `edgepuck train --help`
@@ -49,10 +49,10 @@ enum Command {
     /// Show which points determined a prediction: `edgepuck explain --help`
     #[command(disable_help_flag = true)]
     Explain(trainer::Args),
-    /// Measure the distance between two clouds: `edgepuck compare-points A B`
+    /// Compute the Chamfer distance of two clouds: `edgepuck compare-points A B`
     #[command(disable_help_flag = true)]
     ComparePoints(trainer::Args),
-    /// Recommend one configuration for a device, from what was measured
+    /// Recommend one configuration of the classifier for a device, based on measurements
     #[cfg(feature = "models")]
     Advise(advise::Args),
 }

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 /// Flags of `preview`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scan to draw, .npz or .ply; a scan in a dataset's clean/ is drawn above its noisy version
+    /// Scan to draw, .npz or .ply; if it is in the folder clean/ of a dataset, its noisy version is
+    /// drawn below it
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
 

@@ -25,7 +25,7 @@ pub struct Args {
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     points: u32,
 
-    /// Smallest number of visible points, of six times --points, that a viewpoint must have
+    /// Number of visible points that a viewpoint must have, out of six times --points samples
     #[arg(long, default_value_t = 64, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,

@@ -18,8 +18,9 @@ pub struct Args {
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 
-    /// File to write: .npz, .ply, .csv or .pcap (VLP-32C packets, for that sensor only). With
-    /// several sensors, each has a file of its own, named after it
+    /// File to write: .npz, .ply, .csv or .pcap (VLP-32C packets, for that sensor only). If the
+    /// scene has several sensors, one file per sensor is written, and the sensor's name is appended
+    /// to the file's name
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
@@ -27,8 +28,8 @@ pub struct Args {
     #[arg(long, value_name = "WHICH")]
     returns: Option<Returns>,
 
-    /// Simplify the meshes of objects for which the scene file has no `simplify` key, as
-    /// gen-dataset does
+    /// Simplify meshes as gen-dataset does; applies to objects without a `simplify` key in the
+    /// scene file
     #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
     simplify: Option<Simplify>,
 

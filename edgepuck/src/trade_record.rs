@@ -24,9 +24,9 @@ formats::named! {
     /// A device that was measured or modelled.
     #[derive(clap::ValueEnum)]
     pub enum Device: "device" {
-        /// A Raspberry Pi 5, modelled.
+        /// A Raspberry Pi 5; its times are modelled.
         Pi5 = "pi5",
-        /// The machine that made the record.
+        /// The machine on which the record was measured.
         Here = "here",
     }
 }

@@ -118,7 +118,8 @@ pub(crate) fn within(
     value: impl Into<Option<f64>>,
     range: RangeInclusive<f64>,
 ) -> Result<(), InvalidValue> {
-    let expected = format_args!("a number within {range:?}");
+    let (from, to) = (*range.start(), *range.end());
+    let expected = format_args!("a number within {from}..={to}");
     expect(key, value, expected, |value| range.contains(&value))
 }
 

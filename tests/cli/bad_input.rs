@@ -56,7 +56,7 @@ fn commands_that_cannot_be_are_usage_errors() {
             ("gen-dataset meshes --format stl", "stl"),
             ("gen-dataset meshes --points 0", "--points"),
             ("gen-dataset meshes --format pcap", "sensor \"generic-static\": rotating: missing"),
-            ("gen-dataset meshes --sensor vlp16 --format pcap", "VLP-32C alone"),
+            ("gen-dataset meshes --sensor vlp16 --format pcap", "VLP-32C only"),
             ("gen-dataset meshes --sensor vlp32c --format pcap --noise-model xyz", "noise.model"),
             ("gen-dataset meshes --returns dual", "add --format pcap"),
             ("gen-dataset meshes --returns both", "strongest, last, dual"),

@@ -62,7 +62,7 @@ fn what_packets_cannot_tell_is_refused_before_it_is_cast() {
     for profile in ["vlp16", "kinect-v2", "blainder-ultrapuck", "modelnet40c-lidar"] {
         let folder = scene(profile);
         let said = folder.exits(1, "scan scene.toml --out scan.pcap");
-        for part in ["scene.toml", "sensor[0]", profile, "VLP-32C alone"] {
+        for part in ["scene.toml", "sensor[0]", profile, "VLP-32C only"] {
             assert!(said.contains(part), "{part} in {said}");
         }
         assert!(!said.contains("Casting"), "{said}");

@@ -1,4 +1,4 @@
-//! The repository's command line: its chores, and a way to its programs.
+//! The repository's command line: developer commands, and access to the other programs.
 
 mod forward;
 mod release_check;
@@ -11,12 +11,12 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use xtask::build_pi;
 
-/// Runs the chores of Edgepuck's repository.
+/// Runs the developer commands of Edgepuck's repository.
 ///
-/// Every other command goes to the program `edgepuck` (gen-dataset, gen-shapes,
-/// sample-surfaces, scan, preview, adapters, merge-dataset, import-weights,
-/// export-onnx, train, eval, explain, compare-points, advise), which is built
-/// first if need be. `cargo xtask edgepuck --help` describes them.
+/// All other commands are passed to the program `edgepuck` (gen-dataset, gen-shapes,
+/// sample-surfaces, scan, preview, adapters, merge-dataset, import-weights, export-onnx, train,
+/// eval, explain, compare-points, advise), which is built first if necessary.
+/// `cargo xtask edgepuck --help` describes them.
 #[derive(Parser)]
 #[command(name = "cargo xtask", version, max_term_width = 100)]
 struct Cli {
@@ -26,28 +26,28 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Install what tests need and run all of them
+    /// Install the packages that the tests need, and run all tests
     Test(test::Args),
-    /// Check what a release needs besides the tests: packages, binaries, dependencies
+    /// Check packages, binaries, dependencies and version numbers before a release
     ReleaseCheck,
-    /// Build infer-cpu as one static file for a Raspberry Pi
+    /// Build infer-cpu as one static binary for a Raspberry Pi
     BuildPi(build_pi::Args),
     /// Measure speed and accuracy: `cargo xtask bench --help`
     #[command(disable_help_flag = true)]
     Bench(Forwarded),
-    /// Sweep every parameter from mesh to class, and record time and accuracy
+    /// Sweep every parameter from the mesh to the class, and record time and accuracy
     #[command(disable_help_flag = true)]
     Trade(Forwarded),
     /// Measure how much each effect of a scan matters to a classifier, and what it costs
     #[command(disable_help_flag = true)]
     Ablate(Forwarded),
-    /// Repeat the paper's experiments, and write one report
+    /// Reproduce the paper's experiments, and write one report
     #[command(disable_help_flag = true)]
     Reproduce(Forwarded),
-    /// Gather every record into one page
+    /// Show the results of all measurements on one HTML page
     #[command(disable_help_flag = true)]
     Report(Forwarded),
-    /// Run the program `edgepuck` with these words
+    /// Run the program `edgepuck` with these arguments
     #[command(disable_help_flag = true)]
     Edgepuck(Forwarded),
     /// A command of the program `edgepuck`

@@ -17,7 +17,7 @@ const PACKAGES: &str = "xtask/packages.sh";
 /// Flags of `test`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Install nothing; checks whose needs are missing are skipped, and named
+    /// Install nothing; skip the checks whose requirements are missing, and list them
     #[arg(long)]
     no_install: bool,
 
@@ -25,7 +25,8 @@ pub struct Args {
     #[arg(long, default_value_t = 30, value_name = "SECONDS")]
     fuzz_seconds: u32,
 
-    /// Which of tests/peers to run: none, light, or all, PyTorch too (5 GB from PyPI)
+    /// Which comparisons with other software (tests/peers) to run; `all` downloads about 5 GB from
+    /// PyPI
     #[arg(long, value_enum, default_value_t = peers::Which::Light, value_name = "WHICH")]
     peers: peers::Which,
 

@@ -1,4 +1,4 @@
-//! What surrounds a point, as `infer-cpu/src/edge.rs` defines it: for each
+//! What surrounds a point, as `infer-cpu/src/edge_conv.rs` defines it: for each
 //! radius and channel the largest of `relu(w (q - p) / r + b)` over the points q
 //! of the cloud that are no farther than the radius r from the point p.
 //!

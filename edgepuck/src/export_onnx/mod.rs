@@ -41,15 +41,16 @@ Examples:
 Opset 18, IR version 8, f32. Batch norms are folded into weights. Weights are
 named as in PyTorch's checkpoints (feat.conv1.weight).
 
-Inputs, f32, normalised as the model's card says (unit-sphere: mean to 0, largest
-radius to 1; infer-cpu does it by itself, a graph does not):
-  points [batch, points, 3]  what the network sees, chosen by any sampler
+Inputs in f32. Normalise them as the model's card says (unit-sphere: subtract the
+mean, and divide by the largest radius); infer-cpu does this, the graph does not:
+  points [batch, points, 3]  points that the network sees, chosen by any sampler
   cloud  [batch, all, 3]     all points, for networks with EdgeConv features
 With --critical-points, `cloud` is the only input, and the graph selects the points.
-EdgeConv takes points x all x 64 channels x 4 bytes: 16 MB for 64 of 1,024 points.
+EdgeConv needs memory for points x all x 64 channels x 4 bytes: 16 MB for 64 of
+1,024 points.
 Outputs:
-  logits [batch, classes]    before any softmax, as infer-cpu's --json has them
-  kept   [batch, M], int64   with --critical-points: the points chosen, by index
+  logits [batch, classes]    before the softmax, as in the output of infer-cpu --json
+  kept   [batch, M], int64   with --critical-points: indices of the chosen points
 
 The card (classes, normalization, sampler, ...) is in the file's metadata_props.")]
 pub struct Args {
@@ -61,11 +62,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// Include the model's Critical Points Layer in the graph, as infer-cpu's --sampler cpl
+    /// Include the model's Critical Points Layer in the graph, like --sampler cpl of infer-cpu
     #[arg(long)]
     critical_points: bool,
 
-    /// Number of points that the layer keeps [default: as the model was trained]
+    /// Number of points that the Critical Points Layer keeps [default: as in training]
     #[arg(long, value_name = "M", requires = "critical_points")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     points: Option<u32>,

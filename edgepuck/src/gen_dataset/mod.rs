@@ -50,7 +50,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR", exclusive = true)]
     verify: Option<PathBuf>,
 
-    /// Continue an interrupted run; the result has the same bytes
+    /// Continue an interrupted run; the dataset has the same bytes as without the interruption
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
 
@@ -58,7 +58,7 @@ pub struct Args {
     #[arg(long)]
     overwrite: bool,
 
-    /// Make part I of N of the dataset; `merge-dataset` joins the parts
+    /// Make only part I of N of the dataset; `merge-dataset` joins the parts
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
 

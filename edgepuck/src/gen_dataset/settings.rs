@@ -18,7 +18,8 @@ use std::path::PathBuf;
 #[derive(clap::Parser)]
 #[command(next_help_heading = "What the dataset holds")]
 pub struct Settings {
-    /// A built-in sensor or a TOML profile [default: vlp32c and generic-static, a set each]
+    /// Name of a built-in sensor, or path of a TOML profile [default: vlp32c and generic-static,
+    /// with one set for each]
     #[arg(long, value_name = "NAME|TOML")]
     sensor: Option<String>,
 
@@ -50,11 +51,12 @@ pub struct Settings {
     #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true)]
     noise_mean: f64,
 
-    /// Probability that a noisy scan loses a return
+    /// Probability that a return is missing from a noisy scan
     #[arg(long, default_value_t = 0.0, value_name = "P", allow_negative_numbers = true)]
     dropout: f64,
 
-    /// Round noisy ranges to a quantum in metres, or to the sensor's own
+    /// Round the ranges of noisy scans to multiples of M metres, or without a value, of the
+    /// sensor's own quantum
     #[arg(long, value_name = "M", num_args = 0..=1, default_missing_value = "sensor")]
     quantise: Option<String>,
 
@@ -63,8 +65,8 @@ pub struct Settings {
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 
-    /// File formats of each scan; NPZ is always written. `pcap` writes VLP-32C packets: it
-    /// accepts that sensor only, and all files then use the beam geometry of the packets
+    /// File formats of each scan; NPZ is always written. `pcap` writes VLP-32C packets: it requires
+    /// `--sensor vlp32c`, and all files then use the beam geometry of the packets
     #[arg(long, value_delimiter = ',', default_value = "npz", value_name = "npz,ply,csv,pcap")]
     format: Vec<ScanFormat>,
 
@@ -80,8 +82,9 @@ pub struct Settings {
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 
-    /// Simplify meshes below what the sensor resolves: `auto` derives the bound from the beams
-    /// and distances, a number is the largest distance in metres that the surface may move
+    /// Remove triangles that are too small for the sensor to resolve: `auto` derives the error
+    /// bound from the beams and distances; a number is the largest distance in metres that the
+    /// surface may move
     #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
     simplify: Option<Simplify>,
 
@@ -89,17 +92,17 @@ pub struct Settings {
     #[arg(long, default_value_t = 0)]
     seed: u64,
 
-    /// Points in each packed cloud
+    /// Number of points in each packed cloud
     #[arg(long, default_value_t = 1024, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     points: u32,
 
-    /// Smallest number of points of a scan that joins the packed sets
+    /// Number of points that a scan must have to be included in the packed sets
     #[arg(long, default_value_t = 64, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,
 
-    /// Additional layouts, which other projects read: yanx27, modelnet-h5
+    /// Additional dataset layouts, for other projects: yanx27, modelnet-h5
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     layout: Vec<Layout>,
 }

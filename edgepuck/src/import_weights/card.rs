@@ -15,27 +15,29 @@ use super::table::Table;
 /// the table.
 #[derive(clap::Args)]
 pub struct CardArgs {
-    /// Class names, one a line, in the order of the logits [default: ModelNet40's for 40 logits]
+    /// File of class names, one per line, in the order of the logits [default: ModelNet40's classes
+    /// if there are 40 logits]
     #[arg(long, value_name = "FILE")]
     classes: Option<PathBuf>,
 
-    /// Sampler that the model was trained behind, as infer-cpu names it [default: the table's]
+    /// Sampler that was used in training, by its name in infer-cpu [default: the table's]
     #[arg(long, value_name = "NAME")]
     sampler: Option<String>,
 
-    /// Points that the sampler keeps [default: the table's]
+    /// Number of points that the sampler keeps [default: the table's]
     #[arg(long, value_name = "N")]
     points: Option<usize>,
 
-    /// How clouds were normalised: unit-sphere or none [default: the table's]
+    /// Normalization of clouds in training: unit-sphere or none [default: the table's]
     #[arg(long, value_name = "NAME")]
     normalization: Option<Normalization>,
 
-    /// What the model was trained on
+    /// Name of the training set
     #[arg(long, value_name = "TEXT")]
     training_set: Option<String>,
 
-    /// What the model reached, and on what [default: what the checkpoint says]
+    /// Accuracy of the model, and the data on which it was measured [default: what the checkpoint
+    /// states]
     #[arg(long, value_name = "TEXT")]
     accuracy: Option<String>,
 

@@ -21,7 +21,7 @@ use table::{Names, Table};
 /// Flags of `import-weights`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The checkpoint, as torch.save wrote it
+    /// Checkpoint file that torch.save wrote
     #[arg(value_name = "CHECKPOINT")]
     checkpoint: PathBuf,
 
@@ -29,11 +29,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// Importer table for a model whose layers bear names of their own
+    /// Importer table (TOML) for a model whose layers have other names
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
 
-    /// Clouds to calibrate int8 with, a packed NPZ; best of the training set
+    /// Packed NPZ file of clouds to calibrate int8 with, preferably from the training set
     #[arg(long, value_name = "NPZ")]
     calibrate: Option<PathBuf>,
 

@@ -36,12 +36,14 @@ Examples:
   producer | infer-cpu classify --format ply -
   find scans -name '*.npz' | infer-cpu classify --json --files-from -
 
-Each file gives one line: its name, the class and the confidence, separated by
-tabs. With --json the line is an object with the keys file, class (a number),
-label, confidence (0 to 1), logits, points, used (points that the network saw),
-dropped (points), clipped (activations, with i8), precision (f32 if the chosen
-one overflowed) and ms (without reading the file); if the file fails, the keys
-are file and error. The run goes on after a file that fails and exits with 1.
+One line is printed for each file: its name, the class and the confidence,
+separated by tabs. With --json the line is an object with these keys: file, class
+(a number), label, confidence (0 to 1), logits, points (number of valid points),
+dropped (number of invalid points), used (points that the network saw), clipped
+(number of activations, with i8), precision (f32 if the chosen one overflowed) and
+ms (time without reading the file). If the file fails, the keys are file and error.
+After a failure, the program continues with the next file, and exits with 1 at the
+end.
 
 Formats, by file extension: PLY, NPZ, NPY, PCD, XYZ, CSV, KITTI's .bin, LAS.")]
 pub struct Args {
@@ -50,12 +52,13 @@ pub struct Args {
     files: Vec<PathBuf>,
 
     /// Read file names from LIST, one per line; with `-`, from standard input,
-    /// where each name is answered before the next one is read
+    /// and print the result for each name before reading the next one
     #[arg(long, value_name = "LIST", conflicts_with = "files")]
     files_from: Option<PathBuf>,
 
     /// Format of all clouds: ply, npz, npy, pcd, xyz, csv, kitti, las [default:
-    /// by the file extension; by the first bytes of standard input]
+    /// detected from the file extension, or from the first bytes of standard
+    /// input]
     #[arg(long)]
     format: Option<CloudFormat>,
 
@@ -66,7 +69,8 @@ pub struct Args {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Drop points with NaN or infinite coordinates instead of refusing the cloud
+    /// Drop points with NaN or infinite coordinates instead of rejecting the
+    /// cloud
     #[arg(long)]
     drop_invalid: bool,
 
@@ -79,7 +83,7 @@ pub struct Args {
     precision: Precision,
 
     /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default:
-    /// the fastest that this machine runs]
+    /// the fastest that this machine supports]
     #[arg(long)]
     kernel: Option<KernelName>,
 
@@ -87,8 +91,8 @@ pub struct Args {
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 
-    /// Average the log-probabilities of K passes; needs the sampler random or
-    /// --vote-rotations, so that the passes differ
+    /// Classify K times and average the log-probabilities; requires --sampler
+    /// random or --vote-rotations, because the passes are identical otherwise
     #[arg(long, value_name = "K", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
     votes: u32,
@@ -101,8 +105,8 @@ pub struct Args {
     #[arg(long, default_value = "z", value_parser = up_axis())]
     up: UpAxis,
 
-    /// Sampler that chooses the points the network sees: all, first, random,
-    /// fps, voxel, cpl [default: as in training, else all]
+    /// Sampler that chooses the points that the network sees: all, first,
+    /// random, fps, voxel, cpl [default: as in training, else all]
     #[arg(long, value_name = "NAME")]
     sampler: Option<SamplerKind>,
 

@@ -18,9 +18,9 @@ Examples:
   infer-cpu inspect model.safetensors
   infer-cpu inspect --json
 
-Every tensor is read and checked. A MAC is one multiplication with its addition.
-MACs per point count for each point that the network sees. Bytes are those of
-weights, biases and scales, with batch norms folded in.")]
+Every tensor is read and checked. A MAC is one multiplication and one addition.
+The MACs of a point are needed for each point that the network sees. The bytes
+include weights, biases and scales, with batch norms folded in.")]
 pub struct Args {
     /// Model file [default: $EDGEPUCK_MODEL, else the bundled weights]
     model: Option<PathBuf>,

@@ -13,7 +13,8 @@ mod sampler;
 use clap::{Parser, Subcommand};
 use formats::outcome::{Outcome, Usage};
 
-/// Classify point clouds on a CPU: PointNet behind a Critical Points Layer.
+/// Classify point clouds on a CPU with PointNet, after a Critical Points Layer
+/// or another sampler.
 #[derive(Parser)]
 #[command(name = "infer-cpu", version, max_term_width = 100)]
 #[command(after_help = "\
@@ -28,9 +29,9 @@ pub struct Cli {
 enum Command {
     /// Classify clouds
     Classify(Box<classify::Args>),
-    /// Write the points of a cloud that a sampler chooses
+    /// Reduce a cloud with a sampler, and write the chosen points
     Sample(Box<sample::Args>),
-    /// Show the layers of a model file and what they cost
+    /// Show the layers of a model file, their sizes and operation counts
     Inspect(inspect::Args),
     /// Measure the latency on this machine
     Bench(Box<bench::Args>),

@@ -23,11 +23,10 @@ Examples:
   infer-cpu sample --sampler voxel --voxel-size 0.05 in.las thinned.npz
   infer-cpu sample --sampler cpl --points 64 --model model.safetensors in.npz out.xyz
 
-The output holds the chosen points with the coordinates of the input. A voxel
-size is in the unit of the cloud. cpl normalizes the cloud as in training before
-it chooses; where it repeats points to reach M, the output repeats them too. The
-extension of the output chooses its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin,
-LAS.")]
+The output holds the chosen points with the coordinates of the input. cpl
+normalizes the cloud as in training before it chooses points. If it repeats points
+to reach M, the output repeats them, too. The extension of the output file
+determines its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin, LAS.")]
 pub struct Args {
     /// Sampler that chooses the points: all, first, random, fps, voxel, cpl
     #[arg(long, value_name = "NAME")]
@@ -36,19 +35,21 @@ pub struct Args {
     #[command(flatten)]
     how: SamplerArgs,
 
-    /// Drop points with NaN or infinite coordinates instead of refusing the cloud
+    /// Drop points with NaN or infinite coordinates instead of rejecting the
+    /// cloud
     #[arg(long)]
     drop_invalid: bool,
 
     /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, las [default:
-    /// by the file extension; by the first bytes of standard input]
+    /// detected from the file extension, or from the first bytes of standard
+    /// input]
     #[arg(long)]
     format: Option<CloudFormat>,
 
     #[command(flatten)]
     model: ModelArgs,
 
-    /// File of the cloud; `-` reads standard input
+    /// File with the cloud; `-` reads standard input
     input: PathBuf,
 
     /// File to write

@@ -7,7 +7,7 @@ use super::Usage;
 /// Flags beside the sampler's name.
 #[derive(clap::Args, Default)]
 pub struct SamplerArgs {
-    /// How many points to keep [default: as in training, else 1024]
+    /// Number of points to keep [default: as in training, else 1024]
     #[arg(long, value_name = "M")]
     points: Option<usize>,
 
@@ -15,29 +15,31 @@ pub struct SamplerArgs {
     #[arg(long)]
     seed: Option<u64>,
 
-    /// First point of fps: the one farthest from the centroid (farthest), which
-    /// does not depend on the order of points, or the first one (first)
-    /// [default: as in training, else farthest]
+    /// First point of fps: `farthest` takes the point farthest from the
+    /// centroid, which does not depend on the order of the points; `first`
+    /// takes the first point of the cloud [default: as in training, else
+    /// farthest]
     #[arg(long, value_name = "WHERE")]
     fps_start: Option<FpsStart>,
 
-    /// Edge of a voxel, in place of --points: in the unit of the cloud for
-    /// sample, in that of the normalized cloud for classify
+    /// Edge length of a voxel, instead of --points; `sample` takes it in the
+    /// unit of the cloud, `classify` in the unit of the normalized cloud
     #[arg(long, value_name = "LENGTH", conflicts_with = "points")]
     voxel_size: Option<f64>,
 
-    /// Rule by which cpl makes its critical points M: truncate, cyclic, nearest,
-    /// weighted [default: cyclic]
+    /// Rule by which cpl resizes its set of critical points to M points:
+    /// truncate, cyclic, nearest, weighted [default: cyclic]
     #[arg(long, value_name = "RULE")]
     resize: Option<Resize>,
 
-    /// Further poolings of cpl among the points not yet chosen [default: 0]
+    /// Number of additional max poolings of cpl over the points that it has not
+    /// yet chosen [default: 0]
     #[arg(long, value_name = "K")]
     passes: Option<usize>,
 
-    /// Layers whose features cpl pools: the model's own front end (own), the
-    /// trunk of its input T-Net (stn), its trunk (trunk), or the first of these
-    /// that the model has (auto) [default: auto]
+    /// Layers whose features cpl pools: `own` is the model's own front end,
+    /// `stn` the trunk of its input T-Net, `trunk` its trunk, and `auto` the
+    /// first of these that the model has [default: auto]
     #[arg(long, value_name = "NET")]
     front: Option<FrontChoice>,
 }

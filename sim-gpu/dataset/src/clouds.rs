@@ -8,7 +8,7 @@ use super::config::{DatasetConfig, Layout, SetConfig, Variant};
 use super::error::DatasetError;
 use super::layout;
 use super::manifest::LeftOut;
-use super::record::{Entry, MeshRecord, VariantRecord};
+use super::record::{Cloud, Entry, MeshRecord, VariantRecord};
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, read_scan};
@@ -24,16 +24,6 @@ const KEPT_BYTES: usize = 1 << 30;
 
 /// Points of all clouds that wait to be taken, in one part: 12 MiB.
 const POINTS_AT_ONCE: u32 = 1 << 20;
-
-/// A scan at the size and scale of packed clouds.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Cloud {
-    /// [`DatasetConfig::packed_points`] points, mean 0 and largest radius 1.
-    pub points: Vec<[f32; 3]>,
-    /// The surface's normal at each point, if a layout asks for normals and the scan
-    /// has them.
-    pub normals: Option<Vec<[f32; 3]>>,
-}
 
 /// Which scan a cloud is drawn from.
 #[derive(Clone, Copy)]

@@ -25,9 +25,8 @@ pub mod start;
 pub mod surfaces;
 pub mod verify;
 
-pub use clouds::Cloud;
 pub use config::{DatasetConfig, SetConfig, Variant, Viewpoints};
 pub use error::DatasetError;
 pub use export_layouts::check_layouts;
 pub use manifest::Manifest;
-pub use record::{Entry, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+pub use record::{Cloud, Entry, MeshFailure, MeshRecord, ScanRecord, VariantRecord};

@@ -1,12 +1,12 @@
 //! One mesh: from its file to the rays that are cast at it, and from what was cast
 //! to its scans on disk.
 
-use super::clouds::{Cloud, Source};
+use super::clouds::Source;
 use super::config::{DatasetConfig, SetConfig};
 use super::error::DatasetError;
 use super::layout;
 use super::progress::{Progress, Stage};
-use super::record::{FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+use super::record::{Cloud, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use glam::DAffine3;

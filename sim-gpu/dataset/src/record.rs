@@ -1,6 +1,5 @@
 //! What is known of each mesh once its scans are written.
 
-use super::clouds::Cloud;
 use super::config::Variant;
 use formats::Split;
 use formats::scan_file::ScanFormat;
@@ -77,6 +76,17 @@ pub struct VariantRecord {
     /// it, and so do scans beyond the memory for clouds, which are read again.
     #[serde(skip)]
     pub cloud: Option<Cloud>,
+}
+
+/// A scan at the size and scale of packed clouds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloud {
+    /// As many points as [`DatasetConfig`](super::config::DatasetConfig) says, mean 0 and
+    /// largest radius 1.
+    pub points: Vec<[f32; 3]>,
+    /// The surface's normal at each point, if a layout asks for normals and the scan
+    /// has them.
+    pub normals: Option<Vec<[f32; 3]>>,
 }
 
 /// One file as written.

@@ -7,8 +7,7 @@ mod wing;
 
 use glam::DVec3;
 
-use crate::class::Make;
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, Make, Sampler};
 use details::{gear, jet_engine, propeller, struts};
 use fuselage::Fuselage;
 use jet::{delta, fighter};

@@ -1,10 +1,7 @@
 //! The classes and which file builds each.
 
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, Make, Sampler};
 use crate::{airplane, bottle, bowl, chair, cone, cup, lamp, monitor, table, vase};
-
-/// Builds one make of a class.
-pub(super) type Make = fn(&mut Builder, &mut Sampler);
 
 /// What builds each class, and how often a shape of it stands turned by a quarter
 /// or half turn against its fellows. Counted on ModelNet40's training clouds:

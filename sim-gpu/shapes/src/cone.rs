@@ -4,9 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use crate::class::Make;
 use crate::primitives::{
-    Builder, Profile, Sampler, Section, Vessel, Wall, ellipsoid, outline, prism,
+    Builder, Make, Profile, Sampler, Section, Vessel, Wall, ellipsoid, outline, prism,
 };
 
 /// The makes, some of them more frequent.

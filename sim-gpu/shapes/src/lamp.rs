@@ -6,10 +6,9 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use crate::class::Make;
 use crate::primitives::{
-    Builder, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, frustum, rod,
-    smooth_tube,
+    Builder, Make, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, frustum,
+    rod, smooth_tube,
 };
 use shade::shade;
 

@@ -4,9 +4,8 @@ mod screen;
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use crate::class::Make;
 use crate::primitives::{
-    Builder, Sampler, bar, block, cap_start, cylinder, loft, outline, prism, rod, sheet, skin,
+    Builder, Make, Sampler, bar, block, cap_start, cylinder, loft, outline, prism, rod, sheet, skin,
 };
 use screen::Screen;
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{MAX_RINGS, Rays, checked_ray_count};
+use super::{Rays, checked_ray_count};
 use crate::config::{InvalidValue, positive, within};
 
 /// A table of beams on a turning head.
@@ -80,7 +80,10 @@ impl Rotating {
             return Err(InvalidValue::new("rotating.sequence_quantum_deg", cause));
         }
         within("rotating.beam_crossing_m", self.beam_crossing_m, 0.0..=1.0)?;
-        within("number of rotating.beam", self.beam.len() as f64, 1.0..=MAX_RINGS)?;
+        if !(1..=usize::from(u16::MAX)).contains(&self.beam.len()) {
+            let cause = format!("expected 1 to {} beams, found {}", u16::MAX, self.beam.len());
+            return Err(InvalidValue::new("rotating.beam", cause));
+        }
         for (i, beam) in self.beam.iter().enumerate() {
             let key = |field: &str| format!("rotating.beam[{i}].{field}");
             within(&key("azimuth_offset_deg"), beam.azimuth_offset_deg, -360.0..=360.0)?;

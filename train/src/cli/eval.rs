@@ -16,11 +16,11 @@ pub struct Args {
     /// The model file
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Labelled clouds: a packed NPZ file, or data with a test half, as `train`
-    /// takes it
+    /// Labelled clouds: a packed NPZ file, or data with a test part in any form
+    /// that `train --data` accepts
     #[arg(long, value_name = "PATH")]
     data: PathBuf,
-    /// Arithmetic of the inference: f32, f32-fc16, f16 or i8
+    /// Precision of the inference: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
     /// Write the confusion matrix to this CSV file

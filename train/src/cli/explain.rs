@@ -22,19 +22,21 @@ pub struct Args {
     /// The cloud file: PLY, NPZ, NPY, PCD, text, KITTI or LAS
     #[arg(long, value_name = "FILE")]
     cloud: PathBuf,
-    /// Points that each method marks
+    /// Number of points that each method marks
     #[arg(long, default_value_t = 64, value_name = "N")]
     points: usize,
-    /// Parts that LIME-3D divides the cloud into
+    /// Number of parts into which LIME-3D divides the cloud
     #[arg(long, default_value_t = 20, value_name = "K")]
     clusters: usize,
-    /// Clouds with parts removed that LIME-3D classifies
+    /// Number of copies of the cloud, each with some parts removed, that
+    /// LIME-3D classifies
     #[arg(long, default_value_t = 1000, value_name = "N")]
     samples: usize,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
-    /// Draw the cloud, marked by both methods, into this SVG file
+    /// Draw the cloud, with the points that both methods mark, into this SVG
+    /// file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
 }

@@ -12,43 +12,46 @@ use super::Usage;
 /// Flags of `train`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// What to learn from: a packed NPZ file; the common start of two names, such
-    /// as `rotational-noisy` for rotational-noisy-train.npz and -test.npz; a
-    /// folder with train.npz and test.npz; a folder of ModelNet40's HDF5 files; or
-    /// a folder of text files as in yanx27/Pointnet_Pointnet2_pytorch
+    /// Training data: a packed NPZ file; the common prefix of two packed files,
+    /// such as `rotational-noisy` for rotational-noisy-train.npz and
+    /// rotational-noisy-test.npz; a folder with train.npz and test.npz; a
+    /// folder of ModelNet40's HDF5 files; or a folder of text files as in
+    /// yanx27/Pointnet_Pointnet2_pytorch
     #[arg(long, value_name = "PATH")]
     data: PathBuf,
-    /// What to measure accuracy on, once, at the end [default: the test half of
-    /// --data, if it has two halves]
+    /// Test data, on which the accuracy is measured once, at the end [default:
+    /// the test part of --data, if it has one]
     #[arg(long, value_name = "PATH")]
     test: Option<PathBuf>,
-    /// The recipe as TOML; the flags below override it [default: the baseline's]
+    /// Recipe, a TOML file; the flags below override it [default: the settings
+    /// of the baseline]
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
-    /// The network: pointnet, or cpl for one behind a Critical Points Layer
+    /// Network: pointnet, or cpl (pointnet after a Critical Points Layer)
     /// [default: the recipe's]
     #[arg(long, value_name = "NAME", value_parser = ["pointnet", "cpl"])]
     arch: Option<String>,
-    /// Points of each cloud that the network, or its Critical Points Layer, sees
+    /// Number of points of each cloud that the network, or its Critical Points
+    /// Layer, sees
     #[arg(long, value_name = "N")]
     points: Option<usize>,
-    /// Widths of the Critical Points Layer's point encoder, the 3 coordinates
-    /// first
+    /// Widths of the layers of the Critical Points Layer's point encoder,
+    /// beginning with the 3 coordinates
     #[arg(long, value_name = "3-W-W", value_parser = parse_widths)]
     front: Option<Widths>,
-    /// Points that the Critical Points Layer selects
+    /// Number of points that the Critical Points Layer selects
     #[arg(long, value_name = "M")]
     keep: Option<usize>,
-    /// Passes over the training set
+    /// Number of passes over the training set
     #[arg(long, value_name = "N")]
     epochs: Option<u32>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// What the model's card calls the training set [default: the path]
+    /// Name of the training set on the model's card [default: the path]
     #[arg(long, value_name = "TEXT")]
     data_name: Option<String>,
-    /// The model file to write; the run's folder is beside it, with the
+    /// Model file to write; the folder of the run is beside it, with the
     /// extension `.run`
     #[arg(long, value_name = "FILE")]
     out: PathBuf,

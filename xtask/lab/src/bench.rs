@@ -30,22 +30,23 @@ pub struct BenchArgs {
 
 #[derive(Subcommand, Debug)]
 enum Benchmark {
-    /// Measure the simulator: building hierarchies, casting rays, writing a dataset to disk.
+    /// Measure the simulator: building BVHs, casting rays, writing a dataset to disk.
     Sim(SimArgs),
-    /// Measure the classifier and the sampler against other engines, in turns.
+    /// Compare the speed of the classifier and the sampler with other engines.
     ///
-    /// The other engines are Python packages, installed from PyPI under `target/peers`,
-    /// and Rust crates, built there. An engine that cannot be installed is skipped with a
-    /// message; an engine whose answer is wrong is not timed.
+    /// The engines run in alternation. The other engines are Python packages, installed from PyPI
+    /// under `target/peers`, and Rust crates, built there. An engine that cannot be installed is
+    /// skipped with a message; an engine whose answer is wrong is not timed.
     Infer(infer::InferArgs),
-    /// Measure a step of training against PyTorch's, in turns.
+    /// Compare the time of a training step with PyTorch's.
     Train(infer::learn::TrainArgs),
-    /// Model the classifier on a Raspberry Pi 5 without having one.
+    /// Model the run time of the classifier on a Raspberry Pi 5; no board is needed.
     ///
-    /// llvm-mca analyses the compiled inner loops, QEMU counts the instructions outside
-    /// them, and a model adds memory and threads.
+    /// llvm-mca analyses the compiled inner loops, QEMU counts the instructions outside them, and a
+    /// model adds the effects of memory and threads.
     PiModel(pi5::PiModelArgs),
-    /// Measure how errors grow with scale, offset, N and K, and compare them with derived bounds.
+    /// Measure how numerical errors grow with scale, offset and size, and compare them with derived
+    /// bounds.
     Growth(numerics::GrowthArgs),
     /// Compare every adapter with the CPU on the same meshes.
     Devices(devices::DevicesArgs),
@@ -53,7 +54,7 @@ enum Benchmark {
 
 #[derive(Args, Debug)]
 struct SimArgs {
-    /// Meshes to measure besides the generated ones: a file or a folder.
+    /// Meshes to measure in addition to the generated ones: a file or a folder.
     meshes: Option<PathBuf>,
     /// Measure this adapter only: `auto`, `cpu` or part of a name [default: all].
     #[arg(long, value_name = "NAME")]
@@ -61,7 +62,7 @@ struct SimArgs {
     /// Write all figures to this JSON file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Repeats of each measurement; the median is shown.
+    /// Number of repeats of each measurement; the median is shown.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
     rounds: u16,
     /// Sizes of the generated meshes, in triangles.
@@ -70,16 +71,17 @@ struct SimArgs {
     /// Use at most this many of the given meshes, spread evenly over their list.
     #[arg(long, default_value_t = 16, value_name = "N")]
     limit: usize,
-    /// Measure instead which builder is faster for how many rays.
+    /// Measure only which BVH builder is faster, depending on the number of rays.
     #[arg(long)]
     builders: bool,
-    /// Compare instead with Embree, which is installed from PyPI under `target/peers`.
+    /// Only compare with Embree, which is installed from PyPI under `target/peers`.
     #[arg(long)]
     peers: bool,
-    /// Measure instead the rays that plain Möller-Trumbore in f32 loses at vertices and edges.
+    /// Measure only the rays that the standard Möller-Trumbore test in f32 misses at vertices and
+    /// edges.
     #[arg(long)]
     trade: bool,
-    /// Measure instead the time that `--simplify auto` saves and the errors that it makes.
+    /// Measure only the time that `--simplify auto` saves and the errors that it causes.
     #[arg(long)]
     simplify: bool,
 }

@@ -25,13 +25,13 @@ struct Cli {
 enum Command {
     /// Measure speed and accuracy
     Bench(bench::BenchArgs),
-    /// Sweep every parameter from mesh to class, and record time and accuracy
+    /// Sweep every parameter from the mesh to the class, and record time and accuracy
     Trade(trade::Args),
     /// Measure how much each effect of a scan matters to a classifier, and what it costs
     Ablate(ablation::Args),
-    /// Repeat the paper's experiments, and write one report
+    /// Reproduce the paper's experiments, and write one report
     Reproduce(reproduction::Args),
-    /// Gather every record into one page
+    /// Show the results of all measurements on one HTML page
     Report(report::Args),
 }
 

@@ -14,7 +14,7 @@ const MOST_BYTES: u64 = 4 << 20;
 /// Flags of `build-pi`.
 #[derive(clap::Args, Default)]
 pub struct Args {
-    /// Copy the binary there [default: leave it under target/]
+    /// Copy the binary to this path [default: leave it under target/]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }

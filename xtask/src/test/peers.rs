@@ -33,11 +33,11 @@ const SHARED: Environment<'_> = Environment {
 /// Which scripts are run.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Which {
-    /// None.
+    /// No comparison.
     None,
-    /// Those that share one environment of packages.
+    /// All comparisons except that with PyTorch.
     Light,
-    /// All.
+    /// All comparisons, including that with PyTorch.
     All,
 }
 

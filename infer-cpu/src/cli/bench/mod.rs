@@ -23,14 +23,14 @@ Examples:
   infer-cpu bench --points 64,1024 --precision f32,f16 --threads 1,4
 
 The latency is that of a whole classification, from coordinates to class. Options
-of a sampler follow its name after colons: `fps`, `cpl`, `cpl:stn`, `cpl:trunk`,
-`random:votes5`, `random:votes5:turned`.")]
+of a sampler follow its name, separated by colons: `fps`, `cpl`, `cpl:stn`,
+`cpl:trunk`, `random:votes5`, `random:votes5:turned` (with rotations).")]
 pub struct Args {
     /// Model file [default: the bundled model]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
 
-    /// How many points the network sees
+    /// Numbers of points that the network sees
     #[arg(long, value_delimiter = ',', value_parser = at_least_one,
           default_value = "16,32,64,128,256,512,1024,2048,4096")]
     points: Vec<usize>,
@@ -57,11 +57,11 @@ pub struct Args {
     #[arg(long)]
     kernel: Option<infer_cpu::kernel::KernelName>,
 
-    /// How many points the samplers choose from
+    /// Number of points in the clouds that the samplers choose from
     #[arg(long, default_value_t = 1024, value_name = "N")]
     from: usize,
 
-    /// How often each setting classifies
+    /// Number of classifications per setting
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
 
@@ -70,8 +70,8 @@ pub struct Args {
     json: bool,
 
     #[cfg(feature = "npz")]
-    /// Clouds to calibrate int8 with, a packed NPZ [default: the model's own
-    /// calibration, else built-in procedural shapes]
+    /// Packed NPZ file of clouds to calibrate int8 with [default: the model's
+    /// own calibration, else built-in procedural shapes]
     #[arg(long, value_name = "NPZ")]
     calibrate: Option<PathBuf>,
 }

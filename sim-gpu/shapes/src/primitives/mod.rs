@@ -22,3 +22,6 @@ pub use sheet::{board, sheet};
 pub use spline::smooth;
 pub use sweep::{bar, rod, smooth_tube, sweep, tube};
 pub use vessel::{Vessel, Wall};
+
+/// Builds one make of a class.
+pub type Make = fn(&mut Builder, &mut Sampler);

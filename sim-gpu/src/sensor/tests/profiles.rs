@@ -145,5 +145,6 @@ fn bad_profiles_are_named() {
     );
     let no_beam = "name = \"a\"\nrange = { max_m = 1 }\n\
                    rotating = { rpm = 60, sequence_us = 9, beam = [] }";
-    assert!(parse(no_beam).unwrap_err().to_string().contains("number of rotating.beam: "));
+    let error = parse(no_beam).unwrap_err().to_string();
+    assert!(error.contains("rotating.beam: expected 1 to 65535 beams, found 0"), "{error}");
 }

@@ -37,16 +37,16 @@ pub struct PiModelArgs {
     #[arg(long, value_delimiter = ',', value_parser = eights,
           default_value = "16,32,64,128,256,512,1024,2048,4096")]
     points: Vec<usize>,
-    /// Points of the clouds that samplers choose from.
+    /// Number of points in the clouds that samplers choose from.
     #[arg(long, value_parser = eights, default_value = "1024", value_name = "N")]
     from: usize,
-    /// Points that a Critical Points Layer keeps.
+    /// Number of points that a Critical Points Layer keeps.
     #[arg(long, value_parser = eights, default_value = "64", value_name = "N")]
     critical: usize,
-    /// Precisions: f32, f32-fc16, f16, i8.
+    /// Precisions to model: f32, f32-fc16, f16, i8.
     #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
     precision: Vec<Precision>,
-    /// Number of cores that work.
+    /// Number of cores that are used.
     #[arg(long, default_value_t = model::Machine::PI_5.threads as u16,
           value_parser = clap::value_parser!(u16).range(1..))]
     threads: u16,
@@ -56,14 +56,13 @@ pub struct PiModelArgs {
     /// Memory bandwidth of all cores together, GB/s.
     #[arg(long, default_value_t = model::Machine::PI_5.bytes_per_s / 1e9, value_name = "GB/S", value_parser = positive)]
     bandwidth: f64,
-    /// Instructions a cycle outside inner loops; the core's two SIMD pipes
-    /// allow two.
+    /// Instructions per cycle outside the inner loops; the core's two SIMD pipes allow two.
     #[arg(long, default_value_t = model::Machine::PI_5.instructions_per_cycle, value_name = "IPC", value_parser = positive)]
     other_ipc: f64,
-    /// Do not count instructions under QEMU; model inner loops and memory alone.
+    /// Do not count instructions under QEMU; model only the inner loops and memory.
     #[arg(long)]
     no_counts: bool,
-    /// Fail if a tile's inner loop is below this share of FMA peak, percent.
+    /// Fail if a tile's inner loop reaches less than this share of the peak FMA rate, percent.
     #[arg(long, value_name = "PERCENT", value_parser = positive)]
     least_peak: Option<f64>,
     /// llvm-mca of LLVM 19 or newer [default: the newest on the PATH]
@@ -72,7 +71,7 @@ pub struct PiModelArgs {
     /// Write all figures to this JSON file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the modelled times to this CSV file, one a row.
+    /// Write the modelled times to this CSV file, one per row.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 }
@@ -180,7 +179,7 @@ impl Modelled {
         precision: Precision,
         threads: &[usize],
     ) -> Result<Option<Vec<f64>>> {
-        let setting = rows::Setting { sampler, from, points, precision };
+        let setting = plan::Setting { sampler, from, points, precision };
         let Some(stages) = setting.stages(&self.network) else { return Ok(None) };
         let (network, kernels) = (&self.network, &self.board.kernels);
         let counted = rows::count(&self.counter, network, kernels, setting)?;

@@ -130,6 +130,6 @@ pub mod tests {
         let path = folder.path().join("x.safetensors");
         write_weights(&path, &BTreeMap::new(), &BTreeMap::new()).unwrap();
         let refused = Network::read(&path).unwrap_err().to_string();
-        assert!(refused.contains("x.safetensors") && refused.contains("trunk"), "{refused}");
+        assert!(refused.contains("x.safetensors") && refused.contains("two layers"), "{refused}");
     }
 }

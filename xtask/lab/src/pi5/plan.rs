@@ -4,7 +4,7 @@ use super::network::{Layer, Net, Network};
 use super::number::Number;
 use infer_cpu::Precision;
 use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays, prefilter_pays};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::slice::from_ref;
 
 /// Where the points that a network sees come from.
@@ -34,6 +34,31 @@ impl Sampler {
             Self::Cpl => "cpl:own:truncate",
             Self::CplStn => "cpl:stn:truncate",
         }
+    }
+}
+
+/// What is modelled: `points` of a cloud of `from` points to a class.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Setting {
+    /// Where the points come from.
+    pub sampler: Sampler,
+    /// Points of the cloud.
+    pub from: usize,
+    /// Points that the network sees.
+    pub points: usize,
+    /// What it computes in.
+    #[serde(serialize_with = "by_name")]
+    pub precision: Precision,
+}
+
+fn by_name<S: Serializer>(precision: &Precision, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(precision.name())
+}
+
+impl Setting {
+    /// What infer-cpu does; `None` if the network lacks what the sampler pools.
+    pub fn stages(self, network: &Network) -> Option<Vec<Stage>> {
+        stages(network, self.sampler, (self.from, self.points), self.precision)
     }
 }
 

@@ -5,10 +5,9 @@ use super::count::Counter;
 use super::kernels::Kernels;
 use super::model::{Other, Time, time};
 use super::network::Network;
-use super::plan::{Sampler, Stage, stages};
+use super::plan::{Sampler, Setting, Stage};
 use anyhow::Result;
-use infer_cpu::Precision;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 /// Clouds of more points are not run under QEMU: what is counted grows by the
 /// same amount with every run of blocks.
@@ -33,31 +32,6 @@ pub struct Row {
     pub other: Option<Other>,
     /// Where most instructions were counted, the inner loops among them.
     pub functions: Vec<(String, f64)>,
-}
-
-/// What is modelled: `points` of a cloud of `from` points to a class.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Setting {
-    /// Where the points come from.
-    pub sampler: Sampler,
-    /// Points of the cloud.
-    pub from: usize,
-    /// Points that the network sees.
-    pub points: usize,
-    /// What it computes in.
-    #[serde(serialize_with = "by_name")]
-    pub precision: Precision,
-}
-
-fn by_name<S: Serializer>(precision: &Precision, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(precision.name())
-}
-
-impl Setting {
-    /// What infer-cpu does; `None` if the network lacks what the sampler pools.
-    pub fn stages(self, network: &Network) -> Option<Vec<Stage>> {
-        stages(network, self.sampler, (self.from, self.points), self.precision)
-    }
 }
 
 /// All rows that `args` ask for.

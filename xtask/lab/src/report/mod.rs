@@ -25,11 +25,11 @@ use xtask::workspace;
 /// Flags of `report`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder that holds reports, bench and meshes, as this repository's assets
+    /// Folder that holds the folders reports, bench and meshes [default: this repository's assets]
     #[arg(long, value_name = "DIR")]
     assets: Option<PathBuf>,
 
-    /// Where the page goes
+    /// HTML file to write
     #[arg(long, value_name = "HTML", default_value = "data/report.html")]
     out: PathBuf,
 }

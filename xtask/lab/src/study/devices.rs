@@ -36,15 +36,15 @@ const DISTANCE_M: f64 = 3.0;
 /// Flags of `bench devices`.
 #[derive(Args, Debug)]
 pub struct DevicesArgs {
-    /// CSV file to write, a row for each mesh, view and adapter.
+    /// CSV file to write, with one row for each mesh, view and adapter.
     #[arg(long, value_name = "FILE")]
     csv: PathBuf,
-    /// Meshes besides the parametric shapes [default: assets/meshes].
+    /// Meshes to measure in addition to the procedural shapes [default: assets/meshes].
     meshes: Option<PathBuf>,
     /// Model that classifies, in f32 [default: edge-64 of assets/weights].
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Views of each mesh, spread around it.
+    /// Number of views of each mesh, spread around it.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     views: u32,
 }

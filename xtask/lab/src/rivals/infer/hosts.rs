@@ -13,7 +13,7 @@ const GENERAL: Environment<'_> = Environment {
 const TORCH: Environment<'_> = Environment {
     name: "torch-venv",
     requirements: "xtask/lab/peers/infer/torch-requirements.txt",
-    size: "about 3 GB",
+    size: "about 5 GB",
 };
 
 /// What runs a rival.

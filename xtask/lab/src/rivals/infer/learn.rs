@@ -25,14 +25,14 @@ pub struct TrainArgs {
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = super::positive,
           default_value = "64,1024")]
     points: Vec<usize>,
-    /// Clouds of a batch.
+    /// Number of clouds in a batch.
     #[arg(long, value_name = "N", value_parser = super::positive, default_value = "24")]
     batch: usize,
-    /// Turns of each program at each size, of several steps each; the median of all
-    /// steps is shown.
+    /// Number of rounds. In each round, every program takes several steps at every size; the median
+    /// of all steps is shown.
     #[arg(long, value_name = "N", value_parser = super::positive, default_value = "5")]
     rounds: usize,
-    /// Leave PyTorch out, which downloads about 3 GB from PyPI.
+    /// Do not compare with PyTorch, which is a download of about 5 GB from PyPI.
     #[arg(long)]
     no_torch: bool,
     /// Write all figures, with every step, to this JSON file.

@@ -34,8 +34,8 @@ use xtask::workspace::recorded;
 /// Flags of `bench infer`.
 #[derive(Args, Debug)]
 pub struct InferArgs {
-    /// Weights for all engines: a safetensors file with the key names of yanx27's
-    /// `pointnet_cls` [default: random weights of its shapes].
+    /// Weights for all engines: a safetensors file with the key names of yanx27's `pointnet_cls`
+    /// [default: random weights of the same shapes].
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Sizes of the clouds to classify, in points.
@@ -46,18 +46,18 @@ pub struct InferArgs {
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = positive,
           default_value = "1,2")]
     threads: Vec<usize>,
-    /// Turns of each engine at each job, of several repeats each; the median of all
-    /// repeats is shown.
+    /// Number of rounds. In each round, every engine repeats every job several times; the median of
+    /// all repeats is shown.
     #[arg(long, value_name = "N", default_value = "9", value_parser = positive)]
     rounds: usize,
     /// Write all figures, with every repeat, to this JSON file.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Measure these engines only; `ncnn` includes `ncnn-f16`, and `ours` includes all
-    /// precisions of ours [default: all but PyTorch].
+    /// Measure only these engines; `ours` is infer-cpu in all its precisions, and `ncnn` includes
+    /// `ncnn-f16` [default: all except PyTorch].
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     engines: Vec<String>,
-    /// Measure PyTorch too, which downloads about 3 GB from PyPI.
+    /// Also measure PyTorch, which is a download of about 5 GB from PyPI.
     #[arg(long)]
     torch: bool,
 }

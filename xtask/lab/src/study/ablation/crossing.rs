@@ -1,7 +1,8 @@
 //! Networks by the set that they were trained on, each tested on several sets.
 
-use super::design::{Design, Set, Test};
+use super::design::{Design, Set};
 use super::rows::Answer;
+use super::rows::Test;
 use super::sets::{self, Sets};
 use super::write_csv;
 use crate::study::resume;

@@ -2,8 +2,9 @@
 
 use super::datasets::clouds;
 use super::effects::{DATASETS, Source};
+use super::folder;
 use super::plan::Plan;
-use super::{folder, rows};
+use super::rows::{self, Test};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use train::recipe::Recipe;
@@ -34,15 +35,6 @@ pub struct Set {
     pub path: PathBuf,
     /// Whether only clouds are used whose names all matched sets have.
     pub matched: bool,
-}
-
-/// One set to train on and one to test on.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub struct Test {
-    /// The set that the network learns from.
-    pub trained_on: &'static str,
-    /// The set that it is tested on.
-    pub tested_on: &'static str,
 }
 
 impl Design {

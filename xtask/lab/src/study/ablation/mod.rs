@@ -32,19 +32,19 @@ use std::path::{Path, PathBuf};
 /// Flags of `ablate`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A folder of meshes, as gen-dataset takes it [default: built-in shapes]
+    /// Folder of meshes, as for gen-dataset [default: built-in shapes]
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
-    /// Use a few meshes only, which takes two minutes
+    /// Use only a few meshes; this takes two minutes
     #[arg(long, conflicts_with = "plan")]
     quick: bool,
 
-    /// The sizes of the study, as in the files of assets/ablations
+    /// Plan of the study: its sizes, in a TOML file like those in assets/ablations
     #[arg(long, value_name = "TOML")]
     plan: Option<PathBuf>,
 
-    /// The folder of ablations.csv and of all that it is made from; an interrupted run is resumed
+    /// Folder for ablations.csv and all intermediate files; an interrupted run is resumed
     #[arg(long, value_name = "DIR", default_value = "data/ablations")]
     out: PathBuf,
 }

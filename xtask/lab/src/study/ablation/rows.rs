@@ -1,11 +1,19 @@
 //! The lines of `ablations.csv`.
 
-use super::design::Test;
 use super::effects::{EFFECTS, Effect, Judge, REFERENCE};
 use crate::measure::clock::Spread;
 use formats::interval::wilson;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// One set to train on and one to test on.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Test {
+    /// The set that the network learns from.
+    pub trained_on: &'static str,
+    /// The set that it is tested on.
+    pub tested_on: &'static str,
+}
 
 /// One network's answers on one set: a line of `answers.csv`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

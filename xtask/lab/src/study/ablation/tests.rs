@@ -1,8 +1,9 @@
 //! Networks trained on some sets and tested on others.
 
 use super::crossing;
-use super::design::{Design, Set, Test};
+use super::design::{Design, Set};
 use super::rows::Answer;
+use super::rows::Test;
 use crate::study::test_clouds;
 use std::path::Path;
 

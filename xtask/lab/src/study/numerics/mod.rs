@@ -24,14 +24,15 @@ use xtask::workspace::root;
 /// Flags of `bench growth`.
 #[derive(Args, Debug)]
 pub struct GrowthArgs {
-    /// CSV file to write, a row for each quantity, layer, precision and value of a parameter.
+    /// CSV file to write, with one row for each quantity, layer, precision and value of a
+    /// parameter.
     #[arg(long, value_name = "FILE")]
     csv: PathBuf,
     /// Models whose layers are measured; batch norms must be folded in [default:
     /// edge-64, pointnet-64 and pointnet-1024 of assets/weights].
     #[arg(long, value_name = "FILE,...", value_delimiter = ',')]
     models: Vec<PathBuf>,
-    /// Clouds for each value of a parameter.
+    /// Number of clouds for each value of a parameter.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     clouds: u32,
 }

@@ -32,31 +32,32 @@ use std::time::Instant;
 /// Flags of `reproduce`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// ModelNet40's clouds, as `train --data` takes them [default: points of the meshes' surfaces]
+    /// ModelNet40's clouds, in any form that `train --data` accepts [default: points sampled from
+    /// the meshes' surfaces]
     #[arg(long, value_name = "PATH")]
     clouds: Option<PathBuf>,
 
-    /// What the report calls them [default: their path]
+    /// Name of the clouds in the report [default: their path]
     #[arg(long, value_name = "TEXT", requires = "clouds")]
     clouds_name: Option<String>,
 
-    /// A folder of meshes, as gen-dataset takes it [default: built-in shapes]
+    /// Folder of meshes, as for gen-dataset [default: built-in shapes]
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
-    /// What the report calls those [default: their path]
+    /// Name of the meshes in the report [default: their path]
     #[arg(long, value_name = "TEXT", requires = "meshes")]
     meshes_name: Option<String>,
 
-    /// Run a subset, which takes ten minutes on two cores
+    /// Run a subset of the experiments; this takes ten minutes on two cores
     #[arg(long, conflicts_with = "plan")]
     quick: bool,
 
-    /// The sizes of the experiments, as in the files of assets/reproduce
+    /// Plan of the experiments: their sizes, in a TOML file like those in assets/reproduce
     #[arg(long, value_name = "TOML")]
     plan: Option<PathBuf>,
 
-    /// The folder of the report and of all that it is made from; an interrupted run is resumed
+    /// Folder for the report and all intermediate files; an interrupted run is resumed
     #[arg(long, value_name = "DIR", default_value = "data/reproduce")]
     out: PathBuf,
 }

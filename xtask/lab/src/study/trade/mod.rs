@@ -36,8 +36,8 @@ use xtask::workspace::file_name;
 /// Flags of `trade`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder of meshes, as gen-dataset takes it; the test meshes are scanned [default:
-    /// built-in procedural shapes]
+    /// Folder of meshes, as for gen-dataset; only the test meshes are scanned [default: built-in
+    /// procedural shapes]
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
@@ -50,8 +50,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
-    /// Labelled clouds on which models, samplers, points and precisions are compared, a packed
-    /// NPZ file [default: the scans themselves]
+    /// Packed NPZ file of labelled clouds, on which models, samplers, numbers of points and
+    /// precisions are compared [default: the scans themselves]
     #[arg(long, value_name = "NPZ")]
     clouds: Option<PathBuf>,
 
@@ -59,11 +59,11 @@ pub struct Args {
     #[arg(long, value_name = "TEXT", requires = "clouds")]
     clouds_name: Option<String>,
 
-    /// Measure few meshes and few settings, and do not model a Raspberry Pi: takes two minutes
+    /// Measure few meshes and few settings, and do not model a Raspberry Pi; this takes two minutes
     #[arg(long)]
     quick: bool,
 
-    /// Rounds of all scans and of all classifiers; the medians are recorded
+    /// Number of times that all scans and classifications are measured; the medians are recorded
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     rounds: u16,
 
