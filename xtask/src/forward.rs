@@ -15,16 +15,8 @@ pub const LAB: &str = "edgepuck-lab";
 /// Commands of the product that read or write no network. A first build for them
 /// leaves out the feature `models`: infer-cpu, and readers and writers of PyTorch's
 /// and ONNX's files.
-const WITHOUT_MODELS: [&str; 8] = [
-    "gen-dataset",
-    "gen",
-    "gen-shapes",
-    "sample-surfaces",
-    "scan",
-    "preview",
-    "adapters",
-    "merge-dataset",
-];
+const WITHOUT_MODELS: &str =
+    "gen-dataset gen gen-shapes sample-surfaces scan preview adapters merge-dataset";
 
 /// Runs the program of `package` with `words` in the caller's folder and gives
 /// the exit code that it ended with.
@@ -33,7 +25,7 @@ const WITHOUT_MODELS: [&str; 8] = [
 /// Cargo cannot be started.
 pub fn run(package: &str, words: &[OsString]) -> anyhow::Result<u8> {
     let mut cargo = cargo_run(package);
-    if words.first().is_some_and(|word| WITHOUT_MODELS.iter().any(|name| word == name)) {
+    if words.first().is_some_and(|word| WITHOUT_MODELS.split(' ').any(|name| word == name)) {
         cargo.arg("--no-default-features");
     }
     for feature in features(package, words) {

@@ -66,9 +66,10 @@ fn run_all(args: &Args, summary: &mut Summary) {
     let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
+    let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
     pi::run(summary, install);
     peers::run(summary, packages);
-    fuzz::run(summary, args.fuzz_seconds);
+    fuzz::run(summary, args.fuzz_seconds, fuzz_targets);
 }
 
 /// A check that cannot run here, which fails where it is `required`.

@@ -1,7 +1,7 @@
 //! Feeds each hand-written parser with mutated input for a while.
 
-use crate::summary::{Counts, Summary, check};
-use anyhow::Context;
+use crate::summary::{Counts, Summary};
+use anyhow::{Context, bail};
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Child, Command};
@@ -20,17 +20,26 @@ const COVERAGE: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-l
      -Cllvm-args=-sanitizer-coverage-pc-table \
      -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1";
 
-/// Fuzzes every target for `seconds`, as many at a time as there are cores.
-pub fn run(summary: &mut Summary, seconds: u32) {
-    summary.step("fuzzing", |summary| {
-        let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
-        if seconds == 0 || !is_known {
-            let reason =
-                if is_known { "--fuzz-seconds 0" } else { "its flags are for x86-64 Linux" };
-            return Ok(summary.skip("fuzzing", TARGETS.len(), reason));
-        }
+/// Starts to build the targets, while tests under the emulator leave a core idle.
+pub fn build_meanwhile(seconds: u32) -> Option<anyhow::Result<Child>> {
+    let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
+    (seconds > 0 && is_known).then(|| {
+        fs::create_dir_all(folder().join("target"))?;
         let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
-        check("fuzzing", build.current_dir(folder()).env("RUSTFLAGS", COVERAGE))?;
+        spawn(build.current_dir(folder()).env("RUSTFLAGS", COVERAGE), "build")
+    })
+}
+
+/// Fuzzes every target for `seconds`, as many at a time as there are cores.
+pub fn run(summary: &mut Summary, seconds: u32, build: Option<anyhow::Result<Child>>) {
+    summary.step("fuzzing", |summary| {
+        let Some(build) = build else {
+            let reason = "it needs x86-64 Linux and --fuzz-seconds above 0";
+            return Ok(summary.skip("fuzzing", TARGETS.len(), reason));
+        };
+        if !build?.wait()?.success() {
+            bail!("the targets cannot be built: {}", fs::read_to_string(log("build"))?);
+        }
         let mut counts = Counts::default();
         for targets in TARGETS.chunks(available_parallelism()?.get()) {
             let started = targets.iter().map(|target| start(target, seconds));
@@ -68,9 +77,14 @@ fn start(target: &str, seconds: u32) -> anyhow::Result<Child> {
         fs::create_dir_all(folder.join("corpus").join(target))?;
         command.args([format!("corpus/{target}"), format!("seeds/{target}")]);
     }
-    let log = log(target);
-    let said = File::create(&log).with_context(|| log.display().to_string())?;
-    eprintln!("== fuzzing {target} for {seconds} s, see {}", log.display());
-    command.stdout(said.try_clone()?).stderr(said);
-    command.spawn().with_context(|| format!("cannot start the fuzz target {target}"))
+    eprintln!("== fuzzing {target} for {seconds} s, see {}", log(target).display());
+    spawn(&mut command, target)
+}
+
+/// Starts `command`; its output goes to the log `name`.
+fn spawn(command: &mut Command, name: &str) -> anyhow::Result<Child> {
+    let log = log(name);
+    let output = File::create(&log).with_context(|| log.display().to_string())?;
+    command.stdout(output.try_clone()?).stderr(output);
+    command.spawn().with_context(|| format!("cannot start {}", command.get_program().display()))
 }
