@@ -181,7 +181,7 @@ fn jobs_answer_alike_cast_together_alone_and_while_others_are_in_flight() {
             for thread in 0..4 {
                 let (jobs, expected) = (&jobs, &expected);
                 scope.spawn(move || {
-                    for i in (0..jobs.len()).cycle().skip(thread * 7).take(jobs.len()) {
+                    for i in (0..jobs.len()).cycle().skip(thread * 7).take(3 * jobs.len()) {
                         let first = caster.submit(&jobs[i..=i]).unwrap();
                         let next = (i + 1) % jobs.len();
                         let second = caster.submit(&jobs[next..=next]).unwrap();

@@ -90,6 +90,14 @@ impl Malformed {
         Self::Syntax(format!("expected {expected}, found {:?}", excerpt(found)))
     }
 
+    /// Checks that indices of 32 bits can name `n_vertices` vertices.
+    pub(super) fn check_vertex_count(n_vertices: u64) -> Result<(), Self> {
+        if n_vertices <= u64::from(u32::MAX) {
+            return Ok(());
+        }
+        Err(Self::Syntax(format!("expected at most {} vertices, found {n_vertices}", u32::MAX)))
+    }
+
     /// The cause, found at `line`.
     pub(super) fn at(self, line: usize) -> ParseError {
         ParseError { line: Some(line), cause: self }

@@ -72,10 +72,7 @@ fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
 /// What every mesh must satisfy, whatever its format and reader.
 fn check(mesh: &Mesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
-    if n_vertices > u64::from(u32::MAX) {
-        let cause = format!("expected at most {} vertices, found {n_vertices}", u32::MAX);
-        return Err(Malformed::Syntax(cause).into());
-    }
+    Malformed::check_vertex_count(n_vertices)?;
     if let Some(vertex) = mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {
         return Err(
             Malformed::Syntax(format!("expected finite coordinates, found {vertex}")).into()

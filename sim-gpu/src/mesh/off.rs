@@ -29,10 +29,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
 /// `tokens` has come to.
 fn read(tokens: &mut Tokens<'_>) -> Result<Parsed, Malformed> {
     let [n_vertices, n_faces] = header(tokens)?;
-    if n_vertices > u64::from(u32::MAX) {
-        let cause = format!("expected at most {} vertices, found {n_vertices}", u32::MAX);
-        return Err(Malformed::Syntax(cause));
-    }
+    Malformed::check_vertex_count(n_vertices)?;
     let mut parsed = Parsed::default();
     for held in 0..n_vertices {
         if !tokens.next_data_line() {

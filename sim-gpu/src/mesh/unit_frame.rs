@@ -58,13 +58,20 @@ mod tests {
 
     #[test]
     fn the_unit_frame_scales_by_powers_of_two_only() {
-        for (half, scale) in [(1.0, 1.0), (0.75, 1.0), (1.01, 2.0), (1e-300, 0.0), (1.7e12, 0.0)] {
+        let known = [(0.5, 0.5), (0.50001, 1.0), (0.75, 1.0), (1.0, 1.0), (1.01, 2.0), (2.0, 2.0)];
+        let others = [1e-300, 0.4, 1.5, 3e7, 1.7e12, 1e300].map(|half| (half, 0.0));
+        for (half, scale) in known.into_iter().chain(others) {
             let frame = UnitFrame::of([DVec3::splat(-half), DVec3::splat(half)].into_iter());
             let unit = frame.to_unit(DVec3::splat(half)).x;
             assert!(unit > 0.5 && unit <= 1.0, "{half} maps to {unit}");
             assert_eq!(frame.scale.to_bits() << 12, 0, "{} is a power of two", frame.scale);
             assert!(scale == 0.0 || frame.scale == scale);
         }
+    }
+
+    #[test]
+    fn a_point_keeps_its_scale() {
+        assert_eq!(UnitFrame::of([DVec3::ONE].into_iter()).scale, 1.0);
     }
 
     #[test]
