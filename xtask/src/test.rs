@@ -22,7 +22,7 @@ pub struct Args {
     no_install: bool,
 
     /// Seconds to fuzz each hand-written parser
-    #[arg(long, default_value_t = 30, value_name = "SECONDS")]
+    #[arg(long, default_value_t = 15, value_name = "SECONDS")]
     fuzz_seconds: u32,
 
     /// Which comparisons with other software (tests/peers) to run; `all` downloads about 5 GB from
