@@ -1,36 +1,39 @@
-//! Labelled sets of clouds of one size, read from an NPZ archive of either
-//! convention:
+//! Labelled sets of clouds, read from an NPZ archive of any of three
+//! conventions: clouds of one size as they are or in whole numbers, or clusters of
+//! any size, one behind the other.
 //!
 //! | key | type | shape | what |
 //! | --- | --- | --- | --- |
 //! | `points` | floating | `[m, n, 3]` | coordinates |
 //! | or `points_i16` | i16 | `[m, n, 3]` | coordinates times 32767 |
+//! | or `points` with `offsets` | floating | `[total, 3]` | coordinates of all clouds |
+//! | `offsets` | whole numbers | `[m + 1]` | where each cloud begins, and where the last ends |
 //! | `labels` | whole numbers | `[m]` or `[m, 1]` | indices into the classes |
+//! | or `labels` | text | `[m]` | class names |
 //! | `names`, may be absent | text | `[m]` | instances |
 //! | `n_raw`, may be absent | whole numbers | `[m]` or `[m, 1]` | points of each scan before resampling |
 //! | `classes`, may be absent | text | `[k]` | class names in the order of the labels |
+//! | `range_m`, with `offsets` | floating | `[m]` | distance from the sensor, metres; may be absent |
+//! | `height_m`, with `offsets` | floating | `[m]` | height of the lowest point above the ground, metres, NaN if unknown; may be absent |
+//! | `sensor`, with `offsets` | text | `[m]` | the sensor's name; may be absent |
+//! | `ids`, with `offsets` | text | `[m]` | `FRAME#TRACK`, or any other name of the object; may be absent |
 //!
-//! [`crate::packed`] writes all of them, with `points`. Other keys are ignored.
+//! Where labels are text and no classes are listed, the classes are the sorted
+//! distinct labels. [`crate::packed`] writes clouds of one size, and
+//! [`crate::clusters`] clusters of any size. Other keys are ignored.
 
-use std::io::{Read, Seek};
-use std::path::Path;
+mod read;
 
-use crate::archive::NpzReader;
-use crate::decoding::invalid;
-use crate::error::FormatError;
-use crate::npy;
-use crate::number::NumberType;
-
-/// What 1.0 is in `points_i16`.
-const I16_SCALE: f32 = 32767.0;
+pub use read::read_labelled;
 
 /// A labelled set in memory.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LabelledSet {
-    /// Coordinates of all clouds, `[m, n_points, 3]` in C order.
+    /// Coordinates of all clouds, `[total, 3]` in C order.
     pub points: Vec<f32>,
-    /// Points of a cloud.
-    pub n_points: usize,
+    /// Where each cloud begins among all points, and where the last one ends:
+    /// `[m + 1]`, ascending from 0.
+    pub offsets: Vec<usize>,
     /// Class of each cloud; an index into `classes` where they are known.
     pub labels: Vec<usize>,
     /// Name of each cloud, where the set names them.
@@ -39,6 +42,39 @@ pub struct LabelledSet {
     pub n_raw: Option<Vec<u32>>,
     /// Class names in the order of the labels, where the set lists them.
     pub classes: Option<Vec<String>>,
+    /// Distance of each cloud from the sensor in metres, where the set lists them.
+    pub range_m: Option<Vec<f32>>,
+    /// Height of each cloud's lowest point above the ground under it, metres, NaN
+    /// where that is unknown; where the set lists them.
+    pub height_m: Option<Vec<f32>>,
+    /// Name of the sensor of each cloud, where the set lists them.
+    pub sensor: Option<Vec<String>>,
+    /// Frame and track of each cloud, `FRAME#TRACK`, where the set lists them.
+    pub ids: Option<Vec<String>>,
+}
+
+impl Default for LabelledSet {
+    /// The set without clouds.
+    fn default() -> Self {
+        Self {
+            points: Vec::new(),
+            offsets: vec![0],
+            labels: Vec::new(),
+            names: None,
+            n_raw: None,
+            classes: None,
+            range_m: None,
+            height_m: None,
+            sensor: None,
+            ids: None,
+        }
+    }
+}
+
+/// The offsets of `m` clouds of `n_points` points.
+#[must_use]
+pub fn equal_offsets(m: usize, n_points: usize) -> Vec<usize> {
+    (0..=m).map(|i| i * n_points).collect()
 }
 
 impl LabelledSet {
@@ -57,106 +93,57 @@ impl LabelledSet {
     /// The points of cloud `i`, which must be below [`LabelledSet::len`].
     #[must_use]
     pub fn cloud(&self, i: usize) -> &[[f32; 3]] {
-        let size = self.n_points * 3;
-        self.points[i * size..(i + 1) * size].as_chunks::<3>().0
+        self.points[3 * self.offsets[i]..3 * self.offsets[i + 1]].as_chunks::<3>().0
+    }
+
+    /// As [`LabelledSet::cloud`], to be changed.
+    #[must_use]
+    pub fn cloud_mut(&mut self, i: usize) -> &mut [[f32; 3]] {
+        self.points[3 * self.offsets[i]..3 * self.offsets[i + 1]].as_chunks_mut::<3>().0
+    }
+
+    /// The points of the smallest cloud; 0 without clouds.
+    #[must_use]
+    pub fn smallest_cloud(&self) -> usize {
+        self.offsets.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(0)
+    }
+
+    /// Height of the ground under cloud `i`, in the cloud's frame, metres, where the
+    /// set tells it.
+    #[must_use]
+    pub fn ground_z(&self, i: usize) -> Option<f32> {
+        let height_m = self.height_m.as_ref()?[i];
+        let lowest = self.cloud(i).iter().fold(f32::INFINITY, |lowest, point| lowest.min(point[2]));
+        height_m.is_finite().then_some(lowest - height_m)
+    }
+
+    /// Appends a cloud of class `label`. The columns of remarks, such as names, are
+    /// left to the caller.
+    pub fn push(&mut self, points: &[[f32; 3]], label: usize) {
+        self.points.extend_from_slice(points.as_flattened());
+        self.offsets.push(self.points.len() / 3);
+        self.labels.push(label);
     }
 
     /// The clouds at `indices`, which must be below [`LabelledSet::len`], in
     /// that order.
     #[must_use]
     pub fn select(&self, indices: &[usize]) -> Self {
-        let points = indices.iter().flat_map(|&i| self.cloud(i).as_flattened().iter().copied());
-        Self {
-            points: points.collect(),
-            n_points: self.n_points,
-            labels: chosen(&self.labels, indices),
-            names: self.names.as_ref().map(|names| chosen(names, indices)),
-            n_raw: self.n_raw.as_ref().map(|n_raw| chosen(n_raw, indices)),
+        let mut some = Self {
+            names: chosen(self.names.as_ref(), indices),
+            n_raw: chosen(self.n_raw.as_ref(), indices),
             classes: self.classes.clone(),
-        }
-    }
-}
-
-fn chosen<T: Clone>(values: &[T], indices: &[usize]) -> Vec<T> {
-    indices.iter().map(|&i| values[i].clone()).collect()
-}
-
-/// Reads the labelled set at `path`.
-///
-/// # Errors
-/// A missing array of points or labels, an array of an unexpected type or
-/// length, a label without a class: [`FormatError::Malformed`] with file and key.
-pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
-    let mut npz = NpzReader::open(path)?;
-    let (m, n_points, points) = read_points(&mut npz)?;
-    let labels = read_whole_numbers(&mut npz, "labels")?;
-    let names = if npz.has("names") { Some(npz.text("names")?) } else { None };
-    let n_raw = if npz.has("n_raw") { Some(read_whole_numbers(&mut npz, "n_raw")?) } else { None };
-    let classes = if npz.has("classes") { Some(npz.text("classes")?) } else { None };
-    let lengths = [
-        ("labels", Some(labels.len())),
-        ("names", names.as_ref().map(Vec::len)),
-        ("n_raw", n_raw.as_ref().map(Vec::len)),
-    ];
-    for (key, length) in lengths {
-        if let Some(found) = length.filter(|&length| length != m) {
-            let cause = format!("expected {m} values, one for each cloud, found {found}");
-            return Err(npz.error(key, cause));
-        }
-    }
-    if let Some(classes) = &classes
-        && let Some(label) = labels.iter().find(|&&label| label >= classes.len())
-    {
-        let cause = format!("expected labels below {}, found {label}", classes.len());
-        return Err(npz.error("labels", cause));
-    }
-    Ok(LabelledSet { points, n_points, labels, names, n_raw, classes })
-}
-
-/// How many clouds of how many points there are, and their coordinates.
-fn read_points<R: Read + Seek>(
-    npz: &mut NpzReader<R>,
-) -> Result<(usize, usize, Vec<f32>), FormatError> {
-    let (key, scale) =
-        if npz.has("points_i16") { ("points_i16", I16_SCALE) } else { ("points", 1.0) };
-    npz.entry(key, |header, _, elements| {
-        let [m, n_points, 3] = header.shape[..] else {
-            return Err(invalid(format!("expected shape [m, n, 3], found {:?}", header.shape)));
+            range_m: chosen(self.range_m.as_ref(), indices),
+            height_m: chosen(self.height_m.as_ref(), indices),
+            sensor: chosen(self.sensor.as_ref(), indices),
+            ids: chosen(self.ids.as_ref(), indices),
+            ..Self::default()
         };
-        let is_expected = match header.number() {
-            Some((NumberType::I16, _)) => key == "points_i16",
-            Some((NumberType::F16 | NumberType::F32 | NumberType::F64, _)) => key == "points",
-            _ => false,
-        };
-        if !is_expected {
-            let expected = if key == "points" { "f2, f4 or f8" } else { "i2" };
-            let descr = &header.descr;
-            return Err(invalid(format!("expected elements of type {expected}, found {descr}")));
-        }
-        // f32 holds every i16 and the scale, so that this quotient is rounded
-        // once, as NumPy's own in f32.
-        let points = npy::read_numbers(elements, &header, |x| x as f32 / scale)?;
-        Ok((m, n_points, points))
-    })
+        indices.iter().for_each(|&i| some.push(self.cloud(i), self.labels[i]));
+        some
+    }
 }
 
-/// The array `key`, a list of whole numbers that fit `T`.
-fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
-    npz: &mut NpzReader<R>,
-    key: &str,
-) -> Result<Vec<T>, FormatError> {
-    let numbers = npz.entry(key, |header, _, elements| {
-        if !matches!(header.shape[..], [_] | [_, 1]) {
-            return Err(invalid(format!("expected shape [m], found {:?}", header.shape)));
-        }
-        npy::read_numbers(elements, &header, |number| number)
-    })?;
-    let whole = |number: f64| {
-        // Up to 2^53, far beyond any class, f64 holds every whole number.
-        let is_whole = number >= 0.0 && number.fract() == 0.0 && number < 2f64.powi(53);
-        is_whole.then_some(number as u64).and_then(|number| T::try_from(number).ok())
-    };
-    let expected =
-        |number: f64| npz.error(key, format!("expected whole numbers from 0, found {number}"));
-    numbers.into_iter().map(|number| whole(number).ok_or_else(|| expected(number))).collect()
+fn chosen<T: Clone>(column: Option<&Vec<T>>, indices: &[usize]) -> Option<Vec<T>> {
+    column.map(|values| indices.iter().map(|&i| values[i].clone()).collect())
 }

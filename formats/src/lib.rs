@@ -9,7 +9,7 @@
 //! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY and KITTI's `.bin` |
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets too |
 //! | `cloud-files` | all of these |
-//! | `dataset` | scans, packed sets and yanx27's layout, written and read |
+//! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read |
 //! | `pcap` | a VLP-32C's packets (`vlp32c`) |
 //! | `weights` | models (`weights`) and what they state about themselves (`model_card`) |
 //! | `chamfer` | the distance of two clouds (`chamfer`) |
@@ -28,6 +28,8 @@ pub mod chamfer;
 pub mod cloud;
 #[cfg(feature = "files")]
 pub mod cloud_file;
+#[cfg(feature = "dataset")]
+pub mod clusters;
 pub mod error;
 pub mod hash;
 pub mod interval;
@@ -73,6 +75,8 @@ mod records;
 pub mod scan_file;
 #[cfg(feature = "pcap")]
 pub mod vlp32c;
+#[cfg(feature = "dataset")]
+mod waiting_points;
 #[cfg(feature = "weights")]
 pub mod weights;
 #[cfg(feature = "dataset")]

@@ -3,7 +3,7 @@
 //! | key | value | if absent |
 //! | --- | --- | --- |
 //! | `classes` | JSON list of names, in the order of the logits | `class 0`, `class 1`, … |
-//! | `normalization` | `unit-sphere` or `none` | `unit-sphere` |
+//! | `normalization` | `unit-sphere`, `metric` or `none` | `unit-sphere` |
 //! | `sampler` | sampler that the model was trained behind, as `infer-cpu --sampler` names it | `all` |
 //! | `points` | points that the sampler keeps | none |
 //! | `fps_start` | `farthest` or `first` | `farthest` |
@@ -11,9 +11,15 @@
 //! | `pooled` | `relu` if the trunk's last layer has a ReLU, else `linear` | `linear` |
 //! | `edge_radii` | JSON list: how far each layer `edge.conv1…` looks around a point | none |
 //! | `activation_ranges` | JSON object: layer to its largest activation, for int8 | calibrated at load |
+//! | `unknown_classes` | JSON list of those of the classes that are answered as `unknown` | none |
+//! | `unknown_energy` | a cloud of a larger energy is answered as `unknown` | no cloud is |
+//! | `temperature` | what logits are divided by before the softmax and the energy | `1` |
 //! | `trained` | `false` for a model of random weights | `true` |
 //! | `training_set`, `accuracy`, `provenance` | free text | |
 //! | `widths` | for the reader; the tensors decide | |
+//!
+//! The energy of logits f at temperature T is -T ln Σ exp(f / T) (Liu et al. 2020,
+//! "Energy-based out-of-distribution detection").
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -46,6 +52,13 @@ pub struct ModelCard {
     pub edge_radii: Vec<f32>,
     /// The largest activation of each layer, by the layer's name.
     pub activation_ranges: BTreeMap<String, f32>,
+    /// Those of `classes` that are no object of interest, such as a tree or a wall:
+    /// the answer to them is `unknown`.
+    pub unknown_classes: Vec<String>,
+    /// The answer to a cloud of a larger energy is `unknown`, whatever its class.
+    pub unknown_energy: Option<f64>,
+    /// What logits are divided by before the softmax and the energy.
+    pub temperature: f64,
     /// Whether the weights were trained at all.
     pub trained: bool,
     /// What it was trained on.
@@ -63,6 +76,8 @@ crate::named! {
         /// Mean to 0, largest radius to 1.
         #[default]
         UnitSphere = "unit-sphere",
+        /// Metres: the mean of x and of y to 0, the lowest z to 0, and no scale.
+        Metric = "metric",
         /// As it comes.
         None = "none",
     }
@@ -81,6 +96,9 @@ impl Default for ModelCard {
             pooled_relu: false,
             edge_radii: Vec::new(),
             activation_ranges: BTreeMap::new(),
+            unknown_classes: Vec::new(),
+            unknown_energy: None,
+            temperature: 1.0,
             trained: true,
             training_set: None,
             accuracy: None,
@@ -111,8 +129,11 @@ impl ModelCard {
         let entries = Entries { path, metadata };
         let default = Self::default();
         let either = |no, yes| move |word: &str| choice(word, no, yes);
+        let classes = entries.get("classes", json, default.classes)?;
+        let unknown_classes =
+            entries.get("unknown_classes", |list| some_of(&classes, list), Vec::new())?;
         Ok(Self {
-            classes: entries.get("classes", json, default.classes)?,
+            classes,
             normalization: entries.get("normalization", str::parse, default.normalization)?,
             sampler: text("sampler"),
             points: entries.get("points", |word| count(word).map(Some), None)?,
@@ -121,6 +142,9 @@ impl ModelCard {
             pooled_relu: entries.get("pooled", either("linear", "relu"), default.pooled_relu)?,
             edge_radii: entries.get("edge_radii", json, default.edge_radii)?,
             activation_ranges: entries.get("activation_ranges", json, BTreeMap::new())?,
+            unknown_classes,
+            unknown_energy: entries.get("unknown_energy", |word| finite(word).map(Some), None)?,
+            temperature: entries.get("temperature", positive, default.temperature)?,
             trained: entries.get("trained", either("false", "true"), default.trained)?,
             training_set: text("training_set"),
             accuracy: text("accuracy"),
@@ -143,6 +167,12 @@ impl ModelCard {
             ("pooled", Some(if self.pooled_relu { "relu" } else { "linear" }.to_owned())),
             ("edge_radii", (!self.edge_radii.is_empty()).then(|| format!("{:?}", self.edge_radii))),
             ("activation_ranges", (!ranges.is_empty()).then(|| json!(ranges).to_string())),
+            (
+                "unknown_classes",
+                (!self.unknown_classes.is_empty()).then(|| json!(self.unknown_classes).to_string()),
+            ),
+            ("unknown_energy", self.unknown_energy.map(|energy| energy.to_string())),
+            ("temperature", (self.temperature != 1.0).then(|| self.temperature.to_string())),
             ("trained", Some(self.trained.to_string())),
             ("training_set", self.training_set.clone()),
             ("accuracy", self.accuracy.clone()),
@@ -181,6 +211,25 @@ fn count(value: &str) -> Result<usize, String> {
     value.parse().map_err(|_| format!("expected a count, found `{value}`"))
 }
 
+fn finite(value: &str) -> Result<f64, String> {
+    let number = value.parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| format!("expected a finite number, found `{value}`"))
+}
+
+fn positive(value: &str) -> Result<f64, String> {
+    let number = finite(value).ok().filter(|&number| number > 0.0);
+    number.ok_or_else(|| format!("expected a finite number above 0, found `{value}`"))
+}
+
+/// The names in the JSON list `value`, each of which must be one of `classes`.
+fn some_of(classes: &[String], value: &str) -> Result<Vec<String>, String> {
+    let names: Vec<String> = json(value).map_err(|cause| cause.to_string())?;
+    match names.iter().find(|name| !classes.contains(name)) {
+        Some(name) => Err(format!("expected some of the classes, found `{name}`")),
+        None => Ok(names),
+    }
+}
+
 fn choice(value: &str, no: &str, yes: &str) -> Result<bool, String> {
     match value {
         _ if value == yes => Ok(true),
@@ -205,6 +254,9 @@ mod tests {
             pooled_relu: true,
             edge_radii: vec![0.1, 0.4],
             activation_ranges: BTreeMap::from([("feat.conv1".into(), 1.1)]),
+            unknown_classes: vec!["cup".into()],
+            unknown_energy: Some(-3.25),
+            temperature: 1.5,
             trained: false,
             training_set: Some("t".into()),
             accuracy: Some("0.9".into()),
@@ -225,6 +277,8 @@ mod tests {
             "transform_after",
             "pooled",
             "edge_radii",
+            "unknown_classes",
+            "temperature",
             "trained",
         ];
         for key in keys {
@@ -232,5 +286,17 @@ mod tests {
             let error = ModelCard::from_metadata(Path::new("m"), &metadata).unwrap_err();
             assert!(error.to_string().contains(&format!("`{key}`")), "{error}");
         }
+        let metadata = [("classes", r#"["cup"]"#), ("unknown_classes", r#"["tree"]"#)];
+        let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let error = ModelCard::from_metadata(Path::new("m"), &metadata.into()).unwrap_err();
+        let expected = "m: metadata `unknown_classes`: expected some of the classes, found `tree`";
+        assert_eq!(error.to_string(), expected);
+    }
+
+    #[test]
+    fn a_card_says_nothing_of_unknown_objects_unless_it_knows_something() {
+        let metadata = ModelCard::default().to_metadata();
+        let keys = ["unknown_classes", "unknown_energy", "temperature"];
+        assert!(keys.iter().all(|&key| !metadata.contains_key(key)), "{metadata:?}");
     }
 }

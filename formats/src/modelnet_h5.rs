@@ -15,7 +15,7 @@ use hdf5_pure::{File, FileBuilder};
 use crate::atomic;
 use crate::error::FormatError;
 use crate::hash::HashedFile;
-use crate::labelled::LabelledSet;
+use crate::labelled::{LabelledSet, equal_offsets};
 pub use crate::modelnet_h5_list::is_one;
 use crate::modelnet_h5_list::list;
 use crate::packed::check_cloud;
@@ -171,11 +171,9 @@ fn read_file(path: &Path, set: &mut LabelledSet) -> Result<(), FormatError> {
         ));
     }
     let labels = label.read_u8().map_err(|error| bad(&label_part, error.to_string()))?;
-    if !set.labels.is_empty() && set.n_points as u64 != n_points {
-        return Err(bad(
-            &part,
-            format!("expected clouds of {} points, found {n_points}", set.n_points),
-        ));
+    let expected = set.smallest_cloud();
+    if !set.is_empty() && expected as u64 != n_points {
+        return Err(bad(&part, format!("expected clouds of {expected} points, found {n_points}")));
     }
     let n_classes = set.classes.as_ref().map_or(usize::MAX, Vec::len);
     if let Some(cloud) = labels.iter().position(|&label| usize::from(label) >= n_classes) {
@@ -183,8 +181,8 @@ fn read_file(path: &Path, set: &mut LabelledSet) -> Result<(), FormatError> {
         let cause = format!("cloud {cloud}: expected a label below {n_classes}, found {found}");
         return Err(bad(&label_part, cause));
     }
-    set.n_points = n_points as usize;
     set.points.extend(points);
     set.labels.extend(labels.into_iter().map(usize::from));
+    set.offsets = equal_offsets(set.len(), n_points as usize);
     Ok(())
 }

@@ -13,15 +13,11 @@
 //! fixed-width kind, which `np.load` reads without `allow_pickle`.
 //! [`crate::labelled`] reads these sets.
 
-use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::SpooledTempFile;
-
-use crate::archive::{waiting_room, write_archive};
-use crate::atomic;
+use crate::archive::write_archive;
 use crate::error::FormatError;
-use crate::npy;
+use crate::waiting_points::{WaitingPoints, write_points};
 
 /// A packed set that is being written.
 ///
@@ -33,7 +29,7 @@ pub struct PackedWriter {
     path: PathBuf,
     n_points: usize,
     classes: Vec<String>,
-    points: BufWriter<SpooledTempFile>,
+    points: WaitingPoints,
     labels: Vec<i64>,
     names: Vec<String>,
     n_raw: Vec<u32>,
@@ -50,7 +46,7 @@ impl PackedWriter {
             path: path.to_path_buf(),
             n_points,
             classes,
-            points: BufWriter::new(waiting_room(atomic::make_folder_of(path)?)),
+            points: WaitingPoints::new(path)?,
             labels: Vec::new(),
             names: Vec::new(),
             n_raw: Vec::new(),
@@ -83,11 +79,7 @@ impl PackedWriter {
         n_raw: u32,
     ) -> Result<(), FormatError> {
         check_cloud(name, points.len(), self.n_points, label, self.classes.len())?;
-        for coordinate in points.as_flattened() {
-            self.points
-                .write_all(&coordinate.to_le_bytes())
-                .map_err(|source| FormatError::io(&self.path, source))?;
-        }
+        self.points.push(points).map_err(|source| FormatError::io(&self.path, source))?;
         self.labels.push(label as i64);
         self.names.push(name.to_owned());
         self.n_raw.push(n_raw);
@@ -101,15 +93,9 @@ impl PackedWriter {
     /// What the system reports.
     pub fn finish(self) -> Result<String, FormatError> {
         let Self { path, n_points, classes, points, labels, names, n_raw } = self;
-        let here = |source| FormatError::io(&path, source);
-        let mut points = points.into_inner().map_err(|error| here(error.into_error()))?;
-        let size = points.stream_position().map_err(here)?;
-        points.rewind().map_err(here)?;
+        let points = points.close().map_err(|source| FormatError::io(&path, source))?;
         write_archive(&path, |npz| {
-            let header = npy::header_bytes("<f4", &[labels.len(), n_points, 3]);
-            let entry = npz.begin("points", header.len() as u64 + size)?;
-            entry.write_all(&header)?;
-            io::copy(&mut points, entry)?;
+            write_points(npz, points, &[labels.len(), n_points, 3])?;
             npz.array("labels", &[labels.len()], labels.iter().copied())?;
             npz.text("names", &names)?;
             npz.array("n_raw", &[n_raw.len()], n_raw.iter().copied())?;
@@ -130,6 +116,11 @@ pub(crate) fn check_cloud(
         let cause = format!("expected {expected} points, found {points}");
         return Err(FormatError::instance(name, cause));
     }
+    check_label(name, label, classes)
+}
+
+/// Checks that the cloud `name` has a class.
+pub(crate) fn check_label(name: &str, label: usize, classes: usize) -> Result<(), FormatError> {
     if label >= classes {
         let cause = format!("expected a label below {classes}, found {label}");
         return Err(FormatError::instance(name, cause));

@@ -36,12 +36,49 @@ fn scaled_whole_numbers_are_read_as_numpy_divides_them() {
     let names = ("names", "|S3", "(2,)", &b"cupjar"[..]);
     let classes = ("classes", "<U1", "(2,)", &b"a\0\0\0\xe9\0\0\0"[..]);
     let set = read(&[I16, LABELS, names, classes]).unwrap();
-    assert_eq!((set.len(), set.n_points), (2, 1));
+    assert_eq!((set.len(), set.smallest_cloud()), (2, 1));
     assert_eq!(set.cloud(0), [[1.0, 0.0, -1.0]]);
     assert_eq!(set.cloud(1), [[1.0 / 32767.0, 2.0 / 32767.0, 3.0 / 32767.0]]);
     assert_eq!(set.labels, [1, 0]);
     assert_eq!(set.names.unwrap(), ["cup", "jar"]);
     assert_eq!(set.classes.unwrap(), ["a", "é"]);
+}
+
+/// Three points in two clouds, 1 and 2.
+const RAGGED: Array<'_> = (
+    "points",
+    "<f2",
+    "(3, 3)",
+    &[0, 0x3c, 0, 0, 0, 0xbc, 0, 0x3c, 0, 0x40, 0, 0x42, 0, 0, 0, 0, 0, 0],
+);
+const OFFSETS: Array<'_> = ("offsets", "|u1", "(3,)", &[0, 1, 3]);
+
+#[test]
+fn clusters_of_any_size_have_offsets_and_labels_that_may_be_names() {
+    let labels = ("labels", "|S4", "(2,)", &b"tree\x63ar\0"[..]);
+    let range = ("range_m", "<f2", "(2,)", &[0, 0x3c, 0, 0x7e][..]);
+    let ids = ("ids", "|S3", "(2,)", &b"0#10#2"[..]);
+    let set = read(&[RAGGED, OFFSETS, labels, range, ids]).unwrap();
+    assert_eq!((set.len(), set.smallest_cloud()), (2, 1));
+    assert_eq!(set.cloud(0), [[1.0, 0.0, -1.0]]);
+    assert_eq!(set.cloud(1), [[1.0, 2.0, 3.0], [0.0; 3]]);
+    assert_eq!(set.classes.as_ref().unwrap()[..], ["car", "tree"], "sorted");
+    assert_eq!(set.labels, [1, 0]);
+    let range = set.range_m.as_ref().unwrap();
+    assert!(range[0] == 1.0 && range[1].is_nan(), "{range:?}");
+    assert_eq!(set.ids.as_ref().unwrap()[..], ["0#1", "0#2"]);
+    let turned = set.select(&[1, 0, 1]);
+    assert_eq!((turned.offsets.as_slice(), turned.cloud(2)), (&[0, 2, 3, 5][..], set.cloud(1)));
+    let classes = ("classes", "|S4", "(3,)", &b"bus\0tree\x63ar\0"[..]);
+    assert_eq!(read(&[RAGGED, OFFSETS, labels, classes]).unwrap().labels, [1, 2]);
+}
+
+/// What other programs keep beside clouds of one size is not looked at.
+#[test]
+fn clouds_of_one_size_have_no_remarks() {
+    let ids = ("ids", "<i8", "(1,)", &[7, 0, 0, 0, 0, 0, 0, 0][..]);
+    let set = read(&[F16, LABELS, OFFSETS, ids]).unwrap();
+    assert_eq!((set.offsets.as_slice(), set.ids), (&[0, 1, 2][..], None));
 }
 
 #[test]
@@ -101,6 +138,43 @@ fn what_is_no_labelled_set_is_refused_with_its_key() {
             "names: expected a list of text, found |O of shape [2]",
         ),
         (vec![F16, LABELS, classes], "labels: expected labels below 1, found 1"),
+        (vec![RAGGED, LABELS], "points: expected shape [m, n, 3], found [3, 3]"),
+        (
+            vec![("points", "<f2", "(9,)", RAGGED.3), OFFSETS, LABELS],
+            "points: expected shape [total, 3], found [9]",
+        ),
+        (
+            vec![RAGGED, ("offsets", "|u1", "(3,)", &[1, 1, 3]), LABELS],
+            "offsets: expected 0 first, found 1",
+        ),
+        (
+            vec![RAGGED, ("offsets", "|u1", "(0,)", &[]), LABELS],
+            "offsets: expected 0 first, found none",
+        ),
+        (
+            vec![RAGGED, ("offsets", "|u1", "(3,)", &[0, 1, 4]), LABELS],
+            "offsets: expected 3 last, found 4",
+        ),
+        (
+            vec![RAGGED, ("offsets", "|u1", "(4,)", &[0, 2, 1, 3]), LABELS],
+            "offsets: expected values that ascend, found 1 after 2",
+        ),
+        (
+            vec![RAGGED, ("offsets", "|i1", "(3,)", &[0, 0xff, 3]), LABELS],
+            "offsets: expected whole numbers from 0, found -1",
+        ),
+        (
+            vec![RAGGED, ("offsets", "|u1", "(2,)", &[0, 3]), LABELS],
+            "labels: expected 1 values, one for each cloud, found 2",
+        ),
+        (
+            vec![RAGGED, OFFSETS, LABELS, ("sensor", "|S1", "(1,)", b"a")],
+            "sensor: expected 2 values, one for each cloud, found 1",
+        ),
+        (
+            vec![F16, ("labels", "|S1", "(2,)", b"ab"), classes],
+            "labels: expected one of the classes, found `b`",
+        ),
         (
             vec![("points", "<f2", "(1000000000000000000, 1, 3)", F16.3), LABELS],
             "points: the file ends after 6 of 3000000000000000000",

@@ -48,7 +48,6 @@ fn a_set_may_be_empty() {
     write(&path, 0, 1024);
     let set = read_labelled(&path).unwrap();
     let none = LabelledSet {
-        n_points: 1024,
         names: Some(vec![]),
         n_raw: Some(vec![]),
         classes: Some(classes()),

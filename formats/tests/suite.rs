@@ -3,6 +3,8 @@
 
 #[cfg(feature = "cloud-files")]
 mod clouds;
+#[cfg(feature = "dataset")]
+mod clusters;
 #[cfg(all(feature = "npz", feature = "dataset"))]
 mod labelled_sets;
 #[cfg(feature = "hdf5")]

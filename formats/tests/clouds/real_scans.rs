@@ -74,7 +74,7 @@ fn the_first_line_of_a_sampled_model_is_its_first_point() {
 fn labelled_models_fill_the_unit_sphere() {
     let path = need!(shared_data("modelnet40-clouds/dev.npz"));
     let set = read_labelled(&path).unwrap();
-    assert_eq!((set.len(), set.n_points), (1234, 1024));
+    assert_eq!((set.len(), set.smallest_cloud()), (1234, 1024));
     let (names, classes) = (set.names.clone().unwrap(), set.classes.clone().unwrap());
     assert_eq!((names.len(), classes.len()), (1234, 40));
     for (i, name) in names.iter().enumerate() {

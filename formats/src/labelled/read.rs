@@ -1,0 +1,189 @@
+//! Labelled sets from their archives.
+
+use std::collections::BTreeSet;
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use super::{LabelledSet, equal_offsets};
+use crate::archive::NpzReader;
+use crate::decoding::invalid;
+use crate::error::FormatError;
+use crate::npy;
+use crate::number::NumberType;
+
+/// What 1.0 is in `points_i16`.
+const I16_SCALE: f32 = 32767.0;
+
+/// Reads the labelled set at `path`.
+///
+/// # Errors
+/// A missing array of points or labels, an array of an unexpected type or
+/// length, offsets that do not ascend from 0 to the number of points, a label
+/// without a class: [`FormatError::Malformed`] with file and key.
+pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
+    let mut npz = NpzReader::open(path)?;
+    let (shape, points) = read_points(&mut npz)?;
+    let ragged = match shape[..] {
+        [total, 3] => Some(read_offsets(&mut npz, total)?),
+        _ => None,
+    };
+    let m = ragged.as_ref().map_or(shape[0], |offsets| offsets.len() - 1);
+    let classes = column(&mut npz, "classes", NpzReader::text)?;
+    let (labels, classes) = read_labels(&mut npz, classes)?;
+    let names = column(&mut npz, "names", NpzReader::text)?;
+    let n_raw = column(&mut npz, "n_raw", read_whole_numbers)?;
+    let is_ragged = ragged.is_some();
+    let mut words = |key| if is_ragged { column(&mut npz, key, NpzReader::text) } else { Ok(None) };
+    let (sensor, ids) = (words("sensor")?, words("ids")?);
+    let numbers = |npz: &mut NpzReader, key: &str| read_list(npz, key, |x| x as f32);
+    let range_m = if is_ragged { column(&mut npz, "range_m", numbers)? } else { None };
+    let height_m = if is_ragged { column(&mut npz, "height_m", numbers)? } else { None };
+    let lengths = [
+        ("labels", Some(labels.len())),
+        ("names", names.as_ref().map(Vec::len)),
+        ("n_raw", n_raw.as_ref().map(Vec::len)),
+        ("range_m", range_m.as_ref().map(Vec::len)),
+        ("height_m", height_m.as_ref().map(Vec::len)),
+        ("sensor", sensor.as_ref().map(Vec::len)),
+        ("ids", ids.as_ref().map(Vec::len)),
+    ];
+    for (key, length) in lengths {
+        if let Some(found) = length.filter(|&length| length != m) {
+            let cause = format!("expected {m} values, one for each cloud, found {found}");
+            return Err(npz.error(key, cause));
+        }
+    }
+    // Not before the file is known to hold a label for each cloud: a shape may
+    // promise any number of clouds without points.
+    let offsets = ragged.unwrap_or_else(|| equal_offsets(m, shape[1]));
+    let columns = LabelledSet {
+        names,
+        n_raw,
+        classes,
+        range_m,
+        height_m,
+        sensor,
+        ids,
+        ..LabelledSet::default()
+    };
+    Ok(LabelledSet { points, offsets, labels, ..columns })
+}
+
+/// The array `key` by `read`, if the archive has it.
+fn column<R: Read + Seek, T>(
+    npz: &mut NpzReader<R>,
+    key: &str,
+    read: impl FnOnce(&mut NpzReader<R>, &str) -> Result<T, FormatError>,
+) -> Result<Option<T>, FormatError> {
+    npz.has(key).then(|| read(npz, key)).transpose()
+}
+
+/// The shape of the points, `[m, n, 3]` or `[total, 3]`, and their coordinates.
+fn read_points<R: Read + Seek>(
+    npz: &mut NpzReader<R>,
+) -> Result<(Vec<usize>, Vec<f32>), FormatError> {
+    let (key, scale) =
+        if npz.has("points_i16") { ("points_i16", I16_SCALE) } else { ("points", 1.0) };
+    let may_be_ragged = npz.has("offsets");
+    npz.entry(key, |header, _, elements| {
+        let is_ragged = may_be_ragged && matches!(header.shape[..], [_, 3]);
+        if !is_ragged && !matches!(header.shape[..], [_, _, 3]) {
+            let expected = if may_be_ragged { "[total, 3]" } else { "[m, n, 3]" };
+            return Err(invalid(format!("expected shape {expected}, found {:?}", header.shape)));
+        }
+        let is_expected = match header.number() {
+            Some((NumberType::I16, _)) => key == "points_i16",
+            Some((NumberType::F16 | NumberType::F32 | NumberType::F64, _)) => key == "points",
+            _ => false,
+        };
+        if !is_expected {
+            let expected = if key == "points" { "f2, f4 or f8" } else { "i2" };
+            let descr = &header.descr;
+            return Err(invalid(format!("expected elements of type {expected}, found {descr}")));
+        }
+        // f32 holds every i16 and the scale, so that this quotient is rounded
+        // once, as NumPy's own in f32.
+        let points = npy::read_numbers(elements, &header, |x| x as f32 / scale)?;
+        Ok((header.shape, points))
+    })
+}
+
+/// The offsets of clouds of `total` points together.
+fn read_offsets<R: Read + Seek>(
+    npz: &mut NpzReader<R>,
+    total: usize,
+) -> Result<Vec<usize>, FormatError> {
+    const KEY: &str = "offsets";
+    let offsets: Vec<usize> = read_whole_numbers(npz, KEY)?;
+    let ends = [("first", offsets.first(), 0), ("last", offsets.last(), total)];
+    for (which, found, expected) in ends {
+        if found != Some(&expected) {
+            let found = found.map_or("none".to_owned(), usize::to_string);
+            return Err(npz.error(KEY, format!("expected {expected} {which}, found {found}")));
+        }
+    }
+    if let Some(at) = offsets.windows(2).position(|pair| pair[0] > pair[1]) {
+        let [before, after] = [offsets[at], offsets[at + 1]];
+        let cause = format!("expected values that ascend, found {after} after {before}");
+        return Err(npz.error(KEY, cause));
+    }
+    Ok(offsets)
+}
+
+/// The class of each cloud, and the classes if they are known.
+fn read_labels<R: Read + Seek>(
+    npz: &mut NpzReader<R>,
+    classes: Option<Vec<String>>,
+) -> Result<(Vec<usize>, Option<Vec<String>>), FormatError> {
+    const KEY: &str = "labels";
+    let is_text = npz.entry(KEY, |header, _, _| Ok(header.descr.contains(['U', 'S'])))?;
+    if !is_text {
+        let labels: Vec<usize> = read_whole_numbers(npz, KEY)?;
+        let most = classes.as_ref().map_or(usize::MAX, Vec::len);
+        return match labels.iter().find(|&&label| label >= most) {
+            Some(label) => {
+                Err(npz.error(KEY, format!("expected labels below {most}, found {label}")))
+            }
+            None => Ok((labels, classes)),
+        };
+    }
+    let words = npz.text(KEY)?;
+    let classes = classes
+        .unwrap_or_else(|| words.iter().collect::<BTreeSet<_>>().into_iter().cloned().collect());
+    let label = |word: &String| {
+        let place = classes.iter().position(|class| class == word);
+        place.ok_or_else(|| npz.error(KEY, format!("expected one of the classes, found `{word}`")))
+    };
+    let labels = words.iter().map(label).collect::<Result<_, _>>()?;
+    Ok((labels, Some(classes)))
+}
+
+/// The array `key`, a list of whole numbers that fit `T`.
+fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
+    npz: &mut NpzReader<R>,
+    key: &str,
+) -> Result<Vec<T>, FormatError> {
+    let numbers = read_list(npz, key, |number| number)?;
+    let whole = |number: f64| {
+        // Up to 2^53, far beyond any class, f64 holds every whole number.
+        let is_whole = number >= 0.0 && number.fract() == 0.0 && number < 2f64.powi(53);
+        is_whole.then_some(number as u64).and_then(|number| T::try_from(number).ok())
+    };
+    let expected =
+        |number: f64| npz.error(key, format!("expected whole numbers from 0, found {number}"));
+    numbers.into_iter().map(|number| whole(number).ok_or_else(|| expected(number))).collect()
+}
+
+/// The array `key`, a list of numbers, each through `convert`.
+fn read_list<R: Read + Seek, T: Copy>(
+    npz: &mut NpzReader<R>,
+    key: &str,
+    convert: impl Fn(f64) -> T,
+) -> Result<Vec<T>, FormatError> {
+    npz.entry(key, |header, _, elements| {
+        if !matches!(header.shape[..], [_] | [_, 1]) {
+            return Err(invalid(format!("expected shape [m], found {:?}", header.shape)));
+        }
+        npy::read_numbers(elements, &header, convert)
+    })
+}
