@@ -1,0 +1,215 @@
+//! A sweep as an image: a row for each ring, columns of equal azimuth.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+use std::ops::Range;
+
+use crate::angle::atan2;
+use crate::segmentation::Label;
+use crate::segmenter::{SegmentError, Sweep};
+use crate::settings::Settings;
+
+/// The most rings: at 2,000 columns, the image's cells then take 16 MB.
+pub const MOST_ROWS: usize = 2048;
+
+/// A point in its place.
+#[derive(Clone, Copy, Default)]
+pub struct Return {
+    pub position: [f32; 3],
+    /// Horizontal distance from the sensor in metres.
+    pub range_m: f32,
+    /// Height above the ground in metres, NaN while it is unknown.
+    pub height_m: f32,
+    /// The point's place in the sweep.
+    pub point: u32,
+}
+
+/// The returns of a sweep, sorted by column and then by row. A cell holds any
+/// number of them: rings of two sensors or beams between two columns share cells.
+#[derive(Default)]
+pub struct RangeImage {
+    n_columns: usize,
+    /// The elevation of each row in radians, ascending.
+    elevations: Vec<f32>,
+    /// Where each cell's returns begin, and behind them the end of the last.
+    starts: Vec<u32>,
+    returns: Vec<Return>,
+    spots: Vec<Spot>,
+    rows: Vec<Row>,
+    order: Vec<u32>,
+}
+
+/// Where a point belongs: its column, and its ring or its step in elevation.
+#[derive(Clone, Copy)]
+struct Spot {
+    column: u16,
+    ring: u16,
+    range_m: f32,
+}
+
+/// A spot's column for points that are in no cell.
+const NOWHERE: u16 = u16::MAX;
+
+/// Sums over a ring's returns: their quotient is the tangent of its elevation.
+#[derive(Clone, Copy, Default)]
+struct Row {
+    range_m: f64,
+    z_m: f64,
+    number: u32,
+}
+
+impl RangeImage {
+    /// Sorts `sweep` into the image. `labels` of the points that are in it become
+    /// [`Label::OBSTACLE`], of the others what they are.
+    pub fn fill(
+        &mut self,
+        sweep: &Sweep<'_>,
+        settings: &Settings,
+        labels: &mut [Label],
+    ) -> Result<(), SegmentError> {
+        self.n_columns = (360.0 / settings.column_width_deg).round() as usize;
+        self.place(sweep, settings, labels);
+        self.number_rows()?;
+        self.sort(sweep.points);
+        Ok(())
+    }
+
+    /// Finds the column and the ring of every point.
+    fn place(&mut self, sweep: &Sweep<'_>, settings: &Settings, labels: &mut [Label]) {
+        let n_columns = self.n_columns as f32;
+        let per_row = 1.0 / settings.row_height_deg.to_radians();
+        let squares = settings.min_range_m.powi(2)..=settings.max_range_m.powi(2);
+        self.spots.clear();
+        self.rows.clear();
+        for (point, &[x, y, z]) in sweep.points.iter().enumerate() {
+            let flat = x * x + y * y;
+            let square = flat + z * z;
+            let mut spot = Spot { column: NOWHERE, ring: 0, range_m: flat.sqrt() };
+            if !squares.contains(&square) || square == 0.0 {
+                let is_valid = square > 0.0 && [x, y, z].iter().all(|x| x.is_finite());
+                labels[point] = if is_valid { Label::Small } else { Label::Invalid };
+                self.spots.push(spot);
+                continue;
+            }
+            labels[point] = Label::OBSTACLE;
+            let column = (atan2(y, x) + PI) * (n_columns / (2.0 * PI));
+            spot.column = (column as u16).min(self.n_columns as u16 - 1);
+            spot.ring = match sweep.rings {
+                Some(rings) => rings[point],
+                None => ((atan2(z, spot.range_m) + FRAC_PI_2) * per_row) as u16,
+            };
+            if self.rows.len() <= usize::from(spot.ring) {
+                self.rows.resize(usize::from(spot.ring) + 1, Row::default());
+            }
+            let row = &mut self.rows[usize::from(spot.ring)];
+            row.range_m += f64::from(spot.range_m);
+            row.z_m += f64::from(z);
+            self.spots.push(spot);
+        }
+    }
+
+    /// Numbers the rings that have returns by their elevation, whatever the
+    /// sensor's own order of its lasers.
+    fn number_rows(&mut self) -> Result<(), SegmentError> {
+        let is_used = |row: &Row| row.range_m != 0.0 || row.z_m != 0.0;
+        let elevation = |row: &Row| atan2(row.z_m as f32, row.range_m as f32);
+        let used = self.rows.iter().enumerate().filter(|(_, row)| is_used(row));
+        self.order.clear();
+        self.order.extend(used.map(|(ring, _)| ring as u32));
+        if self.order.len() > MOST_ROWS {
+            return Err(SegmentError::TooManyRings { most: MOST_ROWS, found: self.order.len() });
+        }
+        let of_ring = |ring: u32| elevation(&self.rows[ring as usize]);
+        self.order.sort_unstable_by(|&a, &b| of_ring(a).total_cmp(&of_ring(b)).then(a.cmp(&b)));
+        self.elevations.clear();
+        self.elevations.extend(self.order.iter().map(|&ring| of_ring(ring)));
+        for (number, &ring) in self.order.iter().enumerate() {
+            self.rows[ring as usize].number = number as u32;
+        }
+        Ok(())
+    }
+
+    /// Sorts the points by counting how many each cell has; those of one cell keep
+    /// their order.
+    fn sort(&mut self, points: &[[f32; 3]]) {
+        let Self { n_columns, elevations, starts, returns, spots, rows, .. } = self;
+        let n_rows = elevations.len();
+        let cell = |spot: &Spot| {
+            let row = rows[usize::from(spot.ring)].number as usize;
+            usize::from(spot.column) * n_rows + row
+        };
+        starts.clear();
+        starts.resize(*n_columns * n_rows + 1, 0);
+        let placed = |spot: &Spot| spot.column != NOWHERE;
+        spots.iter().filter(|spot| placed(spot)).for_each(|spot| starts[cell(spot)] += 1);
+        let mut end = 0;
+        for start in starts.iter_mut() {
+            end += *start;
+            *start = end;
+        }
+        returns.clear();
+        returns.resize(end as usize, Return::default());
+        for (point, spot) in spots.iter().enumerate().rev().filter(|(_, spot)| placed(spot)) {
+            let start = &mut starts[cell(spot)];
+            *start -= 1;
+            returns[*start as usize] = Return {
+                position: points[point],
+                range_m: spot.range_m,
+                height_m: f32::NAN,
+                point: point as u32,
+            };
+        }
+    }
+
+    /// Takes all returns out of the image that `is_kept`, given their column, refuses.
+    pub fn retain(&mut self, mut is_kept: impl FnMut(usize, &mut Return) -> bool) {
+        let (mut kept, mut from) = (0, 0);
+        for column in 0..self.n_columns {
+            for row in 0..self.n_rows() {
+                let cell = column * self.n_rows() + row;
+                let to = self.starts[cell + 1] as usize;
+                self.starts[cell] = kept as u32;
+                for at in from..to {
+                    let mut this = self.returns[at];
+                    let is_kept = is_kept(column, &mut this);
+                    self.returns[kept] = this;
+                    kept += usize::from(is_kept);
+                }
+                from = to;
+            }
+        }
+        if let Some(end) = self.starts.last_mut() {
+            *end = kept as u32;
+        }
+        self.returns.truncate(kept);
+    }
+
+    pub fn n_columns(&self) -> usize {
+        self.n_columns
+    }
+
+    pub fn n_rows(&self) -> usize {
+        self.elevations.len()
+    }
+
+    /// The elevation of a row in radians.
+    pub fn elevation(&self, row: usize) -> f32 {
+        self.elevations[row]
+    }
+
+    /// The returns of a column from the lowest row up.
+    pub fn column(&self, column: usize) -> &[Return] {
+        let cell = column * self.n_rows();
+        &self.returns[self.starts[cell] as usize..self.starts[cell + self.n_rows()] as usize]
+    }
+
+    /// The places of a cell's returns.
+    pub fn cell(&self, column: usize, row: usize) -> Range<usize> {
+        let cell = column * self.n_rows() + row;
+        self.starts[cell] as usize..self.starts[cell + 1] as usize
+    }
+
+    /// The returns at some places.
+    pub fn returns(&self, places: Range<usize>) -> &[Return] {
+        &self.returns[places]
+    }
+}

@@ -1,0 +1,154 @@
+//! What a sweep was cut into.
+
+use crate::height_grid::HeightGrid;
+use crate::sets::Sets;
+use crate::settings::Settings;
+
+/// What a point is part of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Label {
+    /// The ground.
+    Ground,
+    /// The cluster of this number, its place among [`Segmentation::clusters`].
+    Cluster(u32),
+    /// No cluster: out of range, or among too few or too many points, or in something too large.
+    Small,
+    /// Nothing: a coordinate is NaN or infinite, or the point lies at the sensor's origin.
+    Invalid,
+}
+
+impl Label {
+    /// Not ground and not in a cluster yet.
+    pub(crate) const OBSTACLE: Self = Self::Cluster(u32::MAX);
+}
+
+/// Points of a sweep that belong together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cluster<'a> {
+    /// Places of the points in the sweep, ascending.
+    pub points: &'a [u32],
+    /// Height of the ground under the middle of the points' bounding box, in metres in the
+    /// sensor's frame; `None` where it is unknown.
+    pub ground_z_m: Option<f32>,
+}
+
+/// A sweep, cut into ground and clusters.
+#[derive(Default)]
+pub struct Segmentation {
+    pub(crate) labels: Vec<Label>,
+    pub(crate) ground: HeightGrid,
+    /// The points of all clusters, one cluster after the other.
+    members: Vec<u32>,
+    /// For each cluster, the end of its members and the height of its ground.
+    ends: Vec<(u32, Option<f32>)>,
+    /// The component that each first point of a set begins.
+    components: Vec<u32>,
+    extents: Vec<Extent>,
+}
+
+impl Segmentation {
+    /// One label for each point of the sweep.
+    #[must_use]
+    pub fn labels(&self) -> &[Label] {
+        &self.labels
+    }
+
+    /// The clusters, in the order of their first points.
+    pub fn clusters(&self) -> impl ExactSizeIterator<Item = Cluster<'_>> {
+        (0..self.ends.len()).map(|number| {
+            let start = number.checked_sub(1).map_or(0, |before| self.ends[before].0);
+            let (end, ground_z_m) = self.ends[number];
+            Cluster { points: &self.members[start as usize..end as usize], ground_z_m }
+        })
+    }
+
+    /// Height of the ground at `(x, y)`, all in metres in the sensor's frame; `None` where too
+    /// little ground was seen nearby.
+    #[must_use]
+    pub fn ground_z_m(&self, x: f32, y: f32) -> Option<f32> {
+        self.ground.z_m(x, y)
+    }
+
+    /// Makes clusters of those sets of obstacles that are neither too small nor too large.
+    pub(crate) fn collect(&mut self, points: &[[f32; 3]], sets: &mut Sets, settings: &Settings) {
+        self.measure(points, sets);
+        self.ends.clear();
+        let mut n_members = 0;
+        for extent in &mut self.extents {
+            let is_cluster = (settings.min_points..=settings.max_points).contains(&extent.count)
+                && extent.diagonal_m() <= settings.max_size_m;
+            extent.number = is_cluster.then_some(self.ends.len() as u32);
+            if is_cluster {
+                // The end grows to its place while the members are filled in.
+                let [x, y] = extent.middle();
+                self.ends.push((n_members, self.ground.z_m(x, y)));
+                n_members += extent.count as u32;
+            }
+        }
+        self.members.clear();
+        self.members.resize(n_members as usize, 0);
+        for (point, label) in self.labels.iter_mut().enumerate() {
+            if *label != Label::OBSTACLE {
+                continue;
+            }
+            let first = sets.first(point as u32) as usize;
+            match self.extents[self.components[first] as usize].number {
+                None => *label = Label::Small,
+                Some(number) => {
+                    *label = Label::Cluster(number);
+                    let end = &mut self.ends[number as usize].0;
+                    self.members[*end as usize] = point as u32;
+                    *end += 1;
+                }
+            }
+        }
+    }
+
+    /// Counts and bounds the points of each set of obstacles.
+    fn measure(&mut self, points: &[[f32; 3]], sets: &mut Sets) {
+        self.extents.clear();
+        self.components.clear();
+        self.components.resize(points.len(), 0);
+        for (point, label) in self.labels.iter().enumerate() {
+            if *label != Label::OBSTACLE {
+                continue;
+            }
+            let first = sets.first(point as u32) as usize;
+            if first == point {
+                self.components[first] = self.extents.len() as u32;
+                self.extents.push(Extent::of(points[point]));
+            } else {
+                self.extents[self.components[first] as usize].add(points[point]);
+            }
+        }
+    }
+}
+
+/// How many points a set has and the rectangle around them.
+struct Extent {
+    count: usize,
+    low: [f32; 2],
+    high: [f32; 2],
+    number: Option<u32>,
+}
+
+impl Extent {
+    fn of([x, y, _]: [f32; 3]) -> Self {
+        Self { count: 1, low: [x, y], high: [x, y], number: None }
+    }
+
+    fn add(&mut self, [x, y, _]: [f32; 3]) {
+        self.count += 1;
+        self.low = [self.low[0].min(x), self.low[1].min(y)];
+        self.high = [self.high[0].max(x), self.high[1].max(y)];
+    }
+
+    fn diagonal_m(&self) -> f32 {
+        (self.high[0] - self.low[0]).hypot(self.high[1] - self.low[1])
+    }
+
+    fn middle(&self) -> [f32; 2] {
+        // Halves first: a sum may overflow.
+        [0, 1].map(|axis| self.low[axis] / 2.0 + self.high[axis] / 2.0)
+    }
+}

@@ -1,0 +1,144 @@
+//! What a segmentation depends on.
+
+/// The numbers that decide what is ground and what belongs together.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Settings {
+    /// Points nearer than this many metres, which are mostly the robot itself, are in no cluster.
+    pub min_range_m: f32,
+    /// Points farther than this many metres are in no cluster.
+    pub max_range_m: f32,
+    /// Width of a column of the range image in degrees: about the sensor's step in azimuth.
+    pub column_width_deg: f32,
+    /// Height of a row of the range image in degrees, for sweeps that come without rings.
+    pub row_height_deg: f32,
+    /// The steepest ground in degrees, against the plane of the ground around the sensor: neither a
+    /// hill nor a tilt of the sensor count, up to 20 degrees.
+    pub max_ground_slope_deg: f32,
+    /// Points at most this many metres above the ground are ground.
+    pub ground_clearance_m: f32,
+    /// Neighbours in the range image at most this many metres apart belong together; the sensor's
+    /// spacing at their range is added to it.
+    pub reach_m: f32,
+    /// Rings without returns, such as those on a car's windows, are bridged over up to this many
+    /// metres of height.
+    pub bridge_m: f32,
+    /// The fewest points of a cluster.
+    pub min_points: usize,
+    /// The most points of a cluster.
+    pub max_points: usize,
+    /// The largest horizontal diagonal of a cluster's bounding box in metres.
+    pub max_size_m: f32,
+    /// With a radius in metres, clusters are the connected components of points within it, of all
+    /// points of a cloud without the structure of a scan: no range image, no ground, any range.
+    pub radius_m: Option<f32>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            // VLP-32C User Manual 63-9325: the least range is 1 m.
+            min_range_m: 1.0,
+            // At 0.2 by 0.33 degrees, a car 100 m away returns some ten points.
+            max_range_m: 100.0,
+            // A VLP-32C at 600 rpm fires every 0.199 degrees, an HDL-64E every 0.17.
+            column_width_deg: 0.2,
+            // An HDL-64E's rings lie 0.33 to 0.5 degrees apart, most of a VLP-32C's 0.33.
+            row_height_deg: 0.4,
+            // Ramps of garages and bridges mostly stay below 8 degrees (14 %); a hill is a plane
+            // of its own.
+            max_ground_slope_deg: 8.0,
+            // A kerb of 0.15 m and range noise.
+            ground_clearance_m: 0.2,
+            // Parked cars stand half a metre apart, persons less.
+            reach_m: 0.25,
+            // Windows of cars are 0.4 to 0.6 m high.
+            bridge_m: 0.6,
+            min_points: 10,
+            max_points: usize::MAX,
+            // An articulated bus is 18 m long and 2.55 m wide.
+            max_size_m: 20.0,
+            radius_m: None,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first setting that is not as it must be.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let check = |name, found: f32, expected, is_right: bool| {
+            let error = SettingsError { name, expected, found: f64::from(found) };
+            if is_right { Ok(()) } else { Err(error) }
+        };
+        let is_length = |x: f32| (0.0..f32::INFINITY).contains(&x);
+        let length = "a length of at least 0 m";
+        for (name, found) in [
+            ("min_range_m", self.min_range_m),
+            ("ground_clearance_m", self.ground_clearance_m),
+            ("reach_m", self.reach_m),
+            ("bridge_m", self.bridge_m),
+        ] {
+            check(name, found, length, is_length(found))?;
+        }
+        let within = |x: f32, low, high| (low..=high).contains(&x);
+        let (far, size) = (self.max_range_m, self.max_size_m);
+        let (width, height) = (self.column_width_deg, self.row_height_deg);
+        let slope = self.max_ground_slope_deg;
+        // Squares of farther ranges overflow.
+        let is_far = within(far, self.min_range_m, 1e15);
+        check("max_range_m", far, "min_range_m to 1e15 m", is_far)?;
+        check("column_width_deg", width, "0.05 to 10 degrees", within(width, 0.05, 10.0))?;
+        check("row_height_deg", height, "0.1 to 10 degrees", within(height, 0.1, 10.0))?;
+        check("max_ground_slope_deg", slope, "0 to 45 degrees", within(slope, 0.0, 45.0))?;
+        check("max_size_m", size, "a length or infinity", size >= 0.0)?;
+        let radius = self.radius_m.unwrap_or(1.0);
+        check("radius_m", radius, "1e-15 to 1e15 m", within(radius, 1e-15, 1e15))
+    }
+}
+
+/// A setting that is not as it must be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("setting {name}: expected {expected}, found {found}")]
+pub struct SettingsError {
+    /// The field of [`Settings`].
+    pub name: &'static str,
+    /// What it may be.
+    pub expected: &'static str,
+    /// What it was.
+    pub found: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_settings_are_right() {
+        assert_eq!(Settings::default().check(), Ok(()));
+    }
+
+    #[test]
+    fn a_wrong_setting_is_named() {
+        let wrong: [fn(&mut Settings); 6] = [
+            |s| s.min_range_m = f32::NAN,
+            |s| s.max_range_m = 0.5,
+            |s| s.column_width_deg = 0.0,
+            |s| s.reach_m = f32::INFINITY,
+            |s| s.max_size_m = -1.0,
+            |s| s.radius_m = Some(0.0),
+        ];
+        let names =
+            ["min_range_m", "max_range_m", "column_width_deg", "reach_m", "max_size_m", "radius_m"];
+        for (change, name) in wrong.into_iter().zip(names) {
+            let mut settings = Settings::default();
+            change(&mut settings);
+            assert_eq!(settings.check().unwrap_err().name, name);
+        }
+        let settings = Settings { reach_m: -1.0, ..Settings::default() };
+        let error = settings.check().unwrap_err().to_string();
+        assert_eq!(error, "setting reach_m: expected a length of at least 0 m, found -1");
+    }
+}

@@ -1,0 +1,122 @@
+//! What is ground, and how high it is.
+
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
+
+use crate::scanner::{HEIGHT, Surface, VLP32C, block, flat, ground, scan};
+
+fn is_ground(label: Label) -> bool {
+    label == Label::Ground
+}
+
+#[test]
+fn a_flat_plane_is_all_ground_at_its_height() {
+    let scan = scan(&VLP32C, &[flat()]);
+    scan.check(|segmentation| {
+        assert_eq!(scan.share(segmentation, 0, is_ground), 1.0);
+        assert_eq!(segmentation.clusters().len(), 0);
+        for [x, y] in [[5.0, 0.0], [-3.0, 20.0], [0.0, 0.0], [30.0, -20.0]] {
+            let z_m = segmentation.ground_z_m(x, y).unwrap();
+            assert!((f64::from(z_m) + HEIGHT).abs() < 1e-5, "{z_m} at {x} {y}");
+        }
+        assert_eq!(segmentation.ground_z_m(3000.0, 0.0), None);
+        assert_eq!(segmentation.ground_z_m(f32::NAN, 0.0), None);
+    });
+}
+
+#[test]
+fn boxes_stand_on_the_ground() {
+    let scan = scan(
+        &VLP32C,
+        &[
+            flat(),
+            block([10.0, 3.0], [2.0, 4.0], 0.0, 1.5),
+            block([-8.0, 0.0], [0.5, 0.5], 0.0, 1.7),
+        ],
+    );
+    scan.check(|segmentation| {
+        assert_eq!(scan.share(segmentation, 0, is_ground), 1.0);
+        assert_eq!(scan.surfaces_of_clusters(segmentation).len(), 2);
+        for cluster in segmentation.clusters() {
+            let z_m = f64::from(cluster.ground_z_m.unwrap());
+            assert!((z_m + HEIGHT).abs() < 0.05, "{z_m}");
+        }
+        for (label, point) in segmentation.labels().iter().zip(&scan.points) {
+            let height = f64::from(point[2]) + HEIGHT;
+            assert!(height < 0.25 || matches!(label, Label::Cluster(_)), "{label:?} at {height}");
+            assert!(height > 0.15 || is_ground(*label), "{label:?} at {height}");
+        }
+    });
+}
+
+#[test]
+fn a_kerb_of_15_cm_and_the_pavement_behind_it_are_ground() {
+    let kerb: Surface = block([0.0, 54.0], [200.0, 100.0], 0.0, 0.15);
+    let scan = scan(&VLP32C, &[flat(), kerb]);
+    scan.check(|segmentation| {
+        assert_eq!(scan.share(segmentation, 0, is_ground), 1.0);
+        assert!(scan.share(segmentation, 1, is_ground) > 0.99);
+        let z_m = f64::from(segmentation.ground_z_m(0.0, 8.0).unwrap());
+        assert!((z_m + HEIGHT - 0.15).abs() < 0.02, "{z_m}");
+    });
+}
+
+#[test]
+fn a_street_of_8_degrees_is_ground_and_carries_boxes() {
+    let slope = 8f64.to_radians().tan();
+    let hill = ground(slope, 0.0, |_, _| true);
+    let scan = scan(&VLP32C, &[hill, block([12.0, 0.0], [1.0, 1.0], 12.0 * slope, 2.0)]);
+    scan.check(|segmentation| {
+        assert!(scan.share(segmentation, 0, is_ground) > 0.99);
+        assert!(scan.share(segmentation, 1, is_ground) < 0.25);
+        let z_m = f64::from(segmentation.ground_z_m(9.0, 0.0).unwrap());
+        assert!((z_m - (9.0 * slope - HEIGHT)).abs() < 0.05, "{z_m}");
+    });
+}
+
+#[test]
+fn a_ramp_that_begins_ahead_is_ground() {
+    let slope = 7f64.to_radians().tan();
+    let street = ground(0.0, 0.0, |x, _| x < 10.0);
+    // Through (10, -HEIGHT): 10 m of slope below the sensor's foot at x = 0.
+    let ramp = ground(slope, -10.0 * slope, |x, _| (10.0..40.0).contains(&x));
+    let scan = scan(&VLP32C, &[street, ramp]);
+    scan.check(|segmentation| {
+        let shares = [0, 1].map(|surface| scan.share(segmentation, surface, is_ground));
+        assert!(shares.iter().all(|&share| share > 0.99), "{shares:?}");
+    });
+}
+
+#[test]
+fn a_sensor_tilted_by_5_degrees_sees_the_same_ground() {
+    let mut scan = scan(&VLP32C, &[flat(), block([10.0, 0.0], [1.0, 2.0], 0.0, 2.5)]);
+    let (sin, cos) = 5f32.to_radians().sin_cos();
+    scan.points
+        .iter_mut()
+        .for_each(|[x, _, z]| (*x, *z) = (cos * *x - sin * *z, sin * *x + cos * *z));
+    scan.check(|segmentation| {
+        assert!(scan.share(segmentation, 0, is_ground) > 0.99);
+        assert!(scan.share(segmentation, 1, is_ground) < 0.2);
+        assert_eq!(scan.surfaces_of_clusters(segmentation), [[1]]);
+    });
+}
+
+/// What hangs over the ground, such as a bridge, is no ground.
+#[test]
+fn a_deck_above_the_street_is_no_ground() {
+    let scan = scan(&VLP32C, &[flat(), block([20.0, 0.0], [8.0, 60.0], 4.0, 1.0)]);
+    scan.check(|segmentation| {
+        assert_eq!(scan.share(segmentation, 1, is_ground), 0.0);
+        assert_eq!(scan.share(segmentation, 0, is_ground), 1.0);
+    });
+}
+
+/// A sensor that was put below the ground, by a wrong frame, finds none or all of
+/// it, and does not fail.
+#[test]
+fn a_sensor_below_the_ground_is_no_error() {
+    let mut scan = scan(&VLP32C, &[flat()]);
+    scan.points.iter_mut().for_each(|point| point[2] += 3.0);
+    let mut segmenter = Segmenter::new(Settings::default()).unwrap();
+    let sweep = Sweep { points: &scan.points, rings: None };
+    assert_eq!(segmenter.segment(&sweep).unwrap().labels().len(), scan.points.len());
+}
