@@ -94,7 +94,7 @@ fn packed_sets_hold_all_scans_of_enough_points() {
     for packed in &manifest.packed {
         let set = read_labelled(&folder.path().join(&packed.file)).unwrap();
         assert_eq!(set.len() as u64, packed.clouds);
-        assert_eq!(set.n_points, PACKED_POINTS as usize);
+        assert_eq!(set.smallest_cloud(), PACKED_POINTS as usize);
         let (classes, names) = (set.classes.as_ref().unwrap(), set.names.as_ref().unwrap());
         assert_eq!(classes[..], ["bowl", "chair", "cup"]);
         assert!(set.n_raw.as_ref().unwrap().iter().all(|&n| n >= MIN_POINTS));

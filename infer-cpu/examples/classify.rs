@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let cloud = read_cloud(Path::new(&file))?;
         let prediction = classifier.classify_f64(&cloud)?;
         let percent = 100.0 * prediction.confidence();
-        println!("{}: {} ({percent:.1} %)", file.display(), prediction.label);
+        println!("{}: {} ({percent:.1} %)", file.display(), prediction.answer());
     }
     Ok(())
 }

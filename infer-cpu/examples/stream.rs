@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         cloud.extend((0..CAPACITY).map(point).map(|(turn, z)| [turn.cos(), turn.sin(), z]));
         let start = Instant::now();
         let prediction = classifier.classify(&cloud)?;
-        println!("frame {frame}: {} in {:.2?}", prediction.label, start.elapsed());
+        println!("frame {frame}: {} in {:.2?}", prediction.answer(), start.elapsed());
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 #[cfg(feature = "npz")]
 use formats::labelled::LabelledSet;
+use formats::model_card::Normalization;
 use formats::rng::StreamKey;
 
 use crate::engine::{Engine, Forward, Input};
@@ -37,7 +38,8 @@ pub fn on_set(path: &Path, set: &LabelledSet) -> Result<BTreeMap<String, f32>, E
 }
 
 /// The largest activation of each layer of the model at `path` on `clouds`,
-/// which are normalised as the network takes them.
+/// which are normalised as the network takes them, or in metres for a network that
+/// takes metres.
 ///
 /// # Errors
 /// A file that is not a model.
@@ -58,7 +60,16 @@ fn on_clouds_of<'a>(
     let team = Team::new(Engine::new(layers, kernels, 1, true), 1)
         .map_err(|source| Error::Threads { threads: 1, source })?;
     let mut scratch = team.scratch();
+    let (mut wide, mut metric) = (Vec::new(), Vec::new());
     for cloud in clouds {
+        let cloud = if card.normalization == Normalization::Metric {
+            wide.clear();
+            wide.extend(cloud.iter().map(|point| point.map(f64::from)));
+            normalize::to_metric(&wide, None, &mut metric);
+            &metric
+        } else {
+            cloud
+        };
         let input = Input { points: cloud, cloud, pooled_stn: false };
         Engine::observe(&team, &input, &mut scratch);
     }

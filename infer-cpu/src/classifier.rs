@@ -13,7 +13,7 @@ use crate::kernel::{self, KernelName, Kernels};
 use crate::normalize;
 use crate::options::{MOST_POINTS, MOST_THREADS, Options};
 use crate::precision::Precision;
-use crate::prediction::{Prediction, argmax};
+use crate::prediction::{Prediction, UnknownRule, argmax, energy};
 use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::selection::{Selection, front_pass};
 use crate::source::ModelSource;
@@ -34,7 +34,7 @@ use crate::test_time_augmentation::TestTimeAugmentation;
 /// let mut classifier = Classifier::load(&model, &Options::default())?;
 /// let prediction = classifier.classify(&[[0.0, 0.0, 0.1], [0.3, 0.0, 0.1], [0.3, 0.2, 0.0]])?;
 /// assert_eq!(prediction.n_used, 3);
-/// println!("{} ({:.1} %)", prediction.label, 100.0 * prediction.confidence());
+/// println!("{} ({:.1} %)", prediction.answer(), 100.0 * prediction.confidence());
 /// # Ok::<(), infer_cpu::Error>(())
 /// ```
 pub struct Classifier {
@@ -54,7 +54,10 @@ pub struct Classifier {
     selection: Selection,
     augmentation: TestTimeAugmentation,
     finite: Vec<[f64; 3]>,
+    /// Height of the ground under the cloud at hand, where it is known.
+    ground_z: Option<f64>,
     normalized: Vec<[f32; 3]>,
+    unknown: UnknownRule,
     prediction: Prediction,
 }
 
@@ -100,9 +103,10 @@ impl Classifier {
         let front = is_cpl.then(|| front_pass(spec.front, &parts)).transpose()?;
         let selection = Selection::new(&spec, front)?;
         let classes = class_names(&card, network.n_classes());
-        let prediction = Prediction::empty(&classes, options.precision);
+        let prediction = Prediction::empty(&classes, card.temperature, options.precision);
         let mut classifier = Self {
             source: (options.precision != Precision::F32).then_some(source),
+            unknown: UnknownRule::new(&card, &classes),
             card,
             augmentation: TestTimeAugmentation::new(options, &spec, classes.len())?,
             classes,
@@ -114,6 +118,7 @@ impl Classifier {
             fallback: None,
             selection,
             finite: Vec::new(),
+            ground_z: None,
             normalized: Vec::new(),
             prediction,
         };
@@ -160,14 +165,29 @@ impl Classifier {
         self.selection.spec()
     }
 
-    /// Classifies a cloud of points, `[n, 3]`, in metres or whatever the unit:
-    /// only shape counts where clouds are normalised.
+    /// Classifies a cloud of points, `[n, 3]`, in metres or, where clouds are
+    /// normalised to the unit sphere and only shape counts, in any unit.
     ///
     /// # Errors
     /// A cloud without points; one with a coordinate that is not finite, unless
     /// [`Options::drop_invalid`]; a network whose arithmetic overflows.
     pub fn classify(&mut self, points: &[[f32; 3]]) -> Result<&Prediction, Error> {
+        self.classify_on_ground(points, None)
+    }
+
+    /// The same for a cluster over ground at the height `ground_z`, in metres in the
+    /// cluster's frame, as a segmentation tells it. A model for metres counts heights
+    /// from there; `None` or NaN takes the lowest point for the ground.
+    ///
+    /// # Errors
+    /// As [`Classifier::classify`].
+    pub fn classify_on_ground(
+        &mut self,
+        points: &[[f32; 3]],
+        ground_z: Option<f32>,
+    ) -> Result<&Prediction, Error> {
         self.take(points.iter().map(|point| point.map(f64::from)))?;
+        self.ground_z = ground_z.map(f64::from);
         self.predict()
     }
 
@@ -197,6 +217,7 @@ impl Classifier {
     /// Keeps what is finite of `points`.
     fn take(&mut self, points: impl Iterator<Item = [f64; 3]>) -> Result<(), Error> {
         self.finite.clear();
+        self.ground_z = None;
         self.prediction.n_dropped = 0;
         for (index, point) in points.enumerate() {
             if point.iter().all(|x| x.is_finite()) {
@@ -221,6 +242,9 @@ impl Classifier {
             Normalization::UnitSphere => {
                 normalize::to_unit_sphere(&self.finite, &mut self.normalized);
             }
+            Normalization::Metric => {
+                normalize::to_metric(&self.finite, self.ground_z, &mut self.normalized);
+            }
             Normalization::None => normalize::not_at_all(&self.finite, &mut self.normalized),
         }
     }
@@ -232,6 +256,7 @@ impl Classifier {
         if self.augmentation.n() <= 1 {
             self.forward()?;
             self.prediction.logits.clone_from(&self.scratch.values);
+            self.prediction.energy = energy(&self.scratch.values, self.card.temperature);
         } else {
             self.vote()?;
         }
@@ -239,6 +264,8 @@ impl Classifier {
         self.prediction.n_clipped = self.events.clipped;
         self.prediction.class = argmax(&self.prediction.logits);
         self.prediction.label = Arc::clone(&self.classes[self.prediction.class]);
+        let Prediction { class, energy, .. } = self.prediction;
+        self.prediction.is_unknown = self.unknown.holds(class, energy);
         Ok(&self.prediction)
     }
 
@@ -273,13 +300,17 @@ impl Classifier {
     /// logits.
     fn vote(&mut self) -> Result<(), Error> {
         self.augmentation.begin(&self.normalized);
+        let mut energies = 0.0;
         for vote in 0..self.augmentation.n() {
             self.selection.set_seed(self.augmentation.seed(vote));
             self.augmentation.turn(vote, &mut self.normalized);
             self.forward()?;
             self.augmentation.count(&self.scratch.values);
+            // The mean log-probabilities have lost it.
+            energies += energy(&self.scratch.values, self.card.temperature);
         }
         self.augmentation.result(&mut self.prediction.logits);
+        self.prediction.energy = energies / f64::from(self.augmentation.n());
         Ok(())
     }
 }

@@ -53,7 +53,7 @@ pub fn evaluate_some(
     for i in indices {
         let label = set.labels[i];
         let answers = confusion.get_mut(label).ok_or(Error::UnknownLabel { label, n_classes })?;
-        answers[classifier.classify(set.cloud(i))?.class] += 1;
+        answers[classifier.classify_on_ground(set.cloud(i), set.ground_z(i))?.class] += 1;
     }
     Ok(Evaluation { confusion })
 }

@@ -19,7 +19,7 @@
 //!     .map(|i| [f32::from(i).cos(), f32::from(i).sin(), f32::from(i) * 0.01])
 //!     .collect();
 //! let prediction = classifier.classify(&cloud)?;
-//! println!("{} ({:.1} %)", prediction.label, 100.0 * prediction.confidence());
+//! println!("{} ({:.1} %)", prediction.answer(), 100.0 * prediction.confidence());
 //! assert_eq!(prediction.n_used, 64);
 //! # Ok::<(), infer_cpu::Error>(())
 //! ```
@@ -85,8 +85,8 @@ pub use error::Error;
 #[cfg(feature = "evaluate")]
 pub use evaluate::{Evaluation, evaluate, evaluate_some};
 pub use formats::model_card::{ModelCard, Normalization};
-pub use normalize::to_unit_sphere;
+pub use normalize::{to_metric, to_unit_sphere};
 pub use options::{Options, TNets, UpAxis};
 pub use precision::Precision;
-pub use prediction::Prediction;
+pub use prediction::{Prediction, UNKNOWN, energy};
 pub use summary::{LayerShape, NetShape, Summary, inspect};

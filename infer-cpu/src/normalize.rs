@@ -35,15 +35,37 @@ pub fn to_unit_sphere(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.extend(points.iter().map(|point| from_mean(point).map(|x| (x * scale) as f32)));
 }
 
+/// Moves the mean of x and of y to 0 and the lowest z to 0, without a scale, and
+/// leaves the result in `out`: a cluster in metres stays one in metres, wherever its
+/// sensor was. The network then sees how large an object is, and how high its parts
+/// are above its foot.
+///
+/// The mean is that of [`to_unit_sphere`], and depends on the order of the points
+/// as little. All coordinates must be finite; none is further from 0 than f32
+/// reaches.
+pub fn to_metric(points: &[[f64; 3]], ground_z: Option<f64>, out: &mut Vec<[f32; 3]>) {
+    out.clear();
+    let mean = [0, 1].map(|axis| exact_mean(points.iter().map(|point| point[axis])));
+    let lowest = || points.iter().fold(f64::INFINITY, |lowest, point| lowest.min(point[2]));
+    let foot = ground_z.filter(|z| z.is_finite()).unwrap_or_else(lowest);
+    let moved = |[x, y, z]: &[f64; 3]| [x - mean[0], y - mean[1], z - foot].map(in_f32);
+    out.extend(points.iter().map(moved));
+}
+
 /// Leaves `points` in `out` as they are, rounded to f32 and no further from 0
 /// than f32 reaches.
 pub fn not_at_all(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.clear();
-    let largest = f64::from(f32::MAX);
-    out.extend(points.iter().map(|point| point.map(|x| x.clamp(-largest, largest) as f32)));
+    out.extend(points.iter().map(|point| point.map(in_f32)));
 }
 
-/// The mean of `values`, all below 1 in magnitude: the same for any order.
+/// `x` rounded to f32, and no further from 0 than f32 reaches.
+fn in_f32(x: f64) -> f32 {
+    let largest = f64::from(f32::MAX);
+    x.clamp(-largest, largest) as f32
+}
+
+/// The mean of `values`, all finite: the same for any order.
 fn exact_mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let largest = values.clone().fold(0.0f64, |most, x| most.max(x.abs()));
     let unit = power_of_two_above(largest);
@@ -95,6 +117,28 @@ fn power_of_two_above(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cluster_in_metres_stays_one_wherever_it_stands_and_however_it_is_ordered() {
+        let metric = |points: &[[f64; 3]]| {
+            let mut out = Vec::new();
+            to_metric(points, None, &mut out);
+            out
+        };
+        let cluster = [[1.0, 0.0, 0.5], [3.0, 0.5, -0.25], [2.0, -0.5, 1.5]];
+        let expected = [[-1.0, 0.0, 0.75], [1.0, 0.5, 0.0], [0.0, -0.5, 1.75]];
+        assert_eq!(metric(&cluster), expected);
+        // Whole metres away: exact in f64.
+        assert_eq!(metric(&cluster.map(|[x, y, z]| [x + 40.0, y - 7.0, z - 2.0])), expected);
+        let [a, b, c] = metric(&[cluster[2], cluster[0], cluster[1]])[..] else { unreachable!() };
+        assert_eq!([b, c, a], expected);
+        assert_eq!(metric(&[]), [[0.0; 3]; 0]);
+        assert_eq!(metric(&[[5.0; 3]]), [[0.0; 3]]);
+        // Halves of the largest number are apart by the largest number.
+        let far = f64::MAX / 2.0;
+        assert_eq!(metric(&[[-far, 0.0, -far], [far, 0.0, far]])[1], [f32::MAX, 0.0, f32::MAX]);
+        assert_eq!(metric(&[[f64::MAX; 3]; 3]), [[0.0; 3]; 3]);
+    }
 
     #[test]
     fn voxels_keep_their_points_far_from_zero_and_at_any_scale() {

@@ -2,7 +2,12 @@
 
 use std::sync::Arc;
 
+use formats::model_card::ModelCard;
+
 use crate::Precision;
+
+/// What [`Prediction::answer`] says of an object that the model does not know.
+pub const UNKNOWN: &str = "unknown";
 
 /// The class of a cloud, and how it was found.
 #[derive(Clone, Debug)]
@@ -11,8 +16,16 @@ pub struct Prediction {
     /// The class: an index into [`crate::Classifier::classes`]. Of equal
     /// logits the first wins.
     pub class: usize,
-    /// The class's name.
+    /// The class's name, even if the object [is unknown](Prediction::is_unknown).
     pub label: Arc<str>,
+    /// Whether the object is none that the model is to tell apart: its class is one
+    /// of [`ModelCard::unknown_classes`], or its energy is above
+    /// [`ModelCard::unknown_energy`].
+    pub is_unknown: bool,
+    /// -T ln Σ exp(logit / T) at the model's temperature T: the larger, the less
+    /// the cloud is like any that the network learnt from (Liu et al. 2020). After
+    /// votes, their mean.
+    pub energy: f64,
     /// The network's outputs, one a class. After votes, mean log-probabilities.
     pub logits: Vec<f32>,
     /// Points of the cloud, without those that were dropped.
@@ -26,24 +39,37 @@ pub struct Prediction {
     pub precision: Precision,
     /// Activations that int8's calibrated ranges clipped.
     pub n_clipped: u64,
+    /// What logits are divided by before the softmax.
+    temperature: f64,
 }
 
 impl Prediction {
     /// None yet, with room for a logit of each of `classes`.
-    pub(crate) fn empty(classes: &[Arc<str>], precision: Precision) -> Self {
+    pub(crate) fn empty(classes: &[Arc<str>], temperature: f64, precision: Precision) -> Self {
         Self {
             class: 0,
             label: classes.first().map_or_else(|| "".into(), Arc::clone),
+            is_unknown: false,
+            energy: 0.0,
             logits: Vec::with_capacity(classes.len()),
             n_points: 0,
             n_dropped: 0,
             n_used: 0,
             precision,
             n_clipped: 0,
+            temperature,
         }
     }
 
-    /// The probability of the predicted class by the network's softmax.
+    /// The answer: the class's name, or [`UNKNOWN`].
+    #[must_use]
+    pub fn answer(&self) -> &str {
+        if self.is_unknown { UNKNOWN } else { &self.label }
+    }
+
+    /// The probability of the predicted class by the network's softmax, at the
+    /// model's temperature. Of an unknown object it is that of the class in
+    /// [`Prediction::label`].
     #[must_use]
     pub fn confidence(&self) -> f64 {
         self.log_probability(self.class).exp()
@@ -55,10 +81,41 @@ impl Prediction {
     /// finite logits overflow.
     #[must_use]
     pub fn log_probability(&self, class: usize) -> f64 {
-        let shifted = |logit: f32| f64::from(logit) - f64::from(self.logits[self.class]);
+        let largest = f64::from(self.logits[self.class]);
+        let shifted = |logit: f32| (f64::from(logit) - largest) / self.temperature;
         let sum: f64 = self.logits.iter().map(|&logit| shifted(logit).exp()).sum();
         shifted(self.logits[class]) - sum.ln()
     }
+}
+
+/// When an object is unknown.
+pub struct UnknownRule {
+    /// Of each class, whether it is one of those that are unknown.
+    classes: Vec<bool>,
+    energy: Option<f64>,
+}
+
+impl UnknownRule {
+    /// That of `card`, for `classes`.
+    pub fn new(card: &ModelCard, classes: &[Arc<str>]) -> Self {
+        let is_unknown =
+            |class: &Arc<str>| card.unknown_classes.iter().any(|name| **name == **class);
+        Self { classes: classes.iter().map(is_unknown).collect(), energy: card.unknown_energy }
+    }
+
+    /// Whether it holds for an object of `class` and of this energy.
+    pub fn holds(&self, class: usize, energy: f64) -> bool {
+        self.classes[class] || self.energy.is_some_and(|most| energy > most)
+    }
+}
+
+/// The energy of `logits`, finite ones and one at least, at `temperature` above 0:
+/// see [`Prediction::energy`].
+#[must_use]
+pub fn energy(logits: &[f32], temperature: f64) -> f64 {
+    let largest = f64::from(logits[argmax(logits)]);
+    let shifted = |&logit: &f32| ((f64::from(logit) - largest) / temperature).exp();
+    -largest - temperature * logits.iter().map(shifted).sum::<f64>().ln()
 }
 
 /// The first of the largest.
@@ -70,4 +127,53 @@ pub fn argmax(logits: &[f32]) -> usize {
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(card: &ModelCard, logits: &[f32]) -> Prediction {
+        let classes: Vec<Arc<str>> = card.classes.iter().map(|name| name.as_str().into()).collect();
+        let mut found = Prediction::empty(&classes, card.temperature, Precision::F32);
+        found.logits = logits.to_vec();
+        found.class = argmax(logits);
+        found.label = Arc::clone(&classes[found.class]);
+        found.energy = energy(logits, card.temperature);
+        found.is_unknown = UnknownRule::new(card, &classes).holds(found.class, found.energy);
+        found
+    }
+
+    #[test]
+    fn unknown_is_the_answer_to_some_classes_and_to_high_energies() {
+        let card = ModelCard {
+            classes: ["car", "tree"].map(str::to_owned).to_vec(),
+            unknown_classes: vec!["tree".to_owned()],
+            ..ModelCard::default()
+        };
+        let car = of(&card, &[3.0, 1.0]);
+        assert_eq!((car.answer(), car.is_unknown), ("car", false));
+        let tree = of(&card, &[1.0, 3.0]);
+        assert_eq!((tree.answer(), &*tree.label, tree.is_unknown), ("unknown", "tree", true));
+        assert_eq!(tree.confidence(), car.confidence());
+        // -ln(e^3 + e^1)
+        assert!((car.energy + 3.126_928).abs() < 1e-6, "{}", car.energy);
+        let strict = ModelCard { unknown_energy: Some(-3.2), ..card.clone() };
+        assert_eq!(of(&strict, &[3.0, 1.0]).answer(), "unknown");
+        let lax = ModelCard { unknown_energy: Some(-3.1), ..card };
+        assert_eq!(of(&lax, &[3.0, 1.0]).answer(), "car");
+    }
+
+    #[test]
+    fn temperature_makes_the_network_less_sure_and_changes_no_class() {
+        let classes = vec!["a".to_owned(), "b".to_owned()];
+        let card = ModelCard { classes, temperature: 2.0, ..ModelCard::default() };
+        let found = of(&card, &[6.0, 2.0]);
+        assert_eq!(found.class, 0);
+        // 1 / (1 + e^-2); -2 ln(e^3 + e^1)
+        assert!((found.confidence() - 0.880_797).abs() < 1e-6, "{}", found.confidence());
+        assert!((found.energy + 6.253_856).abs() < 1e-6, "{}", found.energy);
+        // However large the logits are.
+        assert_eq!(energy(&[3e38, -3e38], 1e-3), -f64::from(3e38f32));
+    }
 }

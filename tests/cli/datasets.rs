@@ -15,7 +15,7 @@ fn the_default_sets_are_written_packed_and_verified() {
             let packed = format!("out/packed/{set}-{variant}-train.npz");
             let packed = read_labelled(&folder.at(&packed)).unwrap();
             assert_eq!(packed.classes.as_ref().unwrap()[..], ["ball", "donut", "ring"]);
-            assert_eq!(packed.n_points, 1024);
+            assert_eq!(packed.smallest_cloud(), 1024);
             assert_eq!(packed.len(), if set == "rotational" { 6 * 4 } else { 6 });
         }
     }

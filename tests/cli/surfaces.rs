@@ -17,7 +17,7 @@ fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
         ["surface", "seen"].map(|set| read_labelled(&folder.at(&format!("a/{set}-test.npz"))));
     let (whole, seen) = (whole.unwrap(), seen.unwrap());
     let (names, seen_names) = (whole.names.as_ref().unwrap(), seen.names.as_ref().unwrap());
-    assert_eq!((whole.len(), whole.n_points, seen.len()), (10, 200, 40));
+    assert_eq!((whole.len(), whole.smallest_cloud(), seen.len()), (10, 200, 40));
     let radius = |p: &[f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
     for (i, name) in names.iter().enumerate() {
         let largest = whole.cloud(i).iter().map(radius).fold(0.0, f32::max);

@@ -5,10 +5,13 @@
 
 use std::borrow::Cow;
 
+use formats::model_card::Normalization;
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{FarthestPoints, FpsStart};
 
 use crate::clouds::Clouds;
+use crate::cluster;
+use crate::draws::Draws;
 use crate::recipe::{Augment, Axis, Recipe, Sampling};
 
 /// One augmented cloud, as the network sees it.
@@ -25,46 +28,25 @@ pub struct TrainingCloud {
     pub target: Vec<f32>,
 }
 
-/// The random numbers of one cloud in one epoch.
-struct Draws {
-    stream: StreamKey,
-    n: u64,
-}
-
-impl Draws {
-    fn unit(&mut self) -> f64 {
-        self.n += 1;
-        self.stream.unit(self.n)
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn below(&mut self, bound: usize) -> usize {
-        self.n += 1;
-        self.stream.below(bound as u64, self.n) as usize
-    }
-
-    /// Standard normal (Box and Muller 1958).
-    fn normal(&mut self) -> f64 {
-        let (radius, angle) = (1.0 - self.unit(), self.unit());
-        (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
-    }
-}
-
-/// Cloud `i` of `clouds` in epoch `epoch` of `recipe`.
+/// Cloud `i` of `clouds`, drawn for the `turn`th time, from 0, in `epoch` of
+/// `recipe`.
 #[must_use]
-pub fn augment(clouds: &Clouds, i: usize, epoch: u32, recipe: &Recipe) -> TrainingCloud {
-    let stream = StreamKey::new(recipe.seed, &format!("augment {i}"), epoch);
-    let mut draws = Draws { stream, n: 0 };
+pub fn augment(
+    clouds: &Clouds,
+    i: usize,
+    (epoch, turn): (u32, u32),
+    recipe: &Recipe,
+) -> TrainingCloud {
+    let again = if turn == 0 { String::new() } else { format!(" again {turn}") };
+    let stream = StreamKey::new(recipe.seed, &format!("augment {i}{again}"), epoch);
+    let mut draws = Draws::new(stream);
     let ChosenPoints { mut points, mut neighborhood, mut places } =
-        choose(clouds.set.cloud(i), recipe, &mut draws);
+        choose(clouds, i, recipe, &mut draws);
     let n_classes = clouds.classes.len();
     let mut target = one_hot(clouds.set.labels[i], n_classes);
     if recipe.augment.cut_mix > 0.0 && draws.unit() < recipe.augment.cut_mix {
         let other = draws.below(clouds.len());
-        let other_points = choose(clouds.set.cloud(other), recipe, &mut draws).points;
+        let other_points = choose(clouds, other, recipe, &mut draws).points;
         let replaced = mix(&mut points, &other_points, &mut draws);
         for (share, other) in target.iter_mut().zip(one_hot(clouds.set.labels[other], n_classes)) {
             *share += replaced * (other - *share);
@@ -74,14 +56,19 @@ pub fn augment(clouds: &Clouds, i: usize, epoch: u32, recipe: &Recipe) -> Traini
     for share in &mut target {
         *share = *share * (1.0 - smoothing) + smoothing / n_classes as f32;
     }
+    let mut moves = recipe.augment.clone();
+    if recipe.normalization == Normalization::Metric {
+        // Errors came before the centring.
+        (moves.jitter, moves.sensor_noise) = (0.0, 0.0);
+    }
     let n = points.len();
     if neighborhood.is_empty() {
-        drop_points(&mut points, recipe.augment.drop, &mut draws);
-        transform(&mut points, &recipe.augment, &mut draws);
+        drop_points(&mut points, moves.drop, &mut draws);
+        transform(&mut points, &moves, &mut draws);
     } else {
         // All points are moved together, so that chosen points stay among them.
-        drop_points(&mut places, recipe.augment.drop, &mut draws);
-        transform(&mut neighborhood, &recipe.augment, &mut draws);
+        drop_points(&mut places, moves.drop, &mut draws);
+        transform(&mut neighborhood, &moves, &mut draws);
         points = places.iter().map(|&place| neighborhood[place]).collect();
     }
     let first_weight = (n - points.len() + 1) as f32;
@@ -101,16 +88,24 @@ fn one_hot(label: usize, n_classes: usize) -> Vec<f32> {
     (0..n_classes).map(|class| f32::from(u8::from(class == label))).collect()
 }
 
-/// Chooses the points of `cloud` that the network sees.
-fn choose(cloud: &[[f32; 3]], recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
+/// Chooses the points of `cloud` that the network sees; a cluster in metres is
+/// varied and centred before.
+fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
+    let cloud = clouds.set.cloud(i);
+    let cloud: Cow<'_, [[f32; 3]]> = match recipe.normalization {
+        Normalization::Metric => {
+            cluster::varied(cloud, clouds.set.ground_z(i), recipe, draws).into()
+        }
+        _ => cloud.into(),
+    };
     let n = recipe.points.min(cloud.len());
     let (candidates, places): (Cow<'_, [[f32; 3]]>, Vec<usize>) = match recipe.sampling {
-        Sampling::First => (cloud.into(), (0..n).collect()),
-        Sampling::Random => (shuffled(cloud, n, draws).into(), (0..n).collect()),
+        Sampling::First => (cloud, (0..n).collect()),
+        Sampling::Random => (draws.shuffled(&cloud, n).into(), (0..n).collect()),
         Sampling::Fps => {
             let some = draws.between(0.5 * cloud.len() as f64, cloud.len() as f64) as usize;
             let some = some.max(n);
-            let mut candidates = shuffled(cloud, some, draws);
+            let mut candidates = draws.shuffled(&cloud, some);
             candidates.truncate(some);
             let kernels = infer_cpu::kernel::available().next();
             let kernels = kernels.expect("invariant: the scalar kernels run everywhere");
@@ -126,17 +121,6 @@ fn choose(cloud: &[[f32; 3]], recipe: &Recipe, draws: &mut Draws) -> ChosenPoint
         neighborhood: if has_edges { candidates.into_owned() } else { Vec::new() },
         places,
     }
-}
-
-/// The points of `cloud`, of which the first `n` are a random choice in random
-/// order (Fisher and Yates).
-fn shuffled(cloud: &[[f32; 3]], n: usize, draws: &mut Draws) -> Vec<[f32; 3]> {
-    let mut points = cloud.to_vec();
-    for i in 0..n {
-        let j = i + draws.below(points.len() - i);
-        points.swap(i, j);
-    }
-    points
 }
 
 /// Replaces a random part of `points` by points of `other`; returns its share.

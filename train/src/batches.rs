@@ -15,10 +15,15 @@ use crate::recipe::Recipe;
 /// Prepared batches that wait for the network, at most.
 const AHEAD: usize = 3;
 
-/// How many whole batches `n` clouds make.
+/// How many whole batches an epoch of `n` clouds has.
 #[must_use]
 pub fn count(n: usize, recipe: &Recipe) -> usize {
-    n / recipe.batch
+    size(n, recipe) / recipe.batch
+}
+
+/// How many clouds are drawn for an epoch of a set of `n`.
+fn size(n: usize, recipe: &Recipe) -> usize {
+    recipe.clouds_per_epoch.unwrap_or(n)
 }
 
 /// The batches of `epoch`, in an order that depends on seed and epoch.
@@ -30,10 +35,10 @@ pub fn start<'s>(
 ) -> Receiver<Batch> {
     let (sender, receiver) = sync_channel(AHEAD);
     scope.spawn(move || {
-        let order = order(clouds.len(), epoch, recipe);
+        let order = order(&clouds.set.labels, clouds.classes.len(), epoch, recipe);
         for some in order.chunks_exact(recipe.batch) {
-            let drawn: Vec<TrainingCloud> =
-                some.par_iter().map(|&i| augment(clouds, i, epoch, recipe)).collect();
+            let draw = |&(i, turn): &(usize, u32)| augment(clouds, i, (epoch, turn), recipe);
+            let drawn: Vec<TrainingCloud> = some.par_iter().map(draw).collect();
             if sender.send(joined(&drawn)).is_err() {
                 // The receiver has stopped after an error.
                 break;
@@ -43,14 +48,39 @@ pub fn start<'s>(
     receiver
 }
 
-/// A permutation of `n` clouds (Fisher and Yates).
-fn order(n: usize, epoch: u32, recipe: &Recipe) -> Vec<usize> {
-    let stream = StreamKey::new(recipe.seed, "order", epoch);
-    let mut order: Vec<usize> = (0..n).collect();
-    for i in (1..n).rev() {
-        order.swap(i, stream.below(i as u64 + 1, i as u64) as usize);
+/// The clouds of an epoch in random order, each with how often it came before.
+/// With `balance` every class has as many, give or take one.
+fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec<(usize, u32)> {
+    let all = 0..labels.len();
+    let groups: Vec<Vec<usize>> = match recipe.balance {
+        false => vec![all.collect()],
+        true => {
+            let of = |class| all.clone().filter(|&i| labels[i] == class).collect();
+            (0..n_classes).map(of).filter(|group: &Vec<usize>| !group.is_empty()).collect()
+        }
+    };
+    let size = size(labels.len(), recipe);
+    let mut order = Vec::with_capacity(size);
+    for (number, group) in groups.iter().enumerate() {
+        // The first groups have one cloud more where the size is no multiple.
+        let share = (size + groups.len() - 1 - number) / groups.len();
+        for turn in 0..share / group.len() {
+            order.extend(group.iter().map(|&i| (i, turn as u32)));
+        }
+        let mut group = group.clone();
+        shuffle(&mut group, StreamKey::new(recipe.seed, &format!("rest of {number}"), epoch));
+        let turn = (share / group.len()) as u32;
+        order.extend(group.iter().take(share % group.len()).map(|&i| (i, turn)));
     }
+    shuffle(&mut order, StreamKey::new(recipe.seed, "order", epoch));
     order
+}
+
+/// Fisher and Yates.
+fn shuffle<T>(values: &mut [T], stream: StreamKey) {
+    for i in (1..values.len()).rev() {
+        values.swap(i, stream.below(i as u64 + 1, i as u64) as usize);
+    }
 }
 
 /// One batch of some clouds.
@@ -70,4 +100,33 @@ pub fn joined(drawn: &[TrainingCloud]) -> Batch {
     batch.targets = Matrix::from_shape_vec((drawn.len(), n_classes), targets)
         .expect("invariant: every target has all classes");
     batch
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_balanced_epoch_has_as_many_clouds_of_each_class() {
+        // Seven of class 0, one of class 1, none of class 2.
+        let labels = [0, 0, 0, 1, 0, 0, 0, 0];
+        let recipe = Recipe { balance: true, clouds_per_epoch: Some(11), ..Recipe::default() };
+        let mut drawn = order(&labels, 3, 5, &recipe);
+        assert_eq!(drawn, order(&labels, 3, 5, &recipe));
+        assert_ne!(drawn, order(&labels, 3, 6, &recipe));
+        drawn.sort_unstable();
+        assert_eq!(drawn.iter().filter(|(i, _)| *i == 3).count(), 5);
+        assert_eq!(drawn.len(), 11);
+        // No draw comes twice: each has random numbers of its own.
+        assert!(drawn.windows(2).all(|pair| pair[0] != pair[1]), "{drawn:?}");
+        assert_eq!(count(8, &Recipe { batch: 4, ..recipe }), 2);
+    }
+
+    #[test]
+    fn an_epoch_has_each_cloud_once() {
+        let mut drawn = order(&[0; 30], 1, 0, &Recipe::default());
+        assert!(!drawn.is_sorted());
+        drawn.sort_unstable();
+        assert_eq!(drawn, (0..30).map(|i| (i, 0)).collect::<Vec<_>>());
+    }
 }

@@ -1,20 +1,22 @@
-//! Labelled clouds, checked and normalised.
+//! Labelled clouds, checked and perhaps normalised.
 
 mod yanx27;
 
 use std::path::{Path, PathBuf};
 
 use formats::labelled::{LabelledSet, read_labelled};
+use formats::model_card::Normalization;
 use formats::modelnet_h5_list;
 use formats::rng::StreamKey;
 use formats::split::Split;
 
 use crate::error::Error;
 
-/// Clouds of one size, with their classes.
+/// Clouds with their classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clouds {
-    /// Coordinates, normalised to the unit sphere.
+    /// Coordinates: of the unit sphere, or metres from the sensor where a network
+    /// takes metres.
     pub set: LabelledSet,
     /// Class names in the order of the labels.
     pub classes: Vec<String>,
@@ -53,6 +55,21 @@ impl Clouds {
     /// Data that cannot be read, a set without clouds, a coordinate that is not
     /// finite.
     pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
+        Self::read_for(Normalization::UnitSphere, path, split, most_points)
+    }
+
+    /// As [`Clouds::read`], for a network of this normalisation: clouds for one that
+    /// takes metres are left as they are, since training moves each of them by
+    /// itself, and infer-cpu does too.
+    ///
+    /// # Errors
+    /// As [`Clouds::read`].
+    pub fn read_for(
+        normalization: Normalization,
+        path: &Path,
+        split: Split,
+        most_points: usize,
+    ) -> Result<Self, Error> {
         let set = if let Some(packed) = packed(path, split) {
             read_labelled(&packed)?
         } else if modelnet_h5_list::list(path, split).is_file() {
@@ -67,15 +84,16 @@ impl Clouds {
             return Err(Error::Data { path: path.to_path_buf(), cause });
         };
         let mut clouds = Self::checked(set, path)?;
-        clouds.normalize();
+        if normalization != Normalization::Metric {
+            clouds.normalize();
+        }
         Ok(clouds)
     }
 
     /// Moves every cloud's mean to 0 and scales its largest radius to 1.
     pub fn normalize(&mut self) {
-        let n_points = self.set.n_points;
-        for cloud in self.set.points.chunks_exact_mut(3 * n_points) {
-            formats::cloud::normalize_unit_sphere(cloud.as_chunks_mut::<3>().0);
+        for cloud in 0..self.len() {
+            formats::cloud::normalize_unit_sphere(self.set.cloud_mut(cloud));
         }
     }
 
@@ -91,14 +109,21 @@ impl Clouds {
 
     fn checked(mut set: LabelledSet, path: &Path) -> Result<Self, Error> {
         let refuse = |cause: String| Err(Error::Data { path: path.to_path_buf(), cause });
-        if set.is_empty() || set.n_points == 0 {
+        if set.is_empty() {
             return refuse("expected clouds, found none".to_owned());
         }
-        if let Some(at) = set.points.iter().position(|x| !x.is_finite()) {
-            let (cloud, point) = (at / 3 / set.n_points, at / 3 % set.n_points);
-            let name =
-                set.names.as_ref().map_or(String::new(), |names| format!(" ({})", names[cloud]));
-            return refuse(format!("point {point} of cloud {cloud}{name} is not finite"));
+        let name = |cloud: usize| {
+            let name = set.names.as_ref().map(|names| format!(" ({})", names[cloud]));
+            format!("cloud {cloud}{}", name.unwrap_or_default())
+        };
+        for cloud in 0..set.len() {
+            let points = set.cloud(cloud);
+            if points.is_empty() {
+                return refuse(format!("{}: expected points, found none", name(cloud)));
+            }
+            if let Some(point) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+                return refuse(format!("point {point} of {} is not finite", name(cloud)));
+            }
         }
         let most = set.labels.iter().max().map_or(0, |label| label + 1);
         let classes = match set.classes.take() {
@@ -126,30 +151,23 @@ impl Clouds {
         Self { set: self.set.select(indices), classes: self.classes.clone() }
     }
 
-    /// These clouds followed by `others`.
+    /// These clouds followed by `others`, without remarks other than their names.
     ///
     /// # Errors
-    /// Clouds of another size or other classes.
+    /// Clouds of other classes.
     pub fn concat(&self, others: &Self) -> Result<Self, String> {
-        let sizes = [self.set.n_points, others.set.n_points];
-        if sizes[0] != sizes[1] {
-            return Err(format!("expected clouds of {} points, found {}", sizes[0], sizes[1]));
-        }
         if self.classes != others.classes {
             return Err(format!(
                 "expected the classes {:?}, found {:?}",
                 self.classes, others.classes
             ));
         }
-        let join = |a: &Vec<String>, b: &Vec<String>| [&a[..], &b[..]].concat();
         let names = self.set.names.as_ref().zip(others.set.names.as_ref());
-        let set = LabelledSet {
-            points: [&self.set.points[..], &others.set.points[..]].concat(),
-            n_points: self.set.n_points,
-            labels: [&self.set.labels[..], &others.set.labels[..]].concat(),
-            names: names.map(|(a, b)| join(a, b)),
-            ..LabelledSet::default()
-        };
+        let names = names.map(|(a, b)| [&a[..], &b[..]].concat());
+        let mut set = LabelledSet { names, ..LabelledSet::default() };
+        for part in [&self.set, &others.set] {
+            (0..part.len()).for_each(|i| set.push(part.cloud(i), part.labels[i]));
+        }
         Ok(Self { set, classes: self.classes.clone() })
     }
 

@@ -1,8 +1,9 @@
 //! Accuracy, measured with infer-cpu, which runs the models that are written.
 
+use std::ops::Range;
 use std::path::Path;
 
-use infer_cpu::{Classifier, Evaluation, Options, evaluate_some};
+use infer_cpu::{Classifier, Evaluation, Options, Prediction, evaluate_some};
 use rayon::prelude::*;
 
 use crate::clouds::Clouds;
@@ -17,21 +18,49 @@ const CHUNK: usize = 128;
 /// A model that infer-cpu refuses, or that has other classes than the clouds.
 pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Evaluation, Error> {
     let n = clouds.classes.len();
-    let parts: Vec<Evaluation> = (0..clouds.len().div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let mut classifier = Classifier::load(path, options)?;
-            let found = classifier.classes().len();
-            if found != n {
-                let cause = format!("expected a model of {n} classes, found {found}");
-                return Err(Error::Data { path: path.to_path_buf(), cause });
-            }
-            let first = chunk * CHUNK;
-            let some = first..clouds.len().min(first + CHUNK);
-            Ok(evaluate_some(&mut classifier, &clouds.set, some)?)
-        })
-        .collect::<Result<_, Error>>()?;
+    let parts = in_chunks(path, clouds, options, |classifier, some| {
+        let found = classifier.classes().len();
+        if found != n {
+            let cause = format!("expected a model of {n} classes, found {found}");
+            return Err(Error::Data { path: path.to_path_buf(), cause });
+        }
+        Ok(evaluate_some(classifier, &clouds.set, some)?)
+    })?;
     let mut whole = Evaluation { confusion: vec![vec![0; n]; n] };
     parts.iter().for_each(|part| whole.merge(part));
     Ok(whole)
+}
+
+/// What the model at `path` says of each of `clouds`, whose classes may be others
+/// than the model's.
+///
+/// # Errors
+/// A model or a cloud that infer-cpu refuses.
+pub fn predictions(
+    path: &Path,
+    clouds: &Clouds,
+    options: &Options,
+) -> Result<Vec<Prediction>, Error> {
+    let parts = in_chunks(path, clouds, options, |classifier, some| {
+        let classify = |i| -> Result<Prediction, Error> {
+            Ok(classifier.classify_on_ground(clouds.set.cloud(i), clouds.set.ground_z(i))?.clone())
+        };
+        some.map(classify).collect::<Result<Vec<_>, _>>()
+    })?;
+    Ok(parts.into_iter().flatten().collect())
+}
+
+/// What `take` makes of each part of the clouds, on all threads, in order.
+fn in_chunks<T: Send>(
+    path: &Path,
+    clouds: &Clouds,
+    options: &Options,
+    take: impl Fn(&mut Classifier, Range<usize>) -> Result<T, Error> + Sync,
+) -> Result<Vec<T>, Error> {
+    let chunk = |chunk| {
+        let first = chunk * CHUNK;
+        let some = first..clouds.len().min(first + CHUNK);
+        take(&mut Classifier::load(path, options)?, some)
+    };
+    (0..clouds.len().div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
 }

@@ -61,10 +61,13 @@ impl Metrics {
         serde_json::from_str(notes)
     }
 
-    /// Whether this epoch is better on the validation set than all before it.
+    /// Whether this epoch is better on the validation set than all before it: by the
+    /// share of clouds, or `by_class` by the mean of that share over classes.
     #[must_use]
-    pub fn is_best(&self, epoch: u32) -> bool {
-        let of = |row: &Row| row.validation_instance.unwrap_or(0.0);
+    pub fn is_best(&self, epoch: u32, by_class: bool) -> bool {
+        let share =
+            |row: &Row| if by_class { row.validation_class } else { row.validation_instance };
+        let of = |row: &Row| share(row).unwrap_or(0.0);
         let this = self.rows.iter().find(|row| row.epoch == epoch).map_or(0.0, of);
         self.rows.iter().filter(|row| row.epoch < epoch).all(|row| of(row) < this)
     }

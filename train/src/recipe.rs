@@ -5,9 +5,11 @@
 use std::path::Path;
 
 use formats::FormatError;
+use formats::model_card::Normalization;
 use serde::{Deserialize, Serialize};
 
 use crate::adam::Adam;
+use crate::cluster::ClusterVariation;
 use crate::cpl::Cpl;
 use crate::error::Error;
 use crate::shape::{Edge, Shape};
@@ -26,6 +28,25 @@ pub struct Recipe {
     pub points: usize,
     /// How those points are chosen from a cloud that has more.
     pub sampling: Sampling,
+    /// How clouds are moved and scaled: `unit-sphere`, or `metric` for clusters in
+    /// metres, z up, with the sensor at the origin, of any number of points.
+    #[serde(with = "by_name", skip_serializing_if = "is_default")]
+    pub normalization: Normalization,
+    /// Draw as many clouds of each class for an epoch.
+    #[serde(skip_serializing_if = "is_default")]
+    pub balance: bool,
+    /// Clouds that are drawn for an epoch; as many as the training set has if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clouds_per_epoch: Option<usize>,
+    /// The classes that the model answers as `unknown`. The temperature of its
+    /// confidences is then fitted to the validation set.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown: Vec<String>,
+    /// The model answers `unknown`, too, to clouds whose energy is above that of this
+    /// share of the validation clouds that it finds to be of its other classes; to no
+    /// others if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keep_known: Option<f64>,
     /// Share of the training set's instances that choose the checkpoint; with 0
     /// the last checkpoint is taken.
     pub validation: f64,
@@ -46,6 +67,9 @@ pub struct Recipe {
     pub schedule: Schedule,
     /// How clouds are augmented.
     pub augment: Augment,
+    /// How clusters in metres are varied before that.
+    #[serde(skip_serializing_if = "is_default")]
+    pub clusters: ClusterVariation,
 }
 
 impl Default for Recipe {
@@ -56,6 +80,11 @@ impl Default for Recipe {
             batch: 24,
             points: 1024,
             sampling: Sampling::First,
+            normalization: Normalization::UnitSphere,
+            balance: false,
+            clouds_per_epoch: None,
+            unknown: Vec::new(),
+            keep_known: None,
             validation: 0.1,
             network: Shape::default(),
             cpl: None,
@@ -65,7 +94,33 @@ impl Default for Recipe {
             adam: Adam::default(),
             schedule: Schedule::default(),
             augment: Augment::default(),
+            clusters: ClusterVariation::default(),
         }
+    }
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// Values that files call by their names.
+mod by_name {
+    use std::fmt::Display;
+    use std::str::FromStr;
+
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<T: Display, S: Serializer>(value: &T, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(value)
+    }
+
+    pub fn deserialize<'de, T, D>(from: D) -> Result<T, D::Error>
+    where
+        T: FromStr<Err: Display>,
+        D: Deserializer<'de>,
+    {
+        String::deserialize(from)?.parse().map_err(Error::custom)
     }
 }
 
@@ -146,7 +201,8 @@ pub struct Augment {
     /// Where jitter is clipped.
     pub jitter_clip: f64,
     /// Standard deviation of a sensor's error, along the ray to each point, for
-    /// a sensor 3 radii away and 20 degrees above, from any side.
+    /// a sensor 3 radii away and 20 degrees above, from any side; for clusters in
+    /// metres, the sensor at the origin.
     pub sensor_noise: f64,
     /// The largest angle about the up axis, degrees; 180 is any.
     pub rotate_degrees: f64,
@@ -208,18 +264,24 @@ impl Recipe {
             .map_err(|error| Error::Recipe { key: "recipe", cause: error.to_string() })
     }
 
+    /// Whether the model's card gets a temperature, and perhaps a largest energy,
+    /// that are fitted to the validation set.
+    #[must_use]
+    pub fn is_calibrated(&self) -> bool {
+        !self.unknown.is_empty() || self.keep_known.is_some()
+    }
+
     /// Checks that every value is in its range.
     ///
     /// # Errors
     /// [`Error::Recipe`] with the key.
     pub fn check(&self) -> Result<(), Error> {
         const SHARE: &str = "expected 0 or more, and less than 1";
-        const FINITE: &str = "expected a finite number of 0 or more";
         const WIDTHS: &str = "expected widths of 1 to 8192";
         let share = |x: f64| (0.0..1.0).contains(&x);
-        let finite = |x: f64| x.is_finite() && x >= 0.0;
         let width = |width: usize| (1..=WIDEST).contains(&width);
-        let Self { network, augment, adam, .. } = self;
+        let Self { network, augment, adam, clusters, .. } = self;
+        let is_metric = self.normalization == Normalization::Metric;
         let radius = |edge: &Edge| edge.radius.is_normal() && edge.radius > 0.0;
         let mut checks = vec![
             (self.epochs > 0, "epochs", "expected 1 or more"),
@@ -265,6 +327,29 @@ impl Recipe {
                 (finite(cpl.weight), "cpl.weight", FINITE),
             ]);
         }
+        checks.extend([
+            (
+                self.normalization != Normalization::None,
+                "normalization",
+                "expected unit-sphere or metric",
+            ),
+            (
+                is_metric || is_default(clusters),
+                "clusters",
+                "expected `normalization` to be metric, because clusters are in metres",
+            ),
+            (
+                self.keep_known.is_none_or(|kept| kept > 0.0 && kept <= 1.0),
+                "keep_known",
+                "expected more than 0, up to 1",
+            ),
+            (
+                self.validation > 0.0 || !self.is_calibrated(),
+                "validation",
+                "expected more than 0 with `unknown` or `keep_known`, which are fitted to it",
+            ),
+        ]);
+        checks.extend(clusters.checks());
         let positive = |x: &f64| x.is_finite() && *x > 0.0;
         let angle = augment.rotate_degrees;
         checks.extend([
@@ -287,6 +372,13 @@ impl Recipe {
         }
     }
 }
+
+/// Whether `x` is a finite number of 0 or more.
+pub(crate) fn finite(x: f64) -> bool {
+    x.is_finite() && x >= 0.0
+}
+
+pub(crate) const FINITE: &str = "expected a finite number of 0 or more";
 
 /// Wider layers are refused as a mistake.
 const WIDEST: usize = 8192;

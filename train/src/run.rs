@@ -3,15 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use formats::model_card::ModelCard;
+use formats::model_card::{ModelCard, Normalization};
 use formats::split::Split;
 use formats::{FormatError, atomic};
 use indicatif::{ProgressBar, ProgressStyle};
-use infer_cpu::{Evaluation, Options};
+use infer_cpu::{Evaluation, Options, energy};
 
+use crate::calibration::{quantile, temperature};
 use crate::clouds::Clouds;
 use crate::error::Error;
-use crate::evaluate::confusion;
+use crate::evaluate::{confusion, predictions};
 use crate::metrics::{Metrics, Row};
 use crate::recipe::{Recipe, Sampling};
 use crate::trainer::{EpochSummary, Trainer};
@@ -70,14 +71,15 @@ impl Job<'_> {
         while run.trainer.epoch < run.trainer.recipe.epochs {
             run.epoch(&clouds, &held)?;
         }
-        run.finish(&self, test, &clouds)
+        run.finish(&self, test, &clouds, &held)
     }
 }
 
 fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
-    let n_points = clouds.set.n_points;
+    let n_points = clouds.set.smallest_cloud();
     let refuse = |cause: String| Err(Error::Data { path: data.into(), cause });
-    if n_points < recipe.points {
+    // A cluster in metres may have any number of points.
+    if recipe.normalization != Normalization::Metric && n_points < recipe.points {
         let wanted = recipe.points;
         return refuse(format!("expected clouds of {wanted} points or more, found {n_points}"));
     }
@@ -88,6 +90,12 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     if let Some(class) = missing {
         let name = &clouds.classes[class];
         return refuse(format!("expected clouds of every class, found none of {class} ({name})"));
+    }
+    if let Some(name) = recipe.unknown.iter().find(|name| !clouds.classes.contains(name)) {
+        return Err(Error::Recipe {
+            key: "unknown",
+            cause: format!("expected some of the classes {:?}, found `{name}`", clouds.classes),
+        });
     }
     Ok(())
 }
@@ -133,7 +141,7 @@ impl Run {
         };
         self.note(epoch, &learnt, validated.as_ref());
         // Without a validation set, the last epoch is taken.
-        if validated.is_none() || self.metrics.is_best(epoch) {
+        if validated.is_none() || self.metrics.is_best(epoch, self.trainer.recipe.balance) {
             let best = self.folder.join("best.safetensors");
             model_file::write(&best, &mut self.trainer.model, &card)?;
         }
@@ -187,6 +195,8 @@ impl Run {
         };
         ModelCard {
             classes: self.classes.clone(),
+            normalization: recipe.normalization,
+            unknown_classes: recipe.unknown.clone(),
             sampler: Some(sampler.to_owned()),
             points: Some(points),
             edge_radii: recipe.network.edges.iter().map(|edge| edge.radius).collect(),
@@ -204,14 +214,16 @@ impl Run {
         job: &Job<'_>,
         test: Option<&Path>,
         clouds: &Clouds,
+        held: &Clouds,
     ) -> Result<Option<String>, Error> {
         model_file::read(&self.folder.join("best.safetensors"), &mut self.trainer.model)?;
         let shipped = self.folder.join("shipped.safetensors");
-        let card = self.card(None);
+        let mut card = self.card(None);
         model_file::ship(&shipped, &mut self.trainer.model, &card)?;
+        self.calibrate(&mut card, &shipped, held)?;
         let accuracy = test.map(|path| self.test(&shipped, path, job.data)).transpose()?;
         let activation_ranges = infer_cpu::activation_ranges_of_set(&shipped, &clouds.set)?;
-        let card = ModelCard { activation_ranges, ..self.card(accuracy.clone()) };
+        let card = ModelCard { activation_ranges, accuracy: accuracy.clone(), ..card };
         model_file::ship(&shipped, &mut self.trainer.model, &card)?;
         // A kill before this line leaves files in the run's folder alone, which
         // the next run sweeps.
@@ -219,8 +231,32 @@ impl Run {
         Ok(accuracy)
     }
 
+    /// Fits the temperature of `card`, and its largest energy if that is asked for,
+    /// to what `model` says of the validation clouds.
+    fn calibrate(&self, card: &mut ModelCard, model: &Path, held: &Clouds) -> Result<(), Error> {
+        let recipe = &self.trainer.recipe;
+        if !recipe.is_calibrated() {
+            return Ok(());
+        }
+        let found = predictions(model, held, &Options::default())?;
+        let logits: Vec<Vec<f32>> = found.iter().map(|found| found.logits.clone()).collect();
+        card.temperature = temperature(&logits, &held.set.labels);
+        if let Some(share) = recipe.keep_known {
+            let is_known = |class: usize| !recipe.unknown.contains(&self.classes[class]);
+            let known = found
+                .iter()
+                .zip(&held.set.labels)
+                .filter(|(found, label)| is_known(**label) && is_known(found.class));
+            let energies = known.map(|(found, _)| energy(&found.logits, card.temperature));
+            card.unknown_energy = quantile(energies.collect(), share);
+        }
+        Ok(())
+    }
+
     fn test(&self, model: &Path, test: &Path, data: &str) -> Result<String, Error> {
-        let clouds = Clouds::read(test, Split::Test, points_to_read(&self.trainer.recipe))?;
+        let recipe = &self.trainer.recipe;
+        let most_points = points_to_read(recipe);
+        let clouds = Clouds::read_for(recipe.normalization, test, Split::Test, most_points)?;
         if clouds.classes != self.classes {
             let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
             return Err(Error::Data { path: test.to_path_buf(), cause });

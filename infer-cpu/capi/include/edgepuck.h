@@ -204,6 +204,11 @@ typedef struct EdgepuckPrediction {
    * classified in "f32".
    */
   bool fell_back;
+  /**
+   * Whether the answer is "unknown", because the model is not meant to
+   * recognise such an object; class_index then states what it resembles most.
+   */
+  bool is_unknown;
 } EdgepuckPrediction;
 
 #ifdef __cplusplus

@@ -21,6 +21,9 @@ pub struct EdgepuckPrediction {
     /// Whether the precision asked for overflowed on this cloud, so that it was
     /// classified in "f32".
     pub fell_back: bool,
+    /// Whether the answer is "unknown", because the model is not meant to
+    /// recognise such an object; class_index then states what it resembles most.
+    pub is_unknown: bool,
 }
 
 impl EdgepuckPrediction {
@@ -34,6 +37,7 @@ impl EdgepuckPrediction {
             n_used: found.n_used,
             n_clipped: found.n_clipped,
             fell_back: found.precision != precision,
+            is_unknown: found.is_unknown,
         }
     }
 }

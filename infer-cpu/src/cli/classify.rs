@@ -37,8 +37,11 @@ Examples:
   find scans -name '*.npz' | infer-cpu classify --json --files-from -
 
 One line is printed for each file: its name, the class and the confidence,
-separated by tabs. With --json the line is an object with these keys: file, class
-(a number), label, confidence (0 to 1), logits, points (number of valid points),
+separated by tabs. The class is `unknown` for an object that the model is not meant
+to recognise. With --json the line is an object with these keys: file, class
+(a number), label, unknown (true, only for such an object; class, label and
+confidence then state what it resembles most), confidence (0 to 1), logits, points
+(number of valid points),
 dropped (number of invalid points), used (points that the network saw), clipped
 (number of activations, with i8), precision (f32 if the chosen one overflowed) and
 ms (time without reading the file). If the file fails, the keys are file and error.
@@ -74,7 +77,8 @@ pub struct Args {
     #[arg(long)]
     drop_invalid: bool,
 
-    /// Normalization of clouds: unit-sphere, none [default: as in training]
+    /// Normalization of clouds: unit-sphere, metric (metres, from the mean of x and
+    /// y and the lowest z), none [default: as in training]
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalization>,
 

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use infer_cpu::sampler::SamplerSpec;
-use infer_cpu::{LayerShape, NetShape, Precision, Summary};
+use infer_cpu::{LayerShape, ModelCard, NetShape, Precision, Summary};
 use serde_json::{Value, json};
 
 use super::Outcome;
@@ -67,6 +67,9 @@ fn as_json(path: &Path, summary: &Summary, sampler: &SamplerSpec) -> Value {
         "accuracy": card.accuracy,
         "provenance": card.provenance,
         "normalization": card.normalization.name(),
+        "unknown_classes": card.unknown_classes,
+        "unknown_energy": card.unknown_energy,
+        "temperature": card.temperature,
         "sampler": sampler.kind.name(),
         "points": card.points,
         "fps_start": sampler.fps_start.name(),
@@ -113,6 +116,9 @@ fn as_text(
         }
     }
     row("classes", classes(summary))?;
+    if let Some(unknown) = unknown(card) {
+        row("unknown", unknown)?;
+    }
     row("normalization", card.normalization.name().to_owned())?;
     let points = card.points.map_or(String::new(), |points| format!(", {points} points"));
     row("sampler", format!("{}{points}", sampler.kind))?;
@@ -156,6 +162,15 @@ fn classes(summary: &Summary) -> String {
         names if names.is_empty() => format!("{}, without names", summary.n_classes()),
         names => format!("{}: {names}", summary.n_classes()),
     }
+}
+
+/// What is answered as unknown, if anything is.
+fn unknown(card: &ModelCard) -> Option<String> {
+    let classes = card.unknown_classes.join(", ");
+    let energy = card.unknown_energy.map(|most| format!("any of an energy above {most:.3}"));
+    let parts: Vec<String> =
+        Some(classes).filter(|classes| !classes.is_empty()).into_iter().chain(energy).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
 }
 
 fn macs(summary: &Summary) -> String {

@@ -11,7 +11,7 @@ use serde::Serialize;
 /// How lines are written.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Style {
-    /// Name, class and confidence between tabs; all else on standard error.
+    /// Name, answer and confidence between tabs; all else on standard error.
     Text,
     /// One JSON object a line.
     Json,
@@ -23,6 +23,8 @@ struct Classified<'a> {
     file: &'a str,
     class: usize,
     label: &'a str,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    unknown: bool,
     confidence: f64,
     logits: &'a [f32],
     points: usize,
@@ -56,12 +58,14 @@ impl Style {
         if self == Self::Text {
             warn(name, prediction, precision);
             let percent = 100.0 * prediction.confidence();
-            return line(&format!("{}\t{}\t{percent:.1} %", name.display(), prediction.label));
+            let answer = prediction.answer();
+            return line(&format!("{}\t{answer}\t{percent:.1} %", name.display()));
         }
         json_line(&Classified {
             file: &name.to_string_lossy(),
             class: prediction.class,
             label: &prediction.label,
+            unknown: prediction.is_unknown,
             confidence: prediction.confidence(),
             logits: &prediction.logits,
             points: prediction.n_points,

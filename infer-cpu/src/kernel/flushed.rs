@@ -112,7 +112,7 @@ unsafe extern "C" fn call_flushed(data: *mut c_void, entry: Entry) {
 }
 
 /// The logits of a small model, one layer of which is `factor` times as large.
-fn logits(model: &Path, precision: Precision, kernel: kernel::KernelName) -> Vec<f32> {
+fn logits(model: &Path, precision: Precision, kernel: KernelName) -> Vec<f32> {
     let options = Options { precision, kernel: Some(kernel), ..Options::default() };
     let mut classifier = Classifier::load(model, &options).unwrap();
     let point = |i: u8| [f32::from(i % 7), f32::from(i % 5) * 0.3, f32::from(i) * 0.02];

@@ -1,5 +1,7 @@
 //! `classify`: its lines, its flags and their sense.
 
+use formats::model_card::{ModelCard, Normalization};
+
 use crate::program::{Folder, card, strip};
 use crate::tiny_model;
 
@@ -34,6 +36,51 @@ fn an_object_says_all_there_is_to_say() {
     assert_eq!((&found["dropped"], &found["clipped"]), (&0.into(), &0.into()));
     assert_eq!(found["precision"], "f32");
     assert!(found["ms"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn unknown_is_printed_and_the_fine_class_stays_in_the_object() {
+    let folder = Folder::new();
+    folder.cloud("c.xyz", &strip(50));
+    let known = folder.classify_json("c.xyz")[0].clone();
+    assert!(known.get("unknown").is_none(), "{known}");
+    let label = known["label"].as_str().unwrap();
+    let write = |card: &ModelCard| {
+        tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), card);
+    };
+    write(&ModelCard { unknown_classes: vec![label.to_owned()], ..card() });
+    assert!(folder.classify("c.xyz").out.starts_with("c.xyz\tunknown\t"));
+    let found = folder.classify_json("c.xyz")[0].clone();
+    assert_eq!(found["unknown"], true);
+    for key in ["class", "label", "confidence", "logits"] {
+        assert_eq!(found[key], known[key], "{key}");
+    }
+    let inspected = folder.run("inspect m.safetensors").out;
+    assert!(inspected.contains(&format!("unknown         {label}\n")), "{inspected}");
+    // No cloud has as little energy.
+    write(&ModelCard { unknown_energy: Some(-1e9), temperature: 2.0, ..card() });
+    let found = folder.classify_json("c.xyz")[0].clone();
+    assert_eq!((&found["unknown"], &found["label"]), (&true.into(), &known["label"]));
+    assert!(found["confidence"].as_f64() < known["confidence"].as_f64(), "{found}");
+}
+
+#[test]
+fn a_network_of_metres_sees_how_large_an_object_is_and_not_where_it_is() {
+    let folder = Folder::new();
+    let card = ModelCard { normalization: Normalization::Metric, ..card() };
+    tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), &card);
+    // Halves and quarters, which f64 holds wherever they lie.
+    let cloud: Vec<_> = strip(50).iter().map(|p| p.map(|x| (x * 8.0).round() / 8.0)).collect();
+    let moved = |point: &[f64; 3]| [point[0] + 32.0, point[1] - 8.0, point[2] - 2.0];
+    folder.cloud("here.xyz", &cloud);
+    folder.cloud("there.xyz", &cloud.iter().rev().map(moved).collect::<Vec<_>>());
+    folder.cloud("large.xyz", &cloud.iter().map(|p| p.map(|x| 2.0 * x)).collect::<Vec<_>>());
+    let found = folder.classify_json("here.xyz there.xyz large.xyz");
+    assert_eq!(found[0]["logits"], found[1]["logits"]);
+    assert_ne!(found[0]["logits"], found[2]["logits"]);
+    let unit = folder.classify_json("--normalize unit-sphere here.xyz large.xyz");
+    assert_eq!(unit[0]["logits"], unit[1]["logits"]);
+    assert_ne!(unit[0]["logits"], found[0]["logits"]);
 }
 
 #[test]

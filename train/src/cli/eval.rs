@@ -1,34 +1,67 @@
 //! `eval`: measures a model's accuracy on labelled clouds.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use formats::atomic;
+use formats::labelled::LabelledSet;
 use formats::split::Split;
-use infer_cpu::{Classifier, Options, Precision};
+use infer_cpu::{Classifier, ModelCard, Options, Precision};
 use train::accuracy_report;
 use train::clouds::Clouds;
 use train::evaluate::confusion;
+use train::object_report::{self, Labels, Object, Table, Truth, classified};
 use train::run::MOST_POINTS;
+
+use super::Usage;
 
 /// Flags of `eval`.
 #[derive(clap::Args, Debug)]
+#[command(after_help = "\
+For clouds of one size, the accuracy is printed. For clusters with the remarks range_m,
+sensor or ids, for several files, and with --known, --map, --tracks or --min-points, a
+table is printed: the shares of right answers, with 95 % intervals, by class, label,
+range, number of points, sensor and file. A label that the model has no class for counts
+as a negative, whose right answer is `unknown`.")]
 pub struct Args {
     /// The model file
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Labelled clouds: a packed NPZ file, or data with a test part in any form
-    /// that `train --data` accepts
-    #[arg(long, value_name = "PATH")]
-    data: PathBuf,
+    /// Labelled clouds: a packed NPZ file, NPZ files of clusters (repeat the flag),
+    /// or data with a test part in any form that `train --data` accepts
+    #[arg(long, value_name = "PATH", required = true)]
+    data: Vec<PathBuf>,
     /// Precision of the inference: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
-    /// Write the confusion matrix to this CSV file
+    /// Write the confusion matrix, or the table of clusters, to this CSV file
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw the confusion matrix into this SVG file
+    /// Draw the confusion matrix of clouds of one size into this SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    #[command(flatten)]
+    objects: ObjectArgs,
+}
+
+/// Flags about clusters.
+#[derive(clap::Args, Debug)]
+struct ObjectArgs {
+    /// The classes that matter, separated by commas; any other answer counts as
+    /// `unknown` [default: all that the model does not answer as `unknown`]
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    known: Vec<String>,
+    /// TOML file that maps labels of the data to classes of the model, such as
+    /// `pedestrian = "person"`; `rider = ""` leaves such objects out
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
+    /// Count an object that several frames show once, by the track in its id,
+    /// FRAME#TRACK
+    #[arg(long)]
+    tracks: bool,
+    /// Leave out objects of fewer points
+    #[arg(long, value_name = "N")]
+    min_points: Option<usize>,
 }
 
 /// Measures the model that `args` name.
@@ -36,26 +69,136 @@ pub struct Args {
 /// # Errors
 /// A model or data that cannot be used, other numbers of classes.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let clouds = Clouds::read(&args.data, Split::Test, MOST_POINTS)?;
-    let options = Options { precision: args.precision, ..Options::default() };
-    let names: Vec<String> = {
-        let classifier = Classifier::load(&args.model, &options)?;
-        classifier.classes().iter().map(ToString::to_string).collect()
+    let (card, names) = {
+        let classifier = Classifier::load(&args.model, &options(args))?;
+        let names: Vec<String> = classifier.classes().iter().map(ToString::to_string).collect();
+        (classifier.card().clone(), names)
     };
+    let read = |path| Clouds::read_for(card.normalization, path, Split::Test, MOST_POINTS);
+    let clouds = args.data.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
+    let ObjectArgs { known, map, tracks, min_points } = &args.objects;
+    let is_asked = !known.is_empty() || map.is_some() || *tracks || min_points.is_some();
+    let has_remarks = |clouds: &Clouds| {
+        let LabelledSet { range_m, sensor, ids, .. } = &clouds.set;
+        range_m.is_some() || sensor.is_some() || ids.is_some()
+    };
+    match (&args.data[..], &clouds[..]) {
+        ([data], [clouds]) if !is_asked && !has_remarks(clouds) => {
+            report_clouds(args, data, clouds, &names)
+        }
+        _ => report_objects(args, &card, &names, clouds),
+    }
+}
+
+fn options(args: &Args) -> Options {
+    Options { precision: args.precision, ..Options::default() }
+}
+
+/// Reports on clouds of the model's own classes.
+fn report_clouds(
+    args: &Args,
+    data: &Path,
+    clouds: &Clouds,
+    names: &[String],
+) -> anyhow::Result<()> {
     // Also checks that model and data have equally many classes.
-    let found = confusion(&args.model, &clouds, &options)?;
+    let found = confusion(&args.model, clouds, &options(args))?;
     let mut pairs = names.iter().zip(&clouds.classes).enumerate();
     if let Some((class, (model, data))) = pairs.find(|(_, (model, data))| model != data) {
         eprintln!(
             "warning: class {class} is called `{model}` by the model and `{data}` by the data"
         );
     }
-    super::print(&accuracy_report::summary(&found, &args.data))?;
+    super::print(&accuracy_report::summary(&found, data))?;
     if let Some(path) = &args.csv {
-        atomic::write_bytes(path, accuracy_report::to_csv(&found, &names))?;
+        atomic::write_bytes(path, accuracy_report::to_csv(&found, names))?;
     }
     if let Some(path) = &args.svg {
-        atomic::write_bytes(path, accuracy_report::drawing(&found, &names).to_string())?;
+        atomic::write_bytes(path, accuracy_report::drawing(&found, names).to_string())?;
     }
     Ok(())
+}
+
+/// Reports on objects that were cut out of scans.
+fn report_objects(
+    args: &Args,
+    card: &ModelCard,
+    names: &[String],
+    clouds: Vec<Clouds>,
+) -> anyhow::Result<()> {
+    if args.svg.is_some() {
+        return Err(Usage("--svg draws clouds of one size, not clusters".to_owned()).into());
+    }
+    let mut labels = Labels::new(names, &unknown(args, card, names)?);
+    if let Some(path) = &args.objects.map {
+        labels = labels.with_aliases(path)?;
+    }
+    let least = args.objects.min_points.unwrap_or(0);
+    let mut objects = Vec::new();
+    for (path, clouds) in args.data.iter().zip(clouds) {
+        let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
+        let found = classified(&args.model, &name, &clouds, (&labels, least), &options(args))?;
+        objects.extend(found);
+    }
+    let table = Table::new(&objects, &labels, args.objects.tracks);
+    super::print(&format!("{table}\n{}", summary(&objects, &labels, &table)))?;
+    if let Some(path) = &args.csv {
+        atomic::write_bytes(path, table.to_csv())?;
+    }
+    Ok(())
+}
+
+/// The classes of the model, `names`, whose objects are negatives.
+fn unknown(args: &Args, card: &ModelCard, names: &[String]) -> Result<Vec<String>, Usage> {
+    let known = &args.objects.known;
+    if known.is_empty() {
+        return Ok(card.unknown_classes.clone());
+    }
+    if let Some(name) = known.iter().find(|name| !names.contains(name)) {
+        let names = names.join(", ");
+        return Err(Usage(format!("--known: expected some of {names}, found {name}")));
+    }
+    Ok(names.iter().filter(|class| !known.contains(class)).cloned().collect())
+}
+
+/// What is said of all objects together.
+fn summary(objects: &[Object], labels: &Labels, table: &Table) -> String {
+    let mut lines = Vec::new();
+    if let Some(balanced) = table.balanced() {
+        lines.push(format!("mean over classes and negatives: {:.1} %", 100.0 * balanced));
+    }
+    type Score = fn(&Object) -> Option<f64>;
+    let scores = |is_known: bool, score: Score| -> Vec<f64> {
+        let some = objects.iter().filter(|o| (o.truth != Truth::Negative) == is_known);
+        some.filter_map(score).collect()
+    };
+    let kinds: [(_, Score); 2] =
+        [("margin", |o| o.answer.margin), ("energy", |o| Some(o.answer.energy))];
+    for (name, score) in kinds {
+        let found = object_report::detection(&scores(true, score), &scores(false, score));
+        if let Some(found) = found {
+            let object_report::Detection { auroc, fpr_at_95 } = found;
+            lines.push(format!(
+                "negatives told by {name}: AUROC {auroc:.3}, false alarms {:.1} % where 95 % of \
+                 known objects stay known",
+                100.0 * fpr_at_95
+            ));
+        }
+    }
+    let confidences = objects.iter().filter_map(|object| match object.truth {
+        Truth::Known(class) => Some((object.answer.confidence, object.answer.fine == class)),
+        Truth::Negative => None,
+    });
+    let error = object_report::calibration_error(&confidences.collect::<Vec<_>>());
+    lines.push(format!("calibration error of known objects: {:.1} %", 100.0 * error));
+    let mut lacking: BTreeMap<&str, usize> = BTreeMap::new();
+    for object in objects.iter().filter(|object| labels.lacks(&object.label)) {
+        *lacking.entry(&object.label).or_default() += 1;
+    }
+    if !lacking.is_empty() {
+        let lacking: Vec<String> =
+            lacking.iter().map(|(label, n)| format!("{label} ({n})")).collect();
+        lines.push(format!("negatives that the model has no class for: {}", lacking.join(", ")));
+    }
+    lines.join("\n")
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use formats::atomic;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, Normalization, Options};
+use infer_cpu::{Classifier, ModelCard, Normalization, Options};
 use train::explanation_drawing;
 use train::lime::{Explanation, Lime, explain};
 use train::random_baseline::RandomBaseline;
@@ -65,7 +65,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Classifier::load(&args.model, &Options { sampler, normalization, ..Options::default() })
     };
     let mut points = Vec::new();
-    infer_cpu::to_unit_sphere(&cloud, &mut points);
+    match ModelCard::read(&args.model)?.normalization {
+        Normalization::Metric => infer_cpu::to_metric(&cloud, None, &mut points),
+        _ => infer_cpu::to_unit_sphere(&cloud, &mut points),
+    }
     let wide: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
     let critical: Vec<usize> = load(spec)?.sample(&wide)?.iter().map(|&i| i as usize).collect();
     let lime =

@@ -75,7 +75,8 @@ fn parse_widths(word: &str) -> Result<Widths, String> {
 /// As [`Job::run`]; flags that contradict each other.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let recipe = recipe(args)?;
-    let clouds = Clouds::read(&args.data, Split::Train, points_to_read(&recipe))?;
+    let most_points = points_to_read(&recipe);
+    let clouds = Clouds::read_for(recipe.normalization, &args.data, Split::Train, most_points)?;
     // A single file has no test half.
     let halves = (!args.data.is_file()).then(|| args.data.clone());
     let name = args.data.display().to_string();

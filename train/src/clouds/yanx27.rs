@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use formats::FormatError;
-use formats::labelled::LabelledSet;
+use formats::labelled::{LabelledSet, equal_offsets};
 use formats::split::Split;
 use rayon::prelude::*;
 
@@ -47,8 +47,9 @@ pub fn read(root: &Path, split: Split, n_points: usize) -> Result<LabelledSet, E
         .map(|(id, &label)| cloud(&root.join(&classes[label]).join(format!("{id}.txt")), n_points))
         .collect::<Result<_, _>>()?;
     let points = clouds.concat();
+    let offsets = equal_offsets(labels.len(), n_points);
     let (names, classes) = (Some(ids), Some(classes));
-    Ok(LabelledSet { points, n_points, labels, names, classes, ..LabelledSet::default() })
+    Ok(LabelledSet { points, offsets, labels, names, classes, ..LabelledSet::default() })
 }
 
 fn cloud(path: &Path, n_points: usize) -> Result<Vec<f32>, FormatError> {

@@ -12,7 +12,7 @@ fn plain() -> Recipe {
 #[test]
 fn without_augmentation_a_cloud_is_its_first_points() {
     let clouds = crate::clouds(4);
-    let drawn = augment::augment(&clouds, 1, 0, &plain());
+    let drawn = augment::augment(&clouds, 1, (0, 0), &plain());
     assert_eq!(drawn.points, clouds.set.cloud(1)[..16]);
     assert_eq!((drawn.first_weight, &drawn.target[..]), (1.0, &[0.0, 1.0, 0.0][..]));
 }
@@ -23,7 +23,7 @@ fn what_is_dropped_counts_with_the_first_point() {
     let recipe = Recipe { augment: Augment { drop: 0.875, ..plain().augment }, ..plain() };
     let mut dropped = 0;
     for epoch in 0..200 {
-        let drawn = augment::augment(&clouds, 0, epoch, &recipe);
+        let drawn = augment::augment(&clouds, 0, (epoch, 0), &recipe);
         assert_eq!(drawn.points[0], clouds.set.cloud(0)[0]);
         let missing = 16 - drawn.points.len();
         assert_eq!(drawn.first_weight, 1.0 + missing as f32);
@@ -41,10 +41,13 @@ fn a_draw_depends_on_cloud_epoch_and_seed_alone() {
     let clouds = crate::clouds(6);
     for sampling in [Sampling::Random, Sampling::Fps] {
         let recipe = Recipe { points: 12, sampling, ..Recipe::default() };
-        let drawn = augment::augment(&clouds, 3, 2, &recipe);
-        assert_eq!(drawn, augment::augment(&clouds, 3, 2, &recipe));
-        assert_ne!(drawn, augment::augment(&clouds, 3, 3, &recipe));
-        assert_ne!(drawn, augment::augment(&clouds, 3, 2, &Recipe { seed: 1, ..recipe.clone() }));
+        let drawn = augment::augment(&clouds, 3, (2, 0), &recipe);
+        assert_eq!(drawn, augment::augment(&clouds, 3, (2, 0), &recipe));
+        assert_ne!(drawn, augment::augment(&clouds, 3, (3, 0), &recipe));
+        assert_ne!(
+            drawn,
+            augment::augment(&clouds, 3, (2, 0), &Recipe { seed: 1, ..recipe.clone() })
+        );
     }
 }
 
@@ -52,7 +55,7 @@ fn a_draw_depends_on_cloud_epoch_and_seed_alone() {
 fn a_turn_about_the_up_axis_keeps_heights_and_radii() {
     let clouds = crate::clouds(4);
     let augment = Augment { rotate_degrees: 180.0, ..plain().augment };
-    let drawn = augment::augment(&clouds, 0, 0, &Recipe { augment, ..plain() });
+    let drawn = augment::augment(&clouds, 0, (0, 0), &Recipe { augment, ..plain() });
     let mut turned = false;
     for (point, before) in drawn.points.iter().zip(clouds.set.cloud(0)) {
         assert_eq!(point[2], before[2]);
@@ -70,7 +73,7 @@ fn a_mixed_cloud_has_a_mixed_target() {
     let augment = Augment { cut_mix: 1.0, ..plain().augment };
     let recipe = Recipe { augment, ..plain() };
     for epoch in 0..20 {
-        let drawn = augment::augment(&clouds, 0, epoch, &recipe);
+        let drawn = augment::augment(&clouds, 0, (epoch, 0), &recipe);
         let own = drawn.points.iter().filter(|p| clouds.set.cloud(0).contains(p)).count();
         let share = drawn.target[0];
         assert!((drawn.target.iter().sum::<f32>() - 1.0).abs() < 1e-6);
@@ -86,7 +89,7 @@ fn a_sensor_s_noise_is_along_its_rays() {
     let recipe = Recipe { points: 32, augment: noisy, ..plain() };
     let (mut sum, mut across, mut n) = (0.0, 0.0, 0.0);
     for epoch in 0..200 {
-        let drawn = augment::augment(&clouds, 0, epoch, &recipe).points;
+        let drawn = augment::augment(&clouds, 0, (epoch, 0), &recipe).points;
         let errors: Vec<[f64; 3]> = drawn
             .iter()
             .zip(clouds.set.cloud(0))
@@ -116,7 +119,7 @@ fn a_chosen_point_is_in_its_neighborhood() {
         let mut recipe = Recipe { points: 16, sampling, augment, ..Recipe::default() };
         recipe.network.edges = vec![Edge { radius: 0.3, channels: 4 }];
         for epoch in 0..5 {
-            let drawn = augment::augment(&clouds, 1, epoch, &recipe);
+            let drawn = augment::augment(&clouds, 1, (epoch, 0), &recipe);
             assert!(
                 drawn.points.iter().all(|point| drawn.neighborhood.contains(point)),
                 "{sampling:?}"

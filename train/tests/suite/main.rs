@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod augment;
+mod clusters;
 mod export;
 mod gradients;
 mod killed;
@@ -10,7 +11,7 @@ mod program;
 mod reference;
 mod resume;
 
-use formats::labelled::LabelledSet;
+use formats::labelled::{LabelledSet, equal_offsets};
 use formats::rng::StreamKey;
 use train::clouds::Clouds;
 
@@ -36,7 +37,7 @@ fn clouds_of(seed: u64, n: usize) -> Clouds {
     }
     let set = LabelledSet {
         points,
-        n_points: 32,
+        offsets: equal_offsets(n, 32),
         labels: (0..n).map(|cloud| cloud % 3).collect(),
         ..LabelledSet::default()
     };

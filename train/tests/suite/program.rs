@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use formats::packed::PackedWriter;
 
-fn train(folder: &Path, words: &str) -> Output {
+pub fn train(folder: &Path, words: &str) -> Output {
     let program = Command::new(env!("CARGO_BIN_EXE_edgepuck-train"))
         .args(words.split_whitespace())
         .current_dir(folder)
@@ -13,7 +13,7 @@ fn train(folder: &Path, words: &str) -> Output {
     program.unwrap()
 }
 
-fn stderr(output: &Output) -> String {
+pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 

@@ -148,7 +148,7 @@ static void options_are_followed(const char *model)
     EXPECT(edgepuck_load(model, &options, &classifier) == EDGEPUCK_STATUS_OK);
     EXPECT(edgepuck_classify(classifier, cloud, 5, &found) == EDGEPUCK_STATUS_OK);
     EXPECT(found.n_points == 4 && found.n_dropped == 1 && found.n_used == 2);
-    EXPECT(found.n_clipped == 0 && !found.fell_back);
+    EXPECT(found.n_clipped == 0 && !found.fell_back && !found.is_unknown);
     EXPECT(strcmp(edgepuck_class_name(classifier, found.class_index), "y") == 0);
     edgepuck_free(classifier);
 }
