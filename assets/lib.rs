@@ -1,14 +1,22 @@
 //! The files of Edgepuck that its programs embed.
 
 /// The built-in sensor profiles: a sensor's name and its TOML.
-pub const SENSORS: [(&str, &str); 7] = [
+pub const SENSORS: [(&str, &str); 8] = [
     ("vlp32c", include_str!("sensors/vlp32c.toml")),
     ("blainder-ultrapuck", include_str!("sensors/blainder-ultrapuck.toml")),
     ("generic-static", include_str!("sensors/generic-static.toml")),
     ("kinect-v2", include_str!("sensors/kinect-v2.toml")),
     ("vlp16", include_str!("sensors/vlp16.toml")),
     ("hdl64e", include_str!("sensors/hdl64e.toml")),
+    ("hdl32e", include_str!("sensors/hdl32e.toml")),
     ("modelnet40c-lidar", include_str!("sensors/modelnet40c-lidar.toml")),
+];
+
+/// The built-in scene recipes, the default one first: a recipe's name and its TOML.
+pub const SCENE_RECIPES: [(&str, &str); 3] = [
+    ("street", include_str!("scenes/street.toml")),
+    ("room", include_str!("scenes/room.toml")),
+    ("yard", include_str!("scenes/yard.toml")),
 ];
 
 /// The tables of layer names that `edgepuck import-weights` knows: a table's

@@ -82,7 +82,10 @@ impl InvalidValue {
 }
 
 /// Reads `file` and parses it.
-pub(crate) fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
+///
+/// # Errors
+/// Names the file and the cause.
+pub fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
     let failed = |source| ConfigError::Read { file: file.to_owned(), source };
     let opened = std::fs::File::open(file).map_err(failed)?;
     let mut text = String::new();
@@ -94,7 +97,10 @@ pub(crate) fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
 }
 
 /// Parses `text`, which stands in `file`.
-pub(crate) fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ConfigError> {
+///
+/// # Errors
+/// Names the file and the cause.
+pub fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ConfigError> {
     toml::from_str(text).map_err(|error| ConfigError::Syntax {
         file: file.to_owned(),
         message: error.to_string().trim_end().to_owned(),

@@ -44,25 +44,33 @@ impl CastJob {
         stream: StreamKey,
         reflectivity: f32,
     ) -> Self {
-        let (beams, rays) = match culling {
-            Culling::On => pattern
-                .within(&frame.cone(pattern))
-                .into_iter()
-                .filter_map(|beam| {
-                    let ray = frame.beam(pattern, beam);
-                    Some((beam, frame.trace_ray(&ray, 0)?))
-                })
-                .unzip(),
-            Culling::Off => pattern
-                .order
-                .iter()
-                .map(|&beam| {
-                    let ray = frame.beam(pattern, beam);
-                    (beam, frame.trace_ray_unculled(&ray, 0))
-                })
-                .unzip(),
-        };
+        let (beams, rays) = aim(&frame, pattern, culling, |_| true);
         Self { target, frame, beams, rays, stream, reflectivity }
+    }
+}
+
+/// Those beams of `pattern` that `is_wanted`, and their rays through `frame`.
+pub(crate) fn aim(
+    frame: &RayFrame,
+    pattern: &BeamPattern,
+    culling: Culling,
+    is_wanted: impl Fn(u32) -> bool,
+) -> (Vec<u32>, Vec<TraceRay>) {
+    let wanted = |beam: &u32| is_wanted(*beam);
+    match culling {
+        Culling::On => pattern
+            .within(&frame.cone(pattern))
+            .into_iter()
+            .filter(wanted)
+            .filter_map(|beam| Some((beam, frame.trace_ray(&frame.beam(pattern, beam), 0)?)))
+            .unzip(),
+        Culling::Off => pattern
+            .order
+            .iter()
+            .copied()
+            .filter(wanted)
+            .map(|beam| (beam, frame.trace_ray_unculled(&frame.beam(pattern, beam), 0)))
+            .unzip(),
     }
 }
 

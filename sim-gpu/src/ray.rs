@@ -113,6 +113,17 @@ impl RayFrame {
         Cone { axis, half_angle_rad: sine.asin() }
     }
 
+    /// A distance from where `pattern`'s beams start, metres, within which there is
+    /// nothing of the object; 0 if the sensor is inside its bounding sphere.
+    #[must_use]
+    pub fn nearest_m(&self, pattern: &BeamPattern) -> f64 {
+        let unit_per_m = stretches(&self.unit_from_sensor).1;
+        let from_sensor_m = (self.origin.length() - self.radius) / unit_per_m;
+        let nearest_m = from_sensor_m - pattern.farthest_start_m();
+        // One part in 10^9 less, for rounding; NaN gives 0.
+        (nearest_m * (1.0 - 1e-9)).max(0.0)
+    }
+
     /// The record of `ray` for a tree whose root is node `root`; `None` if the
     /// ray passes the bounding sphere by.
     #[must_use]
@@ -156,6 +167,13 @@ fn record(origin: DVec3, direction: DVec3, skipped: f64, root: u32) -> TraceRay 
 /// Largest over smallest stretch of a map; 1 for a uniform scale. An object
 /// scaled unevenly looks wider than its unit sphere by at most this.
 fn anisotropy(map: &DMat3) -> f64 {
+    let (least, most) = stretches(map);
+    if least > 0.0 { most / least } else { f64::INFINITY }
+}
+
+/// Bounds of how far a map stretches a vector: at least the first, at most the
+/// second.
+fn stretches(map: &DMat3) -> (f64, f64) {
     let gram = map.transpose() * *map;
     let (low, high) = (0..3).map(|i| gram.col(i).to_array().map(f64::abs)).enumerate().fold(
         (f64::INFINITY, 0.0f64),
@@ -165,5 +183,5 @@ fn anisotropy(map: &DMat3) -> f64 {
             (low.min(column[i] - off), high.max(column[i] + off))
         },
     );
-    if low > 0.0 { (high / low).sqrt() } else { f64::INFINITY }
+    (low.max(0.0).sqrt(), high.sqrt())
 }

@@ -1,5 +1,7 @@
 //! Collects the surfaces of a shape at one fineness of tessellation.
 
+use std::ops::Range;
+
 use glam::{DAffine3, DVec3};
 
 use sim_gpu::mesh::Mesh;
@@ -12,6 +14,7 @@ use sim_gpu::mesh::Mesh;
 pub struct Builder {
     mesh: Mesh,
     parts: Vec<usize>,
+    glass: Vec<Range<usize>>,
     edge_m: f64,
     flat_edge_m: f64,
     placement: DAffine3,
@@ -24,6 +27,7 @@ impl Builder {
         Self {
             mesh: Mesh::default(),
             parts: Vec::new(),
+            glass: Vec::new(),
             edge_m,
             flat_edge_m: edge_m * flat_ratio,
             placement: DAffine3::IDENTITY,
@@ -43,6 +47,27 @@ impl Builder {
     /// The mesh, and the index of the first triangle of each of its parts.
     pub fn finish(self) -> (Mesh, Vec<usize>) {
         (self.mesh, self.parts)
+    }
+
+    /// Builds panes of glass: what `build` adds is of this material.
+    pub fn glass(&mut self, build: impl FnOnce(&mut Self)) {
+        let start = self.n_triangles();
+        build(self);
+        self.glass.push(start..self.n_triangles());
+    }
+
+    /// The mesh with the triangles of glass moved to its end, and their place.
+    pub fn finish_with_glass(self) -> (Mesh, Range<u32>) {
+        let Self { mut mesh, glass, .. } = self;
+        let is_glass = |i: usize| glass.iter().any(|range| range.contains(&i));
+        let (panes, mut opaque): (Vec<_>, Vec<_>) =
+            mesh.triangles.iter().enumerate().partition(|&(i, _)| is_glass(i));
+        let first = opaque.len() as u32;
+        opaque.extend(panes);
+        let triangles: Vec<_> = opaque.into_iter().map(|(_, &triangle)| triangle).collect();
+        let end = triangles.len() as u32;
+        mesh.triangles = triangles;
+        (mesh, first..end)
     }
 
     /// Runs `build` in the frame that `frame` places in the present one.

@@ -19,6 +19,7 @@ mod cup;
 mod finish;
 mod lamp;
 mod monitor;
+pub mod objects;
 mod primitives;
 mod sampler;
 mod supports;
@@ -32,13 +33,13 @@ mod write;
 mod tests;
 
 pub use class::ShapeClass;
+pub use sampler::Sampler;
 pub use tree::{TreeSummary, write_tree};
 pub use write::{write_obj, write_off};
 
 use formats::rng::StreamKey;
 
 use finish::Finish;
-use sampler::Sampler;
 use sim_gpu::mesh::Mesh;
 
 /// The shape that `seed` and `instance` give in `class`.

@@ -1,11 +1,12 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
-use super::request::ScanRequest;
+use super::request::{Glass, ScanRequest};
 use crate::config::InvalidValue;
 use crate::cpu::oracle;
+use crate::cpu::random::random_bits;
 use crate::effects::{Effects, NoiseModel, RayEffect};
 use crate::job::CastJob;
-use crate::resolve::Hits;
+use crate::resolve::{Hit, Hits};
 use crate::sensor::{Sensor, polar_angle_rad};
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
@@ -20,6 +21,8 @@ pub struct ObjectHits<'a> {
     pub object: u32,
     /// Where the object stands.
     pub world_from_object: DAffine3,
+    /// Which of it is glass.
+    pub glass: Option<&'a Glass>,
     /// The rays that were cast at it.
     pub job: &'a CastJob,
     /// What they hit.
@@ -33,7 +36,7 @@ pub struct Tally {
     pub points: u64,
     /// Beams whose nearest surface lies outside the sensor's range.
     pub out_of_range: u64,
-    /// Returns lost to dropout.
+    /// Returns lost to dropout or in glass.
     pub dropped: u64,
     /// Returns whose measured range is not positive.
     pub negative: u64,
@@ -142,6 +145,10 @@ fn measure(
         tally.out_of_range += 1;
         return None;
     }
+    if is_lost_in_glass(found, nearest) {
+        tally.dropped += 1;
+        return None;
+    }
     let effects = HitEffects::of(view.cast_effects, found.hits, hit);
     if view.effects.dropout.is_some() && effects.dropped {
         tally.dropped += 1;
@@ -163,6 +170,18 @@ fn measure(
     let from_start = beam * range_m + sideways;
     let from_sensor = start(view, nearest.beam).map_or(from_start, |start| from_start + start);
     Some(Return { object, hit, from_sensor })
+}
+
+/// Which random bits of a beam say whether glass returns it; effects use lower
+/// numbers.
+const GLASS_PURPOSE: u32 = 16;
+
+fn is_lost_in_glass(found: &ObjectHits, hit: &Hit) -> bool {
+    let Some(glass) = found.glass.filter(|glass| glass.triangles.contains(&hit.triangle)) else {
+        return false;
+    };
+    let [bits, ..] = random_bits(found.job.stream, hit.beam, GLASS_PURPOSE);
+    f64::from(bits) >= glass.returned * 2f64.powi(32)
 }
 
 /// Where a beam starts, from the sensor, in world axes; `None` where that is

@@ -10,12 +10,13 @@ mod assemble;
 mod request;
 
 pub use assemble::{ObjectHits, Tally, assemble};
-pub use request::{PlacedTarget, ScanRequest};
+pub use request::{Glass, PlacedTarget, ScanRequest};
 
 use crate::cast_error::CastError;
 use crate::caster::Caster;
 use crate::config::InvalidValue;
-use crate::job::{Cast, CastJob};
+use crate::cpu;
+use crate::job::CastJob;
 use crate::resolve::{Hits, resolve};
 use crate::target::Target;
 use formats::Scan;
@@ -41,7 +42,8 @@ pub struct Scanned {
     pub scan: Scan,
     /// What became of the returns.
     pub tally: Tally,
-    /// What the beams hit before any effect, by object.
+    /// What the beams hit before any effect, by object. Where the CPU casts at
+    /// several objects, beams that end on a nearer object may be missing.
     pub hits: Vec<Hits>,
     /// Whether the CPU cast because an object was too large for the adapter.
     pub cast_on_cpu: bool,
@@ -90,12 +92,20 @@ fn scan_all(
     caster: &Caster,
     requests: &[(&[PlacedTarget], &ScanRequest)],
 ) -> Result<Vec<Scanned>, ScanError> {
+    let targets = requests.iter().flat_map(|(objects, _)| *objects).map(|object| object.target);
+    let fits = targets.into_iter().all(|target| caster.fits(target));
+    if !fits || matches!(caster, Caster::Cpu(_)) {
+        let scan = |(objects, request): &(&[PlacedTarget], &ScanRequest)| {
+            let (jobs, hits) = cast_nearest_first(caster, objects, request);
+            finish(caster, objects, request, &jobs, hits, !fits)
+        };
+        return requests.par_iter().map(scan).collect();
+    }
     let aim = |(objects, request): &(&[PlacedTarget], &ScanRequest)| {
         objects.iter().map(|object| request.aim(object)).collect::<Vec<_>>()
     };
     let jobs: Vec<CastJob> = requests.par_iter().flat_map(aim).collect();
-    let cast_on_cpu = !jobs.iter().all(|job| caster.fits(&job.target));
-    let casts = if cast_on_cpu { caster.cast_on_cpu(&jobs) } else { caster.cast(&jobs)? };
+    let casts = caster.cast(&jobs)?;
 
     let (mut jobs, mut casts) = (&jobs[..], &casts[..]);
     let mut parts = Vec::with_capacity(requests.len());
@@ -108,10 +118,39 @@ fn scan_all(
     parts
         .into_par_iter()
         .map(|(objects, request, jobs, casts)| {
-            let (hits, scan, tally) = finish(caster, objects, request, jobs, casts)?;
-            Ok(Scanned { scan, tally, hits, cast_on_cpu })
+            let hits = jobs.iter().zip(casts);
+            let hits =
+                hits.map(|(job, cast)| resolve(job, cast, request.pattern, caster.effects()));
+            finish(caster, objects, request, jobs, hits.collect(), false)
         })
         .collect()
+}
+
+/// Casts on the CPU at the nearest object first, so that a beam that ends there is
+/// not cast at what stands wholly behind.
+fn cast_nearest_first(
+    caster: &Caster,
+    objects: &[PlacedTarget],
+    request: &ScanRequest,
+) -> (Vec<CastJob>, Vec<Hits>) {
+    let nearest_m = |object: &PlacedTarget| request.nearest_m(object);
+    let distances_m: Vec<f64> = objects.iter().map(nearest_m).collect();
+    let mut order: Vec<usize> = (0..objects.len()).collect();
+    order.sort_by(|&a, &b| distances_m[a].total_cmp(&distances_m[b]));
+
+    let mut ends_m = vec![f64::INFINITY; request.pattern.len()];
+    let mut cast: Vec<Option<(CastJob, Hits)>> = vec![None; objects.len()];
+    for i in order {
+        let job = request.aim_where(&objects[i], |beam| ends_m[beam as usize] >= distances_m[i]);
+        let answers = cpu::trace::cast(&job, caster.effects());
+        let hits = resolve(&job, &answers, request.pattern, caster.effects());
+        for hit in &hits.hits {
+            let end_m = &mut ends_m[hit.beam as usize];
+            *end_m = end_m.min(hit.range_m);
+        }
+        cast[i] = Some((job, hits));
+    }
+    cast.into_iter().flatten().unzip()
 }
 
 /// From what was cast for one request to its scan.
@@ -120,22 +159,17 @@ fn finish(
     objects: &[PlacedTarget],
     request: &ScanRequest,
     jobs: &[CastJob],
-    casts: &[Cast],
-) -> Result<(Vec<Hits>, Scan, Tally), InvalidValue> {
-    let effects = caster.effects();
-    let hits: Vec<Hits> = jobs
-        .iter()
-        .zip(casts)
-        .map(|(job, cast)| resolve(job, cast, request.pattern, effects))
-        .collect();
+    hits: Vec<Hits>,
+    cast_on_cpu: bool,
+) -> Result<Scanned, ScanError> {
     let found: Vec<ObjectHits> = (0..)
         .zip(objects)
         .zip(jobs.iter().zip(&hits))
         .map(|((object, placed), (job, hits))| {
-            let world_from_object = placed.world_from_object;
-            ObjectHits { object, world_from_object, job, hits }
+            let PlacedTarget { world_from_object, ref glass, .. } = *placed;
+            ObjectHits { object, world_from_object, glass: glass.as_ref(), job, hits }
         })
         .collect();
-    let (scan, tally) = assemble(request, effects, &found)?;
-    Ok((hits, scan, tally))
+    let (scan, tally) = assemble(request, caster.effects(), &found)?;
+    Ok(Scanned { scan, tally, hits, cast_on_cpu })
 }

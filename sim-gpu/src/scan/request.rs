@@ -2,7 +2,7 @@
 
 use crate::config::InvalidValue;
 use crate::effects::Effects;
-use crate::job::{CastJob, Culling};
+use crate::job::{CastJob, Culling, aim};
 use crate::pose::Pose;
 use crate::ray::RayFrame;
 use crate::sensor::{BeamPattern, Sensor};
@@ -10,6 +10,7 @@ use crate::target::Target;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use glam::DAffine3;
+use std::ops::Range;
 
 /// One sensor at one place, and what is wanted of its scan.
 ///
@@ -48,7 +49,7 @@ pub struct ScanRequest<'a> {
 }
 
 /// An object that a sensor looks at.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct PlacedTarget<'a> {
     /// The object.
@@ -60,6 +61,19 @@ pub struct PlacedTarget<'a> {
     /// Keys the random numbers of the object's returns; `None`, the default,
     /// takes the request's key.
     pub stream: Option<StreamKey>,
+    /// Which of it is glass; nothing by default.
+    pub glass: Option<Glass>,
+}
+
+/// Panes of an object. Of the light that meets a pane, a mirror image and what
+/// shines through go elsewhere; a sensor sees the rest seldom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Glass {
+    /// The triangles that are glass, as indices into the mesh.
+    pub triangles: Range<u32>,
+    /// The part of the beams that return from glass, 0 to 1; the others return
+    /// nothing.
+    pub returned: f64,
 }
 
 impl<'a> ScanRequest<'a> {
@@ -95,10 +109,30 @@ impl<'a> ScanRequest<'a> {
     /// The rays of the sensor at `placed`.
     #[must_use]
     pub fn aim(&self, placed: &PlacedTarget) -> CastJob {
-        let &PlacedTarget { target, world_from_object, reflectivity, stream } = placed;
-        let frame = RayFrame::new(&target.surface, &world_from_object, &self.pose);
+        self.aim_where(placed, |_| true)
+    }
+
+    /// The rays at `placed` of those of the sensor's beams that are wanted.
+    pub(super) fn aim_where(
+        &self,
+        placed: &PlacedTarget,
+        is_wanted: impl Fn(u32) -> bool,
+    ) -> CastJob {
+        let PlacedTarget { target, reflectivity, stream, .. } = placed;
+        let frame = self.frame(placed);
         let stream = stream.unwrap_or(self.stream);
-        CastJob::aim(target.clone(), frame, self.pattern, self.culling, stream, reflectivity)
+        let (target, reflectivity) = ((*target).clone(), *reflectivity);
+        let (beams, rays) = aim(&frame, self.pattern, self.culling, is_wanted);
+        CastJob { target, frame, beams, rays, stream, reflectivity }
+    }
+
+    /// A distance within which no beam meets `placed`, metres.
+    pub(super) fn nearest_m(&self, placed: &PlacedTarget) -> f64 {
+        self.frame(placed).nearest_m(self.pattern)
+    }
+
+    fn frame(&self, placed: &PlacedTarget) -> RayFrame {
+        RayFrame::new(&placed.target.surface, &placed.world_from_object, &self.pose)
     }
 }
 
@@ -106,6 +140,12 @@ impl<'a> PlacedTarget<'a> {
     /// `target` where its mesh stands, in the world's frame.
     #[must_use]
     pub fn new(target: &'a Target) -> Self {
-        Self { target, world_from_object: DAffine3::IDENTITY, reflectivity: 1.0, stream: None }
+        Self {
+            target,
+            world_from_object: DAffine3::IDENTITY,
+            reflectivity: 1.0,
+            stream: None,
+            glass: None,
+        }
     }
 }

@@ -1,0 +1,39 @@
+//! Why there is no scene.
+
+use formats::FormatError;
+use sim_gpu::config::{ConfigError, InvalidValue};
+use sim_gpu::mesh::MeshError;
+use sim_gpu::scan::ScanError;
+use std::path::PathBuf;
+
+/// Why scenes cannot be drawn, scanned or packed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The recipe, or a sensor that it names, cannot be used.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A value of the recipe does not fit a sensor.
+    #[error(transparent)]
+    Value(#[from] InvalidValue),
+    /// A user's mesh cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The recipe asks for a user's meshes, and there are none.
+    #[error("{}: expected a folder with OBJ, OFF, PLY or STL files, {cause}", folder.display())]
+    NoMeshes {
+        /// The folder.
+        folder: PathBuf,
+        /// What was found instead.
+        cause: String,
+    },
+    /// The adapter failed.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// The sweep cannot be segmented.
+    #[error("the sweep cannot be segmented: {0}")]
+    Segment(String),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+}

@@ -1,0 +1,265 @@
+//! What all scenes of a recipe share: sensors, casters, and the objects, each of
+//! which is built once and placed many times.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use edgepuck_shapes::objects::{Object, ObjectKind, object};
+use formats::Scan;
+use formats::rng::StreamKey;
+use formats::scan::Attribute;
+use glam::DVec3;
+use sim_gpu::bvh::Builder;
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
+use sim_gpu::mesh::frame::{Normalize, to_world};
+use sim_gpu::mesh::{self, Mesh, MeshFormat};
+use sim_gpu::scan::{Glass, PlacedTarget, ScanRequest, scan_objects};
+use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::target::{Surface, Target};
+
+use crate::error::SceneError;
+use crate::recipe::{Objects, Recipe};
+use crate::scene::Scene;
+
+/// A recipe, ready to be drawn from and scanned.
+pub struct Stage {
+    recipe: Recipe,
+    seed: u64,
+    classes: Vec<String>,
+    sensors: Vec<Eye>,
+    /// By entry of the recipe and by variant.
+    props: Vec<Vec<OnceLock<Prop>>>,
+}
+
+/// A sensor and how its beams are cast.
+struct Eye {
+    sensor: Sensor,
+    pattern: BeamPattern,
+    caster: Caster,
+}
+
+/// An object, ready to be cast.
+pub(crate) struct Prop {
+    target: Target,
+    glass: Range<u32>,
+    /// Length, width and height.
+    pub(crate) size_m: DVec3,
+}
+
+/// One revolution of a sensor in a scene.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    /// The points in the order of firing, in the sensor's frame, metres.
+    pub points: Vec<[f32; 3]>,
+    /// Each point's row of beams, from the lowest elevation.
+    pub rings: Vec<u16>,
+    /// What each point lies on: 0 is the ground, `i` the scene's object `i - 1`.
+    pub surfaces: Vec<u32>,
+    /// The scan, with its points in the scene's frame, and with range, beam, ring,
+    /// time and object.
+    pub scan: Scan,
+}
+
+impl Stage {
+    /// Prepares `recipe`, which stands in `file`. Meshes of a user's own are taken
+    /// from `meshes`. `open` opens a caster for the effects of each sensor.
+    ///
+    /// # Errors
+    /// A sensor that is missing or wrong; meshes that are missing or cannot be
+    /// read; what `open` reports.
+    pub fn new<E: From<SceneError>>(
+        recipe: Recipe,
+        file: &Path,
+        meshes: Option<&Path>,
+        seed: u64,
+        open: impl Fn(&Effects) -> Result<Caster, E>,
+    ) -> Result<Self, E> {
+        let profiles = recipe.sensors(file).map_err(SceneError::from)?;
+        let mut sensors = Vec::with_capacity(profiles.len());
+        for (choice, sensor) in recipe.sensor.iter().zip(profiles) {
+            let typical_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);
+            let sigma_m = choice.noise_m.unwrap_or(typical_m);
+            let effects = Effects {
+                noise: Some(Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range }),
+                dropout: Some(Dropout { probability: choice.dropout }),
+                ..Effects::default()
+            };
+            let pattern = sensor.pattern();
+            sensors.push(Eye { sensor, pattern, caster: open(&effects)? });
+        }
+        let props = recipe.object.iter().map(|objects| match objects.built_in() {
+            Some(_) => Ok((0..recipe.variants).map(|_| OnceLock::new()).collect()),
+            None => own_meshes(objects, meshes, seed),
+        });
+        let props = props.collect::<Result<_, SceneError>>()?;
+        Ok(Self { classes: recipe.classes(), recipe, seed, sensors, props })
+    }
+
+    /// The recipe.
+    #[must_use]
+    pub fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    /// Seed of all random numbers.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// As [`Recipe::classes`].
+    #[must_use]
+    pub fn classes(&self) -> &[String] {
+        &self.classes
+    }
+
+    /// The sensor of `scene`.
+    #[must_use]
+    pub fn sensor(&self, scene: &Scene) -> &Sensor {
+        &self.sensors[scene.sensor].sensor
+    }
+
+    /// Length, width and height of object `i` of `scene`, metres.
+    #[must_use]
+    pub fn size_m(&self, scene: &Scene, i: usize) -> DVec3 {
+        let object = &scene.objects[i];
+        self.prop(object.entry, object.variant).size_m * object.scale
+    }
+
+    /// How many objects entry `entry` of the recipe has to choose from.
+    pub(crate) fn variants(&self, entry: usize) -> u32 {
+        self.props[entry].len() as u32
+    }
+
+    /// Object number `variant` of entry `entry`.
+    pub(crate) fn prop(&self, entry: usize, variant: u32) -> &Prop {
+        self.props[entry][variant as usize].get_or_init(|| {
+            let kind = self.recipe.object[entry].built_in();
+            let kind = kind.expect("invariant: a user's meshes are made ready at the start");
+            Prop::built_in(kind, self.seed, variant)
+        })
+    }
+
+    /// Scans `scene`: its ground and all its objects together.
+    ///
+    /// # Errors
+    /// If the adapter fails.
+    pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
+        let Eye { sensor, pattern, caster } = &self.sensors[scene.sensor];
+        let stream =
+            |part: u32| StreamKey::new(self.seed, &format!("scene/{}/beams", scene.number), part);
+        let ground = scene.ground.mesh();
+        let kept = (0..ground.triangles.len() as u32).collect();
+        let ground = Target::new(Surface::new(ground, kept), Builder::Morton);
+        let mut targets = vec![PlacedTarget::new(&ground)];
+        targets.extend(scene.objects.iter().map(|object| {
+            let prop = self.prop(object.entry, object.variant);
+            let mut placed = PlacedTarget::new(&prop.target);
+            placed.world_from_object = object.world_from_object();
+            placed.glass = (!prop.glass.is_empty())
+                .then(|| Glass { triangles: prop.glass.clone(), returned: scene.glass_returned });
+            placed
+        }));
+        for (target, part) in targets.iter_mut().zip(0..) {
+            target.stream = Some(stream(part));
+        }
+        let mut request = ScanRequest::new(sensor, pattern, scene.pose);
+        request.attributes = [
+            Attribute::Range,
+            Attribute::Beam,
+            Attribute::Ring,
+            Attribute::Time,
+            Attribute::Object,
+        ]
+        .into();
+        request.stream = stream(u32::MAX);
+        let scan = scan_objects(caster, &targets, &request)?.scan;
+        Ok(Sweep::of(scan, scene))
+    }
+}
+
+impl Sweep {
+    fn of(scan: Scan, scene: &Scene) -> Self {
+        let sensor_from_world = scene.pose.world_from_sensor.inverse();
+        let origin = DVec3::from_array(scan.origin) - scene.pose.position_m;
+        let in_sensor = |p: &[f32; 3]| {
+            let from_sensor = DVec3::from_array(p.map(f64::from)) + origin;
+            (sensor_from_world * from_sensor).as_vec3().to_array()
+        };
+        Self {
+            points: scan.positions.iter().map(in_sensor).collect(),
+            rings: scan.ring.clone().unwrap_or_default(),
+            surfaces: scan.object.clone().unwrap_or_default(),
+            scan,
+        }
+    }
+}
+
+impl Prop {
+    fn built_in(kind: ObjectKind, seed: u64, variant: u32) -> Self {
+        let Object { mesh, glass } = object(kind, seed, variant);
+        Self::of(mesh, glass)
+    }
+
+    fn of(mesh: Mesh, glass: Range<u32>) -> Self {
+        let (low, high) = bounds(&mesh);
+        let kept = (0..mesh.triangles.len() as u32).collect();
+        let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
+        Self { target, glass, size_m: high - low }
+    }
+
+    /// A user's mesh, `height_m` high.
+    fn scaled(mut mesh: Mesh, height_m: f64) -> Self {
+        let (low, high) = bounds(&mesh);
+        let origin = ((low + high) / 2.0).truncate().extend(low.z);
+        let scale = height_m / (high.z - low.z);
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex = (*vertex - origin) * scale);
+        Self::of(mesh, 0..0)
+    }
+}
+
+fn bounds(mesh: &Mesh) -> (DVec3, DVec3) {
+    mesh.vertices.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &vertex| {
+        (low.min(vertex), high.max(vertex))
+    })
+}
+
+/// The meshes of a user's own that `objects` names.
+fn own_meshes(
+    objects: &Objects,
+    meshes: Option<&Path>,
+    seed: u64,
+) -> Result<Vec<OnceLock<Prop>>, SceneError> {
+    let name = objects.meshes.as_deref().unwrap_or_default();
+    let missing =
+        |folder: &Path, cause: String| SceneError::NoMeshes { folder: folder.to_path_buf(), cause };
+    let Some(meshes) = meshes else {
+        return Err(missing(Path::new(name), "found no --meshes that names its place".to_owned()));
+    };
+    let folder = meshes.join(name);
+    let files = mesh_files(&folder).map_err(|error| missing(&folder, format!("found: {error}")))?;
+    if files.is_empty() {
+        return Err(missing(&folder, "found none".to_owned()));
+    }
+    let span = objects.height_m.unwrap_or([1.0, 1.0].into());
+    let stream = StreamKey::new(seed, &format!("meshes/{name}"), 0);
+    let ready = files.iter().zip(0..).map(|(file, n)| {
+        let loaded = mesh::load(file)?;
+        let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::None);
+        let prop = Prop::scaled(world.mesh, span.at(stream.unit(n)));
+        Ok(OnceLock::from(prop))
+    });
+    ready.collect()
+}
+
+/// The mesh files in `folder`, by name.
+fn mesh_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder)?;
+    let mut files =
+        entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<PathBuf>>>()?;
+    files.retain(|file| MeshFormat::of(file).is_some());
+    files.sort();
+    Ok(files)
+}

@@ -1,0 +1,186 @@
+//! Scenes as a whole: what is drawn, what is seen of it, and what is cut.
+
+use std::path::Path;
+
+use edgepuck_segment::{Segmenter, Settings, Sweep as Points};
+use glam::{DVec2, DVec3};
+use sim_gpu::caster::Caster;
+
+use crate::{OTHER, Recipe, Scene, SceneError, Stage, label_clusters};
+
+const RECIPE: &str = r#"
+variants = 3
+glass_returned = [0, 0]
+[ground]
+slope_deg = [2, 2]
+roughness_m = [0.01, 0.01]
+road_width_m = [8, 8]
+kerb_m = [0.12, 0.12]
+[mount]
+height_m = [1.8, 1.8]
+tilt_deg = [1, 1]
+off_road_m = [0, 3]
+[[sensor]]
+profile = "vlp16"
+noise_m = 0
+[[object]]
+kind = "car"
+class = "car"
+count = [4, 6]
+place = "parked"
+distance_m = [3, 20]
+[[object]]
+kind = "person"
+class = "person"
+count = [4, 8]
+place = "pavement"
+distance_m = [2, 12]
+[[object]]
+kind = "hedge"
+class = "bush"
+count = [2, 4]
+place = "line"
+distance_m = [3, 20]
+[[object]]
+kind = "pole"
+class = "pole"
+count = [3, 5]
+place = "anywhere"
+distance_m = [3, 15]
+"#;
+
+fn stage(recipe: &str) -> Stage {
+    let file = Path::new("test.toml");
+    let recipe = Recipe::parse(recipe, file).unwrap();
+    Stage::new(recipe, file, None, 5, |effects| Ok::<_, SceneError>(Caster::Cpu(effects.clone())))
+        .unwrap()
+}
+
+#[test]
+fn a_scene_is_a_function_of_recipe_seed_and_number() {
+    let (one, other) = (stage(RECIPE), stage(RECIPE));
+    // Another order of drawing builds the objects in another order.
+    let later = Scene::draw(&other, 8);
+    let scenes = [Scene::draw(&one, 7), Scene::draw(&other, 7)];
+    assert_eq!(scenes[0].objects, scenes[1].objects);
+    assert_eq!(one.sweep(&scenes[0]).unwrap().scan, other.sweep(&scenes[1]).unwrap().scan);
+    assert_ne!(scenes[0].objects, later.objects);
+}
+
+#[test]
+fn every_point_lies_on_the_surface_that_it_is_said_to_lie_on() {
+    let stage = stage(RECIPE);
+    for number in 0..4 {
+        let scene = Scene::draw(&stage, number);
+        let sweep = stage.sweep(&scene).unwrap();
+        assert!(sweep.points.len() > 5_000, "{}", sweep.points.len());
+        for (point, &surface) in sweep.scan.positions.iter().zip(&sweep.surfaces) {
+            let point = DVec3::from_array(point.map(f64::from));
+            let Some(i) = (surface as usize).checked_sub(1) else {
+                // Roughness is 1 cm, uniform, so at most 1.8 cm; a kerb's face is
+                // as high as the kerb.
+                let off_m = point.z - scene.ground.height_m(DVec2::new(point.x, point.y));
+                assert!(off_m.abs() < 0.12 + 0.02, "{point}: {off_m}");
+                continue;
+            };
+            let object = &scene.objects[i];
+            let in_object = object.world_from_object().inverse().transform_point3(point);
+            let size_m = stage.size_m(&scene, i) / object.scale;
+            let half = (size_m / 2.0).with_z(size_m.z) + 1e-3;
+            assert!(in_object.abs().cmple(half).all() && in_object.z > -1e-3, "{in_object}");
+        }
+    }
+}
+
+#[test]
+fn objects_keep_apart_and_stay_within_their_distances() {
+    let stage = stage(RECIPE);
+    let footprints = |scene: &Scene| -> Vec<crate::footprint::Footprint> {
+        let of = |(i, object): (usize, &crate::PlacedObject)| crate::footprint::Footprint {
+            centre: object.position.truncate(),
+            half: stage.size_m(scene, i).truncate() / 2.0,
+            yaw_rad: object.yaw_rad,
+        };
+        scene.objects.iter().enumerate().map(of).collect()
+    };
+    for number in 0..20 {
+        let scene = Scene::draw(&stage, number);
+        let taken = footprints(&scene);
+        for (i, one) in taken.iter().enumerate() {
+            assert!(taken[..i].iter().all(|other| !one.meets(other)), "scene {number}");
+            let most_m = stage.recipe().object[scene.objects[i].entry].distance_m.most;
+            assert!(one.centre.x.abs() <= most_m + 6.0);
+        }
+    }
+}
+
+#[test]
+fn glass_that_returns_nothing_leaves_holes_in_cars() {
+    let with = |returned: &str| {
+        let text = RECIPE.replace("glass_returned = [0, 0]", returned);
+        let stage = stage(&text);
+        let scene = Scene::draw(&stage, 3);
+        stage.sweep(&scene).unwrap().points.len()
+    };
+    let (dark, bright) = (with("glass_returned = [0, 0]"), with("glass_returned = [1, 1]"));
+    assert!(dark < bright, "{dark} points with glass that returns nothing, {bright} with all");
+}
+
+#[test]
+fn a_cluster_of_one_object_has_its_class_and_a_mixed_one_has_none() {
+    let stage = stage(RECIPE);
+    let mut segmenter = Segmenter::new(Settings::default()).unwrap();
+    let mut seen = std::collections::BTreeSet::new();
+    for number in 0..6 {
+        let scene = Scene::draw(&stage, number);
+        let sweep = stage.sweep(&scene).unwrap();
+        let points = Points { points: &sweep.points, rings: Some(&sweep.rings) };
+        let found = segmenter.segment(&points).unwrap();
+        for cluster in label_clusters(&stage, &scene, &sweep, found) {
+            let class = &stage.classes()[cluster.label];
+            if class != OTHER {
+                let object = &scene.objects[cluster.surface as usize - 1];
+                assert_eq!(*class, stage.recipe().object[object.entry].class);
+                assert!(cluster.truth_share >= 0.7);
+            }
+            seen.insert(class.clone());
+        }
+    }
+    for class in ["car", "person", "bush"] {
+        assert!(seen.contains(class), "no cluster of a {class}");
+    }
+}
+
+#[test]
+fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
+    for (from, to, expected) in [
+        ("kind = \"car\"", "kind = \"cra\"", "object[0].kind: expected mesh or one of car, truck"),
+        ("count = [4, 6]", "count = [6, 4]", "object[0].count: expected two ascending numbers"),
+        ("distance_m = [3, 20]", "distance_m = [-3, 20]", "object[0].distance_m: expected two"),
+        ("slope_deg = [2, 2]", "slope_deg = [2, nan]", "ground.slope_deg: expected two ascending"),
+        ("noise_m = 0", "noise_m = inf", "sensor[0].noise_m: expected two ascending"),
+        ("variants = 3", "variants = 0", "variants: expected at least 1, found 0"),
+        ("kind = \"car\"", "kind = \"mesh\"", "object[0].meshes: expected with kind = \"mesh\""),
+    ] {
+        let error = Recipe::parse(&RECIPE.replacen(from, to, 1), Path::new("r.toml")).unwrap_err();
+        let error = error.to_string();
+        assert!(error.starts_with("r.toml: ") && error.contains(expected), "{error}");
+    }
+    assert!(
+        Recipe::parse(
+            "sensor = []\nobject = []\nmount = { height_m = [1, 1] }",
+            Path::new("r.toml")
+        )
+        .is_err()
+    );
+}
+
+#[test]
+fn the_built_in_recipes_can_be_used() {
+    for (name, text) in edgepuck_assets::SCENE_RECIPES {
+        let file = Path::new(name);
+        let recipe = Recipe::parse(text, file).unwrap();
+        assert!(recipe.sensors(file).is_ok());
+        assert!(recipe.classes().len() > 4);
+    }
+}

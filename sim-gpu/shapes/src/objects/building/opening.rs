@@ -1,0 +1,99 @@
+//! A piece of a wall with a window, a door or nothing in it.
+
+use glam::{DVec2, DVec3};
+
+use crate::primitives::{Builder, block};
+
+/// An upright rectangle across x, in (y, z).
+#[derive(Clone, Copy)]
+pub struct Rect {
+    /// The corner with the least y and z.
+    pub low: DVec2,
+    /// The opposite corner.
+    pub high: DVec2,
+}
+
+impl Rect {
+    /// The corners at this x, counter-clockwise as seen from +x.
+    fn corners(self, x: f64) -> Vec<DVec3> {
+        let [low, high] = [self.low, self.high];
+        [(low.x, low.y), (high.x, low.y), (high.x, high.y), (low.x, high.y)]
+            .map(|(y, z)| DVec3::new(x, y, z))
+            .to_vec()
+    }
+
+    /// The rectangle without a border of `by_m`.
+    pub fn shrunk(self, by_m: f64) -> Self {
+        Self { low: self.low + by_m, high: self.high - by_m }
+    }
+
+    /// The middle.
+    pub fn middle(self) -> DVec2 {
+        (self.low + self.high) / 2.0
+    }
+
+    /// Width and height.
+    pub fn size_m(self) -> DVec2 {
+        self.high - self.low
+    }
+}
+
+/// What an opening is closed by.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Filling {
+    /// A pane of glass.
+    Glass,
+    /// Two panes of glass with a bar between them.
+    Panes,
+    /// A door, a roller blind, or a curtain behind the glass.
+    Solid,
+    /// Nothing: a passage.
+    Nothing,
+}
+
+/// An opening in a wall.
+#[derive(Clone, Copy)]
+pub struct Opening {
+    /// The hole in the wall.
+    pub hole: Rect,
+    /// How far the filling lies behind the wall's face.
+    pub recess_m: f64,
+    /// The width of the frame around the filling.
+    pub frame_m: f64,
+    /// What closes it.
+    pub filling: Filling,
+}
+
+/// Adds the wall of a rectangle, which looks to +x at x = 0.
+pub fn blank(b: &mut Builder, cell: Rect) {
+    let [low, high] = [cell.low, cell.high];
+    let row = |z: f64| vec![DVec3::new(0.0, low.x, z), DVec3::new(0.0, high.x, z)];
+    b.grid(&[row(low.y), row(high.y)], false);
+}
+
+impl Opening {
+    /// Adds the wall of `cell` about the hole, the reveals, the frame and the
+    /// filling.
+    pub fn build(self, b: &mut Builder, cell: Rect) {
+        let inner = self.hole.shrunk(self.frame_m);
+        let mut rows = vec![cell.corners(0.0), self.hole.corners(0.0)];
+        rows.push(self.hole.corners(-self.recess_m));
+        if self.filling == Filling::Nothing {
+            return b.grid(&rows, true);
+        }
+        rows.push(inner.corners(-self.recess_m));
+        b.grid(&rows, true);
+        let middle = inner.middle();
+        let centre = DVec3::new(-self.recess_m, middle.x, middle.y);
+        let pane = [inner.corners(-self.recess_m), vec![centre]];
+        match self.filling {
+            Filling::Solid | Filling::Nothing => b.grid(&pane, true),
+            Filling::Glass => b.glass(|b| b.grid(&pane, true)),
+            Filling::Panes => {
+                b.glass(|b| b.grid(&pane, true));
+                let bar = DVec3::new(0.05, 0.08, inner.size_m().y);
+                block(b, DVec3::new(-self.recess_m, middle.x, middle.y), bar);
+            }
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Doors in their frames.
+
+use glam::{DAffine3, DVec3};
+
+use crate::primitives::{Builder, Sampler, block, block_between, rod};
+
+/// Builds a door that looks to +x, shut or ajar: leaves of 0.735 to 0.985 m by
+/// 1.985 to 2.11 m, 0.04 m thick (DIN 18101), one or two; bare, or with a
+/// piece of the wall on either side.
+pub fn build(b: &mut Builder, s: &mut Sampler) {
+    let wide_m = s.pick(&[0.735, 0.86, 0.86, 0.985]);
+    let high_m = s.pick(&[1.985, 1.985, 2.11]);
+    let n = s.weighted(&[(4, 1), (1, 2)]);
+    let half_m = 0.5 * n as f64 * wide_m;
+    let frame_m = s.uniform(0.04, 0.09);
+    let deep_m = s.uniform(0.08, 0.25);
+    let wall_m = if s.chance(0.3) { s.uniform(0.1, 0.5) } else { frame_m };
+    let lintel_m = high_m + if wall_m > frame_m { s.uniform(0.1, 0.5) } else { frame_m };
+    for side in [-1.0, 1.0] {
+        let inner = DVec3::new(-0.5 * deep_m, side * half_m, 0.0);
+        block_between(b, inner, DVec3::new(0.5 * deep_m, side * (half_m + wall_m), lintel_m));
+    }
+    let low = DVec3::new(-0.5 * deep_m, -half_m, high_m);
+    block_between(b, low, DVec3::new(0.5 * deep_m, half_m, lintel_m));
+    let pane = s.chance(0.2);
+    for leaf in 0..n {
+        let side = if leaf == 0 { 1.0 } else { -1.0 };
+        let open_rad = if s.chance(0.5) { s.uniform(0.0, 1.9) } else { 0.0 };
+        // The second leaf is the first one's mirror image.
+        let frame = DAffine3::from_scale(DVec3::new(1.0, side, 1.0))
+            * DAffine3::from_translation(-half_m * DVec3::Y)
+            * DAffine3::from_rotation_z(-open_rad);
+        b.place(frame, |b| door_leaf(b, [wide_m, high_m], pane));
+    }
+}
+
+/// A leaf along y from its hinge, with a handle 1.05 m up and perhaps a pane
+/// of glass.
+fn door_leaf(b: &mut Builder, [wide_m, high_m]: [f64; 2], pane: bool) {
+    let half_m = 0.02;
+    let mut panel = |low: [f64; 2], high: [f64; 2]| {
+        let low = DVec3::new(-half_m, low[0], low[1]);
+        block_between(b, low, DVec3::new(half_m, high[0], high[1]));
+    };
+    if pane {
+        let [left, right, floor, top] = [0.14, wide_m - 0.14, 0.9, high_m - 0.15];
+        panel([0.0, 0.01], [wide_m, floor]);
+        panel([0.0, top], [wide_m, high_m]);
+        panel([0.0, floor], [left, top]);
+        panel([right, floor], [wide_m, top]);
+        b.glass(|b| {
+            let size = DVec3::new(0.006, right - left, top - floor);
+            block(b, DVec3::new(0.0, 0.5 * wide_m, 0.5 * (floor + top)), size);
+        });
+    } else {
+        panel([0.0, 0.01], [wide_m, high_m]);
+    }
+    for x in [-0.06, 0.06] {
+        let handle = DVec3::new(x, wide_m - 0.06, 1.05);
+        rod(b, handle.with_x(0.0), handle, [0.01, 0.01]);
+        rod(b, handle, handle - 0.12 * DVec3::Y, [0.01, 0.01]);
+    }
+}

@@ -1,0 +1,182 @@
+//! Things of no kind of their own, which lie and stand about.
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use crate::objects::plant::uneven::{Lump, Ripple, direction};
+use crate::primitives::{Builder, Make, Profile, Sampler, Section, block, outline, rod};
+
+/// The makes and their frequencies.
+const MAKES: [(usize, Make); 9] = [
+    (3, boxes),
+    (3, rocks),
+    (1, hydrant),
+    (4, cabinet),
+    (2, flower_tub),
+    (1, trolley),
+    (2, a_board),
+    (2, pallets),
+    (2, drum),
+];
+
+/// Builds a piece of clutter.
+pub fn build(b: &mut Builder, s: &mut Sampler) {
+    s.weighted(&MAKES)(b, s);
+}
+
+/// Cardboard boxes beside and upon each other, none quite straight.
+fn boxes(b: &mut Builder, s: &mut Sampler) {
+    let mut top = DVec3::ZERO;
+    for _ in 0..s.count(1, 7) {
+        let size = DVec3::new(s.uniform(0.25, 0.8), s.uniform(0.25, 0.8), s.uniform(0.15, 0.7));
+        let turn = DAffine3::from_rotation_z(s.uniform(-0.5, 0.5));
+        let low = if s.chance(0.5) && top.z < 1.2 {
+            top + 0.1 * direction(s).with_z(0.0)
+        } else {
+            1.2 * s.uniform(0.4, 1.0) * direction(s).with_z(0.0)
+        };
+        let middle = low + 0.5 * size.z * DVec3::Z;
+        b.place(DAffine3::from_translation(middle) * turn, |b| block(b, DVec3::ZERO, size));
+        top = low + size.z * DVec3::Z;
+    }
+}
+
+/// A boulder or a heap of stones, earth or bags.
+fn rocks(b: &mut Builder, s: &mut Sampler) {
+    let n = s.weighted(&[(3, 1), (1, 2), (1, 4)]);
+    let heap_m = if n > 1 { s.uniform(0.3, 1.0) } else { 0.0 };
+    for _ in 0..n {
+        let size_m = if n > 1 { s.log_uniform(0.3, 0.8) } else { s.log_uniform(0.3, 1.2) };
+        let radii_m = size_m * DVec3::new(1.0, s.uniform(0.6, 1.0), s.uniform(0.5, 0.9));
+        let rough_m = s.uniform(0.02, 0.12) * size_m;
+        let at = heap_m * direction(s).with_z(0.0);
+        Lump {
+            centre: at + s.uniform(0.3, 0.9) * radii_m.z * DVec3::Z,
+            radii_m,
+            exponent: s.uniform(2.0, 4.5),
+            ripple: Ripple::draw(s, 0.9 * size_m, rough_m),
+        }
+        .build(b);
+    }
+}
+
+/// A pillar hydrant: 0.6 to 1 m high, with caps at its sides.
+fn hydrant(b: &mut Builder, s: &mut Sampler) {
+    let high_m = s.uniform(0.6, 1.0);
+    let radius_m = s.uniform(0.08, 0.13);
+    Profile::from(1.5 * radius_m, 0.0)
+        .line(1.5 * radius_m, 0.05)
+        .line(radius_m, 0.06)
+        .line(radius_m, 0.75 * high_m)
+        .line(1.25 * radius_m, 0.77 * high_m)
+        .line(1.1 * radius_m, 0.88 * high_m)
+        .line(0.4 * radius_m, 0.95 * high_m)
+        .line(0.3 * radius_m, high_m)
+        .line(0.0, high_m)
+        .revolve(b, Section::Round);
+    let cap = 0.6 * high_m * DVec3::Z;
+    let out = 1.6 * radius_m;
+    rod(b, cap - out * DVec3::Y, cap + out * DVec3::Y, [0.05, 0.05]);
+    rod(b, cap, cap + out * DVec3::X, [0.06, 0.06]);
+}
+
+/// A cabinet beside the road with electric or telephone gear: 0.8 to 1.8 m
+/// high, as network operators set them up.
+fn cabinet(b: &mut Builder, s: &mut Sampler) {
+    let size = DVec3::new(s.uniform(0.25, 0.6), s.uniform(0.4, 1.8), s.uniform(0.75, 1.8));
+    let foot_m = s.uniform(0.05, 0.2);
+    block(b, 0.5 * foot_m * DVec3::Z, size.with_z(foot_m) * DVec3::new(0.85, 0.95, 1.0));
+    block(b, (foot_m + 0.5 * size.z) * DVec3::Z, size);
+    let roof = DVec3::new(size.x + 0.06, size.y + 0.06, 0.05);
+    block(b, (foot_m + size.z + 0.025) * DVec3::Z, roof);
+    let handle = DVec3::new(0.5 * size.x + 0.015, 0.1, foot_m + 0.55 * size.z);
+    block(b, handle, DVec3::new(0.03, 0.04, 0.15));
+}
+
+/// A tub or trough of stone with plants in it.
+fn flower_tub(b: &mut Builder, s: &mut Sampler) {
+    let radius_m = s.uniform(0.25, 0.7);
+    let high_m = s.uniform(0.3, 0.8);
+    let section = s.pick(&[Section::Round, Section::Polygon(4), Section::Polygon(6)]);
+    Profile::from(0.75 * radius_m, 0.0)
+        .line(radius_m, high_m)
+        .line(0.88 * radius_m, high_m)
+        .line(0.0, high_m - 0.06)
+        .revolve(b, section);
+    let plants = s.uniform(0.25, 0.5);
+    let lift = DAffine3::from_translation((high_m - 0.06) * DVec3::Z);
+    let size = DAffine3::from_scale(DVec3::splat(plants));
+    b.place(lift * size, |b| crate::objects::plant::bush(b, s));
+}
+
+/// A shopping trolley of wire on four wheels.
+fn trolley(b: &mut Builder, s: &mut Sampler) {
+    let [long_m, wide_m] = [s.uniform(0.75, 1.0), s.uniform(0.5, 0.6)];
+    let ring = |share: f64, z: f64| {
+        let half = DVec2::new(0.5 * long_m * share, 0.5 * wide_m * (0.6 + 0.4 * share));
+        outline::at_height(&outline::rectangle(half), z)
+    };
+    let [floor, rim] = [ring(0.75, 0.5), ring(1.0, 0.95)];
+    for side in 0..4 {
+        let next = (side + 1) % 4;
+        rod(b, floor[side], floor[next], [0.012, 0.012]);
+        rod(b, rim[side], rim[next], [0.012, 0.012]);
+        for wire in 0..9 {
+            let share = wire as f64 / 9.0;
+            let from = floor[side].lerp(floor[next], share);
+            rod(b, from, rim[side].lerp(rim[next], share), [0.005, 0.005]);
+        }
+        let foot = DVec3::new(0.9 * rim[side].x, 0.9 * rim[side].y, 0.06);
+        rod(b, foot, floor[side], [0.015, 0.015]);
+        rod(b, foot - 0.015 * DVec3::Y, foot + 0.015 * DVec3::Y, [0.06, 0.06]);
+    }
+    let handle = DVec3::new(-0.55 * long_m, 0.0, 1.02);
+    rod(b, handle - 0.5 * wide_m * DVec3::Y, handle + 0.5 * wide_m * DVec3::Y, [0.015, 0.015]);
+}
+
+/// Two boards that lean against each other, before a shop.
+fn a_board(b: &mut Builder, s: &mut Sampler) {
+    let high_m = s.uniform(0.8, 1.3);
+    let size = DVec3::new(0.025, s.uniform(0.5, 0.8), high_m);
+    let lean_rad = s.uniform(0.12, 0.35);
+    for side in [-1.0, 1.0] {
+        let frame = DAffine3::from_translation(high_m * lean_rad.cos() * DVec3::Z)
+            * DAffine3::from_rotation_y(-side * lean_rad);
+        b.place(frame, |b| block(b, -0.5 * high_m * DVec3::Z, size));
+    }
+}
+
+/// Pallets of 0.8 by 1.2 m and 0.144 m high (EN 13698-1), empty or with a
+/// load.
+fn pallets(b: &mut Builder, s: &mut Sampler) {
+    let n = s.count(2, 10);
+    for pallet in 0..n {
+        let frame = DAffine3::from_translation(0.144 * pallet as f64 * DVec3::Z)
+            * DAffine3::from_rotation_z(s.uniform(-0.05, 0.05));
+        b.place(frame, |b| {
+            block(b, 0.133 * DVec3::Z, DVec3::new(0.8, 1.2, 0.022));
+            for x in [-0.35, 0.0, 0.35] {
+                block(b, DVec3::new(x, 0.0, 0.011), DVec3::new(0.1, 1.2, 0.022));
+                for y in [-0.53, 0.0, 0.53] {
+                    block(b, DVec3::new(x, y, 0.072), DVec3::new(0.1, 0.14, 0.1));
+                }
+            }
+        });
+    }
+    if n < 4 && s.chance(0.6) {
+        let load = DVec3::new(0.78, 1.15, s.uniform(0.4, 1.5));
+        block(b, (0.144 * n as f64 + 0.5 * load.z) * DVec3::Z, load);
+    }
+}
+
+/// A barrel, or the drum that guides traffic (MUTCD: 0.9 m high, 0.45 m wide).
+fn drum(b: &mut Builder, s: &mut Sampler) {
+    let radius_m = s.uniform(0.2, 0.32);
+    let high_m = s.uniform(0.7, 1.0);
+    let mut profile = Profile::from(s.uniform(1.0, 1.3) * radius_m, 0.0).line(radius_m, 0.06);
+    for hoop in [0.33, 0.66] {
+        let z = hoop * high_m;
+        profile =
+            profile.line(radius_m, z).line(1.05 * radius_m, z + 0.02).line(radius_m, z + 0.04);
+    }
+    profile.line(0.92 * radius_m, high_m).line(0.0, high_m).revolve(b, Section::Round);
+}

@@ -1,0 +1,58 @@
+//! Bicycles, motorcycles and scooters, alone or with their riders.
+
+mod bicycle;
+mod motorcycle;
+mod parts;
+mod rider;
+
+use glam::{DAffine3, DVec3};
+
+use crate::primitives::{Builder, Sampler};
+use bicycle::Bicycle;
+use motorcycle::Motorcycle;
+
+/// Where a rider touches the vehicle, metres.
+#[derive(Clone, Copy, Debug)]
+pub struct Contacts {
+    /// The middle of the saddle's upper side.
+    pub saddle: DVec3,
+    /// The left grip; the right one is its mirror image.
+    pub grip: DVec3,
+    /// The soles of the right and the left foot.
+    pub soles: [DVec3; 2],
+}
+
+/// Builds a bicycle on its wheels, leaning a little to either side, as on its stand.
+pub fn bicycle(b: &mut Builder, s: &mut Sampler) {
+    let bicycle = Bicycle::draw(s);
+    leaning(b, s.uniform(-12.0, 12.0), |b| bicycle.build(b, s));
+}
+
+/// Builds a bicycle with its rider.
+pub fn cyclist(b: &mut Builder, s: &mut Sampler) {
+    let bicycle = Bicycle::draw(s);
+    leaning(b, s.uniform(-4.0, 4.0), |b| {
+        bicycle.build(b, s);
+        rider::build(b, s, bicycle.contacts(), false);
+    });
+}
+
+/// Builds a motorcycle or a scooter on its stand.
+pub fn motorcycle(b: &mut Builder, s: &mut Sampler) {
+    let motorcycle = Motorcycle::draw(s);
+    leaning(b, s.uniform(-12.0, 12.0), |b| motorcycle.build(b, s));
+}
+
+/// Builds a motorcycle or a scooter with its rider.
+pub fn motorcyclist(b: &mut Builder, s: &mut Sampler) {
+    let motorcycle = Motorcycle::draw(s);
+    leaning(b, s.uniform(-6.0, 6.0), |b| {
+        motorcycle.build(b, s);
+        rider::build(b, s, motorcycle.contacts(), true);
+    });
+}
+
+/// Runs `build` in a frame that leans by `lean_deg` to the right.
+fn leaning(b: &mut Builder, lean_deg: f64, build: impl FnOnce(&mut Builder)) {
+    b.place(DAffine3::from_rotation_x(lean_deg.to_radians()), build);
+}
