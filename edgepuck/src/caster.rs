@@ -43,6 +43,11 @@ impl CasterArgs {
         Ok(caster)
     }
 
+    /// Opens the adapter for `effects`, for commands that need several.
+    pub fn open_quietly(&self, effects: &Effects) -> anyhow::Result<Caster> {
+        Caster::open(&self.adapter, effects).context("cannot open the adapter")
+    }
+
     /// Whether beams that cannot hit are cast.
     pub fn culling(&self) -> Culling {
         if self.no_cull { Culling::Off } else { Culling::On }

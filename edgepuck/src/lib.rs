@@ -6,9 +6,12 @@ pub mod advise;
 pub mod caster;
 pub mod checkout;
 #[cfg(feature = "models")]
+pub mod detect;
+#[cfg(feature = "models")]
 pub mod export_onnx;
 pub mod flags;
 pub mod gen_dataset;
+pub mod gen_scenes;
 pub mod gen_shapes;
 #[cfg(feature = "models")]
 pub mod import_weights;
@@ -19,6 +22,7 @@ pub mod sample_surfaces;
 #[cfg(feature = "models")]
 pub mod sampler_config;
 pub mod scan;
+pub mod segment;
 pub mod significant_digits;
 #[cfg(feature = "models")]
 pub mod trade_record;

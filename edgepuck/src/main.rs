@@ -2,11 +2,11 @@
 
 use clap::{Parser, Subcommand};
 use edgepuck_program::{
-    Outcome, adapters, gen_dataset, gen_shapes, merge_dataset, outcome, preview_scan,
-    sample_surfaces, scan, trainer,
+    Outcome, adapters, gen_dataset, gen_scenes, gen_shapes, merge_dataset, outcome, preview_scan,
+    sample_surfaces, scan, segment, trainer,
 };
 #[cfg(feature = "models")]
-use edgepuck_program::{advise, export_onnx, import_weights};
+use edgepuck_program::{advise, detect, export_onnx, import_weights};
 use std::process::ExitCode;
 
 /// Turns CAD meshes into realistic LiDAR training data.
@@ -22,12 +22,19 @@ enum Command {
     /// Scan a folder of meshes into a LiDAR dataset (default: built-in procedural shapes)
     #[command(alias = "gen")]
     GenDataset(Box<gen_dataset::Args>),
+    /// Scan street scenes and cut them into labelled clusters (default: built-in objects)
+    GenScenes(gen_scenes::Args),
     /// Write the procedural shapes that gen-dataset uses by default as OFF files
     GenShapes(gen_shapes::Args),
     /// Sample points uniformly from the surfaces of meshes, as in ModelNet40's point clouds
     SampleSurfaces(sample_surfaces::Args),
     /// Scan one scene
     Scan(scan::Args),
+    /// Cut a sweep of a sensor into ground and clusters
+    Segment(segment::Args),
+    /// Find and name the objects of a sweep
+    #[cfg(feature = "models")]
+    Detect(detect::Args),
     /// Draw a picture of a scan from the side, from above and from the front
     Preview(preview_scan::Args),
     /// List the adapters (GPUs and CPU) that can cast rays
@@ -64,9 +71,13 @@ fn main() -> ExitCode {
 fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::GenDataset(args) => gen_dataset::run(args),
+        Command::GenScenes(args) => gen_scenes::run(args),
         Command::GenShapes(args) => gen_shapes::run(args),
         Command::SampleSurfaces(args) => sample_surfaces::run(args),
         Command::Scan(args) => scan::run(args),
+        Command::Segment(args) => segment::run(args),
+        #[cfg(feature = "models")]
+        Command::Detect(args) => detect::run(args),
         Command::Preview(args) => preview_scan::run(args),
         Command::Adapters => adapters::run(),
         Command::MergeDataset(args) => merge_dataset::run(args),

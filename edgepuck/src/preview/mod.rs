@@ -4,6 +4,7 @@
 mod canvas;
 mod colours;
 mod frame;
+mod from_above;
 mod panel;
 
 use std::path::Path;
@@ -15,6 +16,7 @@ use plotters::prelude::*;
 use canvas::{Canvas, text};
 use colours::Colours;
 use frame::{Frame, View};
+pub use from_above::draw_from_above;
 
 const TITLE_HEIGHT: u32 = 52;
 const ROW_HEADING_HEIGHT: u32 = 30;
@@ -59,7 +61,7 @@ pub fn draw(clean: &Scan, noisy: Option<&Scan>, title: &str, out: &Path) -> Resu
             heading.draw_text(&row_heading(name, scan, &frame), &text(17), (16, 6))?;
             let tints = colours.tints(scan);
             for (area, view) in views.split_evenly((1, View::ALL.len())).iter().zip(View::ALL) {
-                panel::draw(area, view, scan, &tints, &frame)?;
+                panel::draw(area, view, scan, &tints, &frame, &[])?;
             }
         }
         area.present()?;

@@ -23,16 +23,18 @@ const AXIS_NAMES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
 const GRID: RGBColor = RGBColor(232, 232, 232);
 
 /// Draws what `view` shows of `scan`, nearer points over farther ones, each in
-/// its tint.
+/// its tint, and `names` at their places on the panel, metres.
 pub fn draw(
     area: &Area<'_>,
     view: View,
     scan: &Scan,
     tints: &[RGBColor],
     frame: &Frame,
+    names: &[(&str, [f32; 2])],
 ) -> Result<()> {
     let (caption, below) = area.split_vertically(CAPTION);
-    let middle = (MARGIN + AXIS_Y + SQUARE / 2) as i32 - 4 * view.name.len() as i32;
+    let (width, _) = area.dim_in_pixel();
+    let middle = ((width + AXIS_Y) / 2) as i32 - 4 * view.name.len() as i32;
     caption.draw_text(view.name, &text(16), (middle, 10))?;
     let mut chart = ChartBuilder::on(&below)
         .margin(MARGIN)
@@ -63,6 +65,10 @@ pub fn draw(
         Circle::new(place, radius, tints[i].filled())
     });
     chart.draw_series(points).map_err(|error| anyhow!("drawing the points: {error}"))?;
+    let names = names.iter().map(|&(name, place)| {
+        Text::new(name.to_owned(), (f64::from(place[0]), f64::from(place[1])), text(15))
+    });
+    chart.draw_series(names).map_err(|error| anyhow!("drawing the names: {error}"))?;
     Ok(())
 }
 

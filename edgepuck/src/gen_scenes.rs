@@ -1,0 +1,140 @@
+//! `edgepuck gen-scenes`: street scenes, scanned, and their clusters as a training set.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context;
+use edgepuck_assets::SCENE_RECIPES;
+use edgepuck_scenes::{Generation, Recipe, Stage, generate};
+use edgepuck_segment::Settings;
+use formats::scan_file::{ScanFormat, write_scan};
+use formats::{Scan, atomic};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+use crate::caster::CasterArgs;
+use crate::{Outcome, preview, segment};
+
+/// Flags of `gen-scenes`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Scene recipe: street, room, yard, or the path of a TOML file
+    #[arg(value_name = "RECIPE", default_value = "street")]
+    recipe: PathBuf,
+
+    /// Folder for packed/train.npz and packed/test.npz (labelled clusters), sweeps/ and preview.png
+    #[arg(long, default_value = "data/scenes", value_name = "DIR")]
+    out: PathBuf,
+
+    /// Number of scenes; each is scanned once
+    #[arg(long, default_value_t = 40, value_name = "N")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    sweeps: u32,
+
+    /// Sensors to use in place of the recipe's: built-in names or TOML files, separated by commas
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    sensor: Vec<String>,
+
+    /// Folder of your own meshes, for the recipe's objects of kind "mesh"
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+
+    /// Number of sweeps to write as scans, each with a JSON file that lists its objects
+    #[arg(long, default_value_t = 10, value_name = "N")]
+    save: u32,
+
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+
+    #[command(flatten)]
+    caster: CasterArgs,
+}
+
+/// Draws, scans, cuts and packs.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let mut recipe = read_recipe(&args.recipe)?;
+    recipe.use_sensors(&args.sensor);
+    let meshes = args.meshes.as_deref();
+    let stage = Stage::new(recipe, &args.recipe, meshes, args.seed, |effects| {
+        args.caster.open_quietly(effects)
+    })?;
+    let started = Instant::now();
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
+    let bar = ProgressBar::new(args.sweeps.into()).with_style(style);
+    let mut n_points = 0;
+    let packed = args.out.join("packed");
+    let counts = generate(&stage, &Settings::default(), args.sweeps, &packed, |done| {
+        bar.inc(1);
+        n_points += done.sweep.points.len();
+        if done.scene.number == 0 {
+            let Generation { sweep, labels, .. } = done;
+            let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
+            let seen = Scan { positions: sweep.points.clone(), ..Scan::default() };
+            preview::draw_from_above(&seen, &tints, &[], "scene 0", &args.out.join("preview.png"))?;
+        }
+        if done.scene.number < args.save { save(&stage, done, &args.out) } else { Ok(()) }
+    })?;
+    bar.finish_and_clear();
+    let seconds = started.elapsed().as_secs_f64();
+    eprintln!(
+        "{} sweeps of {} points on average in {seconds:.1} s ({:.1} a second)",
+        args.sweeps,
+        n_points / args.sweeps as usize,
+        f64::from(args.sweeps) / seconds
+    );
+    println!("{:<16} {:>9} {:>9}", "class", "train", "test");
+    for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
+        println!("{class:<16} {train:>9} {test:>9}");
+    }
+    eprintln!(
+        "Clusters: {}. Picture: {}.",
+        packed.display(),
+        args.out.join("preview.png").display()
+    );
+    Ok(Outcome::Success)
+}
+
+/// A built-in recipe by its name, or else a file.
+fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
+    let built_in = SCENE_RECIPES.iter().find(|(name, _)| Path::new(name) == recipe);
+    Ok(match built_in {
+        Some((_, text)) => Recipe::parse(text, recipe)?,
+        None => Recipe::load(recipe)?,
+    })
+}
+
+/// Writes the sweep as a scan, and what stands in the scene as JSON.
+fn save(stage: &Stage, done: &Generation, out: &Path) -> anyhow::Result<()> {
+    let name = format!("sweeps/{:06}", done.scene.number);
+    let file = out.join(format!("{name}.npz"));
+    write_scan(&file, ScanFormat::Npz, &done.sweep.scan)?;
+    let json = serde_json::to_vec_pretty(&description(stage, done)).context("writing JSON")?;
+    atomic::write_bytes(&out.join(format!("{name}.json")), json)?;
+    Ok(())
+}
+
+fn description(stage: &Stage, done: &Generation) -> Value {
+    let scene = &done.scene;
+    let mut points = vec![0u32; scene.objects.len() + 1];
+    done.sweep.surfaces.iter().for_each(|&surface| points[surface as usize] += 1);
+    let objects = scene.objects.iter().enumerate().map(|(i, object)| {
+        let entry = &stage.recipe().object[object.entry];
+        json!({
+            "object": i + 1,
+            "class": entry.class,
+            "kind": entry.kind,
+            "position_m": object.position.to_array(),
+            "yaw_deg": object.yaw_rad.to_degrees(),
+            "size_m": stage.size_m(scene, i).to_array(),
+            "points": points[i + 1],
+        })
+    });
+    json!({
+        "frame": "x along the road, z up, origin on the ground below the sensor; metres",
+        "sensor": stage.sensor(scene).name,
+        "sensor_pose": scene.pose,
+        "object_0": "the ground",
+        "objects": objects.collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,45 @@
+//! A picture of a whole sweep from above.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use formats::Scan;
+use plotters::prelude::*;
+
+use super::canvas::{Canvas, text};
+use super::frame::{Frame, View};
+use super::panel;
+
+const EDGE: u32 = 1200;
+const TITLE_HEIGHT: u32 = 44;
+
+/// What is farther from the sensor is left out: the picture would be all road.
+const FARTHEST_M: f64 = 50.0;
+
+/// Draws the points of `scan` around its origin, each in its tint, and `names` at
+/// their places (x, y), to the PNG file `out`, atomically.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn draw_from_above(
+    scan: &Scan,
+    tints: &[RGBColor],
+    names: &[(&str, [f32; 2])],
+    title: &str,
+    out: &Path,
+) -> Result<()> {
+    let finite = scan.positions.iter().flatten().filter(|x| x.is_finite());
+    let farthest = finite.fold(1.0, |farthest: f64, x| farthest.max(f64::from(x.abs())));
+    let frame = Frame { centre: [0.0; 3], half: farthest.min(FARTHEST_M) };
+    let mut canvas = Canvas::new(EDGE, EDGE + TITLE_HEIGHT)?;
+    {
+        let area = canvas.area();
+        area.fill(&WHITE)?;
+        let (heading, below) = area.split_vertically(TITLE_HEIGHT);
+        heading.draw_text(title, &text(24), (16, 16))?;
+        let [_, from_above, _] = View::ALL;
+        panel::draw(&below, from_above, scan, tints, &frame, names)?;
+        area.present()?;
+    }
+    canvas.write_png(out).with_context(|| format!("drawing {}", out.display()))
+}

@@ -1,0 +1,122 @@
+//! `edgepuck segment`: cuts a sweep into ground and clusters.
+
+use crate::{Outcome, Usage, preview};
+use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
+use formats::cloud_file::{read_cloud, write_cloud};
+use formats::scan_file::read_scan;
+use formats::{FormatError, Scan, atomic};
+use plotters::style::{Color, HSLColor, RGBColor};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Flags of `segment`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Sweep to cut: a scan, .npz or .ply, whose rings are used if it has them, or a cloud in any
+    /// format that infer-cpu reads; metres, z up
+    #[arg(value_name = "SWEEP")]
+    sweep: PathBuf,
+
+    /// Folder for cluster-0000.npy and so on (the points of each cluster in metres from the
+    /// sensor), sweep.ply (the sweep, coloured by cluster) and preview.png
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+
+    /// Where the sensor is in the sweep, in metres [default: 0 0 0]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    sensor: Option<Vec<f64>>,
+
+    /// Take the connected components of points within this many metres instead, for clouds that are
+    /// not sweeps of a sensor; there is no ground then
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    radius: Option<f32>,
+}
+
+/// Cuts the sweep.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let scan = read_sweep(&args.sweep, sensor_position(args.sensor.as_deref()))?;
+    let mut settings = Settings::default();
+    settings.radius_m = args.radius;
+    let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
+    let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
+    // A robot's second sweep and all that follow find the memory of the first.
+    segmenter.segment(&sweep)?;
+    let start = Instant::now();
+    let segmentation = segmenter.segment(&sweep)?;
+    let elapsed_ms = 1e3 * start.elapsed().as_secs_f64();
+
+    write_clusters(&args.out, &scan, segmentation)?;
+    let tints: Vec<_> = segmentation.labels().iter().map(|label| tint(*label)).collect();
+    write_ply(&args.out.join("sweep.ply"), &scan.positions, &tints)?;
+    let title = args.sweep.file_stem().unwrap_or_default().to_string_lossy();
+    preview::draw_from_above(&scan, &tints, &[], &title, &args.out.join("preview.png"))?;
+    let ground = segmentation.labels().iter().filter(|label| **label == Label::Ground).count();
+    eprintln!(
+        "{} points in {elapsed_ms:.1} ms: {} clusters, {:.0} % ground: {}",
+        scan.len(),
+        segmentation.clusters().len(),
+        100.0 * ground as f64 / scan.len().max(1) as f64,
+        args.out.display()
+    );
+    Ok(Outcome::Success)
+}
+
+/// What `--sensor` says; the origin without it.
+pub fn sensor_position(flag: Option<&[f64]>) -> [f64; 3] {
+    flag.and_then(|xyz| xyz.try_into().ok()).unwrap_or_default()
+}
+
+/// The points at `path`, from the sensor, and their rings if the file is a scan
+/// that has them.
+pub fn read_sweep(path: &Path, sensor: [f64; 3]) -> Result<Scan, FormatError> {
+    let points = read_cloud(path)?;
+    let from_sensor = |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - sensor[axis]) as f32);
+    let positions = points.iter().map(from_sensor).collect();
+    // A cloud that is not a scan has no rings.
+    let ring = read_scan(path).ok().and_then(|scan| scan.ring);
+    Ok(Scan { positions, ring, ..Scan::default() })
+}
+
+/// Grey for the ground, light grey for what is in no cluster, and for clusters
+/// hues a golden angle apart, so that no two in sequence look alike.
+pub fn tint(label: Label) -> RGBColor {
+    match label {
+        Label::Ground => RGBColor(150, 150, 150),
+        Label::Small | Label::Invalid => RGBColor(205, 205, 205),
+        Label::Cluster(number) => {
+            let hue = (f64::from(number) * 0.618_033_988_75).fract();
+            let (red, green, blue) = HSLColor(hue, 0.8, 0.42).rgb();
+            RGBColor(red, green, blue)
+        }
+    }
+}
+
+/// Writes each cluster, and removes those that a run before left behind.
+fn write_clusters(folder: &Path, scan: &Scan, found: &Segmentation) -> Result<(), FormatError> {
+    let file = |number: usize| folder.join(format!("cluster-{number:04}.npy"));
+    for (number, cluster) in found.clusters().enumerate() {
+        let position = |&point: &u32| scan.positions[point as usize].map(f64::from);
+        let points: Vec<_> = cluster.points.iter().map(position).collect();
+        write_cloud(&file(number), &points)?;
+    }
+    let left = (found.clusters().len()..).map(file).take_while(|file| file.exists());
+    for file in left {
+        std::fs::remove_file(&file).map_err(|source| FormatError::io(&file, source))?;
+    }
+    Ok(())
+}
+
+fn write_ply(file: &Path, points: &[[f32; 3]], tints: &[RGBColor]) -> Result<(), FormatError> {
+    atomic::write(file, |writer| {
+        write!(writer, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", points.len())?;
+        write!(writer, "property float x\nproperty float y\nproperty float z\n")?;
+        write!(writer, "property uchar red\nproperty uchar green\nproperty uchar blue\n")?;
+        writeln!(writer, "end_header")?;
+        for (point, tint) in points.iter().zip(tints) {
+            point.iter().try_for_each(|x| writer.write_all(&x.to_le_bytes()))?;
+            writer.write_all(&[tint.0, tint.1, tint.2])?;
+        }
+        Ok(())
+    })
+}
