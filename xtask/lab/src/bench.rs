@@ -4,7 +4,8 @@
 //! time of a dataset [`to_disk`], which of the [`builders`] is faster for how many rays,
 //! the comparison with Embree ([`peers`]), the rays lost without [`watertightness`], and
 //! what [`simplify`] saves. [`infer`] is about classifying, sampling and learning,
-//! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters.
+//! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters,
+//! [`sensor`] about how true a profile is to real sweeps.
 
 use crate::measure::machine::{self, Machine};
 use crate::measure::{backends, bench_mesh};
@@ -12,7 +13,7 @@ use crate::pi5;
 use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
-use crate::study::{devices, numerics};
+use crate::study::{devices, numerics, sensor};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -50,6 +51,8 @@ enum Benchmark {
     Growth(numerics::GrowthArgs),
     /// Compare every adapter with the CPU on the same meshes.
     Devices(devices::DevicesArgs),
+    /// Compare a sensor's profile with real sweeps of the sensor: directions, noise, missing returns.
+    Sensor(sensor::SensorArgs),
 }
 
 #[derive(Args, Debug)]
@@ -131,6 +134,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome> {
         Benchmark::PiModel(args) => pi5::run(args),
         Benchmark::Growth(args) => numerics::run(args),
         Benchmark::Devices(args) => devices::run(args),
+        Benchmark::Sensor(args) => sensor::run(args),
     }?;
     Ok(Outcome::Success)
 }

@@ -101,6 +101,21 @@ impl Table {
         Ok(csv.into_inner()?)
     }
 
+    /// The table as Markdown, under its title.
+    pub fn markdown(&self) -> String {
+        let line = |words: Vec<&str>| format!("| {} |\n", words.join(" | "));
+        let heading = self.heading.iter().map(String::as_str).collect();
+        let rows =
+            self.rows.iter().map(|row| row.cells.iter().map(|cell| cell.text.as_str()).collect());
+        let body: String = rows.map(line).collect();
+        format!(
+            "## {}\n\n{}{}{body}",
+            self.title,
+            line(heading),
+            line(vec!["---"; self.heading.len()])
+        )
+    }
+
     /// The table as HTML.
     pub fn html(&self) -> Markup {
         html! {
@@ -170,6 +185,10 @@ mod tests {
         let mut table = Table::of("title", &[1], &columns);
         table.push_marked(true, vec!["c".to_owned(), "10".to_owned()]);
         assert_eq!(table.to_string(), "\ntitle\n  name   ms\n  a < b   1\n  c      10\n");
+        assert_eq!(
+            table.markdown(),
+            "## title\n\n| name | ms |\n| --- | --- |\n| a < b | 1 |\n| c | 10 |\n"
+        );
         let html = table.html().into_string();
         assert!(html.contains("<th scope=\"row\">a &lt; b</th><td>1</td>"), "{html}");
         assert!(html.contains("<tr class=\"marked\">"), "{html}");

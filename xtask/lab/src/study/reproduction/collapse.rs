@@ -108,11 +108,10 @@ fn steps(context: &ExperimentContext) -> anyhow::Result<Vec<Step>> {
 /// as the baseline's text files have it.
 fn turned(clouds: &Clouds, y_up: bool) -> Clouds {
     let mut clouds = clouds.clone();
-    let n_points = clouds.set.n_points;
-    for (i, cloud) in clouds.set.points.chunks_exact_mut(3 * n_points).enumerate() {
+    for i in 0..clouds.len() {
         let angle = std::f64::consts::TAU * StreamKey::new(0, "turned", i as u32).unit(0);
         let (sin, cos) = (angle.sin() as f32, angle.cos() as f32);
-        for [x, y, z] in cloud.as_chunks_mut::<3>().0 {
+        for [x, y, z] in clouds.set.cloud_mut(i) {
             (*x, *y) = (cos * *x - sin * *y, sin * *x + cos * *y);
             if y_up {
                 (*y, *z) = (*z, -*y);
@@ -135,12 +134,10 @@ fn thinned(context: &ExperimentContext, seen: &Clouds) -> anyhow::Result<Clouds>
         .collect();
     ensure!(!kept.is_empty(), "no cloud of seen-test.npz has a scan of its name");
     let mut clouds = seen.select(&kept.iter().map(|(i, _)| *i).collect::<Vec<_>>());
-    let n_points = clouds.set.n_points;
-    let rows = clouds.set.points.chunks_exact_mut(3 * n_points);
-    for (cloud, (_, count)) in rows.zip(kept) {
-        let points = cloud.as_chunks_mut::<3>().0;
-        let n = count.clamp(1, n_points);
-        for i in n..n_points {
+    for (cloud, (_, count)) in kept.into_iter().enumerate() {
+        let points = clouds.set.cloud_mut(cloud);
+        let n = count.clamp(1, points.len());
+        for i in n..points.len() {
             points[i] = points[i % n];
         }
     }
@@ -156,7 +153,8 @@ mod tests {
     #[test]
     fn turning_keeps_heights_or_lays_them_along_y() {
         let points = vec![0.6, 0.0, 0.8, 0.0, 0.0, 1.0];
-        let set = LabelledSet { points, n_points: 2, labels: vec![0], ..LabelledSet::default() };
+        let offsets = vec![0, 2];
+        let set = LabelledSet { points, offsets, labels: vec![0], ..LabelledSet::default() };
         let clouds = Clouds { set, classes: vec!["cup".to_owned()] };
         let about_z = turned(&clouds, false);
         assert_eq!(about_z.set.points[2], 0.8);

@@ -53,7 +53,7 @@ impl ExperimentContext {
         for (what, clouds, most) in
             [("--clouds", train, most), ("surfaces/surface", surface, self.plan.mesh_points)]
         {
-            let n_points = clouds.set.n_points;
+            let n_points = clouds.set.smallest_cloud();
             ensure!(
                 most <= n_points,
                 "{what}: expected clouds of {most} points or more, found {n_points}"

@@ -36,8 +36,8 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     let mut tested = Table::new("1 tested at N", caption, "points", columns);
     for &n in &context.plan.tested_points {
         let at = |kind| {
-            if n > held.set.n_points {
-                return Ok(Cell::Text(format!("clouds have {} points", held.set.n_points)));
+            if n > held.set.smallest_cloud() {
+                return Ok(Cell::Text(format!("clouds have {} points", held.set.smallest_cloud())));
             }
             Ok(Cell::instance(&test(&model, &held, Some(sampler(kind, n)))?))
         };

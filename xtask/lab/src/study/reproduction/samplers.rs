@@ -99,7 +99,7 @@ fn accuracy(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table>
         "sampler",
         kept.iter().map(|n| format!("{n} points")),
     );
-    for (rival, networks) in rivals(&context.plan, train.set.n_points) {
+    for (rival, networks) in rivals(&context.plan, train.set.smallest_cloud()) {
         let trained = |i: usize| {
             let Some((name, recipe)) = networks.get(i) else { return Ok(Cell::None) };
             let model = context.network(name, recipe.clone(), &train)?;
@@ -112,7 +112,7 @@ fn accuracy(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table>
 
 fn latency(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let keep = context.plan.kept[0];
-    let caption = format!("Choosing {keep} of {} points, ms", held.set.n_points);
+    let caption = format!("Choosing {keep} of {} points, ms", held.set.smallest_cloud());
     let mut table = Table::new("4 latency", caption, "sampler", ["ms", "paper (1024 to 128)"]);
     let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
     for (name, kind, paper) in
@@ -174,7 +174,7 @@ fn unique(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let columns = ["least", "median", "most", "paper"];
     let mut table = Table::new("4 unique", caption, "front end", columns);
     for front in &context.plan.fronts {
-        let (name, mut classifier) = with_cpl(context, front, held.set.n_points)?;
+        let (name, mut classifier) = with_cpl(context, front, held.set.smallest_cloud())?;
         let mut counts = Vec::new();
         for i in 0..held.len() {
             counts.push(classifier.sample(&wide(held.set.cloud(i)))?.len() as f64);

@@ -1,0 +1,119 @@
+//! Sweeps whose points know their laser and their time, real and simulated.
+
+use crate::measure::bench_mesh::target;
+use anyhow::{Context, Result, bail, ensure};
+use formats::rng::StreamKey;
+use formats::scan::Attribute;
+use glam::{DQuat, DVec3, dvec3};
+use half::f16;
+use ndarray::{Array1, Array2};
+use ndarray_npy::ReadNpyExt;
+use sim_gpu::bvh::Builder;
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::{Effects, Noise, NoiseModel, Quantum};
+use sim_gpu::mesh::Mesh;
+use sim_gpu::pose::Pose;
+use sim_gpu::scan::{ScanRequest, scan};
+use sim_gpu::sensor::{Rotating, Sensor};
+use std::fs::File;
+use std::path::Path;
+use zip::ZipArchive;
+
+/// Height of the simulated sensor above the ground, metres: on a car's roof.
+const HEIGHT_M: f64 = 1.65;
+
+/// A return.
+#[derive(Clone, Copy)]
+pub struct Return {
+    /// Where, in the car's frame, metres.
+    pub position_m: DVec3,
+    /// Number of its laser, from 0 for each sensor. The order is unknown.
+    pub laser: usize,
+    /// Since the sweep's reference, seconds.
+    pub time_s: f64,
+}
+
+/// The returns in `file` by sensor, each of which has `n_lasers`.
+///
+/// # Errors
+/// A file without lasers, times or positions, or of another number of lasers.
+pub fn read(file: &Path, n_lasers: usize) -> Result<Vec<Vec<Return>>> {
+    let name = || file.display().to_string();
+    let mut archive = ZipArchive::new(File::open(file).with_context(name)?).with_context(name)?;
+    let lasers: Array1<u8> = array(&mut archive, "laser").with_context(name)?;
+    let positions: Array2<i32> = array(&mut archive, "xyz_mm").with_context(name)?;
+    let times: Array1<i32> = array(&mut archive, "offset_ns").with_context(name)?;
+    let shape = positions.shape();
+    if shape != [lasers.len(), 3] || times.len() != lasers.len() {
+        let (n, times) = (lasers.len(), times.len());
+        bail!("{}: xyz_mm: expected {n} points and times, found {shape:?} and {times}", name());
+    }
+    let n_sensors = lasers.iter().max().map_or(0, |&most| usize::from(most) / n_lasers + 1);
+    let mut sensors = vec![Vec::new(); n_sensors];
+    for ((row, &laser), &time_ns) in positions.rows().into_iter().zip(&lasers).zip(&times) {
+        let position_m = DVec3::from_array([0, 1, 2].map(|axis| f64::from(row[axis]) * 1e-3));
+        let (sensor, laser) = (usize::from(laser) / n_lasers, usize::from(laser) % n_lasers);
+        sensors[sensor].push(Return { position_m, laser, time_s: f64::from(time_ns) * 1e-9 });
+    }
+    for (i, returns) in sensors.iter().enumerate() {
+        let mut counts = vec![0; n_lasers];
+        returns.iter().for_each(|r| counts[r.laser] += 1);
+        let few = counts.iter().position(|&n| n < 100);
+        let laser = few.map(|laser| i * n_lasers + laser).unwrap_or_default();
+        let n = few.map(|laser| counts[laser]).unwrap_or_default();
+        ensure!(few.is_none(), "{}: laser {laser}: expected 100 returns, found {n}", name());
+    }
+    Ok(sensors)
+}
+
+fn array<A: ReadNpyExt>(archive: &mut ZipArchive<File>, key: &str) -> Result<A> {
+    let found: Vec<String> =
+        archive.file_names().filter_map(Result::ok).map(|name| name.replace(".npy", "")).collect();
+    let entry = archive.by_name(&format!("{key}.npy"));
+    let entry =
+        entry.with_context(|| format!("expected `{key}`, found none but {}", found.join(", ")))?;
+    A::read_npy(entry).with_context(|| key.to_owned())
+}
+
+/// What `sensor` measures in a street of even ground between walls, with the noise
+/// and the quantum of its profile, in the precision of Argoverse 2's files.
+pub fn simulated(sensor: &Sensor, table: &Rotating) -> Result<Vec<Return>> {
+    let pattern = sensor.pattern();
+    let sigma_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);
+    let effects = Effects {
+        noise: Some(Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range }),
+        quantum: sensor.range.quantum_m.map(|_| Quantum { step_m: None }),
+        ..Effects::default()
+    };
+    let pose = Pose { position_m: dvec3(0.0, 0.0, HEIGHT_M), world_from_sensor: DQuat::IDENTITY };
+    let mut request = ScanRequest::new(sensor, &pattern, pose);
+    request.attributes = [Attribute::Beam, Attribute::Time].into();
+    request.stream = StreamKey::new(0, "sensor", 0);
+    let street = target(street(), Builder::Sah);
+    let scan = scan(&Caster::Cpu(effects), &street, &request)?;
+    let (beams, times) = (scan.beam.context("no beams")?, scan.time_s.context("no times")?);
+    let order = table.firing_order();
+    let returns =
+        scan.positions.iter().zip(beams.iter().zip(&times)).map(|(p, (&beam, &time_s))| {
+            let laser = order[beam as usize % order.len()];
+            let position_m = DVec3::from_array(p.map(|x| f16::from_f32(x).to_f64()));
+            Return { position_m, laser, time_s: f64::from(time_s) }
+        });
+    Ok(returns.collect())
+}
+
+/// Ground of 240 m by 240 m, and walls 15 m high: a street 24 m wide and 120 m long.
+fn street() -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut quad = |corner: DVec3, a: DVec3, b: DVec3| {
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend([corner, corner + a, corner + a + b, corner + b]);
+        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    };
+    quad(dvec3(-120.0, -120.0, 0.0), 240.0 * DVec3::X, 240.0 * DVec3::Y);
+    for side in [-1.0, 1.0] {
+        quad(dvec3(-60.0, side * 12.0, 0.0), 120.0 * DVec3::X, 15.0 * DVec3::Z);
+        quad(dvec3(side * 60.0, -12.0, 0.0), 24.0 * DVec3::Y, 15.0 * DVec3::Z);
+    }
+    mesh
+}
