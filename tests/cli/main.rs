@@ -19,6 +19,7 @@ mod scenes;
 #[cfg(feature = "simplify")]
 mod simplified;
 mod surfaces;
+mod sweeps;
 
 use formats::Scan;
 use formats::scan_file::read_scan;

@@ -24,6 +24,7 @@ pub struct Recipe {
     /// Where the sensor is mounted.
     pub mount: Mount,
     /// The sensors; each sweep is of one of them.
+    #[serde(default)]
     pub sensor: Vec<SensorChoice>,
     /// The part of the beams that return from glass; drawn for each scene.
     #[serde(default)]
@@ -33,6 +34,7 @@ pub struct Recipe {
     /// ones take their feet away. By default that of the segmentation.
     pub ground_clearance_m: Option<Span>,
     /// The objects, placed in this order.
+    #[serde(default)]
     pub object: Vec<Objects>,
 }
 

@@ -1,0 +1,93 @@
+//! `gen-scenes`, `segment` and `detect`.
+
+use crate::{Folder, in_repository};
+use formats::labelled::read_labelled;
+use serde_json::Value;
+
+#[test]
+fn scenes_are_scanned_cut_labelled_and_packed_alike_every_time() {
+    let folder = Folder::new();
+    for out in ["one", "other"] {
+        let said = folder
+            .succeeds(&format!("gen-scenes yard --adapter cpu --sweeps 10 --save 2 --out {out}"));
+        assert!(said.contains("10 sweeps"), "{said}");
+    }
+    for file in ["packed/train.npz", "packed/test.npz", "sweeps/000001.npz", "preview.png"] {
+        let [one, other] = ["one", "other"].map(|out| folder.bytes(&format!("{out}/{file}")));
+        assert!(one == other, "{file} differs");
+    }
+    let set = read_labelled(&folder.at("one/packed/train.npz")).unwrap();
+    let classes = set.classes.clone().unwrap();
+    assert!(classes.is_sorted() && classes.contains(&"other".to_owned()), "{classes:?}");
+    assert!(set.len() > 50, "{} clusters", set.len());
+    // Sensor frame: no sensor of the recipe sees a cluster beyond its range.
+    let farthest = set.range_m.as_ref().unwrap().iter().fold(0.0, |far: f32, r| far.max(*r));
+    assert!((5.0..200.0).contains(&farthest), "{farthest} m");
+
+    let scene: Value = serde_json::from_slice(&folder.bytes("one/sweeps/000001.json")).unwrap();
+    let points: u64 =
+        scene["objects"].as_array().unwrap().iter().map(|o| o["points"].as_u64().unwrap()).sum();
+    let scan = folder.scan("one/sweeps/000001.npz");
+    let on_objects = scan.object.unwrap().iter().filter(|&&object| object > 0).count() as u64;
+    assert_eq!(points, on_objects);
+}
+
+#[test]
+fn a_sweep_is_cut_and_its_clusters_are_named() {
+    let folder = Folder::new();
+    folder.succeeds("gen-scenes --adapter cpu --sweeps 1 --save 1 --out scenes");
+    let scene: Value = serde_json::from_slice(&folder.bytes("scenes/sweeps/000000.json")).unwrap();
+    let height_m = scene["sensor_pose"]["position_m"][2].as_f64().unwrap();
+    let sweep = format!("scenes/sweeps/000000.npz --sensor 0 0 {height_m}");
+    let said = folder.succeeds(&format!("segment {sweep} --out clusters"));
+    assert!(said.contains("clusters, "), "{said}");
+    assert!(folder.bytes("clusters/sweep.ply").starts_with(b"ply\n"));
+    assert!(folder.bytes("clusters/cluster-0000.npy").starts_with(b"\x93NUMPY"));
+    assert!(folder.bytes("clusters/preview.png").starts_with(b"\x89PNG"));
+
+    let model = in_repository("assets/weights/edge-64.safetensors");
+    folder.succeeds(&format!("detect {sweep} --model {} --out objects.json", model.display()));
+    let found: Value = serde_json::from_slice(&folder.bytes("objects.json")).unwrap();
+    let objects = found["objects"].as_array().unwrap();
+    assert!(!objects.is_empty());
+    for object in objects {
+        assert!(object["points"].as_u64().unwrap() >= 20);
+        assert!((0.0..=1.0).contains(&object["confidence"].as_f64().unwrap()));
+        let size: Vec<f64> = serde_json::from_value(object["box"]["size_m"].clone()).unwrap();
+        assert!(size[0] >= size[1] && size[0] < 30.0, "{object}");
+    }
+    assert!(folder.bytes("objects.png").starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn what_cannot_be_used_is_named_and_nothing_is_written() {
+    let folder = Folder::new();
+    folder.write("recipe.toml", "mount = { height_m = [1, 2] }\n[[sensor]]\nprofile = \"vlp99\"\n");
+    folder.write(
+        "own.toml",
+        "mount = { height_m = [1, 2] }\n[[sensor]]\nprofile = \"vlp16\"\n[[object]]\nkind = \"mesh\"\n\
+         class = \"chair\"\ncount = [1, 1]\nplace = \"anywhere\"\ndistance_m = [2, 3]\n\
+         meshes = \"chairs\"\nheight_m = [1, 1]\n",
+    );
+    folder.write("not_a_cloud.npz", "nothing");
+    folder.refuses(
+        1,
+        &[
+            ("gen-scenes missing.toml --out out", "missing.toml"),
+            (
+                "gen-scenes recipe.toml --out out",
+                "recipe.toml: object: expected at least one [[object]]",
+            ),
+            ("gen-scenes street --sensor vlp99 --out out", "vlp99"),
+            (
+                "gen-scenes own.toml --out out",
+                "chairs: expected a folder with OBJ, OFF, PLY or STL files",
+            ),
+            ("gen-scenes own.toml --meshes . --out out", "chairs: expected a folder with OBJ"),
+            ("segment missing.npz --out out", "missing.npz"),
+            ("segment not_a_cloud.npz --out out", "not_a_cloud.npz"),
+            ("detect missing.npz --model nothing.safetensors --out out", "missing.npz"),
+        ],
+    );
+    assert!(!folder.at("out").exists(), "something was written");
+}
