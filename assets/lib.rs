@@ -8,8 +8,8 @@ pub const SENSORS: [(&str, &str); 8] = [
     ("kinect-v2", include_str!("sensors/kinect-v2.toml")),
     ("vlp16", include_str!("sensors/vlp16.toml")),
     ("hdl64e", include_str!("sensors/hdl64e.toml")),
-    ("hdl32e", include_str!("sensors/hdl32e.toml")),
     ("modelnet40c-lidar", include_str!("sensors/modelnet40c-lidar.toml")),
+    ("hdl32e", include_str!("sensors/hdl32e.toml")),
 ];
 
 /// The built-in scene recipes, the default one first: a recipe's name and its TOML.

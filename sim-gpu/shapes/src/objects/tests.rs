@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::{Object, ObjectKind, object};
 
 const SEED: u64 = 5;
-const INSTANCES: u32 = 20;
+const INSTANCES: u32 = 8;
 
 /// The smallest and the largest length, width and height of a kind in metres, mirrors,
 /// loads, leans and what is pushed included.

@@ -60,7 +60,7 @@ fn clumps(b: &mut Builder, s: &mut Sampler, size_m: DVec3) {
 fn trimmed(b: &mut Builder, s: &mut Sampler) {
     // As high as a gardener reaches with shears.
     let height_m = s.uniform(0.4, 2.6);
-    let half_m = (height_m * s.uniform(0.4, 1.1)).max(0.22);
+    let half_m = (height_m * s.uniform(0.4, 1.1)).clamp(0.22, 1.9);
     let depth_m = half_m * s.uniform(0.75, 1.0);
     // A dome's middle is near the ground, a ball's at half its height.
     let middle_m = height_m * s.uniform(0.1, 0.6);
