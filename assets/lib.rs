@@ -39,3 +39,6 @@ pub const TRADE_RECORD: &str = include_str!("reports/trade/trade.csv");
 
 /// The bundled default model, `edge-64`, as a model file's bytes.
 pub const EDGE_64: &[u8] = include_bytes!("weights/edge-64.safetensors");
+
+/// The bundled model for clusters of streets, `street-128`, as a model file's bytes.
+pub const STREET_128: &[u8] = include_bytes!("weights/street-128.safetensors");

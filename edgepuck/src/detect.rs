@@ -11,6 +11,9 @@ use serde_json::{Value, json};
 use crate::segment::{read_sweep, sensor_position, tint};
 use crate::{Outcome, Usage, preview};
 
+/// The model that comes with the program.
+const BUNDLED: &str = "street-128";
+
 /// Flags of `detect`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -19,7 +22,7 @@ pub struct Args {
     sweep: PathBuf,
 
     /// Model for clusters: street-128, or the path of a model file
-    #[arg(long, default_value = "street-128", value_name = "MODEL")]
+    #[arg(long, default_value = BUNDLED, value_name = "MODEL")]
     model: PathBuf,
 
     /// JSON file for the objects; a picture is written beside it, with the extension .png
@@ -97,9 +100,12 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The model that is embedded under this name, or else that of a file.
+/// The bundled model, or else that of a file.
 fn open(model: &Path, options: &Options) -> anyhow::Result<Classifier> {
-    Ok(Classifier::load(model, options)?)
+    Ok(match model == Path::new(BUNDLED) {
+        true => Classifier::from_bytes(edgepuck_assets::STREET_128, options)?,
+        false => Classifier::load(model, options)?,
+    })
 }
 
 fn object(class: &str, confidence: f64, n_points: usize, place: &OrientedBox) -> Value {
