@@ -108,7 +108,10 @@ fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
 fn save(stage: &Stage, done: &Generation, out: &Path) -> anyhow::Result<()> {
     let name = format!("sweeps/{:06}", done.scene.number);
     let file = out.join(format!("{name}.npz"));
-    write_scan(&file, ScanFormat::Npz, &done.sweep.scan)?;
+    // As a robot has it: in the sensor's frame.
+    let positions = done.sweep.points.clone();
+    let scan = Scan { origin: [0.0; 3], positions, ..done.sweep.scan.clone() };
+    write_scan(&file, ScanFormat::Npz, &scan)?;
     let json = serde_json::to_vec_pretty(&description(stage, done)).context("writing JSON")?;
     atomic::write_bytes(&out.join(format!("{name}.json")), json)?;
     Ok(())
@@ -131,7 +134,8 @@ fn description(stage: &Stage, done: &Generation) -> Value {
         })
     });
     json!({
-        "frame": "x along the road, z up, origin on the ground below the sensor; metres",
+        "sweep_frame": "the sensor's: metres, x forward, z up",
+        "objects_frame": "x along the road, z up, origin on the ground below the sensor; metres",
         "sensor": stage.sensor(scene).name,
         "sensor_pose": scene.pose,
         "object_0": "the ground",
