@@ -27,7 +27,7 @@ impl CasterArgs {
     /// Opens the adapter for `effects` and says which it is.
     pub fn open(&self, effects: &Effects) -> anyhow::Result<Caster> {
         if self.adapter != AdapterRequest::Auto {
-            let caster = Caster::open(&self.adapter, effects).context("cannot open the adapter")?;
+            let caster = self.open_quietly(effects)?;
             eprintln!("Casting on {}.", caster.name());
             return Ok(caster);
         }

@@ -8,7 +8,7 @@ use formats::atomic;
 use infer_cpu::{Classifier, Options, Precision};
 use serde_json::{Value, json};
 
-use crate::segment::{read_sweep, sensor_position, tint};
+use crate::segment::{SweepArgs, tint};
 use crate::{Outcome, Usage, preview};
 
 /// The model that comes with the program.
@@ -17,9 +17,8 @@ const BUNDLED: &str = "street-128";
 /// Flags of `detect`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Sweep, in any format that `segment` reads; metres, z up
-    #[arg(value_name = "SWEEP")]
-    sweep: PathBuf,
+    #[command(flatten)]
+    input: SweepArgs,
 
     /// Model for clusters: street-128, or the path of a model file
     #[arg(long, default_value = BUNDLED, value_name = "MODEL")]
@@ -28,10 +27,6 @@ pub struct Args {
     /// JSON file for the objects; a picture is written beside it, with the extension .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-
-    /// Where the sensor is in the sweep, in metres [default: 0 0 0]
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
-    sensor: Option<Vec<f64>>,
 
     /// Fewest points of an object
     #[arg(long, default_value_t = 20, value_name = "N")]
@@ -44,7 +39,7 @@ pub struct Args {
 
 /// Cuts the sweep and names its clusters.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let scan = read_sweep(&args.sweep, sensor_position(args.sensor.as_deref()))?;
+    let scan = args.input.read()?;
     let options = Options { precision: args.precision, ..Options::default() };
     let mut classifier = open(&args.model, &options)?;
     let mut settings = Settings::default();
@@ -57,7 +52,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut objects = Vec::new();
     let mut n_unknown = 0;
     let mut cloud = Vec::new();
-    for (cluster, number) in segmentation.clusters().zip(0u32..) {
+    for (cluster, number) in segmentation.clusters().zip(0..) {
         cloud.clear();
         cloud.extend(cluster.points.iter().map(|&i| scan.positions[i as usize]));
         let prediction = classifier.classify_on_ground(&cloud, cluster.ground_z_m)?;
@@ -65,15 +60,16 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
             n_unknown += 1;
             continue;
         }
-        let place = OrientedBox::around(&cloud);
-        let name = (number, prediction.label.to_string(), place.centre_m);
-        let object =
-            object(prediction.label.as_ref(), prediction.confidence(), cloud.len(), &place);
-        objects.push((name, object));
+        objects.push(Object {
+            cluster: number,
+            class: prediction.label.to_string(),
+            confidence: prediction.confidence(),
+            n_points: cloud.len(),
+            place: OrientedBox::around(&cloud),
+        });
     }
     let elapsed_ms = 1e3 * started.elapsed().as_secs_f64();
 
-    let (names, objects): (Vec<_>, Vec<Value>) = objects.into_iter().unzip();
     eprintln!(
         "{} points in {elapsed_ms:.1} ms: {} objects, {n_unknown} unknown clusters: {}",
         scan.len(),
@@ -82,22 +78,49 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     );
     let written = json!({
         "frame": "the sensor's: metres, z up, the sensor at the origin",
-        "sweep": args.sweep.file_name().unwrap_or_default().to_string_lossy(),
-        "objects": objects,
+        "sweep": args.input.sweep.file_name().unwrap_or_default().to_string_lossy(),
+        "objects": objects.iter().map(Object::json).collect::<Vec<_>>(),
     });
     atomic::write_bytes(&args.out, serde_json::to_vec_pretty(&written)?)?;
-    let kept: Vec<u32> = names.iter().map(|(number, ..)| *number).collect();
-    let texts: Vec<_> =
-        names.iter().map(|(_, label, [x, y, _])| (label.as_str(), [*x, *y])).collect();
+    let is_named = |number| objects.binary_search_by_key(&number, |object| object.cluster).is_ok();
     let tints = segmentation.labels().iter().map(|&label| match label {
-        Label::Cluster(number) if kept.binary_search(&number).is_err() => tint(Label::Small),
+        Label::Cluster(number) if !is_named(number) => tint(Label::Small),
         other => tint(other),
     });
     let tints: Vec<_> = tints.collect();
-    let title = args.sweep.file_stem().unwrap_or_default().to_string_lossy();
+    let names: Vec<_> = objects.iter().map(Object::name).collect();
     let picture = args.out.with_extension("png");
-    preview::draw_from_above(&scan, &tints, &texts, &title, &picture)?;
+    preview::draw_from_above(&scan, &tints, &names, &args.input.title(), &picture)?;
     Ok(Outcome::Success)
+}
+
+/// A cluster that has a name.
+struct Object {
+    /// Its number among the clusters.
+    cluster: u32,
+    class: String,
+    confidence: f64,
+    n_points: usize,
+    place: OrientedBox,
+}
+
+impl Object {
+    /// Its class, and where it is seen from above.
+    fn name(&self) -> (&str, [f32; 2]) {
+        let [x, y, _] = self.place.centre_m;
+        (&self.class, [x, y])
+    }
+
+    fn json(&self) -> Value {
+        let OrientedBox { centre_m, size_m, yaw_rad } = self.place;
+        json!({
+            "class": self.class,
+            "confidence": self.confidence,
+            "points": self.n_points,
+            "range_m": centre_m[0].hypot(centre_m[1]),
+            "box": { "centre_m": centre_m, "size_m": size_m, "yaw_deg": yaw_rad.to_degrees() },
+        })
+    }
 }
 
 /// The bundled model, or else that of a file.
@@ -105,16 +128,5 @@ fn open(model: &Path, options: &Options) -> anyhow::Result<Classifier> {
     Ok(match model == Path::new(BUNDLED) {
         true => Classifier::from_bytes(edgepuck_assets::STREET_128, options)?,
         false => Classifier::load(model, options)?,
-    })
-}
-
-fn object(class: &str, confidence: f64, n_points: usize, place: &OrientedBox) -> Value {
-    let OrientedBox { centre_m, size_m, yaw_rad } = place;
-    json!({
-        "class": class,
-        "confidence": confidence,
-        "points": n_points,
-        "range_m": centre_m[0].hypot(centre_m[1]),
-        "box": { "centre_m": centre_m, "size_m": size_m, "yaw_deg": yaw_rad.to_degrees() },
     })
 }

@@ -7,8 +7,8 @@ use anyhow::Context;
 use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_scenes::{Generation, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
+use formats::atomic;
 use formats::scan_file::{ScanFormat, write_scan};
-use formats::{Scan, atomic};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
@@ -66,12 +66,17 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let packed = args.out.join("packed");
     let counts = generate(&stage, &Settings::default(), args.sweeps, &packed, |done| {
         bar.inc(1);
-        n_points += done.sweep.points.len();
+        n_points += done.sweep.points().len();
         if done.scene.number == 0 {
             let Generation { sweep, labels, .. } = done;
             let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
-            let seen = Scan { positions: sweep.points.clone(), ..Scan::default() };
-            preview::draw_from_above(&seen, &tints, &[], "scene 0", &args.out.join("preview.png"))?;
+            preview::draw_from_above(
+                &sweep.scan,
+                &tints,
+                &[],
+                "scene 0",
+                &args.out.join("preview.png"),
+            )?;
         }
         if done.scene.number < args.save { save(&stage, done, &args.out) } else { Ok(()) }
     })?;
@@ -108,10 +113,7 @@ fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
 fn save(stage: &Stage, done: &Generation, out: &Path) -> anyhow::Result<()> {
     let name = format!("sweeps/{:06}", done.scene.number);
     let file = out.join(format!("{name}.npz"));
-    // As a robot has it: in the sensor's frame.
-    let positions = done.sweep.points.clone();
-    let scan = Scan { origin: [0.0; 3], positions, ..done.sweep.scan.clone() };
-    write_scan(&file, ScanFormat::Npz, &scan)?;
+    write_scan(&file, ScanFormat::Npz, &done.sweep.scan)?;
     let json = serde_json::to_vec_pretty(&description(stage, done)).context("writing JSON")?;
     atomic::write_bytes(&out.join(format!("{name}.json")), json)?;
     Ok(())
@@ -119,8 +121,7 @@ fn save(stage: &Stage, done: &Generation, out: &Path) -> anyhow::Result<()> {
 
 fn description(stage: &Stage, done: &Generation) -> Value {
     let scene = &done.scene;
-    let mut points = vec![0u32; scene.objects.len() + 1];
-    done.sweep.surfaces.iter().for_each(|&surface| points[surface as usize] += 1);
+    let points = done.sweep.points_by_surface(scene);
     let objects = scene.objects.iter().enumerate().map(|(i, object)| {
         let entry = &stage.recipe().object[object.entry];
         json!({

@@ -6,26 +6,34 @@ use formats::cloud_file::{read_cloud, write_cloud};
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, atomic};
 use plotters::style::{Color, HSLColor, RGBColor};
+use std::borrow::Cow;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Flags of `segment`.
+/// The sweep that a command takes.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct SweepArgs {
     /// Sweep to cut: a scan, .npz or .ply, whose rings are used if it has them, or a cloud in any
     /// format that infer-cpu reads; metres, z up
     #[arg(value_name = "SWEEP")]
-    sweep: PathBuf,
+    pub sweep: PathBuf,
+
+    /// Where the sensor is in the sweep, in metres [default: 0 0 0]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    sensor: Option<Vec<f64>>,
+}
+
+/// Flags of `segment`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    input: SweepArgs,
 
     /// Folder for cluster-0000.npy and so on (the points of each cluster in metres from the
     /// sensor), sweep.ply (the sweep, coloured by cluster) and preview.png
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-
-    /// Where the sensor is in the sweep, in metres [default: 0 0 0]
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
-    sensor: Option<Vec<f64>>,
 
     /// Take the connected components of points within this many metres instead, for clouds that are
     /// not sweeps of a sensor; there is no ground then
@@ -35,7 +43,7 @@ pub struct Args {
 
 /// Cuts the sweep.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let scan = read_sweep(&args.sweep, sensor_position(args.sensor.as_deref()))?;
+    let scan = args.input.read()?;
     let mut settings = Settings::default();
     settings.radius_m = args.radius;
     let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
@@ -49,8 +57,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     write_clusters(&args.out, &scan, segmentation)?;
     let tints: Vec<_> = segmentation.labels().iter().map(|label| tint(*label)).collect();
     write_ply(&args.out.join("sweep.ply"), &scan.positions, &tints)?;
-    let title = args.sweep.file_stem().unwrap_or_default().to_string_lossy();
-    preview::draw_from_above(&scan, &tints, &[], &title, &args.out.join("preview.png"))?;
+    preview::draw_from_above(
+        &scan,
+        &tints,
+        &[],
+        &args.input.title(),
+        &args.out.join("preview.png"),
+    )?;
     let ground = segmentation.labels().iter().filter(|label| **label == Label::Ground).count();
     eprintln!(
         "{} points in {elapsed_ms:.1} ms: {} clusters, {:.0} % ground: {}",
@@ -62,20 +75,24 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// What `--sensor` says; the origin without it.
-pub fn sensor_position(flag: Option<&[f64]>) -> [f64; 3] {
-    flag.and_then(|xyz| xyz.try_into().ok()).unwrap_or_default()
-}
+impl SweepArgs {
+    /// The points, from the sensor, and their rings if the file is a scan that has
+    /// them.
+    pub fn read(&self) -> Result<Scan, FormatError> {
+        let sensor = self.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
+        let sensor = sensor.unwrap_or_default();
+        let from_sensor =
+            |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - sensor[axis]) as f32);
+        let positions = read_cloud(&self.sweep)?.iter().map(from_sensor).collect();
+        // A cloud that is not a scan has no rings.
+        let ring = read_scan(&self.sweep).ok().and_then(|scan| scan.ring);
+        Ok(Scan { positions, ring, ..Scan::default() })
+    }
 
-/// The points at `path`, from the sensor, and their rings if the file is a scan
-/// that has them.
-pub fn read_sweep(path: &Path, sensor: [f64; 3]) -> Result<Scan, FormatError> {
-    let points = read_cloud(path)?;
-    let from_sensor = |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - sensor[axis]) as f32);
-    let positions = points.iter().map(from_sensor).collect();
-    // A cloud that is not a scan has no rings.
-    let ring = read_scan(path).ok().and_then(|scan| scan.ring);
-    Ok(Scan { positions, ring, ..Scan::default() })
+    /// What a picture of the sweep is called.
+    pub fn title(&self) -> Cow<'_, str> {
+        self.sweep.file_stem().unwrap_or_default().to_string_lossy()
+    }
 }
 
 /// Grey for the ground, light grey for what is in no cluster, and for clusters

@@ -76,7 +76,8 @@ crate::named! {
         /// Mean to 0, largest radius to 1.
         #[default]
         UnitSphere = "unit-sphere",
-        /// Metres: the mean of x and of y to 0, the lowest z to 0, and no scale.
+        /// Metres: the mean of x and of y to 0, the ground, or the lowest z where it is
+        /// unknown, to 0, and no scale.
         Metric = "metric",
         /// As it comes.
         None = "none",

@@ -35,10 +35,11 @@ pub fn to_unit_sphere(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.extend(points.iter().map(|point| from_mean(point).map(|x| (x * scale) as f32)));
 }
 
-/// Moves the mean of x and of y to 0 and the lowest z to 0, without a scale, and
-/// leaves the result in `out`: a cluster in metres stays one in metres, wherever its
+/// Moves the mean of x and of y to 0 and the ground to z = 0, without a scale, and
+/// leaves the result in `out`. The ground is at `ground_z`, or at the lowest point
+/// where that is `None` or not finite. A cluster in metres stays one in metres, wherever its
 /// sensor was. The network then sees how large an object is, and how high its parts
-/// are above its foot.
+/// are above the ground.
 ///
 /// The mean is that of [`to_unit_sphere`], and depends on the order of the points
 /// as little. All coordinates must be finite; none is further from 0 than f32

@@ -8,48 +8,19 @@
 #[path = "support/tiny_model.rs"]
 mod tiny_model;
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, Precision};
-
-/// The system's allocator, its calls counted.
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call goes to the system's allocator as it is.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise is the system's condition.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise is the system's condition.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise is the system's condition.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
+use test_support::IS_EMULATED;
+use test_support::allocations::{self, Counting};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
 const CAPACITY: usize = 300;
-
-/// Whether this is probably an emulated Raspberry Pi, which is slow: it gets fewer
-/// clouds, since only its kernels are its own.
-const IS_EMULATED: bool = !cfg!(target_arch = "x86_64");
 
 /// Clouds of all sizes, distinct, repeated and lying in one point.
 fn clouds() -> Vec<Vec<[f32; 3]>> {
@@ -67,11 +38,11 @@ fn clouds() -> Vec<Vec<[f32; 3]>> {
 fn allocations(model: &Path, options: &Options, clouds: &[Vec<[f32; 3]>], n: usize) -> usize {
     let mut classifier = Classifier::load(model, options).unwrap();
     let mut total = 0.0;
-    let before = ALLOCATIONS.load(Ordering::SeqCst);
+    let before = allocations::count();
     for cloud in clouds.iter().cycle().take(n) {
         total += classifier.classify(cloud).unwrap().confidence();
     }
-    let n_allocations = ALLOCATIONS.load(Ordering::SeqCst) - before;
+    let n_allocations = allocations::count() - before;
     assert!(total > 0.0);
     n_allocations
 }

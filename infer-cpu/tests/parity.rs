@@ -7,7 +7,7 @@ use formats::model_card::Normalization;
 use formats::weights::{Tensor, WeightsFile};
 use infer_cpu::kernel::{self, KernelName};
 use infer_cpu::{Classifier, Options, Precision};
-use test_support::{need, shared_data};
+use test_support::{IS_EMULATED, need, shared_data};
 
 /// The points of a tensor `[1, 3, n]`.
 fn channels_first(tensor: &Tensor) -> Vec<[f32; 3]> {
@@ -15,20 +15,15 @@ fn channels_first(tensor: &Tensor) -> Vec<[f32; 3]> {
     (0..n).map(|i| [0, 1, 2].map(|axis| tensor.values[axis * n + i])).collect()
 }
 
-/// Points of the golden clouds. An emulated Raspberry Pi is slow, and takes the
-/// largest cloud once for each kernel, with several `threads`.
-fn sizes(threads: usize) -> impl Iterator<Item = usize> {
-    let largest = if cfg!(target_arch = "aarch64") && threads == 1 { 128 } else { 1024 };
-    [16, 64, 128, 1024].into_iter().filter(move |&n| n <= largest)
-}
+/// Points of the golden clouds.
+const SIZES: [usize; 4] = [16, 64, 128, 1024];
 
 #[test]
 fn the_baseline_gives_pytorch_s_log_probabilities() {
     let folder = need!(shared_data("parity"));
     let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();
     for kernel in kernel::available().map(|kernels| kernels.name) {
-        // An emulated Raspberry Pi is slow, and the scalar kernel is not its own.
-        if cfg!(target_arch = "aarch64") && kernel == KernelName::Scalar {
+        if IS_EMULATED && kernel == KernelName::Scalar {
             continue;
         }
         for threads in [1, 3] {
@@ -40,7 +35,9 @@ fn the_baseline_gives_pytorch_s_log_probabilities() {
             };
             let model = folder.join("pointnet.safetensors");
             let mut classifier = Classifier::load(&model, &options).unwrap();
-            for n in sizes(threads) {
+            // Emulated, the largest cloud comes once for each kernel.
+            let largest = if IS_EMULATED && threads == 1 { 128 } else { 1024 };
+            for n in SIZES.into_iter().filter(|&n| n <= largest) {
                 let cloud = channels_first(&golden.read(&format!("x{n}")).unwrap());
                 let expected = golden.read(&format!("logp{n}")).unwrap().values;
                 let prediction = classifier.classify(&cloud).unwrap();
@@ -63,7 +60,7 @@ fn cheaper_precisions_stay_near() {
             Options { precision, normalization: Some(Normalization::None), ..Options::default() };
         let model = folder.join("pointnet.safetensors");
         let mut classifier = Classifier::load(&model, &options).unwrap();
-        for n in sizes(1) {
+        for n in SIZES {
             let cloud = channels_first(&golden.read(&format!("x{n}")).unwrap());
             let expected = golden.read(&format!("logp{n}")).unwrap().values;
             let prediction = classifier.classify(&cloud).unwrap();

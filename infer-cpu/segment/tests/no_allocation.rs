@@ -9,36 +9,9 @@
 #[allow(dead_code, reason = "the suite uses all of it")]
 mod scanner;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use edgepuck_segment::{Segmenter, Settings, Sweep};
 use scanner::{VLP32C, block, flat, scan};
-
-/// The system's allocator, its calls counted.
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call goes to the system's allocator as it is.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise is the system's condition.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise is the system's condition.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise is the system's condition.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
+use test_support::allocations::{self, Counting};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -57,9 +30,9 @@ fn main() {
                 segmenter.segment(&sweep).unwrap().clusters().len()
             };
             segment(&large);
-            let before = ALLOCATIONS.load(Ordering::SeqCst);
+            let before = allocations::count();
             let n_clusters = segment(&small) + segment(&large);
-            let n_allocations = ALLOCATIONS.load(Ordering::SeqCst) - before;
+            let n_allocations = allocations::count() - before;
             assert_eq!(n_allocations, 0, "radius {radius_m:?}, rings {with_rings}");
             assert!(n_clusters > 0);
         }

@@ -10,6 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 
 use formats::model_card::ModelCard;
+use test_support::IS_EMULATED;
 
 use crate::kernel::{self, KernelName};
 use crate::precision::Precision;
@@ -150,8 +151,7 @@ fn subnormal_weights_move_no_logit_whether_flushed_or_not() {
         let model = tiny_model::write(&path, &tensors, &ModelCard::default());
         for precision in Precision::ALL {
             for kernels in kernel::available().filter(|kernels| precision.runs_on(kernels)) {
-                // An emulated Raspberry Pi is slow; x86-64 tests the scalar kernels.
-                if cfg!(target_arch = "aarch64") && kernels.name == KernelName::Scalar {
+                if IS_EMULATED && kernels.name == KernelName::Scalar {
                     continue;
                 }
                 let plain = logits(&model, precision, kernels.name);

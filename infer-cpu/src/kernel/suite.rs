@@ -563,8 +563,7 @@ macro_rules! suite {
 
         /// The kernels; an error if this machine cannot run them.
         fn here() -> Result<&'static $crate::kernel::Kernels, String> {
-            // They are the same everywhere, and an emulated Raspberry Pi is slow.
-            if cfg!(target_arch = "aarch64") && module_path!().contains("::scalar::") {
+            if test_support::IS_EMULATED && module_path!().contains("::scalar::") {
                 return Err("x86-64 tests the scalar kernels".to_owned());
             }
             let lack = concat!("this machine lacks the instructions of ", module_path!());

@@ -44,12 +44,11 @@ pub fn label_clusters(
     sweep: &Sweep,
     found: &Segmentation,
 ) -> Vec<LabelledCluster> {
-    let mut visible = vec![0u32; scene.objects.len() + 1];
-    sweep.surfaces.iter().for_each(|&surface| visible[surface as usize] += 1);
+    let (surfaces, visible) = (sweep.surfaces(), sweep.points_by_surface(scene));
     let mut counts = vec![0u32; visible.len()];
     let clusters = found.clusters().map(|cluster| {
         counts.fill(0);
-        cluster.points.iter().for_each(|&i| counts[sweep.surfaces[i as usize] as usize] += 1);
+        cluster.points.iter().for_each(|&i| counts[surfaces[i as usize] as usize] += 1);
         // Of equal counts, the first.
         let most = (0..counts.len()).rev().max_by_key(|&surface| counts[surface]).unwrap_or(0);
         let share = f64::from(counts[most]) / cluster.points.len() as f64;
@@ -61,7 +60,7 @@ pub fn label_clusters(
             _ => OTHER,
         };
         let label = stage.classes().binary_search_by(|known| known.as_str().cmp(class));
-        let (range_m, lowest_m) = place(&sweep.points, cluster.points);
+        let (range_m, lowest_m) = place(sweep.points(), cluster.points);
         LabelledCluster {
             points: cluster.points.to_vec(),
             label: label.expect("invariant: classes holds those of all objects"),

@@ -86,7 +86,7 @@ fn one(stage: &Stage, number: u32, settings: &Settings) -> Result<Generation, Sc
     }
     let mut segmenter = Segmenter::new(settings).map_err(|e| SceneError::Segment(e.to_string()))?;
     let sweep = stage.sweep(&scene)?;
-    let points = Points { points: &sweep.points, rings: Some(&sweep.rings) };
+    let points = Points { points: sweep.points(), rings: Some(sweep.rings()) };
     let found = segmenter.segment(&points).map_err(|e| SceneError::Segment(e.to_string()))?;
     let clusters = label_clusters(stage, &scene, &sweep, found);
     let labels = found.labels().to_vec();
@@ -104,7 +104,7 @@ fn pack(
     let mut points = Vec::new();
     for (cluster, n) in clusters.iter().zip(0..) {
         points.clear();
-        points.extend(cluster.points.iter().map(|&i| sweep.points[i as usize]));
+        points.extend(cluster.points.iter().map(|&i| sweep.points()[i as usize]));
         counts[cluster.label] += 1;
         let class = &stage.classes()[cluster.label];
         let remarks = Remarks {

@@ -203,11 +203,11 @@ impl<'a> Placing<'a> {
                 }
                 let centre = DVec2::new(x_m, y_m);
                 if centre.length() >= objects.distance_m.least {
-                    let heading_rad = yaw_rad + if self.s.chance(0.5) { PI } else { 0.0 };
-                    let heading_rad =
-                        if style.faces_road(&objects.place) { yaw_rad } else { heading_rad };
-                    let yaw_rad = heading_rad + self.skew();
-                    self.try_at(&object, centre, yaw_rad);
+                    // A house keeps its front to the road.
+                    let is_turned = self.s.chance(0.5) && objects.place != Place::Front;
+                    let heading_rad = yaw_rad + if is_turned { PI } else { 0.0 };
+                    let skew_rad = self.skew();
+                    self.try_at(&object, centre, heading_rad + skew_rad);
                 }
                 x_m += half_m + self.within(objects.gap_m);
             }
@@ -243,10 +243,4 @@ struct RowStyle {
     pavement_m: f64,
     /// Depth of what is between the pavement and a house, metres.
     garden_m: f64,
-}
-
-impl RowStyle {
-    fn faces_road(&self, place: &Place) -> bool {
-        *place == Place::Front
-    }
 }

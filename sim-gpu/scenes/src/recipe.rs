@@ -303,7 +303,7 @@ impl Objects {
     /// The kind of built-in objects; `None` for a user's meshes.
     #[must_use]
     pub fn built_in(&self) -> Option<ObjectKind> {
-        ObjectKind::ALL.into_iter().find(|kind| kind.name() == self.kind)
+        self.kind.parse().ok()
     }
 
     fn check(&self, key: &str) -> Result<(), InvalidValue> {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use edgepuck_shapes::objects::{Object, ObjectKind, object};
+use edgepuck_shapes::objects::{Object, ObjectKind, object, stand};
 use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
@@ -14,6 +14,7 @@ use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
 use sim_gpu::mesh::frame::{Normalize, to_world};
+use sim_gpu::mesh::unit_frame::bounding_box;
 use sim_gpu::mesh::{self, Mesh, MeshFormat};
 use sim_gpu::scan::{Glass, PlacedTarget, ScanRequest, scan_objects};
 use sim_gpu::sensor::{BeamPattern, Sensor};
@@ -51,14 +52,9 @@ pub(crate) struct Prop {
 /// One revolution of a sensor in a scene.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// The points in the order of firing, in the sensor's frame, metres.
-    pub points: Vec<[f32; 3]>,
-    /// Each point's row of beams, from the lowest elevation.
-    pub rings: Vec<u16>,
-    /// What each point lies on: 0 is the ground, `i` the scene's object `i - 1`.
-    pub surfaces: Vec<u32>,
-    /// The scan, with its points in the scene's frame, and with range, beam, ring,
-    /// time and object.
+    /// The points in the order of firing, in the sensor's frame, metres, with range,
+    /// beam, ring, time and object. Object 0 is the ground, and `i` the scene's
+    /// object `i - 1`.
     pub scan: Scan,
 }
 
@@ -181,19 +177,41 @@ impl Stage {
 }
 
 impl Sweep {
-    fn of(scan: Scan, scene: &Scene) -> Self {
+    fn of(mut scan: Scan, scene: &Scene) -> Self {
         let sensor_from_world = scene.pose.world_from_sensor.inverse();
-        let origin = DVec3::from_array(scan.origin) - scene.pose.position_m;
-        let in_sensor = |p: &[f32; 3]| {
-            let from_sensor = DVec3::from_array(p.map(f64::from)) + origin;
-            (sensor_from_world * from_sensor).as_vec3().to_array()
-        };
-        Self {
-            points: scan.positions.iter().map(in_sensor).collect(),
-            rings: scan.ring.clone().unwrap_or_default(),
-            surfaces: scan.object.clone().unwrap_or_default(),
-            scan,
+        let origin = DVec3::from_array(std::mem::take(&mut scan.origin)) - scene.pose.position_m;
+        for point in &mut scan.positions {
+            let from_sensor = DVec3::from_array(point.map(f64::from)) + origin;
+            *point = (sensor_from_world * from_sensor).as_vec3().to_array();
         }
+        Self { scan }
+    }
+
+    /// The points, in the sensor's frame, metres.
+    #[must_use]
+    pub fn points(&self) -> &[[f32; 3]] {
+        &self.scan.positions
+    }
+
+    /// Each point's row of beams, from the lowest elevation.
+    #[must_use]
+    pub fn rings(&self) -> &[u16] {
+        self.scan.ring.as_deref().expect("invariant: a sweep is scanned with rings")
+    }
+
+    /// What each point lies on, as in [`Sweep::scan`].
+    #[must_use]
+    pub fn surfaces(&self) -> &[u32] {
+        self.scan.object.as_deref().expect("invariant: a sweep is scanned with objects")
+    }
+
+    /// How many points lie on the ground and on each object of `scene`, whose sweep
+    /// this is.
+    #[must_use]
+    pub fn points_by_surface(&self, scene: &Scene) -> Vec<u32> {
+        let mut counts = vec![0; scene.objects.len() + 1];
+        self.surfaces().iter().for_each(|&surface| counts[surface as usize] += 1);
+        counts
     }
 }
 
@@ -204,7 +222,7 @@ impl Prop {
     }
 
     fn of(mesh: Mesh, glass: Range<u32>) -> Self {
-        let (low, high) = bounds(&mesh);
+        let (low, high) = bounding_box(mesh.vertices.iter().copied());
         let kept = (0..mesh.triangles.len() as u32).collect();
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         Self { target, glass, size_m: high - low }
@@ -212,18 +230,12 @@ impl Prop {
 
     /// A user's mesh, `height_m` high.
     fn scaled(mut mesh: Mesh, height_m: f64) -> Self {
-        let (low, high) = bounds(&mesh);
-        let origin = ((low + high) / 2.0).truncate().extend(low.z);
+        let (low, high) = bounding_box(mesh.vertices.iter().copied());
         let scale = height_m / (high.z - low.z);
-        mesh.vertices.iter_mut().for_each(|vertex| *vertex = (*vertex - origin) * scale);
+        stand(&mut mesh);
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex *= scale);
         Self::of(mesh, 0..0)
     }
-}
-
-fn bounds(mesh: &Mesh) -> (DVec3, DVec3) {
-    mesh.vertices.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &vertex| {
-        (low.min(vertex), high.max(vertex))
-    })
 }
 
 /// The meshes of a user's own that `objects` names.

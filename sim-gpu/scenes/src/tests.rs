@@ -73,9 +73,10 @@ fn every_point_lies_on_the_surface_that_it_is_said_to_lie_on() {
     for number in 0..4 {
         let scene = Scene::draw(&stage, number);
         let sweep = stage.sweep(&scene).unwrap();
-        assert!(sweep.points.len() > 5_000, "{}", sweep.points.len());
-        for (point, &surface) in sweep.scan.positions.iter().zip(&sweep.surfaces) {
-            let point = DVec3::from_array(point.map(f64::from));
+        assert!(sweep.points().len() > 5_000, "{}", sweep.points().len());
+        for (point, &surface) in sweep.points().iter().zip(sweep.surfaces()) {
+            let in_sensor = DVec3::from_array(point.map(f64::from));
+            let point = scene.pose.position_m + scene.pose.world_from_sensor * in_sensor;
             let Some(i) = (surface as usize).checked_sub(1) else {
                 // Roughness is 1 cm, uniform, so at most 1.8 cm; a kerb's face is
                 // as high as the kerb.
@@ -120,7 +121,7 @@ fn glass_that_returns_nothing_leaves_holes_in_cars() {
         let text = RECIPE.replace("glass_returned = [0, 0]", returned);
         let stage = stage(&text);
         let scene = Scene::draw(&stage, 3);
-        stage.sweep(&scene).unwrap().points.len()
+        stage.sweep(&scene).unwrap().points().len()
     };
     let (dark, bright) = (with("glass_returned = [0, 0]"), with("glass_returned = [1, 1]"));
     assert!(dark < bright, "{dark} points with glass that returns nothing, {bright} with all");
@@ -134,7 +135,7 @@ fn a_cluster_of_one_object_has_its_class_and_a_mixed_one_has_none() {
     for number in 0..6 {
         let scene = Scene::draw(&stage, number);
         let sweep = stage.sweep(&scene).unwrap();
-        let points = Points { points: &sweep.points, rings: Some(&sweep.rings) };
+        let points = Points { points: sweep.points(), rings: Some(sweep.rings()) };
         let found = segmenter.segment(&points).unwrap();
         for cluster in label_clusters(&stage, &scene, &sweep, found) {
             let class = &stage.classes()[cluster.label];

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::finish::{Finish, MIN_TRIANGLES};
 use crate::primitives::Builder;
 use sim_gpu::mesh::Mesh;
+use sim_gpu::mesh::unit_frame::bounding_box;
 
 /// Trials before the best mesh so far is good enough.
 const MAX_TRIALS: usize = 10;
@@ -47,6 +48,5 @@ pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
 
 /// The box of the vertices: its lowest and highest corner.
 pub fn bounds(mesh: &Mesh) -> [DVec3; 2] {
-    let vertices = || mesh.vertices.iter().copied();
-    [vertices().fold(DVec3::INFINITY, DVec3::min), vertices().fold(-DVec3::INFINITY, DVec3::max)]
+    bounding_box(mesh.vertices.iter().copied()).into()
 }

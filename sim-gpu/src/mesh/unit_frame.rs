@@ -34,7 +34,8 @@ impl UnitFrame {
 
 /// The lowest and the highest coordinates of `points`; infinite, and the lowest
 /// above the highest, if there are none.
-pub(crate) fn bounding_box(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+#[must_use]
+pub fn bounding_box(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| {
         (low.min(point), high.max(point))
     })

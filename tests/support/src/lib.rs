@@ -7,6 +7,8 @@
 //! names a file in [`SKIPPED_TESTS`], and moves each test that wrote a line
 //! there from the passed to the skipped.
 
+pub mod allocations;
+
 use std::env;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
@@ -20,6 +22,10 @@ pub const SHARED_DATA: &str = "EDGEPUCK_SHARED_DATA";
 
 /// Set to 1, a missing Vulkan adapter fails the tests that want one.
 pub const REQUIRE_ADAPTER: &str = "EDGEPUCK_REQUIRE_ADAPTER";
+
+/// Whether the test is probably that of a Raspberry Pi under an emulator, which is
+/// slow: only its kernels are its own there, and x86-64 tests all else as well.
+pub const IS_EMULATED: bool = !cfg!(target_arch = "x86_64");
 
 /// The value of a `Result` whose error says what is missing here; on an error,
 /// the test is reported as skipped and returns. For use in the body of a test.

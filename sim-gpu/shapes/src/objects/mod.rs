@@ -19,7 +19,7 @@ mod two_wheeler;
 #[cfg(test)]
 mod tests;
 
-pub use standing::Object;
+pub use standing::{Object, stand};
 
 use formats::rng::StreamKey;
 

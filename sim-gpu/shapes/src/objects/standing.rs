@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
 use sim_gpu::mesh::Mesh;
 
 use crate::primitives::Builder;
+use crate::tessellation::bounds;
 
 /// Chords of curved surfaces are about this long, metres: a beam of 0.2 degrees
 /// at 30 m is 0.1 m wide.
@@ -31,16 +31,15 @@ impl Object {
         let mut builder = Builder::new(EDGE_M, FLAT_RATIO);
         build(&mut builder);
         let (mut mesh, glass) = builder.finish_with_glass();
-        stand(&mut mesh.vertices);
+        stand(&mut mesh);
         Self { mesh, glass }
     }
 }
 
-/// Moves `vertices` so that the lowest is at height 0 and the middle of their
+/// Moves `mesh` so that its lowest vertex is at height 0 and the middle of its
 /// footprint at the origin.
-fn stand(vertices: &mut [DVec3]) {
-    let low = vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-    let high = vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+pub fn stand(mesh: &mut Mesh) {
+    let [low, high] = bounds(mesh);
     let origin = ((low + high) / 2.0).truncate().extend(low.z);
-    vertices.iter_mut().for_each(|vertex| *vertex -= origin);
+    mesh.vertices.iter_mut().for_each(|vertex| *vertex -= origin);
 }
