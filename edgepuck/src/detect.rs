@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use edgepuck_segment::{Label, OrientedBox, Segmenter, Settings, Sweep};
-use formats::atomic;
+use formats::{Scan, atomic};
 use infer_cpu::{Classifier, Options, Precision};
 use serde_json::{Value, json};
 
@@ -41,33 +41,9 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let scan = args.input.read()?;
     let options = Options { precision: args.precision, ..Options::default() };
-    let mut classifier = open(&args.model, &options)?;
-    let mut settings = Settings::default();
-    settings.min_points = args.min_points;
-    let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
+    let mut detector = Detector::open(&args.model, &options, args.min_points)?;
     let started = Instant::now();
-    let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
-    let segmentation = segmenter.segment(&sweep)?;
-
-    let mut objects = Vec::new();
-    let mut n_unknown = 0;
-    let mut cloud = Vec::new();
-    for (cluster, number) in segmentation.clusters().zip(0..) {
-        cloud.clear();
-        cloud.extend(cluster.points.iter().map(|&i| scan.positions[i as usize]));
-        let prediction = classifier.classify_on_ground(&cloud, cluster.ground_z_m)?;
-        if prediction.is_unknown {
-            n_unknown += 1;
-            continue;
-        }
-        objects.push(Object {
-            cluster: number,
-            class: prediction.label.to_string(),
-            confidence: prediction.confidence(),
-            n_points: cloud.len(),
-            place: OrientedBox::around(&cloud),
-        });
-    }
+    let Detections { labels, objects, n_unknown } = detector.detect(&scan)?;
     let elapsed_ms = 1e3 * started.elapsed().as_secs_f64();
 
     eprintln!(
@@ -83,7 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     });
     atomic::write_bytes(&args.out, serde_json::to_vec_pretty(&written)?)?;
     let is_named = |number| objects.binary_search_by_key(&number, |object| object.cluster).is_ok();
-    let tints = segmentation.labels().iter().map(|&label| match label {
+    let tints = labels.iter().map(|&label| match label {
         Label::Cluster(number) if !is_named(number) => tint(Label::Small),
         other => tint(other),
     });
@@ -94,14 +70,75 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
+/// Finds and names the objects of one sweep after the other.
+pub struct Detector {
+    segmenter: Segmenter,
+    classifier: Classifier,
+}
+
+/// What a [`Detector`] finds in a sweep.
+pub struct Detections {
+    /// What each point is part of.
+    pub labels: Vec<Label>,
+    /// The clusters that have a name, in the order of their numbers.
+    pub objects: Vec<Object>,
+    /// The number of clusters that have none.
+    pub n_unknown: usize,
+}
+
+impl Detector {
+    /// With the bundled model, or else that of a file, for clusters of at least
+    /// `min_points` points.
+    pub fn open(model: &Path, options: &Options, min_points: usize) -> anyhow::Result<Self> {
+        let classifier = match model == Path::new(BUNDLED) {
+            true => Classifier::from_bytes(edgepuck_assets::STREET_128, options)?,
+            false => Classifier::load(model, options)?,
+        };
+        let mut settings = Settings::default();
+        settings.min_points = min_points;
+        let segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
+        Ok(Self { segmenter, classifier })
+    }
+
+    /// Cuts `scan`, in the sensor's frame, and names its clusters.
+    pub fn detect(&mut self, scan: &Scan) -> anyhow::Result<Detections> {
+        let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
+        let segmentation = self.segmenter.segment(&sweep)?;
+        let labels = segmentation.labels().to_vec();
+        let mut found = Detections { labels, objects: Vec::new(), n_unknown: 0 };
+        let mut cloud = Vec::new();
+        for (cluster, number) in segmentation.clusters().zip(0..) {
+            cloud.clear();
+            cloud.extend(cluster.points.iter().map(|&i| scan.positions[i as usize]));
+            let prediction = self.classifier.classify_on_ground(&cloud, cluster.ground_z_m)?;
+            if prediction.is_unknown {
+                found.n_unknown += 1;
+                continue;
+            }
+            found.objects.push(Object {
+                cluster: number,
+                class: prediction.label.to_string(),
+                confidence: prediction.confidence(),
+                n_points: cloud.len(),
+                place: OrientedBox::around(&cloud),
+            });
+        }
+        Ok(found)
+    }
+}
+
 /// A cluster that has a name.
-struct Object {
+pub struct Object {
     /// Its number among the clusters.
-    cluster: u32,
-    class: String,
-    confidence: f64,
-    n_points: usize,
-    place: OrientedBox,
+    pub cluster: u32,
+    /// Its class.
+    pub class: String,
+    /// The network's confidence in that, 0 to 1.
+    pub confidence: f64,
+    /// The number of its points.
+    pub n_points: usize,
+    /// Where it is.
+    pub place: OrientedBox,
 }
 
 impl Object {
@@ -121,12 +158,4 @@ impl Object {
             "box": { "centre_m": centre_m, "size_m": size_m, "yaw_deg": yaw_rad.to_degrees() },
         })
     }
-}
-
-/// The bundled model, or else that of a file.
-fn open(model: &Path, options: &Options) -> anyhow::Result<Classifier> {
-    Ok(match model == Path::new(BUNDLED) {
-        true => Classifier::from_bytes(edgepuck_assets::STREET_128, options)?,
-        false => Classifier::load(model, options)?,
-    })
 }

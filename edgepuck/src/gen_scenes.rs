@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
     let stage = Stage::new(recipe, &args.recipe, meshes, args.seed, |effects| {
-        args.caster.open_quietly(effects)
+        args.caster.open_for_scenes(effects)
     })?;
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;

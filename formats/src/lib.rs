@@ -7,7 +7,7 @@
 //! | feature | what |
 //! | --- | --- |
 //! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY and KITTI's `.bin` |
-//! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets too |
+//! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets and sweeps too |
 //! | `cloud-files` | all of these |
 //! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read |
 //! | `pcap` | a VLP-32C's packets (`vlp32c`) |
@@ -49,6 +49,8 @@ pub mod csv;
 mod decoding;
 #[cfg(feature = "npz")]
 pub mod labelled;
+#[cfg(feature = "npz")]
+pub mod labelled_sweep;
 #[cfg(feature = "files")]
 mod lines;
 #[cfg(feature = "weights")]

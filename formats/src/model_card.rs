@@ -79,8 +79,19 @@ crate::named! {
         /// Metres: the mean of x and of y to 0, the ground, or the lowest z where it is
         /// unknown, to 0, and no scale.
         Metric = "metric",
+        /// The same, turned about z so that the line of sight, from the sensor to the mean,
+        /// is along x: a network sees which side of an object faced the sensor.
+        MetricSight = "metric-sight",
         /// As it comes.
         None = "none",
+    }
+}
+
+impl Normalization {
+    /// Whether clouds keep their size in metres.
+    #[must_use]
+    pub fn is_metric(self) -> bool {
+        matches!(self, Self::Metric | Self::MetricSight)
     }
 }
 

@@ -5,7 +5,6 @@ use std::path::Path;
 
 #[cfg(feature = "npz")]
 use formats::labelled::LabelledSet;
-use formats::model_card::Normalization;
 use formats::rng::StreamKey;
 
 use crate::engine::{Engine, Forward, Input};
@@ -62,10 +61,10 @@ fn on_clouds_of<'a>(
     let mut scratch = team.scratch();
     let (mut wide, mut metric) = (Vec::new(), Vec::new());
     for cloud in clouds {
-        let cloud = if card.normalization == Normalization::Metric {
+        let cloud = if card.normalization.is_metric() {
             wide.clear();
             wide.extend(cloud.iter().map(|point| point.map(f64::from)));
-            normalize::to_metric(&wide, None, &mut metric);
+            normalize::normalize(card.normalization, &wide, None, &mut metric);
             &metric
         } else {
             cloud

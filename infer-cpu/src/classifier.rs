@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use formats::model_card::{ModelCard, Normalization};
+use formats::model_card::ModelCard;
 
 use crate::choose::check_finite;
 use crate::engine::{Forward, Input, RangeEvents, Scratch};
@@ -238,15 +238,8 @@ impl Classifier {
     }
 
     fn normalize(&mut self) {
-        match self.options.normalization.unwrap_or(self.card.normalization) {
-            Normalization::UnitSphere => {
-                normalize::to_unit_sphere(&self.finite, &mut self.normalized);
-            }
-            Normalization::Metric => {
-                normalize::to_metric(&self.finite, self.ground_z, &mut self.normalized);
-            }
-            Normalization::None => normalize::not_at_all(&self.finite, &mut self.normalized),
-        }
+        let normalization = self.options.normalization.unwrap_or(self.card.normalization);
+        normalize::normalize(normalization, &self.finite, self.ground_z, &mut self.normalized);
     }
 
     fn predict(&mut self) -> Result<&Prediction, Error> {

@@ -85,7 +85,7 @@ pub use error::Error;
 #[cfg(feature = "evaluate")]
 pub use evaluate::{Evaluation, evaluate, evaluate_some};
 pub use formats::model_card::{ModelCard, Normalization};
-pub use normalize::{to_metric, to_unit_sphere};
+pub use normalize::{normalize, to_unit_sphere};
 pub use options::{Options, TNets, UpAxis};
 pub use precision::Precision;
 pub use prediction::{Prediction, UNKNOWN, energy};

@@ -109,6 +109,16 @@ impl Caster {
         }
     }
 
+    /// Whether this is software Vulkan: a graphics interface without a GPU.
+    #[must_use]
+    pub fn is_software_vulkan(&self) -> bool {
+        match self {
+            Self::Cpu(_) => false,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(gpu) => gpu.summary().kind == gpu::AdapterKind::Software,
+        }
+    }
+
     /// The effects that are modelled.
     #[must_use]
     pub fn effects(&self) -> &Effects {

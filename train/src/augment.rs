@@ -5,7 +5,6 @@
 
 use std::borrow::Cow;
 
-use formats::model_card::Normalization;
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{FarthestPoints, FpsStart};
 
@@ -57,7 +56,7 @@ pub fn augment(
         *share = *share * (1.0 - smoothing) + smoothing / n_classes as f32;
     }
     let mut moves = recipe.augment.clone();
-    if recipe.normalization == Normalization::Metric {
+    if recipe.normalization.is_metric() {
         // Errors came before the centring.
         (moves.jitter, moves.sensor_noise) = (0.0, 0.0);
     }
@@ -92,11 +91,10 @@ fn one_hot(label: usize, n_classes: usize) -> Vec<f32> {
 /// varied and centred before.
 fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
     let cloud = clouds.set.cloud(i);
-    let cloud: Cow<'_, [[f32; 3]]> = match recipe.normalization {
-        Normalization::Metric => {
-            cluster::varied(cloud, clouds.set.ground_z(i), recipe, draws).into()
-        }
-        _ => cloud.into(),
+    let cloud: Cow<'_, [[f32; 3]]> = if recipe.normalization.is_metric() {
+        cluster::varied(cloud, clouds.set.ground_z(i), recipe, draws).into()
+    } else {
+        cloud.into()
     };
     let n = recipe.points.min(cloud.len());
     let (candidates, places): (Cow<'_, [[f32; 3]]>, Vec<usize>) = match recipe.sampling {

@@ -84,7 +84,7 @@ impl Clouds {
             return Err(Error::Data { path: path.to_path_buf(), cause });
         };
         let mut clouds = Self::checked(set, path)?;
-        if normalization != Normalization::Metric {
+        if !normalization.is_metric() {
             clouds.normalize();
         }
         Ok(clouds)

@@ -82,7 +82,7 @@ pub(crate) fn varied(
     let ground_z = ground_z.map(f64::from).filter(|_| draws.unit() >= variation.ground_unknown);
     add_ground(&mut points, ground_z, variation, draws);
     let mut centred = Vec::new();
-    infer_cpu::to_metric(&points, ground_z, &mut centred);
+    infer_cpu::normalize(recipe.normalization, &points, ground_z, &mut centred);
     centred
 }
 

@@ -281,7 +281,7 @@ impl Recipe {
         let share = |x: f64| (0.0..1.0).contains(&x);
         let width = |width: usize| (1..=WIDEST).contains(&width);
         let Self { network, augment, adam, clusters, .. } = self;
-        let is_metric = self.normalization == Normalization::Metric;
+        let is_metric = self.normalization.is_metric();
         let radius = |edge: &Edge| edge.radius.is_normal() && edge.radius > 0.0;
         let mut checks = vec![
             (self.epochs > 0, "epochs", "expected 1 or more"),
@@ -331,12 +331,12 @@ impl Recipe {
             (
                 self.normalization != Normalization::None,
                 "normalization",
-                "expected unit-sphere or metric",
+                "expected unit-sphere, metric or metric-sight",
             ),
             (
                 is_metric || is_default(clusters),
                 "clusters",
-                "expected `normalization` to be metric, because clusters are in metres",
+                "expected `normalization` to be metric or metric-sight, because clusters are in metres",
             ),
             (
                 self.keep_known.is_none_or(|kept| kept > 0.0 && kept <= 1.0),

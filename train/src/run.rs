@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use formats::model_card::{ModelCard, Normalization};
+use formats::model_card::ModelCard;
 use formats::split::Split;
 use formats::{FormatError, atomic};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -79,7 +79,7 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     let n_points = clouds.set.smallest_cloud();
     let refuse = |cause: String| Err(Error::Data { path: data.into(), cause });
     // A cluster in metres may have any number of points.
-    if recipe.normalization != Normalization::Metric && n_points < recipe.points {
+    if !recipe.normalization.is_metric() && n_points < recipe.points {
         let wanted = recipe.points;
         return refuse(format!("expected clouds of {wanted} points or more, found {n_points}"));
     }

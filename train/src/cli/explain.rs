@@ -65,10 +65,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Classifier::load(&args.model, &Options { sampler, normalization, ..Options::default() })
     };
     let mut points = Vec::new();
-    match ModelCard::read(&args.model)?.normalization {
-        Normalization::Metric => infer_cpu::to_metric(&cloud, None, &mut points),
-        _ => infer_cpu::to_unit_sphere(&cloud, &mut points),
-    }
+    let normalization = match ModelCard::read(&args.model)?.normalization {
+        // Clouds of any size are shown in the same frame.
+        Normalization::None => Normalization::UnitSphere,
+        other => other,
+    };
+    infer_cpu::normalize(normalization, &cloud, None, &mut points);
     let wide: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
     let critical: Vec<usize> = load(spec)?.sample(&wide)?.iter().map(|&i| i as usize).collect();
     let lime =

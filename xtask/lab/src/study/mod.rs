@@ -3,6 +3,7 @@
 pub mod ablation;
 pub mod casting;
 pub mod devices;
+pub mod frames;
 mod meshes;
 pub mod numerics;
 mod plan;

@@ -3,14 +3,15 @@
 //! [`sweep`] reads and simulates sweeps, [`mounting`] finds where the sensor stands and
 //! where its lasers point, [`patches`] measures noise and missing returns.
 
-mod mounting;
+pub mod mounting;
 mod patches;
-mod sweep;
+pub mod sweep;
 
 use crate::render::table::{Table, percent};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use formats::atomic;
+use formats::labelled_sweep::read_labelled_sweep;
 use mounting::Mounting;
 use patches::{Patch, Shown, typical_mm};
 use sim_gpu::sensor::{Layout, Rotating, Sensor};
@@ -63,7 +64,9 @@ pub fn run(args: &SensorArgs) -> Result<()> {
     };
     let mut real = Vec::new();
     for file in &args.frames {
-        match sweep::read(file, table.beam.len()) {
+        let sensors = read_labelled_sweep(file).map_err(anyhow::Error::from);
+        let sensors = sensors.and_then(|sweep| sweep::by_sensor(&sweep, table.beam.len()));
+        match sensors.with_context(|| file.display().to_string()) {
             Ok(sensors) => real.extend(sensors.iter().zip(1..).map(|(returns, number)| {
                 let frame = file.file_stem().unwrap_or_default().to_string_lossy();
                 Sweep::of(format!("{frame}, sensor {number}"), returns, table)

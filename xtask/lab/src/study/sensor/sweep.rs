@@ -1,13 +1,12 @@
 //! Sweeps whose points know their laser and their time, real and simulated.
 
 use crate::measure::bench_mesh::target;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
+use formats::labelled_sweep::LabelledSweep;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use glam::{DQuat, DVec3, dvec3};
 use half::f16;
-use ndarray::{Array1, Array2};
-use ndarray_npy::ReadNpyExt;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel, Quantum};
@@ -15,9 +14,6 @@ use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::scan::{ScanRequest, scan};
 use sim_gpu::sensor::{Rotating, Sensor};
-use std::fs::File;
-use std::path::Path;
-use zip::ZipArchive;
 
 /// Height of the simulated sensor above the ground, metres: on a car's roof.
 const HEIGHT_M: f64 = 1.65;
@@ -33,46 +29,29 @@ pub struct Return {
     pub time_s: f64,
 }
 
-/// The returns in `file` by sensor, each of which has `n_lasers`.
+/// The returns of `sweep` by sensor, each of which has `n_lasers`.
 ///
 /// # Errors
-/// A file without lasers, times or positions, or of another number of lasers.
-pub fn read(file: &Path, n_lasers: usize) -> Result<Vec<Vec<Return>>> {
-    let name = || file.display().to_string();
-    let mut archive = ZipArchive::new(File::open(file).with_context(name)?).with_context(name)?;
-    let lasers: Array1<u8> = array(&mut archive, "laser").with_context(name)?;
-    let positions: Array2<i32> = array(&mut archive, "xyz_mm").with_context(name)?;
-    let times: Array1<i32> = array(&mut archive, "offset_ns").with_context(name)?;
-    let shape = positions.shape();
-    if shape != [lasers.len(), 3] || times.len() != lasers.len() {
-        let (n, times) = (lasers.len(), times.len());
-        bail!("{}: xyz_mm: expected {n} points and times, found {shape:?} and {times}", name());
-    }
+/// A sweep without lasers or times, or of another number of lasers.
+pub fn by_sensor(sweep: &LabelledSweep, n_lasers: usize) -> Result<Vec<Vec<Return>>> {
+    let lasers = sweep.lasers.as_ref().context("expected `laser`, found none")?;
+    let times = sweep.times_s.as_ref().context("expected `offset_ns`, found none")?;
     let n_sensors = lasers.iter().max().map_or(0, |&most| usize::from(most) / n_lasers + 1);
     let mut sensors = vec![Vec::new(); n_sensors];
-    for ((row, &laser), &time_ns) in positions.rows().into_iter().zip(&lasers).zip(&times) {
-        let position_m = DVec3::from_array([0, 1, 2].map(|axis| f64::from(row[axis]) * 1e-3));
+    for ((&point, &laser), &time_s) in sweep.points.iter().zip(lasers).zip(times) {
+        let position_m = DVec3::from_array(point);
         let (sensor, laser) = (usize::from(laser) / n_lasers, usize::from(laser) % n_lasers);
-        sensors[sensor].push(Return { position_m, laser, time_s: f64::from(time_ns) * 1e-9 });
+        sensors[sensor].push(Return { position_m, laser, time_s });
     }
     for (i, returns) in sensors.iter().enumerate() {
         let mut counts = vec![0; n_lasers];
         returns.iter().for_each(|r| counts[r.laser] += 1);
-        let few = counts.iter().position(|&n| n < 100);
-        let laser = few.map(|laser| i * n_lasers + laser).unwrap_or_default();
-        let n = few.map(|laser| counts[laser]).unwrap_or_default();
-        ensure!(few.is_none(), "{}: laser {laser}: expected 100 returns, found {n}", name());
+        if let Some(few) = counts.iter().position(|&n| n < 100) {
+            let laser = i * n_lasers + few;
+            bail!("laser {laser}: expected 100 returns, found {}", counts[few]);
+        }
     }
     Ok(sensors)
-}
-
-fn array<A: ReadNpyExt>(archive: &mut ZipArchive<File>, key: &str) -> Result<A> {
-    let found: Vec<String> =
-        archive.file_names().filter_map(Result::ok).map(|name| name.replace(".npy", "")).collect();
-    let entry = archive.by_name(&format!("{key}.npy"));
-    let entry =
-        entry.with_context(|| format!("expected `{key}`, found none but {}", found.join(", ")))?;
-    A::read_npy(entry).with_context(|| key.to_owned())
 }
 
 /// What `sensor` measures in a street of even ground between walls, with the noise

@@ -1,0 +1,356 @@
+//! `cargo xtask bench frames`: what `edgepuck detect` finds in whole sweeps of real
+//! sensors whose objects are labelled.
+
+use crate::render::table::{Table, percent};
+use crate::study::sensor::{mounting::Mounting, sweep};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use edgepuck_program::detect::{Detections, Detector, Object};
+use edgepuck_segment::Label;
+use formats::interval::wilson;
+use formats::labelled_sweep::{LabelledBox, LabelledSweep, read_labelled_sweep};
+use formats::{Scan, atomic};
+use glam::DVec3;
+use infer_cpu::Options;
+use sim_gpu::sensor::{Layout, Sensor};
+use std::fmt::{self, Display, Write};
+use std::path::{Path, PathBuf};
+
+/// Flags of `bench frames`.
+#[derive(Args, Debug)]
+pub struct FramesArgs {
+    /// Labelled sweeps as NPZ files with `xyz_mm`, `boxes` and `classes`. Those with `laser` are of
+    /// Argoverse 2, in the car's frame, and labelled all round; others are of KITTI, in the
+    /// sensor's frame, and labelled where its camera looks.
+    #[arg(required = true, value_name = "FRAME")]
+    frames: Vec<PathBuf>,
+    /// Model for clusters: street-128, or the path of a model file.
+    #[arg(long, default_value = "street-128", value_name = "MODEL")]
+    model: PathBuf,
+    /// Write the tables to this Markdown file.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+}
+
+/// Fewest points of a cluster that is named, as `detect` has it.
+const MIN_CLUSTER: usize = 20;
+/// Objects of fewer points are not asked for.
+const MIN_POINTS: usize = 30;
+/// Nor are objects farther away, metres.
+const MAX_RANGE_M: f64 = 40.0;
+/// KITTI's camera sees 1,242 pixels at a focal length of 721.5 pixels: 40.7 degrees to
+/// either side of x.
+const HALF_VIEW_RAD: f64 = 0.711;
+/// Boxes are labelled by hand, and a sensor's noise reaches beyond them, metres.
+const MARGIN_M: f64 = 0.3;
+/// An object is found if a cluster holds this share of its points, and if this share of the
+/// cluster's points are the object's.
+const SHARE: f64 = 0.5;
+/// Borders of the bins of range, metres.
+const RANGES_M: [f64; 5] = [0.0, 10.0, 20.0, 30.0, MAX_RANGE_M];
+
+/// What labels call the classes of a network for streets.
+const CLASSES: [(&str, &str); 16] = [
+    ("car", "car"),
+    ("van", "car"),
+    ("regular_vehicle", "car"),
+    ("pedestrian", "person"),
+    ("person_sitting", "person"),
+    ("truck", "truck"),
+    ("box_truck", "truck"),
+    ("truck_cab", "truck"),
+    ("large_vehicle", "truck"),
+    ("bus", "bus"),
+    ("school_bus", "bus"),
+    ("cyclist", "two-wheeler"),
+    ("bicyclist", "two-wheeler"),
+    ("bicycle", "two-wheeler"),
+    ("motorcycle", "two-wheeler"),
+    ("motorcyclist", "two-wheeler"),
+];
+
+/// The class of a labelled object, if a network for streets has one for it.
+fn class(label: &str) -> Option<&'static str> {
+    let label = label.to_lowercase();
+    CLASSES.iter().find(|(name, _)| *name == label).map(|(_, class)| *class)
+}
+
+/// What became of a labelled car or person.
+enum Outcome {
+    Named,
+    Misnamed(String),
+    Unknown,
+    /// No cluster is mostly it.
+    NotCut,
+}
+
+impl Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Named => f.write_str("named"),
+            Self::Misnamed(class) => write!(f, "called {class}"),
+            Self::Unknown => f.write_str("unknown"),
+            Self::NotCut => f.write_str("not cut out"),
+        }
+    }
+}
+
+/// A labelled car or person, and what became of it.
+struct Asked {
+    frame: String,
+    source: &'static str,
+    class: &'static str,
+    range_m: f64,
+    n_points: usize,
+    outcome: Outcome,
+}
+
+/// A named cluster that is nothing of its name.
+struct FalseAlarm {
+    frame: String,
+    source: &'static str,
+    class: String,
+    /// What it is, as far as that is labelled.
+    truth: String,
+    object: String,
+}
+
+/// A sweep, its labels in the sensor's frame, and what was found in it.
+struct Judged {
+    name: String,
+    source: &'static str,
+    points: Vec<[f64; 3]>,
+    boxes: Vec<LabelledBox>,
+    is_all_round: bool,
+    found: Detections,
+}
+
+/// Detects in each frame, prints the tables and writes the report.
+pub fn run(args: &FramesArgs) -> Result<()> {
+    let mut detector = Detector::open(&args.model, &Options::default(), MIN_CLUSTER)?;
+    let (mut asked, mut alarms, mut sources) = (Vec::new(), Vec::new(), Vec::new());
+    for file in &args.frames {
+        let judged = Judged::of(file, &mut detector)?;
+        asked.extend(judged.asked());
+        alarms.extend(judged.false_alarms());
+        sources.push(judged.source);
+    }
+    let mut report = String::new();
+    for table in [summary(&asked, &alarms, &sources), misses(&asked), alarm_table(&alarms)] {
+        print!("{table}");
+        writeln!(report, "{}", table.markdown())?;
+    }
+    if let Some(file) = &args.report {
+        atomic::write_bytes(file, report)?;
+    }
+    Ok(())
+}
+
+impl Judged {
+    fn of(file: &Path, detector: &mut Detector) -> Result<Self> {
+        let LabelledSweep { points, lasers, boxes, times_s } = read_labelled_sweep(file)?;
+        let is_all_round = lasers.is_some();
+        let mut sweep = LabelledSweep { points, lasers, boxes, times_s };
+        if is_all_round {
+            let origin = origin_m(&sweep).with_context(|| file.display().to_string())?;
+            let from_sensor = |at: [f64; 3]| (DVec3::from_array(at) - origin).to_array();
+            sweep.points.iter_mut().for_each(|point| *point = from_sensor(*point));
+            sweep.boxes.iter_mut().for_each(|one| one.centre_m = from_sensor(one.centre_m));
+        }
+        let positions = sweep.points.iter().map(|point| point.map(|x| x as f32)).collect();
+        let scan = Scan { positions, ring: sweep.lasers, ..Scan::default() };
+        let found = detector.detect(&scan).with_context(|| file.display().to_string())?;
+        Ok(Self {
+            name: file.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            source: if is_all_round { "Argoverse 2, VLP-32C" } else { "KITTI, HDL-64E" },
+            points: sweep.points,
+            boxes: sweep.boxes,
+            is_all_round,
+            found,
+        })
+    }
+
+    /// Whether objects at `centre_m` are labelled and near enough to be asked for.
+    fn is_judged(&self, [x, y]: [f64; 2]) -> bool {
+        x.hypot(y) <= MAX_RANGE_M && (self.is_all_round || y.atan2(x).abs() <= HALF_VIEW_RAD)
+    }
+
+    /// The labelled cars and persons that are asked for.
+    fn asked(&self) -> Vec<Asked> {
+        let mut asked = Vec::new();
+        for one in &self.boxes {
+            let [x, y, _] = one.centre_m;
+            let class = class(&one.class).filter(|class| ["car", "person"].contains(class));
+            let (Some(class), true) = (class, self.is_judged([x, y])) else { continue };
+            let inside = self.points_in(one, 0.0);
+            if inside.len() >= MIN_POINTS {
+                let outcome = self.outcome(one, class, &inside);
+                let n_points = inside.len();
+                let (frame, source) = (self.name.clone(), self.source);
+                let range_m = x.hypot(y);
+                asked.push(Asked { frame, source, class, range_m, n_points, outcome });
+            }
+        }
+        asked
+    }
+
+    fn points_in(&self, one: &LabelledBox, margin_m: f64) -> Vec<usize> {
+        (0..self.points.len()).filter(|&i| one.contains(self.points[i], margin_m)).collect()
+    }
+
+    /// What became of the object in `one`, which has the points `inside` that are not ground.
+    fn outcome(&self, one: &LabelledBox, class: &str, inside: &[usize]) -> Outcome {
+        let labels = &self.found.labels;
+        let standing: Vec<_> =
+            inside.iter().map(|&i| labels[i]).filter(|label| *label != Label::Ground).collect();
+        let mut clusters: Vec<u32> = standing
+            .iter()
+            .filter_map(
+                |label| if let Label::Cluster(number) = label { Some(*number) } else { None },
+            )
+            .collect();
+        clusters.sort_unstable();
+        let largest = clusters.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len());
+        let Some(largest) = largest else { return Outcome::NotCut };
+        let (within, all) = self.shared(largest[0], one);
+        let holds = largest.len() as f64 >= SHARE * standing.len() as f64;
+        if !holds || (within as f64) < SHARE * all as f64 {
+            return Outcome::NotCut;
+        }
+        match self.found.objects.iter().find(|object| object.cluster == largest[0]) {
+            None => Outcome::Unknown,
+            Some(object) if object.class == class => Outcome::Named,
+            Some(object) => Outcome::Misnamed(object.class.clone()),
+        }
+    }
+
+    /// How many points of a cluster lie in `one`, and how many it has.
+    fn shared(&self, cluster: u32, one: &LabelledBox) -> (usize, usize) {
+        let labels = self.found.labels.iter().zip(&self.points);
+        let members = labels.filter(|(label, _)| **label == Label::Cluster(cluster));
+        members.fold((0, 0), |(within, all), (_, &point)| {
+            (within + usize::from(one.contains(point, MARGIN_M)), all + 1)
+        })
+    }
+
+    /// The named clusters that no box of their class holds mostly.
+    fn false_alarms(&self) -> Vec<FalseAlarm> {
+        let is_judged = |object: &&Object| {
+            let [x, y, _] = object.place.centre_m.map(f64::from);
+            self.is_judged([x, y])
+        };
+        let mut alarms = Vec::new();
+        for object in self.found.objects.iter().filter(is_judged) {
+            let holds = |one: &&LabelledBox| {
+                let (within, all) = self.shared(object.cluster, one);
+                within as f64 >= SHARE * all as f64
+            };
+            let held: Vec<_> = self.boxes.iter().filter(holds).collect();
+            if held.iter().any(|one| class(&one.class) == Some(&object.class)) {
+                continue;
+            }
+            let [x, y, z] = object.place.centre_m;
+            let [length, width, height] = object.place.size_m;
+            alarms.push(FalseAlarm {
+                frame: self.name.clone(),
+                source: self.source,
+                class: object.class.clone(),
+                truth: held.first().map_or("-".to_owned(), |one| one.class.clone()),
+                object: format!(
+                    "{} points at {x:.1} {y:.1} {z:.1}, {length:.1} x {width:.1} x {height:.1} m",
+                    object.n_points
+                ),
+            });
+        }
+        alarms
+    }
+}
+
+/// Where the sensors of a sweep stand: the mean of their origins, fitted to their beams.
+fn origin_m(sweep: &LabelledSweep) -> Result<DVec3> {
+    let Layout::Rotating(table) = Sensor::resolve("vlp32c")?.layout else {
+        bail!("vlp32c: expected a table of rotating beams, found another layout");
+    };
+    let sensors = sweep::by_sensor(sweep, table.beam.len())?;
+    let origins = sensors.iter().map(|returns| Mounting::fit(returns, &table).origin_m());
+    Ok(origins.sum::<DVec3>() / sensors.len() as f64)
+}
+
+/// Shares of found and named objects by source, class and range, and false alarms.
+fn summary(asked: &[Asked], alarms: &[FalseAlarm], sources: &[&'static str]) -> Table {
+    let mut table = Table::new(
+        "Cars and persons of 30 points or more within 40 m",
+        &["what", "found and named", "share", "95 % interval, %"],
+    );
+    let mut names = sources.to_vec();
+    names.sort_unstable();
+    names.dedup();
+    let mut push = |name: String, of: &dyn Fn(&&Asked) -> bool| {
+        let of: Vec<_> = asked.iter().filter(of).collect();
+        let named = of.iter().filter(|one| matches!(one.outcome, Outcome::Named)).count();
+        if of.is_empty() {
+            return;
+        }
+        let (low, high) = wilson(named, of.len());
+        let interval = format!("{} to {}", percent(low), percent(high));
+        let share = percent(named as f64 / of.len() as f64);
+        table.push(vec![name, format!("{named} of {}", of.len()), share, interval]);
+    };
+    push("all".to_owned(), &|_| true);
+    for source in &names {
+        push((*source).to_owned(), &|one| one.source == *source);
+        for class in ["car", "person"] {
+            push(format!("{source}: {class}"), &|one| one.source == *source && one.class == class);
+        }
+    }
+    for range in RANGES_M.windows(2) {
+        let within = |one: &&Asked| (range[0]..range[1]).contains(&one.range_m);
+        push(format!("{} to {} m", range[0], range[1]), &within);
+    }
+    for source in names {
+        let of = |classes: &[&str]| {
+            let of = alarms.iter().filter(|alarm| alarm.source == source);
+            of.filter(|alarm| classes.contains(&alarm.class.as_str())).count()
+        };
+        let n_frames = sources.iter().filter(|other| **other == source).count();
+        for classes in [&["car", "person"][..], &["truck", "bus", "two-wheeler"]] {
+            let n = of(classes);
+            table.push(vec![
+                format!("{source}: false alarms, {}", classes.join(", ")),
+                format!("{n} in {n_frames} frames"),
+                format!("{:.2} a frame", n as f64 / n_frames as f64),
+                String::new(),
+            ]);
+        }
+    }
+    table
+}
+
+fn misses(asked: &[Asked]) -> Table {
+    let missed: Vec<_> =
+        asked.iter().filter(|one| !matches!(one.outcome, Outcome::Named)).collect();
+    Table::of(
+        "What was missed",
+        &missed,
+        &[
+            ("frame", &|one| one.frame.clone()),
+            ("object", &|one| one.class.to_owned()),
+            ("range, m", &|one| format!("{:.1}", one.range_m)),
+            ("points", &|one| one.n_points.to_string()),
+            ("outcome", &|one| one.outcome.to_string()),
+        ],
+    )
+}
+
+fn alarm_table(alarms: &[FalseAlarm]) -> Table {
+    Table::of(
+        "False alarms",
+        alarms,
+        &[
+            ("frame", &|one| one.frame.clone()),
+            ("called", &|one| one.class.clone()),
+            ("labelled", &|one| one.truth.clone()),
+            ("what", &|one| one.object.clone()),
+        ],
+    )
+}
