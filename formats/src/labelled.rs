@@ -17,6 +17,7 @@
 //! | `height_m`, with `offsets` | floating | `[m]` | height of the lowest point above the ground, metres, NaN if unknown; may be absent |
 //! | `sensor`, with `offsets` | text | `[m]` | the sensor's name; may be absent |
 //! | `ids`, with `offsets` | text | `[m]` | `FRAME#TRACK`, or any other name of the object; may be absent |
+//! | `sensor_origin`, with `offsets` | floating | `[3]` or `[m, 3]` | where the sensor was, from where `points` are then counted; may be absent |
 //! | `raw_labels`, with `offsets` | text | `[m]` | class names as the data's source has them; may be absent |
 //! | `fold`, with `offsets` | whole numbers | `[m]` | part of a cross-validation; may be absent |
 //!

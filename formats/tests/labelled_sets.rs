@@ -77,6 +77,25 @@ fn clusters_of_any_size_have_offsets_and_labels_that_may_be_names() {
     assert_eq!(read(&[RAGGED, OFFSETS, labels, classes]).unwrap().labels, [1, 2]);
 }
 
+/// A cluster in another frame than its sensor's is moved there: directions and ranges
+/// are from the sensor.
+#[test]
+fn points_are_counted_from_where_the_sensor_was() {
+    let labels = ("labels", "|u1", "(2,)", &[0, 1][..]);
+    // 1, 0, 2 for both; then that and 0, 0, 1.
+    let one = ("sensor_origin", "<f2", "(3,)", &[0, 0x3c, 0, 0, 0, 0x40][..]);
+    let each =
+        ("sensor_origin", "<f2", "(2, 3)", &[0, 0x3c, 0, 0, 0, 0x40, 0, 0, 0, 0, 0, 0x3c][..]);
+    let set = read(&[RAGGED, OFFSETS, labels, one]).unwrap();
+    assert_eq!(set.cloud(0), [[0.0, 0.0, -3.0]]);
+    assert_eq!(set.cloud(1), [[0.0, 2.0, 1.0], [-1.0, 0.0, -2.0]]);
+    let set = read(&[RAGGED, OFFSETS, labels, each]).unwrap();
+    assert_eq!(set.cloud(1), [[1.0, 2.0, 2.0], [0.0, 0.0, -1.0]]);
+    let wrong = ("sensor_origin", "<f2", "(1,)", &[0, 0][..]);
+    let error = read(&[RAGGED, OFFSETS, labels, wrong]).unwrap_err().to_string();
+    assert!(error.ends_with("sensor_origin: expected shape [3] or [2, 3], found [1]"), "{error}");
+}
+
 /// What other programs keep beside clouds of one size is not looked at.
 #[test]
 fn clouds_of_one_size_have_no_remarks() {

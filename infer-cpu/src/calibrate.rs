@@ -64,7 +64,7 @@ fn on_clouds_of<'a>(
         let cloud = if card.normalization.is_metric() {
             wide.clear();
             wide.extend(cloud.iter().map(|point| point.map(f64::from)));
-            normalize::normalize(card.normalization, &wide, None, &mut metric);
+            normalize(card.normalization, &wide, None, &mut metric);
             &metric
         } else {
             cloud

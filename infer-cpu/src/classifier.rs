@@ -239,7 +239,7 @@ impl Classifier {
 
     fn normalize(&mut self) {
         let normalization = self.options.normalization.unwrap_or(self.card.normalization);
-        normalize::normalize(normalization, &self.finite, self.ground_z, &mut self.normalized);
+        normalize(normalization, &self.finite, self.ground_z, &mut self.normalized);
     }
 
     fn predict(&mut self) -> Result<&Prediction, Error> {

@@ -10,6 +10,7 @@ use crate::classify::Classify;
 use crate::sample::Sample;
 use crate::scan::Scan;
 use crate::scene::ManyObjects;
+use crate::sweep::Sweep;
 
 /// Set to 1, heavy cases run.
 const HEAVY: &str = "EDGEPUCK_HEAVY";
@@ -27,6 +28,7 @@ struct File {
     classify: Option<Classify>,
     sample: Option<Sample>,
     scene: Option<ManyObjects>,
+    sweep: Option<Sweep>,
 }
 
 /// A case of whichever kind, as the test that it is.
@@ -60,15 +62,16 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     if file.derivation.trim().is_empty() {
         return Err("`derivation` is empty".to_owned());
     }
-    let kinds: [(&str, Option<Check>); 4] = [
+    let kinds: [(&str, Option<Check>); 5] = [
         ("scan", file.scan.map(|case| Box::new(move || case.check()) as Check)),
         ("classify", file.classify.map(|case| Box::new(move || case.check()) as Check)),
         ("sample", file.sample.map(|case| Box::new(move || case.check()) as Check)),
         ("scene", file.scene.map(|case| Box::new(move || case.check()) as Check)),
+        ("sweep", file.sweep.map(|case| Box::new(move || case.check()) as Check)),
     ];
     let mut named = kinds.into_iter().filter_map(|(kind, check)| Some((kind, check?)));
     let (Some((kind, check)), None) = (named.next(), named.next()) else {
-        return Err("a case is one table: scan, classify, sample or scene".to_owned());
+        return Err("a case is one table: scan, classify, sample, scene or sweep".to_owned());
     };
     match path.parent().and_then(Path::file_name) {
         Some(folder) if folder == kind => Ok((file.heavy, check)),

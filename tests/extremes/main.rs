@@ -24,6 +24,7 @@ mod scan;
 mod scene;
 mod shape;
 mod stream;
+mod sweep;
 #[path = "../../infer-cpu/tests/support/tiny_model.rs"]
 mod tiny_model;
 

@@ -48,22 +48,26 @@ pub fn start<'s>(
     receiver
 }
 
-/// The clouds of an epoch in random order, each with how often it came before.
-/// With `balance` every class has as many, give or take one.
+/// The clouds of an epoch in random order, each with how often it came before. With
+/// `balance` a class of `n` clouds has a share in proportion to n^(1 - balance), give or
+/// take one.
 fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec<(usize, u32)> {
     let all = 0..labels.len();
-    let groups: Vec<Vec<usize>> = match recipe.balance {
-        false => vec![all.collect()],
-        true => {
-            let of = |class| all.clone().filter(|&i| labels[i] == class).collect();
-            (0..n_classes).map(of).filter(|group: &Vec<usize>| !group.is_empty()).collect()
-        }
+    let groups: Vec<Vec<usize>> = if recipe.balance > 0.0 {
+        let of = |class| all.clone().filter(|&i| labels[i] == class).collect();
+        (0..n_classes).map(of).filter(|group: &Vec<usize>| !group.is_empty()).collect()
+    } else {
+        vec![all.collect()]
     };
+    let weight = |group: &Vec<usize>| (group.len() as f64).powf(1.0 - recipe.balance);
+    let total: f64 = groups.iter().map(weight).sum();
     let size = size(labels.len(), recipe);
     let mut order = Vec::with_capacity(size);
+    let mut weighed = 0.0;
     for (number, group) in groups.iter().enumerate() {
-        // The first groups have one cloud more where the size is no multiple.
-        let share = (size + groups.len() - 1 - number) / groups.len();
+        weighed += weight(group);
+        // What the groups up to this one have together is rounded, so that all have `size`.
+        let share = (size as f64 * weighed / total).round() as usize - order.len();
         for turn in 0..share / group.len() {
             order.extend(group.iter().map(|&i| (i, turn as u32)));
         }
@@ -110,7 +114,7 @@ mod tests {
     fn a_balanced_epoch_has_as_many_clouds_of_each_class() {
         // Seven of class 0, one of class 1, none of class 2.
         let labels = [0, 0, 0, 1, 0, 0, 0, 0];
-        let recipe = Recipe { balance: true, clouds_per_epoch: Some(11), ..Recipe::default() };
+        let recipe = Recipe { balance: 1.0, clouds_per_epoch: Some(11), ..Recipe::default() };
         let mut drawn = order(&labels, 3, 5, &recipe);
         assert_eq!(drawn, order(&labels, 3, 5, &recipe));
         assert_ne!(drawn, order(&labels, 3, 6, &recipe));
@@ -119,6 +123,10 @@ mod tests {
         assert_eq!(drawn.len(), 11);
         // No draw comes twice: each has random numbers of its own.
         assert!(drawn.windows(2).all(|pair| pair[0] != pair[1]), "{drawn:?}");
+        // Halfway, the square roots of 7 and 1 share the eleven.
+        let drawn = order(&labels, 3, 5, &Recipe { balance: 0.5, ..recipe.clone() });
+        assert_eq!(drawn.iter().filter(|(i, _)| *i == 3).count(), 3);
+        assert_eq!(drawn.len(), 11);
         assert_eq!(count(8, &Recipe { batch: 4, ..recipe }), 2);
     }
 

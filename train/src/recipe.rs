@@ -31,13 +31,15 @@ pub struct Recipe {
     pub points: usize,
     /// How those points are chosen from a cloud that has more.
     pub sampling: Sampling,
-    /// How clouds are moved and scaled: `unit-sphere`, or `metric` for clusters in
+    /// How clouds are moved and scaled: `unit-sphere`, or `metric` and
+    /// `metric-sight` for clusters in
     /// metres, z up, with the sensor at the origin, of any number of points.
     #[serde(with = "by_name", skip_serializing_if = "is_default")]
     pub normalization: Normalization,
-    /// Draw as many clouds of each class for an epoch.
+    /// How evenly an epoch's clouds are drawn from the classes: 0 as they come, 1 as
+    /// many of each, and between these a class of n in proportion to n^(1 - balance).
     #[serde(skip_serializing_if = "is_default")]
-    pub balance: bool,
+    pub balance: f64,
     /// Clouds that are drawn for an epoch; as many as the training set has if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clouds_per_epoch: Option<usize>,
@@ -85,7 +87,7 @@ impl Default for Recipe {
             points: 1024,
             sampling: Sampling::First,
             normalization: Normalization::UnitSphere,
-            balance: false,
+            balance: 0.0,
             clouds_per_epoch: None,
             unknown: Vec::new(),
             keep_known: None,
@@ -294,6 +296,7 @@ impl Recipe {
             (share(self.validation), "validation", SHARE),
             (share(self.dropout), "dropout", SHARE),
             (share(self.label_smoothing), "label_smoothing", SHARE),
+            ((0.0..=1.0).contains(&self.balance), "balance", "expected 0 to 1"),
             (finite(self.orthogonality), "orthogonality", FINITE),
             (finite(adam.rate) && adam.rate > 0.0, "adam.rate", "expected a finite number above 0"),
             (network.trunk.len() > 1, "network.trunk", "expected 2 layers or more"),

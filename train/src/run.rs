@@ -146,7 +146,7 @@ impl Run {
         };
         self.note(epoch, &learnt, validated.as_ref());
         // Without a validation set, the last epoch is taken.
-        if validated.is_none() || self.metrics.is_best(epoch, self.trainer.recipe.balance) {
+        if validated.is_none() || self.metrics.is_best(epoch, self.trainer.recipe.balance > 0.0) {
             let best = self.folder.join("best.safetensors");
             model_file::write(&best, &mut self.trainer.model, &card)?;
         }

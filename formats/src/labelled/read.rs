@@ -22,11 +22,14 @@ const I16_SCALE: f32 = 32767.0;
 /// without a class: [`FormatError::Malformed`] with file and key.
 pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
     let mut npz = NpzReader::open(path)?;
-    let (shape, points) = read_points(&mut npz)?;
+    let (shape, mut points) = read_points(&mut npz)?;
     let ragged = match shape[..] {
         [total, 3] => Some(read_offsets(&mut npz, total)?),
         _ => None,
     };
+    if let Some(offsets) = ragged.as_ref().filter(|_| npz.has("sensor_origin")) {
+        count_from_sensor(&mut npz, offsets, points.as_chunks_mut().0)?;
+    }
     let m = ragged.as_ref().map_or(shape[0], |offsets| offsets.len() - 1);
     let classes = column(&mut npz, "classes", NpzReader::text)?;
     let (labels, classes) = read_labels(&mut npz, classes)?;
@@ -133,6 +136,29 @@ fn read_offsets<R: Read + Seek>(
         return Err(npz.error(KEY, cause));
     }
     Ok(offsets)
+}
+
+/// Moves the clouds that begin at `offsets` so that the sensor is at 0.
+fn count_from_sensor<R: Read + Seek>(
+    npz: &mut NpzReader<R>,
+    offsets: &[usize],
+    points: &mut [[f32; 3]],
+) -> Result<(), FormatError> {
+    let m = offsets.len() - 1;
+    let origins = npz.entry("sensor_origin", |header, _, elements| match header.shape[..] {
+        [3] => Ok(npy::read_numbers(elements, &header, |x| x as f32)?.repeat(m)),
+        [n, 3] if n == m => npy::read_numbers(elements, &header, |x| x as f32),
+        _ => {
+            let found = header.shape;
+            Err(invalid(format!("expected shape [3] or [{m}, 3], found {found:?}")))
+        }
+    })?;
+    for (span, origin) in offsets.windows(2).zip(origins.as_chunks::<3>().0) {
+        for point in &mut points[span[0]..span[1]] {
+            *point = [0, 1, 2].map(|axis| point[axis] - origin[axis]);
+        }
+    }
+    Ok(())
 }
 
 /// The class of each cloud, and the classes if they are known.

@@ -78,7 +78,8 @@ pub struct Args {
     drop_invalid: bool,
 
     /// Normalization of clouds: unit-sphere, metric (metres, from the mean of x and
-    /// y and the lowest z), none [default: as in training]
+    /// y and the lowest z), metric-sight (the same, turned to the line of sight),
+    /// none [default: as in training]
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalization>,
 

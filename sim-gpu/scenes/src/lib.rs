@@ -23,6 +23,11 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
+/// The README's example is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub use clusters::{LabelledCluster, OTHER, label_clusters};
 pub use error::SceneError;
 pub use generate::{Counts, Generation, generate};

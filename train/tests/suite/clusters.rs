@@ -162,7 +162,7 @@ fn a_network_of_clusters_is_trained_and_answers_unknown() {
     write(&folder.path().join("train.npz"), 60, 1);
     write(&folder.path().join("test.npz"), 30, 2);
     let recipe = "points = 48\nbatch = 20\nepochs = 10\nsampling = \"random\"\n\
-        normalization = \"metric\"\nbalance = true\nclouds_per_epoch = 200\n\
+        normalization = \"metric\"\nbalance = 1.0\nclouds_per_epoch = 200\n\
         unknown = [\"wall\"]\nkeep_known = 0.95\n\
         [network]\ninput_transform = false\nfeature_transform = false\ntrunk = [16, 32]\n\
         head = [16]\n\

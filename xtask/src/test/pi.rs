@@ -10,6 +10,9 @@ type Check = fn(&mut Summary, &str, bool) -> anyhow::Result<Counts>;
 const CHECKS: [(&str, Check); 3] =
     [("Raspberry Pi lints", lints), ("Raspberry Pi tests", tests), ("Raspberry Pi binary", binary)];
 
+/// What runs on a Raspberry Pi.
+const PACKAGES: [&str; 4] = ["--package", "infer-cpu", "--package", "edgepuck-segment"];
+
 /// Runs the three checks; those that cannot run here fail where they are `required`.
 pub fn run(summary: &mut Summary, required: bool) {
     for (name, check) in CHECKS {
@@ -22,11 +25,11 @@ pub fn run(summary: &mut Summary, required: bool) {
 
 /// Lints the code that is compiled for the Raspberry Pi alone.
 fn lints(_: &mut Summary, name: &str, _: bool) -> anyhow::Result<Counts> {
-    let mut lints = pi_target::cargo(&["clippy", "--package", "infer-cpu", "--all-targets"]);
-    check(name, lints.args(["--", "--deny", "warnings"]))
+    let mut lints = pi_target::cargo(&["clippy", "--all-targets"]);
+    check(name, lints.args(PACKAGES).args(["--", "--deny", "warnings"]))
 }
 
-/// Tests infer-cpu with the Raspberry Pi's instructions.
+/// Tests the packages with the Raspberry Pi's instructions.
 fn tests(summary: &mut Summary, name: &str, required: bool) -> anyhow::Result<Counts> {
     if cfg!(target_arch = "aarch64") {
         let reason = "this processor is of its kind, so the tests above were these";
@@ -37,8 +40,8 @@ fn tests(summary: &mut Summary, name: &str, required: bool) -> anyhow::Result<Co
         let required = required && cfg!(target_os = "linux");
         return go_without(summary, name, pi_target::NO_EMULATOR, required);
     }
-    let tests = ["test", "--package", "infer-cpu", "--lib", "--bins", "--tests", "--no-fail-fast"];
-    test_programs::run(summary, &mut pi_target::cargo(&tests))
+    let mut tests = pi_target::cargo(&["test", "--lib", "--bins", "--tests", "--no-fail-fast"]);
+    test_programs::run(summary, tests.args(PACKAGES))
 }
 
 /// Checks that a binary for the Raspberry Pi can be made, and is as small as promised.
