@@ -27,6 +27,11 @@ pub struct Args {
     /// of the baseline]
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
+    /// Model file whose weights training starts from. All layers but the last must be
+    /// those of the recipe; the last is taken, too, if the classes are the same
+    /// [default: random numbers]
+    #[arg(long, value_name = "MODEL")]
+    init: Option<PathBuf>,
     /// Network: pointnet, or cpl (pointnet after a Critical Points Layer)
     /// [default: the recipe's]
     #[arg(long, value_name = "NAME", value_parser = ["pointnet", "cpl"])]
@@ -110,6 +115,7 @@ fn recipe(args: &Args) -> anyhow::Result<Recipe> {
     recipe.points = args.points.unwrap_or(recipe.points);
     recipe.epochs = args.epochs.unwrap_or(recipe.epochs);
     recipe.seed = args.seed.unwrap_or(recipe.seed);
+    recipe.init = args.init.clone().or(recipe.init);
     recipe.check()?;
     Ok(recipe)
 }
