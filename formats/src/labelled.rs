@@ -17,6 +17,8 @@
 //! | `height_m`, with `offsets` | floating | `[m]` | height of the lowest point above the ground, metres, NaN if unknown; may be absent |
 //! | `sensor`, with `offsets` | text | `[m]` | the sensor's name; may be absent |
 //! | `ids`, with `offsets` | text | `[m]` | `FRAME#TRACK`, or any other name of the object; may be absent |
+//! | `raw_labels`, with `offsets` | text | `[m]` | class names as the data's source has them; may be absent |
+//! | `fold`, with `offsets` | whole numbers | `[m]` | part of a cross-validation; may be absent |
 //!
 //! Where labels are text and no classes are listed, the classes are the sorted
 //! distinct labels. [`crate::packed`] writes clouds of one size, and
@@ -51,6 +53,10 @@ pub struct LabelledSet {
     pub sensor: Option<Vec<String>>,
     /// Frame and track of each cloud, `FRAME#TRACK`, where the set lists them.
     pub ids: Option<Vec<String>>,
+    /// Class of each cloud as the data's source names it, where the set lists them.
+    pub raw_labels: Option<Vec<String>>,
+    /// Part of a cross-validation that each cloud is in, where the set lists them.
+    pub fold: Option<Vec<u32>>,
 }
 
 impl Default for LabelledSet {
@@ -67,6 +73,8 @@ impl Default for LabelledSet {
             height_m: None,
             sensor: None,
             ids: None,
+            raw_labels: None,
+            fold: None,
         }
     }
 }
@@ -137,6 +145,8 @@ impl LabelledSet {
             height_m: chosen(self.height_m.as_ref(), indices),
             sensor: chosen(self.sensor.as_ref(), indices),
             ids: chosen(self.ids.as_ref(), indices),
+            raw_labels: chosen(self.raw_labels.as_ref(), indices),
+            fold: chosen(self.fold.as_ref(), indices),
             ..Self::default()
         };
         indices.iter().for_each(|&i| some.push(self.cloud(i), self.labels[i]));

@@ -58,7 +58,9 @@ fn clusters_of_any_size_have_offsets_and_labels_that_may_be_names() {
     let labels = ("labels", "|S4", "(2,)", &b"tree\x63ar\0"[..]);
     let range = ("range_m", "<f2", "(2,)", &[0, 0x3c, 0, 0x7e][..]);
     let ids = ("ids", "|S3", "(2,)", &b"0#10#2"[..]);
-    let set = read(&[RAGGED, OFFSETS, labels, range, ids]).unwrap();
+    let fold = ("fold", "|u1", "(2,)", &[3, 1][..]);
+    let raw = ("raw_labels", "|S3", "(2,)", &b"elmute"[..]);
+    let set = read(&[RAGGED, OFFSETS, labels, range, ids, fold, raw]).unwrap();
     assert_eq!((set.len(), set.smallest_cloud()), (2, 1));
     assert_eq!(set.cloud(0), [[1.0, 0.0, -1.0]]);
     assert_eq!(set.cloud(1), [[1.0, 2.0, 3.0], [0.0; 3]]);
@@ -68,6 +70,8 @@ fn clusters_of_any_size_have_offsets_and_labels_that_may_be_names() {
     assert!(range[0] == 1.0 && range[1].is_nan(), "{range:?}");
     assert_eq!(set.ids.as_ref().unwrap()[..], ["0#1", "0#2"]);
     let turned = set.select(&[1, 0, 1]);
+    assert_eq!(turned.fold.as_ref().unwrap()[..], [1, 3, 1]);
+    assert_eq!(turned.raw_labels.as_ref().unwrap()[..], ["ute", "elm", "ute"]);
     assert_eq!((turned.offsets.as_slice(), turned.cloud(2)), (&[0, 2, 3, 5][..], set.cloud(1)));
     let classes = ("classes", "|S4", "(3,)", &b"bus\0tree\x63ar\0"[..]);
     assert_eq!(read(&[RAGGED, OFFSETS, labels, classes]).unwrap().labels, [1, 2]);

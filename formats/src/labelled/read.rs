@@ -34,7 +34,8 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
     let n_raw = column(&mut npz, "n_raw", read_whole_numbers)?;
     let is_ragged = ragged.is_some();
     let mut words = |key| if is_ragged { column(&mut npz, key, NpzReader::text) } else { Ok(None) };
-    let (sensor, ids) = (words("sensor")?, words("ids")?);
+    let (sensor, ids, raw_labels) = (words("sensor")?, words("ids")?, words("raw_labels")?);
+    let fold = if is_ragged { column(&mut npz, "fold", read_whole_numbers)? } else { None };
     let numbers = |npz: &mut NpzReader, key: &str| read_list(npz, key, |x| x as f32);
     let range_m = if is_ragged { column(&mut npz, "range_m", numbers)? } else { None };
     let height_m = if is_ragged { column(&mut npz, "height_m", numbers)? } else { None };
@@ -46,6 +47,8 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
         ("height_m", height_m.as_ref().map(Vec::len)),
         ("sensor", sensor.as_ref().map(Vec::len)),
         ("ids", ids.as_ref().map(Vec::len)),
+        ("raw_labels", raw_labels.as_ref().map(Vec::len)),
+        ("fold", fold.as_ref().map(Vec::len)),
     ];
     for (key, length) in lengths {
         if let Some(found) = length.filter(|&length| length != m) {
@@ -64,6 +67,8 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
         height_m,
         sensor,
         ids,
+        raw_labels,
+        fold,
         ..LabelledSet::default()
     };
     Ok(LabelledSet { points, offsets, labels, ..columns })
