@@ -9,6 +9,7 @@ mod plan;
 pub mod reproduction;
 mod resume;
 pub mod sensor;
+pub mod sydney;
 #[cfg(test)]
 mod test_clouds;
 pub mod trade;
