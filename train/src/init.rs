@@ -12,7 +12,6 @@
 //! the others.
 
 use std::collections::BTreeSet;
-use std::fmt::Debug;
 use std::path::Path;
 
 use formats::FormatError;
@@ -47,8 +46,9 @@ pub fn start(
     let mut file = WeightsFile::open(path)?;
     let model = ModelCard::from_metadata(path, &file.metadata())?;
     check_card(path, card, &model)?;
-    let mut reader = Reader { file: &mut file, used: BTreeSet::new() };
-    let is_folded = reader.network(&mut trainer.model, model.classes == card.classes)?;
+    let is_folded = !file.shapes().into_keys().any(|name| name.ends_with(".running_var"));
+    let mut reader = Reader { file: &mut file, used: BTreeSet::new(), is_folded };
+    reader.network(&mut trainer.model, model.classes == card.classes)?;
     reader.check_that_all_is_used()?;
     if is_folded {
         unfold(&mut trainer.model, &trainer.recipe, clouds);
@@ -58,35 +58,38 @@ pub fn start(
 
 /// Whether both are of the same inputs, in the same layers.
 fn check_card(path: &Path, wanted: &ModelCard, found: &ModelCard) -> Result<(), FormatError> {
-    let same = |key, wanted: &dyn Debug, found: &dyn Debug| {
-        let (wanted, found) = (format!("{wanted:?}"), format!("{found:?}"));
-        if wanted == found {
-            return Ok(());
-        }
-        let cause = format!("expected {wanted}, as the recipe has it, found {found}");
-        Err(FormatError::malformed(path, format!("metadata `{key}`"), cause))
-    };
-    let names = [wanted, found].map(|card| card.normalization.to_string());
-    same("normalization", &names[0], &names[1])?;
     // A model that was imported may not say how many points it takes.
-    let points = [wanted.points, found.points.or(wanted.points)].map(Option::unwrap_or_default);
-    same("points", &points[0], &points[1])?;
-    same("edge_radii", &wanted.edge_radii, &found.edge_radii)?;
-    same("transform_after", &wanted.transform_after, &found.transform_after)?;
-    same("pooled", &wanted.pooled_relu, &found.pooled_relu)
+    let found = ModelCard { points: found.points.or(wanted.points), ..found.clone() };
+    for ((key, wanted), (_, found)) in facts(wanted).into_iter().zip(facts(&found)) {
+        if wanted != found {
+            let cause = format!("expected {wanted}, as the recipe has it, found {found}");
+            return Err(FormatError::malformed(path, format!("metadata `{key}`"), cause));
+        }
+    }
+    Ok(())
+}
+
+fn facts(card: &ModelCard) -> [(&'static str, String); 5] {
+    [
+        ("normalization", card.normalization.to_string()),
+        ("points", card.points.unwrap_or_default().to_string()),
+        ("edge_radii", format!("{:?}", card.edge_radii)),
+        ("transform_after", card.transform_after.to_string()),
+        ("pooled", if card.pooled_relu { "relu" } else { "linear" }.to_owned()),
+    ]
 }
 
 struct Reader<'a> {
     file: &'a mut WeightsFile,
     used: BTreeSet<String>,
+    is_folded: bool,
 }
 
 impl Reader<'_> {
-    /// Reads all layers of `model`, without the last unless `with_last`. Returns whether
-    /// some batch norms were folded.
-    fn network(&mut self, model: &mut Model, with_last: bool) -> Result<bool, FormatError> {
+    /// Reads all layers of `model`, without the last unless `with_last`.
+    fn network(&mut self, model: &mut Model, with_last: bool) -> Result<(), FormatError> {
         let layers: Vec<LayerMut<'_>> = model.layers();
-        let (n, mut is_folded) = (layers.len(), false);
+        let n = layers.len();
         for (place, LayerMut { linear, norm, .. }) in layers.into_iter().enumerate() {
             if linear.name() == TRAINING_ONLY {
                 continue;
@@ -97,14 +100,11 @@ impl Reader<'_> {
             }
             self.parameter(&mut linear.weight)?;
             self.parameter(&mut linear.bias)?;
-            let Some(norm) = norm else { continue };
-            if self.file.shape(&norm.scale.name).is_some() {
+            if let Some(norm) = norm.filter(|_| !self.is_folded) {
                 self.norm(norm)?;
-            } else {
-                is_folded = true;
             }
         }
-        Ok(is_folded)
+        Ok(())
     }
 
     fn norm(&mut self, norm: &mut Norm) -> Result<(), FormatError> {

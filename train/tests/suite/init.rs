@@ -132,7 +132,7 @@ fn a_model_that_the_recipe_does_not_fit_is_refused_with_file_and_part() {
         (
             shape.clone(),
             ModelCard { normalization: Normalization::Metric, ..card(&clouds) },
-            "metadata `normalization`: expected \"metric\", as the recipe has it, found \"unit-sphere\"",
+            "metadata `normalization`: expected metric, as the recipe has it, found unit-sphere",
         ),
         (
             shape.clone(),

@@ -6,7 +6,8 @@
 //! what [`simplify`] saves. [`infer`] is about classifying, sampling and learning,
 //! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters,
 //! [`sensor`] about how true a profile is to real sweeps, [`frames`] about what is found in
-//! them.
+//! them, [`sydney`] about what a network that has learnt from simulated scenes gives to one
+//! of real objects.
 
 use crate::measure::machine::{self, Machine};
 use crate::measure::{backends, bench_mesh};
@@ -14,7 +15,7 @@ use crate::pi5;
 use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
-use crate::study::{devices, frames, numerics, sensor};
+use crate::study::{devices, frames, numerics, sensor, sydney};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -56,6 +57,8 @@ enum Benchmark {
     Sensor(sensor::SensorArgs),
     /// Detect the cars and persons in labelled sweeps of real sensors, and count false alarms.
     Frames(frames::FramesArgs),
+    /// Follow the protocol of the Sydney Urban Objects benchmark, pre-trained and from scratch.
+    Sydney(sydney::SydneyArgs),
 }
 
 #[derive(Args, Debug)]
@@ -139,6 +142,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome> {
         Benchmark::Devices(args) => devices::run(args),
         Benchmark::Sensor(args) => sensor::run(args),
         Benchmark::Frames(args) => frames::run(args),
+        Benchmark::Sydney(args) => sydney::run(args),
     }?;
     Ok(Outcome::Success)
 }

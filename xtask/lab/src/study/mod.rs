@@ -10,6 +10,7 @@ mod plan;
 pub mod reproduction;
 mod resume;
 pub mod sensor;
+pub mod sydney;
 #[cfg(test)]
 mod test_clouds;
 pub mod trade;
