@@ -7,8 +7,9 @@ use formats::model_card::{ModelCard, Normalization};
 use formats::split::Split;
 use formats::{FormatError, atomic};
 use indicatif::{ProgressBar, ProgressStyle};
-use infer_cpu::{Evaluation, Options, energy};
+use infer_cpu::{Evaluation, Options, UNKNOWN, energy};
 
+use crate::augment::varied_too;
 use crate::calibration::{quantile, temperature};
 use crate::clouds::Clouds;
 use crate::error::Error;
@@ -16,7 +17,7 @@ use crate::evaluate::{confusion, predictions};
 use crate::metrics::{Metrics, Row};
 use crate::recipe::{Recipe, Sampling};
 use crate::trainer::{EpochSummary, Trainer};
-use crate::{accuracy_report, batches, checkpoint, model_file};
+use crate::{accuracy_report, batches, checkpoint, model_file, negatives};
 
 /// Points that are read from a text file at most: as many as the baseline's
 /// files have.
@@ -34,6 +35,8 @@ pub fn points_to_read(recipe: &Recipe) -> usize {
 pub struct Job<'a> {
     /// How to train.
     pub recipe: Recipe,
+    /// Model file whose weights the network starts with; random ones without.
+    pub init: Option<&'a Path>,
     /// What to learn from.
     pub clouds: &'a Clouds,
     /// Where the clouds come from, for errors.
@@ -57,7 +60,11 @@ impl Job<'_> {
         recipe.check()?;
         check(all, recipe, data)?;
         let (learnt, held) = all.split_validation(recipe.validation, recipe.seed);
-        let (clouds, held) = (all.select(&learnt), all.select(&held));
+        let (clouds, mut held) = (all.select(&learnt), all.select(&held));
+        if recipe.varies_objects() && !held.is_empty() {
+            held = varied_too(&held, recipe);
+        }
+        let held = negatives::added(held, recipe, "held", 0);
         if batches::count(clouds.len(), recipe) == 0 {
             let n = clouds.len();
             let cause =
@@ -91,7 +98,11 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
         let name = &clouds.classes[class];
         return refuse(format!("expected clouds of every class, found none of {class} ({name})"));
     }
-    if let Some(name) = recipe.unknown.iter().find(|name| !clouds.classes.contains(name)) {
+    if recipe.negatives > 0.0 && clouds.classes.iter().any(|name| name == UNKNOWN) {
+        return refuse(format!("expected no class `{UNKNOWN}` beside the recipe's negatives"));
+    }
+    let lacks = |name: &&String| !recipe.classes(&clouds.classes).contains(name);
+    if let Some(name) = recipe.unknown.iter().find(lacks) {
         return Err(Error::Recipe {
             key: "unknown",
             cause: format!("expected some of the classes {:?}, found `{name}`", clouds.classes),
@@ -111,7 +122,7 @@ struct Run {
 
 impl Run {
     fn open(folder: PathBuf, job: &Job<'_>) -> Result<Self, Error> {
-        let classes = job.clouds.classes.clone();
+        let classes = job.recipe.classes(&job.clouds.classes);
         let mut trainer = Trainer::new(job.recipe.clone(), classes.len())?;
         let path = folder.join("checkpoint.safetensors");
         let metrics = if path.is_file() {
@@ -120,6 +131,9 @@ impl Run {
             Metrics::from_notes(&notes)
                 .map_err(|cause| FormatError::malformed(&path, "metadata `notes`", cause))?
         } else {
+            if let Some(init) = job.init {
+                model_file::start_from(init, &mut trainer.model, &classes)?;
+            }
             Metrics::default()
         };
         let text = trainer.recipe.to_toml()?;
@@ -154,6 +168,7 @@ impl Run {
     /// Learns for one epoch, with a progress bar on standard error.
     fn learn(&mut self, clouds: &Clouds) -> Result<EpochSummary, Error> {
         let (epoch, epochs) = (self.trainer.epoch + 1, self.trainer.recipe.epochs);
+        let clouds = &negatives::added(clouds.clone(), &self.trainer.recipe, "learnt", epoch);
         let batch = self.trainer.recipe.batch;
         let bar = ProgressBar::new(batches::count(clouds.len(), &self.trainer.recipe) as u64);
         let template = "epoch {prefix} {bar:30} {pos}/{len} {msg} {eta} left";
@@ -197,6 +212,7 @@ impl Run {
             classes: self.classes.clone(),
             normalization: recipe.normalization,
             unknown_classes: recipe.unknown.clone(),
+            outlier_filter: recipe.outlier_filter,
             sampler: Some(sampler.to_owned()),
             points: Some(points),
             edge_radii: recipe.network.edges.iter().map(|edge| edge.radius).collect(),
@@ -256,7 +272,8 @@ impl Run {
     fn test(&self, model: &Path, test: &Path, data: &str) -> Result<String, Error> {
         let recipe = &self.trainer.recipe;
         let most_points = points_to_read(recipe);
-        let clouds = Clouds::read_for(recipe.normalization, test, Split::Test, most_points)?;
+        let mut clouds = Clouds::read_for(recipe.normalization, test, Split::Test, most_points)?;
+        clouds.classes = recipe.classes(&clouds.classes);
         if clouds.classes != self.classes {
             let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
             return Err(Error::Data { path: test.to_path_buf(), cause });

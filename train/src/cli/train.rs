@@ -27,6 +27,10 @@ pub struct Args {
     /// of the baseline]
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
+    /// Start from the weights of this model file, of the same layers, whose classes are
+    /// the first of the data's [default: from random weights]
+    #[arg(long, value_name = "MODEL")]
+    init: Option<PathBuf>,
     /// Network: pointnet, or cpl (pointnet after a Critical Points Layer)
     /// [default: the recipe's]
     #[arg(long, value_name = "NAME", value_parser = ["pointnet", "cpl"])]
@@ -82,7 +86,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let name = args.data.display().to_string();
     let data_name = args.data_name.as_ref().unwrap_or(&name);
     let test = args.test.clone().or(halves);
-    let job = Job { recipe, clouds: &clouds, data: &name, data_name, out: &args.out };
+    let init = args.init.as_deref();
+    let job = Job { recipe, init, clouds: &clouds, data: &name, data_name, out: &args.out };
     if let Some(accuracy) = job.run(test.as_deref())? {
         super::print(&accuracy)?;
     }

@@ -10,6 +10,7 @@ mod killed;
 mod program;
 mod reference;
 mod resume;
+mod robust;
 
 use formats::labelled::{LabelledSet, equal_offsets};
 use formats::rng::StreamKey;
