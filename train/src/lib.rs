@@ -22,6 +22,7 @@ pub mod error;
 pub mod evaluate;
 pub mod explanation_drawing;
 pub mod gumbel;
+pub mod init;
 pub mod layer;
 pub mod lime;
 pub mod loss;

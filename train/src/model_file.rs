@@ -8,7 +8,7 @@ use formats::model_card::ModelCard;
 use formats::weights::{Tensor, WeightsFile, tensor_part, write_half_weights, write_weights};
 
 use crate::error::Error;
-use crate::layer::{LayerMut, Module};
+use crate::layer::Module;
 use crate::point_encoder::TRAINING_ONLY;
 
 /// Parameters and running statistics by name.
@@ -49,35 +49,6 @@ pub fn read(path: &Path, network: &mut dyn Module) -> Result<(), Error> {
     }
     let mut statistics = network.statistics().into_iter();
     Ok(statistics.try_for_each(|(name, values)| read_into(&mut file, &name, values))?)
-}
-
-/// Sets `network` to the shipped weights at `path`, whose batch norms are folded in; the
-/// first batch makes new ones that change nothing. Classes that the file lacks, the last
-/// ones, keep their random weights.
-///
-/// # Errors
-/// As [`read()`]; a model whose classes are not the first of `classes`.
-pub fn start_from(path: &Path, network: &mut dyn Module, classes: &[String]) -> Result<(), Error> {
-    let mut file = WeightsFile::open(path)?;
-    let known = ModelCard::from_metadata(path, &file.metadata())?.classes;
-    if !classes.starts_with(&known) {
-        let cause = format!("expected the first of the classes {classes:?}, found {known:?}");
-        return Err(Error::Data { path: path.to_path_buf(), cause });
-    }
-    for LayerMut { linear, norm, .. } in network.layers() {
-        let is_last = norm.is_none();
-        for parameter in [&mut linear.weight, &mut linear.bias] {
-            let mut values = parameter.value.clone();
-            let new =
-                if is_last { values.len() / classes.len() * known.len() } else { values.len() };
-            let kept = values.split_off(new);
-            read_into(&mut file, &parameter.name, &mut values)?;
-            values.extend(kept);
-            parameter.value = values;
-        }
-        norm.into_iter().for_each(|norm| norm.adopts = true);
-    }
-    Ok(())
 }
 
 /// Sets `values` to the tensor `name` of `file`.

@@ -2,7 +2,7 @@
 //! (yanx27/Pointnet_Pointnet2_pytorch, `train_classification.py`,
 //! `provider.py`).
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use formats::FormatError;
 use formats::model_card::Normalization;
@@ -21,6 +21,9 @@ use crate::shape::{Edge, Shape};
 pub struct Recipe {
     /// Seed of all random numbers.
     pub seed: u64,
+    /// Model file whose weights training starts from; random numbers if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub init: Option<PathBuf>,
     /// Passes over the training set.
     pub epochs: u32,
     /// Clouds of a batch; an incomplete batch at an epoch's end is left out.
@@ -87,6 +90,7 @@ impl Default for Recipe {
     fn default() -> Self {
         Self {
             seed: 0,
+            init: None,
             epochs: 200,
             batch: 24,
             points: 1024,

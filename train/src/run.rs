@@ -17,7 +17,7 @@ use crate::evaluate::{confusion, predictions};
 use crate::metrics::{Metrics, Row};
 use crate::recipe::{Recipe, Sampling};
 use crate::trainer::{EpochSummary, Trainer};
-use crate::{accuracy_report, batches, checkpoint, model_file, negatives};
+use crate::{accuracy_report, batches, checkpoint, init, model_file, negatives};
 
 /// Points that are read from a text file at most: as many as the baseline's
 /// files have.
@@ -35,8 +35,6 @@ pub fn points_to_read(recipe: &Recipe) -> usize {
 pub struct Job<'a> {
     /// How to train.
     pub recipe: Recipe,
-    /// Model file whose weights the network starts with; random ones without.
-    pub init: Option<&'a Path>,
     /// What to learn from.
     pub clouds: &'a Clouds,
     /// Where the clouds come from, for errors.
@@ -74,7 +72,7 @@ impl Job<'_> {
         let folder = out.with_extension("run");
         fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
         atomic::sweep_leftovers(&folder)?;
-        let mut run = Run::open(folder, &self)?;
+        let mut run = Run::open(folder, &self, &clouds)?;
         while run.trainer.epoch < run.trainer.recipe.epochs {
             run.epoch(&clouds, &held)?;
         }
@@ -121,25 +119,28 @@ struct Run {
 }
 
 impl Run {
-    fn open(folder: PathBuf, job: &Job<'_>) -> Result<Self, Error> {
+    /// The run in `folder` as its checkpoint has it, or a new one that learns from
+    /// `clouds`.
+    fn open(folder: PathBuf, job: &Job<'_>, clouds: &Clouds) -> Result<Self, Error> {
         let classes = job.recipe.classes(&job.clouds.classes);
-        let mut trainer = Trainer::new(job.recipe.clone(), classes.len())?;
-        let path = folder.join("checkpoint.safetensors");
-        let metrics = if path.is_file() {
-            let notes = checkpoint::read(&path, &mut trainer)?;
-            eprintln!("resuming after epoch {} of {}", trainer.epoch, trainer.recipe.epochs);
-            Metrics::from_notes(&notes)
-                .map_err(|cause| FormatError::malformed(&path, "metadata `notes`", cause))?
-        } else {
-            if let Some(init) = job.init {
-                model_file::start_from(init, &mut trainer.model, &classes)?;
-            }
-            Metrics::default()
-        };
-        let text = trainer.recipe.to_toml()?;
-        atomic::write_bytes(&folder.join("recipe.toml"), &text)?;
+        let trainer = Trainer::new(job.recipe.clone(), classes.len())?;
         let training_set = job.data_name.to_owned();
-        Ok(Self { folder, trainer, metrics, classes, training_set })
+        let metrics = Metrics::default();
+        let mut run = Self { folder, trainer, metrics, classes, training_set };
+        let path = run.folder.join("checkpoint.safetensors");
+        if path.is_file() {
+            let notes = checkpoint::read(&path, &mut run.trainer)?;
+            eprintln!("resuming after epoch {} of {}", run.trainer.epoch, job.recipe.epochs);
+            run.metrics = Metrics::from_notes(&notes)
+                .map_err(|cause| FormatError::malformed(&path, "metadata `notes`", cause))?;
+        } else if let Some(model) = &job.recipe.init {
+            let card = run.card(None);
+            let clouds = negatives::added(clouds.clone(), &job.recipe, "learnt", 0);
+            init::start(&mut run.trainer, model, &card, &clouds)?;
+        }
+        let text = run.trainer.recipe.to_toml()?;
+        atomic::write_bytes(&run.folder.join("recipe.toml"), &text)?;
+        Ok(run)
     }
 
     fn epoch(&mut self, clouds: &Clouds, held: &Clouds) -> Result<(), Error> {
@@ -208,6 +209,9 @@ impl Run {
             (None, Sampling::Random) => ("random", recipe.points),
             (None, Sampling::Fps) => ("fps", recipe.points),
         };
+        let from = recipe.init.as_deref().and_then(Path::file_stem);
+        let from = from.map(|name| format!(", from {}", name.to_string_lossy()));
+        let from = from.unwrap_or_default();
         ModelCard {
             classes: self.classes.clone(),
             normalization: recipe.normalization,
@@ -218,7 +222,7 @@ impl Run {
             edge_radii: recipe.network.edges.iter().map(|edge| edge.radius).collect(),
             training_set: Some(self.training_set.clone()),
             accuracy,
-            provenance: Some(format!("edgepuck train, seed {}", recipe.seed)),
+            provenance: Some(format!("edgepuck train, seed {}{from}", recipe.seed)),
             ..ModelCard::default()
         }
     }

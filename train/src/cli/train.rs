@@ -27,8 +27,9 @@ pub struct Args {
     /// of the baseline]
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
-    /// Start from the weights of this model file, of the same layers, whose classes are
-    /// the first of the data's [default: from random weights]
+    /// Model file whose weights training starts from. All layers but the last must be
+    /// those of the recipe; the last is taken, too, if the model's classes are the first
+    /// of the recipe's, and others get random numbers [default: random numbers]
     #[arg(long, value_name = "MODEL")]
     init: Option<PathBuf>,
     /// Network: pointnet, or cpl (pointnet after a Critical Points Layer)
@@ -86,8 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let name = args.data.display().to_string();
     let data_name = args.data_name.as_ref().unwrap_or(&name);
     let test = args.test.clone().or(halves);
-    let init = args.init.as_deref();
-    let job = Job { recipe, init, clouds: &clouds, data: &name, data_name, out: &args.out };
+    let job = Job { recipe, clouds: &clouds, data: &name, data_name, out: &args.out };
     if let Some(accuracy) = job.run(test.as_deref())? {
         super::print(&accuracy)?;
     }
@@ -115,6 +115,7 @@ fn recipe(args: &Args) -> anyhow::Result<Recipe> {
     recipe.points = args.points.unwrap_or(recipe.points);
     recipe.epochs = args.epochs.unwrap_or(recipe.epochs);
     recipe.seed = args.seed.unwrap_or(recipe.seed);
+    recipe.init = args.init.clone().or(recipe.init);
     recipe.check()?;
     Ok(recipe)
 }

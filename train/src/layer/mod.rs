@@ -21,7 +21,7 @@ mod transform;
 pub use edge::EdgeLayer;
 pub use hidden::HiddenLayer;
 pub use linear::Linear;
-pub use norm::Norm;
+pub use norm::{EPSILON, Norm};
 pub use normed::Normed;
 pub use pooled::PooledLayer;
 pub use transform::{Transforms, orthogonality};

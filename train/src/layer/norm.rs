@@ -24,9 +24,6 @@ pub struct Norm {
     pub mean: Vec<f32>,
     /// Running variance.
     pub variance: Vec<f32>,
-    /// Take the first batch's statistics for scale, shift and running ones, so that the
-    /// linear layer's output passes through unchanged.
-    pub adopts: bool,
 }
 
 /// The values of a forward pass that the backward pass needs.
@@ -51,7 +48,6 @@ impl Norm {
             shift: parameter("bias", 0.0),
             mean: vec![0.0; channels],
             variance: vec![1.0; channels],
-            adopts: false,
         }
     }
 
@@ -86,20 +82,12 @@ impl Norm {
         total: f32,
         momentum: f32,
     ) {
-        let (unbiased, momentum) = match self.adopts {
-            true => (1.0, 1.0),
-            false => (total / (total - 1.0).max(1.0), momentum),
-        };
+        let unbiased = total / (total - 1.0).max(1.0);
         for (channel, running) in self.mean.iter_mut().enumerate() {
             *running += momentum * (mean[channel] + bias[channel] - *running);
         }
         for (running, variance) in self.variance.iter_mut().zip(variance) {
             *running += momentum * (variance * unbiased - *running);
-        }
-        if std::mem::take(&mut self.adopts) {
-            let deviation = |variance: &f32| (variance + EPSILON).sqrt();
-            self.scale.value = variance.iter().map(deviation).collect();
-            self.shift.value.clone_from(&self.mean);
         }
     }
 

@@ -6,6 +6,7 @@ mod augment;
 mod clusters;
 mod export;
 mod gradients;
+mod init;
 mod killed;
 mod program;
 mod reference;

@@ -28,7 +28,7 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
         return Ok(());
     }
     eprintln!("training {name}: {} clouds, {} points", clouds.len(), recipe.points);
-    let job = Job { recipe, init: None, clouds, data: name, data_name: name, out };
+    let job = Job { recipe, clouds, data: name, data_name: name, out };
     job.run(None).map(|_| ()).with_context(|| format!("cannot train {name}"))
 }
 
