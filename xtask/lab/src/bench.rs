@@ -5,7 +5,8 @@
 //! the comparison with Embree ([`peers`]), the rays lost without [`watertightness`], and
 //! what [`simplify`] saves. [`infer`] is about classifying, sampling and learning,
 //! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters,
-//! [`sensor`] about how true a profile is to real sweeps.
+//! [`sensor`] about how true a profile is to real sweeps, [`robustness`] about what
+//! classifiers make of strays, turns and few points.
 
 use crate::measure::machine::{self, Machine};
 use crate::measure::{backends, bench_mesh};
@@ -13,7 +14,7 @@ use crate::pi5;
 use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
-use crate::study::{devices, numerics, sensor};
+use crate::study::{devices, numerics, robustness, sensor};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -53,6 +54,8 @@ enum Benchmark {
     Devices(devices::DevicesArgs),
     /// Compare a sensor's profile with real sweeps of the sensor: directions, noise, missing returns.
     Sensor(sensor::SensorArgs),
+    /// Measure classifiers of whole objects on strays, turned and sparse clouds, and on no objects.
+    Robustness(robustness::RobustnessArgs),
 }
 
 #[derive(Args, Debug)]
@@ -135,6 +138,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome> {
         Benchmark::Growth(args) => numerics::run(args),
         Benchmark::Devices(args) => devices::run(args),
         Benchmark::Sensor(args) => sensor::run(args),
+        Benchmark::Robustness(args) => robustness::run(args),
     }?;
     Ok(Outcome::Success)
 }

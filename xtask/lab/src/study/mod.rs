@@ -8,6 +8,7 @@ pub mod numerics;
 mod plan;
 pub mod reproduction;
 mod resume;
+pub mod robustness;
 pub mod sensor;
 #[cfg(test)]
 mod test_clouds;
