@@ -7,6 +7,7 @@
 //! | `sampler` | sampler that the model was trained behind, as `infer-cpu --sampler` names it | `all` |
 //! | `points` | points that the sampler keeps | none |
 //! | `fps_start` | `farthest` or `first` | `farthest` |
+//! | `outlier_filter` | `true` if outliers are dropped before the sampler | `false` |
 //! | `transform_after` | layer of the trunk whose features the feature transform turns | `1` |
 //! | `pooled` | `relu` if the trunk's last layer has a ReLU, else `linear` | `linear` |
 //! | `edge_radii` | JSON list: how far each layer `edge.conv1…` looks around a point | none |
@@ -44,6 +45,8 @@ pub struct ModelCard {
     pub points: Option<usize>,
     /// Where farthest point sampling began in training.
     pub fps_start: Option<String>,
+    /// Whether outliers were dropped before the sampler in training.
+    pub outlier_filter: bool,
     /// How many layers of the trunk come before the feature transform.
     pub transform_after: usize,
     /// Whether the trunk's last layer has a ReLU.
@@ -104,6 +107,7 @@ impl Default for ModelCard {
             sampler: None,
             points: None,
             fps_start: None,
+            outlier_filter: false,
             transform_after: 1,
             pooled_relu: false,
             edge_radii: Vec::new(),
@@ -150,6 +154,11 @@ impl ModelCard {
             sampler: text("sampler"),
             points: entries.get("points", |word| count(word).map(Some), None)?,
             fps_start: text("fps_start"),
+            outlier_filter: entries.get(
+                "outlier_filter",
+                either("false", "true"),
+                default.outlier_filter,
+            )?,
             transform_after: entries.get("transform_after", count, default.transform_after)?,
             pooled_relu: entries.get("pooled", either("linear", "relu"), default.pooled_relu)?,
             edge_radii: entries.get("edge_radii", json, default.edge_radii)?,
@@ -175,6 +184,7 @@ impl ModelCard {
             ("sampler", self.sampler.clone()),
             ("points", self.points.map(|points| points.to_string())),
             ("fps_start", self.fps_start.clone()),
+            ("outlier_filter", self.outlier_filter.then(|| "true".to_owned())),
             ("transform_after", Some(self.transform_after.to_string())),
             ("pooled", Some(if self.pooled_relu { "relu" } else { "linear" }.to_owned())),
             ("edge_radii", (!self.edge_radii.is_empty()).then(|| format!("{:?}", self.edge_radii))),
@@ -262,6 +272,7 @@ mod tests {
             sampler: Some("cpl".into()),
             points: Some(64),
             fps_start: Some("first".into()),
+            outlier_filter: true,
             transform_after: 2,
             pooled_relu: true,
             edge_radii: vec![0.1, 0.4],
@@ -286,6 +297,7 @@ mod tests {
             "classes",
             "normalization",
             "points",
+            "outlier_filter",
             "transform_after",
             "pooled",
             "edge_radii",

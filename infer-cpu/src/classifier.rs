@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use formats::model_card::ModelCard;
+use formats::model_card::{ModelCard, Normalization};
 
 use crate::choose::check_finite;
 use crate::engine::{Forward, Input, RangeEvents, Scratch};
@@ -14,7 +14,7 @@ use crate::normalize;
 use crate::options::{MOST_POINTS, MOST_THREADS, Options};
 use crate::precision::Precision;
 use crate::prediction::{Prediction, UnknownRule, argmax, energy};
-use crate::sampler::{SamplerKind, SamplerSpec};
+use crate::sampler::{OutlierFilter, SamplerKind, SamplerSpec};
 use crate::selection::{Selection, front_pass};
 use crate::source::ModelSource;
 use crate::test_time_augmentation::TestTimeAugmentation;
@@ -57,6 +57,10 @@ pub struct Classifier {
     /// Height of the ground under the cloud at hand, where it is known.
     ground_z: Option<f64>,
     normalized: Vec<[f32; 3]>,
+    /// Where clouds are filtered before they are sampled.
+    outliers: Option<OutlierFilter>,
+    /// Places of the points that [`Classifier::sample`] has chosen.
+    sampled: Vec<u32>,
     unknown: UnknownRule,
     prediction: Prediction,
 }
@@ -104,6 +108,7 @@ impl Classifier {
         let selection = Selection::new(&spec, front)?;
         let classes = class_names(&card, network.n_classes());
         let prediction = Prediction::empty(&classes, card.temperature, options.precision);
+        let outliers = filters_outliers(options, &card)?.then(OutlierFilter::default);
         let mut classifier = Self {
             source: (options.precision != Precision::F32).then_some(source),
             unknown: UnknownRule::new(&card, &classes),
@@ -120,6 +125,8 @@ impl Classifier {
             finite: Vec::new(),
             ground_z: None,
             normalized: Vec::new(),
+            outliers,
+            sampled: Vec::new(),
             prediction,
         };
         classifier.reserve(options.capacity)?;
@@ -138,6 +145,8 @@ impl Classifier {
         self.finite.reserve(n);
         self.normalized.reserve(n);
         self.augmentation.reserve(n);
+        self.sampled.reserve(n);
+        self.outliers.iter_mut().for_each(|filter| filter.reserve(n));
         self.selection.reserve(n, self.kernels, &*self.network, &mut self.scratch)
     }
 
@@ -211,7 +220,11 @@ impl Classifier {
         self.take(points.iter().copied())?;
         self.normalize();
         let Self { selection, normalized, kernels, network, scratch, .. } = self;
-        selection.select(normalized, kernels, &**network, scratch)
+        let places = selection.select(normalized, kernels, &**network, scratch)?;
+        self.sampled.clear();
+        self.sampled.extend(places);
+        self.outliers.iter().for_each(|filter| filter.in_whole_cloud(&mut self.sampled));
+        Ok(&self.sampled)
     }
 
     /// Keeps what is finite of `points`.
@@ -237,7 +250,19 @@ impl Classifier {
         }
     }
 
+    /// Normalises the cloud at hand, and once more if that shows outliers.
     fn normalize(&mut self) {
+        self.normalize_whole();
+        self.prediction.n_outliers = 0;
+        if let Some(filter) = &mut self.outliers {
+            self.prediction.n_outliers = filter.drop_outliers(&mut self.finite, &self.normalized);
+            if self.prediction.n_outliers > 0 {
+                self.normalize_whole();
+            }
+        }
+    }
+
+    fn normalize_whole(&mut self) {
         let normalization = self.options.normalization.unwrap_or(self.card.normalization);
         normalize(normalization, &self.finite, self.ground_z, &mut self.normalized);
     }
@@ -322,6 +347,23 @@ fn forward_whole(
     let input = Input { points: selection.points(), cloud, pooled_stn: selection.pooled_stn() };
     network.run(&input, scratch);
     Ok(scratch.events)
+}
+
+/// Whether outliers are dropped: as the model was trained, unless `options` say
+/// otherwise.
+///
+/// # Errors
+/// [`Error::OutlierFilter`] where clouds are not normalised to the unit sphere. In
+/// clusters in metres an outlier shrinks nothing, and the filter was not measured to help.
+fn filters_outliers(options: &Options, card: &ModelCard) -> Result<bool, Error> {
+    let normalization = options.normalization.unwrap_or(card.normalization);
+    match options.outlier_filter {
+        _ if normalization == Normalization::UnitSphere => {
+            Ok(options.outlier_filter.unwrap_or(card.outlier_filter))
+        }
+        Some(true) => Err(Error::OutlierFilter(normalization)),
+        _ => Ok(false),
+    }
 }
 
 fn all_finite(values: &[f32]) -> bool {

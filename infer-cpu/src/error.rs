@@ -49,6 +49,9 @@ pub enum Error {
         /// The precision.
         precision: crate::Precision,
     },
+    /// Outliers are sought in clouds of the unit sphere alone.
+    #[error("expected clouds normalised to unit-sphere for the outlier filter, found {0}")]
+    OutlierFilter(formats::model_card::Normalization),
     /// Arithmetic left the range of f32.
     #[error("the network overflows on this cloud: its logits are not finite")]
     Overflow,

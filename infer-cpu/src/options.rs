@@ -92,6 +92,9 @@ pub struct Options {
     pub activation_ranges: Option<BTreeMap<String, f32>>,
     /// How clouds are normalised; as in training if `None`.
     pub normalization: Option<Normalization>,
+    /// Whether outliers are dropped before the sampler, of clouds in the unit sphere; as
+    /// in training if `None`.
+    pub outlier_filter: Option<bool>,
     /// Drop points that are not finite instead of refusing the cloud.
     pub drop_invalid: bool,
     /// Draws of a random subset whose log-probabilities are averaged.
@@ -120,6 +123,7 @@ impl Default for Options {
             sampler: None,
             activation_ranges: None,
             normalization: None,
+            outlier_filter: None,
             drop_invalid: false,
             votes: 1,
             vote_rotations: false,

@@ -32,6 +32,8 @@ pub struct Prediction {
     pub n_points: usize,
     /// Points that were dropped because a coordinate was not finite.
     pub n_dropped: usize,
+    /// Points, of [`Prediction::n_points`], that were dropped as outliers.
+    pub n_outliers: usize,
     /// Points that the network saw: those that the sampler kept, each once.
     pub n_used: usize,
     /// What the network computed in: fp32 if the precision asked for
@@ -54,6 +56,7 @@ impl Prediction {
             logits: Vec::with_capacity(classes.len()),
             n_points: 0,
             n_dropped: 0,
+            n_outliers: 0,
             n_used: 0,
             precision,
             n_clipped: 0,

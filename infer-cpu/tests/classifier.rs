@@ -6,7 +6,8 @@
 #[path = "support/tiny_model.rs"]
 mod tiny_model;
 
-use formats::model_card::ModelCard;
+use formats::model_card::{ModelCard, Normalization};
+use infer_cpu::kernel;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Error, Options, Precision};
 
@@ -73,4 +74,66 @@ fn a_precision_that_overflows_falls_back_to_fp32_when_the_file_is_gone() {
     assert_eq!(prediction.precision, Precision::F32);
     assert_eq!(prediction.logits, expected);
     assert!(matches!(Classifier::load(&model, &options), Err(Error::Format(_))));
+}
+
+/// A model whose card asks for the outlier filter.
+fn filtering_model(folder: &std::path::Path) -> std::path::PathBuf {
+    let card = ModelCard {
+        outlier_filter: true,
+        sampler: Some("fps".to_owned()),
+        points: Some(20),
+        ..ModelCard::default()
+    };
+    tiny_model::write(&folder.join("m.safetensors"), &tiny_model::tensors(4), &card)
+}
+
+/// [`cloud`] after a stray.
+fn cloud_with_stray() -> Vec<[f32; 3]> {
+    [vec![[90.0, -40.0, 30.0]], cloud()].concat()
+}
+
+#[test]
+fn a_stray_changes_no_bit_of_a_model_that_filters_outliers() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = filtering_model(folder.path());
+    for kernels in kernel::available() {
+        for threads in [1, 3] {
+            let options = Options { kernel: Some(kernels.name), threads, ..Options::default() };
+            let mut classifier = Classifier::load(&model, &options).unwrap();
+            let alone = classifier.classify(&cloud()).unwrap().clone();
+            assert_eq!((alone.n_points, alone.n_outliers), (60, 0));
+            let found = classifier.classify(&cloud_with_stray()).unwrap();
+            assert_eq!((found.n_points, found.n_outliers), (61, 1));
+            assert_eq!(found.logits, alone.logits, "{} and {threads} threads", kernels.name);
+            // The filter is an option, and the card's wish a default.
+            let off = Options { outlier_filter: Some(false), ..options };
+            let mut plain = Classifier::load(&model, &off).unwrap();
+            assert_eq!(plain.classify(&cloud()).unwrap().logits, alone.logits);
+            assert_ne!(plain.classify(&cloud_with_stray()).unwrap().logits, alone.logits);
+        }
+    }
+}
+
+#[test]
+fn sampled_places_are_those_of_the_cloud_with_its_outliers() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut classifier =
+        Classifier::load(&filtering_model(folder.path()), &Options::default()).unwrap();
+    let in_f64 = |cloud: Vec<[f32; 3]>| cloud.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
+    let expected: Vec<u32> =
+        classifier.sample(&in_f64(cloud())).unwrap().iter().map(|place| place + 1).collect();
+    assert_eq!(classifier.sample(&in_f64(cloud_with_stray())).unwrap(), expected);
+}
+
+#[test]
+fn the_outlier_filter_is_for_clouds_in_the_unit_sphere() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = filtering_model(folder.path());
+    let metric = Options { normalization: Some(Normalization::Metric), ..Options::default() };
+    let mut classifier = Classifier::load(&model, &metric).unwrap();
+    assert_eq!(classifier.classify(&cloud_with_stray()).unwrap().n_outliers, 0);
+    let asked = Options { outlier_filter: Some(true), ..metric };
+    let error = Classifier::load(&model, &asked).err().unwrap();
+    let expected = "expected clouds normalised to unit-sphere for the outlier filter, found metric";
+    assert_eq!(error.to_string(), expected);
 }

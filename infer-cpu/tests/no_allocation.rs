@@ -28,10 +28,12 @@ fn clouds() -> Vec<Vec<[f32; 3]>> {
     let point = |i: usize| [0, 1, 2].map(|axis| key.unit((3 * i + axis) as u64) as f32);
     let all = [1, 48, 49, 150, CAPACITY, 2, 47, 97, 200];
     let sizes = if IS_EMULATED { &all[2..5] } else { &all[..] };
+    // With one stray, which the outlier filter drops.
+    let stray = (0..CAPACITY).map(|i| if i == 7 { [9.0; 3] } else { point(i) }).collect();
     let distinct = sizes.iter().map(|&n| (0..n).map(point).collect());
     let repeated = sizes.iter().map(|&n| (0..n).map(|i| point(i % 5)).collect());
     let equal = sizes.iter().map(|&n| vec![[0.5; 3]; n]);
-    distinct.chain(repeated).chain(equal).collect()
+    distinct.chain(repeated).chain(equal).chain([stray]).collect()
 }
 
 /// How often `n` classifications allocate.
@@ -87,6 +89,11 @@ fn main() {
                 }
             }
         }
+    }
+    let filter = Options { outlier_filter: Some(true), capacity: CAPACITY, ..Options::default() };
+    let n = allocations(&model, &filter, &clouds, ROUNDS * clouds.len());
+    if n > 0 {
+        found.push(format!("outlier filter: {n}"));
     }
     let votes = Options {
         sampler: Some(spec(SamplerKind::Random)),

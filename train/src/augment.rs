@@ -74,6 +74,22 @@ pub fn augment(
     TrainingCloud { points, neighborhood, first_weight, target }
 }
 
+/// `held`, and each of its clouds once more as training varies and turns it, so that a
+/// checkpoint is not chosen for clouds alone that nothing has happened to.
+#[must_use]
+pub fn varied_too(held: &Clouds, recipe: &Recipe) -> Clouds {
+    let mut both = held.clone();
+    both.set.names = None;
+    let turned = Augment { scale: [1.0; 2], shift: 0.0, stretch: 0.0, ..recipe.augment.clone() };
+    for i in 0..held.len() {
+        let mut draws = Draws::new(StreamKey::new(recipe.seed, "vary validation", i as u32));
+        let mut cloud = cluster::varied_object(held.set.cloud(i), recipe, &mut draws);
+        transform(&mut cloud, &turned, &mut draws);
+        both.set.push(&cloud, held.set.labels[i]);
+    }
+    both
+}
+
 /// The points of a cloud that the network sees.
 struct ChosenPoints {
     points: Vec<[f32; 3]>,
@@ -93,6 +109,8 @@ fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> Chos
     let cloud = clouds.set.cloud(i);
     let cloud: Cow<'_, [[f32; 3]]> = if recipe.normalization.is_metric() {
         cluster::varied(cloud, clouds.set.ground_z(i), recipe, draws).into()
+    } else if recipe.varies_objects() {
+        cluster::varied_object(cloud, recipe, draws).into()
     } else {
         cloud.into()
     };
@@ -150,7 +168,10 @@ fn transform(points: &mut [[f32; 3]], augment: &Augment, draws: &mut Draws) {
     let scale = draws.between(low, high);
     let shifts = [(); 3].map(|()| draws.between(-shift, shift));
     let factors = [(); 3].map(|()| scale * draws.between(1.0 - stretch, 1.0 + stretch));
-    let angle = draws.between(-rotate_degrees, rotate_degrees).to_radians();
+    let mut angle = draws.between(-rotate_degrees, rotate_degrees).to_radians();
+    if augment.rotate_share < 1.0 && draws.unit() >= augment.rotate_share {
+        angle = 0.0;
+    }
     let [a, b, _] = axes(augment.up);
     let (sin, cos) = angle.sin_cos();
     let sensor = (augment.sensor_noise > 0.0).then(|| sensor(augment.up, draws));

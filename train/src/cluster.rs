@@ -6,6 +6,7 @@
 //! the mean and the lowest point of what a sensor saw, errors included. A turn about
 //! the up axis alone may follow: it and the centring can change places.
 
+use infer_cpu::sampler::OutlierFilter;
 use serde::{Deserialize, Serialize};
 
 use crate::draws::Draws;
@@ -38,6 +39,12 @@ pub struct ClusterVariation {
 }
 
 impl ClusterVariation {
+    /// Whether it varies nothing but what clouds of the unit sphere have, too.
+    pub(crate) fn suits_whole_objects(&self) -> bool {
+        let Self { cut, ground_share, ground_reach, ground_unknown, .. } = *self;
+        [cut, ground_share, ground_reach, ground_unknown] == [0.0; 4]
+    }
+
     /// Whether each value is in its range, with the recipe's key and what is expected.
     pub(crate) fn checks(&self) -> [(bool, &'static str, &'static str); 8] {
         let Self { density, cut, stray_share, strays, stray_reach, .. } = *self;
@@ -78,12 +85,32 @@ pub(crate) fn varied(
     let cut = cut(cluster, variation.cut * draws.unit());
     let seen = thinned(&cut, variation, draws);
     let mut points = noisy(&seen, &recipe.augment, draws);
-    add_strays(&mut points, variation, draws);
+    add_strays(&mut points, variation, 0.0, draws);
     let ground_z = ground_z.map(f64::from).filter(|_| draws.unit() >= variation.ground_unknown);
     add_ground(&mut points, ground_z, variation, draws);
     let mut centred = Vec::new();
     infer_cpu::normalize(recipe.normalization, &points, ground_z, &mut centred);
     centred
+}
+
+/// `cloud`, a whole object in the unit sphere: thinned, among strays, and then as
+/// infer-cpu makes it of that, without outliers and in the unit sphere again.
+pub(crate) fn varied_object(
+    cloud: &[[f32; 3]],
+    recipe: &Recipe,
+    draws: &mut Draws,
+) -> Vec<[f32; 3]> {
+    let variation = &recipe.clusters;
+    let mut points: Vec<[f64; 3]> =
+        thinned(cloud, variation, draws).iter().map(|point| point.map(f64::from)).collect();
+    add_strays(&mut points, variation, variation.stray_reach, draws);
+    let mut normalized = Vec::new();
+    infer_cpu::to_unit_sphere(&points, &mut normalized);
+    if recipe.outlier_filter && OutlierFilter::default().drop_outliers(&mut points, &normalized) > 0
+    {
+        infer_cpu::to_unit_sphere(&points, &mut normalized);
+    }
+    normalized
 }
 
 /// `cluster` without what is less than `height` above its lowest point: a
@@ -180,9 +207,14 @@ fn add_ground(
 }
 
 /// Adds points of other things to a share of clusters: anywhere in the cluster's
-/// box, widened to its sides and upwards. Below it is the ground, which a
-/// segmentation has removed.
-fn add_strays(points: &mut Vec<[f64; 3]>, variation: &ClusterVariation, draws: &mut Draws) {
+/// box, widened to its sides and upwards, and by `reach_below`: that is 0 where a
+/// segmentation has removed the ground.
+fn add_strays(
+    points: &mut Vec<[f64; 3]>,
+    variation: &ClusterVariation,
+    reach_below: f64,
+    draws: &mut Draws,
+) {
     let ClusterVariation { stray_share, strays, stray_reach, .. } = *variation;
     if stray_share <= 0.0 || draws.unit() >= stray_share {
         return;
@@ -191,7 +223,7 @@ fn add_strays(points: &mut Vec<[f64; 3]>, variation: &ClusterVariation, draws: &
         let along = points.iter().map(|point| point[axis]);
         along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
     });
-    let below = [stray_reach, stray_reach, 0.0];
+    let below = [stray_reach, stray_reach, reach_below];
     for _ in 0..=draws.below(strays) {
         points.push([0, 1, 2].map(|axis| {
             let (low, high) = bounds[axis];

@@ -1,7 +1,7 @@
 //! Training that starts from a model's weights instead of random numbers.
 //!
-//! All layers but the last are the model's; the last is, too, if the model has the
-//! same classes.
+//! All layers but the last are the model's; the last is, too, if the model's classes are
+//! the first of the network's. Its other classes keep random numbers.
 //!
 //! A shipped model has no batch norms: they are folded into its linear layers. A batch
 //! norm of scale 1 and shift 0 would undo what was folded, since training normalises by
@@ -46,9 +46,10 @@ pub fn start(
     let mut file = WeightsFile::open(path)?;
     let model = ModelCard::from_metadata(path, &file.metadata())?;
     check_card(path, card, &model)?;
-    let is_folded = !file.shapes().into_keys().any(|name| name.ends_with(".running_var"));
-    let mut reader = Reader { file: &mut file, used: BTreeSet::new(), is_folded };
-    reader.network(&mut trainer.model, model.classes == card.classes)?;
+    let mut reader = Reader { file: &mut file, used: BTreeSet::new() };
+    let is_known = !model.classes.is_empty() && card.classes.starts_with(&model.classes);
+    let n_known = is_known.then_some(model.classes.len());
+    let is_folded = reader.network(&mut trainer.model, n_known)?;
     reader.check_that_all_is_used()?;
     if is_folded {
         unfold(&mut trainer.model, &trainer.recipe, clouds);
@@ -82,29 +83,37 @@ fn facts(card: &ModelCard) -> [(&'static str, String); 5] {
 struct Reader<'a> {
     file: &'a mut WeightsFile,
     used: BTreeSet<String>,
-    is_folded: bool,
 }
 
 impl Reader<'_> {
-    /// Reads all layers of `model`, without the last unless `with_last`.
-    fn network(&mut self, model: &mut Model, with_last: bool) -> Result<(), FormatError> {
+    /// Reads all layers of `model`, of the last one the first `n_known` classes. Returns
+    /// whether some batch norms were folded.
+    fn network(&mut self, model: &mut Model, n_known: Option<usize>) -> Result<bool, FormatError> {
         let layers: Vec<LayerMut<'_>> = model.layers();
-        let n = layers.len();
+        let (n, mut is_folded) = (layers.len(), false);
         for (place, LayerMut { linear, norm, .. }) in layers.into_iter().enumerate() {
             if linear.name() == TRAINING_ONLY {
                 continue;
             }
-            if place + 1 == n && !with_last {
-                self.used.extend([linear.weight.name.clone(), linear.bias.name.clone()]);
+            if place + 1 == n {
+                for parameter in [&mut linear.weight, &mut linear.bias] {
+                    match n_known {
+                        Some(n_known) => self.first_rows(parameter, n_known)?,
+                        None => _ = self.used.insert(parameter.name.clone()),
+                    }
+                }
                 continue;
             }
             self.parameter(&mut linear.weight)?;
             self.parameter(&mut linear.bias)?;
-            if let Some(norm) = norm.filter(|_| !self.is_folded) {
+            let Some(norm) = norm else { continue };
+            if self.file.shape(&norm.scale.name).is_some() {
                 self.norm(norm)?;
+            } else {
+                is_folded = true;
             }
         }
-        Ok(())
+        Ok(is_folded)
     }
 
     fn norm(&mut self, norm: &mut Norm) -> Result<(), FormatError> {
@@ -119,6 +128,13 @@ impl Reader<'_> {
 
     fn parameter(&mut self, parameter: &mut Parameter) -> Result<(), FormatError> {
         parameter.value = self.tensor(&parameter.name, &parameter.shape)?;
+        Ok(())
+    }
+
+    fn first_rows(&mut self, parameter: &mut Parameter, n: usize) -> Result<(), FormatError> {
+        let shape = [&[n], &parameter.shape[1..]].concat();
+        let rows = self.tensor(&parameter.name, &shape)?;
+        parameter.value[..rows.len()].copy_from_slice(&rows);
         Ok(())
     }
 

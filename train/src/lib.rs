@@ -31,6 +31,7 @@ pub mod metrics;
 mod mlp;
 pub mod model;
 pub mod model_file;
+pub mod negatives;
 pub mod network;
 pub mod object_report;
 pub mod parameter;

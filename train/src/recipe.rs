@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use formats::FormatError;
 use formats::model_card::Normalization;
+use infer_cpu::UNKNOWN;
 use serde::{Deserialize, Serialize};
 
 use crate::adam::Adam;
@@ -52,6 +53,15 @@ pub struct Recipe {
     /// others if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep_known: Option<f64>,
+    /// Clouds of nothing in particular that are made for each epoch, over the clouds of
+    /// the data: patches of ground, walls, blobs, pairs and slivers of objects. Their
+    /// class, `unknown`, comes after those of the data.
+    #[serde(skip_serializing_if = "is_default")]
+    pub negatives: f64,
+    /// The model drops outliers before it samples (infer-cpu's `outliers`), and so does
+    /// its training, for clouds of the unit sphere.
+    #[serde(skip_serializing_if = "is_default")]
+    pub outlier_filter: bool,
     /// Share of the training set's instances that choose the checkpoint; with 0
     /// the last checkpoint is taken.
     pub validation: f64,
@@ -72,7 +82,8 @@ pub struct Recipe {
     pub schedule: Schedule,
     /// How clouds are augmented.
     pub augment: Augment,
-    /// How clusters in metres are varied before that.
+    /// How clusters in metres are varied before that. Clouds of the unit sphere may have
+    /// its density and strays, whose reach is then in radii.
     #[serde(skip_serializing_if = "is_default")]
     pub clusters: ClusterVariation,
 }
@@ -91,6 +102,8 @@ impl Default for Recipe {
             clouds_per_epoch: None,
             unknown: Vec::new(),
             keep_known: None,
+            negatives: 0.0,
+            outlier_filter: false,
             validation: 0.1,
             network: Shape::default(),
             cpl: None,
@@ -107,6 +120,11 @@ impl Default for Recipe {
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
 }
 
 /// Values that files call by their names.
@@ -212,6 +230,10 @@ pub struct Augment {
     pub sensor_noise: f64,
     /// The largest angle about the up axis, degrees; 180 is any.
     pub rotate_degrees: f64,
+    /// Share of clouds that are turned; the others keep the direction that they have in
+    /// the data, which a network of aligned shapes does better with.
+    #[serde(skip_serializing_if = "is_one")]
+    pub rotate_share: f64,
     /// The up axis: x, y or z.
     pub up: Axis,
     /// Each axis is stretched by a factor that is uniform in 1 ± this.
@@ -241,6 +263,7 @@ impl Default for Augment {
             jitter_clip: 0.05,
             sensor_noise: 0.0,
             rotate_degrees: 0.0,
+            rotate_share: 1.0,
             up: Axis::Z,
             stretch: 0.0,
             cut_mix: 0.0,
@@ -275,6 +298,20 @@ impl Recipe {
     #[must_use]
     pub fn is_calibrated(&self) -> bool {
         !self.unknown.is_empty() || self.keep_known.is_some()
+    }
+
+    /// Whether clouds of the unit sphere are varied before points are chosen.
+    #[must_use]
+    pub fn varies_objects(&self) -> bool {
+        let is_unit = self.normalization == Normalization::UnitSphere;
+        is_unit && (self.outlier_filter || !is_default(&self.clusters))
+    }
+
+    /// The network's classes, for data of the classes `of_data`.
+    #[must_use]
+    pub fn classes(&self, of_data: &[String]) -> Vec<String> {
+        let own = (self.negatives > 0.0).then(|| UNKNOWN.to_owned());
+        of_data.iter().cloned().chain(own).collect()
     }
 
     /// Checks that every value is in its range.
@@ -341,9 +378,20 @@ impl Recipe {
                 "expected unit-sphere, metric or metric-sight",
             ),
             (
-                is_metric || is_default(clusters),
+                is_metric || clusters.suits_whole_objects(),
                 "clusters",
                 "expected `normalization` to be metric or metric-sight, because clusters are in metres",
+            ),
+            (
+                !is_metric || !self.outlier_filter,
+                "outlier_filter",
+                "expected false with `normalization` metric, where it was not measured to help",
+            ),
+            (finite(self.negatives), "negatives", FINITE),
+            (
+                self.negatives <= 0.0 || !is_metric && self.unknown == [UNKNOWN],
+                "negatives",
+                "expected `normalization` unit-sphere and `unknown = [\"unknown\"]` with it",
             ),
             (
                 self.keep_known.is_none_or(|kept| kept > 0.0 && kept <= 1.0),
@@ -372,6 +420,11 @@ impl Recipe {
             (share(augment.stretch), "augment.stretch", SHARE),
             ((0.0..=1.0).contains(&augment.cut_mix), "augment.cut_mix", "expected 0 to 1"),
             ((0.0..=180.0).contains(&angle), "augment.rotate_degrees", "expected 0 to 180"),
+            (
+                (0.0..=1.0).contains(&augment.rotate_share),
+                "augment.rotate_share",
+                "expected 0 to 1",
+            ),
         ]);
         match checks.into_iter().find(|(holds, ..)| !holds) {
             Some((_, key, cause)) => Err(Error::Recipe { key, cause: cause.to_owned() }),

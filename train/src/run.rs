@@ -7,8 +7,9 @@ use formats::model_card::ModelCard;
 use formats::split::Split;
 use formats::{FormatError, atomic};
 use indicatif::{ProgressBar, ProgressStyle};
-use infer_cpu::{Evaluation, Options, energy};
+use infer_cpu::{Evaluation, Options, UNKNOWN, energy};
 
+use crate::augment::varied_too;
 use crate::calibration::{quantile, temperature};
 use crate::clouds::Clouds;
 use crate::error::Error;
@@ -16,7 +17,7 @@ use crate::evaluate::{confusion, predictions};
 use crate::metrics::{Metrics, Row};
 use crate::recipe::{Recipe, Sampling};
 use crate::trainer::{EpochSummary, Trainer};
-use crate::{accuracy_report, batches, checkpoint, init, model_file};
+use crate::{accuracy_report, batches, checkpoint, init, model_file, negatives};
 
 /// Points that are read from a text file at most: as many as the baseline's
 /// files have.
@@ -57,7 +58,11 @@ impl Job<'_> {
         recipe.check()?;
         check(all, recipe, data)?;
         let (learnt, held) = all.split_validation(recipe.validation, recipe.seed);
-        let (clouds, held) = (all.select(&learnt), all.select(&held));
+        let (clouds, mut held) = (all.select(&learnt), all.select(&held));
+        if recipe.varies_objects() && !held.is_empty() {
+            held = varied_too(&held, recipe);
+        }
+        let held = negatives::added(held, recipe, "held", 0);
         if batches::count(clouds.len(), recipe) == 0 {
             let n = clouds.len();
             let cause =
@@ -91,7 +96,11 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
         let name = &clouds.classes[class];
         return refuse(format!("expected clouds of every class, found none of {class} ({name})"));
     }
-    if let Some(name) = recipe.unknown.iter().find(|name| !clouds.classes.contains(name)) {
+    if recipe.negatives > 0.0 && clouds.classes.iter().any(|name| name == UNKNOWN) {
+        return refuse(format!("expected no class `{UNKNOWN}` beside the recipe's negatives"));
+    }
+    let lacks = |name: &&String| !recipe.classes(&clouds.classes).contains(name);
+    if let Some(name) = recipe.unknown.iter().find(lacks) {
         return Err(Error::Recipe {
             key: "unknown",
             cause: format!("expected some of the classes {:?}, found `{name}`", clouds.classes),
@@ -113,7 +122,7 @@ impl Run {
     /// The run in `folder` as its checkpoint has it, or a new one that learns from
     /// `clouds`.
     fn open(folder: PathBuf, job: &Job<'_>, clouds: &Clouds) -> Result<Self, Error> {
-        let classes = job.clouds.classes.clone();
+        let classes = job.recipe.classes(&job.clouds.classes);
         let trainer = Trainer::new(job.recipe.clone(), classes.len())?;
         let training_set = job.data_name.to_owned();
         let metrics = Metrics::default();
@@ -126,7 +135,8 @@ impl Run {
                 .map_err(|cause| FormatError::malformed(&path, "metadata `notes`", cause))?;
         } else if let Some(model) = &job.recipe.init {
             let card = run.card(None);
-            init::start(&mut run.trainer, model, &card, clouds)?;
+            let clouds = negatives::added(clouds.clone(), &job.recipe, "learnt", 0);
+            init::start(&mut run.trainer, model, &card, &clouds)?;
         }
         let text = run.trainer.recipe.to_toml()?;
         atomic::write_bytes(&run.folder.join("recipe.toml"), &text)?;
@@ -159,6 +169,7 @@ impl Run {
     /// Learns for one epoch, with a progress bar on standard error.
     fn learn(&mut self, clouds: &Clouds) -> Result<EpochSummary, Error> {
         let (epoch, epochs) = (self.trainer.epoch + 1, self.trainer.recipe.epochs);
+        let clouds = &negatives::added(clouds.clone(), &self.trainer.recipe, "learnt", epoch);
         let batch = self.trainer.recipe.batch;
         let bar = ProgressBar::new(batches::count(clouds.len(), &self.trainer.recipe) as u64);
         let template = "epoch {prefix} {bar:30} {pos}/{len} {msg} {eta} left";
@@ -205,6 +216,7 @@ impl Run {
             classes: self.classes.clone(),
             normalization: recipe.normalization,
             unknown_classes: recipe.unknown.clone(),
+            outlier_filter: recipe.outlier_filter,
             sampler: Some(sampler.to_owned()),
             points: Some(points),
             edge_radii: recipe.network.edges.iter().map(|edge| edge.radius).collect(),
@@ -264,7 +276,8 @@ impl Run {
     fn test(&self, model: &Path, test: &Path, data: &str) -> Result<String, Error> {
         let recipe = &self.trainer.recipe;
         let most_points = points_to_read(recipe);
-        let clouds = Clouds::read_for(recipe.normalization, test, Split::Test, most_points)?;
+        let mut clouds = Clouds::read_for(recipe.normalization, test, Split::Test, most_points)?;
+        clouds.classes = recipe.classes(&clouds.classes);
         if clouds.classes != self.classes {
             let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
             return Err(Error::Data { path: test.to_path_buf(), cause });

@@ -113,6 +113,7 @@ impl EdgepuckOptions {
                 sampler: self.sampler()?,
                 activation_ranges: None,
                 normalization: word("normalization", self.normalization)?,
+                outlier_filter: None,
                 drop_invalid: self.drop_invalid,
                 votes: self.votes,
                 vote_rotations: self.vote_rotations,

@@ -42,7 +42,8 @@ to recognise. With --json the line is an object with these keys: file, class
 (a number), label, unknown (true, only for such an object; class, label and
 confidence then state what it resembles most), confidence (0 to 1), logits, points
 (number of valid points),
-dropped (number of invalid points), used (points that the network saw), clipped
+dropped (number of invalid points), outliers (number of points that the outlier filter
+dropped, if any), used (points that the network saw), clipped
 (number of activations, with i8), precision (f32 if the chosen one overflowed) and
 ms (time without reading the file). If the file fails, the keys are file and error.
 After a failure, the program continues with the next file, and exits with 1 at the
@@ -82,6 +83,11 @@ pub struct Args {
     /// none [default: as in training]
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalization>,
+
+    /// Drop outliers before the sampler, from clouds of the unit sphere [default: as in
+    /// training]
+    #[arg(long, value_name = "YES", value_parser = clap::value_parser!(bool))]
+    outlier_filter: Option<bool>,
 
     /// Precision of the network: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
@@ -173,6 +179,7 @@ impl Args {
             },
             sampler: Some(self.how.apply(self.sampler, trained)?),
             normalization: self.normalize,
+            outlier_filter: self.outlier_filter,
             drop_invalid: self.drop_invalid,
             votes: self.votes,
             vote_rotations: self.vote_rotations,

@@ -67,6 +67,7 @@ fn as_json(path: &Path, summary: &Summary, sampler: &SamplerSpec) -> Value {
         "accuracy": card.accuracy,
         "provenance": card.provenance,
         "normalization": card.normalization.name(),
+        "outlier_filter": card.outlier_filter,
         "unknown_classes": card.unknown_classes,
         "unknown_energy": card.unknown_energy,
         "temperature": card.temperature,
@@ -121,7 +122,8 @@ fn as_text(
     }
     row("normalization", card.normalization.name().to_owned())?;
     let points = card.points.map_or(String::new(), |points| format!(", {points} points"));
-    row("sampler", format!("{}{points}", sampler.kind))?;
+    let filter = if card.outlier_filter { ", after the outlier filter" } else { "" };
+    row("sampler", format!("{}{points}{filter}", sampler.kind))?;
     row("input T-Net", net(summary.stn.as_ref()))?;
     let feature = net(summary.fstn.as_ref());
     match summary.fstn {

@@ -30,9 +30,16 @@ struct Classified<'a> {
     points: usize,
     used: usize,
     dropped: usize,
+    #[serde(skip_serializing_if = "is_zero")]
+    outliers: usize,
     clipped: u64,
     precision: &'a str,
     ms: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_zero(n: &usize) -> bool {
+    *n == 0
 }
 
 /// A cloud without one.
@@ -71,6 +78,7 @@ impl Style {
             points: prediction.n_points,
             used: prediction.n_used,
             dropped: prediction.n_dropped,
+            outliers: prediction.n_outliers,
             clipped: prediction.n_clipped,
             precision: prediction.precision.name(),
             ms: time.as_secs_f64() * 1e3,

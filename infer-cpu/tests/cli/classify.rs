@@ -226,3 +226,15 @@ fn a_reader_that_leaves_is_no_failure() {
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
 }
+
+#[test]
+fn outliers_are_dropped_where_the_card_or_the_flag_says_so() {
+    let folder = Folder::new();
+    folder.cloud("c.xyz", &[strip(50), vec![[40.0, 40.0, 40.0]]].concat());
+    assert!(folder.classify_json("c.xyz")[0].get("outliers").is_none());
+    assert_eq!(folder.classify_json("--outlier-filter true c.xyz")[0]["outliers"], 1);
+    let card = ModelCard { outlier_filter: true, ..card() };
+    tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), &card);
+    assert_eq!(folder.classify_json("c.xyz")[0]["outliers"], 1);
+    assert!(folder.classify_json("--outlier-filter false c.xyz")[0].get("outliers").is_none());
+}

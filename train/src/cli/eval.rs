@@ -34,6 +34,10 @@ pub struct Args {
     /// Precision of the inference: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
+    /// Drop outliers before the sampler, from clouds of the unit sphere [default: as in
+    /// training]
+    #[arg(long, value_name = "YES")]
+    outlier_filter: Option<bool>,
     /// Write the confusion matrix, or the table of clusters, to this CSV file
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -91,7 +95,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn options(args: &Args) -> Options {
-    Options { precision: args.precision, ..Options::default() }
+    let Args { precision, outlier_filter, .. } = *args;
+    Options { precision, outlier_filter, ..Options::default() }
 }
 
 /// Reports on clouds of the model's own classes.
@@ -101,8 +106,13 @@ fn report_clouds(
     clouds: &Clouds,
     names: &[String],
 ) -> anyhow::Result<()> {
+    // A model's classes after those of the data, such as `unknown`, have no cloud.
+    let mut clouds = clouds.clone();
+    if names.starts_with(&clouds.classes) {
+        clouds.classes = names.to_vec();
+    }
     // Also checks that model and data have equally many classes.
-    let found = confusion(&args.model, clouds, &options(args))?;
+    let found = confusion(&args.model, &clouds, &options(args))?;
     let mut pairs = names.iter().zip(&clouds.classes).enumerate();
     if let Some((class, (model, data))) = pairs.find(|(_, (model, data))| model != data) {
         eprintln!(

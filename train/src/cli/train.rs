@@ -28,8 +28,8 @@ pub struct Args {
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
     /// Model file whose weights training starts from. All layers but the last must be
-    /// those of the recipe; the last is taken, too, if the classes are the same
-    /// [default: random numbers]
+    /// those of the recipe; the last is taken, too, if the model's classes are the first
+    /// of the recipe's, and others get random numbers [default: random numbers]
     #[arg(long, value_name = "MODEL")]
     init: Option<PathBuf>,
     /// Network: pointnet, or cpl (pointnet after a Critical Points Layer)

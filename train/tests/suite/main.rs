@@ -11,6 +11,7 @@ mod killed;
 mod program;
 mod reference;
 mod resume;
+mod robust;
 
 use formats::labelled::{LabelledSet, equal_offsets};
 use formats::rng::StreamKey;

@@ -7,7 +7,8 @@
 //! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters,
 //! [`sensor`] about how true a profile is to real sweeps, [`frames`] about what is found in
 //! them, [`sydney`] about what a network that has learnt from simulated scenes gives to one
-//! of real objects.
+//! of real objects, [`robustness`] about what classifiers make of strays, turns and few
+//! points.
 
 use crate::measure::machine::{self, Machine};
 use crate::measure::{backends, bench_mesh};
@@ -15,7 +16,7 @@ use crate::pi5;
 use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
-use crate::study::{devices, frames, numerics, sensor, sydney};
+use crate::study::{devices, frames, numerics, robustness, sensor, sydney};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -59,6 +60,8 @@ enum Benchmark {
     Frames(frames::FramesArgs),
     /// Follow the protocol of the Sydney Urban Objects benchmark, pre-trained and from scratch.
     Sydney(sydney::SydneyArgs),
+    /// Measure classifiers of whole objects on strays, turned and sparse clouds, and on no objects.
+    Robustness(robustness::RobustnessArgs),
 }
 
 #[derive(Args, Debug)]
@@ -143,6 +146,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome> {
         Benchmark::Sensor(args) => sensor::run(args),
         Benchmark::Frames(args) => frames::run(args),
         Benchmark::Sydney(args) => sydney::run(args),
+        Benchmark::Robustness(args) => robustness::run(args),
     }?;
     Ok(Outcome::Success)
 }

@@ -9,6 +9,7 @@ pub mod numerics;
 mod plan;
 pub mod reproduction;
 mod resume;
+pub mod robustness;
 pub mod sensor;
 pub mod sydney;
 #[cfg(test)]

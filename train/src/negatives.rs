@@ -1,0 +1,144 @@
+//! Clouds of nothing in particular, for the class `unknown`. No score of a network that
+//! has met objects alone tells them: to it, flat ground is a keyboard for certain. They
+//! have to be learnt (outlier exposure: Hendrycks et al. 2019).
+
+use formats::labelled::LabelledSet;
+use formats::rng::StreamKey;
+
+use crate::clouds::Clouds;
+use crate::draws::Draws;
+use crate::recipe::Recipe;
+
+/// Points of a negative that is made of nothing else.
+const POINTS: usize = 1024;
+
+formats::named! {
+    /// Kinds of negatives.
+    pub enum Negative: "kind of negative" {
+        /// A patch of ground, rough or in a scanner's lines.
+        Ground = "ground",
+        /// The same upright, in any direction.
+        Wall = "wall",
+        /// One to three clouds without a surface.
+        Blob = "blob",
+        /// Two objects in one cloud.
+        Pair = "pair",
+        /// A slice of an object.
+        Sliver = "sliver",
+    }
+}
+
+/// `clouds`, followed by as many negatives as `recipe` asks for: the same for the same
+/// seed, `purpose` and `index`.
+#[must_use]
+pub fn added(clouds: Clouds, recipe: &Recipe, purpose: &str, index: u32) -> Clouds {
+    let n = (recipe.negatives * clouds.len() as f64) as usize;
+    let classes = recipe.classes(&clouds.classes);
+    if n == 0 {
+        return Clouds { classes, ..clouds };
+    }
+    // Remarks on each cloud would lack those on negatives.
+    let LabelledSet { points, offsets, labels, .. } = clouds.set.clone();
+    let mut set = LabelledSet { points, offsets, labels, ..LabelledSet::default() };
+    for (number, kind) in Negative::ALL.into_iter().cycle().enumerate().take(n) {
+        let stream = StreamKey::new(recipe.seed, &format!("negative {purpose} {number}"), index);
+        set.push(&negative(kind, &clouds, stream), classes.len() - 1);
+    }
+    Clouds { set, classes }
+}
+
+/// A negative in the unit sphere, z up, drawn from `stream`. `clouds` are objects of the
+/// unit sphere, some of which pairs and slivers are of.
+#[must_use]
+pub fn negative(kind: Negative, clouds: &Clouds, stream: StreamKey) -> Vec<[f32; 3]> {
+    let draws = &mut Draws::new(stream);
+    let points = match kind {
+        Negative::Ground => patch(draws),
+        Negative::Wall => turned(patch(draws).into_iter().map(|[x, y, z]| [x, z, y]), draws),
+        Negative::Blob => blob(draws),
+        Negative::Pair => pair(clouds, draws),
+        Negative::Sliver => sliver(clouds, draws),
+    };
+    let mut normalized = Vec::new();
+    infer_cpu::to_unit_sphere(&points, &mut normalized);
+    normalized
+}
+
+/// A rough, perhaps sloping rectangle or ellipse, any way round; half of them in lines,
+/// as a scanner sees the ground.
+fn patch(draws: &mut Draws) -> Vec<[f64; 3]> {
+    let width = draws.between(0.3, 1.0);
+    let is_round = draws.unit() < 0.5;
+    let lines = (draws.unit() < 0.5).then(|| draws.between(4.0, 16.0).floor());
+    let (slope, roughness) = (draws.between(-0.2, 0.2), draws.between(0.0, 0.03));
+    let (height, wave) = (draws.between(0.0, 0.06), [(); 2].map(|()| draws.between(0.0, 6.0)));
+    let mut points = Vec::with_capacity(POINTS);
+    while points.len() < POINTS {
+        let [x, mut y] = [(); 2].map(|()| draws.between(-1.0, 1.0));
+        if is_round && x * x + y * y > 1.0 {
+            continue;
+        }
+        if let Some(lines) = lines {
+            y = (y * lines).round() / lines;
+        }
+        let relief = height * (wave[0] * x + wave[1]).sin() * (wave[1] * y).cos();
+        points.push([x, width * y, slope * x + relief + roughness * draws.normal()]);
+    }
+    turned(points.into_iter(), draws)
+}
+
+/// One to three normal or uniform clouds, each with three widths of its own.
+fn blob(draws: &mut Draws) -> Vec<[f64; 3]> {
+    let is_normal = draws.unit() < 0.7;
+    let parts: Vec<[[f64; 3]; 2]> = (0..=draws.below(3))
+        .map(|_| {
+            let centre = [(); 3].map(|()| draws.between(-1.0, 1.0));
+            [centre, [(); 3].map(|()| draws.between(0.3, 1.0))]
+        })
+        .collect();
+    let point = |_| {
+        let [centre, widths] = parts[draws.below(parts.len())];
+        let offset = [(); 3].map(|()| match is_normal {
+            true => draws.normal(),
+            false => draws.between(-1.7, 1.7),
+        });
+        [0, 1, 2].map(|axis| centre[axis] + widths[axis] * offset[axis])
+    };
+    (0..POINTS).map(point).collect()
+}
+
+/// Two objects on one floor, side by side, of which one may be the smaller.
+fn pair(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
+    let (apart, angle) = (draws.between(1.0, 2.2), draws.between(0.0, std::f64::consts::TAU));
+    let scale = draws.between(0.5, 1.0);
+    let mut all = Vec::new();
+    for (scale, shift) in [(1.0, [0.0; 2]), (scale, [apart * angle.cos(), apart * angle.sin()])] {
+        let one = object(clouds, draws);
+        let one = turned(one.into_iter().map(|point| point.map(|x| scale * x)), draws);
+        let floor = one.iter().fold(f64::INFINITY, |floor, point| floor.min(point[2]));
+        all.extend(one.iter().map(|[x, y, z]| [x + shift[0], y + shift[1], z - floor]));
+    }
+    all
+}
+
+/// A twentieth to a fifth of an object's points, between two parallel planes.
+fn sliver(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
+    let across = [(); 3].map(|()| draws.normal());
+    let mut points = object(clouds, draws);
+    let along = |p: &[f64; 3]| p.iter().zip(across).map(|(x, n)| x * n).sum::<f64>();
+    points.sort_by(|a, b| along(a).total_cmp(&along(b)));
+    let n = (draws.between(0.05, 0.2) * points.len() as f64).ceil() as usize;
+    let first = draws.below(points.len() - n + 1);
+    points[first..first + n].to_vec()
+}
+
+fn object(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
+    let cloud = clouds.set.cloud(draws.below(clouds.len()));
+    cloud.iter().map(|point| point.map(f64::from)).collect()
+}
+
+/// `points`, turned about z by any angle.
+fn turned(points: impl Iterator<Item = [f64; 3]>, draws: &mut Draws) -> Vec<[f64; 3]> {
+    let (sin, cos) = draws.between(0.0, std::f64::consts::TAU).sin_cos();
+    points.map(|[x, y, z]| [cos * x - sin * y, sin * x + cos * y, z]).collect()
+}
