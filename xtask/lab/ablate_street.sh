@@ -5,11 +5,13 @@
 #     xtask/lab/ablate_street.sh WORK_FOLDER REAL.npz...
 #
 # Each row is one scene recipe and one training recipe, made here from the shipped ones, with
-# fewer scenes and epochs, so that a row takes some three minutes on two cores. One seed a row.
+# fewer scenes and epochs, so that a row takes some two minutes on two cores. One seed a row.
 set -eu
 
-scenes=1000
-epochs=15
+scenes=600
+epochs=10
+# The program that does all of it.
+edgepuck=${EDGEPUCK:-cargo xtask}
 work=$1
 shift
 mkdir -p "$work"
@@ -44,14 +46,14 @@ row() {
     name=$1 data=$2 recipe=$3
     shift 3
     if [ ! -f "$work/$data/packed/train.npz" ]; then
-        cargo xtask gen-scenes "$work/$data.toml" --sweeps $scenes --seed 4 --save 0 \
+        $edgepuck gen-scenes "$work/$data.toml" --sweeps $scenes --seed 4 --save 0 \
             --out "$work/$data" "$@" >"$work/$data.log" 2>&1
     fi
     model="$work/$data-$recipe.safetensors"
-    cargo xtask train --data "$work/$data/packed" --recipe "$work/$recipe-recipe.toml" \
+    $edgepuck train --data "$work/$data/packed" --recipe "$work/$recipe-recipe.toml" \
         --out "$model" >"$work/$data-$recipe.log" 2>&1
     # shellcheck disable=SC2086 # One flag a file.
-    cargo xtask eval --model "$model" $real --known car,person --min-points 100 2>&1 |
+    $edgepuck eval --model "$model" $real --known car,person --min-points 100 2>&1 |
         tee "$work/$data-$recipe.eval" | awk -v name="$name" '
             $2 == "all" { share[$1] = $6 " %" }
             END {
