@@ -159,9 +159,9 @@ fn write(path: &Path, n: usize, seed: u64) {
 #[test]
 fn a_network_of_clusters_is_trained_and_answers_unknown() {
     let folder = tempfile::tempdir().unwrap();
-    write(&folder.path().join("train.npz"), 60, 1);
+    write(&folder.path().join("train.npz"), 240, 1);
     write(&folder.path().join("test.npz"), 30, 2);
-    let recipe = "points = 48\nbatch = 20\nepochs = 10\nsampling = \"random\"\n\
+    let recipe = "points = 48\nbatch = 20\nepochs = 20\nsampling = \"random\"\n\
         normalization = \"metric\"\nbalance = 1.0\nclouds_per_epoch = 200\n\
         unknown = [\"wall\"]\nkeep_known = 0.95\n\
         [network]\ninput_transform = false\nfeature_transform = false\ntrunk = [16, 32]\n\
