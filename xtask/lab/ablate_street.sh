@@ -5,11 +5,11 @@
 #     xtask/lab/ablate_street.sh WORK_FOLDER REAL.npz...
 #
 # Each row is one scene recipe and one training recipe, made here from the shipped ones, with
-# fewer scenes and epochs, so that a row takes some two minutes on two cores. One seed a row.
+# fewer scenes and epochs, so that a row takes under a minute on two cores. One seed a row.
 set -eu
 
-scenes=600
-epochs=10
+scenes=400
+epochs=8
 # The program that does all of it.
 edgepuck=${EDGEPUCK:-cargo xtask}
 work=$1
