@@ -1,6 +1,7 @@
 //! `eval`: measures a model's accuracy on labelled clouds.
 
 use std::collections::BTreeMap;
+use std::iter::repeat_n;
 use std::path::{Path, PathBuf};
 
 use formats::atomic;
@@ -41,7 +42,7 @@ pub struct Args {
     /// Write the confusion matrix, or the table of clusters, to this CSV file
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw the confusion matrix of clouds of one size into this SVG file
+    /// Draw the confusion matrix, or the clusters that are named wrongly, into this SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     #[command(flatten)]
@@ -136,24 +137,29 @@ fn report_objects(
     names: &[String],
     clouds: Vec<Clouds>,
 ) -> anyhow::Result<()> {
-    if args.svg.is_some() {
-        return Err(Usage("--svg draws clouds of one size, not clusters".to_owned()).into());
-    }
     let mut labels = Labels::new(names, &unknown(args, card, names)?);
     if let Some(path) = &args.objects.map {
         labels = labels.with_aliases(path)?;
     }
     let least = args.objects.min_points.unwrap_or(0);
-    let mut objects = Vec::new();
+    let (mut objects, mut sets) = (Vec::new(), Vec::new());
     for (path, clouds) in args.data.iter().zip(clouds) {
         let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
         let found = classified(&args.model, &name, &clouds, (&labels, least), &options(args))?;
+        sets.push((clouds.set, found.len()));
         objects.extend(found);
     }
     let table = Table::new(&objects, &labels, args.objects.tracks);
     super::print(&format!("{table}\n{}", summary(&objects, &labels, &table)))?;
     if let Some(path) = &args.csv {
         atomic::write_bytes(path, table.to_csv())?;
+    }
+    if let Some(path) = &args.svg {
+        let each_set = sets.iter().flat_map(|(set, n)| repeat_n(set, *n));
+        let clouds: Vec<_> =
+            each_set.zip(&objects).map(|(set, object)| set.cloud(object.index)).collect();
+        let drawing = object_report::drawing(&objects, &clouds, &labels);
+        atomic::write_bytes(path, drawing.to_string())?;
     }
     Ok(())
 }

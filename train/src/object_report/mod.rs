@@ -6,10 +6,12 @@
 //! something known is a false alarm.
 
 mod detection;
+mod failures;
 mod table;
 mod truth;
 
 pub use detection::{Detection, calibration_error, detection};
+pub use failures::drawing;
 pub use table::{Row, Table};
 pub use truth::{Labels, Truth};
 
@@ -26,6 +28,8 @@ use crate::evaluate::predictions;
 pub struct Object {
     /// The file that it is from, without its extension.
     pub data: String,
+    /// Its place in that file.
+    pub index: usize,
     /// Its label in the file.
     pub label: String,
     /// What the answer should be.
@@ -85,13 +89,15 @@ pub fn classified(
         let label = &clouds.classes[clouds.set.labels[i]];
         clouds.set.cloud(i).len() >= least && labels.truth(label).is_some()
     };
-    let clouds = clouds.select(&(0..clouds.len()).filter(is_wanted).collect::<Vec<_>>());
+    let wanted: Vec<_> = (0..clouds.len()).filter(is_wanted).collect();
+    let clouds = clouds.select(&wanted);
     let found = predictions(path, &clouds, options)?;
     let object = |(i, found): (usize, &Prediction)| {
         let (set, label) = (&clouds.set, clouds.classes[clouds.set.labels[i]].clone());
         let track = set.ids.as_ref().and_then(|ids| ids[i].split_once('#'));
         Some(Object {
             data: data.to_owned(),
+            index: wanted[i],
             truth: labels.truth(&label)?,
             label,
             n_points: set.cloud(i).len(),

@@ -185,7 +185,7 @@ fn a_network_of_clusters_is_trained_and_answers_unknown() {
         .collect();
     assert_eq!(answers, ["car", "person", "unknown"]);
 
-    let words = "eval --model m.safetensors --data test.npz --csv t.csv --min-points 30";
+    let words = "eval --model m.safetensors --data test.npz --csv t.csv --svg t.svg --min-points 8";
     let ran = train(folder.path(), words);
     let text = String::from_utf8_lossy(&ran.stdout).into_owned();
     assert!(ran.status.success(), "{}", stderr(&ran));
@@ -194,9 +194,19 @@ fn a_network_of_clusters_is_trained_and_answers_unknown() {
     }
     let csv = std::fs::read_to_string(folder.path().join("t.csv")).unwrap();
     assert!(csv.starts_with("class,group,hits,of,share,low,high\ncar,all,"), "{csv}");
+    let svg = std::fs::read_to_string(folder.path().join("t.svg")).unwrap();
+    let wrong: usize =
+        csv.lines().filter(|line| line.split(',').nth(1) == Some("all")).map(missed).sum();
+    assert!(svg.contains(&format!("{wrong} objects named wrongly")), "{wrong}: {svg:.500}");
     let ran = train(folder.path(), "eval --model m.safetensors --data test.npz --known plane");
     assert!(stderr(&ran).contains("--known: expected some of car, person, wall, found plane"));
     assert_eq!(ran.status.code(), Some(2));
+}
+
+/// The objects of a line of the table that are not hit.
+fn missed(line: &str) -> usize {
+    let number = |column| line.split(',').nth(column).unwrap().parse::<usize>().unwrap();
+    number(3) - number(2)
 }
 
 #[test]
