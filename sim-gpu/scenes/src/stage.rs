@@ -143,12 +143,7 @@ impl Stage {
     /// # Errors
     /// If the adapter fails.
     pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
-        let Eye { sensor, pattern, caster } = &self.sensors[scene.sensor];
-        let stream =
-            |part: u32| StreamKey::new(self.seed, &format!("scene/{}/beams", scene.number), part);
-        let ground = scene.ground.mesh();
-        let kept = (0..ground.triangles.len() as u32).collect();
-        let ground = Target::new(Surface::new(ground, kept), Builder::Morton);
+        let ground = Target::new(whole(scene.ground.mesh()), Builder::Morton);
         let mut targets = vec![PlacedTarget::new(&ground)];
         targets.extend(scene.objects.iter().map(|object| {
             let prop = self.prop(object.entry, object.variant);
@@ -158,6 +153,38 @@ impl Stage {
                 .then(|| Glass { triangles: prop.glass.clone(), returned: scene.glass_returned });
             placed
         }));
+        self.sweep_targets(scene, &mut targets)
+    }
+
+    /// Ground and objects of `scene` as one mesh, without what is known of its parts.
+    #[must_use]
+    pub fn mesh(&self, scene: &Scene) -> Mesh {
+        let mut whole = scene.ground.mesh();
+        for object in &scene.objects {
+            let world_from_object = object.world_from_object();
+            let surface = &self.prop(object.entry, object.variant).target.surface;
+            for &index in surface.kept() {
+                let first = whole.vertices.len() as u32;
+                let corners = surface.corners(index).map(|corner| surface.frame.to_object(corner));
+                whole.vertices.extend(corners.map(|at| world_from_object.transform_point3(at)));
+                whole.triangles.push([first, first + 1, first + 2]);
+            }
+        }
+        whole
+    }
+
+    /// Scans `targets` by the sensor of `scene`, in place of what stands there.
+    ///
+    /// # Errors
+    /// If the adapter fails.
+    pub fn sweep_targets(
+        &self,
+        scene: &Scene,
+        targets: &mut [PlacedTarget<'_>],
+    ) -> Result<Sweep, SceneError> {
+        let Eye { sensor, pattern, caster } = &self.sensors[scene.sensor];
+        let stream =
+            |part: u32| StreamKey::new(self.seed, &format!("scene/{}/beams", scene.number), part);
         for (target, part) in targets.iter_mut().zip(0..) {
             target.stream = Some(stream(part));
         }
@@ -171,9 +198,15 @@ impl Stage {
         ]
         .into();
         request.stream = stream(u32::MAX);
-        let scan = scan_objects(caster, &targets, &request)?.scan;
+        let scan = scan_objects(caster, targets, &request)?.scan;
         Ok(Sweep::of(scan, scene))
     }
+}
+
+/// All of `mesh` as a surface.
+fn whole(mesh: Mesh) -> Surface {
+    let kept = (0..mesh.triangles.len() as u32).collect();
+    Surface::new(mesh, kept)
 }
 
 impl Sweep {
@@ -223,8 +256,7 @@ impl Prop {
 
     fn of(mesh: Mesh, glass: Range<u32>) -> Self {
         let (low, high) = bounding_box(mesh.vertices.iter().copied());
-        let kept = (0..mesh.triangles.len() as u32).collect();
-        let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
+        let target = Target::new(whole(mesh), Builder::Sah);
         Self { target, glass, size_m: high - low }
     }
 

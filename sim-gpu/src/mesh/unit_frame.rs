@@ -30,6 +30,12 @@ impl UnitFrame {
     pub fn to_unit(&self, point: DVec3) -> DVec3 {
         (point - self.centre) / self.scale
     }
+
+    /// To the object's frame.
+    #[must_use]
+    pub fn to_object(&self, point: DVec3) -> DVec3 {
+        point * self.scale + self.centre
+    }
 }
 
 /// The lowest and the highest coordinates of `points`; infinite, and the lowest

@@ -3,7 +3,7 @@
 //! `bench sim` has a file for each question: the [`speed`] of building and tracing, the
 //! time of a dataset [`to_disk`], which of the [`builders`] is faster for how many rays,
 //! the comparison with Embree ([`peers`]), the rays lost without [`watertightness`], and
-//! what [`simplify`] saves. [`infer`] is about classifying, sampling and learning,
+//! what [`simplify`] saves. [`scenes`] is about scenes of many objects, [`infer`] is about classifying, sampling and learning,
 //! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters,
 //! [`sensor`] about how true a profile is to real sweeps, [`frames`] about what is found in
 //! them, [`sydney`] about what a network that has learnt from simulated scenes gives to one
@@ -15,7 +15,7 @@ use crate::measure::{backends, bench_mesh};
 use crate::pi5;
 use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
-use crate::study::casting::{builders, simplify, speed, to_disk, watertightness};
+use crate::study::casting::{builders, scenes, simplify, speed, to_disk, watertightness};
 use crate::study::{devices, frames, numerics, robustness, sensor, sydney};
 use anyhow::Result;
 use clap::{Args, Subcommand};
@@ -36,6 +36,8 @@ pub struct BenchArgs {
 enum Benchmark {
     /// Measure the simulator: building BVHs, casting rays, writing a dataset to disk.
     Sim(SimArgs),
+    /// Compare what a scene of many objects costs with what its rays cost at one mesh.
+    Scenes(scenes::ScenesArgs),
     /// Compare the speed of the classifier and the sampler with other engines.
     ///
     /// The engines run in alternation. The other engines are Python packages, installed from PyPI
@@ -138,6 +140,7 @@ impl Figures {
 pub fn run(args: &BenchArgs) -> Result<Outcome> {
     match &args.what {
         Benchmark::Sim(args) => return sim(args),
+        Benchmark::Scenes(args) => scenes::run(args),
         Benchmark::Infer(args) => infer::run(args),
         Benchmark::Train(args) => infer::learn::run(args),
         Benchmark::PiModel(args) => pi5::run(args),

@@ -1,0 +1,103 @@
+//! `cargo xtask bench scenes`: what a scene of many objects costs, beside its rays alone.
+
+use crate::measure::clock::{Spread, Workload, interleave, measured, workload};
+use crate::render::table::{Table, milliseconds};
+use anyhow::{Context, Result};
+use clap::Args;
+use edgepuck_scenes::{Recipe, Scene, Stage};
+use edgepuck_segment::{Segmenter, Settings, Sweep};
+use sim_gpu::bvh::Builder;
+use sim_gpu::caster::Caster;
+use sim_gpu::scan::PlacedTarget;
+use sim_gpu::target::{Surface, Target};
+use std::path::{Path, PathBuf};
+
+/// Flags of `bench scenes`.
+#[derive(Args, Debug)]
+pub struct ScenesArgs {
+    /// Scene recipe.
+    #[arg(default_value = "assets/scenes/street.toml", value_name = "RECIPE")]
+    recipe: PathBuf,
+    /// Sensor in place of the recipe's.
+    #[arg(long, default_value = "vlp32c", value_name = "NAME")]
+    sensor: String,
+    /// Scenes to measure.
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..))]
+    scenes: u32,
+    /// Number of repeats of each measurement; the median counts.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
+    rounds: u16,
+}
+
+/// What one scene takes, seconds.
+struct Measured {
+    n_objects: usize,
+    n_triangles: usize,
+    n_points: usize,
+    /// Ground and objects, each with a hierarchy of its own.
+    sweep_s: f64,
+    /// All of it as one mesh, whose hierarchy is there.
+    one_mesh_s: f64,
+    /// To make that hierarchy.
+    build_s: f64,
+    segment_s: f64,
+}
+
+/// Casts each scene object by object and as one mesh, on the CPU.
+pub fn run(args: &ScenesArgs) -> Result<()> {
+    let mut recipe = Recipe::load(&args.recipe)?;
+    recipe.use_sensors(std::slice::from_ref(&args.sensor));
+    let open = |effects: &_| Ok::<_, anyhow::Error>(Caster::Cpu(Clone::clone(effects)));
+    let stage = Stage::new(recipe, Path::new(&args.recipe), None, 0, open)?;
+    let scenes = (0..args.scenes).map(|number| measure(&stage, number, args.rounds.into()));
+    let scenes = scenes.collect::<Result<Vec<_>>>()?;
+    print!("{}", table(&scenes));
+    Ok(())
+}
+
+fn measure(stage: &Stage, number: u32, rounds: usize) -> Result<Measured> {
+    let scene = Scene::draw(stage, number);
+    let mesh = stage.mesh(&scene);
+    let n_triangles = mesh.triangles.len();
+    let (whole, build) = measured(|| Target::new(Surface::of_mesh(mesh), Builder::Sah));
+    let sweep = stage.sweep(&scene)?;
+    let as_sweep = Sweep { points: sweep.points(), rings: Some(sweep.rings()) };
+    let mut segmenter = Segmenter::new(Settings::default()).context("the default settings")?;
+    let workloads: &mut [Workload<'_>] = &mut [
+        workload(|| Ok(stage.sweep(&scene)?)),
+        workload(|| Ok(stage.sweep_targets(&scene, &mut [PlacedTarget::new(&whole)])?)),
+        workload(|| Ok(segmenter.segment(&as_sweep)?.clusters().len())),
+    ];
+    let costs = interleave(rounds, workloads)?;
+    let [sweep_s, one_mesh_s, segment_s] = [0, 1, 2].map(|i| costs[i].cpu_s().median);
+    Ok(Measured {
+        n_objects: scene.objects.len(),
+        n_triangles,
+        n_points: sweep.points().len(),
+        sweep_s,
+        one_mesh_s,
+        build_s: build.cpu_s,
+        segment_s,
+    })
+}
+
+fn table(scenes: &[Measured]) -> Table {
+    let mut table = Table::new(
+        "CPU time of a scene, medians and extremes over scenes",
+        &["what", "median", "least", "most"],
+    );
+    let mut push = |what: &str, show: fn(f64) -> String, of: &dyn Fn(&Measured) -> f64| {
+        let Spread { median, min, max } = Spread::of(scenes.iter().map(of));
+        table.push(vec![what.to_owned(), show(median), show(min), show(max)]);
+    };
+    let count = |x: f64| format!("{x:.0}");
+    push("objects", count, &|one| one.n_objects as f64);
+    push("triangles", count, &|one| one.n_triangles as f64);
+    push("points", count, &|one| one.n_points as f64);
+    push("sweep, ms", milliseconds, &|one| one.sweep_s);
+    push("the same rays at one mesh, ms", milliseconds, &|one| one.one_mesh_s);
+    push("sweep / one mesh", |x| format!("{x:.2}"), &|one| one.sweep_s / one.one_mesh_s);
+    push("building that mesh's BVH, ms", milliseconds, &|one| one.build_s);
+    push("ground and clusters, ms", milliseconds, &|one| one.segment_s);
+    table
+}
