@@ -1,6 +1,7 @@
 //! Self-contained pages: one HTML file with its styles, drawings and scripts.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd};
 
 const STYLE: &str = include_str!("../../../../assets/page/page.css");
 const TABS: &str = include_str!("../../../../assets/page/page.js");
@@ -68,6 +69,31 @@ pub fn cloud(points: &str, colours: &str, palette: &str, caption: &Markup) -> Ma
     }
 }
 
+/// A record in Markdown. Its links lead to other files, which a page that is alone does not
+/// have: their words stay. Its headings go below those of a chapter.
+pub fn markdown(text: &str) -> Markup {
+    let lower = |level| match level {
+        HeadingLevel::H1 => HeadingLevel::H3,
+        HeadingLevel::H2 => HeadingLevel::H4,
+        _ => HeadingLevel::H5,
+    };
+    let parser = Parser::new_ext(text, Options::ENABLE_TABLES);
+    let events = parser.filter_map(|event| match event {
+        Event::Start(Tag::Link { .. } | Tag::Image { .. })
+        | Event::End(TagEnd::Link | TagEnd::Image) => None,
+        Event::Start(Tag::Heading { level, id, classes, attrs }) => {
+            Some(Event::Start(Tag::Heading { level: lower(level), id, classes, attrs }))
+        }
+        Event::End(TagEnd::Heading(level)) => Some(Event::End(TagEnd::Heading(lower(level)))),
+        // Nothing but Markdown is meant.
+        Event::Html(text) | Event::InlineHtml(text) => Some(Event::Text(text)),
+        event => Some(event),
+    });
+    let mut page = String::new();
+    pulldown_cmark::html::push_html(&mut page, events);
+    PreEscaped(page)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -84,6 +110,15 @@ mod tests {
         assert!(page.contains(r#"data-tab="one""#) && page.contains(r#"<section id="one""#));
         for outside in ["http://", "https://", "src=", "@import"] {
             assert!(!page.contains(outside), "{outside}");
+        }
+    }
+
+    #[test]
+    fn a_record_in_markdown_has_tables_and_no_links() {
+        let text = "# Cars\n\n| a | b |\n|---|---|\n| 1 | <b> |\n\nSee [it](https://a.b/c.md).\n";
+        let page = markdown(text).into_string();
+        for expected in ["<h3>Cars</h3>", "<td>1</td>", "&lt;b&gt;", "<p>See it.</p>"] {
+            assert!(page.contains(expected), "{expected}: {page}");
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{lines, missing, remarks, text};
 use crate::render::chart::{Axis, Chart, Dot, Series};
+use crate::render::page;
 use crate::render::table::{Table, digits};
 use anyhow::{Context, Result};
 use maud::{Markup, html};
@@ -54,7 +55,7 @@ pub fn body(folder: &Path) -> Result<Markup> {
             summary { "The same dataset on every adapter" }
             (Table::from_csv("", csv.as_bytes()).context("reading devices.csv")?.html())
         } }
-        @if let Some(fuzz) = fuzz { details { summary { "Fuzzing" } pre { (fuzz) } } }
+        @if let Some(fuzz) = fuzz { details { summary { "Fuzzing" } (page::markdown(&fuzz)) } }
     })
 }
 

@@ -45,6 +45,9 @@ pub fn run(args: &Args) -> Result<Outcome> {
     let scans = scans::body(&assets)?;
     let mut chapters = vec![Chapter::new("scans", "Scans", "What does a scan look like?", scans)];
     chapters.extend(trade_chapters(&reports.join("trade/trade.csv"))?);
+    let reality = records::reality(&reports.join("reality"))?;
+    let question = "What do networks make of real sensors' scans?";
+    chapters.push(Chapter::new("reality", "Reality", question, reality));
     let effects = records::ablations(&reports.join("ablations"))?;
     let question = "Which effects of a scan matter to a classifier?";
     chapters.push(Chapter::new("effects", "Effects", question, effects));
@@ -125,6 +128,6 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
 fn remarks(folder: &Path) -> Result<Markup> {
     let text = text(&folder.join("README.md"))?;
     Ok(
-        html! { @if let Some(text) = text { details { summary { "How it was measured" } pre { (text) } } } },
+        html! { @if let Some(text) = text { details { summary { "How it was measured" } (page::markdown(&text)) } } },
     )
 }

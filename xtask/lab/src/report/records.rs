@@ -1,12 +1,37 @@
 //! Records that are tables: the ablations, and the paper's experiments.
 
 use super::{entries, lines, missing, remarks, text};
+use crate::render::page;
 use crate::render::table::{Table, percent};
 use anyhow::Result;
 use maud::{Markup, html};
 use serde::Deserialize;
 use std::path::Path;
 use xtask::workspace::file_name;
+
+/// The records on real objects and sensors in `folder`, each a Markdown file.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn reality(folder: &Path) -> Result<Markup> {
+    const MAIN: &str = "README.md";
+    let Some(main) = text(&folder.join(MAIN))? else {
+        return Ok(missing(&folder.join(MAIN), "cargo xtask bench frames --report"));
+    };
+    let mut others = entries(folder)?;
+    others.retain(|path| path.extension().is_some_and(|end| end == "md") && !path.ends_with(MAIN));
+    Ok(html! {
+        (page::markdown(&main))
+        @for path in &others { @if let Some(text) = text(path)? {
+            details { summary { (title(&text)) } (page::markdown(&text)) }
+        } }
+    })
+}
+
+/// The heading of a Markdown file.
+fn title(text: &str) -> &str {
+    text.lines().next().unwrap_or_default().trim_start_matches('#').trim()
+}
 
 /// How much each effect matters, of the record in `folder`.
 ///
