@@ -59,6 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let stage = Stage::new(recipe, &args.recipe, meshes, args.seed, |effects| {
         args.caster.open_for_scenes(effects)
     })?;
+    let stage = stage.with_culling(args.caster.culling());
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
     let bar = ProgressBar::new(args.sweeps.into()).with_style(style);

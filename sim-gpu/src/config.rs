@@ -118,8 +118,11 @@ pub(crate) fn positive(key: &str, value: impl Into<Option<f64>>) -> Result<(), I
     expect(key, value, format_args!("a number above 0"), |value| value > 0.0)
 }
 
-/// That `value`, if there is one, is finite and lies in `range`.
-pub(crate) fn within(
+/// Checks that `value`, if there is one, lies in `range`.
+///
+/// # Errors
+/// Names the `key`, what it may be, and the value.
+pub fn within(
     key: &str,
     value: impl Into<Option<f64>>,
     range: RangeInclusive<f64>,

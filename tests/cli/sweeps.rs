@@ -69,6 +69,8 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
          class = \"chair\"\ncount = [1, 1]\nplace = \"anywhere\"\ndistance_m = [2, 3]\n\
          meshes = \"chairs\"\nheight_m = [1, 1]\n",
     );
+    let flat = "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n";
+    folder.write("flat/chairs/flat.obj", flat);
     folder.write("not_a_cloud.npz", "nothing");
     folder.refuses(
         1,
@@ -84,6 +86,10 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
                 "chairs: expected a folder with OBJ, OFF, PLY or STL files",
             ),
             ("gen-scenes own.toml --meshes . --out out", "chairs: expected a folder with OBJ"),
+            (
+                "gen-scenes own.toml --meshes flat --out out",
+                "flat.obj: expected a mesh with a height, found all of it at one height",
+            ),
             ("segment missing.npz --out out", "missing.npz"),
             ("segment not_a_cloud.npz --out out", "not_a_cloud.npz"),
             ("detect missing.npz --model nothing.safetensors --out out", "missing.npz"),

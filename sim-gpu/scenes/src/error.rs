@@ -19,6 +19,12 @@ pub enum SceneError {
     /// A user's mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// A user's mesh cannot be scaled to a height.
+    #[error("{}: expected a mesh with a height, found all of it at one height", file.display())]
+    FlatMesh {
+        /// The mesh.
+        file: PathBuf,
+    },
     /// The recipe asks for a user's meshes, and there are none.
     #[error("{}: expected a folder with OBJ, OFF, PLY or STL files, {cause}", folder.display())]
     NoMeshes {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use edgepuck_shapes::objects::ObjectKind;
 use serde::Deserialize;
-use sim_gpu::config::{self, ConfigError, InvalidValue};
+use sim_gpu::config::{self, ConfigError, InvalidValue, within};
 use sim_gpu::sensor::Sensor;
 
 /// Everything a scene is drawn from.
@@ -261,7 +261,7 @@ impl Recipe {
         if self.variants == 0 {
             return Err(InvalidValue::new("variants", "expected at least 1, found 0"));
         }
-        Span::from([ground.half_m; 2]).check("ground.half_m", 1.0, MOST_M)?;
+        within("ground.half_m", ground.half_m, 1.0..=MOST_M)?;
         ground.slope_deg.check("ground.slope_deg", 0.0, 45.0)?;
         ground.roughness_m.check("ground.roughness_m", 0.0, 1.0)?;
         ground.road_width_m.check("ground.road_width_m", 0.0, MOST_M)?;
@@ -290,9 +290,8 @@ impl Recipe {
 
 impl SensorChoice {
     fn check(&self, key: &str) -> Result<(), InvalidValue> {
-        let noise_m = self.noise_m.unwrap_or_default();
-        Span::from([noise_m; 2]).check(&format!("{key}.noise_m"), 0.0, 1.0)?;
-        Span::from([self.dropout; 2]).check(&format!("{key}.dropout"), 0.0, 1.0)
+        within(&format!("{key}.noise_m"), self.noise_m, 0.0..=1.0)?;
+        within(&format!("{key}.dropout"), self.dropout, 0.0..=1.0)
     }
 }
 

@@ -13,6 +13,7 @@ use glam::DVec3;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
+use sim_gpu::job::Culling;
 use sim_gpu::mesh::frame::{Normalize, to_world};
 use sim_gpu::mesh::unit_frame::bounding_box;
 use sim_gpu::mesh::{self, Mesh, MeshFormat};
@@ -30,6 +31,7 @@ pub struct Stage {
     seed: u64,
     classes: Vec<String>,
     sensors: Vec<Eye>,
+    culling: Culling,
     /// By entry of the recipe and by variant.
     props: Vec<Vec<OnceLock<Prop>>>,
 }
@@ -90,7 +92,14 @@ impl Stage {
             None => own_meshes(objects, meshes, seed),
         });
         let props = props.collect::<Result<_, SceneError>>()?;
-        Ok(Self { classes: recipe.classes(), recipe, seed, sensors, props })
+        Ok(Self { classes: recipe.classes(), recipe, seed, sensors, culling: Culling::On, props })
+    }
+
+    /// The same stage, whose beams that cannot hit anything are cast as `culling` says; the
+    /// sweeps are the same.
+    #[must_use]
+    pub fn with_culling(self, culling: Culling) -> Self {
+        Self { culling, ..self }
     }
 
     /// The recipe.
@@ -197,6 +206,7 @@ impl Stage {
             Attribute::Object,
         ]
         .into();
+        request.culling = self.culling;
         request.stream = stream(u32::MAX);
         let scan = scan_objects(caster, targets, &request)?.scan;
         Ok(Sweep::of(scan, scene))
@@ -260,13 +270,16 @@ impl Prop {
         Self { target, glass, size_m: high - low }
     }
 
-    /// A user's mesh, `height_m` high.
-    fn scaled(mut mesh: Mesh, height_m: f64) -> Self {
+    /// A user's mesh, `height_m` high; `None` of one that is flat.
+    fn scaled(mut mesh: Mesh, height_m: f64) -> Option<Self> {
         let (low, high) = bounding_box(mesh.vertices.iter().copied());
         let scale = height_m / (high.z - low.z);
+        if !(scale.is_normal() && scale > 0.0) {
+            return None;
+        }
         stand(&mut mesh);
         mesh.vertices.iter_mut().for_each(|vertex| *vertex *= scale);
-        Self::of(mesh, 0..0)
+        Some(Self::of(mesh, 0..0))
     }
 }
 
@@ -293,7 +306,8 @@ fn own_meshes(
         let loaded = mesh::load(file)?;
         let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::None);
         let prop = Prop::scaled(world.mesh, span.at(stream.unit(n)));
-        Ok(OnceLock::from(prop))
+        let flat = || SceneError::FlatMesh { file: file.clone() };
+        Ok(OnceLock::from(prop.ok_or_else(flat)?))
     });
     ready.collect()
 }

@@ -1,10 +1,15 @@
 //! Scenes as a whole: what is drawn, what is seen of it, and what is cut.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use edgepuck_segment::{Segmenter, Settings, Sweep as Points};
+use formats::Scan;
 use glam::{DVec2, DVec3};
+use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
+use sim_gpu::scan::PlacedTarget;
+use sim_gpu::target::{Surface, Target};
 
 use crate::{OTHER, Recipe, Scene, SceneError, Stage, label_clusters};
 
@@ -93,6 +98,31 @@ fn every_point_lies_on_the_surface_that_it_is_said_to_lie_on() {
     }
 }
 
+/// Silhouettes are where a beam may pass one and meet the other: the hierarchies hold their
+/// triangles in f32, each in a frame of its own.
+#[test]
+fn a_sweep_of_many_objects_is_that_of_one_mesh_of_them_all() {
+    let opaque = RECIPE.replace("glass_returned = [0, 0]", "glass_returned = [1, 1]");
+    let stage = stage(&opaque);
+    for number in 0..3 {
+        let scene = Scene::draw(&stage, number);
+        let whole = Target::new(Surface::of_mesh(stage.mesh(&scene)), Builder::Sah);
+        let of_mesh = stage.sweep_targets(&scene, &mut [PlacedTarget::new(&whole)]).unwrap().scan;
+        let of_parts = stage.sweep(&scene).unwrap().scan;
+        let ranges = |scan: &Scan| -> BTreeMap<u32, f32> {
+            let beams = scan.beam.as_ref().unwrap().iter().copied();
+            beams.zip(scan.range_m.as_ref().unwrap().iter().copied()).collect()
+        };
+        let (one, other) = (ranges(&of_mesh), ranges(&of_parts));
+        let is_same = |(beam, range_m): (&u32, &f32)| {
+            one.get(beam).is_some_and(|other_m| (other_m - range_m).abs() < 1e-3)
+        };
+        let n_same = other.iter().filter(|&pair| is_same(pair)).count();
+        assert!(n_same > 5_000 && n_same * 1000 > other.len() * 999, "{n_same} of {}", other.len());
+        assert!(one.len().abs_diff(other.len()) * 1000 < other.len());
+    }
+}
+
 #[test]
 fn objects_keep_apart_and_stay_within_their_distances() {
     let stage = stage(RECIPE);
@@ -159,7 +189,11 @@ fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
         ("count = [4, 6]", "count = [6, 4]", "object[0].count: expected two ascending numbers"),
         ("distance_m = [3, 20]", "distance_m = [-3, 20]", "object[0].distance_m: expected two"),
         ("slope_deg = [2, 2]", "slope_deg = [2, nan]", "ground.slope_deg: expected two ascending"),
-        ("noise_m = 0", "noise_m = inf", "sensor[0].noise_m: expected two ascending"),
+        (
+            "noise_m = 0",
+            "noise_m = inf",
+            "sensor[0].noise_m: expected a number within 0..=1, found inf",
+        ),
         ("variants = 3", "variants = 0", "variants: expected at least 1, found 0"),
         ("kind = \"car\"", "kind = \"mesh\"", "object[0].meshes: expected with kind = \"mesh\""),
     ] {
