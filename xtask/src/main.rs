@@ -13,9 +13,9 @@ use xtask::build_pi;
 
 /// Runs the developer commands of Edgepuck's repository.
 ///
-/// All other commands are passed to the program `edgepuck` (gen-dataset, gen-shapes,
-/// sample-surfaces, scan, preview, adapters, merge-dataset, import-weights, export-onnx, train,
-/// eval, explain, compare-points, advise), which is built first if necessary.
+/// All other commands are passed to the program `edgepuck` (gen-dataset, gen-scenes, gen-shapes,
+/// sample-surfaces, scan, segment, detect, preview, adapters, merge-dataset, import-weights, advise,
+/// export-onnx, train, eval, explain, compare-points), which is built first if necessary.
 /// `cargo xtask edgepuck --help` describes them.
 #[derive(Parser)]
 #[command(name = "cargo xtask", version, max_term_width = 100)]
@@ -33,30 +33,25 @@ enum Command {
     /// Build infer-cpu as one static binary for a Raspberry Pi
     BuildPi(build_pi::Args),
     /// Measure speed and accuracy: `cargo xtask bench --help`
-    #[command(disable_help_flag = true)]
     Bench(Forwarded),
     /// Sweep every parameter from the mesh to the class, and record time and accuracy
-    #[command(disable_help_flag = true)]
     Trade(Forwarded),
     /// Measure how much each effect of a scan matters to a classifier, and what it costs
-    #[command(disable_help_flag = true)]
     Ablate(Forwarded),
     /// Reproduce the paper's experiments, and write one report
-    #[command(disable_help_flag = true)]
     Reproduce(Forwarded),
     /// Show the results of all measurements on one HTML page
-    #[command(disable_help_flag = true)]
     Report(Forwarded),
     /// Run the program `edgepuck` with these arguments
-    #[command(disable_help_flag = true)]
     Edgepuck(Forwarded),
     /// A command of the program `edgepuck`
     #[command(external_subcommand)]
     Product(Vec<OsString>),
 }
 
-/// Words that another program reads.
+/// Words that another program reads, `--help` among them.
 #[derive(clap::Args)]
+#[command(disable_help_flag = true)]
 struct Forwarded {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
     words: Vec<OsString>,

@@ -91,7 +91,8 @@ pub fn markdown(text: &str) -> Markup {
     });
     let mut page = String::new();
     pulldown_cmark::html::push_html(&mut page, events);
-    PreEscaped(page)
+    let scrolled = page.replace("<table>", r#"<div class="scroll"><table>"#);
+    PreEscaped(scrolled.replace("</table>", "</table></div>"))
 }
 
 #[cfg(test)]
