@@ -4,6 +4,7 @@ use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::cloud_file::{read_cloud, write_cloud};
 use formats::scan_file::read_scan;
+use formats::velodyne::read_turn;
 use formats::{FormatError, Scan, atomic};
 use plotters::style::{Color, HSLColor, RGBColor};
 use std::borrow::Cow;
@@ -14,8 +15,9 @@ use std::time::Instant;
 /// The sweep that a command takes.
 #[derive(clap::Args)]
 pub struct SweepArgs {
-    /// Sweep to cut: a scan, .npz or .ply, whose rings are used if it has them, or a cloud in any
-    /// format that infer-cpu reads; metres, z up
+    /// Sweep to cut: a scan, .npz or .ply, whose rings are used if it has them; the first turn in a
+    /// capture, .pcap or .pcapng, of a VLP-16's or VLP-32C's packets; or a cloud in any format that
+    /// infer-cpu reads; metres, z up
     #[arg(value_name = "SWEEP")]
     pub sweep: PathBuf,
 
@@ -86,6 +88,14 @@ impl SweepArgs {
         let sensor = sensor.unwrap_or_default();
         let from_sensor =
             |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - sensor[axis]) as f32);
+        let is_capture = self.sweep.extension().is_some_and(|end| end == "pcap" || end == "pcapng");
+        if is_capture {
+            let mut scan = read_turn(&self.sweep)?;
+            for point in &mut scan.positions {
+                *point = from_sensor(&point.map(f64::from));
+            }
+            return Ok(scan);
+        }
         let positions = read_cloud(&self.sweep)?.iter().map(from_sensor).collect();
         // A cloud that is not a scan has no rings.
         let ring = read_scan(&self.sweep).ok().and_then(|scan| scan.ring);

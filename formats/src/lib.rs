@@ -10,7 +10,7 @@
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets and sweeps too |
 //! | `cloud-files` | all of these |
 //! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read |
-//! | `pcap` | a VLP-32C's packets (`vlp32c`) |
+//! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`), and a VLP-16's or VLP-32C's, read (`velodyne`) |
 //! | `weights` | models (`weights`) and what they state about themselves (`model_card`) |
 //! | `chamfer` | the distance of two clouds (`chamfer`) |
 //! | `hdf5` | ModelNet40's HDF5 layout |
@@ -75,6 +75,8 @@ mod python_literal;
 mod records;
 #[cfg(feature = "dataset")]
 pub mod scan_file;
+#[cfg(feature = "pcap")]
+pub mod velodyne;
 #[cfg(feature = "pcap")]
 pub mod vlp32c;
 #[cfg(feature = "dataset")]

@@ -16,6 +16,8 @@ mod packed_sets;
 #[cfg(feature = "dataset")]
 mod scan_files;
 #[cfg(feature = "pcap")]
+mod velodyne;
+#[cfg(feature = "pcap")]
 mod vlp32c;
 #[cfg(feature = "dataset")]
 mod written_bytes;

@@ -1,7 +1,7 @@
 //! `--format pcap`: a VLP-32C's packets. `tests/peers` decodes them.
 
 use crate::{Folder, meshes};
-use formats::vlp32c::count_returns;
+use formats::velodyne::count_returns;
 
 const DATASET: &str =
     "gen-dataset meshes --sensor vlp32c --views 2 --format pcap --returns dual --adapter cpu";

@@ -1,11 +1,13 @@
-"""velodyne-decoder, a driver of real sensors, on packets that we write.
+"""velodyne-decoder, a driver of real sensors, on packets that we write and read.
 
-It decodes `--format pcap` to the points of the NPZ of the same scan. Run by
+It decodes `--format pcap` to the points of the NPZ of the same scan, and what `segment` reads
+of a capture, also of a real VLP-16's, to the same points. Run by
 `cargo xtask test`, which sets EDGEPUCK_PROGRAM, EDGEPUCK_ROOT and EDGEPUCK_OUT.
 """
 
 import json
 import os
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +17,7 @@ sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file_
 
 try:
     import numpy
+    import plyfile
     import velodyne_decoder
 except ImportError as error:
     print(f"SKIPPED: {error}")
@@ -199,5 +202,48 @@ def scenes():
     print("nothing.pcap: no return, no point")
 
 
+# Half a unit of azimuth, which the decoder rounds and we do not, and what the rates of turning
+# differ by within a packet.
+READ_AZIMUTH_DEG = 0.02
+
+
+def reading():
+    """`segment` reads the first turn of a capture as the decoder does."""
+    captures = [OUT / f"room-{rpm}.pcap" for rpm in (300, 600, 1200)]
+    packets = ROOT.parent / "shared/data/real_scans/vlp16_packets_1206B.bin"
+    if packets.is_file():
+        captures.append(capture_of(packets.read_bytes()))
+    else:
+        print("a real VLP-16's packets are not here")
+    config = velodyne_decoder.Config(timestamp_first_packet=True, min_range=0, max_range=1000)
+    for pcap in captures:
+        run(EDGEPUCK, "segment", pcap, "--out", OUT / "clusters")
+        vertices = plyfile.PlyData.read(str(OUT / "clusters/sweep.ply"))["vertex"]
+        ours = numpy.stack([vertices[axis] for axis in "xyz"], 1).astype(float)
+        scans = [points for _, points in velodyne_decoder.read_pcap(str(pcap), config)]
+        theirs = numpy.concatenate(scans)[: len(ours), :3].astype(float)
+        assert len(ours) == len(theirs) and len(ours) > 10_000, f"{pcap}: {len(ours)} points"
+        apart_m = numpy.linalg.norm(ours - theirs, axis=1)
+        apart_deg = numpy.degrees(apart_m / numpy.linalg.norm(theirs, axis=1)).max()
+        print(f"{pcap.name}, read: {len(ours)} points; largest difference {apart_deg:.4f} deg")
+        assert apart_deg < READ_AZIMUTH_DEG
+
+
+def capture_of(payloads):
+    """Payloads of 1206 bytes as a capture, without checksums."""
+    header = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
+    frames = [header]
+    for i in range(0, len(payloads), 1206):
+        payload = payloads[i : i + 1206]
+        udp = struct.pack(">HHHH", 2368, 2368, 8 + len(payload), 0) + payload
+        ip = struct.pack(">BBHHHBBH4s4s", 0x45, 0, 20 + len(udp), 0, 0, 64, 17, 0, bytes(4), bytes(4))
+        frame = bytes(12) + b"\x08\x00" + ip + udp
+        frames += [struct.pack("<IIII", i, 0, len(frame), len(frame)), frame]
+    path = OUT / "vlp16.pcap"
+    path.write_bytes(b"".join(frames))
+    return path
+
+
 datasets()
 scenes()
+reading()

@@ -1,5 +1,5 @@
 //! Scans as a Velodyne VLP-32C sends them: data packets in a capture, which any
-//! driver of the sensor decodes. They are written, and counted, not read.
+//! driver of the sensor decodes, [`crate::velodyne`] among them.
 //!
 //! Layout and timing: VLP-32C User Manual 63-9325, chapter 9. A packet's 1206
 //! bytes, little-endian, are sent to UDP port 2368:
@@ -45,8 +45,7 @@
 //! A scan that was cast from one point could not come back: no range along a
 //! line that starts 20 mm lower ends at the same point.
 
-mod count;
-mod packet;
+pub(crate) mod packet;
 
 use std::io::Write;
 use std::path::Path;
@@ -57,7 +56,6 @@ use crate::atomic;
 use crate::error::FormatError;
 use crate::pcap::{self, Sender};
 use crate::scan::{Attribute, Scan};
-pub use count::count_returns;
 use packet::{BLOCKS, LASERS, Measurement};
 
 /// From one firing sequence to the next, microseconds.
@@ -143,7 +141,7 @@ impl Returns {
         }
     }
 
-    fn of_byte(byte: u8) -> Option<Self> {
+    pub(crate) fn of_byte(byte: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|returns| returns.byte() == byte)
     }
 }

@@ -3,23 +3,23 @@
 use super::{DISTANCE_UNIT_M, Returns};
 
 /// Lasers of the sensor, and measurements of a block.
-pub(super) const LASERS: usize = 32;
+pub(crate) const LASERS: usize = 32;
 /// Blocks of a packet.
-pub(super) const BLOCKS: usize = 12;
+pub(crate) const BLOCKS: usize = 12;
 
 /// Bytes of a block's flag and azimuth.
-pub(super) const BLOCK_HEADER_SIZE: usize = 4;
+pub(crate) const BLOCK_HEADER_SIZE: usize = 4;
 /// Bytes of a distance and a reflectivity.
-pub(super) const MEASUREMENT_SIZE: usize = 3;
+pub(crate) const MEASUREMENT_SIZE: usize = 3;
 /// Bytes of a block.
-pub(super) const BLOCK_SIZE: usize = BLOCK_HEADER_SIZE + LASERS * MEASUREMENT_SIZE;
+pub(crate) const BLOCK_SIZE: usize = BLOCK_HEADER_SIZE + LASERS * MEASUREMENT_SIZE;
 /// Bytes of a packet.
-pub(super) const PAYLOAD_SIZE: usize = BLOCKS * BLOCK_SIZE + 6;
+pub(crate) const PAYLOAD_SIZE: usize = BLOCKS * BLOCK_SIZE + 6;
 
 /// What each block begins with.
-pub(super) const FLAG: [u8; 2] = [0xff, 0xee];
+pub(crate) const FLAG: [u8; 2] = [0xff, 0xee];
 /// What a packet of a VLP-32C ends with.
-pub(super) const MODEL: u8 = 0x28;
+pub(crate) const MODEL: u8 = 0x28;
 
 /// What one laser measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

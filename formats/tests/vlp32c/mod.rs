@@ -1,12 +1,12 @@
 //! Packets are what the sensor's manual says, byte by byte.
 
 mod capture;
-mod damaged;
 
 use std::fs;
 
 use capture::{Block, Packet};
-use formats::vlp32c::{FARTHEST_M, Returns, Revolution, START_S, count_returns, write};
+use formats::velodyne::count_returns;
+use formats::vlp32c::{FARTHEST_M, Returns, Revolution, START_S, write};
 use formats::{FormatError, Scan};
 use proptest::prelude::*;
 

@@ -7,7 +7,7 @@ use super::layout;
 use super::manifest::Manifest;
 use formats::labelled::read_labelled;
 use formats::scan_file::{ScanFormat, read_scan};
-use formats::{FormatError, hash, vlp32c};
+use formats::{FormatError, hash, velodyne};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader};
@@ -126,7 +126,7 @@ impl Expected<'_> {
         let (found, expected, what) = match self.holds {
             Holds::Points(ScanFormat::Csv, points) => (csv_points(path), points, "points"),
             Holds::Points(ScanFormat::Pcap, points) => {
-                return match vlp32c::count_returns(path) {
+                return match velodyne::count_returns(path) {
                     Err(error) => Some(error.to_string()),
                     // Of a range that no packet can tell there is no return.
                     Ok(returns) => (returns > points)

@@ -177,6 +177,7 @@ mod tests {
     fn object(label: &str, truth: Truth, class: Option<usize>, track: &str) -> Object {
         let answer = Answer { class, confidence: 1.0, fine: 0, energy: 0.0, margin: None };
         Object {
+            index: 0,
             data: "kitti".to_owned(),
             label: label.to_owned(),
             truth,

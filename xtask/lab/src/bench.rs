@@ -3,12 +3,12 @@
 //! `bench sim` has a file for each question: the [`speed`] of building and tracing, the
 //! time of a dataset [`to_disk`], which of the [`builders`] is faster for how many rays,
 //! the comparison with Embree ([`peers`]), the rays lost without [`watertightness`], and
-//! what [`simplify`] saves. [`scenes`] is about scenes of many objects, [`infer`] is about classifying, sampling and learning,
-//! [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`devices`] about adapters,
-//! [`sensor`] about how true a profile is to real sweeps, [`frames`] about what is found in
-//! them, [`sydney`] about what a network that has learnt from simulated scenes gives to one
-//! of real objects, [`robustness`] about what classifiers make of strays, turns and few
-//! points.
+//! what [`simplify`] saves. [`scenes`] is about scenes of many objects, [`infer`] is about
+//! classifying, sampling and learning, [`pi5`] about a Raspberry Pi, [`numerics`] about
+//! errors, [`devices`] about adapters, [`sensor`] about how true a profile is to real
+//! sweeps, [`frames`] about what is found in them, [`sydney`] about what a network that has
+//! learnt from simulated scenes gives to one of real objects, [`robustness`] about what
+//! classifiers make of strays, turns and few points.
 
 use crate::measure::machine::{self, Machine};
 use crate::measure::{backends, bench_mesh};

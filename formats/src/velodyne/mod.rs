@@ -1,0 +1,15 @@
+//! Data packets of spinning Velodyne sensors, read: what a VLP-16 or a VLP-32C sends to UDP port
+//! 2368, 1206 bytes each.
+//!
+//! The layout stands in [`crate::vlp32c`], which writes such packets. A VLP-16's blocks hold two
+//! firing sequences of 16 lasers, which fire one at a time, and its unit of distance is 2 mm (VLP-16
+//! User Manual 63-9243, chapter 9). With both returns, each pair of blocks is of the same sequences,
+//! the last return first.
+
+mod capture;
+mod model;
+mod packet;
+
+pub use capture::{count_returns, read_turn};
+pub use model::Model;
+pub use packet::{Decoder, Header, PacketError, Return};

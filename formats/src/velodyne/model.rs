@@ -1,0 +1,133 @@
+//! The sensors whose packets are decoded.
+
+use crate::vlp32c::{BEAM_CROSSING_M, DISTANCE_UNIT_M, SEQUENCE_US};
+
+crate::named! {
+    /// A spinning sensor of Velodyne's.
+    pub enum Model: "sensor model" {
+        /// VLP-16 "Puck".
+        Vlp16 = "vlp16",
+        /// VLP-32C "UltraPuck".
+        Vlp32c = "vlp32c",
+    }
+}
+
+/// Elevations of a VLP-16's lasers, degrees: ros-drivers/velodyne, `VLP16db.yaml`.
+const VLP16_DEG: [f64; 16] =
+    [-15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0, 15.0];
+
+/// Azimuth offsets and elevations of a VLP-32C's lasers, degrees: User Manual 63-9325, chapter 9;
+/// the same in ros-drivers/velodyne, `VeloView-VLP-32C.yaml`.
+const VLP32C_DEG: [[f64; 2]; 32] = [
+    [-1.4, -25.0],
+    [4.2, -1.0],
+    [-1.4, -1.667],
+    [1.4, -15.639],
+    [-1.4, -11.31],
+    [1.4, 0.0],
+    [-4.2, -0.667],
+    [1.4, -8.843],
+    [-1.4, -7.254],
+    [4.2, 0.333],
+    [-1.4, -0.333],
+    [1.4, -6.148],
+    [-4.2, -5.333],
+    [1.4, 1.333],
+    [-4.2, 0.667],
+    [1.4, -4.0],
+    [-1.4, -4.667],
+    [4.2, 1.667],
+    [-1.4, 1.0],
+    [4.2, -3.667],
+    [-4.2, -3.333],
+    [1.4, 3.333],
+    [-1.4, 2.333],
+    [1.4, -2.667],
+    [-1.4, -3.0],
+    [1.4, 7.0],
+    [-1.4, 4.667],
+    [4.2, -2.333],
+    [-4.2, -2.0],
+    [1.4, 15.0],
+    [-1.4, 10.333],
+    [1.4, -1.333],
+];
+
+/// From one firing of a sequence to the next, microseconds (both user manuals).
+const FIRING_US: f64 = 2.304;
+
+/// How far the beams of a VLP-16 cross in front of the axis, metres: its vertical corrections in
+/// `VLP16db.yaml`, 11.2 mm at 15 degrees.
+const VLP16_CROSSING_M: f64 = 0.0419;
+
+/// Where a laser aims and when it fires.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Laser {
+    /// Counted from the lowest elevation.
+    pub ring: u16,
+    /// Against the encoder's azimuth, radians.
+    pub azimuth_offset: f64,
+    pub sin_elevation: f64,
+    pub cos_elevation: f64,
+    /// Metres below where the beam would be if it crossed the axis at the origin.
+    pub drop_m: f64,
+    /// After the start of its firing sequence, microseconds.
+    pub fires_us: f64,
+}
+
+impl Model {
+    /// The model by the last byte of its packets.
+    #[must_use]
+    pub fn of_byte(byte: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|model| model.byte() == byte)
+    }
+
+    /// The last byte of its packets (VLP-16 User Manual 63-9243, table 9-5).
+    #[must_use]
+    pub fn byte(self) -> u8 {
+        match self {
+            Self::Vlp16 => 0x22,
+            Self::Vlp32c => crate::vlp32c::packet::MODEL,
+        }
+    }
+
+    /// The unit of distances in its packets, metres.
+    pub(super) fn distance_unit_m(self) -> f64 {
+        match self {
+            Self::Vlp16 => 0.002,
+            Self::Vlp32c => DISTANCE_UNIT_M,
+        }
+    }
+
+    /// Firing sequences of each block.
+    pub(super) fn sequences_per_block(self) -> usize {
+        match self {
+            Self::Vlp16 => 2,
+            Self::Vlp32c => 1,
+        }
+    }
+
+    /// Microseconds of each block.
+    pub(super) fn block_us(self) -> f64 {
+        self.sequences_per_block() as f64 * SEQUENCE_US
+    }
+
+    /// Its lasers, as packets list them.
+    pub(super) fn lasers(self) -> Vec<Laser> {
+        let (angles_deg, crossing_m, at_once) = match self {
+            Self::Vlp16 => {
+                (VLP16_DEG.map(|elevation| [0.0, elevation]).to_vec(), VLP16_CROSSING_M, 1)
+            }
+            Self::Vlp32c => (VLP32C_DEG.to_vec(), BEAM_CROSSING_M, 2),
+        };
+        let laser = |(number, &[offset, elevation]): (usize, &[f64; 2])| Laser {
+            ring: angles_deg.iter().filter(|[_, other]| *other < elevation).count() as u16,
+            azimuth_offset: offset.to_radians(),
+            sin_elevation: elevation.to_radians().sin(),
+            cos_elevation: elevation.to_radians().cos(),
+            drop_m: crossing_m * elevation.to_radians().tan(),
+            fires_us: (number / at_once) as f64 * FIRING_US,
+        };
+        angles_deg.iter().enumerate().map(laser).collect()
+    }
+}

@@ -1,0 +1,243 @@
+//! One data packet, decoded.
+
+use super::Model;
+use super::model::Laser;
+use crate::vlp32c::packet::{
+    BLOCK_HEADER_SIZE, BLOCK_SIZE, BLOCKS, FLAG, MEASUREMENT_SIZE, PAYLOAD_SIZE,
+};
+use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, SEQUENCE_US};
+
+/// Azimuth units of a turn.
+pub(super) const TURN: u16 = 36_000;
+
+/// Why a payload is not a data packet.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PacketError {
+    /// Another length.
+    #[error("expected a data packet of 1206 bytes, found {0} bytes")]
+    Length(usize),
+    /// A sensor that is not known here.
+    #[error("expected a packet of a VLP-16 (byte 0x22) or VLP-32C (0x28), found byte {0:#04x}")]
+    Model(u8),
+    /// Another sensor than the packets before.
+    #[error("expected a packet of a {expected}, found one of a {found}")]
+    OtherModel {
+        /// The sensor of the packets before.
+        expected: Model,
+        /// The sensor of this packet.
+        found: Model,
+    },
+    /// A byte that names no return mode.
+    #[error("expected the return mode 0x37, 0x38 or 0x39, found {0:#04x}")]
+    Returns(u8),
+    /// A block without its flag.
+    #[error("block {0}: expected the flag ff ee")]
+    Flag(usize),
+    /// An azimuth beyond a turn.
+    #[error("block {block}: expected an azimuth below 36000, found {found}")]
+    Azimuth {
+        /// The block, from 0.
+        block: usize,
+        /// Its azimuth in units of 0.01 degree.
+        found: u16,
+    },
+}
+
+/// What a packet states about itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Header {
+    /// The sensor.
+    pub model: Model,
+    /// Which returns it sends.
+    pub returns: Returns,
+    /// Microseconds past the hour at which the first block was fired.
+    pub time_us: u32,
+    /// The encoder's azimuth at the first block, units of 0.01 degree.
+    pub azimuth: u16,
+    /// Units of 0.01 degree that the head turns in a microsecond, by the packet's first and last
+    /// azimuth. A head that seems to go backwards has been stopped or started: it counts as
+    /// standing.
+    pub units_per_us: f64,
+}
+
+/// One return of one beam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Return {
+    /// In the sensor's frame, metres: x forward (azimuth 0), y left, z up.
+    pub point_m: [f32; 3],
+    /// As the sensor measured it, metres.
+    pub range_m: f32,
+    /// The laser's row, from the lowest elevation.
+    pub ring: u16,
+    /// 0 to 100 for surfaces that scatter light, beyond for retro-reflectors.
+    pub reflectivity: u8,
+    /// Microseconds after the packet's time.
+    pub after_us: f64,
+    /// Whether it is the last or the strongest, or both at once (`Dual`).
+    pub kind: Returns,
+}
+
+/// Decodes packets of one sensor.
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    model: Model,
+    lasers: Vec<Laser>,
+}
+
+impl Header {
+    /// What `payload` states.
+    ///
+    /// # Errors
+    /// If it is no data packet of a sensor that is known here.
+    pub fn of(payload: &[u8]) -> Result<Self, PacketError> {
+        let blocks = blocks(payload)?;
+        let [.., a, b, c, d, mode, model] = *payload else {
+            return Err(PacketError::Length(payload.len()));
+        };
+        let model = Model::of_byte(model).ok_or(PacketError::Model(model))?;
+        let returns = Returns::of_byte(mode).ok_or(PacketError::Returns(mode))?;
+        let (first, step) = (azimuth(blocks[0]), blocks_per_sequence(returns));
+        let turned = advance(first, azimuth(blocks[BLOCKS - step]));
+        let elapsed_us = (BLOCKS / step - 1) as f64 * model.block_us();
+        Ok(Self {
+            model,
+            returns,
+            time_us: u32::from_le_bytes([a, b, c, d]),
+            azimuth: first,
+            units_per_us: f64::from(turned) / elapsed_us,
+        })
+    }
+}
+
+impl Header {
+    /// Microseconds from the packet's first firing sequence to the end of its last.
+    pub(super) fn duration_us(&self) -> f64 {
+        (BLOCKS / blocks_per_sequence(self.returns)) as f64 * self.model.block_us()
+    }
+}
+
+impl Decoder {
+    /// For packets of `model`.
+    #[must_use]
+    pub fn new(model: Model) -> Self {
+        Self { model, lasers: model.lasers() }
+    }
+
+    /// The sensor.
+    #[must_use]
+    pub fn model(&self) -> Model {
+        self.model
+    }
+
+    /// Gives each return of `payload` to `each`, in the order of firing. Of a beam whose last
+    /// return is the strongest, there is one.
+    ///
+    /// # Errors
+    /// If it is no data packet of this sensor; nothing was given then.
+    pub fn decode(
+        &self,
+        payload: &[u8],
+        mut each: impl FnMut(&Return),
+    ) -> Result<Header, PacketError> {
+        let header = Header::of(payload)?;
+        if header.model != self.model {
+            return Err(PacketError::OtherModel { expected: self.model, found: header.model });
+        }
+        let blocks = blocks(payload)?;
+        let step = blocks_per_sequence(header.returns);
+        for (number, blocks) in blocks.chunks_exact(step).enumerate() {
+            let block_us = number as f64 * self.model.block_us();
+            let encoder = f64::from(azimuth(blocks[0]));
+            for i in 0..self.model.sequences_per_block() * self.lasers.len() {
+                let (sequence, laser) =
+                    (i / self.lasers.len(), &self.lasers[i % self.lasers.len()]);
+                let since_us = sequence as f64 * SEQUENCE_US + laser.fires_us;
+                let encoder = encoder + header.units_per_us * since_us;
+                let angle = (encoder * AZIMUTH_UNIT_DEG).to_radians() - laser.azimuth_offset;
+                let [last, strongest] = [blocks[0], blocks[step - 1]].map(|b| measurement(b, i));
+                let kind =
+                    if step == 2 && last == strongest { Returns::Dual } else { header.returns };
+                let kinds = match kind {
+                    Returns::Dual if last != strongest => {
+                        [Some((last, Returns::Last)), Some((strongest, Returns::Strongest))]
+                    }
+                    kind => [Some((last, kind)), None],
+                };
+                for ((distance, reflectivity), kind) in kinds.into_iter().flatten() {
+                    if distance != 0 {
+                        let range = f64::from(distance) * self.model.distance_unit_m();
+                        let after_us = block_us + since_us;
+                        each(&laser.hit(angle, range, reflectivity, after_us, kind));
+                    }
+                }
+            }
+        }
+        Ok(header)
+    }
+}
+
+impl Laser {
+    fn hit(
+        &self,
+        angle: f64,
+        range: f64,
+        reflectivity: u8,
+        after_us: f64,
+        kind: Returns,
+    ) -> Return {
+        let (sin, cos) = angle.sin_cos();
+        let flat = range * self.cos_elevation;
+        // Azimuths grow clockwise.
+        let point = [flat * cos, -flat * sin, range * self.sin_elevation - self.drop_m];
+        Return {
+            point_m: point.map(|x| x as f32),
+            range_m: range as f32,
+            ring: self.ring,
+            reflectivity,
+            after_us,
+            kind,
+        }
+    }
+}
+
+/// The blocks of a packet, checked.
+fn blocks(payload: &[u8]) -> Result<[&[u8]; BLOCKS], PacketError> {
+    if payload.len() != PAYLOAD_SIZE {
+        return Err(PacketError::Length(payload.len()));
+    }
+    let mut blocks = [&payload[..0]; BLOCKS];
+    for (number, (block, bytes)) in
+        blocks.iter_mut().zip(payload.chunks_exact(BLOCK_SIZE)).enumerate()
+    {
+        if !bytes.starts_with(&FLAG) {
+            return Err(PacketError::Flag(number));
+        }
+        let found = azimuth(bytes);
+        if found >= TURN {
+            return Err(PacketError::Azimuth { block: number, found });
+        }
+        *block = bytes;
+    }
+    Ok(blocks)
+}
+
+fn azimuth(block: &[u8]) -> u16 {
+    u16::from_le_bytes([block[2], block[3]])
+}
+
+/// Distance in the sensor's units, and reflectivity, of measurement `i` of a block.
+fn measurement(block: &[u8], i: usize) -> (u16, u8) {
+    let bytes = &block[BLOCK_HEADER_SIZE + i * MEASUREMENT_SIZE..];
+    (u16::from_le_bytes([bytes[0], bytes[1]]), bytes[2])
+}
+
+/// Azimuth units from one azimuth to a later one; none if the later one seems to be earlier.
+pub(super) fn advance(from: u16, to: u16) -> u16 {
+    let turned = if to >= from { to - from } else { TURN - from + to };
+    if turned > TURN / 2 { 0 } else { turned }
+}
+
+fn blocks_per_sequence(returns: Returns) -> usize {
+    if returns == Returns::Dual { 2 } else { 1 }
+}
