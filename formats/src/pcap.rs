@@ -18,7 +18,7 @@ use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
 use crate::error::FormatError;
 
 /// A file in this byte order whose times are in microseconds.
-pub(crate) const MAGIC: u32 = 0xa1b2_c3d4;
+const MAGIC: u32 = 0xa1b2_c3d4;
 const VERSION: [u16; 2] = [2, 4];
 /// No frame was cut: longer ones than this do not exist.
 const SNAP_LENGTH: u32 = 65535;

@@ -5,7 +5,9 @@ use std::path::Path;
 use formats::interval::wilson;
 use infer_cpu::Evaluation;
 use svg::Document;
-use svg::node::element::{Rectangle, Text};
+use svg::node::element::Rectangle;
+
+use crate::svg_text::text;
 
 /// The accuracies with their intervals, in one line.
 #[must_use]
@@ -49,13 +51,7 @@ pub fn drawing(found: &Evaluation, classes: &[String]) -> Document {
     const MARGIN: f64 = 110.0;
     let n = classes.len() as f64;
     let side = MARGIN + n * CELL + 10.0;
-    let text = |words: &str, x: f64, y: f64| {
-        Text::new(words)
-            .set("x", x)
-            .set("y", y)
-            .set("font-family", "sans-serif")
-            .set("font-size", 10)
-    };
+    let text = |words: &str, x: f64, y: f64| text(words, x, y, 10);
     let background = Rectangle::new().set("width", side).set("height", side).set("fill", "white");
     let mut document = Document::new().set("viewBox", (0, 0, side, side)).add(background);
     for (row, (class, answers)) in classes.iter().zip(&found.confusion).enumerate() {

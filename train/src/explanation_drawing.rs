@@ -1,8 +1,9 @@
 //! A drawing of an explained cloud.
 
 use crate::lime::Explanation;
+use crate::svg_text::text;
 use svg::Document;
-use svg::node::element::{Circle, Rectangle, Text};
+use svg::node::element::{Circle, Rectangle};
 
 const SIDE: f64 = 360.0;
 
@@ -24,9 +25,10 @@ pub fn draw(points: &[[f32; 3]], found: &Explanation, critical: &[usize]) -> Doc
     for &i in critical {
         document = document.add(dot(&points[i], SIDE, 3.5, "#c30", 1.0));
     }
+    let heading = |words: &str, left: f64| text(words, left + 10.0, 18.0, 12);
     document
-        .add(text("LIME-3D: red speaks for the class, blue against", 0.0))
-        .add(text("critical points", SIDE))
+        .add(heading("LIME-3D: red speaks for the class, blue against", 0.0))
+        .add(heading("critical points", SIDE))
 }
 
 /// A point as seen from an azimuth of 30 degrees and an elevation of 20 degrees.
@@ -43,12 +45,4 @@ fn dot(point: &[f32; 3], left: f64, radius: f64, colour: &str, opacity: f64) -> 
         .set("r", radius)
         .set("fill", colour.to_owned())
         .set("fill-opacity", format!("{opacity:.2}"))
-}
-
-fn text(words: &str, left: f64) -> Text {
-    Text::new(words)
-        .set("x", left + 10.0)
-        .set("y", 18.0)
-        .set("font-family", "sans-serif")
-        .set("font-size", 12)
 }

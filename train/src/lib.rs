@@ -41,6 +41,7 @@ pub mod recipe;
 pub mod run;
 pub mod selector;
 pub mod shape;
+mod svg_text;
 mod t_net;
 pub mod trainer;
 

@@ -6,7 +6,9 @@ use std::path::Path;
 use formats::{FormatError, atomic};
 use serde::{Deserialize, Serialize};
 use svg::Document;
-use svg::node::element::{Polyline, Text};
+use svg::node::element::Polyline;
+
+use crate::svg_text::text;
 
 /// One epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,12 +115,7 @@ impl Metrics {
                 .set("stroke-width", 1.5)
         };
         let text = |words: String, x: f64, y: f64, colour: &str| {
-            Text::new(words)
-                .set("x", x)
-                .set("y", y)
-                .set("font-family", "sans-serif")
-                .set("font-size", 12)
-                .set("fill", colour.to_owned())
+            text(&words, x, y, 12).set("fill", colour.to_owned())
         };
         let mut document = Document::new().set("viewBox", (0, 0, width, height)).add(
             svg::node::element::Rectangle::new()

@@ -12,9 +12,8 @@ pub fn run() -> anyhow::Result<u8> {
     summary.step("packages", |_| packages());
     summary.step("binaries", binaries);
     summary.step("dependencies", |_| {
-        let mut deny = tool("cargo-deny", "cargo-deny")?;
         let words = ["check", "--hide-inclusion-graph", "bans", "licenses", "sources"];
-        check("dependencies", deny.args(words))
+        check("dependencies", tool("cargo-deny", "cargo-deny")?.args(words))
     });
     summary.step("advisories", advisories);
     summary.step("semantic versions", semantic_versions);
@@ -86,7 +85,9 @@ mod tests {
     #[test]
     fn a_missing_tool_is_named_with_what_installs_it() {
         let error = tool("edgepuck-no-such-tool", "a-package").unwrap_err().to_string();
-        assert!(error.ends_with("is missing: `cargo install --locked a-package` installs it"));
+        let expected =
+            "edgepuck-no-such-tool is missing: `cargo install --locked a-package` installs it";
+        assert_eq!(error, expected);
     }
 
     #[test]

@@ -43,10 +43,10 @@ pub fn read_turn(path: &Path) -> Result<Scan, FormatError> {
     let mut turn = Turn::default();
     let n_packets = each_packet(path, |payload| turn.take(payload))?;
     // A unit may be lost to rounding.
-    if turn.end < f64::from(TURN) - 1.0 {
+    if turn.end() < f64::from(TURN) - 1.0 {
         let found = match turn.decoder {
             None => format!("none among {n_packets} UDP packets"),
-            Some(_) => format!("{:.1} degrees of one", turn.end * AZIMUTH_UNIT_DEG),
+            Some(_) => format!("{:.1} degrees of one", turn.end() * AZIMUTH_UNIT_DEG),
         };
         let cause = format!("expected a turn of a VLP-16 or VLP-32C, found {found}");
         return Err(FormatError::malformed(path, "packets", cause));
@@ -81,9 +81,8 @@ struct Turn {
     decoder: Option<Decoder>,
     /// The packet before.
     before: Option<Header>,
-    /// Where the last packet began and ended, azimuth units since the first one began.
+    /// Where the last packet began, azimuth units since the first one began.
     start: f64,
-    end: f64,
     /// Microseconds since the first packet.
     time_us: f64,
     positions: Vec<[f32; 3]>,
@@ -109,7 +108,6 @@ impl Turn {
             self.time_us += f64::from(header.time_us.saturating_sub(before.time_us));
         }
         self.before = Some(header);
-        self.end = self.start + header.units_per_us * header.duration_us();
         let Self {
             decoder, start, time_us, positions, ranges_m, rings, times_s, intensities, ..
         } = self;
@@ -125,6 +123,12 @@ impl Turn {
             intensities.push(f32::from(found.reflectivity) / 100.0);
         })?;
         Ok(ControlFlow::Continue(()))
+    }
+
+    /// Where the last packet ended.
+    fn end(&self) -> f64 {
+        let span = |last: Header| last.units_per_us * last.duration_us();
+        self.start + self.before.map_or(0.0, span)
     }
 
     fn scan(self) -> Scan {

@@ -91,13 +91,17 @@ impl Header {
     /// # Errors
     /// If it is no data packet of a sensor that is known here.
     pub fn of(payload: &[u8]) -> Result<Self, PacketError> {
-        let blocks = blocks(payload)?;
+        Self::of_blocks(payload, &blocks(payload)?)
+    }
+
+    /// The same, of a payload whose blocks are at hand.
+    fn of_blocks(payload: &[u8], blocks: &[&[u8]; BLOCKS]) -> Result<Self, PacketError> {
         let [.., a, b, c, d, mode, model] = *payload else {
             return Err(PacketError::Length(payload.len()));
         };
         let model = Model::of_byte(model).ok_or(PacketError::Model(model))?;
         let returns = Returns::of_byte(mode).ok_or(PacketError::Returns(mode))?;
-        let (first, step) = (azimuth(blocks[0]), blocks_per_sequence(returns));
+        let (first, step) = (azimuth(blocks[0]), returns.blocks_per_sequence());
         let turned = advance(first, azimuth(blocks[BLOCKS - step]));
         let elapsed_us = (BLOCKS / step - 1) as f64 * model.block_us();
         Ok(Self {
@@ -108,12 +112,10 @@ impl Header {
             units_per_us: f64::from(turned) / elapsed_us,
         })
     }
-}
 
-impl Header {
     /// Microseconds from the packet's first firing sequence to the end of its last.
     pub(super) fn duration_us(&self) -> f64 {
-        (BLOCKS / blocks_per_sequence(self.returns)) as f64 * self.model.block_us()
+        (BLOCKS / self.returns.blocks_per_sequence()) as f64 * self.model.block_us()
     }
 }
 
@@ -140,12 +142,12 @@ impl Decoder {
         payload: &[u8],
         mut each: impl FnMut(&Return),
     ) -> Result<Header, PacketError> {
-        let header = Header::of(payload)?;
+        let blocks = blocks(payload)?;
+        let header = Header::of_blocks(payload, &blocks)?;
         if header.model != self.model {
             return Err(PacketError::OtherModel { expected: self.model, found: header.model });
         }
-        let blocks = blocks(payload)?;
-        let step = blocks_per_sequence(header.returns);
+        let step = header.returns.blocks_per_sequence();
         for (number, blocks) in blocks.chunks_exact(step).enumerate() {
             let block_us = number as f64 * self.model.block_us();
             let encoder = f64::from(azimuth(blocks[0]));
@@ -156,13 +158,11 @@ impl Decoder {
                 let encoder = encoder + header.units_per_us * since_us;
                 let angle = (encoder * AZIMUTH_UNIT_DEG).to_radians() - laser.azimuth_offset;
                 let [last, strongest] = [blocks[0], blocks[step - 1]].map(|b| measurement(b, i));
-                let kind =
-                    if step == 2 && last == strongest { Returns::Dual } else { header.returns };
-                let kinds = match kind {
+                let kinds = match header.returns {
                     Returns::Dual if last != strongest => {
                         [Some((last, Returns::Last)), Some((strongest, Returns::Strongest))]
                     }
-                    kind => [Some((last, kind)), None],
+                    one_or_both => [Some((last, one_or_both)), None],
                 };
                 for ((distance, reflectivity), kind) in kinds.into_iter().flatten() {
                     if distance != 0 {
@@ -236,8 +236,4 @@ fn measurement(block: &[u8], i: usize) -> (u16, u8) {
 pub(super) fn advance(from: u16, to: u16) -> u16 {
     let turned = if to >= from { to - from } else { TURN - from + to };
     if turned > TURN / 2 { 0 } else { turned }
-}
-
-fn blocks_per_sequence(returns: Returns) -> usize {
-    if returns == Returns::Dual { 2 } else { 1 }
 }

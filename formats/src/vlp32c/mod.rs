@@ -129,7 +129,7 @@ impl Revolution {
 
 impl Returns {
     /// Blocks of each firing sequence.
-    fn blocks_per_sequence(self) -> usize {
+    pub(crate) fn blocks_per_sequence(self) -> usize {
         if self == Self::Dual { 2 } else { 1 }
     }
 

@@ -1,9 +1,10 @@
 //! A drawing of the objects that are named wrongly.
 
 use svg::Document;
-use svg::node::element::{Circle, Line, Rectangle, Text};
+use svg::node::element::{Circle, Line, Rectangle};
 
 use super::{Labels, Object};
+use crate::svg_text::text;
 
 /// Most objects that are drawn; the page stays one that a browser opens.
 const MOST: usize = 120;
@@ -99,12 +100,4 @@ fn draw(mut document: Document, cloud: &[[f32; 3]], left: f64, top: f64) -> Docu
             .set("y2", top + SIDE - 2.0)
             .set("stroke", "#333"),
     )
-}
-
-fn text(words: &str, left: f64, top: f64, size: u32) -> Text {
-    Text::new(words)
-        .set("x", left)
-        .set("y", top)
-        .set("font-family", "sans-serif")
-        .set("font-size", size)
 }
