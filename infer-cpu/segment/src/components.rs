@@ -4,6 +4,7 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
+use crate::link::Links;
 use crate::segmentation::Label;
 use crate::sets::Sets;
 

@@ -1,7 +1,7 @@
 //! Follows the ground along the columns of a range image.
 
 use crate::height_grid::{HeightGrid, SECTORS};
-use crate::image::{RangeImage, Return};
+use crate::image::{Columns, Return};
 use crate::plane::{Plane, STEEPEST};
 use crate::settings::Settings;
 
@@ -37,7 +37,7 @@ struct Anchor {
 
 impl GroundFinder {
     /// Fills `grid` with the ground of `image`.
-    pub fn find(&mut self, image: &RangeImage, settings: &Settings, grid: &mut HeightGrid) {
+    pub fn find(&mut self, image: &impl Columns, settings: &Settings, grid: &mut HeightGrid) {
         let slope = f64::from(settings.max_ground_slope_deg).to_radians().tan() as f32;
         // To find the ground takes the plane that it lies near, and the other way round;
         // a quarter of the sectors tells the plane.
@@ -52,7 +52,7 @@ impl GroundFinder {
     /// true.
     fn follow_all(
         &mut self,
-        image: &RangeImage,
+        image: &impl Columns,
         plane: Plane,
         slope: f32,
         grid: &mut HeightGrid,
@@ -73,7 +73,7 @@ impl GroundFinder {
 
     /// The median height of the lowest returns of the columns, the near ones if
     /// there are any.
-    fn level_under_sensor(&mut self, image: &RangeImage) -> Plane {
+    fn level_under_sensor(&mut self, image: &impl Columns) -> Plane {
         for farthest_m in [NEAR_M, f32::INFINITY] {
             let lowest = (0..image.n_columns()).filter_map(|column| image.column(column).first());
             let near = lowest.filter(|lowest| lowest.range_m <= farthest_m);

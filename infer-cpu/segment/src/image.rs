@@ -1,7 +1,6 @@
 //! A sweep as an image: a row for each ring, columns of equal azimuth.
 
 use std::f32::consts::{FRAC_PI_2, PI};
-use std::ops::Range;
 
 use crate::angle::atan2;
 use crate::segmentation::Label;
@@ -21,6 +20,24 @@ pub struct Return {
     pub height_m: f32,
     /// The point's place in the sweep.
     pub point: u32,
+}
+
+/// A range image, column by column.
+pub trait Columns {
+    /// The number of columns all around the sensor.
+    fn n_columns(&self) -> usize;
+    /// The returns of a column from the lowest row up.
+    fn column(&self, column: usize) -> &[Return];
+}
+
+/// A range image, cell by cell.
+pub trait Cells {
+    /// The number of columns all around the sensor.
+    fn n_columns(&self) -> usize;
+    /// The elevation of each row in radians, ascending.
+    fn elevations(&self) -> &[f32];
+    /// The returns of a cell.
+    fn cell(&self, column: usize, row: usize) -> &[Return];
 }
 
 /// The returns of a sweep, sorted by column and then by row. A cell holds any
@@ -66,16 +83,15 @@ impl RangeImage {
         settings: &Settings,
         labels: &mut [Label],
     ) -> Result<(), SegmentError> {
-        self.n_columns = (360.0 / settings.column_width_deg).round() as usize;
+        self.n_columns = n_columns(settings);
         self.place(sweep, settings, labels);
-        self.number_rows()?;
+        self.number_rows(settings.ring_elevations_deg.as_deref())?;
         self.sort(sweep.points);
         Ok(())
     }
 
     /// Finds the column and the ring of every point.
     fn place(&mut self, sweep: &Sweep<'_>, settings: &Settings, labels: &mut [Label]) {
-        let n_columns = self.n_columns as f32;
         let per_row = 1.0 / settings.row_height_deg.to_radians();
         let squares = settings.min_range_m.powi(2)..=settings.max_range_m.powi(2);
         self.spots.clear();
@@ -91,8 +107,7 @@ impl RangeImage {
                 continue;
             }
             labels[point] = Label::OBSTACLE;
-            let column = (atan2(y, x) + PI) * (n_columns / (2.0 * PI));
-            spot.column = (column as u16).min(self.n_columns as u16 - 1);
+            spot.column = column(self.n_columns, x, y);
             spot.ring = match sweep.rings {
                 Some(rings) => rings[point],
                 None => ((atan2(z, spot.range_m) + FRAC_PI_2) * per_row) as u16,
@@ -107,18 +122,33 @@ impl RangeImage {
         }
     }
 
-    /// Numbers the rings that have returns by their elevation, whatever the
-    /// sensor's own order of its lasers.
-    fn number_rows(&mut self) -> Result<(), SegmentError> {
+    /// Numbers the rings by their elevation, whatever the sensor's own order of its lasers:
+    /// those of `elevations_deg`, or else those that have returns.
+    fn number_rows(&mut self, elevations_deg: Option<&[f32]>) -> Result<(), SegmentError> {
         let is_used = |row: &Row| row.range_m != 0.0 || row.z_m != 0.0;
-        let elevation = |row: &Row| atan2(row.z_m as f32, row.range_m as f32);
-        let used = self.rows.iter().enumerate().filter(|(_, row)| is_used(row));
         self.order.clear();
-        self.order.extend(used.map(|(ring, _)| ring as u32));
+        match elevations_deg {
+            Some(known) if known.len() < self.rows.len() => {
+                let (expected, found) = (known.len(), self.rows.len() - 1);
+                return Err(SegmentError::UnknownRing { expected, found });
+            }
+            Some(known) => {
+                self.rows.resize(known.len(), Row::default());
+                self.order.extend(0..known.len() as u32);
+            }
+            None => {
+                let used = self.rows.iter().enumerate().filter(|(_, row)| is_used(row));
+                self.order.extend(used.map(|(ring, _)| ring as u32));
+            }
+        }
         if self.order.len() > MOST_ROWS {
             return Err(SegmentError::TooManyRings { most: MOST_ROWS, found: self.order.len() });
         }
-        let of_ring = |ring: u32| elevation(&self.rows[ring as usize]);
+        let mean = |row: &Row| atan2(row.z_m as f32, row.range_m as f32);
+        let of_ring = |ring: u32| match elevations_deg {
+            Some(known) => known[ring as usize].to_radians(),
+            None => mean(&self.rows[ring as usize]),
+        };
         self.order.sort_unstable_by(|&a, &b| of_ring(a).total_cmp(&of_ring(b)).then(a.cmp(&b)));
         self.elevations.clear();
         self.elevations.extend(self.order.iter().map(|&ring| of_ring(ring)));
@@ -160,6 +190,10 @@ impl RangeImage {
         }
     }
 
+    fn n_rows(&self) -> usize {
+        self.elevations.len()
+    }
+
     /// Takes all returns out of the image that `is_kept`, given their column, refuses.
     pub fn retain(&mut self, mut is_kept: impl FnMut(usize, &mut Return) -> bool) {
         let (mut kept, mut from) = (0, 0);
@@ -182,34 +216,42 @@ impl RangeImage {
         }
         self.returns.truncate(kept);
     }
+}
 
-    pub fn n_columns(&self) -> usize {
+impl Columns for RangeImage {
+    fn n_columns(&self) -> usize {
         self.n_columns
     }
 
-    pub fn n_rows(&self) -> usize {
-        self.elevations.len()
-    }
-
-    /// The elevation of a row in radians.
-    pub fn elevation(&self, row: usize) -> f32 {
-        self.elevations[row]
-    }
-
-    /// The returns of a column from the lowest row up.
-    pub fn column(&self, column: usize) -> &[Return] {
+    fn column(&self, column: usize) -> &[Return] {
         let cell = column * self.n_rows();
         &self.returns[self.starts[cell] as usize..self.starts[cell + self.n_rows()] as usize]
     }
+}
 
-    /// The places of a cell's returns.
-    pub fn cell(&self, column: usize, row: usize) -> Range<usize> {
+impl Cells for RangeImage {
+    fn n_columns(&self) -> usize {
+        self.n_columns
+    }
+
+    fn elevations(&self) -> &[f32] {
+        &self.elevations
+    }
+
+    fn cell(&self, column: usize, row: usize) -> &[Return] {
         let cell = column * self.n_rows() + row;
-        self.starts[cell] as usize..self.starts[cell + 1] as usize
+        &self.returns[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
+}
 
-    /// The returns at some places.
-    pub fn returns(&self, places: Range<usize>) -> &[Return] {
-        &self.returns[places]
-    }
+/// The number of columns all around the sensor.
+pub fn n_columns(settings: &Settings) -> usize {
+    (360.0 / settings.column_width_deg).round() as usize
+}
+
+/// The column, of `n_columns`, in which a return at `(x, y)` lies: counterclockwise from
+/// behind the sensor.
+pub fn column(n_columns: usize, x: f32, y: f32) -> u16 {
+    let column = (atan2(y, x) + PI) * (n_columns as f32 / (2.0 * PI));
+    (column as u16).min(n_columns as u16 - 1)
 }

@@ -17,6 +17,7 @@
 //! ground is followed from the lowest ring up; what is found becomes a polar grid of
 //! heights, and whatever lies little above that grid is ground. The other points are
 //! linked to their neighbours in the image, and points that are linked are a cluster.
+//! A [`Segmenter`] does this for whole sweeps, a [`Stream`] for returns as they come.
 //! Clouds without the structure of a scan are cut into connected components instead.
 
 mod angle;
@@ -25,14 +26,17 @@ mod ground;
 mod height_grid;
 mod image;
 mod link;
+mod open_sets;
 mod oriented_box;
 mod plane;
 mod segmentation;
 mod segmenter;
 mod sets;
 mod settings;
+mod stream;
 
 pub use oriented_box::OrientedBox;
 pub use segmentation::{Cluster, Label, Segmentation};
 pub use segmenter::{SegmentError, Segmenter, Sweep};
 pub use settings::{Settings, SettingsError};
+pub use stream::{Dropped, Stream, StreamCluster};

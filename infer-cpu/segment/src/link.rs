@@ -1,9 +1,8 @@
 //! Links neighbours in the range image that are near each other.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::RangeInclusive;
 
-use crate::image::{RangeImage, Return};
-use crate::sets::Sets;
+use crate::image::{Cells, Return};
 use crate::settings::Settings;
 
 /// On a surface at 30 degrees to the beams, rings are twice as far apart as on one
@@ -20,52 +19,83 @@ const MOST_PITCH: f32 = 0.0131;
 /// the branches over them are not linked like the other side of a window.
 const BELT_M: RangeInclusive<f32> = 0.6..=1.3;
 /// The most columns that are searched for a neighbour: 8 degrees.
-const MOST_COLUMNS: usize = 40;
+pub const MOST_COLUMNS: usize = 40;
 /// The most returns of one cell that are compared. Two sensors with four rings in
 /// a row's height and two returns in a column's width have as many; it bounds the
 /// time for clouds with all points in one cell.
-const MOST_IN_CELL: usize = 16;
+pub const MOST_IN_CELL: usize = 16;
 
-/// Joins the sets of all returns that belong together.
-pub fn link(image: &RangeImage, settings: &Settings, sets: &mut Sets) {
-    let mut linker = Linker {
-        image,
-        sets,
-        column_width: settings.column_width_deg.to_radians(),
-        reach_m: settings.reach_m,
-        bridge_m: settings.bridge_m,
-    };
-    for column in 0..image.n_columns() {
-        for row in 0..image.n_rows() {
-            let cell = image.cell(column, row);
-            for at in cell.clone() {
-                let this = image.returns(at..at + 1)[0];
-                linker.join_near(&this, at + 1..cell.end, within(linker.reach_m));
-                linker.look_aside(&this, column, row);
-                linker.look_up(&this, column, row);
-            }
+/// Who is linked to whom.
+pub trait Links {
+    /// Notes that two points belong together.
+    fn join(&mut self, a: u32, b: u32);
+}
+
+/// Joins all returns of `column` with those that belong to them: in the column itself, in the
+/// next one and in the one before, and, along a row, in columns of higher numbers.
+pub fn link_column(image: &impl Cells, column: usize, settings: &Settings, links: &mut impl Links) {
+    let mut linker = Linker { image, links, limits: Limits::new(settings) };
+    for row in 0..image.elevations().len() {
+        let cell = image.cell(column, row);
+        for (at, this) in cell.iter().enumerate() {
+            let others = &cell[at + 1..];
+            linker.join_near(this, others, within(linker.limits.reach_m));
+            linker.look_aside(this, column, row);
+            linker.look_up(this, column, row);
         }
     }
 }
 
-struct Linker<'a> {
-    image: &'a RangeImage,
-    sets: &'a mut Sets,
+/// Distances that link.
+#[derive(Clone, Copy)]
+pub struct Limits {
+    /// The width of a column, radians.
     column_width: f32,
     reach_m: f32,
     bridge_m: f32,
 }
 
-impl Linker<'_> {
+impl Limits {
+    pub fn new(settings: &Settings) -> Self {
+        let column_width = settings.column_width_deg.to_radians();
+        Self { column_width, reach_m: settings.reach_m, bridge_m: settings.bridge_m }
+    }
+
+    /// How far apart, at a horizontal distance from the sensor, neighbours on a row may be, and
+    /// how many columns away.
+    fn aside(&self, range_m: f32) -> (f32, usize) {
+        let spacing_m = range_m * self.column_width;
+        let limit_m = self.reach_m + spacing_m;
+        (limit_m, ((limit_m / spacing_m) as usize).clamp(1, MOST_COLUMNS))
+    }
+
+    /// The most columns of lower numbers from which a return at this horizontal distance can be
+    /// linked.
+    ///
+    /// A return at the distance r' links over d(r') = reach + r' w, w being a column's width.
+    /// The two differ in distance by no more than that, so that r' >= (r - reach) / (1 + w); and
+    /// the nearer it is, the more columns it looks at. What rounding may add is far below
+    /// a thousandth.
+    pub fn most_columns(&self, range_m: f32) -> usize {
+        let nearest_m = 0.999 * (range_m - self.reach_m) / (1.0 + self.column_width);
+        if nearest_m > 0.0 { self.aside(nearest_m).1 } else { MOST_COLUMNS }
+    }
+}
+
+struct Linker<'a, I, L> {
+    image: &'a I,
+    links: &'a mut L,
+    limits: Limits,
+}
+
+impl<I: Cells, L: Links> Linker<'_, I, L> {
     /// Links `this` to the next return on its row that is near, past missing ones
     /// and past things in front or behind.
     fn look_aside(&mut self, this: &Return, column: usize, row: usize) {
-        let spacing_m = this.range_m * self.column_width;
-        let limit_m = self.reach_m + spacing_m;
+        let (limit_m, most) = self.limits.aside(this.range_m);
         let n_columns = self.image.n_columns();
-        let most = ((limit_m / spacing_m) as usize).clamp(1, MOST_COLUMNS.min(n_columns - 1));
         let mut beside = column;
-        for _ in 0..most {
+        for _ in 0..most.min(n_columns - 1) {
             beside = if beside + 1 == n_columns { 0 } else { beside + 1 };
             if self.join_near(this, self.image.cell(beside, row), within(limit_m)) {
                 return;
@@ -76,22 +106,23 @@ impl Linker<'_> {
     /// Links `this` to the next return above it that is near, past rows without one.
     /// Above a car's belt line, that is as far as a window is high.
     fn look_up(&mut self, this: &Return, column: usize, row: usize) {
-        let n_rows = self.image.n_rows();
-        if row + 1 == n_rows {
+        let elevations = self.image.elevations();
+        if row + 1 == elevations.len() {
             return;
         }
         let n_columns = self.image.n_columns();
         let columns = [column, (column + 1) % n_columns, (column + n_columns - 1) % n_columns];
-        let elevation = self.image.elevation(row);
-        let pitch = (self.image.elevation(row + 1) - elevation).max(LEAST_PITCH);
-        let limit_m = self.reach_m + SLANT * this.range_m * pitch.min(MOST_PITCH);
-        let height_m = self.reach_m + SLANT * this.range_m * pitch;
+        let elevation = elevations[row];
+        let pitch = (elevations[row + 1] - elevation).max(LEAST_PITCH);
+        let Limits { reach_m, bridge_m, .. } = self.limits;
+        let limit_m = reach_m + SLANT * this.range_m * pitch.min(MOST_PITCH);
+        let height_m = reach_m + SLANT * this.range_m * pitch;
         let is_belt = BELT_M.contains(&this.height_m);
-        let bridged_m = if is_belt { self.bridge_m.max(height_m) } else { height_m };
+        let bridged_m = if is_belt { bridge_m.max(height_m) } else { height_m };
         let highest = elevation + bridged_m / this.range_m;
         let is_linked = |flat: f32, dz: f32| within(limit_m)(flat, dz * limit_m / bridged_m);
-        for above in row + 1..n_rows {
-            if self.image.elevation(above) > highest {
+        for (above, &beam) in elevations.iter().enumerate().skip(row + 1) {
+            if beam > highest {
                 return;
             }
             let mut is_near = false;
@@ -105,20 +136,20 @@ impl Linker<'_> {
         }
     }
 
-    /// Links `this` to those returns at `places` of which `is_near` is true, given the
+    /// Links `this` to those of `others` of which `is_near` is true, given the
     /// square of their horizontal distance and their difference in height, and says
     /// whether there are any.
     fn join_near(
         &mut self,
         this: &Return,
-        places: Range<usize>,
+        others: &[Return],
         is_near: impl Fn(f32, f32) -> bool,
     ) -> bool {
         let mut any = false;
-        for other in self.image.returns(places).iter().take(MOST_IN_CELL) {
+        for other in others.iter().take(MOST_IN_CELL) {
             let [dx, dy, dz] = [0, 1, 2].map(|axis| other.position[axis] - this.position[axis]);
             if is_near(dx * dx + dy * dy, dz) {
-                self.sets.join(this.point, other.point);
+                self.links.join(this.point, other.point);
                 any = true;
             }
         }

@@ -43,7 +43,8 @@ pub struct Segmentation {
     ends: Vec<(u32, Option<f32>)>,
     /// The component that each first point of a set begins.
     components: Vec<u32>,
-    extents: Vec<Extent>,
+    /// Of each set, its extent and the cluster that it is.
+    extents: Vec<(Extent, Option<u32>)>,
 }
 
 impl Segmentation {
@@ -74,10 +75,9 @@ impl Segmentation {
         self.measure(points, sets);
         self.ends.clear();
         let mut n_members = 0;
-        for extent in &mut self.extents {
-            let is_cluster = (settings.min_points..=settings.max_points).contains(&extent.count)
-                && extent.diagonal_m() <= settings.max_size_m;
-            extent.number = is_cluster.then_some(self.ends.len() as u32);
+        for (extent, number) in &mut self.extents {
+            let is_cluster = extent.is_cluster(settings);
+            *number = is_cluster.then_some(self.ends.len() as u32);
             if is_cluster {
                 // The end grows to its place while the members are filled in.
                 let [x, y] = extent.middle();
@@ -92,7 +92,7 @@ impl Segmentation {
                 continue;
             }
             let first = sets.first(point as u32) as usize;
-            match self.extents[self.components[first] as usize].number {
+            match self.extents[self.components[first] as usize].1 {
                 None => *label = Label::Small,
                 Some(number) => {
                     *label = Label::Cluster(number);
@@ -116,38 +116,47 @@ impl Segmentation {
             let first = sets.first(point as u32) as usize;
             if first == point {
                 self.components[first] = self.extents.len() as u32;
-                self.extents.push(Extent::of(points[point]));
+                self.extents.push((Extent::of(points[point]), None));
             } else {
-                self.extents[self.components[first] as usize].add(points[point]);
+                self.extents[self.components[first] as usize].0.add(&Extent::of(points[point]));
             }
         }
     }
 }
 
 /// How many points a set has and the rectangle around them.
-struct Extent {
-    count: usize,
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Extent {
+    pub count: usize,
     low: [f32; 2],
     high: [f32; 2],
-    number: Option<u32>,
 }
 
 impl Extent {
-    fn of([x, y, _]: [f32; 3]) -> Self {
-        Self { count: 1, low: [x, y], high: [x, y], number: None }
+    pub fn of([x, y, _]: [f32; 3]) -> Self {
+        Self { count: 1, low: [x, y], high: [x, y] }
     }
 
-    fn add(&mut self, [x, y, _]: [f32; 3]) {
-        self.count += 1;
-        self.low = [self.low[0].min(x), self.low[1].min(y)];
-        self.high = [self.high[0].max(x), self.high[1].max(y)];
+    /// Adds another set.
+    pub fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        for axis in 0..2 {
+            self.low[axis] = self.low[axis].min(other.low[axis]);
+            self.high[axis] = self.high[axis].max(other.high[axis]);
+        }
+    }
+
+    /// Whether the set is neither too small nor too large for a cluster.
+    pub fn is_cluster(&self, settings: &Settings) -> bool {
+        (settings.min_points..=settings.max_points).contains(&self.count)
+            && self.diagonal_m() <= settings.max_size_m
     }
 
     fn diagonal_m(&self) -> f32 {
         (self.high[0] - self.low[0]).hypot(self.high[1] - self.low[1])
     }
 
-    fn middle(&self) -> [f32; 2] {
+    pub fn middle(&self) -> [f32; 2] {
         // Halves first: a sum may overflow.
         [0, 1].map(|axis| self.low[axis] / 2.0 + self.high[axis] / 2.0)
     }

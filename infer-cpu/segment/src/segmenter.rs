@@ -2,8 +2,8 @@
 
 use crate::components::Components;
 use crate::ground::{GroundFinder, sector};
-use crate::image::RangeImage;
-use crate::link::link;
+use crate::image::{Columns, RangeImage};
+use crate::link::link_column;
 use crate::segmentation::{Label, Segmentation};
 use crate::sets::Sets;
 use crate::settings::{Settings, SettingsError};
@@ -36,6 +36,14 @@ pub enum SegmentError {
         /// The most that are supported.
         most: usize,
         /// How many the sweep has.
+        found: usize,
+    },
+    /// A ring of which the settings do not tell the elevation.
+    #[error("expected rings below {expected}, as many as there are elevations, found {found}")]
+    UnknownRing {
+        /// The number of elevations.
+        expected: usize,
+        /// A ring of the sweep.
         found: usize,
     },
     /// More points than their indices can count.
@@ -112,7 +120,9 @@ impl Segmenter {
             }
             !is_ground
         });
-        link(&self.image, &self.settings, &mut self.sets);
+        for column in 0..n_columns {
+            link_column(&self.image, column, &self.settings, &mut self.sets);
+        }
         Ok(())
     }
 }

@@ -1,5 +1,7 @@
 //! Disjoint sets of points: who is linked to whom.
 
+use crate::link::Links;
+
 /// A forest over the points; the root of a set is its first point, whatever the
 /// order of the links.
 #[derive(Default)]
@@ -27,9 +29,10 @@ impl Sets {
             point = grandparent;
         }
     }
+}
 
-    /// Joins the sets of two points.
-    pub fn join(&mut self, a: u32, b: u32) {
+impl Links for Sets {
+    fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.first(a), self.first(b));
         self.parents[a.max(b) as usize] = a.min(b);
     }

@@ -1,5 +1,7 @@
 //! What a segmentation depends on.
 
+use crate::image::MOST_ROWS;
+
 /// The numbers that decide what is ground and what belongs together.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -12,6 +14,9 @@ pub struct Settings {
     pub column_width_deg: f32,
     /// Height of a row of the range image in degrees, for sweeps that come without rings.
     pub row_height_deg: f32,
+    /// The elevation of each ring of the sensor in degrees, in the order of the rings' numbers.
+    /// `None` takes the mean of each ring's returns. A [`Stream`](crate::Stream) must have them.
+    pub ring_elevations_deg: Option<Vec<f32>>,
     /// The steepest ground in degrees, against the plane of the ground around the sensor: neither a
     /// hill nor a tilt of the sensor count, up to 20 degrees.
     pub max_ground_slope_deg: f32,
@@ -45,6 +50,7 @@ impl Default for Settings {
             column_width_deg: 0.2,
             // An HDL-64E's rings lie 0.33 to 0.5 degrees apart, most of a VLP-32C's 0.33.
             row_height_deg: 0.4,
+            ring_elevations_deg: None,
             // Ramps of garages and bridges mostly stay below 8 degrees (14 %); a hill is a plane
             // of its own.
             max_ground_slope_deg: 8.0,
@@ -94,6 +100,13 @@ impl Settings {
         check("row_height_deg", height, "0.1 to 10 degrees", within(height, 0.1, 10.0))?;
         check("max_ground_slope_deg", slope, "0 to 45 degrees", within(slope, 0.0, 45.0))?;
         check("max_size_m", size, "a length or infinity", size >= 0.0)?;
+        for &elevation in self.ring_elevations_deg.iter().flatten() {
+            let is_elevation = within(elevation, -90.0, 90.0);
+            check("ring_elevations_deg", elevation, "-90 to 90 degrees", is_elevation)?;
+        }
+        let n_rings = self.ring_elevations_deg.as_ref().map_or(1, Vec::len);
+        let is_few = (1..=MOST_ROWS).contains(&n_rings);
+        check("ring_elevations_deg", n_rings as f32, "1 to 2048 rings", is_few)?;
         let radius = self.radius_m.unwrap_or(1.0);
         check("radius_m", radius, "1e-15 to 1e15 m", within(radius, 1e-15, 1e15))
     }
@@ -122,16 +135,26 @@ mod tests {
 
     #[test]
     fn a_wrong_setting_is_named() {
-        let wrong: [fn(&mut Settings); 6] = [
+        let wrong: [fn(&mut Settings); 8] = [
             |s| s.min_range_m = f32::NAN,
             |s| s.max_range_m = 0.5,
             |s| s.column_width_deg = 0.0,
             |s| s.reach_m = f32::INFINITY,
             |s| s.max_size_m = -1.0,
             |s| s.radius_m = Some(0.0),
+            |s| s.ring_elevations_deg = Some(vec![]),
+            |s| s.ring_elevations_deg = Some(vec![0.0, 91.0]),
         ];
-        let names =
-            ["min_range_m", "max_range_m", "column_width_deg", "reach_m", "max_size_m", "radius_m"];
+        let names = [
+            "min_range_m",
+            "max_range_m",
+            "column_width_deg",
+            "reach_m",
+            "max_size_m",
+            "radius_m",
+            "ring_elevations_deg",
+            "ring_elevations_deg",
+        ];
         for (change, name) in wrong.into_iter().zip(names) {
             let mut settings = Settings::default();
             change(&mut settings);

@@ -9,7 +9,7 @@
 #[allow(dead_code, reason = "the suite uses all of it")]
 mod scanner;
 
-use edgepuck_segment::{Segmenter, Settings, Sweep};
+use edgepuck_segment::{Segmenter, Settings, Stream, Sweep};
 use scanner::{VLP32C, block, flat, scan};
 use test_support::allocations::{self, Counting};
 
@@ -37,4 +37,26 @@ fn main() {
             assert!(n_clusters > 0);
         }
     }
+    stream_allocates_nothing(&large);
+}
+
+/// After its first two turns, whose grounds take the room for all others.
+fn stream_allocates_nothing(scan: &scanner::Scan) {
+    let mut settings = Settings::default();
+    settings.ring_elevations_deg = Some(VLP32C.map(|degrees| degrees as f32).to_vec());
+    let mut stream = Stream::new(settings, 150_000).unwrap();
+    let (mut before, mut n_clusters) = (0, 0);
+    for turn in 0..5 {
+        if turn == 3 {
+            before = allocations::count();
+        }
+        // The scanner turns counterclockwise, the stream's sensor clockwise.
+        for i in (0..scan.points.len()).rev() {
+            let [x, y, _] = scan.points[i];
+            stream.advance(-y.atan2(x) - 0.01, |_| n_clusters += 1);
+            stream.push(scan.points[i], scan.rings[i], ());
+        }
+    }
+    assert_eq!(allocations::count() - before, 0, "stream");
+    assert!(n_clusters > 3);
 }

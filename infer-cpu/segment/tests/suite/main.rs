@@ -11,3 +11,4 @@ mod inputs;
 mod npz;
 mod real_frames;
 mod scanner;
+mod stream;

@@ -1,0 +1,203 @@
+//! Disjoint sets of points that come and go.
+
+use crate::link::Links;
+use crate::segmentation::Extent;
+
+/// No point.
+pub const NONE: u32 = u32::MAX;
+
+/// A forest over the points at hand, in a fixed number of slots. Each set is also a ring of
+/// its points, so that it can be listed and two sets can be joined without a search.
+pub struct OpenSets<T> {
+    slots: Vec<Slot<T>>,
+    /// What is known of each set, in the slot of its root.
+    sets: Vec<Set>,
+    /// The first free slot; each names the next.
+    free: u32,
+    /// Points that have come.
+    n_points: u64,
+}
+
+/// A point.
+#[derive(Clone, Copy)]
+pub struct Slot<T> {
+    pub position: [f32; 3],
+    pub row: u16,
+    pub tag: T,
+    /// How many points came before it.
+    pub order: u64,
+    /// Its column, counted from the start of the stream.
+    pub place: u64,
+    /// [`NONE`] of a free slot.
+    parent: u32,
+    /// The next of its set, or of the free slots.
+    next: u32,
+    /// The next of a list of its owner's.
+    pub link: u32,
+}
+
+/// Points that belong together.
+#[derive(Clone, Copy, Default)]
+pub struct Set {
+    pub extent: Extent,
+    /// The column of its first point.
+    pub first_place: u64,
+    /// The last column from which a return may still be linked to it.
+    pub last_place: u64,
+    /// Whether it has been cut, because it goes on around the sensor.
+    pub is_cut: bool,
+}
+
+impl Set {
+    fn add(&mut self, other: &Self) {
+        self.extent.add(&other.extent);
+        self.first_place = self.first_place.min(other.first_place);
+        self.last_place = self.last_place.max(other.last_place);
+        self.is_cut |= other.is_cut;
+    }
+}
+
+impl<T: Copy + Default> OpenSets<T> {
+    /// With room for `capacity` points.
+    pub fn new(capacity: u32) -> Self {
+        let slot = |i: u32| Slot {
+            position: [0.0; 3],
+            row: 0,
+            tag: T::default(),
+            order: 0,
+            place: 0,
+            parent: NONE,
+            next: if i + 1 < capacity { i + 1 } else { NONE },
+            link: NONE,
+        };
+        Self {
+            slots: (0..capacity).map(slot).collect(),
+            sets: vec![Set::default(); capacity as usize],
+            free: if capacity > 0 { 0 } else { NONE },
+            n_points: 0,
+        }
+    }
+
+    /// Takes in a point as a set of its own; `None` if there is no room. What may be linked
+    /// to it is not known yet.
+    pub fn insert(&mut self, position: [f32; 3], row: u16, tag: T, place: u64) -> Option<u32> {
+        let point = self.free;
+        let slot = self.slots.get_mut(point as usize)?;
+        self.free = slot.next;
+        let order = self.n_points;
+        let (parent, next) = (point, point);
+        *slot = Slot { position, row, tag, order, place, parent, next, link: NONE };
+        self.n_points += 1;
+        let extent = Extent::of(position);
+        let set = Set { extent, first_place: place, last_place: place, is_cut: false };
+        self.sets[point as usize] = set;
+        Some(point)
+    }
+
+    pub fn slot(&self, point: u32) -> &Slot<T> {
+        &self.slots[point as usize]
+    }
+
+    /// What the owner's list names after `point`.
+    pub fn link_mut(&mut self, point: u32) -> &mut u32 {
+        &mut self.slots[point as usize].link
+    }
+
+    /// Notes that returns up to the column `place` may be linked to `point`, a set of its own.
+    pub fn wait_until(&mut self, point: u32, place: u64) {
+        self.sets[point as usize].last_place = place;
+    }
+
+    /// The root of the set that holds `point`; `None` if the point is gone.
+    pub fn root(&mut self, mut point: u32) -> Option<u32> {
+        loop {
+            let parent = self.slots[point as usize].parent;
+            if parent == NONE {
+                return None;
+            }
+            if parent == point {
+                return Some(point);
+            }
+            // Halving the paths keeps them short.
+            let grandparent = self.slots[parent as usize].parent;
+            self.slots[point as usize].parent = grandparent;
+            point = grandparent;
+        }
+    }
+
+    /// The set of this root.
+    pub fn set(&self, root: u32) -> &Set {
+        &self.sets[root as usize]
+    }
+
+    /// The points of the set of this root.
+    pub fn members(&self, root: u32) -> impl Iterator<Item = u32> {
+        let mut next = Some(root);
+        std::iter::from_fn(move || {
+            let here = next?;
+            let after = self.slots[here as usize].next;
+            next = (after != root).then_some(after);
+            Some(here)
+        })
+    }
+
+    /// Takes out a point that is a set of its own.
+    pub fn remove(&mut self, point: u32) {
+        let slot = &mut self.slots[point as usize];
+        (slot.parent, slot.next) = (NONE, self.free);
+        self.free = point;
+    }
+
+    /// Takes out the set of this root.
+    pub fn remove_set(&mut self, root: u32) {
+        let mut here = self.slots[root as usize].next;
+        while here != root {
+            let next = self.slots[here as usize].next;
+            self.remove(here);
+            here = next;
+        }
+        self.remove(root);
+    }
+
+    /// Takes out the points of this root's set in columns before `place`, and marks it as cut.
+    pub fn cut(&mut self, root: u32, place: u64) {
+        let whole = self.sets[root as usize];
+        let mut kept: Option<u32> = None;
+        let mut here = self.slots[root as usize].next;
+        loop {
+            let Slot { next, place: at, position, .. } = self.slots[here as usize];
+            if at < place {
+                self.remove(here);
+            } else {
+                (self.slots[here as usize].parent, self.slots[here as usize].next) = (here, here);
+                let extent = Extent::of(position);
+                self.sets[here as usize] = Set { extent, first_place: at, is_cut: true, ..whole };
+                match kept {
+                    None => kept = Some(here),
+                    Some(kept) => self.join(kept, here),
+                }
+            }
+            if here == root {
+                return;
+            }
+            here = next;
+        }
+    }
+}
+
+impl<T: Copy + Default> Links for OpenSets<T> {
+    fn join(&mut self, a: u32, b: u32) {
+        let (Some(a), Some(b)) = (self.root(a), self.root(b)) else { return };
+        if a == b {
+            return;
+        }
+        let is_larger = self.sets[a as usize].extent.count >= self.sets[b as usize].extent.count;
+        let (root, joined) = if is_larger { (a, b) } else { (b, a) };
+        self.slots[joined as usize].parent = root;
+        let next = self.slots[root as usize].next;
+        self.slots[root as usize].next = self.slots[joined as usize].next;
+        self.slots[joined as usize].next = next;
+        let other = self.sets[joined as usize];
+        self.sets[root as usize].add(&other);
+    }
+}

@@ -1,0 +1,491 @@
+//! Clusters of a sensor that turns on and on, each as soon as it is complete.
+
+use std::f32::consts::{PI, TAU};
+use std::ops::Range;
+
+use crate::ground::{GroundFinder, sector};
+use crate::height_grid::HeightGrid;
+use crate::image::{self, Cells, Columns, Return};
+use crate::link::{Limits, MOST_COLUMNS, MOST_IN_CELL, link_column};
+use crate::open_sets::{NONE, OpenSets};
+use crate::settings::{Settings, SettingsError};
+
+/// Columns that are held for linking: those that a return may look at, and a few to spare.
+const WINDOW: usize = 64;
+const _: () = assert!(MOST_COLUMNS + 2 < WINDOW);
+
+/// Cuts the returns of a sensor that turns clockwise into clusters while they come.
+///
+/// A cluster is complete, and handed out, when the beams have passed it by as much as
+/// its neighbours may be apart: at 10 m these are 1.8 degrees. The ground is that of the turn
+/// before. Only the clusters of the first turn wait for its end, because no ground is known
+/// before. Whatever links all around the sensor, such as the walls of a small room, has no end
+/// and is no cluster.
+///
+/// ```
+/// use edgepuck_segment::{Settings, Stream};
+///
+/// let mut settings = Settings::default();
+/// settings.ring_elevations_deg = Some((-10..6).map(|degrees| degrees as f32).collect());
+/// let mut stream = Stream::new(settings, 100_000)?;
+/// let mut n_clusters = 0;
+/// for turn in 0..2 {
+///     for degrees in 0..360 {
+///         // No return of an azimuth before this comes any more.
+///         let azimuth_rad = (degrees as f32).to_radians();
+///         stream.advance(azimuth_rad, |cluster| {
+///             n_clusters += 1;
+///             assert_eq!(cluster.points.len(), 16);
+///         });
+///         if degrees == 90 {
+///             // A post on the right, seen by every ring.
+///             for (ring, elevation) in (-10..6).enumerate() {
+///                 let z = 5.0 * (elevation as f32).to_radians().tan();
+///                 stream.push([0.0, -5.0, z], ring as u16, turn);
+///             }
+///         }
+///     }
+/// }
+/// stream.end(|_| n_clusters += 1);
+/// assert_eq!(n_clusters, 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Stream<T> {
+    settings: Settings,
+    limits: Limits,
+    /// The row of each ring.
+    rows: Vec<u16>,
+    /// The first column that may still get returns. Columns are counted as the sensor turns,
+    /// clockwise; in images they are numbered the other way round.
+    front: Option<u64>,
+    /// The last column that has returns.
+    newest: u64,
+    /// The first column of the turn at hand.
+    turn_start: u64,
+    n_turns: u64,
+    points: OpenSets<T>,
+    /// The first point of each column that is not closed; the others follow by their links.
+    waiting: Vec<u32>,
+    turn: Turn,
+    window: Window,
+    /// The first of those points to which nothing can be linked after a column.
+    due: [u32; WINDOW],
+    finder: GroundFinder,
+    ground: Option<HeightGrid>,
+    /// That of the turn before last, whose memory is used again.
+    spare_ground: HeightGrid,
+    column: Vec<(u16, u64, u32)>,
+    members: Vec<(u64, u32)>,
+    positions: Vec<[f32; 3]>,
+    tags: Vec<T>,
+    dropped: Dropped,
+}
+
+/// Points that belong together, in the order in which they came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StreamCluster<'a, T> {
+    /// Metres, in the sensor's frame.
+    pub points: &'a [[f32; 3]],
+    /// What came with each point.
+    pub tags: &'a [T],
+    /// Height of the ground under the middle of the points' bounding box, in metres in the
+    /// sensor's frame; `None` where it is unknown.
+    pub ground_z_m: Option<f32>,
+}
+
+/// How many returns are in no column, by cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// They came after their column was closed, or before the first one was named.
+    pub late: u64,
+    /// There was no room: more came than a turn has.
+    pub overflow: u64,
+}
+
+/// All returns of a turn, sorted by column and row.
+struct Turn {
+    returns: Vec<Return>,
+    columns: Vec<Range<usize>>,
+}
+
+/// The obstacles in the latest columns.
+struct Window {
+    n_columns: usize,
+    elevations: Vec<f32>,
+    columns: Vec<WindowColumn>,
+    /// The place of the newest one.
+    newest: u64,
+}
+
+#[derive(Clone, Default)]
+struct WindowColumn {
+    returns: Vec<Return>,
+    /// Where each row begins, and the end of the last.
+    starts: Vec<u32>,
+}
+
+impl<T: Copy + Default> Stream<T> {
+    /// A stream with these settings. It holds up to `capacity` returns, which is best half
+    /// as many again as the sensor sends in a turn; `T` is what comes with a return.
+    ///
+    /// # Errors
+    /// A setting that is not as it must be: there must be `ring_elevations_deg`, and no
+    /// `radius_m`.
+    pub fn new(settings: Settings, capacity: u32) -> Result<Self, SettingsError> {
+        settings.check()?;
+        let wrong = |name, expected| SettingsError { name, expected, found: f64::NAN };
+        let no_elevations = || wrong("ring_elevations_deg", "one for each ring");
+        let degrees = settings.ring_elevations_deg.as_deref().ok_or_else(no_elevations)?;
+        if let Some(radius_m) = settings.radius_m {
+            return Err(SettingsError {
+                found: f64::from(radius_m),
+                ..wrong("radius_m", "none in a stream")
+            });
+        }
+        let mut order: Vec<_> = (0..degrees.len()).collect();
+        order.sort_by(|&a, &b| degrees[a].total_cmp(&degrees[b]).then(a.cmp(&b)));
+        let elevations: Vec<_> = order.iter().map(|&ring| degrees[ring].to_radians()).collect();
+        let mut rows = vec![0; order.len()];
+        order.iter().zip(0..).for_each(|(&ring, row)| rows[ring] = row);
+        let n_columns = image::n_columns(&settings);
+        Ok(Self {
+            limits: Limits::new(&settings),
+            window: Window::new(n_columns, elevations),
+            rows,
+            front: None,
+            newest: 0,
+            turn_start: 0,
+            n_turns: 0,
+            points: OpenSets::new(capacity),
+            waiting: vec![NONE; n_columns],
+            turn: Turn {
+                returns: Vec::with_capacity(capacity as usize),
+                columns: vec![0..0; n_columns],
+            },
+            due: [NONE; WINDOW],
+            finder: GroundFinder::default(),
+            ground: None,
+            spare_ground: HeightGrid::default(),
+            column: Vec::new(),
+            members: Vec::with_capacity(capacity as usize),
+            positions: Vec::with_capacity(capacity as usize),
+            tags: Vec::with_capacity(capacity as usize),
+            dropped: Dropped::default(),
+            settings,
+        })
+    }
+
+    /// Takes in a return at `position`, metres in the sensor's frame. Whatever is no obstacle
+    /// for a [`Segmenter`](crate::Segmenter), such as a point out of range, is passed over, and
+    /// so is a ring that the settings do not name.
+    pub fn push(&mut self, position: [f32; 3], ring: u16, tag: T) {
+        let [x, y, z] = position;
+        let square = x * x + y * y + z * z;
+        let squares = self.settings.min_range_m.powi(2)..=self.settings.max_range_m.powi(2);
+        if !squares.contains(&square) || square == 0.0 || usize::from(ring) >= self.rows.len() {
+            return;
+        }
+        let Some(front) = self.front else {
+            self.dropped.late += 1;
+            return;
+        };
+        let n_columns = self.waiting.len();
+        let column = n_columns - 1 - usize::from(image::column(n_columns, x, y));
+        let ahead = ahead(front, column, n_columns);
+        if ahead >= n_columns - n_columns / 4 {
+            self.dropped.late += 1;
+            return;
+        }
+        let (row, place) = (self.rows[usize::from(ring)], front + ahead as u64);
+        match self.points.insert(position, row, tag, place) {
+            None => self.dropped.overflow += 1,
+            Some(point) => {
+                *self.points.link_mut(point) = std::mem::replace(&mut self.waiting[column], point);
+                self.newest = self.newest.max(place);
+            }
+        }
+    }
+
+    /// Says that all returns before `azimuth_rad` have come, clockwise from x, and hands each
+    /// cluster that is complete by that to `each`. An azimuth behind the one before changes
+    /// nothing. The first one is where the stream begins.
+    pub fn advance(&mut self, azimuth_rad: f32, mut each: impl FnMut(StreamCluster<'_, T>)) {
+        let n_columns = self.waiting.len();
+        // What rounding may take a return back by: `angle::atan2` is off by 2e-5.
+        const ROUNDING: f32 = 1e-4;
+        let turned = (azimuth_rad - ROUNDING + PI).rem_euclid(TAU) / TAU;
+        let column = ((turned * n_columns as f32) as usize).min(n_columns - 1);
+        let Some(front) = self.front else {
+            self.front = Some(column as u64);
+            self.turn_start = column as u64;
+            return;
+        };
+        let ahead = ahead(front, column, n_columns);
+        if ahead <= n_columns / 2 {
+            (0..ahead).for_each(|_| self.close(&mut each));
+        }
+    }
+
+    /// Hands out what has come so far, complete or not. The stream begins anew where it is
+    /// next advanced to, with the ground that it knows.
+    pub fn end(&mut self, mut each: impl FnMut(StreamCluster<'_, T>)) {
+        if self.front.is_none() {
+            return;
+        }
+        while self.front.is_some_and(|front| front <= self.newest) {
+            self.close(&mut each);
+        }
+        if self.ground.is_none() {
+            self.end_turn(&mut each);
+        }
+        (0..WINDOW).for_each(|_| self.close_column(&mut each));
+        self.turn.clear();
+        self.window.clear();
+        (self.front, self.newest) = (None, 0);
+    }
+
+    /// How many turns have ended.
+    #[must_use]
+    pub fn n_turns(&self) -> u64 {
+        self.n_turns
+    }
+
+    /// The returns that were dropped so far.
+    #[must_use]
+    pub fn dropped(&self) -> Dropped {
+        self.dropped
+    }
+
+    /// Closes the column at the front, and with its last one the turn.
+    fn close(&mut self, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        self.close_column(each);
+        if self.front == Some(self.turn_start + self.waiting.len() as u64) {
+            self.end_turn(each);
+        }
+    }
+
+    fn close_column(&mut self, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        let Some(place) = self.front else { return };
+        self.front = Some(place + 1);
+        self.sort_column(place);
+        if self.ground.is_some() {
+            self.open(place, each);
+        }
+    }
+
+    /// Takes what waits for the column into the turn.
+    fn sort_column(&mut self, place: u64) {
+        let Self { waiting, column, points, turn, .. } = self;
+        let n_columns = waiting.len();
+        let at = (place % n_columns as u64) as usize;
+        column.clear();
+        let mut next = std::mem::replace(&mut waiting[at], NONE);
+        while next != NONE {
+            let slot = points.slot(next);
+            column.push((slot.row, slot.order, next));
+            next = slot.link;
+        }
+        column.sort_unstable();
+        let start = turn.returns.len();
+        for &(_, _, point) in column.iter() {
+            if turn.returns.len() == turn.returns.capacity() {
+                self.dropped.overflow += 1;
+                points.remove(point);
+                continue;
+            }
+            let slot = points.slot(point);
+            let [x, y, _] = slot.position;
+            turn.returns.push(Return {
+                position: slot.position,
+                range_m: (x * x + y * y).sqrt(),
+                height_m: f32::NAN,
+                point,
+            });
+        }
+        turn.columns[n_columns - 1 - at] = start..turn.returns.len();
+    }
+
+    /// Takes the obstacles of a column of the turn into the window, links the column before,
+    /// to which this is the last neighbour, and hands out what that completes.
+    fn open(&mut self, place: u64, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        let Self { ground: Some(ground), points, turn, window, settings, .. } = self else {
+            return;
+        };
+        let n_columns = self.waiting.len();
+        let column = image_column(place, n_columns);
+        let sector = sector(n_columns, column);
+        window.begin(place);
+        for this in turn.column(column) {
+            let mut this = *this;
+            this.height_m = ground.above_ground_m(sector, this.range_m, this.position);
+            if this.height_m <= settings.ground_clearance_m {
+                points.remove(this.point);
+                continue;
+            }
+            let row = points.slot(this.point).row;
+            if !window.push(row, this) {
+                self.dropped.overflow += 1;
+                points.remove(this.point);
+                continue;
+            }
+            let last_place = place + self.limits.most_columns(this.range_m) as u64;
+            points.wait_until(this.point, last_place);
+            let due = &mut self.due[last_place as usize % WINDOW];
+            *points.link_mut(this.point) = std::mem::replace(due, this.point);
+        }
+        window.finish();
+        if let Some(before) = place.checked_sub(1) {
+            link_column(window, image_column(before, n_columns), settings, points);
+            self.complete(before, each);
+        }
+    }
+
+    /// Hands out the clusters to which nothing can be linked after the column `place`.
+    fn complete(&mut self, place: u64, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        let mut next = std::mem::replace(&mut self.due[place as usize % WINDOW], NONE);
+        while next != NONE {
+            let point = next;
+            next = self.points.slot(point).link;
+            let Some(root) = self.points.root(point) else { continue };
+            let set = self.points.set(root);
+            if set.last_place == place {
+                if !set.is_cut && set.extent.is_cluster(&self.settings) {
+                    self.hand_out(root, each);
+                }
+                self.points.remove_set(root);
+            } else if place >= set.first_place + self.waiting.len() as u64 {
+                self.points.cut(root, place + 1 - (WINDOW as u64 - 2));
+            }
+        }
+    }
+
+    fn hand_out(&mut self, root: u32, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        let Self { points, members, positions, tags, ground, .. } = self;
+        members.clear();
+        members.extend(points.members(root).map(|point| (points.slot(point).order, point)));
+        members.sort_unstable();
+        positions.clear();
+        positions.extend(members.iter().map(|&(_, point)| points.slot(point).position));
+        tags.clear();
+        tags.extend(members.iter().map(|&(_, point)| points.slot(point).tag));
+        let [x, y] = points.set(root).extent.middle();
+        let ground_z_m = ground.as_ref().and_then(|ground| ground.z_m(x, y));
+        each(StreamCluster { points: positions, tags, ground_z_m });
+    }
+
+    /// Finds the ground of the turn, for the next one. The columns of the first turn, which
+    /// waited for it, are opened.
+    fn end_turn(&mut self, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        let mut ground = std::mem::take(&mut self.spare_ground);
+        self.finder.find(&self.turn, &self.settings, &mut ground);
+        self.n_turns += 1;
+        match self.ground.replace(ground) {
+            Some(before) => self.spare_ground = before,
+            None => {
+                let end = self.front.unwrap_or(self.turn_start);
+                (self.turn_start..end).for_each(|place| self.open(place, each));
+            }
+        }
+        self.turn_start = self.front.unwrap_or(0);
+        self.turn.clear();
+    }
+}
+
+/// How many columns from `front` on to `column` of a turn.
+fn ahead(front: u64, column: usize, n_columns: usize) -> usize {
+    let front = (front % n_columns as u64) as usize;
+    if column >= front { column - front } else { column + n_columns - front }
+}
+
+/// The number in an image of a column that is counted clockwise.
+fn image_column(place: u64, n_columns: usize) -> usize {
+    n_columns - 1 - (place % n_columns as u64) as usize
+}
+
+impl Turn {
+    fn clear(&mut self) {
+        self.returns.clear();
+        self.columns.fill(0..0);
+    }
+}
+
+impl Columns for Turn {
+    fn n_columns(&self) -> usize {
+        self.columns.len()
+    }
+
+    fn column(&self, column: usize) -> &[Return] {
+        &self.returns[self.columns[column].clone()]
+    }
+}
+
+impl Window {
+    fn new(n_columns: usize, elevations: Vec<f32>) -> Self {
+        let n_rows = elevations.len();
+        let column = || WindowColumn {
+            returns: Vec::with_capacity(MOST_IN_CELL * n_rows),
+            starts: vec![0; n_rows + 1],
+        };
+        let columns = (0..WINDOW).map(|_| column()).collect();
+        Self { n_columns, elevations, columns, newest: 0 }
+    }
+
+    fn clear(&mut self) {
+        self.columns.iter_mut().for_each(WindowColumn::clear);
+    }
+
+    /// Begins a column, in the place of the oldest one.
+    fn begin(&mut self, place: u64) {
+        self.newest = place;
+        self.columns[place as usize % WINDOW].clear();
+    }
+
+    /// Adds a return to the newest column, if there is room.
+    fn push(&mut self, row: u16, this: Return) -> bool {
+        let column = &mut self.columns[self.newest as usize % WINDOW];
+        let has_room = column.returns.len() < column.returns.capacity();
+        if has_room {
+            column.returns.push(this);
+            column.starts[usize::from(row) + 1] += 1;
+        }
+        has_room
+    }
+
+    /// Ends the newest column, whose returns came by rows.
+    fn finish(&mut self) {
+        let column = &mut self.columns[self.newest as usize % WINDOW];
+        let mut end = 0;
+        for start in &mut column.starts {
+            end += *start;
+            *start = end;
+        }
+    }
+}
+
+impl WindowColumn {
+    fn clear(&mut self) {
+        self.returns.clear();
+        self.starts.fill(0);
+    }
+}
+
+impl Cells for Window {
+    fn n_columns(&self) -> usize {
+        self.n_columns
+    }
+
+    fn elevations(&self) -> &[f32] {
+        &self.elevations
+    }
+
+    fn cell(&self, column: usize, row: usize) -> &[Return] {
+        // The newest column of this number is so many columns old.
+        let newest = image_column(self.newest, self.n_columns);
+        let age = if column >= newest { column - newest } else { column + self.n_columns - newest };
+        if age >= WINDOW || age as u64 > self.newest {
+            return &[];
+        }
+        let column = &self.columns[(self.newest as usize - age) % WINDOW];
+        &column.returns[column.starts[row] as usize..column.starts[row + 1] as usize]
+    }
+}
