@@ -20,6 +20,10 @@ struct Turn {
     encoder_rad: Vec<f32>,
 }
 
+/// The turn and the place of each point of a cluster, and the encoder's azimuth at which it was
+/// handed out, all turns together.
+type HandedOut = (Vec<(u32, u32)>, f32);
+
 impl Turn {
     /// A turn that begins with the encoder at `start_rad`.
     fn new(points: &[[f32; 3]], rings: &[u16], start_rad: f32) -> Self {
@@ -65,9 +69,8 @@ impl Turn {
         found.clusters().map(|cluster| sorted(cluster.points)).collect()
     }
 
-    /// The clusters of `n_turns` such turns: of each the turn and the place of each point, and
-    /// the encoder's azimuth at which it was handed out, all turns together.
-    fn stream(&self, settings: &Settings, n_turns: u32) -> (Vec<(Vec<(u32, u32)>, f32)>, Dropped) {
+    /// The clusters of `n_turns` such turns.
+    fn stream(&self, settings: &Settings, n_turns: u32) -> (Vec<HandedOut>, Dropped) {
         let mut stream = Stream::new(settings.clone(), 300_000).unwrap();
         let mut found = Vec::new();
         let behind = OFFSETS_DEG[3].to_radians();
