@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 #[cfg(feature = "npz")]
 use formats::labelled::LabelledSet;
@@ -56,7 +57,7 @@ fn on_clouds_of<'a>(
     let (mut file, card) = model.open()?;
     let kernels = kernel::fastest();
     let layers = layers::pack::<F32>(&mut file, &card, kernels)?;
-    let team = Team::new(Engine::new(layers, kernels, 1, true), 1)
+    let team = Team::new(Engine::new(Arc::new(layers), kernels, 1, true), 1)
         .map_err(|source| Error::Threads { threads: 1, source })?;
     let mut scratch = team.scratch();
     let (mut wide, mut metric) = (Vec::new(), Vec::new());

@@ -106,14 +106,28 @@ impl Classifier {
         let is_cpl = spec.kind == SamplerKind::Cpl;
         let front = is_cpl.then(|| front_pass(spec.front, &parts)).transpose()?;
         let selection = Selection::new(&spec, front)?;
+        let source = (options.precision != Precision::F32).then_some(source);
+        Self::around(network, kernels, selection, source, card, options)
+    }
+
+    /// A classifier around a network.
+    fn around(
+        network: Box<dyn Forward>,
+        kernels: &'static Kernels,
+        selection: Selection,
+        source: Option<ModelSource>,
+        card: ModelCard,
+        options: &Options,
+    ) -> Result<Self, Error> {
         let classes = class_names(&card, network.n_classes());
         let prediction = Prediction::empty(&classes, card.temperature, options.precision);
         let outliers = filters_outliers(options, &card)?.then(OutlierFilter::default);
+        let augmentation = TestTimeAugmentation::new(options, selection.spec(), classes.len())?;
         let mut classifier = Self {
-            source: (options.precision != Precision::F32).then_some(source),
+            source,
             unknown: UnknownRule::new(&card, &classes),
             card,
-            augmentation: TestTimeAugmentation::new(options, &spec, classes.len())?,
+            augmentation,
             classes,
             options: options.clone(),
             kernels,
@@ -131,6 +145,25 @@ impl Classifier {
         };
         classifier.reserve(options.capacity)?;
         Ok(classifier)
+    }
+
+    /// A classifier for one thread, which shares the weights.
+    pub(crate) fn twin(&self) -> Result<Self, Error> {
+        let options = Options { threads: 1, ..self.options.clone() };
+        let threads = |source| Error::Threads { threads: 1, source };
+        let network = self.network.twin().map_err(threads)?;
+        let (source, card) = (self.source.clone(), self.card.clone());
+        Self::around(network, self.kernels, self.selection.twin()?, source, card, &options)
+    }
+
+    /// What the classifier computes by.
+    pub(crate) fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// No answer yet, with room for one.
+    pub(crate) fn no_prediction(&self) -> Prediction {
+        Prediction::empty(&self.classes, self.card.temperature, self.options.precision)
     }
 
     /// Makes room for clouds of `n` points, so that none of them allocates.

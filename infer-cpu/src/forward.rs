@@ -1,5 +1,7 @@
 //! A network of whichever precision, loaded and ready to run.
 
+use std::sync::Arc;
+
 use formats::model_card::ModelCard;
 use formats::weights::WeightsFile;
 
@@ -60,7 +62,7 @@ fn loaded<T: Format>(
     layers.stn.take_if(|_| !t_nets.runs_input());
     layers.fstn.take_if(|_| !t_nets.runs_feature());
     let parts = layers.parts();
-    let engine = Engine::new(layers, kernels, threads, false);
+    let engine = Engine::new(Arc::new(layers), kernels, threads, false);
     let team = Team::new(engine, threads).map_err(|source| Error::Threads { threads, source })?;
     Ok(Loaded { card, network: Box::new(team), parts })
 }

@@ -39,6 +39,7 @@
 mod calibrate;
 mod choose;
 mod classifier;
+mod classifier_team;
 mod dense;
 mod edge_conv;
 mod engine;
@@ -81,6 +82,7 @@ pub use calibrate::on_set as activation_ranges_of_set;
 pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};
 pub use choose::choose;
 pub use classifier::Classifier;
+pub use classifier_team::ClassifierTeam;
 pub use error::Error;
 #[cfg(feature = "evaluate")]
 pub use evaluate::{Evaluation, evaluate, evaluate_some};

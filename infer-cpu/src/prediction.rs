@@ -10,7 +10,7 @@ use crate::Precision;
 pub const UNKNOWN: &str = "unknown";
 
 /// The class of a cloud, and how it was found.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 #[non_exhaustive]
 pub struct Prediction {
     /// The class: an index into [`crate::Classifier::classes`]. Of equal
@@ -43,6 +43,19 @@ pub struct Prediction {
     pub n_clipped: u64,
     /// What logits are divided by before the softmax.
     temperature: f64,
+}
+
+impl Clone for Prediction {
+    fn clone(&self) -> Self {
+        Self { label: Arc::clone(&self.label), logits: self.logits.clone(), ..*self }
+    }
+
+    /// Takes over `source` without allocating, if it has no more classes.
+    fn clone_from(&mut self, source: &Self) {
+        let mut logits = std::mem::take(&mut self.logits);
+        logits.clone_from(&source.logits);
+        *self = Self { label: Arc::clone(&source.label), logits, ..*source };
+    }
 }
 
 impl Prediction {

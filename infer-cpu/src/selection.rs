@@ -53,6 +53,14 @@ impl Selection {
         })
     }
 
+    /// The same selection with memory of its own.
+    ///
+    /// # Errors
+    /// As [`Selection::new`].
+    pub fn twin(&self) -> Result<Self, Error> {
+        Self::new(&self.spec, self.front)
+    }
+
     /// What is selected by.
     pub fn spec(&self) -> &SamplerSpec {
         &self.spec

@@ -9,7 +9,7 @@ mod tiny_model;
 use formats::model_card::{ModelCard, Normalization};
 use infer_cpu::kernel;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, Error, Options, Precision};
+use infer_cpu::{Classifier, ClassifierTeam, Error, Options, Precision};
 
 #[test]
 fn ten_million_points_are_classified() {
@@ -74,6 +74,42 @@ fn a_precision_that_overflows_falls_back_to_fp32_when_the_file_is_gone() {
     assert_eq!(prediction.precision, Precision::F32);
     assert_eq!(prediction.logits, expected);
     assert!(matches!(Classifier::load(&model, &options), Err(Error::Format(_))));
+}
+
+#[test]
+fn a_team_answers_as_a_classifier_does_for_each_cloud() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = overflowing_model(folder.path());
+    let clouds: Vec<Vec<[f32; 3]>> = (0..30).map(|n| cloud()[..2 * n].to_vec()).collect();
+    let with_ground = || clouds.iter().map(|cloud| (&cloud[..], Some(-1.0)));
+    for precision in Precision::ALL {
+        let options = |threads| Options { precision, threads, ..Options::default() };
+        let mut alone = Classifier::load(&model, &options(1)).unwrap();
+        let expected: Vec<_> = with_ground()
+            .map(|(points, ground_z)| {
+                let answer = alone.classify_on_ground(points, ground_z);
+                answer
+                    .map(|p| (p.logits.clone(), p.precision, p.n_points))
+                    .map_err(|e| e.to_string())
+            })
+            .collect();
+        assert_eq!(expected[0], Err(Error::NoPoints.to_string()));
+        for threads in [1, 4] {
+            let classifier = Classifier::load(&model, &options(threads)).unwrap();
+            let mut team = ClassifierTeam::new(classifier).unwrap();
+            for _ in 0..2 {
+                let mut found = Vec::new();
+                team.classify_many(with_ground(), |answer| {
+                    found.push(
+                        answer
+                            .map(|p| (p.logits.clone(), p.precision, p.n_points))
+                            .map_err(ToString::to_string),
+                    );
+                });
+                assert_eq!(found, expected, "{precision}, {threads} threads");
+            }
+        }
+    }
 }
 
 /// A model whose card asks for the outlier filter.

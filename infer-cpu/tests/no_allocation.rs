@@ -13,7 +13,7 @@ use std::path::Path;
 use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, Options, Precision};
+use infer_cpu::{Classifier, ClassifierTeam, Options, Precision};
 use test_support::IS_EMULATED;
 use test_support::allocations::{self, Counting};
 
@@ -110,4 +110,22 @@ fn main() {
     // What grows by something a cloud shows in many.
     let many = Options { capacity: CAPACITY, ..Options::default() };
     assert_eq!(allocations(&model, &many, &clouds, MANY), 0);
+    team_allocates_nothing(&model, &clouds);
+}
+
+/// Many clouds at once, in more threads than there are cores and in one.
+fn team_allocates_nothing(model: &Path, clouds: &[Vec<[f32; 3]>]) {
+    for threads in [1, 3] {
+        let options = Options { threads, capacity: CAPACITY, ..Options::default() };
+        let classifier = Classifier::load(model, &options).unwrap();
+        let mut team = ClassifierTeam::new(classifier).unwrap();
+        let mut total = 0.0;
+        let before = allocations::count();
+        for _ in 0..ROUNDS {
+            let clouds = clouds.iter().map(|cloud| (&cloud[..], None));
+            team.classify_many(clouds, |answer| total += answer.unwrap().confidence());
+        }
+        assert_eq!(allocations::count() - before, 0, "a team of {threads}");
+        assert!(total > 0.0);
+    }
 }

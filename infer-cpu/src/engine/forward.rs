@@ -1,5 +1,6 @@
 //! The order of passes: T-Nets, trunk, head.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::{
@@ -69,6 +70,8 @@ pub trait Forward: Send + Sync {
     fn scratch(&self) -> Scratch;
     /// How many classes the network tells apart.
     fn n_classes(&self) -> usize;
+    /// The same network, for one thread and with memory of its own.
+    fn twin(&self) -> std::io::Result<Box<dyn Forward>>;
 }
 
 impl<T: Format> Forward for Team<Engine<T>> {
@@ -114,6 +117,12 @@ impl<T: Format> Forward for Team<Engine<T>> {
 
     fn n_classes(&self) -> usize {
         self.work().layers.head.last().map_or(0, |layer| layer.columns.outputs())
+    }
+
+    fn twin(&self) -> std::io::Result<Box<dyn Forward>> {
+        let engine = self.work();
+        let twin = Engine::new(Arc::clone(&engine.layers), engine.kernels, 1, engine.observing);
+        Ok(Box::new(Self::new(twin, 1)?))
     }
 }
 

@@ -12,7 +12,7 @@
 //! built, but for points beyond any seen before.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use crate::edge_conv::{EdgeConv, Neighborhood};
 use crate::kernel::{GEMV_NR, Kernels, Panels};
@@ -85,7 +85,8 @@ struct Run {
 /// A network of format `T` and the memory that it works in.
 pub struct Engine<T: Format> {
     kernels: &'static Kernels,
-    layers: Layers<T>,
+    /// Engines of one model share them.
+    layers: Arc<Layers<T>>,
     /// The trunk's first layer, behind the input transform.
     entry: RwLock<Panels<f32>>,
     feature: RwLock<Packed<T>>,
@@ -154,7 +155,7 @@ impl<T: Format> Engine<T> {
     /// An engine for `layers` and a team of `n_threads`. One that observes
     /// keeps the largest activation of each layer.
     pub fn new(
-        layers: Layers<T>,
+        layers: Arc<Layers<T>>,
         kernels: &'static Kernels,
         n_threads: usize,
         observing: bool,

@@ -32,7 +32,7 @@ impl<T: Format> Engine<T> {
         feature: &'a Packed<T>,
         folded: &'a Packed<T>,
     ) -> impl Iterator<Item = &'a Packed<T>> {
-        let Network { stn, trunk, fstn, transform_after, .. } = &self.layers;
+        let Network { stn, trunk, fstn, transform_after, .. } = &*self.layers;
         let after = *transform_after;
         let fold = self.fold.load(Ordering::Relaxed);
         // Up to the transform, through it, on.
