@@ -66,7 +66,7 @@ pub mod outcome;
 #[cfg(feature = "dataset")]
 pub mod packed;
 #[cfg(feature = "pcap")]
-mod pcap;
+pub mod pcap;
 #[cfg(feature = "ply")]
 pub mod ply;
 #[cfg(feature = "files")]

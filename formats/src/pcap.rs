@@ -8,10 +8,11 @@
 
 use std::fs::File;
 use std::io::{self, Write};
+use std::net::IpAddr;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use etherparse::{PacketBuilder, SlicedPacket, TransportSlice};
+use etherparse::{NetSlice, PacketBuilder, SlicedPacket, TransportSlice};
 use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
 
@@ -71,28 +72,41 @@ pub(crate) fn write_packet(
 /// Bytes that are held at once; no frame is longer than 64 KiB.
 const CAPACITY: usize = 256 * 1024;
 
-/// Gives the payload of each UDP packet in the capture at `path` to `each`, until that breaks.
+/// A UDP packet of a capture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UdpPacket<'a> {
+    /// When it was captured, seconds of Unix time; `None` where the capture does not tell.
+    pub time_s: Option<f64>,
+    /// Who sent it.
+    pub source: IpAddr,
+    /// The port that it was sent to.
+    pub port: u16,
+    /// What it carries.
+    pub payload: &'a [u8],
+}
+
+/// Gives each UDP packet in the capture at `path`, pcap or pcapng, to `each`, until that breaks.
 /// Other packets, and those that make no sense, are passed over.
 ///
 /// # Errors
 /// A file that cannot be read, is no capture of Ethernet frames, or ends within a frame; a UDP
 /// packet that comes in fragments.
-pub(crate) fn read(
+pub fn read(
     path: &Path,
-    mut each: impl FnMut(&[u8]) -> ControlFlow<()>,
+    mut each: impl FnMut(UdpPacket<'_>) -> ControlFlow<()>,
 ) -> Result<(), FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     let flaw = |part: String, cause: String| FormatError::malformed(path, part, cause);
     let mut reader =
         create_reader(CAPACITY, file).map_err(|error| flaw("header".to_owned(), words(&error)))?;
-    let (mut links, mut number) = (Vec::new(), 0);
+    let (mut interfaces, mut number) = (Vec::new(), 0);
     loop {
         let part = || format!("frame {number}");
         match reader.next() {
             Ok((size, block)) => {
-                if let Some((link, frame)) = frame(&block, &mut links) {
-                    let payload = udp_payload(link, frame).map_err(|cause| flaw(part(), cause))?;
-                    if payload.is_some_and(|payload| each(payload).is_break()) {
+                if let Some(frame) = Frame::of(&block, &mut interfaces) {
+                    let packet = frame.udp_packet().map_err(|cause| flaw(part(), cause))?;
+                    if packet.is_some_and(|packet| each(packet).is_break()) {
                         return Ok(());
                     }
                     number += 1;
@@ -108,42 +122,75 @@ pub(crate) fn read(
     }
 }
 
-/// The frame in a block, if it holds one, and what link it was sent over. `links` are those of
-/// the interfaces so far.
-fn frame<'a>(
-    block: &'a PcapBlockOwned<'_>,
-    links: &mut Vec<Linktype>,
-) -> Option<(Linktype, &'a [u8])> {
-    match block {
-        PcapBlockOwned::LegacyHeader(header) => *links = vec![header.network],
-        PcapBlockOwned::NG(Block::SectionHeader(_)) => links.clear(),
-        PcapBlockOwned::NG(Block::InterfaceDescription(interface)) => {
-            links.push(interface.linktype)
-        }
-        PcapBlockOwned::Legacy(packet) => return Some((*links.first()?, packet.data)),
-        PcapBlockOwned::NG(Block::EnhancedPacket(packet)) => {
-            return Some((*links.get(packet.if_id as usize)?, packet.packet_data()));
-        }
-        PcapBlockOwned::NG(Block::SimplePacket(packet)) => {
-            return Some((*links.first()?, packet.packet_data()));
-        }
-        PcapBlockOwned::NG(_) => {}
-    }
-    None
+/// What a capture says of a network interface.
+#[derive(Clone, Copy)]
+struct Interface {
+    link: Linktype,
+    /// Seconds of Unix time at which its clock begins, and ticks of that clock each second.
+    clock: (u64, u64),
 }
 
-/// What an Ethernet frame carries by UDP, if it does.
-fn udp_payload(link: Linktype, frame: &[u8]) -> Result<Option<&[u8]>, String> {
-    if link != Linktype::ETHERNET {
-        return Err(format!("expected Ethernet (link type 1), found link type {}", link.0));
+/// A frame of a capture.
+struct Frame<'a> {
+    link: Linktype,
+    time_s: Option<f64>,
+    bytes: &'a [u8],
+}
+
+impl<'a> Frame<'a> {
+    /// The frame in a block, if it holds one. `interfaces` are those so far.
+    fn of(block: &'a PcapBlockOwned<'_>, interfaces: &mut Vec<Interface>) -> Option<Self> {
+        match block {
+            PcapBlockOwned::LegacyHeader(header) => {
+                let ticks =
+                    if header.is_nanosecond_precision() { 1_000_000_000 } else { 1_000_000 };
+                *interfaces = vec![Interface { link: header.network, clock: (0, ticks) }];
+            }
+            PcapBlockOwned::NG(Block::SectionHeader(_)) => interfaces.clear(),
+            PcapBlockOwned::NG(Block::InterfaceDescription(interface)) => {
+                let ticks = interface.ts_resolution().unwrap_or(1_000_000);
+                let start = u64::try_from(interface.if_tsoffset).unwrap_or_default();
+                interfaces.push(Interface { link: interface.linktype, clock: (start, ticks) });
+            }
+            PcapBlockOwned::Legacy(packet) => {
+                let &Interface { link, clock: (_, ticks) } = interfaces.first()?;
+                let second = f64::from(packet.ts_usec) / ticks as f64;
+                let time_s = Some(f64::from(packet.ts_sec) + second);
+                return Some(Self { link, time_s, bytes: packet.data });
+            }
+            PcapBlockOwned::NG(Block::EnhancedPacket(packet)) => {
+                let &Interface { link, clock } = interfaces.get(packet.if_id as usize)?;
+                let ticks = u64::from(packet.ts_high) << 32 | u64::from(packet.ts_low);
+                let time_s = Some(clock.0 as f64 + ticks as f64 / clock.1 as f64);
+                return Some(Self { link, time_s, bytes: packet.packet_data() });
+            }
+            PcapBlockOwned::NG(Block::SimplePacket(packet)) => {
+                let link = interfaces.first()?.link;
+                return Some(Self { link, time_s: None, bytes: packet.packet_data() });
+            }
+            PcapBlockOwned::NG(_) => {}
+        }
+        None
     }
-    let Ok(packet) = SlicedPacket::from_ethernet(frame) else { return Ok(None) };
-    if packet.is_ip_payload_fragmented() {
-        return Err("expected whole UDP packets, found a fragment of one".to_owned());
-    }
-    match packet.transport {
-        Some(TransportSlice::Udp(udp)) => Ok(Some(udp.payload())),
-        _ => Ok(None),
+
+    /// What the frame carries by UDP, if it does.
+    fn udp_packet(&self) -> Result<Option<UdpPacket<'a>>, String> {
+        if self.link != Linktype::ETHERNET {
+            let found = self.link.0;
+            return Err(format!("expected Ethernet (link type 1), found link type {found}"));
+        }
+        let Ok(packet) = SlicedPacket::from_ethernet(self.bytes) else { return Ok(None) };
+        if packet.is_ip_payload_fragmented() {
+            return Err("expected whole UDP packets, found a fragment of one".to_owned());
+        }
+        let source = match &packet.net {
+            Some(NetSlice::Ipv4(ip)) => ip.header().source_addr().into(),
+            Some(NetSlice::Ipv6(ip)) => ip.header().source_addr().into(),
+            _ => return Ok(None),
+        };
+        let Some(TransportSlice::Udp(udp)) = packet.transport else { return Ok(None) };
+        let (time_s, port) = (self.time_s, udp.destination_port());
+        Ok(Some(UdpPacket { time_s, source, port, payload: udp.payload() }))
     }
 }
 

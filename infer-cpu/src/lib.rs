@@ -49,6 +49,8 @@ mod evaluate;
 mod forward;
 pub mod kernel;
 mod layers;
+#[cfg(feature = "live")]
+pub mod live;
 mod network;
 mod normalize;
 mod options;

@@ -60,9 +60,9 @@ fn each_packet(
     mut take: impl FnMut(&[u8]) -> Result<ControlFlow<()>, PacketError>,
 ) -> Result<usize, FormatError> {
     let (mut n_packets, mut flaw) = (0, None);
-    pcap::read(path, |payload| {
+    pcap::read(path, |packet| {
         n_packets += 1;
-        take(payload).unwrap_or_else(|cause| {
+        take(packet.payload).unwrap_or_else(|cause| {
             flaw = Some(cause);
             ControlFlow::Break(())
         })

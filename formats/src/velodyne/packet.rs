@@ -114,7 +114,8 @@ impl Header {
     }
 
     /// Microseconds from the packet's first firing sequence to the end of its last.
-    pub(super) fn duration_us(&self) -> f64 {
+    #[must_use]
+    pub fn duration_us(&self) -> f64 {
         (BLOCKS / self.returns.blocks_per_sequence()) as f64 * self.model.block_us()
     }
 }
@@ -124,6 +125,21 @@ impl Decoder {
     #[must_use]
     pub fn new(model: Model) -> Self {
         Self { model, lasers: model.lasers() }
+    }
+
+    /// How far ahead of the encoder, or behind it, the lasers aim at most, radians.
+    #[must_use]
+    pub fn most_offset_rad(&self) -> f64 {
+        self.lasers.iter().map(|laser| laser.azimuth_offset.abs()).fold(0.0, f64::max)
+    }
+
+    /// The elevation of each ring, radians.
+    #[must_use]
+    pub fn elevations_rad(&self) -> Vec<f64> {
+        let mut elevations: Vec<_> =
+            self.lasers.iter().map(|laser| laser.sin_elevation.asin()).collect();
+        elevations.sort_by(f64::total_cmp);
+        elevations
     }
 
     /// The sensor.

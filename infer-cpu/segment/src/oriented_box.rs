@@ -7,6 +7,9 @@ const STEPS: u32 = 90;
 /// of a sensor (the paper's d0).
 const NEAR_M: f32 = 0.05;
 
+/// The most points among which the direction is searched; of more, every second one, or third.
+const MOST_SEARCHED: usize = 300;
+
 /// A box with a level base, in the frame of its points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrientedBox {
@@ -28,28 +31,31 @@ impl OrientedBox {
     #[must_use]
     pub fn around(points: &[[f32; 3]]) -> Self {
         let finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());
+        let stride = points.len().div_ceil(MOST_SEARCHED).max(1);
+        let searched = points.iter().step_by(stride).filter(finite);
         let points = points.iter().filter(finite);
-        let mut best = (f32::NEG_INFINITY, Rectangle::default());
+        let mut best = (f32::NEG_INFINITY, 0.0);
         for step in 0..STEPS {
             let angle_rad = step as f32 * std::f32::consts::FRAC_PI_2 / STEPS as f32;
-            let rectangle = Rectangle::around(points.clone(), angle_rad);
-            let closeness = rectangle.closeness(points.clone());
+            let rectangle = Rectangle::around(searched.clone(), angle_rad);
+            let closeness = rectangle.closeness(searched.clone());
             if closeness > best.0 {
-                best = (closeness, rectangle);
+                best = (closeness, angle_rad);
             }
         }
+        let rectangle = Rectangle::around(points.clone(), best.1);
         let heights = points.map(|point| point[2]);
         let (low, high) = heights
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
         if low > high {
             return Self { centre_m: [0.0; 3], size_m: [0.0; 3], yaw_rad: 0.0 };
         }
-        best.1.with_heights(low, high)
+        rectangle.with_heights(low, high)
     }
 }
 
 /// Bounds along two axes that are turned by an angle.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Rectangle {
     angle_rad: f32,
     low: [f32; 2],

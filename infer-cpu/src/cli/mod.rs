@@ -4,6 +4,8 @@ mod bench;
 mod classify;
 mod input;
 mod inspect;
+#[cfg(feature = "live")]
+mod live;
 mod model;
 mod names;
 mod report;
@@ -33,6 +35,9 @@ enum Command {
     Sample(Box<sample::Args>),
     /// Show the layers of a model file, their sizes and operation counts
     Inspect(inspect::Args),
+    /// Name and track the objects that a LiDAR sees, from its packets, as they come
+    #[cfg(feature = "live")]
+    Live(Box<live::Args>),
     /// Measure the latency on this machine
     Bench(Box<bench::Args>),
 }
@@ -46,6 +51,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Classify(args) => classify::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Inspect(args) => inspect::run(args),
+        #[cfg(feature = "live")]
+        Command::Live(args) => live::run(args),
         Command::Bench(args) => {
             bench::run(args, &model::find(args.model.as_deref())?).map(|()| Outcome::Success)
         }

@@ -17,8 +17,8 @@ const NAMES: [&str; 2] = ["edge-64.safetensors", "untrained-test.safetensors"];
 #[derive(clap::Args)]
 pub struct ModelArgs {
     /// Model file in safetensors format [default: $EDGEPUCK_MODEL, else
-    /// edge-64.safetensors (for whole objects of ModelNet40) in weights/ beside
-    /// this program or in ./assets/weights]
+    /// edge-64.safetensors (for whole objects of ModelNet40), or street-128.safetensors for
+    /// `live`, in weights/ beside this program or in ./assets/weights]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
@@ -34,7 +34,15 @@ impl ModelArgs {
     /// None is found; it cannot be read; it is untrained, and that is not
     /// allowed.
     pub fn open(&self) -> anyhow::Result<(PathBuf, ModelCard)> {
-        let path = find(self.model.as_deref())?;
+        self.open_or(&NAMES)
+    }
+
+    /// The same, where `names` are those of the bundled weights that will do.
+    ///
+    /// # Errors
+    /// As [`ModelArgs::open`].
+    pub fn open_or(&self, names: &[&str]) -> anyhow::Result<(PathBuf, ModelCard)> {
+        let path = find_or(self.model.as_deref(), names)?;
         let card = ModelCard::read(&path)?;
         if !card.trained && !self.allow_untrained {
             return Err(Usage(format!(
@@ -53,6 +61,10 @@ impl ModelArgs {
 /// # Errors
 /// None is found.
 pub fn find(named: Option<&Path>) -> Result<PathBuf, Usage> {
+    find_or(named, &NAMES)
+}
+
+fn find_or(named: Option<&Path>, names: &[&str]) -> Result<PathBuf, Usage> {
     if let Some(path) = named {
         return Ok(path.to_path_buf());
     }
@@ -60,12 +72,12 @@ pub fn find(named: Option<&Path>) -> Result<PathBuf, Usage> {
         return Ok(path.into());
     }
     let folders = folders();
-    let candidates = NAMES.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
+    let candidates = names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
     candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
         let folders: Vec<_> = folders.iter().map(|folder| folder.display().to_string()).collect();
         Usage(format!(
             "found no model: name one by --model or ${VARIABLE}, or put {} into one of {}",
-            NAMES[0],
+            names[0],
             folders.join(", ")
         ))
     })

@@ -1,0 +1,211 @@
+//! `infer-cpu live`: the objects that a LiDAR sees, as they come.
+
+mod report;
+mod source;
+
+use std::io::{self, BufWriter, Write};
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::available_parallelism;
+
+use glam::DVec3;
+use infer_cpu::live::{EgoMotion, LiveOptions, Object, Pipeline};
+use infer_cpu::{Classifier, Options, Precision};
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use super::model::ModelArgs;
+use super::{Outcome, Usage, of_setup};
+use source::{Source, Tick};
+
+/// The bundled weights for objects of streets.
+const MODELS: [&str; 1] = ["street-128.safetensors"];
+
+/// More threads than a Raspberry Pi has cores were never measured to help.
+const MOST_THREADS: usize = 4;
+
+/// Flags of `live`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  infer-cpu live --udp 2368
+  infer-cpu live --udp 2368 --from 192.168.1.201 --stats
+  infer-cpu live --pcap drive.pcap --realtime
+  infer-cpu live --pcap drive.pcap --poses drive.tum > objects.jsonl
+
+The sensor is a Velodyne VLP-32C or VLP-16; its first packet tells which. One line of JSON is
+printed for each object and turn, as soon as the beams have passed the object. The
+keys, in this order: version (1), turn, track (a number that stays with the object), class (of
+the track, by all that was seen of it, or `unknown`; null while no cluster of it had
+--min-points), resembles (the same, also where that is none that the model is to tell
+apart), confidence (the probability of `resembles` by this cluster alone, or null), probability
+(the same by all clusters of the track), frame (sensor, or world with --poses or --twist: of
+position, yaw and velocity), position_m (the middle of the box around the points), size_m
+(length, width, height), yaw_deg (direction of the length, -90 to 90), velocity_m_s (null
+at first; relative to the sensor in its frame), points, range_m, first_s and last_s (Unix time
+of the first and the last point by the sensor's clock), latency_ms (from the arrival of the
+packet with the last point to this line; null without --udp or --realtime).
+
+SIGTERM and Ctrl-C end the program after the last objects, with exit status 0.")]
+pub struct Args {
+    /// Receive packets on this UDP port; a Velodyne's is 2368
+    #[arg(long, value_name = "PORT", required_unless_present = "pcap", conflicts_with = "pcap")]
+    udp: Option<u16>,
+
+    /// Read packets from a capture, pcap or pcapng
+    #[arg(long, value_name = "FILE")]
+    pcap: Option<PathBuf>,
+
+    /// Take packets of the capture at the times at which they were captured, instead of as fast
+    /// as possible
+    #[arg(long, requires = "pcap")]
+    realtime: bool,
+
+    /// Print JSON lines; the default, unless --stats is given
+    #[arg(long)]
+    json: bool,
+
+    /// At the end, report the time of each stage, lost packets and memory on standard error
+    #[arg(long)]
+    stats: bool,
+
+    /// Drop packets from all other addresses
+    #[arg(long, value_name = "IP")]
+    from: Option<IpAddr>,
+
+    /// Join a multicast group
+    #[arg(long, value_name = "IP", requires = "udp")]
+    multicast: Option<Ipv4Addr>,
+
+    /// Listen on the network interface that has this address only [default: on all]
+    #[arg(long, value_name = "IP", requires = "udp", default_value = "0.0.0.0")]
+    interface: Ipv4Addr,
+
+    /// Poses of the sensor in the world, in TUM's format (Unix time x y z qx qy qz qw), by which
+    /// clusters are deskewed and tracked in the world
+    #[arg(long, value_name = "FILE", conflicts_with = "twist")]
+    poses: Option<PathBuf>,
+
+    /// Steady motion of the sensor in its own frame, in place of poses: metres and degrees a
+    /// second
+    #[arg(long, num_args = 6, value_names = ["VX", "VY", "VZ", "WX", "WY", "WZ"])]
+    #[arg(allow_negative_numbers = true)]
+    twist: Option<Vec<f64>>,
+
+    /// Fewest points of a cluster that is classified
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    min_points: usize,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// Precision of the network: f32, f32-fc16, f16 or i8
+    #[arg(long, default_value = "f32")]
+    precision: Precision,
+
+    /// Number of threads that classify [default: one per core, at most 4]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+}
+
+/// Answers until the packets end or a signal comes.
+///
+/// # Errors
+/// Options that cannot be met; a model, poses or a capture that cannot be read; a port that is
+/// taken; an output that cannot be written to.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let mut pipeline = args.pipeline()?;
+    let is_over = Arc::new(AtomicBool::new(false));
+    for signal in [SIGTERM, SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&is_over))?;
+    }
+    let source = args.source(&is_over)?;
+    let mut output = Output { lines: BufWriter::new(io::stdout().lock()), failure: None };
+    let prints = args.json || !args.stats;
+    let read = source.run(|tick| {
+        match tick {
+            Tick::Packet(payload, arrival) => pipeline.take(payload, arrival),
+            Tick::End => pipeline.end(),
+        }
+        pipeline.answer(|object| {
+            if prints {
+                output.write(object);
+            }
+        });
+        for flaw in pipeline.new_flaws() {
+            eprintln!("warning: a packet was passed over, and so are others like it: {flaw}");
+        }
+        !is_over.load(Ordering::Relaxed) && output.failure.is_none()
+    })?;
+    output.end()?;
+    if args.stats {
+        report::print(&pipeline, &read);
+    }
+    match pipeline.counts().packets {
+        0 => Err(Usage(format!(
+            "expected packets of a VLP-16 or VLP-32C, found none among {} UDP packets",
+            read.n_packets
+        ))
+        .into()),
+        _ => Ok(Outcome::Success),
+    }
+}
+
+impl Args {
+    fn pipeline(&self) -> anyhow::Result<Pipeline> {
+        let (model, _) = self.model.open_or(&MODELS)?;
+        let cores = || available_parallelism().map_or(1, usize::from);
+        let threads = self.threads.map_or_else(|| cores().min(MOST_THREADS), usize::from);
+        let options = Options { precision: self.precision, threads, ..Options::default() };
+        let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
+        let mut options = LiveOptions::default();
+        options.min_points = self.min_points;
+        options.ego_motion = match (&self.poses, self.twist.as_deref()) {
+            (Some(file), _) => Some(EgoMotion::read_tum(file)?),
+            (None, Some(&[x, y, z, roll, pitch, yaw])) => Some(EgoMotion::Twist {
+                linear_m_s: DVec3::new(x, y, z),
+                angular_rad_s: DVec3::new(roll, pitch, yaw).map(f64::to_radians),
+            }),
+            _ => None,
+        };
+        Ok(Pipeline::new(classifier, &options)?)
+    }
+
+    fn source(&self, is_over: &Arc<AtomicBool>) -> anyhow::Result<Source> {
+        match (&self.pcap, self.udp) {
+            (Some(file), _) => Ok(Source::capture(file, self.from, self.realtime)),
+            (None, port) => {
+                let address = (self.interface, port.unwrap_or_default()).into();
+                Source::udp(address, self.multicast, self.from, is_over)
+            }
+        }
+    }
+}
+
+/// Lines on standard output.
+struct Output<W: Write> {
+    lines: W,
+    /// Why no line can be written any more.
+    failure: Option<io::Error>,
+}
+
+impl<W: Write> Output<W> {
+    /// Writes an object, and lets nobody wait for it.
+    fn write(&mut self, object: &Object) {
+        if self.failure.is_some() {
+            return;
+        }
+        let line = serde_json::to_writer(&mut self.lines, object).map_err(io::Error::from);
+        let written = line.and_then(|()| writeln!(self.lines)).and_then(|()| self.lines.flush());
+        self.failure = written.err();
+    }
+
+    /// Whoever closes the pipe has seen enough: that is no failure.
+    fn end(self) -> io::Result<()> {
+        match self.failure {
+            Some(failure) if failure.kind() != io::ErrorKind::BrokenPipe => Err(failure),
+            _ => Ok(()),
+        }
+    }
+}

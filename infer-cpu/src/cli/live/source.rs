@@ -1,0 +1,252 @@
+//! Where packets come from: a socket or a capture.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel,
+};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use formats::pcap;
+use infer_cpu::live::Arrival;
+use socket2::{Domain, Protocol, Socket, Type};
+
+/// Packets that wait at most: two thirds of a second of a VLP-32C's.
+const RING: usize = 1024;
+/// The longest packet that is looked at; a sensor's are shorter.
+const MOST_BYTES: usize = 65_535;
+/// The kernel's buffer that is asked for: some seconds.
+const KERNEL_BUFFER: usize = 8 << 20;
+/// How often a quiet socket is left, to see whether the program is to end.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// What a source tells.
+pub enum Tick<'a> {
+    /// A packet has come.
+    Packet(&'a [u8], Arrival),
+    /// No more will come.
+    End,
+}
+
+/// Where packets come from.
+pub enum Source {
+    /// A capture.
+    Capture { file: PathBuf, from: Option<IpAddr>, realtime: bool },
+    /// A socket.
+    Udp(Box<Listener>),
+}
+
+/// What was read.
+#[derive(Default)]
+pub struct Read {
+    /// UDP packets of all kinds.
+    pub n_packets: u64,
+    /// Packets from other addresses, which were not looked at.
+    pub n_from_others: u64,
+    /// Packets that found the ring full, because answers took too long.
+    pub n_overrun: u64,
+}
+
+/// A thread that receives packets, and the ring that they wait in.
+pub struct Listener {
+    thread: JoinHandle<io::Result<()>>,
+    filled: Receiver<Slot>,
+    empty: SyncSender<Slot>,
+    counts: Arc<ListenerCounts>,
+    is_over: Arc<AtomicBool>,
+}
+
+#[derive(Default)]
+struct ListenerCounts {
+    packets: AtomicU64,
+    from_others: AtomicU64,
+    overrun: AtomicU64,
+}
+
+/// A place for a packet.
+struct Slot {
+    bytes: Box<[u8]>,
+    n_bytes: usize,
+    arrival: Arrival,
+}
+
+impl Source {
+    /// Packets of the capture at `file`, by the address they come `from`.
+    pub fn capture(file: &Path, from: Option<IpAddr>, realtime: bool) -> Self {
+        Self::Capture { file: file.to_path_buf(), from, realtime }
+    }
+
+    /// Packets that come to `address`, received from now on until `is_over`.
+    pub fn udp(
+        address: SocketAddr,
+        multicast: Option<Ipv4Addr>,
+        from: Option<IpAddr>,
+        is_over: &Arc<AtomicBool>,
+    ) -> anyhow::Result<Self> {
+        let socket = bind(address, multicast).with_context(|| format!("UDP {address}"))?;
+        let (fill, filled) = sync_channel(RING);
+        let (empty, empties) = sync_channel(RING);
+        for _ in 0..RING {
+            let bytes = vec![0; MOST_BYTES].into_boxed_slice();
+            // There is room for all of them.
+            let _ = empty.send(Slot { bytes, n_bytes: 0, arrival: Arrival::now() });
+        }
+        let counts = Arc::new(ListenerCounts::default());
+        let (thread_counts, thread_is_over) = (Arc::clone(&counts), Arc::clone(is_over));
+        let thread = thread::Builder::new().name("receiver".to_owned()).spawn(move || {
+            receive(&socket, from, &fill, &empties, &thread_counts, &thread_is_over)
+        })?;
+        let is_over = Arc::clone(is_over);
+        Ok(Self::Udp(Box::new(Listener { thread, filled, empty, counts, is_over })))
+    }
+
+    /// Gives every packet to `take`, until there are no more or that is false; then the end.
+    pub fn run(self, mut take: impl FnMut(Tick<'_>) -> bool) -> anyhow::Result<Read> {
+        let read = match self {
+            Self::Udp(listener) => listener.run(&mut take)?,
+            Self::Capture { file, from, realtime } => replay(&file, from, realtime, &mut take)?,
+        };
+        take(Tick::End);
+        Ok(read)
+    }
+}
+
+fn bind(address: SocketAddr, multicast: Option<Ipv4Addr>) -> io::Result<UdpSocket> {
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
+    // What the kernel grants may be less; it does not fail.
+    socket.set_recv_buffer_size(KERNEL_BUFFER)?;
+    let interface = match address.ip() {
+        IpAddr::V4(interface) => interface,
+        IpAddr::V6(_) => Ipv4Addr::UNSPECIFIED,
+    };
+    match multicast {
+        None => socket.bind(&address.into())?,
+        Some(group) => {
+            // Several programs may listen to a group.
+            socket.set_reuse_address(true)?;
+            socket.bind(&SocketAddr::from((group, address.port())).into())?;
+            socket.join_multicast_v4(&group, &interface)?;
+        }
+    }
+    socket.set_read_timeout(Some(PATIENCE))?;
+    Ok(socket.into())
+}
+
+/// Receives packets into empty slots until it is over.
+fn receive(
+    socket: &UdpSocket,
+    from: Option<IpAddr>,
+    fill: &SyncSender<Slot>,
+    empties: &Receiver<Slot>,
+    counts: &ListenerCounts,
+    is_over: &AtomicBool,
+) -> io::Result<()> {
+    let mut spare: Option<Slot> = None;
+    let mut overrun = [0; 1];
+    while !is_over.load(Ordering::Relaxed) {
+        let slot = match spare.take().map_or_else(|| empties.try_recv(), Ok) {
+            Ok(slot) => Some(slot),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => return Ok(()),
+        };
+        let mut slot = slot;
+        let buffer = slot.as_mut().map_or(&mut overrun[..], |slot| &mut slot.bytes);
+        let received = socket.recv_from(buffer);
+        let (n_bytes, sender) = match received {
+            Ok(received) => received,
+            Err(error) if is_only_late(&error) => {
+                spare = slot;
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        counts.packets.fetch_add(1, Ordering::Relaxed);
+        if from.is_some_and(|from| from != sender.ip()) {
+            counts.from_others.fetch_add(1, Ordering::Relaxed);
+            spare = slot;
+            continue;
+        }
+        let Some(mut slot) = slot else {
+            counts.overrun.fetch_add(1, Ordering::Relaxed);
+            continue;
+        };
+        (slot.n_bytes, slot.arrival) = (n_bytes, Arrival::now());
+        match fill.try_send(slot) {
+            // Slots are as many as have room.
+            Ok(()) | Err(TrySendError::Full(_)) => {}
+            Err(TrySendError::Disconnected(_)) => return Ok(()),
+        }
+    }
+    Ok(())
+}
+
+/// Whether nothing has come yet.
+fn is_only_late(error: &io::Error) -> bool {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    matches!(error.kind(), Interrupted | TimedOut | WouldBlock)
+}
+
+impl Listener {
+    fn run(self, take: &mut impl FnMut(Tick<'_>) -> bool) -> anyhow::Result<Read> {
+        loop {
+            match self.filled.recv_timeout(PATIENCE) {
+                Ok(slot) => {
+                    let goes_on = take(Tick::Packet(&slot.bytes[..slot.n_bytes], slot.arrival));
+                    // There is room for all slots.
+                    let _ = self.empty.send(slot);
+                    if !goes_on {
+                        break;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) if self.is_over.load(Ordering::Relaxed) => break,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        self.is_over.store(true, Ordering::Relaxed);
+        let ended = self.thread.join().map_err(|_| anyhow::anyhow!("the receiver panicked"))?;
+        ended.context("receiving packets")?;
+        let of = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        Ok(Read {
+            n_packets: of(&self.counts.packets),
+            n_from_others: of(&self.counts.from_others),
+            n_overrun: of(&self.counts.overrun),
+        })
+    }
+}
+
+/// Gives the packets of a capture to `take`, at their times if it is to be `realtime`.
+fn replay(
+    file: &Path,
+    from: Option<IpAddr>,
+    realtime: bool,
+    take: &mut impl FnMut(Tick<'_>) -> bool,
+) -> anyhow::Result<Read> {
+    let (mut read, start, mut first_s) = (Read::default(), Instant::now(), None);
+    pcap::read(file, |packet| {
+        read.n_packets += 1;
+        if from.is_some_and(|from| from != packet.source) {
+            read.n_from_others += 1;
+            return ControlFlow::Continue(());
+        }
+        let time_s = packet.time_s.unwrap_or_default();
+        let mut moment = None;
+        if realtime {
+            let since_s = time_s - *first_s.get_or_insert(time_s);
+            let due = start + Duration::try_from_secs_f64(since_s).unwrap_or_default();
+            thread::sleep(due.saturating_duration_since(Instant::now()));
+            moment = Some(Instant::now());
+        }
+        match take(Tick::Packet(packet.payload, Arrival { time_s, moment })) {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
+        }
+    })?;
+    Ok(read)
+}

@@ -1,0 +1,39 @@
+//! From the packets of a LiDAR to named, tracked objects, while the sensor turns.
+//!
+//! A [`Pipeline`] takes packets one by one. Each is decoded, its returns join the columns of
+//! [`edgepuck_segment::Stream`], and each cluster that is complete is classified and becomes
+//! part of a track. An [`Object`] says what is known of it then.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use infer_cpu::live::{Arrival, LiveOptions, Pipeline};
+//! use infer_cpu::{Classifier, Options};
+//!
+//! let classifier = Classifier::load(Path::new("street-128.safetensors"), &Options::default())?;
+//! let mut pipeline = Pipeline::new(classifier, &LiveOptions::default())?;
+//! let socket = std::net::UdpSocket::bind("0.0.0.0:2368")?;
+//! let mut packet = [0; 2048];
+//! loop {
+//!     let n = socket.recv(&mut packet)?;
+//!     pipeline.take(&packet[..n], Arrival::now());
+//!     pipeline.answer(|object| println!("{:?} at {:?} m", object.class, object.position_m));
+//! }
+//! # #[allow(unreachable_code)]
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod counts;
+mod ego_motion;
+mod kalman;
+mod object;
+mod packet_clock;
+mod pipeline;
+mod stats;
+mod tracker;
+
+pub use counts::Counts;
+pub use ego_motion::{EgoMotion, EgoMotionError, Pose};
+pub use object::{Object, SCHEMA_VERSION};
+pub use pipeline::{Arrival, LiveError, LiveOptions, Pipeline};
+pub use stats::{Stage, Stats};

@@ -1,0 +1,132 @@
+//! The times of packets: which one follows which, how many are lost, and when it was.
+
+/// After this long without a packet, or back by as much, a sensor counts as started anew.
+const RESTART_S: f64 = 1.0;
+/// The share of the difference between the clocks of the host and of the sensor that each packet
+/// takes away: they drift apart by some microseconds a second, and packets come with
+/// milliseconds of jitter.
+const DRIFT_SHARE: f64 = 1e-3;
+
+/// Follows the time stamps of one sensor.
+#[derive(Clone, Debug)]
+pub struct PacketClock {
+    /// Microseconds after which time stamps begin anew.
+    wraps_us: f64,
+    last: Option<Last>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    stamp_us: f64,
+    /// How long the packet takes.
+    duration_us: f64,
+    /// When it was taken, by its stamp, seconds of Unix time.
+    time_s: f64,
+}
+
+/// What a packet is after the one before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Succession {
+    /// It follows, after so many that are missing.
+    Follows {
+        /// The packets between.
+        missing: u64,
+    },
+    /// The same once more.
+    Duplicate,
+    /// It should have come earlier.
+    Late,
+    /// The sensor, or its clock, began anew.
+    Restart,
+}
+
+impl PacketClock {
+    /// For time stamps that begin anew after `wraps_us` microseconds.
+    pub fn new(wraps_us: f64) -> Self {
+        Self { wraps_us, last: None }
+    }
+
+    /// Takes a packet of this time stamp and duration, which arrived at `arrival_s` of Unix
+    /// time: what it is, and when it was sent by the sensor's clock, in Unix time.
+    pub fn take(&mut self, stamp_us: f64, duration_us: f64, arrival_s: f64) -> (Succession, f64) {
+        let began = Last { stamp_us, duration_us, time_s: arrival_s };
+        let Some(last) = self.last else {
+            self.last = Some(began);
+            return (Succession::Restart, arrival_s);
+        };
+        // The shorter way around, since stamps wrap.
+        let half = self.wraps_us / 2.0;
+        let step_us = (stamp_us - last.stamp_us + half).rem_euclid(self.wraps_us) - half;
+        let by_stamp_s = last.time_s + step_us * 1e-6;
+        let off_s = arrival_s - by_stamp_s;
+        let is_jump = off_s.abs() > RESTART_S || step_us.abs() > RESTART_S * 1e6;
+        let succession = match step_us {
+            _ if is_jump => Succession::Restart,
+            0.0 => return (Succession::Duplicate, by_stamp_s),
+            ..0.0 => return (Succession::Late, by_stamp_s),
+            _ => {
+                let periods = (step_us / last.duration_us.max(1.0)).round().max(1.0);
+                Succession::Follows { missing: periods as u64 - 1 }
+            }
+        };
+        let time_s = if is_jump { arrival_s } else { by_stamp_s + DRIFT_SHARE * off_s };
+        self.last = Some(Last { time_s, ..began });
+        (succession, time_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOUR_US: f64 = 3.6e9;
+
+    fn follows(missing: u64) -> Succession {
+        Succession::Follows { missing }
+    }
+
+    #[test]
+    fn missing_late_and_repeated_packets_are_told_apart() {
+        let mut clock = PacketClock::new(HOUR_US);
+        let mut take = |stamp: f64| clock.take(stamp, 600.0, 50.0 + stamp * 1e-6).0;
+        assert_eq!(take(1000.0), Succession::Restart);
+        assert_eq!(take(1600.0), follows(0));
+        assert_eq!(take(3401.0), follows(2));
+        assert_eq!(take(3401.0), Succession::Duplicate);
+        assert_eq!(take(2200.0), Succession::Late);
+        assert_eq!(take(4000.0), follows(0));
+    }
+
+    #[test]
+    fn the_hour_ends_and_time_goes_on() {
+        let mut clock = PacketClock::new(HOUR_US);
+        assert_eq!(clock.take(HOUR_US - 300.0, 600.0, 7.0).1, 7.0);
+        let (succession, time_s) = clock.take(300.0, 600.0, 7.0006);
+        assert_eq!(succession, follows(0));
+        assert!((time_s - 7.0006).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_jump_of_either_clock_is_a_restart() {
+        for (stamp_us, arrival_s) in [(5e6, 10.001), (1600.0, 60.0), (1600.0, 2.0), (1e9, 10.001)] {
+            let mut clock = PacketClock::new(HOUR_US);
+            clock.take(2e6, 600.0, 10.0);
+            assert_eq!(clock.take(stamp_us, 600.0, arrival_s), (Succession::Restart, arrival_s));
+        }
+    }
+
+    /// The host's clock is faster by 50 millionths, and packets come up to 2 ms late.
+    #[test]
+    fn clocks_that_drift_apart_stay_together() {
+        let mut clock = PacketClock::new(HOUR_US);
+        let mut worst_s = 0.0f64;
+        for packet in 0..2_000_000u64 {
+            let sent_s = packet as f64 * 600e-6;
+            let late_s = (packet * 7 % 5) as f64 * 5e-4;
+            let arrival_s = sent_s * (1.0 + 50e-6) + late_s;
+            let (_, time_s) = clock.take(sent_s * 1e6 % HOUR_US, 600.0, arrival_s);
+            worst_s = worst_s.max((time_s - arrival_s).abs());
+        }
+        assert!(worst_s < 0.003, "{worst_s} s apart");
+    }
+}

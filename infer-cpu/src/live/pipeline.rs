@@ -1,0 +1,488 @@
+//! From packets to objects.
+
+use std::f64::consts::TAU;
+use std::mem::discriminant;
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::{Instant, SystemTime};
+
+use edgepuck_segment::{OrientedBox, Settings, SettingsError, Stream, StreamCluster};
+use formats::velodyne::{Decoder, Header, PacketError, Return};
+use glam::{DVec3, Vec3};
+
+use super::counts::Counts;
+use super::ego_motion::{EgoMotion, Pose};
+use super::object::{Object, SCHEMA_VERSION};
+use super::packet_clock::{PacketClock, Succession};
+use super::stats::{Stage, Stats};
+use super::tracker::{Seen, Tracker};
+use crate::classifier::Classifier;
+use crate::classifier_team::ClassifierTeam;
+use crate::error::Error;
+use crate::prediction::{UNKNOWN, UnknownRule};
+
+/// Returns for which there is room, for each ring: half as many again as a VLP-32C sends in
+/// its slowest turn with both returns.
+const ROOM_PER_RING: u32 = 8192;
+
+/// How a pipeline works.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct LiveOptions {
+    /// Clusters of fewer points are not classified.
+    pub min_points: usize,
+    /// What is ground and what belongs together. The elevations of the rings are the sensor's.
+    pub segmentation: Settings,
+    /// How the sensor moves, if that is known.
+    pub ego_motion: Option<EgoMotion>,
+}
+
+impl Default for LiveOptions {
+    fn default() -> Self {
+        Self { min_points: 20, segmentation: Settings::default(), ego_motion: None }
+    }
+}
+
+/// A pipeline that cannot be set up.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LiveError {
+    /// Its settings.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// Its classifiers.
+    #[error(transparent)]
+    Classifier(#[from] Error),
+}
+
+/// When a packet came.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// Seconds of Unix time.
+    pub time_s: f64,
+    /// The moment, for latencies; `None` for packets of a capture that is read as fast as it can
+    /// be.
+    pub moment: Option<Instant>,
+}
+
+impl Arrival {
+    /// Of a packet that has just come.
+    #[must_use]
+    pub fn now() -> Self {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        // A clock before 1970 has not been set.
+        let time_s = since.map_or(0.0, |since| since.as_secs_f64());
+        Self { time_s, moment: Some(Instant::now()) }
+    }
+}
+
+/// Decodes, segments, classifies and tracks what one sensor sends.
+///
+/// Whatever comes over the network, a packet is decoded or counted; nothing ends the pipeline,
+/// and its memory does not grow with what comes.
+pub struct Pipeline {
+    options: LiveOptions,
+    sensor: Option<Sensor>,
+    returns: Vec<Return>,
+    waiting: Waiting,
+    namer: Namer,
+    tracker: Tracker,
+    counts: Counts,
+    stats: Stats,
+    /// The flaws of packets so far, one of each kind, and how many of them were told.
+    flaws: Vec<PacketError>,
+    n_told: usize,
+}
+
+/// The sensor that the first packet is of.
+struct Sensor {
+    decoder: Decoder,
+    clock: PacketClock,
+    stream: Stream<Tag>,
+    /// When its first packet came, seconds of Unix time.
+    start_s: f64,
+    n_packets: u64,
+}
+
+/// What is known of a point besides its place.
+#[derive(Clone, Copy, Default)]
+struct Tag {
+    /// Seconds of Unix time.
+    time_s: f64,
+    /// When its packet came.
+    moment: Option<Instant>,
+}
+
+/// Clusters that are complete and not answered.
+#[derive(Default)]
+struct Waiting {
+    points: Vec<[f32; 3]>,
+    clusters: Vec<Cluster>,
+}
+
+struct Cluster {
+    points: Range<usize>,
+    ground_z_m: Option<f32>,
+    first_s: f64,
+    last_s: f64,
+    last_moment: Option<Instant>,
+    turn: u64,
+}
+
+/// Gives clusters their classes.
+struct Namer {
+    team: ClassifierTeam,
+    classes: Vec<Arc<str>>,
+    unknown: UnknownRule,
+    unknown_name: Arc<str>,
+    /// Of each cluster, the log-probabilities of all classes; empty where it has too few points.
+    log_probabilities: Vec<f64>,
+    views: Vec<Option<(Range<usize>, f64)>>,
+}
+
+impl Pipeline {
+    /// A pipeline whose clusters are classified by as many threads as `classifier` has.
+    ///
+    /// # Errors
+    /// Settings that are not as they must be; threads that cannot be started.
+    pub fn new(classifier: Classifier, options: &LiveOptions) -> Result<Self, LiveError> {
+        options.segmentation.check()?;
+        let namer = Namer {
+            classes: classifier.classes().to_vec(),
+            unknown: UnknownRule::new(classifier.card(), classifier.classes()),
+            unknown_name: UNKNOWN.into(),
+            team: ClassifierTeam::new(classifier)?,
+            log_probabilities: Vec::new(),
+            views: Vec::new(),
+        };
+        Ok(Self {
+            options: options.clone(),
+            sensor: None,
+            returns: Vec::new(),
+            waiting: Waiting::default(),
+            namer,
+            tracker: Tracker::default(),
+            counts: Counts::default(),
+            stats: Stats::new(),
+            flaws: Vec::new(),
+            n_told: 0,
+        })
+    }
+
+    /// Takes a packet. What it completes is there for [`Pipeline::answer`].
+    pub fn take(&mut self, payload: &[u8], arrival: Arrival) {
+        if let Err(flaw) = self.take_data(payload, arrival) {
+            self.counts.foreign += 1;
+            if self.flaws.iter().all(|known| discriminant(known) != discriminant(&flaw)) {
+                self.flaws.push(flaw);
+            }
+        }
+    }
+
+    fn take_data(&mut self, payload: &[u8], arrival: Arrival) -> Result<(), PacketError> {
+        let Self { sensor, options, returns, waiting, stats, .. } = self;
+        let start = Instant::now();
+        let header = Header::of(payload)?;
+        let sensor = match sensor {
+            Some(sensor) => sensor,
+            None => sensor.insert(Sensor::new(&header, options, arrival.time_s)),
+        };
+        returns.clear();
+        sensor.decoder.decode(payload, |found| returns.push(*found))?;
+        let decoded = Instant::now();
+        stats.spend(Stage::Decode, decoded - start);
+        let stamp_us = f64::from(header.time_us);
+        let (succession, time_s) =
+            sensor.clock.take(stamp_us, header.duration_us(), arrival.time_s);
+        let start_s = sensor.start_s;
+        let motion = options.ego_motion.as_ref().map(|motion| Motion { motion, start_s });
+        match succession {
+            Succession::Duplicate => {
+                self.counts.duplicated += 1;
+                return Ok(());
+            }
+            Succession::Late => {
+                self.counts.late += 1;
+                return Ok(());
+            }
+            Succession::Restart if sensor.n_packets > 0 => {
+                self.counts.restarts += 1;
+                sensor.end(waiting, motion);
+                self.tracker.forget();
+            }
+            Succession::Restart => {}
+            Succession::Follows { missing } => {
+                self.counts.lost += missing;
+                // Beyond a quarter of a turn, the azimuth does not tell how far the head is.
+                let turned = missing as f64 * header.duration_us() * header.units_per_us;
+                if turned > 9_000.0 {
+                    sensor.end(waiting, motion);
+                }
+            }
+        }
+        sensor.n_packets += 1;
+        self.counts.packets += 1;
+        self.counts.points += returns.len() as u64;
+        if header.units_per_us > 0.0 {
+            self.tracker.set_turn(36_000.0 / header.units_per_us * 1e-6);
+        }
+        let n_turns = sensor.stream.n_turns();
+        let moment = arrival.moment;
+        sensor.push(&header, returns, Tag { time_s, moment }, waiting, motion);
+        let dropped = sensor.stream.dropped();
+        self.counts.dropped_points = dropped.late + dropped.overflow;
+        stats.spend(Stage::Segment, decoded.elapsed());
+        if sensor.stream.n_turns() > n_turns {
+            stats.end_turn();
+        }
+        Ok(())
+    }
+
+    /// Ends what is not complete, as at the end of a recording.
+    pub fn end(&mut self) {
+        let Self { sensor: Some(sensor), waiting, options, .. } = self else { return };
+        let start_s = sensor.start_s;
+        let motion = options.ego_motion.as_ref().map(|motion| Motion { motion, start_s });
+        sensor.end(waiting, motion);
+    }
+
+    /// Classifies and tracks the clusters that are complete, and gives each to `each`, in the
+    /// order in which the beams have passed them.
+    pub fn answer(&mut self, mut each: impl FnMut(&Object)) {
+        if self.waiting.clusters.is_empty() {
+            return;
+        }
+        let start = Instant::now();
+        let start_s = self.sensor.as_ref().map_or(0.0, |sensor| sensor.start_s);
+        let motion = self.options.ego_motion.as_ref().map(|motion| Motion { motion, start_s });
+        self.namer.name(&self.waiting, self.options.min_points);
+        let named = Instant::now();
+        self.stats.spend(Stage::Classify, named - start);
+        for (cluster, view) in self.waiting.clusters.iter().zip(&self.namer.views) {
+            let view = view
+                .as_ref()
+                .map(|(range, energy)| (&self.namer.log_probabilities[range.clone()], *energy));
+            let points = &self.waiting.points[cluster.points.clone()];
+            let pose = motion.map(|motion| motion.pose(cluster.last_s));
+            let sensor_m = pose.map_or([0.0; 2], |pose| pose.position_m.truncate().to_array());
+            let place = Place::of(points, pose);
+            let track = self.tracker.see(&Seen {
+                time_s: cluster.last_s,
+                position_m: place.position_m,
+                size_m: [place.size_m[0], place.size_m[1]],
+                yaw_rad: place.yaw_deg.to_radians(),
+                sensor_m,
+                view,
+            });
+            let fused = self.namer.fused(&track.log_probabilities, track.energy);
+            let latency = cluster.last_moment.map(|moment| moment.elapsed());
+            let confidence = view.zip(fused.as_ref());
+            self.counts.clusters += 1;
+            self.counts.unclassified += u64::from(view.is_none());
+            each(&Object {
+                version: SCHEMA_VERSION,
+                turn: cluster.turn,
+                track: track.id,
+                class: fused.as_ref().map(|fused| Arc::clone(&fused.answer)),
+                resembles: fused.as_ref().map(|fused| Arc::clone(&self.namer.classes[fused.class])),
+                confidence: confidence.map(|((view, _), fused)| view[fused.class].exp()),
+                probability: fused.as_ref().map(|fused| fused.probability),
+                frame: place.frame,
+                position_m: place.position_m,
+                size_m: place.size_m,
+                yaw_deg: place.yaw_deg,
+                velocity_m_s: track.velocity_m_s(),
+                points: points.len(),
+                range_m: place.range_m,
+                first_s: cluster.first_s,
+                last_s: cluster.last_s,
+                latency_ms: latency.map(|latency| latency.as_secs_f64() * 1e3),
+            });
+            latency.into_iter().for_each(|latency| self.stats.answered_after(latency));
+        }
+        self.waiting.points.clear();
+        self.waiting.clusters.clear();
+        self.stats.spend(Stage::Track, named.elapsed());
+    }
+
+    /// What came and what did not.
+    #[must_use]
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// How long things took.
+    #[must_use]
+    pub fn stats(&self) -> &Stats {
+        &self.stats
+    }
+
+    /// The flaws of packets that were not told by an earlier call: one of each kind.
+    pub fn new_flaws(&mut self) -> &[PacketError] {
+        let told = std::mem::replace(&mut self.n_told, self.flaws.len());
+        &self.flaws[told..]
+    }
+}
+
+impl Sensor {
+    fn new(header: &Header, options: &LiveOptions, start_s: f64) -> Self {
+        let decoder = Decoder::new(header.model);
+        let elevations = decoder.elevations_rad();
+        let n_rings = elevations.len() as u32;
+        let degrees = elevations.iter().map(|angle| angle.to_degrees() as f32);
+        let mut settings = options.segmentation.clone();
+        settings.ring_elevations_deg = Some(degrees.collect());
+        let stream = Stream::new(settings, n_rings * ROOM_PER_RING)
+            .expect("invariant: settings were checked, and a sensor's elevations are right");
+        Self { decoder, clock: PacketClock::new(HOUR_US), stream, start_s, n_packets: 0 }
+    }
+
+    /// Takes in the returns of a packet, which is of the time that `packet` says.
+    fn push(
+        &mut self,
+        header: &Header,
+        returns: &[Return],
+        packet: Tag,
+        waiting: &mut Waiting,
+        motion: Option<Motion<'_>>,
+    ) {
+        let Self { decoder, stream, .. } = self;
+        let encoder = f64::from(header.azimuth) / 36_000.0 * TAU;
+        let turn = stream.n_turns();
+        stream.advance((encoder - decoder.most_offset_rad()) as f32, |cluster| {
+            waiting.push(&cluster, turn, motion);
+        });
+        for found in returns {
+            let tag = Tag { time_s: packet.time_s + found.after_us * 1e-6, ..packet };
+            stream.push(found.point_m, found.ring, tag);
+        }
+    }
+
+    fn end(&mut self, waiting: &mut Waiting, motion: Option<Motion<'_>>) {
+        let turn = self.stream.n_turns();
+        self.stream.end(|cluster| waiting.push(&cluster, turn, motion));
+    }
+}
+
+/// How the sensor moves since its first packet.
+#[derive(Clone, Copy)]
+struct Motion<'a> {
+    motion: &'a EgoMotion,
+    start_s: f64,
+}
+
+impl Motion<'_> {
+    fn pose(&self, time_s: f64) -> Pose {
+        self.motion.pose(time_s, self.start_s)
+    }
+}
+
+/// The time stamps of Velodyne's packets count microseconds past the hour.
+const HOUR_US: f64 = 3.6e9;
+
+impl Waiting {
+    /// Takes in a cluster of a turn. If the sensor moves, its points are brought to where the
+    /// sensor would have seen them all with the last one.
+    fn push(&mut self, cluster: &StreamCluster<'_, Tag>, turn: u64, motion: Option<Motion<'_>>) {
+        let (Some(first), Some(last)) = (cluster.tags.first(), cluster.tags.last()) else { return };
+        let start = self.points.len();
+        self.points.extend_from_slice(cluster.points);
+        if let Some(motion) = motion {
+            let pose = motion.pose(last.time_s);
+            for (point, tag) in self.points[start..].iter_mut().zip(cluster.tags) {
+                let in_world = motion.pose(tag.time_s).to_world(Vec3::from(*point).as_dvec3());
+                *point = pose.from_world(in_world).as_vec3().to_array();
+            }
+        }
+        self.clusters.push(Cluster {
+            points: start..self.points.len(),
+            ground_z_m: cluster.ground_z_m,
+            first_s: first.time_s,
+            last_s: last.time_s,
+            last_moment: last.moment,
+            turn,
+        });
+    }
+}
+
+/// Class and probability of a track.
+struct Fused {
+    class: usize,
+    answer: Arc<str>,
+    probability: f64,
+}
+
+impl Namer {
+    /// Classifies those of the clusters that have enough points.
+    fn name(&mut self, waiting: &Waiting, min_points: usize) {
+        let Self { team, log_probabilities, views, .. } = self;
+        log_probabilities.clear();
+        views.clear();
+        let is_enough = |cluster: &&Cluster| cluster.points.len() >= min_points;
+        let large = waiting.clusters.iter().filter(is_enough);
+        let clouds =
+            large.map(|cluster| (&waiting.points[cluster.points.clone()], cluster.ground_z_m));
+        team.classify_many(clouds, |answer| {
+            let start = log_probabilities.len();
+            // A network whose arithmetic overflows says nothing of the cluster.
+            views.push(answer.ok().map(|answer| {
+                let n_classes = answer.logits.len();
+                let all = (0..n_classes).map(|class| answer.log_probability(class));
+                log_probabilities.extend(all);
+                (start..start + n_classes, answer.energy)
+            }));
+        });
+        // Those of too few points have their places between the others.
+        let mut next = views.len();
+        views.resize(waiting.clusters.len(), None);
+        for at in (0..waiting.clusters.len()).rev() {
+            if is_enough(&&waiting.clusters[at]) {
+                next -= 1;
+                views.swap(at, next);
+            }
+        }
+    }
+
+    /// What the mean log-probabilities and the mean energy of a track make of it; `None`
+    /// without a view.
+    fn fused(&self, means: &[f64], energy: f64) -> Option<Fused> {
+        let (class, largest) = means.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+        let sum: f64 = means.iter().map(|mean| (mean - largest).exp()).sum();
+        let answer = match self.unknown.holds(class, energy) {
+            true => Arc::clone(&self.unknown_name),
+            false => Arc::clone(&self.classes[class]),
+        };
+        Some(Fused { class, answer, probability: 1.0 / sum })
+    }
+}
+
+/// Where a cluster is.
+struct Place {
+    frame: &'static str,
+    position_m: [f64; 3],
+    size_m: [f64; 3],
+    yaw_deg: f64,
+    range_m: f64,
+}
+
+impl Place {
+    /// Of points in the frame of the sensor, whose pose is known or not.
+    fn of(points: &[[f32; 3]], pose: Option<Pose>) -> Self {
+        let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(points);
+        let mut place = Self {
+            frame: "sensor",
+            position_m: centre_m.map(f64::from),
+            size_m: size_m.map(f64::from),
+            yaw_deg: f64::from(yaw_rad.to_degrees()),
+            range_m: f64::from(centre_m[0].hypot(centre_m[1])),
+        };
+        if let Some(pose) = pose {
+            let (sin, cos) = f64::from(yaw_rad).sin_cos();
+            let along = pose.world_from_sensor * DVec3::new(cos, sin, 0.0);
+            place.frame = "world";
+            place.position_m = pose.to_world(place.position_m.into()).to_array();
+            place.yaw_deg = (along.y / along.x).atan().to_degrees();
+        }
+        place
+    }
+}

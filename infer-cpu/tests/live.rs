@@ -1,0 +1,217 @@
+//! From packets to tracked objects, also where packets are lost, late, foreign or damaged, and
+//! where clocks jump.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[path = "support/street.rs"]
+mod street;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use formats::rng::StreamKey;
+use glam::DVec3;
+use infer_cpu::live::{Arrival, Counts, EgoMotion, LiveOptions, Object, Pipeline};
+use infer_cpu::{Classifier, Options};
+use street::{PACKET, PACKET_S, PACKETS_PER_S, Thing, packets, street};
+
+/// Unix time at the first packet, seconds.
+const START_S: f64 = 1.7e9;
+
+fn pipeline(options: &LiveOptions) -> Pipeline {
+    let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
+    let model = Path::new(weights).join("street-128.safetensors");
+    Pipeline::new(Classifier::load(&model, &Options::default()).unwrap(), options).unwrap()
+}
+
+/// Gives a pipeline packets that come at these times since the first one, and to its end.
+fn run<'a>(
+    pipeline: &mut Pipeline,
+    packets: impl IntoIterator<Item = (f64, &'a [u8])>,
+) -> Vec<Object> {
+    let mut objects = Vec::new();
+    for (since_s, packet) in packets {
+        pipeline.take(packet, Arrival { time_s: START_S + since_s, moment: None });
+        pipeline.answer(|object| objects.push(object.clone()));
+    }
+    pipeline.end();
+    pipeline.answer(|object| objects.push(object.clone()));
+    objects
+}
+
+/// The packets at the times at which they were sent.
+fn on_time(packets: &[[u8; PACKET]]) -> impl Iterator<Item = (f64, &[u8])> {
+    packets.iter().enumerate().map(|(i, packet)| (i as f64 * PACKET_S, &packet[..]))
+}
+
+/// For each thing, the tracks of the objects near it and how many objects each has.
+fn tracks(objects: &[Object], things: &[Thing]) -> Vec<BTreeMap<u64, usize>> {
+    let mut tracks = vec![BTreeMap::new(); things.len()];
+    for object in objects {
+        let since_s = object.last_s - START_S;
+        for (thing, tracks) in things.iter().zip(&mut tracks) {
+            let off = [0, 1].map(|axis| {
+                thing.at[axis] + since_s * thing.velocity[axis] - object.position_m[axis]
+            });
+            if off[0].hypot(off[1]) < thing.size[0] / 2.0 + 0.3 {
+                *tracks.entry(object.track).or_default() += 1;
+            }
+        }
+    }
+    tracks
+}
+
+#[test]
+fn each_object_keeps_its_track_and_has_its_velocity() {
+    let (things, n_turns) = (street(), 30);
+    let sent = packets(&things, 5_000, 3 * PACKETS_PER_S);
+    let objects = run(&mut pipeline(&LiveOptions::default()), on_time(&sent));
+    for (thing, tracks) in things.iter().zip(tracks(&objects, &things)) {
+        let (&track, &n) = tracks.iter().max_by_key(|(_, n)| **n).unwrap();
+        assert!(n >= n_turns - 1, "{thing:?}: {tracks:?}");
+        let last = objects.iter().rfind(|object| object.track == track).unwrap();
+        let velocity = last.velocity_m_s.unwrap();
+        // The visible sides change while a car drives by, and with them the middle of its box.
+        let off = (velocity[0] - thing.velocity[0]).hypot(velocity[1] - thing.velocity[1]);
+        assert!(off < 1.0, "{thing:?}: {velocity:?}");
+        assert!(last.frame == "sensor" && last.points >= 20 && last.class.is_some());
+        assert!((last.last_s - START_S - 3.0).abs() < 0.15, "{last:?}");
+        assert!((0.0..0.1).contains(&(last.last_s - last.first_s)));
+    }
+}
+
+/// Whatever is lost is counted. A packet is a wedge of 4.8 degrees, which cuts a near car in two: one
+/// in a hundred changes no track, of one in ten some tracks stay long.
+#[test]
+fn lost_packets_are_counted_and_answers_go_on() {
+    let things = street();
+    let sent = packets(&things, 5_000, 3 * PACKETS_PER_S);
+    let key = StreamKey::new(0, "lost packets", 0);
+    for (share, most_tracks) in [(0.01, 1), (0.1, 3), (0.5, 6)] {
+        let comes = |i: usize| i == 0 || key.unit(i as u64) >= share || i + 1 == sent.len();
+        let coming = on_time(&sent).enumerate().filter(|(i, _)| comes(*i)).map(|(_, p)| p);
+        let mut pipeline = pipeline(&LiveOptions::default());
+        let objects = run(&mut pipeline, coming);
+        let n_lost = (0..sent.len()).filter(|&i| !comes(i)).count() as u64;
+        let counts = pipeline.counts();
+        assert_eq!((counts.lost, counts.restarts, counts.late), (n_lost, 0, 0), "{share}");
+        for tracks in tracks(&objects, &things) {
+            let n_long = tracks.values().filter(|n| **n >= 8).count();
+            let least = usize::from(share < 0.5);
+            assert!((least..=most_tracks).contains(&n_long), "{share}: {tracks:?}");
+        }
+    }
+}
+
+#[test]
+fn packets_that_come_twice_or_late_change_nothing() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let expected = run(&mut pipeline(&LiveOptions::default()), on_time(&sent));
+    let mut pipeline = pipeline(&LiveOptions::default());
+    let again = on_time(&sent).enumerate().flat_map(|(i, packet)| {
+        let late = (i >= 3 && i % 10 == 0).then(|| (packet.0, &sent[i - 3][..]));
+        let twice = (i % 7 == 0).then_some(packet);
+        [Some(packet), twice, late].into_iter().flatten()
+    });
+    assert_eq!(run(&mut pipeline, again), expected);
+    let counts = pipeline.counts();
+    assert_eq!((counts.duplicated, counts.late, counts.lost), (108, 75, 0));
+}
+
+#[test]
+fn a_sensor_that_restarts_and_clocks_that_jump_begin_a_new_stream() {
+    let things = street();
+    let [before, after] = [3_000_000_000, 0].map(|stamp| packets(&things, stamp, PACKETS_PER_S));
+    // The sensor is off for five seconds; or its clock is set; or the host's is.
+    for (pause_s, after) in [(5.0, &after), (0.0, &after), (-100.0, &before)] {
+        let mut pipeline = pipeline(&LiveOptions::default());
+        let later = on_time(after).map(|(since_s, packet)| (since_s + 1.0 + pause_s, packet));
+        let objects = run(&mut pipeline, on_time(&before).chain(later));
+        let counts = pipeline.counts();
+        assert_eq!((counts.restarts, counts.lost), (1, 0), "{pause_s}");
+        assert_eq!(counts.packets, 2 * PACKETS_PER_S as u64);
+        // Objects of both halves, and none in between.
+        let n_late = objects.iter().filter(|object| object.first_s > START_S + 0.9 + pause_s);
+        assert!(n_late.count() >= 20, "{pause_s}");
+    }
+}
+
+#[test]
+fn time_that_runs_backwards_answers_nothing_and_harms_nothing() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let mut pipeline = pipeline(&LiveOptions::default());
+    let backwards = sent.iter().rev().enumerate();
+    let coming = backwards.map(|(i, packet)| (i as f64 * PACKET_S, &packet[..]));
+    run(&mut pipeline, coming.chain(on_time(&sent).map(|(since_s, p)| (since_s + 10.0, p))));
+    let counts = *pipeline.counts();
+    assert_eq!(counts.packets + counts.late, 2 * PACKETS_PER_S as u64, "{counts:?}");
+    assert!(counts.packets > PACKETS_PER_S as u64 && counts.clusters > 20, "{counts:?}");
+}
+
+#[test]
+fn foreign_packets_are_counted_and_each_kind_is_told_once() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let key = StreamKey::new(0, "foreign packets", 0);
+    let noise: Vec<u8> = (0..PACKET).map(|i| (key.unit(i as u64) * 256.0) as u8).collect();
+    let mut other_model = sent[0];
+    other_model[1205] = 0x28;
+    let mut unknown_model = sent[0];
+    unknown_model[1205] = 0x77;
+    let foreign: [&[u8]; 6] =
+        [&[], &sent[0][..700], &[7; 65_507], &noise, &other_model, &unknown_model];
+    let mut pipeline = pipeline(&LiveOptions::default());
+    let expected = run(&mut self::pipeline(&LiveOptions::default()), on_time(&sent));
+    let mixed = on_time(&sent).enumerate().flat_map(|(i, packet)| {
+        let foreign = foreign.get(i % 20).map(|bytes| (packet.0, *bytes));
+        [Some(packet), foreign].into_iter().flatten()
+    });
+    assert_eq!(run(&mut pipeline, mixed), expected);
+    assert!(pipeline.counts().foreign >= 6 * 37);
+    let flaws: Vec<_> = pipeline.new_flaws().iter().map(ToString::to_string).collect();
+    let expected = [
+        "expected a data packet of 1206 bytes, found 0 bytes",
+        "block 0: expected the flag ff ee",
+        "expected a packet of a vlp16, found one of a vlp32c",
+        "expected a packet of a VLP-16 (byte 0x22) or VLP-32C (0x28), found byte 0x77",
+    ];
+    assert_eq!(flaws, expected);
+    assert!(pipeline.new_flaws().is_empty());
+}
+
+/// The world stands still, and the sensor drives and turns: seen from it, all moves.
+#[test]
+fn with_the_sensors_motion_what_stands_still_stands_still() {
+    // In the sensor's frame, things of the world move against it.
+    let things: Vec<_> =
+        street()[..1].iter().map(|thing| Thing { velocity: [-4.0, 0.0], ..*thing }).collect();
+    let sent = packets(&things, 5_000, 2 * PACKETS_PER_S);
+    let mut options = LiveOptions::default();
+    options.ego_motion =
+        Some(EgoMotion::Twist { linear_m_s: DVec3::X * 4.0, angular_rad_s: DVec3::ZERO });
+    let objects = run(&mut pipeline(&options), on_time(&sent));
+    let parked: Vec<_> =
+        objects.iter().filter(|o| (o.position_m[0] - 8.0).abs() < 1.0 && o.turn > 5).collect();
+    assert!(parked.len() >= 12, "{}", parked.len());
+    for object in &parked {
+        let [x, y, _] = object.velocity_m_s.unwrap();
+        assert!(object.frame == "world" && x.hypot(y) < 0.5, "{object:?}");
+    }
+    let relative = run(&mut pipeline(&LiveOptions::default()), on_time(&sent));
+    let last = relative.iter().rfind(|object| object.velocity_m_s.is_some()).unwrap();
+    assert!((last.velocity_m_s.unwrap()[0] + 4.0).abs() < 0.5, "{last:?}");
+}
+
+#[test]
+fn clusters_of_few_points_are_reported_and_not_guessed() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let mut options = LiveOptions::default();
+    options.min_points = 1_000_000;
+    let mut pipeline = pipeline(&options);
+    let objects = run(&mut pipeline, on_time(&sent));
+    assert!(objects.len() > 20);
+    for object in &objects {
+        assert_eq!((&object.class, object.confidence, object.probability), (&None, None, None));
+    }
+    let Counts { clusters, unclassified, .. } = *pipeline.counts();
+    assert_eq!((clusters, unclassified), (objects.len() as u64, objects.len() as u64));
+}

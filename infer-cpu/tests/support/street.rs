@@ -1,0 +1,95 @@
+//! Packets of a VLP-16 in a street of boxes, whose returns follow in closed form.
+
+use std::f64::consts::TAU;
+
+/// Bytes of a data packet.
+pub const PACKET: usize = 1206;
+/// Firing sequences of a packet, and the time of one.
+const SEQUENCES: usize = 24;
+const SEQUENCE_S: f64 = 55.296e-6;
+/// The time of a packet, seconds.
+pub const PACKET_S: f64 = SEQUENCES as f64 * SEQUENCE_S;
+/// Turns a second.
+const TURNS_PER_S: f64 = 10.0;
+/// Packets of ten turns and a bit.
+pub const PACKETS_PER_S: usize = 754;
+/// Elevations of the lasers as packets list them, degrees (VLP-16 User Manual 63-9243).
+const LASERS_DEG: [f64; 16] =
+    [-15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0, 15.0];
+/// Height of the sensor above the street, metres.
+const HEIGHT_M: f64 = 1.2;
+/// The farthest return, metres.
+const FARTHEST_M: f64 = 60.0;
+
+/// A box that stands on the street and moves, metres and metres a second.
+#[derive(Clone, Copy, Debug)]
+pub struct Thing {
+    pub at: [f64; 2],
+    pub velocity: [f64; 2],
+    pub size: [f64; 3],
+}
+
+impl Thing {
+    fn distance(&self, beam: [f64; 3], time_s: f64) -> Option<f64> {
+        let middle = [0, 1].map(|i| self.at[i] + time_s * self.velocity[i]);
+        let [length, width, height] = self.size;
+        let low = [middle[0] - length / 2.0, middle[1] - width / 2.0, -HEIGHT_M];
+        let high = [middle[0] + length / 2.0, middle[1] + width / 2.0, height - HEIGHT_M];
+        let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+        for axis in 0..3 {
+            let ends = [low[axis] / beam[axis], high[axis] / beam[axis]];
+            enter = enter.max(ends[0].min(ends[1]));
+            leave = leave.min(ends[0].max(ends[1]));
+        }
+        (enter <= leave && leave > 0.0).then_some(enter)
+    }
+}
+
+/// A parked car, a car that drives by and a walking person.
+pub fn street() -> Vec<Thing> {
+    vec![
+        Thing { at: [8.0, -5.0], velocity: [0.0; 2], size: [4.2, 1.8, 1.5] },
+        Thing { at: [-10.0, 6.0], velocity: [6.0, 0.0], size: [4.2, 1.8, 1.5] },
+        Thing { at: [5.0, 2.0], velocity: [-1.2, 0.4], size: [0.4, 0.5, 1.7] },
+    ]
+}
+
+/// The first `n` packets of a sensor among `things`, whose stamps begin at `stamp_us`.
+pub fn packets(things: &[Thing], stamp_us: u32, n: usize) -> Vec<[u8; PACKET]> {
+    (0..n).map(|number| packet(things, stamp_us, number)).collect()
+}
+
+fn packet(things: &[Thing], first_stamp_us: u32, number: usize) -> [u8; PACKET] {
+    let start_s = number as f64 * PACKET_S;
+    let mut bytes = [0; PACKET];
+    for block in 0..12 {
+        let block_s = start_s + (2 * block) as f64 * SEQUENCE_S;
+        let at = &mut bytes[block * 100..][..100];
+        let azimuth = ((block_s * TURNS_PER_S * 36_000.0).round() as u64 % 36_000) as u16;
+        at[..2].copy_from_slice(&[0xff, 0xee]);
+        at[2..4].copy_from_slice(&azimuth.to_le_bytes());
+        for i in 0..32 {
+            let time_s = block_s + (i / 16) as f64 * SEQUENCE_S + (i % 16) as f64 * 2.304e-6;
+            let elevation = LASERS_DEG[i % 16].to_radians();
+            let units = (distance(things, elevation, time_s) / 0.002).round() as u16;
+            at[4 + 3 * i..6 + 3 * i].copy_from_slice(&units.to_le_bytes());
+            at[6 + 3 * i] = 50;
+        }
+    }
+    let stamp_us = first_stamp_us.wrapping_add((start_s * 1e6).round() as u32);
+    bytes[1200..1204].copy_from_slice(&stamp_us.to_le_bytes());
+    bytes[1204..].copy_from_slice(&[0x37, 0x22]);
+    bytes
+}
+
+/// How far the beam of this elevation sees at `time_s`, 0 for nothing.
+fn distance(things: &[Thing], elevation: f64, time_s: f64) -> f64 {
+    let (sin, cos) = (time_s * TURNS_PER_S * TAU).sin_cos();
+    let (up, flat) = elevation.sin_cos();
+    // Azimuths grow clockwise.
+    let beam = [flat * cos, -flat * sin, up];
+    let ground = if up < 0.0 { -HEIGHT_M / up } else { f64::INFINITY };
+    let hits = things.iter().filter_map(|thing| thing.distance(beam, time_s));
+    let nearest = hits.fold(ground, f64::min);
+    if nearest <= FARTHEST_M { nearest } else { 0.0 }
+}
