@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "support/street.rs"]
+#[allow(dead_code, reason = "the tests of the program use all of it")]
 mod street;
 
 use std::collections::BTreeMap;

@@ -1,7 +1,9 @@
 //! The box around a cluster, turned as the object stands.
 
-/// Steps in which the direction is searched: one degree, over a quarter turn.
-const STEPS: u32 = 90;
+/// The direction is searched over a quarter turn in steps of three degrees, and then by single
+/// degrees beside the best of them.
+const COARSE_DEG: i32 = 3;
+const QUARTER_DEG: i32 = 90;
 
 /// Points nearer to an edge than this count alike, metres: about the range noise
 /// of a sensor (the paper's d0).
@@ -34,16 +36,18 @@ impl OrientedBox {
         let stride = points.len().div_ceil(MOST_SEARCHED).max(1);
         let searched = points.iter().step_by(stride).filter(finite);
         let points = points.iter().filter(finite);
-        let mut best = (f32::NEG_INFINITY, 0.0);
-        for step in 0..STEPS {
-            let angle_rad = step as f32 * std::f32::consts::FRAC_PI_2 / STEPS as f32;
-            let rectangle = Rectangle::around(searched.clone(), angle_rad);
-            let closeness = rectangle.closeness(searched.clone());
-            if closeness > best.0 {
-                best = (closeness, angle_rad);
-            }
-        }
-        let rectangle = Rectangle::around(points.clone(), best.1);
+        let closeness = |degrees: i32| {
+            let angle_rad = (degrees as f32).to_radians();
+            Rectangle::around(searched.clone(), angle_rad).closeness(searched.clone())
+        };
+        let best_of = |directions: &mut dyn Iterator<Item = i32>| {
+            let all = directions.map(|degrees| (closeness(degrees), degrees));
+            all.reduce(|best, other| if other.0 > best.0 { other } else { best }).map_or(0, |b| b.1)
+        };
+        let coarse = best_of(&mut (0..QUARTER_DEG).step_by(COARSE_DEG as usize));
+        let fine = best_of(&mut (coarse + 1 - COARSE_DEG..coarse + COARSE_DEG));
+        let angle_rad = (fine.rem_euclid(QUARTER_DEG) as f32).to_radians();
+        let rectangle = Rectangle::around(points.clone(), angle_rad);
         let heights = points.map(|point| point[2]);
         let (low, high) = heights
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));

@@ -113,16 +113,12 @@ impl Footprint {
 /// by the Mahalanobis distance of a Kalman filter for constant velocity along each axis, that
 /// of the surer prediction of two. A track takes one cluster a turn.
 pub struct Tracker {
+    /// Room for all of them, of which the first `n_used` have been used.
     tracks: Vec<Track>,
+    n_used: usize,
     n_ids: u64,
     /// The time that a turn takes, seconds.
     turn_s: f64,
-}
-
-impl Default for Tracker {
-    fn default() -> Self {
-        Self { tracks: Vec::with_capacity(MOST_TRACKS), n_ids: 0, turn_s: 0.1 }
-    }
 }
 
 impl Track {
@@ -185,6 +181,14 @@ impl Track {
 }
 
 impl Tracker {
+    /// A tracker of objects of so many classes.
+    pub fn new(n_classes: usize) -> Self {
+        let track =
+            || Track { log_probabilities: Vec::with_capacity(n_classes), ..Track::default() };
+        let tracks = (0..MOST_TRACKS).map(|_| track()).collect();
+        Self { tracks, n_used: 0, n_ids: 0, turn_s: 0.1 }
+    }
+
     /// Says how long a turn takes, seconds.
     pub fn set_turn(&mut self, turn_s: f64) {
         self.turn_s = turn_s;
@@ -202,7 +206,7 @@ impl Tracker {
         let waits = |track: &Track| seen.time_s - track.last_s;
         // A track that was seen in this turn has its cluster.
         let due = 0.5 * self.turn_s..=PATIENCE_S.max(2.5 * self.turn_s);
-        let tracks = self.tracks.iter().enumerate();
+        let tracks = self.tracks[..self.n_used].iter().enumerate();
         let tracks = tracks.filter(|(_, track)| due.contains(&waits(track)));
         let costs = tracks.filter_map(|(at, track)| Some((track.cost(seen)?, at)));
         if let Some((_, at)) = costs.min_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -220,13 +224,13 @@ impl Tracker {
             None => f64::INFINITY,
             Some(_) => time_s - track.last_s,
         };
-        let longest = self.tracks.iter().map(waited).enumerate();
+        let longest = self.tracks[..self.n_used].iter().map(waited).enumerate();
         let longest = longest.max_by(|a, b| a.1.total_cmp(&b.1));
         match longest {
-            Some((at, waited_s)) if waited_s > PATIENCE_S || self.tracks.len() >= MOST_TRACKS => at,
+            Some((at, waited_s)) if waited_s > PATIENCE_S || self.n_used == MOST_TRACKS => at,
             _ => {
-                self.tracks.push(Track::default());
-                self.tracks.len() - 1
+                self.n_used += 1;
+                self.n_used - 1
             }
         }
     }
@@ -254,7 +258,7 @@ mod tests {
 
     #[test]
     fn two_persons_keep_their_numbers_while_they_pass_each_other() {
-        let mut tracker = Tracker::default();
+        let mut tracker = Tracker::new(2);
         let mut ids = [vec![], vec![]];
         for turn in 0..60 {
             let t = f64::from(turn) * 0.1;
@@ -267,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_car_is_found_again_after_a_second_and_not_after_two() {
-        let mut tracker = Tracker::default();
+        let mut tracker = Tracker::new(2);
         let at = |t: f64| seen(t, 12.0 * t, 3.0);
         (0..20).for_each(|turn| {
             tracker.see(&at(f64::from(turn) * 0.1));
@@ -280,7 +284,7 @@ mod tests {
 
     #[test]
     fn what_is_cut_in_two_is_two_tracks_and_so_is_what_is_far_off() {
-        let mut tracker = Tracker::default();
+        let mut tracker = Tracker::new(2);
         tracker.see(&seen(0.0, 5.0, 0.0));
         assert_eq!(tracker.see(&seen(0.1, 5.1, 0.0)).id, 1);
         assert_eq!(tracker.see(&seen(0.101, 5.4, 0.0)).id, 2);
@@ -290,7 +294,7 @@ mod tests {
 
     #[test]
     fn a_class_firms_up_over_views() {
-        let mut tracker = Tracker::default();
+        let mut tracker = Tracker::new(2);
         let views = [[-2.0, -0.2], [-0.1, -3.0], [-0.1, -3.0]];
         let means = views.iter().enumerate().map(|(turn, view)| {
             let time_s = turn as f64 * 0.1;
@@ -306,7 +310,7 @@ mod tests {
     /// Of a car that stands, first a corner is seen, then its side and then its rear.
     #[test]
     fn what_is_hidden_of_a_car_moves_it_nowhere() {
-        let mut tracker = Tracker::default();
+        let mut tracker = Tracker::new(2);
         let views = [
             ([8.0, -5.0], [4.2, 1.8], 0.0),
             ([8.0, -4.1], [4.2, 0.0], 0.0),
@@ -325,13 +329,13 @@ mod tests {
 
     #[test]
     fn tracks_are_bounded_and_their_memory_is_used_again() {
-        let mut tracker = Tracker::default();
+        let mut tracker = Tracker::new(2);
         for i in 0..5000 {
             tracker.see(&seen(0.0, f64::from(i) * 100.0, 0.0));
         }
-        assert_eq!(tracker.tracks.len(), MOST_TRACKS);
+        assert_eq!(tracker.n_used, MOST_TRACKS);
         tracker.see(&seen(100.0, 0.0, 0.0));
-        assert_eq!(tracker.tracks.len(), MOST_TRACKS);
+        assert_eq!(tracker.n_used, MOST_TRACKS);
         tracker.forget();
         assert_eq!(tracker.see(&seen(100.1, 0.0, 0.0)).id, 5002);
     }

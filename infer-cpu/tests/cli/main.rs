@@ -6,9 +6,14 @@
 mod classify;
 mod extremes;
 mod inspect;
+#[cfg(feature = "live")]
+mod live;
 mod models;
 mod program;
 mod sample;
 mod streams;
+#[cfg(feature = "live")]
+#[path = "../support/street.rs"]
+mod street;
 #[path = "../support/tiny_model.rs"]
 mod tiny_model;
