@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::mem::discriminant;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
@@ -24,6 +24,9 @@ use crate::prediction::{UNKNOWN, UnknownRule};
 /// Returns for which there is room, for each ring: half as many again as a VLP-32C sends in
 /// its slowest turn with both returns.
 const ROOM_PER_RING: u32 = 8192;
+
+/// Times of arrival that are believed, seconds of Unix time: three thousand years.
+const LIKELY_S: RangeInclusive<f64> = 0.0..=1e11;
 
 /// How a pipeline works.
 #[derive(Clone, Debug)]
@@ -170,7 +173,11 @@ impl Pipeline {
     }
 
     /// Takes a packet. What it completes is there for [`Pipeline::answer`].
-    pub fn take(&mut self, payload: &[u8], arrival: Arrival) {
+    pub fn take(&mut self, payload: &[u8], mut arrival: Arrival) {
+        // A capture may state any time.
+        if !LIKELY_S.contains(&arrival.time_s) {
+            arrival.time_s = 0.0;
+        }
         if let Err(flaw) = self.take_data(payload, arrival) {
             self.counts.foreign += 1;
             if self.flaws.iter().all(|known| discriminant(known) != discriminant(&flaw)) {

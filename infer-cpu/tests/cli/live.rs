@@ -184,6 +184,11 @@ fn what_cannot_be_listened_to_is_named() {
         "error: poses.tum: line 1: expected 8 numbers (time, x y z, qx qy qz qw), found 3",
     );
     refused("--pcap drive.pcap --from 10.0.0.1", 2, "error: expected packets of a VLP-16");
+    refused(
+        "--pcap drive.pcap --twist 0 0 nan 0 0 0",
+        2,
+        "error: invalid value 'nan' for '--twist",
+    );
     let address = format!("127.0.0.1:{port}");
     refused(
         &format!("--udp {port} --interface 127.0.0.1"),

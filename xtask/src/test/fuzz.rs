@@ -9,7 +9,7 @@ use std::thread::available_parallelism;
 use xtask::workspace::{cargo, root};
 
 /// The targets, a program each.
-const TARGETS: [&str; 4] = ["off", "mesh", "clouds", "model"];
+const TARGETS: [&str; 5] = ["off", "mesh", "clouds", "model", "live"];
 
 /// Named, so that build scripts go without the flags.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";

@@ -90,7 +90,7 @@ pub struct Args {
     /// Steady motion of the sensor in its own frame, in place of poses: metres and degrees a
     /// second
     #[arg(long, num_args = 6, value_names = ["VX", "VY", "VZ", "WX", "WY", "WZ"])]
-    #[arg(allow_negative_numbers = true)]
+    #[arg(allow_negative_numbers = true, value_parser = rate)]
     twist: Option<Vec<f64>>,
 
     /// Fewest points of a cluster that is classified
@@ -107,6 +107,12 @@ pub struct Args {
     /// Number of threads that classify [default: one per core, at most 4]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
+}
+
+/// A velocity of a vehicle, or a rate at which it turns.
+fn rate(word: &str) -> Result<f64, String> {
+    let rate = word.parse().ok().filter(|rate: &f64| rate.abs() <= 1000.0);
+    rate.ok_or_else(|| format!("expected a number from -1000 to 1000, found {word:?}"))
 }
 
 /// Answers until the packets end or a signal comes.
