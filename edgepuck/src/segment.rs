@@ -4,8 +4,7 @@ use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::cloud_file::{read_cloud, write_cloud};
 use formats::scan_file::read_scan;
-use formats::velodyne::read_turn;
-use formats::{FormatError, Scan, atomic};
+use formats::{FormatError, Scan, atomic, ouster, velodyne};
 use plotters::style::{Color, HSLColor, RGBColor};
 use std::borrow::Cow;
 use std::io::Write;
@@ -16,10 +15,14 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct SweepArgs {
     /// Sweep to cut: a scan, .npz or .ply, whose rings are used if it has them; the first turn in a
-    /// capture, .pcap or .pcapng, of a VLP-16's or VLP-32C's packets; or a cloud in any format that
-    /// infer-cpu reads; metres, z up
+    /// capture, .pcap or .pcapng, of a VLP-16's or VLP-32C's packets, or of an Ouster's with
+    /// --metadata; or a cloud in any format that infer-cpu reads; metres, z up
     #[arg(value_name = "SWEEP")]
     pub sweep: PathBuf,
+
+    /// Metadata (JSON) of the Ouster OS0, OS1 or OS2 whose packets are in the capture SWEEP
+    #[arg(long, value_name = "FILE")]
+    metadata: Option<PathBuf>,
 
     /// Where the sensor is in the sweep, in metres [default: 0 0 0]
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
@@ -88,9 +91,7 @@ impl SweepArgs {
         let sensor = sensor.unwrap_or_default();
         let from_sensor =
             |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - sensor[axis]) as f32);
-        let is_capture = self.sweep.extension().is_some_and(|end| end == "pcap" || end == "pcapng");
-        if is_capture {
-            let mut scan = read_turn(&self.sweep)?;
+        if let Some(mut scan) = self.read_capture()? {
             for point in &mut scan.positions {
                 *point = from_sensor(&point.map(f64::from));
             }
@@ -100,6 +101,19 @@ impl SweepArgs {
         // A cloud that is not a scan has no rings.
         let ring = read_scan(&self.sweep).ok().and_then(|scan| scan.ring);
         Ok(Scan { positions, ring, ..Scan::default() })
+    }
+
+    /// The first turn, if the sweep is a capture.
+    fn read_capture(&self) -> Result<Option<Scan>, FormatError> {
+        if let Some(file) = &self.metadata {
+            let metadata = ouster::Metadata::read(file)?;
+            return ouster::read_frame(&self.sweep, &metadata).map(Some);
+        }
+        let is = |end: &str| self.sweep.extension().is_some_and(|it| it.eq_ignore_ascii_case(end));
+        match is("pcap") || is("pcapng") {
+            true => velodyne::read_turn(&self.sweep).map(Some),
+            false => Ok(None),
+        }
     }
 
     /// What a picture of the sweep is called.

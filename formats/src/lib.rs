@@ -10,7 +10,7 @@
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets and sweeps too |
 //! | `cloud-files` | all of these |
 //! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read |
-//! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`), and a VLP-16's or VLP-32C's, read (`velodyne`) |
+//! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`), and a VLP-16's, VLP-32C's (`velodyne`) or Ouster's (`ouster`), read |
 //! | `weights` | models (`weights`) and what they state about themselves (`model_card`) |
 //! | `chamfer` | the distance of two clouds (`chamfer`) |
 //! | `hdf5` | ModelNet40's HDF5 layout |
@@ -43,6 +43,8 @@ pub mod split;
 mod archive;
 #[cfg(feature = "files")]
 pub mod atomic;
+#[cfg(feature = "pcap")]
+mod capture;
 #[cfg(feature = "dataset")]
 pub mod csv;
 #[cfg(feature = "files")]
@@ -61,6 +63,8 @@ pub mod modelnet_h5;
 mod npy;
 #[cfg(feature = "files")]
 mod number;
+#[cfg(feature = "pcap")]
+pub mod ouster;
 #[cfg(feature = "cli")]
 pub mod outcome;
 #[cfg(feature = "dataset")]
@@ -73,6 +77,8 @@ pub mod ply;
 mod python_literal;
 #[cfg(feature = "files")]
 mod records;
+#[cfg(feature = "pcap")]
+pub mod returns;
 #[cfg(feature = "dataset")]
 pub mod scan_file;
 #[cfg(feature = "pcap")]

@@ -4,15 +4,18 @@
 //! of 16 (<https://ietf-opsawg-wg.github.io/draft-ietf-opsawg-pcap/draft-ietf-opsawg-pcap.html>).
 //! These two are a few words each, so no crate writes them; the headers and
 //! checksums inside the frames are `etherparse`'s. Captures of both formats, the classic one
-//! and pcapng, are read with `pcap-parser`.
+//! and pcapng, are read with `pcap-parser`. Packets that are longer than a frame come in fragments
+//! (RFC 791), which are joined.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Write};
 use std::net::IpAddr;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use etherparse::{NetSlice, PacketBuilder, SlicedPacket, TransportSlice};
+use etherparse::defrag::IpDefragBuf;
+use etherparse::{Ipv4Slice, NetSlice, PacketBuilder, SlicedPacket, TransportSlice, UdpSlice};
 use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
 
@@ -73,7 +76,7 @@ pub(crate) fn write_packet(
 const CAPACITY: usize = 256 * 1024;
 
 /// A UDP packet of a capture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct UdpPacket<'a> {
     /// When it was captured, seconds of Unix time; `None` where the capture does not tell.
     pub time_s: Option<f64>,
@@ -82,38 +85,42 @@ pub struct UdpPacket<'a> {
     /// The port that it was sent to.
     pub port: u16,
     /// What it carries.
-    pub payload: &'a [u8],
+    pub payload: Cow<'a, [u8]>,
 }
 
 /// Gives each UDP packet in the capture at `path`, pcap or pcapng, to `each`, until that breaks.
 /// Other packets, and those that make no sense, are passed over.
 ///
 /// # Errors
-/// A file that cannot be read, is no capture of Ethernet frames, or ends within a frame; a UDP
-/// packet that comes in fragments.
+/// A file that cannot be read, is no capture of Ethernet frames, or ends within a frame; if it is
+/// read to its end, a packet some of whose fragments are missing.
 pub fn read(
     path: &Path,
-    mut each: impl FnMut(UdpPacket<'_>) -> ControlFlow<()>,
+    mut each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
 ) -> Result<(), FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     let flaw = |part: String, cause: String| FormatError::malformed(path, part, cause);
     let mut reader =
         create_reader(CAPACITY, file).map_err(|error| flaw("header".to_owned(), words(&error)))?;
-    let (mut interfaces, mut number) = (Vec::new(), 0);
+    let (mut interfaces, mut fragments, mut number) = (Vec::new(), Fragments::default(), 0);
     loop {
         let part = || format!("frame {number}");
         match reader.next() {
             Ok((size, block)) => {
                 if let Some(frame) = Frame::of(&block, &mut interfaces) {
-                    let packet = frame.udp_packet().map_err(|cause| flaw(part(), cause))?;
-                    if packet.is_some_and(|packet| each(packet).is_break()) {
+                    let packet = frame.udp_packet(number, &mut fragments);
+                    let packet = packet.map_err(|cause| flaw(part(), cause))?;
+                    if packet.is_some_and(|packet| each(&packet).is_break()) {
                         return Ok(());
                     }
                     number += 1;
                 }
                 reader.consume(size);
             }
-            Err(PcapError::Eof) => return Ok(()),
+            Err(PcapError::Eof) => {
+                let Some(number) = fragments.first_unfinished() else { return Ok(()) };
+                return Err(flaw(format!("frame {number}"), FRAGMENT.to_owned()));
+            }
             Err(PcapError::Incomplete(_)) => {
                 reader.refill().map_err(|error| flaw(part(), words(&error)))?;
             }
@@ -173,24 +180,95 @@ impl<'a> Frame<'a> {
         None
     }
 
-    /// What the frame carries by UDP, if it does.
-    fn udp_packet(&self) -> Result<Option<UdpPacket<'a>>, String> {
+    /// What the frame carries by UDP, if it does or is the last fragment of what does.
+    fn udp_packet(
+        &self,
+        number: usize,
+        fragments: &mut Fragments,
+    ) -> Result<Option<UdpPacket<'a>>, String> {
         if self.link != Linktype::ETHERNET {
             let found = self.link.0;
             return Err(format!("expected Ethernet (link type 1), found link type {found}"));
         }
         let Ok(packet) = SlicedPacket::from_ethernet(self.bytes) else { return Ok(None) };
-        if packet.is_ip_payload_fragmented() {
-            return Err("expected whole UDP packets, found a fragment of one".to_owned());
-        }
         let source = match &packet.net {
             Some(NetSlice::Ipv4(ip)) => ip.header().source_addr().into(),
             Some(NetSlice::Ipv6(ip)) => ip.header().source_addr().into(),
             _ => return Ok(None),
         };
-        let Some(TransportSlice::Udp(udp)) = packet.transport else { return Ok(None) };
-        let (time_s, port) = (self.time_s, udp.destination_port());
-        Ok(Some(UdpPacket { time_s, source, port, payload: udp.payload() }))
+        let of = |udp: &UdpSlice<'_>, payload| UdpPacket {
+            time_s: self.time_s,
+            source,
+            port: udp.destination_port(),
+            payload,
+        };
+        if packet.is_ip_payload_fragmented() {
+            let Some(NetSlice::Ipv4(fragment)) = &packet.net else {
+                return Err(FRAGMENT.to_owned());
+            };
+            let joined = fragments.join(fragment, number);
+            let udp = joined.as_deref().and_then(|joined| UdpSlice::from_slice(joined).ok());
+            return Ok(udp.map(|udp| of(&udp, Cow::Owned(udp.payload().to_vec()))));
+        }
+        match packet.transport {
+            Some(TransportSlice::Udp(udp)) => Ok(Some(of(&udp, Cow::Borrowed(udp.payload())))),
+            _ => Ok(None),
+        }
+    }
+}
+
+/// What is wrong with a packet that cannot be joined.
+const FRAGMENT: &str = "expected whole UDP packets, found a fragment of one";
+
+/// Packets that are joined at once: a few senders' at most, of 64 KiB each.
+const AT_ONCE: usize = 16;
+
+/// Frames within which a sender does not use an identification, of 16 bits, twice.
+const REPEATS: usize = 60_000;
+
+/// UDP packets of which some fragments have come, the oldest first.
+#[derive(Default)]
+struct Fragments {
+    unfinished: Vec<Unfinished>,
+    /// The frame in which the first packet began that was given up.
+    given_up: Option<usize>,
+}
+
+struct Unfinished {
+    /// Source, destination and identification.
+    key: ([u8; 4], [u8; 4], u16),
+    /// Where its first fragment was found.
+    number: usize,
+    joined: IpDefragBuf,
+}
+
+impl Fragments {
+    /// The packet that `fragment`, in frame `number`, makes whole. Fragments of other protocols
+    /// than UDP, and those that contradict each other, are passed over.
+    fn join(&mut self, fragment: &Ipv4Slice<'_>, number: usize) -> Option<Vec<u8>> {
+        let (header, payload) = (fragment.header(), fragment.payload());
+        if payload.ip_number != etherparse::IpNumber::UDP {
+            return None;
+        }
+        let key = (header.source(), header.destination(), header.identification());
+        let full = self.unfinished.len() == AT_ONCE;
+        if self.unfinished.first().is_some_and(|one| full || number - one.number > REPEATS) {
+            let oldest = self.unfinished.remove(0);
+            self.given_up.get_or_insert(oldest.number);
+        }
+        let at = self.unfinished.iter().position(|one| one.key == key).unwrap_or_else(|| {
+            let joined = IpDefragBuf::new(payload.ip_number, Vec::new(), Vec::new());
+            self.unfinished.push(Unfinished { key, number, joined });
+            self.unfinished.len() - 1
+        });
+        let joined = &mut self.unfinished[at].joined;
+        joined.add(header.fragments_offset(), header.more_fragments(), payload.payload).ok()?;
+        joined.is_complete().then(|| self.unfinished.remove(at).joined.take_bufs().0)
+    }
+
+    /// The frame in which the first packet began that never became whole.
+    fn first_unfinished(&self) -> Option<usize> {
+        self.given_up.or_else(|| self.unfinished.first().map(|one| one.number))
     }
 }
 

@@ -11,6 +11,8 @@ mod labelled_sets;
 mod modelnet_h5;
 #[cfg(feature = "npz")]
 mod numpy;
+#[cfg(feature = "pcap")]
+mod ouster;
 #[cfg(feature = "dataset")]
 mod packed_sets;
 #[cfg(feature = "dataset")]

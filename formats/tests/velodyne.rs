@@ -198,7 +198,7 @@ fn frames(file: &[u8]) -> Vec<Vec<u8>> {
 
 /// The same as pcapng: a section, an Ethernet interface, and an enhanced packet block each
 /// (draft-ietf-opsawg-pcapng).
-fn pcapng(frames: &[Vec<u8>]) -> Vec<u8> {
+pub fn pcapng(frames: &[Vec<u8>]) -> Vec<u8> {
     let block = |kind: u32, body: &[u8]| -> Vec<u8> {
         let length = (body.len() as u32 + 12).to_le_bytes();
         [&kind.to_le_bytes(), &length[..], body, &length].concat()

@@ -72,6 +72,7 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
     let flat = "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n";
     folder.write("flat/chairs/flat.obj", flat);
     folder.write("not_a_cloud.npz", "nothing");
+    folder.write("no_capture.PCAP", "nothing");
     folder.refuses(
         1,
         &[
@@ -92,6 +93,12 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
             ),
             ("segment missing.npz --out out", "missing.npz"),
             ("segment not_a_cloud.npz --out out", "not_a_cloud.npz"),
+            ("segment no_capture.PCAP --out out", "no_capture.PCAP: header: expected a capture"),
+            ("segment no_capture.PCAP --metadata missing.json --out out", "missing.json"),
+            (
+                "segment no_capture.PCAP --metadata recipe.toml --out out",
+                "recipe.toml: metadata: expected value at line 1",
+            ),
             ("detect missing.npz --model nothing.safetensors --out out", "missing.npz"),
         ],
     );

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use super::packet::{TURN, advance};
 use super::{Decoder, Header, Model, PacketError};
+use crate::capture::{Points, each_packet};
 use crate::error::FormatError;
-use crate::pcap;
+use crate::returns::Kind;
 use crate::scan::Scan;
 use crate::vlp32c::packet::PAYLOAD_SIZE;
-use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns};
+use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, WHITE};
 
 /// Counts the beams that returned something in the capture of a VLP-32C at `path`: the two
 /// returns of one beam are one.
@@ -23,11 +24,11 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
         let (mut all, mut strongest) = (0, 0);
         let header = decoder.decode(payload, |found| {
             all += 1;
-            strongest += u64::from(found.kind == Returns::Strongest);
+            strongest += u64::from(found.kind == Kind::Strongest);
         })?;
         // Of a beam with two different returns, both were given.
         count += if header.returns == Returns::Dual { all - strongest } else { all };
-        Ok(ControlFlow::Continue(()))
+        Ok::<_, PacketError>(ControlFlow::Continue(()))
     })?;
     Ok(count)
 }
@@ -51,28 +52,7 @@ pub fn read_turn(path: &Path) -> Result<Scan, FormatError> {
         let cause = format!("expected a turn of a VLP-16 or VLP-32C, found {found}");
         return Err(FormatError::malformed(path, "packets", cause));
     }
-    Ok(turn.scan())
-}
-
-/// Gives each UDP packet of a capture to `take`, until that breaks; the number of packets.
-fn each_packet(
-    path: &Path,
-    mut take: impl FnMut(&[u8]) -> Result<ControlFlow<()>, PacketError>,
-) -> Result<usize, FormatError> {
-    let (mut n_packets, mut flaw) = (0, None);
-    pcap::read(path, |packet| {
-        n_packets += 1;
-        take(packet.payload).unwrap_or_else(|cause| {
-            flaw = Some(cause);
-            ControlFlow::Break(())
-        })
-    })?;
-    match flaw {
-        None => Ok(n_packets),
-        Some(cause) => {
-            Err(FormatError::malformed(path, format!("UDP packet {}", n_packets - 1), cause))
-        }
-    }
+    Ok(turn.points.scan())
 }
 
 /// A turn while it is read.
@@ -85,11 +65,7 @@ struct Turn {
     start: f64,
     /// Microseconds since the first packet.
     time_us: f64,
-    positions: Vec<[f32; 3]>,
-    ranges_m: Vec<f32>,
-    rings: Vec<u16>,
-    times_s: Vec<f32>,
-    intensities: Vec<f32>,
+    points: Points,
 }
 
 impl Turn {
@@ -108,19 +84,12 @@ impl Turn {
             self.time_us += f64::from(header.time_us.saturating_sub(before.time_us));
         }
         self.before = Some(header);
-        let Self {
-            decoder, start, time_us, positions, ranges_m, rings, times_s, intensities, ..
-        } = self;
+        let Self { decoder, start, time_us, points, .. } = self;
         let decoder = decoder.get_or_insert_with(|| Decoder::new(header.model));
         decoder.decode(payload, |found| {
-            if *start + header.units_per_us * found.after_us >= f64::from(TURN) {
-                return;
+            if *start + header.units_per_us * found.after_us < f64::from(TURN) {
+                points.push(found, *time_us, f32::from(WHITE));
             }
-            positions.push(found.point_m);
-            ranges_m.push(found.range_m);
-            rings.push(found.ring);
-            times_s.push(((*time_us + found.after_us) * 1e-6) as f32);
-            intensities.push(f32::from(found.reflectivity) / 100.0);
         })?;
         Ok(ControlFlow::Continue(()))
     }
@@ -129,16 +98,5 @@ impl Turn {
     fn end(&self) -> f64 {
         let span = |last: Header| last.units_per_us * last.duration_us();
         self.start + self.before.map_or(0.0, span)
-    }
-
-    fn scan(self) -> Scan {
-        Scan {
-            positions: self.positions,
-            range_m: Some(self.ranges_m),
-            ring: Some(self.rings),
-            time_s: Some(self.times_s),
-            intensity: Some(self.intensities),
-            ..Scan::default()
-        }
     }
 }

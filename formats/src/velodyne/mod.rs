@@ -12,4 +12,4 @@ mod packet;
 
 pub use capture::{count_returns, read_turn};
 pub use model::Model;
-pub use packet::{Decoder, Header, PacketError, Return};
+pub use packet::{Decoder, Header, PacketError};

@@ -2,6 +2,7 @@
 
 use super::Model;
 use super::model::Laser;
+use crate::returns::{Kind, Return};
 use crate::vlp32c::packet::{
     BLOCK_HEADER_SIZE, BLOCK_SIZE, BLOCKS, FLAG, MEASUREMENT_SIZE, PAYLOAD_SIZE,
 };
@@ -61,23 +62,6 @@ pub struct Header {
     pub units_per_us: f64,
 }
 
-/// One return of one beam.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Return {
-    /// In the sensor's frame, metres: x forward (azimuth 0), y left, z up.
-    pub point_m: [f32; 3],
-    /// As the sensor measured it, metres.
-    pub range_m: f32,
-    /// The laser's row, from the lowest elevation.
-    pub ring: u16,
-    /// 0 to 100 for surfaces that scatter light, beyond for retro-reflectors.
-    pub reflectivity: u8,
-    /// Microseconds after the packet's time.
-    pub after_us: f64,
-    /// Whether it is the last or the strongest, or both at once (`Dual`).
-    pub kind: Returns,
-}
-
 /// Decodes packets of one sensor.
 #[derive(Clone, Debug)]
 pub struct Decoder {
@@ -133,19 +117,19 @@ impl Decoder {
         self.lasers.iter().map(|laser| laser.azimuth_offset.abs()).fold(0.0, f64::max)
     }
 
-    /// The elevation of each ring, radians.
-    #[must_use]
-    pub fn elevations_rad(&self) -> Vec<f64> {
-        let mut elevations: Vec<_> =
-            self.lasers.iter().map(|laser| laser.sin_elevation.asin()).collect();
-        elevations.sort_by(f64::total_cmp);
-        elevations
-    }
-
     /// The sensor.
     #[must_use]
     pub fn model(&self) -> Model {
         self.model
+    }
+
+    /// The elevations of its lasers, radians, by ring: ascending.
+    #[must_use]
+    pub fn elevations_rad(&self) -> Vec<f32> {
+        let elevation = |laser: &Laser| laser.sin_elevation.atan2(laser.cos_elevation) as f32;
+        let mut elevations: Vec<_> = self.lasers.iter().map(elevation).collect();
+        elevations.sort_by(f32::total_cmp);
+        elevations
     }
 
     /// Gives each return of `payload` to `each`, in the order of firing. Of a beam whose last
@@ -176,9 +160,11 @@ impl Decoder {
                 let [last, strongest] = [blocks[0], blocks[step - 1]].map(|b| measurement(b, i));
                 let kinds = match header.returns {
                     Returns::Dual if last != strongest => {
-                        [Some((last, Returns::Last)), Some((strongest, Returns::Strongest))]
+                        [Some((last, Kind::Last)), Some((strongest, Kind::Strongest))]
                     }
-                    one_or_both => [Some((last, one_or_both)), None],
+                    Returns::Dual => [Some((last, Kind::Both)), None],
+                    Returns::Last => [Some((last, Kind::Last)), None],
+                    Returns::Strongest => [Some((last, Kind::Strongest)), None],
                 };
                 for ((distance, reflectivity), kind) in kinds.into_iter().flatten() {
                     if distance != 0 {
@@ -194,14 +180,7 @@ impl Decoder {
 }
 
 impl Laser {
-    fn hit(
-        &self,
-        angle: f64,
-        range: f64,
-        reflectivity: u8,
-        after_us: f64,
-        kind: Returns,
-    ) -> Return {
+    fn hit(&self, angle: f64, range: f64, reflectivity: u8, after_us: f64, kind: Kind) -> Return {
         let (sin, cos) = angle.sin_cos();
         let flat = range * self.cos_elevation;
         // Azimuths grow clockwise.

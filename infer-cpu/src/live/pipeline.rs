@@ -7,7 +7,8 @@ use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
 use edgepuck_segment::{OrientedBox, Settings, SettingsError, Stream, StreamCluster};
-use formats::velodyne::{Decoder, Header, PacketError, Return};
+use formats::returns::Return;
+use formats::velodyne::{Decoder, Header, PacketError};
 use glam::{DVec3, Vec3};
 
 use super::counts::Counts;
@@ -336,7 +337,7 @@ impl Sensor {
         let decoder = Decoder::new(header.model);
         let elevations = decoder.elevations_rad();
         let n_rings = elevations.len() as u32;
-        let degrees = elevations.iter().map(|angle| angle.to_degrees() as f32);
+        let degrees = elevations.iter().map(|angle| angle.to_degrees());
         let mut settings = options.segmentation.clone();
         settings.ring_elevations_deg = Some(degrees.collect());
         let stream = Stream::new(settings, n_rings * ROOM_PER_RING)

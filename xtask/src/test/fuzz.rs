@@ -9,7 +9,7 @@ use std::thread::available_parallelism;
 use xtask::workspace::{cargo, root};
 
 /// The targets, a program each.
-const TARGETS: [&str; 5] = ["off", "mesh", "clouds", "model", "live"];
+const TARGETS: [&str; 6] = ["off", "mesh", "clouds", "model", "packets", "live"];
 
 /// Named, so that build scripts go without the flags.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";

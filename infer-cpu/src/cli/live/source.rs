@@ -243,7 +243,7 @@ fn replay(
             thread::sleep(due.saturating_duration_since(Instant::now()));
             moment = Some(Instant::now());
         }
-        match take(Tick::Packet(packet.payload, Arrival { time_s, moment })) {
+        match take(Tick::Packet(&packet.payload, Arrival { time_s, moment })) {
             true => ControlFlow::Continue(()),
             false => ControlFlow::Break(()),
         }

@@ -1,0 +1,100 @@
+//! Captures of a sensor's packets: their first whole frame as a scan.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use super::{Decoder, Header, Metadata, PacketError};
+use crate::capture::{Points, each_packet};
+use crate::error::FormatError;
+use crate::scan::Scan;
+
+/// Reads the first frame in the capture at `path`, pcap or pcapng, of which every packet was
+/// caught: points in the sensor's frame, ranges, rings, times in seconds since the frame's first
+/// packet, and reflectivities in parts of 255. UDP packets of another length are not the sensor's
+/// lidar packets, and are passed over.
+///
+/// # Errors
+/// A file that is not such a capture or holds no whole frame; a packet that cannot be decoded, by
+/// its number.
+pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError> {
+    let decoder = Decoder::new(metadata);
+    let (mut frame, mut most) = (Frame::default(), 0);
+    let expected = n_columns(metadata);
+    let n_packets = each_packet(path, |payload| {
+        if payload.len() != decoder.packet_size() {
+            return Ok(ControlFlow::Continue(()));
+        }
+        frame.take(&decoder, metadata, payload)?;
+        most = most.max(frame.n_columns);
+        let is_whole = frame.n_columns == expected;
+        Ok::<_, PacketError>(if is_whole {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
+    })?;
+    if most < expected {
+        let cause = format!(
+            "expected a whole frame of {expected} columns, found {most} at most among \
+             {n_packets} UDP packets"
+        );
+        return Err(FormatError::malformed(path, "packets", cause));
+    }
+    Ok(frame.points.scan())
+}
+
+/// How many columns of a frame the sensor sends.
+fn n_columns(metadata: &Metadata) -> usize {
+    let [first, last] = metadata.column_window.map(usize::from);
+    let per_frame = usize::from(metadata.columns_per_frame);
+    (last + per_frame - first) % per_frame + 1
+}
+
+/// A frame while it is read.
+#[derive(Default)]
+struct Frame {
+    /// Its first packet's.
+    first: Option<Header>,
+    /// Which columns were caught.
+    caught: Vec<bool>,
+    /// How many were, of those that the sensor sends.
+    n_columns: usize,
+    points: Points,
+}
+
+impl Frame {
+    /// Adds a packet, which may begin another frame.
+    fn take(
+        &mut self,
+        decoder: &Decoder,
+        metadata: &Metadata,
+        payload: &[u8],
+    ) -> Result<(), PacketError> {
+        let header = decoder.header(payload)?;
+        if self.first.is_none_or(|first| first.frame_id != header.frame_id) {
+            let caught = vec![false; usize::from(header.columns_per_frame)];
+            *self = Self { first: Some(header), caught, ..Self::default() };
+        }
+        let per_frame = usize::from(header.columns_per_frame);
+        let first = usize::from(metadata.column_window[0]);
+        let is_sent =
+            |column: usize| (column + per_frame - first) % per_frame < n_columns(metadata);
+        let start = usize::from(header.measurement_id);
+        let mut is_new = false;
+        for column in start..start + usize::from(header.columns) {
+            if let Some(caught @ false) = self.caught.get_mut(column) {
+                *caught = true;
+                is_new = true;
+                self.n_columns += usize::from(is_sent(column));
+            }
+        }
+        // A network may bring a packet twice.
+        if is_new {
+            let since = self.first.map_or(0, |first| first.time_ns);
+            let packet_us = header.time_ns.saturating_sub(since) as f64 * 1e-3;
+            let points = &mut self.points;
+            decoder.decode(payload, |found| points.push(found, packet_us, f32::from(u8::MAX)))?;
+        }
+        Ok(())
+    }
+}

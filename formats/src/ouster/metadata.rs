@@ -1,0 +1,234 @@
+//! What a sensor tells of itself.
+
+use std::fs::File;
+use std::io::Read;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::error::FormatError;
+
+/// Metadata that are longer, bytes, are refused.
+const LONGEST: u64 = 4 << 20;
+
+crate::named! {
+    /// What is in a packet's pixels, words of 32 bits each; ranges in millimetres unless it says
+    /// otherwise. Other fields than these are passed over.
+    #[derive(Default)]
+    pub enum Profile: "lidar profile" {
+        /// Three words: range of 20 bits; reflectivity u8 at byte 4.
+        #[default]
+        Legacy = "LEGACY",
+        /// Three words: range of 19 bits; reflectivity u8 at byte 4.
+        Single = "RNG19_RFL8_SIG16_NIR16",
+        /// Four words, the first two for a return each: range of 19 bits, reflectivity u8 at byte 3.
+        Dual = "RNG19_RFL8_SIG16_NIR16_DUAL",
+        /// One word: range of 15 bits in units of 8 mm; reflectivity u8 at byte 2.
+        LowRate = "RNG15_RFL8_NIR8",
+    }
+}
+
+/// What decoding needs of a sensor's metadata.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metadata {
+    pub(super) profile: Profile,
+    /// Whether headers are of the type FUSA.
+    pub(super) is_fusa: bool,
+    pub(super) columns_per_frame: u16,
+    pub(super) columns_per_packet: u16,
+    /// The first and the last column that are sent; the first may be behind the last.
+    pub(super) column_window: [u16; 2],
+    /// Turns a second.
+    pub(super) rate_hz: f64,
+    /// Altitude and azimuth of each row, degrees.
+    pub(super) beams_deg: Vec<[f64; 2]>,
+    /// x and z of where beams begin as the encoder is at 0, metres, in the lidar frame.
+    pub(super) origin_m: [f64; 2],
+    /// The upper three rows of the transform, metres.
+    pub(super) lidar_to_sensor: [[f64; 4]; 3],
+}
+
+impl Metadata {
+    /// Reads the file at `path`.
+    ///
+    /// # Errors
+    /// A file that cannot be read; as [`Metadata::parse`].
+    pub fn read(path: &Path) -> Result<Self, FormatError> {
+        let mut text = String::new();
+        let read =
+            File::open(path).and_then(|file| file.take(LONGEST + 1).read_to_string(&mut text));
+        read.map_err(|source| FormatError::io(path, source))?;
+        Self::parse(&text, path)
+    }
+
+    /// Interprets `text`, which errors say is from `path`. Both layouts are known: the nested one,
+    /// and that of older firmware and programs, in which most fields stand at the top.
+    ///
+    /// # Errors
+    /// What is not JSON, or a field that decoding needs and that is missing or makes no sense.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, FormatError> {
+        if text.len() as u64 > LONGEST {
+            let cause = format!("expected at most {LONGEST} bytes, found more");
+            return Err(FormatError::malformed(path, "metadata", cause));
+        }
+        let root: Value = serde_json::from_str(text)
+            .map_err(|cause| FormatError::malformed(path, "metadata", cause))?;
+        let fields = Fields { path, root: &root, is_nested: root.get("beam_intrinsics").is_some() };
+        let columns_per_frame = fields.get(FORMAT, "columns_per_frame", |v| whole(v, 1..=4096))?;
+        let rows = fields.get(FORMAT, "pixels_per_column", |v| whole(v, 1..=256))?;
+        let altitudes = fields.get(BEAMS, "beam_altitude_angles", |v| numbers(v, rows, 90.0))?;
+        let azimuths = fields.get(BEAMS, "beam_azimuth_angles", |v| numbers(v, rows, 360.0))?;
+        Ok(Self {
+            // Firmware before 2.1 knows no other, and does not name it.
+            profile: fields.optional(FORMAT, "udp_profile_lidar", profile)?.unwrap_or_default(),
+            is_fusa: fields.optional(FORMAT, "header_type", is_fusa)?.unwrap_or_default(),
+            columns_per_frame,
+            columns_per_packet: fields.get(FORMAT, "columns_per_packet", |v| whole(v, 1..=64))?,
+            column_window: fields
+                .optional(FORMAT, "column_window", |v| window(v, columns_per_frame))?
+                .unwrap_or([0, columns_per_frame - 1]),
+            rate_hz: fields.get(CONFIG, "lidar_mode", |v| rate_hz(v, columns_per_frame))?,
+            beams_deg: altitudes.into_iter().zip(azimuths).map(|(p, a)| [p, a]).collect(),
+            origin_m: fields.origin_m()?,
+            lidar_to_sensor: fields.get(LIDAR, "lidar_to_sensor_transform", rigid)?,
+        })
+    }
+}
+
+/// Where fields stand, in the flat layout and in the nested one.
+type Section = [&'static str; 2];
+const FORMAT: Section = ["/data_format", "/lidar_data_format"];
+const BEAMS: Section = ["", "/beam_intrinsics"];
+const LIDAR: Section = ["", "/lidar_intrinsics"];
+const CONFIG: Section = ["", "/config_params"];
+
+/// The fields of a file.
+struct Fields<'a> {
+    path: &'a Path,
+    root: &'a Value,
+    is_nested: bool,
+}
+
+impl Fields<'_> {
+    /// What `parse` makes of a field, if it is there.
+    fn optional<T>(
+        &self,
+        section: Section,
+        name: &str,
+        parse: impl FnOnce(&Value) -> Result<T, String>,
+    ) -> Result<Option<T>, FormatError> {
+        let pointer = format!("{}/{name}", section[usize::from(self.is_nested)]);
+        let parsed = self.root.pointer(&pointer).map(parse).transpose();
+        parsed.map_err(|cause| self.error(&pointer, cause))
+    }
+
+    /// The same of a field that must be there.
+    fn get<T>(
+        &self,
+        section: Section,
+        name: &str,
+        parse: impl FnOnce(&Value) -> Result<T, String>,
+    ) -> Result<T, FormatError> {
+        let pointer = format!("{}/{name}", section[usize::from(self.is_nested)]);
+        let found = self.optional(section, name, parse)?;
+        found.ok_or_else(|| self.error(&pointer, "expected a value, found none".to_owned()))
+    }
+
+    fn error(&self, pointer: &str, cause: String) -> FormatError {
+        FormatError::malformed(self.path, pointer[1..].replace('/', "."), cause)
+    }
+
+    /// Where beams begin: newer firmware tells more than the distance from the axis.
+    fn origin_m(&self) -> Result<[f64; 2], FormatError> {
+        let of_transform = |v: &Value| rows(v).map(|[x, _, z]| [x[3], z[3]]);
+        if let Some(origin) = self.optional(BEAMS, "beam_to_lidar_transform", of_transform)? {
+            return Ok(origin);
+        }
+        let name = "lidar_origin_to_beam_origin_mm";
+        self.get(BEAMS, name, |v| number(v, FARTHEST_MM).map(|x| [x * 1e-3, 0.0]))
+    }
+}
+
+/// No part of a sensor is farther from another, millimetres.
+const FARTHEST_MM: f64 = 1e4;
+
+fn whole(value: &Value, range: RangeInclusive<u16>) -> Result<u16, String> {
+    let found = value.as_u64().and_then(|n| u16::try_from(n).ok()).filter(|n| range.contains(n));
+    let (least, most) = range.into_inner();
+    found.ok_or_else(|| {
+        format!("expected a whole number, {least} to {most}, found {}", shown(value))
+    })
+}
+
+fn number(value: &Value, most: f64) -> Result<f64, String> {
+    let found = value.as_f64().filter(|x| x.abs() <= most);
+    found.ok_or_else(|| format!("expected a number, -{most} to {most}, found {}", shown(value)))
+}
+
+fn list(value: &Value, n: u16) -> Result<&[Value], String> {
+    match value.as_array() {
+        Some(list) if list.len() == usize::from(n) => Ok(list),
+        Some(list) => Err(format!("expected {n} values, found {}", list.len())),
+        None => Err(format!("expected a list of {n} values, found {}", shown(value))),
+    }
+}
+
+fn numbers(value: &Value, n: u16, most: f64) -> Result<Vec<f64>, String> {
+    list(value, n)?.iter().map(|value| number(value, most)).collect()
+}
+
+fn profile(value: &Value) -> Result<Profile, String> {
+    let name = value.as_str().ok_or_else(|| format!("expected a name, found {}", shown(value)))?;
+    name.parse().map_err(|error: FormatError| error.to_string())
+}
+
+fn is_fusa(value: &Value) -> Result<bool, String> {
+    match value.as_str() {
+        Some("STANDARD") => Ok(false),
+        Some("FUSA") => Ok(true),
+        _ => Err(format!("expected STANDARD or FUSA, found {}", shown(value))),
+    }
+}
+
+fn window(value: &Value, columns: u16) -> Result<[u16; 2], String> {
+    let column = |i: usize| whole(&list(value, 2)?[i], 0..=columns - 1);
+    Ok([column(0)?, column(1)?])
+}
+
+/// Turns a second, of a mode such as 1024x10.
+fn rate_hz(value: &Value, columns: u16) -> Result<f64, String> {
+    let rate = value.as_str().and_then(|mode| mode.strip_prefix(&format!("{columns}x")));
+    let rate = rate.and_then(|rate| rate.parse().ok()).filter(|rate: &u8| (1..=100).contains(rate));
+    let found =
+        rate.ok_or_else(|| format!("expected {columns}x10 or alike, found {}", shown(value)));
+    found.map(f64::from)
+}
+
+/// The upper three rows of a transform in millimetres, in metres.
+fn rows(value: &Value) -> Result<[[f64; 4]; 3], String> {
+    let found = numbers(value, 16, FARTHEST_MM)?;
+    let mut rows = [[0.0; 4]; 3];
+    for (row, found) in rows.iter_mut().zip(found.chunks_exact(4)) {
+        *row = [found[0], found[1], found[2], found[3] * 1e-3];
+    }
+    Ok(rows)
+}
+
+/// The same of a transform that keeps lengths.
+fn rigid(value: &Value) -> Result<[[f64; 4]; 3], String> {
+    let rows = rows(value)?;
+    let product = |i: usize, j: usize| (0..3).map(|k| rows[i][k] * rows[j][k]).sum::<f64>();
+    let is_off = |i: usize, j: usize| (product(i, j) - f64::from(i == j)).abs() > 1e-3;
+    if (0..3).any(|i| (0..3).any(|j| is_off(i, j))) {
+        return Err(format!("expected a rotation and a shift, found {}", shown(value)));
+    }
+    Ok(rows)
+}
+
+/// The start of a value.
+fn shown(value: &Value) -> String {
+    let text = value.to_string();
+    let start: String = text.chars().take(40).collect();
+    if start.len() < text.len() { start + "..." } else { start }
+}

@@ -1,0 +1,397 @@
+//! Lidar packets of Ouster's sensors are read as their metadata tells. `tests/peers` compares with
+//! Ouster's own programs, which write packets.
+
+use std::fs;
+use std::path::Path;
+
+use formats::ouster::{Decoder, Header, Metadata, PacketError, Profile, read_frame};
+use formats::returns::{Kind, Return};
+use formats::velodyne;
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+use crate::velodyne::pcapng;
+
+/// A turn has 32 columns, a packet four, a column three rows, the lowest of them first.
+const COLUMNS: u16 = 32;
+const ROWS_DEG: [[f64; 2]; 3] = [[-20.0, 3.0], [15.0, 0.0], [0.5, -1.5]];
+const RINGS: [u16; 3] = [0, 2, 1];
+/// From the axis to where beams begin, and how high the lidar frame is in the sensor's.
+const ORIGIN_M: f64 = 0.0158;
+const HEIGHT_M: f64 = 0.0362;
+
+/// Ten turns a second.
+const COLUMN_NS: u64 = 100_000_000 / COLUMNS as u64;
+
+/// In the layout of older firmware.
+fn flat(profile: Profile) -> Value {
+    json!({
+        "beam_altitude_angles": ROWS_DEG.map(|[altitude, _]| altitude),
+        "beam_azimuth_angles": ROWS_DEG.map(|[_, azimuth]| azimuth),
+        "lidar_origin_to_beam_origin_mm": 1e3 * ORIGIN_M,
+        "lidar_mode": "32x10",
+        "lidar_to_sensor_transform":
+            [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 1e3 * HEIGHT_M, 0, 0, 0, 1],
+        "data_format": {
+            "columns_per_frame": COLUMNS, "columns_per_packet": 4, "pixels_per_column": 3,
+            "udp_profile_lidar": profile.name(), "column_window": [0, COLUMNS - 1],
+        },
+    })
+}
+
+fn parse(metadata: &Value) -> Result<Metadata, String> {
+    let parsed = Metadata::parse(&metadata.to_string(), Path::new("m.json"));
+    parsed.map_err(|error| error.to_string())
+}
+
+fn decoder(profile: Profile) -> Decoder {
+    Decoder::new(&parse(&flat(profile)).unwrap())
+}
+
+/// What a pixel measures: millimetres, of which a packet of low rate tells eighths, and the
+/// reflectivity, of a return and of a second one.
+fn measured(column: u16, row: usize) -> [(u32, u8); 2] {
+    let range = 8 * (500 + 40 * u32::from(column) + row as u32);
+    [(range, column as u8), (range + 4096, 200 + row as u8)]
+}
+
+fn pixel(profile: Profile, [(first, a), (second, b)]: [(u32, u8); 2]) -> Vec<u8> {
+    // Bits that are not of the range are set.
+    let word = |x: u32| x.to_le_bytes();
+    match profile {
+        Profile::Legacy => [&word(first | 0xf << 28)[..], &[a, 9, 9, 9], &[9; 4]].concat(),
+        Profile::Single => [&word(first | 0x1f << 19)[..], &[a, 9, 9, 9], &[9; 4]].concat(),
+        Profile::Dual => {
+            let word = |range: u32, r: u8| word(range | 0x1f << 19 | u32::from(r) << 24);
+            [word(first, a), word(second, b), [9; 4], [9; 4]].concat()
+        }
+        Profile::LowRate => {
+            word((first / 8) | (1 << 15) | (u32::from(a) << 16) | (9 << 24)).to_vec()
+        }
+    }
+}
+
+/// The packet of `frame` whose first column is `start`.
+fn packet(profile: Profile, frame: u16, start: u16) -> Vec<u8> {
+    let is_legacy = profile == Profile::Legacy;
+    let around = if is_legacy { 0 } else { 32 };
+    let mut bytes = [&[1, 0], &frame.to_le_bytes()[..], &[7; 28]].concat();
+    bytes.truncate(around);
+    for column in start..start + 4 {
+        let time_ns = (u64::from(frame) * u64::from(COLUMNS) + u64::from(column)) * COLUMN_NS;
+        bytes.extend(time_ns.to_le_bytes());
+        bytes.extend(column.to_le_bytes());
+        match is_legacy {
+            true => bytes.extend([&frame.to_le_bytes()[..], &[7; 4]].concat()),
+            false => bytes.extend([1, 0]),
+        }
+        (0..3).for_each(|row| bytes.extend(pixel(profile, measured(column, row))));
+        bytes.extend(if is_legacy { &[0xff; 4][..] } else { &[] });
+    }
+    bytes.extend(&vec![7; around]);
+    bytes
+}
+
+/// Where a row of a column saw something, by the angles of Ouster's manual.
+fn point(column: u16, row: usize, range: f64) -> [f64; 3] {
+    let [altitude, azimuth] = ROWS_DEG[row].map(f64::to_radians);
+    let encoder = -std::f64::consts::TAU * f64::from(column) / f64::from(COLUMNS);
+    let flat = (range - ORIGIN_M) * altitude.cos();
+    let x = flat * (encoder - azimuth).cos() + ORIGIN_M * encoder.cos();
+    let y = flat * (encoder - azimuth).sin() + ORIGIN_M * encoder.sin();
+    [-x, -y, (range - ORIGIN_M) * altitude.sin() + HEIGHT_M]
+}
+
+/// f32 holds coordinates below 16 m to half of 9.6e-7 m.
+#[test]
+fn every_profile_is_read_to_the_bits_of_its_packets() {
+    for profile in Profile::ALL {
+        let mut found = Vec::new();
+        let header = decoder(profile).decode(&packet(profile, 513, 8), |it| found.push(*it));
+        let expected = Header {
+            frame_id: 513,
+            measurement_id: 8,
+            time_ns: (513 * u64::from(COLUMNS) + 8) * COLUMN_NS,
+            columns_per_frame: COLUMNS,
+            columns: 4,
+            valid: 0b1111,
+            duration_us: 12_500.0,
+        };
+        assert_eq!(header.unwrap(), expected, "{profile}");
+        let returns = if profile == Profile::Dual { 2 } else { 1 };
+        assert_eq!(found.len(), 4 * 3 * returns, "{profile}");
+        for (n, found) in found.into_iter().enumerate() {
+            let (i, row, which) = (n / returns / 3, n / returns % 3, n % returns);
+            let column = 8 + i as u16;
+            let (mm, reflectivity) = measured(column, row)[which];
+            let range = f64::from(mm) * 1e-3;
+            let point = point(column, row, range);
+            let apart = [0, 1, 2].map(|axis| f64::from(found.point_m[axis]) - point[axis]);
+            assert!(apart.iter().all(|x| x.abs() < 4.8e-7), "{profile}: {apart:?}");
+            let expected = Return {
+                point_m: found.point_m,
+                range_m: range as f32,
+                ring: RINGS[row],
+                reflectivity,
+                after_us: i as f64 * 3125.0,
+                kind: [Kind::Strongest, Kind::Second][which],
+            };
+            assert_eq!(found, expected, "{profile}");
+        }
+    }
+}
+
+#[test]
+fn what_was_not_measured_gives_no_return() {
+    let decoder = decoder(Profile::Single);
+    let mut bytes = packet(Profile::Single, 1, 4);
+    let column = 12 + 3 * 12;
+    // The first column is not valid, and the second one's first row saw nothing.
+    bytes[32 + 10] = 0xfe;
+    bytes[32 + column + 12..][..3].fill(0);
+    let (mut n, mut first_us) = (0, f64::NAN);
+    let header = decoder.decode(&bytes, |found| {
+        first_us = if n == 0 { found.after_us } else { first_us };
+        n += 1;
+    });
+    let header = header.unwrap();
+    assert_eq!((n, header.valid, header.measurement_id), (3 * 3 - 1, 0b1110, 4));
+    // Times count from the first column that was measured.
+    assert_eq!((header.time_ns, first_us), ((32 + 5) * COLUMN_NS, 0.0));
+    (0..4).for_each(|i| bytes[32 + i * column + 10] = 0);
+    let header = decoder.decode(&bytes, |_| panic!("a return of a column that is not valid"));
+    assert_eq!(header.unwrap().valid, 0);
+}
+
+#[test]
+fn what_is_no_lidar_packet_is_named() {
+    let decoder = decoder(Profile::Single);
+    let bytes = packet(Profile::Single, 1, 4);
+    let said = |bytes: &[u8]| decoder.header(bytes).unwrap_err().to_string();
+    assert_eq!(decoder.packet_size(), 256);
+    assert_eq!(said(&[0; 48]), "expected a lidar packet of 256 bytes, found 48 bytes");
+    let changed = |at: usize, byte: u8| {
+        let mut bytes = bytes.clone();
+        bytes[at] = byte;
+        said(&bytes)
+    };
+    assert_eq!(changed(0, 2), "expected a packet of type 1 (lidar), found type 2");
+    let expected = "column 1: expected measurement 5 of 32, found 6";
+    assert_eq!(changed(32 + 48 + 8, 6), expected);
+    assert!(
+        said(&packet(Profile::Single, 1, 30)).ends_with("expected measurement 32 of 32, found 32")
+    );
+}
+
+#[test]
+fn the_header_of_type_fusa_counts_more_frames() {
+    let mut metadata = flat(Profile::Single);
+    metadata["data_format"]["header_type"] = json!("FUSA");
+    let mut bytes = packet(Profile::Single, 0, 4);
+    bytes[4..8].copy_from_slice(&70_000u32.to_le_bytes());
+    let header = Decoder::new(&parse(&metadata).unwrap()).header(&bytes);
+    assert_eq!(header.unwrap().frame_id, 70_000);
+}
+
+#[test]
+fn elevations_rise_by_ring() {
+    let degrees = |elevations: Vec<f32>| -> Vec<f32> {
+        elevations.iter().map(|x| (x.to_degrees() * 1e3).round() / 1e3).collect()
+    };
+    assert_eq!(degrees(decoder(Profile::Dual).elevations_rad()), [-20.0, 0.5, 15.0]);
+    let vlp16 = velodyne::Decoder::new(velodyne::Model::Vlp16).elevations_rad();
+    let odd: Vec<_> = (0..16u8).map(|ring| 2.0 * f32::from(ring) - 15.0).collect();
+    assert_eq!(degrees(vlp16), odd);
+}
+
+#[test]
+fn both_layouts_of_metadata_say_the_same() {
+    let mut flat = flat(Profile::LowRate);
+    let mut nested = json!({
+        "lidar_data_format": flat["data_format"],
+        "config_params": { "lidar_mode": flat["lidar_mode"] },
+        "lidar_intrinsics": { "lidar_to_sensor_transform": flat["lidar_to_sensor_transform"] },
+        "beam_intrinsics": flat,
+        "sensor_info": { "prod_line": "OS-1-128" },
+    });
+    assert_eq!(parse(&nested), parse(&flat));
+    // The transform of newer firmware tells the beams' height, too.
+    let shift = |z: f64| json!([1, 0, 0, 15.8, 0, 1, 0, 0, 0, 0, 1, z, 0, 0, 0, 1]);
+    nested["beam_intrinsics"]["beam_to_lidar_transform"] = shift(0.0);
+    assert_eq!(parse(&nested), parse(&flat));
+    nested["beam_intrinsics"]["beam_to_lidar_transform"] = shift(2.0);
+    assert_ne!(parse(&nested), parse(&flat));
+    // What firmware does not name is what it was when there was nothing else.
+    let legacy =
+        json!({ "columns_per_frame": 32, "columns_per_packet": 4, "pixels_per_column": 3 });
+    flat["data_format"] = legacy;
+    assert_eq!(parse(&flat), parse(&self::flat(Profile::Legacy)));
+}
+
+#[test]
+fn metadata_that_make_no_sense_are_named() {
+    let said = |pointer: &str, value: Value| {
+        let mut metadata = flat(Profile::Single);
+        *metadata.pointer_mut(pointer).unwrap() = value;
+        parse(&metadata).unwrap_err()
+    };
+    let format = |name: &str, value: Value| said(&format!("/data_format/{name}"), value);
+    for (found, expected) in [
+        (
+            format("columns_per_frame", json!(1 << 20)),
+            "columns_per_frame: expected a whole number, 1 to 4096, found 1048576",
+        ),
+        (
+            format("columns_per_packet", json!(65)),
+            "columns_per_packet: expected a whole number, 1 to 64, found 65",
+        ),
+        (format("pixels_per_column", json!(2)), "beam_altitude_angles: expected 2 values, found 3"),
+        (
+            format("udp_profile_lidar", json!("RNG1")),
+            "udp_profile_lidar: unknown lidar profile `RNG1`, expected one of LEGACY,",
+        ),
+        (format("udp_profile_lidar", json!(1)), "udp_profile_lidar: expected a name, found 1"),
+        (
+            format("column_window", json!([0, 32])),
+            "column_window: expected a whole number, 0 to 31, found 32",
+        ),
+        (
+            said("/data_format", json!("error")),
+            "data_format.columns_per_frame: expected a value, found none",
+        ),
+        (
+            said("/lidar_mode", json!("1024x10")),
+            "lidar_mode: expected 32x10 or alike, found \"1024x10\"",
+        ),
+        (
+            said("/beam_azimuth_angles", json!([0, "x", 0])),
+            "beam_azimuth_angles: expected a number, -360 to 360, found \"x\"",
+        ),
+        (
+            said("/lidar_origin_to_beam_origin_mm", json!(1e9)),
+            "lidar_origin_to_beam_origin_mm: expected a number, -10000",
+        ),
+        (
+            said("/lidar_to_sensor_transform", json!(vec![0; 16])),
+            "lidar_to_sensor_transform: expected a rotation and a shift, found [0,0",
+        ),
+    ] {
+        assert!(found.starts_with("m.json: ") && found.contains(expected), "{found}");
+    }
+    let error = Metadata::parse("{", Path::new("m.json")).unwrap_err().to_string();
+    assert!(error.starts_with("m.json: metadata: EOF"), "{error}");
+    let error = Metadata::parse(&" ".repeat(5 << 20), Path::new("m.json")).unwrap_err().to_string();
+    assert_eq!(error, "m.json: metadata: expected at most 4194304 bytes, found more");
+}
+
+/// An Ethernet frame of each part of a UDP packet, of `at_once` bytes at most (RFC 791).
+fn frames(payload: &[u8], identification: u8, at_once: usize) -> Vec<Vec<u8>> {
+    let length = (8 + payload.len() as u16).to_be_bytes();
+    let udp = [&[0x1d, 0x4e, 0x1d, 0x4e], &length[..], &[0, 0], payload].concat();
+    let frame = |(i, part): (usize, &[u8])| {
+        let more = (i + 1) * at_once < udp.len();
+        let offset = ((i * at_once / 8) as u16 | u16::from(more) << 13).to_be_bytes();
+        let length = (20 + part.len() as u16).to_be_bytes();
+        let ip =
+            [&[0x45, 0], &length[..], &[0, identification], &offset, &[64, 17, 0, 0], &[10; 8]];
+        [&[0; 12][..], &[8, 0], &ip.concat(), part].concat()
+    };
+    udp.chunks(at_once).enumerate().map(frame).collect()
+}
+
+/// What a sensor sends from the middle of a frame on: an IMU's packet after each of the lidar's.
+fn capture(at_once: usize) -> Vec<Vec<u8>> {
+    let (mut sent, mut identification) = (Vec::new(), 0);
+    for column in (16..96).step_by(4) {
+        let lidar = packet(Profile::Dual, column / COLUMNS, column % COLUMNS);
+        for payload in [&lidar[..], &[0; 48]] {
+            sent.extend(frames(payload, identification, at_once));
+            identification += 1;
+        }
+    }
+    sent
+}
+
+#[test]
+fn the_first_whole_frame_of_a_capture_is_read_also_from_fragments() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frames.pcapng");
+    let metadata = parse(&flat(Profile::Dual)).unwrap();
+    let read = |frames: &[Vec<u8>]| {
+        fs::write(&path, pcapng(frames)).unwrap();
+        read_frame(&path, &metadata).map_err(|error| error.to_string())
+    };
+    let scan = read(&capture(1480)).unwrap();
+    assert_eq!(scan.len(), 32 * 3 * 2);
+    let (rings, times) = (scan.ring.as_ref().unwrap(), scan.time_s.as_ref().unwrap());
+    assert_eq!(rings[..6], [0, 0, 2, 2, 1, 1]);
+    assert!((times[191] - 31.0 * 3125e-6).abs() < 1e-7, "{}", times[191]);
+    let range = f64::from(measured(0, 0)[0].0) * 1e-3;
+    let apart = [0, 1, 2].map(|axis| f64::from(scan.positions[0][axis]) - point(0, 0, range)[axis]);
+    assert!(apart.iter().all(|x| x.abs() < 4.8e-7), "{apart:?}");
+
+    let fragments = capture(160);
+    assert_eq!(read(&fragments).unwrap(), scan);
+    let mut shuffled = fragments.clone();
+    shuffled.chunks_mut(3).for_each(|some| some.reverse());
+    assert_eq!(read(&shuffled).unwrap(), scan);
+    // A packet that came twice is taken once.
+    let twice: Vec<_> =
+        capture(1480).into_iter().flat_map(|frame| [frame.clone(), frame]).collect();
+    assert_eq!(read(&twice).unwrap(), scan);
+}
+
+#[test]
+fn a_capture_without_a_whole_frame_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frames.pcapng");
+    let read = |frames: &[Vec<u8>], metadata: &Value| {
+        fs::write(&path, pcapng(frames)).unwrap();
+        let scan = read_frame(&path, &parse(metadata).unwrap());
+        scan.map_err(|error| error.to_string().split_once("pcapng: ").unwrap().1.to_owned())
+    };
+    let mut metadata = flat(Profile::Dual);
+    // The second frame without its fourth packet, and the third without its last.
+    let mut lost = capture(1480);
+    lost.pop();
+    lost.pop();
+    lost.remove(2 * 7);
+    let expected =
+        "packets: expected a whole frame of 32 columns, found 28 at most among 37 UDP packets";
+    assert_eq!(read(&lost, &metadata).unwrap_err(), expected);
+    // Whole is what the sensor is told to send.
+    metadata["data_format"]["column_window"] = json!([18, 10]);
+    assert_eq!(read(&lost, &metadata).unwrap().len(), 28 * 3 * 2);
+
+    let mut fragments = capture(160);
+    fragments.truncate(3);
+    fragments.remove(1);
+    let expected = "frame 0: expected whole UDP packets, found a fragment of one";
+    assert_eq!(read(&fragments, &metadata).unwrap_err(), expected);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn no_payload_makes_the_decoder_panic(
+        changes in prop::collection::vec((0usize..400, any::<u8>()), 0..400), profile in 0usize..4,
+    ) {
+        let profile = Profile::ALL[profile];
+        let decoder = decoder(profile);
+        let size = decoder.packet_size();
+        let mut payload = packet(profile, 3, 4);
+        for (at, byte) in changes {
+            payload[at % size] = byte;
+        }
+        let (mut n, mut finite) = (0, true);
+        let decoded = decoder.decode(&payload, |found| {
+            n += 1;
+            finite &= found.point_m.iter().all(|x| x.is_finite());
+        });
+        prop_assert!(finite && n <= 4 * 3 * 2);
+        prop_assert!(decoded.is_ok() || n == 0);
+        let short = decoder.decode(&payload[1..], |_| ());
+        prop_assert_eq!(short, Err(PacketError::Length { expected: size, found: size - 1 }));
+    }
+}
