@@ -10,11 +10,15 @@ mod street;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use formats::ouster::Metadata;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use infer_cpu::live::{Arrival, Counts, EgoMotion, LiveOptions, Object, Pipeline};
 use infer_cpu::{Classifier, Options};
-use street::{PACKET, PACKET_S, PACKETS_PER_S, Thing, packets, street};
+use street::{
+    OUSTER_PACKETS_PER_S, PACKET, PACKET_S, PACKETS_PER_S, Thing, ouster_metadata, ouster_packet,
+    packets, street,
+};
 
 /// Unix time at the first packet, seconds.
 const START_S: f64 = 1.7e9;
@@ -78,6 +82,31 @@ fn each_object_keeps_its_track_and_has_its_velocity() {
         assert!(last.frame == "sensor" && last.points >= 20 && last.class.is_some());
         assert!((last.last_s - START_S - 3.0).abs() < 0.15, "{last:?}");
         assert!((0.0..0.1).contains(&(last.last_s - last.first_s)));
+    }
+}
+
+#[test]
+fn an_ouster_sees_the_same_street() {
+    let (things, n_turns) = (street(), 20);
+    let n_packets = 2 * OUSTER_PACKETS_PER_S;
+    let sent: Vec<_> = (0..n_packets).map(|number| ouster_packet(&things, number)).collect();
+    let mut options = LiveOptions::default();
+    options.ouster = Some(Metadata::parse(&ouster_metadata(), Path::new("os.json")).unwrap());
+    let mut pipeline = pipeline(&options);
+    let since_s = |i: usize| i as f64 / OUSTER_PACKETS_PER_S as f64;
+    let lost = |i: usize| i % 640 == 100;
+    let coming = sent.iter().enumerate().filter(|(i, _)| !lost(*i));
+    let objects = run(&mut pipeline, coming.map(|(i, packet)| (since_s(i), &packet[..])));
+    pipeline.take(&sent[0][..48], Arrival { time_s: START_S, moment: None });
+    let counts = pipeline.counts();
+    assert_eq!((counts.packets, counts.lost, counts.foreign), (n_packets as u64 - 2, 2, 1));
+    for (thing, tracks) in things.iter().zip(tracks(&objects, &things)) {
+        let (&track, &n) = tracks.iter().max_by_key(|(_, n)| **n).unwrap();
+        assert!(n >= n_turns - 2, "{thing:?}: {tracks:?}");
+        let last = objects.iter().rfind(|object| object.track == track).unwrap();
+        let velocity = last.velocity_m_s.unwrap();
+        let off = (velocity[0] - thing.velocity[0]).hypot(velocity[1] - thing.velocity[1]);
+        assert!(off < 1.0, "{thing:?}: {velocity:?}");
     }
 }
 

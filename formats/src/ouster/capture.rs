@@ -19,7 +19,7 @@ use crate::scan::Scan;
 pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError> {
     let decoder = Decoder::new(metadata);
     let (mut frame, mut most) = (Frame::default(), 0);
-    let expected = n_columns(metadata);
+    let expected = usize::from(metadata.columns_per_frame - metadata.n_columns_unsent());
     let n_packets = each_packet(path, |payload| {
         if payload.len() != decoder.packet_size() {
             return Ok(ControlFlow::Continue(()));
@@ -41,13 +41,6 @@ pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError>
         return Err(FormatError::malformed(path, "packets", cause));
     }
     Ok(frame.points.scan())
-}
-
-/// How many columns of a frame the sensor sends.
-fn n_columns(metadata: &Metadata) -> usize {
-    let [first, last] = metadata.column_window.map(usize::from);
-    let per_frame = usize::from(metadata.columns_per_frame);
-    (last + per_frame - first) % per_frame + 1
 }
 
 /// A frame while it is read.
@@ -77,8 +70,8 @@ impl Frame {
         }
         let per_frame = usize::from(header.columns_per_frame);
         let first = usize::from(metadata.column_window[0]);
-        let is_sent =
-            |column: usize| (column + per_frame - first) % per_frame < n_columns(metadata);
+        let n_sent = per_frame - usize::from(metadata.n_columns_unsent());
+        let is_sent = |column: usize| (column + per_frame - first) % per_frame < n_sent;
         let start = usize::from(header.measurement_id);
         let mut is_new = false;
         for column in start..start + usize::from(header.columns) {

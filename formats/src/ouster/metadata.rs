@@ -96,6 +96,28 @@ impl Metadata {
     }
 }
 
+impl Metadata {
+    /// Columns of each packet.
+    #[must_use]
+    pub fn columns_per_packet(&self) -> u16 {
+        self.columns_per_packet
+    }
+
+    /// Columns of a turn that the sensor does not send.
+    #[must_use]
+    pub fn n_columns_unsent(&self) -> u16 {
+        let [first, last] = self.column_window;
+        let sent = (last + self.columns_per_frame - first) % self.columns_per_frame + 1;
+        self.columns_per_frame - sent
+    }
+
+    /// How the lidar is turned in the sensor's frame, radians counterclockwise.
+    #[must_use]
+    pub fn yaw_rad(&self) -> f64 {
+        self.lidar_to_sensor[1][0].atan2(self.lidar_to_sensor[0][0])
+    }
+}
+
 /// Where fields stand, in the flat layout and in the nested one.
 type Section = [&'static str; 2];
 const FORMAT: Section = ["/data_format", "/lidar_data_format"];

@@ -150,6 +150,19 @@ impl Decoder {
         self.layout.packet
     }
 
+    /// Columns of each packet.
+    #[must_use]
+    pub fn columns(&self) -> u16 {
+        self.metadata.columns_per_packet
+    }
+
+    /// How far ahead of the encoder, or behind it, the rows aim at most, radians.
+    #[must_use]
+    pub fn most_offset_rad(&self) -> f64 {
+        let azimuths = self.metadata.beams_deg.iter().map(|[_, azimuth]| azimuth.abs());
+        azimuths.fold(0.0, f64::max).to_radians()
+    }
+
     /// The altitudes of its rows, radians, by ring: ascending.
     #[must_use]
     pub fn elevations_rad(&self) -> Vec<f32> {
@@ -178,7 +191,7 @@ impl Decoder {
         let Metadata { columns_per_frame: per_frame, columns_per_packet, .. } = self.metadata;
         let measurement_id = u16_at(payload, self.layout.header + 8);
         let mut valid = 0u64;
-        for (column, bytes) in self.columns(payload).enumerate() {
+        for (column, bytes) in self.columns_of(payload).enumerate() {
             if bytes[self.layout.status] & 1 == 0 {
                 continue;
             }
@@ -212,7 +225,7 @@ impl Decoder {
         mut each: impl FnMut(&Return),
     ) -> Result<Header, PacketError> {
         let header = self.header(payload)?;
-        for (i, column) in self.columns(payload).enumerate() {
+        for (i, column) in self.columns_of(payload).enumerate() {
             if header.valid >> i & 1 == 0 {
                 continue;
             }
@@ -242,7 +255,7 @@ impl Decoder {
     }
 
     /// The columns of a payload of the right length.
-    fn columns<'a>(&self, payload: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+    fn columns_of<'a>(&self, payload: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
         let n = usize::from(self.metadata.columns_per_packet);
         payload[self.layout.header..].chunks_exact(self.layout.column).take(n)
     }

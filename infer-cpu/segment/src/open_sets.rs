@@ -9,10 +9,12 @@ pub const NONE: u32 = u32::MAX;
 /// A forest over the points at hand, in a fixed number of slots. Each set is also a ring of
 /// its points, so that it can be listed and two sets can be joined without a search.
 pub struct OpenSets<T> {
+    /// Those that have been used so far, with room for all.
     slots: Vec<Slot<T>>,
     /// What is known of each set, in the slot of its root.
     sets: Vec<Set>,
-    /// The first free slot; each names the next.
+    capacity: u32,
+    /// The first free one of them; each names the next.
     free: u32,
     /// Points that have come.
     n_points: u64,
@@ -60,20 +62,11 @@ impl Set {
 impl<T: Copy + Default> OpenSets<T> {
     /// With room for `capacity` points.
     pub fn new(capacity: u32) -> Self {
-        let slot = |i: u32| Slot {
-            position: [0.0; 3],
-            row: 0,
-            tag: T::default(),
-            order: 0,
-            place: 0,
-            parent: NONE,
-            next: if i + 1 < capacity { i + 1 } else { NONE },
-            link: NONE,
-        };
         Self {
-            slots: (0..capacity).map(slot).collect(),
-            sets: vec![Set::default(); capacity as usize],
-            free: if capacity > 0 { 0 } else { NONE },
+            slots: Vec::with_capacity(capacity as usize),
+            sets: Vec::with_capacity(capacity as usize),
+            capacity,
+            free: NONE,
             n_points: 0,
         }
     }
@@ -81,16 +74,23 @@ impl<T: Copy + Default> OpenSets<T> {
     /// Takes in a point as a set of its own; `None` if there is no room. What may be linked
     /// to it is not known yet.
     pub fn insert(&mut self, position: [f32; 3], row: u16, tag: T, place: u64) -> Option<u32> {
-        let point = self.free;
-        let slot = self.slots.get_mut(point as usize)?;
-        self.free = slot.next;
-        let order = self.n_points;
-        let (parent, next) = (point, point);
-        *slot = Slot { position, row, tag, order, place, parent, next, link: NONE };
-        self.n_points += 1;
+        let n_used = self.slots.len() as u32;
+        let point = if self.free == NONE { n_used } else { self.free };
+        let (order, parent, next) = (self.n_points, point, point);
+        let slot = Slot { position, row, tag, order, place, parent, next, link: NONE };
         let extent = Extent::of(position);
         let set = Set { extent, first_place: place, last_place: place, is_cut: false };
-        self.sets[point as usize] = set;
+        if point < n_used {
+            self.free = self.slots[point as usize].next;
+            self.slots[point as usize] = slot;
+            self.sets[point as usize] = set;
+        } else if n_used < self.capacity {
+            self.slots.push(slot);
+            self.sets.push(set);
+        } else {
+            return None;
+        }
+        self.n_points += 1;
         Some(point)
     }
 

@@ -29,6 +29,7 @@ mod kalman;
 mod object;
 mod packet_clock;
 mod pipeline;
+mod sensor;
 mod stats;
 mod tracker;
 
@@ -36,4 +37,5 @@ pub use counts::Counts;
 pub use ego_motion::{EgoMotion, EgoMotionError, Pose};
 pub use object::{Object, SCHEMA_VERSION};
 pub use pipeline::{Arrival, LiveError, LiveOptions, Pipeline};
+pub use sensor::Flaw;
 pub use stats::{Stage, Stats};

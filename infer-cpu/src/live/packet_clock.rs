@@ -10,8 +10,8 @@ const DRIFT_SHARE: f64 = 1e-3;
 /// Follows the time stamps of one sensor.
 #[derive(Clone, Debug)]
 pub struct PacketClock {
-    /// Microseconds after which time stamps begin anew.
-    wraps_us: f64,
+    /// Microseconds after which time stamps begin anew, if they do.
+    wraps_us: Option<f64>,
     last: Option<Last>,
 }
 
@@ -41,8 +41,8 @@ pub enum Succession {
 }
 
 impl PacketClock {
-    /// For time stamps that begin anew after `wraps_us` microseconds.
-    pub fn new(wraps_us: f64) -> Self {
+    /// For time stamps that begin anew after `wraps_us` microseconds, if they do.
+    pub fn new(wraps_us: Option<f64>) -> Self {
         Self { wraps_us, last: None }
     }
 
@@ -54,9 +54,11 @@ impl PacketClock {
             self.last = Some(began);
             return (Succession::Restart, arrival_s);
         };
-        // The shorter way around, since stamps wrap.
-        let half = self.wraps_us / 2.0;
-        let step_us = (stamp_us - last.stamp_us + half).rem_euclid(self.wraps_us) - half;
+        let mut step_us = stamp_us - last.stamp_us;
+        if let Some(wraps_us) = self.wraps_us {
+            // The shorter way around.
+            step_us = (step_us + wraps_us / 2.0).rem_euclid(wraps_us) - wraps_us / 2.0;
+        }
         let by_stamp_s = last.time_s + step_us * 1e-6;
         let off_s = arrival_s - by_stamp_s;
         let is_jump = off_s.abs() > RESTART_S || step_us.abs() > RESTART_S * 1e6;
@@ -87,7 +89,7 @@ mod tests {
 
     #[test]
     fn missing_late_and_repeated_packets_are_told_apart() {
-        let mut clock = PacketClock::new(HOUR_US);
+        let mut clock = PacketClock::new(Some(HOUR_US));
         let mut take = |stamp: f64| clock.take(stamp, 600.0, 50.0 + stamp * 1e-6).0;
         assert_eq!(take(1000.0), Succession::Restart);
         assert_eq!(take(1600.0), follows(0));
@@ -99,7 +101,7 @@ mod tests {
 
     #[test]
     fn the_hour_ends_and_time_goes_on() {
-        let mut clock = PacketClock::new(HOUR_US);
+        let mut clock = PacketClock::new(Some(HOUR_US));
         assert_eq!(clock.take(HOUR_US - 300.0, 600.0, 7.0).1, 7.0);
         let (succession, time_s) = clock.take(300.0, 600.0, 7.0006);
         assert_eq!(succession, follows(0));
@@ -109,7 +111,7 @@ mod tests {
     #[test]
     fn a_jump_of_either_clock_is_a_restart() {
         for (stamp_us, arrival_s) in [(5e6, 10.001), (1600.0, 60.0), (1600.0, 2.0), (1e9, 10.001)] {
-            let mut clock = PacketClock::new(HOUR_US);
+            let mut clock = PacketClock::new(Some(HOUR_US));
             clock.take(2e6, 600.0, 10.0);
             assert_eq!(clock.take(stamp_us, 600.0, arrival_s), (Succession::Restart, arrival_s));
         }
@@ -118,7 +120,7 @@ mod tests {
     /// The host's clock is faster by 50 millionths, and packets come up to 2 ms late.
     #[test]
     fn clocks_that_drift_apart_stay_together() {
-        let mut clock = PacketClock::new(HOUR_US);
+        let mut clock = PacketClock::new(Some(HOUR_US));
         let mut worst_s = 0.0f64;
         for packet in 0..2_000_000u64 {
             let sent_s = packet as f64 * 600e-6;

@@ -1,20 +1,20 @@
 //! From packets to objects.
 
-use std::f64::consts::TAU;
-use std::mem::discriminant;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
 use edgepuck_segment::{OrientedBox, Settings, SettingsError, Stream, StreamCluster};
+use formats::ouster::Metadata;
 use formats::returns::Return;
-use formats::velodyne::{Decoder, Header, PacketError};
 use glam::{DVec3, Vec3};
 
 use super::counts::Counts;
 use super::ego_motion::{EgoMotion, Pose};
 use super::object::{Object, SCHEMA_VERSION};
 use super::packet_clock::{PacketClock, Succession};
+use super::sensor::{Decoder, Facts, Flaw};
 use super::stats::{Stage, Stats};
 use super::tracker::{Seen, Tracker};
 use crate::classifier::Classifier;
@@ -29,6 +29,9 @@ const ROOM_PER_RING: u32 = 8192;
 /// Times of arrival that are believed, seconds of Unix time: three thousand years.
 const LIKELY_S: RangeInclusive<f64> = 0.0..=1e11;
 
+/// The widest columns, degrees: a sensor's steps are narrower, unless its packet is damaged.
+const WIDEST_DEG: f32 = 1.0;
+
 /// How a pipeline works.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -39,11 +42,13 @@ pub struct LiveOptions {
     pub segmentation: Settings,
     /// How the sensor moves, if that is known.
     pub ego_motion: Option<EgoMotion>,
+    /// What an Ouster tells of itself; without it the sensor is a Velodyne.
+    pub ouster: Option<Metadata>,
 }
 
 impl Default for LiveOptions {
     fn default() -> Self {
-        Self { min_points: 20, segmentation: Settings::default(), ego_motion: None }
+        Self { min_points: 20, segmentation: Settings::default(), ego_motion: None, ouster: None }
     }
 }
 
@@ -94,7 +99,7 @@ pub struct Pipeline {
     counts: Counts,
     stats: Stats,
     /// The flaws of packets so far, one of each kind, and how many of them were told.
-    flaws: Vec<PacketError>,
+    flaws: Vec<Flaw>,
     n_told: usize,
 }
 
@@ -181,27 +186,24 @@ impl Pipeline {
         }
         if let Err(flaw) = self.take_data(payload, arrival) {
             self.counts.foreign += 1;
-            if self.flaws.iter().all(|known| discriminant(known) != discriminant(&flaw)) {
+            if !self.flaws.iter().any(|known| known.is_like(&flaw)) {
                 self.flaws.push(flaw);
             }
         }
     }
 
-    fn take_data(&mut self, payload: &[u8], arrival: Arrival) -> Result<(), PacketError> {
+    fn take_data(&mut self, payload: &[u8], arrival: Arrival) -> Result<(), Flaw> {
         let Self { sensor, options, returns, waiting, stats, .. } = self;
         let start = Instant::now();
-        let header = Header::of(payload)?;
         let sensor = match sensor {
             Some(sensor) => sensor,
-            None => sensor.insert(Sensor::new(&header, options, arrival.time_s)),
+            None => sensor.insert(Sensor::new(payload, options, arrival.time_s)?),
         };
-        returns.clear();
-        sensor.decoder.decode(payload, |found| returns.push(*found))?;
+        let facts = sensor.decoder.decode(payload, returns)?;
         let decoded = Instant::now();
         stats.spend(Stage::Decode, decoded - start);
-        let stamp_us = f64::from(header.time_us);
         let (succession, time_s) =
-            sensor.clock.take(stamp_us, header.duration_us(), arrival.time_s);
+            sensor.clock.take(facts.stamp_us, facts.duration_us, arrival.time_s);
         let start_s = sensor.start_s;
         let motion = options.ego_motion.as_ref().map(|motion| Motion { motion, start_s });
         match succession {
@@ -220,10 +222,10 @@ impl Pipeline {
             }
             Succession::Restart => {}
             Succession::Follows { missing } => {
-                self.counts.lost += missing;
+                self.counts.lost += missing.saturating_sub(facts.n_unsent);
                 // Beyond a quarter of a turn, the azimuth does not tell how far the head is.
-                let turned = missing as f64 * header.duration_us() * header.units_per_us;
-                if turned > 9_000.0 {
+                let turned_rad = missing as f64 * facts.duration_us * facts.speed_rad_us;
+                if turned_rad > FRAC_PI_2 {
                     sensor.end(waiting, motion);
                 }
             }
@@ -231,12 +233,12 @@ impl Pipeline {
         sensor.n_packets += 1;
         self.counts.packets += 1;
         self.counts.points += returns.len() as u64;
-        if header.units_per_us > 0.0 {
-            self.tracker.set_turn(36_000.0 / header.units_per_us * 1e-6);
+        if facts.speed_rad_us > 0.0 {
+            self.tracker.set_turn(TAU / facts.speed_rad_us * 1e-6);
         }
         let n_turns = sensor.stream.n_turns();
         let moment = arrival.moment;
-        sensor.push(&header, returns, Tag { time_s, moment }, waiting, motion);
+        sensor.push(&facts, returns, Tag { time_s, moment }, waiting, motion);
         let dropped = sensor.stream.dropped();
         self.counts.dropped_points = dropped.late + dropped.overflow;
         stats.spend(Stage::Segment, decoded.elapsed());
@@ -326,38 +328,41 @@ impl Pipeline {
     }
 
     /// The flaws of packets that were not told by an earlier call: one of each kind.
-    pub fn new_flaws(&mut self) -> &[PacketError] {
+    pub fn new_flaws(&mut self) -> &[Flaw] {
         let told = std::mem::replace(&mut self.n_told, self.flaws.len());
         &self.flaws[told..]
     }
 }
 
 impl Sensor {
-    fn new(header: &Header, options: &LiveOptions, start_s: f64) -> Self {
-        let decoder = Decoder::new(header.model);
-        let elevations = decoder.elevations_rad();
+    /// The sensor that sent `payload`.
+    fn new(payload: &[u8], options: &LiveOptions, start_s: f64) -> Result<Self, Flaw> {
+        let mut decoder = Decoder::new(options.ouster.as_ref(), payload)?;
+        let facts = decoder.decode(payload, &mut Vec::new())?;
+        let elevations = decoder.elevations_deg();
         let n_rings = elevations.len() as u32;
-        let degrees = elevations.iter().map(|angle| angle.to_degrees());
         let mut settings = options.segmentation.clone();
-        settings.ring_elevations_deg = Some(degrees.collect());
+        settings.ring_elevations_deg = Some(elevations);
+        let step_deg = decoder.step_rad(&facts).to_degrees() as f32;
+        settings.column_width_deg = settings.column_width_deg.max(step_deg.min(WIDEST_DEG));
         let stream = Stream::new(settings, n_rings * ROOM_PER_RING)
             .expect("invariant: settings were checked, and a sensor's elevations are right");
-        Self { decoder, clock: PacketClock::new(HOUR_US), stream, start_s, n_packets: 0 }
+        let clock = PacketClock::new(decoder.wraps_us());
+        Ok(Self { decoder, clock, stream, start_s, n_packets: 0 })
     }
 
     /// Takes in the returns of a packet, which is of the time that `packet` says.
     fn push(
         &mut self,
-        header: &Header,
+        facts: &Facts,
         returns: &[Return],
         packet: Tag,
         waiting: &mut Waiting,
         motion: Option<Motion<'_>>,
     ) {
         let Self { decoder, stream, .. } = self;
-        let encoder = f64::from(header.azimuth) / 36_000.0 * TAU;
         let turn = stream.n_turns();
-        stream.advance((encoder - decoder.most_offset_rad()) as f32, |cluster| {
+        stream.advance((facts.azimuth_rad - decoder.most_offset_rad()) as f32, |cluster| {
             waiting.push(&cluster, turn, motion);
         });
         for found in returns {
@@ -384,9 +389,6 @@ impl Motion<'_> {
         self.motion.pose(time_s, self.start_s)
     }
 }
-
-/// The time stamps of Velodyne's packets count microseconds past the hour.
-const HOUR_US: f64 = 3.6e9;
 
 impl Waiting {
     /// Takes in a cluster of a turn. If the sensor moves, its points are brought to where the

@@ -14,6 +14,7 @@ mod sample;
 mod streams;
 #[cfg(feature = "live")]
 #[path = "../support/street.rs"]
+#[allow(dead_code, reason = "the tests of the library use all of it")]
 mod street;
 #[path = "../support/tiny_model.rs"]
 mod tiny_model;

@@ -71,7 +71,8 @@ fn packet(things: &[Thing], first_stamp_us: u32, number: usize) -> [u8; PACKET] 
         for i in 0..32 {
             let time_s = block_s + (i / 16) as f64 * SEQUENCE_S + (i % 16) as f64 * 2.304e-6;
             let elevation = LASERS_DEG[i % 16].to_radians();
-            let units = (distance(things, elevation, time_s) / 0.002).round() as u16;
+            let azimuth = time_s * TURNS_PER_S * TAU;
+            let units = (distance(things, azimuth, elevation, time_s) / 0.002).round() as u16;
             at[4 + 3 * i..6 + 3 * i].copy_from_slice(&units.to_le_bytes());
             at[6 + 3 * i] = 50;
         }
@@ -82,9 +83,9 @@ fn packet(things: &[Thing], first_stamp_us: u32, number: usize) -> [u8; PACKET] 
     bytes
 }
 
-/// How far the beam of this elevation sees at `time_s`, 0 for nothing.
-fn distance(things: &[Thing], elevation: f64, time_s: f64) -> f64 {
-    let (sin, cos) = (time_s * TURNS_PER_S * TAU).sin_cos();
+/// How far a beam sees at `time_s`, 0 for nothing.
+fn distance(things: &[Thing], azimuth: f64, elevation: f64, time_s: f64) -> f64 {
+    let (sin, cos) = azimuth.sin_cos();
     let (up, flat) = elevation.sin_cos();
     // Azimuths grow clockwise.
     let beam = [flat * cos, -flat * sin, up];
@@ -92,6 +93,60 @@ fn distance(things: &[Thing], elevation: f64, time_s: f64) -> f64 {
     let hits = things.iter().filter_map(|thing| thing.distance(beam, time_s));
     let nearest = hits.fold(ground, f64::min);
     if nearest <= FARTHEST_M { nearest } else { 0.0 }
+}
+
+/// Altitudes and azimuths of an Ouster's rows, degrees.
+const ROWS_DEG: [[f64; 2]; 16] = {
+    let mut rows = [[0.0; 2]; 16];
+    let mut row = 0;
+    while row < 16 {
+        rows[row] = [15.0 - 2.0 * row as f64, [4.2, 1.4, -1.4, -4.2][row % 4]];
+        row += 1;
+    }
+    rows
+};
+/// Columns of its turn and of its packet.
+const COLUMNS: usize = 1024;
+const COLUMNS_PER_PACKET: usize = 16;
+/// Packets of a second.
+pub const OUSTER_PACKETS_PER_S: usize = 640;
+
+/// The metadata of that Ouster, whose lidar faces the sensor's rear.
+pub fn ouster_metadata() -> String {
+    let column = |i: usize| ROWS_DEG.map(|row| row[i]);
+    format!(
+        r#"{{"beam_altitude_angles": {:?}, "beam_azimuth_angles": {:?}, "lidar_mode": "1024x10",
+        "lidar_origin_to_beam_origin_mm": 15.806,
+        "lidar_to_sensor_transform": [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 36.18, 0, 0, 0, 1],
+        "data_format": {{"columns_per_frame": {COLUMNS}, "columns_per_packet": {COLUMNS_PER_PACKET},
+        "pixels_per_column": 16, "udp_profile_lidar": "RNG19_RFL8_SIG16_NIR16"}}}}"#,
+        column(0),
+        column(1)
+    )
+}
+
+/// Packet number `number` of that Ouster among `things`. The beams begin at the origin, which the
+/// sensor's do not by centimetres.
+pub fn ouster_packet(things: &[Thing], number: usize) -> Vec<u8> {
+    let mut bytes = vec![0; 32];
+    let per_turn = COLUMNS / COLUMNS_PER_PACKET;
+    bytes[..4].copy_from_slice(&[1, 0, (number / per_turn) as u8, 0]);
+    for i in 0..COLUMNS_PER_PACKET {
+        let column = number * COLUMNS_PER_PACKET + i;
+        let turns = column as f64 / COLUMNS as f64;
+        let time_s = turns / TURNS_PER_S;
+        bytes.extend(((time_s * 1e9) as u64).to_le_bytes());
+        bytes.extend(((column % COLUMNS) as u16).to_le_bytes());
+        bytes.extend([1, 0]);
+        for [altitude, azimuth] in ROWS_DEG {
+            let azimuth = azimuth.to_radians() + (turns + 0.5) * TAU;
+            let range_m = distance(things, azimuth, altitude.to_radians(), time_s);
+            bytes.extend(((range_m * 1e3).round() as u32).to_le_bytes());
+            bytes.extend([60, 0, 0, 0, 0, 0, 0, 0]);
+        }
+    }
+    bytes.extend([0; 32]);
+    bytes
 }
 
 /// A capture of packets that were sent at these microseconds of Unix time, in libpcap's classic

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::available_parallelism;
 
+use formats::ouster::Metadata;
 use glam::DVec3;
 use infer_cpu::live::{EgoMotion, LiveOptions, Object, Pipeline};
 use infer_cpu::{Classifier, Options, Precision};
@@ -31,10 +32,12 @@ const MOST_THREADS: usize = 4;
 Examples:
   infer-cpu live --udp 2368
   infer-cpu live --udp 2368 --from 192.168.1.201 --stats
+  infer-cpu live --udp 7502 --metadata os1.json
   infer-cpu live --pcap drive.pcap --realtime
   infer-cpu live --pcap drive.pcap --poses drive.tum > objects.jsonl
 
-The sensor is a Velodyne VLP-32C or VLP-16; its first packet tells which. One line of JSON is
+The sensor is a Velodyne VLP-32C or VLP-16, as its first packet tells, or with --metadata an
+Ouster. One line of JSON is
 printed for each object and turn, as soon as the beams have passed the object. The
 keys, in this order: version (1), turn, track (a number that stays with the object), class (of
 the track, by all that was seen of it, or `unknown`; null while no cluster of it had
@@ -49,7 +52,7 @@ packet with the last point to this line; null without --udp or --realtime).
 
 SIGTERM and Ctrl-C end the program after the last objects, with exit status 0.")]
 pub struct Args {
-    /// Receive packets on this UDP port; a Velodyne's is 2368
+    /// Receive packets on this UDP port; a Velodyne's is 2368, an Ouster's 7502
     #[arg(long, value_name = "PORT", required_unless_present = "pcap", conflicts_with = "pcap")]
     udp: Option<u16>,
 
@@ -81,6 +84,10 @@ pub struct Args {
     /// Listen on the network interface that has this address only [default: on all]
     #[arg(long, value_name = "IP", requires = "udp", default_value = "0.0.0.0")]
     interface: Ipv4Addr,
+
+    /// The sensor is an Ouster OS0, OS1 or OS2, of which this is the metadata file (JSON)
+    #[arg(long, value_name = "FILE")]
+    metadata: Option<PathBuf>,
 
     /// Poses of the sensor in the world, in TUM's format (Unix time x y z qx qy qz qw), by which
     /// clusters are deskewed and tracked in the world
@@ -150,7 +157,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     match pipeline.counts().packets {
         0 => Err(Usage(format!(
-            "expected packets of a VLP-16 or VLP-32C, found none among {} UDP packets",
+            "expected packets of {}, found none among {} UDP packets",
+            if args.metadata.is_some() { "the Ouster" } else { "a VLP-16 or VLP-32C" },
             read.n_packets
         ))
         .into()),
@@ -175,6 +183,7 @@ impl Args {
             }),
             _ => None,
         };
+        options.ouster = self.metadata.as_deref().map(Metadata::read).transpose()?;
         Ok(Pipeline::new(classifier, &options)?)
     }
 

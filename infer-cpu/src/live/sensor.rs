@@ -1,0 +1,152 @@
+//! The sensors whose packets are taken.
+
+use std::f64::consts::TAU;
+use std::mem::discriminant;
+
+use formats::returns::Return;
+use formats::vlp32c::SEQUENCE_US;
+use formats::{ouster, velodyne};
+
+/// Why a payload is not the sensor's data.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Flaw {
+    /// Velodyne's.
+    #[error(transparent)]
+    Velodyne(#[from] velodyne::PacketError),
+    /// Ouster's.
+    #[error(transparent)]
+    Ouster(#[from] ouster::PacketError),
+}
+
+impl Flaw {
+    /// Whether the other differs in its numbers at most.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Velodyne(a), Self::Velodyne(b)) => discriminant(a) == discriminant(b),
+            (Self::Ouster(a), Self::Ouster(b)) => discriminant(a) == discriminant(b),
+            _ => false,
+        }
+    }
+}
+
+/// Decodes the packets of one sensor.
+pub enum Decoder {
+    /// A VLP-16 or VLP-32C.
+    Velodyne(velodyne::Decoder),
+    /// An OS0, OS1 or OS2.
+    Ouster {
+        /// What decodes it.
+        decoder: Box<ouster::Decoder>,
+        /// How the lidar is turned in the sensor's frame, radians counterclockwise.
+        yaw_rad: f64,
+        /// Packets of each turn that are not sent, because their columns are not wanted.
+        n_unsent: u64,
+        /// The first column of the packet before.
+        before: u16,
+    },
+}
+
+/// What is known of a packet, whatever sensor it is of.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts {
+    /// Its time stamp, microseconds.
+    pub stamp_us: f64,
+    /// How long its firings take, microseconds.
+    pub duration_us: f64,
+    /// Where the head was at its first firing, radians clockwise from x.
+    pub azimuth_rad: f64,
+    /// By how much the head turns in a microsecond, radians.
+    pub speed_rad_us: f64,
+    /// Packets that were not sent between the one before and this.
+    pub n_unsent: u64,
+}
+
+impl Decoder {
+    /// For the sensor of `metadata`, or else that which the first `payload` is of.
+    ///
+    /// # Errors
+    /// If that is no data packet.
+    pub fn new(metadata: Option<&ouster::Metadata>, payload: &[u8]) -> Result<Self, Flaw> {
+        let Some(metadata) = metadata else {
+            let header = velodyne::Header::of(payload)?;
+            return Ok(Self::Velodyne(velodyne::Decoder::new(header.model)));
+        };
+        let decoder = Box::new(ouster::Decoder::new(metadata));
+        let before = decoder.header(payload)?.measurement_id;
+        let unsent = metadata.n_columns_unsent() / metadata.columns_per_packet();
+        let yaw_rad = metadata.yaw_rad();
+        Ok(Self::Ouster { decoder, yaw_rad, n_unsent: unsent.into(), before })
+    }
+
+    /// Decodes a packet into `returns`.
+    ///
+    /// # Errors
+    /// If it is not this sensor's data.
+    pub fn decode(&mut self, payload: &[u8], returns: &mut Vec<Return>) -> Result<Facts, Flaw> {
+        returns.clear();
+        match self {
+            Self::Velodyne(decoder) => {
+                let header = decoder.decode(payload, |found| returns.push(*found))?;
+                Ok(Facts {
+                    stamp_us: f64::from(header.time_us),
+                    duration_us: header.duration_us(),
+                    azimuth_rad: f64::from(header.azimuth) * UNIT_RAD,
+                    speed_rad_us: header.units_per_us * UNIT_RAD,
+                    n_unsent: 0,
+                })
+            }
+            Self::Ouster { decoder, yaw_rad, n_unsent, before } => {
+                let header = decoder.decode(payload, |found| returns.push(*found))?;
+                let column_rad = TAU / f64::from(header.columns_per_frame);
+                let is_new_turn = header.measurement_id < *before;
+                *before = header.measurement_id;
+                Ok(Facts {
+                    stamp_us: header.time_ns as f64 * 1e-3,
+                    duration_us: header.duration_us,
+                    azimuth_rad: f64::from(header.measurement_id) * column_rad - *yaw_rad,
+                    speed_rad_us: f64::from(header.columns) * column_rad / header.duration_us,
+                    n_unsent: if is_new_turn { *n_unsent } else { 0 },
+                })
+            }
+        }
+    }
+
+    /// How far ahead of the head, or behind it, beams aim at most, radians.
+    pub fn most_offset_rad(&self) -> f64 {
+        match self {
+            Self::Velodyne(decoder) => decoder.most_offset_rad(),
+            Self::Ouster { decoder, .. } => decoder.most_offset_rad(),
+        }
+    }
+
+    /// The elevation of each ring, degrees.
+    pub fn elevations_deg(&self) -> Vec<f32> {
+        let radians = match self {
+            Self::Velodyne(decoder) => decoder.elevations_rad(),
+            Self::Ouster { decoder, .. } => decoder.elevations_rad(),
+        };
+        radians.into_iter().map(f32::to_degrees).collect()
+    }
+
+    /// Microseconds after which time stamps begin anew, if they do in a lifetime.
+    pub fn wraps_us(&self) -> Option<f64> {
+        match self {
+            // They count microseconds past the hour.
+            Self::Velodyne(_) => Some(3.6e9),
+            Self::Ouster { .. } => None,
+        }
+    }
+
+    /// From one firing of all beams to the next in a packet of these facts, radians.
+    pub fn step_rad(&self, facts: &Facts) -> f64 {
+        let step_us = match self {
+            Self::Velodyne(_) => SEQUENCE_US,
+            Self::Ouster { decoder, .. } => facts.duration_us / f64::from(decoder.columns()),
+        };
+        step_us * facts.speed_rad_us
+    }
+}
+
+/// The unit of a Velodyne's azimuths, radians.
+const UNIT_RAD: f64 = TAU / 36_000.0;
