@@ -11,6 +11,7 @@ pub mod detect;
 pub mod export_onnx;
 pub mod flags;
 pub mod gen_dataset;
+pub mod gen_drive;
 pub mod gen_scenes;
 pub mod gen_shapes;
 #[cfg(feature = "models")]

@@ -2,8 +2,8 @@
 
 use clap::{Parser, Subcommand};
 use edgepuck_program::{
-    Outcome, adapters, gen_dataset, gen_scenes, gen_shapes, merge_dataset, outcome, preview_scan,
-    sample_surfaces, scan, segment, trainer,
+    Outcome, adapters, gen_dataset, gen_drive, gen_scenes, gen_shapes, merge_dataset, outcome,
+    preview_scan, sample_surfaces, scan, segment, trainer,
 };
 #[cfg(feature = "models")]
 use edgepuck_program::{advise, detect, export_onnx, import_weights};
@@ -24,6 +24,8 @@ enum Command {
     GenDataset(Box<gen_dataset::Args>),
     /// Scan street scenes and cut them into labelled clusters (default: built-in objects)
     GenScenes(gen_scenes::Args),
+    /// Simulate a drive through a street, as one capture of a VLP-32C's packets with its truth
+    GenDrive(gen_drive::Args),
     /// Write the procedural shapes that gen-dataset uses by default as OFF files
     GenShapes(gen_shapes::Args),
     /// Sample points uniformly from the surfaces of meshes, as in ModelNet40's point clouds
@@ -72,6 +74,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::GenDataset(args) => gen_dataset::run(args),
         Command::GenScenes(args) => gen_scenes::run(args),
+        Command::GenDrive(args) => gen_drive::run(args),
         Command::GenShapes(args) => gen_shapes::run(args),
         Command::SampleSurfaces(args) => sample_surfaces::run(args),
         Command::Scan(args) => scan::run(args),

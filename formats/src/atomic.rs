@@ -11,7 +11,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 use crate::error::FormatError;
 use crate::hash::{HashedFile, hexadecimal};
@@ -71,16 +71,67 @@ fn write_through<W: Write, T>(
     fill: impl FnOnce(&mut BufWriter<W>) -> io::Result<()>,
     close: impl FnOnce(W) -> T,
 ) -> Result<T, FormatError> {
-    let here = |source| FormatError::io(path, source);
-    let folder = make_folder_of(path)?;
-    let temporary = named_temporary(folder).map_err(here)?;
-    let (file, temporary) = temporary.into_parts();
-    let mut writer = BufWriter::new(open(file));
-    fill(&mut writer).map_err(here)?;
-    // Windows cannot rename a file that is open for writing.
-    let closed = close(writer.into_inner().map_err(|error| here(error.into_error()))?);
-    temporary.persist(path).map_err(|error| here(error.error))?;
-    Ok(closed)
+    let mut file = Unfinished::open(path, open)?;
+    file.append(fill)?;
+    file.close(close)
+}
+
+/// A file that is written piece by piece: it lies under its name once it is finished, and
+/// nothing is left of one that is dropped before.
+pub struct Unfinished<W: Write = File> {
+    path: PathBuf,
+    writer: BufWriter<W>,
+    temporary: TempPath,
+}
+
+impl Unfinished {
+    /// Begins the file at `path`. Folders that are missing are made.
+    ///
+    /// # Errors
+    /// What the system reports; a folder that has the file's name.
+    pub fn create(path: &Path) -> Result<Self, FormatError> {
+        if path.is_dir() {
+            return Err(FormatError::io(path, io::ErrorKind::IsADirectory.into()));
+        }
+        Self::open(path, |file| file)
+    }
+
+    /// Gives the file its name, replacing what was there.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub fn finish(self) -> Result<(), FormatError> {
+        self.close(drop)
+    }
+}
+
+impl<W: Write> Unfinished<W> {
+    fn open(path: &Path, open: impl FnOnce(File) -> W) -> Result<Self, FormatError> {
+        let temporary = named_temporary(make_folder_of(path)?);
+        let (file, temporary) =
+            temporary.map_err(|source| FormatError::io(path, source))?.into_parts();
+        Ok(Self { path: path.to_path_buf(), writer: BufWriter::new(open(file)), temporary })
+    }
+
+    /// Appends what `fill` writes.
+    ///
+    /// # Errors
+    /// What the system or `fill` reports, with the file's name.
+    pub fn append(
+        &mut self,
+        fill: impl FnOnce(&mut BufWriter<W>) -> io::Result<()>,
+    ) -> Result<(), FormatError> {
+        fill(&mut self.writer).map_err(|source| FormatError::io(&self.path, source))
+    }
+
+    fn close<T>(self, close: impl FnOnce(W) -> T) -> Result<T, FormatError> {
+        let Self { path, writer, temporary } = self;
+        let here = |source| FormatError::io(&path, source);
+        // Windows cannot rename a file that is open for writing.
+        let closed = close(writer.into_inner().map_err(|error| here(error.into_error()))?);
+        temporary.persist(&path).map_err(|error| here(error.error))?;
+        Ok(closed)
+    }
 }
 
 /// [`write()`] of bytes that are at hand.

@@ -15,7 +15,7 @@ pub const LAB: &str = "edgepuck-lab";
 /// Commands of the product that read or write no network. A first build for them
 /// leaves out the feature `models`: infer-cpu, and readers and writers of PyTorch's
 /// and ONNX's files.
-const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes gen-shapes sample-surfaces scan \
+const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes gen-drive gen-shapes sample-surfaces scan \
      segment preview adapters merge-dataset";
 
 /// Runs the program of `package` with `words` in the caller's folder and gives

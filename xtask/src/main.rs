@@ -13,7 +13,7 @@ use xtask::build_pi;
 
 /// Runs the developer commands of Edgepuck's repository.
 ///
-/// All other commands are passed to the program `edgepuck` (gen-dataset, gen-scenes, gen-shapes,
+/// All other commands are passed to the program `edgepuck` (gen-dataset, gen-scenes, gen-drive, gen-shapes,
 /// sample-surfaces, scan, segment, detect, preview, adapters, merge-dataset, import-weights, advise,
 /// export-onnx, train, eval, explain, compare-points), which is built first if necessary.
 /// `cargo xtask edgepuck --help` describes them.

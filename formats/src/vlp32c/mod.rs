@@ -47,12 +47,12 @@
 
 pub(crate) mod packet;
 
-use std::io::Write;
-use std::path::Path;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::atomic;
+use crate::atomic::{self, Unfinished};
 use crate::error::FormatError;
 use crate::pcap::{self, Sender};
 use crate::scan::{Attribute, Scan};
@@ -60,6 +60,11 @@ use packet::{BLOCKS, LASERS, Measurement};
 
 /// From one firing sequence to the next, microseconds.
 pub const SEQUENCE_US: f64 = 55.296;
+
+/// Firing sequences of a packet that holds one return of each beam.
+pub const SEQUENCES_PER_PACKET: u32 = BLOCKS as u32;
+
+const HOUR_US: u64 = 3_600_000_000;
 
 /// The unit of distances, metres.
 pub const DISTANCE_UNIT_M: f64 = 0.004;
@@ -70,11 +75,13 @@ pub const FARTHEST_M: f64 = u16::MAX as f64 * DISTANCE_UNIT_M;
 /// The unit of azimuths, degrees.
 pub const AZIMUTH_UNIT_DEG: f64 = 0.01;
 
+const UNITS_PER_TURN: f64 = 360.0 / AZIMUTH_UNIT_DEG;
+
 /// All beams cross this far in front of the axis, metres: what velodyne-decoder
 /// 3.1.0 takes off its points' z.
 pub const BEAM_CROSSING_M: f64 = 0.0424;
 
-/// When every revolution starts: 2000-01-01, 00:00:00 UTC, in Unix time, so
+/// When every revolution and capture starts: 2000-01-01, 00:00:00 UTC, in Unix time, so
 /// that the same scan gives the same bytes.
 pub const START_S: u32 = 946_684_800;
 
@@ -121,9 +128,20 @@ impl Revolution {
     /// What the encoder reads when `sequence` starts, units of 0.01 degree.
     #[must_use]
     pub fn azimuth(&self, sequence: u32) -> u16 {
+        self.units(sequence).rem_euclid(UNITS_PER_TURN) as u16
+    }
+
+    /// How often the encoder has passed 0 when `sequence` of a sensor that keeps turning starts,
+    /// by what it reads then.
+    #[must_use]
+    pub fn turn(&self, sequence: u32) -> u32 {
+        (self.units(sequence) / UNITS_PER_TURN) as u32
+    }
+
+    /// Whole units of azimuth since sequence 0.
+    fn units(&self, sequence: u32) -> f64 {
         let turned = f64::from(sequence) * SEQUENCE_US * 1e-6 * self.rpm / 60.0;
-        let units_per_turn = 360.0 / AZIMUTH_UNIT_DEG;
-        (turned * units_per_turn).round().rem_euclid(units_per_turn) as u16
+        (turned * UNITS_PER_TURN).round()
     }
 }
 
@@ -169,17 +187,72 @@ pub fn write(
     let fired = measurements(path, revolution, scan)?;
     atomic::write_hashed(path, |writer| {
         pcap::write_header(writer)?;
-        for (number, fired) in fired.chunks(sequences_per_packet).enumerate() {
-            let first = number * sequences_per_packet;
-            // Below an hour by far: a revolution takes a fraction of a second.
-            let time_us = (first as f64 * SEQUENCE_US).round() as u32;
-            let azimuth = |i: usize| revolution.azimuth((first + i) as u32);
-            let payload = packet::payload(returns, time_us, azimuth, fired);
-            let stamp = [START_S + time_us / 1_000_000, time_us % 1_000_000];
-            pcap::write_packet(writer, &SENSOR, stamp, &payload)?;
+        for (number, fired) in (0..).zip(fired.chunks(sequences_per_packet)) {
+            let first = number * sequences_per_packet as u32;
+            write_packet(writer, revolution, returns, first, fired)?;
         }
         writer.flush()
     })
+}
+
+/// Writes the packet that begins with sequence `first`.
+fn write_packet(
+    writer: &mut impl Write,
+    revolution: &Revolution,
+    returns: Returns,
+    first: u32,
+    fired: &[[Measurement; LASERS]],
+) -> io::Result<()> {
+    let time_us = (f64::from(first) * SEQUENCE_US).round() as u64;
+    let azimuth = |i: usize| revolution.azimuth(first + i as u32);
+    // START_S is a whole hour.
+    let payload = packet::payload(returns, (time_us % HOUR_US) as u32, azimuth, fired);
+    let stamp = [START_S + (time_us / 1_000_000) as u32, (time_us % 1_000_000) as u32];
+    pcap::write_packet(writer, &SENSOR, stamp, &payload)
+}
+
+/// A capture of a sensor that keeps turning, written packet by packet, with the strongest
+/// returns. It appears under its name once it is finished.
+pub struct Capture {
+    file: Unfinished,
+    path: PathBuf,
+    packet: Revolution,
+    sequences: u32,
+}
+
+impl Capture {
+    /// Begins the capture at `path` of a sensor that turns `rpm` times a minute.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub fn create(path: &Path, rpm: f64) -> Result<Self, FormatError> {
+        let mut file = Unfinished::create(path)?;
+        file.append(|writer| pcap::write_header(writer))?;
+        let packet = Revolution { rpm, n_beams: SEQUENCES_PER_PACKET * LASERS as u32 };
+        Ok(Self { file, path: path.to_path_buf(), packet, sequences: 0 })
+    }
+
+    /// Appends the next [`SEQUENCES_PER_PACKET`] firing sequences, as [`write()`] does: beam b
+    /// of `scan` is laser b % 32 of their sequence b / 32.
+    ///
+    /// # Errors
+    /// As [`write()`].
+    pub fn push(&mut self, scan: &Scan) -> Result<(), FormatError> {
+        let fired = measurements(&self.path, &self.packet, scan)?;
+        let (packet, first) = (&self.packet, self.sequences);
+        self.file
+            .append(|writer| write_packet(writer, packet, Returns::Strongest, first, &fired))?;
+        self.sequences += SEQUENCES_PER_PACKET;
+        Ok(())
+    }
+
+    /// Gives the capture its name.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub fn finish(self) -> Result<(), FormatError> {
+        self.file.finish()
+    }
 }
 
 /// What each sequence measured.

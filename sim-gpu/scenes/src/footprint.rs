@@ -32,7 +32,7 @@ impl Footprint {
     }
 
     /// How far it reaches from its centre along `axis`.
-    fn reach(&self, axis: DVec2) -> f64 {
+    pub(crate) fn reach(&self, axis: DVec2) -> f64 {
         let [x, y] = self.axes();
         self.half.x * x.dot(axis).abs() + self.half.y * y.dot(axis).abs()
     }

@@ -19,7 +19,8 @@ const KERB_FACE_M: f64 = 0.03;
 /// The ground of one scene; the origin is on it, below the sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct Ground {
-    half_m: f64,
+    /// Half of its edge.
+    pub(crate) half_m: f64,
     /// Rise for each metre along x and y.
     slope: DVec2,
     roughness_m: f64,
@@ -54,9 +55,29 @@ impl Ground {
         self.slope.dot(at) + step_m(at.y) - step_m(0.0)
     }
 
+    /// `x_m` along the road.
+    pub(crate) fn along(&self, x_m: f64) -> DVec3 {
+        DVec3::new(x_m, 0.0, self.slope.x * x_m)
+    }
+
     /// The surface as triangles.
     pub(crate) fn mesh(&self) -> Mesh {
         let xs = self.lines(&[]);
+        self.surface(&xs, |row, column| (row * xs.len() + column) as u64)
+    }
+
+    /// The part of an endless surface from x = `number` x `length_m` on, `length_m` long.
+    /// Neighbours have the vertices between them in common.
+    pub(crate) fn part(&self, number: i32, length_m: f64) -> Mesh {
+        let n_steps = if self.roughness_m > 0.0 { (length_m / STEP_M).ceil() as i32 } else { 1 };
+        let line = |column: i32| number * n_steps + column;
+        let step_m = length_m / f64::from(n_steps);
+        let xs: Vec<f64> = (0..=n_steps).map(|column| f64::from(line(column)) * step_m).collect();
+        self.surface(&xs, |row, column| u64::from(line(column as i32) as u32) << 32 | row as u64)
+    }
+
+    /// The surface above the lines `xs`; `vertex` numbers what lies at a row and a column.
+    fn surface(&self, xs: &[f64], vertex: impl Fn(usize, usize) -> u64) -> Mesh {
         let kerbs = [-1.0, 1.0].map(|side| self.road_y_m + side * self.road_half_m);
         let faces = [kerbs[0] - KERB_FACE_M, kerbs[0], kerbs[1], kerbs[1] + KERB_FACE_M];
         let ys = self.lines(&faces);
@@ -64,7 +85,7 @@ impl Ground {
         let mut mesh = Mesh::default();
         for (row, &y) in ys.iter().enumerate() {
             mesh.vertices.extend(xs.iter().enumerate().map(|(column, &x)| {
-                let rough_m = self.roughness_m * self.bump(row * n + column);
+                let rough_m = self.roughness_m * self.bump(vertex(row, column));
                 DVec3::new(x, y, self.height_m(DVec2::new(x, y)) + rough_m)
             }));
         }
@@ -99,7 +120,7 @@ impl Ground {
 
     /// A number of mean 0 and variance 1 for one vertex: uniform, since no gravel
     /// stands out by more.
-    fn bump(&self, vertex: usize) -> f64 {
-        (2.0 * self.stream.unit(vertex as u64) - 1.0) * 3f64.sqrt()
+    fn bump(&self, vertex: u64) -> f64 {
+        (2.0 * self.stream.unit(vertex) - 1.0) * 3f64.sqrt()
     }
 }

@@ -11,14 +11,17 @@
 //! every machine, whatever the number of threads.
 
 mod clusters;
+mod drive;
 mod error;
 mod footprint;
 mod generate;
 mod ground;
+mod lanes;
 mod place;
 mod recipe;
 mod scene;
 mod stage;
+mod street;
 
 #[cfg(test)]
 mod tests;
@@ -29,8 +32,10 @@ mod tests;
 struct Readme;
 
 pub use clusters::{LabelledCluster, OTHER, label_clusters};
+pub use drive::{Drive, Packet, Sighting, Sightings};
 pub use error::SceneError;
 pub use generate::{Counts, Generation, generate};
 pub use recipe::{Objects, Place, Recipe, Span};
 pub use scene::{PlacedObject, Scene};
 pub use stage::{Stage, Sweep};
+pub use street::Body;

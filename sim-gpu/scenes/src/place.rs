@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 
 use crate::footprint::Footprint;
 use crate::ground::Ground;
+use crate::lanes::Lane;
 use crate::recipe::{Objects, Place};
 use crate::scene::PlacedObject;
 
@@ -14,10 +15,10 @@ use crate::scene::PlacedObject;
 const TRIES: usize = 12;
 
 /// The sensor's own vehicle covers this much around it, metres.
-const OWN_RADIUS_M: f64 = 1.2;
+pub(crate) const OWN_RADIUS_M: f64 = 1.2;
 
 /// Width of a pavement, metres.
-const PAVEMENT_M: [f64; 2] = [1.5, 4.5];
+pub(crate) const PAVEMENT_M: [f64; 2] = [1.5, 4.5];
 
 /// How far behind the pavements houses begin, metres.
 const FRONT_GARDEN_M: [f64; 2] = [0.0, 6.0];
@@ -29,11 +30,17 @@ const SKEW_RAD: f64 = 0.04;
 /// The share of places in a row of parked cars that are free.
 const FREE: f64 = 0.25;
 
-/// Takes objects into a scene, one after the other.
+/// What goes along the street keeps as far away from what is ahead as it goes in this time,
+/// seconds.
+const HEADWAY_S: f64 = 0.25;
+
+/// Takes objects into a scene or a block of a street, one after the other.
 pub(crate) struct Placing<'a> {
     pub(crate) ground: &'a Ground,
     pub(crate) s: &'a mut Sampler,
     taken: Vec<Footprint>,
+    /// Nothing reaches farther along x.
+    half_length_m: f64,
     pub(crate) objects: Vec<PlacedObject>,
 }
 
@@ -50,7 +57,31 @@ impl<'a> Placing<'a> {
     pub(crate) fn new(ground: &'a Ground, s: &'a mut Sampler) -> Self {
         let half = DVec2::splat(OWN_RADIUS_M);
         let own = Footprint { centre: DVec2::ZERO, half, yaw_rad: 0.0 };
-        Self { ground, s, taken: vec![own], objects: Vec::new() }
+        Self { ground, s, taken: vec![own], half_length_m: f64::INFINITY, objects: Vec::new() }
+    }
+
+    /// In a block of a street, `length_m` long, beside the sensor's way and the `lanes`.
+    pub(crate) fn in_block(
+        ground: &'a Ground,
+        s: &'a mut Sampler,
+        length_m: f64,
+        lanes: &[Lane],
+    ) -> Self {
+        let half_length_m = length_m / 2.0;
+        let strip = |y_m: f64, half_m: f64| Footprint {
+            centre: DVec2::new(0.0, y_m),
+            half: DVec2::new(half_length_m, half_m),
+            yaw_rad: 0.0,
+        };
+        let mut taken = vec![strip(0.0, OWN_RADIUS_M)];
+        taken.extend(lanes.iter().map(|lane| strip(lane.y_m, lane.half_m)));
+        Self { ground, s, taken, half_length_m, objects: Vec::new() }
+    }
+
+    /// In a block of a lane, `length_m` long.
+    pub(crate) fn in_lane(ground: &'a Ground, s: &'a mut Sampler, length_m: f64) -> Self {
+        let half_length_m = length_m / 2.0;
+        Self { ground, s, taken: Vec::new(), half_length_m, objects: Vec::new() }
     }
 
     /// Places the objects of one entry of a recipe, number `entry`, of which there
@@ -62,16 +93,7 @@ impl<'a> Placing<'a> {
         n_variants: u32,
         size: impl Fn(u32) -> DVec3,
     ) {
-        let [least, most] = objects.count.map(|n| n as usize);
-        let n = self.s.count(least, most);
-        let mut queue: Vec<Unplaced> = (0..n)
-            .map(|_| {
-                let variant = self.s.count(0, n_variants as usize - 1) as u32;
-                let scale = DVec3::from_array([(); 3].map(|()| self.within(objects.scale)));
-                let half = (size(variant) * scale / 2.0).truncate();
-                Unplaced { entry, variant, scale, half }
-            })
-            .collect();
+        let mut queue = self.draw(entry, objects, n_variants, size);
         match objects.place {
             Place::Anywhere => self.scatter(objects, queue, Self::anywhere),
             Place::Road => self.scatter(objects, queue, Self::on_road),
@@ -86,6 +108,55 @@ impl<'a> Placing<'a> {
                 }
             }
         }
+    }
+
+    /// Places those objects of one entry, as [`Placing::place`] draws them, that go in `lane`:
+    /// a `share` of them.
+    pub(crate) fn place_in(
+        &mut self,
+        lane: &Lane,
+        share: f64,
+        entry: usize,
+        objects: &Objects,
+        n_variants: u32,
+        size: impl Fn(u32) -> DVec3,
+    ) {
+        let headway_m = HEADWAY_S * lane.velocity_m_s.abs();
+        let heading_rad = if lane.velocity_m_s < 0.0 { PI } else { 0.0 };
+        for mut object in self.draw(entry, objects, n_variants, size) {
+            if !self.s.chance(share) {
+                continue;
+            }
+            let beside_m = lane.half_m - object.half.y;
+            object.half.x += headway_m;
+            for _ in 0..TRIES {
+                let x_m = self.half_length_m * self.s.uniform(-1.0, 1.0);
+                let y_m = lane.y_m + beside_m * self.s.uniform(-1.0, 1.0);
+                if self.try_at(&object, DVec2::new(x_m, y_m), heading_rad) {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Draws the objects of one entry.
+    fn draw(
+        &mut self,
+        entry: usize,
+        objects: &Objects,
+        n_variants: u32,
+        size: impl Fn(u32) -> DVec3,
+    ) -> Vec<Unplaced> {
+        let [least, most] = objects.count.map(|n| n as usize);
+        let n = self.s.count(least, most);
+        (0..n)
+            .map(|_| {
+                let variant = self.s.count(0, n_variants as usize - 1) as u32;
+                let scale = DVec3::from_array([(); 3].map(|()| self.within(objects.scale)));
+                let half = (size(variant) * scale / 2.0).truncate();
+                Unplaced { entry, variant, scale, half }
+            })
+            .collect()
     }
 
     fn within(&mut self, span: crate::recipe::Span) -> f64 {
@@ -107,6 +178,9 @@ impl<'a> Placing<'a> {
     /// Takes `object` if it is free there.
     fn try_at(&mut self, object: &Unplaced, centre: DVec2, yaw_rad: f64) -> bool {
         let footprint = Footprint { centre, half: object.half, yaw_rad };
+        if centre.x.abs() + footprint.reach(DVec2::X) > self.half_length_m {
+            return false;
+        }
         if self.taken.iter().any(|other| other.meets(&footprint)) {
             return false;
         }
@@ -186,7 +260,7 @@ impl<'a> Placing<'a> {
                 pavement_m: self.s.uniform(PAVEMENT_M[0], PAVEMENT_M[1]),
                 garden_m: self.s.uniform(FRONT_GARDEN_M[0], FRONT_GARDEN_M[1]),
             };
-            let end_m = objects.distance_m.most;
+            let end_m = objects.distance_m.most.min(self.half_length_m);
             let mut x_m = -end_m * self.s.uniform(0.0, 1.0);
             let share = if side < 0.0 { queue.len() / 2 } else { queue.len() };
             for object in queue.by_ref().take(share) {

@@ -101,6 +101,10 @@ pub struct Objects {
     /// Factors of the size, drawn for each axis.
     #[serde(default = "scale")]
     pub scale: Span,
+    /// How fast they go along the street in a drive, metres a second; they stand by default, and
+    /// in every scene.
+    #[serde(default)]
+    pub speed_m_s: Span,
     /// For `kind = "mesh"`: the folder of the meshes, inside that of `--meshes`.
     pub meshes: Option<String>,
     /// For `kind = "mesh"`: the height to which a mesh is scaled, metres.
@@ -305,6 +309,12 @@ impl Objects {
         self.kind.parse().ok()
     }
 
+    /// Whether they go along the street in a drive.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.speed_m_s.most > 0.0
+    }
+
     fn check(&self, key: &str) -> Result<(), InvalidValue> {
         let at = |field: &str| format!("{key}.{field}");
         if self.built_in().is_none() && self.kind != MESH {
@@ -330,6 +340,11 @@ impl Objects {
         self.distance_m.check(&at("distance_m"), 0.01, MOST_M)?;
         self.gap_m.check(&at("gap_m"), 0.0, MOST_M)?;
         self.scale.check(&at("scale"), 0.01, 100.0)?;
+        self.speed_m_s.check(&at("speed_m_s"), 0.0, 100.0)?;
+        if self.moves() && !matches!(self.place, Place::Road | Place::Pavement) {
+            let cause = format!("expected with place = road or pavement, found \"{}\"", self.place);
+            return Err(InvalidValue::new(at("speed_m_s"), cause));
+        }
         self.height_m.unwrap_or([1.0, 1.0].into()).check(&at("height_m"), 0.01, MOST_M)
     }
 }

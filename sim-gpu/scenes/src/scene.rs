@@ -66,7 +66,8 @@ impl Scene {
         let road_y_m = if s.chance(0.5) { off_road_m } else { -off_road_m };
         let ground = Ground::draw(&recipe.ground, road_y_m, s, stream("ground"));
         let sensor = s.count(0, recipe.sensor.len() - 1);
-        let pose = mount(stage, s);
+        let mut pose = mount(stage, s);
+        pose.world_from_sensor *= DQuat::from_rotation_z(s.uniform(0.0, TAU));
         let glass_returned = recipe.glass_returned.at(s.uniform(0.0, 1.0));
         let share = s.uniform(0.0, 1.0);
         let ground_clearance_m = recipe.ground_clearance_m.map(|span| span.at(share));
@@ -80,14 +81,13 @@ impl Scene {
     }
 }
 
-/// Where the sensor is: above the origin, a little tilted, turned in any way.
-fn mount(stage: &Stage, s: &mut Sampler) -> Pose {
+/// Where the sensor is: above the origin, a little tilted.
+pub(crate) fn mount(stage: &Stage, s: &mut Sampler) -> Pose {
     let mount = &stage.recipe().mount;
     let height_m = mount.height_m.at(s.uniform(0.0, 1.0));
     let tilt_rad = mount.tilt_deg.at(s.uniform(0.0, 1.0)).to_radians();
     let towards_rad = s.uniform(0.0, TAU);
     let tilt_axis = DVec3::new(towards_rad.cos(), towards_rad.sin(), 0.0);
     let tilt = DQuat::from_axis_angle(tilt_axis, tilt_rad);
-    let yaw = DQuat::from_rotation_z(s.uniform(0.0, TAU));
-    Pose { position_m: DVec3::new(0.0, 0.0, height_m), world_from_sensor: tilt * yaw }
+    Pose { position_m: DVec3::new(0.0, 0.0, height_m), world_from_sensor: tilt }
 }

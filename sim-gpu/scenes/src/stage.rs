@@ -23,24 +23,24 @@ use sim_gpu::target::{Surface, Target};
 
 use crate::error::SceneError;
 use crate::recipe::{Objects, Recipe};
-use crate::scene::Scene;
+use crate::scene::{PlacedObject, Scene};
 
 /// A recipe, ready to be drawn from and scanned.
 pub struct Stage {
     recipe: Recipe,
     seed: u64,
     classes: Vec<String>,
-    sensors: Vec<Eye>,
+    pub(crate) sensors: Vec<Eye>,
     culling: Culling,
     /// By entry of the recipe and by variant.
     props: Vec<Vec<OnceLock<Prop>>>,
 }
 
 /// A sensor and how its beams are cast.
-struct Eye {
-    sensor: Sensor,
+pub(crate) struct Eye {
+    pub(crate) sensor: Sensor,
     pattern: BeamPattern,
-    caster: Caster,
+    pub(crate) caster: Caster,
 }
 
 /// An object, ready to be cast.
@@ -129,7 +129,11 @@ impl Stage {
     /// Length, width and height of object `i` of `scene`, metres.
     #[must_use]
     pub fn size_m(&self, scene: &Scene, i: usize) -> DVec3 {
-        let object = &scene.objects[i];
+        self.size_of(&scene.objects[i])
+    }
+
+    /// Length, width and height of `object`, metres.
+    pub(crate) fn size_of(&self, object: &PlacedObject) -> DVec3 {
         self.prop(object.entry, object.variant).size_m * object.scale
     }
 
@@ -154,15 +158,19 @@ impl Stage {
     pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
         let ground = Target::new(whole(scene.ground.mesh()), Builder::Morton);
         let mut targets = vec![PlacedTarget::new(&ground)];
-        targets.extend(scene.objects.iter().map(|object| {
-            let prop = self.prop(object.entry, object.variant);
-            let mut placed = PlacedTarget::new(&prop.target);
-            placed.world_from_object = object.world_from_object();
-            placed.glass = (!prop.glass.is_empty())
-                .then(|| Glass { triangles: prop.glass.clone(), returned: scene.glass_returned });
-            placed
-        }));
+        targets
+            .extend(scene.objects.iter().map(|object| self.target(object, scene.glass_returned)));
         self.sweep_targets(scene, &mut targets)
+    }
+
+    /// `object` where it stands, whose glass returns this part of the beams.
+    pub(crate) fn target(&self, object: &PlacedObject, glass_returned: f64) -> PlacedTarget<'_> {
+        let prop = self.prop(object.entry, object.variant);
+        let mut placed = PlacedTarget::new(&prop.target);
+        placed.world_from_object = object.world_from_object();
+        placed.glass = (!prop.glass.is_empty())
+            .then(|| Glass { triangles: prop.glass.clone(), returned: glass_returned });
+        placed
     }
 
     /// Ground and objects of `scene` as one mesh, without what is known of its parts.
@@ -214,7 +222,7 @@ impl Stage {
 }
 
 /// All of `mesh` as a surface.
-fn whole(mesh: Mesh) -> Surface {
+pub(crate) fn whole(mesh: Mesh) -> Surface {
     let kept = (0..mesh.triangles.len() as u32).collect();
     Surface::new(mesh, kept)
 }

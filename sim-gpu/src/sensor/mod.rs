@@ -170,9 +170,7 @@ impl Sensor {
             Layout::Uniform(uniform) => uniform.rays(keep_each),
             Layout::Grid(grid) => grid.rays(keep_each),
         };
-        let mut pattern = BeamPattern::new(rays.directions, rays.ring, rays.time_s);
-        pattern.start_z_m = rays.start_z_m;
-        pattern
+        rays.into_pattern()
     }
 
     /// The same sensor with only each `k`-th azimuth step, or column of
@@ -211,6 +209,12 @@ impl Rays {
             time_s: Vec::with_capacity(n_rays),
             start_z_m: Vec::new(),
         }
+    }
+
+    fn into_pattern(self) -> BeamPattern {
+        let mut pattern = BeamPattern::new(self.directions, self.ring, self.time_s);
+        pattern.start_z_m = self.start_z_m;
+        pattern
     }
 
     fn push(&mut self, direction: glam::DVec3, ring: u16, time_s: f64) {

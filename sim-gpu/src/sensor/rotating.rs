@@ -1,11 +1,12 @@
 //! A head of lasers that turns clockwise and fires in sequence, as Velodyne's.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Rays, checked_ray_count};
+use super::{BeamPattern, Rays, checked_ray_count};
 use crate::config::{InvalidValue, positive, within};
 
 /// A table of beams on a turning head.
@@ -102,18 +103,31 @@ impl Rotating {
     /// The rays of one revolution, of which only each `keep_each`-th firing
     /// sequence is kept.
     pub(super) fn rays(&self, keep_each: u32) -> Rays {
+        let n_rays = self.rays_per_revolution();
+        // Checked: no pattern has more than 2^26 rays.
+        let sequences = 0..n_rays.div_ceil(self.beam.len() as u64) as u32;
+        self.rays_of(sequences.step_by(keep_each as usize), n_rays)
+    }
+
+    /// The beams of these firing `sequences` of a head that keeps turning: sequence n starts
+    /// n x `sequence_us` after the head read 0, and times count from there.
+    #[must_use]
+    pub fn pattern_of(&self, sequences: Range<u32>) -> BeamPattern {
+        self.rays_of(sequences, u64::MAX).into_pattern()
+    }
+
+    /// The rays of `sequences`, of which the ray number `n_rays` and those after it are left
+    /// out.
+    fn rays_of(&self, sequences: impl ExactSizeIterator<Item = u32>, n_rays: u64) -> Rays {
         let firing_order = self.firing_order();
         let rings = self.rings();
-        let n_rays = self.rays_per_revolution();
         let n_beams = self.beam.len() as u64;
-        let sequences = n_rays.div_ceil(n_beams);
-        let kept_sequences = sequences.div_ceil(u64::from(keep_each));
-        let mut rays = Rays::with_capacity((kept_sequences * n_beams) as usize);
-        for sequence in (0..sequences).step_by(keep_each as usize) {
-            let fired = (n_rays - sequence * n_beams).min(n_beams) as usize;
+        let mut rays = Rays::with_capacity(sequences.len() * self.beam.len());
+        for sequence in sequences {
+            let fired = (n_rays - u64::from(sequence) * n_beams).min(n_beams) as usize;
             for &beam in &firing_order[..fired] {
                 let laser = &self.beam[beam];
-                let start_us = sequence as f64 * self.sequence_us;
+                let start_us = f64::from(sequence) * self.sequence_us;
                 let time_s = (start_us + laser.firing_us) * 1e-6;
                 let encoder_rad = self.encoder_rad(start_us * 1e-6, time_s);
                 rays.push(direction(laser, encoder_rad), rings[beam], time_s);

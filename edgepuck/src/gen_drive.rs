@@ -1,0 +1,152 @@
+//! `edgepuck gen-drive`: a simulated drive through a street, as a sensor's packets.
+
+use std::ffi::OsStr;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use edgepuck_scenes::{Drive, SceneError, Sighting, Sightings, Stage};
+use formats::atomic::Unfinished;
+use formats::vlp32c::{Capture, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
+use indicatif::{ProgressBar, ProgressStyle};
+use sim_gpu::caster::Caster;
+
+use crate::gen_scenes::read_recipe;
+use crate::{Outcome, Usage};
+
+/// Flags of `gen-drive`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Scene recipe: street, yard, or the path of a TOML file
+    #[arg(value_name = "RECIPE", default_value = "street")]
+    recipe: PathBuf,
+
+    /// Capture to write (.pcap); the sensor's poses (.tum) and what it saw (.truth.jsonl) are
+    /// written beside it
+    #[arg(long, default_value = "data/drive.pcap", value_name = "FILE")]
+    out: PathBuf,
+
+    /// How long the drive takes, seconds
+    #[arg(long, default_value_t = 60.0, value_name = "S")]
+    #[arg(value_parser = seconds, allow_negative_numbers = true)]
+    seconds: f64,
+
+    /// How fast the sensor goes along the road, metres a second; 0 stands still
+    #[arg(long, default_value_t = 5.0, value_name = "M/S")]
+    #[arg(value_parser = speed, allow_negative_numbers = true)]
+    speed: f64,
+
+    /// Sensor: vlp32c, as the recipe has it, or the path of a VLP-32C's profile
+    #[arg(long, default_value = "vlp32c", value_name = "NAME")]
+    sensor: String,
+
+    /// Folder of your own meshes, for the recipe's objects of kind "mesh"
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+/// A capture of a day has 16 GB.
+const MOST_SECONDS: f64 = 86_400.0;
+
+const MOST_SPEED_M_S: f64 = 100.0;
+
+/// Packets that are fired together, on all cores: about a turn.
+const BATCH: usize = 150;
+
+/// Poses in each second.
+const POSES_HZ: u32 = 100;
+
+fn seconds(word: &str) -> Result<f64, String> {
+    match word.parse() {
+        Ok(s) if s > 0.0 && s <= MOST_SECONDS => Ok(s),
+        _ => Err(format!("expected a number above 0 and up to {MOST_SECONDS}, found {word}")),
+    }
+}
+
+fn speed(word: &str) -> Result<f64, String> {
+    match word.parse() {
+        Ok(speed) if (0.0..=MOST_SPEED_M_S).contains(&speed) => Ok(speed),
+        _ => Err(format!("expected a number within 0..={MOST_SPEED_M_S}, found {word}")),
+    }
+}
+
+/// Drives, and writes the capture and its truth.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    if args.out.extension() != Some(OsStr::new("pcap")) {
+        let found = args.out.display();
+        return Err(Usage(format!("--out: expected a file name with .pcap, found {found}")).into());
+    }
+    let mut recipe = read_recipe(&args.recipe)?;
+    recipe.use_sensors(std::slice::from_ref(&args.sensor));
+    let cast = |effects: &_| Ok::<_, SceneError>(Caster::Cpu(Clone::clone(effects)));
+    let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed, cast)?;
+    let mut drive = Drive::new(&stage, args.speed)?;
+    let started = Instant::now();
+    let n_points = write(&mut drive, args.seconds, &args.out)?;
+    eprintln!(
+        "{} s, {n_points} points: {}, in {:.1} s",
+        args.seconds,
+        args.out.display(),
+        started.elapsed().as_secs_f64()
+    );
+    Ok(Outcome::Success)
+}
+
+/// Writes the three files of a drive, and returns the number of points.
+fn write(drive: &mut Drive, seconds: f64, out: &Path) -> anyhow::Result<usize> {
+    let packet_s = SEQUENCE_US * 1e-6 * f64::from(SEQUENCES_PER_PACKET);
+    let n_packets = (seconds / packet_s).ceil() as u32;
+    let mut capture = Capture::create(out, drive.revolution().rpm)?;
+    let mut poses = Unfinished::create(&out.with_extension("tum"))?;
+    let mut truth = Unfinished::create(&out.with_extension("truth.jsonl"))?;
+
+    let style =
+        ProgressStyle::with_template("{bar:40} {percent}% of the packets, {per_sec}, {eta} left")?;
+    let bar = ProgressBar::new(n_packets.into()).with_style(style);
+    let (mut n_points, mut sightings) = (0, Sightings::default());
+    for first in (0..n_packets).step_by(BATCH) {
+        let packets = drive.fire(first..n_packets.min(first + BATCH as u32))?;
+        for packet in &packets {
+            capture.push(&packet.scan)?;
+            n_points += packet.scan.len();
+        }
+        append(&mut truth, &sightings.add(drive, &packets))?;
+        bar.inc(packets.len() as u64);
+    }
+    append(&mut truth, &sightings.finish(drive))?;
+    write_poses(&mut poses, drive, f64::from(n_packets) * packet_s)?;
+    bar.finish_and_clear();
+    poses.finish()?;
+    truth.finish()?;
+    capture.finish()?;
+    Ok(n_points)
+}
+
+fn append(truth: &mut Unfinished, sightings: &[Sighting]) -> anyhow::Result<()> {
+    for sighting in sightings {
+        let line = serde_json::to_string(sighting)?;
+        truth.append(|writer| writeln!(writer, "{line}"))?;
+    }
+    Ok(())
+}
+
+/// Writes the sensor's poses in the format of the TUM RGB-D benchmark, to the end of the drive
+/// and one beyond. The sensor moves evenly, so that what lies between two is between them.
+fn write_poses(file: &mut Unfinished, drive: &Drive, seconds: f64) -> anyhow::Result<()> {
+    file.append(|writer| writeln!(writer, "# timestamp tx ty tz qx qy qz qw"))?;
+    for n in 0..=(seconds * f64::from(POSES_HZ)).ceil() as u32 {
+        let time_s = f64::from(n) / f64::from(POSES_HZ);
+        let pose = drive.pose(time_s);
+        let [x, y, z] = pose.position_m.to_array();
+        let [qx, qy, qz, qw] = pose.world_from_sensor.to_array();
+        let time_s = f64::from(START_S) + time_s;
+        file.append(|writer| {
+            writeln!(writer, "{time_s:.2} {x:.6} {y:.6} {z:.6} {qx:.9} {qy:.9} {qz:.9} {qw:.9}")
+        })?;
+    }
+    Ok(())
+}
