@@ -6,6 +6,7 @@ mod advise;
 mod bad_input;
 mod checkpoints;
 mod datasets;
+mod drives;
 mod end_to_end;
 #[cfg(unix)]
 mod exit_codes;

@@ -47,8 +47,7 @@ pub struct Drive<'a> {
 #[derive(Clone, Debug)]
 pub struct Packet {
     /// Beams, ranges and objects in the order of firing. Object 0 is the ground, and `i` is
-    /// [`Drive::body`] `i`. Positions are in the world, from where the sensor was in the middle
-    /// of the packet.
+    /// [`Drive::body`] `i`. Positions are in the world.
     pub scan: Scan,
     seen: Seen,
 }

@@ -11,7 +11,7 @@ use sim_gpu::caster::Caster;
 use sim_gpu::scan::PlacedTarget;
 use sim_gpu::target::{Surface, Target};
 
-use crate::{OTHER, Recipe, Scene, SceneError, Stage, label_clusters};
+use crate::{Drive, OTHER, Packet, Recipe, Scene, SceneError, Sightings, Stage, label_clusters};
 
 const RECIPE: &str = r#"
 variants = 3
@@ -194,6 +194,16 @@ fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
             "noise_m = inf",
             "sensor[0].noise_m: expected a number within 0..=1, found inf",
         ),
+        (
+            "distance_m = [2, 12]",
+            "distance_m = [2, 12]\nspeed_m_s = [-1, 1]",
+            "object[1].speed_m_s: expected two ascending",
+        ),
+        (
+            "place = \"parked\"",
+            "place = \"parked\"\nspeed_m_s = [1, 2]",
+            "object[0].speed_m_s: expected with place = road or pavement, found \"parked\"",
+        ),
         ("variants = 3", "variants = 0", "variants: expected at least 1, found 0"),
         ("kind = \"car\"", "kind = \"mesh\"", "object[0].meshes: expected with kind = \"mesh\""),
     ] {
@@ -208,6 +218,84 @@ fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
         )
         .is_err()
     );
+}
+
+/// The scene's recipe for a drive: its persons walk, and cars go along the road.
+fn drive_recipe() -> String {
+    let walking =
+        RECIPE.replace("distance_m = [2, 12]", "distance_m = [2, 12]\nspeed_m_s = [1, 2]");
+    let cars = "[[object]]\nkind = \"car\"\nclass = \"car\"\ncount = [3, 5]\nplace = \"road\"\n\
+                distance_m = [3, 20]\nspeed_m_s = [8, 10]\n";
+    walking.replace("vlp16", "vlp32c") + cars
+}
+
+/// The first packets of a drive at 6 m/s, so many in each batch.
+fn packets(stage: &Stage, n: u32, batch: u32) -> Vec<Packet> {
+    let mut drive = Drive::new(stage, 6.0).unwrap();
+    let batches = (0..n).step_by(batch as usize);
+    batches.flat_map(|first| drive.fire(first..n.min(first + batch)).unwrap()).collect()
+}
+
+#[test]
+fn a_drive_is_the_same_in_batches_and_threads_of_any_number() {
+    let stage = stage(&drive_recipe());
+    let expected = packets(&stage, 60, 60);
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let found = alone.install(|| packets(&stage, 60, 7));
+    for (expected, found) in expected.iter().zip(&found) {
+        assert_eq!(expected.scan, found.scan);
+    }
+}
+
+/// While it goes on and the sensor does, every point of it lies in its box at that time.
+#[test]
+fn what_moves_is_seen_where_it_is() {
+    let stage = stage(&drive_recipe());
+    let mut drive = Drive::new(&stage, 6.0).unwrap();
+    let packets = drive.fire(0..452).unwrap();
+    let mut n_moving = 0;
+    for (packet, number) in packets.iter().zip(0u32..) {
+        // The middle of the packet's 12 sequences of 55.296 us.
+        let time_s = (f64::from(number) + 0.5) * 12.0 * 55.296e-6;
+        let origin = DVec3::from_array(packet.scan.origin);
+        let objects = packet.scan.object.as_ref().unwrap();
+        for (position, &object) in packet.scan.positions.iter().zip(objects) {
+            let Some(body) = drive.body(object) else { continue };
+            let at = DVec3::from_array(position.map(f64::from)) + origin;
+            let from_centre = at - body.centre_m(time_s);
+            let in_box = glam::DQuat::from_rotation_z(-body.object.yaw_rad) * from_centre;
+            // Half a unit of the packets' distances, and the times within a packet.
+            let margin_m = 0.01 + 0.5e-3 * (body.velocity_m_s.length() + 6.0);
+            let outside = (in_box.abs() - body.size_m / 2.0).max_element();
+            assert!(outside < margin_m, "object {object} of packet {number}: {outside} m outside");
+            n_moving += usize::from(body.velocity_m_s != DVec3::ZERO);
+        }
+    }
+    assert!(n_moving > 200, "{n_moving} points on what moves");
+}
+
+#[test]
+fn sightings_tell_every_point_once_with_its_turn() {
+    let stage = stage(&drive_recipe());
+    let mut drive = Drive::new(&stage, 6.0).unwrap();
+    let packets = drive.fire(0..452).unwrap();
+    let mut sightings = Sightings::default();
+    let mut told: Vec<_> =
+        packets.chunks(100).flat_map(|packets| sightings.add(&drive, packets)).collect();
+    told.extend(sightings.finish(&drive));
+    let on_objects =
+        |packet: &Packet| packet.scan.object.iter().flatten().filter(|&&object| object > 0).count();
+    let n_points: u32 = told.iter().map(|sighting| sighting.points).sum();
+    assert_eq!(n_points as usize, packets.iter().map(on_objects).sum::<usize>());
+    let keys: Vec<_> = told.iter().map(|sighting| (sighting.turn, sighting.object)).collect();
+    assert!(keys.is_sorted_by(|a, b| a < b), "once each, in order");
+    // 452 packets of 0.66 ms at 10 turns a second.
+    assert_eq!(keys.last().unwrap().0, 2);
+    for sighting in &told {
+        let since_s = sighting.time_s - 946_684_800.0;
+        let turn = f64::from(sighting.turn);
+        assert!((turn..turn + 1.0).contains(&(since_s * 10.0)), "{sighting:?}");
+    }
 }
 
 #[test]
