@@ -227,7 +227,7 @@ impl Capture {
     /// What the system reports.
     pub fn create(path: &Path, rpm: f64) -> Result<Self, FormatError> {
         let mut file = Unfinished::create(path)?;
-        file.append(|writer| pcap::write_header(writer))?;
+        file.append(pcap::write_header)?;
         let packet = Revolution { rpm, n_beams: SEQUENCES_PER_PACKET * LASERS as u32 };
         Ok(Self { file, path: path.to_path_buf(), packet, sequences: 0 })
     }

@@ -13,6 +13,9 @@ const ACCELERATION_M_S2: [f64; 3] = [3.0, 3.0, 0.5];
 /// beams, metres, and a share of the box's length, because other sides come into sight.
 const OFF_M: f64 = 0.1;
 const OFF_SHARE: f64 = 0.05;
+/// By how much two views of a side differ: metres, and a share of it.
+const SIZE_OFF_M: f64 = 0.2;
+const SIZE_OFF_SHARE: f64 = 0.3;
 /// What is kept of a side from turn to turn, when less is seen of it: what was one with a
 /// neighbour is not taken for larger than it is for long.
 const SHRINKAGE: f64 = 0.99;
@@ -100,6 +103,17 @@ impl Footprint {
         middle
     }
 
+    /// How little what is seen of an object has the size of the whole: squares of the sides'
+    /// differences in units of what other views of the same object differ by.
+    fn mismatch(&self, seen: &Seen<'_>) -> f64 {
+        let (sides, _) = self.sides_of(seen);
+        let term = |i: usize| {
+            let larger = sides[i].max(self.sides_m[i]);
+            ((sides[i] - self.sides_m[i]) / (SIZE_OFF_M + SIZE_OFF_SHARE * larger)).powi(2)
+        };
+        term(0) + term(1)
+    }
+
     fn update(&mut self, seen: &Seen<'_>) {
         let (sides, yaw_rad) = self.sides_of(seen);
         let grown = |i: usize| sides[i].max(SHRINKAGE * self.sides_m[i]);
@@ -140,7 +154,7 @@ impl Track {
             distance += (middle[i] - axis.place).powi(2) / variance;
             logarithm += variance.ln();
         }
-        (distance <= GATE).then_some(distance + logarithm)
+        (distance <= GATE).then_some(distance + logarithm + self.footprint.mismatch(seen))
     }
 
     fn update(&mut self, seen: &Seen<'_>) {
