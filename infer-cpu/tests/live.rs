@@ -208,6 +208,20 @@ fn foreign_packets_are_counted_and_each_kind_is_told_once() {
     assert!(pipeline.new_flaws().is_empty());
 }
 
+/// One packet that is not the sensor's must not make the pipeline deaf to it.
+#[test]
+fn a_sensor_that_is_replaced_by_another_model_is_taken_after_a_while() {
+    let sent = packets(&street(), 5_000, 2 * PACKETS_PER_S);
+    let mut stranger = sent[0];
+    stranger[1205] = 0x28;
+    let mut pipeline = pipeline(&LiveOptions::default());
+    let objects = run(&mut pipeline, [(0.0, &stranger[..])].into_iter().chain(on_time(&sent)));
+    let counts = pipeline.counts();
+    assert_eq!((counts.foreign, counts.restarts), (300, 1));
+    assert_eq!(counts.packets, sent.len() as u64 + 1 - 300);
+    assert!(objects.len() > 30, "{}", objects.len());
+}
+
 /// The world stands still, and the sensor drives and turns: seen from it, all moves.
 #[test]
 fn with_the_sensors_motion_what_stands_still_stands_still() {

@@ -82,6 +82,12 @@ typedef enum EdgepuckStatus {
 typedef struct EdgepuckClassifier EdgepuckClassifier;
 
 /**
+ * From the packets of a LiDAR to named, tracked objects: made by
+ * edgepuck_live_open, unmade by edgepuck_live_close.
+ */
+typedef struct EdgepuckLive EdgepuckLive;
+
+/**
  * How a classifier computes. Begin with edgepuck_options_default, then change
  * what you like. Choices are words, the same as on infer-cpu's command line;
  * a word that names nothing gives an error that lists those that do.
@@ -211,6 +217,85 @@ typedef struct EdgepuckPrediction {
   bool is_unknown;
 } EdgepuckPrediction;
 
+/**
+ * An object, as edgepuck_live_next tells it.
+ */
+typedef struct EdgepuckObject {
+  /**
+   * A number that stays with the object from turn to turn.
+   */
+  uint64_t track;
+  /**
+   * The number of the turn, from 0.
+   */
+  uint64_t turn;
+  /**
+   * The class by all that was seen of the object, or "unknown"; UTF-8, for as
+   * long as the pipeline lives. Null while it has had too few points.
+   */
+  const char *class_name;
+  /**
+   * The probability of the class that the object is most like, by all that
+   * was seen of it, 0 to 1; NaN while there is none.
+   */
+  double probability;
+  /**
+   * The middle of the box around the points, metres, in the sensor's frame.
+   */
+  double position_m[3];
+  /**
+   * Length, width and height of that box, metres.
+   */
+  double size_m[3];
+  /**
+   * The direction of the length, degrees counterclockwise from x, -90 to 90.
+   */
+  double yaw_deg;
+  /**
+   * Metres a second, relative to the sensor; NaN of what was seen once.
+   */
+  double velocity_m_s[3];
+  /**
+   * The number of points.
+   */
+  size_t n_points;
+  /**
+   * When the first point was measured, seconds of Unix time by the sensor's
+   * clock.
+   */
+  double first_s;
+  /**
+   * When the last point was.
+   */
+  double last_s;
+} EdgepuckObject;
+
+/**
+ * Packets since the start.
+ */
+typedef struct EdgepuckLiveCounts {
+  /**
+   * Packets that were decoded.
+   */
+  uint64_t packets;
+  /**
+   * Packets that are missing by the time stamps of those that came.
+   */
+  uint64_t lost;
+  /**
+   * Packets that came late or twice.
+   */
+  uint64_t late;
+  /**
+   * Packets that are not the sensor's data.
+   */
+  uint64_t foreign;
+  /**
+   * How often the sensor or its clock began anew.
+   */
+  uint64_t restarts;
+} EdgepuckLiveCounts;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -302,6 +387,83 @@ void edgepuck_free(struct EdgepuckClassifier *classifier);
  * The text is UTF-8 and this thread's: it is gone when another call fails.
  */
 const char *edgepuck_last_error(void);
+
+/**
+ * Opens a pipeline whose clusters are classified by the model file at path, as
+ * options ask (null: the defaults) and by as many threads; those of fewer than
+ * min_points points are not classified. The sensor is a Velodyne VLP-16 or
+ * VLP-32C, or, if metadata is not null, the Ouster whose metadata file (JSON)
+ * that names. Writes the pipeline to out, or null when it fails. Pass it to
+ * edgepuck_live_close in the end.
+ *
+ * # Safety
+ *
+ * path is null or a NUL-terminated string, as are metadata and every word of
+ * options; options is null or valid; out is null or may be written to.
+ */
+enum EdgepuckStatus edgepuck_live_open(const char *path,
+                                       const struct EdgepuckOptions *options,
+                                       const char *metadata,
+                                       size_t min_points,
+                                       struct EdgepuckLive **out);
+
+/**
+ * Takes what one UDP packet of the sensor carries, n_bytes at packet, which
+ * came at time_s of Unix time in seconds. Whatever it holds, it is decoded or
+ * counted: see edgepuck_live_counts. Then ask edgepuck_live_next.
+ *
+ * # Safety
+ *
+ * live is null or comes from edgepuck_live_open, is not closed, and no other
+ * thread uses it now; packet is null or n_bytes bytes can be read there.
+ */
+enum EdgepuckStatus edgepuck_live_take(struct EdgepuckLive *live,
+                                       const uint8_t *packet,
+                                       size_t n_bytes,
+                                       double time_s);
+
+/**
+ * Ends what is not complete, as at the end of a recording. Then ask
+ * edgepuck_live_next.
+ *
+ * # Safety
+ *
+ * live is null or comes from edgepuck_live_open, is not closed, and no other
+ * thread uses it now.
+ */
+enum EdgepuckStatus edgepuck_live_end(struct EdgepuckLive *live);
+
+/**
+ * Writes the next object to out and is true; false if there is none until more
+ * packets are taken, or if a pointer is null.
+ *
+ * # Safety
+ *
+ * live is null or comes from edgepuck_live_open, is not closed, and no other
+ * thread uses it now; out is null or may be written to.
+ */
+bool edgepuck_live_next(struct EdgepuckLive *live, struct EdgepuckObject *out);
+
+/**
+ * Writes what came and what did not to out.
+ *
+ * # Safety
+ *
+ * live is null or comes from edgepuck_live_open, is not closed, and no other
+ * thread takes packets with it now; out is null or may be written to.
+ */
+enum EdgepuckStatus edgepuck_live_counts(const struct EdgepuckLive *live,
+                                         struct EdgepuckLiveCounts *out);
+
+/**
+ * Closes a pipeline; null is none.
+ *
+ * # Safety
+ *
+ * live is null or comes from edgepuck_live_open; nobody uses it, or a name
+ * that it gave, now or later.
+ */
+void edgepuck_live_close(struct EdgepuckLive *live);
 
 /**
  * The options of a classifier that is loaded without any.

@@ -6,6 +6,7 @@
 
 mod classifier;
 mod failure;
+mod live;
 mod options;
 mod pointers;
 mod prediction;
@@ -16,6 +17,10 @@ pub use classifier::{
     edgepuck_logits, edgepuck_n_classes, edgepuck_version,
 };
 pub use failure::edgepuck_last_error;
+pub use live::{
+    EdgepuckLive, EdgepuckLiveCounts, EdgepuckObject, edgepuck_live_close, edgepuck_live_counts,
+    edgepuck_live_end, edgepuck_live_next, edgepuck_live_open, edgepuck_live_take,
+};
 pub use options::{EdgepuckOptions, edgepuck_options_default};
 pub use prediction::EdgepuckPrediction;
 pub use status::EdgepuckStatus;

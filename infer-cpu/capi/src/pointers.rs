@@ -64,6 +64,20 @@ pub unsafe fn cloud<'a>(xyz: *const f32, n: usize) -> Result<&'a [[f32; 3]], Fai
     }
 }
 
+/// The bytes of a packet.
+///
+/// # Safety
+/// If `packet` is not null, `n` bytes lie there that nobody changes during `'a`.
+pub unsafe fn bytes<'a>(packet: *const u8, n: usize) -> Result<&'a [u8], Failure> {
+    check(packet, "packet")?;
+    if isize::try_from(n).is_err() {
+        let message = format!("expected a packet that fits in memory, found {n} bytes");
+        return Err(Failure::new(EdgepuckStatus::BadPointer, message));
+    }
+    // SAFETY: not null, and no longer than a slice may be; the rest is the caller's promise.
+    Ok(unsafe { std::slice::from_raw_parts(packet, n) })
+}
+
 /// The path at `pointer`: bytes as they are on Unix, UTF-8 elsewhere.
 ///
 /// # Safety

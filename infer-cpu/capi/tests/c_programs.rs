@@ -4,11 +4,15 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[path = "../../tests/support/street.rs"]
+#[allow(dead_code, reason = "the tests of infer-cpu use all of it")]
+mod street;
 mod support;
 
 use std::path::Path;
 use std::process::{Command, Output};
 
+use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline};
 use infer_cpu::{Classifier, Options};
 use support::Compiler;
 use test_support::need;
@@ -50,6 +54,47 @@ fn the_example_gives_what_the_rust_library_gives() {
 
     let rod = run(&example, &[&model]);
     assert!(text(&rod.stdout).starts_with("z ("), "{}", text(&rod.stdout));
+}
+
+/// A second of a VLP-16 in a street, as a capture and as the Rust library answers it.
+#[test]
+fn the_example_of_packets_gives_what_the_rust_library_gives() {
+    let compiler = need!(Compiler::c());
+    let example = compiler.compile("examples/live.c", &support::static_link());
+    let model = compiler.folder().join("model.safetensors");
+    support::write_longest_axis_model(&model);
+    let sent = street::packets(&street::street(), 7, street::PACKETS_PER_S);
+    let time_us = |i: usize| 1_000_000_000 + (i as f64 * street::PACKET_S * 1e6) as u64;
+    let capture = compiler.folder().join("drive.pcap");
+    let timed = sent.iter().enumerate().map(|(i, packet)| (time_us(i), &packet[..]));
+    std::fs::write(&capture, street::capture(timed)).unwrap();
+
+    let classifier = Classifier::load(&model, &Options::default()).unwrap();
+    let mut pipeline = Pipeline::new(classifier, &LiveOptions::default()).unwrap();
+    let mut expected = String::new();
+    let mut write = |object: &Object| {
+        let [x, y, z] = object.position_m;
+        let class = object.class.as_deref().unwrap_or("-");
+        let line = format!("{} {class} {x:.3} {y:.3} {z:.3} {}\n", object.track, object.points);
+        expected.push_str(&line);
+    };
+    for (i, packet) in sent.iter().enumerate() {
+        let (seconds, micros) = (time_us(i) / 1_000_000, time_us(i) % 1_000_000);
+        let time_s = seconds as f64 + 1e-6 * micros as f64;
+        pipeline.take(packet, Arrival { time_s, moment: None });
+        pipeline.answer(&mut write);
+    }
+    pipeline.end();
+    pipeline.answer(&mut write);
+    let output = run(&example, &[&model, &capture]);
+    assert_eq!(text(&output.stderr), "754 packets, 0 lost, 0 of something else\n");
+    assert_eq!(text(&output.stdout), expected);
+    assert!(expected.lines().count() > 20);
+
+    std::fs::write(&capture, "no capture").unwrap();
+    let output = run(&example, &[&model, &capture]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("expected a capture"), "{}", text(&output.stderr));
 }
 
 #[test]

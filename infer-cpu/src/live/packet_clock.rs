@@ -27,6 +27,8 @@ struct Last {
 /// What a packet is after the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Succession {
+    /// There is none before.
+    First,
     /// It follows, after so many that are missing.
     Follows {
         /// The packets between.
@@ -52,7 +54,7 @@ impl PacketClock {
         let began = Last { stamp_us, duration_us, time_s: arrival_s };
         let Some(last) = self.last else {
             self.last = Some(began);
-            return (Succession::Restart, arrival_s);
+            return (Succession::First, arrival_s);
         };
         let mut step_us = stamp_us - last.stamp_us;
         if let Some(wraps_us) = self.wraps_us {
@@ -91,7 +93,7 @@ mod tests {
     fn missing_late_and_repeated_packets_are_told_apart() {
         let mut clock = PacketClock::new(Some(HOUR_US));
         let mut take = |stamp: f64| clock.take(stamp, 600.0, 50.0 + stamp * 1e-6).0;
-        assert_eq!(take(1000.0), Succession::Restart);
+        assert_eq!(take(1000.0), Succession::First);
         assert_eq!(take(1600.0), follows(0));
         assert_eq!(take(3401.0), follows(2));
         assert_eq!(take(3401.0), Succession::Duplicate);

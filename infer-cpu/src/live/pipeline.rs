@@ -29,6 +29,10 @@ const ROOM_PER_RING: u32 = 8192;
 /// Times of arrival that are believed, seconds of Unix time: three thousand years.
 const LIKELY_S: RangeInclusive<f64> = 0.0..=1e11;
 
+/// So many packets of another model, and none of the sensor's own in between, mean that the sensor
+/// is another one: some tenths of a second of packets.
+const MOST_FOREIGN: u32 = 300;
+
 /// The widest columns, degrees: a sensor's steps are narrower, unless its packet is damaged.
 const WIDEST_DEG: f32 = 1.0;
 
@@ -110,7 +114,8 @@ struct Sensor {
     stream: Stream<Tag>,
     /// When its first packet came, seconds of Unix time.
     start_s: f64,
-    n_packets: u64,
+    /// Packets since its last one that were not its data.
+    n_foreign: u32,
 }
 
 /// What is known of a point besides its place.
@@ -184,75 +189,91 @@ impl Pipeline {
         if !LIKELY_S.contains(&arrival.time_s) {
             arrival.time_s = 0.0;
         }
-        if let Err(flaw) = self.take_data(payload, arrival) {
-            self.counts.foreign += 1;
-            if !self.flaws.iter().any(|known| known.is_like(&flaw)) {
-                self.flaws.push(flaw);
+        let Err(flaw) = self.take_data(payload, arrival) else { return };
+        self.counts.foreign += 1;
+        if let Some(sensor) = &mut self.sensor {
+            sensor.n_foreign += 1;
+            // Whoever sent the first packet sends no more, and somebody else does.
+            if flaw.is_of_another_model() && sensor.n_foreign >= MOST_FOREIGN {
+                self.end();
+                self.sensor = None;
+                self.counts.restarts += 1;
+                self.tracker.forget();
             }
+        }
+        if !self.flaws.iter().any(|known| known.is_like(&flaw)) {
+            self.flaws.push(flaw);
         }
     }
 
     fn take_data(&mut self, payload: &[u8], arrival: Arrival) -> Result<(), Flaw> {
-        let Self { sensor, options, returns, waiting, stats, .. } = self;
+        let Self { sensor, options, returns, stats, .. } = self;
         let start = Instant::now();
         let sensor = match sensor {
             Some(sensor) => sensor,
             None => sensor.insert(Sensor::new(payload, options, arrival.time_s)?),
         };
         let facts = sensor.decoder.decode(payload, returns)?;
+        sensor.n_foreign = 0;
         let decoded = Instant::now();
         stats.spend(Stage::Decode, decoded - start);
         let (succession, time_s) =
             sensor.clock.take(facts.stamp_us, facts.duration_us, arrival.time_s);
-        let start_s = sensor.start_s;
-        let motion = options.ego_motion.as_ref().map(|motion| Motion { motion, start_s });
+        if self.is_in_order(succession, &facts) {
+            self.segment(&facts, Tag { time_s, moment: arrival.moment });
+        }
+        self.stats.spend(Stage::Segment, decoded.elapsed());
+        Ok(())
+    }
+
+    /// Counts what a packet is after the one before. Whether its returns are wanted; if they are
+    /// far behind those before, these are ended.
+    fn is_in_order(&mut self, succession: Succession, facts: &Facts) -> bool {
         match succession {
-            Succession::Duplicate => {
-                self.counts.duplicated += 1;
-                return Ok(());
-            }
-            Succession::Late => {
-                self.counts.late += 1;
-                return Ok(());
-            }
-            Succession::Restart if sensor.n_packets > 0 => {
+            Succession::Duplicate => self.counts.duplicated += 1,
+            Succession::Late => self.counts.late += 1,
+            Succession::First => {}
+            Succession::Restart => {
                 self.counts.restarts += 1;
-                sensor.end(waiting, motion);
+                self.end();
                 self.tracker.forget();
             }
-            Succession::Restart => {}
             Succession::Follows { missing } => {
                 self.counts.lost += missing.saturating_sub(facts.n_unsent);
                 // Beyond a quarter of a turn, the azimuth does not tell how far the head is.
                 let turned_rad = missing as f64 * facts.duration_us * facts.speed_rad_us;
                 if turned_rad > FRAC_PI_2 {
-                    sensor.end(waiting, motion);
+                    self.end();
                 }
             }
         }
-        sensor.n_packets += 1;
-        self.counts.packets += 1;
-        self.counts.points += returns.len() as u64;
+        !matches!(succession, Succession::Duplicate | Succession::Late)
+    }
+
+    /// Takes the decoded returns of a packet into the stream.
+    fn segment(&mut self, facts: &Facts, packet: Tag) {
+        let Self { sensor: Some(sensor), options, returns, waiting, counts, .. } = self else {
+            return;
+        };
+        let motion = sensor.motion(options);
+        counts.packets += 1;
+        counts.points += returns.len() as u64;
         if facts.speed_rad_us > 0.0 {
             self.tracker.set_turn(TAU / facts.speed_rad_us * 1e-6);
         }
         let n_turns = sensor.stream.n_turns();
-        let moment = arrival.moment;
-        sensor.push(&facts, returns, Tag { time_s, moment }, waiting, motion);
+        sensor.push(facts, returns, packet, waiting, motion);
         let dropped = sensor.stream.dropped();
-        self.counts.dropped_points = dropped.late + dropped.overflow;
-        stats.spend(Stage::Segment, decoded.elapsed());
+        counts.dropped_points = dropped.late + dropped.overflow;
         if sensor.stream.n_turns() > n_turns {
-            stats.end_turn();
+            self.stats.end_turn();
         }
-        Ok(())
     }
 
     /// Ends what is not complete, as at the end of a recording.
     pub fn end(&mut self) {
         let Self { sensor: Some(sensor), waiting, options, .. } = self else { return };
-        let start_s = sensor.start_s;
-        let motion = options.ego_motion.as_ref().map(|motion| Motion { motion, start_s });
+        let motion = sensor.motion(options);
         sensor.end(waiting, motion);
     }
 
@@ -263,8 +284,7 @@ impl Pipeline {
             return;
         }
         let start = Instant::now();
-        let start_s = self.sensor.as_ref().map_or(0.0, |sensor| sensor.start_s);
-        let motion = self.options.ego_motion.as_ref().map(|motion| Motion { motion, start_s });
+        let motion = self.sensor.as_ref().and_then(|sensor| sensor.motion(&self.options));
         self.namer.name(&self.waiting, self.options.min_points);
         let named = Instant::now();
         self.stats.spend(Stage::Classify, named - start);
@@ -348,7 +368,7 @@ impl Sensor {
         let stream = Stream::new(settings, n_rings * ROOM_PER_RING)
             .expect("invariant: settings were checked, and a sensor's elevations are right");
         let clock = PacketClock::new(decoder.wraps_us());
-        Ok(Self { decoder, clock, stream, start_s, n_packets: 0 })
+        Ok(Self { decoder, clock, stream, start_s, n_foreign: 0 })
     }
 
     /// Takes in the returns of a packet, which is of the time that `packet` says.
@@ -369,6 +389,12 @@ impl Sensor {
             let tag = Tag { time_s: packet.time_s + found.after_us * 1e-6, ..packet };
             stream.push(found.point_m, found.ring, tag);
         }
+    }
+
+    /// How it moves, if `options` tell.
+    fn motion<'a>(&self, options: &'a LiveOptions) -> Option<Motion<'a>> {
+        let start_s = self.start_s;
+        options.ego_motion.as_ref().map(|motion| Motion { motion, start_s })
     }
 
     fn end(&mut self, waiting: &mut Waiting, motion: Option<Motion<'_>>) {

@@ -20,6 +20,11 @@ pub enum Flaw {
 }
 
 impl Flaw {
+    /// Whether it is the data of another sensor.
+    pub(super) fn is_of_another_model(&self) -> bool {
+        matches!(self, Self::Velodyne(velodyne::PacketError::OtherModel { .. }))
+    }
+
     /// Whether the other differs in its numbers at most.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {

@@ -26,6 +26,9 @@ const MOST_HIDDEN_M: f64 = 4.0;
 const GATE: f64 = 11.34;
 /// How long a track waits for its object, seconds.
 const PATIENCE_S: f64 = 1.05;
+/// Sensors turn 5 to 20 times a second; a damaged packet may say anything.
+const LEAST_TURN_S: f64 = 0.02;
+const MOST_TURN_S: f64 = 0.4;
 /// The most tracks: what comes on top replaces the track that has waited longest.
 const MOST_TRACKS: usize = 1024;
 /// The weight of the latest view among all of a track, at least: some two seconds count at
@@ -205,7 +208,7 @@ impl Tracker {
 
     /// Says how long a turn takes, seconds.
     pub fn set_turn(&mut self, turn_s: f64) {
-        self.turn_s = turn_s;
+        self.turn_s = turn_s.clamp(LEAST_TURN_S, MOST_TURN_S);
     }
 
     /// Forgets all objects; numbers go on.
