@@ -190,10 +190,12 @@ fn what_cannot_be_listened_to_is_named() {
         "error: invalid value 'nan' for '--twist",
     );
     let address = format!("127.0.0.1:{port}");
+    // In the words of the system.
+    let in_use = UdpSocket::bind(&address).unwrap_err();
     refused(
         &format!("--udp {port} --interface 127.0.0.1"),
         1,
-        &format!("error: UDP {address}: Address already in use"),
+        &format!("error: UDP {address}: {in_use}"),
     );
     refused("--udp 2368 --multicast 10.0.0.1", 1, "error: UDP 0.0.0.0:2368: ");
 }
