@@ -1,0 +1,188 @@
+//! Messages of named, tracked objects.
+
+use serde::Deserialize;
+
+use crate::messages::{
+    BoundingBox3D, ColorRGBA, Detection3D, Detection3DArray, Duration, Header, Marker, MarkerArray,
+    ObjectHypothesis, ObjectHypothesisWithPose, Point, Pose, PoseWithCovariance, Quaternion, Time,
+    Vector3,
+};
+
+/// How long a marker is shown that no later one replaces, seconds: a turn and a half at 10 Hz.
+pub const MARKER_LIFETIME_S: f64 = 0.15;
+
+/// The height of letters, metres.
+const LETTER_M: f64 = 0.4;
+
+/// What messages need of an object as a line of `infer-cpu live` has it, version 1; keys that are
+/// not here are passed over.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Object {
+    /// The number of the turn, from 0.
+    pub turn: u64,
+    /// The number of its track, from 1.
+    pub track: u64,
+    /// Its class, or `unknown`; `None` where it had too few points to be classified.
+    pub class: Option<String>,
+    /// The probability of its class by all clusters of the track.
+    pub probability: Option<f64>,
+    /// The frame of `position_m` and `yaw_deg`.
+    pub frame: String,
+    /// The middle of its box, metres.
+    pub position_m: [f64; 3],
+    /// Length, width and height of its box, metres.
+    pub size_m: [f64; 3],
+    /// The direction of its length, degrees counterclockwise from x.
+    pub yaw_deg: f64,
+    /// When its last point was measured, seconds of Unix time.
+    pub last_s: f64,
+}
+
+impl Object {
+    fn header(&self) -> Header {
+        Header { stamp: Time::from_s(self.last_s), frame_id: self.frame.clone() }
+    }
+
+    fn pose(&self) -> Pose {
+        let [x, y, z] = self.position_m;
+        Pose { position: Point { x, y, z }, orientation: Quaternion::from_yaw_deg(self.yaw_deg) }
+    }
+
+    fn size(&self) -> Vector3 {
+        let [x, y, z] = self.size_m;
+        Vector3 { x, y, z }
+    }
+
+    fn detection(&self) -> Detection3D {
+        let hypothesis = |class: &String| ObjectHypothesisWithPose {
+            hypothesis: ObjectHypothesis {
+                class_id: class.clone(),
+                score: self.probability.unwrap_or_default(),
+            },
+            pose: PoseWithCovariance { pose: self.pose(), ..PoseWithCovariance::default() },
+        };
+        Detection3D {
+            header: self.header(),
+            results: self.class.iter().map(hypothesis).collect(),
+            bbox: BoundingBox3D { center: self.pose(), size: self.size() },
+            id: self.track.to_string(),
+        }
+    }
+
+    /// A box, and a text above it.
+    fn markers(&self) -> [Marker; 2] {
+        let cube = Marker {
+            header: self.header(),
+            ns: "boxes".to_owned(),
+            // ROS has half as many numbers as tracks could have in 2^31 turns.
+            id: (self.track % i32::MAX as u64) as i32,
+            kind: Marker::CUBE,
+            pose: self.pose(),
+            scale: self.size(),
+            color: color(self.class.as_deref()),
+            lifetime: Duration { sec: 0, nanosec: (MARKER_LIFETIME_S * 1e9) as u32 },
+            ..Marker::default()
+        };
+        let mut text = Marker {
+            ns: "names".to_owned(),
+            kind: Marker::TEXT_VIEW_FACING,
+            scale: Vector3 { x: 0.0, y: 0.0, z: LETTER_M },
+            color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
+            text: format!("{} {}", self.class.as_deref().unwrap_or("?"), self.track),
+            ..cube.clone()
+        };
+        text.pose.position.z += self.size_m[2] / 2.0 + LETTER_M;
+        [cube, text]
+    }
+}
+
+/// The objects of a turn. The array's time and frame are those of the last object.
+#[must_use]
+pub fn detections(objects: &[Object]) -> Detection3DArray {
+    Detection3DArray {
+        header: objects.last().map(Object::header).unwrap_or_default(),
+        detections: objects.iter().map(Object::detection).collect(),
+    }
+}
+
+/// The objects of a turn for RViz and other viewers: a box and a text each, whose `id` is the
+/// track.
+#[must_use]
+pub fn markers(objects: &[Object]) -> MarkerArray {
+    MarkerArray { markers: objects.iter().flat_map(Object::markers).collect() }
+}
+
+/// A colour that a class has in every run: a hue by its name; grey where it has no class.
+fn color(class: Option<&str>) -> ColorRGBA {
+    let Some(class) = class.filter(|class| *class != "unknown") else {
+        return ColorRGBA { r: 0.6, g: 0.6, b: 0.6, a: 0.5 };
+    };
+    // FNV-1a, 32 bits (RFC 9923).
+    let hash = class
+        .bytes()
+        .fold(0x811c_9dc5u32, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+    // A hue of full saturation: each of red, green and blue is a third of a turn further.
+    let hue = (hash % 360) as f32 / 60.0;
+    let share = |shift: f32| (((hue + shift) % 6.0 - 3.0).abs() - 1.0).clamp(0.0, 1.0);
+    ColorRGBA { r: share(0.0), g: share(4.0), b: share(2.0), a: 0.5 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Message;
+
+    const LINE: &str = r#"{"version":1,"turn":3,"track":7,"class":"car","resembles":"car",
+        "confidence":0.9,"probability":0.8,"frame":"sensor","position_m":[1.0,2.0,3.0],
+        "size_m":[4.0,2.0,1.5],"yaw_deg":90.0,"velocity_m_s":null,"points":99,"range_m":2.2,
+        "first_s":9.9,"last_s":10.25,"latency_ms":null}"#;
+
+    fn object() -> Object {
+        serde_json::from_str(LINE).unwrap()
+    }
+
+    #[test]
+    fn a_line_becomes_a_detection() {
+        let array = detections(&[object()]);
+        let [detection] = &array.detections[..] else { panic!("{array:?}") };
+        assert_eq!(array.header.stamp, Time { sec: 10, nanosec: 250_000_000 });
+        assert_eq!((array.header.frame_id.as_str(), detection.id.as_str()), ("sensor", "7"));
+        assert_eq!(detection.bbox.center.position, Point { x: 1.0, y: 2.0, z: 3.0 });
+        assert!((detection.bbox.center.orientation.z - 0.5f64.sqrt()).abs() < 1e-15);
+        let hypothesis = &detection.results[0].hypothesis;
+        assert_eq!((hypothesis.class_id.as_str(), hypothesis.score), ("car", 0.8));
+        let nameless = Object { class: None, ..object() };
+        assert_eq!(detections(&[nameless]).detections[0].results, []);
+    }
+
+    #[test]
+    fn a_line_becomes_a_box_and_a_text_that_a_later_one_of_its_track_replaces() {
+        let array = markers(&[object(), Object { class: None, ..object() }]);
+        let [cube, text, nameless, _] = &array.markers[..] else { panic!("{array:?}") };
+        assert_eq!((cube.kind, cube.id, cube.ns.as_str()), (1, 7, "boxes"));
+        assert_eq!((text.kind, text.id, text.text.as_str()), (9, 7, "car 7"));
+        assert_eq!(cube.lifetime, Duration { sec: 0, nanosec: 150_000_000 });
+        assert!(text.pose.position.z > cube.pose.position.z + 0.75);
+        let names = ["car", "pedestrian", "cyclist", "truck"];
+        for (i, name) in names.iter().enumerate() {
+            assert!(names[..i].iter().all(|other| color(Some(name)) != color(Some(other))));
+        }
+        assert_eq!(nameless.color, color(Some("unknown")));
+    }
+
+    /// By hand, from the definition and CDR's rule that a number of n bytes lies at a multiple of
+    /// n after the encapsulation.
+    #[test]
+    fn bytes_are_plain_cdr() {
+        let bytes = detections(&[object()]).to_cdr();
+        let mut expected = vec![0, 1, 0, 0, 10, 0, 0, 0];
+        expected.extend(250_000_000u32.to_le_bytes());
+        expected.extend(*b"\x07\0\0\0sensor\0\0\x01\0\0\0");
+        assert_eq!(bytes[..expected.len()], expected);
+        // The end: three f64 of the size, and the id.
+        let end = bytes.len() - 6;
+        assert_eq!(bytes[end..], *b"\x02\0\0\x007\0");
+        assert_eq!(bytes[end - 8..end], 1.5f64.to_le_bytes());
+        assert_eq!((end - 4) % 8, 0);
+    }
+}
