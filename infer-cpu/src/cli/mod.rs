@@ -4,7 +4,7 @@ mod bench;
 mod classify;
 mod input;
 mod inspect;
-#[cfg(feature = "live")]
+#[cfg(feature = "mcap")]
 mod live;
 mod model;
 mod names;
@@ -36,7 +36,7 @@ enum Command {
     /// Show the layers of a model file, their sizes and operation counts
     Inspect(inspect::Args),
     /// Name and track the objects that a LiDAR sees, from its packets, as they come
-    #[cfg(feature = "live")]
+    #[cfg(feature = "mcap")]
     Live(Box<live::Args>),
     /// Measure the latency on this machine
     Bench(Box<bench::Args>),
@@ -51,7 +51,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Classify(args) => classify::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Inspect(args) => inspect::run(args),
-        #[cfg(feature = "live")]
+        #[cfg(feature = "mcap")]
         Command::Live(args) => live::run(args),
         Command::Bench(args) => {
             bench::run(args, &model::find(args.model.as_deref())?).map(|()| Outcome::Success)

@@ -29,6 +29,8 @@ mod kalman;
 mod object;
 mod packet_clock;
 mod pipeline;
+#[cfg(feature = "mcap")]
+mod recorder;
 mod sensor;
 mod stats;
 mod tracker;
@@ -36,6 +38,8 @@ mod tracker;
 pub use counts::Counts;
 pub use ego_motion::{EgoMotion, EgoMotionError, Pose};
 pub use object::{Object, SCHEMA_VERSION};
-pub use pipeline::{Arrival, LiveError, LiveOptions, Pipeline};
+pub use pipeline::{Arrival, Decoded, LiveError, LiveOptions, Pipeline};
+#[cfg(feature = "mcap")]
+pub use recorder::{RecordError, Recorder};
 pub use sensor::Flaw;
 pub use stats::{Stage, Stats};

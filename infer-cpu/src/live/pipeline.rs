@@ -89,6 +89,17 @@ impl Arrival {
     }
 }
 
+/// What a packet held.
+#[derive(Clone, Copy, Debug)]
+pub struct Decoded<'a> {
+    /// Its returns, in the sensor's frame. Their times count from `time_s`.
+    pub returns: &'a [Return],
+    /// When it was sent by the sensor's clock, seconds of Unix time.
+    pub time_s: f64,
+    /// The number of the turn, from 0.
+    pub turn: u64,
+}
+
 /// Decodes, segments, classifies and tracks what one sensor sends.
 ///
 /// Whatever comes over the network, a packet is decoded or counted; nothing ends the pipeline,
@@ -97,6 +108,8 @@ pub struct Pipeline {
     options: LiveOptions,
     sensor: Option<Sensor>,
     returns: Vec<Return>,
+    /// When the packet of `returns` was sent, seconds of Unix time; `None` where it was not taken.
+    taken_s: Option<f64>,
     waiting: Waiting,
     namer: Namer,
     tracker: Tracker,
@@ -173,6 +186,7 @@ impl Pipeline {
             options: options.clone(),
             sensor: None,
             returns: Vec::new(),
+            taken_s: None,
             waiting: Waiting::default(),
             tracker: Tracker::new(namer.classes.len()),
             namer,
@@ -189,6 +203,7 @@ impl Pipeline {
         if !LIKELY_S.contains(&arrival.time_s) {
             arrival.time_s = 0.0;
         }
+        self.taken_s = None;
         let Err(flaw) = self.take_data(payload, arrival) else { return };
         self.counts.foreign += 1;
         if let Some(sensor) = &mut self.sensor {
@@ -220,6 +235,7 @@ impl Pipeline {
         let (succession, time_s) =
             sensor.clock.take(facts.stamp_us, facts.duration_us, arrival.time_s);
         if self.is_in_order(succession, &facts) {
+            self.taken_s = Some(time_s);
             self.segment(&facts, Tag { time_s, moment: arrival.moment });
         }
         self.stats.spend(Stage::Segment, decoded.elapsed());
@@ -272,6 +288,7 @@ impl Pipeline {
 
     /// Ends what is not complete, as at the end of a recording.
     pub fn end(&mut self) {
+        self.taken_s = None;
         let Self { sensor: Some(sensor), waiting, options, .. } = self else { return };
         let motion = sensor.motion(options);
         sensor.end(waiting, motion);
@@ -333,6 +350,22 @@ impl Pipeline {
         self.waiting.points.clear();
         self.waiting.clusters.clear();
         self.stats.spend(Stage::Track, named.elapsed());
+    }
+
+    /// What the packet held that [`Pipeline::take`] was given last; `None` where it was late, came
+    /// twice, or was not the sensor's, and after [`Pipeline::end`].
+    #[must_use]
+    pub fn decoded(&self) -> Option<Decoded<'_>> {
+        let turn = self.sensor.as_ref()?.stream.n_turns();
+        self.taken_s.map(|time_s| Decoded { returns: &self.returns, time_s, turn })
+    }
+
+    /// Where the sensor is at `time_s` of Unix time; `None` where its motion is not known or no
+    /// packet has come.
+    #[must_use]
+    pub fn pose(&self, time_s: f64) -> Option<Pose> {
+        let motion = self.sensor.as_ref()?.motion(&self.options);
+        motion.map(|motion| motion.pose(time_s))
     }
 
     /// What came and what did not.

@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::program::Folder;
 use crate::street::{PACKET_S, PACKETS_PER_S, capture, packets, street};
 
-const LIVE: &str = "live --model m.safetensors --threads 1";
+pub const LIVE: &str = "live --model m.safetensors --threads 1";
 
 /// The order of keys is part of the format.
 const KEYS: [&str; 17] = [
@@ -35,7 +35,7 @@ const KEYS: [&str; 17] = [
 ];
 
 /// A folder with a capture `drive.pcap` of one second from Unix time 1000 s on.
-fn folder() -> Folder {
+pub fn folder() -> Folder {
     let folder = Folder::new();
     let sent = packets(&street(), 7, PACKETS_PER_S);
     let time_us = |i: usize| 1_000_000_000 + (i as f64 * PACKET_S * 1e6) as u64;
@@ -97,12 +97,12 @@ fn poses_bring_objects_into_the_world() {
 }
 
 /// A port that is free now.
-fn free_port() -> u16 {
+pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
 /// The program at a port of this machine, once it listens.
-fn listen(folder: &Folder, port: u16, more: &str) -> Child {
+pub fn listen(folder: &Folder, port: u16, more: &str) -> Child {
     let line = format!("{LIVE} --udp {port} --interface 127.0.0.1 {more}");
     let mut command = folder.command(&line);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -112,7 +112,7 @@ fn listen(folder: &Folder, port: u16, more: &str) -> Child {
     child
 }
 
-fn terminate(child: &mut Child) -> (Option<i32>, String) {
+pub fn terminate(child: &mut Child) -> (Option<i32>, String) {
     let kill = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
     assert!(kill.success());
     let mut err = String::new();

@@ -6,13 +6,15 @@
 mod classify;
 mod extremes;
 mod inspect;
-#[cfg(feature = "live")]
+#[cfg(feature = "mcap")]
 mod live;
 mod models;
 mod program;
+#[cfg(feature = "mcap")]
+mod recordings;
 mod sample;
 mod streams;
-#[cfg(feature = "live")]
+#[cfg(feature = "mcap")]
 #[path = "../support/street.rs"]
 #[allow(dead_code, reason = "the tests of the library use all of it")]
 mod street;

@@ -1,9 +1,9 @@
 //! `infer-cpu live`: the objects that a LiDAR sees, as they come.
 
+mod outputs;
 mod report;
 mod source;
 
-use std::io::{self, BufWriter, Write};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,12 +12,13 @@ use std::thread::available_parallelism;
 
 use formats::ouster::Metadata;
 use glam::DVec3;
-use infer_cpu::live::{EgoMotion, LiveOptions, Object, Pipeline};
+use infer_cpu::live::{EgoMotion, LiveOptions, Pipeline, Recorder};
 use infer_cpu::{Classifier, Options, Precision};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::model::ModelArgs;
 use super::{Outcome, Usage, of_setup};
+use outputs::Outputs;
 use source::{Source, Tick};
 
 /// The bundled weights for objects of streets.
@@ -35,6 +36,7 @@ Examples:
   infer-cpu live --udp 7502 --metadata os1.json
   infer-cpu live --pcap drive.pcap --realtime
   infer-cpu live --pcap drive.pcap --poses drive.tum > objects.jsonl
+  infer-cpu live --udp 2368 --mcap drive.mcap
 
 The sensor is a Velodyne VLP-32C or VLP-16, as its first packet tells, or with --metadata an
 Ouster. One line of JSON is
@@ -65,9 +67,15 @@ pub struct Args {
     #[arg(long, requires = "pcap")]
     realtime: bool,
 
-    /// Print JSON lines; the default, unless --stats is given
+    /// Print JSON lines; the default, unless --stats or --mcap is given
     #[arg(long)]
     json: bool,
+
+    /// Record points and objects to a new file that ROS 2, Foxglove and Rerun read: MCAP with
+    /// /points (PointCloud2), /objects (Detection3DArray), /objects/markers (MarkerArray),
+    /// /tf_static and, with --poses or --twist, /tf; each turn is in the file when it ends
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
 
     /// At the end, report the time of each stage, lost packets and memory on standard error
     #[arg(long)]
@@ -134,24 +142,22 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         signal_hook::flag::register(signal, Arc::clone(&is_over))?;
     }
     let source = args.source(&is_over)?;
-    let mut output = Output { lines: BufWriter::new(io::stdout().lock()), failure: None };
-    let prints = args.json || !args.stats;
+    let mut outputs = args.outputs()?;
     let read = source.run(|tick| {
         match tick {
             Tick::Packet(payload, arrival) => pipeline.take(payload, arrival),
             Tick::End => pipeline.end(),
         }
-        pipeline.answer(|object| {
-            if prints {
-                output.write(object);
-            }
-        });
+        pipeline.answer(|object| outputs.object(object));
+        outputs.packet(&pipeline);
         for flaw in pipeline.new_flaws() {
             eprintln!("warning: a packet was passed over, and so are others like it: {flaw}");
         }
-        !is_over.load(Ordering::Relaxed) && output.failure.is_none()
-    })?;
-    output.end()?;
+        !is_over.load(Ordering::Relaxed) && outputs.are_wanted()
+    });
+    let ended = outputs.end(&pipeline);
+    let read = read?;
+    ended?;
     if args.stats {
         report::print(&pipeline, &read);
     }
@@ -187,6 +193,12 @@ impl Args {
         Ok(Pipeline::new(classifier, &options)?)
     }
 
+    fn outputs(&self) -> anyhow::Result<Outputs> {
+        let recorder = self.mcap.as_deref().map(Recorder::create).transpose()?;
+        let prints = self.json || !(self.stats || recorder.is_some());
+        Ok(Outputs::new(prints, recorder))
+    }
+
     fn source(&self, is_over: &Arc<AtomicBool>) -> anyhow::Result<Source> {
         match (&self.pcap, self.udp) {
             (Some(file), _) => Ok(Source::capture(file, self.from, self.realtime)),
@@ -194,33 +206,6 @@ impl Args {
                 let address = (self.interface, port.unwrap_or_default()).into();
                 Source::udp(address, self.multicast, self.from, is_over)
             }
-        }
-    }
-}
-
-/// Lines on standard output.
-struct Output<W: Write> {
-    lines: W,
-    /// Why no line can be written any more.
-    failure: Option<io::Error>,
-}
-
-impl<W: Write> Output<W> {
-    /// Writes an object, and lets nobody wait for it.
-    fn write(&mut self, object: &Object) {
-        if self.failure.is_some() {
-            return;
-        }
-        let line = serde_json::to_writer(&mut self.lines, object).map_err(io::Error::from);
-        let written = line.and_then(|()| writeln!(self.lines)).and_then(|()| self.lines.flush());
-        self.failure = written.err();
-    }
-
-    /// Whoever closes the pipe has seen enough: that is no failure.
-    fn end(self) -> io::Result<()> {
-        match self.failure {
-            Some(failure) if failure.kind() != io::ErrorKind::BrokenPipe => Err(failure),
-            _ => Ok(()),
         }
     }
 }

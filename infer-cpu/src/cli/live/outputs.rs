@@ -1,0 +1,68 @@
+//! Where objects go: lines on standard output, and a recording.
+
+use std::io::{self, BufWriter, ErrorKind, StdoutLock, Write};
+
+use infer_cpu::live::{Object, Pipeline, RecordError, Recorder};
+
+/// What is asked for, and what has become of it.
+pub struct Outputs {
+    lines: Option<BufWriter<StdoutLock<'static>>>,
+    recorder: Option<Recorder>,
+    /// Why lines or the recording ended before the packets did.
+    lines_failure: Option<io::Error>,
+    recorder_failure: Option<RecordError>,
+}
+
+impl Outputs {
+    /// Lines if it `prints`, and what the recorder makes.
+    pub fn new(prints: bool, recorder: Option<Recorder>) -> Self {
+        let lines = prints.then(|| BufWriter::new(io::stdout().lock()));
+        Self { lines, recorder, lines_failure: None, recorder_failure: None }
+    }
+
+    /// Writes an object, and lets nobody wait for it.
+    pub fn object(&mut self, object: &Object) {
+        if let Some(lines) = &mut self.lines {
+            let line = serde_json::to_writer(&mut *lines, object).map_err(io::Error::from);
+            let written = line.and_then(|()| writeln!(lines)).and_then(|()| lines.flush());
+            if let Err(failure) = written {
+                (self.lines, self.lines_failure) = (None, Some(failure));
+            }
+        }
+        if let Some(recorder) = &mut self.recorder {
+            recorder.object(object);
+        }
+    }
+
+    /// Records the packet that `pipeline` has taken, after its objects. A robot needs its answers
+    /// also when its disk is full: if there are lines, they go on.
+    pub fn packet(&mut self, pipeline: &Pipeline) {
+        let Some(recorder) = &mut self.recorder else { return };
+        if let Err(failure) = recorder.packet(pipeline) {
+            if self.lines.is_some() {
+                let cause = &failure.source;
+                eprintln!("warning: the recording ends, the answers go on: {failure}: {cause}");
+            }
+            (self.recorder, self.recorder_failure) = (None, Some(failure));
+        }
+    }
+
+    /// Whether somebody waits for more.
+    pub fn are_wanted(&self) -> bool {
+        self.lines_failure.is_none() && (self.lines.is_some() || self.recorder_failure.is_none())
+    }
+
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// Lines or a recording that could not be written to their end. Whoever closes the pipe of the
+    /// lines has seen enough: that is no error.
+    pub fn end(self, pipeline: &Pipeline) -> anyhow::Result<()> {
+        let recorded = self.recorder.map_or(Ok(()), |recorder| recorder.finish(pipeline));
+        if let Some(failure) = self.lines_failure.filter(|f| f.kind() != ErrorKind::BrokenPipe) {
+            return Err(failure.into());
+        }
+        self.recorder_failure.map_or(recorded, Err)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,140 @@
+//! Recordings of a stream of packets. What is in their messages, `tests/peers/recordings.py`
+//! reads with other software.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::net::UdpSocket;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use mcap::MessageStream;
+use mcap::read::Options;
+
+use crate::live::{LIVE, folder, free_port, listen, terminate};
+use crate::program::Folder;
+use crate::street::{PACKET_S, packets, street};
+
+/// The number of messages of each topic that can be read before the file is damaged, if it is.
+fn n_messages(folder: &Folder, name: &str) -> BTreeMap<String, usize> {
+    let bytes = fs::read(folder.path(name)).unwrap();
+    let mut counts = BTreeMap::new();
+    let damaged_end = Options::IgnoreEndMagic;
+    for message in MessageStream::new_with_options(&bytes, damaged_end.into()).unwrap() {
+        let Ok(message) = message else { break };
+        *counts.entry(message.channel.topic.clone()).or_default() += 1;
+    }
+    counts
+}
+
+#[test]
+fn a_recording_has_a_cloud_and_the_objects_of_each_turn() {
+    let folder = folder();
+    let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --mcap run.mcap"));
+    assert_eq!((ran.code, ran.out.as_str(), ran.err.as_str()), (0, "", ""));
+    // A second.
+    let per_turn = ["/points", "/objects", "/objects/markers"].map(|topic| (topic.to_owned(), 10));
+    let mut expected = BTreeMap::from(per_turn);
+    expected.insert("/tf_static".to_owned(), 1);
+    assert_eq!(n_messages(&folder, "run.mcap"), expected);
+    // The end is whole too, with an index.
+    let bytes = fs::read(folder.path("run.mcap")).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    assert_eq!(summary.stats.unwrap().message_count, 31);
+
+    // With the motion of the sensor, there is a pose a turn.
+    let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --mcap w.mcap --twist 1 0 0 0 0 0"));
+    assert_eq!(ran.code, 0);
+    expected.insert("/tf".to_owned(), 10);
+    assert_eq!(n_messages(&folder, "w.mcap"), expected);
+
+    // It changes no answer, and not by one byte from run to run.
+    let plain = folder.run(&format!("{LIVE} --pcap drive.pcap"));
+    let both = folder.run(&format!("{LIVE} --pcap drive.pcap --json --mcap again.mcap"));
+    assert_eq!(both.out, plain.out);
+    assert!(fs::read(folder.path("again.mcap")).unwrap() == bytes);
+}
+
+#[test]
+fn a_recording_replaces_no_file_and_one_of_nothing_is_not_left() {
+    let folder = folder();
+    folder.write("precious.mcap", "an hour of driving");
+    let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --mcap precious.mcap"));
+    ran.assert_refused(1, "error: precious.mcap: expected a name that no file has, found a file");
+    assert_eq!(fs::read(folder.path("precious.mcap")).unwrap(), b"an hour of driving");
+    folder
+        .run(&format!("{LIVE} --pcap drive.pcap --mcap no/folder.mcap"))
+        .assert_refused(1, "error: no/folder.mcap: ");
+    for (line, code) in [("--pcap absent.pcap", 1), ("--pcap drive.pcap --from 10.0.0.1", 2)] {
+        let ran = folder.run(&format!("{LIVE} {line} --mcap nothing.mcap"));
+        assert_eq!(ran.code, code);
+        assert!(!folder.path("nothing.mcap").exists());
+    }
+}
+
+/// Listens, is sent `n` packets at their time, and has answered the first turn.
+fn recorded(folder: &Folder, n: usize) -> std::process::Child {
+    let port = free_port();
+    let mut child = listen(folder, port, "--json --mcap run.mcap");
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    for packet in packets(&street(), 7, n) {
+        socket.send_to(&packet, ("127.0.0.1", port)).unwrap();
+        thread::sleep(Duration::from_secs_f64(PACKET_S));
+    }
+    lines.next().unwrap().unwrap();
+    thread::spawn(move || lines.for_each(drop));
+    thread::sleep(Duration::from_millis(300));
+    child
+}
+
+#[test]
+fn what_was_recorded_before_the_program_is_killed_can_be_read() {
+    let folder = Folder::new();
+    // Three turns and a half.
+    let mut child = recorded(&folder, 264);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(n_messages(&folder, "run.mcap")["/points"], 3);
+}
+
+#[test]
+fn sigterm_ends_a_recording_with_what_has_come() {
+    let folder = Folder::new();
+    let mut child = recorded(&folder, 264);
+    let (code, err) = terminate(&mut child);
+    assert_eq!((code, err.as_str()), (Some(0), ""));
+    assert_eq!(n_messages(&folder, "run.mcap")["/points"], 4);
+    let bytes = fs::read(folder.path("run.mcap")).unwrap();
+    assert!(mcap::Summary::read(&bytes).unwrap().is_some());
+}
+
+/// A file that may not grow further, as on a full disk.
+#[test]
+fn a_full_disk_ends_the_recording_and_not_the_answers() {
+    let folder = folder();
+    let plain = folder.run(&format!("{LIVE} --pcap drive.pcap"));
+    let limited = |line: &str| {
+        let command = folder.command(&format!("{LIVE} --pcap drive.pcap {line}"));
+        let mut shell = Command::new("sh");
+        // Files of 1 MiB at most, in blocks of 512 bytes.
+        shell.args(["-c", "trap '' XFSZ; ulimit -f 2048; exec \"$@\"", "sh"]);
+        shell.arg(command.get_program()).args(command.get_args());
+        shell.current_dir(folder.path(".")).stdin(Stdio::null()).output().unwrap()
+    };
+    let ran = limited("--json --mcap run.mcap");
+    let err = String::from_utf8(ran.stderr).unwrap();
+    assert_eq!(ran.status.code(), Some(1), "{err}");
+    assert!(String::from_utf8(ran.stdout).unwrap() == plain.out);
+    let warning = "warning: the recording ends, the answers go on: run.mcap: ";
+    assert!(err.starts_with(warning), "{err}");
+    assert!(err.lines().last().unwrap().starts_with("error: run.mcap: "), "{err}");
+    let whole_turns = n_messages(&folder, "run.mcap")["/points"];
+    assert!((1..10).contains(&whole_turns), "{whole_turns}");
+
+    // Where nothing but the recording is asked for, nobody waits for more.
+    let ran = limited("--mcap only.mcap");
+    let err = String::from_utf8(ran.stderr).unwrap();
+    assert_eq!((ran.status.code(), err.lines().count()), (Some(1), 1), "{err}");
+}
