@@ -1,11 +1,10 @@
 //! The scripts in `tests/peers`, which compare our programs with other software.
 //!
-//! Python runs each alone, in an environment of pinned packages from PyPI.
-//! `EDGEPUCK_PROGRAM`, `EDGEPUCK_LAB` and `EDGEPUCK_INFER` tell it where our
-//! programs are, `EDGEPUCK_ROOT` names the workspace, and `EDGEPUCK_OUT` an empty
-//! folder. It ends with 0 if all is well and with [`SKIPPED`] if it cannot run
-//! here. A script `x.py` uses the packages of `requirements.txt`, unless there is an
-//! `x-requirements.txt` with packages that are too large for every run.
+//! Python runs each alone, in an environment of pinned packages from PyPI. `EDGEPUCK_PROGRAM`,
+//! `EDGEPUCK_LAB`, `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_ROOT` is the
+//! workspace, and `EDGEPUCK_OUT` an empty folder. It ends with 0 if all is well and with [`SKIPPED`]
+//! if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, unless there is
+//! an `x-requirements.txt` with packages that are too large for every run.
 
 use super::cargo_on_all;
 use crate::summary::{Counts, Summary};
@@ -155,7 +154,7 @@ fn scripts() -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// The variables that tell scripts of our programs, and the programs.
-type Programs = [(&'static str, PathBuf); 3];
+type Programs = [(&'static str, PathBuf); 4];
 
 /// Our programs as the tests have built them: nothing is built for the peers alone.
 fn programs() -> anyhow::Result<Programs> {
@@ -166,5 +165,6 @@ fn programs() -> anyhow::Result<Programs> {
         ("EDGEPUCK_PROGRAM", executable(&messages, "edgepuck")?),
         ("EDGEPUCK_LAB", executable(&messages, "edgepuck-lab")?),
         ("EDGEPUCK_INFER", executable(&messages, "infer-cpu")?),
+        ("EDGEPUCK_ROS2", executable(&messages, "edgepuck-ros2")?),
     ])
 }
