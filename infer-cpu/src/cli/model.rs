@@ -18,7 +18,8 @@ const NAMES: [&str; 2] = ["edge-64.safetensors", "untrained-test.safetensors"];
 pub struct ModelArgs {
     /// Model file in safetensors format [default: $EDGEPUCK_MODEL, else
     /// edge-64.safetensors (for whole objects of ModelNet40), or street-128.safetensors for
-    /// `live`, in weights/ beside this program or in ./assets/weights]
+    /// `live`, in weights/ beside this program, in ../share/edgepuck/weights from there or in
+    /// ./assets/weights]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
@@ -86,8 +87,11 @@ fn find_or(named: Option<&Path>, names: &[&str]) -> Result<PathBuf, Usage> {
 /// Where bundled weights may lie.
 fn folders() -> Vec<PathBuf> {
     let program = env::current_exe().ok();
-    let beside = program.as_deref().and_then(Path::parent).map(|folder| folder.join("weights"));
-    let mut folders: Vec<PathBuf> = beside.into_iter().collect();
+    let beside = program.as_deref().and_then(Path::parent);
+    // An archive that was unpacked, and a package that was installed under /usr.
+    let places =
+        beside.map(|beside| ["weights", "../share/edgepuck/weights"].map(|at| beside.join(at)));
+    let mut folders: Vec<PathBuf> = places.into_iter().flatten().collect();
     folders.push(Path::new("assets").join("weights"));
     // A developer's build finds the weights of its own workspace.
     #[cfg(debug_assertions)]

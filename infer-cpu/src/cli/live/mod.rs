@@ -1,5 +1,6 @@
 //! `infer-cpu live`: the objects that a LiDAR sees, as they come.
 
+mod notify;
 mod outputs;
 mod report;
 mod source;
@@ -9,6 +10,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::available_parallelism;
+use std::time::Instant;
 
 use formats::ouster::Metadata;
 use glam::DVec3;
@@ -18,6 +20,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::model::ModelArgs;
 use super::{Outcome, Usage, of_setup};
+use notify::Notifier;
 use outputs::Outputs;
 use source::{Source, Tick};
 
@@ -52,7 +55,8 @@ at first; relative to the sensor in its frame), points, range_m, first_s and las
 of the first and the last point by the sensor's clock), latency_ms (from the arrival of the
 packet with the last point to this line; null without --udp or --realtime).
 
-SIGTERM and Ctrl-C end the program after the last objects, with exit status 0.")]
+SIGTERM and Ctrl-C end the program after the last objects, with exit status 0. As a service of
+systemd (Type=notify), it tells when it receives packets, and the watchdog that it is alive.")]
 pub struct Args {
     /// Receive packets on this UDP port; a Velodyne's is 2368, an Ouster's 7502
     #[arg(long, value_name = "PORT", required_unless_present = "pcap", conflicts_with = "pcap")]
@@ -141,18 +145,25 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     for signal in [SIGTERM, SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&is_over))?;
     }
+    let mut notifier = Notifier::of_environment()?;
     let source = args.source(&is_over)?;
     let mut outputs = args.outputs()?;
+    notifier.ready()?;
     let read = source.run(|tick| {
         match tick {
             Tick::Packet(payload, arrival) => pipeline.take(payload, arrival),
-            Tick::End => pipeline.end(),
+            Tick::Quiet => {}
+            Tick::End => {
+                notifier.stopping();
+                pipeline.end();
+            }
         }
         pipeline.answer(|object| outputs.object(object));
         outputs.packet(&pipeline);
         for flaw in pipeline.new_flaws() {
             eprintln!("warning: a packet was passed over, and so are others like it: {flaw}");
         }
+        notifier.alive(pipeline.counts(), Instant::now());
         !is_over.load(Ordering::Relaxed) && outputs.are_wanted()
     });
     let ended = outputs.end(&pipeline);
@@ -161,15 +172,19 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.stats {
         report::print(&pipeline, &read);
     }
-    match pipeline.counts().packets {
-        0 => Err(Usage(format!(
+    if pipeline.counts().packets == 0 {
+        let cause = format!(
             "expected packets of {}, found none among {} UDP packets",
             if args.metadata.is_some() { "the Ouster" } else { "a VLP-16 or VLP-32C" },
             read.n_packets
-        ))
-        .into()),
-        _ => Ok(Outcome::Success),
+        );
+        // A service may be stopped before its sensor is switched on.
+        if args.udp.is_none() {
+            return Err(Usage(cause).into());
+        }
+        eprintln!("warning: {cause}");
     }
+    Ok(Outcome::Success)
 }
 
 impl Args {

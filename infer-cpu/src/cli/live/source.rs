@@ -23,13 +23,16 @@ const RING: usize = 1024;
 const MOST_BYTES: usize = 65_535;
 /// The kernel's buffer that is asked for: some seconds.
 const KERNEL_BUFFER: usize = 8 << 20;
-/// How often a quiet socket is left, to see whether the program is to end.
+/// How often a quiet socket is left, to see whether the program is to end and to show that it is
+/// alive.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// What a source tells.
 pub enum Tick<'a> {
     /// A packet has come.
     Packet(&'a [u8], Arrival),
+    /// None has come for a while.
+    Quiet,
     /// No more will come.
     End,
 }
@@ -204,7 +207,7 @@ impl Listener {
                         break;
                     }
                 }
-                Err(RecvTimeoutError::Timeout) if self.is_over.load(Ordering::Relaxed) => break,
+                Err(RecvTimeoutError::Timeout) if !take(Tick::Quiet) => break,
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }

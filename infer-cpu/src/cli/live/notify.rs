@@ -1,0 +1,254 @@
+//! What systemd is told of a service of `Type=notify`: that it is ready, that it is alive, what
+//! it does, that it ends. The protocol: sd_notify(3) and sd_watchdog_enabled(3).
+
+use std::env;
+use std::ffi::{OsStr, OsString};
+use std::io;
+use std::process;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use infer_cpu::live::Counts;
+
+use manager::Manager;
+
+/// How often the status is told where systemd has no watchdog.
+const STATUS_PERIOD: Duration = Duration::from_secs(5);
+
+/// Tells systemd, if it listens.
+pub struct Notifier {
+    manager: Option<Manager>,
+    /// How long the manager waits for a sign of life.
+    watchdog: Option<Duration>,
+    /// When the next sign of life is due.
+    due: Instant,
+}
+
+impl Notifier {
+    /// As the variables of the environment ask for that systemd sets.
+    ///
+    /// # Errors
+    /// They are not what systemd sets.
+    pub fn of_environment() -> anyhow::Result<Self> {
+        Self::new(|name| env::var_os(name))
+    }
+
+    fn new(variable: impl Fn(&str) -> Option<OsString>) -> anyhow::Result<Self> {
+        let manager = variable("NOTIFY_SOCKET").map(|name| {
+            Manager::at(&name).with_context(|| format!("NOTIFY_SOCKET={}", name.display()))
+        });
+        // A process that this program's parent watches is not this one.
+        let is_ours = variable("WATCHDOG_PID").is_none_or(|id| id == *process::id().to_string());
+        let watchdog =
+            variable("WATCHDOG_USEC").filter(|_| is_ours).map(|time| microseconds(&time));
+        Ok(Self {
+            manager: manager.transpose()?,
+            watchdog: watchdog.transpose()?,
+            due: Instant::now(),
+        })
+    }
+
+    /// Tells that packets are received and the model is loaded.
+    ///
+    /// # Errors
+    /// The manager cannot be told, and would wait for it in vain.
+    pub fn ready(&self) -> anyhow::Result<()> {
+        let Some(manager) = &self.manager else { return Ok(()) };
+        manager.tell("READY=1\nSTATUS=Waiting for packets").context("telling NOTIFY_SOCKET")
+    }
+
+    /// Gives a sign of life if one is due. Whoever handles packets calls this, so that the
+    /// watchdog sees when that stops.
+    pub fn alive(&mut self, counts: &Counts, now: Instant) {
+        let Some(manager) = self.manager.as_ref().filter(|_| now >= self.due) else { return };
+        let Counts { packets, clusters, .. } = counts;
+        let sign = if self.watchdog.is_some() { "WATCHDOG=1\n" } else { "" };
+        // What the manager has no room for now is told with the next packet.
+        if manager.tell(&format!("{sign}STATUS={packets} packets, {clusters} objects")).is_ok() {
+            // sd_watchdog_enabled(3) recommends half of the time.
+            self.due = now + self.watchdog.map_or(STATUS_PERIOD, |time| time / 2);
+        }
+    }
+
+    /// Tells that the program ends; nothing is told after it.
+    pub fn stopping(&mut self) {
+        if let Some(manager) = self.manager.take() {
+            // A manager that does not hear this sees the process end.
+            let _ = manager.tell("STOPPING=1");
+        }
+    }
+}
+
+fn microseconds(text: &OsStr) -> anyhow::Result<Duration> {
+    let number = text.to_str().and_then(|text| text.parse().ok()).filter(|&number| number > 0);
+    number.map(Duration::from_micros).with_context(|| {
+        format!("expected microseconds in WATCHDOG_USEC, found `{}`", text.display())
+    })
+}
+
+#[cfg(target_os = "linux")]
+mod manager {
+    use super::{OsStr, io};
+    use std::os::linux::net::SocketAddrExt;
+    use std::os::unix::ffi::OsStrExt;
+    use std::os::unix::net::{SocketAddr, UnixDatagram};
+
+    /// Where the manager listens.
+    pub struct Manager {
+        socket: UnixDatagram,
+        address: SocketAddr,
+    }
+
+    impl Manager {
+        /// The one at a path, or at the abstract name that follows an `@`.
+        pub fn at(name: &OsStr) -> io::Result<Self> {
+            let address = match name.as_bytes() {
+                [b'@', name @ ..] => SocketAddr::from_abstract_name(name)?,
+                [b'/', ..] => SocketAddr::from_pathname(name)?,
+                _ => return Err(io::Error::other("expected a path or an abstract name: /… or @…")),
+            };
+            let socket = UnixDatagram::unbound()?;
+            // Packets must not wait for a manager that is busy.
+            socket.set_nonblocking(true)?;
+            Ok(Self { socket, address })
+        }
+
+        pub fn tell(&self, state: &str) -> io::Result<()> {
+            self.socket.send_to_addr(state.as_bytes(), &self.address).map(drop)
+        }
+    }
+}
+
+/// systemd is a manager of Linux only.
+#[cfg(not(target_os = "linux"))]
+mod manager {
+    use super::{OsStr, io};
+
+    pub enum Manager {}
+
+    impl Manager {
+        pub fn at(_: &OsStr) -> io::Result<Self> {
+            Err(io::ErrorKind::Unsupported.into())
+        }
+
+        pub fn tell(&self, _: &str) -> io::Result<()> {
+            match *self {}
+        }
+    }
+}
+
+#[cfg(test)]
+#[cfg(target_os = "linux")]
+mod tests {
+    use super::*;
+    use std::os::linux::net::SocketAddrExt;
+    use std::os::unix::net::{SocketAddr, UnixDatagram};
+
+    const COUNTS: Counts = Counts {
+        packets: 754,
+        clusters: 30,
+        lost: 0,
+        late: 0,
+        duplicated: 0,
+        foreign: 0,
+        restarts: 0,
+        points: 0,
+        dropped_points: 0,
+        unclassified: 0,
+    };
+
+    /// A manager's socket at a path, and its name.
+    fn manager() -> (tempfile::TempDir, UnixDatagram, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notify");
+        let socket = UnixDatagram::bind(&path).unwrap();
+        socket.set_nonblocking(true).unwrap();
+        (folder, socket, path.to_str().unwrap().to_owned())
+    }
+
+    fn notifier(variables: &[(&str, &str)]) -> anyhow::Result<Notifier> {
+        Notifier::new(|name| {
+            let (_, value) = variables.iter().find(|(key, _)| *key == name)?;
+            Some(value.into())
+        })
+    }
+
+    /// What was told since the last call.
+    fn told(manager: &UnixDatagram) -> Vec<String> {
+        let mut buffer = [0; 256];
+        let mut next = || manager.recv(&mut buffer).ok().map(|n| buffer[..n].to_vec());
+        let all = std::iter::from_fn(&mut next);
+        all.map(|state| String::from_utf8(state).unwrap()).collect()
+    }
+
+    #[test]
+    fn a_service_is_ready_then_alive_at_half_of_the_watchdogs_time_then_stopping() {
+        let (_folder, manager, path) = manager();
+        let own_id = process::id().to_string();
+        let watched =
+            [("NOTIFY_SOCKET", &*path), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", &own_id)];
+        let mut notifier = notifier(&watched).unwrap();
+        notifier.ready().unwrap();
+        assert_eq!(told(&manager), ["READY=1\nSTATUS=Waiting for packets"]);
+        let start = Instant::now();
+        for tenths in 0..=100 {
+            notifier.alive(&COUNTS, start + Duration::from_millis(100 * tenths));
+        }
+        assert_eq!(told(&manager), ["WATCHDOG=1\nSTATUS=754 packets, 30 objects"; 3]);
+        notifier.stopping();
+        notifier.alive(&COUNTS, start + Duration::from_secs(100));
+        assert_eq!(told(&manager), ["STOPPING=1"]);
+    }
+
+    #[test]
+    fn without_a_watchdog_of_its_own_only_the_status_is_told() {
+        let (_folder, manager, path) = manager();
+        let unwatched = [("NOTIFY_SOCKET", &*path)];
+        let others =
+            [("NOTIFY_SOCKET", &*path), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", "1")];
+        for variables in [&unwatched[..], &others] {
+            notifier(variables).unwrap().alive(&COUNTS, Instant::now());
+            assert_eq!(told(&manager), ["STATUS=754 packets, 30 objects"]);
+        }
+    }
+
+    #[test]
+    fn a_socket_may_have_an_abstract_name() {
+        let name = format!("edgepuck-notify-{}", process::id());
+        let address = SocketAddr::from_abstract_name(&name).unwrap();
+        let manager = UnixDatagram::bind_addr(&address).unwrap();
+        manager.set_nonblocking(true).unwrap();
+        notifier(&[("NOTIFY_SOCKET", &format!("@{name}"))]).unwrap().ready().unwrap();
+        assert_eq!(told(&manager), ["READY=1\nSTATUS=Waiting for packets"]);
+    }
+
+    #[test]
+    fn a_busy_manager_delays_the_sign_of_life_and_not_the_packets() {
+        let (_folder, manager, path) = manager();
+        let mut notifier = notifier(&[("NOTIFY_SOCKET", &*path)]).unwrap();
+        let now = Instant::now();
+        while notifier.ready().is_ok() {}
+        notifier.alive(&COUNTS, now);
+        told(&manager);
+        notifier.alive(&COUNTS, now);
+        assert_eq!(told(&manager), ["STATUS=754 packets, 30 objects"]);
+    }
+
+    #[test]
+    fn nobody_is_told_without_a_socket_and_odd_variables_are_refused() {
+        let mut silent = notifier(&[("WATCHDOG_USEC", "10000000")]).unwrap();
+        silent.ready().unwrap();
+        silent.alive(&COUNTS, Instant::now());
+        let refusal = |variables: &[_]| format!("{:#}", notifier(variables).err().unwrap());
+        assert_eq!(
+            refusal(&[("NOTIFY_SOCKET", "vsock:2:1")]),
+            "NOTIFY_SOCKET=vsock:2:1: expected a path or an abstract name: /… or @…"
+        );
+        assert_eq!(
+            refusal(&[("WATCHDOG_USEC", "10 s")]),
+            "expected microseconds in WATCHDOG_USEC, found `10 s`"
+        );
+        let gone = notifier(&[("NOTIFY_SOCKET", "/nowhere/notify")]).unwrap();
+        assert!(gone.ready().is_err());
+    }
+}
