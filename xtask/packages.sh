@@ -1,12 +1,12 @@
 #!/bin/sh
 # Installs what tests need beyond Rust: software Vulkan, a C++ compiler for the
-# fuzz targets, what Open3D links to, a browser, what judges Debian packages, and for
+# fuzz targets, what Open3D links to, PCL, a browser, what judges Debian packages, and for
 # the Raspberry Pi its target's standard library, an emulator and a model of its core.
 # Both the README and CI run this, through `cargo xtask test`.
 set -eu
 
 backported="mesa-vulkan-drivers libvulkan1"
-plain="g++ lintian qemu-user libusb-1.0-0"
+plain="g++ lintian pcl-tools qemu-user libusb-1.0-0"
 pi_target="aarch64-unknown-linux-musl"
 # The releases of LLVM whose llvm-mca knows Neoverse N1, the newest first.
 llvms="22 21 20 19"
