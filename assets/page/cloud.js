@@ -3,8 +3,9 @@
 for (const canvas of document.querySelectorAll("canvas.cloud")) {
   const numbers = canvas.dataset.points.split(" ").map(Number);
   const palette = canvas.dataset.palette.split(" ");
+  const [small, large] = canvas.dataset.radii.split(" ").map(Number);
   const context = canvas.getContext("2d");
-  let azimuth = 0.6, elevation = 0.35, from = null;
+  let azimuth = 0.6, elevation = Number(canvas.dataset.elevation), from = null;
   const draw = () => {
     const { width, height } = canvas, scale = 0.45 * Math.min(width, height) / 1000;
     context.clearRect(0, 0, width, height);
@@ -21,7 +22,7 @@ for (const canvas of document.querySelectorAll("canvas.cloud")) {
     for (const [, x, y, colour] of points) {
       context.fillStyle = palette[colour];
       context.beginPath();
-      context.arc(x, y, colour === "0" ? 1.6 : 3.4, 0, 2 * Math.PI);
+      context.arc(x, y, colour === "0" ? small : large, 0, 2 * Math.PI);
       context.fill();
     }
   };

@@ -57,14 +57,44 @@ pub fn of(title: &str, lead: &Markup, chapters: &[Chapter]) -> String {
     page.into_string()
 }
 
-/// A cloud that a reader can rotate: coordinates in thousandths, a digit for the colour
-/// of each point, and the colours that the digits mean.
-pub fn cloud(points: &str, colours: &str, palette: &str, caption: &Markup) -> Markup {
-    html! {
-        figure {
-            canvas class="cloud" width="480" height="360" data-points=(points)
-                data-colours=(colours) data-palette=(palette) {}
-            figcaption { (caption) }
+/// A cloud that a reader can rotate.
+pub struct Cloud<'a> {
+    /// Coordinates in thousandths.
+    pub points: &'a str,
+    /// A digit for the colour of each point.
+    pub colours: &'a str,
+    /// The colours that the digits mean.
+    pub palette: &'a str,
+    /// Width and height.
+    pub pixels: [u32; 2],
+    /// Of the points of the first colour and of all others, pixels.
+    pub radii: [f32; 2],
+    /// How high above the cloud the viewer is at first.
+    pub elevation_rad: f32,
+}
+
+impl Cloud<'_> {
+    /// What most clouds have; they have no points yet.
+    pub const EMPTY: Self = Self {
+        points: "",
+        colours: "",
+        palette: "",
+        pixels: [480, 360],
+        radii: [1.6, 3.4],
+        elevation_rad: 0.35,
+    };
+
+    /// The cloud above its caption.
+    pub fn figure(&self, caption: &Markup) -> Markup {
+        let Self { points, colours, palette, pixels: [width, height], radii, elevation_rad } = self;
+        html! {
+            figure {
+                canvas class="cloud" width=(width) height=(height) data-points=(points)
+                    data-colours=(colours) data-palette=(palette)
+                    data-radii=(format!("{} {}", radii[0], radii[1]))
+                    data-elevation=(elevation_rad) {}
+                figcaption { (caption) }
+            }
         }
     }
 }

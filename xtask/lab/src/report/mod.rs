@@ -1,12 +1,13 @@
 //! `cargo xtask report`: every record on one self-contained page.
 //!
-//! Each file makes a chapter: [`scans`] shows clouds that can be rotated, [`records`]
-//! the tables under `assets/reports`, [`growth`] errors beside their bounds,
+//! Each file makes a chapter: [`scans`] shows clouds that can be rotated, [`live`] a turn of
+//! a drive whose clusters are named, [`records`] the tables under `assets/reports`, [`growth`] errors beside their bounds,
 //! [`benchmarks`] the records under `assets/bench`. For a missing record the page names
 //! the command that makes it.
 
 mod benchmarks;
 mod growth;
+mod live;
 mod records;
 mod scans;
 
@@ -44,6 +45,8 @@ pub fn run(args: &Args) -> Result<Outcome> {
     let reports = assets.join("reports");
     let scans = scans::body(&assets)?;
     let mut chapters = vec![Chapter::new("scans", "Scans", "What does a scan look like?", scans)];
+    let question = "What does it see in a street?";
+    chapters.push(Chapter::new("live", "Live", question, live::body()?));
     chapters.extend(trade_chapters(&reports.join("trade/trade.csv"))?);
     let reality = records::reality(&reports.join("reality"))?;
     let question = "What do networks make of real sensors' scans?";

@@ -1,6 +1,6 @@
 //! Clouds that can be rotated: one mesh as several sensors see it.
 
-use crate::render::page;
+use crate::render::page::Cloud;
 use anyhow::{Context, Result};
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -48,7 +48,12 @@ pub fn body(assets: &Path) -> Result<Markup> {
         p { (file_name(&entry.path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
             (ELEVATION_DEG) "° below it. Made now, on the CPU." }
         div class="clouds" { @for (sensor, noise_m, cloud) in &clouds {
-            (page::cloud(&thousandths(cloud), &"0".repeat(shown(cloud).count()), "#1763c7", &html! {
+            (Cloud {
+                points: &thousandths(cloud),
+                colours: &"0".repeat(shown(cloud).count()),
+                palette: "#1763c7",
+                ..Cloud::EMPTY
+            }.figure(&html! {
                 (sensor) @if *noise_m > 0.0 { ", noise " (noise_m) " m" } ": " (cloud.len()) " points. "
                 "Drag to rotate."
             }))

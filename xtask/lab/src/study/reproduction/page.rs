@@ -55,7 +55,9 @@ fn canvas(cloud: &Cloud) -> Markup {
         span style={ "color:" (COLOURS[2]) } { "LIME's strongest" } ", "
         span style={ "color:" (COLOURS[3]) } { "both" }
     };
-    page::cloud(&joined(&cloud.points), &colours, &COLOURS.join(" "), &caption)
+    let (points, palette) = (joined(&cloud.points), COLOURS.join(" "));
+    page::Cloud { points: &points, colours: &colours, palette: &palette, ..page::Cloud::EMPTY }
+        .figure(&caption)
 }
 
 fn joined(points: &[[i16; 3]]) -> String {
