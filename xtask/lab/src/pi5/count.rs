@@ -36,7 +36,7 @@ impl Counter {
         workspace::output(&mut cc).context("the plugin that counts needs a C compiler")?;
         let (binary, model) = (binary.to_owned(), model.to_owned());
         let counter = Self { plugin, folder: folder.to_owned(), binary, model };
-        counter.run("--version", None).context("this QEMU takes no plugins (7.2 does)")?;
+        counter.run("--version", &[]).context("this QEMU takes no plugins (7.2 does)")?;
         Ok(counter)
     }
 
@@ -50,28 +50,34 @@ impl Counter {
                 "bench --json --threads 1 --repeats {repeats} --sampler {sampler} --from {from} \
                  --points {points} --precision {precision} --model"
             );
-            self.run(&flags, Some(&self.model))
+            self.run(&flags, &[&self.model]).map(|(counts, _)| counts)
         };
         Ok(repeated(2)?.less(&repeated(1)?))
     }
 
-    /// Counts a run of the binary with these flags, then `more`.
-    fn run(&self, flags: &str, more: Option<&PathBuf>) -> anyhow::Result<Counts> {
+    /// Counts `live` on a capture; also gives its lines.
+    pub fn live(&self, capture: &Path) -> anyhow::Result<(Counts, String)> {
+        let model = self.model.as_path();
+        self.run("live --threads 1", &["--model".as_ref(), model, "--pcap".as_ref(), capture])
+    }
+
+    /// Counts a run of the binary with these flags, then `more`; also gives what it prints.
+    fn run(&self, flags: &str, more: &[&Path]) -> anyhow::Result<(Counts, String)> {
         let mut qemu = pi_target::emulator().context(pi_target::NO_EMULATOR)?;
         let log = tempfile::NamedTempFile::new_in(&self.folder)?;
         qemu.arg("-plugin").arg(&self.plugin).args(["-d", "plugin", "-D"]).arg(log.path());
-        workspace::output(qemu.arg(&self.binary).args(flags.split(' ')).args(more))?;
+        let printed = workspace::output(qemu.arg(&self.binary).args(flags.split(' ')).args(more))?;
         let log = std::fs::read_to_string(log.path())
             .with_context(|| format!("cannot read {}", log.path().display()))?;
         let counts = Counts::parse(&log);
         ensure!(!counts.0.is_empty(), "QEMU's plugin counted nothing");
-        Ok(counts)
+        Ok((counts, printed))
     }
 }
 
 impl Counts {
     /// Reads lines `COUNT SYMBOL`.
-    fn parse(log: &str) -> Self {
+    pub fn parse(log: &str) -> Self {
         let mut counts = BTreeMap::new();
         for (count, symbol) in log.lines().filter_map(|line| line.split_once(' ')) {
             let Ok(count) = count.parse::<f64>() else { continue };
@@ -88,6 +94,11 @@ impl Counts {
     /// Instructions of functions whose name contains `part`.
     fn of(&self, part: &str) -> f64 {
         self.0.iter().filter(|(name, _)| name.contains(part)).map(|(_, count)| count).sum()
+    }
+
+    /// Every function and its instructions.
+    pub fn all(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.0.iter().map(|(name, count)| (name.as_str(), *count))
     }
 
     /// The functions that most instructions are spent in.

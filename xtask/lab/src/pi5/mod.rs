@@ -11,11 +11,12 @@ use edgepuck_program::flags::positive;
 use formats::atomic;
 use infer_cpu::Precision;
 use std::path::{Path, PathBuf};
-use xtask::{build_pi, pi_target};
+use xtask::{build_pi, pi_target, workspace};
 
 mod assembly;
 mod count;
 mod kernels;
+mod live;
 mod load;
 mod mca;
 mod model;
@@ -30,9 +31,14 @@ pub use plan::Sampler;
 /// Flags of `bench pi-model`.
 #[derive(Args, Debug)]
 pub struct PiModelArgs {
-    /// Model file [default: the baseline network with weights drawn at random]
+    /// Model file [default: the baseline network with weights drawn at random; street-128 with
+    /// --live]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// Model `infer-cpu live` instead, by what the second of two captures of a drive takes more than
+    /// the first, such as those of `gen-drive --seconds 1` and `--seconds 3`.
+    #[arg(long, num_args = 2, value_names = ["SHORT", "LONG"])]
+    live: Vec<PathBuf>,
     /// Numbers of points that the network sees, multiples of 8.
     #[arg(long, value_delimiter = ',', value_parser = eights,
           default_value = "16,32,64,128,256,512,1024,2048,4096")]
@@ -92,6 +98,12 @@ impl PiModelArgs {
 /// if a kernel is below the share of peak asked for.
 pub fn run(args: &PiModelArgs) -> Result<()> {
     let board = Board::open(args.llvm_mca.as_deref())?;
+    if !args.live.is_empty() {
+        let street = || workspace::root().join("assets/weights/street-128.safetensors");
+        let counter = board.counter(&args.model.clone().unwrap_or_else(street))?;
+        print!("{}", live::table(&counter, &args.live, args.machine())?);
+        return Ok(());
+    }
     print!("{}", report::kernels(&board.kernels, &board.llvm_mca));
     check_peaks(&board.kernels, args.least_peak)?;
 
@@ -135,7 +147,7 @@ impl Board {
     fn open(llvm_mca: Option<&str>) -> Result<Self> {
         let mca = mca::Mca::find(llvm_mca)?;
         pi_target::need_standard_library()?;
-        let folder = xtask::workspace::root().join("target/pi-model");
+        let folder = workspace::root().join("target/pi-model");
         std::fs::create_dir_all(&folder)?;
         let listing = folder.join("infer-cpu.s");
         let emit = format!("asm={}", listing.display());
