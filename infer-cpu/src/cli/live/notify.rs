@@ -34,18 +34,17 @@ impl Notifier {
     }
 
     fn new(variable: impl Fn(&str) -> Option<OsString>) -> anyhow::Result<Self> {
-        let manager = variable("NOTIFY_SOCKET").map(|name| {
-            Manager::at(&name).with_context(|| format!("NOTIFY_SOCKET={}", name.display()))
-        });
+        let due = Instant::now();
+        let Some(name) = variable("NOTIFY_SOCKET").filter(|name| !name.is_empty()) else {
+            return Ok(Self { manager: None, watchdog: None, due });
+        };
+        let manager =
+            Manager::at(&name).with_context(|| format!("NOTIFY_SOCKET={}", name.display()))?;
         // A process that this program's parent watches is not this one.
         let is_ours = variable("WATCHDOG_PID").is_none_or(|id| id == *process::id().to_string());
-        let watchdog =
-            variable("WATCHDOG_USEC").filter(|_| is_ours).map(|time| microseconds(&time));
-        Ok(Self {
-            manager: manager.transpose()?,
-            watchdog: watchdog.transpose()?,
-            due: Instant::now(),
-        })
+        let watchdog = variable("WATCHDOG_USEC").filter(|_| is_ours);
+        let watchdog = watchdog.map(|time| microseconds(&time)).transpose()?;
+        Ok(Self { manager: Some(manager), watchdog, due })
     }
 
     /// Tells that packets are received and the model is loaded.
@@ -144,26 +143,20 @@ mod tests {
     use std::os::linux::net::SocketAddrExt;
     use std::os::unix::net::{SocketAddr, UnixDatagram};
 
-    const COUNTS: Counts = Counts {
-        packets: 754,
-        clusters: 30,
-        lost: 0,
-        late: 0,
-        duplicated: 0,
-        foreign: 0,
-        restarts: 0,
-        points: 0,
-        dropped_points: 0,
-        unclassified: 0,
-    };
+    fn counts() -> Counts {
+        Counts { packets: 754, clusters: 30, ..Counts::default() }
+    }
 
-    /// A manager's socket at a path, and its name.
-    fn manager() -> (tempfile::TempDir, UnixDatagram, String) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("notify");
-        let socket = UnixDatagram::bind(&path).unwrap();
+    /// A manager's socket at an abstract name of this test's own, and what names it.
+    fn manager(test: &str) -> (UnixDatagram, String) {
+        let name = format!("edgepuck-{test}-{}", process::id());
+        let address = SocketAddr::from_abstract_name(&name).unwrap();
+        (unblocked(UnixDatagram::bind_addr(&address).unwrap()), format!("@{name}"))
+    }
+
+    fn unblocked(socket: UnixDatagram) -> UnixDatagram {
         socket.set_nonblocking(true).unwrap();
-        (folder, socket, path.to_str().unwrap().to_owned())
+        socket
     }
 
     fn notifier(variables: &[(&str, &str)]) -> anyhow::Result<Notifier> {
@@ -183,69 +176,63 @@ mod tests {
 
     #[test]
     fn a_service_is_ready_then_alive_at_half_of_the_watchdogs_time_then_stopping() {
-        let (_folder, manager, path) = manager();
-        let own_id = process::id().to_string();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notify");
+        let manager = unblocked(UnixDatagram::bind(&path).unwrap());
+        let (path, own_id) = (path.to_str().unwrap(), process::id().to_string());
         let watched =
-            [("NOTIFY_SOCKET", &*path), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", &own_id)];
+            [("NOTIFY_SOCKET", path), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", &own_id)];
         let mut notifier = notifier(&watched).unwrap();
         notifier.ready().unwrap();
         assert_eq!(told(&manager), ["READY=1\nSTATUS=Waiting for packets"]);
         let start = Instant::now();
         for tenths in 0..=100 {
-            notifier.alive(&COUNTS, start + Duration::from_millis(100 * tenths));
+            notifier.alive(&counts(), start + Duration::from_millis(100 * tenths));
         }
         assert_eq!(told(&manager), ["WATCHDOG=1\nSTATUS=754 packets, 30 objects"; 3]);
         notifier.stopping();
-        notifier.alive(&COUNTS, start + Duration::from_secs(100));
+        notifier.alive(&counts(), start + Duration::from_secs(100));
         assert_eq!(told(&manager), ["STOPPING=1"]);
     }
 
     #[test]
     fn without_a_watchdog_of_its_own_only_the_status_is_told() {
-        let (_folder, manager, path) = manager();
-        let unwatched = [("NOTIFY_SOCKET", &*path)];
+        let (manager, name) = manager("unwatched");
+        let unwatched = [("NOTIFY_SOCKET", &*name)];
         let others =
-            [("NOTIFY_SOCKET", &*path), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", "1")];
+            [("NOTIFY_SOCKET", &*name), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", "1")];
         for variables in [&unwatched[..], &others] {
-            notifier(variables).unwrap().alive(&COUNTS, Instant::now());
+            notifier(variables).unwrap().alive(&counts(), Instant::now());
             assert_eq!(told(&manager), ["STATUS=754 packets, 30 objects"]);
         }
     }
 
     #[test]
-    fn a_socket_may_have_an_abstract_name() {
-        let name = format!("edgepuck-notify-{}", process::id());
-        let address = SocketAddr::from_abstract_name(&name).unwrap();
-        let manager = UnixDatagram::bind_addr(&address).unwrap();
-        manager.set_nonblocking(true).unwrap();
-        notifier(&[("NOTIFY_SOCKET", &format!("@{name}"))]).unwrap().ready().unwrap();
-        assert_eq!(told(&manager), ["READY=1\nSTATUS=Waiting for packets"]);
-    }
-
-    #[test]
     fn a_busy_manager_delays_the_sign_of_life_and_not_the_packets() {
-        let (_folder, manager, path) = manager();
-        let mut notifier = notifier(&[("NOTIFY_SOCKET", &*path)]).unwrap();
+        let (manager, name) = manager("busy");
+        let mut notifier = notifier(&[("NOTIFY_SOCKET", &*name)]).unwrap();
         let now = Instant::now();
         while notifier.ready().is_ok() {}
-        notifier.alive(&COUNTS, now);
+        notifier.alive(&counts(), now);
         told(&manager);
-        notifier.alive(&COUNTS, now);
+        notifier.alive(&counts(), now);
         assert_eq!(told(&manager), ["STATUS=754 packets, 30 objects"]);
     }
 
     #[test]
     fn nobody_is_told_without_a_socket_and_odd_variables_are_refused() {
-        let mut silent = notifier(&[("WATCHDOG_USEC", "10000000")]).unwrap();
-        silent.ready().unwrap();
-        silent.alive(&COUNTS, Instant::now());
+        for unset in [&[("WATCHDOG_USEC", "10 s")][..], &[("NOTIFY_SOCKET", "")]] {
+            let mut silent = notifier(unset).unwrap();
+            silent.ready().unwrap();
+            silent.alive(&counts(), Instant::now());
+        }
         let refusal = |variables: &[_]| format!("{:#}", notifier(variables).err().unwrap());
         assert_eq!(
             refusal(&[("NOTIFY_SOCKET", "vsock:2:1")]),
             "NOTIFY_SOCKET=vsock:2:1: expected a path or an abstract name: /… or @…"
         );
         assert_eq!(
-            refusal(&[("WATCHDOG_USEC", "10 s")]),
+            refusal(&[("NOTIFY_SOCKET", "/nowhere/notify"), ("WATCHDOG_USEC", "10 s")]),
             "expected microseconds in WATCHDOG_USEC, found `10 s`"
         );
         let gone = notifier(&[("NOTIFY_SOCKET", "/nowhere/notify")]).unwrap();
