@@ -32,6 +32,17 @@ MOST_EXPOSED = 1.5
 START_S = 20.0
 
 
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+PORT = free_port()
+# What an administrator would set.
+OPTIONS = f"--udp {PORT} --interface 127.0.0.1"
+
+
 def main():
     missing = [tool for tool in TOOLS if shutil.which(tool) is None]
     if missing or subprocess.run([*AS_ROOT, "true"], check=False).returncode != 0:
@@ -66,8 +77,12 @@ def packages():
     tools = OUT.parent.parent / "cargo-deb"
     version = [tools / "bin/cargo-deb", "--version"]
     if not version[0].exists() or CARGO_DEB not in subprocess.check_output(version, text=True):
-        run("cargo", "install", f"cargo-deb@{CARGO_DEB}", "--locked", "--debug",
-            "--no-default-features", "--root", tools, "--target-dir", tools / "target")
+        fetched = subprocess.run(
+            ["cargo", "install", f"cargo-deb@{CARGO_DEB}", "--locked", "--debug",
+             "--no-default-features", "--root", tools, "--target-dir", tools / "target"],
+            check=False)
+        if fetched.returncode != 0:
+            skip("cargo-deb cannot be fetched")
         shutil.rmtree(tools / "target")
     program = OUT / "target/release/infer-cpu"
     program.parent.mkdir(parents=True)
@@ -101,22 +116,10 @@ def install(package):
     wanted = root / "etc/systemd/system/multi-user.target.wants/infer-cpu.service"
     assert wanted.is_symlink(), "the service starts with the system"
     # What an administrator has set stays when the package is installed again.
-    (root / "etc/default/infer-cpu").write_text(f'INFER_CPU_LIVE="{options()}"\n')
+    (root / "etc/default/infer-cpu").write_text(f'INFER_CPU_LIVE="{OPTIONS}"\n')
     dpkg(root, "--install", package)
-    assert options() in (root / "etc/default/infer-cpu").read_text()
+    assert OPTIONS in (root / "etc/default/infer-cpu").read_text()
     return root
-
-
-def options(port=None):
-    if port is None:
-        port = options.port = getattr(options, "port", None) or free_port()
-    return f"--udp {port} --interface 127.0.0.1"
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
 
 
 def check_unit(root):
@@ -161,7 +164,7 @@ def serve(root):
     try:
         assert manager.recv(999).decode().startswith("READY=1\n")
         assert manager.recv(999).decode().startswith("WATCHDOG=1\n"), "alive without a packet"
-        sent = send(options.port)
+        sent = send()
         while f"{sent} packets" not in (told := manager.recv(999).decode()):
             assert told.startswith("WATCHDOG=1\n"), told
         service.send_signal(signal.SIGTERM)
@@ -176,7 +179,7 @@ def serve(root):
     print(f"the service, on an emulated Cortex-A76: {sent} packets, {len(objects)} objects")
 
 
-def send(port):
+def send():
     """Sends the packets of half a second of a drive at their times; gives their number."""
     capture = OUT / "drive.pcap"
     run(os.environ["EDGEPUCK_PROGRAM"], "gen-drive", "--seconds", "0.5", "--out", capture)
@@ -187,7 +190,7 @@ def send(port):
             _, time_us, n_bytes, _ = struct.unpack_from("<4I", content, at)
             time.sleep(max(0.0, start + time_us * 1e-6 - time.monotonic()))
             # The headers of Ethernet, IP and UDP are 42 bytes.
-            sender.sendto(content[at + 16 + 42 : at + 16 + n_bytes], ("127.0.0.1", port))
+            sender.sendto(content[at + 16 + 42 : at + 16 + n_bytes], ("127.0.0.1", PORT))
             at, n_packets = at + 16 + n_bytes, n_packets + 1
     return n_packets
 
