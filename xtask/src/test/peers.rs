@@ -4,7 +4,7 @@
 //! `EDGEPUCK_LAB`, `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_ROOT` is the
 //! workspace, and `EDGEPUCK_OUT` an empty folder. It ends with 0 if all is well and with [`SKIPPED`]
 //! if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, unless there is
-//! an `x-requirements.txt` with packages that are too large for every run.
+//! an `x-requirements.txt`: of packages that others do not go with, or that are very large.
 
 use super::cargo_on_all;
 use crate::summary::{Counts, Summary};
@@ -53,8 +53,7 @@ pub struct Packages {
 }
 
 impl Packages {
-    /// Begins to fetch the packages that most scripts share, which takes
-    /// minutes, while other steps compile.
+    /// Begins to fetch what most scripts share, which takes minutes, while other steps compile.
     pub fn fetch_meanwhile(which: Which, install: bool) -> Self {
         let fetch = move || match which {
             Which::None => Err("--peers none asks for none".to_owned()),
@@ -64,17 +63,18 @@ impl Packages {
     }
 }
 
-/// The interpreter that has what script `name` imports; `None` if the script needs
-/// only what most scripts share.
+/// The interpreter of script `name`; `None` if it needs only what most scripts share.
 fn python_of(name: &str, which: Which, install: bool) -> Option<Python> {
     let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
     if !root().join(&requirements).exists() {
         return None;
     }
-    if which != Which::All {
+    let is_large = name == "pytorch";
+    if is_large && which != Which::All {
         return Some(Err("its packages are large; --peers all runs it".to_owned()));
     }
-    let (folder, size) = (format!("tests-{name}-venv"), "some 5 GB");
+    let size = if is_large { "some 5 GB" } else { "some 400 MB" };
+    let folder = format!("tests-{name}-venv");
     Some(interpreter(&Environment { name: &folder, requirements: &requirements, size }, install))
 }
 
