@@ -10,7 +10,7 @@
 use glam::DVec3;
 
 use super::error::{Malformed, ParseError, excerpt};
-use super::tokens::{Tokens, coordinate, integer};
+use super::tokens::{Tokens, integer};
 use super::triangle_mesh::Parsed;
 
 /// Reads an ASCII OFF file from its bytes.
@@ -37,8 +37,7 @@ fn read(tokens: &mut Tokens<'_>) -> Result<Parsed, Malformed> {
         }
         let mut position = DVec3::ZERO;
         for axis in 0..3 {
-            let token = tokens.next_of("coordinates of a vertex", axis as u64, 3)?;
-            position[axis] = coordinate(token)?;
+            position[axis] = tokens.next_coordinate(axis as u64)?;
         }
         parsed.mesh.vertices.push(position);
     }
@@ -62,8 +61,7 @@ fn read_corners(
     corners.clear();
     let n_corners = integer(tokens.next().unwrap_or_default(), "a number of corners")?;
     for nth in (0..n_corners).filter(|_| n_corners >= 3) {
-        let token = tokens.next_of("corners of a face", nth as u64, n_corners as u64)?;
-        let index = integer(token, "a vertex index")?;
+        let (token, index) = tokens.next_index(nth as u64, n_corners as u64)?;
         let corner = u32::try_from(index).ok().filter(|&corner| u64::from(corner) < n_vertices);
         let outside = || Malformed::IndexOutOfRange { found: excerpt(token), n_vertices };
         corners.push(corner.ok_or_else(outside)?);

@@ -17,11 +17,11 @@ impl<'a> Tokens<'a> {
 
     /// The next token on this line.
     pub fn next(&mut self) -> Option<&'a [u8]> {
+        self.skip_blanks();
         let rest = &self.bytes[self.at..];
-        let blank = rest.iter().take_while(|byte| is_blank(**byte)).count();
-        let length = rest[blank..].iter().take_while(|byte| is_word(**byte)).count();
-        self.at += blank + length;
-        (length > 0).then(|| &rest[blank..blank + length])
+        let length = rest.iter().take_while(|byte| is_word(**byte)).count();
+        self.at += length;
+        (length > 0).then(|| &rest[..length])
     }
 
     /// The next token on this line, its `nth` of the `expected` tokens that are
@@ -29,6 +29,44 @@ impl<'a> Tokens<'a> {
     pub fn next_of(&mut self, what: &str, nth: u64, expected: u64) -> Result<&'a [u8], Malformed> {
         let short = || format!("expected {expected} {what} on the line, found {nth}");
         self.next().ok_or_else(|| Malformed::Syntax(short()))
+    }
+
+    /// The coordinate that the next token on this line spells, the `nth` of three.
+    pub fn next_coordinate(&mut self, nth: u64) -> Result<f64, Malformed> {
+        self.skip_blanks();
+        let rest = &self.bytes[self.at..];
+        // Finds where the number ends while it reads it; whatever it reads otherwise than
+        // `coordinate` is left to that.
+        if let Ok((number, length)) = fast_float2::parse_partial::<f64, _>(rest)
+            && number.is_finite()
+            && rest.get(length).is_none_or(|&byte| !is_word(byte))
+        {
+            self.at += length;
+            return Ok(number);
+        }
+        coordinate(self.next_of("coordinates of a vertex", nth, 3)?)
+    }
+
+    /// The next token on this line, the `nth` of `expected`, and the vertex index that it
+    /// spells.
+    pub fn next_index(&mut self, nth: u64, expected: u64) -> Result<(&'a [u8], i64), Malformed> {
+        self.skip_blanks();
+        let rest = &self.bytes[self.at..];
+        // So many digits cannot overflow.
+        let digits = rest.iter().take(9).take_while(|byte| byte.is_ascii_digit()).count();
+        if digits > 0 && rest.get(digits).is_none_or(|&byte| !is_word(byte)) {
+            self.at += digits;
+            let token = &rest[..digits];
+            let number = token.iter().fold(0, |sum, byte| sum * 10 + i64::from(byte - b'0'));
+            return Ok((token, number));
+        }
+        let token = self.next_of("corners of a face", nth, expected)?;
+        Ok((token, integer(token, "a vertex index")?))
+    }
+
+    fn skip_blanks(&mut self) {
+        let rest = &self.bytes[self.at..];
+        self.at += rest.iter().take_while(|byte| is_blank(**byte)).count();
     }
 
     /// Leaves this line for the next one that holds a token; false at the end.
@@ -52,7 +90,7 @@ impl<'a> Tokens<'a> {
     /// Moves past the next line end: `\n`, `\r\n` or `\r`.
     fn skip_line(&mut self) {
         let rest = &self.bytes[self.at..];
-        let Some(end) = rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')) else {
+        let Some(end) = memchr::memchr2(b'\n', b'\r', rest) else {
             self.at = self.bytes.len();
             return;
         };
@@ -74,7 +112,7 @@ pub(super) fn integer(token: &[u8], expected: &str) -> Result<i64, Malformed> {
 }
 
 /// The coordinate that `token` spells.
-pub(super) fn coordinate(token: &[u8]) -> Result<f64, Malformed> {
+fn coordinate(token: &[u8]) -> Result<f64, Malformed> {
     let number = std::str::from_utf8(token).ok().and_then(|text| text.parse::<f64>().ok());
     let finite = number.filter(|number| number.is_finite());
     finite.ok_or_else(|| Malformed::expected("a finite coordinate", token))

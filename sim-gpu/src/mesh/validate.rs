@@ -1,6 +1,7 @@
 //! Which triangles of a mesh a beam can meet, and how many it cannot.
 
 use glam::{DVec3, Vec3};
+use hashbrown::HashMap;
 use serde::{Deserialize, Serialize};
 
 use super::frame::named_vertices;
@@ -84,21 +85,9 @@ fn key(position: Vec3) -> [u32; 3] {
 }
 
 /// For each item the index of the first one that equals it.
-///
-/// By sorting, which takes as long whatever the items are, and needs no hash.
-fn lowest_equal(items: impl Iterator<Item = [u32; 3]>) -> Vec<u32> {
-    let pack = |(index, [a, b, c]): (usize, [u32; 3])| {
-        u128::from(a) << 96 | u128::from(b) << 64 | u128::from(c) << 32 | index as u128
-    };
-    let mut packed: Vec<u128> = items.enumerate().map(pack).collect();
-    packed.sort_unstable();
-    let mut lowest = vec![0; packed.len()];
-    for equal in packed.chunk_by(|a, b| a >> 32 == b >> 32) {
-        for item in equal {
-            lowest[*item as u32 as usize] = equal[0] as u32;
-        }
-    }
-    lowest
+fn lowest_equal(items: impl ExactSizeIterator<Item = [u32; 3]>) -> Vec<u32> {
+    let mut firsts = HashMap::with_capacity(items.len());
+    (0..).zip(items).map(|(index, item)| *firsts.entry(item).or_insert(index)).collect()
 }
 
 #[cfg(test)]
