@@ -2,7 +2,7 @@
 
 use crate::Outcome;
 use crate::caster::HOW_TO_GET_VULKAN;
-use sim_gpu::gpu::list_adapters;
+use sim_gpu::gpu::{AdapterKind, list_adapters};
 use std::io::Write;
 
 /// Lists every adapter, best first, and the CPU caster.
@@ -21,8 +21,8 @@ pub fn run() -> anyhow::Result<Outcome> {
         )?;
     }
     writeln!(out, "cpu\n    the CPU caster, on all cores; it needs no driver")?;
-    if adapters.is_empty() {
-        writeln!(out, "No GPU or software Vulkan was found; {HOW_TO_GET_VULKAN}.")?;
+    if adapters.iter().all(|adapter| adapter.kind == AdapterKind::Software) {
+        writeln!(out, "No GPU was found; {HOW_TO_GET_VULKAN}.")?;
     }
     Ok(Outcome::Success)
 }

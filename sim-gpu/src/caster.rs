@@ -31,7 +31,8 @@ pub enum Casting {
 /// Which adapter is to cast.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AdapterRequest {
-    /// The best there is: discrete GPU, integrated GPU, software Vulkan, CPU.
+    /// The best GPU that opens, or else the CPU. Software Vulkan has to be named: it
+    /// runs on the same cores as the CPU caster and is slower.
     #[default]
     Auto,
     /// The CPU, without any graphics driver.
@@ -55,8 +56,6 @@ impl FromStr for AdapterRequest {
 impl Caster {
     /// The caster that answers `request` and models `effects`.
     ///
-    /// `Auto` falls back to the CPU where no adapter is found.
-    ///
     /// # Errors
     /// If a named adapter is missing or the device cannot be opened.
     pub fn open(request: &AdapterRequest, effects: &Effects) -> Result<Self, CastError> {
@@ -78,12 +77,15 @@ impl Caster {
         Err(CastError::NoGpuSupport { wanted: name.to_owned() })
     }
 
-    /// The best caster that opens, and why better ones did not.
+    /// The best GPU that opens, or else the CPU; and why better GPUs did not open.
     #[cfg(feature = "gpu")]
     #[must_use]
     pub fn open_best(effects: &Effects) -> (Self, Vec<CastError>) {
         let mut passed_over = Vec::new();
         for adapter in gpu::adapters() {
+            if gpu::kind(&adapter) == gpu::AdapterKind::Software {
+                continue;
+            }
             match GpuCaster::open(&adapter, effects) {
                 Ok(gpu) => return (Self::Gpu(Box::new(gpu)), passed_over),
                 Err(error) => passed_over.push(error),
@@ -106,16 +108,6 @@ impl Caster {
             Self::Cpu(_) => "cpu",
             #[cfg(feature = "gpu")]
             Self::Gpu(gpu) => &gpu.summary().name,
-        }
-    }
-
-    /// Whether this is software Vulkan: a graphics interface without a GPU.
-    #[must_use]
-    pub fn is_software_vulkan(&self) -> bool {
-        match self {
-            Self::Cpu(_) => false,
-            #[cfg(feature = "gpu")]
-            Self::Gpu(gpu) => gpu.summary().kind == gpu::AdapterKind::Software,
         }
     }
 

@@ -1,10 +1,11 @@
 //! The one switch that decides on which casters a test runs.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
+use sim_gpu::gpu::list_adapters;
 
 /// The CPU twin, and the adapter if there is one.
 pub fn casters(effects: &Effects) -> Vec<&'static Caster> {
@@ -14,13 +15,16 @@ pub fn casters(effects: &Effects) -> Vec<&'static Caster> {
         .collect()
 }
 
-/// The best adapter.
+/// The best adapter, which may be software Vulkan.
 ///
 /// # Errors
 /// If there is none.
 pub fn adapter(effects: &Effects) -> Result<&'static Caster, String> {
-    let caster = open(&AdapterRequest::Auto, effects);
-    test_support::adapter(matches!(caster, Caster::Gpu(_)).then_some(caster))
+    static BEST: LazyLock<Option<AdapterRequest>> = LazyLock::new(|| {
+        let best = list_adapters().into_iter().next();
+        best.map(|adapter| AdapterRequest::Named(adapter.name))
+    });
+    test_support::adapter(BEST.as_ref().map(|best| open(best, effects)))
 }
 
 /// One device per process and set of effects: tests run side by side, and

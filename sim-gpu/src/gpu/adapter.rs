@@ -70,7 +70,7 @@ pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, CastError> {
 pub(crate) fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
     let info = adapter.get_info();
     AdapterSummary {
-        kind: kind(info.device_type),
+        kind: kind(adapter),
         backend: info.backend.to_string(),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
         max_binding_bytes: adapter.limits().max_storage_buffer_binding_size,
@@ -88,12 +88,13 @@ pub(crate) fn adapters() -> Vec<wgpu::Adapter> {
                 a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
             })
             .collect();
-    adapters.sort_by_key(|a| kind(a.get_info().device_type));
+    adapters.sort_by_key(kind);
     adapters
 }
 
-fn kind(device: wgpu::DeviceType) -> AdapterKind {
-    match device {
+/// What sort of device `adapter` is.
+pub(crate) fn kind(adapter: &wgpu::Adapter) -> AdapterKind {
+    match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,
         wgpu::DeviceType::IntegratedGpu => AdapterKind::Integrated,
         wgpu::DeviceType::VirtualGpu => AdapterKind::Virtual,

@@ -9,7 +9,7 @@ mod pipeline;
 mod slot;
 
 pub use adapter::{AdapterKind, AdapterSummary, list_adapters};
-pub(crate) use adapter::{adapters, find_adapter};
+pub(crate) use adapter::{adapters, find_adapter, kind};
 pub use batch::{Batch, BatchLimits};
 pub use caster::{GpuCaster, Pending};
 pub use compose::compose;
