@@ -8,7 +8,7 @@ use crate::prediction::Prediction;
 use crate::team::{Team, Work};
 
 /// Clouds that each thread has waiting for it: large ones and small ones even out.
-const CLOUDS_PER_THREAD: usize = 4;
+const CLOUDS_PER_THREAD: usize = 8;
 
 /// Classifiers that share the weights of one model and work side by side, each in a thread of
 /// its own.

@@ -13,41 +13,65 @@
 //! plate and a rod differ in it where a few sampled points do not. Neighbours
 //! are taken from all points, kept by the sampler or not. p is its own
 //! neighbour, so that the maximum is never of nothing. It depends neither on
-//! the order of points nor on repetitions. As ReLU keeps order, it is applied
-//! once, to the maximum.
+//! the order of points nor on repetitions.
+//!
+//! Computed is `relu(max(w q / r) - w p / r + b)`, which is the same but for rounding: a
+//! neighbour costs a maximum instead of a product. Products are computed for a tile of the
+//! cloud at a time, which stays in the first-level cache, and serve all points of a block.
+
+use std::ops::Range;
 
 use crate::dense::Dense;
 
-/// Points whose distances are found at once.
+/// Points of the cloud whose products are at hand at once.
 const TILE: usize = 64;
+/// Channels whose maxima stay in registers while neighbours pass. Layers are padded to
+/// whole ones.
+const LANES: usize = 32;
 
-/// The layers of all radii, the widest first.
+/// Some channels, side by side.
+type Lanes = [f32; LANES];
+
+/// The layers of all radii.
 #[derive(Clone, Debug, Default)]
 pub struct EdgeConv {
+    /// The widest first.
     layers: Vec<EdgeLayer>,
+    /// Weights of x, y and z, divided by the radius, and biases, of all layers.
+    weights: Vec<[Lanes; 3]>,
+    bias: Vec<Lanes>,
 }
 
 #[derive(Clone, Debug)]
 struct EdgeLayer {
     squared_radius: f32,
-    /// Where its channels begin among those of all layers.
-    first: usize,
-    /// Weights of x, y and z, divided by the radius.
-    weights: [Vec<f32>; 3],
-    bias: Vec<f32>,
+    /// Its places among the features of all layers.
+    features: Range<usize>,
+    /// Its places among all layers' weights.
+    lanes: Range<usize>,
 }
 
-/// All points of a cloud, coordinate by coordinate.
+/// All points of a cloud, coordinate by coordinate, and infinitely far ones that make whole
+/// tiles of them.
 #[derive(Clone, Debug, Default)]
 pub struct Neighborhood {
     axes: [Vec<f32>; 3],
+}
+
+/// The memory in which a block's features arise.
+#[derive(Clone, Debug, Default)]
+pub struct EdgeScratch {
+    /// A tile's points with the weights.
+    products: Vec<[Lanes; TILE]>,
+    /// Of the points of a block: all of the first, all of the second, ...
+    maxima: Vec<Lanes>,
 }
 
 impl Neighborhood {
     /// Makes room for `n` points.
     pub fn reserve(&mut self, n: usize) {
         for axis in &mut self.axes {
-            axis.reserve(n.saturating_sub(axis.len()));
+            axis.reserve(n.next_multiple_of(TILE).saturating_sub(axis.len()));
         }
     }
 
@@ -56,30 +80,39 @@ impl Neighborhood {
         for (k, axis) in self.axes.iter_mut().enumerate() {
             axis.clear();
             axis.extend(points.iter().map(|point| point[k]));
+            axis.resize(points.len().next_multiple_of(TILE), f32::INFINITY);
         }
+    }
+
+    /// The points, a tile at a time.
+    #[inline(always)]
+    fn tiles(&self) -> impl Iterator<Item = Tile<'_>> {
+        let [xs, ys, zs] = self.axes.each_ref().map(|axis| axis.as_chunks().0.iter());
+        xs.zip(ys).zip(zs).map(|((x, y), z)| Tile { x, y, z })
     }
 }
 
 impl EdgeConv {
     /// Layers of `[channels, 3]` each, with their radii.
     pub fn new(layers: &[(f32, Dense)]) -> Self {
+        let mut edges = Self::default();
         let mut first = 0;
-        let mut layers: Vec<EdgeLayer> = layers
-            .iter()
-            .map(|(radius, dense)| {
-                let of = |k| (0..dense.outputs).map(|c| dense.at(k, c) / radius).collect();
-                let layer = EdgeLayer {
-                    squared_radius: radius * radius,
-                    first,
-                    weights: [of(0), of(1), of(2)],
-                    bias: dense.bias.clone(),
-                };
-                first += dense.outputs;
-                layer
-            })
-            .collect();
-        layers.sort_by(|a, b| b.squared_radius.total_cmp(&a.squared_radius));
-        Self { layers }
+        for (radius, dense) in layers {
+            let of = |c: usize, value: &dyn Fn(usize) -> f32| -> Lanes {
+                std::array::from_fn(|i| if c + i < dense.outputs { value(c + i) } else { 0.0 })
+            };
+            let from = edges.bias.len();
+            for c in (0..dense.outputs).step_by(LANES) {
+                edges.weights.push([0, 1, 2].map(|k| of(c, &|c| dense.at(k, c) / radius)));
+                edges.bias.push(of(c, &|c| dense.bias[c]));
+            }
+            let features = first..first + dense.outputs;
+            first = features.end;
+            let (squared_radius, lanes) = (radius * radius, from..edges.bias.len());
+            edges.layers.push(EdgeLayer { squared_radius, features, lanes });
+        }
+        edges.layers.sort_by(|a, b| b.squared_radius.total_cmp(&a.squared_radius));
+        edges
     }
 
     /// Whether there is none.
@@ -87,53 +120,173 @@ impl EdgeConv {
         self.layers.is_empty()
     }
 
-    /// Writes the features of `centre` into `out`, `[channels]`, in the order
-    /// in which layers were given.
-    pub fn features(&self, centre: [f32; 3], cloud: &Neighborhood, out: &mut [f32]) {
-        // The centre's own: nothing times the weights.
-        out.fill(0.0);
-        let Some(widest) = self.layers.first() else { return };
-        let [xs, ys, zs] = &cloud.axes;
+    /// Memory for blocks of up to `n` points.
+    pub fn scratch(&self, n: usize) -> EdgeScratch {
+        EdgeScratch {
+            products: vec![[[0.0; LANES]; TILE]; self.bias.len()],
+            maxima: vec![[0.0; LANES]; n * self.bias.len()],
+        }
+    }
+
+    /// Writes the features of the points of `rows` behind their coordinates, layer by layer
+    /// in the order in which they were given; `[points, stride]`. Kernels call it, compiled
+    /// for their vectors.
+    #[inline(always)]
+    pub fn features<const FUSED: bool>(
+        &self,
+        (rows, stride): (&mut [f32], usize),
+        cloud: &Neighborhood,
+        scratch: &mut EdgeScratch,
+    ) {
+        if self.is_empty() {
+            return;
+        }
+        let EdgeScratch { products, maxima } = scratch;
+        let of_point = self.bias.len();
+        for (row, maxima) in rows.chunks_exact(stride).zip(maxima.chunks_exact_mut(of_point)) {
+            // Each point is its own neighbour.
+            for (most, weights) in maxima.iter_mut().zip(&self.weights) {
+                *most = product::<FUSED, LANES>(weights.each_ref(), [row[0], row[1], row[2]]);
+            }
+        }
+        for tile in cloud.tiles() {
+            let mut is_projected = false;
+            for (row, maxima) in rows.chunks_exact(stride).zip(maxima.chunks_exact_mut(of_point)) {
+                let squared = tile.squared_distances([row[0], row[1], row[2]]);
+                for EdgeLayer { squared_radius, lanes, .. } in &self.layers {
+                    let near = within(&squared, *squared_radius);
+                    if near == 0 {
+                        break;
+                    }
+                    if !is_projected {
+                        self.project::<FUSED>(&tile, products);
+                        is_projected = true;
+                    }
+                    for i in lanes.clone() {
+                        raise(&mut maxima[i], &products[i], near);
+                    }
+                }
+            }
+        }
+        for (row, maxima) in rows.chunks_exact_mut(stride).zip(maxima.chunks_exact(of_point)) {
+            self.finish::<FUSED>(maxima, row);
+        }
+    }
+
+    /// Writes the products of a tile's points with all weights.
+    #[inline(always)]
+    fn project<const FUSED: bool>(&self, tile: &Tile<'_>, products: &mut [[Lanes; TILE]]) {
+        for (products, weights) in products.iter_mut().zip(&self.weights) {
+            // Half the channels at a time, so that their weights stay in registers.
+            let halves = weights.each_ref().map(|weights| weights.as_chunks::<{ LANES / 2 }>().0);
+            for half in 0..2 {
+                let weights = halves.map(|halves| &halves[half]);
+                for (i, out) in products.iter_mut().enumerate() {
+                    let (halves, _) = out.as_chunks_mut();
+                    let point = [tile.x[i], tile.y[i], tile.z[i]];
+                    halves[half] = product::<FUSED, { LANES / 2 }>(weights, point);
+                }
+            }
+        }
+    }
+
+    /// Writes the features of the point of `row` from its maxima. Where its own product
+    /// leaves f32, it has no extent.
+    #[inline(always)]
+    fn finish<const FUSED: bool>(&self, maxima: &[Lanes], row: &mut [f32]) {
+        let (centre, out) = row.split_at_mut(3);
+        for EdgeLayer { features, lanes, .. } in &self.layers {
+            for (i, out) in lanes.clone().zip(out[features.clone()].chunks_mut(LANES)) {
+                let centre = [centre[0], centre[1], centre[2]];
+                let own = product::<FUSED, LANES>(self.weights[i].each_ref(), centre);
+                let extents = maxima[i].iter().zip(&own).map(|(most, own)| (most - own).max(0.0));
+                for (out, (extent, bias)) in out.iter_mut().zip(extents.zip(&self.bias[i])) {
+                    *out = (extent + bias).max(0.0);
+                }
+            }
+        }
+    }
+}
+
+/// Points of a cloud that are looked at together.
+struct Tile<'a> {
+    x: &'a [f32; TILE],
+    y: &'a [f32; TILE],
+    z: &'a [f32; TILE],
+}
+
+impl Tile<'_> {
+    #[inline(always)]
+    fn squared_distances(&self, [x, y, z]: [f32; 3]) -> [f32; TILE] {
         let mut squared = [0.0; TILE];
-        for first in (0..xs.len()).step_by(TILE) {
-            let tile = first..xs.len().min(first + TILE);
-            let (xs, ys, zs) = (&xs[tile.clone()], &ys[tile.clone()], &zs[tile]);
-            for i in 0..xs.len() {
-                let (x, y, z) = (xs[i] - centre[0], ys[i] - centre[1], zs[i] - centre[2]);
-                squared[i] = x * x + y * y + z * z;
-            }
-            for i in (0..xs.len()).filter(|&i| squared[i] <= widest.squared_radius) {
-                let offset = [xs[i] - centre[0], ys[i] - centre[1], zs[i] - centre[2]];
-                let reach = self.layers.iter().take_while(|l| squared[i] <= l.squared_radius);
-                reach.for_each(|layer| layer.raise(offset, out));
-            }
+        for (i, squared) in squared.iter_mut().enumerate() {
+            let (x, y, z) = (self.x[i] - x, self.y[i] - y, self.z[i] - z);
+            *squared = x * x + y * y + z * z;
         }
-        self.layers.iter().for_each(|layer| layer.finish(out));
+        squared
     }
 }
 
-impl EdgeLayer {
-    fn channels<'a>(&self, out: &'a mut [f32]) -> &'a mut [f32] {
-        &mut out[self.first..][..self.bias.len()]
+/// The products of a point with some channels' weights. `FUSED` where the processor rounds
+/// a product and a sum at once: what it must imitate takes it long.
+#[inline(always)]
+fn product<const FUSED: bool, const N: usize>(
+    [wx, wy, wz]: [&[f32; N]; 3],
+    [x, y, z]: [f32; 3],
+) -> [f32; N] {
+    let mut out = [0.0; N];
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = if FUSED {
+            wx[i].mul_add(x, wy[i].mul_add(y, wz[i] * z))
+        } else {
+            wx[i] * x + (wy[i] * y + wz[i] * z)
+        };
     }
+    out
+}
 
-    /// Raises maxima to what a neighbour at `offset` gives.
-    fn raise(&self, [x, y, z]: [f32; 3], out: &mut [f32]) {
-        let out = self.channels(out);
-        let [wx, wy, wz] = &self.weights;
-        let weights = wx.iter().zip(wy).zip(wz);
-        for (out, ((wx, wy), wz)) in out.iter_mut().zip(weights) {
-            let product = wx * x + wy * y + wz * z;
-            *out = if product > *out { product } else { *out };
+/// The points of a tile within a radius, a bit each.
+#[inline(always)]
+fn within(squared: &[f32; TILE], squared_radius: f32) -> u64 {
+    /// Moves the lowest bit of byte i to bit 56 + i: the factor has the bits 56 - 7 i.
+    const GATHER: u64 = 0x0102_0408_1020_4080;
+    let mut is_near = [0; TILE];
+    for (is_near, squared) in is_near.iter_mut().zip(squared) {
+        *is_near = u8::from(*squared <= squared_radius);
+    }
+    let (eights, _) = is_near.as_chunks();
+    let bits = eights.iter().map(|&eight| u64::from_le_bytes(eight).wrapping_mul(GATHER) >> 56);
+    bits.rev().fold(0, |near, bits| near << 8 | bits)
+}
+
+/// Raises maxima to the products of the points that are `near`, a bit each.
+#[inline(always)]
+fn raise(maxima: &mut Lanes, products: &[Lanes; TILE], mut near: u64) {
+    let mut most = *maxima;
+    while near != 0 {
+        let products = &products[near.trailing_zeros() as usize % TILE];
+        near &= near - 1;
+        for (most, &product) in most.iter_mut().zip(products) {
+            *most = greater(*most, product);
         }
     }
+    *maxima = most;
+}
 
-    fn finish(&self, out: &mut [f32]) {
-        for (out, bias) in self.channels(out).iter_mut().zip(&self.bias) {
-            *out = (*out + bias).max(0.0);
-        }
+/// The greater of two numbers, one instruction of each processor. Neither is NaN but where
+/// a product leaves f32.
+#[inline(always)]
+fn greater(most: f32, product: f32) -> f32 {
+    if cfg!(target_arch = "aarch64") {
+        most.max(product)
+    } else if product > most {
+        product
+    } else {
+        most
     }
 }
+
+const _: () = assert!(TILE == u64::BITS as usize);
 
 #[cfg(test)]
 mod tests {
@@ -181,9 +334,12 @@ mod tests {
     fn features(edges: &EdgeConv, p: [f32; 3], cloud: &[[f32; 3]], n: usize) -> Vec<f32> {
         let mut neighborhood = Neighborhood::default();
         neighborhood.set(cloud);
-        let mut out = vec![f32::NAN; n];
-        edges.features(p, &neighborhood, &mut out);
-        out
+        // Two points, so that one does not disturb the other, with padding.
+        let mut rows = vec![f32::NAN; 2 * (n + 5)];
+        rows[..3].copy_from_slice(&cloud[0]);
+        rows[n + 5..n + 8].copy_from_slice(&p);
+        edges.features::<false>((&mut rows, n + 5), &neighborhood, &mut edges.scratch(2));
+        rows[n + 8..][..n].to_vec()
     }
 
     #[test]
@@ -194,9 +350,11 @@ mod tests {
             let cloud = cloud(n);
             let found = features(&edges, cloud[n / 2], &cloud, 8);
             for (found, truth) in found.iter().zip(twin(&layers, cloud[n / 2], &cloud)) {
-                // Weights and offsets over the radius are at most 1 each: three
-                // products, two sums, a quotient and a bias, each rounded once.
-                let bound = 8.0 * f64::from(f32::EPSILON) * 3.1;
+                // In units u = EPSILON / 2: weights are at most 1, over the radius at
+                // most 5 and off by 5u, coordinates at most 1. A product of three with
+                // its sums is off by 4 * 15u, the difference of two by 120u and its own
+                // rounding, 15u; the bias adds 15u.
+                let bound = 150.0 * f64::from(f32::EPSILON) / 2.0;
                 assert!((f64::from(*found) - truth).abs() <= bound, "{found}, {truth}, n {n}");
             }
         }

@@ -67,7 +67,8 @@ mod test_time_augmentation;
 /// How a team of threads shares out a cloud, for models of its speed.
 pub mod sharing {
     pub use crate::engine::{
-        BLOCK, GROUP, RUN_BLOCKS, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK, folding_pays,
+        BLOCK, GROUP, RUN_BLOCKS, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK, block_points,
+        folding_pays,
     };
     pub use crate::prefilter::prefilter_pays;
 }

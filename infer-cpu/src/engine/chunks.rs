@@ -3,10 +3,10 @@
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Block, Engine, GROUP, Group, Head, Pass, Run, Task, ThreadScratch, VECTOR_BLOCK,
-    VECTOR_CHUNK,
+    Block, Engine, GROUP, Group, Head, Pass, Run, Task, ThreadScratch, VECTOR_BLOCK, VECTOR_CHUNK,
 };
 use super::{lock, read, write};
+use crate::edge_conv::EdgeScratch;
 use crate::kernel::{Kernels, Rows};
 use crate::layers::Packed;
 use crate::precision::{F16_LARGEST, Format, Weight};
@@ -17,7 +17,7 @@ impl<T: Format> Work for Engine<T> {
     fn chunk(&self, thread: usize, chunk: usize) {
         let task = *read(&self.task);
         match task {
-            Task::Hidden { pass, first_block } => self.hidden(thread, pass, first_block, chunk),
+            Task::Hidden { pass, run } => self.hidden(thread, pass, run, chunk),
             Task::Pool { pass, run } => self.pool_group(thread, pass, run, chunk),
             Task::Vector { head, layer } => self.vector_chunk(head, layer, chunk),
         }
@@ -25,20 +25,20 @@ impl<T: Format> Work for Engine<T> {
 }
 
 impl<T: Format> Engine<T> {
-    /// Takes block `first_block + slot` of the points up to a pass's last layer.
-    fn hidden(&self, thread: usize, pass: Pass, first_block: usize, slot: usize) {
+    /// Takes block `slot` of a run up to a pass's last layer.
+    fn hidden(&self, thread: usize, pass: Pass, run: Run, slot: usize) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let points = read(&self.points);
         let mut scratch = lock(&self.threads[thread]);
-        let ThreadScratch { edged, wide, narrow: [from, to], .. } = &mut *scratch;
-        let rows = block_rows(&points, first_block + slot);
+        let ThreadScratch { edged, edge_scratch, wide, narrow: [from, to], .. } = &mut *scratch;
+        let rows = block_rows(&points, run.block, run.first_block + slot);
         let n = rows.n();
         let first = self.first(pass);
         let mut width = first.panels.padded_outputs();
         match pass {
             Pass::Front | Pass::Stn => self.multiply(&rows, &first.panels, wide, width),
             Pass::Fstn | Pass::Trunk => {
-                let rows = self.with_edge_features(&rows, edged);
+                let rows = self.with_edge_features(&rows, edged, edge_scratch);
                 self.multiply(&rows, &read(&self.entry), wide, width);
             }
         }
@@ -68,20 +68,24 @@ impl<T: Format> Engine<T> {
     }
 
     /// `rows` of coordinates, each followed by the point's EdgeConv features.
-    fn with_edge_features<'a>(&self, rows: &Rows<'a, f32>, edged: &'a mut [f32]) -> Rows<'a, f32> {
+    fn with_edge_features<'a>(
+        &self,
+        rows: &Rows<'a, f32>,
+        edged: &'a mut [f32],
+        edge_scratch: &mut EdgeScratch,
+    ) -> Rows<'a, f32> {
         if self.edges.is_empty() {
             return *rows;
         }
-        let cloud = read(&self.cloud);
-        let first = self.layers.trunk[0].first();
-        let (inputs, stride) = (first.panels.inputs(), first.panels.padded_inputs());
+        let stride = self.layers.trunk[0].first().panels.padded_inputs();
+        let edged = &mut edged[..rows.n() * stride];
         let points = rows.data().chunks_exact(rows.stride());
         for (point, row) in points.zip(edged.chunks_exact_mut(stride)) {
-            let (centre, features) = row[..inputs].split_at_mut(3);
-            centre.copy_from_slice(&point[..3]);
-            self.edges.features([point[0], point[1], point[2]], &cloud, features);
+            row[..3].copy_from_slice(&point[..3]);
         }
-        Rows::new(&edged[..rows.n() * stride], stride, rows.n())
+        let rows_out = (&mut *edged, stride);
+        (self.kernels.edge_features)(&self.edges, rows_out, &read(&self.cloud), edge_scratch);
+        Rows::new(edged, stride, rows.n())
     }
 
     /// Rounds a layer's outputs for the layer `next`, and notes what is lost.
@@ -99,7 +103,7 @@ impl<T: Format> Engine<T> {
 
     /// Pools group `group` of a pass's last channels over some blocks.
     fn pool_group(&self, thread: usize, pass: Pass, run: Run, group: usize) {
-        let Run { first_block, n_blocks, winners } = run;
+        let Run { block: block_points, first_block, n_blocks, winners } = run;
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let last = self.last(pass, &feature, &folded);
         let n_points = read(&self.points).len() / 4;
@@ -110,9 +114,10 @@ impl<T: Format> Engine<T> {
             pool.begin::<T>(last, group, winners);
         }
         for slot in 0..n_blocks {
-            let first_row = (first_block + slot) * BLOCK;
+            let first_row = (first_block + slot) * block_points;
             let block = read(&self.blocks[slot]);
-            let rows = Rows::new(&block.features[..], stride, BLOCK.min(n_points - first_row));
+            let rows =
+                Rows::new(&block.features[..], stride, block_points.min(n_points - first_row));
             let is_pooled = pool.prefilters && block.has_levels && {
                 let prefilter_scratch = &mut lock(&self.threads[thread]).prefilter_scratch;
                 pool.prefilter::<T>(
@@ -221,8 +226,8 @@ fn n_channels<T: Format>(last: &Packed<T>, group: usize) -> usize {
     GROUP.min(last.width() - group * GROUP)
 }
 
-/// The rows of block `block` of `points`.
-fn block_rows(points: &[f32], block: usize) -> Rows<'_, f32> {
-    let n = BLOCK.min(points.len() / 4 - block * BLOCK);
-    Rows::new(&points[block * BLOCK * 4..][..n * 4], 4, n)
+/// The rows of block `block` of `points`, of `size` each but for the last.
+fn block_rows(points: &[f32], size: usize, block: usize) -> Rows<'_, f32> {
+    let n = size.min(points.len() / 4 - block * size);
+    Rows::new(&points[block * size * 4..][..n * 4], 4, n)
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::{
-    BLOCK, Engine, GROUP, Head, Interleave, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Task,
-    VECTOR_BLOCK, VECTOR_CHUNK, lock, read, write,
+    Engine, GROUP, Head, Interleave, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Task,
+    VECTOR_BLOCK, VECTOR_CHUNK, block_points, lock, read, write,
 };
 use crate::kernel::{Panels, Rows};
 use crate::layers::Conv;
@@ -159,22 +159,24 @@ impl<T: Format> Engine<T> {
     fn pool(team: &Team<Self>, pass: Pass, winners: bool, scratch: &mut Scratch) {
         let engine = team.work();
         let n_points = read(&engine.points).len() / 4;
-        let n_blocks = n_points.div_ceil(BLOCK);
+        let block = block_points(n_points, engine.threads.len());
+        let n_blocks = n_points.div_ceil(block);
         let width = engine.last_width(pass);
         // Blocks go in runs, so that the features kept before the last layer are
         // bounded whatever the cloud's size.
         for first_block in (0..n_blocks).step_by(RUN_BLOCKS) {
             let n_blocks = RUN_BLOCKS.min(n_blocks - first_block);
-            engine.begin(Task::Hidden { pass, first_block });
+            let run = Run { block, first_block, n_blocks, winners };
+            engine.begin(Task::Hidden { pass, run });
             team.run(n_blocks);
-            engine.begin(Task::Pool { pass, run: Run { first_block, n_blocks, winners } });
+            engine.begin(Task::Pool { pass, run });
             team.run(width.div_ceil(GROUP));
         }
-        engine.collect(pass, scratch);
+        engine.collect(pass, winners, scratch);
     }
 
     /// Scales, biases and ReLU, once for the maxima: all of them keep order.
-    fn collect(&self, pass: Pass, scratch: &mut Scratch) {
+    fn collect(&self, pass: Pass, winners: bool, scratch: &mut Scratch) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let panels = &self.last(pass, &feature, &folded).panels;
         let interleave = Interleave::new(read(&self.points).len() / 4);
@@ -183,13 +185,15 @@ impl<T: Format> Engine<T> {
         for (g, first) in (0..panels.outputs()).step_by(GROUP).enumerate() {
             let group = lock(&self.groups[g]);
             let channels = first..panels.outputs().min(first + GROUP);
-            for (channel, (&sum, &winner)) in channels.zip(group.maxima.iter().zip(&group.winners))
-            {
+            if winners {
+                let points = group.winners[..channels.len()].iter();
+                scratch.winners.extend(points.map(|&row| interleave.point(row as usize) as u32));
+            }
+            for (channel, &sum) in channels.zip(&group.maxima) {
                 let scale = panels.scales().get(channel).copied().unwrap_or(1.0);
                 let value = T::widen(sum) * scale + panels.biases()[channel];
                 let is_cut = panels.relu() && value < 0.0;
                 scratch.values.push(if is_cut { 0.0 } else { value });
-                scratch.winners.push(interleave.point(winner as usize) as u32);
             }
         }
     }

@@ -14,7 +14,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-use crate::edge_conv::{EdgeConv, Neighborhood};
+use crate::edge_conv::{EdgeConv, EdgeScratch, Neighborhood};
 use crate::kernel::{GEMV_NR, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
 use crate::precision::Format;
@@ -30,9 +30,11 @@ pub use forward::{Forward, Input, Scratch, folding_pays};
 use interleave::Interleave;
 use route::stacks;
 
-/// Points of a block: whole tiles of every kernel, and few enough that their
+/// Points of a block at most: whole tiles of every kernel, and few enough that their
 /// features stay in a first-level cache.
 pub const BLOCK: usize = 48;
+/// Points of a block are a multiple of this: whole tiles of most kernels.
+const BLOCK_STEP: usize = 8;
 /// Blocks whose features are kept: 1,056 points, 540 KiB for 128 features.
 pub const RUN_BLOCKS: usize = 22;
 /// Blocks of outputs (64 each) of a vector layer that a thread does at a time.
@@ -41,6 +43,15 @@ pub const VECTOR_CHUNK: usize = 2;
 pub const VECTOR_BLOCK: usize = GEMV_NR;
 /// A vector layer of fewer products than this is not worth sharing out.
 pub const SMALL_VECTOR: usize = 1 << 15;
+
+/// How many points a block has where `n_threads` share out `n_points`: as many as leave no
+/// thread idle while others work.
+#[must_use]
+pub fn block_points(n_points: usize, n_threads: usize) -> usize {
+    let n_threads = n_threads.clamp(1, RUN_BLOCKS);
+    let rounds = n_points.div_ceil(n_threads * BLOCK).max(1);
+    n_points.div_ceil(n_threads * rounds).next_multiple_of(BLOCK_STEP).clamp(BLOCK_STEP, BLOCK)
+}
 
 /// What is taken through which layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +78,7 @@ enum Head {
 #[derive(Clone, Copy)]
 enum Task {
     /// Features of blocks of points before a pass's last layer.
-    Hidden { pass: Pass, first_block: usize },
+    Hidden { pass: Pass, run: Run },
     /// The last layer and its maxima, of some blocks.
     Pool { pass: Pass, run: Run },
     /// One vector layer.
@@ -77,6 +88,8 @@ enum Task {
 /// Blocks whose features are at hand, and whether to keep the points that win.
 #[derive(Clone, Copy)]
 struct Run {
+    /// Points of a block, but for the last.
+    block: usize,
     first_block: usize,
     n_blocks: usize,
     winners: bool,
@@ -109,7 +122,7 @@ pub struct Engine<T: Format> {
     observing: bool,
 }
 
-/// Features of [`BLOCK`] points before the last layer.
+/// Features of up to [`BLOCK`] points before the last layer.
 struct Block<T: Format> {
     features: Vec<T::Activation>,
     /// The same in levels, if they have any.
@@ -129,6 +142,7 @@ struct Group<S> {
 struct ThreadScratch<T: Format> {
     /// Points with their EdgeConv features.
     edged: Vec<f32>,
+    edge_scratch: EdgeScratch,
     wide: Vec<f32>,
     narrow: [Vec<T::Activation>; 2],
     prefilter_scratch: PrefilterScratch,
@@ -180,8 +194,10 @@ impl<T: Format> Engine<T> {
         let prefilters = pooled_layers(&layers).any(|layer| layer.prefilter.is_some());
         let edges = EdgeConv::new(&layers.edges);
         let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs() };
+        let edge_scratch = edges.scratch(BLOCK);
         let thread = || ThreadScratch {
             edged: vec![0.0; edged],
+            edge_scratch: edge_scratch.clone(),
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
             prefilter_scratch: if prefilters {
@@ -321,4 +337,20 @@ fn write<V>(lock: &RwLock<V>) -> std::sync::RwLockWriteGuard<'_, V> {
 
 fn lock<V>(lock: &Mutex<V>) -> MutexGuard<'_, V> {
     lock.lock().unwrap_or_else(|_: PoisonError<_>| panic!("a worker panicked"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_shared_out_evenly() {
+        assert_eq!([1, 2, 4].map(|threads| block_points(64, threads)), [32, 32, 16]);
+        assert_eq!([1, 2, 4].map(|threads| block_points(1024, threads)), [48, 48, 48]);
+        assert_eq!([0, 1, 3].map(|points| block_points(points, 4)), [8, 8, 8]);
+        for (points, threads) in [(100, 3), (1057, 22), (1_000_000, 64), (5, 1000)] {
+            let block = block_points(points, threads);
+            assert!((1..=BLOCK).contains(&block), "{points} points, {threads} threads: {block}");
+        }
+    }
 }

@@ -19,6 +19,8 @@ use std::ops::Range;
 
 use half::f16;
 
+use crate::edge_conv::{EdgeConv, EdgeScratch, Neighborhood};
+
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -219,6 +221,10 @@ pub(crate) type AboveFloors =
 pub(crate) type Dots =
     fn(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &mut [f32]);
 
+/// [`EdgeConv::features`].
+pub(crate) type EdgeFeatures =
+    fn(&EdgeConv, rows: (&mut [f32], usize), &Neighborhood, &mut EdgeScratch);
+
 /// Cloud coordinates as structure of arrays, for sampling.
 #[derive(Clone, Copy)]
 pub(crate) struct Soa<'a> {
@@ -260,6 +266,8 @@ pub struct Kernels {
     /// point) to that from `pick` and returns the first of the farthest points.
     /// Squares are summed as `(dx² + dy²) + dz²`, each rounded, as NumPy does.
     pub(crate) fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
+    /// [`EdgeConv::features`].
+    pub(crate) edge_features: EdgeFeatures,
 }
 
 formats::named! {

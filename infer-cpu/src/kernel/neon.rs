@@ -20,6 +20,7 @@
 use std::arch::aarch64::*;
 
 use super::{KernelName, Kernels, declare_kernels};
+use crate::edge_conv::EdgeConv;
 
 mod fps;
 mod gemv;
@@ -48,6 +49,7 @@ pub(super) const NEON: Kernels = Kernels {
     narrow_f16: narrow::to_f16,
     narrow_i8: narrow::to_i8,
     fps_step: fps::step,
+    edge_features: EdgeConv::features::<true>,
 };
 
 struct F32;

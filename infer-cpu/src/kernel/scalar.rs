@@ -8,6 +8,7 @@ use half::f16;
 use super::{
     Candidate, Gemm, I8_LARGEST, LevelSums, Panels, PrefilterKernels, Rows, Soa, declare_kernels,
 };
+use crate::edge_conv::EdgeConv;
 
 /// Products of fp16 are summed in fp16 over this many inputs.
 pub(super) const F16_CHUNK: usize = 32;
@@ -32,6 +33,7 @@ declare_kernels!(Scalar, runs_here: true, {
     narrow_f16,
     narrow_i8,
     fps_step,
+    edge_features: EdgeConv::features::<false>,
 });
 
 /// An activation of one number format.

@@ -14,6 +14,8 @@ use half::f16;
 
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 use super::{Candidate, Gemm, Gemv, I8_LARGEST, Kernels, Panels, Rows, Soa, WIDTH_STEP};
+use crate::dense::Dense;
+use crate::edge_conv::{EdgeConv, Neighborhood};
 pub use crate::precision::{F16, F32, I8};
 use crate::precision::{Format, Weight};
 
@@ -517,6 +519,40 @@ pub fn fps_is_the_reference(kernels: &Kernels) {
     }
 }
 
+/// That EdgeConv features are near those of the reference.
+pub fn edge_features_are_near_the_reference(kernels: &Kernels) {
+    let mut draw = Draw::new("edges");
+    let mut dense = |outputs: usize| Dense {
+        name: String::new(),
+        inputs: 3,
+        outputs,
+        weight: (0..3 * outputs).map(|_| draw.signed()).collect(),
+        bias: (0..outputs).map(|_| draw.signed()).collect(),
+        relu: true,
+    };
+    let edges = EdgeConv::new(&[(0.3, dense(40)), (0.6, dense(64))]);
+    let mut cloud = Neighborhood::default();
+    let points: Vec<[f32; 3]> = (0..150).map(|_| [(); 3].map(|()| draw.signed())).collect();
+    cloud.set(&points);
+    let stride = 3 + 104;
+    let mut rows = vec![0.0; 7 * stride];
+    for (row, point) in rows.chunks_exact_mut(stride).zip(&points) {
+        row[..3].copy_from_slice(point);
+    }
+    let features = |kernels: &Kernels| {
+        let mut rows = rows.clone();
+        (kernels.edge_features)(&edges, (&mut rows, stride), &cloud, &mut edges.scratch(7));
+        rows
+    };
+    let expected = features(reference());
+    assert!(expected.iter().filter(|&&feature| feature > 0.0).count() > 100);
+    // Each is off by 150 u at most: the tests of `edge_conv` derive it for larger weights
+    // over the radius (5 there, 3.4 here).
+    let bound = 2.0 * 150.0 * f32::EPSILON / 2.0;
+    let near = |(found, expected): (&f32, &f32)| (found - expected).abs() <= bound;
+    assert!(features(kernels).iter().zip(&expected).all(near));
+}
+
 /// That `work` panics with a message that contains `words`.
 pub fn panics_with<T>(words: &str, work: impl FnOnce() -> T) {
     let panic = catch_unwind(AssertUnwindSafe(|| drop(work()))).expect_err("it goes through");
@@ -593,6 +629,7 @@ macro_rules! suite {
             must::gemv_is_near_exact(kernels.gemv_i8, i8::MAX);
             must::narrowing_is_the_reference(kernels);
             must::fps_is_the_reference(kernels);
+            must::edge_features_are_near_the_reference(kernels);
         }
 
         #[test]

@@ -1,13 +1,15 @@
 //! How long a classification takes.
 
 use std::collections::BTreeMap;
+use std::hint::black_box;
 use std::io::{Write, stdout};
+use std::iter::repeat_n;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Context;
 use formats::rng::StreamKey;
-use infer_cpu::{Classifier, ModelCard, Options, Precision, TNets};
+use infer_cpu::{Classifier, ClassifierTeam, ModelCard, Options, Precision, TNets};
 use serde::Serialize;
 
 use super::machine::Machine;
@@ -32,6 +34,8 @@ struct Row {
     from: usize,
     precision: &'static str,
     threads: usize,
+    /// Clouds that were classified together; times are of all of them.
+    clouds: usize,
     kernel: &'static str,
     p50_ms: f64,
     p99_ms: f64,
@@ -84,6 +88,7 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         "from",
         "points",
         "threads",
+        "clouds",
         "p50 ms",
         "p99 ms",
     ];
@@ -96,6 +101,7 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
             row.from.to_string(),
             row.points.to_string(),
             row.threads.to_string(),
+            row.clouds.to_string(),
             format!("{:.3}", row.p50_ms),
             format!("{:.3}", row.p99_ms),
         ]
@@ -126,15 +132,25 @@ fn measure(
     };
     sampler.set(&mut options, points);
     let mut classifier = Classifier::load(model, &options)?;
+    let kernel = classifier.kernel().name();
     let cloud = cloud(from);
     // Once for caches, pages and sleeping threads.
     classifier.classify(&cloud).context("classifying a random cloud")?;
-    let mut samples_ms = Vec::with_capacity(args.repeats as usize);
-    for _ in 0..args.repeats {
-        let start = Instant::now();
-        classifier.classify(&cloud)?;
-        samples_ms.push(start.elapsed().as_secs_f64() * 1e3);
-    }
+    let samples_ms = if args.clouds == 1 {
+        samples_ms(args.repeats, || Ok(black_box(classifier.classify(&cloud)).map(drop)?))?
+    } else {
+        let mut team = ClassifierTeam::new(classifier)?;
+        samples_ms(args.repeats, || {
+            let clouds = repeat_n((&cloud[..], None), args.clouds);
+            let mut all = Ok(());
+            team.classify_many(clouds, |answer| {
+                if let Err(error) = black_box(answer) {
+                    all = Err(anyhow::anyhow!(error.to_string()));
+                }
+            });
+            all
+        })?
+    };
     Ok(Row {
         sampler: sampler.to_string(),
         t_nets: t_nets.name(),
@@ -142,11 +158,26 @@ fn measure(
         from,
         precision: precision.name(),
         threads,
-        kernel: classifier.kernel().name(),
+        clouds: args.clouds,
+        kernel,
         p50_ms: quantile(&samples_ms, 0.5),
         p99_ms: quantile(&samples_ms, 0.99),
         samples_ms,
     })
+}
+
+/// How long each of so many calls of `classify` takes.
+fn samples_ms(
+    repeats: u32,
+    mut classify: impl FnMut() -> anyhow::Result<()>,
+) -> anyhow::Result<Vec<f64>> {
+    let mut samples_ms = Vec::with_capacity(repeats as usize);
+    for _ in 0..repeats {
+        let start = Instant::now();
+        classify()?;
+        samples_ms.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    Ok(samples_ms)
 }
 
 /// Points all over a cube, the same in every run.

@@ -21,6 +21,7 @@ use variant::Variant;
 Examples:
   infer-cpu bench --json > pi5.json
   infer-cpu bench --points 64,1024 --precision f32,f16 --threads 1,4
+  infer-cpu bench --points 64 --precision i8 --threads 1,4 --clouds 30
 
 The latency is that of a whole classification, from coordinates to class. Options
 of a sampler follow its name, separated by colons: `fps`, `cpl`, `cpl:stn`,
@@ -60,6 +61,11 @@ pub struct Args {
     /// Number of points in the clouds that the samplers choose from
     #[arg(long, default_value_t = 1024, value_name = "N")]
     from: usize,
+
+    /// Number of clouds that are classified together, a thread a cloud; the time is that of
+    /// all of them. A single one is shared out among the threads
+    #[arg(long, default_value = "1", value_parser = at_least_one, value_name = "N")]
+    clouds: usize,
 
     /// Number of classifications per setting
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]

@@ -25,6 +25,7 @@ macro_rules! declare {
     ) => {
         use std::ops::Range;
 
+        use $crate::edge_conv::{EdgeConv, EdgeScratch, Neighborhood};
         use $crate::kernel::x86::{self, Byte, Half, Single, Tile, Weight};
         use $crate::kernel::{
             Candidate, GEMV_NR, Gemm, LevelSums, Panels, PrefilterKernels, Rows, Soa,
@@ -42,7 +43,28 @@ macro_rules! declare {
             narrow_f16,
             narrow_i8,
             fps_step,
+            edge_features,
         });
+
+        fn edge_features(
+            edges: &EdgeConv,
+            rows: (&mut [f32], usize),
+            cloud: &Neighborhood,
+            scratch: &mut EdgeScratch,
+        ) {
+            #[target_feature(enable = $features)]
+            fn run(
+                edges: &EdgeConv,
+                rows: (&mut [f32], usize),
+                cloud: &Neighborhood,
+                scratch: &mut EdgeScratch,
+            ) {
+                edges.features::<true>(rows, cloud, scratch);
+            }
+            // SAFETY: `kernels()` gives out the table of these functions where the
+            // machine was found to have the features.
+            unsafe { run(edges, rows, cloud, scratch) }
+        }
 
         /// The products of one format.
         const fn gemm<T: Tile<$lanes>>()

@@ -5,7 +5,7 @@ use super::mca::Cost;
 use super::number::Number;
 use super::plan::{Product, Stage};
 use infer_cpu::kernel::WIDTH_STEP;
-use infer_cpu::sharing::{BLOCK, GROUP, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK};
+use infer_cpu::sharing::{GROUP, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK, block_points};
 
 /// What a stage asks of the machine in its inner loops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,7 +24,8 @@ pub struct Load {
 pub fn load(stage: &Stage, kernels: &Kernels, threads: usize) -> Load {
     match stage {
         Stage::Hidden { rows, products } => {
-            let blocks = (0..*rows).step_by(BLOCK).map(|first| BLOCK.min(rows - first));
+            let size = block_points(*rows, threads);
+            let blocks = (0..*rows).step_by(size).map(|first| size.min(rows - first));
             let block = |rows: usize| products.iter().map(|p| tiles(p, rows, kernels)).sum();
             shared(blocks.map(block), threads, products.iter().map(weight_bytes).sum())
         }
@@ -110,16 +111,18 @@ mod tests {
     }
 
     #[test]
-    fn one_block_of_points_keeps_one_thread_busy() {
+    fn threads_share_out_blocks_of_points() {
         let kernels = round_kernels();
         let hidden = |rows| Stage::Hidden { rows, products: vec![product(64, 128)] };
-        // 6 tiles of 8 rows, 16 panels of 8 channels, 64 inputs.
-        let block = 6.0 * 16.0 * 64.0;
-        let one = load(&hidden(48), &kernels, 4);
-        assert_eq!((one.cycles, one.span), (block, block));
-        assert_eq!(one.bytes, 64.0 * 128.0 * 4.0);
-        let five = load(&hidden(5 * 48), &kernels, 4);
-        assert_eq!((five.cycles, five.span), (5.0 * block, 2.0 * block));
+        // 8 rows, 16 panels of 8 channels, 64 inputs.
+        let tile = 16.0 * 64.0;
+        // Three blocks of 16 points.
+        let few = load(&hidden(48), &kernels, 4);
+        assert_eq!((few.cycles, few.span), (6.0 * tile, 2.0 * tile));
+        assert_eq!(few.bytes, 64.0 * 128.0 * 4.0);
+        // Seven blocks of 32 and one of 16: two for each thread.
+        let more = load(&hidden(240), &kernels, 4);
+        assert_eq!((more.cycles, more.span), (30.0 * tile, 8.0 * tile));
     }
 
     #[test]
