@@ -56,22 +56,12 @@ pub(crate) fn aim(
     culling: Culling,
     is_wanted: impl Fn(u32) -> bool,
 ) -> (Vec<u32>, Vec<TraceRay>) {
-    let wanted = |beam: &u32| is_wanted(*beam);
-    match culling {
-        Culling::On => pattern
-            .within(&frame.cone(pattern))
-            .into_iter()
-            .filter(wanted)
-            .filter_map(|beam| Some((beam, frame.trace_ray(&frame.beam(pattern, beam), 0)?)))
-            .unzip(),
-        Culling::Off => pattern
-            .order
-            .iter()
-            .copied()
-            .filter(wanted)
-            .map(|beam| (beam, frame.trace_ray_unculled(&frame.beam(pattern, beam), 0)))
-            .unzip(),
-    }
+    let mut beams = match culling {
+        Culling::On => pattern.within(&frame.cone(pattern)),
+        Culling::Off => pattern.order.clone(),
+    };
+    beams.retain(|&beam| is_wanted(beam));
+    frame.trace_rays(pattern, beams, culling == Culling::Off)
 }
 
 /// What a caster answers for one job.

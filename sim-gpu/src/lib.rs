@@ -41,6 +41,7 @@ pub mod effects;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod job;
+mod lanes;
 pub mod mesh;
 pub mod packets;
 pub mod pose;

@@ -1,5 +1,6 @@
 //! Rays in an object's own frame.
 
+use crate::lanes::{Lanewise, Vectors, each, widest};
 use crate::pose::Pose;
 use crate::sensor::{BeamPattern, Cone};
 use crate::target::Surface;
@@ -9,7 +10,7 @@ use glam::{DAffine3, DMat3, DVec3};
 /// One ray as casters read it. `shaders/shared/ray.wgsl` declares the same; a
 /// test compares size and offsets.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TraceRay {
     /// Where the ray starts, in the unit frame: on the object's bounding
     /// sphere, or the sensor itself if it is inside.
@@ -78,13 +79,19 @@ impl RayFrame {
     /// The ray of `pattern`'s beam of this number, from where that beam starts.
     #[must_use]
     pub fn beam(&self, pattern: &BeamPattern, beam: u32) -> Ray {
-        let from_sensor = self.ray(pattern.directions[beam as usize]);
-        match pattern.start(beam) {
-            None => from_sensor,
-            Some(start) => {
-                Ray { origin: self.origin + self.unit_from_sensor * start, ..from_sensor }
-            }
+        let ray = self.beams(pattern, [beam]);
+        Ray { origin: ray.origin.lane(0), direction: ray.direction.lane(0) }
+    }
+
+    /// The rays of some of `pattern`'s beams.
+    #[inline(always)]
+    pub(crate) fn beams<const N: usize>(&self, pattern: &BeamPattern, beams: [u32; N]) -> Rays<N> {
+        let directions = each(|lane| pattern.directions[beams[lane] as usize]);
+        let mut origin = Vectors::new([self.origin; N]);
+        if let Some(starts) = pattern.starts(beams) {
+            origin = origin + Vectors::new(starts).mapped(&self.unit_from_sensor);
         }
+        Rays { origin, direction: Vectors::new(directions).mapped(&self.unit_from_sensor) }
     }
 
     /// The cone of directions in which `pattern`'s beams may hit the object's
@@ -128,39 +135,124 @@ impl RayFrame {
     /// ray passes the bounding sphere by.
     #[must_use]
     pub fn trace_ray(&self, ray: &Ray, root: u32) -> Option<TraceRay> {
-        let direction = ray.direction.normalize();
-        let along = -ray.origin.dot(direction);
-        let closest = ray.origin + direction * along;
-        let half_chord_squared = self.radius * self.radius - closest.length_squared();
-        if half_chord_squared.is_nan() || half_chord_squared < 0.0 {
-            return None;
-        }
-        let half_chord = half_chord_squared.sqrt();
-        if along + half_chord < 0.0 {
-            return None;
-        }
-        let skipped = (along - half_chord).max(0.0);
-        Some(record(ray.origin, direction, skipped, root))
+        let entry = Entries::of(&Rays::one(ray), self.radius);
+        entry.is_hit[0].then(|| entry.records(root)[0])
     }
 
     /// The record of a ray whether or not it can hit: what is cast when
     /// culling is off.
     #[must_use]
     pub fn trace_ray_unculled(&self, ray: &Ray, root: u32) -> TraceRay {
-        self.trace_ray(ray, root).unwrap_or_else(|| {
-            let direction = ray.direction.normalize();
-            let skipped = (-ray.origin.dot(direction) - self.radius).max(0.0);
-            record(ray.origin, direction, skipped, root)
-        })
+        Entries::of(&Rays::one(ray), self.radius).records(root)[0]
+    }
+
+    /// Those of `pattern`'s `beams` that meet the bounding sphere, or all of them,
+    /// and their records for a tree whose root is node 0.
+    pub(crate) fn trace_rays(
+        &self,
+        pattern: &BeamPattern,
+        mut beams: Vec<u32>,
+        all: bool,
+    ) -> (Vec<u32>, Vec<TraceRay>) {
+        let mut rays = vec![TraceRay::zeroed(); beams.len()];
+        let (frame, (beams_ref, rays_ref)) = (self, (&mut beams[..], &mut rays[..]));
+        let kept = widest(Aiming { frame, pattern, beams: beams_ref, rays: rays_ref, all });
+        beams.truncate(kept);
+        rays.truncate(kept);
+        (beams, rays)
     }
 }
 
-fn record(origin: DVec3, direction: DVec3, skipped: f64, root: u32) -> TraceRay {
-    TraceRay {
-        origin: (origin + direction * skipped).as_vec3().to_array(),
-        root,
-        direction: direction.as_vec3().to_array(),
-        skipped: skipped as f32,
+/// Moves the beams that [`RayFrame::trace_rays`] keeps to the front, their records
+/// too, and says how many there are.
+struct Aiming<'a> {
+    frame: &'a RayFrame,
+    pattern: &'a BeamPattern,
+    beams: &'a mut [u32],
+    rays: &'a mut [TraceRay],
+    all: bool,
+}
+
+impl Lanewise for Aiming<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        let mut kept = 0;
+        for from in (0..self.beams.len()).step_by(LANES) {
+            let count = LANES.min(self.beams.len() - from);
+            let beams: [u32; LANES] = each(|lane| self.beams[from + lane.min(count - 1)]);
+            let rays = self.frame.beams(self.pattern, beams);
+            let entries = Entries::of(&rays, self.frame.radius);
+            let records = entries.records(0);
+            for lane in 0..count {
+                (self.beams[kept], self.rays[kept]) = (beams[lane], records[lane]);
+                kept += usize::from(entries.is_hit[lane] || self.all);
+            }
+        }
+        kept
+    }
+}
+
+/// How many rays are aimed, and ranges solved, at once.
+pub(crate) const LANES: usize = 8;
+
+/// Rays in f64, side by side.
+#[derive(Clone, Copy)]
+pub(crate) struct Rays<const N: usize> {
+    pub origin: Vectors<N>,
+    pub direction: Vectors<N>,
+}
+
+impl Rays<1> {
+    #[inline(always)]
+    pub fn one(ray: &Ray) -> Self {
+        Self { origin: Vectors::new([ray.origin]), direction: Vectors::new([ray.direction]) }
+    }
+}
+
+/// Where rays enter a bounding sphere.
+struct Entries<const N: usize> {
+    /// Where each ray starts.
+    origin: Vectors<N>,
+    /// Unit directions.
+    direction: Vectors<N>,
+    /// How far from its start each ray enters the sphere; for a ray that passes it
+    /// by, a distance in which it meets nothing.
+    skipped: [f64; N],
+    /// Whether it meets the sphere.
+    is_hit: [bool; N],
+}
+
+impl<const N: usize> Entries<N> {
+    #[inline(always)]
+    fn of(rays: &Rays<N>, radius: f64) -> Self {
+        let (origin, direction) = (rays.origin, rays.direction.normalize());
+        let along = origin.dot(&direction);
+        let along = each(|i| -along[i]);
+        let closest = origin + direction * along;
+        let closest_squared = closest.dot(&closest);
+        let half_chord_squared: [f64; N] = each(|i| radius * radius - closest_squared[i]);
+        // Not a number for a ray that passes by, or whose numbers overflow.
+        let half_chord: [f64; N] = each(|i| half_chord_squared[i].sqrt());
+        let is_hit = each(|i| along[i] + half_chord[i] >= 0.0);
+        let skipped = each(|i| {
+            let back = if half_chord_squared[i] >= 0.0 { half_chord[i] } else { radius };
+            let skipped = along[i] - back;
+            if skipped > 0.0 { skipped } else { 0.0 }
+        });
+        Self { origin, direction, skipped, is_hit }
+    }
+
+    #[inline(always)]
+    fn records(&self, root: u32) -> [TraceRay; N] {
+        let origin = self.origin + self.direction * self.skipped;
+        each(|i| TraceRay {
+            origin: origin.lane(i).as_vec3().to_array(),
+            root,
+            direction: self.direction.lane(i).as_vec3().to_array(),
+            skipped: self.skipped[i] as f32,
+        })
     }
 }
 

@@ -8,7 +8,8 @@ use crate::cpu::effects::append_outputs;
 use crate::cpu::oracle;
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
-use crate::ray::{AMBIGUOUS, MISS};
+use crate::lanes::{Lanewise, each, widest};
+use crate::ray::{AMBIGUOUS, LANES, MISS};
 use crate::sensor::BeamPattern;
 
 /// One beam's nearest surface.
@@ -37,28 +38,74 @@ pub struct Hits {
 #[must_use]
 pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effects) -> Hits {
     let per_ray = effects.outputs_per_ray();
-    let mut order: Vec<usize> = (0..cast.codes.len()).filter(|&i| cast.codes[i] != MISS).collect();
-    order.sort_unstable_by_key(|&i| job.beams[i]);
+    let order = by_beam(job, cast, pattern.len());
+    let ranges_m = widest(Ranges { job, cast, pattern, rays: &order });
     let mut resolved = Hits { hits: Vec::with_capacity(order.len()), ..Hits::default() };
-    for i in order {
-        let beam = job.beams[i];
-        let ray = job.frame.beam(pattern, beam);
-        let found = cast.codes[i] & !AMBIGUOUS;
-        let mut triangle = found;
-        if cast.codes[i] & AMBIGUOUS != 0 {
+    for (ray, range_m) in order.into_iter().zip(ranges_m) {
+        let (beam, code) = (job.beams[ray as usize], cast.codes[ray as usize]);
+        let (mut triangle, mut range_m) = (code & !AMBIGUOUS, range_m);
+        if code & AMBIGUOUS != 0 {
             resolved.decided_in_f64 += 1;
+            let ray = job.frame.beam(pattern, beam);
             let Some(nearest) = oracle::nearest(&job.target, &ray) else { continue };
-            triangle = nearest.index;
+            if nearest.index != triangle {
+                triangle = nearest.index;
+                // By the same formula whoever found the triangle.
+                range_m = oracle::range_to(&job.target, &ray, triangle).unwrap_or(f64::NAN);
+            }
         }
-        // By the same formula whoever found the triangle.
-        let Some(range_m) = oracle::range_to(&job.target, &ray, triangle) else { continue };
+        if range_m.is_nan() {
+            continue;
+        }
         resolved.hits.push(Hit { beam, triangle, range_m });
-        if triangle == found {
-            let of_ray = &cast.effect_outputs[i * per_ray..(i + 1) * per_ray];
-            resolved.effect_outputs.extend(of_ray);
+        if triangle == code & !AMBIGUOUS {
+            let from = ray as usize * per_ray;
+            resolved.effect_outputs.extend(&cast.effect_outputs[from..from + per_ray]);
         } else {
+            let ray = job.frame.beam(pattern, beam);
             append_outputs(&mut resolved.effect_outputs, effects, job, beam, &ray, triangle);
         }
     }
     resolved
+}
+
+/// How far each of the rays of these numbers goes to the triangle that its code names;
+/// NaN where that lies behind the sensor.
+struct Ranges<'a> {
+    job: &'a CastJob,
+    cast: &'a Cast,
+    pattern: &'a BeamPattern,
+    rays: &'a [u32],
+}
+
+impl Lanewise for Ranges<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<f64> {
+        let mut ranges_m = Vec::with_capacity(self.rays.len());
+        for rays in self.rays.chunks(LANES) {
+            let of_lane: [u32; LANES] = each(|lane| rays[lane.min(rays.len() - 1)]);
+            let triangles: [u32; LANES] =
+                each(|i| self.cast.codes[of_lane[i] as usize] & !AMBIGUOUS);
+            let beams: [u32; LANES] = each(|i| self.job.beams[of_lane[i] as usize]);
+            let of_beam = self.job.frame.beams(self.pattern, beams);
+            let found = oracle::ranges_to(&self.job.target.surface, &of_beam, triangles);
+            ranges_m.extend(&found[..rays.len()]);
+        }
+        ranges_m
+    }
+}
+
+/// The rays of `job` that hit, in the order of their beams, each of which has at
+/// most one.
+fn by_beam(job: &CastJob, cast: &Cast, n_beams: usize) -> Vec<u32> {
+    let mut ray_of = vec![u32::MAX; n_beams];
+    for (ray, (&beam, &code)) in (0..).zip(job.beams.iter().zip(&cast.codes)) {
+        if code != MISS {
+            ray_of[beam as usize] = ray;
+        }
+    }
+    ray_of.retain(|&ray| ray != u32::MAX);
+    ray_of
 }

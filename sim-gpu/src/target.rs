@@ -5,6 +5,8 @@ use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::validate::triangle_stats;
 use crate::mesh::{Mesh, MeshError, load};
 use glam::DVec3;
+use std::cmp::Ordering;
+use std::mem::swap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,6 +22,8 @@ pub struct Surface {
     pub radius: f64,
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
+    /// The same, the corners of each in the order of their coordinates.
+    sorted: Vec<[u32; 3]>,
     kept: Vec<u32>,
 }
 
@@ -58,13 +62,22 @@ impl Surface {
         // The sphere must hold the padded boxes' contents as the caster rounds
         // them: 2^-18 per axis (`bvh::BOX_PADDING`), times sqrt(3).
         let radius = farthest + 1e-5;
-        Self { frame, radius, vertices, triangles: mesh.triangles, kept }
+        let sorted = mesh.triangles.iter().map(|&corners| sorted(corners, &vertices)).collect();
+        Self { frame, radius, vertices, triangles: mesh.triangles, sorted, kept }
     }
 
     /// The corners of triangle `index` of the mesh, in the unit frame.
     #[must_use]
     pub fn corners(&self, index: u32) -> [DVec3; 3] {
         self.triangles[index as usize].map(|v| self.vertices[v as usize])
+    }
+
+    /// As [`corners`](Self::corners), in the order of their coordinates: triangles of
+    /// the same three corners are the same here.
+    #[must_use]
+    #[inline]
+    pub(crate) fn sorted_corners(&self, index: u32) -> [DVec3; 3] {
+        self.sorted[index as usize].map(|v| self.vertices[v as usize])
     }
 
     /// The indices of the triangles that a ray can meet, ascending.
@@ -115,10 +128,31 @@ impl Target {
     /// Bytes held, for memory budgets.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let Surface { vertices, triangles, kept, .. } = &*self.surface;
+        let Surface { vertices, triangles, sorted, kept, .. } = &*self.surface;
         self.bvh.bytes()
             + size_of_val(&vertices[..])
             + size_of_val(&triangles[..])
+            + size_of_val(&sorted[..])
             + size_of_val(&kept[..])
     }
+}
+
+/// `corners` in the order of their coordinates.
+fn sorted(corners: [u32; 3], vertices: &[DVec3]) -> [u32; 3] {
+    let [mut a, mut b, mut c] = corners;
+    let follows = |a: u32, b: u32| {
+        let [p, q] = [a, b].map(|v| vertices[v as usize].to_array());
+        p.iter().zip(q).map(|(p, q)| p.total_cmp(&q)).find(|order| order.is_ne())
+            == Some(Ordering::Greater)
+    };
+    // Three exchanges sort three.
+    for _ in 0..2 {
+        if follows(a, b) {
+            swap(&mut a, &mut b);
+        }
+        if follows(b, c) {
+            swap(&mut b, &mut c);
+        }
+    }
+    [a, b, c]
 }

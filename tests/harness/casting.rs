@@ -26,7 +26,7 @@ pub fn target_by(builder: Builder, mesh: &Mesh) -> Target {
 
 /// A tree as it is uploaded: its nodes, then its triangles.
 pub fn tree_bytes(bvh: &Bvh) -> Vec<u8> {
-    let Bvh { nodes, triangles } = bvh;
+    let Bvh { nodes, triangles, .. } = bvh;
     [bytemuck::cast_slice::<_, u8>(nodes), bytemuck::cast_slice(triangles)].concat()
 }
 

@@ -1,8 +1,8 @@
 //! Bounding volume hierarchies over triangles in the unit frame.
 //!
-//! One layout for every caster: two-wide nodes of 64 bytes that hold the
-//! boxes of both children (Aila and Laine 2009), and triangles of 48 bytes
-//! sorted so that each leaf's lie side by side.
+//! Shaders read two-wide nodes of 64 bytes that hold the boxes of both children
+//! (Aila and Laine 2009), and triangles of 48 bytes sorted so that each leaf's
+//! lie side by side. The CPU searches the same tree collapsed to eight-wide nodes.
 
 mod bounds;
 mod choose;
@@ -11,11 +11,14 @@ mod node;
 mod sah;
 mod traverse;
 mod validate;
+mod wide;
 
 pub use bounds::Bounds;
 pub use node::{LeafTriangle, Node, canonical_corners};
-pub use traverse::traverse;
+pub(crate) use traverse::step;
+pub use traverse::{Entered, Stack, traverse};
 pub use validate::assert_well_formed;
+pub use wide::{LEAF, Leaf4, WIDTH, WideBvh, WideChild, WideNode};
 
 /// No path from the root to a leaf is longer; casters size their stacks by it.
 pub const MAX_DEPTH: usize = 64;
@@ -54,6 +57,8 @@ pub struct Bvh {
     pub nodes: Vec<Node>,
     /// Triangles in leaf order.
     pub triangles: Vec<LeafTriangle>,
+    /// The same tree as the CPU searches it.
+    pub wide: WideBvh,
 }
 
 /// One triangle on its way into a tree.
@@ -78,16 +83,17 @@ impl Bvh {
             Builder::Sah => sah::build(&mut primitives),
             Builder::Morton => morton::build(&mut primitives),
         };
-        let triangles = primitives
+        let triangles: Vec<LeafTriangle> = primitives
             .iter()
             .map(|p| LeafTriangle::new(corners[p.triangle as usize], indices[p.triangle as usize]))
             .collect();
-        Self { nodes, triangles }
+        let wide = WideBvh::collapsed(&nodes, &triangles);
+        Self { nodes, triangles, wide }
     }
 
-    /// Bytes of nodes and triangles together.
+    /// Bytes of both trees.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.triangles[..])
+        size_of_val(&self.nodes[..]) + size_of_val(&self.triangles[..]) + self.wide.bytes()
     }
 }

@@ -1,58 +1,121 @@
 //! The search through a tree that all users on the CPU share.
 
-use super::{MAX_DEPTH, Node};
-use std::ops::Range;
+use super::MAX_DEPTH;
+use super::wide::{Leaf4, WIDTH, WideBvh, WideChild, WideNode};
 
-/// Visits the leaves below node `root` that matter, nearer children first, and
-/// gives `visit` the places of each leaf's triangles.
-///
-/// `enter` says how far away the box of these two corners begins, or infinity
-/// if nothing in it matters. It sees `state` as earlier leaves left it, and so
-/// can leave out what lies behind the best one found.
-///
-/// Both children's boxes are tested before either leaf is visited, the left
-/// leaf comes before the right one, and of two nodes at the same distance the
-/// left one comes first: `shaders/traverse.wgsl` has the same order.
-#[inline]
-pub fn traverse<State, Distance: PartialOrd + Copy + From<f32>>(
-    nodes: &[Node],
-    root: u32,
-    state: &mut State,
-    enter: impl Fn(&State, [f32; 3], [f32; 3]) -> Distance,
-    mut visit: impl FnMut(&mut State, Range<usize>),
-) {
-    // A sentinel instead of an `Option` keeps the choice of the nearer child
-    // free of branches.
-    let never = Distance::from(f32::INFINITY);
-    let leaf = |first: u32, count: u32| first as usize..(first + count) as usize;
-    let mut stack = [0u32; MAX_DEPTH];
-    let mut height = 0;
-    let mut at = root;
-    loop {
-        let node = &nodes[at as usize];
-        let mut left = enter(state, node.left_min, node.left_max);
-        let mut right = enter(state, node.right_min, node.right_max);
-        if left < never && node.left_count > 0 {
-            visit(state, leaf(node.left, node.left_count));
-            left = never;
-        }
-        if right < never && node.right_count > 0 {
-            visit(state, leaf(node.right, node.right_count));
-            right = never;
-        }
-        let left_first = left <= right;
-        let (near, far) = if left_first { (left, right) } else { (right, left) };
-        if near < never {
-            at = if left_first { node.left } else { node.right };
-            if far < never {
-                stack[height] = if left_first { node.right } else { node.left };
-                height += 1;
+/// Which of a node's boxes matter, a bit each, and how far away each begins.
+pub type Entered<Distance> = (u32, [Distance; WIDTH]);
+
+/// What a search has still to visit. The caller keeps it, so that a search does
+/// not begin by filling it.
+pub struct Stack<Distance> {
+    /// On each level of the tree all children but one may have to wait.
+    waiting: [(WideChild, Distance); (WIDTH - 1) * MAX_DEPTH],
+    height: usize,
+}
+
+impl<Distance: Copy + Default> Default for Stack<Distance> {
+    fn default() -> Self {
+        Self { waiting: [Default::default(); (WIDTH - 1) * MAX_DEPTH], height: 0 }
+    }
+}
+
+impl<Distance: PartialOrd + Copy> Stack<Distance> {
+    /// Forgets what a search that has ended early left.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.height = 0;
+    }
+
+    #[inline(always)]
+    fn push(&mut self, child: (WideChild, Distance)) {
+        self.waiting[self.height] = child;
+        self.height += 1;
+    }
+
+    /// Takes the last child that `matters`, and forgets those after it.
+    #[inline(always)]
+    fn pop(&mut self, matters: impl Fn(Distance) -> bool) -> Option<WideChild> {
+        loop {
+            self.height = self.height.checked_sub(1)?;
+            let (child, distance) = self.waiting[self.height];
+            if matters(distance) {
+                return Some(child);
             }
-        } else if height > 0 {
-            height -= 1;
-            at = stack[height];
-        } else {
-            return;
         }
     }
+
+    /// Pushes the children that are `entered`, the nearest last.
+    #[inline(always)]
+    fn push_sorted(&mut self, node: &WideNode, (mut entered, distances): Entered<Distance>) {
+        let base = self.height;
+        while entered != 0 {
+            let i = entered.trailing_zeros() as usize % WIDTH;
+            entered &= entered - 1;
+            let mut at = self.height;
+            while at > base && self.waiting[at - 1].1 < distances[i] {
+                self.waiting[at] = self.waiting[at - 1];
+                at -= 1;
+            }
+            self.waiting[at] = (node.children[i], distances[i]);
+            self.height += 1;
+        }
+    }
+}
+
+/// Visits the leaves at or below `from` that matter, nearer ones first.
+///
+/// `enter` says which boxes of a node matter and how far away each begins.
+/// `matters` says, when the turn of what begins at a distance has come, whether
+/// it still does. Both see `state` as earlier leaves left it, and so can leave
+/// out what lies behind the best one found.
+#[inline(always)]
+pub fn traverse<State, Distance: PartialOrd + Copy>(
+    tree: &WideBvh,
+    from: WideChild,
+    stack: &mut Stack<Distance>,
+    state: &mut State,
+    enter: impl Fn(&State, &WideNode) -> Entered<Distance>,
+    matters: impl Fn(&State, Distance) -> bool,
+    mut visit: impl FnMut(&mut State, &Leaf4),
+) {
+    stack.clear();
+    let mut at = Some(from);
+    while let Some(child) = at {
+        at = step(tree, child, stack, state, &enter, &matters, &mut visit);
+    }
+}
+
+/// One step of [`traverse`]: visits the node or leaf `at`, and says which is next.
+#[inline(always)]
+pub(crate) fn step<State, Distance: PartialOrd + Copy>(
+    tree: &WideBvh,
+    at: WideChild,
+    stack: &mut Stack<Distance>,
+    state: &mut State,
+    enter: impl Fn(&State, &WideNode) -> Entered<Distance>,
+    matters: impl Fn(&State, Distance) -> bool,
+    mut visit: impl FnMut(&mut State, &Leaf4),
+) -> Option<WideChild> {
+    if let Some(leaf) = at.leaf() {
+        visit(state, &tree.leaves[leaf]);
+        return stack.pop(|distance| matters(state, distance));
+    }
+    let node = &tree.nodes[at.node()];
+    let (entered, distances) = enter(state, node);
+    let rest = entered & entered.wrapping_sub(1);
+    if entered == 0 || rest & rest.wrapping_sub(1) != 0 {
+        stack.push_sorted(node, (entered, distances));
+        return stack.pop(|distance| matters(state, distance));
+    }
+    // Most often one or two are entered: these need no sort.
+    let first = entered.trailing_zeros() as usize % WIDTH;
+    if rest == 0 {
+        return Some(node.children[first]);
+    }
+    let second = rest.trailing_zeros() as usize % WIDTH;
+    let swap = distances[second] < distances[first];
+    let (near, far) = if swap { (second, first) } else { (first, second) };
+    stack.push((node.children[far], distances[far]));
+    Some(node.children[near])
 }

@@ -1,6 +1,7 @@
 //! Watertight ray-triangle test: Woop, Benthin, Wald, "Watertight
 //! ray/triangle intersection", JCGT 2(1), 2013. Twin of
-//! `shaders/intersect.wgsl`.
+//! `shaders/intersect.wgsl`, for the four triangles of a leaf at once: each lane
+//! does to the bit what `reference` does for one triangle, as the shader does.
 //!
 //! Subnormal numbers: WGSL lets an adapter flush them to 0 or not, as it likes, and
 //! the CPU does not. Promised is what does not depend on it. In the unit frame a
@@ -10,28 +11,37 @@
 //! that a beam hits it on the one and what lies behind it on the other. Such a
 //! triangle is smaller than the rounding of any vertex that is not next to 0.
 
-use crate::bvh::LeafTriangle;
-use crate::ray::NO_HIT;
-use glam::Vec3;
+#[cfg(test)]
+mod reference;
 
-/// Rows of the shear that maps the ray onto +z.
+use crate::bvh::{LEAF, Leaf4};
+use crate::ray::NO_HIT;
+use glam::{Vec3, Vec4};
+
+/// The shear that maps a ray onto +z.
 #[derive(Clone, Copy, Debug)]
 pub struct Shear {
-    x: Vec3,
-    y: Vec3,
-    z: Vec3,
+    /// The axes that become x, y and z: z is the ray's largest component.
+    pub(super) axes: [usize; 3],
+    /// What x and y lose for each unit along z.
+    pub(super) x: f32,
+    pub(super) y: f32,
+    /// Distance along the ray for each unit along z.
+    pub(super) per_z: f32,
 }
 
-/// A triangle that a ray meets.
+/// What a ray meets of the triangles of a leaf, a lane each.
 #[derive(Clone, Copy, Debug)]
-pub struct Candidate {
+pub struct Candidates4 {
+    /// The lanes that the ray meets, a bit each.
+    pub met: u32,
     /// Distance from the ray's origin, unit lengths.
-    pub t: f32,
+    pub t: [f32; LEAF],
     /// How far the true distance may be from `t`.
-    pub error: f32,
+    pub error: [f32; LEAF],
     /// The lowest distance at which the ray may truly meet something else than
     /// this triangle, as far as this test can know; `NO_HIT` if nothing.
-    pub rival: f32,
+    pub rival: [f32; LEAF],
 }
 
 /// Rounding moves a triangle by at most this much against the ray, in unit
@@ -52,72 +62,89 @@ pub const STEEPEST: f32 = 573.0;
 impl Shear {
     /// The shear of a ray along `direction`.
     #[must_use]
+    #[inline]
     pub fn of(direction: Vec3) -> Self {
         let size = direction.abs();
-        let (ex, ey, ez, d) = if size.x > size.y && size.x > size.z {
-            (Vec3::Y, Vec3::Z, Vec3::X, Vec3::new(direction.y, direction.z, direction.x))
+        let axes = if size.x > size.y && size.x > size.z {
+            [1, 2, 0]
         } else if size.y > size.z {
-            (Vec3::Z, Vec3::X, Vec3::Y, Vec3::new(direction.z, direction.x, direction.y))
+            [2, 0, 1]
         } else {
-            (Vec3::X, Vec3::Y, Vec3::Z, direction)
+            [0, 1, 2]
         };
-        let per_z = 1.0 / d.z;
-        Self { x: ex - ez * (d.x * per_z), y: ey - ez * (d.y * per_z), z: ez * per_z }
+        let d = axes.map(|axis| direction[axis]);
+        let per_z = 1.0 / d[2];
+        Self { axes, x: d[0] * per_z, y: d[1] * per_z, per_z }
     }
 }
 
-fn row(r: Vec3, p: Vec3) -> f32 {
-    r.x * p.x + r.y * p.y + r.z * p.z
+/// Points as the sheared ray sees them, before their distance is asked for.
+struct Sheared {
+    x: Vec4,
+    y: Vec4,
+    /// Along the largest axis, not yet divided.
+    along: Vec4,
 }
 
-fn edge(px: f32, py: f32, qx: f32, qy: f32) -> f32 {
+#[inline(always)]
+fn sheared(points: &[[f32; LEAF]; 3], origin: &[Vec4; 3], shear: &Shear) -> Sheared {
+    let [i, j, k] = shear.axes;
+    let [x, y, along] = [points[i], points[j], points[k]].map(Vec4::from_array);
+    let along = along - origin[2];
+    let x = (x - origin[0]) - along * shear.x;
+    let y = (y - origin[1]) - along * shear.y;
+    Sheared { x, y, along }
+}
+
+#[inline(always)]
+fn edge(px: Vec4, py: Vec4, qx: Vec4, qy: Vec4) -> Vec4 {
     px * qy - py * qx
 }
 
-/// Where the ray meets the triangle, both faces alike, edges included.
-#[inline]
+/// Which of a leaf's triangles a ray meets and where, both faces alike, edges
+/// included; `None` if it meets none.
+#[inline(always)]
 #[must_use]
-pub fn intersect(origin: Vec3, shear: &Shear, triangle: &LeafTriangle) -> Option<Candidate> {
-    let a = Vec3::from_array(triangle.a) - origin;
-    let b = Vec3::from_array(triangle.b) - origin;
-    let c = Vec3::from_array(triangle.c) - origin;
-    let (ax, ay) = (row(shear.x, a), row(shear.y, a));
-    let (bx, by) = (row(shear.x, b), row(shear.y, b));
-    let (cx, cy) = (row(shear.x, c), row(shear.y, c));
-    let u = edge(bx, by, cx, cy);
-    let v = -edge(ax, ay, cx, cy);
-    let w = edge(ax, ay, bx, by);
-    let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
+pub fn intersect4(origin: Vec3, shear: &Shear, leaf: &Leaf4) -> Option<Candidates4> {
+    let origin = shear.axes.map(|axis| Vec4::splat(origin[axis]));
+    let [a, b, c] = &leaf.corners;
+    let (a, b, c) =
+        (sheared(a, &origin, shear), sheared(b, &origin, shear), sheared(c, &origin, shear));
+    let u = edge(b.x, b.y, c.x, c.y);
+    let v = -edge(a.x, a.y, c.x, c.y);
+    let w = edge(a.x, a.y, b.x, b.y);
+    let zero = Vec4::ZERO;
+    let negative = u.cmplt(zero) | v.cmplt(zero) | w.cmplt(zero);
+    let positive = u.cmpgt(zero) | v.cmpgt(zero) | w.cmpgt(zero);
     let determinant = u + v + w;
-    if outside || determinant == 0.0 {
+    // A determinant that is not a number fails here too.
+    let inside = !(negative & positive) & determinant.cmpne(zero);
+    if !inside.any() {
         return None;
     }
-    let (az, bz, cz) = (row(shear.z, a), row(shear.z, b), row(shear.z, c));
+    let (az, bz, cz) = (a.along * shear.per_z, b.along * shear.per_z, c.along * shear.per_z);
     let t = (u * az + v * bz + w * cz) / determinant;
     // The normal in sheared space has the determinant as its z: their ratio is
     // the tangent that turns a displacement into an error of distance.
-    let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
-    let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
+    let slope_x = edge(b.y - a.y, bz - az, c.y - a.y, cz - az);
+    let slope_y = edge(bz - az, b.x - a.x, cz - az, c.x - a.x);
     let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
     let error = DISPLACEMENT * (1.0 + slope);
-    let near_edge =
-        within(u, cx - bx, cy - by) || within(v, cx - ax, cy - ay) || within(w, bx - ax, by - ay);
-    let rival = if near_edge {
-        // Truly the ray may pass the edge and meet the neighbour, whose plane
-        // parts from this one by both slopes.
-        t - 2.0 * error - DISPLACEMENT * STEEPEST
-    } else if t < error {
-        // Truly the triangle may lie behind the ray's origin.
-        t - error
-    } else {
-        NO_HIT
+    // Whether a point lies within `DISPLACEMENT` of the line along (x, y), given
+    // the edge function there. Squares that vanish count as within.
+    let within = |edge: Vec4, x: Vec4, y: Vec4| {
+        (edge * edge).cmple(DISPLACEMENT * DISPLACEMENT * (x * x + y * y))
     };
-    (t + error >= 0.0).then_some(Candidate { t, error, rival })
-}
-
-/// Whether a point lies within `DISPLACEMENT` of the line along (x, y), given
-/// the edge function there. Squares that vanish count as within.
-#[inline]
-fn within(edge: f32, x: f32, y: f32) -> bool {
-    edge * edge <= DISPLACEMENT * DISPLACEMENT * (x * x + y * y)
+    let near_edge = within(u, c.x - b.x, c.y - b.y)
+        | within(v, c.x - a.x, c.y - a.y)
+        | within(w, b.x - a.x, b.y - a.y);
+    // Near an edge the ray may truly pass it and meet the neighbour, whose plane
+    // parts from this one by both slopes. Or else the triangle may truly lie
+    // behind the ray's origin.
+    let beside = t - 2.0 * error - DISPLACEMENT * STEEPEST;
+    let behind = Vec4::select(t.cmplt(error), t - error, Vec4::splat(NO_HIT));
+    let rival = Vec4::select(near_edge, beside, behind);
+    let met = (inside & (t + error).cmpge(zero)).bitmask();
+    let [t, error, rival] = [t, error, rival].map(|lanes| lanes.to_array());
+    Some(Candidates4 { met, t, error, rival })
 }

@@ -2,8 +2,12 @@
 //! names, and the f64 oracle that both are held to.
 
 pub mod effects;
+mod frustum;
+mod interleaved;
 pub mod intersect;
 pub mod oracle;
+#[cfg(target_arch = "x86_64")]
+mod packet;
 pub mod random;
 pub mod trace;
 pub mod traverse;

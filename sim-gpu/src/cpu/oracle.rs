@@ -1,9 +1,10 @@
 //! The f64 twin: the same test on the same tree, in double precision. Every
 //! range that leaves this crate was solved here, whoever found the triangle.
 
-use crate::bvh::{LeafTriangle, traverse};
-use crate::ray::Ray;
-use crate::target::Target;
+use crate::bvh::{Entered, Stack, WIDTH, WideChild, WideNode, traverse};
+use crate::lanes::{Vectors, each};
+use crate::ray::{Ray, Rays};
+use crate::target::{Surface, Target};
 use glam::DVec3;
 
 /// Where a ray meets a surface.
@@ -26,17 +27,17 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
     let shear = Shear::of(ray.direction);
     let per_direction = reciprocal(ray.direction);
     let mut best: Option<Crossing> = None;
+    let farthest = |best: &Option<Crossing>| best.map_or(f64::INFINITY, |best| best.range_m);
     traverse(
-        &target.bvh.nodes,
-        0,
+        &target.bvh.wide,
+        WideChild::ROOT,
+        &mut Stack::default(),
         &mut best,
-        |best, low, high| {
-            let farthest = best.map_or(f64::INFINITY, |best| best.range_m);
-            enter(low, high, ray.origin, per_direction, farthest)
-        },
+        |best, node| enter(node, ray.origin, per_direction, farthest(best)),
+        |best, distance| distance <= farthest(best) * FAR_SCALE,
         |best, leaf| {
-            for &LeafTriangle { index, .. } in &target.bvh.triangles[leaf] {
-                let corners = target.surface.corners(index);
+            for &index in leaf.indices() {
+                let corners = target.surface.sorted_corners(index);
                 let Some(range_m) = cross(ray.origin, &shear, corners) else { continue };
                 if best.is_none_or(|best| (range_m, index) < (best.range_m, best.index)) {
                     *best = Some(Crossing { range_m, index });
@@ -53,16 +54,35 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
 /// of the triangle's corners has no say, to the last bit.
 #[must_use]
 pub fn range_to(target: &Target, ray: &Ray, index: u32) -> Option<f64> {
-    let corners = canonical(target.surface.corners(index));
-    let [a, b, c] = corners.map(|v| v - ray.origin);
-    let normal = (b - a).cross(c - a);
-    let length_squared = ray.direction.length_squared();
-    let along = [a, b, c].map(|v| v.dot(ray.direction) / length_squared);
-    let (low, high) =
-        along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &t| (l.min(t), h.max(t)));
-    let t = normal.dot(a) / normal.dot(ray.direction);
-    let t = if t.is_finite() { t.clamp(low, high) } else { low };
-    (high >= 0.0).then_some(t.max(0.0))
+    let [range_m] = ranges_to(&target.surface, &Rays::one(ray), [index]);
+    (!range_m.is_nan()).then_some(range_m)
+}
+
+/// As [`range_to`] for several rays, each with a triangle of its own; NaN where all of
+/// the triangle lies behind the sensor.
+#[inline(always)]
+pub(crate) fn ranges_to<const N: usize>(
+    surface: &Surface,
+    rays: &Rays<N>,
+    triangles: [u32; N],
+) -> [f64; N] {
+    let corners: [[DVec3; 3]; N] = each(|i| surface.sorted_corners(triangles[i]));
+    let a = Vectors::new(each(|i| corners[i][0])) - rays.origin;
+    let b = Vectors::new(each(|i| corners[i][1])) - rays.origin;
+    let c = Vectors::new(each(|i| corners[i][2])) - rays.origin;
+    let normal = (b - a).cross(&(c - a));
+    let length_squared = rays.direction.dot(&rays.direction);
+    let [of_a, of_b, of_c] = [a, b, c].map(|v| v.dot(&rays.direction));
+    let (height, drop) = (normal.dot(&a), normal.dot(&rays.direction));
+    each(|i| {
+        let [of_a, of_b, of_c] = [of_a, of_b, of_c].map(|along| along[i] / length_squared[i]);
+        let (low, high) = (of_a.min(of_b).min(of_c), of_a.max(of_b).max(of_c));
+        let t = height[i] / drop[i];
+        let t = if t.is_finite() && t > low { t } else { low };
+        let t = if t > high { high } else { t };
+        let t = if t > 0.0 { t } else { 0.0 };
+        if high >= 0.0 { t } else { f64::NAN }
+    })
 }
 
 /// The unit normal of triangle `index` in the unit frame; zero if it has none.
@@ -72,16 +92,25 @@ pub fn normal(target: &Target, index: u32) -> DVec3 {
     (b - a).cross(c - a).normalize_or_zero()
 }
 
-/// Where the ray enters the box, in its own units; infinity if it does not.
-fn enter(low: [f32; 3], high: [f32; 3], origin: DVec3, per_direction: DVec3, farthest: f64) -> f64 {
-    let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
-    let t0 = (corner(low) - origin) * per_direction;
-    let t1 = (corner(high) - origin) * per_direction;
-    let near = t0.min(t1).max_element().max(0.0);
-    // Ize 2013, in f64: boxes are padded by 2^-18, which also covers that they
-    // were rounded to f32.
-    let far = t0.max(t1).min_element().min(farthest) * (1.0 + 1e-14);
-    if near <= far { near } else { f64::INFINITY }
+/// Bounds the rounding of near and far together: Ize 2013, in f64. Boxes are
+/// padded by 2^-18, which also covers that they were rounded to f32.
+const FAR_SCALE: f64 = 1.0 + 1e-14;
+
+/// Which of the node's boxes the ray enters before `farthest`, and where, in its
+/// own units.
+fn enter(node: &WideNode, origin: DVec3, per_direction: DVec3, farthest: f64) -> Entered<f64> {
+    let (mut near, mut far) = ([0.0f64; WIDTH], [farthest; WIDTH]);
+    for axis in 0..3 {
+        let [low, high] = node.boxes.map(|corners| corners[axis]);
+        for i in 0..WIDTH {
+            let t0 = (f64::from(low[i]) - origin[axis]) * per_direction[axis];
+            let t1 = (f64::from(high[i]) - origin[axis]) * per_direction[axis];
+            near[i] = near[i].max(t0.min(t1));
+            far[i] = far[i].min(t0.max(t1));
+        }
+    }
+    let entered = (0..WIDTH).filter(|&i| near[i] <= far[i] * FAR_SCALE);
+    (entered.fold(0, |bits, i| bits | 1 << i), near)
 }
 
 fn reciprocal(direction: DVec3) -> DVec3 {
@@ -119,7 +148,7 @@ impl Shear {
 }
 
 fn cross(origin: DVec3, shear: &Shear, corners: [DVec3; 3]) -> Option<f64> {
-    let [a, b, c] = canonical(corners).map(|v| shear.apply(v - origin));
+    let [a, b, c] = corners.map(|v| shear.apply(v - origin));
     let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
     let (u, v, w) = (edge(b, c), -edge(a, c), edge(a, b));
     let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
@@ -129,11 +158,4 @@ fn cross(origin: DVec3, shear: &Shear, corners: [DVec3; 3]) -> Option<f64> {
     }
     let t = (u * a[2] + v * b[2] + w * c[2]) / determinant;
     (t >= 0.0).then_some(t)
-}
-
-fn canonical(mut corners: [DVec3; 3]) -> [DVec3; 3] {
-    corners.sort_unstable_by(|p, q| {
-        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z))
-    });
-    corners
 }

@@ -1,9 +1,10 @@
 //! Finds the nearest triangle along a ray. Twin of `shaders/traverse.wgsl`.
 
-use super::intersect::{Candidate, Shear, intersect};
-use crate::bvh::{self, LeafTriangle, Node};
+use super::intersect::{Shear, intersect4};
+use crate::bvh::{self, Entered, LEAF, Leaf4, Stack, WIDTH, WideBvh, WideChild, WideNode};
 use crate::ray::{AMBIGUOUS, MISS, NO_HIT, TraceRay};
-use glam::{Vec3, Vec3A};
+use bytemuck::{must_cast, must_cast_ref};
+use glam::{Vec3, Vec4};
 
 /// Directions closer to zero than this count as this: a reciprocal stays
 /// finite and boxes are padded by far more than a ray drifts by it.
@@ -28,54 +29,122 @@ pub struct Nearest {
     /// The triangle's index in its mesh, or [`MISS`].
     pub index: u32,
     /// No surface that starts beyond this can be the nearest.
-    farthest: f32,
+    pub(super) farthest: f32,
     /// The lowest distance that another surface may truly have.
-    rival: f32,
+    pub(super) rival: f32,
 }
 
-fn reciprocal(direction: Vec3) -> Vec3A {
-    let away = |d: f32| {
-        if d.abs() >= LEAST_COMPONENT {
-            d
-        } else if d >= 0.0 {
-            LEAST_COMPONENT
-        } else {
-            -LEAST_COMPONENT
-        }
-    };
-    Vec3A::new(1.0 / away(direction.x), 1.0 / away(direction.y), 1.0 / away(direction.z))
-}
-
-/// A ray as slab tests see it: distance to a plane at x is
-/// x * `per_direction` + `offset`. Rounding moves the plane by 4 * 2^-24 at
-/// most, for which boxes are padded.
+/// A ray as boxes and triangles are tested against it.
 #[derive(Clone, Copy)]
-struct Slabs {
-    per_direction: Vec3A,
-    offset: Vec3A,
+pub(super) struct Prepared {
+    pub origin: Vec3,
+    pub shear: Shear,
+    /// The ray meets a plane at x where x * `per_direction` + `offset`. Rounding
+    /// moves the plane by 4 * 2^-24 at most, for which boxes are padded.
+    pub per_direction: [f32; 3],
+    pub offset: [f32; 3],
 }
 
-/// Where the ray enters the box; infinity if it does not.
-#[inline]
-fn enter(low: [f32; 3], high: [f32; 3], slabs: Slabs, farthest: f32) -> f32 {
-    let t0 = Vec3A::from_array(low) * slabs.per_direction + slabs.offset;
-    let t1 = Vec3A::from_array(high) * slabs.per_direction + slabs.offset;
-    let near = t0.min(t1).max_element().max(0.0);
-    let far = t0.max(t1).min_element().min(farthest) * FAR_SCALE;
-    if near <= far { near } else { f32::INFINITY }
+impl Prepared {
+    #[inline(always)]
+    pub fn new(ray: &TraceRay) -> Self {
+        let direction = Vec3::from_array(ray.direction);
+        let away = |d: f32| match d.abs() >= LEAST_COMPONENT {
+            true => d,
+            false if d >= 0.0 => LEAST_COMPONENT,
+            false => -LEAST_COMPONENT,
+        };
+        let per_direction = ray.direction.map(|d| 1.0 / away(d));
+        let [x, y, z] = ray.origin;
+        let offset = [-(x * per_direction[0]), -(y * per_direction[1]), -(z * per_direction[2])];
+        let origin = Vec3::from_array(ray.origin);
+        Self { origin, shear: Shear::of(direction), per_direction, offset }
+    }
+
+    /// Finds the nearest triangle of those at or below `from` and of what `nearest`
+    /// already knows. `enter` does what [`enter`] does.
+    #[inline(always)]
+    pub fn trace(
+        &self,
+        tree: &WideBvh,
+        from: WideChild,
+        stack: &mut Stack<f32>,
+        nearest: &mut Nearest,
+        enter: impl Fn(&Self, &WideNode, f32) -> Entered<f32>,
+    ) {
+        stack.clear();
+        let mut at = Some(from);
+        while let Some(child) = at {
+            at = self.step(tree, child, stack, nearest, &enter);
+        }
+    }
+
+    /// One step of `trace`: visits the node or leaf `at`, and says which is next.
+    #[inline(always)]
+    pub fn step(
+        &self,
+        tree: &WideBvh,
+        at: WideChild,
+        stack: &mut Stack<f32>,
+        nearest: &mut Nearest,
+        enter: impl Fn(&Self, &WideNode, f32) -> Entered<f32>,
+    ) -> Option<WideChild> {
+        bvh::step(
+            tree,
+            at,
+            stack,
+            nearest,
+            |nearest, node| enter(self, node, nearest.farthest),
+            |nearest, distance| distance <= nearest.farthest * FAR_SCALE,
+            |nearest, leaf| nearest.consider_all(self, leaf),
+        )
+    }
+}
+
+/// Which boxes of `node` the ray enters before `farthest`, and where.
+#[inline(always)]
+pub(super) fn enter(ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32> {
+    let (mut entered, mut distances) = (0, [[0.0; 4]; WIDTH / 4]);
+    for four in 0..WIDTH / 4 {
+        let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(farthest));
+        for axis in 0..3 {
+            let [t0, t1] = [0, 1].map(|side| {
+                let planes: &[[f32; 4]; WIDTH / 4] = must_cast_ref(&node.boxes[side][axis]);
+                Vec4::from_array(planes[four]) * ray.per_direction[axis] + ray.offset[axis]
+            });
+            near = near.max(t0.min(t1));
+            far = far.min(t0.max(t1));
+        }
+        entered |= near.cmple(far * FAR_SCALE).bitmask() << (4 * four);
+        distances[four] = near.to_array();
+    }
+    (entered, must_cast(distances))
 }
 
 impl Nearest {
-    const NONE: Self = Self { t: NO_HIT, error: 0.0, index: MISS, farthest: NO_HIT, rival: NO_HIT };
+    pub(super) const NONE: Self =
+        Self { t: NO_HIT, error: 0.0, index: MISS, farthest: NO_HIT, rival: NO_HIT };
 
-    #[inline]
-    fn consider(&mut self, candidate: Candidate, index: u32) {
-        let wins = candidate.t < self.t || (candidate.t == self.t && index < self.index);
-        let loser = if wins { self.t - self.error } else { candidate.t - candidate.error };
-        self.rival = self.rival.min(loser).min(candidate.rival);
-        self.farthest = self.farthest.min(candidate.t + candidate.error);
+    #[inline(always)]
+    fn consider(&mut self, t: f32, error: f32, rival: f32, index: u32) {
+        let wins = t < self.t || (t == self.t && index < self.index);
+        let loser = if wins { self.t - self.error } else { t - error };
+        self.rival = self.rival.min(loser).min(rival);
+        self.farthest = self.farthest.min(t + error);
         if wins {
-            (self.t, self.error, self.index) = (candidate.t, candidate.error, index);
+            (self.t, self.error, self.index) = (t, error, index);
+        }
+    }
+
+    /// Considers the triangles of `leaf` that `ray` meets.
+    #[inline(always)]
+    pub(super) fn consider_all(&mut self, ray: &Prepared, leaf: &Leaf4) {
+        let Some(found) = intersect4(ray.origin, &ray.shear, leaf) else { return };
+        let mut met = found.met;
+        while met != 0 {
+            let i = met.trailing_zeros() as usize % LEAF;
+            met &= met - 1;
+            self.consider(found.t[i], found.error[i], found.rival[i], leaf.indices[i]);
         }
     }
 
@@ -91,26 +160,10 @@ impl Nearest {
 }
 
 /// Finds the nearest triangle along `ray`.
+#[inline(always)]
 #[must_use]
-pub fn traverse(nodes: &[Node], triangles: &[LeafTriangle], ray: &TraceRay) -> Nearest {
-    let direction = Vec3::from_array(ray.direction);
-    let origin = Vec3::from_array(ray.origin);
-    let shear = Shear::of(direction);
-    let per_direction = reciprocal(direction);
-    let slabs = Slabs { per_direction, offset: -(Vec3A::from(origin) * per_direction) };
+pub fn traverse(tree: &WideBvh, stack: &mut Stack<f32>, ray: &TraceRay) -> Nearest {
     let mut nearest = Nearest::NONE;
-    bvh::traverse(
-        nodes,
-        ray.root,
-        &mut nearest,
-        |nearest, low, high| enter(low, high, slabs, nearest.farthest),
-        |nearest, leaf| {
-            for triangle in &triangles[leaf] {
-                if let Some(candidate) = intersect(origin, &shear, triangle) {
-                    nearest.consider(candidate, triangle.index);
-                }
-            }
-        },
-    );
+    Prepared::new(ray).trace(tree, WideChild::ROOT, stack, &mut nearest, enter);
     nearest
 }

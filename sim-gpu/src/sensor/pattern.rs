@@ -1,5 +1,6 @@
 //! All beams of a sensor at once, and the few that can hit something.
 
+use crate::lanes::each;
 use glam::DVec3;
 
 use super::coherence::coherent_order;
@@ -50,7 +51,15 @@ impl BeamPattern {
     /// is the sensor itself.
     #[must_use]
     pub fn start(&self, beam: u32) -> Option<DVec3> {
-        self.start_z_m.get(beam as usize).map(|&z_m| DVec3::new(0.0, 0.0, z_m))
+        self.starts([beam]).map(|[start]| start)
+    }
+
+    /// Where these rays start, in the sensor frame, metres; `None` where all rays
+    /// start at the sensor itself.
+    #[inline(always)]
+    pub(crate) fn starts<const N: usize>(&self, beams: [u32; N]) -> Option<[DVec3; N]> {
+        let start = |lane: usize| DVec3::new(0.0, 0.0, self.start_z_m[beams[lane] as usize]);
+        (!self.start_z_m.is_empty()).then(|| each(start))
     }
 
     /// How far from the sensor a ray starts at most, metres.

@@ -1,8 +1,9 @@
 //! How far a point is from a surface, in f64.
 
 use glam::DVec3;
+use std::array;
 
-use crate::bvh::traverse;
+use crate::bvh::{Bounds, Stack, WIDTH, WideChild, traverse};
 use crate::target::Target;
 
 /// The distance from `point` to the triangle of these corners, which may be
@@ -42,16 +43,21 @@ pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
         return nearest;
     }
     traverse(
-        &target.bvh.nodes,
-        0,
+        &target.bvh.wide,
+        WideChild::ROOT,
+        &mut Stack::default(),
         &mut nearest,
-        |nearest, low, high| {
-            let distance = to_box(point, low, high);
-            if distance < *nearest { distance } else { f64::INFINITY }
+        |nearest, node| {
+            let distances: [f64; WIDTH] = array::from_fn(|i| to_box(point, node.bounds(i)));
+            // A child that is missing is as far away as f32 can say.
+            let farthest = nearest.min(f64::from(f32::MAX));
+            let nearer = (0..WIDTH).filter(|&i| distances[i] < farthest);
+            (nearer.fold(0, |bits, i| bits | 1 << i), distances)
         },
+        |nearest, distance| distance < *nearest,
         |nearest, leaf| {
-            for triangle in &target.bvh.triangles[leaf] {
-                let corners = target.surface.corners(triangle.index);
+            for &index in leaf.indices() {
+                let corners = target.surface.corners(index);
                 *nearest = nearest.min(distance_to_triangle(point, corners));
             }
         },
@@ -60,9 +66,8 @@ pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
 }
 
 /// Boxes are padded by more than their rounding to f32.
-fn to_box(point: DVec3, low: [f32; 3], high: [f32; 3]) -> f64 {
-    let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
-    (point.clamp(corner(low), corner(high)) - point).length()
+fn to_box(point: DVec3, bounds: Bounds) -> f64 {
+    (point.clamp(bounds.min.as_dvec3(), bounds.max.as_dvec3()) - point).length()
 }
 
 #[cfg(test)]

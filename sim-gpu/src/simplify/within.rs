@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::distance::distance_to_triangle;
-use crate::bvh::traverse;
+use crate::bvh::{Bounds, Stack, WIDTH, WideChild, traverse};
 use crate::target::{Surface, Target};
 
 /// Pieces shorter than this part of the bound are not halved any more: the
@@ -108,23 +108,26 @@ impl Proof<'_> {
     /// all of `piece`.
     fn search(&self, [a, b, c]: [DVec3; 3], fit: impl Fn(u32) -> bool) -> Option<u32> {
         let (low, high) = (a.min(b).min(c) + self.bound, a.max(b).max(c) - self.bound);
-        let corner = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
         let Target { surface, bvh } = self.target;
         let mut found = None;
         if surface.is_empty() {
             return found;
         }
+        let holds = |Bounds { min, max }: Bounds| {
+            min.as_dvec3().cmple(low).all() && max.as_dvec3().cmpge(high).all()
+        };
         traverse(
-            &bvh.nodes,
-            0,
+            &bvh.wide,
+            WideChild::ROOT,
+            &mut Stack::default(),
             &mut found,
-            |found: &Option<u32>, min, max| {
-                let may_hold = corner(min).cmple(low).all() && corner(max).cmpge(high).all();
-                if may_hold && found.is_none() { 0.0 } else { f32::INFINITY }
+            |_, node| {
+                let may_hold = (0..WIDTH).filter(|&i| holds(node.bounds(i)));
+                (may_hold.fold(0, |bits, i| bits | 1 << i), [0.0; WIDTH])
             },
+            |found: &Option<u32>, _| found.is_none(),
             |found, leaf| {
-                let mut indices = bvh.triangles[leaf].iter().map(|triangle| triangle.index);
-                *found = found.or_else(|| indices.find(|&index| fit(index)));
+                *found = found.or_else(|| leaf.indices().iter().copied().find(|&index| fit(index)));
             },
         );
         found

@@ -1,9 +1,9 @@
 //! Methods that find the ranges of rays on the CPU, from exact to fast.
 
 use super::ray_set::RaySet;
-use glam::{Vec3, Vec3A};
+use glam::Vec3;
 use rayon::prelude::*;
-use sim_gpu::bvh::{self, Bvh, LeafTriangle};
+use sim_gpu::bvh::{self, Entered, LEAF, Stack, WIDTH, WideBvh, WideChild, WideNode};
 use sim_gpu::cpu::oracle;
 use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::ray::{MISS, TraceRay};
@@ -18,16 +18,16 @@ pub fn in_f64(ray_set: &RaySet) -> Vec<Option<f64>> {
 /// watertightness and accuracy cost.
 pub fn moller_trumbore(ray_set: &RaySet) -> Vec<Option<f64>> {
     in_f32(ray_set, |ray| {
-        let t = moller_trumbore_nearest(&ray_set.job.target.bvh, ray);
+        let t = moller_trumbore_nearest(&ray_set.job.target.bvh.wide, ray);
         t.is_finite().then_some(t)
     })
 }
 
 /// The watertight test in f32, with the range that it finds.
 pub fn watertight_in_f32(ray_set: &RaySet) -> Vec<Option<f64>> {
-    let bvh = &ray_set.job.target.bvh;
+    let tree = &ray_set.job.target.bvh.wide;
     in_f32(ray_set, |ray| {
-        let nearest = traverse(&bvh.nodes, &bvh.triangles, ray);
+        let nearest = traverse(tree, &mut Stack::default(), ray);
         (nearest.index != MISS).then_some(nearest.t)
     })
 }
@@ -42,34 +42,43 @@ fn in_f32(ray_set: &RaySet, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -
 /// Distance to the nearest triangle along `ray` from its origin, unit lengths; infinite if
 /// there is none: Möller and Trumbore, "Fast, minimum storage ray/triangle intersection",
 /// JGT 2(1), 1997, over the same tree, with a plain slab test.
-fn moller_trumbore_nearest(bvh: &Bvh, ray: &TraceRay) -> f32 {
+fn moller_trumbore_nearest(tree: &WideBvh, ray: &TraceRay) -> f32 {
     let (origin, direction) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
-    let (corner, per_direction) = (Vec3A::from(origin), Vec3A::from(direction.recip()));
+    let per_direction = direction.recip();
     let mut nearest = f32::INFINITY;
     bvh::traverse(
-        &bvh.nodes,
-        ray.root,
+        tree,
+        WideChild::ROOT,
+        &mut Stack::default(),
         &mut nearest,
-        |&nearest, low, high| enter(low, high, corner, per_direction, nearest),
+        |&nearest, node| enter(node, origin, per_direction, nearest),
+        |&nearest, distance| distance <= nearest,
         |nearest, leaf| {
-            for triangle in &bvh.triangles[leaf] {
-                *nearest = nearest.min(intersect(origin, direction, triangle));
+            for i in 0..LEAF {
+                let corner = |c: usize| Vec3::from_array(leaf.corners[c].map(|axis| axis[i]));
+                *nearest = nearest.min(intersect(origin, direction, [0, 1, 2].map(corner)));
             }
         },
     );
     nearest
 }
 
-fn enter(low: [f32; 3], high: [f32; 3], origin: Vec3A, per_direction: Vec3A, farthest: f32) -> f32 {
-    let t0 = (Vec3A::from_array(low) - origin) * per_direction;
-    let t1 = (Vec3A::from_array(high) - origin) * per_direction;
-    let near = t0.min(t1).max_element().max(0.0);
-    let far = t0.max(t1).min_element().min(farthest);
-    if near <= far { near } else { f32::INFINITY }
+fn enter(node: &WideNode, origin: Vec3, per_direction: Vec3, farthest: f32) -> Entered<f32> {
+    let (mut near, mut far) = ([0.0f32; WIDTH], [farthest; WIDTH]);
+    for axis in 0..3 {
+        let [low, high] = node.boxes.map(|corners| corners[axis]);
+        for i in 0..WIDTH {
+            let t0 = (low[i] - origin[axis]) * per_direction[axis];
+            let t1 = (high[i] - origin[axis]) * per_direction[axis];
+            near[i] = near[i].max(t0.min(t1));
+            far[i] = far[i].min(t0.max(t1));
+        }
+    }
+    let entered = (0..WIDTH).filter(|&i| near[i] <= far[i]);
+    (entered.fold(0, |bits, i| bits | 1 << i), near)
 }
 
-fn intersect(origin: Vec3, direction: Vec3, triangle: &LeafTriangle) -> f32 {
-    let [a, b, c] = [triangle.a, triangle.b, triangle.c].map(Vec3::from_array);
+fn intersect(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(ac);
     let determinant = ab.dot(p);

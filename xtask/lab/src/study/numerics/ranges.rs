@@ -1,7 +1,7 @@
 //! Ranges: what f32 finds by itself, and what is delivered once f64 has solved it.
 
 use glam::DVec3;
-use sim_gpu::bvh::Builder;
+use sim_gpu::bvh::{Builder, Stack};
 use sim_gpu::caster::Caster;
 use sim_gpu::cpu::oracle;
 use sim_gpu::cpu::traverse::traverse;
@@ -78,8 +78,7 @@ fn measure_at(setting: Setting, sensor: &Sensor, pattern: &BeamPattern) -> [Row;
         delivered.push((hit.range_m - truth_m).abs());
         let ray = there.frame.beam(pattern, hit.beam);
         let Some(trace) = there.frame.trace_ray(&ray, 0) else { continue };
-        let bvh = &there.target.bvh;
-        let nearest = traverse(&bvh.nodes, &bvh.triangles, &trace);
+        let nearest = traverse(&there.target.bvh.wide, &mut Stack::default(), &trace);
         if nearest.index == hit.triangle {
             let found = f64::from(trace.skipped) + f64::from(nearest.t);
             in_f32.push((found * unit - truth_m).abs());

@@ -1,0 +1,118 @@
+//! The same test for one triangle, line by line as in `shaders/intersect.wgsl`.
+
+use super::{Candidates4, DISPLACEMENT, STEEPEST, Shear, intersect4};
+use crate::bvh::{Builder, Bvh};
+use crate::ray::NO_HIT;
+use formats::rng::StreamKey;
+use glam::Vec3;
+
+struct Rows {
+    x: Vec3,
+    y: Vec3,
+    z: Vec3,
+}
+
+fn rows(direction: Vec3) -> Rows {
+    let size = direction.abs();
+    let (ex, ey, ez, d) = if size.x > size.y && size.x > size.z {
+        (Vec3::Y, Vec3::Z, Vec3::X, Vec3::new(direction.y, direction.z, direction.x))
+    } else if size.y > size.z {
+        (Vec3::Z, Vec3::X, Vec3::Y, Vec3::new(direction.z, direction.x, direction.y))
+    } else {
+        (Vec3::X, Vec3::Y, Vec3::Z, direction)
+    };
+    let per_z = 1.0 / d.z;
+    Rows { x: ex - ez * (d.x * per_z), y: ey - ez * (d.y * per_z), z: ez * per_z }
+}
+
+fn row(r: Vec3, p: Vec3) -> f32 {
+    r.x * p.x + r.y * p.y + r.z * p.z
+}
+
+fn edge(px: f32, py: f32, qx: f32, qy: f32) -> f32 {
+    px * qy - py * qx
+}
+
+fn within(edge: f32, x: f32, y: f32) -> bool {
+    edge * edge <= DISPLACEMENT * DISPLACEMENT * (x * x + y * y)
+}
+
+/// Distance, error and rival.
+fn intersect(origin: Vec3, direction: Vec3, corners: [[f32; 3]; 3]) -> Option<[f32; 3]> {
+    let shear = rows(direction);
+    let [a, b, c] = corners.map(|corner| Vec3::from_array(corner) - origin);
+    let (ax, ay) = (row(shear.x, a), row(shear.y, a));
+    let (bx, by) = (row(shear.x, b), row(shear.y, b));
+    let (cx, cy) = (row(shear.x, c), row(shear.y, c));
+    let u = edge(bx, by, cx, cy);
+    let v = -edge(ax, ay, cx, cy);
+    let w = edge(ax, ay, bx, by);
+    let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
+    let determinant = u + v + w;
+    if outside || determinant == 0.0 {
+        return None;
+    }
+    let (az, bz, cz) = (row(shear.z, a), row(shear.z, b), row(shear.z, c));
+    let t = (u * az + v * bz + w * cz) / determinant;
+    let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
+    let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
+    let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
+    let error = DISPLACEMENT * (1.0 + slope);
+    let near_edge =
+        within(u, cx - bx, cy - by) || within(v, cx - ax, cy - ay) || within(w, bx - ax, by - ay);
+    let rival = if near_edge {
+        t - 2.0 * error - DISPLACEMENT * STEEPEST
+    } else if t < error {
+        t - error
+    } else {
+        NO_HIT
+    };
+    (t + error >= 0.0).then_some([t, error, rival])
+}
+
+/// Coordinates on a coarse grid, so that edges, corners and flat triangles are
+/// met exactly; some of them are 0.
+fn grid(key: StreamKey, i: u64) -> Vec3 {
+    Vec3::from_array(
+        [0, 1, 2].map(|axis| (16.0 * key.unit(3 * i + axis)).floor() as f32 / 8.0 - 1.0),
+    )
+}
+
+#[test]
+fn each_lane_does_what_one_triangle_does() {
+    let (on_grid, anywhere) = (StreamKey::new(1, "grid", 0), StreamKey::new(1, "anywhere", 0));
+    let point = |i: u64| match i % 7 {
+        0 => Vec3::from_array([0, 1, 2].map(|axis| anywhere.unit(3 * i + axis) as f32 - 0.5)),
+        _ => grid(on_grid, i),
+    };
+    let (mut met, mut missed) = (0, 0);
+    for i in 0..20_000u64 {
+        let n = 1 + (i % 4) as usize;
+        let corners: Vec<[[f32; 3]; 3]> = (0..n as u64)
+            .map(|t| [0, 1, 2].map(|c| point(17 * i + 3 * t + c).to_array()))
+            .collect();
+        let origin = point(17 * i + 13) * 2.0;
+        let Some(direction) = (point(17 * i + 14) - origin).try_normalize() else { continue };
+        let bvh = Bvh::build(Builder::Morton, &corners, &[0, 1, 2, 3][..n]);
+        let leaf = &bvh.wide.leaves[1];
+        let lanes = intersect4(origin, &Shear::of(direction), leaf);
+        for lane in 0..4 {
+            let corner = |c: usize| leaf.corners[c].map(|axis| axis[lane]);
+            let expected = intersect(origin, direction, [0, 1, 2].map(corner));
+            let of_lane = |found: Candidates4| {
+                let met = found.met & (1 << lane) != 0;
+                met.then_some([found.t[lane], found.error[lane], found.rival[lane]])
+            };
+            let found = lanes.and_then(of_lane);
+            let bits = |v: [f32; 3]| v.map(f32::to_bits);
+            assert_eq!(found.map(bits), expected.map(bits), "case {i}, lane {lane}");
+            if found.is_some() {
+                met += 1
+            } else {
+                missed += 1
+            }
+            assert!(lane < n || found.is_none(), "a lane without a triangle is hit");
+        }
+    }
+    assert!(met > 1000 && missed > 1000, "{met} met, {missed} missed");
+}
