@@ -80,13 +80,6 @@ impl RaySet {
         Self { job, rays }
     }
 
-    /// The same rays in the order of their beams: as the sensor fires them.
-    pub fn in_firing_order(&self) -> Self {
-        let mut order: Vec<usize> = (0..self.rays.len()).collect();
-        order.sort_unstable_by_key(|&i| self.job.beams[i]);
-        self.only(&order)
-    }
-
     /// The rays of these numbers, in this order.
     pub fn only(&self, numbers: &[usize]) -> Self {
         let mut ray_set = self.clone();

@@ -1,4 +1,4 @@
-//! Embree, through Open3D in a subprocess.
+//! Embree, through Open3D and through embreex in a subprocess.
 
 use crate::measure::clock::Cost;
 use crate::measure::ray_set::RaySet;
@@ -12,6 +12,9 @@ use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 use xtask::venv;
+
+/// Embree with one thread, called directly, and with all threads, through Open3D.
+pub const RIVALS: [&str; 2] = ["embreex", "open3d"];
 
 /// A running `peers/embree.py`. Every method fails if the program ends.
 pub struct Embree {
@@ -40,24 +43,24 @@ impl Embree {
         self.process.ask(json!({ "mesh": files }))
     }
 
-    /// Prepares to cast the rays of `ray_set`, `copies` times over, as `key`.
-    pub fn aim(&mut self, key: &str, ray_set: &RaySet, copies: usize) -> Result<()> {
+    /// Prepares to cast the rays of `ray_set`, `copies` times over.
+    pub fn aim(&mut self, ray_set: &RaySet, copies: usize) -> Result<()> {
         let rays = ray_set.in_world().flat_map(|(origin, direction)| [origin, direction]);
         let file = self.files.path().join("rays.npy");
         write(&file, rays.flat_map(|v| in_f32(&v)).collect(), 6)?;
-        self.process.ask::<Cost>(json!({ "rays": file, "copies": copies, "as": key }))?;
+        self.process.ask::<Cost>(json!({ "rays": file, "copies": copies }))?;
         Ok(())
     }
 
-    /// Casts the rays of `key` once; what it cost.
-    pub fn cast(&mut self, key: &str) -> Result<Cost> {
-        self.process.ask(json!({ "cast": key }))
+    /// Casts all rays once by `rival`, one of [`RIVALS`]; what it cost.
+    pub fn cast(&mut self, rival: &str) -> Result<Cost> {
+        self.process.ask(json!({ "cast": rival }))
     }
 
-    /// The ranges of one copy of the rays of `key`, metres; infinite where nothing is hit.
-    pub fn ranges(&mut self, key: &str) -> Result<Vec<f32>> {
+    /// The ranges of one copy of the rays by `rival`, metres; infinite where nothing is hit.
+    pub fn ranges(&mut self, rival: &str) -> Result<Vec<f32>> {
         let file = self.files.path().join("ranges.npy");
-        self.process.ask::<Cost>(json!({ "answers": file, "of": key }))?;
+        self.process.ask::<Cost>(json!({ "answers": file, "of": rival }))?;
         let ranges: Array1<f32> = ndarray_npy::read_npy(&file)?;
         Ok(ranges.to_vec())
     }

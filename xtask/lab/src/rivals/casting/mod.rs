@@ -12,12 +12,13 @@ use crate::measure::scenes::in_a_room;
 use crate::render::table::{Column, Table, digits, millions_per_s, milliseconds};
 use crate::study::casting::speed::casting;
 use anyhow::Result;
-use embree::Embree;
+use embree::{Embree, RIVALS};
+use rayon::prelude::*;
 use serde::Serialize;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::mesh::Mesh;
 use sim_gpu::resolve::{Hits, resolve};
 use sim_gpu::scan::{PlacedTarget, ScanRequest};
@@ -32,12 +33,6 @@ const OPEN3D: Environment<'_> = Environment {
     requirements: "xtask/lab/peers/requirements.txt",
     size: "some 700 MB",
 };
-
-/// Embree with rays in the order in which we cast them: neighbours traverse alike.
-const EMBREE: &str = "Embree";
-
-/// Embree with the same rays in the order in which the sensor fires them.
-const EMBREE_FIRED: &str = "Embree, firing order";
 
 /// How often the rays of a revolution are aimed, cast and solved in one repeat.
 const REVOLUTIONS: usize = 10;
@@ -117,14 +112,13 @@ impl Bench<'_> {
     fn trace(&self, rays_from: &'static str, ray_set: &RaySet) -> Result<Vec<Entry>> {
         let most = self.backends.iter().map(|backend| backend.rays).max().unwrap_or(0);
         let copies = most.div_ceil(ray_set.rays.len().max(1));
-        self.embree.borrow_mut().aim(EMBREE_FIRED, &ray_set.in_firing_order(), copies)?;
-        self.embree.borrow_mut().aim(EMBREE, ray_set, copies)?;
+        self.embree.borrow_mut().aim(ray_set, copies)?;
         let jobs = vec![ray_set.job.clone(); copies];
         let ours = self.backends.iter().map(|backend| casting(backend, jobs.clone())).collect();
         let ranges = |caster: &Caster| -> Result<_> {
             Ok(ray_set.ranges(&caster.cast(from_ref(&ray_set.job))?.swap_remove(0)))
         };
-        self.entries(rays_from, (ray_set, copies), ours, &[EMBREE_FIRED, EMBREE], ranges)
+        self.entries(rays_from, (ray_set, copies), ours, ranges)
     }
 
     /// From beams to ranges: we aim, cast and solve in f64; Embree is handed
@@ -137,14 +131,23 @@ impl Bench<'_> {
     ) -> Result<Vec<Entry>> {
         let pattern = request.pattern;
         let solve = |caster: &Caster, revolutions: usize| -> Result<Vec<Hits>> {
-            let aim = |_| request.aim(&PlacedTarget::new(target));
-            let jobs: Vec<CastJob> = (0..revolutions).map(aim).collect();
-            let pairs = jobs.iter().zip(caster.cast(&jobs)?);
-            let hits = pairs.map(|(job, cast)| resolve(job, &cast, pattern, &Effects::default()));
-            Ok(hits.collect())
+            let aim = || request.aim(&PlacedTarget::new(target));
+            let resolve =
+                |job: &CastJob, cast: &Cast| resolve(job, cast, pattern, &Effects::default());
+            // As `scan_many`: a CPU takes one scan after another, a GPU all at once.
+            if matches!(caster, Caster::Cpu(_)) {
+                let scan = |_| -> Result<Hits> {
+                    let job = aim();
+                    Ok(resolve(&job, &caster.cast(from_ref(&job))?[0]))
+                };
+                return (0..revolutions).into_par_iter().map(scan).collect();
+            }
+            let jobs: Vec<CastJob> = (0..revolutions).map(|_| aim()).collect();
+            let casts = caster.cast(&jobs)?;
+            Ok(jobs.iter().zip(&casts).map(|(job, cast)| resolve(job, cast)).collect())
         };
         let all = RaySet::sweep(target, &request.pose, pattern, Culling::Off);
-        self.embree.borrow_mut().aim(EMBREE, &all, REVOLUTIONS)?;
+        self.embree.borrow_mut().aim(&all, REVOLUTIONS)?;
         let ours = self.backends.iter();
         let ours = ours.map(|ours| workload(move || solve(&ours.caster, REVOLUTIONS))).collect();
         let ranges = |caster: &Caster| -> Result<_> {
@@ -154,22 +157,21 @@ impl Bench<'_> {
             }
             Ok(all.job.beams.iter().map(|&beam| by_beam[beam as usize]).collect())
         };
-        self.entries(rays_from, (&all, REVOLUTIONS), ours, &[EMBREE], ranges)
+        self.entries(rays_from, (&all, REVOLUTIONS), ours, ranges)
     }
 
-    /// Times `ours`, one workload for each backend, and Embree's rays of these keys, which
-    /// are all of `copies` copies of `ray_set`; `ranges` is what a backend finds for one.
+    /// Times `ours`, one workload for each backend, and Embree's rays, `copies` copies of
+    /// `ray_set`; `ranges` is what a backend finds for one.
     fn entries(
         &self,
         rays_from: &'static str,
         (ray_set, copies): (&RaySet, usize),
         ours: Vec<Workload<'_>>,
-        keys: &[&str],
         ranges: impl Fn(&Caster) -> Result<Vec<Option<f64>>>,
     ) -> Result<Vec<Entry>> {
         let mut workloads: Vec<Workload<'_>> = ours;
-        for &key in keys {
-            workloads.push(Box::new(move || self.embree.borrow_mut().cast(key)));
+        for rival in RIVALS {
+            workloads.push(Box::new(move || self.embree.borrow_mut().cast(rival)));
         }
         let costs = interleave(self.rounds, &mut workloads)?;
         let truth = methods::in_f64(ray_set);
@@ -177,11 +179,11 @@ impl Bench<'_> {
         for backend in self.backends {
             answers.push((backend.name(), ranges(&backend.caster)?));
         }
-        // Only the time depends on the order of Embree's rays.
-        let in_our_order = self.embree.borrow_mut().ranges(EMBREE)?.into_iter();
-        let of_embree: Vec<Option<f64>> =
-            in_our_order.map(|t| t.is_finite().then_some(f64::from(t))).collect();
-        answers.extend(keys.iter().map(|&key| (key, of_embree.clone())));
+        for rival in RIVALS {
+            let ranges = self.embree.borrow_mut().ranges(rival)?.into_iter();
+            let ranges = ranges.map(|t| t.is_finite().then_some(f64::from(t)));
+            answers.push((rival, ranges.collect()));
+        }
         let entry = |((caster, ranges), costs): ((&str, Vec<_>), Costs)| Entry {
             mesh: self.mesh.to_owned(),
             triangles: ray_set.job.target.surface.len(),
@@ -200,7 +202,7 @@ impl Comparison {
     pub fn table(&self) -> Table {
         let same_rays = |a: &Entry, b: &Entry| a.mesh == b.mesh && a.rays_from == b.rays_from;
         let groups = self.entries.chunk_by(same_rays);
-        // Embree is the last of each group.
+        // Embree through Open3D is the last of each group.
         let rows: Vec<(&Entry, &Entry)> =
             groups.flat_map(|group| zip(group, repeat(&group[group.len() - 1]))).collect();
         let cpu_s = |entry: &Entry| entry.costs.cpu_s().median;
@@ -218,9 +220,10 @@ impl Comparison {
             ("worst range error m", &|(entry, _)| digits(entry.accuracy.worst_m)),
         ];
         let title = format!(
-            "Against Embree (Open3D {}), million rays a second; `whole` is aiming, casting and \
-             solving ranges in f64, the beams that culling spares counted",
-            self.versions["open3d"].as_str().unwrap_or("?")
+            "Against Embree (Open3D {} and embreex {}), million rays a second; `whole` is aiming, \
+             casting and solving ranges in f64, the beams that culling spares counted",
+            self.versions["open3d"].as_str().unwrap_or("?"),
+            self.versions["embreex"].as_str().unwrap_or("?")
         );
         Table::of(title, &rows, &columns)
     }
