@@ -141,35 +141,48 @@ impl EdgeConv {
         if self.is_empty() {
             return;
         }
-        let EdgeScratch { products, maxima } = scratch;
         let of_point = self.bias.len();
-        for (row, maxima) in rows.chunks_exact(stride).zip(maxima.chunks_exact_mut(of_point)) {
+        let maxima = scratch.maxima.chunks_exact_mut(of_point);
+        for (row, maxima) in rows.chunks_exact(stride).zip(maxima) {
             // Each point is its own neighbour.
             for (most, weights) in maxima.iter_mut().zip(&self.weights) {
                 *most = product::<FUSED, LANES>(weights.each_ref(), [row[0], row[1], row[2]]);
             }
         }
         for tile in cloud.tiles() {
-            let mut is_projected = false;
-            for (row, maxima) in rows.chunks_exact(stride).zip(maxima.chunks_exact_mut(of_point)) {
-                let squared = tile.squared_distances([row[0], row[1], row[2]]);
-                for EdgeLayer { squared_radius, lanes, .. } in &self.layers {
-                    let near = within(&squared, *squared_radius);
-                    if near == 0 {
-                        break;
-                    }
-                    if !is_projected {
-                        self.project::<FUSED>(&tile, products);
-                        is_projected = true;
-                    }
-                    for i in lanes.clone() {
-                        raise(&mut maxima[i], &products[i], near);
-                    }
+            self.raise_all::<FUSED>(&tile, rows.chunks_exact(stride), scratch);
+        }
+        let maxima = scratch.maxima.chunks_exact(of_point);
+        for (row, maxima) in rows.chunks_exact_mut(stride).zip(maxima) {
+            self.finish::<FUSED>(maxima, row);
+        }
+    }
+
+    /// Raises the maxima of the points of `rows` to the products of their neighbours in `tile`.
+    #[inline(always)]
+    fn raise_all<'a, const FUSED: bool>(
+        &self,
+        tile: &Tile<'_>,
+        rows: impl Iterator<Item = &'a [f32]>,
+        scratch: &mut EdgeScratch,
+    ) {
+        let EdgeScratch { products, maxima } = scratch;
+        let mut is_projected = false;
+        for (row, maxima) in rows.zip(maxima.chunks_exact_mut(self.bias.len())) {
+            let squared = tile.squared_distances([row[0], row[1], row[2]]);
+            for EdgeLayer { squared_radius, lanes, .. } in &self.layers {
+                let near = within(&squared, *squared_radius);
+                if near == 0 {
+                    break;
+                }
+                if !is_projected {
+                    self.project::<FUSED>(tile, products);
+                    is_projected = true;
+                }
+                for i in lanes.clone() {
+                    raise(&mut maxima[i], &products[i], near);
                 }
             }
-        }
-        for (row, maxima) in rows.chunks_exact_mut(stride).zip(maxima.chunks_exact(of_point)) {
-            self.finish::<FUSED>(maxima, row);
         }
     }
 

@@ -15,6 +15,9 @@ pub(crate) fn each<T: Copy + Default, const N: usize>(of: impl Fn(usize) -> T) -
     lanes
 }
 
+/// How many rays are aimed, and ranges solved, at once.
+pub(crate) const LANES: usize = 8;
+
 /// `N` vectors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Vectors<const N: usize> {

@@ -1,6 +1,6 @@
 //! Rays in an object's own frame.
 
-use crate::lanes::{Lanewise, Vectors, each, widest};
+use crate::lanes::{LANES, Lanewise, Vectors, each, widest};
 use crate::pose::Pose;
 use crate::sensor::{BeamPattern, Cone};
 use crate::target::Surface;
@@ -155,8 +155,8 @@ impl RayFrame {
         all: bool,
     ) -> (Vec<u32>, Vec<TraceRay>) {
         let mut rays = vec![TraceRay::zeroed(); beams.len()];
-        let (frame, (beams_ref, rays_ref)) = (self, (&mut beams[..], &mut rays[..]));
-        let kept = widest(Aiming { frame, pattern, beams: beams_ref, rays: rays_ref, all });
+        let aiming = Aiming { frame: self, pattern, beams: &mut beams, rays: &mut rays, all };
+        let kept = widest(aiming);
         beams.truncate(kept);
         rays.truncate(kept);
         (beams, rays)
@@ -193,9 +193,6 @@ impl Lanewise for Aiming<'_> {
         kept
     }
 }
-
-/// How many rays are aimed, and ranges solved, at once.
-pub(crate) const LANES: usize = 8;
 
 /// Rays in f64, side by side.
 #[derive(Clone, Copy)]

@@ -5,11 +5,11 @@
 //! and as accurate near grazing as elsewhere.
 
 use crate::cpu::effects::append_outputs;
-use crate::cpu::oracle;
+use crate::cpu::oracle::{self, Crossing};
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
-use crate::lanes::{Lanewise, each, widest};
-use crate::ray::{AMBIGUOUS, LANES, MISS};
+use crate::lanes::{LANES, Lanewise, each, widest};
+use crate::ray::{AMBIGUOUS, MISS};
 use crate::sensor::BeamPattern;
 
 /// One beam's nearest surface.
@@ -43,28 +43,25 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
     let mut resolved = Hits { hits: Vec::with_capacity(order.len()), ..Hits::default() };
     for (ray, range_m) in order.into_iter().zip(ranges_m) {
         let (beam, code) = (job.beams[ray as usize], cast.codes[ray as usize]);
-        let (mut triangle, mut range_m) = (code & !AMBIGUOUS, range_m);
+        let triangle = code & !AMBIGUOUS;
         if code & AMBIGUOUS != 0 {
             resolved.decided_in_f64 += 1;
             let ray = job.frame.beam(pattern, beam);
-            let Some(nearest) = oracle::nearest(&job.target, &ray) else { continue };
-            if nearest.index != triangle {
-                triangle = nearest.index;
+            let Some(Crossing { index, .. }) = oracle::nearest(&job.target, &ray) else { continue };
+            if index != triangle {
                 // By the same formula whoever found the triangle.
-                range_m = oracle::range_to(&job.target, &ray, triangle).unwrap_or(f64::NAN);
+                let Some(range_m) = oracle::range_to(&job.target, &ray, index) else { continue };
+                resolved.hits.push(Hit { beam, triangle: index, range_m });
+                append_outputs(&mut resolved.effect_outputs, effects, job, beam, &ray, index);
+                continue;
             }
         }
         if range_m.is_nan() {
             continue;
         }
         resolved.hits.push(Hit { beam, triangle, range_m });
-        if triangle == code & !AMBIGUOUS {
-            let from = ray as usize * per_ray;
-            resolved.effect_outputs.extend(&cast.effect_outputs[from..from + per_ray]);
-        } else {
-            let ray = job.frame.beam(pattern, beam);
-            append_outputs(&mut resolved.effect_outputs, effects, job, beam, &ray, triangle);
-        }
+        let from = ray as usize * per_ray;
+        resolved.effect_outputs.extend(&cast.effect_outputs[from..from + per_ray]);
     }
     resolved
 }

@@ -5,8 +5,6 @@ use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::validate::triangle_stats;
 use crate::mesh::{Mesh, MeshError, load};
 use glam::DVec3;
-use std::cmp::Ordering;
-use std::mem::swap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -138,21 +136,10 @@ impl Target {
 }
 
 /// `corners` in the order of their coordinates.
-fn sorted(corners: [u32; 3], vertices: &[DVec3]) -> [u32; 3] {
-    let [mut a, mut b, mut c] = corners;
-    let follows = |a: u32, b: u32| {
-        let [p, q] = [a, b].map(|v| vertices[v as usize].to_array());
-        p.iter().zip(q).map(|(p, q)| p.total_cmp(&q)).find(|order| order.is_ne())
-            == Some(Ordering::Greater)
-    };
-    // Three exchanges sort three.
-    for _ in 0..2 {
-        if follows(a, b) {
-            swap(&mut a, &mut b);
-        }
-        if follows(b, c) {
-            swap(&mut b, &mut c);
-        }
-    }
-    [a, b, c]
+fn sorted(mut corners: [u32; 3], vertices: &[DVec3]) -> [u32; 3] {
+    corners.sort_unstable_by(|&a, &b| {
+        let [p, q] = [a, b].map(|v| vertices[v as usize]);
+        p.x.total_cmp(&q.x).then_with(|| p.y.total_cmp(&q.y)).then_with(|| p.z.total_cmp(&q.z))
+    });
+    corners
 }

@@ -6,6 +6,12 @@ use super::wide::{Leaf4, WIDTH, WideBvh, WideChild, WideNode};
 /// Which of a node's boxes matter, a bit each, and how far away each begins.
 pub type Entered<Distance> = (u32, [Distance; WIDTH]);
 
+/// The boxes that `matter`, a bit each.
+#[inline(always)]
+pub fn boxes_that(matter: impl Fn(usize) -> bool) -> u32 {
+    (0..WIDTH).fold(0, |bits, i| bits | u32::from(matter(i)) << i)
+}
+
 /// What a search has still to visit. The caller keeps it, so that a search does
 /// not begin by filling it.
 pub struct Stack<Distance> {

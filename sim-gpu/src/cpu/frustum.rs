@@ -1,6 +1,7 @@
 //! What bounds a few rays that run side by side: Reshetov, Soupikov, Hurley,
 //! "Multi-level ray tracing algorithm", SIGGRAPH 2005.
 
+use super::intersect::axes_by_size;
 use crate::bvh::{WIDTH, WideNode};
 use crate::ray::TraceRay;
 
@@ -37,13 +38,8 @@ impl Frustum {
     /// not finite.
     #[inline(always)]
     pub fn around<const N: usize>(rays: &[TraceRay; N]) -> Option<Self> {
-        let size = rays[0].direction.map(f32::abs);
-        let main = match size {
-            [x, y, z] if x > y && x > z => 0,
-            [_, y, z] if y > z => 1,
-            _ => 2,
-        };
-        let axes = [(main + 1) % 3, (main + 2) % 3, main];
+        let axes = axes_by_size(rays[0].direction.map(f32::abs));
+        let main = axes[2];
         let is_forward = rays[0].direction[main] > 0.0;
         let along = rays.each_ref().map(|ray| ray.direction[main]);
         let start = rays.each_ref().map(|ray| ray.origin[main]);

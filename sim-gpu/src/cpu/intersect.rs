@@ -59,19 +59,25 @@ pub const DISPLACEMENT: f32 = 48.0 / 16_777_216.0;
 /// accuracy: 1 / tan(0.1 degree).
 pub const STEEPEST: f32 = 573.0;
 
+/// The axes in an even order, that of the largest of `sizes` last.
+#[must_use]
+#[inline(always)]
+pub(super) fn axes_by_size<T: PartialOrd>([x, y, z]: [T; 3]) -> [usize; 3] {
+    if x > y && x > z {
+        [1, 2, 0]
+    } else if y > z {
+        [2, 0, 1]
+    } else {
+        [0, 1, 2]
+    }
+}
+
 impl Shear {
     /// The shear of a ray along `direction`.
     #[must_use]
     #[inline]
     pub fn of(direction: Vec3) -> Self {
-        let size = direction.abs();
-        let axes = if size.x > size.y && size.x > size.z {
-            [1, 2, 0]
-        } else if size.y > size.z {
-            [2, 0, 1]
-        } else {
-            [0, 1, 2]
-        };
+        let axes = axes_by_size(direction.abs().to_array());
         let d = axes.map(|axis| direction[axis]);
         let per_z = 1.0 / d[2];
         Self { axes, x: d[0] * per_z, y: d[1] * per_z, per_z }

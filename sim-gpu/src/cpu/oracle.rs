@@ -1,7 +1,8 @@
 //! The f64 twin: the same test on the same tree, in double precision. Every
 //! range that leaves this crate was solved here, whoever found the triangle.
 
-use crate::bvh::{Entered, Stack, WIDTH, WideChild, WideNode, traverse};
+use super::intersect::axes_by_size;
+use crate::bvh::{Entered, Stack, WIDTH, WideChild, WideNode, boxes_that, traverse};
 use crate::lanes::{Vectors, each};
 use crate::ray::{Ray, Rays};
 use crate::target::{Surface, Target};
@@ -109,8 +110,7 @@ fn enter(node: &WideNode, origin: DVec3, per_direction: DVec3, farthest: f64) ->
             far[i] = far[i].min(t0.max(t1));
         }
     }
-    let entered = (0..WIDTH).filter(|&i| near[i] <= far[i] * FAR_SCALE);
-    (entered.fold(0, |bits, i| bits | 1 << i), near)
+    (boxes_that(|i| near[i] <= far[i] * FAR_SCALE), near)
 }
 
 fn reciprocal(direction: DVec3) -> DVec3 {
@@ -129,14 +129,7 @@ struct Shear {
 
 impl Shear {
     fn of(direction: DVec3) -> Self {
-        let size = direction.abs();
-        let axes = if size.x > size.y && size.x > size.z {
-            [1, 2, 0]
-        } else if size.y > size.z {
-            [2, 0, 1]
-        } else {
-            [0, 1, 2]
-        };
+        let axes = axes_by_size(direction.abs().to_array());
         let d = axes.map(|axis| direction[axis]);
         Self { axes, x: d[0] / d[2], y: d[1] / d[2], z: 1.0 / d[2] }
     }

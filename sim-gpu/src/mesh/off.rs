@@ -61,7 +61,8 @@ fn read_corners(
     corners.clear();
     let n_corners = integer(tokens.next().unwrap_or_default(), "a number of corners")?;
     for nth in (0..n_corners).filter(|_| n_corners >= 3) {
-        let (token, index) = tokens.next_index(nth as u64, n_corners as u64)?;
+        let token = tokens.next_of("corners of a face", nth as u64, n_corners as u64)?;
+        let index = integer(token, "a vertex index")?;
         let corner = u32::try_from(index).ok().filter(|&corner| u64::from(corner) < n_vertices);
         let outside = || Malformed::IndexOutOfRange { found: excerpt(token), n_vertices };
         corners.push(corner.ok_or_else(outside)?);

@@ -47,23 +47,6 @@ impl<'a> Tokens<'a> {
         coordinate(self.next_of("coordinates of a vertex", nth, 3)?)
     }
 
-    /// The next token on this line, the `nth` of `expected`, and the vertex index that it
-    /// spells.
-    pub fn next_index(&mut self, nth: u64, expected: u64) -> Result<(&'a [u8], i64), Malformed> {
-        self.skip_blanks();
-        let rest = &self.bytes[self.at..];
-        // So many digits cannot overflow.
-        let digits = rest.iter().take(9).take_while(|byte| byte.is_ascii_digit()).count();
-        if digits > 0 && rest.get(digits).is_none_or(|&byte| !is_word(byte)) {
-            self.at += digits;
-            let token = &rest[..digits];
-            let number = token.iter().fold(0, |sum, byte| sum * 10 + i64::from(byte - b'0'));
-            return Ok((token, number));
-        }
-        let token = self.next_of("corners of a face", nth, expected)?;
-        Ok((token, integer(token, "a vertex index")?))
-    }
-
     fn skip_blanks(&mut self) {
         let rest = &self.bytes[self.at..];
         self.at += rest.iter().take_while(|byte| is_blank(**byte)).count();

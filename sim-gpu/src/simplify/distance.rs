@@ -3,7 +3,7 @@
 use glam::DVec3;
 use std::array;
 
-use crate::bvh::{Bounds, Stack, WIDTH, WideChild, traverse};
+use crate::bvh::{Bounds, Stack, WIDTH, WideChild, boxes_that, traverse};
 use crate::target::Target;
 
 /// The distance from `point` to the triangle of these corners, which may be
@@ -49,10 +49,7 @@ pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
         &mut nearest,
         |nearest, node| {
             let distances: [f64; WIDTH] = array::from_fn(|i| to_box(point, node.bounds(i)));
-            // A child that is missing is as far away as f32 can say.
-            let farthest = nearest.min(f64::from(f32::MAX));
-            let nearer = (0..WIDTH).filter(|&i| distances[i] < farthest);
-            (nearer.fold(0, |bits, i| bits | 1 << i), distances)
+            (boxes_that(|i| distances[i] < *nearest), distances)
         },
         |nearest, distance| distance < *nearest,
         |nearest, leaf| {

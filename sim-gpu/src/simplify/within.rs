@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::distance::distance_to_triangle;
-use crate::bvh::{Bounds, Stack, WIDTH, WideChild, traverse};
+use crate::bvh::{Bounds, Stack, WIDTH, WideChild, boxes_that, traverse};
 use crate::target::{Surface, Target};
 
 /// Pieces shorter than this part of the bound are not halved any more: the
@@ -121,10 +121,7 @@ impl Proof<'_> {
             WideChild::ROOT,
             &mut Stack::default(),
             &mut found,
-            |_, node| {
-                let may_hold = (0..WIDTH).filter(|&i| holds(node.bounds(i)));
-                (may_hold.fold(0, |bits, i| bits | 1 << i), [0.0; WIDTH])
-            },
+            |_, node| (boxes_that(|i| holds(node.bounds(i))), [0.0; WIDTH]),
             |found: &Option<u32>, _| found.is_none(),
             |found, leaf| {
                 *found = found.or_else(|| leaf.indices().iter().copied().find(|&index| fit(index)));

@@ -41,12 +41,10 @@ fn revolutions(target: &Target) -> Vec<TraceRay> {
 
 /// `rays` in an order in which no two that follow each other run side by side.
 fn shuffled(rays: &[TraceRay]) -> Vec<TraceRay> {
-    let step = (rays.len() / 3..).find(|step| gcd(*step, rays.len()) == 1).unwrap();
-    (0..rays.len()).map(|i| rays[i * step % rays.len()]).collect()
-}
-
-fn gcd(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { gcd(b, a % b) }
+    // A prime that does not divide their number: each comes once.
+    const STEP: usize = 7919;
+    assert!(!rays.len().is_multiple_of(STEP));
+    (0..rays.len()).map(|i| rays[i * STEP % rays.len()]).collect()
 }
 
 /// Rays along an axis, along a diagonal, of no direction, and of numbers that are

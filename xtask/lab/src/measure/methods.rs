@@ -3,7 +3,7 @@
 use super::ray_set::RaySet;
 use glam::Vec3;
 use rayon::prelude::*;
-use sim_gpu::bvh::{self, Entered, LEAF, Stack, WIDTH, WideBvh, WideChild, WideNode};
+use sim_gpu::bvh::{self, Entered, LEAF, Stack, WIDTH, WideBvh, WideChild, WideNode, boxes_that};
 use sim_gpu::cpu::oracle;
 use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::ray::{MISS, TraceRay};
@@ -74,8 +74,7 @@ fn enter(node: &WideNode, origin: Vec3, per_direction: Vec3, farthest: f32) -> E
             far[i] = far[i].min(t0.max(t1));
         }
     }
-    let entered = (0..WIDTH).filter(|&i| near[i] <= far[i]);
-    (entered.fold(0, |bits, i| bits | 1 << i), near)
+    (boxes_that(|i| near[i] <= far[i]), near)
 }
 
 fn intersect(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
