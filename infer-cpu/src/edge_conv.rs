@@ -167,7 +167,7 @@ impl EdgeConv {
         scratch: &mut EdgeScratch,
     ) {
         let EdgeScratch { products, maxima } = scratch;
-        let mut is_projected = false;
+        let mut projected = 0;
         for (row, maxima) in rows.zip(maxima.chunks_exact_mut(self.bias.len())) {
             let squared = tile.squared_distances([row[0], row[1], row[2]]);
             for EdgeLayer { squared_radius, lanes, .. } in &self.layers {
@@ -175,9 +175,9 @@ impl EdgeConv {
                 if near == 0 {
                     break;
                 }
-                if !is_projected {
-                    self.project::<FUSED>(tile, products);
-                    is_projected = true;
+                if near & !projected != 0 {
+                    self.project::<FUSED>(tile, near & !projected, products);
+                    projected |= near;
                 }
                 for i in lanes.clone() {
                     raise(&mut maxima[i], &products[i], near);
@@ -186,16 +186,21 @@ impl EdgeConv {
         }
     }
 
-    /// Writes the products of a tile's points with all weights.
+    /// Writes the products of some of a tile's points, a bit each, with all weights.
     #[inline(always)]
-    fn project<const FUSED: bool>(&self, tile: &Tile<'_>, products: &mut [[Lanes; TILE]]) {
+    fn project<const FUSED: bool>(
+        &self,
+        tile: &Tile<'_>,
+        points: u64,
+        products: &mut [[Lanes; TILE]],
+    ) {
         for (products, weights) in products.iter_mut().zip(&self.weights) {
             // Half the channels at a time, so that their weights stay in registers.
             let halves = weights.each_ref().map(|weights| weights.as_chunks::<{ LANES / 2 }>().0);
             for half in 0..2 {
                 let weights = halves.map(|halves| &halves[half]);
-                for (i, out) in products.iter_mut().enumerate() {
-                    let (halves, _) = out.as_chunks_mut();
+                for i in bits(points) {
+                    let (halves, _) = products[i].as_chunks_mut();
                     let point = [tile.x[i], tile.y[i], tile.z[i]];
                     halves[half] = product::<FUSED, { LANES / 2 }>(weights, point);
                 }
@@ -272,14 +277,22 @@ fn within(squared: &[f32; TILE], squared_radius: f32) -> u64 {
     bits.rev().fold(0, |near, bits| near << 8 | bits)
 }
 
+/// The numbers of the bits that are set.
+#[inline(always)]
+fn bits(mut of: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lowest = of.trailing_zeros() as usize;
+        of &= of.wrapping_sub(1);
+        (lowest < TILE).then_some(lowest)
+    })
+}
+
 /// Raises maxima to the products of the points that are `near`, a bit each.
 #[inline(always)]
-fn raise(maxima: &mut Lanes, products: &[Lanes; TILE], mut near: u64) {
+fn raise(maxima: &mut Lanes, products: &[Lanes; TILE], near: u64) {
     let mut most = *maxima;
-    while near != 0 {
-        let products = &products[near.trailing_zeros() as usize % TILE];
-        near &= near - 1;
-        for (most, &product) in most.iter_mut().zip(products) {
+    for i in bits(near) {
+        for (most, &product) in most.iter_mut().zip(&products[i]) {
             *most = greater(*most, product);
         }
     }
