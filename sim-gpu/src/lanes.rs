@@ -1,5 +1,5 @@
 //! Vectors in f64 side by side, a lane each: plain loops that the compiler turns into
-//! vector instructions, of AVX2 where [`widest`] finds it. Each lane is to the bit
+//! vector instructions, of AVX2 or AVX-512 where [`widest`] finds them. Each lane is to the bit
 //! what glam gives for one vector.
 
 use glam::{DMat3, DVec3};
@@ -107,9 +107,56 @@ impl<const N: usize> Mul<[f64; N]> for Vectors<N> {
     }
 }
 
-/// Whether the processor has AVX2 and what came with it.
+/// The proof that the processor has AVX2 and what came with it.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2(());
+
+/// Work on lanes.
+pub(crate) trait Lanewise: Sized {
+    /// What it gives.
+    type Output;
+
+    /// Does the work, with AVX2 at hand if there is any; must be `#[inline(always)]`, or it
+    /// is not compiled anew for wider vectors.
+    fn run(self, avx2: Option<Avx2>) -> Self::Output;
+}
+
+/// A way of doing work: what it is compiled for, and a function that does it.
+pub(crate) type Way<W> = (&'static str, fn(W) -> <W as Lanewise>::Output);
+
+/// The ways of doing work that this processor has, that of the widest vectors first.
+pub(crate) fn ways<W: Lanewise>() -> impl Iterator<Item = Way<W>> {
+    #[cfg(target_arch = "x86_64")]
+    let wide = {
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        fn avx512<W: Lanewise>(work: W) -> W::Output {
+            work.run(Some(Avx2(())))
+        }
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        fn avx2<W: Lanewise>(work: W) -> W::Output {
+            work.run(Some(Avx2(())))
+        }
+        // SAFETY: the way is given out only if the processor has the instructions.
+        let avx512: Way<W> = ("AVX-512", |work| unsafe { avx512(work) });
+        // SAFETY: as above.
+        let avx2: Way<W> = ("AVX2", |work| unsafe { avx2(work) });
+        [has_avx512().then_some(avx512), has_avx2().then_some(avx2)]
+    };
+    #[cfg(not(target_arch = "x86_64"))]
+    let wide = [];
+    let portable: Way<W> = ("portable", |work| work.run(None));
+    wide.into_iter().flatten().chain([portable])
+}
+
+/// Does `work` with the widest vectors that the processor has.
+pub(crate) fn widest<W: Lanewise>(work: W) -> W::Output {
+    let (_, way) = ways().next().expect("invariant: the portable way is always there");
+    way(work)
+}
+
 #[cfg(target_arch = "x86_64")]
-pub(crate) fn has_avx2() -> bool {
+fn has_avx2() -> bool {
     is_x86_feature_detected!("avx2")
         && is_x86_feature_detected!("bmi1")
         && is_x86_feature_detected!("bmi2")
@@ -117,26 +164,11 @@ pub(crate) fn has_avx2() -> bool {
         && is_x86_feature_detected!("popcnt")
 }
 
-/// Work on lanes.
-pub(crate) trait Lanewise {
-    /// What it gives.
-    type Output;
-
-    /// Does the work; must be `#[inline(always)]`, or it is not compiled anew for
-    /// wider vectors.
-    fn run(self) -> Self::Output;
-}
-
-/// Does `work` with the widest vectors that the processor has.
-pub(crate) fn widest<W: Lanewise>(work: W) -> W::Output {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-        fn avx2<W: Lanewise>(work: W) -> W::Output {
-            work.run()
-        }
-        // SAFETY: the processor has the instructions.
-        return unsafe { avx2(work) };
-    }
-    work.run()
+#[cfg(target_arch = "x86_64")]
+fn has_avx512() -> bool {
+    has_avx2()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512bw")
 }

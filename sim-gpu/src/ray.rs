@@ -1,6 +1,6 @@
 //! Rays in an object's own frame.
 
-use crate::lanes::{LANES, Lanewise, Vectors, each, widest};
+use crate::lanes::{Avx2, LANES, Lanewise, Vectors, each, widest};
 use crate::pose::Pose;
 use crate::sensor::{BeamPattern, Cone};
 use crate::target::Surface;
@@ -177,7 +177,7 @@ impl Lanewise for Aiming<'_> {
     type Output = usize;
 
     #[inline(always)]
-    fn run(self) -> usize {
+    fn run(self, _: Option<Avx2>) -> usize {
         let mut kept = 0;
         for from in (0..self.beams.len()).step_by(LANES) {
             let count = LANES.min(self.beams.len() - from);

@@ -8,7 +8,7 @@ use crate::cpu::effects::append_outputs;
 use crate::cpu::oracle::{self, Crossing};
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
-use crate::lanes::{LANES, Lanewise, each, widest};
+use crate::lanes::{Avx2, LANES, Lanewise, each, widest};
 use crate::ray::{AMBIGUOUS, MISS};
 use crate::sensor::BeamPattern;
 
@@ -79,7 +79,7 @@ impl Lanewise for Ranges<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
-    fn run(self) -> Vec<f64> {
+    fn run(self, _: Option<Avx2>) -> Vec<f64> {
         let mut ranges_m = Vec::with_capacity(self.rays.len());
         for rays in self.rays.chunks(LANES) {
             let of_lane: [u32; LANES] = each(|lane| rays[lane.min(rays.len() - 1)]);

@@ -16,7 +16,7 @@ mod wide;
 pub use bounds::Bounds;
 pub use node::{LeafTriangle, Node, canonical_corners};
 pub(crate) use traverse::step;
-pub use traverse::{Entered, Stack, boxes_that, traverse};
+pub use traverse::{Entered, Search, Stack, boxes_that, traverse};
 pub use validate::assert_well_formed;
 pub use wide::{LEAF, Leaf4, WIDTH, WideBvh, WideChild, WideNode};
 

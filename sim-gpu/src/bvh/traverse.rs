@@ -12,6 +12,21 @@ pub fn boxes_that(matter: impl Fn(usize) -> bool) -> u32 {
     (0..WIDTH).fold(0, |bits, i| bits | u32::from(matter(i)) << i)
 }
 
+/// What is looked for in a tree.
+pub trait Search {
+    /// What says how far away something begins.
+    type Distance: PartialOrd + Copy + Default;
+
+    /// Which boxes of `node` matter, and how far away each begins.
+    fn enter(&self, node: &WideNode) -> Entered<Self::Distance>;
+
+    /// Whether what begins at `distance` still matters, now that its turn has come.
+    fn matters(&self, distance: Self::Distance) -> bool;
+
+    /// Looks at the triangles of `leaf`.
+    fn visit(&mut self, leaf: &Leaf4);
+}
+
 /// What a search has still to visit. The caller keeps it, so that a search does
 /// not begin by filling it.
 pub struct Stack<Distance> {
@@ -26,7 +41,7 @@ impl<Distance: Copy + Default> Default for Stack<Distance> {
     }
 }
 
-impl<Distance: PartialOrd + Copy> Stack<Distance> {
+impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
     /// Forgets what a search that has ended early left.
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
@@ -41,11 +56,11 @@ impl<Distance: PartialOrd + Copy> Stack<Distance> {
 
     /// Takes the last child that `matters`, and forgets those after it.
     #[inline(always)]
-    fn pop(&mut self, matters: impl Fn(Distance) -> bool) -> Option<WideChild> {
+    fn pop(&mut self, search: &impl Search<Distance = Distance>) -> Option<WideChild> {
         loop {
             self.height = self.height.checked_sub(1)?;
             let (child, distance) = self.waiting[self.height];
-            if matters(distance) {
+            if search.matters(distance) {
                 return Some(child);
             }
         }
@@ -69,50 +84,39 @@ impl<Distance: PartialOrd + Copy> Stack<Distance> {
     }
 }
 
-/// Visits the leaves at or below `from` that matter, nearer ones first.
-///
-/// `enter` says which boxes of a node matter and how far away each begins.
-/// `matters` says, when the turn of what begins at a distance has come, whether
-/// it still does. Both see `state` as earlier leaves left it, and so can leave
-/// out what lies behind the best one found.
+/// Visits the leaves at or below `from` that matter to `search`, nearer ones first.
 #[inline(always)]
-pub fn traverse<State, Distance: PartialOrd + Copy>(
+pub fn traverse<S: Search>(
     tree: &WideBvh,
     from: WideChild,
-    stack: &mut Stack<Distance>,
-    state: &mut State,
-    enter: impl Fn(&State, &WideNode) -> Entered<Distance>,
-    matters: impl Fn(&State, Distance) -> bool,
-    mut visit: impl FnMut(&mut State, &Leaf4),
+    stack: &mut Stack<S::Distance>,
+    search: &mut S,
 ) {
     stack.clear();
     let mut at = Some(from);
     while let Some(child) = at {
-        at = step(tree, child, stack, state, &enter, &matters, &mut visit);
+        at = step(tree, child, stack, search);
     }
 }
 
 /// One step of [`traverse`]: visits the node or leaf `at`, and says which is next.
 #[inline(always)]
-pub(crate) fn step<State, Distance: PartialOrd + Copy>(
+pub(crate) fn step<S: Search>(
     tree: &WideBvh,
     at: WideChild,
-    stack: &mut Stack<Distance>,
-    state: &mut State,
-    enter: impl Fn(&State, &WideNode) -> Entered<Distance>,
-    matters: impl Fn(&State, Distance) -> bool,
-    mut visit: impl FnMut(&mut State, &Leaf4),
+    stack: &mut Stack<S::Distance>,
+    search: &mut S,
 ) -> Option<WideChild> {
     if let Some(leaf) = at.leaf() {
-        visit(state, &tree.leaves[leaf]);
-        return stack.pop(|distance| matters(state, distance));
+        search.visit(&tree.leaves[leaf]);
+        return stack.pop(search);
     }
     let node = &tree.nodes[at.node()];
-    let (entered, distances) = enter(state, node);
+    let (entered, distances) = search.enter(node);
     let rest = entered & entered.wrapping_sub(1);
     if entered == 0 || rest & rest.wrapping_sub(1) != 0 {
         stack.push_sorted(node, (entered, distances));
-        return stack.pop(|distance| matters(state, distance));
+        return stack.pop(search);
     }
     // Most often one or two are entered: these need no sort.
     let first = entered.trailing_zeros() as usize % WIDTH;

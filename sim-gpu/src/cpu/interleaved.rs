@@ -2,8 +2,8 @@
 //! one waits for a node to come from memory, the others go on. Kocberber, Falsafi,
 //! Grot, "Asynchronous memory access chaining", VLDB 2015.
 
-use super::traverse::{Nearest, Prepared};
-use crate::bvh::{Entered, Stack, WideBvh, WideChild, WideNode};
+use super::traverse::{Along, Instructions, Nearest, Prepared};
+use crate::bvh::{Stack, WideBvh, WideChild, WideNode, step};
 use crate::ray::TraceRay;
 use bytemuck::Zeroable;
 use std::iter::repeat_with;
@@ -31,6 +31,7 @@ struct Walk {
 }
 
 impl Walk {
+    #[inline(always)]
     fn begin(&mut self, (number, ray): (usize, &TraceRay)) {
         self.number = number;
         self.ray = Prepared::new(ray);
@@ -55,14 +56,14 @@ impl Interleaved {
         Self { walks: repeat_with(walk).take(under_way).collect() }
     }
 
-    /// The code of each of `rays`. `enter` does what `traverse::enter` does.
+    /// The code of each of `rays`.
     #[inline(always)]
     pub fn trace(
         &mut self,
         tree: &WideBvh,
         rays: &[TraceRay],
         codes: &mut [u32],
-        enter: impl Fn(&Prepared, &WideNode, f32) -> Entered<f32>,
+        by: impl Instructions,
     ) {
         let mut to_begin = rays.iter().enumerate();
         let under_way = self.walks.len().min(rays.len());
@@ -72,7 +73,7 @@ impl Interleaved {
             let mut turn = 0;
             while turn < walks.len() {
                 let Walk { number, ray, nearest, stack, at } = &mut walks[turn];
-                if let Some(next) = ray.step(tree, *at, stack, nearest, &enter) {
+                if let Some(next) = step(tree, *at, stack, &mut Along { ray, nearest, by }) {
                     *at = next;
                     fetch(tree, next);
                     turn += 1;

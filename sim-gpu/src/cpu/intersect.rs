@@ -19,7 +19,7 @@ use crate::ray::NO_HIT;
 use glam::{Vec3, Vec4};
 
 /// The shear that maps a ray onto +z.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Shear {
     /// The axes that become x, y and z: z is the ray's largest component.
     pub(super) axes: [usize; 3],

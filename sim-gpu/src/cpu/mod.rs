@@ -2,6 +2,8 @@
 //! names, and the f64 oracle that both are held to.
 
 pub mod effects;
+#[cfg(target_arch = "x86_64")]
+mod f32x8;
 mod frustum;
 mod interleaved;
 pub mod intersect;

@@ -2,7 +2,7 @@
 //! range that leaves this crate was solved here, whoever found the triangle.
 
 use super::intersect::axes_by_size;
-use crate::bvh::{Entered, Stack, WIDTH, WideChild, WideNode, boxes_that, traverse};
+use crate::bvh::{Entered, Leaf4, Search, Stack, WIDTH, WideChild, WideNode, boxes_that, traverse};
 use crate::lanes::{Vectors, each};
 use crate::ray::{Ray, Rays};
 use crate::target::{Surface, Target};
@@ -25,28 +25,51 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
     if target.surface.is_empty() {
         return None;
     }
-    let shear = Shear::of(ray.direction);
-    let per_direction = reciprocal(ray.direction);
-    let mut best: Option<Crossing> = None;
-    let farthest = |best: &Option<Crossing>| best.map_or(f64::INFINITY, |best| best.range_m);
-    traverse(
-        &target.bvh.wide,
-        WideChild::ROOT,
-        &mut Stack::default(),
-        &mut best,
-        |best, node| enter(node, ray.origin, per_direction, farthest(best)),
-        |best, distance| distance <= farthest(best) * FAR_SCALE,
-        |best, leaf| {
-            for &index in leaf.indices() {
-                let corners = target.surface.sorted_corners(index);
-                let Some(range_m) = cross(ray.origin, &shear, corners) else { continue };
-                if best.is_none_or(|best| (range_m, index) < (best.range_m, best.index)) {
-                    *best = Some(Crossing { range_m, index });
-                }
+    let mut search = NearestInF64 {
+        surface: &target.surface,
+        origin: ray.origin,
+        shear: Shear::of(ray.direction),
+        per_direction: reciprocal(ray.direction),
+        best: None,
+    };
+    traverse(&target.bvh.wide, WideChild::ROOT, &mut Stack::default(), &mut search);
+    search.best
+}
+
+struct NearestInF64<'a> {
+    surface: &'a Surface,
+    origin: DVec3,
+    shear: Shear,
+    per_direction: DVec3,
+    best: Option<Crossing>,
+}
+
+impl NearestInF64<'_> {
+    fn farthest(&self) -> f64 {
+        self.best.map_or(f64::INFINITY, |best| best.range_m)
+    }
+}
+
+impl Search for NearestInF64<'_> {
+    type Distance = f64;
+
+    fn enter(&self, node: &WideNode) -> Entered<f64> {
+        enter(node, self.origin, self.per_direction, self.farthest())
+    }
+
+    fn matters(&self, distance: f64) -> bool {
+        distance <= self.farthest() * FAR_SCALE
+    }
+
+    fn visit(&mut self, leaf: &Leaf4) {
+        for &index in leaf.indices() {
+            let corners = self.surface.sorted_corners(index);
+            let Some(range_m) = cross(self.origin, &self.shear, corners) else { continue };
+            if self.best.is_none_or(|best| (range_m, index) < (best.range_m, best.index)) {
+                self.best = Some(Crossing { range_m, index });
             }
-        },
-    );
-    best
+        }
+    }
 }
 
 /// The range at which `ray` meets the plane of triangle `index`, which a

@@ -1,26 +1,22 @@
-//! Eight coherent rays at once, with AVX2: a lane for each ray. Wald, Slusallek,
+//! Eight coherent rays at once, with AVX2 or AVX-512: a lane for each ray. Wald, Slusallek,
 //! Benthin, Wagner, "Interactive rendering with coherent ray tracing",
 //! Eurographics 2001.
 //!
 //! Where few of the rays go the same way, each goes on alone. Each lane does to
 //! the bit what `traverse` does for a ray alone.
 
+use super::f32x8::{F32x8, Mask8};
 use super::frustum::Frustum;
 use super::intersect::{DISPLACEMENT, STEEPEST};
-use super::traverse::{FAR_SCALE, Nearest, Prepared};
+use super::traverse::{FAR_SCALE, Instructions, Nearest, PACKET, Prepared};
 use crate::bvh::{Entered, LEAF, Leaf4, MAX_DEPTH, Stack, WIDTH, WideBvh, WideChild, WideNode};
+use crate::lanes::{Avx2, each};
 use crate::ray::{MISS, NO_HIT, TraceRay};
-use bytemuck::must_cast;
-use std::arch::x86_64::*;
-use std::array;
-
-/// How many rays are traced at once.
-pub const LANES: usize = 8;
 
 /// So many rays, or fewer, go on alone.
 const FEW: u32 = 3;
 
-type Lanes = [f32; LANES];
+type Lanes = [f32; PACKET];
 
 /// A node or leaf that rays have still to visit.
 #[derive(Clone, Copy)]
@@ -45,7 +41,8 @@ impl Default for Stacks {
 
 /// Eight rays side by side.
 struct Packet {
-    rays: [Prepared; LANES],
+    avx2: Avx2,
+    rays: [Prepared; PACKET],
     frustum: Frustum,
     /// The axes that the shear makes x, y and z.
     axes: [usize; 3],
@@ -60,41 +57,194 @@ struct Packet {
 struct Found {
     t: Lanes,
     error: Lanes,
-    index: [u32; LANES],
+    index: [u32; PACKET],
     farthest: Lanes,
     rival: Lanes,
 }
 
-impl Packet {
-    /// The packet of `rays`, if all are sheared along the same axis.
+impl Instructions for Avx2 {
+    type Stacks = Stacks;
+
     #[inline(always)]
-    fn new(rays: &[TraceRay; LANES], frustum: Frustum) -> Option<Self> {
-        let rays = rays.each_ref().map(Prepared::new);
+    fn enter(self, ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32> {
+        let [x, y, z] = ray.per_direction.map(|d| usize::from(d < 0.0));
+        let near = reach(ray, node, x, 0).max(reach(ray, node, y, 1));
+        let near = near.max(reach(ray, node, z, 2)).max(F32x8::ZERO);
+        let far = reach(ray, node, 1 - x, 0).min(reach(ray, node, 1 - y, 1));
+        let far = far.min(reach(ray, node, 1 - z, 2)).min(F32x8::splat(farthest));
+        (near.cmple(far * F32x8::splat(FAR_SCALE)).bits(), near.into())
+    }
+
+    #[inline(always)]
+    fn trace(
+        self,
+        tree: &WideBvh,
+        stacks: &mut Stacks,
+        rays: &[TraceRay; PACKET],
+        frustum: Frustum,
+    ) -> [u32; PACKET] {
+        let mut found = Found::NONE;
+        Packet::new(rays, frustum, self).trace(tree, stacks, &mut found);
+        each(|lane| found.get(lane).code(rays[lane].skipped))
+    }
+}
+
+/// Where the ray meets the planes of `side` of the boxes of `node`.
+#[inline(always)]
+fn reach(ray: &Prepared, node: &WideNode, side: usize, axis: usize) -> F32x8 {
+    let planes = F32x8::from(node.boxes[side][axis]);
+    planes * F32x8::splat(ray.per_direction[axis]) + F32x8::splat(ray.offset[axis])
+}
+
+impl Packet {
+    #[inline(always)]
+    fn new(rays: &[TraceRay; PACKET], frustum: Frustum, avx2: Avx2) -> Self {
+        let rays: [Prepared; PACKET] = each(|lane| Prepared::new(&rays[lane]));
         let axes = rays[0].shear.axes;
-        let lanes = |of: &dyn Fn(&Prepared) -> f32| array::from_fn(|lane| of(&rays[lane]));
-        rays.iter().all(|ray| ray.shear.axes == axes).then(|| Self {
+        Self {
+            avx2,
             frustum,
             axes,
-            per_direction: array::from_fn(|axis| lanes(&|ray| ray.per_direction[axis])),
-            offset: array::from_fn(|axis| lanes(&|ray| ray.offset[axis])),
-            origin: axes.map(|axis| lanes(&|ray| ray.origin[axis])),
+            per_direction: each(|axis| each(|lane| rays[lane].per_direction[axis])),
+            offset: each(|axis| each(|lane| rays[lane].offset[axis])),
+            origin: each(|to| each(|lane| rays[lane].origin[axes[to]])),
             shear: [
-                lanes(&|ray| ray.shear.x),
-                lanes(&|ray| ray.shear.y),
-                lanes(&|ray| ray.shear.per_z),
+                each(|lane| rays[lane].shear.x),
+                each(|lane| rays[lane].shear.y),
+                each(|lane| rays[lane].shear.per_z),
             ],
             rays,
-        })
+        }
+    }
+
+    /// Traces the rays, together where more than a few of them go the same way.
+    #[inline(always)]
+    fn trace(&self, tree: &WideBvh, stacks: &mut Stacks, found: &mut Found) {
+        let is_of_one_axis = (0..PACKET).all(|lane| self.rays[lane].shear.axes == self.axes);
+        let few = if is_of_one_axis { FEW } else { PACKET as u32 };
+        let Stacks { waiting, alone } = stacks;
+        let mut at = Some(Waiting { near: [0.0; PACKET], child: WideChild::ROOT });
+        while let Some(Waiting { near, child }) = at.take().or_else(|| waiting.pop()) {
+            let live = found.live(near.into());
+            if live.bits().count_ones() <= few {
+                for lane in lanes_of(live.bits()) {
+                    let mut nearest = found.get(lane);
+                    self.rays[lane].trace(tree, child, alone, &mut nearest, self.avx2);
+                    found.set(lane, &nearest);
+                }
+            } else if let Some(leaf) = child.leaf() {
+                self.consider_all(&tree.leaves[leaf], live, found);
+            } else {
+                at = self.enter(&tree.nodes[child.node()], found, waiting);
+            }
+        }
+    }
+
+    /// Tests the boxes of `node`: the nearest child to go on with, while the
+    /// others that any ray enters wait, farther ones below nearer ones.
+    #[inline(always)]
+    fn enter(&self, node: &WideNode, found: &Found, waiting: &mut Vec<Waiting>) -> Option<Waiting> {
+        let [low, high] = &node.boxes;
+        let base = waiting.len();
+        let mut nearest = (f32::INFINITY, base);
+        for i in lanes_of(self.frustum.may_enter(node)) {
+            let (mut near, mut far) = (F32x8::ZERO, F32x8::from(found.farthest));
+            for axis in 0..3 {
+                let (a, b) = (self.reach(axis, low[axis][i]), self.reach(axis, high[axis][i]));
+                near = near.max(a.min(b));
+                far = far.min(a.max(b));
+            }
+            let entered = near.cmple(far * F32x8::splat(FAR_SCALE));
+            if entered.bits() == 0 {
+                continue;
+            }
+            let near: Lanes = entered.select(near, F32x8::splat(f32::INFINITY)).into();
+            let begins = near[entered.bits().trailing_zeros() as usize % PACKET];
+            if begins < nearest.0 {
+                nearest = (begins, waiting.len());
+            }
+            waiting.push(Waiting { near, child: node.children[i] });
+        }
+        (waiting.len() > base).then(|| waiting.swap_remove(nearest.1))
+    }
+
+    /// Where the rays meet the plane at `coordinate` of `axis`.
+    #[inline(always)]
+    fn reach(&self, axis: usize, coordinate: f32) -> F32x8 {
+        F32x8::splat(coordinate) * self.per_direction[axis].into() + self.offset[axis].into()
+    }
+
+    /// Considers the triangles of `leaf` for the rays that are `live`: all triangles
+    /// with one ray at once, or all rays with one triangle, whichever is less.
+    #[inline(always)]
+    fn consider_all(&self, leaf: &Leaf4, live: Mask8, found: &mut Found) {
+        if live.bits().count_ones() < leaf.len {
+            for lane in lanes_of(live.bits()) {
+                let mut nearest = found.get(lane);
+                nearest.consider_all(&self.rays[lane], leaf);
+                found.set(lane, &nearest);
+            }
+        } else {
+            for i in 0..leaf.len as usize {
+                self.consider(leaf, i % LEAF, live, found);
+            }
+        }
+    }
+
+    /// As `Nearest::consider` for what `intersect4` says of triangle `i` of `leaf`.
+    #[inline(always)]
+    fn consider(&self, leaf: &Leaf4, i: usize, live: Mask8, found: &mut Found) {
+        let [a, b, c] = &leaf.corners;
+        let (a, b, c) = (self.sheared(a, i), self.sheared(b, i), self.sheared(c, i));
+        let u = edge(b.x, b.y, c.x, c.y);
+        let v = edge(a.x, a.y, c.x, c.y).negated();
+        let w = edge(a.x, a.y, b.x, b.y);
+        let zero = F32x8::ZERO;
+        let negative = u.cmplt(zero) | v.cmplt(zero) | w.cmplt(zero);
+        let positive = zero.cmplt(u) | zero.cmplt(v) | zero.cmplt(w);
+        let determinant = u + v + w;
+        let inside = determinant.cmpne(zero).without(negative & positive) & live;
+        if inside.bits() == 0 {
+            return;
+        }
+        let per_z = F32x8::from(self.shear[2]);
+        let (az, bz, cz) = (a.along * per_z, b.along * per_z, c.along * per_z);
+        let t = (u * az + v * bz + w * cz) / determinant;
+        let slope_x = edge(b.y - a.y, bz - az, c.y - a.y, cz - az);
+        let slope_y = edge(bz - az, b.x - a.x, cz - az, c.x - a.x);
+        let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
+        let error = F32x8::splat(DISPLACEMENT) * (F32x8::splat(1.0) + slope);
+        let met = zero.cmple(t + error) & inside;
+        let near_edge = within(u, c.x - b.x, c.y - b.y)
+            | within(v, c.x - a.x, c.y - a.y)
+            | within(w, b.x - a.x, b.y - a.y);
+        let beside = t - F32x8::splat(2.0) * error - F32x8::splat(DISPLACEMENT * STEEPEST);
+        let behind = t.cmplt(error).select(t - error, F32x8::splat(NO_HIT));
+        let rival = near_edge.select(beside, behind);
+        found.consider(met, t, error, rival, leaf.indices[i]);
+    }
+
+    #[inline(always)]
+    fn sheared(&self, corner: &[[f32; LEAF]; 3], i: usize) -> Sheared {
+        let along = self.beside_origin(corner, i, 2);
+        let x = self.beside_origin(corner, i, 0) - along * self.shear[0].into();
+        let y = self.beside_origin(corner, i, 1) - along * self.shear[1].into();
+        Sheared { x, y, along }
+    }
+
+    #[inline(always)]
+    fn beside_origin(&self, corner: &[[f32; LEAF]; 3], i: usize, to: usize) -> F32x8 {
+        F32x8::splat(corner[self.axes[to]][i]) - self.origin[to].into()
     }
 }
 
 impl Found {
     const NONE: Self = Self {
-        t: [NO_HIT; LANES],
-        error: [0.0; LANES],
-        index: [MISS; LANES],
-        farthest: [NO_HIT; LANES],
-        rival: [NO_HIT; LANES],
+        t: [NO_HIT; PACKET],
+        error: [0.0; PACKET],
+        index: [MISS; PACKET],
+        farthest: [NO_HIT; PACKET],
+        rival: [NO_HIT; PACKET],
     };
 
     #[inline(always)]
@@ -108,22 +258,6 @@ impl Found {
         }
     }
 
-    /// Traces ray `lane` alone, from node or leaf `from` down.
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn trace(
-        &mut self,
-        lane: usize,
-        ray: &Prepared,
-        tree: &WideBvh,
-        from: WideChild,
-        stack: &mut Stack<f32>,
-    ) {
-        let mut nearest = self.get(lane);
-        ray.trace(tree, from, stack, &mut nearest, |ray, node, far| enter(ray, node, far));
-        self.set(lane, &nearest);
-    }
-
     #[inline(always)]
     fn set(&mut self, lane: usize, nearest: &Nearest) {
         self.t[lane] = nearest.t;
@@ -132,273 +266,51 @@ impl Found {
         self.farthest[lane] = nearest.farthest;
         self.rival[lane] = nearest.rival;
     }
-}
-
-/// The codes of `rays`, which run side by side within `frustum`.
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub fn trace(
-    tree: &WideBvh,
-    stacks: &mut Stacks,
-    rays: &[TraceRay; LANES],
-    frustum: Frustum,
-) -> [u32; LANES] {
-    let mut found = Found::NONE;
-    match Packet::new(rays, frustum) {
-        Some(packet) => packet.trace(tree, stacks, &mut found),
-        None => {
-            for (lane, ray) in rays.iter().enumerate() {
-                found.trace(lane, &Prepared::new(ray), tree, WideChild::ROOT, &mut stacks.alone);
-            }
-        }
-    }
-    array::from_fn(|lane| found.get(lane).code(rays[lane].skipped))
-}
-
-/// As `traverse::enter`.
-#[inline]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub fn enter(ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32> {
-    let [x, y, z] = ray.per_direction.map(|d| usize::from(d < 0.0));
-    let reach = |side: usize, axis: usize| {
-        let product = _mm256_mul_ps(
-            must_cast(node.boxes[side][axis]),
-            _mm256_set1_ps(ray.per_direction[axis]),
-        );
-        _mm256_add_ps(product, _mm256_set1_ps(ray.offset[axis]))
-    };
-    let near = _mm256_max_ps(reach(x, 0), reach(y, 1));
-    let near = _mm256_max_ps(near, reach(z, 2));
-    let near = _mm256_max_ps(near, _mm256_setzero_ps());
-    let far = _mm256_min_ps(reach(1 - x, 0), reach(1 - y, 1));
-    let far = _mm256_min_ps(far, reach(1 - z, 2));
-    let far = _mm256_min_ps(far, _mm256_set1_ps(farthest));
-    let far = _mm256_mul_ps(far, _mm256_set1_ps(FAR_SCALE));
-    (bits(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)), must_cast(near))
-}
-
-impl Packet {
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn trace(&self, tree: &WideBvh, stacks: &mut Stacks, found: &mut Found) {
-        let Stacks { waiting, alone } = stacks;
-        let mut at = Some(Waiting { near: [0.0; LANES], child: WideChild::ROOT });
-        while let Some(Waiting { near, child }) = at.take().or_else(|| waiting.pop()) {
-            let live = self.live(&near, found);
-            if bits(live).count_ones() <= FEW {
-                for lane in lanes_of(bits(live)) {
-                    found.trace(lane, &self.rays[lane], tree, child, alone);
-                }
-            } else if let Some(leaf) = child.leaf() {
-                self.consider_all(&tree.leaves[leaf], live, found);
-            } else {
-                at = self.enter(&tree.nodes[child.node()], found, waiting);
-            }
-        }
-    }
 
     /// The rays for which what begins at `near` still matters.
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn live(&self, near: &Lanes, found: &Found) -> __m256 {
-        let far = _mm256_mul_ps(must_cast(found.farthest), _mm256_set1_ps(FAR_SCALE));
-        _mm256_cmp_ps::<_CMP_LE_OQ>(must_cast(*near), far)
+    #[inline(always)]
+    fn live(&self, near: F32x8) -> Mask8 {
+        near.cmple(F32x8::from(self.farthest) * F32x8::splat(FAR_SCALE))
     }
 
-    /// Tests the boxes of `node`: the nearest child to go on with, while the
-    /// others that any ray enters wait, farther ones below nearer ones.
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn enter(&self, node: &WideNode, found: &Found, waiting: &mut Vec<Waiting>) -> Option<Waiting> {
-        let [low, high] = &node.boxes;
-        let base = waiting.len();
-        let mut nearest = (f32::INFINITY, base);
-        for i in lanes_of(self.frustum.may_enter(node)) {
-            let (mut near, mut far) = (_mm256_setzero_ps(), must_cast(found.farthest));
-            for axis in 0..3 {
-                let (a, b) = (self.reach(axis, low[axis][i]), self.reach(axis, high[axis][i]));
-                near = _mm256_max_ps(near, _mm256_min_ps(a, b));
-                far = _mm256_min_ps(far, _mm256_max_ps(a, b));
-            }
-            let far = _mm256_mul_ps(far, _mm256_set1_ps(FAR_SCALE));
-            let entered = _mm256_cmp_ps::<_CMP_LE_OQ>(near, far);
-            let live = bits(entered);
-            if live == 0 {
-                continue;
-            }
-            let never = _mm256_set1_ps(f32::INFINITY);
-            let near: Lanes = must_cast(_mm256_blendv_ps(never, near, entered));
-            let begins = near[live.trailing_zeros() as usize % LANES];
-            if begins < nearest.0 {
-                nearest = (begins, waiting.len());
-            }
-            waiting.push(Waiting { near, child: node.children[i] });
-        }
-        (waiting.len() > base).then(|| waiting.swap_remove(nearest.1))
-    }
-
-    /// Where the rays meet the plane at `coordinate` of `axis`.
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn reach(&self, axis: usize, coordinate: f32) -> __m256 {
-        let product =
-            _mm256_mul_ps(_mm256_set1_ps(coordinate), must_cast(self.per_direction[axis]));
-        _mm256_add_ps(product, must_cast(self.offset[axis]))
-    }
-
-    /// Considers the triangles of `leaf` for the rays that are `live`: all triangles
-    /// with one ray at once, or all rays with one triangle, whichever is less.
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn consider_all(&self, leaf: &Leaf4, live: __m256, found: &mut Found) {
-        if bits(live).count_ones() < leaf.len {
-            for lane in lanes_of(bits(live)) {
-                let mut nearest = found.get(lane);
-                nearest.consider_all(&self.rays[lane], leaf);
-                found.set(lane, &nearest);
-            }
-        } else {
-            for i in 0..leaf.len as usize {
-                self.consider(leaf, i % LEAF, live, found);
-            }
-        }
-    }
-
-    /// As `Nearest::consider` for what `intersect4` says of triangle `i` of `leaf`.
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn consider(&self, leaf: &Leaf4, i: usize, live: __m256, found: &mut Found) {
-        let [a, b, c] = &leaf.corners;
-        let (a, b, c) = (self.sheared(a, i), self.sheared(b, i), self.sheared(c, i));
-        let u = edge(b.x, b.y, c.x, c.y);
-        let v = negated(edge(a.x, a.y, c.x, c.y));
-        let w = edge(a.x, a.y, b.x, b.y);
-        let zero = _mm256_setzero_ps();
-        let below = |v| _mm256_cmp_ps::<_CMP_LT_OQ>(v, zero);
-        let above = |v| _mm256_cmp_ps::<_CMP_GT_OQ>(v, zero);
-        let negative = _mm256_or_ps(_mm256_or_ps(below(u), below(v)), below(w));
-        let positive = _mm256_or_ps(_mm256_or_ps(above(u), above(v)), above(w));
-        let determinant = _mm256_add_ps(_mm256_add_ps(u, v), w);
-        let some = _mm256_cmp_ps::<_CMP_NEQ_UQ>(determinant, zero);
-        let outside = _mm256_and_ps(negative, positive);
-        let inside = _mm256_and_ps(_mm256_andnot_ps(outside, some), live);
-        if bits(inside) == 0 {
-            return;
-        }
-        let (az, bz, cz) = (self.depth(a.along), self.depth(b.along), self.depth(c.along));
-        let weighted = _mm256_add_ps(_mm256_mul_ps(u, az), _mm256_mul_ps(v, bz));
-        let t = _mm256_div_ps(_mm256_add_ps(weighted, _mm256_mul_ps(w, cz)), determinant);
-        let less = |p, q| _mm256_sub_ps(p, q);
-        let slope_x = edge(less(b.y, a.y), less(bz, az), less(c.y, a.y), less(cz, az));
-        let slope_y = edge(less(bz, az), less(b.x, a.x), less(cz, az), less(c.x, a.x));
-        let slope = _mm256_add_ps(absolute(slope_x), absolute(slope_y));
-        let slope = _mm256_div_ps(slope, absolute(determinant));
-        let displacement = _mm256_set1_ps(DISPLACEMENT);
-        let error = _mm256_mul_ps(displacement, _mm256_add_ps(_mm256_set1_ps(1.0), slope));
-        let met = _mm256_cmp_ps::<_CMP_GE_OQ>(_mm256_add_ps(t, error), zero);
-        let met = _mm256_and_ps(met, inside);
-        let near_edge = _mm256_or_ps(
-            _mm256_or_ps(
-                within(u, less(c.x, b.x), less(c.y, b.y)),
-                within(v, less(c.x, a.x), less(c.y, a.y)),
-            ),
-            within(w, less(b.x, a.x), less(b.y, a.y)),
-        );
-        let twice = _mm256_mul_ps(_mm256_set1_ps(2.0), error);
-        let beside = less(less(t, twice), _mm256_set1_ps(DISPLACEMENT * STEEPEST));
-        let is_behind = _mm256_cmp_ps::<_CMP_LT_OQ>(t, error);
-        let behind = _mm256_blendv_ps(_mm256_set1_ps(NO_HIT), less(t, error), is_behind);
-        let rival = _mm256_blendv_ps(behind, beside, near_edge);
-        found.consider(met, t, error, rival, leaf.indices[i]);
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn sheared(&self, corner: &[[f32; LEAF]; 3], i: usize) -> Sheared {
-        let from = |to: usize| {
-            let coordinate = _mm256_set1_ps(corner[self.axes[to]][i]);
-            _mm256_sub_ps(coordinate, must_cast(self.origin[to]))
-        };
-        let along = from(2);
-        let less = |p, shear: Lanes| _mm256_sub_ps(p, _mm256_mul_ps(along, must_cast(shear)));
-        Sheared { x: less(from(0), self.shear[0]), y: less(from(1), self.shear[1]), along }
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn depth(&self, along: __m256) -> __m256 {
-        _mm256_mul_ps(along, must_cast(self.shear[2]))
-    }
-}
-
-impl Found {
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    fn consider(&mut self, met: __m256, t: __m256, error: __m256, rival: __m256, index: u32) {
-        let (old_t, old_error): (__m256, __m256) = (must_cast(self.t), must_cast(self.error));
-        let indices: __m256i = must_cast(self.index);
-        let index = _mm256_set1_epi32(index as i32);
-        // Indices are below 2^31; `MISS`, of a distance that nothing else has, is -1.
-        let lower = _mm256_castsi256_ps(_mm256_cmpgt_epi32(indices, index));
-        let same = _mm256_cmp_ps::<_CMP_EQ_OQ>(t, old_t);
-        let nearer = _mm256_cmp_ps::<_CMP_LT_OQ>(t, old_t);
-        let wins = _mm256_or_ps(nearer, _mm256_and_ps(same, lower));
-        let loser =
-            _mm256_blendv_ps(_mm256_sub_ps(t, error), _mm256_sub_ps(old_t, old_error), wins);
-        // Of two numbers of which the first is none, these choose the second.
-        let least = |new, old: Lanes| {
-            let old = must_cast(old);
-            must_cast(_mm256_blendv_ps(old, _mm256_min_ps(new, old), met))
-        };
-        self.rival = least(loser, self.rival);
-        self.rival = least(rival, self.rival);
-        self.farthest = least(_mm256_add_ps(t, error), self.farthest);
-        let wins = _mm256_and_ps(wins, met);
-        self.t = must_cast(_mm256_blendv_ps(old_t, t, wins));
-        self.error = must_cast(_mm256_blendv_ps(old_error, error, wins));
-        let indices =
-            _mm256_blendv_ps(_mm256_castsi256_ps(indices), _mm256_castsi256_ps(index), wins);
-        self.index = must_cast(_mm256_castps_si256(indices));
+    /// As `Nearest::consider`, of the rays that have `met` triangle `index`.
+    #[inline(always)]
+    fn consider(&mut self, met: Mask8, t: F32x8, error: F32x8, rival: F32x8, index: u32) {
+        let (old_t, old_error) = (F32x8::from(self.t), F32x8::from(self.error));
+        // `MISS` is at a distance that nothing else has.
+        let is_lower = Mask8::above(self.index, index);
+        let wins = t.cmplt(old_t) | (t.cmpeq(old_t) & is_lower);
+        let loser = wins.select(old_t - old_error, t - error);
+        let old_rival = F32x8::from(self.rival);
+        // Of two numbers of which the first is none, `min` is the second.
+        let new_rival = rival.min(loser.min(old_rival));
+        self.rival = met.select(new_rival, old_rival).into();
+        let old_farthest = F32x8::from(self.farthest);
+        self.farthest = met.select((t + error).min(old_farthest), old_farthest).into();
+        let wins = wins & met;
+        self.t = wins.select(t, old_t).into();
+        self.error = wins.select(error, old_error).into();
+        self.index = wins.select_index(index, self.index);
     }
 }
 
 /// A corner as the sheared rays see it, before its distance is asked for.
+#[derive(Clone, Copy)]
 struct Sheared {
-    x: __m256,
-    y: __m256,
-    along: __m256,
+    x: F32x8,
+    y: F32x8,
+    along: F32x8,
 }
 
-#[inline]
-#[target_feature(enable = "avx2")]
-fn edge(px: __m256, py: __m256, qx: __m256, qy: __m256) -> __m256 {
-    _mm256_sub_ps(_mm256_mul_ps(px, qy), _mm256_mul_ps(py, qx))
+#[inline(always)]
+fn edge(px: F32x8, py: F32x8, qx: F32x8, qy: F32x8) -> F32x8 {
+    px * qy - py * qx
 }
 
 /// As in `intersect4`.
-#[inline]
-#[target_feature(enable = "avx2")]
-fn within(edge: __m256, x: __m256, y: __m256) -> __m256 {
-    let squared = _mm256_add_ps(_mm256_mul_ps(x, x), _mm256_mul_ps(y, y));
-    let reach = _mm256_mul_ps(_mm256_set1_ps(DISPLACEMENT * DISPLACEMENT), squared);
-    _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_mul_ps(edge, edge), reach)
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn negated(v: __m256) -> __m256 {
-    _mm256_xor_ps(v, _mm256_set1_ps(-0.0))
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn absolute(v: __m256) -> __m256 {
-    _mm256_andnot_ps(_mm256_set1_ps(-0.0), v)
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn bits(mask: __m256) -> u32 {
-    _mm256_movemask_ps(mask) as u32
+#[inline(always)]
+fn within(edge: F32x8, x: F32x8, y: F32x8) -> Mask8 {
+    (edge * edge).cmple(F32x8::splat(DISPLACEMENT * DISPLACEMENT) * (x * x + y * y))
 }
 
 /// The numbers of the lanes whose bits are set.
@@ -407,6 +319,6 @@ fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);
-        (lane < LANES).then_some(lane)
+        (lane < PACKET).then_some(lane)
     })
 }

@@ -4,14 +4,11 @@
 use super::effects::append_outputs;
 use super::frustum::Frustum;
 use super::interleaved::Interleaved;
-#[cfg(target_arch = "x86_64")]
-use super::packet;
-use super::traverse::{Prepared, enter, traverse};
-use crate::bvh::{Entered, Stack, WideBvh, WideNode};
+use super::traverse::{Instructions, PACKET, Portable};
+use crate::bvh::WideBvh;
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::has_avx2;
+use crate::lanes::{Avx2, Lanewise, widest};
 use crate::ray::{AMBIGUOUS, MISS, Ray, TraceRay};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -23,67 +20,64 @@ const TASK: usize = 2048;
 #[must_use]
 pub fn trace(tree: &WideBvh, rays: &[TraceRay]) -> Vec<u32> {
     let mut codes = vec![MISS; rays.len()];
-    let one_task = task_for_this_processor();
     codes
         .par_chunks_mut(TASK)
         .zip(rays.par_chunks(TASK))
-        .for_each(|(codes, rays)| one_task(tree, rays, codes));
+        .for_each(|(codes, rays)| widest(Task { tree, rays, codes }));
     codes
 }
 
-type Task = fn(&WideBvh, &[TraceRay], &mut [u32]);
+/// Some rays, and where the code of each goes.
+struct Task<'a> {
+    tree: &'a WideBvh,
+    rays: &'a [TraceRay],
+    codes: &'a mut [u32],
+}
 
-/// How many rays are looked at together.
-const PACKET: usize = 8;
+impl Lanewise for Task<'_> {
+    type Output = ();
 
-/// The code of each of `rays`: `side_by_side` traces those that run so, the others
-/// are traced interleaved. `enter` does what `traverse::enter` does.
-#[inline(always)]
-fn task(
-    tree: &WideBvh,
-    rays: &[TraceRay],
-    codes: &mut [u32],
-    mut side_by_side: impl FnMut(&[TraceRay; PACKET], Frustum) -> [u32; PACKET],
-    enter: impl Fn(&Prepared, &WideNode, f32) -> Entered<f32>,
-) {
-    let (packets, _) = rays.as_chunks();
-    let mut apart = Interleaved::for_tree(tree);
-    // From here on rays have still to be traced.
-    let mut from = 0;
-    for (packet, at) in packets.iter().zip((0..).step_by(PACKET)) {
-        if let Some(frustum) = Frustum::around(packet) {
-            apart.trace(tree, &rays[from..at], &mut codes[from..at], &enter);
-            from = at + PACKET;
-            codes[at..from].copy_from_slice(&side_by_side(packet, frustum));
+    #[inline(always)]
+    fn run(self, avx2: Option<Avx2>) {
+        match avx2 {
+            #[cfg(target_arch = "x86_64")]
+            Some(avx2) => self.trace(avx2),
+            _ => self.trace(Portable),
         }
     }
-    apart.trace(tree, &rays[from..], &mut codes[from..], &enter);
 }
 
-fn task_anywhere(tree: &WideBvh, rays: &[TraceRay], codes: &mut [u32]) {
-    let mut stack = Stack::default();
-    let one_by_one = |rays: &[TraceRay; PACKET], _| {
-        rays.each_ref().map(|ray| traverse(tree, &mut stack, ray).code(ray.skipped))
-    };
-    task(tree, rays, codes, one_by_one, enter);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn task_avx2(tree: &WideBvh, rays: &[TraceRay], codes: &mut [u32]) {
-    let mut stacks = packet::Stacks::default();
-    let at_once =
-        |rays: &[TraceRay; PACKET], frustum| packet::trace(tree, &mut stacks, rays, frustum);
-    task(tree, rays, codes, at_once, |ray, node, far| packet::enter(ray, node, far));
-}
-
-fn task_for_this_processor() -> Task {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        // SAFETY: the processor has the instructions.
-        return |tree, rays, codes| unsafe { task_avx2(tree, rays, codes) };
+impl Task<'_> {
+    /// Traces packets of rays that run side by side together, and the others interleaved.
+    #[inline(always)]
+    fn trace<I: Instructions>(self, by: I) {
+        let Self { tree, rays, codes } = self;
+        let mut stacks = I::Stacks::default();
+        let mut apart = Interleaved::for_tree(tree);
+        let mut from = 0;
+        while from < rays.len() {
+            let packet = next_packet(rays, from);
+            let at = packet.as_ref().map_or(rays.len(), |(at, ..)| *at);
+            apart.trace(tree, &rays[from..at], &mut codes[from..at], by);
+            from = at;
+            if let Some((_, rays, frustum)) = packet {
+                from += PACKET;
+                codes[at..from].copy_from_slice(&by.trace(tree, &mut stacks, rays, frustum));
+            }
+        }
     }
-    task_anywhere
+}
+
+/// The first packet of rays that run side by side, from number `from` on, where one begins;
+/// and at which number it does.
+#[inline(always)]
+fn next_packet(rays: &[TraceRay], from: usize) -> Option<(usize, &[TraceRay; PACKET], Frustum)> {
+    for (rays, at) in rays[from..].as_chunks().0.iter().zip((from..).step_by(PACKET)) {
+        if let Some(frustum) = Frustum::around(rays) {
+            return Some((at, rays, frustum));
+        }
+    }
+    None
 }
 
 /// Casts `job` and models `effects`, on all cores.

@@ -1,7 +1,8 @@
 //! Finds the nearest triangle along a ray. Twin of `shaders/traverse.wgsl`.
 
+use super::frustum::Frustum;
 use super::intersect::{Shear, intersect4};
-use crate::bvh::{self, Entered, LEAF, Leaf4, Stack, WIDTH, WideBvh, WideChild, WideNode};
+use crate::bvh::{self, Entered, LEAF, Leaf4, Search, Stack, WIDTH, WideBvh, WideChild, WideNode};
 use crate::ray::{AMBIGUOUS, MISS, NO_HIT, TraceRay};
 use bytemuck::{must_cast, must_cast_ref};
 use glam::{Vec3, Vec4};
@@ -35,7 +36,7 @@ pub struct Nearest {
 }
 
 /// A ray as boxes and triangles are tested against it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Prepared {
     pub origin: Vec3,
     pub shear: Shear,
@@ -62,7 +63,7 @@ impl Prepared {
     }
 
     /// Finds the nearest triangle of those at or below `from` and of what `nearest`
-    /// already knows. `enter` does what [`enter`] does.
+    /// already knows.
     #[inline(always)]
     pub fn trace(
         &self,
@@ -70,55 +71,95 @@ impl Prepared {
         from: WideChild,
         stack: &mut Stack<f32>,
         nearest: &mut Nearest,
-        enter: impl Fn(&Self, &WideNode, f32) -> Entered<f32>,
+        by: impl Instructions,
     ) {
-        stack.clear();
-        let mut at = Some(from);
-        while let Some(child) = at {
-            at = self.step(tree, child, stack, nearest, &enter);
-        }
-    }
-
-    /// One step of `trace`: visits the node or leaf `at`, and says which is next.
-    #[inline(always)]
-    pub fn step(
-        &self,
-        tree: &WideBvh,
-        at: WideChild,
-        stack: &mut Stack<f32>,
-        nearest: &mut Nearest,
-        enter: impl Fn(&Self, &WideNode, f32) -> Entered<f32>,
-    ) -> Option<WideChild> {
-        bvh::step(
-            tree,
-            at,
-            stack,
-            nearest,
-            |nearest, node| enter(self, node, nearest.farthest),
-            |nearest, distance| distance <= nearest.farthest * FAR_SCALE,
-            |nearest, leaf| nearest.consider_all(self, leaf),
-        )
+        bvh::traverse(tree, from, stack, &mut Along { ray: self, nearest, by });
     }
 }
 
-/// Which boxes of `node` the ray enters before `farthest`, and where.
-#[inline(always)]
-pub(super) fn enter(ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32> {
-    let (mut entered, mut distances) = (0, [[0.0; 4]; WIDTH / 4]);
-    for four in 0..WIDTH / 4 {
-        let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(farthest));
-        for axis in 0..3 {
-            let [t0, t1] = [0, 1].map(|side| {
-                let planes: &[[f32; 4]; WIDTH / 4] = must_cast_ref(&node.boxes[side][axis]);
-                Vec4::from_array(planes[four]) * ray.per_direction[axis] + ray.offset[axis]
-            });
-            near = near.max(t0.min(t1));
-            far = far.min(t0.max(t1));
-        }
-        entered |= near.cmple(far * FAR_SCALE).bitmask() << (4 * four);
-        distances[four] = near.to_array();
+/// The search along a ray.
+pub(super) struct Along<'a, I> {
+    pub ray: &'a Prepared,
+    pub nearest: &'a mut Nearest,
+    pub by: I,
+}
+
+impl<I: Instructions> Search for Along<'_, I> {
+    type Distance = f32;
+
+    #[inline(always)]
+    fn enter(&self, node: &WideNode) -> Entered<f32> {
+        self.by.enter(self.ray, node, self.nearest.farthest)
     }
-    (entered, must_cast(distances))
+
+    #[inline(always)]
+    fn matters(&self, distance: f32) -> bool {
+        distance <= self.nearest.farthest * FAR_SCALE
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, leaf: &Leaf4) {
+        self.nearest.consider_all(self.ray, leaf);
+    }
+}
+
+/// How many rays that run side by side are traced together.
+pub(super) const PACKET: usize = 8;
+
+/// What rays are traced by. All ways give the same codes.
+pub(super) trait Instructions: Copy {
+    /// What rays have still to visit.
+    type Stacks: Default;
+
+    /// Which boxes of `node` the ray enters before `farthest`, and where.
+    fn enter(self, ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32>;
+
+    /// The codes of `rays`, which run side by side within `frustum`.
+    fn trace(
+        self,
+        tree: &WideBvh,
+        stacks: &mut Self::Stacks,
+        rays: &[TraceRay; PACKET],
+        frustum: Frustum,
+    ) -> [u32; PACKET];
+}
+
+/// Those of every processor: four boxes at once, one ray after another.
+#[derive(Clone, Copy)]
+pub(super) struct Portable;
+
+impl Instructions for Portable {
+    type Stacks = Stack<f32>;
+
+    #[inline(always)]
+    fn enter(self, ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32> {
+        let (mut entered, mut distances) = (0, [[0.0; 4]; WIDTH / 4]);
+        for four in 0..WIDTH / 4 {
+            let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(farthest));
+            for axis in 0..3 {
+                let [t0, t1] = [0, 1].map(|side| {
+                    let planes: &[[f32; 4]; WIDTH / 4] = must_cast_ref(&node.boxes[side][axis]);
+                    Vec4::from_array(planes[four]) * ray.per_direction[axis] + ray.offset[axis]
+                });
+                near = near.max(t0.min(t1));
+                far = far.min(t0.max(t1));
+            }
+            entered |= near.cmple(far * FAR_SCALE).bitmask() << (4 * four);
+            distances[four] = near.to_array();
+        }
+        (entered, must_cast(distances))
+    }
+
+    #[inline(always)]
+    fn trace(
+        self,
+        tree: &WideBvh,
+        stack: &mut Stack<f32>,
+        rays: &[TraceRay; PACKET],
+        _: Frustum,
+    ) -> [u32; PACKET] {
+        rays.each_ref().map(|ray| traverse(tree, stack, ray).code(ray.skipped))
+    }
 }
 
 impl Nearest {
@@ -164,6 +205,6 @@ impl Nearest {
 #[must_use]
 pub fn traverse(tree: &WideBvh, stack: &mut Stack<f32>, ray: &TraceRay) -> Nearest {
     let mut nearest = Nearest::NONE;
-    Prepared::new(ray).trace(tree, WideChild::ROOT, stack, &mut nearest, enter);
+    Prepared::new(ray).trace(tree, WideChild::ROOT, stack, &mut nearest, Portable);
     nearest
 }

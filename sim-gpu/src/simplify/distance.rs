@@ -3,8 +3,10 @@
 use glam::DVec3;
 use std::array;
 
-use crate::bvh::{Bounds, Stack, WIDTH, WideChild, boxes_that, traverse};
-use crate::target::Target;
+use crate::bvh::{
+    Bounds, Entered, Leaf4, Search, Stack, WideChild, WideNode, boxes_that, traverse,
+};
+use crate::target::{Surface, Target};
 
 /// The distance from `point` to the triangle of these corners, which may be
 /// degenerate. Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
@@ -38,28 +40,37 @@ fn to_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
 /// frame; infinite for a surface of nothing.
 #[must_use]
 pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
-    let mut nearest = f64::INFINITY;
-    if target.surface.is_empty() {
-        return nearest;
+    let mut search = NearestTo { point, surface: &target.surface, nearest: f64::INFINITY };
+    if !target.surface.is_empty() {
+        traverse(&target.bvh.wide, WideChild::ROOT, &mut Stack::default(), &mut search);
     }
-    traverse(
-        &target.bvh.wide,
-        WideChild::ROOT,
-        &mut Stack::default(),
-        &mut nearest,
-        |nearest, node| {
-            let distances: [f64; WIDTH] = array::from_fn(|i| to_box(point, node.bounds(i)));
-            (boxes_that(|i| distances[i] < *nearest), distances)
-        },
-        |nearest, distance| distance < *nearest,
-        |nearest, leaf| {
-            for &index in leaf.indices() {
-                let corners = target.surface.corners(index);
-                *nearest = nearest.min(distance_to_triangle(point, corners));
-            }
-        },
-    );
-    nearest
+    search.nearest
+}
+
+struct NearestTo<'a> {
+    point: DVec3,
+    surface: &'a Surface,
+    nearest: f64,
+}
+
+impl Search for NearestTo<'_> {
+    type Distance = f64;
+
+    fn enter(&self, node: &WideNode) -> Entered<f64> {
+        let distances = array::from_fn(|i| to_box(self.point, node.bounds(i)));
+        (boxes_that(|i| self.matters(distances[i])), distances)
+    }
+
+    fn matters(&self, distance: f64) -> bool {
+        distance < self.nearest
+    }
+
+    fn visit(&mut self, leaf: &Leaf4) {
+        for &index in leaf.indices() {
+            let distance = distance_to_triangle(self.point, self.surface.corners(index));
+            self.nearest = self.nearest.min(distance);
+        }
+    }
 }
 
 /// Boxes are padded by more than their rounding to f32.
@@ -72,7 +83,6 @@ mod tests {
     use super::*;
     use crate::bvh::Builder;
     use crate::mesh::Mesh;
-    use crate::target::Surface;
 
     const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
 

@@ -11,7 +11,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::distance::distance_to_triangle;
-use crate::bvh::{Bounds, Stack, WIDTH, WideChild, boxes_that, traverse};
+use crate::bvh::{
+    Bounds, Entered, Leaf4, Search, Stack, WIDTH, WideChild, WideNode, boxes_that, traverse,
+};
 use crate::target::{Surface, Target};
 
 /// Pieces shorter than this part of the bound are not halved any more: the
@@ -109,25 +111,39 @@ impl Proof<'_> {
     fn search(&self, [a, b, c]: [DVec3; 3], fit: impl Fn(u32) -> bool) -> Option<u32> {
         let (low, high) = (a.min(b).min(c) + self.bound, a.max(b).max(c) - self.bound);
         let Target { surface, bvh } = self.target;
-        let mut found = None;
-        if surface.is_empty() {
-            return found;
+        let mut search = AnyFit { low, high, fit, found: None };
+        if !surface.is_empty() {
+            traverse(&bvh.wide, WideChild::ROOT, &mut Stack::default(), &mut search);
         }
+        search.found
+    }
+}
+
+/// The search for a triangle that is `fit`, in boxes that reach below `low` and above `high`.
+struct AnyFit<Fit> {
+    low: DVec3,
+    high: DVec3,
+    fit: Fit,
+    found: Option<u32>,
+}
+
+impl<Fit: Fn(u32) -> bool> Search for AnyFit<Fit> {
+    /// All are as near.
+    type Distance = ();
+
+    fn enter(&self, node: &WideNode) -> Entered<()> {
         let holds = |Bounds { min, max }: Bounds| {
-            min.as_dvec3().cmple(low).all() && max.as_dvec3().cmpge(high).all()
+            min.as_dvec3().cmple(self.low).all() && max.as_dvec3().cmpge(self.high).all()
         };
-        traverse(
-            &bvh.wide,
-            WideChild::ROOT,
-            &mut Stack::default(),
-            &mut found,
-            |_, node| (boxes_that(|i| holds(node.bounds(i))), [0.0; WIDTH]),
-            |found: &Option<u32>, _| found.is_none(),
-            |found, leaf| {
-                *found = found.or_else(|| leaf.indices().iter().copied().find(|&index| fit(index)));
-            },
-        );
-        found
+        (boxes_that(|i| holds(node.bounds(i))), [(); WIDTH])
+    }
+
+    fn matters(&self, (): ()) -> bool {
+        self.found.is_none()
+    }
+
+    fn visit(&mut self, leaf: &Leaf4) {
+        self.found = leaf.indices().iter().copied().find(|&index| (self.fit)(index));
     }
 }
 

@@ -1,8 +1,10 @@
 //! However rays are traced, the answers are the same.
 
 use super::*;
-use crate::bvh::Builder;
+use crate::bvh::{Builder, Stack};
+use crate::cpu::traverse::traverse;
 use crate::job::Culling;
+use crate::lanes::ways;
 use crate::mesh::Mesh;
 use crate::pose::Pose;
 use crate::ray::RayFrame;
@@ -78,12 +80,12 @@ fn packets_and_interleaved_rays_answer_as_rays_one_by_one() {
             let expected = one_by_one(tree, rays);
             let hits = expected.iter().filter(|&&code| code != MISS).count();
             assert!(hits * 10 > rays.len(), "{hits} of {} {kind} rays hit", rays.len());
-            for (task, path) in [(task_for_this_processor(), "widest"), (task_anywhere, "portable")]
-            {
+            for nth in 0..ways::<Task<'_>>().count() {
                 let mut codes = vec![0; rays.len()];
-                task(tree, rays, &mut codes);
+                let (name, way) = ways().nth(nth).unwrap();
+                way(Task { tree, rays, codes: &mut codes });
                 let wrong = expected.iter().zip(&codes).position(|(a, b)| a != b);
-                assert_eq!(wrong, None, "{path}, {kind}, of {} bytes", tree.bytes());
+                assert_eq!(wrong, None, "{name}, {kind}, of {} bytes", tree.bytes());
             }
             assert_eq!(trace(tree, rays), expected);
         }

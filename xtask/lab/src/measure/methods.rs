@@ -3,7 +3,9 @@
 use super::ray_set::RaySet;
 use glam::Vec3;
 use rayon::prelude::*;
-use sim_gpu::bvh::{self, Entered, LEAF, Stack, WIDTH, WideBvh, WideChild, WideNode, boxes_that};
+use sim_gpu::bvh::{
+    self, Entered, LEAF, Leaf4, Search, Stack, WIDTH, WideBvh, WideChild, WideNode, boxes_that,
+};
 use sim_gpu::cpu::oracle;
 use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::ray::{MISS, TraceRay};
@@ -43,24 +45,42 @@ fn in_f32(ray_set: &RaySet, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -
 /// there is none: Möller and Trumbore, "Fast, minimum storage ray/triangle intersection",
 /// JGT 2(1), 1997, over the same tree, with a plain slab test.
 fn moller_trumbore_nearest(tree: &WideBvh, ray: &TraceRay) -> f32 {
-    let (origin, direction) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
-    let per_direction = direction.recip();
-    let mut nearest = f32::INFINITY;
-    bvh::traverse(
-        tree,
-        WideChild::ROOT,
-        &mut Stack::default(),
-        &mut nearest,
-        |&nearest, node| enter(node, origin, per_direction, nearest),
-        |&nearest, distance| distance <= nearest,
-        |nearest, leaf| {
-            for i in 0..LEAF {
-                let corner = |c: usize| Vec3::from_array(leaf.corners[c].map(|axis| axis[i]));
-                *nearest = nearest.min(intersect(origin, direction, [0, 1, 2].map(corner)));
-            }
-        },
-    );
-    nearest
+    let direction = Vec3::from_array(ray.direction);
+    let mut search = MollerTrumbore {
+        origin: Vec3::from_array(ray.origin),
+        direction,
+        per_direction: direction.recip(),
+        nearest: f32::INFINITY,
+    };
+    bvh::traverse(tree, WideChild::ROOT, &mut Stack::default(), &mut search);
+    search.nearest
+}
+
+struct MollerTrumbore {
+    origin: Vec3,
+    direction: Vec3,
+    per_direction: Vec3,
+    nearest: f32,
+}
+
+impl Search for MollerTrumbore {
+    type Distance = f32;
+
+    fn enter(&self, node: &WideNode) -> Entered<f32> {
+        enter(node, self.origin, self.per_direction, self.nearest)
+    }
+
+    fn matters(&self, distance: f32) -> bool {
+        distance <= self.nearest
+    }
+
+    fn visit(&mut self, leaf: &Leaf4) {
+        for i in 0..LEAF {
+            let corner = |c: usize| Vec3::from_array(leaf.corners[c].map(|axis| axis[i]));
+            let t = intersect(self.origin, self.direction, [0, 1, 2].map(corner));
+            self.nearest = self.nearest.min(t);
+        }
+    }
 }
 
 fn enter(node: &WideNode, origin: Vec3, per_direction: Vec3, farthest: f32) -> Entered<f32> {
