@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
 mod ablate;
+mod gpu;
 mod trade;
 
 use std::path::{Path, PathBuf};

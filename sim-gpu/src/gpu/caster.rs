@@ -93,6 +93,14 @@ impl GpuCaster {
         &self.core.limits
     }
 
+    /// Bytes of memory that the device holds for this caster's buffers; `None` where the
+    /// graphics interface does not tell.
+    #[must_use]
+    pub fn held_bytes(&self) -> Option<u64> {
+        let report = self.core.pipeline.device.generate_allocator_report()?;
+        Some(report.total_reserved_bytes)
+    }
+
     /// Uploads and starts `jobs`, in as few dispatches as the limits allow.
     ///
     /// # Errors

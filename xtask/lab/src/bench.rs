@@ -5,7 +5,7 @@
 //! the comparison with Embree ([`peers`]), the rays lost without [`watertightness`], and
 //! what [`simplify`] saves. [`scenes`] is about scenes of many objects, [`infer`] is about
 //! classifying, sampling and learning, [`pi5`] about a Raspberry Pi, [`numerics`] about
-//! errors, [`devices`] about adapters, [`sensor`] about how true a profile is to real
+//! errors, [`devices`] and [`gpu`] about adapters, [`sensor`] about how true a profile is to real
 //! sweeps, [`frames`] about what is found in them, [`sydney`] about what a network that has
 //! learnt from simulated scenes gives to one of real objects, [`robustness`] about what
 //! classifiers make of strays, turns and few points.
@@ -16,7 +16,7 @@ use crate::pi5;
 use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, scenes, simplify, speed, to_disk, watertightness};
-use crate::study::{devices, frames, numerics, robustness, sensor, sydney};
+use crate::study::{devices, frames, gpu, numerics, robustness, sensor, sydney};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -56,6 +56,13 @@ enum Benchmark {
     Growth(numerics::GrowthArgs),
     /// Compare every adapter with the CPU on the same meshes.
     Devices(devices::DevicesArgs),
+    /// Check and measure a GPU in one call of some minutes, and write gpu.json.
+    ///
+    /// Every shader is compared with its counterpart on the CPU, and rays are aimed at the vertices
+    /// and edges of a closed surface. Then rays per second, datasets per second and memory are
+    /// measured. The exit code is 1 if a comparison fails. A copy of the program runs on a machine
+    /// without the workspace and without a network.
+    Gpu(gpu::GpuArgs),
     /// Compare a sensor's profile with real sweeps of the sensor: directions, noise, missing returns.
     Sensor(sensor::SensorArgs),
     /// Detect the cars and persons in labelled sweeps of real sensors, and count false alarms.
@@ -140,6 +147,7 @@ impl Figures {
 pub fn run(args: &BenchArgs) -> Result<Outcome> {
     match &args.what {
         Benchmark::Sim(args) => return sim(args),
+        Benchmark::Gpu(args) => return gpu::run(args),
         Benchmark::Scenes(args) => scenes::run(args),
         Benchmark::Infer(args) => infer::run(args),
         Benchmark::Train(args) => infer::learn::run(args),

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, bail};
 use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::{AdapterKind, list_adapters};
+use sim_gpu::gpu::{AdapterKind, AdapterSummary, list_adapters};
 
 /// Rays that fill a GPU, so that what is measured is not its idling.
 const RAYS_TO_FILL_A_GPU: usize = 1 << 22;
@@ -27,18 +27,21 @@ impl Backend {
     pub fn name(&self) -> &str {
         self.caster.name()
     }
+
+    /// What opens another caster on the same adapter.
+    pub fn request(&self) -> AdapterRequest {
+        match &self.caster {
+            Caster::Cpu(_) => AdapterRequest::Cpu,
+            Caster::Gpu(_) => AdapterRequest::Named(self.name().to_owned()),
+        }
+    }
 }
 
 /// The CPU and all adapters, or the one that `request` names, which must be there.
 pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
-    let cpu = Backend {
-        caster: Caster::Cpu(Effects::default()),
-        rays: RAYS_TO_FILL_THE_CORES,
-        is_gpu: false,
-    };
     let mut backends = Vec::new();
     if matches!(request, None | Some(AdapterRequest::Cpu)) {
-        backends.push(cpu);
+        backends.push(cpu());
     }
     for adapter in list_adapters() {
         let wanted = match request {
@@ -51,18 +54,29 @@ pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
         };
         let known = backends.iter().any(|backend: &Backend| backend.name() == adapter.name);
         if wanted && !known {
-            let named = AdapterRequest::Named(adapter.name.clone());
-            let caster = Caster::open(&named, &Effects::default())
-                .with_context(|| format!("opening {}", adapter.name))?;
-            let software = adapter.kind == AdapterKind::Software;
-            let rays = if software { RAYS_TO_FILL_THE_CORES } else { RAYS_TO_FILL_A_GPU };
-            backends.push(Backend { caster, rays, is_gpu: !software });
+            backends.push(of_adapter(&adapter)?);
         }
     }
     if backends.is_empty() {
         bail!("expected an adapter of that name; `cargo xtask adapters` lists them");
     }
     Ok(backends)
+}
+
+/// The CPU.
+pub fn cpu() -> Backend {
+    let caster = Caster::Cpu(Effects::default());
+    Backend { caster, rays: RAYS_TO_FILL_THE_CORES, is_gpu: false }
+}
+
+/// The first adapter that has the name of `adapter`.
+pub fn of_adapter(adapter: &AdapterSummary) -> Result<Backend> {
+    let named = AdapterRequest::Named(adapter.name.clone());
+    let caster = Caster::open(&named, &Effects::default())
+        .with_context(|| format!("opening {}", adapter.name))?;
+    let is_gpu = adapter.kind != AdapterKind::Software;
+    let rays = if is_gpu { RAYS_TO_FILL_A_GPU } else { RAYS_TO_FILL_THE_CORES };
+    Ok(Backend { caster, rays, is_gpu })
 }
 
 /// An adapter's name, short enough for a table.

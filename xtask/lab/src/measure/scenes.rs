@@ -1,8 +1,8 @@
 //! Meshes made by rule, so that every machine measures the same.
 
 use glam::{DQuat, DVec3, dvec3};
+use harness::meshes::{icosphere, mapped};
 use sim_gpu::mesh::Mesh;
-use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 /// A bumpy torus of about `triangles` triangles that fits the unit sphere.
@@ -38,14 +38,9 @@ pub fn in_a_room(mut mesh: Mesh) -> Mesh {
 
 /// A closed sphere of 20 * 4^`levels` triangles, neither centred nor aligned.
 pub fn closed_sphere(levels: u32) -> Mesh {
-    let mut mesh = icosahedron();
-    for _ in 0..levels {
-        mesh = refined(&mesh);
-    }
     let turn = DQuat::from_axis_angle(dvec3(0.3, -0.5, 0.8).normalize(), 0.7);
     let shift = dvec3(0.137, -0.291, 0.053);
-    mesh.vertices.iter_mut().for_each(|v| *v = turn * *v + shift);
-    mesh
+    mapped(&icosphere(levels), |v| turn * v + shift)
 }
 
 /// The points halfway along each edge of `mesh`, once each.
@@ -63,46 +58,6 @@ pub fn edge_midpoints(mesh: &Mesh) -> Vec<DVec3> {
 
 fn push_quad(mesh: &mut Mesh, [a, b, c, d]: [u32; 4]) {
     mesh.triangles.extend([[a, b, c], [a, c, d]]);
-}
-
-fn icosahedron() -> Mesh {
-    let phi = (1.0 + 5f64.sqrt()) / 2.0;
-    let mut vertices = Vec::with_capacity(12);
-    for (one, long) in [(1.0, phi), (-1.0, phi), (1.0, -phi), (-1.0, -phi)] {
-        vertices.extend([dvec3(0.0, one, long), dvec3(one, long, 0.0), dvec3(long, 0.0, one)]);
-    }
-    // Faces join the corners at the least distance, 2.
-    let near = |p: usize, q: usize| (vertices[p] - vertices[q]).length() < 2.1;
-    let mut triangles = Vec::with_capacity(20);
-    for a in 0..12 {
-        for b in a + 1..12 {
-            for c in b + 1..12 {
-                if near(a, b) && near(b, c) && near(a, c) {
-                    triangles.push([a as u32, b as u32, c as u32]);
-                }
-            }
-        }
-    }
-    Mesh { vertices: vertices.into_iter().map(DVec3::normalize).collect(), triangles }
-}
-
-/// Each triangle cut in four, the new corners on the unit sphere.
-fn refined(mesh: &Mesh) -> Mesh {
-    let mut vertices = mesh.vertices.clone();
-    let mut known = HashMap::new();
-    let mut middle = |p: u32, q: u32| {
-        *known.entry((p.min(q), p.max(q))).or_insert_with(|| {
-            let at = (vertices[p as usize] + vertices[q as usize]).normalize();
-            vertices.push(at);
-            vertices.len() as u32 - 1
-        })
-    };
-    let mut triangles = Vec::with_capacity(4 * mesh.triangles.len());
-    for &[a, b, c] in &mesh.triangles {
-        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-        triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-    }
-    Mesh { vertices, triangles }
 }
 
 #[cfg(test)]

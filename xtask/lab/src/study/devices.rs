@@ -10,12 +10,13 @@ use clap::Args;
 use edgepuck_shapes::{ShapeClass, generate};
 use formats::atomic;
 use glam::{DAffine3, DVec3};
+use harness::judge::{RANGE_TOLERANCE, SILHOUETTE_RAD, near_edge};
 use infer_cpu::{Classifier, Options};
+use serde::Serialize;
 use sim_gpu::bvh::Builder;
-use sim_gpu::cpu::oracle;
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::pose::Pose;
-use sim_gpu::ray::{Ray, RayFrame};
+use sim_gpu::ray::RayFrame;
 use sim_gpu::resolve::{Hit, Hits};
 use sim_gpu::scan::{ScanRequest, scan_many};
 use sim_gpu::target::Target;
@@ -26,10 +27,6 @@ use crate::measure::ray_set::vlp32c;
 use crate::render::table::{Column, Table, digits};
 use xtask::workspace::root;
 
-/// Relative error that is promised of a range.
-const RANGE_TOLERANCE: f64 = 1e-6;
-/// Beams this close to a silhouette may see what lies on its other side.
-const SILHOUETTE_RAD: f64 = 1e-6;
 /// From the middle of a mesh of the unit sphere, metres.
 const DISTANCE_M: f64 = 3.0;
 
@@ -50,10 +47,13 @@ pub struct DevicesArgs {
 }
 
 /// One mesh from one side, on one adapter beside the CPU.
-struct Comparison {
-    mesh: String,
+#[derive(Serialize)]
+pub struct Comparison {
+    /// The name of the mesh.
+    pub mesh: String,
     view: u32,
-    adapter: String,
+    /// The name of the adapter.
+    pub adapter: String,
     points: [usize; 2],
     /// Beams that see another surface, or none.
     silhouettes: Vec<u32>,
@@ -80,24 +80,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
             "expected an adapter to compare with the CPU, found none; `cargo xtask adapters` lists them"
         );
     }
-    let sensor = vlp32c();
-    let pattern = sensor.pattern();
-    let mut all = Vec::new();
-    for bench_mesh in &bench_meshes {
-        let target = target(bench_mesh.mesh.clone(), Builder::Sah);
-        for view in 0..args.views {
-            let azimuth = std::f64::consts::TAU * f64::from(view) / f64::from(args.views) + 0.3;
-            let pose = Pose::view(DISTANCE_M, 20f64.to_radians(), azimuth, DVec3::ZERO);
-            let request = ScanRequest::new(&sensor, &pattern, pose);
-            let seen = View { target: &target, request };
-            let reference = seen.cast(cpu)?;
-            for backend in others {
-                let found = seen.cast(backend)?;
-                let place = (bench_mesh.name.as_str(), view, backend.name());
-                all.push(seen.compare(place, &reference, &found, &mut classifier)?);
-            }
-        }
-    }
+    let all = compare(&bench_meshes, args.views, (cpu, others), &mut classifier)?;
     atomic::write_bytes(&args.csv, &csv(&all)?)?;
     print!("{}", summary(&all, others));
     match all.iter().find(|comparison| !comparison.is_equal()) {
@@ -111,8 +94,36 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     }
 }
 
+/// Compares each of `others` with the CPU, on `views` of each mesh.
+pub fn compare(
+    bench_meshes: &[BenchMesh],
+    views: u32,
+    (cpu, others): (&Backend, &[Backend]),
+    classifier: &mut Classifier,
+) -> Result<Vec<Comparison>> {
+    let sensor = vlp32c();
+    let pattern = sensor.pattern();
+    let mut all = Vec::new();
+    for bench_mesh in bench_meshes {
+        let target = target(bench_mesh.mesh.clone(), Builder::Sah);
+        for view in 0..views {
+            let azimuth = std::f64::consts::TAU * f64::from(view) / f64::from(views) + 0.3;
+            let pose = Pose::view(DISTANCE_M, 20f64.to_radians(), azimuth, DVec3::ZERO);
+            let request = ScanRequest::new(&sensor, &pattern, pose);
+            let seen = View { target: &target, request };
+            let reference = seen.cast(cpu)?;
+            for backend in others {
+                let found = seen.cast(backend)?;
+                let place = (bench_mesh.name.as_str(), view, backend.name());
+                all.push(seen.compare(place, &reference, &found, classifier)?);
+            }
+        }
+    }
+    Ok(all)
+}
+
 /// The first of the parametric shapes of `class`.
-fn shape(class: ShapeClass) -> BenchMesh {
+pub fn shape(class: ShapeClass) -> BenchMesh {
     let mesh = to_world(&generate(class, 0, 0), Up::Z, Normalize::UnitSphere).mesh;
     BenchMesh { name: format!("shape {class}"), mesh }
 }
@@ -180,26 +191,17 @@ impl View<'_> {
         (pose.position_m + direction * hit.range_m).to_array()
     }
 
-    /// Whether one of eight beams around `beam` sees another triangle, or none.
+    /// Whether an edge is as near to `beam` as a silhouette may be.
     fn is_near_edge(&self, beam: u32) -> bool {
-        let surface = &self.target.surface;
-        let frame = RayFrame::new(surface, &DAffine3::IDENTITY, &self.request.pose);
+        let frame = RayFrame::new(&self.target.surface, &DAffine3::IDENTITY, &self.request.pose);
         let ray = frame.ray(self.request.pattern.directions[beam as usize]);
-        let seen = |ray: &Ray| oracle::nearest(self.target, ray).map(|found| found.index);
-        let length = ray.direction.length();
-        let (across, up) = (ray.direction / length).any_orthonormal_pair();
-        let own = seen(&ray);
-        (0..8).any(|eighth| {
-            let (sine, cosine) = (f64::from(eighth) * std::f64::consts::FRAC_PI_4).sin_cos();
-            let aside = (across * cosine + up * sine) * (SILHOUETTE_RAD * length);
-            seen(&Ray { direction: ray.direction + aside, ..ray }) != own
-        })
+        near_edge(self.target, &ray, SILHOUETTE_RAD)
     }
 }
 
 impl Comparison {
     /// Positions and classes equal, and as many points but for silhouettes.
-    fn is_equal(&self) -> bool {
+    pub fn is_equal(&self) -> bool {
         self.unexplained == 0 && self.classes[0] == self.classes[1]
     }
 }
@@ -222,7 +224,8 @@ fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
     Table::of("", all, &columns).to_csv()
 }
 
-fn summary(all: &[Comparison], others: &[Backend]) -> Table {
+/// One row for each of `others`.
+pub fn summary(all: &[Comparison], others: &[Backend]) -> Table {
     let scans = |backend: &Backend| {
         all.iter().filter(|c| c.adapter == backend.name()).collect::<Vec<&Comparison>>()
     };

@@ -4,6 +4,7 @@ pub mod ablation;
 pub mod casting;
 pub mod devices;
 pub mod frames;
+pub mod gpu;
 mod meshes;
 pub mod numerics;
 mod plan;

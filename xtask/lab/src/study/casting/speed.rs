@@ -53,12 +53,20 @@ pub struct Speed {
 
 /// Measures `bench_meshes` on `backends` in `rounds` rounds each.
 pub fn measure(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
+    let mut speed = tracing(bench_meshes, backends, rounds)?;
+    for bench_mesh in bench_meshes {
+        speed.builds.extend(builds(bench_mesh, rounds)?);
+    }
+    Ok(speed)
+}
+
+/// The same without the building of hierarchies.
+pub fn tracing(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
     let mut speed = Speed::default();
     let pattern = vlp32c().pattern();
     let pose = sweep_pose();
     for bench_mesh in bench_meshes {
         eprintln!("{}", bench_mesh.name);
-        speed.builds.extend(builds(bench_mesh, rounds)?);
         let object = target(bench_mesh.mesh.clone(), Builder::Sah);
         let room = target(in_a_room(bench_mesh.mesh.clone()), Builder::Sah);
         for (rays_from, ray_set) in [
@@ -180,9 +188,8 @@ impl Speed {
         ];
         let tracing = "Tracing, million rays a second (upload and read-back included; beams \
                        count those that culling spared)";
-        vec![
-            Table::of("Building the hierarchy", &self.builds, &of_build),
-            Table::of(tracing, &self.traces, &of_trace),
-        ]
+        let builds = Table::of("Building the hierarchy", &self.builds, &of_build);
+        let traces = Table::of(tracing, &self.traces, &of_trace);
+        [builds, traces].into_iter().filter(|table| table.len() > 0).collect()
     }
 }

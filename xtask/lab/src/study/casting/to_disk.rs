@@ -12,7 +12,7 @@ use edgepuck_dataset::pipeline::{Run, scan_all};
 use edgepuck_dataset::progress::{Progress, Stage};
 use edgepuck_program::gen_dataset::default_config;
 use serde::Serialize;
-use sim_gpu::caster::{AdapterRequest, Caster};
+use sim_gpu::caster::Caster;
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::tree::MeshEntry;
 use std::path::Path;
@@ -45,11 +45,7 @@ pub fn measure(
     let config = default_config()?;
     let mut datasets = Vec::new();
     for backend in backends {
-        let request = match &backend.caster {
-            Caster::Cpu(_) => AdapterRequest::Cpu,
-            Caster::Gpu(_) => AdapterRequest::Named(backend.name().to_owned()),
-        };
-        let caster = Caster::open(&request, &config.cast_effects())?;
+        let caster = Caster::open(&backend.request(), &config.cast_effects())?;
         let once = |_| once(&config, &caster, &meshes);
         let mut repeats = (0..rounds).map(once).collect::<Result<Vec<_>>>()?;
         repeats.sort_by(|a, b| a.cost.cpu_s.total_cmp(&b.cost.cpu_s));
