@@ -1,25 +1,28 @@
 #!/bin/sh
 # Installs what tests need beyond Rust: software Vulkan, a C++ compiler for the
-# fuzz targets, what Open3D links to, PCL, a browser, what judges Debian packages, and for
-# the Raspberry Pi its target's standard library, an emulator and a model of its core.
+# fuzz targets, what Open3D links to, PCL, a browser, what judges Debian packages, for the
+# Raspberry Pi an emulator and a model of its core, and the standard libraries of the targets
+# that code is checked for: the Raspberry Pi, and systems of Metal and of Direct3D 12.
 # Both the README and CI run this, through `cargo xtask test`.
 set -eu
 
 backported="mesa-vulkan-drivers libvulkan1"
 plain="g++ lintian pcl-tools qemu-user libusb-1.0-0"
-pi_target="aarch64-unknown-linux-musl"
+targets="aarch64-unknown-linux-musl aarch64-apple-darwin x86_64-pc-windows-msvc"
 # The releases of LLVM whose llvm-mca knows Neoverse N1, the newest first.
 llvms="22 21 20 19"
 
 if command -v rustup >/dev/null 2>&1; then
     cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
     cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
-    rustup target list --installed | grep -qx "$pi_target" ||
-        rustup target add "$pi_target" ||
-        echo "Cannot fetch Rust's standard library for $pi_target:" \
-            "tests of the Raspberry Pi's code need it." >&2
+    for target in $targets; do
+        rustup target list --installed | grep -qx "$target" ||
+            rustup target add "$target" ||
+            echo "Cannot fetch Rust's standard library for $target:" \
+                "checks of the code for it need it." >&2
+    done
 else
-    echo "No rustup here: install Rust's standard library for $pi_target yourself." >&2
+    echo "No rustup here: install Rust's standard libraries for $targets yourself." >&2
 fi
 
 missing_of() {

@@ -144,7 +144,7 @@ pub(crate) fn ways<W: Lanewise>() -> impl Iterator<Item = Way<W>> {
         [has_avx512().then_some(avx512), has_avx2().then_some(avx2)]
     };
     #[cfg(not(target_arch = "x86_64"))]
-    let wide = [];
+    let wide: [Option<Way<W>>; 0] = [];
     let portable: Way<W> = ("portable", |work| work.run(None));
     wide.into_iter().flatten().chain([portable])
 }

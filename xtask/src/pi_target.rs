@@ -8,9 +8,6 @@ use std::process::Command;
 /// Static binaries that run on any 64-bit Raspberry Pi, whatever its system.
 pub const TRIPLE: &str = "aarch64-unknown-linux-musl";
 
-/// What to do about a missing standard library.
-pub const NO_STANDARD_LIBRARY: &str = "Rust's standard library for the Raspberry Pi is missing: \
-     rustup target add aarch64-unknown-linux-musl";
 /// What to do about a missing emulator.
 pub const NO_EMULATOR: &str =
     "no qemu-aarch64 here knows the Cortex-A76: install qemu-user, QEMU 7.1 or newer";
@@ -21,20 +18,13 @@ const EMULATOR: &str = "qemu-aarch64";
 /// extension, so that a kernel which strays beyond traps.
 const CORE: &str = "cortex-a76";
 
-/// Whether this toolchain has the target's standard library.
-///
-/// # Errors
-/// If there is no rustc to ask.
-pub fn has_standard_library() -> anyhow::Result<bool> {
-    Ok(workspace::standard_library(TRIPLE)?.is_dir())
-}
-
 /// Fetches the target's standard library through rustup unless it is there.
 ///
 /// # Errors
 /// There is no rustup, or it cannot fetch the library.
 pub fn need_standard_library() -> anyhow::Result<()> {
-    if has_standard_library()? {
+    let is_there = || Ok::<_, anyhow::Error>(workspace::standard_library(TRIPLE)?.is_dir());
+    if is_there()? {
         return Ok(());
     }
     eprintln!("fetching Rust's standard library for {TRIPLE}: rustup target add {TRIPLE}");
@@ -42,7 +32,7 @@ pub fn need_standard_library() -> anyhow::Result<()> {
     let status = status.with_context(|| {
         format!("there is no rustup here to fetch it; install {TRIPLE}'s standard library yourself")
     })?;
-    if !status.success() || !has_standard_library()? {
+    if !status.success() || !is_there()? {
         bail!("rustup could not fetch {TRIPLE}; is this machine offline?");
     }
     Ok(())

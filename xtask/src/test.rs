@@ -2,8 +2,8 @@
 
 mod fuzz;
 mod peers;
-mod pi;
 mod sanitize;
+mod targets;
 mod test_programs;
 
 use crate::summary::{Counts, Summary};
@@ -67,7 +67,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
     let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
-    pi::run(summary, install);
+    targets::run(summary, install);
     peers::run(summary, packages);
     fuzz::run(summary, args.fuzz_seconds, fuzz_targets);
 }

@@ -3,7 +3,7 @@
 //! Grot, "Asynchronous memory access chaining", VLDB 2015.
 
 use super::traverse::{Along, Instructions, Nearest, Prepared};
-use crate::bvh::{Stack, WideBvh, WideChild, WideNode, step};
+use crate::bvh::{Stack, WideBvh, WideChild, step};
 use crate::ray::TraceRay;
 use bytemuck::Zeroable;
 use std::iter::repeat_with;
@@ -103,7 +103,10 @@ fn fetch(tree: &WideBvh, at: WideChild) {
             Some(leaf) => {
                 ((&raw const tree.leaves[leaf]).cast::<i8>(), size_of_val(&tree.leaves[leaf]))
             }
-            None => ((&raw const tree.nodes[at.node()]).cast::<i8>(), size_of::<WideNode>()),
+            None => {
+                let node = &tree.nodes[at.node()];
+                ((&raw const *node).cast::<i8>(), size_of_val(node))
+            }
         };
         for line in (0..size).step_by(CACHE_LINE) {
             // SAFETY: a prefetch reads nothing, whatever the address.

@@ -1,26 +1,44 @@
-//! What is compiled for the Raspberry Pi: lints, tests under an emulator, the binary.
+//! What is compiled for other targets: for the Raspberry Pi, where tests run under an emulator,
+//! and for the systems on which wgpu uses Metal and Direct3D 12.
 
 use super::{go_without, test_programs};
 use crate::summary::{Counts, Summary, check};
+use xtask::workspace::{cargo, standard_library};
 use xtask::{build_pi, pi_target};
 
 /// A check: its name, and whether it fails where it cannot run.
 type Check = fn(&mut Summary, &str, bool) -> anyhow::Result<Counts>;
 
-const CHECKS: [(&str, Check); 3] =
-    [("Raspberry Pi lints", lints), ("Raspberry Pi tests", tests), ("Raspberry Pi binary", binary)];
+const METAL: &str = "aarch64-apple-darwin";
+const DX12: &str = "x86_64-pc-windows-msvc";
+
+/// The target that each check needs the standard library of, its name, and the check.
+const CHECKS: [(&str, &str, Check); 5] = [
+    (METAL, "Metal lints", |_, name, _| gpu_lints(METAL, name)),
+    (DX12, "Direct3D 12 lints", |_, name, _| gpu_lints(DX12, name)),
+    (pi_target::TRIPLE, "Raspberry Pi lints", lints),
+    (pi_target::TRIPLE, "Raspberry Pi tests", tests),
+    (pi_target::TRIPLE, "Raspberry Pi binary", binary),
+];
 
 /// What runs on a Raspberry Pi.
 const PACKAGES: [&str; 4] = ["--package", "infer-cpu", "--package", "edgepuck-segment"];
 
-/// Runs the three checks; those that cannot run here fail where they are `required`.
+/// Runs the checks; those that cannot run here fail where they are `required`.
 pub fn run(summary: &mut Summary, required: bool) {
-    for (name, check) in CHECKS {
-        summary.step(name, |summary| match pi_target::has_standard_library()? {
+    for (target, name, check) in CHECKS {
+        let lack = format!("Rust's standard library for it is missing: rustup target add {target}");
+        summary.step(name, |summary| match standard_library(target)?.is_dir() {
             true => check(summary, name, required),
-            false => go_without(summary, name, pi_target::NO_STANDARD_LIBRARY, required),
+            false => go_without(summary, name, &lack, required),
         });
     }
+}
+
+/// Lints the ray-casting library for a system whose part of wgpu no other step compiles.
+fn gpu_lints(target: &str, name: &str) -> anyhow::Result<Counts> {
+    let mut lints = cargo(&["clippy", "--package", "sim-gpu", "--target", target]);
+    check(name, lints.args(["--", "--deny", "warnings"]))
 }
 
 /// Lints the code that is compiled for the Raspberry Pi alone.
