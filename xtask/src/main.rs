@@ -58,19 +58,15 @@ struct Forwarded {
 }
 
 fn main() -> ExitCode {
-    // The laboratory's commands have the same names there.
     let typed: Vec<OsString> = std::env::args_os().skip(1).collect();
     let done = match Cli::parse().command {
         Command::Test(args) => test::run(&args),
         Command::ReleaseCheck => release_check::run(),
         Command::BuildPi(args) => build_pi::run(&args).map(|()| 0),
-        Command::Bench(_)
-        | Command::Trade(_)
-        | Command::Ablate(_)
-        | Command::Reproduce(_)
-        | Command::Report(_) => forward::run(LAB, &typed),
         Command::Edgepuck(args) => forward::run(EDGEPUCK, &args.words),
         Command::Product(words) => forward::run(EDGEPUCK, &words),
+        // The laboratory's commands, which have the same names there.
+        _ => forward::run(LAB, &typed),
     };
     match done {
         Ok(code) => ExitCode::from(code),

@@ -65,10 +65,7 @@ fn crates() -> anyhow::Result<Vec<Value>> {
     Ok(metadata["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
 }
 
-/// The program, at the workspace's root.
-///
-/// # Errors
-/// It is not installed; the error says which package installs it.
+/// The program, at the workspace's root, or an error that says which package installs it.
 fn tool(program: &str, package: &str) -> anyhow::Result<Command> {
     if Command::new(program).arg("--version").output().is_err() {
         bail!("{program} is missing: `cargo install --locked {package}` installs it");
@@ -84,9 +81,8 @@ mod tests {
 
     #[test]
     fn a_missing_tool_is_named_with_what_installs_it() {
-        let error = tool("edgepuck-no-such-tool", "a-package").unwrap_err().to_string();
-        let expected =
-            "edgepuck-no-such-tool is missing: `cargo install --locked a-package` installs it";
+        let error = tool("no-such-tool", "a-package").unwrap_err().to_string();
+        let expected = "no-such-tool is missing: `cargo install --locked a-package` installs it";
         assert_eq!(error, expected);
     }
 

@@ -133,11 +133,7 @@ impl fmt::Display for Summary {
             writeln!(f, "{remark}")?;
         }
         let width = self.steps.iter().map(|(name, ..)| name.len()).max().unwrap_or(0).max(4);
-        writeln!(
-            f,
-            "{:width$}  {:>7}  {:>7}  {:>7}  {:>7}",
-            "step", "seconds", "passed", "failed", "skipped"
-        )?;
+        writeln!(f, "{:width$}  seconds   passed   failed  skipped", "step")?;
         for (name, time, Counts { passed, failed, skipped }) in &self.steps {
             let seconds = time.as_secs_f64();
             writeln!(f, "{name:width$}  {seconds:>7.0}  {passed:>7}  {failed:>7}  {skipped:>7}")?;
@@ -152,18 +148,19 @@ mod tests {
 
     #[test]
     fn closing_lines_of_test_programs_are_counted_and_others_are_not() {
+        let passed = "ok. 59 passed; 0 failed; 1 ignored; 0 measured; finished in 0.31s";
+        let failed = "FAILED. 1 passed; 22 failed; 0 ignored; 0 measured; 0 filtered out\n";
+        let of = |[passed, failed, skipped]: [u64; 3]| Counts { passed, failed, skipped };
         for (line, expected) in [
-            ("ok. 59 passed; 0 failed; 1 ignored; 0 measured; in 0.31s", Some([59, 0, 1])),
-            ("FAILED. 1 passed; 22 failed; 0 ignored; 0 measured\n", Some([1, 22, 0])),
+            (passed, Some(of([59, 0, 1]))),
+            (failed, Some(of([1, 22, 0]))),
             ("", None),
             ("ok. many passed; 0 failed; 0 ignored; 0 measured", None),
             ("ok. 1 passed; 0 failed", None),
         ] {
-            let expected =
-                expected.map(|[passed, failed, skipped]| Counts { passed, failed, skipped });
-            let counts = Counts::of_closing_line(&format!("test result: {line}"));
-            assert_eq!(counts, expected, "{line}");
-            assert_eq!(Counts::of_closing_line(&format!("found test result: {line}")), None);
+            let line = format!("test result: {line}");
+            assert_eq!(Counts::of_closing_line(&line), expected, "{line}");
+            assert_eq!(Counts::of_closing_line(&format!("found {line}")), None);
         }
         assert_eq!(Counts::of_closing_line("test a::b ... ok"), None);
     }

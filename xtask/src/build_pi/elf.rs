@@ -9,13 +9,6 @@ const MACHINE_AARCH64: u16 = 183;
 const SEGMENT_INTERPRETER: u32 = 3;
 const SECTION_SYMBOLS: u32 = 2;
 
-/// A table of headers within the file: where, an entry's size, how many.
-struct Headers {
-    at: usize,
-    size: usize,
-    count: usize,
-}
-
 /// That `file` is a program for 64-bit Arm which needs no library of the
 /// system it runs on and carries no symbols.
 ///
@@ -29,33 +22,23 @@ pub fn check_static_stripped_aarch64(file: &[u8]) -> anyhow::Result<()> {
         machine == MACHINE_AARCH64,
         "expected a program for aarch64, found ELF machine {machine}"
     );
-    let segments = Headers::read(file, 32, 54)?;
-    if segments.types(file, 0)?.contains(&SEGMENT_INTERPRETER) {
+    if types(file, 32, 54, 0)?.contains(&SEGMENT_INTERPRETER) {
         bail!("expected a static program, found one that is linked dynamically");
     }
-    let sections = Headers::read(file, 40, 58)?;
-    if sections.types(file, 4)?.contains(&SECTION_SYMBOLS) {
+    if types(file, 40, 58, 4)?.contains(&SECTION_SYMBOLS) {
         bail!("expected a stripped program, found a table of symbols");
     }
     Ok(())
 }
 
-impl Headers {
-    /// `at`: where the file header says where the table starts; `size_at`:
-    /// where it says how large entries are, the count behind.
-    fn read(file: &[u8], at: usize, size_at: usize) -> anyhow::Result<Self> {
-        Ok(Self {
-            at: usize::try_from(u64::from_le_bytes(bytes_at(file, at)?))?,
-            size: u16_at(file, size_at)?.into(),
-            count: u16_at(file, size_at + 2)?.into(),
-        })
-    }
-
-    /// Each entry's type, which is `offset` bytes into it.
-    fn types(&self, file: &[u8], offset: usize) -> anyhow::Result<Vec<u32>> {
-        let entry = |i| self.at.checked_add(i * self.size + offset).context(CUT_SHORT);
-        (0..self.count).map(|i| Ok(u32::from_le_bytes(bytes_at(file, entry(i)?)?))).collect()
-    }
+/// The type, `offset` bytes into an entry, of each entry of a table of headers. The file
+/// header says at `at` where the table starts, and at `size_at` how large entries are, their
+/// number behind.
+fn types(file: &[u8], at: usize, size_at: usize, offset: usize) -> anyhow::Result<Vec<u32>> {
+    let start = usize::try_from(u64::from_le_bytes(bytes_at(file, at)?))?;
+    let [size, count] = [u16_at(file, size_at)?, u16_at(file, size_at + 2)?].map(usize::from);
+    let entry = |i| start.checked_add(i * size + offset).context(CUT_SHORT);
+    (0..count).map(|i| Ok(u32::from_le_bytes(bytes_at(file, entry(i)?)?))).collect()
 }
 
 const CUT_SHORT: &str = "its headers are cut short";

@@ -3,6 +3,7 @@
 
 use super::{go_without, test_programs};
 use crate::summary::Summary;
+use anyhow::{Context, ensure};
 use xtask::workspace::{cargo, standard_library};
 
 /// Its runtime comes with Rust for this target.
@@ -22,8 +23,8 @@ const STEPS: [(&str, &[&str]); 3] = [
 pub fn run(summary: &mut Summary) {
     for (name, tests) in STEPS {
         summary.step(name, |summary| {
-            if let Err(lack) = runtime() {
-                return go_without(summary, name, &lack, false);
+            if let Err(lack) = need_runtime() {
+                return go_without(summary, name, &format!("{lack:#}"), false);
             }
             let mut cargo = cargo(&["test", "--target", TRIPLE, "--no-fail-fast"]);
             // The flag is not stable; the compiler and the runtime that it needs are.
@@ -33,17 +34,12 @@ pub fn run(summary: &mut Summary) {
     }
 }
 
-/// Whether Rust's standard library has the sanitizer's runtime here.
-///
-/// # Errors
-/// If it has not, in words for the user.
-fn runtime() -> Result<(), String> {
-    let folder = standard_library(TRIPLE).map_err(|error| format!("{error:#}"))?;
-    let files = std::fs::read_dir(folder).map_err(|error| format!("{TRIPLE}: {error}"))?;
-    let is_runtime = |name: &str| name.ends_with("_rt.asan.a");
+/// Checks that Rust's standard library has the sanitizer's runtime here.
+fn need_runtime() -> anyhow::Result<()> {
+    let folder = standard_library(TRIPLE)?;
+    let files = std::fs::read_dir(&folder).with_context(|| folder.display().to_string())?;
     let mut names = files.flatten().map(|file| file.file_name());
-    match names.any(|name| name.to_str().is_some_and(is_runtime)) {
-        true => Ok(()),
-        false => Err("Rust's standard library comes without AddressSanitizer's runtime".to_owned()),
-    }
+    let is_here = names.any(|name| name.to_string_lossy().ends_with("_rt.asan.a"));
+    ensure!(is_here, "Rust's standard library comes without AddressSanitizer's runtime");
+    Ok(())
 }
