@@ -1,6 +1,7 @@
 //! `cargo xtask test`: everything a change must pass.
 
 mod fuzz;
+mod meanwhile;
 mod peers;
 mod sanitize;
 mod targets;
@@ -53,6 +54,8 @@ fn run_all(args: &Args, summary: &mut Summary) {
         summary.command("packages", Command::new("sh").arg(PACKAGES).current_dir(root()));
     }
     let packages = peers::Packages::fetch_meanwhile(args.peers, install);
+    let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
+    let _pi_binary = targets::build_meanwhile();
     summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
     let mut lints = cargo_on_all(&["clippy", "--all-targets"]);
     summary.command("lints", lints.args(["--", "--deny", "warnings"]));
@@ -66,7 +69,6 @@ fn run_all(args: &Args, summary: &mut Summary) {
     let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
-    let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
     targets::run(summary, install);
     peers::run(summary, packages);
     fuzz::run(summary, args.fuzz_seconds, fuzz_targets);

@@ -1,8 +1,10 @@
 //! What is compiled for other targets: for the Raspberry Pi, where tests run under an emulator,
 //! and for the systems on which wgpu uses Metal and Direct3D 12.
 
-use super::{go_without, test_programs};
+use super::{go_without, meanwhile::Meanwhile, test_programs};
 use crate::summary::{Counts, Summary, check};
+use anyhow::ensure;
+use std::{env::current_exe, process::Command};
 use xtask::workspace::{cargo, standard_library};
 use xtask::{build_pi, pi_target};
 
@@ -23,6 +25,13 @@ const CHECKS: [(&str, &str, Check); 5] = [
 
 /// What runs on a Raspberry Pi.
 const PACKAGES: [&str; 4] = ["--package", "infer-cpu", "--package", "edgepuck-segment"];
+
+/// Starts to make the binary, which takes one core minutes. What checks it waits for Cargo's
+/// lock, and makes it itself if this could not.
+pub fn build_meanwhile() -> anyhow::Result<Meanwhile> {
+    ensure!(standard_library(pi_target::TRIPLE)?.is_dir(), "there is no standard library for it");
+    Meanwhile::start("build-pi", Command::new(current_exe()?).arg("build-pi"))
+}
 
 /// Runs the checks; those that cannot run here fail where they are `required`.
 pub fn run(summary: &mut Summary, required: bool) {
