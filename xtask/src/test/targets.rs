@@ -23,8 +23,10 @@ const CHECKS: [(&str, &str, Check); 5] = [
     (pi_target::TRIPLE, "Raspberry Pi binary", binary),
 ];
 
-/// What runs on a Raspberry Pi.
-const PACKAGES: [&str; 4] = ["--package", "infer-cpu", "--package", "edgepuck-segment"];
+/// What depends on the processor: the classifier as a library, and its tests. What reads
+/// command lines, packets and recordings is the same on all, and tested on this one. The
+/// program runs under the emulator as well: tests/peers/debian_package.py sends it packets.
+const LIBRARY: [&str; 5] = ["--package", "infer-cpu", "--no-default-features", "--lib", "--tests"];
 
 /// Starts to make the binary, which takes one core minutes. What checks it waits for Cargo's
 /// lock, and makes it itself if this could not.
@@ -52,11 +54,11 @@ fn gpu_lints(target: &str, name: &str) -> anyhow::Result<Counts> {
 
 /// Lints the code that is compiled for the Raspberry Pi alone.
 fn lints(_: &mut Summary, name: &str, _: bool) -> anyhow::Result<Counts> {
-    let mut lints = pi_target::cargo(&["clippy", "--all-targets"]);
-    check(name, lints.args(PACKAGES).args(["--", "--deny", "warnings"]))
+    let mut lints = pi_target::cargo(&["clippy"]);
+    check(name, lints.args(LIBRARY).args(["--", "--deny", "warnings"]))
 }
 
-/// Tests the packages with the Raspberry Pi's instructions.
+/// Tests the library with the Raspberry Pi's instructions.
 fn tests(summary: &mut Summary, name: &str, required: bool) -> anyhow::Result<Counts> {
     if cfg!(target_arch = "aarch64") {
         let reason = "this processor is of its kind, so the tests above were these";
@@ -67,8 +69,8 @@ fn tests(summary: &mut Summary, name: &str, required: bool) -> anyhow::Result<Co
         let required = required && cfg!(target_os = "linux");
         return go_without(summary, name, pi_target::NO_EMULATOR, required);
     }
-    let mut tests = pi_target::cargo(&["test", "--lib", "--bins", "--tests", "--no-fail-fast"]);
-    test_programs::run(summary, tests.args(PACKAGES))
+    let mut tests = pi_target::cargo(&["test", "--no-fail-fast"]);
+    test_programs::run(summary, tests.args(LIBRARY))
 }
 
 /// Checks that a binary for the Raspberry Pi can be made, and is as small as promised.
