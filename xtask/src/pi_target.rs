@@ -23,8 +23,7 @@ const CORE: &str = "cortex-a76";
 /// # Errors
 /// There is no rustup, or it cannot fetch the library.
 pub fn need_standard_library() -> anyhow::Result<()> {
-    let is_there = || Ok::<_, anyhow::Error>(workspace::standard_library(TRIPLE)?.is_dir());
-    if is_there()? {
+    if workspace::standard_library(TRIPLE)?.is_dir() {
         return Ok(());
     }
     eprintln!("fetching Rust's standard library for {TRIPLE}: rustup target add {TRIPLE}");
@@ -32,7 +31,7 @@ pub fn need_standard_library() -> anyhow::Result<()> {
     let status = status.with_context(|| {
         format!("there is no rustup here to fetch it; install {TRIPLE}'s standard library yourself")
     })?;
-    if !status.success() || !is_there()? {
+    if !status.success() {
         bail!("rustup could not fetch {TRIPLE}; is this machine offline?");
     }
     Ok(())

@@ -1,17 +1,18 @@
 //! The scripts in `tests/peers`, which compare our programs with other software.
 //!
-//! Python runs each alone, in an environment of pinned packages from PyPI. `EDGEPUCK_PROGRAM`,
+//! Python runs each in an environment of pinned packages from PyPI. `EDGEPUCK_PROGRAM`,
 //! `EDGEPUCK_LAB`, `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_ROOT` is the
 //! workspace, and `EDGEPUCK_OUT` an empty folder. It ends with 0 if all is well and with [`SKIPPED`]
 //! if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, unless there is
 //! an `x-requirements.txt`: of packages that others do not go with, or that are very large.
 
-use super::cargo_on_all;
+use super::{cargo_on_all, meanwhile::Meanwhile};
 use crate::summary::{Counts, Summary};
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Mutex;
 use std::thread::JoinHandle;
 use xtask::venv::{Environment, cache_dir};
 use xtask::workspace::{executable, output, root};
@@ -85,7 +86,8 @@ fn interpreter(environment: &Environment<'_>, install: bool) -> Python {
     }
 }
 
-/// Runs the scripts. A script whose packages are missing is skipped, and named.
+/// Runs the scripts, two at a time: each waits for files, sockets and other programs.
+/// A script whose packages are missing is skipped, and named.
 pub fn run(summary: &mut Summary, packages: Packages) {
     summary.step("peers", |summary| {
         let scripts = scripts()?;
@@ -95,47 +97,55 @@ pub fn run(summary: &mut Summary, packages: Packages) {
         }
         let programs = programs()?;
         let shared = shared.join().unwrap_or_else(|_| Err("fetching them panicked".to_owned()));
-        let mut counts = Counts::default();
-        for script in scripts {
-            let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let python = python_of(&name, which, install).unwrap_or_else(|| shared.clone());
-            counts = counts.and(match python {
-                Ok(python) => check(summary, &name, &script, &python, &programs)?,
-                Err(cause) => summary.skip(&format!("peer {name}"), 1, &cause),
-            });
-        }
-        Ok(counts)
+        let (scripts, summary) = (Mutex::new(scripts.into_iter()), Mutex::new(summary));
+        let next = || scripts.lock().ok()?.next();
+        let work = || {
+            std::iter::from_fn(next).try_fold(Counts::default(), |counts, script| {
+                let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                let python = python_of(&name, which, install).unwrap_or_else(|| shared.clone());
+                Ok(counts.and(check(&summary, &name, &script, python, &programs)?))
+            })
+        };
+        std::thread::scope(|scope| {
+            let other = scope.spawn(work);
+            let counts: anyhow::Result<Counts> = work();
+            Ok(counts?.and(other.join().map_err(|_| anyhow!("a thread panicked"))??))
+        })
     });
 }
 
 fn check(
-    summary: &mut Summary,
+    summary: &Mutex<&mut Summary>,
     name: &str,
     script: &Path,
-    python: &Path,
+    python: Python,
     programs: &Programs,
 ) -> anyhow::Result<Counts> {
+    let peer = format!("peer {name}");
+    let summary = || summary.lock().expect("invariant: nothing panics with the lock");
+    let python = match python {
+        Ok(python) => python,
+        Err(cause) => return Ok(summary().skip(&peer, 1, &cause)),
+    };
     let out = cache_dir().join("tests").join(name);
     if out.exists() {
         fs::remove_dir_all(&out).with_context(|| out.display().to_string())?;
     }
     fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
-    eprintln!("== peer {name}: {SCRIPTS}/{name}.py");
     // -B keeps compiled files from lying beside the scripts.
     let mut command = Command::new(python);
     command.arg("-B").arg(script).current_dir(&out);
     // Scripts are named after packages, which must not be taken for them.
     command.env("PYTHONSAFEPATH", "1");
-    for (variable, program) in programs {
-        command.env(variable, program);
-    }
+    command.envs(programs.iter().map(|(variable, program)| (variable, program)));
     command.env("EDGEPUCK_ROOT", root()).env("EDGEPUCK_OUT", &out);
-    let status = command.status().with_context(|| format!("cannot run {}", script.display()))?;
+    let (status, said) = Meanwhile::start(&format!("peer-{name}"), &mut command)?.end()?;
+    eprintln!("== {peer}: {SCRIPTS}/{name}.py\n{said}");
     Ok(match status.code() {
         Some(0) => Counts::PASSED,
-        Some(SKIPPED) => summary.skip(&format!("peer {name}"), 1, "it said why"),
+        Some(SKIPPED) => summary().skip(&peer, 1, "it said why"),
         _ => {
-            summary.remark(format!("peer {name}: FAILED, {status}"));
+            summary().remark(format!("{peer}: FAILED, {status}"));
             Counts::FAILED
         }
     })
@@ -144,10 +154,8 @@ fn check(
 fn scripts() -> anyhow::Result<Vec<PathBuf>> {
     let folder = root().join(SCRIPTS);
     let entries = fs::read_dir(&folder).with_context(|| folder.display().to_string())?;
-    let mut scripts = entries
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<Vec<_>, _>>()
-        .with_context(|| folder.display().to_string())?;
+    let paths = entries.map(|entry| entry.map(|entry| entry.path()));
+    let mut scripts = paths.collect::<Result<Vec<_>, _>>()?;
     scripts.retain(|path| path.extension().is_some_and(|extension| extension == "py"));
     scripts.sort();
     Ok(scripts)

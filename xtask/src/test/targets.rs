@@ -1,12 +1,10 @@
-//! What is compiled for other targets: for the Raspberry Pi, where tests run under an emulator,
-//! and for the systems on which wgpu uses Metal and Direct3D 12.
+//! Checks of other targets: the Raspberry Pi, and systems of Metal and of Direct3D 12.
 
 use super::{go_without, meanwhile::Meanwhile, test_programs};
 use crate::summary::{Counts, Summary, check};
 use anyhow::ensure;
 use std::{env::current_exe, process::Command};
-use xtask::workspace::{cargo, standard_library};
-use xtask::{build_pi, pi_target};
+use xtask::{build_pi, pi_target, workspace::cargo, workspace::standard_library};
 
 /// A check: its name, and whether it fails where it cannot run.
 type Check = fn(&mut Summary, &str, bool) -> anyhow::Result<Counts>;
@@ -16,20 +14,23 @@ const DX12: &str = "x86_64-pc-windows-msvc";
 
 /// The target that each check needs the standard library of, its name, and the check.
 const CHECKS: [(&str, &str, Check); 5] = [
-    (METAL, "Metal lints", |_, name, _| gpu_lints(METAL, name)),
-    (DX12, "Direct3D 12 lints", |_, name, _| gpu_lints(DX12, name)),
-    (pi_target::TRIPLE, "Raspberry Pi lints", lints),
+    (METAL, "Metal lints", |_, name, _| lints(name, cargo(&SIM_GPU).args(["--target", METAL]))),
+    (DX12, "Direct3D 12 lints", |_, name, _| lints(name, cargo(&SIM_GPU).args(["--target", DX12]))),
+    (pi_target::TRIPLE, "Raspberry Pi lints", |_, name, _| {
+        lints(name, pi_target::cargo(&["clippy"]).args(LIBRARY))
+    }),
     (pi_target::TRIPLE, "Raspberry Pi tests", tests),
     (pi_target::TRIPLE, "Raspberry Pi binary", binary),
 ];
 
-/// What depends on the processor: the classifier as a library, and its tests. What reads
-/// command lines, packets and recordings is the same on all, and tested on this one. The
-/// program runs under the emulator as well: tests/peers/debian_package.py sends it packets.
+/// Lints the ray-casting library, for systems whose part of wgpu no other step compiles.
+const SIM_GPU: [&str; 3] = ["clippy", "--package", "sim-gpu"];
+
+/// What depends on the processor: the classifier as a library, and its tests. What reads command
+/// lines and packets is tested natively; tests/peers/debian_package.py emulates the program.
 const LIBRARY: [&str; 5] = ["--package", "infer-cpu", "--no-default-features", "--lib", "--tests"];
 
-/// Starts to make the binary, which takes one core minutes. What checks it waits for Cargo's
-/// lock, and makes it itself if this could not.
+/// Starts to make the binary, which takes one core minutes; what checks it waits for Cargo's lock.
 pub fn build_meanwhile() -> anyhow::Result<Meanwhile> {
     ensure!(standard_library(pi_target::TRIPLE)?.is_dir(), "there is no standard library for it");
     Meanwhile::start("build-pi", Command::new(current_exe()?).arg("build-pi"))
@@ -46,16 +47,8 @@ pub fn run(summary: &mut Summary, required: bool) {
     }
 }
 
-/// Lints the ray-casting library for a system whose part of wgpu no other step compiles.
-fn gpu_lints(target: &str, name: &str) -> anyhow::Result<Counts> {
-    let mut lints = cargo(&["clippy", "--package", "sim-gpu", "--target", target]);
-    check(name, lints.args(["--", "--deny", "warnings"]))
-}
-
-/// Lints the code that is compiled for the Raspberry Pi alone.
-fn lints(_: &mut Summary, name: &str, _: bool) -> anyhow::Result<Counts> {
-    let mut lints = pi_target::cargo(&["clippy"]);
-    check(name, lints.args(LIBRARY).args(["--", "--deny", "warnings"]))
+fn lints(name: &str, clippy: &mut Command) -> anyhow::Result<Counts> {
+    check(name, clippy.args(["--", "--deny", "warnings"]))
 }
 
 /// Tests the library with the Raspberry Pi's instructions.
