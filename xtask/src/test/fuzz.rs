@@ -21,12 +21,13 @@ const COVERAGE: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-l
      -Cllvm-args=-sanitizer-coverage-pc-table \
      -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1";
 
-/// Starts to build the targets, while other steps leave a core idle.
+/// Starts to build the targets, in the time that other steps leave a core idle.
 pub fn build_meanwhile(seconds: u32) -> Option<anyhow::Result<Meanwhile>> {
     let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
     (seconds > 0 && is_known).then(|| {
-        let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
-        build.current_dir(folder()).env("RUSTFLAGS", COVERAGE);
+        let mut build = Command::new("nice");
+        build.arg(cargo(&[]).get_program()).args(["build", "--release", "--target", TRIPLE]);
+        build.arg("--bins").current_dir(folder()).env("RUSTFLAGS", COVERAGE);
         Meanwhile::start("fuzz-build", &mut build)
     })
 }

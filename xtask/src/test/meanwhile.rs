@@ -4,7 +4,7 @@ use anyhow::Context;
 use std::fs::{self, File};
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus};
-use xtask::workspace::root;
+use xtask::workspace::{root, words};
 
 /// A command that runs, and the file of what it says.
 pub struct Meanwhile {
@@ -20,8 +20,7 @@ impl Meanwhile {
         fs::create_dir_all(folder)?;
         let output = File::create(&log).with_context(|| log.display().to_string())?;
         command.stdout(output.try_clone()?).stderr(output);
-        let program = command.get_program().display().to_string();
-        let child = command.spawn().with_context(|| format!("cannot start {program}"))?;
+        let child = command.spawn().with_context(|| format!("cannot start {}", words(command)))?;
         Ok(Self { child, log })
     }
 

@@ -33,7 +33,7 @@ const LIBRARY: [&str; 5] = ["--package", "infer-cpu", "--no-default-features", "
 /// Starts to make the binary, which takes one core minutes; what checks it waits for Cargo's lock.
 pub fn build_meanwhile() -> anyhow::Result<Meanwhile> {
     ensure!(standard_library(pi_target::TRIPLE)?.is_dir(), "there is no standard library for it");
-    Meanwhile::start("build-pi", Command::new(current_exe()?).arg("build-pi"))
+    Meanwhile::start("build-pi", Command::new("nice").arg(current_exe()?).arg("build-pi"))
 }
 
 /// Runs the checks; those that cannot run here fail where they are `required`.
