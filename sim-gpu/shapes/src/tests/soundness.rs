@@ -114,8 +114,10 @@ fn pieces(mesh: &Mesh) -> usize {
     }
     let mut pieces = 0;
     for start in 0..occupied.len() {
-        pieces += usize::from(occupied[start]);
-        clear_connected(&mut occupied, start);
+        if occupied[start] {
+            pieces += 1;
+            clear_connected(&mut occupied, start);
+        }
     }
     pieces
 }
