@@ -5,6 +5,8 @@
 
 /// The entry point: one ray per invocation.
 pub const TRACE: &str = include_str!("trace.wgsl");
+/// Rays from a sensor's beams.
+pub const AIM: &str = include_str!("aim.wgsl");
 /// The search for the nearest triangle along a ray.
 pub const TRAVERSE: &str = include_str!("traverse.wgsl");
 /// The watertight test of a ray against a triangle.

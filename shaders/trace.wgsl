@@ -3,12 +3,53 @@
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> triangles: array<LeafTriangle>;
-@group(0) @binding(2) var<storage, read> rays: array<TraceRay>;
+// A word for each ray that is made here: its beam. Eight, a `TraceRay`, for each other.
+@group(0) @binding(2) var<storage, read> rays: array<u32>;
 @group(0) @binding(3) var<storage, read_write> codes: array<u32>;
+// In the order of their first rays.
+@group(0) @binding(4) var<storage, read> views: array<View>;
+// Three words for each beam of a pattern.
+@group(0) @binding(5) var<storage, read> directions: array<i32>;
 // Buffers are used again by batches of other sizes, so their lengths do not tell
-// how many rays there are. This number comes with each dispatch, so that the
+// how much of them counts. These numbers come with each dispatch, so that the
 // bindings stay as they are.
-var<immediate> ray_count: u32;
+struct Counts {
+    rays: u32,
+    views: u32,
+}
+var<immediate> counts: Counts;
+
+// The view that ray `i` belongs to: the last that begins at it or before it.
+fn view_of(i: u32) -> View {
+    var low = 0u;
+    var high = counts.views;
+    while high - low > 1u {
+        let middle = (low + high) / 2u;
+        if views[middle].first_ray <= i {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return views[low];
+}
+
+fn sent_vector(at: u32) -> vec3f {
+    return bitcast<vec3f>(vec3u(rays[at], rays[at + 1u], rays[at + 2u]));
+}
+
+fn ray_of(i: u32) -> TraceRay {
+    let view = view_of(i);
+    let number = i - view.first_ray;
+    if view.first_direction == SENT {
+        let at = view.first_word + 8u * number;
+        let root = view.root + rays[at + 3u];
+        return TraceRay(
+            sent_vector(at), root, sent_vector(at + 4u), bitcast<f32>(rays[at + 7u]));
+    }
+    let at = 3u * (view.first_direction + rays[view.first_word + number]);
+    return aim(view, vec3i(directions[at], directions[at + 1u], directions[at + 2u]));
+}
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(
@@ -17,10 +58,10 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let i = (workgroup.y * workgroups.x + workgroup.x) * WORKGROUP_SIZE + lane;
-    if i >= ray_count {
+    if i >= counts.rays {
         return;
     }
-    let ray = rays[i];
+    let ray = ray_of(i);
     let nearest = traverse(ray);
     codes[i] = code_of(nearest, ray.skipped);
     finish(i, ray, nearest);

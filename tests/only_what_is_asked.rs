@@ -89,18 +89,7 @@ fn asked() -> Vec<Asked> {
             &[MODULE, RANDOM, &["shader, function dropout", "shader, constant dropout_"]],
         ),
         ("quantum", Effects { quantum, ..plain() }, &[]),
-        (
-            "intensity effect",
-            with_intensity(),
-            &[
-                MODULE,
-                &[
-                    "shader, function intensity",
-                    "shader, group 1 binding 2: reflectivities",
-                    "ray, bytes of reflectivities sent",
-                ],
-            ],
-        ),
+        ("intensity effect", with_intensity(), &[MODULE, &["shader, function intensity"]]),
     ];
     let asked = effects.into_iter().map(|(name, effects, own)| {
         let attributes = AttributeSet::new();

@@ -126,7 +126,7 @@ fn the_adapter_names_the_triangles_of_its_twin() {
     for_all_jobs(|name, target, pose, pattern| {
         let job = job(target, pose, pattern);
         let [on_cpu, on_gpu] = [cpu, gpu].map(|caster| cast(caster, &job));
-        rays += job.rays.len();
+        rays += job.beams.len();
         for (i, (&a, &b)) in on_cpu.codes.iter().zip(&on_gpu.codes).enumerate() {
             if a & !AMBIGUOUS == b & !AMBIGUOUS {
                 continue;
@@ -146,7 +146,7 @@ fn culling_changes_no_hit() {
         for_all_jobs(|name, target, pose, pattern| {
             let [(few, culled), (all, unculled)] = [Culling::On, Culling::Off].map(|culling| {
                 let job = job_with(target, pose, pattern, culling);
-                (job.rays.len(), hits(caster, &job, pattern))
+                (job.beams.len(), hits(caster, &job, pattern))
             });
             assert!(few <= all && all == pattern.len());
             assert_eq!(culled, unculled, "{name}, {}", caster.name());

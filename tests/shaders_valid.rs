@@ -11,12 +11,18 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use sim_gpu::bvh::{LeafTriangle, Node};
 use sim_gpu::cpu::effects::append_outputs;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
-use sim_gpu::gpu::compose;
+use sim_gpu::gpu::{View, compose};
 use sim_gpu::ray::TraceRay;
 
 /// What every variant is made of.
-const TRACE: [&str; 5] =
-    ["shared/bvh.wgsl", "shared/ray.wgsl", "intersect.wgsl", "traverse.wgsl", "trace.wgsl"];
+const TRACE: [&str; 6] = [
+    "shared/bvh.wgsl",
+    "shared/ray.wgsl",
+    "aim.wgsl",
+    "intersect.wgsl",
+    "traverse.wgsl",
+    "trace.wgsl",
+];
 
 /// All combinations of effects, and the files that each must be made of.
 fn variants() -> Vec<(Effects, Vec<&'static str>)> {
@@ -232,5 +238,22 @@ fn records_are_laid_out_alike_in_wgsl_and_rust() {
         );
         assert_same_layout!(module, LeafTriangle { a, index, b, _padding_b, c, _padding_c });
         assert_same_layout!(module, TraceRay { origin, root, direction, skipped });
+        assert_same_layout!(
+            module,
+            View {
+                turn_x,
+                root,
+                turn_y,
+                first_ray,
+                turn_z,
+                first_word,
+                origin_low,
+                first_direction,
+                origin_high,
+                reach_low,
+                reach_high,
+                reflectivity,
+            }
+        );
     }
 }

@@ -1,8 +1,6 @@
 // |cos(incidence)| times the object's reflectivity: BLAINDER's model. Counterpart:
 // `sim-gpu/src/cpu/effects.rs`.
 
-@group(1) @binding(2) var<storage, read> reflectivities: array<f32>;
-
 fn intensity(i: u32, ray: TraceRay, nearest: Nearest) -> f32 {
     let triangle = triangles[nearest.leaf];
     // Slivers and tiny triangles: scaled so that the product cannot underflow.
@@ -12,5 +10,5 @@ fn intensity(i: u32, ray: TraceRay, nearest: Nearest) -> f32 {
     e2 /= max(max(abs(e2.x), abs(e2.y)), abs(e2.z));
     let normal = cross(e1, e2);
     let cosine = abs(dot(normal, ray.direction)) / length(normal);
-    return min(cosine, 1.0) * reflectivities[i];
+    return min(cosine, 1.0) * view_of(i).reflectivity;
 }

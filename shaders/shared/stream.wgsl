@@ -4,17 +4,6 @@
 // Key in x and y, beam in z.
 @group(1) @binding(1) var<storage, read> streams: array<vec4u>;
 
-// The high half of a 64-bit product, from 16-bit halves.
-fn multiply_high(a: u32, b: u32) -> u32 {
-    let a0 = a & 0xFFFFu;
-    let a1 = a >> 16u;
-    let b0 = b & 0xFFFFu;
-    let b1 = b >> 16u;
-    let middle = a1 * b0 + ((a0 * b0) >> 16u);
-    let carry = (a0 * b1 + (middle & 0xFFFFu)) >> 16u;
-    return a1 * b1 + (middle >> 16u) + carry;
-}
-
 // Philox4x32-10: Salmon et al., SC 2011.
 fn philox(counter: vec4u, key: vec2u) -> vec4u {
     var x = counter;

@@ -106,7 +106,7 @@ pub enum RayInput {
     RandomBits,
     /// Normal deviates made of the ray's random bits.
     NormalDeviates,
-    /// The object's reflectivity: the shader's `reflectivities`.
+    /// The object's reflectivity: that of the shader's view.
     Reflectivity,
 }
 

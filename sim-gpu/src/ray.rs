@@ -1,8 +1,9 @@
 //! Rays in an object's own frame.
 
+use crate::cpu::aim::FixedFrame;
 use crate::lanes::{Avx2, LANES, Lanewise, Vectors, each, widest};
 use crate::pose::Pose;
-use crate::sensor::{BeamPattern, Cone};
+use crate::sensor::{BeamPattern, Cone, starts};
 use crate::target::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec3};
@@ -86,12 +87,29 @@ impl RayFrame {
     /// The rays of some of `pattern`'s beams.
     #[inline(always)]
     pub(crate) fn beams<const N: usize>(&self, pattern: &BeamPattern, beams: [u32; N]) -> Rays<N> {
-        let directions = each(|lane| pattern.directions[beams[lane] as usize]);
+        self.rays(&pattern.directions, &pattern.start_z_m, beams)
+    }
+
+    /// The rays of some of the beams of these directions and starts.
+    #[inline(always)]
+    fn rays<const N: usize>(
+        &self,
+        directions: &[DVec3],
+        start_z_m: &[f64],
+        beams: [u32; N],
+    ) -> Rays<N> {
+        let directions = each(|lane| directions[beams[lane] as usize]);
         let mut origin = Vectors::new([self.origin; N]);
-        if let Some(starts) = pattern.starts(beams) {
+        if let Some(starts) = starts(start_z_m, beams) {
             origin = origin + Vectors::new(starts).mapped(&self.unit_from_sensor);
         }
         Rays { origin, direction: Vectors::new(directions).mapped(&self.unit_from_sensor) }
+    }
+
+    /// This frame in whole numbers, if they are exact enough for it.
+    #[must_use]
+    pub fn fixed(&self) -> Option<FixedFrame> {
+        FixedFrame::new(self.origin, &self.unit_from_sensor, self.radius)
     }
 
     /// The cone of directions in which `pattern`'s beams may hit the object's
@@ -146,16 +164,19 @@ impl RayFrame {
         Entries::of(&Rays::one(ray), self.radius).records(root)[0]
     }
 
-    /// Those of `pattern`'s `beams` that meet the bounding sphere, or all of them,
-    /// and their records for a tree whose root is node 0.
+    /// Those of `beams`, by number among these directions and starts, that meet the
+    /// bounding sphere, or all of them, and their records for a tree whose root is node 0.
     pub(crate) fn trace_rays(
         &self,
-        pattern: &BeamPattern,
+        directions: &[DVec3],
+        start_z_m: &[f64],
         mut beams: Vec<u32>,
         all: bool,
     ) -> (Vec<u32>, Vec<TraceRay>) {
         let mut rays = vec![TraceRay::zeroed(); beams.len()];
-        let aiming = Aiming { frame: self, pattern, beams: &mut beams, rays: &mut rays, all };
+        let (of_beams, of_rays) = (&mut beams[..], &mut rays[..]);
+        let aiming =
+            Aiming { frame: self, directions, start_z_m, beams: of_beams, rays: of_rays, all };
         let kept = widest(aiming);
         beams.truncate(kept);
         rays.truncate(kept);
@@ -167,7 +188,8 @@ impl RayFrame {
 /// too, and says how many there are.
 struct Aiming<'a> {
     frame: &'a RayFrame,
-    pattern: &'a BeamPattern,
+    directions: &'a [DVec3],
+    start_z_m: &'a [f64],
     beams: &'a mut [u32],
     rays: &'a mut [TraceRay],
     all: bool,
@@ -182,7 +204,7 @@ impl Lanewise for Aiming<'_> {
         for from in (0..self.beams.len()).step_by(LANES) {
             let count = LANES.min(self.beams.len() - from);
             let beams: [u32; LANES] = each(|lane| self.beams[from + lane.min(count - 1)]);
-            let rays = self.frame.beams(self.pattern, beams);
+            let rays = self.frame.rays(self.directions, self.start_z_m, beams);
             let entries = Entries::of(&rays, self.frame.radius);
             let records = entries.records(0);
             for lane in 0..count {

@@ -13,8 +13,8 @@ pub fn rows(effects: &Effects) -> Rows {
     let target = casting::target(&meshes::icosphere(4));
     let job = casting::job(&target, &casting::at(DVec3::X * 3.0), &casting::builtin("vlp32c"));
     let mut batch = Batch::default();
-    batch.push(&job, 0..job.rays.len(), effects);
-    let n = job.rays.len() as u64;
+    batch.push(&job, 0..job.beams.len(), effects);
+    let n = job.beams.len() as u64;
     let codes = n * size_of::<u32>() as u64;
     let outputs = n * (effects.outputs_per_ray() * size_of::<f32>()) as u64;
     for caster in adapter::casters(effects) {
@@ -30,7 +30,6 @@ pub fn rows(effects: &Effects) -> Rows {
     [
         ("ray, bytes of rays sent", bytes_of(size_of_val(&batch.rays[..]))),
         ("ray, bytes of streams sent", bytes_of(size_of_val(&batch.streams[..]))),
-        ("ray, bytes of reflectivities sent", bytes_of(size_of_val(&batch.reflectivities[..]))),
         ("ray, bytes of codes read back", per_ray(codes)),
         ("ray, bytes of effect outputs read back", per_ray(outputs)),
     ]

@@ -95,7 +95,7 @@ pub fn prepare(
         };
         views.iter().zip(frames).map(aim).collect()
     });
-    let cast: usize = jobs.iter().map(|job| job.rays.len()).sum();
+    let cast: usize = jobs.iter().map(|job| job.beams.len()).sum();
     let beams: usize = views.iter().map(|view| patterns[view.set].len()).sum();
     progress.rays_cast.fetch_add(cast as u64, Relaxed);
     progress.rays_culled.fetch_add((beams - cast) as u64, Relaxed);

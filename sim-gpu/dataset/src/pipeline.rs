@@ -306,7 +306,7 @@ fn gather<'b>(prepared: &Receiver<Held<'b>>, wait_for_one: bool) -> Vec<Held<'b>
     if wait_for_one {
         batch.extend(prepared.recv());
     }
-    let rays = |held: &Held| held.prepared.jobs.iter().map(|job| job.rays.len()).sum::<usize>();
+    let rays = |held: &Held| held.prepared.jobs.iter().map(|job| job.beams.len()).sum::<usize>();
     let mut gathered: usize = batch.iter().map(rays).sum();
     while gathered < RAYS_PER_BATCH {
         let Ok(held) = prepared.try_recv() else { break };

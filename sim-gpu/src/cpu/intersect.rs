@@ -52,7 +52,10 @@ pub struct Candidates4 {
 /// over a chord of 3.5; twice that through the shear (|Sx| <= 1): 15u. The
 /// shear's own arithmetic: 8u, the rounding of Sx: 5.5u, edge functions over
 /// edges of at most 2: 8u. Together 36.5u sideways; along the ray
-/// 1.74 * 7.5u and 4u * 3.5 of the division: 27u. Both are below 48u.
+/// 1.74 * 7.5u and 4u * 3.5 of the division: 27u. Of a ray that is made in whole
+/// numbers ([`aim`](super::aim)), the origin counts 5.5u, and the direction 0.6u a unit
+/// length, 2.2u over 3.55: 10.7u where the others have 7.5u, so 43u sideways and 33u
+/// along the ray. All are below 48u.
 pub const DISPLACEMENT: f32 = 48.0 / 16_777_216.0;
 
 /// The tangent of the steepest incidence at which a range keeps its promised

@@ -1,6 +1,7 @@
 //! The CPU twins of the shaders in `shaders/`, file by file under the same
 //! names, and the f64 oracle that both are held to.
 
+pub mod aim;
 pub mod effects;
 #[cfg(target_arch = "x86_64")]
 mod f32x8;

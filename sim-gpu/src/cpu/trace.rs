@@ -83,13 +83,13 @@ fn next_packet(rays: &[TraceRay], from: usize) -> Option<(usize, &[TraceRay; PAC
 /// Casts `job` and models `effects`, on all cores.
 #[must_use]
 pub fn cast(job: &CastJob, effects: &Effects) -> Cast {
-    let codes = trace(&job.target.bvh.wide, &job.rays);
+    let codes = trace(&job.target.bvh.wide, job.rays());
     let per_ray = effects.outputs_per_ray();
     if per_ray == 0 {
         return Cast { codes, effect_outputs: Vec::new() };
     }
     let mut effect_outputs = Vec::with_capacity(codes.len() * per_ray);
-    for ((&code, &beam), ray) in codes.iter().zip(&job.beams).zip(&job.rays) {
+    for ((&code, &beam), ray) in codes.iter().zip(&job.beams).zip(job.rays()) {
         if code == MISS {
             effect_outputs.resize(effect_outputs.len() + per_ray, 0.0);
             continue;

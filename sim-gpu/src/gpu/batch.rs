@@ -1,13 +1,69 @@
 //! Many meshes and views laid side by side for one dispatch.
 
-use super::compose::{reads, reads_random_bits};
+use super::compose::reads_random_bits;
 use crate::bvh::{Bvh, LeafTriangle, Node};
-use crate::effects::{Effects, RayInput};
-use crate::job::CastJob;
-use crate::ray::TraceRay;
+use crate::cpu::aim::FixedFrame;
+use crate::effects::Effects;
+use crate::job::{Aim, CastJob, MOST_DIRECTIONS};
+use crate::sensor::Directions;
 use crate::target::Target;
+use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
+
+/// Stands for [`View::first_direction`] where the rays are sent.
+pub(super) const SENT: u32 = u32::MAX;
+
+/// How a sensor sees an object, and where its rays and beams begin in their buffers.
+/// `shaders/aim.wgsl` declares the same; a test compares size and offsets. What a
+/// [`FixedFrame`] holds is 0 where the rays are sent.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct View {
+    /// The first row of the rotation.
+    pub turn_x: [i32; 3],
+    /// The root node of the object's tree.
+    pub root: u32,
+    /// The second row of the rotation.
+    pub turn_y: [i32; 3],
+    /// The number of the first ray.
+    pub first_ray: u32,
+    /// The third row of the rotation.
+    pub turn_z: [i32; 3],
+    /// Where its word or words are.
+    pub first_word: u32,
+    /// The sensor, the low halves.
+    pub origin_low: [u32; 3],
+    /// The pattern's first beam among all directions, or `u32::MAX` where the rays are sent.
+    pub first_direction: u32,
+    /// The sensor, the high halves.
+    pub origin_high: [u32; 3],
+    /// The reach, its low half.
+    pub reach_low: u32,
+    /// The reach, its high half.
+    pub reach_high: u32,
+    /// The object's reflectivity, 0 to 1.
+    pub reflectivity: f32,
+    pub(super) _padding: [u32; 2],
+}
+
+impl From<&FixedFrame> for View {
+    fn from(fixed: &FixedFrame) -> Self {
+        let [turn_x, turn_y, turn_z] = fixed.turn;
+        let (low, high) = (|x: i64| x as u32, |x: i64| (x >> 32) as u32);
+        Self {
+            turn_x,
+            turn_y,
+            turn_z,
+            origin_low: fixed.origin.map(low),
+            origin_high: fixed.origin.map(high),
+            reach_low: low(fixed.reach),
+            reach_high: high(fixed.reach),
+            ..Self::default()
+        }
+    }
+}
 
 /// What one dispatch can hold.
 #[derive(Clone, Copy, Debug)]
@@ -34,23 +90,33 @@ pub struct Batch {
     pub nodes: Vec<Node>,
     /// Their triangles.
     pub triangles: Vec<LeafTriangle>,
-    /// The rays of all jobs, one job after another.
-    pub rays: Vec<TraceRay>,
+    /// The rays of all jobs, one job after another: eight words for each that is sent,
+    /// its beam for each that the shader makes.
+    pub rays: Vec<u32>,
+    /// How many rays these are.
+    pub n_rays: usize,
+    /// A view for each job, or part of one.
+    pub views: Vec<View>,
+    /// The directions of each pattern whose beams are among the rays.
+    pub directions: Vec<Directions>,
     /// Key, key, beam and nothing per ray; empty unless an effect reads it.
     pub streams: Vec<[u32; 4]>,
-    /// Reflectivity per ray; empty unless an effect reads it.
-    pub reflectivities: Vec<f32>,
     bases: HashMap<*const Bvh, u32>,
 }
 
 impl Batch {
-    /// Whether `rays` more rays of `target` fit beside what is here. What fits
+    /// Whether `rays` more rays of `job` fit beside what is here. What fits
     /// no batch at all is for the caller to keep away.
     #[must_use]
-    pub fn has_room(&self, target: &Target, rays: usize, limits: &BatchLimits) -> bool {
-        if self.rays.len() + rays > limits.rays {
+    pub fn has_room(&self, job: &CastJob, rays: usize, limits: &BatchLimits) -> bool {
+        let view_bytes = (self.views.len() + 1) * size_of::<View>();
+        if self.n_rays + rays > limits.rays
+            || view_bytes > limits.binding_bytes
+            || !self.has_room_for_directions(job)
+        {
             return false;
         }
+        let target = &job.target;
         self.bases.contains_key(&Arc::as_ptr(&target.bvh)) || {
             let nodes = self.nodes.len() + target.bvh.nodes.len();
             let triangles = self.triangles.len() + target.bvh.triangles.len();
@@ -59,18 +125,48 @@ impl Batch {
         }
     }
 
+    /// Whether the directions that the rays of `job` are made from fit, if they are not here.
+    fn has_room_for_directions(&self, job: &CastJob) -> bool {
+        let Aim::ByCaster { directions, .. } = &job.aim else { return true };
+        let is_here = self.directions.iter().any(|here| here.is_shared_with(directions));
+        let others: usize = self.directions.iter().map(|here| here.len()).sum();
+        is_here || others + directions.len() <= MOST_DIRECTIONS
+    }
+
     /// Adds rays `range` of `job`.
-    pub fn push(&mut self, job: &CastJob, range: std::ops::Range<usize>, effects: &Effects) {
+    pub fn push(&mut self, job: &CastJob, range: Range<usize>, effects: &Effects) {
+        let view = match &job.aim {
+            Aim::Rays(_) => View { first_direction: SENT, ..View::default() },
+            Aim::ByCaster { fixed, directions, .. } => {
+                View { first_direction: self.first_direction(directions), ..fixed.into() }
+            }
+        };
         let root = self.root_of(&job.target);
-        let rays = &job.rays[range.clone()];
-        self.rays.extend(rays.iter().map(|ray| TraceRay { root: ray.root + root, ..*ray }));
+        let (first_ray, first_word) = (self.n_rays as u32, self.rays.len() as u32);
+        let reflectivity = job.reflectivity;
+        self.views.push(View { root, first_ray, first_word, reflectivity, ..view });
+        self.rays.extend_from_slice(match &job.aim {
+            Aim::Rays(rays) => bytemuck::cast_slice(&rays[range.clone()]),
+            Aim::ByCaster { .. } => &job.beams[range.clone()],
+        });
+        self.n_rays += range.len();
         if reads_random_bits(effects) {
             let [low, high] = job.stream.0;
             self.streams.extend(job.beams[range].iter().map(|&beam| [low, high, beam, 0]));
         }
-        if reads(effects, RayInput::Reflectivity) {
-            self.reflectivities.resize(self.rays.len(), job.reflectivity);
+    }
+
+    /// Where `directions` start among all; they are added once.
+    fn first_direction(&mut self, directions: &Directions) -> u32 {
+        let mut first = 0;
+        for here in &self.directions {
+            if here.is_shared_with(directions) {
+                return first;
+            }
+            first += here.len() as u32;
         }
+        self.directions.push(directions.clone());
+        first
     }
 
     /// Where the tree of `target` starts; it is copied here once.

@@ -2,7 +2,9 @@
 //! `edgepuck_shaders`. A variant holds the sources of the effects that it
 //! models and no others.
 
+use super::batch::SENT;
 use crate::bvh::MAX_DEPTH;
+use crate::cpu::aim::BEFORE;
 use crate::cpu::intersect::{DISPLACEMENT, STEEPEST};
 use crate::cpu::traverse::{ACCURACY, FAR_SCALE, LEAST_COMPONENT};
 use crate::effects::{Effects, RayEffect, RayInput};
@@ -13,8 +15,14 @@ use edgepuck_shaders as shaders;
 pub(super) const WORKGROUP_SIZE: usize = 64;
 
 /// What every variant holds.
-const TRACE: [&str; 5] =
-    [shaders::BVH, shaders::RAY, shaders::INTERSECT, shaders::TRAVERSE, shaders::TRACE];
+const TRACE: [&str; 6] = [
+    shaders::BVH,
+    shaders::RAY,
+    shaders::AIM,
+    shaders::INTERSECT,
+    shaders::TRAVERSE,
+    shaders::TRACE,
+];
 
 /// The WGSL of the variant that traces rays and models `effects`.
 #[must_use]
@@ -42,7 +50,7 @@ pub fn compose(effects: &Effects) -> String {
 }
 
 /// Whether any of `effects` reads `input`.
-pub(super) fn reads(effects: &Effects, input: RayInput) -> bool {
+fn reads(effects: &Effects, input: RayInput) -> bool {
     effects.per_ray().any(|effect| effect.input() == input)
 }
 
@@ -54,7 +62,7 @@ pub(super) fn reads_random_bits(effects: &Effects) -> bool {
 
 /// The constants that shaders share with their counterparts, which document
 /// them.
-fn constants() -> String {
+pub(super) fn constants() -> String {
     let floats = [
         ("ACCURACY", ACCURACY),
         ("DISPLACEMENT", DISPLACEMENT),
@@ -66,13 +74,14 @@ fn constants() -> String {
     let whole = [
         ("AMBIGUOUS", AMBIGUOUS),
         ("MISS", MISS),
+        ("SENT", SENT),
         ("STACK_SIZE", MAX_DEPTH as u32),
         ("WORKGROUP_SIZE", WORKGROUP_SIZE as u32),
     ];
     // Debug formatting of f32 is the shortest text that reads back the same.
     let floats = floats.map(|(name, value)| format!("const {name}: f32 = {value:?};\n"));
     let whole = whole.map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
-    floats.concat() + &whole.concat()
+    floats.concat() + &whole.concat() + &format!("const BEFORE: i32 = {BEFORE};\n")
 }
 
 fn source(effect: &RayEffect) -> &'static str {

@@ -1,6 +1,8 @@
 //! Casting on a GPU, or on software Vulkan, through wgpu.
 
 mod adapter;
+#[cfg(test)]
+mod aim_tests;
 mod batch;
 mod caster;
 mod clock;
@@ -10,6 +12,6 @@ mod slot;
 
 pub use adapter::{AdapterKind, AdapterSummary, list_adapters};
 pub(crate) use adapter::{adapters, find_adapter, kind};
-pub use batch::{Batch, BatchLimits};
+pub use batch::{Batch, BatchLimits, View};
 pub use caster::{GpuCaster, Pending};
 pub use compose::compose;

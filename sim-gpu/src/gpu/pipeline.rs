@@ -1,7 +1,7 @@
 //! A device with the shader variant of one set of effects compiled on it.
 
-use super::compose::{compose, reads, reads_random_bits};
-use crate::effects::{Effects, RayInput};
+use super::compose::{compose, reads_random_bits};
+use crate::effects::Effects;
 
 /// A device, its queue and the compiled shader.
 pub(super) struct Pipeline {
@@ -24,12 +24,11 @@ impl Pipeline {
                 entries,
             })
         };
-        let trace = [storage(0, true), storage(1, true), storage(2, true), storage(3, false)];
+        let trace = [0, 1, 2, 3, 4, 5].map(|binding| storage(binding, binding != CODES));
         let trace_layout = layout("trace", &trace);
         let effects_layout = effects.per_ray().next().map(|_| {
             let mut entries = vec![storage(0, false)];
             entries.extend(reads_random_bits(effects).then(|| storage(1, true)));
-            entries.extend(reads(effects, RayInput::Reflectivity).then(|| storage(2, true)));
             layout("effects", &entries)
         });
         let groups: Vec<_> = [Some(&trace_layout), effects_layout.as_ref()]
@@ -42,8 +41,8 @@ impl Pipeline {
             layout: Some(&device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some("trace"),
                 bind_group_layouts: &groups,
-                // The number of rays.
-                immediate_size: size_of::<u32>() as u32,
+                // The numbers of rays and views.
+                immediate_size: size_of::<[u32; 2]>() as u32,
             })),
             module: &device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some("trace"),
@@ -61,6 +60,9 @@ impl Pipeline {
         Self { device, queue, compute, trace_layout, effects_layout, effects }
     }
 }
+
+/// The binding of group 0 that the shader writes to.
+const CODES: u32 = 3;
 
 fn storage(binding: u32, read_only: bool) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {

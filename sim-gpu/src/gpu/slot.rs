@@ -3,9 +3,10 @@
 
 use super::batch::Batch;
 use super::clock::Clock;
-use super::compose::{WORKGROUP_SIZE, reads, reads_random_bits};
+use super::compose::{WORKGROUP_SIZE, reads_random_bits};
 use super::pipeline::Pipeline;
-use crate::effects::RayInput;
+use crate::cpu::aim::fixed_direction;
+use crate::sensor::Directions;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 const INPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST);
@@ -66,12 +67,15 @@ pub(super) struct Slot {
     nodes: Growing,
     triangles: Growing,
     rays: Growing,
+    views: Growing,
+    directions: Growing,
     codes: Growing,
     outputs: Growing,
     streams: Growing,
-    reflectivities: Growing,
     codes_readback: Growing,
     outputs_readback: Growing,
+    /// What the buffer of directions holds.
+    patterns: Vec<Directions>,
     bind_groups: Option<BindGroups>,
     clock: Option<Clock>,
     answer: AnswerBytes,
@@ -103,12 +107,14 @@ impl Slot {
             nodes: Growing::new("nodes", INPUT),
             triangles: Growing::new("triangles", INPUT),
             rays: Growing::new("rays", INPUT),
+            views: Growing::new("views", INPUT),
+            directions: Growing::new("directions", INPUT),
             codes: Growing::new("codes", OUTPUT),
             outputs: Growing::new("effect outputs", OUTPUT),
             streams: Growing::new("streams", INPUT),
-            reflectivities: Growing::new("reflectivities", INPUT),
             codes_readback: Growing::new("codes, read back", READBACK),
             outputs_readback: Growing::new("effect outputs, read back", READBACK),
+            patterns: Vec::new(),
             bind_groups: None,
             clock: if timed { Clock::new(pipeline) } else { None },
             answer: AnswerBytes::default(),
@@ -136,10 +142,10 @@ impl Slot {
         if let Some(effects) = effects {
             pass.set_bind_group(1, effects, &[]);
         }
-        let n_rays = batch.rays.len();
-        let ray_count = u32::try_from(n_rays).expect("invariant: a batch holds at most 2^22 rays");
-        pass.set_immediates(0, bytemuck::bytes_of(&ray_count));
-        let [x, y] = workgroups(n_rays, &device.limits());
+        // At most 2^22 rays, and a view for each.
+        let counts = [batch.n_rays as u32, batch.views.len() as u32];
+        pass.set_immediates(0, bytemuck::bytes_of(&counts));
+        let [x, y] = workgroups(batch.n_rays, &device.limits());
         pass.dispatch_workgroups(x, y, 1);
         drop(pass);
         self.read_back(pipeline, encoder);
@@ -149,12 +155,14 @@ impl Slot {
     /// another one now.
     fn upload(&mut self, pipeline: &Pipeline, batch: &Batch) -> bool {
         let Pipeline { device, effects, .. } = pipeline;
-        let n_rays = batch.rays.len();
+        let n_rays = batch.n_rays;
         self.answer.codes = (n_rays * size_of::<u32>()) as u64;
         self.answer.outputs = (n_rays * effects.outputs_per_ray() * size_of::<f32>()) as u64;
         let mut grown = self.nodes.upload(pipeline, bytemuck::cast_slice(&batch.nodes));
         grown |= self.triangles.upload(pipeline, bytemuck::cast_slice(&batch.triangles));
         grown |= self.rays.upload(pipeline, bytemuck::cast_slice(&batch.rays));
+        grown |= self.views.upload(pipeline, bytemuck::cast_slice(&batch.views));
+        grown |= self.upload_directions(pipeline, &batch.directions);
         grown |= self.codes.reserve(device, self.answer.codes);
         if self.answer.outputs > 0 {
             grown |= self.outputs.reserve(device, self.answer.outputs);
@@ -162,11 +170,20 @@ impl Slot {
         if reads_random_bits(effects) {
             grown |= self.streams.upload(pipeline, bytemuck::cast_slice(&batch.streams));
         }
-        if reads(effects, RayInput::Reflectivity) {
-            let reflectivities = bytemuck::cast_slice(&batch.reflectivities);
-            grown |= self.reflectivities.upload(pipeline, reflectivities);
-        }
         grown
+    }
+
+    /// Uploads the directions of `patterns`, unless they are there since an earlier batch.
+    fn upload_directions(&mut self, pipeline: &Pipeline, patterns: &[Directions]) -> bool {
+        let is_there = |(here, wanted): (&Directions, &Directions)| here.is_shared_with(wanted);
+        let are_there = self.patterns.len() >= patterns.len()
+            && self.patterns.iter().zip(patterns).all(is_there);
+        if are_there && self.directions.buffer.is_some() {
+            return false;
+        }
+        let fixed: Vec<[i32; 3]> = patterns.iter().flatten().map(|&d| fixed_direction(d)).collect();
+        self.patterns = patterns.to_vec();
+        self.directions.upload(pipeline, bytemuck::cast_slice(&fixed))
     }
 
     fn bind(&self, pipeline: &Pipeline) -> BindGroups {
@@ -182,13 +199,12 @@ impl Slot {
                 entries: &entries,
             })
         };
-        let trace = [&self.nodes, &self.triangles, &self.rays, &self.codes];
+        let inputs = [&self.nodes, &self.triangles, &self.rays];
+        let trace = inputs.into_iter().chain([&self.codes, &self.views, &self.directions]);
         let trace: Vec<_> = (0..).zip(trace).collect();
         let effects = &pipeline.effects;
         let mut read_by_effects = vec![(0, &self.outputs)];
         read_by_effects.extend(reads_random_bits(effects).then_some((1, &self.streams)));
-        let reads_reflectivity = reads(effects, RayInput::Reflectivity);
-        read_by_effects.extend(reads_reflectivity.then_some((2, &self.reflectivities)));
         BindGroups {
             trace: group("trace", &pipeline.trace_layout, &trace),
             effects: pipeline

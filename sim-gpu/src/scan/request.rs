@@ -122,8 +122,8 @@ impl<'a> ScanRequest<'a> {
         let frame = self.frame(placed);
         let stream = stream.unwrap_or(self.stream);
         let (target, reflectivity) = ((*target).clone(), *reflectivity);
-        let (beams, rays) = aim(&frame, self.pattern, self.culling, is_wanted);
-        CastJob { target, frame, beams, rays, stream, reflectivity }
+        let (beams, aim) = aim(&frame, self.pattern, self.culling, is_wanted);
+        CastJob { target, frame, beams, aim, stream, reflectivity }
     }
 
     /// A distance within which no beam meets `placed`, metres.

@@ -14,7 +14,8 @@ use crate::config::{self, ConfigError, InvalidValue};
 
 pub use cone::Cone;
 pub use grid::Grid;
-pub use pattern::BeamPattern;
+pub(crate) use pattern::starts;
+pub use pattern::{BeamPattern, Directions};
 pub use rings::{Rings, polar_angle_rad};
 pub use rotating::{Beam, Rotating};
 pub use sample::Sample;

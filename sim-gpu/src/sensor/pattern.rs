@@ -2,6 +2,8 @@
 
 use crate::lanes::each;
 use glam::DVec3;
+use std::ops::Deref;
+use std::sync::Arc;
 
 use super::coherence::coherent_order;
 use super::cone::{BlockCone, Cone};
@@ -11,11 +13,40 @@ const BLOCK_RAYS: usize = 64;
 /// Blocks of one group share a bounding cone.
 const GROUP_BLOCKS: usize = 32;
 
+/// Unit vectors. A clone shares them, so that a caster knows them again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Directions(Arc<[DVec3]>);
+
+impl Directions {
+    /// Whether these are the same vectors in memory.
+    #[must_use]
+    pub fn is_shared_with(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl Deref for Directions {
+    type Target = [DVec3];
+
+    fn deref(&self) -> &[DVec3] {
+        &self.0
+    }
+}
+
+impl<'a> IntoIterator for &'a Directions {
+    type Item = &'a DVec3;
+    type IntoIter = std::slice::Iter<'a, DVec3>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.iter()
+    }
+}
+
 /// The rays of one revolution or image, in firing order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeamPattern {
     /// Unit vectors in the sensor frame, `[n_rays]`.
-    pub directions: Vec<DVec3>,
+    pub directions: Directions,
     /// Rank by elevation, 0 from below; for a camera the row from below,
     /// `[n_rays]`.
     pub ring: Vec<u16>,
@@ -44,6 +75,7 @@ impl BeamPattern {
         let bound = |rays: &[u32]| BlockCone::around(rays.iter().map(|&i| directions[i as usize]));
         let blocks = order.chunks(BLOCK_RAYS).map(bound).collect();
         let groups = order.chunks(BLOCK_RAYS * GROUP_BLOCKS).map(bound).collect();
+        let directions = Directions(directions.into());
         Self { directions, ring, time_s, start_z_m: Vec::new(), order, blocks, groups }
     }
 
@@ -51,15 +83,7 @@ impl BeamPattern {
     /// is the sensor itself.
     #[must_use]
     pub fn start(&self, beam: u32) -> Option<DVec3> {
-        self.starts([beam]).map(|[start]| start)
-    }
-
-    /// Where these rays start, in the sensor frame, metres; `None` where all rays
-    /// start at the sensor itself.
-    #[inline(always)]
-    pub(crate) fn starts<const N: usize>(&self, beams: [u32; N]) -> Option<[DVec3; N]> {
-        let start = |lane: usize| DVec3::new(0.0, 0.0, self.start_z_m[beams[lane] as usize]);
-        (!self.start_z_m.is_empty()).then(|| each(start))
+        starts(&self.start_z_m, [beam]).map(|[start]| start)
     }
 
     /// How far from the sensor a ray starts at most, metres.
@@ -106,4 +130,12 @@ impl BeamPattern {
         }
         found
     }
+}
+
+/// Where these rays start, by [`BeamPattern::start_z_m`], in the sensor frame, metres; `None`
+/// where all rays start at the sensor itself.
+#[inline(always)]
+pub(crate) fn starts<const N: usize>(start_z_m: &[f64], beams: [u32; N]) -> Option<[DVec3; N]> {
+    let start = |lane: usize| DVec3::new(0.0, 0.0, start_z_m[beams[lane] as usize]);
+    (!start_z_m.is_empty()).then(|| each(start))
 }

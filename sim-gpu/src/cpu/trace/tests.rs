@@ -36,7 +36,7 @@ fn revolutions(target: &Target) -> Vec<TraceRay> {
         let pose = Pose::look_at(place, DVec3::new(0.1, 0.2, 0.0)).unwrap();
         let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, &pose);
         let stream = StreamKey::new(1, "trace", 0);
-        CastJob::aim(target.clone(), frame, &pattern, Culling::Off, stream, 1.0).rays
+        CastJob::aim(target.clone(), frame, &pattern, Culling::Off, stream, 1.0).rays().to_vec()
     };
     places.into_iter().flat_map(aim).collect()
 }

@@ -38,7 +38,7 @@ pub fn watertight_in_f32(ray_set: &RaySet) -> Vec<Option<f64>> {
 fn in_f32(ray_set: &RaySet, nearest: impl Fn(&TraceRay) -> Option<f32> + Sync) -> Vec<Option<f64>> {
     let scale = ray_set.job.target.surface.frame.scale;
     let range = |ray: &TraceRay| nearest(ray).map(|t| f64::from(ray.skipped + t) * scale);
-    ray_set.job.rays.par_iter().map(range).collect()
+    ray_set.job.rays().par_iter().map(range).collect()
 }
 
 /// Distance to the nearest triangle along `ray` from its origin, unit lengths; infinite if

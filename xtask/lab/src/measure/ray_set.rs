@@ -3,7 +3,7 @@
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3, dvec3};
 use sim_gpu::cpu::oracle;
-use sim_gpu::job::{Cast, CastJob, Culling};
+use sim_gpu::job::{Aim, Cast, CastJob, Culling};
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::{AMBIGUOUS, MISS, Ray, RayFrame};
 use sim_gpu::sensor::{BeamPattern, Sensor};
@@ -73,7 +73,7 @@ impl RaySet {
             target: target.clone(),
             frame,
             beams: (0..rays.len() as u32).collect(),
-            rays: rays.iter().map(|ray| frame.trace_ray_unculled(ray, 0)).collect(),
+            aim: Aim::Rays(rays.iter().map(|ray| frame.trace_ray_unculled(ray, 0)).collect()),
             stream: StreamKey::new(SEED, "points", 0),
             reflectivity: 1.0,
         };
@@ -84,7 +84,7 @@ impl RaySet {
     pub fn only(&self, numbers: &[usize]) -> Self {
         let mut ray_set = self.clone();
         ray_set.rays = numbers.iter().map(|&i| self.rays[i]).collect();
-        ray_set.job.rays = numbers.iter().map(|&i| self.job.rays[i]).collect();
+        ray_set.job.aim = Aim::Rays(numbers.iter().map(|&i| self.job.rays()[i]).collect());
         ray_set.job.beams = numbers.iter().map(|&i| self.job.beams[i]).collect();
         ray_set
     }

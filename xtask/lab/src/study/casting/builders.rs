@@ -67,7 +67,7 @@ fn at(
     let ray_sets = views(&sah, pattern, rays);
     let through = |target: &Target| {
         let bvh = &target.bvh;
-        let codes = |set: &RaySet| trace::trace(&bvh.wide, &set.job.rays);
+        let codes = |set: &RaySet| trace::trace(&bvh.wide, set.job.rays());
         ray_sets.iter().map(codes).collect::<Vec<_>>()
     };
     let mut workloads = [

@@ -88,7 +88,7 @@ fn on(bench_mesh: &BenchMesh, backends: &[Backend], rounds: usize) -> Result<Sim
     let mut costs = interleave(rounds, &mut workloads)?.into_iter();
     let mut next = || costs.next().unwrap_or_default();
     let (simplify, build) = (next(), [next(), next()]);
-    let rays = jobs[0].iter().map(|job| job.rays.len()).sum();
+    let rays = jobs[0].iter().map(|job| job.beams.len()).sum();
     let traces = backends.iter().map(|backend| Traced {
         adapter: backend.name().to_owned(),
         rays,

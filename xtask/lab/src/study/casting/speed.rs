@@ -111,7 +111,7 @@ fn traces(
         fits
     };
     let backends: Vec<&Backend> = backends.iter().filter(fitting).collect();
-    let copies = |backend: &Backend| backend.rays.div_ceil(job.rays.len().max(1));
+    let copies = |backend: &Backend| backend.rays.div_ceil(job.beams.len().max(1));
     let copied = |backend: &Backend| vec![job.clone(); copies(backend)];
     let mut workloads: Vec<Workload<'_>> =
         backends.iter().map(|backend| casting(backend, copied(backend))).collect();
@@ -122,7 +122,7 @@ fn traces(
             triangles: job.target.surface.len(),
             rays_from,
             adapter: backend.name().to_owned(),
-            rays: copies(backend) * job.rays.len(),
+            rays: copies(backend) * job.beams.len(),
             beams: copies(backend) * beams,
             hits: copies(backend) * hits,
             costs,
