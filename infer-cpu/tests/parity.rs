@@ -119,14 +119,17 @@ fn narrow_networks_give_pytorch_s_logits_with_and_without_t_nets() {
 #[test]
 fn threads_change_nothing() {
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/tiny.safetensors");
+    // Threads share work alike on all processors; kernels get other rows of it.
+    let teams: &[usize] = if IS_EMULATED { &[1, 3] } else { &[1, 2, 3, 8] };
     for precision in Precision::ALL {
         for n in [1, 49, 1057, 3000] {
             let cloud: Vec<_> = (0..n).map(golden_point).collect();
-            let logits = [1, 2, 3, 8].map(|threads| {
+            let logits = teams.iter().map(|&threads| {
                 let options = Options { precision, threads, ..Options::default() };
                 let mut classifier = Classifier::load(&model, &options).unwrap();
                 classifier.classify(&cloud).unwrap().logits.clone()
             });
+            let logits: Vec<_> = logits.collect();
             assert!(logits.iter().all(|other| *other == logits[0]), "{precision} {n}");
         }
     }
