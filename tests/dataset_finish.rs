@@ -1,7 +1,7 @@
 //! A finished dataset is complete, the same however often it was finished, and
 //! says what was done to it since.
 
-use edgepuck_dataset::config::Layout;
+use edgepuck_dataset::config::{DatasetConfig, Layout};
 use edgepuck_dataset::finish::finish;
 use edgepuck_dataset::journal::{Journal, Terms};
 use edgepuck_dataset::manifest::{Manifest, Poses};
@@ -11,6 +11,7 @@ use edgepuck_dataset::record::Entry;
 use edgepuck_dataset::verify::verify;
 use edgepuck_dataset::{DatasetError, MeshFailure, check_layouts, layout};
 use formats::Split::{Test, Train};
+use formats::hash::Hashing;
 use formats::labelled::read_labelled;
 use sim_gpu::caster::Caster;
 use sim_gpu::job::Culling;
@@ -38,7 +39,11 @@ fn failures() -> Vec<MeshFailure> {
 }
 
 fn make(out: &Path) -> Manifest {
-    let terms = terms(config(), None);
+    make_hashed(out, Hashing::default())
+}
+
+fn make_hashed(out: &Path, hash: Hashing) -> Manifest {
+    let terms = terms(DatasetConfig { hash, ..config() }, None);
     let records = write(out, &terms, &entries());
     finish(out, &terms, records, failures()).expect("a dataset")
 }
@@ -233,6 +238,31 @@ fn what_was_done_to_a_dataset_is_named() {
 }
 
 #[test]
+fn files_are_hashed_as_was_asked() {
+    for (hash, keys, said) in [
+        (Hashing::Sha256, ["sha256"].as_slice(), Some("was changed: its SHA-256 is ")),
+        (Hashing::Blake3, &["hash", "blake3"], Some("was changed: its BLAKE3 is ")),
+        (Hashing::None, &["hash"], None),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path();
+        make_hashed(out, hash);
+        let manifest = fs::read_to_string(layout::manifest(out)).unwrap();
+        for key in ["sha256", "blake3", "hash"] {
+            assert_eq!(manifest.contains(&format!("\"{key}\": ")), keys.contains(&key), "{key}");
+        }
+        // Text stays readable, and keeps its lines: a hash alone tells.
+        let path = out.join("rotational/clean/chair/train/chair_0_v1.csv");
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replacen('x', "y", 1)).unwrap();
+        let report = verify(out).unwrap();
+        let found: Vec<&str> = report.problems.iter().map(|problem| &problem.what[..]).collect();
+        assert_eq!((report.hash, found.len()), (hash, usize::from(said.is_some())), "{found:?}");
+        assert!(found.iter().zip(said).all(|(found, said)| found.starts_with(said)), "{found:?}");
+    }
+}
+
+#[test]
 fn what_is_no_finished_dataset_is_found_out() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
@@ -255,6 +285,8 @@ fn what_is_no_finished_dataset_is_found_out() {
     };
     let message = refused(&|manifest| manifest.tool = "other".to_owned());
     assert!(message.ends_with("made by `other`, not by `edgepuck`"), "{message}");
+    let message = refused(&|manifest| manifest.packed[0].hash = None);
+    assert!(message.ends_with("expected the hash sha256 of every file, found none"), "{message}");
     for name in ["..", "a/b", "/etc", r"a\b", ""] {
         for message in [
             refused(&|manifest| manifest.meshes[0].entry.name = name.to_owned()),

@@ -5,6 +5,7 @@
 use std::num::NonZeroU32;
 
 use formats::Scan;
+use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use formats::vlp32c::{BEAM_CROSSING_M, Returns, Revolution, write};
@@ -100,7 +101,7 @@ fn decode(capture: &[u8], returns: Returns, head: &Rotating) -> Vec<Decoded> {
 fn packets_of(sensor: &Sensor, returns: Returns, scan: &Scan) -> Vec<Decoded> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.pcap");
-    write(&path, &revolution(sensor).unwrap(), returns, scan).unwrap();
+    write(&path, Hashing::None, &revolution(sensor).unwrap(), returns, scan).unwrap();
     decode(&std::fs::read(&path).unwrap(), returns, head_of(&mut sensor.clone()))
 }
 

@@ -8,6 +8,7 @@ use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_scenes::{Generation, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::atomic;
+use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -113,7 +114,7 @@ pub(crate) fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
 fn save(stage: &Stage, done: &Generation, out: &Path) -> anyhow::Result<()> {
     let name = format!("sweeps/{:06}", done.scene.number);
     let file = out.join(format!("{name}.npz"));
-    write_scan(&file, ScanFormat::Npz, &done.sweep.scan)?;
+    write_scan(&file, ScanFormat::Npz, Hashing::None, &done.sweep.scan)?;
     let json = serde_json::to_vec_pretty(&description(stage, done)).context("writing JSON")?;
     atomic::write_bytes(&out.join(format!("{name}.json")), json)?;
     Ok(())

@@ -4,6 +4,7 @@ use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, flags};
 use anyhow::Context;
 use formats::atomic;
+use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::{self, Returns};
 use sim_gpu::packets;
@@ -78,10 +79,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         match format {
             ScanFormat::Pcap => {
                 let revolution = packets::revolution(&asked.sensor)?;
-                vlp32c::write(&file, &revolution, args.returns.unwrap_or_default(), scan)?;
+                let returns = args.returns.unwrap_or_default();
+                vlp32c::write(&file, Hashing::None, &revolution, returns, scan)?;
             }
             _ => {
-                write_scan(&file, format, scan)?;
+                write_scan(&file, format, Hashing::None, scan)?;
             }
         }
         eprintln!(

@@ -8,9 +8,12 @@ use tempfile::SpooledTempFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 
+#[cfg(feature = "dataset")]
 use crate::atomic;
 use crate::decoding::invalid;
 use crate::error::FormatError;
+#[cfg(feature = "dataset")]
+use crate::hash::{FileHash, Hashing};
 use crate::npy::{self, Header};
 use crate::number::Number;
 
@@ -90,20 +93,22 @@ pub(crate) fn waiting_room(folder: &Path) -> SpooledTempFile {
 }
 
 /// Writes the archive whose arrays `fill` writes to `path`, atomically, and returns
-/// the SHA-256 of the file.
+/// the hash of the file that `hashing` asks for.
 ///
 /// The head of an entry is patched once the entry is complete, while a file that is
 /// hashed as it is written takes its bytes in order: the archive waits till it is
 /// whole.
+#[cfg(feature = "dataset")]
 pub(crate) fn write_archive(
     path: &Path,
+    hashing: Hashing,
     fill: impl FnOnce(&mut NpzWriter<&mut SpooledTempFile>) -> io::Result<()>,
-) -> Result<String, FormatError> {
+) -> Result<Option<FileHash>, FormatError> {
     let here = |source| FormatError::io(path, source);
     let mut archive = waiting_room(atomic::make_folder_of(path)?);
     NpzWriter::write(&mut archive, fill).map_err(here)?;
     archive.rewind().map_err(here)?;
-    atomic::write_hashed(path, |writer| io::copy(&mut archive, writer).map(drop))
+    atomic::write_hashed(path, hashing, |writer| io::copy(&mut archive, writer).map(drop))
 }
 
 /// An archive that is being read. Its errors name the file and the key.

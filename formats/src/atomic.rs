@@ -5,16 +5,17 @@
 //! file under its final name. Nothing is synced to the disk: that guards
 //! against a power cut, and would cost more than writing a small scan.
 
+#[cfg(feature = "dataset")]
 use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest, Sha256};
 use tempfile::{NamedTempFile, TempPath};
 
 use crate::error::FormatError;
-use crate::hash::{HashedFile, hexadecimal};
+#[cfg(feature = "dataset")]
+use crate::hash::{FileHash, HashedFile, Hasher, Hashing};
 
 const PREFIX: &str = ".edgepuck-";
 const SUFFIX: &str = ".tmp";
@@ -35,25 +36,29 @@ pub fn write(
     write_through(path, |file| file, fill, drop)
 }
 
-/// As [`write()`], and returns the SHA-256 of the file in hexadecimal digits.
+/// As [`write()`], and returns the hash of the file that `hashing` asks for.
 /// Bytes are hashed while they are written, in order: nothing is read back.
 ///
 /// # Errors
 /// As [`write()`].
+#[cfg(feature = "dataset")]
 pub fn write_hashed(
     path: &Path,
+    hashing: Hashing,
     fill: impl FnOnce(&mut BufWriter<HashingFile>) -> io::Result<()>,
-) -> Result<String, FormatError> {
-    let hashing = |file| HashingFile { file, hash: Sha256::new() };
-    write_through(path, hashing, fill, |written| hexadecimal(&written.hash.finalize()))
+) -> Result<Option<FileHash>, FormatError> {
+    let open = |file| HashingFile { file, hash: Hasher::new(hashing) };
+    write_through(path, open, fill, |written| written.hash.finish())
 }
 
 /// A file that is hashed while it is written.
+#[cfg(feature = "dataset")]
 pub struct HashingFile {
     file: File,
-    hash: Sha256,
+    hash: Hasher,
 }
 
+#[cfg(feature = "dataset")]
 impl Write for HashingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.file.write(bytes)?;
@@ -147,14 +152,16 @@ pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FormatErr
 }
 
 /// Writes `lines` to `path`, atomically.
+#[cfg(feature = "dataset")]
 pub(crate) fn write_lines(
     path: PathBuf,
+    hashing: Hashing,
     lines: impl IntoIterator<Item = impl Display>,
 ) -> Result<HashedFile, FormatError> {
-    let sha256 = write_hashed(&path, |writer| {
+    let hash = write_hashed(&path, hashing, |writer| {
         lines.into_iter().try_for_each(|line| writeln!(writer, "{line}"))
     })?;
-    Ok(HashedFile { path, sha256 })
+    Ok(HashedFile { path, hash })
 }
 
 /// The folder that holds `path`, made if it is missing.
@@ -259,24 +266,27 @@ mod tests {
         assert_eq!(names(folder.path()), ["scan.bin"]);
     }
 
+    #[cfg(feature = "dataset")]
     #[test]
     fn a_file_is_hashed_as_it_is_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scan.bin");
         // More than one buffer, in pieces of many lengths.
         let bytes: Vec<u8> = (0..100_000u32).map(|i| (i.wrapping_mul(i) >> 3) as u8).collect();
-        let sha256 = write_hashed(&path, |writer| {
-            let mut rest = &bytes[..];
-            for length in (1..).take_while(|length| length * (length + 1) / 2 <= bytes.len()) {
-                let (piece, others) = rest.split_at(length);
-                writer.write_all(piece)?;
-                rest = others;
-            }
-            writer.write_all(rest)
-        })
-        .unwrap();
-        assert_eq!(fs::read(&path).unwrap(), bytes);
-        assert_eq!(sha256, crate::hash::of_file(&path).unwrap());
+        for hashing in Hashing::ALL {
+            let hash = write_hashed(&path, hashing, |writer| {
+                let mut rest = &bytes[..];
+                for length in (1..).take_while(|length| length * (length + 1) / 2 <= bytes.len()) {
+                    let (piece, others) = rest.split_at(length);
+                    writer.write_all(piece)?;
+                    rest = others;
+                }
+                writer.write_all(rest)
+            })
+            .unwrap();
+            assert_eq!(fs::read(&path).unwrap(), bytes);
+            assert_eq!(hash, hashing.of_file(&path).unwrap());
+        }
     }
 
     #[test]

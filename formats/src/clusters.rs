@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 
 use crate::archive::write_archive;
 use crate::error::FormatError;
+use crate::hash::Hashing;
 use crate::packed::check_label;
 use crate::waiting_points::{WaitingPoints, write_points};
 
@@ -129,7 +130,7 @@ impl ClusterWriter {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn finish(self) -> Result<String, FormatError> {
+    pub fn finish(self) -> Result<(), FormatError> {
         let Self { path, classes, points, offsets, labels, .. } = self;
         let points = points.close().map_err(|source| FormatError::io(&path, source))?;
         let (m, total) = (labels.len(), offsets.last().map_or(0, |&total| total as usize));
@@ -138,7 +139,7 @@ impl ClusterWriter {
             ("truth_share", self.truth_share),
             ("height_m", self.height_m),
         ];
-        write_archive(&path, |npz| {
+        write_archive(&path, Hashing::None, |npz| {
             write_points(npz, points, &[total, 3])?;
             npz.array("offsets", &[m + 1], offsets.into_iter())?;
             npz.array("labels", &[m], labels.into_iter())?;
@@ -150,5 +151,6 @@ impl ClusterWriter {
                 .into_iter()
                 .try_for_each(|(key, values)| npz.array(key, &[m], values.into_iter()))
         })
+        .map(drop)
     }
 }

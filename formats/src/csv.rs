@@ -5,20 +5,25 @@ use std::path::Path;
 
 use crate::atomic;
 use crate::error::FormatError;
+use crate::hash::{FileHash, Hashing};
 use crate::scan::{Column, Scan};
 
 /// Writes `scan` to `path`, atomically: the header `x,y,z` and the attributes'
-/// names (`nx,ny,nz` for normals), then one point a line. Returns the SHA-256 of
-/// the file.
+/// names (`nx,ny,nz` for normals), then one point a line. Returns the hash of
+/// the file that `hashing` asks for.
 ///
 /// Numbers are the shortest that read back as the same f32, and need no quotes. Text
 /// has room for any coordinate, so that the origin is added to the positions.
 ///
 /// # Errors
 /// An attribute of another length than the positions; what the system reports.
-pub fn write_scan(path: &Path, scan: &Scan) -> Result<String, FormatError> {
+pub fn write_scan(
+    path: &Path,
+    hashing: Hashing,
+    scan: &Scan,
+) -> Result<Option<FileHash>, FormatError> {
     scan.check_lengths()?;
-    atomic::write_hashed(path, |writer| {
+    atomic::write_hashed(path, hashing, |writer| {
         write!(writer, "x,y,z")?;
         let mut names = scan.columns().flat_map(|(attribute, _)| attribute.column_names());
         names.try_for_each(|name| write!(writer, ",{name}"))?;

@@ -1,24 +1,157 @@
-//! SHA-256 of files, so that datasets can be checked with common tools.
+//! Hashes of files, so that datasets can be checked with common tools.
 
 use crate::error::FormatError;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+#[cfg(feature = "dataset")]
+use std::path::PathBuf;
+
+crate::named! {
+    /// How the files of a dataset are hashed.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Hashing: "hash" {
+        /// SHA-256, which `sha256sum` checks. It takes little where the processor has
+        /// instructions for it: most of x86-64 since 2019, and of AArch64.
+        #[default]
+        Sha256 = "sha256",
+        /// BLAKE3, which `b3sum` checks, fast on any processor.
+        Blake3 = "blake3",
+        /// None: nothing can be checked later.
+        None = "none",
+    }
+}
+
+/// The hash of a file's bytes, in hexadecimal digits. Serialised it is one field, named
+/// after the hash.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FileHash {
+    /// SHA-256, as `sha256sum` prints it.
+    Sha256(String),
+    /// BLAKE3, as `b3sum` prints it.
+    Blake3(String),
+}
+
+impl FileHash {
+    /// Which hash it is.
+    #[must_use]
+    pub const fn hashing(&self) -> Hashing {
+        match self {
+            Self::Sha256(_) => Hashing::Sha256,
+            Self::Blake3(_) => Hashing::Blake3,
+        }
+    }
+
+    /// Its hexadecimal digits.
+    #[must_use]
+    pub fn digits(&self) -> &str {
+        match self {
+            Self::Sha256(digits) | Self::Blake3(digits) => digits,
+        }
+    }
+}
+
+impl Display for FileHash {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sha256(digits) => write!(f, "SHA-256 is {digits}"),
+            Self::Blake3(digits) => write!(f, "BLAKE3 is {digits}"),
+        }
+    }
+}
+
+/// A file as it was written.
+#[cfg(feature = "dataset")]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct HashedFile {
+    /// Where the file is.
+    pub path: PathBuf,
+    /// Its hash, if one was asked for.
+    pub hash: Option<FileHash>,
+}
+
+/// Bytes that are being hashed.
+#[cfg(feature = "dataset")]
+pub(crate) enum Hasher {
+    Sha256(Sha256),
+    // A state of 2 KiB.
+    Blake3(Box<blake3::Hasher>),
+    None,
+}
+
+#[cfg(feature = "dataset")]
+impl Hasher {
+    pub(crate) fn new(hashing: Hashing) -> Self {
+        match hashing {
+            Hashing::Sha256 => Self::Sha256(Sha256::new()),
+            Hashing::Blake3 => Self::Blake3(Box::default()),
+            Hashing::None => Self::None,
+        }
+    }
+
+    pub(crate) fn update(&mut self, bytes: &[u8]) {
+        match self {
+            Self::Sha256(hash) => hash.update(bytes),
+            Self::Blake3(hash) => drop(hash.update(bytes)),
+            Self::None => {}
+        }
+    }
+
+    pub(crate) fn finish(self) -> Option<FileHash> {
+        match self {
+            Self::Sha256(hash) => Some(FileHash::Sha256(hexadecimal(&hash.finalize()))),
+            Self::Blake3(hash) => Some(FileHash::Blake3(hash.finalize().to_string())),
+            Self::None => None,
+        }
+    }
+}
+
+#[cfg(feature = "dataset")]
+impl Hashing {
+    /// The hash of a file's bytes. With [`Hashing::None`] the file is not opened.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn of_file(self, path: &Path) -> Result<Option<FileHash>, FormatError> {
+        let mut hash = Hasher::new(self);
+        if self != Self::None {
+            for_each_block(path, |block| hash.update(block))?;
+        }
+        Ok(hash.finish())
+    }
+
+    /// The hash of `bytes`.
+    #[must_use]
+    pub fn of_bytes(self, bytes: &[u8]) -> Option<FileHash> {
+        let mut hash = Hasher::new(self);
+        hash.update(bytes);
+        hash.finish()
+    }
+}
 
 /// The SHA-256 of a file's bytes, as `sha256sum` prints it.
 ///
 /// # Errors
 /// If the file cannot be read.
 pub fn of_file(path: &Path) -> Result<String, FormatError> {
+    let mut hash = Sha256::new();
+    for_each_block(path, |block| hash.update(block))?;
+    Ok(hexadecimal(&hash.finalize()))
+}
+
+fn for_each_block(path: &Path, mut take: impl FnMut(&[u8])) -> Result<(), FormatError> {
     let here = |source| FormatError::io(path, source);
     let mut file = File::open(path).map_err(here)?;
-    let mut hash = Sha256::new();
     let mut block = vec![0; 1 << 16];
     loop {
         match file.read(&mut block).map_err(here)? {
-            0 => return Ok(hexadecimal(&hash.finalize())),
-            n => hash.update(&block[..n]),
+            0 => return Ok(()),
+            n => take(&block[..n]),
         }
     }
 }
@@ -29,17 +162,45 @@ pub fn of_bytes(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
-/// A file as it was written, and the SHA-256 of its bytes in hexadecimal digits.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct HashedFile {
-    /// Where the file is.
-    pub path: PathBuf,
-    /// Its hash.
-    pub sha256: String,
-}
-
 /// Lower-case hexadecimal digits, two a byte.
 #[must_use]
 pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+#[cfg(feature = "dataset")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_are_those_that_were_published() {
+        // FIPS 180-2, appendix B.1, and BLAKE3's test_vectors.json: no input.
+        let sha256 = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        let blake3 = "af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262";
+        let hash = Hashing::Sha256.of_bytes(b"abc").unwrap();
+        assert_eq!(hash, FileHash::Sha256(sha256.to_owned()));
+        let hash = Hashing::Blake3.of_bytes(b"").unwrap();
+        assert_eq!(hash, FileHash::Blake3(blake3.to_owned()));
+        assert_eq!(Hashing::None.of_bytes(b"abc"), None);
+    }
+
+    #[test]
+    fn a_hash_is_a_field_that_bears_its_name() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct Record {
+            file: u8,
+            #[serde(flatten)]
+            hash: Option<FileHash>,
+        }
+        for (hash, text) in [
+            (Some(FileHash::Sha256("0a".to_owned())), r#"{"file":1,"sha256":"0a"}"#),
+            (Some(FileHash::Blake3("0b".to_owned())), r#"{"file":1,"blake3":"0b"}"#),
+            (None, r#"{"file":1}"#),
+        ] {
+            let record = Record { file: 1, hash };
+            assert_eq!(serde_json::to_string(&record).unwrap(), text);
+            assert_eq!(serde_json::from_str::<Record>(text).unwrap(), record);
+        }
+    }
 }

@@ -111,14 +111,16 @@ fn rows(npz: &mut NpzReader, key: &str, width: usize) -> Result<Vec<f64>, Format
 }
 
 #[cfg(test)]
+#[cfg(feature = "dataset")]
 mod tests {
     use super::*;
     use crate::archive::write_archive;
+    use crate::hash::Hashing;
 
     fn written(boxes: &[usize], classes: &[&str]) -> (tempfile::TempDir, std::path::PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frame.npz");
-        write_archive(&path, |npz| {
+        write_archive(&path, Hashing::None, |npz| {
             npz.array("xyz_mm", &[2, 3], [1000i32, -2000, 500, 0, 0, 0].into_iter())?;
             npz.array("laser", &[2], [31u32, 7].into_iter())?;
             let row = [1.0f32, -2.0, 0.5, 4.0, 2.0, 1.5, std::f32::consts::FRAC_PI_2];

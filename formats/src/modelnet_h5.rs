@@ -14,7 +14,7 @@ use hdf5_pure::{File, FileBuilder};
 
 use crate::atomic;
 use crate::error::FormatError;
-use crate::hash::HashedFile;
+use crate::hash::{HashedFile, Hashing};
 use crate::labelled::{LabelledSet, equal_offsets};
 pub use crate::modelnet_h5_list::is_one;
 use crate::modelnet_h5_list::list;
@@ -35,14 +35,21 @@ pub struct ModelNetH5Writer {
     n_files: usize,
     data: Vec<f32>,
     labels: Vec<u8>,
+    hashing: Hashing,
     files: Vec<HashedFile>,
 }
 
 impl ModelNetH5Writer {
     /// Begins the `split` of a dataset in `folder`, of clouds of `n_points`
-    /// points. A label is an index into `classes`.
+    /// points. A label is an index into `classes`; files are hashed as `hashing` says.
     #[must_use]
-    pub fn create(folder: &Path, split: Split, n_points: usize, classes: Vec<String>) -> Self {
+    pub fn create(
+        folder: &Path,
+        split: Split,
+        n_points: usize,
+        classes: Vec<String>,
+        hashing: Hashing,
+    ) -> Self {
         Self {
             folder: folder.to_path_buf(),
             split,
@@ -51,6 +58,7 @@ impl ModelNetH5Writer {
             n_files: 0,
             data: Vec::new(),
             labels: Vec::new(),
+            hashing,
             files: Vec::new(),
         }
     }
@@ -85,10 +93,10 @@ impl ModelNetH5Writer {
             self.write_file()?;
         }
         let names = self.folder.join("shape_names.txt");
-        self.files.push(atomic::write_lines(names, &self.classes)?);
+        self.files.push(atomic::write_lines(names, self.hashing, &self.classes)?);
         let listed = |k| format!("{LISTED_FOLDER}/{}", file_name(self.split, k));
         let list = list(&self.folder, self.split);
-        self.files.push(atomic::write_lines(list, (0..self.n_files).map(listed))?);
+        self.files.push(atomic::write_lines(list, self.hashing, (0..self.n_files).map(listed))?);
         Ok(self.files)
     }
 
@@ -104,8 +112,8 @@ impl ModelNetH5Writer {
         let path = self.folder.join(file_name(self.split, self.n_files));
         let bytes =
             file.finish().map_err(|error| FormatError::io(&path, io::Error::other(error)))?;
-        let sha256 = atomic::write_hashed(&path, |writer| writer.write_all(&bytes))?;
-        self.files.push(HashedFile { path, sha256 });
+        let hash = atomic::write_hashed(&path, self.hashing, |writer| writer.write_all(&bytes))?;
+        self.files.push(HashedFile { path, hash });
         self.n_files += 1;
         self.data.clear();
         self.labels.clear();

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 use crate::archive::write_archive;
 use crate::error::FormatError;
+use crate::hash::{FileHash, Hashing};
 use crate::waiting_points::{WaitingPoints, write_points};
 
 /// A packed set that is being written.
@@ -86,15 +87,15 @@ impl PackedWriter {
         Ok(())
     }
 
-    /// Writes the set, atomically, and returns the SHA-256 of the file; the same
+    /// Writes the set, atomically, and returns the hash of the file that `hashing` asks for; the same
     /// clouds in the same order give the same bytes. A set may be empty.
     ///
     /// # Errors
     /// What the system reports.
-    pub fn finish(self) -> Result<String, FormatError> {
+    pub fn finish(self, hashing: Hashing) -> Result<Option<FileHash>, FormatError> {
         let Self { path, n_points, classes, points, labels, names, n_raw } = self;
         let points = points.close().map_err(|source| FormatError::io(&path, source))?;
-        write_archive(&path, |npz| {
+        write_archive(&path, hashing, |npz| {
             write_points(npz, points, &[labels.len(), n_points, 3])?;
             npz.array("labels", &[labels.len()], labels.iter().copied())?;
             npz.text("names", &names)?;

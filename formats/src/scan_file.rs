@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::archive::{NpzReader, NpzWriter, Values, write_archive};
 use crate::error::FormatError;
+use crate::hash::{FileHash, Hashing};
 use crate::number::Number;
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 use crate::{csv, ply};
@@ -59,20 +60,25 @@ impl ScanFormat {
 /// What is said to whoever takes packets for points.
 const PACKETS: &str = "packets hold a sensor's ranges, not points";
 
-/// Writes `scan` to `path`, atomically, and returns the SHA-256 of the file; the
-/// same scan gives the same bytes. The name is taken as it is.
+/// Writes `scan` to `path`, atomically, and returns the hash of the file that `hashing`
+/// asks for; the same scan gives the same bytes. The name is taken as it is.
 ///
 /// # Errors
 /// An attribute of another length than the positions; [`ScanFormat::Pcap`], whose
 /// packets hold no points; what the system reports.
-pub fn write_scan(path: &Path, format: ScanFormat, scan: &Scan) -> Result<String, FormatError> {
+pub fn write_scan(
+    path: &Path,
+    format: ScanFormat,
+    hashing: Hashing,
+    scan: &Scan,
+) -> Result<Option<FileHash>, FormatError> {
     match format {
         ScanFormat::Npz => {
             scan.check_lengths()?;
-            write_archive(path, |npz| write_npz(npz, scan))
+            write_archive(path, hashing, |npz| write_npz(npz, scan))
         }
-        ScanFormat::Ply => ply::write_scan(path, scan),
-        ScanFormat::Csv => csv::write_scan(path, scan),
+        ScanFormat::Ply => ply::write_scan(path, hashing, scan),
+        ScanFormat::Csv => csv::write_scan(path, hashing, scan),
         ScanFormat::Pcap => Err(FormatError::malformed(path, "extension", PACKETS)),
     }
 }

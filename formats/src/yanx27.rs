@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use crate::atomic;
 use crate::error::FormatError;
-use crate::hash::HashedFile;
+use crate::hash::{HashedFile, Hashing};
 use crate::split::Split;
 
 /// A dataset in yanx27's layout that is being written.
@@ -25,23 +25,29 @@ pub struct Yanx27Writer {
     classes: Vec<String>,
     /// Sorted, so that the lists do not depend on the order of pushing.
     ids: [BTreeSet<String>; Split::ALL.len()],
+    hashing: Hashing,
     files: Vec<HashedFile>,
 }
 
 impl Yanx27Writer {
     /// Begins a dataset in the folder `root`. Labels follow the order of
-    /// `classes`.
+    /// `classes`; files are hashed as `hashing` says.
     ///
     /// # Errors
     /// [`FormatError::Instance`] for a class whose name cannot be a folder's.
-    pub fn create(root: &Path, classes: Vec<String>) -> Result<Self, FormatError> {
+    pub fn create(
+        root: &Path,
+        classes: Vec<String>,
+        hashing: Hashing,
+    ) -> Result<Self, FormatError> {
         if let Some(class) = classes.iter().find(|class| !is_folder_name(class)) {
             return Err(FormatError::instance(
                 class,
                 "expected a class name that can be a folder's",
             ));
         }
-        Ok(Self { root: root.to_path_buf(), classes, ids: Default::default(), files: Vec::new() })
+        let root = root.to_path_buf();
+        Ok(Self { root, classes, ids: Default::default(), hashing, files: Vec::new() })
     }
 
     /// Writes one cloud: the `view` of the mesh `name` of `class`. Normals that
@@ -87,13 +93,13 @@ impl Yanx27Writer {
         self.ids[split as usize].insert(id.clone());
         let normals = normals.map_or([].iter(), <[_]>::iter).chain(std::iter::repeat(&[0.0; 3]));
         let path = self.root.join(class).join(format!("{id}.txt"));
-        let sha256 = atomic::write_hashed(&path, |writer| {
+        let hash = atomic::write_hashed(&path, self.hashing, |writer| {
             for ([x, y, z], [nx, ny, nz]) in points.iter().zip(normals) {
                 writeln!(writer, "{x},{y},{z},{nx},{ny},{nz}")?;
             }
             Ok(())
         })?;
-        self.files.push(HashedFile { path, sha256 });
+        self.files.push(HashedFile { path, hash });
         Ok(())
     }
 
@@ -112,10 +118,10 @@ impl Yanx27Writer {
 
     fn write_lists(&mut self, stem: &str) -> Result<(), FormatError> {
         let path = self.root.join(format!("{stem}_shape_names.txt"));
-        self.files.push(atomic::write_lines(path, &self.classes)?);
+        self.files.push(atomic::write_lines(path, self.hashing, &self.classes)?);
         for split in Split::ALL {
             let path = self.root.join(format!("{stem}_{split}.txt"));
-            self.files.push(atomic::write_lines(path, &self.ids[split as usize])?);
+            self.files.push(atomic::write_lines(path, self.hashing, &self.ids[split as usize])?);
         }
         Ok(())
     }
@@ -168,7 +174,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path();
         let classes = vec!["night_stand".to_owned(), "cup".to_owned()];
-        let mut writer = Yanx27Writer::create(root, classes).unwrap();
+        let mut writer = Yanx27Writer::create(root, classes, Hashing::None).unwrap();
         let points = [[0.5, -1.0, 1e-7], [0.0, 0.25, 3.0]];
         writer.push("cup", Split::Test, "cup_0002", 1, &points, None).unwrap();
         let normals = Some(&points[..]);

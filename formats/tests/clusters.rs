@@ -3,7 +3,6 @@
 use std::fs;
 
 use formats::clusters::{ClusterWriter, Remarks};
-use formats::hash;
 use formats::labelled::read_labelled;
 
 const REMARKS: Remarks<'_> = Remarks {
@@ -27,7 +26,7 @@ fn clusters_come_back_from_their_file_with_their_remarks() {
     writer.push(&[[1.0, 2.0, 3.0]], 1, &REMARKS).unwrap();
     writer.push(&[[4.0; 3], [5.0; 3]], 0, &Remarks { range_m: 3.0, ..REMARKS }).unwrap();
     assert_eq!(writer.len(), 2);
-    assert_eq!(writer.finish().unwrap(), hash::of_file(&path).unwrap());
+    writer.finish().unwrap();
     let set = read_labelled(&path).unwrap();
     assert_eq!(set.cloud(0), [[1.0, 2.0, 3.0]]);
     assert_eq!(set.cloud(1), [[4.0; 3], [5.0; 3]]);

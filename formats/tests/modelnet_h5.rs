@@ -5,12 +5,13 @@ use std::fs;
 use std::path::Path;
 
 use formats::Split;
+use formats::hash::Hashing;
 use formats::modelnet_h5::{self, CLOUDS_PER_FILE, ModelNetH5Writer};
 use formats::modelnet_h5_list;
 
 fn write(folder: &Path, m: usize) {
     let classes = vec!["bowl".to_owned(), "chair".to_owned()];
-    let mut writer = ModelNetH5Writer::create(folder, Split::Train, 2, classes);
+    let mut writer = ModelNetH5Writer::create(folder, Split::Train, 2, classes, Hashing::None);
     for i in 0..m {
         writer.push(&[[i as f32, 0.0, 1.0], [0.5, 0.25, i as f32]], i % 2, "a").unwrap();
     }
@@ -51,7 +52,8 @@ fn the_same_clouds_give_the_same_bytes_and_none_are_fine() {
 #[test]
 fn a_label_beyond_the_classes_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let mut writer = ModelNetH5Writer::create(folder.path(), Split::Test, 1, vec!["a".into()]);
+    let mut writer =
+        ModelNetH5Writer::create(folder.path(), Split::Test, 1, vec!["a".into()], Hashing::None);
     assert!(writer.push(&[[0.0; 3]], 1, "b").is_err());
     assert!(writer.push(&[[0.0; 3]; 2], 0, "b").is_err());
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use formats::hash;
+use formats::hash::{FileHash, Hashing};
 use formats::labelled::{LabelledSet, read_labelled};
 use formats::packed::PackedWriter;
 
@@ -11,13 +11,13 @@ fn classes() -> Vec<String> {
     ["bowl", "chaise longue", "étagère"].map(str::to_owned).to_vec()
 }
 
-fn write(path: &Path, m: usize, n_points: usize) -> String {
+fn write(path: &Path, m: usize, n_points: usize) -> Option<FileHash> {
     let mut writer = PackedWriter::create(path, n_points, classes()).unwrap();
     for i in 0..m {
         let cloud: Vec<_> = (0..n_points).map(|j| [i as f32, j as f32, 0.5]).collect();
         writer.push(&cloud, i % 3, &format!("mesh_{i}_v0"), 10 + i as u32).unwrap();
     }
-    writer.finish().unwrap()
+    writer.finish(Hashing::Blake3).unwrap()
 }
 
 #[test]
@@ -61,8 +61,8 @@ fn a_set_may_be_empty() {
 fn a_set_beyond_memory_comes_back_with_the_hash_it_was_written_with() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("large.npz");
-    let sha256 = write(&path, 2000, 2048);
-    assert_eq!(sha256, hash::of_file(&path).unwrap());
+    let hash = write(&path, 2000, 2048);
+    assert_eq!(hash, Hashing::Blake3.of_file(&path).unwrap());
     let set = read_labelled(&path).unwrap();
     assert_eq!((set.len(), set.cloud(1999)[2047]), (2000, [1999.0, 2047.0, 0.5]));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
@@ -87,7 +87,7 @@ fn what_does_not_fit_is_refused_by_name() {
     assert_eq!(size, "instance `a_v1`: expected 2 points, found 1");
     let label = writer.push(&[[0.0; 3]; 2], 3, "a_v1", 1).unwrap_err().to_string();
     assert_eq!(label, "instance `a_v1`: expected a label below 3, found 3");
-    writer.finish().unwrap();
+    writer.finish(Hashing::None).unwrap();
     assert_eq!(read_labelled(&path).unwrap().len(), 0);
 }
 

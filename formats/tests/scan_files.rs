@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use formats::Attribute;
+use formats::hash::Hashing;
 use formats::scan::{ColumnSlot, Scan};
 use formats::scan_file::{ScanFormat, read_scan, write_scan};
 use proptest::prelude::*;
@@ -27,7 +28,7 @@ fn scan(n: usize, wanted: u8) -> Scan {
 fn there_and_back(scan: &Scan, format: ScanFormat) -> Scan {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan").with_extension(format.name());
-    write_scan(&path, format, scan).unwrap();
+    write_scan(&path, format, Hashing::None, scan).unwrap();
     read_scan(&path).unwrap()
 }
 
@@ -47,7 +48,7 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         for format in [ScanFormat::Npz, ScanFormat::Ply] {
             let path = folder.path().join("scan").with_extension(format.name());
-            write_scan(&path, format, &scan(5, 0xff)).unwrap();
+            write_scan(&path, format, Hashing::None, &scan(5, 0xff)).unwrap();
             let mut bytes = fs::read(&path).unwrap();
             let at = at.index(bytes.len());
             if cut { bytes.truncate(at) } else { bytes[at] = value }
@@ -79,10 +80,10 @@ fn csv_has_a_name_and_a_number_for_each_column() {
         normal: Some(vec![[0.0, 1.0, 0.25]]),
         ..Scan::default()
     };
-    write_scan(&path, ScanFormat::Csv, &scan).unwrap();
+    write_scan(&path, ScanFormat::Csv, Hashing::None, &scan).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!(text, "x,y,z,ring,nx,ny,nz\n10000000.5,0.1,-0,31,0,1,0.25\n");
-    write_scan(&path, ScanFormat::Csv, &Scan::default()).unwrap();
+    write_scan(&path, ScanFormat::Csv, Hashing::None, &Scan::default()).unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), "x,y,z\n");
 }
 
@@ -92,7 +93,7 @@ fn an_attribute_of_another_length_is_not_written() {
     let path = folder.path().join("scan.npz");
     let scan = Scan { ring: Some(vec![1]), ..scan(2, 0) };
     for format in ScanFormat::POINTS {
-        let error = write_scan(&path, format, &scan).unwrap_err();
+        let error = write_scan(&path, format, Hashing::None, &scan).unwrap_err();
         assert_eq!(
             error.to_string(),
             "attribute ring: expected 2 values, one for each point, found 1"

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use formats::hash::Hashing;
 use formats::velodyne::{Decoder, Header, Model, PacketError, count_returns, read_turn};
 use formats::vlp32c::{Returns, Revolution, write};
 use formats::{FormatError, Scan};
@@ -31,7 +32,7 @@ fn capture(folder: &Path, returns: Returns) -> PathBuf {
         ..Scan::default()
     };
     let path = folder.join("turn.pcap");
-    write(&path, &REVOLUTION, returns, &scan).unwrap();
+    write(&path, Hashing::None, &REVOLUTION, returns, &scan).unwrap();
     path
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
+use sim_gpu::formats::hash::Hashing;
 use sim_gpu::formats::scan_file::{ScanFormat, write_scan};
 use sim_gpu::glam::DVec3;
 use sim_gpu::mesh::frame::Normalize;
@@ -22,6 +23,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pose = Pose::look_at(DVec3::new(3.0, 0.0, 1.0), DVec3::ZERO)?;
     let caster = Caster::Cpu(Effects::default());
     let scan = sim_gpu::scan(&caster, &target, &ScanRequest::new(&sensor, &pattern, pose))?;
-    write_scan(Path::new("scan.npz"), ScanFormat::Npz, &scan)?;
+    write_scan(Path::new("scan.npz"), ScanFormat::Npz, Hashing::None, &scan)?;
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! ```no_run
 //! use sim_gpu::caster::{AdapterRequest, Caster};
 //! use sim_gpu::effects::Effects;
+//! use sim_gpu::formats::hash::Hashing;
 //! use sim_gpu::formats::scan_file::{ScanFormat, write_scan};
 //! use sim_gpu::glam::DVec3;
 //! use sim_gpu::mesh::frame::Normalize;
@@ -24,7 +25,7 @@
 //!
 //! let scan = sim_gpu::scan(&caster, &target, &ScanRequest::new(&sensor, &pattern, pose))?;
 //! println!("{} points", scan.positions.len());
-//! write_scan(Path::new("scan.npz"), ScanFormat::Npz, &scan)?;
+//! write_scan(Path::new("scan.npz"), ScanFormat::Npz, Hashing::None, &scan)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -55,6 +55,7 @@ fn commands_that_cannot_be_are_usage_errors() {
             ("gen-dataset meshes --attributes colour", "colour"),
             ("gen-dataset meshes --format stl", "stl"),
             ("gen-dataset meshes --points 0", "--points"),
+            ("gen-dataset meshes --hash md5", "sha256, blake3, none"),
             ("gen-dataset meshes --format pcap", "sensor \"generic-static\": rotating: missing"),
             ("gen-dataset meshes --sensor vlp16 --format pcap", "VLP-32C only"),
             ("gen-dataset meshes --sensor vlp32c --format pcap --noise-model xyz", "noise.model"),

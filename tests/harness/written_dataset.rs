@@ -8,11 +8,12 @@ use edgepuck_dataset::{
     DatasetConfig, MeshFailure, MeshRecord, ScanRecord, SetConfig, Variant, VariantRecord,
     Viewpoints, layout,
 };
+use formats::Split;
+use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::Returns;
-use formats::{Split, hash};
 use sim_gpu::effects::Effects;
 use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::mesh::validate::MeshDefects;
@@ -50,6 +51,7 @@ pub fn config() -> DatasetConfig {
         min_points: MIN_POINTS,
         layouts: vec![Layout::Yanx27],
         returns: Returns::default(),
+        hash: Hashing::default(),
     }
 }
 
@@ -94,7 +96,7 @@ fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
     MeshRecord {
         entry: entry.clone(),
         source: format!("{}/{}/{}.off", entry.class, entry.split, entry.name),
-        sha256: hash::hexadecimal(entry.name.as_bytes()),
+        hash: config.hash.of_bytes(entry.name.as_bytes()),
         up: Up::Z,
         centre: [0.1, -0.2, 1e-7],
         scale: 1.0 / 3.0,
@@ -118,7 +120,7 @@ fn write_variant(
     let scan = scan(StreamKey::new(config.seed, &name, view));
     let write = |&format: &ScanFormat| {
         let path = layout::scan(out, &set.name, variant, entry, view, format);
-        FileRecord { format, sha256: write_scan(&path, format, &scan).expect("a scan") }
+        FileRecord { format, hash: write_scan(&path, format, config.hash, &scan).expect("a scan") }
     };
     VariantRecord {
         variant,

@@ -1,6 +1,7 @@
 //! What a point takes in each format of scans.
 
 use formats::Scan;
+use formats::hash::Hashing;
 use formats::scan::AttributeSet;
 use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
@@ -49,6 +50,6 @@ fn scan(distance_m: f64, effects: &Effects, attributes: &AttributeSet) -> Scan {
 fn bytes(scan: &Scan, format: ScanFormat) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan");
-    write_scan(&path, format, scan).unwrap();
+    write_scan(&path, format, Hashing::None, scan).unwrap();
     std::fs::read(path).unwrap()
 }

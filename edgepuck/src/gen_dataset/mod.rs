@@ -20,6 +20,7 @@ use edgepuck_dataset::progress::Progress;
 use edgepuck_dataset::start::{Begin, Start, begin};
 use edgepuck_dataset::verify::verify;
 use edgepuck_shapes as shapes;
+use formats::hash::Hashing;
 use settings::Settings;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use std::collections::BTreeSet;
@@ -161,12 +162,12 @@ fn check(folder: &Path) -> anyhow::Result<Outcome> {
     for problem in &report.problems {
         writeln!(out, "{problem}")?;
     }
-    eprintln!(
-        "{}: {} files checked, {} problems.",
-        folder.display(),
-        report.files,
-        report.problems.len()
-    );
+    let by = match report.hash {
+        Hashing::None => "read, without hashes to compare",
+        Hashing::Sha256 | Hashing::Blake3 => "checked",
+    };
+    let (folder, files, problems) = (folder.display(), report.files, report.problems.len());
+    eprintln!("{folder}: {files} files {by}, {problems} problems.");
     Ok(if report.problems.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
 }
 

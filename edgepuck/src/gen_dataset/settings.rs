@@ -3,6 +3,7 @@
 use super::usage;
 use anyhow::Context;
 use edgepuck_dataset::config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
+use formats::hash::Hashing;
 use formats::scan::{Attribute, AttributeSet};
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
@@ -105,6 +106,12 @@ pub struct Settings {
     /// Additional dataset layouts, for other projects: yanx27, modelnet-h5
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     layout: Vec<Layout>,
+
+    /// Hash of each mesh and file in the manifest: sha256, blake3 (faster on processors without
+    /// instructions for SHA-256) or none. Without hashes `--verify` finds only files that are
+    /// missing, added or cannot be read, and `--resume` does not notice a changed mesh
+    #[arg(long, default_value = "sha256", value_name = "HASH")]
+    hash: Hashing,
 }
 
 impl Settings {
@@ -152,6 +159,7 @@ impl Settings {
             min_points: self.min_points,
             layouts: self.layout.clone(),
             returns: self.returns.unwrap_or_default(),
+            hash: self.hash,
         })
     }
 

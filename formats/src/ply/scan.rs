@@ -13,16 +13,22 @@ use std::path::Path;
 use super::elements::read_elements;
 use crate::atomic;
 use crate::error::FormatError;
+use crate::hash::{FileHash, Hashing};
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 
-/// Writes `scan` to `path`, atomically, and returns the SHA-256 of the file.
+/// Writes `scan` to `path`, atomically, and returns the hash of the file that
+/// `hashing` asks for.
 ///
 /// # Errors
 /// An attribute of another length than the positions; what the system reports.
-pub fn write_scan(path: &Path, scan: &Scan) -> Result<String, FormatError> {
+pub fn write_scan(
+    path: &Path,
+    hashing: Hashing,
+    scan: &Scan,
+) -> Result<Option<FileHash>, FormatError> {
     scan.check_lengths()?;
     let columns: Vec<_> = scan.columns().map(|(_, column)| column).collect();
-    atomic::write_hashed(path, |writer| {
+    atomic::write_hashed(path, hashing, |writer| {
         writer.write_all(header(scan).as_bytes())?;
         for (i, position) in scan.positions.iter().enumerate() {
             write_vector(writer, position)?;

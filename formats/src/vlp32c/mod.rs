@@ -52,8 +52,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::atomic::{self, Unfinished};
+#[cfg(feature = "dataset")]
+use crate::atomic;
+use crate::atomic::Unfinished;
 use crate::error::FormatError;
+#[cfg(feature = "dataset")]
+use crate::hash::{FileHash, Hashing};
 use crate::pcap::{self, Sender};
 use crate::scan::{Attribute, Scan};
 use packet::{BLOCKS, LASERS, Measurement};
@@ -165,7 +169,7 @@ impl Returns {
 }
 
 /// Writes the packets of one `revolution` to `path`, atomically, and returns the
-/// SHA-256 of the file.
+/// hash of the file that `hashing` asks for.
 ///
 /// `scan` has the beam and the range of each point, beam b being laser b % 32
 /// of sequence b / 32; positions are not looked at. An intensity becomes a
@@ -177,15 +181,17 @@ impl Returns {
 /// # Errors
 /// A scan without beams or ranges, or with a beam beyond the revolution's; an
 /// attribute of another length than the positions; what the system reports.
+#[cfg(feature = "dataset")]
 pub fn write(
     path: &Path,
+    hashing: Hashing,
     revolution: &Revolution,
     returns: Returns,
     scan: &Scan,
-) -> Result<String, FormatError> {
+) -> Result<Option<FileHash>, FormatError> {
     let sequences_per_packet = BLOCKS / returns.blocks_per_sequence();
     let fired = measurements(path, revolution, scan)?;
-    atomic::write_hashed(path, |writer| {
+    atomic::write_hashed(path, hashing, |writer| {
         pcap::write_header(writer)?;
         for (number, fired) in (0..).zip(fired.chunks(sequences_per_packet)) {
             let first = number * sequences_per_packet as u32;

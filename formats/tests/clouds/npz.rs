@@ -17,6 +17,7 @@ fn bytes_of(shape: &str, data: &[u8]) -> Vec<u8> {
 fn a_scan_of_ours_is_read_with_its_origin() {
     use formats::Scan;
     use formats::cloud_file::read_cloud;
+    use formats::hash::Hashing;
     use formats::scan_file::{ScanFormat, write_scan};
 
     let folder = tempfile::tempdir().unwrap();
@@ -30,7 +31,7 @@ fn a_scan_of_ours_is_read_with_its_origin() {
     let expected = [[1e7 + 0.5, 0.0, -1.0], [1e7 + f64::from(1e-3f32), -0.25, 3.0]];
     for format in ScanFormat::POINTS {
         let path = folder.path().join("scan").with_extension(format.name());
-        write_scan(&path, format, &scan).unwrap();
+        write_scan(&path, format, Hashing::None, &scan).unwrap();
         assert_eq!(read_cloud(&path).unwrap(), expected, "{format}");
     }
 }

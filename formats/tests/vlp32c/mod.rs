@@ -5,6 +5,7 @@ mod capture;
 use std::fs;
 
 use capture::{Block, Packet};
+use formats::hash::Hashing;
 use formats::velodyne::count_returns;
 use formats::vlp32c::{FARTHEST_M, Returns, Revolution, START_S, write};
 use formats::{FormatError, Scan};
@@ -30,7 +31,7 @@ fn every_beam() -> Scan {
 fn written(revolution: &Revolution, returns: Returns, scan: &Scan) -> (Vec<Packet>, u64) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.pcap");
-    write(&path, revolution, returns, scan).unwrap();
+    write(&path, Hashing::None, revolution, returns, scan).unwrap();
     (capture::parse(&fs::read(&path).unwrap()), count_returns(&path).unwrap())
 }
 
@@ -180,7 +181,8 @@ fn a_scan_that_says_too_little_or_too_much_is_refused() {
         ),
         (Scan { beam: Some(vec![57_870]), ..whole.clone() }, "beam: 57870 of 57870"),
     ] {
-        let error: FormatError = write(&path, &REVOLUTION, Returns::Dual, &scan).unwrap_err();
+        let error: FormatError =
+            write(&path, Hashing::None, &REVOLUTION, Returns::Dual, &scan).unwrap_err();
         assert!(error.to_string().contains(part), "{error}");
         assert!(!path.exists());
     }
@@ -191,7 +193,7 @@ fn the_same_scan_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let [first, second] = ["first", "second"].map(|name| {
         let path = folder.path().join(name);
-        write(&path, &REVOLUTION, Returns::Dual, &every_beam()).unwrap();
+        write(&path, Hashing::None, &REVOLUTION, Returns::Dual, &every_beam()).unwrap();
         fs::read(&path).unwrap()
     });
     assert_eq!(first, second);

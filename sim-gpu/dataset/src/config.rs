@@ -1,5 +1,6 @@
 //! What a dataset is to hold. The manifest keeps it in full.
 
+use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan::AttributeSet;
 use formats::scan_file::ScanFormat;
@@ -45,10 +46,13 @@ pub struct DatasetConfig {
     /// Which returns packets hold, where they are among the formats.
     #[serde(default, skip_serializing_if = "is_default")]
     pub returns: Returns,
+    /// How the manifest hashes the meshes and the files.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub hash: Hashing,
 }
 
-fn is_default(returns: &Returns) -> bool {
-    *returns == Returns::default()
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// One sensor and where it stands.

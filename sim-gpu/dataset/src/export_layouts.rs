@@ -4,11 +4,10 @@ use super::clouds::{Packed, Part, Scans};
 use super::config::{DatasetConfig, Layout};
 use super::error::DatasetError;
 use super::layout;
-use super::manifest::HashedFile;
+use super::manifest::LayoutFile;
 use super::record::{Entry, MeshRecord};
 use formats::yanx27::Yanx27Writer;
 use formats::{Split, hash};
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -25,7 +24,7 @@ pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), D
     for &layout in &config.layouts {
         match layout {
             Layout::Yanx27 => {
-                Yanx27Writer::create(Path::new(""), classes.to_vec())?;
+                Yanx27Writer::create(Path::new(""), classes.to_vec(), config.hash)?;
                 refuse_if(config.packed_points < 2, layout, "a cloud needs two points or more")?;
             }
             Layout::ModelnetH5 => {
@@ -47,7 +46,7 @@ fn refuse_if(unfit: bool, layout: Layout, cause: &'static str) -> Result<(), Dat
 /// # Errors
 /// As [`check_layouts`]; a scan that cannot be read or is not as recorded; a
 /// file that cannot be written.
-pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<HashedFile>, DatasetError> {
+pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<LayoutFile>, DatasetError> {
     check_layouts(scans.config, scans.classes)?;
     let mut files = Vec::new();
     for &layout in &scans.config.layouts {
@@ -70,7 +69,7 @@ pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<HashedFile>, DatasetErr
     files.dedup();
     let listed = |file: hash::HashedFile| {
         let path = file.path.strip_prefix(scans.out).unwrap_or(&file.path);
-        HashedFile { file: layout::slashed(path), sha256: file.sha256 }
+        LayoutFile { file: layout::slashed(path), hash: file.hash }
     };
     Ok(files.into_iter().map(listed).collect())
 }
@@ -81,7 +80,7 @@ fn write_yanx27<'a>(
     folder: &Path,
 ) -> Result<Vec<hash::HashedFile>, DatasetError> {
     let names = yanx27_names(scans.records);
-    let mut writer = Yanx27Writer::create(folder, scans.classes.to_vec())?;
+    let mut writer = Yanx27Writer::create(folder, scans.classes.to_vec(), scans.config.hash)?;
     for part in parts {
         scans.for_each_cloud(part, |Packed { entry, view, cloud, .. }| {
             let name = names.get(entry).unwrap_or(&entry.name);
@@ -106,7 +105,7 @@ fn yanx27_names(records: &[MeshRecord]) -> BTreeMap<&Entry, String> {
         alike.entry(place(&record.entry)).or_default().push(record);
     }
     let renamed = |record: &MeshRecord| {
-        let digits = hash::hexadecimal(&Sha256::digest(record.source.as_bytes()));
+        let digits = hash::of_bytes(record.source.as_bytes());
         format!("{}_{}", record.entry.name, &digits[..HASH_DIGITS])
     };
     let shared = alike.into_values().filter(|records| records.len() > 1).flatten();
@@ -124,7 +123,8 @@ fn write_modelnet_h5<'a>(
     let mut files = Vec::new();
     for part in parts {
         let classes = scans.classes.to_vec();
-        let mut writer = ModelNetH5Writer::create(folder, part.split, n_points, classes);
+        let mut writer =
+            ModelNetH5Writer::create(folder, part.split, n_points, classes, scans.config.hash);
         scans.for_each_cloud(part, |Packed { label, name, cloud, .. }| {
             Ok(writer.push(&cloud.points, label, &name)?)
         })?;

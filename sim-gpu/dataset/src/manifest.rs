@@ -8,6 +8,7 @@ use super::error::DatasetError;
 use super::journal::{Terms, digest, read_json, write_json};
 use super::layout;
 use super::record::{Entry, FileRecord, MeshFailure, MeshRecord, VariantRecord};
+use formats::hash::{FileHash, Hashing};
 use serde::{Deserialize, Serialize};
 use sim_gpu::pose::Pose;
 use std::collections::BTreeSet;
@@ -35,7 +36,7 @@ pub struct Manifest {
     /// The packed files: by set, variant and split.
     pub packed: Vec<PackedRecord>,
     /// The files of other projects' layouts, sorted.
-    pub layout_files: Vec<HashedFile>,
+    pub layout_files: Vec<LayoutFile>,
     /// Meshes that could not be scanned, sorted by entry.
     pub failures: Vec<MeshFailure>,
     /// Meshes that were scanned, sorted by entry.
@@ -76,8 +77,9 @@ pub struct MeshPoses {
 pub struct PackedRecord {
     /// Its path from the dataset's folder, with forward slashes.
     pub file: String,
-    /// SHA-256 of its bytes, hexadecimal.
-    pub sha256: String,
+    /// The hash of its bytes, if the configuration asks for one.
+    #[serde(flatten)]
+    pub hash: Option<FileHash>,
     /// Clouds in it.
     pub clouds: u64,
     /// The scans that are not in it: they have fewer points than
@@ -94,13 +96,14 @@ pub struct LeftOut {
     pub points: u64,
 }
 
-/// A file and what it must hash to.
+/// A file of another project's layout.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HashedFile {
+pub struct LayoutFile {
     /// Its path from the dataset's folder, with forward slashes.
     pub file: String,
-    /// SHA-256 of its bytes, hexadecimal.
-    pub sha256: String,
+    /// The hash of its bytes, if the configuration asks for one.
+    #[serde(flatten)]
+    pub hash: Option<FileHash>,
 }
 
 impl Manifest {
@@ -172,6 +175,14 @@ impl Manifest {
         })
     }
 
+    /// The hashes of all meshes and files.
+    fn hashes(&self) -> impl Iterator<Item = &Option<FileHash>> {
+        let meshes = self.meshes.iter().map(|mesh| &mesh.hash);
+        let scans = self.scan_files().map(|(_, file, _)| &file.hash);
+        let packed = self.packed.iter().map(|packed| &packed.hash);
+        meshes.chain(scans).chain(packed).chain(self.layout_files.iter().map(|file| &file.hash))
+    }
+
     /// Every mesh and its file, scanned or failed.
     fn sources(&self) -> impl Iterator<Item = (Entry, &str)> {
         let failed = self.failures.iter().map(|f| (f.entry.clone(), f.source.as_str()));
@@ -184,6 +195,12 @@ impl Manifest {
         }
         if let Some((number, of)) = self.shard.filter(|(number, of)| number >= of) {
             return Some(format!("part {number} from 0 of {of} parts"));
+        }
+        let hashing =
+            |hash: &Option<FileHash>| hash.as_ref().map_or(Hashing::None, FileHash::hashing);
+        if let Some(other) = self.hashes().map(hashing).find(|found| *found != self.config.hash) {
+            let expected = self.config.hash;
+            return Some(format!("expected the hash {expected} of every file, found {other}"));
         }
         let folders = self.config.sets.iter().map(|set| &set.name);
         let names = self.entries().flat_map(|entry| [&entry.class, &entry.name]);

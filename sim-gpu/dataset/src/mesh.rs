@@ -7,6 +7,7 @@ use super::error::DatasetError;
 use super::layout;
 use super::progress::{Progress, Stage};
 use super::record::{Cloud, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+use formats::hash::{FileHash, Hashing};
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use glam::DAffine3;
@@ -16,7 +17,7 @@ use sim_gpu::job::{Cast, CastJob, Culling};
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::mesh::validate::triangle_stats;
-use sim_gpu::mesh::{LoadedMesh, Mesh, MeshError, load};
+use sim_gpu::mesh::{LoadedMesh, Mesh, MeshError, load_hashed};
 use sim_gpu::packets;
 use sim_gpu::pose::Pose;
 use sim_gpu::ray::RayFrame;
@@ -60,7 +61,7 @@ pub fn prepare(
     progress: &Progress,
 ) -> Result<Prepared, MeshFailure> {
     let (mut record, mesh, kept) = progress
-        .time(Stage::Read, || read(entry, config.up, config.normalize))
+        .time(Stage::Read, || read(entry, config.up, config.normalize, config.hash))
         .map_err(|error| failure(entry, &error))?;
     let id = record.entry.id();
     let views = plan(config, &id);
@@ -124,15 +125,16 @@ pub(super) fn read(
     entry: &MeshEntry,
     up: Option<Up>,
     normalize: Normalize,
+    hashing: Hashing,
 ) -> Result<(MeshRecord, Mesh, Vec<u32>), MeshError> {
-    let LoadedMesh { mesh, format, sha256, dropped_faces } = load(&entry.path)?;
+    let (LoadedMesh { mesh, format, dropped_faces }, hash) = load_hashed(&entry.path, hashing)?;
     let up = up.unwrap_or(format.default_up());
     let world = to_world(&mesh, up, normalize);
     let stats = triangle_stats(&world.mesh);
     let record = MeshRecord {
         entry: entry.into(),
         source: entry.relative.clone(),
-        sha256: formats::hash::hexadecimal(&sha256),
+        hash,
         up,
         centre: world.centre.to_array(),
         scale: world.scale,
@@ -221,11 +223,11 @@ fn write_view(
         let (entry, view) = (&record.entry, planned.view);
         let write = |&format: &ScanFormat| -> Result<FileRecord, DatasetError> {
             let path = layout::scan(output.out, &set.name, variant, entry, view, format);
-            let sha256 = match format {
+            let hash = match format {
                 ScanFormat::Pcap => write_packets(output, &path, &request, &objects)?,
-                _ => write_scan(&path, format, &scan)?,
+                _ => write_scan(&path, format, config.hash, &scan)?,
             };
-            Ok(FileRecord { format, sha256 })
+            Ok(FileRecord { format, hash })
         };
         let files = output
             .progress
@@ -243,11 +245,12 @@ fn write_packets(
     path: &Path,
     request: &ScanRequest,
     objects: &[ObjectHits],
-) -> Result<String, DatasetError> {
+) -> Result<Option<FileHash>, DatasetError> {
     let revolution = packets::revolution(request.sensor)?;
     let effects = request.applied_effects(output.cast_effects)?;
     let mut request = request.clone();
     request.attributes = packets::attributes(&effects);
     let (scan, _) = assemble(&request, output.cast_effects, objects)?;
-    Ok(vlp32c::write(path, &revolution, output.config.returns, &scan)?)
+    let DatasetConfig { hash, returns, .. } = *output.config;
+    Ok(vlp32c::write(path, hash, &revolution, returns, &scan)?)
 }

@@ -35,5 +35,6 @@ fn pack_part<'a>(scans: &Scans<'a>, part: &Part<'a>) -> Result<PackedRecord, Dat
     })?;
     let clouds = writer.len() as u64;
     let file = layout::slashed(&place(Path::new("")));
-    Ok(PackedRecord { file, sha256: writer.finish()?, clouds, left_out })
+    let hash = writer.finish(scans.config.hash)?;
+    Ok(PackedRecord { file, hash, clouds, left_out })
 }

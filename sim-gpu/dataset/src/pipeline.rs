@@ -116,9 +116,12 @@ pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError
     Ok(scanned)
 }
 
-/// Whether `record` is of the file that `mesh` names, as it is now.
+/// Whether `record` is of the file that `mesh` names, as it is now. Without a hash its
+/// name must do.
 fn is_of(record: &MeshRecord, mesh: &MeshEntry) -> bool {
-    formats::hash::of_file(&mesh.path).is_ok_and(|sha256| sha256 == record.sha256)
+    let Some(recorded) = &record.hash else { return true };
+    let now = recorded.hashing().of_file(&mesh.path);
+    now.is_ok_and(|now| now.as_ref() == Some(recorded))
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

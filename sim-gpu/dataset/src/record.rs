@@ -2,6 +2,7 @@
 
 use super::config::Variant;
 use formats::Split;
+use formats::hash::FileHash;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
 use sim_gpu::mesh::frame::Up;
@@ -29,8 +30,9 @@ pub struct MeshRecord {
     pub entry: Entry,
     /// The file, from the dataset's folder, with forward slashes.
     pub source: String,
-    /// SHA-256 of the file's bytes, hexadecimal.
-    pub sha256: String,
+    /// The hash of the file's bytes, if the configuration asks for one.
+    #[serde(flatten)]
+    pub hash: Option<FileHash>,
     /// The axis that was taken for upward.
     pub up: Up,
     /// What was subtracted from the upright vertices.
@@ -94,8 +96,9 @@ pub struct Cloud {
 pub struct FileRecord {
     /// Its format.
     pub format: ScanFormat,
-    /// SHA-256 of its bytes, hexadecimal.
-    pub sha256: String,
+    /// The hash of its bytes, if the configuration asks for one.
+    #[serde(flatten)]
+    pub hash: Option<FileHash>,
 }
 
 /// One mesh that could not be scanned.

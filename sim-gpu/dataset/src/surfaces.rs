@@ -6,6 +6,7 @@ use super::mesh::{failed, failure, read};
 use super::record::{Entry, MeshFailure};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
+use formats::hash::Hashing;
 use formats::packed::PackedWriter;
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -97,15 +98,15 @@ pub fn write_surfaces(
                 }
             }
         }
-        surface.finish()?;
-        seen.finish()?;
+        surface.finish(Hashing::None)?;
+        seen.finish(Hashing::None)?;
     }
     Ok(failures)
 }
 
 fn draw(mesh: &MeshEntry, config: &SurfaceConfig) -> Result<Drawn, MeshFailure> {
-    let (record, in_world, kept) =
-        read(mesh, config.up, config.normalize).map_err(|error| failure(mesh, &error))?;
+    let (record, in_world, kept) = read(mesh, config.up, config.normalize, Hashing::None)
+        .map_err(|error| failure(mesh, &error))?;
     let surface = Surface::new(in_world, kept);
     let n = config.points as usize;
     let id = record.entry.id();

@@ -5,9 +5,10 @@ use super::finish::failure_lines;
 use super::journal::Journal;
 use super::layout;
 use super::manifest::Manifest;
+use formats::hash::{FileHash, Hashing};
 use formats::labelled::read_labelled;
 use formats::scan_file::{ScanFormat, read_scan};
-use formats::{FormatError, hash, velodyne};
+use formats::{FormatError, velodyne};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader};
@@ -23,6 +24,8 @@ pub struct Report {
     pub scans: usize,
     /// Clouds in packed files.
     pub clouds: u64,
+    /// The hash that files were compared by. With none, points and clouds were counted.
+    pub hash: Hashing,
     /// What is wrong, sorted by path; at most one problem a file.
     pub problems: Vec<Problem>,
 }
@@ -46,7 +49,7 @@ impl Report {
 }
 
 /// Checks the dataset in `out` against its manifest: every file is there, has
-/// its hash, and can be read with as many points or clouds as recorded; and
+/// its hash, if it has one, and can be read with as many points or clouds as recorded; and
 /// the folders of scans, packed files and layouts hold nothing else. Other
 /// files beside the manifest are the user's.
 ///
@@ -71,6 +74,7 @@ pub fn verify(out: &Path) -> Result<Report, DatasetError> {
         files: expected.len(),
         scans: manifest.meshes.iter().flat_map(|mesh| &mesh.scans).map(|s| s.variants.len()).sum(),
         clouds: manifest.packed.iter().map(|packed| packed.clouds).sum(),
+        hash: manifest.config.hash,
         problems,
     })
 }
@@ -78,7 +82,7 @@ pub fn verify(out: &Path) -> Result<Report, DatasetError> {
 /// A file that the manifest names.
 struct Expected<'a> {
     path: PathBuf,
-    sha256: &'a str,
+    hash: Option<&'a FileHash>,
     holds: Holds,
 }
 
@@ -91,18 +95,18 @@ enum Holds {
 fn expected_files(manifest: &Manifest) -> Vec<Expected<'_>> {
     let scans = manifest.scan_files().map(|(path, file, written)| Expected {
         path,
-        sha256: &file.sha256,
+        hash: file.hash.as_ref(),
         holds: Holds::Points(file.format, written.tally.points),
     });
     let mut expected: Vec<Expected> = scans.collect();
     expected.extend(manifest.packed.iter().map(|packed| Expected {
         path: PathBuf::from(&packed.file),
-        sha256: &packed.sha256,
+        hash: packed.hash.as_ref(),
         holds: Holds::Clouds(packed.clouds),
     }));
     expected.extend(manifest.layout_files.iter().map(|file| Expected {
         path: PathBuf::from(&file.file),
-        sha256: &file.sha256,
+        hash: file.hash.as_ref(),
         holds: Holds::Anything,
     }));
     expected
@@ -116,12 +120,12 @@ impl Expected<'_> {
     }
 
     fn flaw(&self, path: &Path) -> Option<String> {
-        match hash::of_file(path) {
-            Err(error) => return Some(error.to_string()),
-            Ok(sha256) if sha256 != self.sha256 => {
-                return Some(format!("was changed: its SHA-256 is {sha256}, not {}", self.sha256));
+        match self.hash.map(|recorded| (recorded, recorded.hashing().of_file(path))) {
+            Some((_, Err(error))) => return Some(error.to_string()),
+            Some((recorded, Ok(Some(found)))) if found != *recorded => {
+                return Some(format!("was changed: its {found}, not {}", recorded.digits()));
             }
-            Ok(_) => {}
+            _ => {}
         }
         let (found, expected, what) = match self.holds {
             Holds::Points(ScanFormat::Csv, points) => (csv_points(path), points, "points"),

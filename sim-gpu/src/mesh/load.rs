@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use sha2::{Digest, Sha256};
+use formats::hash::{FileHash, Hashing};
 
 use super::error::{Malformed, MeshError, ParseError};
 use super::format::MeshFormat;
@@ -18,8 +18,6 @@ pub struct LoadedMesh {
     pub mesh: Mesh,
     /// The format by the file's extension.
     pub format: MeshFormat,
-    /// SHA-256 of the file's bytes.
-    pub sha256: [u8; 32],
     /// Faces of fewer than three corners, which were left out.
     pub dropped_faces: usize,
 }
@@ -33,13 +31,26 @@ pub struct LoadedMesh {
 /// format, or holds an index out of range, a coordinate that is not finite, or
 /// no triangle.
 pub fn load(path: &Path) -> Result<LoadedMesh, MeshError> {
+    Ok(load_hashed(path, Hashing::None)?.0)
+}
+
+/// As [`load`], and the hash of the file's bytes that `hashing` asks for: the file is
+/// read once.
+///
+/// # Errors
+///
+/// As [`load`].
+pub fn load_hashed(
+    path: &Path,
+    hashing: Hashing,
+) -> Result<(LoadedMesh, Option<FileHash>), MeshError> {
     let format = MeshFormat::of(path).ok_or_else(|| MeshError::UnknownFormat { path: path.into() });
     let bytes = read(path)?;
     let format = format?;
     let Parsed { mesh, dropped_faces } = parse(&bytes, format).map_err(|error| {
         MeshError::Malformed { path: path.into(), line: error.line, cause: error.cause }
     })?;
-    Ok(LoadedMesh { mesh, format, sha256: Sha256::digest(&bytes).into(), dropped_faces })
+    Ok((LoadedMesh { mesh, format, dropped_faces }, hashing.of_bytes(&bytes)))
 }
 
 /// Reads a mesh of `format` from a file's bytes.
@@ -99,11 +110,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.OFF");
         fs::write(&path, TRIANGLE).unwrap();
-        let loaded = load(&path).unwrap();
+        let (loaded, hash) = load_hashed(&path, Hashing::Sha256).unwrap();
         assert_eq!(loaded.format, MeshFormat::Off);
         assert_eq!(loaded.mesh.triangles, [[0, 1, 2]]);
-        let expected: [u8; 32] = Sha256::digest(TRIANGLE).into();
-        assert_eq!(loaded.sha256, expected);
+        assert_eq!(hash, Hashing::Sha256.of_bytes(TRIANGLE.as_bytes()));
     }
 
     #[test]

@@ -22,5 +22,5 @@ pub mod validate;
 
 pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
-pub use load::{LoadedMesh, load, parse};
+pub use load::{LoadedMesh, load, load_hashed, parse};
 pub use triangle_mesh::{Mesh, Parsed};

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use formats::hash::Hashing;
 use formats::packed::PackedWriter;
 
 pub fn train(folder: &Path, words: &str) -> Output {
@@ -35,7 +36,7 @@ fn write(path: &Path, clouds: &train::clouds::Clouds) {
         let name = format!("{}_{i:04}", clouds.classes[clouds.set.labels[i]]);
         packed.push(clouds.set.cloud(i), clouds.set.labels[i], &name, 32).unwrap();
     }
-    packed.finish().unwrap();
+    packed.finish(Hashing::None).unwrap();
 }
 
 #[test]

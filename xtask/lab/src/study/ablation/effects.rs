@@ -5,6 +5,7 @@ use crate::study::uniform_raster::as_even_grid;
 use anyhow::Context;
 use edgepuck_dataset::config::{DatasetConfig, SetConfig, Variant, Viewpoints};
 use edgepuck_dataset::surfaces::SurfaceConfig;
+use formats::hash::Hashing;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
@@ -153,6 +154,7 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
         min_points: plan.min_points,
         layouts: Vec::new(),
         returns: Returns::default(),
+        hash: Hashing::default(),
     })
 }
 

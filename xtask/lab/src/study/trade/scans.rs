@@ -7,6 +7,7 @@ use crate::measure::energy::Energy;
 use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
 use formats::chamfer::chamfer;
+use formats::hash::Hashing;
 use formats::scan::{Attribute, AttributeSet, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use rayon::prelude::*;
@@ -165,7 +166,7 @@ fn file_bytes(clouds: &[Cloud]) -> Result<f64> {
     let mut bytes = 0;
     for cloud in clouds {
         let scan = Scan { positions: cloud.clone(), ..Scan::default() };
-        write_scan(&path, ScanFormat::Npz, &scan)?;
+        write_scan(&path, ScanFormat::Npz, Hashing::None, &scan)?;
         bytes += path.metadata()?.len();
     }
     Ok(bytes as f64 / clouds.len().max(1) as f64)
