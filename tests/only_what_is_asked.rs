@@ -22,7 +22,9 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use formats::scan::{Attribute, AttributeSet};
-use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
+use sim_gpu::effects::{
+    Detection, DetectionLimit, Dropout, Effects, Intensity, Noise, NoiseModel, Quantum,
+};
 
 /// What a scan costs, by what it costs: instructions, bindings, bytes.
 type Rows = BTreeMap<String, u64>;
@@ -69,6 +71,9 @@ const NOISE: &[&str] = &["shader, function normal_deviate", "shader, constant no
 
 fn asked() -> Vec<Asked> {
     let plain = Effects::default;
+    let limit = Some(DetectionLimit { reflectivity: 0.8, range_m: 200.0 });
+    let (threshold_to_noise, range_sigma_m) = (Some(100.0), Some(0.05));
+    let detection = Some(Detection { limit, threshold_to_noise, range_sigma_m });
     let noise = |model| Some(Noise { mean_m: 0.0, sigma_m: 0.01, model });
     let dropout = Some(Dropout { probability: 0.1 });
     let quantum = Some(Quantum { step_m: Some(0.004) });
@@ -89,6 +94,7 @@ fn asked() -> Vec<Asked> {
             &[MODULE, RANDOM, &["shader, function dropout", "shader, constant dropout_"]],
         ),
         ("quantum", Effects { quantum, ..plain() }, &[]),
+        ("detection limit", Effects { detection, ..plain() }, &[]),
         ("intensity effect", with_intensity(), &[MODULE, &["shader, function intensity"]]),
     ];
     let asked = effects.into_iter().map(|(name, effects, own)| {

@@ -11,6 +11,7 @@ mod only_what_is_asked;
 mod packets;
 mod parity;
 mod real_meshes;
+mod received_power;
 mod scan_effects;
 mod shaders_valid;
 #[cfg(feature = "simplify")]

@@ -87,9 +87,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
             }
         }
         eprintln!(
-            "{sensor}: {} points ({} out of range, {} dropped, {} with a negative range): {}",
+            "{sensor}: {} points ({} out of range, {}{} dropped, {} with a negative range): {}",
             tally.points,
             tally.out_of_range,
+            scene
+                .effects
+                .detection
+                .map_or(String::new(), |_| format!("{} undetected, ", tally.undetected)),
             tally.dropped,
             tally.negative,
             file.display()
@@ -123,7 +127,7 @@ fn cast_as_packets_tell(scene: &mut Scene) -> anyhow::Result<()> {
         sensor.sensor = packets::as_packets_tell(&sensor.sensor)
             .with_context(|| format!("sensor[{i}]: no packets of \"{}\"", sensor.sensor.name))?;
     }
-    scene.attributes = packets::attributes(&scene.effects);
+    scene.attributes = packets::attributes(&scene.effects, &scene.attributes);
     Ok(())
 }
 

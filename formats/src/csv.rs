@@ -43,6 +43,7 @@ fn write_point(writer: &mut impl Write, scan: &Scan, i: usize) -> io::Result<()>
     for (_, column) in scan.columns() {
         match column {
             Column::F32(values) => write!(writer, ",{}", values[i])?,
+            Column::U8(values) => write!(writer, ",{}", values[i])?,
             Column::U16(values) => write!(writer, ",{}", values[i])?,
             Column::U32(values) => write!(writer, ",{}", values[i])?,
             Column::Vector(values) => {

@@ -33,6 +33,12 @@ pub struct Scan {
     pub object: Option<Vec<u32>>,
     /// Returned intensity, 0 to 1.
     pub intensity: Option<Vec<f32>>,
+    /// Received power, relative to that of a white surface that faces the sensor 1 m away:
+    /// it falls with the square of the range.
+    pub power: Option<Vec<f32>>,
+    /// Calibrated reflectivity as Velodyne's sensors report it, whatever the range: 0 to 100
+    /// are percent of a white surface that faces the sensor, 101 to 255 retro-reflectors.
+    pub reflectivity: Option<Vec<u8>>,
     /// Unit normal of the surface, towards the sensor, in the world's frame.
     pub normal: Option<Vec<[f32; 3]>>,
 }
@@ -57,6 +63,10 @@ crate::named! {
         Object = "object",
         /// [`Scan::intensity`].
         Intensity = "intensity",
+        /// [`Scan::power`].
+        Power = "power",
+        /// [`Scan::reflectivity`].
+        Reflectivity = "reflectivity",
         /// [`Scan::normal`].
         Normal = "normal",
     }
@@ -70,6 +80,8 @@ pub type AttributeSet = BTreeSet<Attribute>;
 pub enum Column<'a> {
     /// Real numbers.
     F32(&'a [f32]),
+    /// Bytes.
+    U8(&'a [u8]),
     /// Small whole numbers.
     U16(&'a [u16]),
     /// Whole numbers.
@@ -82,6 +94,7 @@ impl Column<'_> {
     fn len(&self) -> usize {
         match self {
             Self::F32(values) => values.len(),
+            Self::U8(values) => values.len(),
             Self::U16(values) => values.len(),
             Self::U32(values) => values.len(),
             Self::Vector(values) => values.len(),
@@ -93,6 +106,8 @@ impl Column<'_> {
 pub enum ColumnSlot<'a> {
     /// Real numbers.
     F32(&'a mut Option<Vec<f32>>),
+    /// Bytes.
+    U8(&'a mut Option<Vec<u8>>),
     /// Small whole numbers.
     U16(&'a mut Option<Vec<u16>>),
     /// Whole numbers.
@@ -125,6 +140,8 @@ impl Scan {
             Attribute::Triangle => self.triangle.as_deref().map(Column::U32),
             Attribute::Object => self.object.as_deref().map(Column::U32),
             Attribute::Intensity => self.intensity.as_deref().map(Column::F32),
+            Attribute::Power => self.power.as_deref().map(Column::F32),
+            Attribute::Reflectivity => self.reflectivity.as_deref().map(Column::U8),
             Attribute::Normal => self.normal.as_deref().map(Column::Vector),
         }
     }
@@ -139,6 +156,8 @@ impl Scan {
             Attribute::Triangle => ColumnSlot::U32(&mut self.triangle),
             Attribute::Object => ColumnSlot::U32(&mut self.object),
             Attribute::Intensity => ColumnSlot::F32(&mut self.intensity),
+            Attribute::Power => ColumnSlot::F32(&mut self.power),
+            Attribute::Reflectivity => ColumnSlot::U8(&mut self.reflectivity),
             Attribute::Normal => ColumnSlot::Vector(&mut self.normal),
         }
     }

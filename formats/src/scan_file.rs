@@ -4,9 +4,10 @@
 //! | key | type | shape |
 //! | --- | --- | --- |
 //! | `positions` | f32 | `[n, 3]` |
-//! | `range`, `time`, `intensity` | f32 | `[n, 1]` |
+//! | `range`, `time`, `intensity`, `power` | f32 | `[n, 1]` |
 //! | `beam`, `triangle`, `object` | u32 | `[n, 1]` |
 //! | `ring` | u16 | `[n, 1]` |
+//! | `reflectivity` | u8 | `[n, 1]` |
 //! | `normal` | f32 | `[n, 3]` |
 //! | `origin`, only if it is not 0 | f64 | `[3]` |
 //!
@@ -104,6 +105,7 @@ fn write_npz<W: Write + Seek>(npz: &mut NpzWriter<W>, scan: &Scan) -> io::Result
         let key = attribute.name();
         match column {
             Column::F32(values) => write_columns(npz, key, values, 1)?,
+            Column::U8(values) => write_columns(npz, key, values, 1)?,
             Column::U16(values) => write_columns(npz, key, values, 1)?,
             Column::U32(values) => write_columns(npz, key, values, 1)?,
             Column::Vector(values) => write_columns(npz, key, values.as_flattened(), 3)?,
@@ -143,6 +145,7 @@ fn read_npz(path: &Path) -> Result<Scan, FormatError> {
         }
         match scan.slot(attribute) {
             ColumnSlot::F32(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
+            ColumnSlot::U8(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
             ColumnSlot::U16(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
             ColumnSlot::U32(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
             ColumnSlot::Vector(slot) => {

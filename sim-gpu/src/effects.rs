@@ -1,5 +1,5 @@
-//! What a scan does to the ideal ranges: noise, dropout, quantisation,
-//! intensity. An effect that is `None` costs nothing.
+//! What a scan does to the ideal ranges: noise, dropout, the detection limit,
+//! quantisation, intensity. An effect that is `None` costs nothing.
 //!
 //! In TOML and in the manifest:
 //!
@@ -7,6 +7,7 @@
 //! [effects]
 //! noise = { mean_m = 0.0, sigma_m = 0.01, model = "range" }
 //! dropout = { probability = 0.05 }
+//! detection = { reflectivity = 0.1, range_m = 60 } # or true: the sensor's own limit
 //! quantise_m = 0.004 # or true: the sensor's own quantum
 //! intensity = true
 //! ```
@@ -15,6 +16,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
 use crate::sensor::Sensor;
+
+pub use detection::{Detection, DetectionLimit};
+
+mod detection;
 
 /// No length of an effect is larger: shaders hold it in f32, with room to
 /// multiply.
@@ -28,6 +33,8 @@ pub struct Effects {
     pub noise: Option<Noise>,
     /// Random loss of returns.
     pub dropout: Option<Dropout>,
+    /// The loss of returns that are too weak.
+    pub detection: Option<Detection>,
     /// Rounding of the range.
     pub quantum: Option<Quantum>,
     /// Intensity of the return.
@@ -157,7 +164,8 @@ impl RayEffect {
 
 impl Effects {
     /// The effects that casters compute for each ray, in the order of their
-    /// outputs. Rounding of the range is left out: it depends on no ray.
+    /// outputs. The detection limit and the rounding of the range are left out: they come
+    /// after the range, which is solved once all rays are cast.
     pub fn per_ray(&self) -> impl Iterator<Item = RayEffect> + use<> {
         let noise = self.noise.map(|noise| match noise.model {
             NoiseModel::Range => RayEffect::NoiseRange(noise),
@@ -191,7 +199,8 @@ impl Effects {
     ///
     /// # Errors
     ///
-    /// If quantisation is wanted and the sensor states no quantum.
+    /// If quantisation is wanted and the sensor states no quantum, or its own detection
+    /// limit is and it states none.
     pub fn for_sensor(&self, sensor: &Sensor) -> Result<Self, InvalidValue> {
         let mut resolved = self.clone();
         if let Some(quantum) = &mut resolved.quantum
@@ -201,6 +210,17 @@ impl Effects {
                 let name = &sensor.name;
                 let cause = format!("expected metres, as sensor \"{name}\" has no range.quantum_m");
                 InvalidValue::new("effects.quantise_m", cause)
+            })?);
+        }
+        if let Some(detection) = &mut resolved.detection
+            && detection.limit.is_none()
+        {
+            detection.limit = Some(sensor.detection.ok_or_else(|| {
+                let name = &sensor.name;
+                let cause = format!(
+                    "expected reflectivity and range_m, as sensor \"{name}\" has no [detection]"
+                );
+                InvalidValue::new("effects.detection", cause)
             })?);
         }
         Ok(resolved)
@@ -215,6 +235,9 @@ impl Effects {
         if let Some(noise) = self.noise {
             within("effects.noise.mean_m", noise.mean_m, -LARGEST_M..=LARGEST_M)?;
             within("effects.noise.sigma_m", noise.sigma_m, 0.0..=LARGEST_M)?;
+        }
+        if let Some(detection) = self.detection {
+            detection.validate()?;
         }
         let probability = self.dropout.map(|dropout| dropout.probability);
         within("effects.dropout.probability", probability, 0.0..=1.0)?;
@@ -232,6 +255,8 @@ struct EffectsTable {
     noise: Option<Noise>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     dropout: Option<Dropout>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    detection: Option<detection::Table>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     quantise_m: Option<SwitchOrMetres>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -258,7 +283,9 @@ impl TryFrom<EffectsTable> for Effects {
             Some(SwitchOrMetres::Metres(step_m)) => Some(Quantum { step_m: Some(step_m) }),
         };
         let intensity = (table.intensity == Some(true)).then_some(Intensity);
-        let effects = Self { noise: table.noise, dropout: table.dropout, quantum, intensity };
+        let detection = table.detection.map_or(Ok(None), detection::Table::detection)?;
+        let EffectsTable { noise, dropout, .. } = table;
+        let effects = Self { noise, dropout, detection, quantum, intensity };
         effects.validate()?;
         Ok(effects)
     }
@@ -269,6 +296,7 @@ impl From<Effects> for EffectsTable {
         Self {
             noise: effects.noise,
             dropout: effects.dropout,
+            detection: effects.detection.map(detection::Table::from),
             quantise_m: effects.quantum.map(|quantum| {
                 quantum.step_m.map_or(SwitchOrMetres::Switch(true), SwitchOrMetres::Metres)
             }),

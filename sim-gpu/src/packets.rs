@@ -8,11 +8,16 @@ use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, NoiseModel};
 use crate::sensor::{Layout, Rotating, Sensor};
 
-/// What [`formats::vlp32c`] needs of each point.
+/// What [`formats::vlp32c`] takes of each point, where these `effects` and attributes are
+/// `wanted`: their calibrated reflectivity or else their intensity, if there is either.
 #[must_use]
-pub fn attributes(effects: &Effects) -> AttributeSet {
-    let intensity = effects.intensity.map(|_| Attribute::Intensity);
-    [Attribute::Beam, Attribute::Range].into_iter().chain(intensity).collect()
+pub fn attributes(effects: &Effects, wanted: &AttributeSet) -> AttributeSet {
+    let brightness = if wanted.contains(&Attribute::Reflectivity) {
+        Some(Attribute::Reflectivity)
+    } else {
+        effects.intensity.map(|_| Attribute::Intensity)
+    };
+    [Attribute::Beam, Attribute::Range].into_iter().chain(brightness).collect()
 }
 
 /// `sensor` with its beams cast as its packets tell them: from where they leave

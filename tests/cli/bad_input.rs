@@ -56,6 +56,8 @@ fn commands_that_cannot_be_are_usage_errors() {
             ("gen-dataset meshes --format stl", "stl"),
             ("gen-dataset meshes --points 0", "--points"),
             ("gen-dataset meshes --hash md5", "sha256, blake3, none"),
+            ("gen-dataset meshes --reflectivity 1.5", "--reflectivity: expected a number within"),
+            ("gen-dataset meshes --effects a.toml --noise 0.02", "--effects"),
             ("gen-dataset meshes --format pcap", "sensor \"generic-static\": rotating: missing"),
             ("gen-dataset meshes --sensor vlp16 --format pcap", "VLP-32C only"),
             ("gen-dataset meshes --sensor vlp32c --format pcap --noise-model xyz", "noise.model"),
@@ -78,6 +80,8 @@ fn what_is_not_there_is_named() {
         1,
         &[
             ("gen-dataset nowhere", "nowhere"),
+            ("gen-dataset empty --effects bad.toml", "bad.toml"),
+            ("gen-dataset empty --effects none.toml", "none.toml"),
             ("gen-dataset empty", "empty"),
             ("gen-dataset empty --sensor vlp99", "vlp32c"),
             ("gen-dataset empty --sensor ./bad.toml", "bad.toml"),

@@ -83,6 +83,26 @@ fn what_is_asked_for_is_there_and_nothing_else() {
 }
 
 #[test]
+fn effects_come_from_a_file_and_dark_meshes_are_not_detected() {
+    let folder = Folder::with_meshes();
+    // A ball of radius 1, 3 m away: its nearest point is 2 m away.
+    folder.write("limit.toml", "[effects]\ndetection = { reflectivity = 1, range_m = 2.5 }\n");
+    let words = "gen-dataset meshes --sensor vlp32c --effects limit.toml --attributes reflectivity";
+    folder.succeeds(&format!("{words} --out white"));
+    folder.succeeds(&format!("{words} --out grey --reflectivity 0.5"));
+    let scan = |variant: &str| {
+        folder.scan(&format!("{variant}/ball/train/ball_0001_v0.npz")).reflectivity.unwrap()
+    };
+    let (clean, noisy) = (scan("white/rotational/clean"), scan("white/rotational/noisy"));
+    assert!(!noisy.is_empty() && noisy.len() < clean.len());
+    // 1 / 2.5^2 times the square of a range of 2 m or more.
+    assert!(noisy.iter().all(|&byte| byte >= 64) && clean.iter().any(|&byte| byte < 64));
+    assert!(scan("grey/rotational/noisy").is_empty());
+    let manifest = folder.text("grey/manifest.json");
+    assert!(manifest.contains("\"reflectivity\": 0.5") && manifest.contains("\"undetected\": "));
+}
+
+#[test]
 fn noise_is_along_the_ray_and_of_the_size_asked_for() {
     let folder = Folder::with_meshes();
     folder.succeeds("gen-dataset meshes --out out --noise 0.02 --attributes range,beam");

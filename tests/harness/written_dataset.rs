@@ -52,6 +52,7 @@ pub fn config() -> DatasetConfig {
         layouts: vec![Layout::Yanx27],
         returns: Returns::default(),
         hash: Hashing::default(),
+        reflectivity: 1.0,
     }
 }
 

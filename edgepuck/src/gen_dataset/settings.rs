@@ -4,9 +4,10 @@ use super::usage;
 use anyhow::Context;
 use edgepuck_dataset::config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
 use formats::hash::Hashing;
-use formats::scan::{Attribute, AttributeSet};
+use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
+use sim_gpu::config::{self, within};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::packets;
@@ -61,8 +62,18 @@ pub struct Settings {
     #[arg(long, value_name = "M", num_args = 0..=1, default_missing_value = "sensor")]
     quantise: Option<String>,
 
+    /// TOML file with a table `[effects]` as a scene has it, such as the sensor's detection limit;
+    /// replaces the flags of noise, dropout and quantisation
+    #[arg(long, value_name = "TOML",
+          conflicts_with_all = ["noise", "noise_model", "noise_mean", "dropout", "quantise"])]
+    effects: Option<PathBuf>,
+
+    /// Diffuse reflectivity of the meshes, from 0 (black) to 1 (white)
+    #[arg(long, default_value_t = 1.0, value_name = "R", allow_negative_numbers = true)]
+    reflectivity: f64,
+
     /// Attributes of each point besides its position: range, beam, ring, time, triangle, object,
-    /// intensity, normal
+    /// intensity, power, reflectivity, normal
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 
@@ -132,6 +143,8 @@ impl Settings {
             ));
         }
         let effects = self.effects()?;
+        within("--reflectivity", self.reflectivity, 0.0..=1.0)
+            .map_err(|error| usage(error.to_string()))?;
         if formats.contains(&ScanFormat::Pcap) {
             cast_as_packets_tell(&mut sets, &effects)?;
         } else if self.returns.is_some() {
@@ -160,11 +173,16 @@ impl Settings {
             layouts: self.layout.clone(),
             returns: self.returns.unwrap_or_default(),
             hash: self.hash,
+            reflectivity: self.reflectivity,
         })
     }
 
     fn effects(&self) -> anyhow::Result<Effects> {
-        let attributes: AttributeSet = self.attributes.iter().copied().collect();
+        let intensity = self.attributes.contains(&Attribute::Intensity).then_some(Intensity);
+        if let Some(file) = &self.effects {
+            let EffectsFile { effects } = config::read(file)?;
+            return Ok(Effects { intensity: effects.intensity.or(intensity), ..effects });
+        }
         let noise = Noise { mean_m: self.noise_mean, sigma_m: self.noise, model: self.noise_model };
         let step_m = match self.quantise.as_deref() {
             None => None,
@@ -179,7 +197,8 @@ impl Settings {
             noise: (self.noise != 0.0 || self.noise_mean != 0.0).then_some(noise),
             dropout: (self.dropout != 0.0).then_some(Dropout { probability: self.dropout }),
             quantum: step_m.map(|step_m| Quantum { step_m }),
-            intensity: attributes.contains(&Attribute::Intensity).then_some(Intensity),
+            detection: None,
+            intensity,
         };
         effects.validate().map_err(|error| usage(error.to_string()))?;
         Ok(effects)
@@ -219,6 +238,13 @@ impl Settings {
         };
         Ok(SetConfig { name: name.to_owned(), sensor, viewpoints })
     }
+}
+
+/// A file of effects.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EffectsFile {
+    effects: Effects,
 }
 
 /// Gives the sensors the beam geometry that their packets describe.

@@ -35,6 +35,7 @@ pub fn write_scan(
             for column in &columns {
                 match column {
                     Column::F32(values) => writer.write_all(&values[i].to_le_bytes())?,
+                    Column::U8(values) => writer.write_all(&[values[i]])?,
                     Column::U16(values) => writer.write_all(&values[i].to_le_bytes())?,
                     Column::U32(values) => writer.write_all(&values[i].to_le_bytes())?,
                     Column::Vector(values) => write_vector(writer, &values[i])?,
@@ -60,6 +61,7 @@ fn header(scan: &Scan) -> String {
     for (attribute, column) in scan.columns() {
         let number = match column {
             Column::F32(_) | Column::Vector(_) => "float",
+            Column::U8(_) => "uchar",
             Column::U16(_) => "ushort",
             Column::U32(_) => "uint",
         };
@@ -104,6 +106,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
             |cause: String| FormatError::malformed(path, format!("property {attribute}"), cause);
         match scan.slot(attribute) {
             ColumnSlot::F32(slot) => *slot = Some(rows.column(first).map(|x| x as f32).collect()),
+            ColumnSlot::U8(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
             ColumnSlot::U16(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
             ColumnSlot::U32(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
             ColumnSlot::Vector(slot) => *slot = Some(rows.vectors(first)),

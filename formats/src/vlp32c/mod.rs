@@ -172,10 +172,10 @@ impl Returns {
 /// hash of the file that `hashing` asks for.
 ///
 /// `scan` has the beam and the range of each point, beam b being laser b % 32
-/// of sequence b / 32; positions are not looked at. An intensity becomes a
-/// reflectivity of 0 to 100, Velodyne's scale for surfaces that scatter 0 to
-/// 100 % of the light (101 to 255 are retro-reflectors: HDL-32E User Manual,
-/// intensity data); without one, it is [`WHITE`]. A range that is not finite, below half a unit or beyond [`FARTHEST_M`] is no
+/// of sequence b / 32; positions are not looked at. A reflectivity is written as
+/// it is: 0 to 100 for surfaces that scatter 0 to 100 % of the light, 101 to 255 for
+/// retro-reflectors (VLP-32C User Manual 63-9325, 6.1). Without one an intensity becomes a
+/// reflectivity of 0 to 100, and without either it is [`WHITE`]. A range that is not finite, below half a unit or beyond [`FARTHEST_M`] is no
 /// return.
 ///
 /// # Errors
@@ -281,7 +281,11 @@ fn measurements(
             let cause = format!("{beam} of {} in a revolution", revolution.n_beams);
             return Err(FormatError::malformed(path, "beam", cause));
         }
-        let reflectivity = scan.intensity.as_ref().map_or(WHITE, |values| percent(values[i]));
+        let reflectivity = match (&scan.reflectivity, &scan.intensity) {
+            (Some(bytes), _) => bytes[i],
+            (None, Some(values)) => percent(values[i]),
+            (None, None) => WHITE,
+        };
         let (sequence, laser) = (beam as usize / LASERS, beam as usize % LASERS);
         fired[sequence][laser] = Measurement::new(range_m, reflectivity);
     }

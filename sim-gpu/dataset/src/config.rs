@@ -49,6 +49,17 @@ pub struct DatasetConfig {
     /// How the manifest hashes the meshes and the files.
     #[serde(default, skip_serializing_if = "is_default")]
     pub hash: Hashing,
+    /// The meshes' diffuse reflectivity, 0 to 1.
+    #[serde(default = "white", skip_serializing_if = "is_white")]
+    pub reflectivity: f64,
+}
+
+fn white() -> f64 {
+    1.0
+}
+
+fn is_white(reflectivity: &f64) -> bool {
+    *reflectivity == white()
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

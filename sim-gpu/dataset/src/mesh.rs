@@ -92,7 +92,8 @@ pub fn prepare(
         let aim = |(view, frame): (&PlannedView, RayFrame)| {
             let set = &config.sets[view.set];
             let stream = set.stream(config.seed, &id, view.view);
-            CastJob::aim(target.clone(), frame, &patterns[view.set], culling, stream, 1.0)
+            let reflectivity = config.reflectivity as f32;
+            CastJob::aim(target.clone(), frame, &patterns[view.set], culling, stream, reflectivity)
         };
         views.iter().zip(frames).map(aim).collect()
     });
@@ -208,7 +209,8 @@ fn write_view(
     let config = output.config;
     let set = &config.sets[planned.set];
     let world_from_object = DAffine3::IDENTITY;
-    let objects = [ObjectHits { object: 0, world_from_object, glass: None, job, hits }];
+    let objects =
+        [ObjectHits { object: 0, world_from_object, glass: None, retroreflection: 0.0, job, hits }];
     let mut variants = Vec::new();
     for &variant in &config.variants {
         let mut request =
@@ -249,7 +251,7 @@ fn write_packets(
     let revolution = packets::revolution(request.sensor)?;
     let effects = request.applied_effects(output.cast_effects)?;
     let mut request = request.clone();
-    request.attributes = packets::attributes(&effects);
+    request.attributes = packets::attributes(&effects, &request.attributes);
     let (scan, _) = assemble(&request, output.cast_effects, objects)?;
     let DatasetConfig { hash, returns, .. } = *output.config;
     Ok(vlp32c::write(path, hash, &revolution, returns, &scan)?)

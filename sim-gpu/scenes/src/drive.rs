@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sim_gpu::packets;
 use sim_gpu::pose::Pose;
-use sim_gpu::scan::{PlacedTarget, ScanRequest, scan_objects};
+use sim_gpu::scan::{ScanRequest, scan_objects};
 use sim_gpu::sensor::{BeamPattern, Layout, Rotating, Sensor};
 
 use crate::error::SceneError;
@@ -172,7 +172,7 @@ impl<'a> Drive<'a> {
         let (ids, objects): (Vec<u32>, Vec<_>) =
             in_sight.map(|(id, body)| (*id, body.at(time_s))).unzip();
         let parts = parts.range(self.street.parts_in_sight(pose.position_m.x));
-        let mut targets: Vec<_> = parts.map(|(_, part)| PlacedTarget::new(part)).collect();
+        let mut targets: Vec<_> = parts.map(|(_, part)| stage.ground(part, 0)).collect();
         let n_parts = targets.len();
         targets.extend(objects.iter().map(|object| stage.target(object, self.glass_returned)));
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use edgepuck_shapes::objects::ObjectKind;
 use serde::Deserialize;
 use sim_gpu::config::{self, ConfigError, InvalidValue, within};
+use sim_gpu::effects::Effects;
 use sim_gpu::sensor::Sensor;
 
 /// Everything a scene is drawn from.
@@ -52,6 +53,8 @@ pub struct Ground {
     pub road_width_m: Span,
     /// How far the pavements on both sides stand above the road.
     pub kerb_m: Span,
+    /// The part of the light that comes back at vertical incidence; all of it by default.
+    pub reflectivity: Span,
 }
 
 /// Where the sensor is. Each number is drawn for each scene.
@@ -79,6 +82,9 @@ pub struct SensorChoice {
     /// The probability that a return is lost.
     #[serde(default)]
     pub dropout: f64,
+    /// Further effects, such as the detection limit; none by default.
+    #[serde(default)]
+    pub effects: Effects,
 }
 
 /// Objects of one kind.
@@ -105,6 +111,10 @@ pub struct Objects {
     /// in every scene.
     #[serde(default)]
     pub speed_m_s: Span,
+    /// The part of the light that comes back at vertical incidence, drawn for each object;
+    /// all of it by default.
+    #[serde(default = "white")]
+    pub reflectivity: Span,
     /// For `kind = "mesh"`: the folder of the meshes, inside that of `--meshes`.
     pub meshes: Option<String>,
     /// For `kind = "mesh"`: the height to which a mesh is scaled, metres.
@@ -155,6 +165,10 @@ fn gap() -> Span {
     [0.4, 1.5].into()
 }
 
+fn white() -> Span {
+    [1.0, 1.0].into()
+}
+
 fn scale() -> Span {
     [0.94, 1.06].into()
 }
@@ -167,6 +181,7 @@ impl Default for Ground {
             roughness_m: Span::default(),
             road_width_m: [6.0, 6.0].into(),
             kerb_m: Span::default(),
+            reflectivity: white(),
         }
     }
 }
@@ -232,6 +247,7 @@ impl Recipe {
                 profile: name.clone(),
                 noise_m: None,
                 dropout: 0.0,
+                effects: Effects::default(),
             })
         };
         self.sensor = names.iter().map(choice).collect();
@@ -270,6 +286,7 @@ impl Recipe {
         ground.roughness_m.check("ground.roughness_m", 0.0, 1.0)?;
         ground.road_width_m.check("ground.road_width_m", 0.0, MOST_M)?;
         ground.kerb_m.check("ground.kerb_m", 0.0, 1.0)?;
+        ground.reflectivity.check("ground.reflectivity", 0.0, 1.0)?;
         mount.height_m.check("mount.height_m", -10.0, 100.0)?;
         mount.tilt_deg.check("mount.tilt_deg", 0.0, 45.0)?;
         mount.off_road_m.check("mount.off_road_m", 0.0, MOST_M)?;
@@ -295,7 +312,16 @@ impl Recipe {
 impl SensorChoice {
     fn check(&self, key: &str) -> Result<(), InvalidValue> {
         within(&format!("{key}.noise_m"), self.noise_m, 0.0..=1.0)?;
-        within(&format!("{key}.dropout"), self.dropout, 0.0..=1.0)
+        within(&format!("{key}.dropout"), self.dropout, 0.0..=1.0)?;
+        for (own, is_there) in
+            [("noise", self.effects.noise.is_some()), ("dropout", self.effects.dropout.is_some())]
+        {
+            if is_there {
+                let cause = "expected noise_m and dropout of the sensor itself in its place";
+                return Err(InvalidValue::new(format!("{key}.effects.{own}"), cause));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -340,6 +366,7 @@ impl Objects {
         self.distance_m.check(&at("distance_m"), 0.01, MOST_M)?;
         self.gap_m.check(&at("gap_m"), 0.0, MOST_M)?;
         self.scale.check(&at("scale"), 0.01, 100.0)?;
+        self.reflectivity.check(&at("reflectivity"), 0.0, 1.0)?;
         self.speed_m_s.check(&at("speed_m_s"), 0.0, 100.0)?;
         if self.moves() && !matches!(self.place, Place::Road | Place::Pavement) {
             let cause = format!("expected with place = road or pavement, found \"{}\"", self.place);

@@ -82,8 +82,10 @@ impl Stage {
             let effects = Effects {
                 noise: Some(Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range }),
                 dropout: Some(Dropout { probability: choice.dropout }),
-                ..Effects::default()
+                ..choice.effects.clone()
             };
+            let fits = effects.for_sensor(&sensor).map(drop);
+            fits.map_err(|invalid| SceneError::from(invalid.in_file(file)))?;
             let pattern = sensor.pattern();
             sensors.push(Eye { sensor, pattern, caster: open(&effects)? });
         }
@@ -157,10 +159,18 @@ impl Stage {
     /// If the adapter fails.
     pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
         let ground = Target::new(whole(scene.ground.mesh()), Builder::Morton);
-        let mut targets = vec![PlacedTarget::new(&ground)];
+        let mut targets = vec![self.ground(&ground, scene.number)];
         targets
             .extend(scene.objects.iter().map(|object| self.target(object, scene.glass_returned)));
         self.sweep_targets(scene, &mut targets)
+    }
+
+    /// A part of the ground of the scene or drive of this `number`.
+    pub(crate) fn ground<'a>(&self, part: &'a Target, number: u32) -> PlacedTarget<'a> {
+        let drawn = StreamKey::new(self.seed, "reflectivity/ground", number).unit(0);
+        let mut placed = PlacedTarget::new(part);
+        placed.reflectivity = self.recipe.ground.reflectivity.at(drawn) as f32;
+        placed
     }
 
     /// `object` where it stands, whose glass returns this part of the beams.
@@ -168,6 +178,9 @@ impl Stage {
         let prop = self.prop(object.entry, object.variant);
         let mut placed = PlacedTarget::new(&prop.target);
         placed.world_from_object = object.world_from_object();
+        let drawn = StreamKey::new(self.seed, "reflectivity/object", object.entry as u32);
+        let reflectivity = self.recipe.object[object.entry].reflectivity;
+        placed.reflectivity = reflectivity.at(drawn.unit(object.variant.into())) as f32;
         placed.glass = (!prop.glass.is_empty())
             .then(|| Glass { triangles: prop.glass.clone(), returned: glass_returned });
         placed

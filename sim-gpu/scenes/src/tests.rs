@@ -158,6 +158,31 @@ fn glass_that_returns_nothing_leaves_holes_in_cars() {
 }
 
 #[test]
+fn what_is_dark_is_detected_less_far() {
+    let with = |effects: &str, reflectivity: &str| {
+        let text = RECIPE.replacen("noise_m = 0", &format!("noise_m = 0\n{effects}"), 1);
+        let text = text.replace("kind = \"car\"", &format!("kind = \"car\"\n{reflectivity}"));
+        let stage = stage(&text);
+        let scene = Scene::draw(&stage, 3);
+        let scan = stage.sweep(&scene).unwrap().scan;
+        let is_car = |object: u32| {
+            let entry = (object as usize).checked_sub(1).map(|i| scene.objects[i].entry);
+            entry == Some(0)
+        };
+        let ranges_m = scan.range_m.unwrap();
+        let of_cars = ranges_m.iter().zip(scan.object.unwrap()).filter(|(_, o)| is_car(*o));
+        (ranges_m.len(), of_cars.map(|(range_m, _)| *range_m).fold(0.0, f32::max))
+    };
+    let limit = "effects = { detection = { reflectivity = 1, range_m = 20 } }";
+    let (all, farthest_m) = with("", "");
+    let (near, white_m) = with(limit, "");
+    let (_, dark_m) = with(limit, "reflectivity = [0.09, 0.09]");
+    assert!(near < all && farthest_m >= white_m && white_m <= 20.0, "{near} of {all}");
+    // 0.09 / 6^2 is 1 / 20^2.
+    assert!(0.0 < dark_m && dark_m <= 6.0 && dark_m < white_m, "{dark_m} m, {white_m} m");
+}
+
+#[test]
 fn a_cluster_of_one_object_has_its_class_and_a_mixed_one_has_none() {
     let stage = stage(RECIPE);
     let mut segmenter = Segmenter::new(Settings::default()).unwrap();
@@ -203,6 +228,16 @@ fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
             "place = \"parked\"",
             "place = \"parked\"\nspeed_m_s = [1, 2]",
             "object[0].speed_m_s: expected with place = road or pavement, found \"parked\"",
+        ),
+        (
+            "noise_m = 0",
+            "effects = { dropout = { probability = 0.1 } }",
+            "sensor[0].effects.dropout: expected noise_m and dropout of the sensor itself",
+        ),
+        (
+            "[ground]",
+            "[ground]\nreflectivity = [0, 2]",
+            "ground.reflectivity: expected two ascending",
         ),
         ("variants = 3", "variants = 0", "variants: expected at least 1, found 0"),
         ("kind = \"car\"", "kind = \"mesh\"", "object[0].meshes: expected with kind = \"mesh\""),

@@ -4,7 +4,7 @@
 use formats::rng::StreamKey;
 
 /// The random bits of `stream` for one beam and one purpose (1 is noise, 2 is
-/// dropout).
+/// dropout, 3 the receiver, 16 glass).
 #[must_use]
 pub fn random_bits(stream: StreamKey, beam: u32, purpose: u32) -> [u32; 4] {
     stream.words([beam, purpose, 0, 0])

@@ -16,6 +16,9 @@ fn effects_survive_a_round_trip() {
         "noise = { mean_m = -0.5, sigma_m = 1000, model = \"xyz\" }",
         "dropout = { probability = 1 }\nquantise_m = true",
         "quantise_m = 0.004\nintensity = true",
+        "detection = true",
+        "detection = { threshold_to_noise = 5, range_sigma_m = 0.06 }",
+        "detection = { reflectivity = 0.1, range_m = 60 }",
     ] {
         let effects: Effects = toml::from_str(text).unwrap();
         let json = serde_json::to_string(&effects).unwrap();
@@ -36,6 +39,18 @@ fn bad_numbers_are_named() {
         ("quantise_m = \"4 mm\"", "quantise_m"),
         ("noise = { sigma = 0.1 }", "sigma"),
         ("fog = true", "fog"),
+        ("detection = 0.1", "expected true for the sensor's own limit"),
+        ("detection = { limit = 1 }", "expected true for the sensor's own limit"),
+        (
+            "detection = { range_m = 60 }",
+            "effects.detection.reflectivity: expected a number beside",
+        ),
+        ("detection = { reflectivity = 0.1 }", "effects.detection.range_m"),
+        ("detection = { reflectivity = 0, range_m = 60 }", "effects.detection.reflectivity"),
+        ("detection = { reflectivity = 1.1, range_m = 60 }", "effects.detection.reflectivity"),
+        ("detection = { reflectivity = 0.1, range_m = 1e10 }", "effects.detection.range_m"),
+        ("detection = { threshold_to_noise = 0 }", "effects.detection.threshold_to_noise"),
+        ("detection = { range_sigma_m = -1 }", "effects.detection.range_sigma_m"),
     ] {
         let error = toml::from_str::<Effects>(text).unwrap_err().to_string();
         assert!(error.contains(key), "{text}: {error}");
@@ -51,4 +66,15 @@ fn the_sensors_own_quantum_is_filled_in() {
     let kinect = Sensor::builtin("kinect-v2").unwrap();
     let error = effects.for_sensor(&kinect).unwrap_err();
     assert!(error.to_string().contains("kinect-v2"), "{error}");
+}
+
+#[test]
+fn the_sensors_own_detection_limit_is_filled_in() {
+    let effects: Effects = toml::from_str("detection = true").unwrap();
+    let vlp32c = Sensor::builtin("vlp32c").unwrap();
+    let limit = effects.for_sensor(&vlp32c).unwrap().detection.unwrap().limit;
+    assert_eq!(limit, Some(DetectionLimit { reflectivity: 0.8, range_m: 200.0 }));
+    let kinect = Sensor::builtin("kinect-v2").unwrap();
+    let error = effects.for_sensor(&kinect).unwrap_err();
+    assert!(error.to_string().contains("as sensor \"kinect-v2\" has no [detection]"), "{error}");
 }

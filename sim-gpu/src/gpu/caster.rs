@@ -254,6 +254,7 @@ mod tests {
             noise: Some(Noise { mean_m: 0.0, sigma_m: 1.0, model: NoiseModel::Xyz }),
             dropout: Some(Dropout { probability: 0.5 }),
             intensity: Some(Intensity),
+            detection: None,
             quantum: None,
         };
         let best = test_support::adapter(adapter::adapters().into_iter().next())?;

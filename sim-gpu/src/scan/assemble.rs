@@ -1,10 +1,11 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
+use super::power;
 use super::request::{Glass, ScanRequest};
 use crate::config::InvalidValue;
 use crate::cpu::oracle;
 use crate::cpu::random::random_bits;
-use crate::effects::{Effects, NoiseModel, RayEffect};
+use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
 use crate::job::CastJob;
 use crate::resolve::{Hit, Hits};
 use crate::sensor::{Sensor, polar_angle_rad};
@@ -23,6 +24,8 @@ pub struct ObjectHits<'a> {
     pub world_from_object: DAffine3,
     /// Which of it is glass.
     pub glass: Option<&'a Glass>,
+    /// As [`PlacedTarget::retroreflection`](super::PlacedTarget::retroreflection).
+    pub retroreflection: f64,
     /// The rays that were cast at it.
     pub job: &'a CastJob,
     /// What they hit.
@@ -38,8 +41,15 @@ pub struct Tally {
     pub out_of_range: u64,
     /// Returns lost to dropout or in glass.
     pub dropped: u64,
+    /// Returns too weak to be detected.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub undetected: u64,
     /// Returns whose measured range is not positive.
     pub negative: u64,
+}
+
+fn is_zero(n: &u64) -> bool {
+    *n == 0
 }
 
 impl AddAssign for Tally {
@@ -47,6 +57,7 @@ impl AddAssign for Tally {
         self.points += other.points;
         self.out_of_range += other.out_of_range;
         self.dropped += other.dropped;
+        self.undetected += other.undetected;
         self.negative += other.negative;
     }
 }
@@ -67,7 +78,8 @@ pub fn assemble(
     objects: &[ObjectHits],
 ) -> Result<(Scan, Tally), InvalidValue> {
     let effects = request.applied_effects(cast_effects)?;
-    let view = View { request, cast_effects, effects };
+    let limit = effects.detection.and_then(|detection| detection.limit);
+    let view = View { request, cast_effects, effects, limit };
     let position_m = request.pose.position_m;
     let origin = origin_for(position_m);
     let mut tally = Tally::default();
@@ -91,6 +103,15 @@ struct View<'a> {
     cast_effects: &'a Effects,
     /// The effects to apply, a part of those that were cast.
     effects: Effects,
+    /// The sensor's detection limit, where detection is among the effects.
+    limit: Option<DetectionLimit>,
+}
+
+impl View<'_> {
+    /// Where a beam points, in world axes.
+    fn direction(&self, beam: u32) -> DVec3 {
+        self.request.pose.world_from_sensor * self.request.pattern.directions[beam as usize]
+    }
 }
 
 /// Zero near the world's origin, else whole metres near the sensor.
@@ -149,6 +170,11 @@ fn measure(
         tally.dropped += 1;
         return None;
     }
+    let beam = view.direction(nearest.beam);
+    let Some(timing_m) = detect(view, found, nearest, beam) else {
+        tally.undetected += 1;
+        return None;
+    };
     let effects = HitEffects::of(view.cast_effects, found.hits, hit);
     if view.effects.dropout.is_some() && effects.dropped {
         tally.dropped += 1;
@@ -156,7 +182,7 @@ fn measure(
     }
     let noise = view.effects.noise.map(|noise| noise.model);
     let along = if noise == Some(NoiseModel::Range) { effects.noise.x } else { 0.0 };
-    let mut range_m = nearest.range_m + along;
+    let mut range_m = nearest.range_m + along + timing_m;
     if let Some(step_m) = view.effects.quantum.and_then(|quantum| quantum.step_m) {
         range_m = (range_m / step_m).round() * step_m;
     }
@@ -164,12 +190,23 @@ fn measure(
         tally.negative += 1;
         return None;
     }
-    let beam = view.request.pose.world_from_sensor
-        * view.request.pattern.directions[nearest.beam as usize];
     let sideways = if noise == Some(NoiseModel::Xyz) { effects.noise } else { DVec3::ZERO };
     let from_start = beam * range_m + sideways;
     let from_sensor = start(view, nearest.beam).map_or(from_start, |start| from_start + start);
     Some(Return { object, hit, from_sensor })
+}
+
+/// The error that a receiver's noise gives the range of a hit, metres; `None` if the sensor
+/// does not detect it.
+fn detect(view: &View, found: &ObjectHits, hit: &Hit, beam: DVec3) -> Option<f64> {
+    let Some((detection, limit)) = view.effects.detection.zip(view.limit) else {
+        return Some(0.0);
+    };
+    let power = power::received(power::brightness(found, hit, beam), hit.range_m);
+    let stream = found.job.stream;
+    let error = |sigma_m| power::range_error(sigma_m, &limit, power, stream, hit.beam);
+    power::is_detected(&detection, &limit, power, stream, hit.beam)
+        .then(|| detection.range_sigma_m.map_or(0.0, error))
 }
 
 /// Which random bits of a beam say whether glass returns it; effects use lower
@@ -272,6 +309,19 @@ fn with_attributes(
                     HitEffects::of(view.cast_effects, objects[r.object].hits, r.hit).intensity
                 });
             }
+            Attribute::Power => {
+                scan.power = column(returns, |r| {
+                    let (found, hit) = (&objects[r.object], hit(r));
+                    let brightness = power::brightness(found, hit, view.direction(hit.beam));
+                    power::received(brightness, hit.range_m).min(f64::from(f32::MAX)) as f32
+                });
+            }
+            Attribute::Reflectivity => {
+                scan.reflectivity = column(returns, |r| {
+                    let hit = hit(r);
+                    power::calibrated(&objects[r.object], hit, view.direction(hit.beam))
+                });
+            }
             Attribute::Normal => {
                 scan.normal =
                     column(returns, |r| normal(&objects[r.object], hit(r).triangle, from_start(r)));
@@ -285,10 +335,14 @@ fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>>
     Some(returns.iter().map(value).collect())
 }
 
+/// A unit normal of the surface in world axes; zero for a triangle without area.
+pub(super) fn unit_normal(found: &ObjectHits, triangle: u32) -> DVec3 {
+    let in_object = oracle::normal(&found.job.target, triangle);
+    (found.world_from_object.matrix3.inverse().transpose() * in_object).normalize_or_zero()
+}
+
 /// The surface's unit normal in world axes, against the `beam` that hit it.
 fn normal(found: &ObjectHits, triangle: u32, beam: DVec3) -> [f32; 3] {
-    let in_object = oracle::normal(&found.job.target, triangle);
-    let turned = found.world_from_object.matrix3.inverse().transpose() * in_object;
-    let normal = turned.normalize_or_zero();
+    let normal = unit_normal(found, triangle);
     f32x3(if normal.dot(beam) > 0.0 { -normal } else { normal })
 }

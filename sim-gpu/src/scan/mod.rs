@@ -7,6 +7,7 @@
 //! ([`assemble`]).
 
 mod assemble;
+mod power;
 mod request;
 
 pub use assemble::{ObjectHits, Tally, assemble};
@@ -166,8 +167,9 @@ fn finish(
         .zip(objects)
         .zip(jobs.iter().zip(&hits))
         .map(|((object, placed), (job, hits))| {
-            let PlacedTarget { world_from_object, ref glass, .. } = *placed;
-            ObjectHits { object, world_from_object, glass: glass.as_ref(), job, hits }
+            let PlacedTarget { world_from_object, ref glass, retroreflection, .. } = *placed;
+            let glass = glass.as_ref();
+            ObjectHits { object, world_from_object, glass, retroreflection, job, hits }
         })
         .collect();
     let (scan, tally) = assemble(request, caster.effects(), &found)?;

@@ -63,6 +63,9 @@ pub struct PlacedTarget<'a> {
     pub stream: Option<StreamKey>,
     /// Which of it is glass; nothing by default.
     pub glass: Option<Glass>,
+    /// How well it reflects light back to where it came from, as road signs and licence
+    /// plates do: above 0, 1 being ideal. 0, the default, is a surface that scatters.
+    pub retroreflection: f64,
 }
 
 /// Panes of an object. Of the light that meets a pane, a mirror image and what
@@ -146,6 +149,7 @@ impl<'a> PlacedTarget<'a> {
             reflectivity: 1.0,
             stream: None,
             glass: None,
+            retroreflection: 0.0,
         }
     }
 }

@@ -123,6 +123,7 @@ fn cast_sensor(
             let mut target = PlacedTarget::new(&placed.target);
             target.world_from_object = placed.world_from_object;
             target.reflectivity = object.reflectivity as f32;
+            target.retroreflection = object.retroreflection;
             target.stream = Some(StreamKey::new(scene.seed, &object.name, number));
             target
         })

@@ -59,8 +59,11 @@ pub struct SceneObject {
     /// Factors along the mesh's axes once upright, all above 0.
     pub scale: DVec3,
     /// The part of the light that comes back at vertical incidence, 0..=1.
-    /// Used for intensity alone; default 1.
+    /// Default 1.
     pub reflectivity: f64,
+    /// How well it returns light to where it came from, 0..=1, 1 being an ideal
+    /// retro-reflector; 0, the default, is a surface that scatters.
+    pub retroreflection: f64,
     /// Whether and how far the mesh is simplified; `Some(None)`, `false` in
     /// TOML, is not at all. `None`, the default, is as the scene says.
     pub simplify: Option<Option<Simplify>>,

@@ -48,6 +48,8 @@ pub(super) struct ObjectTable {
     quaternion_xyzw: Option<[f64; 4]>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
+    #[serde(default)]
+    retroreflection: f64,
     simplify: Option<OwnSimplify>,
 }
 
@@ -94,6 +96,7 @@ impl ObjectTable {
         scale.into_iter().try_for_each(|factor| positive(&key("scale"), factor))?;
         let reflectivity = self.reflectivity.unwrap_or(1.0);
         within(&key("reflectivity"), reflectivity, 0.0..=1.0)?;
+        within(&key("retroreflection"), self.retroreflection, 0.0..=1.0)?;
         let keys = PoseKeys {
             position_m: self.position_m,
             look_at_m: None,
@@ -124,6 +127,7 @@ impl ObjectTable {
             rotation: keys.rotation(&table)?.unwrap_or(DQuat::IDENTITY),
             scale: DVec3::from_array(scale),
             reflectivity,
+            retroreflection: self.retroreflection,
             simplify,
         })
     }

@@ -86,6 +86,8 @@ fn bad_scenes_are_named() {
         (object("scale = [1, 1]"), "as scale"),
         (object("reflectivity = 1.5"), "object[0].reflectivity"),
         (object("reflectivity = nan"), "object[0].reflectivity"),
+        (object("retroreflection = 2"), "object[0].retroreflection"),
+        (both("effects = { detection = { range_m = 5 } }"), "effects.detection.reflectivity"),
         (object("up = \"x\""), "unknown variant `x`"),
         (object("normalize = \"sphere\""), "unknown variant `sphere`"),
         (object("position_m = [0, 0, inf]"), "object[0].position_m"),

@@ -11,6 +11,7 @@ use edgepuck_assets::SENSORS;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, ConfigError, InvalidValue};
+use crate::effects::DetectionLimit;
 
 pub use cone::Cone;
 pub use grid::Grid;
@@ -64,6 +65,9 @@ pub struct Sensor {
     /// Typical noise: stated by the maker, applied only where asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<TypicalNoise>,
+    /// What it just detects: applied only where the detection effect is named.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub detection: Option<DetectionLimit>,
     /// The arrangement of the beams.
     #[serde(flatten)]
     pub layout: Layout,

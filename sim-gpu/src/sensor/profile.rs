@@ -9,6 +9,7 @@ use super::{
     Grid, Layout, RangeLimits, Rings, Rotating, Sample, Sensor, TypicalNoise, Uniform, Views,
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
+use crate::effects::DetectionLimit;
 
 /// Farther than any sensor sees, and its square is still finite in f32.
 const MAX_RANGE_M: f64 = 1e9;
@@ -24,6 +25,7 @@ pub(super) struct Profile {
     sources: Vec<String>,
     range: RangeLimits,
     noise: Option<TypicalNoise>,
+    detection: Option<DetectionLimit>,
     rotating: Option<Rotating>,
     uniform: Option<Uniform>,
     grid: Option<Grid>,
@@ -54,6 +56,9 @@ impl TryFrom<Profile> for Sensor {
         check_range(&profile.range)?;
         let sigma_m = profile.noise.map(|noise| noise.typical_sigma_m);
         within("noise.typical_sigma_m", sigma_m, 0.0..=f64::MAX)?;
+        if let Some(limit) = &profile.detection {
+            limit.validate("detection")?;
+        }
         if let Some(rings) = &profile.rings {
             rings.validate()?;
         }
@@ -77,6 +82,7 @@ impl TryFrom<Profile> for Sensor {
             sources: profile.sources,
             range: profile.range,
             noise: profile.noise,
+            detection: profile.detection,
             layout,
             decimation: profile.decimation,
             rings: profile.rings,

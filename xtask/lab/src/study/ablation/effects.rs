@@ -129,6 +129,7 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
     let effects = Effects {
         noise: switches.noise.map(|model| Noise { mean_m: 0.0, sigma_m, model }),
         dropout: switches.dropout.then_some(Dropout { probability: plan.dropout }),
+        detection: None,
         quantum: switches.quantum.then_some(Quantum { step_m: None }),
         intensity: switches.intensity.then_some(Intensity),
     };
@@ -155,6 +156,7 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
         layouts: Vec::new(),
         returns: Returns::default(),
         hash: Hashing::default(),
+        reflectivity: 1.0,
     })
 }
 

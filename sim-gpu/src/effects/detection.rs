@@ -1,0 +1,128 @@
+//! The weakest signal that a sensor detects.
+
+use serde::{Deserialize, Serialize};
+
+use super::LARGEST_M;
+use crate::config::{InvalidValue, positive, within};
+
+/// Whether a sensor detects a return, by the power that it receives.
+///
+/// A receiver reports a pulse where its signal crosses a threshold. Here the signal is
+/// the received power; the threshold is the power of the weakest surface that the sensor
+/// is stated to detect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection {
+    /// What the sensor still detects; `None` is the sensor's own limit.
+    pub limit: Option<DetectionLimit>,
+    /// The threshold divided by the standard deviation of the receiver's noise: returns
+    /// near the limit are then lost or kept at random. `None` is a receiver without noise.
+    pub threshold_to_noise: Option<f64>,
+    /// Standard deviation that the receiver's noise gives the range of a return at the
+    /// limit, metres; it falls as the square root of the power grows. `None` is none.
+    pub range_sigma_m: Option<f64>,
+}
+
+/// A surface that a sensor just detects if it faces the sensor in clear air: what makers
+/// state as "80 % at 120 m".
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DetectionLimit {
+    /// The surface's diffuse reflectivity, above 0 and at most 1.
+    pub reflectivity: f64,
+    /// Its distance in metres.
+    pub range_m: f64,
+}
+
+impl DetectionLimit {
+    /// The least power that is detected, relative to that received from a white surface
+    /// that faces the sensor 1 m away.
+    #[must_use]
+    pub fn power(&self) -> f64 {
+        self.reflectivity / self.range_m.powi(2)
+    }
+
+    /// Checks both numbers, under the names that begin with `key`.
+    ///
+    /// # Errors
+    /// On the first that is not finite or out of its bounds.
+    pub(crate) fn validate(&self, key: &str) -> Result<(), InvalidValue> {
+        positive(&format!("{key}.reflectivity"), self.reflectivity)?;
+        within(&format!("{key}.reflectivity"), self.reflectivity, 0.0..=1.0)?;
+        positive(&format!("{key}.range_m"), self.range_m)?;
+        within(&format!("{key}.range_m"), self.range_m, 0.0..=LARGEST_M)
+    }
+}
+
+impl Detection {
+    pub(super) fn validate(&self) -> Result<(), InvalidValue> {
+        if let Some(limit) = self.limit {
+            limit.validate("effects.detection")?;
+        }
+        let ratio = self.threshold_to_noise;
+        positive("effects.detection.threshold_to_noise", ratio)?;
+        within("effects.detection.threshold_to_noise", ratio, 0.0..=1e9)?;
+        within("effects.detection.range_sigma_m", self.range_sigma_m, 0.0..=LARGEST_M)
+    }
+}
+
+/// [`Detection`] as written in TOML and JSON.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected true for the sensor's own limit, or a table of reflectivity, range_m, \
+                 threshold_to_noise and range_sigma_m as detection"
+)]
+pub(super) enum Table {
+    Switch(bool),
+    Numbers(Numbers),
+}
+
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Numbers {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reflectivity: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    range_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    threshold_to_noise: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    range_sigma_m: Option<f64>,
+}
+
+impl Table {
+    pub(super) fn detection(self) -> Result<Option<Detection>, InvalidValue> {
+        let numbers = match self {
+            Self::Switch(false) => return Ok(None),
+            Self::Switch(true) => Numbers::default(),
+            Self::Numbers(numbers) => numbers,
+        };
+        let missing = |key: &str, other: &str| {
+            let key = format!("effects.detection.{key}");
+            Err(InvalidValue::new(key, format!("expected a number beside {other}, found none")))
+        };
+        let limit = match (numbers.reflectivity, numbers.range_m) {
+            (None, None) => None,
+            (Some(reflectivity), Some(range_m)) => Some(DetectionLimit { reflectivity, range_m }),
+            (Some(_), None) => return missing("range_m", "reflectivity"),
+            (None, Some(_)) => return missing("reflectivity", "range_m"),
+        };
+        let Numbers { threshold_to_noise, range_sigma_m, .. } = numbers;
+        Ok(Some(Detection { limit, threshold_to_noise, range_sigma_m }))
+    }
+}
+
+impl From<Detection> for Table {
+    fn from(detection: Detection) -> Self {
+        let Detection { limit, threshold_to_noise, range_sigma_m } = detection;
+        if (limit, threshold_to_noise, range_sigma_m) == (None, None, None) {
+            return Self::Switch(true);
+        }
+        Self::Numbers(Numbers {
+            reflectivity: limit.map(|limit| limit.reflectivity),
+            range_m: limit.map(|limit| limit.range_m),
+            threshold_to_noise,
+            range_sigma_m,
+        })
+    }
+}

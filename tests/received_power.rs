@@ -1,0 +1,204 @@
+//! What a sensor receives of a surface, against closed forms: power, calibrated
+//! reflectivity, the detection limit. On every caster.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+use formats::rng::StreamKey;
+use formats::scan::{Attribute, Scan};
+use glam::{DAffine3, DVec3};
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::{Detection, DetectionLimit, Effects};
+use sim_gpu::mesh::Mesh;
+use sim_gpu::pose::Pose;
+use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
+use sim_gpu::sensor::Sensor;
+use tests::{adapter, casting, meshes};
+
+/// How far the wall is, metres.
+const WALL_M: f64 = 10.0;
+
+/// A surface, from a sensor at the origin.
+struct Seen {
+    mesh: Mesh,
+    world_from_object: DAffine3,
+    reflectivity: f32,
+    retroreflection: f64,
+}
+
+impl Seen {
+    fn new(mesh: Mesh) -> Self {
+        let world_from_object = DAffine3::IDENTITY;
+        Self { mesh, world_from_object, reflectivity: 1.0, retroreflection: 0.0 }
+    }
+
+    /// A wall across the x axis.
+    fn wall(reflectivity: f32) -> Self {
+        let low = DVec3::new(WALL_M, -60.0, -20.0);
+        let mesh = meshes::cuboid(low, DVec3::new(WALL_M + 1.0, 60.0, 20.0));
+        Self { reflectivity, ..Self::new(mesh) }
+    }
+
+    /// The inside of a ball around the sensor, which has nearly one range and faces it.
+    fn ball() -> Self {
+        Self::new(meshes::mapped(&meshes::icosphere(5), |p| p * WALL_M))
+    }
+
+    fn scan(&self, caster: &Caster) -> (Scan, Tally) {
+        let target = casting::target(&self.mesh);
+        let mut placed = PlacedTarget::new(&target);
+        placed.world_from_object = self.world_from_object;
+        (placed.reflectivity, placed.retroreflection) = (self.reflectivity, self.retroreflection);
+        let sensor = Sensor::builtin("vlp32c").unwrap();
+        let pattern = sensor.pattern();
+        let pose = Pose::look_at(DVec3::ZERO, DVec3::X).unwrap();
+        let mut request = ScanRequest::new(&sensor, &pattern, pose);
+        request.attributes = [
+            Attribute::Range,
+            Attribute::Beam,
+            Attribute::Normal,
+            Attribute::Power,
+            Attribute::Reflectivity,
+        ]
+        .into();
+        request.stream = StreamKey([3, 5]);
+        let scanned = scan_objects(caster, &[placed], &request).unwrap();
+        (scanned.scan, scanned.tally)
+    }
+
+    fn on_cpu(&self, detection: Option<Detection>) -> (Scan, Tally) {
+        self.scan(&Caster::Cpu(Effects { detection, ..Effects::default() }))
+    }
+}
+
+fn detection(reflectivity: f64, range_m: f64) -> Detection {
+    let limit = Some(DetectionLimit { reflectivity, range_m });
+    Detection { limit, threshold_to_noise: None, range_sigma_m: None }
+}
+
+fn ranges(scan: &Scan) -> Vec<f64> {
+    scan.range_m.as_ref().unwrap().iter().map(|&range_m| range_m.into()).collect()
+}
+
+#[test]
+fn power_falls_with_incidence_and_the_square_of_the_range() {
+    for caster in adapter::casters(&Effects::default()) {
+        let (scan, _) = Seen::wall(0.6).scan(caster);
+        let (powers, bytes) = (scan.power.as_ref().unwrap(), scan.reflectivity.as_ref().unwrap());
+        assert!(scan.len() > 10_000);
+        for ((range_m, power), byte) in ranges(&scan).into_iter().zip(powers).zip(bytes) {
+            let brightness = f64::from(0.6f32) * WALL_M / range_m;
+            let expected = brightness / range_m.powi(2);
+            // The range is there in f32, half of 2^-23 from its own; its cube three times that.
+            assert!((f64::from(*power) / expected - 1.0).abs() < 4e-7, "{range_m} m: {power}");
+            assert!((f64::from(*byte) - 100.0 * brightness).abs() <= 0.5 + 1e-5, "{byte}");
+        }
+    }
+}
+
+#[test]
+fn incidence_is_that_in_the_world_however_an_object_is_scaled() {
+    // A plane through the x axis' point WALL_M, tilted by 45 degrees before it is stretched.
+    let corners = [[1.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [-1.0, 1.0]];
+    let vertices = corners.map(|[up, side]| DVec3::new(up, 20.0 * side, up)).to_vec();
+    let mesh = Mesh { vertices, triangles: vec![[0, 1, 2], [1, 3, 2]] };
+    let placed = DAffine3::from_translation(DVec3::X * WALL_M);
+    let stretched = placed * DAffine3::from_scale(DVec3::new(1.0, 1.0, 4.0));
+    let (scan, _) = Seen { world_from_object: stretched, ..Seen::new(mesh) }.on_cpu(None);
+    assert!(scan.len() > 1000);
+    let normal = DVec3::new(4.0, 0.0, -1.0).normalize();
+    for (position, byte) in scan.positions.iter().zip(scan.reflectivity.as_ref().unwrap()) {
+        let beam = DVec3::from_array(position.map(f64::from)).normalize();
+        assert!((f64::from(*byte) - 100.0 * normal.dot(beam).abs()).abs() <= 0.5 + 1e-4);
+    }
+}
+
+#[test]
+fn a_retro_reflector_is_bright_at_every_incidence() {
+    for (retroreflection, expected) in [(1.0, 255), (0.5, 178), (1e-9, 101)] {
+        let (scan, _) = Seen { retroreflection, ..Seen::wall(0.1) }.on_cpu(None);
+        assert!(scan.reflectivity.as_ref().unwrap().iter().all(|&byte| byte == expected));
+        for (range_m, &power) in ranges(&scan).into_iter().zip(scan.power.as_ref().unwrap()) {
+            assert!((f64::from(power) * range_m.powi(2) - 1.0).abs() < 3e-7);
+        }
+    }
+}
+
+#[test]
+fn returns_below_the_limit_are_lost_and_no_others() {
+    // 0.6 x 10 / R^3 against 0.3 / 20^2: R is 20 m at most.
+    let effects = Effects { detection: Some(detection(0.3, 20.0)), ..Effects::default() };
+    let (all, _) = Seen::wall(0.6).on_cpu(None);
+    let near: Vec<[f32; 3]> = all
+        .positions
+        .iter()
+        .zip(ranges(&all))
+        .filter(|(_, range_m)| *range_m <= 20.0)
+        .map(|(position, _)| *position)
+        .collect();
+    assert!(near.len() > 1000 && near.len() + 1000 < all.len());
+    for caster in adapter::casters(&effects) {
+        let (scan, tally) = Seen::wall(0.6).scan(caster);
+        assert_eq!(scan.positions, near);
+        assert_eq!(
+            (tally.points, tally.undetected),
+            (near.len() as u64, (all.len() - near.len()) as u64)
+        );
+    }
+}
+
+/// The limit against which the ball returns `ratio` times the least power.
+fn of_the_balls_power(ratio: f64) -> Detection {
+    detection(0.5, WALL_M * (0.5 * ratio).sqrt())
+}
+
+// Facets of the ball lie up to 3e-4 of its radius inside it, and face the sensor within
+// 0.02 rad: power differs by 1e-3 at most.
+const POWER: f64 = 1e-3;
+
+#[test]
+fn a_noisy_threshold_loses_as_many_as_a_normal_distribution_says() {
+    let n = Seen::ball().on_cpu(None).0.len() as f64;
+    // Phi(5 (ratio - 1)).
+    for (ratio, expected) in
+        [(1.0, 0.5), (1.2, 0.841_344_7), (0.8, 0.158_655_3), (0.6, 0.022_750_1)]
+    {
+        let noisy = Detection { threshold_to_noise: Some(5.0), ..of_the_balls_power(ratio) };
+        let (scan, tally) = Seen::ball().on_cpu(Some(noisy));
+        assert_eq!((tally.points + tally.undetected) as f64, n);
+        let share = scan.len() as f64 / n;
+        let deviation = (expected * (1.0 - expected) / n).sqrt();
+        // The density is 0.4 at most.
+        let most = 4.0 * deviation + 0.4 * 5.0 * POWER;
+        assert!((share - expected).abs() < most, "{ratio}: {share}");
+    }
+}
+
+#[test]
+fn a_weak_return_is_measured_worse() {
+    let clean = ranges(&Seen::ball().on_cpu(None).0);
+    for (ratio, expected_m) in [(1.0 + POWER, 0.1), (4.0, 0.05), (1e6, 1e-4)] {
+        let weak = Detection { range_sigma_m: Some(0.1), ..of_the_balls_power(ratio) };
+        let (scan, _) = Seen::ball().on_cpu(Some(weak));
+        let errors = ranges(&scan).into_iter().zip(&clean).map(|(p, q)| p - q);
+        let n = clean.len() as f64;
+        assert_eq!(scan.len(), clean.len());
+        let sigma_m = (errors.map(|error| error * error).sum::<f64>() / n).sqrt();
+        // The standard error of a deviation is 1 / sqrt(2n); ranges are stored in f32, 1e-6 m.
+        let most = expected_m * (4.0 / (2.0 * n).sqrt() + POWER) + 1e-6;
+        assert!((sigma_m - expected_m).abs() < most, "{ratio}: {sigma_m} m");
+    }
+}
+
+#[test]
+fn numbers_hold_at_the_extremes() {
+    let n = Seen::ball().on_cpu(None).0.len();
+    let kept = |detection| Seen::ball().on_cpu(Some(detection)).0.len();
+    assert_eq!(kept(detection(f64::MIN_POSITIVE, 1e9)), n, "nothing is too weak");
+    assert_eq!(kept(detection(1.0, 1e-150)), 0, "everything is");
+    let black = Seen { reflectivity: 0.0, ..Seen::ball() };
+    let (scan, tally) = black.on_cpu(Some(detection(1e-300, 1e9)));
+    assert_eq!((scan.len(), tally.undetected), (0, n as u64), "black returns nothing");
+    let far = Detection { threshold_to_noise: Some(1e-9), ..of_the_balls_power(1.0) };
+    let half = kept(far) as f64 / n as f64;
+    assert!((half - 0.5).abs() < 4.0 * 0.5 / (n as f64).sqrt(), "noise alone: {half}");
+}
