@@ -12,6 +12,9 @@ pub const SENSORS: [(&str, &str); 8] = [
     ("hdl32e", include_str!("sensors/hdl32e.toml")),
 ];
 
+/// Diffuse reflectivities of materials, by name, as TOML.
+pub const MATERIALS: &str = include_str!("materials.toml");
+
 /// The built-in scene recipes, the default one first: a recipe's name and its TOML.
 pub const SCENE_RECIPES: [(&str, &str); 3] = [
     ("street", include_str!("scenes/street.toml")),

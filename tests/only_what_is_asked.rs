@@ -77,7 +77,7 @@ fn asked() -> Vec<Asked> {
     let noise = |model| Some(Noise { mean_m: 0.0, sigma_m: 0.01, model });
     let dropout = Some(Dropout { probability: 0.1 });
     let quantum = Some(Quantum { step_m: Some(0.004) });
-    let effects: [(_, _, &[&[&str]]); 5] = [
+    let effects: [(_, _, &[&[&str]]); 6] = [
         (
             "noise along the ray",
             Effects { noise: noise(NoiseModel::Range), ..plain() },

@@ -8,10 +8,13 @@ use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Detection, DetectionLimit, Effects};
+use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
+use sim_gpu::scene::{Scene, cast};
 use sim_gpu::sensor::Sensor;
+use std::fs;
 use tests::{adapter, casting, meshes};
 
 /// How far the wall is, metres.
@@ -201,4 +204,45 @@ fn numbers_hold_at_the_extremes() {
     let far = Detection { threshold_to_noise: Some(1e-9), ..of_the_balls_power(1.0) };
     let half = kept(far) as f64 / n as f64;
     assert!((half - 0.5).abs() < 4.0 * 0.5 / (n as f64).sqrt(), "noise alone: {half}");
+}
+
+#[test]
+fn faces_return_light_as_their_materials_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    // A wall 5 m away, white on the left, grey in the middle, a road sign on the right.
+    write(
+        "wall.obj",
+        "mtllib wall.mtl\nv 5 9 -1\nv 5 9 1\nv 5 3 -1\nv 5 3 1\nv 5 -3 -1\nv 5 -3 1\nv 5 -9 -1\n\
+         v 5 -9 1\nf 1 2 4 3\nusemtl grey\nf 3 4 6 5\nusemtl sign\nf 5 6 8 7\n",
+    );
+    write("wall.mtl", "newmtl grey\nKd 0.5 0.5 0.5\nnewmtl sign\nKd 0 1 0\n");
+    write(
+        "scene.toml",
+        "attributes = [\"intensity\", \"reflectivity\"]\n[effects]\nintensity = true\n\
+         [[object]]\nmesh = \"wall.obj\"\nup = \"z\"\nreflectivity = 0.8\nmtl = true\n\
+         materials = { sign = { retroreflection = 1 } }\n\
+         [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n",
+    );
+    let scene = Scene::load(&folder.path().join("scene.toml")).unwrap();
+    let scan = &cast(&scene, &Caster::Cpu(scene.effects.clone()), Culling::On).unwrap()[0].scan;
+    let (intensities, bytes) =
+        (scan.intensity.as_ref().unwrap(), scan.reflectivity.as_ref().unwrap());
+    // Half of sRGB's range in linear light: ((0.5 + 0.055) / 1.055)^2.4.
+    let grey = 0.214_041_14;
+    let mut seen = [0; 3];
+    for ((position, intensity), byte) in scan.positions.iter().zip(intensities).zip(bytes) {
+        let beam = DVec3::from_array(position.map(f64::from));
+        let cosine = beam.x / beam.length();
+        let part = usize::from(beam.y < 3.0) + usize::from(beam.y < -3.0);
+        let (reflectivity, expected) = match part {
+            0 => (0.8, 80.0 * cosine),
+            1 => (grey, 100.0 * grey * cosine),
+            _ => (1.0, 255.0),
+        };
+        assert!((f64::from(*intensity) - reflectivity * cosine).abs() < 1e-6, "{position:?}");
+        assert!((f64::from(*byte) - expected).abs() <= 0.5 + 1e-4, "{position:?}");
+        seen[part] += 1;
+    }
+    assert!(seen.iter().all(|&n| n > 100), "{seen:?}");
 }

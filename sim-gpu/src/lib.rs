@@ -43,6 +43,7 @@ pub mod effects;
 pub mod gpu;
 pub mod job;
 mod lanes;
+pub mod material;
 pub mod mesh;
 pub mod packets;
 pub mod pose;

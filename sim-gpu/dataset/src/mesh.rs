@@ -209,8 +209,15 @@ fn write_view(
     let config = output.config;
     let set = &config.sets[planned.set];
     let world_from_object = DAffine3::IDENTITY;
-    let objects =
-        [ObjectHits { object: 0, world_from_object, glass: None, retroreflection: 0.0, job, hits }];
+    let objects = [ObjectHits {
+        object: 0,
+        world_from_object,
+        glass: None,
+        retroreflection: 0.0,
+        materials: None,
+        job,
+        hits,
+    }];
     let mut variants = Vec::new();
     for &variant in &config.variants {
         let mut request =

@@ -7,6 +7,7 @@ use formats::hash::{FileHash, Hashing};
 
 use super::error::{Malformed, MeshError, ParseError};
 use super::format::MeshFormat;
+use super::obj::{Colour, MaterialNames};
 use super::triangle_mesh::{Mesh, Parsed};
 use super::{obj, off, ply, stl};
 
@@ -51,6 +52,34 @@ pub fn load_hashed(
         MeshError::Malformed { path: path.into(), line: error.line, cause: error.cause }
     })?;
     Ok((LoadedMesh { mesh, format, dropped_faces }, hashing.of_bytes(&bytes)))
+}
+
+/// The materials of the OBJ file at `path`, by triangle of the mesh that [`load`] makes of it.
+///
+/// # Errors
+///
+/// A file that is no OBJ file or cannot be read.
+pub fn material_names(path: &Path) -> Result<MaterialNames, MeshError> {
+    let malformed =
+        |ParseError { line, cause }| MeshError::Malformed { path: path.into(), line, cause };
+    if MeshFormat::of(path) != Some(MeshFormat::Obj) {
+        let cause = "expected an OBJ file, whose faces name materials, found another format";
+        return Err(malformed(Malformed::Syntax(cause.to_owned()).into()));
+    }
+    MaterialNames::parse(&read(path)?).map_err(malformed)
+}
+
+/// The colours of the materials in the MTL file at `path`.
+///
+/// # Errors
+///
+/// A file that cannot be read, or a colour that is none.
+pub(crate) fn colours(path: &Path) -> Result<Vec<Colour>, MeshError> {
+    obj::parse_colours(&read(path)?).map_err(|ParseError { line, cause }| MeshError::Malformed {
+        path: path.into(),
+        line,
+        cause,
+    })
 }
 
 /// Reads a mesh of `format` from a file's bytes.

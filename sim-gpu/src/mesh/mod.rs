@@ -22,5 +22,8 @@ pub mod validate;
 
 pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
-pub use load::{LoadedMesh, load, load_hashed, parse};
+pub(crate) use load::colours;
+pub use load::{LoadedMesh, load, load_hashed, material_names, parse};
+pub(crate) use obj::Colour;
+pub use obj::MaterialNames;
 pub use triangle_mesh::{Mesh, Parsed};

@@ -7,6 +7,7 @@ use crate::cpu::oracle;
 use crate::cpu::random::random_bits;
 use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
 use crate::job::CastJob;
+use crate::material::{Material, Materials};
 use crate::resolve::{Hit, Hits};
 use crate::sensor::{Sensor, polar_angle_rad};
 use formats::rng::StreamKey;
@@ -26,10 +27,21 @@ pub struct ObjectHits<'a> {
     pub glass: Option<&'a Glass>,
     /// As [`PlacedTarget::retroreflection`](super::PlacedTarget::retroreflection).
     pub retroreflection: f64,
+    /// The materials of its triangles, where they differ.
+    pub materials: Option<&'a Materials>,
     /// The rays that were cast at it.
     pub job: &'a CastJob,
     /// What they hit.
     pub hits: &'a Hits,
+}
+
+impl ObjectHits<'_> {
+    /// What triangle `index` is made of.
+    pub(super) fn material(&self, index: u32) -> Material {
+        let (reflectivity, retroreflection) = (self.job.reflectivity.into(), self.retroreflection);
+        let one = || Material { reflectivity, retroreflection };
+        self.materials.map_or_else(one, |materials| materials.of(index))
+    }
 }
 
 /// What became of a scan's returns.
@@ -306,7 +318,10 @@ fn with_attributes(
             Attribute::Object => scan.object = column(returns, |r| objects[r.object].object),
             Attribute::Intensity => {
                 scan.intensity = column(returns, |r| {
-                    HitEffects::of(view.cast_effects, objects[r.object].hits, r.hit).intensity
+                    let found = &objects[r.object];
+                    let intensity = HitEffects::of(view.cast_effects, found.hits, r.hit).intensity;
+                    let material = found.materials.map(|all| all.of(hit(r).triangle));
+                    material.map_or(intensity, |own| intensity * own.reflectivity as f32)
                 });
             }
             Attribute::Power => {

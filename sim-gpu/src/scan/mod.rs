@@ -167,9 +167,10 @@ fn finish(
         .zip(objects)
         .zip(jobs.iter().zip(&hits))
         .map(|((object, placed), (job, hits))| {
-            let PlacedTarget { world_from_object, ref glass, retroreflection, .. } = *placed;
+            let PlacedTarget { world_from_object, ref glass, .. } = *placed;
             let glass = glass.as_ref();
-            ObjectHits { object, world_from_object, glass, retroreflection, job, hits }
+            let PlacedTarget { retroreflection, materials, .. } = *placed;
+            ObjectHits { object, world_from_object, glass, retroreflection, materials, job, hits }
         })
         .collect();
     let (scan, tally) = assemble(request, caster.effects(), &found)?;

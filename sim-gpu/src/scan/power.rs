@@ -34,11 +34,11 @@ const IDEAL_RETRO: f64 = 255.0;
 /// So is a retro-reflector at any incidence. It returns far more than that; how much no
 /// maker states, so that this is a lower bound.
 pub(super) fn brightness(found: &ObjectHits, hit: &Hit, beam: DVec3) -> f64 {
-    if found.retroreflection > 0.0 {
+    let material = found.material(hit.triangle);
+    if material.retroreflection > 0.0 {
         return 1.0;
     }
-    let cosine = unit_normal(found, hit.triangle).dot(beam).abs().min(1.0);
-    f64::from(found.job.reflectivity) * cosine
+    material.reflectivity * unit_normal(found, hit.triangle).dot(beam).abs().min(1.0)
 }
 
 /// The power received from a surface of this brightness at this range.
@@ -49,7 +49,7 @@ pub(super) fn received(brightness: f64, range_m: f64) -> f64 {
 
 /// The byte that a sensor with calibrated reflectivity reports.
 pub(super) fn calibrated(found: &ObjectHits, hit: &Hit, beam: DVec3) -> u8 {
-    let byte = match found.retroreflection {
+    let byte = match found.material(hit.triangle).retroreflection {
         retro if retro > 0.0 => LEAST_RETRO + (IDEAL_RETRO - LEAST_RETRO) * retro,
         _ => WHITE * brightness(found, hit, beam),
     };

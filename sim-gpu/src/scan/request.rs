@@ -3,6 +3,7 @@
 use crate::config::InvalidValue;
 use crate::effects::Effects;
 use crate::job::{CastJob, Culling, aim};
+use crate::material::Materials;
 use crate::pose::Pose;
 use crate::ray::RayFrame;
 use crate::sensor::{BeamPattern, Sensor};
@@ -66,6 +67,9 @@ pub struct PlacedTarget<'a> {
     /// How well it reflects light back to where it came from, as road signs and licence
     /// plates do: above 0, 1 being ideal. 0, the default, is a surface that scatters.
     pub retroreflection: f64,
+    /// The materials of its triangles, in place of its reflectivity and retroreflection;
+    /// one for all by default.
+    pub materials: Option<&'a Materials>,
 }
 
 /// Panes of an object. Of the light that meets a pane, a mirror image and what
@@ -124,7 +128,9 @@ impl<'a> ScanRequest<'a> {
         let PlacedTarget { target, reflectivity, stream, .. } = placed;
         let frame = self.frame(placed);
         let stream = stream.unwrap_or(self.stream);
-        let (target, reflectivity) = ((*target).clone(), *reflectivity);
+        // Materials come in when the triangles that were hit are known.
+        let reflectivity = if placed.materials.is_some() { 1.0 } else { *reflectivity };
+        let target = (*target).clone();
         let (beams, aim) = aim(&frame, self.pattern, self.culling, is_wanted);
         CastJob { target, frame, beams, aim, stream, reflectivity }
     }
@@ -150,6 +156,7 @@ impl<'a> PlacedTarget<'a> {
             stream: None,
             glass: None,
             retroreflection: 0.0,
+            materials: None,
         }
     }
 }

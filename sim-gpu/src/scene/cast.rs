@@ -4,6 +4,7 @@ use super::{Scene, SceneObject, SceneSensor};
 use crate::bvh::Builder;
 use crate::caster::Caster;
 use crate::job::Culling;
+use crate::material::{Material, MaterialError, Materials};
 use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::validate::triangle_stats;
 use crate::mesh::{LoadedMesh, Mesh, MeshError, load};
@@ -20,6 +21,9 @@ pub enum SceneError {
     /// A mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// The materials of a mesh cannot be had.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
     /// An effect does not fit a sensor, or the adapter failed.
     #[error(transparent)]
     Scan(#[from] ScanError),
@@ -48,6 +52,7 @@ struct Placed {
     target: Target,
     world_from_object: DAffine3,
     simplified: Option<Simplified>,
+    materials: Option<Materials>,
 }
 
 /// One scan per sensor of `scene`. `caster` must have been opened for the
@@ -77,16 +82,21 @@ fn place(scene: &Scene, object: &SceneObject) -> Result<Placed, SceneError> {
         // The mesh keeps its own origin: undo the recentring.
         world_from_object *= DAffine3::from_translation(world.centre);
     }
+    let otherwise =
+        Material { reflectivity: object.reflectivity, retroreflection: object.retroreflection };
+    let materials = (!object.materials.is_plain())
+        .then(|| Materials::load(&object.mesh, &object.materials, otherwise))
+        .transpose()?;
     let Some(simplify) = scene.simplify_of(object) else {
         let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
-        return Ok(Placed { target, world_from_object, simplified: None });
+        return Ok(Placed { target, world_from_object, simplified: None, materials });
     };
     let bound_m = simplify.bound_m(|| resolved_by(scene, object, &world.mesh, &world_from_object));
     // No length of the mesh is longer in the world than by its largest factor.
     let surface = simplified_surface(world.mesh, kept, bound_m / object.scale.max_element())?;
     let simplified = Some(Simplified { bound_m, triangles: surface.len() as u64 });
     let target = Target::new(surface, Builder::Sah);
-    Ok(Placed { target, world_from_object, simplified })
+    Ok(Placed { target, world_from_object, simplified, materials })
 }
 
 /// What the scene's sensors can tell apart on `mesh`, in metres.
@@ -124,6 +134,7 @@ fn cast_sensor(
             target.world_from_object = placed.world_from_object;
             target.reflectivity = object.reflectivity as f32;
             target.retroreflection = object.retroreflection;
+            target.materials = placed.materials.as_ref();
             target.stream = Some(StreamKey::new(scene.seed, &object.name, number));
             target
         })

@@ -8,6 +8,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use crate::config::{self, ConfigError, InvalidValue};
 use crate::effects::Effects;
+use crate::material::MaterialChoice;
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::Pose;
 use crate::sensor::Sensor;
@@ -64,6 +65,8 @@ pub struct SceneObject {
     /// How well it returns light to where it came from, 0..=1, 1 being an ideal
     /// retro-reflector; 0, the default, is a surface that scatters.
     pub retroreflection: f64,
+    /// The materials of its faces, OBJ alone; by default one for all.
+    pub materials: MaterialChoice,
     /// Whether and how far the mesh is simplified; `Some(None)`, `false` in
     /// TOML, is not at all. `None`, the default, is as the scene says.
     pub simplify: Option<Option<Simplify>>,
@@ -164,6 +167,13 @@ impl Scene {
             let cause = "a simplified mesh does not have the file's triangles, so that the \
                          attribute `triangle` cannot name them";
             return Err(InvalidValue::new("simplify", cause));
+        }
+        let differ = |object: &SceneObject| {
+            self.simplify_of(object).is_some() && !object.materials.is_plain()
+        };
+        if let Some(i) = self.objects.iter().position(differ) {
+            let cause = "a simplified mesh does not have the file's faces, which name materials";
+            return Err(InvalidValue::new(format!("object[{i}].materials"), cause));
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! A scene as TOML holds it, and its checks.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use formats::scan::{Attribute, AttributeSet};
@@ -9,6 +10,7 @@ use serde::Deserialize;
 use super::{SceneObject, SceneSensor};
 use crate::config::{InvalidValue, positive, within};
 use crate::effects::Effects;
+use crate::material::{MaterialChoice, MaterialTable};
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::PoseKeys;
 use crate::sensor::Sensor;
@@ -50,6 +52,10 @@ pub(super) struct ObjectTable {
     reflectivity: Option<f64>,
     #[serde(default)]
     retroreflection: f64,
+    #[serde(default)]
+    mtl: bool,
+    #[serde(default)]
+    materials: BTreeMap<String, MaterialTable>,
     simplify: Option<OwnSimplify>,
 }
 
@@ -116,6 +122,11 @@ impl ObjectTable {
                 ));
             }
         };
+        let own = self.materials.into_iter().map(|(name, material)| {
+            let material = material.material(&format!("{table}.materials.{name}"))?;
+            Ok((name, material))
+        });
+        let by_name = own.collect::<Result<_, InvalidValue>>()?;
         let name = self.name.unwrap_or_else(|| stem.to_string_lossy().into_owned());
         Ok(SceneObject {
             name: named(&table, name)?,
@@ -128,6 +139,7 @@ impl ObjectTable {
             scale: DVec3::from_array(scale),
             reflectivity,
             retroreflection: self.retroreflection,
+            materials: MaterialChoice { from_mtl: self.mtl, by_name },
             simplify,
         })
     }

@@ -87,6 +87,13 @@ fn bad_scenes_are_named() {
         (object("reflectivity = 1.5"), "object[0].reflectivity"),
         (object("reflectivity = nan"), "object[0].reflectivity"),
         (object("retroreflection = 2"), "object[0].retroreflection"),
+        (object("materials = { a = 0.5 }"), "expected the name of a built-in material"),
+        (object("materials = { a = \"paint\" }"), "object[0].materials.a: expected one of asphalt"),
+        (
+            object("materials = { a = { reflectivity = -1 } }"),
+            "object[0].materials.a.reflectivity: expected a number within 0..=1",
+        ),
+        (object("mtl = true\nsimplify = \"auto\""), "object[0].materials: a simplified mesh"),
         (both("effects = { detection = { range_m = 5 } }"), "effects.detection.reflectivity"),
         (object("up = \"x\""), "unknown variant `x`"),
         (object("normalize = \"sphere\""), "unknown variant `sphere`"),
