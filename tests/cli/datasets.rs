@@ -103,6 +103,26 @@ fn effects_come_from_a_file_and_dark_meshes_are_not_detected() {
 }
 
 #[test]
+fn meshes_have_the_colours_of_their_mtl_files() {
+    let folder = Folder::new();
+    let wall = "mtllib grey.mtl\nusemtl grey\nv 0 -1 -1\nv 0 1 -1\nv 0 1 1\nv 0 -1 1\nf 1 2 3 4\n";
+    folder.write("meshes/wall/train/wall_0001.obj", wall);
+    folder.write("meshes/wall/train/grey.mtl", "newmtl grey\nKd 0.5\n");
+    folder.write("meshes/wall/train/wall_0002.obj", wall.replace("grey.mtl", "none.mtl"));
+    let words = "gen-dataset meshes --out out --sensor vlp32c --noise 0 --up z --elevation 0 --mtl \
+                 --attributes reflectivity,intensity";
+    let said = folder.exits(1, words);
+    assert!(said.contains("none.mtl: cannot be read"), "{said}");
+    let scan = folder.scan("out/rotational/clean/wall/train/wall_0001_v0.npz");
+    let (bytes, intensities) = (scan.reflectivity.unwrap(), scan.intensity.unwrap());
+    // Half of sRGB's range is 21.4 % of the light; the first view faces the wall.
+    assert_eq!(bytes.iter().max(), Some(&21));
+    for (byte, intensity) in bytes.iter().zip(intensities) {
+        assert!((100.0 * intensity - f32::from(*byte)).abs() <= 0.501, "{byte} {intensity}");
+    }
+}
+
+#[test]
 fn noise_is_along_the_ray_and_of_the_size_asked_for() {
     let folder = Folder::with_meshes();
     folder.succeeds("gen-dataset meshes --out out --noise 0.02 --attributes range,beam");

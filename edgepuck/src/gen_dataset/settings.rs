@@ -72,6 +72,10 @@ pub struct Settings {
     #[arg(long, default_value_t = 1.0, value_name = "R", allow_negative_numbers = true)]
     reflectivity: f64,
 
+    /// Take reflectivities from the colours in the MTL files of the meshes, which must be OBJ files
+    #[arg(long, conflicts_with = "simplify")]
+    mtl: bool,
+
     /// Attributes of each point besides its position: range, beam, ring, time, triangle, object,
     /// intensity, power, reflectivity, normal
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
@@ -174,6 +178,7 @@ impl Settings {
             returns: self.returns.unwrap_or_default(),
             hash: self.hash,
             reflectivity: self.reflectivity,
+            mtl: self.mtl,
         })
     }
 

@@ -52,6 +52,10 @@ pub struct DatasetConfig {
     /// The meshes' diffuse reflectivity, 0 to 1.
     #[serde(default = "white", skip_serializing_if = "is_white")]
     pub reflectivity: f64,
+    /// Whether OBJ meshes have the diffuse colours of their MTL files; what has none has
+    /// the reflectivity.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub mtl: bool,
 }
 
 fn white() -> f64 {

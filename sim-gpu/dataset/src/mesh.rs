@@ -14,6 +14,7 @@ use glam::DAffine3;
 use sim_gpu::bvh::Builder;
 use sim_gpu::effects::Effects;
 use sim_gpu::job::{Cast, CastJob, Culling};
+use sim_gpu::material::{Material, MaterialChoice, MaterialError, Materials};
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::mesh::validate::triangle_stats;
@@ -37,6 +38,8 @@ pub struct Prepared {
     pub views: Vec<PlannedView>,
     /// The rays of each view.
     pub jobs: Vec<CastJob>,
+    /// The materials of the mesh, where they are asked for.
+    pub materials: Option<Materials>,
 }
 
 /// One view of one mesh.
@@ -63,6 +66,7 @@ pub fn prepare(
     let (mut record, mesh, kept) = progress
         .time(Stage::Read, || read(entry, config.up, config.normalize, config.hash))
         .map_err(|error| failure(entry, &error))?;
+    let materials = materials(entry, config)?;
     let id = record.entry.id();
     let views = plan(config, &id);
     let surface = match config.simplify {
@@ -92,7 +96,8 @@ pub fn prepare(
         let aim = |(view, frame): (&PlannedView, RayFrame)| {
             let set = &config.sets[view.set];
             let stream = set.stream(config.seed, &id, view.view);
-            let reflectivity = config.reflectivity as f32;
+            // Materials come in when the triangles that were hit are known.
+            let reflectivity = if materials.is_some() { 1.0 } else { config.reflectivity as f32 };
             CastJob::aim(target.clone(), frame, &patterns[view.set], culling, stream, reflectivity)
         };
         views.iter().zip(frames).map(aim).collect()
@@ -101,7 +106,17 @@ pub fn prepare(
     let beams: usize = views.iter().map(|view| patterns[view.set].len()).sum();
     progress.rays_cast.fetch_add(cast as u64, Relaxed);
     progress.rays_culled.fetch_add((beams - cast) as u64, Relaxed);
-    Ok(Prepared { record, views, jobs })
+    Ok(Prepared { record, views, jobs, materials })
+}
+
+fn materials(entry: &MeshEntry, config: &DatasetConfig) -> Result<Option<Materials>, MeshFailure> {
+    let otherwise = Material::diffuse(config.reflectivity);
+    let choice = MaterialChoice { from_mtl: config.mtl, ..MaterialChoice::default() };
+    let load = || Materials::load(&entry.path, &choice, otherwise);
+    config.mtl.then(load).transpose().map_err(|error| match error {
+        MaterialError::Mesh(error) => failure(entry, &error),
+        other => failed(entry, None, other.to_string()),
+    })
 }
 
 fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
@@ -187,13 +202,13 @@ pub fn write_mesh(
     prepared: Prepared,
     casts: &[Cast],
 ) -> Result<MeshRecord, DatasetError> {
-    let Prepared { mut record, views, jobs } = prepared;
+    let Prepared { mut record, views, jobs, materials } = prepared;
     for ((planned, job), cast) in views.iter().zip(&jobs).zip(casts) {
         let hits = output.progress.time(Stage::Resolve, || {
             resolve(job, cast, &output.patterns[planned.set], output.cast_effects)
         });
         output.progress.rays_decided_in_f64.fetch_add(hits.decided_in_f64 as u64, Relaxed);
-        let scan = write_view(output, &record, planned, job, &hits)?;
+        let scan = write_view(output, &record, planned, job, &hits, materials.as_ref())?;
         record.scans.push(scan);
     }
     Ok(record)
@@ -205,6 +220,7 @@ fn write_view(
     planned: &PlannedView,
     job: &CastJob,
     hits: &Hits,
+    materials: Option<&Materials>,
 ) -> Result<ScanRecord, DatasetError> {
     let config = output.config;
     let set = &config.sets[planned.set];
@@ -214,7 +230,7 @@ fn write_view(
         world_from_object,
         glass: None,
         retroreflection: 0.0,
-        materials: None,
+        materials,
         job,
         hits,
     }];
