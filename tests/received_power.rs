@@ -220,7 +220,7 @@ fn faces_return_light_as_their_materials_do() {
     write(
         "scene.toml",
         "attributes = [\"intensity\", \"reflectivity\"]\n[effects]\nintensity = true\n\
-         [[object]]\nmesh = \"wall.obj\"\nup = \"z\"\nreflectivity = 0.8\nmtl = true\n\
+         [[object]]\nmesh = \"wall.obj\"\nup = \"z\"\nreflectivity = 0.8\ncolours = \"mtl\"\n\
          materials = { sign = { retroreflection = 1 } }\n\
          [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n",
     );

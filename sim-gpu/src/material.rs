@@ -1,18 +1,22 @@
 //! What surfaces are made of: how much light they return.
 //!
-//! An OBJ file names a material for each face (`usemtl`). Its colour (`Kd` in the MTL file)
-//! is what a screen shows, not what a sensor at 905 nm measures: black plastic may be bright
-//! there. So a name may be given a reflectivity of its own, or one of the table in
-//! `assets/materials.toml`.
+//! An OBJ file names a material for each face (`usemtl`), whose colour stands in an MTL file
+//! (`Kd`, `map_Kd`), or has colours at its vertices. A colour is what a screen shows, not what
+//! a sensor at 905 nm measures: black plastic may be bright there. So a name may be given a
+//! reflectivity of its own, or one of the table in `assets/materials.toml`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use edgepuck_assets::MATERIALS;
-use serde::Deserialize;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
-use crate::mesh::{Colour, MaterialNames, MeshError, colours, material_names};
+use crate::mesh::{Appearance, Colour, Face, MeshError, colours};
+use texture::Texture;
+
+mod texture;
 
 /// How a surface returns light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,12 +55,24 @@ fn table() -> BTreeMap<String, f64> {
     toml::from_str(MATERIALS).expect("invariant: a test parses the table")
 }
 
+formats::named! {
+    /// Where the colours of an OBJ file's faces come from.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum ColourSource: "source of colours" {
+        /// The materials of its MTL files: `Kd` and `map_Kd`.
+        Mtl = "mtl",
+        /// Its vertices: `v x y z red green blue`.
+        Vertices = "vertices",
+    }
+}
+
 /// Which materials are wanted for a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MaterialChoice {
-    /// Whether diffuse colours are taken from the mesh's MTL file.
-    pub from_mtl: bool,
-    /// Materials by name, which come before those of the MTL file.
+    /// Where colours are taken from, if they are.
+    pub colours: Option<ColourSource>,
+    /// Materials by name, which come before colours.
     pub by_name: BTreeMap<String, Material>,
 }
 
@@ -126,7 +142,7 @@ pub enum MaterialError {
         /// The names that the mesh uses.
         known: Vec<String>,
     },
-    /// A material of an MTL file has no colour that can be used.
+    /// A material has no colour that can be used.
     #[error("{}: material {name}: {cause}", path.display())]
     Colour {
         /// The MTL file.
@@ -134,16 +150,41 @@ pub enum MaterialError {
         /// The material.
         name: String,
         /// Why.
-        cause: &'static str,
+        cause: String,
+    },
+    /// The colour of a vertex is none.
+    #[error(
+        "{}: vertex {vertex}: expected three numbers within 0..=1 as its colour, found {found:?}",
+        path.display()
+    )]
+    Vertex {
+        /// The OBJ file.
+        path: PathBuf,
+        /// The vertex, from 1.
+        vertex: u32,
+        /// Its numbers.
+        found: [f64; 3],
     },
 }
 
 /// The materials of a mesh's triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Materials {
-    materials: Vec<Material>,
-    /// Indices into `materials`, `[n_triangles]`.
-    of_triangle: Vec<u32>,
+    even: Vec<Material>,
+    textures: Vec<Texture>,
+    /// `[n_triangles]`.
+    of_triangle: Vec<Paint>,
+}
+
+/// What one triangle is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Paint {
+    /// One material, by its place.
+    Even(u32),
+    /// Reflectivities of its corners.
+    Corners([f32; 3]),
+    /// An image by its place, and where its corners lie there.
+    Textured(u32, [[f32; 2]; 3]),
 }
 
 impl Materials {
@@ -152,73 +193,149 @@ impl Materials {
     ///
     /// # Errors
     /// A file that is not OBJ or cannot be read; a name that the mesh does not use; an MTL
-    /// file that is missing or malformed, or has a colour or a texture that cannot be used.
+    /// file that is missing or malformed, a colour or an image that cannot be used.
     pub fn load(
         path: &Path,
         choice: &MaterialChoice,
         otherwise: Material,
     ) -> Result<Self, MaterialError> {
-        let MaterialNames { libraries, names, of_triangle } = material_names(path)?;
-        if let Some(name) = choice.by_name.keys().find(|name| !names.contains(name)) {
+        let appearance = Appearance::load(path)?;
+        if let Some(name) = choice.by_name.keys().find(|name| !appearance.names.contains(name)) {
             let (path, name) = (path.to_owned(), name.clone());
-            return Err(MaterialError::UnknownName { path, name, known: names });
+            return Err(MaterialError::UnknownName { path, name, known: appearance.names });
         }
-        let known = if choice.from_mtl { read_libraries(path, &libraries)? } else { vec![] };
-        let mut materials = vec![otherwise];
-        for name in &names {
-            let colour = known.iter().find(|(_, colour)| colour.name == *name);
-            materials.push(match (choice.by_name.get(name), colour) {
-                (Some(material), _) => *material,
-                (None, Some((library, colour))) => diffuse(library, colour)?,
-                (None, None) => otherwise,
-            });
+        let from_mtl = choice.colours == Some(ColourSource::Mtl);
+        let known = if from_mtl { read_libraries(path, &appearance.libraries)? } else { vec![] };
+        let mut materials = Self { even: vec![otherwise], textures: vec![], of_triangle: vec![] };
+        let named: Vec<Named> = appearance
+            .names
+            .iter()
+            .map(|name| {
+                materials.add(choice.by_name.get(name), known.iter().find(|c| c.name == *name))
+            })
+            .collect::<Result<_, _>>()?;
+        let from_vertices = choice.colours == Some(ColourSource::Vertices);
+        for face in &appearance.triangles {
+            let paint = match face.material.map(|place| &named[place as usize]) {
+                Some(Named::Even(place)) => Paint::Even(*place),
+                Some(Named::Textured(place, colour)) => {
+                    Paint::Textured(*place, corners_in_image(&appearance, face, colour)?)
+                }
+                _ if from_vertices => painted(path, &appearance, face)?,
+                _ => Paint::Even(0),
+            };
+            materials.of_triangle.push(paint);
         }
-        Ok(Self { materials, of_triangle })
+        Ok(materials)
     }
 
-    /// The material of triangle `index` of the mesh.
-    #[must_use]
-    pub fn of(&self, index: u32) -> Material {
-        self.materials[self.of_triangle[index as usize] as usize]
-    }
-}
-
-/// The colours in the MTL files that the OBJ file at `path` names, and where each stands.
-fn read_libraries(path: &Path, libraries: &[String]) -> Result<Vec<(PathBuf, Colour)>, MeshError> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut found = Vec::new();
-    for library in libraries {
-        let path = folder.join(library);
-        found.extend(colours(&path)?.into_iter().map(|colour| (path.clone(), colour)));
-    }
-    Ok(found)
-}
-
-/// The material of a colour: its luminance.
-fn diffuse(library: &Path, colour: &Colour) -> Result<Material, MaterialError> {
-    let failed = |cause| {
-        let (path, name) = (library.to_owned(), colour.name.clone());
-        Err(MaterialError::Colour { path, name, cause })
-    };
-    match colour.diffuse {
-        _ if colour.has_image => failed(
-            "map_Kd names an image, which is not read; give the material a reflectivity by name",
-        ),
-        None => failed("expected a colour Kd, found none"),
-        Some(srgb) => Ok(Material::diffuse(luminance(srgb))),
-    }
-}
-
-/// The luminance of an sRGB colour in linear light: IEC 61966-2-1 for each part, and the
-/// weights of ITU-R BT.709.
-fn luminance(srgb: [f64; 3]) -> f64 {
-    let [r, g, b] =
-        srgb.map(
-            |part| {
-                if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) }
+    /// Adds what a name stands for: its `own` material, or its `colour`.
+    fn add<'a>(
+        &mut self,
+        own: Option<&Material>,
+        colour: Option<&'a Colour>,
+    ) -> Result<Named<'a>, MaterialError> {
+        let material = match (own, colour) {
+            (Some(material), _) => *material,
+            (None, None) => return Ok(Named::Nothing),
+            (None, Some(colour)) => match &colour.image {
+                Some(image) => {
+                    let kd = colour.diffuse.unwrap_or([1.0; 3]);
+                    let texture = Texture::load(image, |srgb| tinted(srgb, kd))
+                        .map_err(|cause| unfit(colour, format!("{}: {cause}", image.display())))?;
+                    self.textures.push(texture);
+                    return Ok(Named::Textured(self.textures.len() as u32 - 1, colour));
+                }
+                None => {
+                    let missing = || unfit(colour, "expected a colour Kd, found none".to_owned());
+                    Material::diffuse(luminance(colour.diffuse.ok_or_else(missing)?))
+                }
             },
-        );
-    (0.2126 * r + 0.7152 * g + 0.0722 * b).min(1.0)
+        };
+        self.even.push(material);
+        Ok(Named::Even(self.even.len() as u32 - 1))
+    }
+
+    /// The material of triangle `index` of the mesh, at a point whose barycentric
+    /// coordinates are made if they matter.
+    #[must_use]
+    pub fn at(&self, index: u32, barycentric: impl FnOnce() -> DVec3) -> Material {
+        match self.of_triangle[index as usize] {
+            Paint::Even(place) => self.even[place as usize],
+            Paint::Corners(corners) => {
+                let reflectivity = DVec3::from_array(corners.map(f64::from)).dot(barycentric());
+                Material::diffuse(reflectivity.clamp(0.0, 1.0))
+            }
+            Paint::Textured(place, corners) => {
+                let share = barycentric().to_array();
+                let [u, v] = [0, 1].map(|axis| {
+                    corners.iter().zip(share).map(|(at, share)| f64::from(at[axis]) * share).sum()
+                });
+                Material::diffuse(self.textures[place as usize].at(u, v).clamp(0.0, 1.0))
+            }
+        }
+    }
+}
+
+/// What a name of a material stands for.
+enum Named<'a> {
+    Nothing,
+    /// One material, by its place.
+    Even(u32),
+    /// An image, by its place, of this colour.
+    Textured(u32, &'a Colour),
+}
+
+/// The colours in the MTL files that the OBJ file at `path` names.
+fn read_libraries(path: &Path, libraries: &[String]) -> Result<Vec<Colour>, MeshError> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let read = libraries.iter().map(|library| colours(&folder.join(library)));
+    Ok(read.collect::<Result<Vec<_>, _>>()?.concat())
+}
+
+fn unfit(colour: &Colour, cause: String) -> MaterialError {
+    MaterialError::Colour { path: colour.library.clone(), name: colour.name.clone(), cause }
+}
+
+/// Where the corners of `face` lie in the image of `colour`.
+fn corners_in_image(
+    appearance: &Appearance,
+    face: &Face,
+    colour: &Colour,
+) -> Result<[[f32; 2]; 3], MaterialError> {
+    let missing = || unfit(colour, "map_Kd: a face has no texture coordinates".to_owned());
+    let corners = face.texture.ok_or_else(missing)?;
+    Ok(corners.map(|i| appearance.texture_coordinates[i as usize].map(|x| x as f32)))
+}
+
+/// The colours of the vertices of `face`, if all have one.
+fn painted(path: &Path, appearance: &Appearance, face: &Face) -> Result<Paint, MaterialError> {
+    let mut corners = [0.0; 3];
+    for (corner, vertex) in corners.iter_mut().zip(face.vertices) {
+        let Some(found) = appearance.colours[vertex as usize] else { return Ok(Paint::Even(0)) };
+        if !found.iter().all(|part| (0.0..=1.0).contains(part)) {
+            return Err(MaterialError::Vertex { path: path.to_owned(), vertex: vertex + 1, found });
+        }
+        *corner = luminance(found) as f32;
+    }
+    Ok(Paint::Corners(corners))
+}
+
+/// The luminance of an sRGB colour in linear light, with the weights of ITU-R BT.709.
+fn luminance(srgb: [f64; 3]) -> f64 {
+    tinted(srgb, [1.0; 3])
+}
+
+/// As [`luminance`], of light that another colour `tint` dims.
+fn tinted(srgb: [f64; 3], tint: [f64; 3]) -> f64 {
+    let weights = [0.2126, 0.7152, 0.0722];
+    let parts = srgb.iter().zip(tint).zip(weights);
+    parts.map(|((&part, tint), weight)| linear(part) * linear(tint) * weight).sum::<f64>().min(1.0)
+}
+
+/// Linear light of a part of an sRGB colour: IEC 61966-2-1.
+fn linear(part: f64) -> f64 {
+    if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]
@@ -240,12 +357,18 @@ mod tests {
         let materials = Materials::load(&path, choice, Material::diffuse(0.9))
             .map_err(|error| error.to_string().replace(folder.path().to_str().unwrap(), ""))?;
         assert_eq!(materials.of_triangle.len(), n as usize);
-        Ok((0..n).map(|triangle| materials.of(triangle).reflectivity).collect())
+        Ok((0..n)
+            .map(|triangle| materials.at(triangle, || DVec3::splat(1.0 / 3.0)).reflectivity)
+            .collect())
+    }
+
+    fn from(source: ColourSource) -> MaterialChoice {
+        MaterialChoice { colours: Some(source), ..MaterialChoice::default() }
     }
 
     fn by_name(name: &str, reflectivity: f64) -> MaterialChoice {
         let by_name = [(name.to_owned(), Material::diffuse(reflectivity))].into();
-        MaterialChoice { from_mtl: false, by_name }
+        MaterialChoice { colours: None, by_name }
     }
 
     #[test]
@@ -253,17 +376,17 @@ mod tests {
         // Half of sRGB's range is 21.4 % of the light.
         let grey = luminance([0.5; 3]);
         assert!((grey - 0.214_041).abs() < 1e-6, "{grey}");
-        let mtl = MaterialChoice { from_mtl: true, ..MaterialChoice::default() };
+        let mtl = from(ColourSource::Mtl);
         assert_eq!(load(OBJ, MTL, &mtl).unwrap(), [0.9, grey, grey, 0.2126, grey]);
         let named = by_name("tyre", 0.02);
         assert_eq!(load(OBJ, "", &named).unwrap(), [0.9, 0.9, 0.9, 0.02, 0.9]);
-        let both = MaterialChoice { from_mtl: true, ..named };
+        let both = MaterialChoice { by_name: named.by_name, ..mtl };
         assert_eq!(load(OBJ, MTL, &both).unwrap(), [0.9, grey, grey, 0.02, grey]);
     }
 
     #[test]
     fn what_cannot_be_used_is_named() {
-        let mtl = MaterialChoice { from_mtl: true, ..MaterialChoice::default() };
+        let mtl = from(ColourSource::Mtl);
         for (text, choice, expected) in [
             (
                 MTL,
@@ -283,7 +406,12 @@ mod tests {
             ("newmtl body\nKd 0.5 0.5\n", mtl.clone(), "/car parts.mtl:2: expected one or three"),
             ("Kd 1 1 1\n", mtl.clone(), "/car parts.mtl:1: expected newmtl and a name before it"),
             ("newmtl body\n", mtl.clone(), "material body: expected a colour Kd, found none"),
-            ("newmtl body\nKd 1 1 1\nmap_Kd a.png\n", mtl.clone(), "map_Kd names an image"),
+            ("newmtl body\nmap_Kd a.png\n", mtl.clone(), "a.png: cannot be read: "),
+            (
+                "newmtl body\nmap_Kd -s 1 a.png\n",
+                mtl.clone(),
+                ":2: expected a file without options",
+            ),
         ] {
             let error = load(OBJ, text, &choice).unwrap_err();
             assert!(error.contains(expected), "{error}");
@@ -292,6 +420,51 @@ mod tests {
         assert!(load(&missing, "", &mtl).unwrap_err().starts_with("/none.mtl: cannot be read"));
         let error = Materials::load(Path::new("a.stl"), &mtl, Material::diffuse(1.0)).unwrap_err();
         assert!(error.to_string().contains("expected an OBJ file"), "{error}");
+    }
+
+    #[test]
+    fn vertices_give_their_colours_to_the_points_between_them() {
+        let obj =
+            "v 0 0 0 1 1 1\nv 1 0 0 0 0 0\nv 0 1 0 0.5 0.5 0.5\nv 1 1 0\nf 1 2 3\nf -3 -2 -1\n";
+        let vertices = from(ColourSource::Vertices);
+        let [coloured, plain] = load(obj, "", &vertices).unwrap()[..] else { panic!("two") };
+        assert!((coloured - (1.0 + luminance([0.5; 3])) / 3.0).abs() < 1e-7, "{coloured}");
+        assert_eq!(plain, 0.9, "a vertex without a colour");
+        let error = load(&obj.replace("1 1 1", "255 1 1"), "", &vertices).unwrap_err();
+        assert!(
+            error.contains("/car.obj: vertex 1: expected three numbers within 0..=1"),
+            "{error}"
+        );
+    }
+
+    #[cfg(feature = "textures")]
+    #[test]
+    fn an_image_colours_the_faces_of_its_material() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        // Black on the left, white on the right.
+        let pixels = image::GrayImage::from_raw(2, 1, vec![0, 255]).unwrap();
+        pixels.save(file("stripes.png")).unwrap();
+        let corners = "vt 0.25 0.5\nvt 0.75 0.5\nvt 1.25 0.5\n";
+        let obj =
+            format!("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{corners}usemtl a\nf 1/1 2/2 3/3\n");
+        fs::write(file("a.obj"), &obj).unwrap();
+        fs::write(file("m.mtl"), "newmtl a\nKd 1 0 0\nmap_Kd stripes.png\n").unwrap();
+        let choice = from(ColourSource::Mtl);
+        let all = Materials::load(&file("a.obj"), &choice, Material::diffuse(1.0)).unwrap();
+        let at = |x, y, z| all.at(0, || DVec3::new(x, y, z)).reflectivity;
+        // The red part of white.
+        for (found, expected) in [
+            (at(1.0, 0.0, 0.0), 0.0),
+            (at(0.0, 1.0, 0.0), 0.2126),
+            (at(0.0, 0.0, 1.0), 0.0),
+            (at(0.5, 0.5, 0.0), 0.1063),
+        ] {
+            assert!((found - expected).abs() < 1e-7, "{found}, not {expected}");
+        }
+        fs::write(file("a.obj"), obj.replace("1/1", "1")).unwrap();
+        let error = Materials::load(&file("a.obj"), &choice, Material::diffuse(1.0)).unwrap_err();
+        assert!(error.to_string().ends_with("a face has no texture coordinates"), "{error}");
     }
 
     #[test]

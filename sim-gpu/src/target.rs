@@ -70,6 +70,21 @@ impl Surface {
         self.triangles[index as usize].map(|v| self.vertices[v as usize])
     }
 
+    /// How much of each corner of triangle `index` there is in `point`, which lies in its
+    /// plane, in the unit frame: from 0 to 1, together 1.
+    #[must_use]
+    pub fn barycentric(&self, index: u32, point: DVec3) -> DVec3 {
+        let [a, b, c] = self.corners(index);
+        let (to_b, to_c, to_point) = (b - a, c - a, point - a);
+        let normal = to_b.cross(to_c);
+        let twice_area = normal.length_squared();
+        let of_b = (to_point.cross(to_c).dot(normal) / twice_area).clamp(0.0, 1.0);
+        let of_c = (to_b.cross(to_point).dot(normal) / twice_area).clamp(0.0, 1.0 - of_b);
+        let shares = DVec3::new(1.0 - of_b - of_c, of_b, of_c);
+        // The area of a tiny triangle may underflow; all of it is one place then.
+        if shares.is_finite() { shares } else { DVec3::splat(1.0 / 3.0) }
+    }
+
     /// As [`corners`](Self::corners), in the order of their coordinates: triangles of
     /// the same three corners are the same here.
     #[must_use]

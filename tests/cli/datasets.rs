@@ -109,7 +109,7 @@ fn meshes_have_the_colours_of_their_mtl_files() {
     folder.write("meshes/wall/train/wall_0001.obj", wall);
     folder.write("meshes/wall/train/grey.mtl", "newmtl grey\nKd 0.5\n");
     folder.write("meshes/wall/train/wall_0002.obj", wall.replace("grey.mtl", "none.mtl"));
-    let words = "gen-dataset meshes --out out --sensor vlp32c --noise 0 --up z --elevation 0 --mtl \
+    let words = "gen-dataset meshes --out out --sensor vlp32c --noise 0 --up z --elevation 0 --colours mtl \
                  --attributes reflectivity,intensity";
     let said = folder.exits(1, words);
     assert!(said.contains("none.mtl: cannot be read"), "{said}");

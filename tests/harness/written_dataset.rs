@@ -53,7 +53,7 @@ pub fn config() -> DatasetConfig {
         returns: Returns::default(),
         hash: Hashing::default(),
         reflectivity: 1.0,
-        mtl: false,
+        colours: None,
     }
 }
 

@@ -44,29 +44,29 @@ fn become_process(command: &mut Command) -> std::io::Result<u8> {
     Ok(command.status()?.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
 }
 
-/// The features that a command line needs beyond the default ones, which leave
-/// out what takes long to build: meshoptimizer and HDF5.
+/// The features that a command line needs beyond the default ones: what takes long to build.
 fn features(package: &str, words: &[OsString]) -> Vec<&'static str> {
     let any = |is: fn(&str) -> bool| words.iter().any(|word| is(&word.to_string_lossy()));
-    let simplifies = any(|word| word.starts_with("--simplify"))
-        || package == EDGEPUCK && any(|word| word.ends_with(".toml") && is_simplified(word));
+    let is_in_scene = |key| package == EDGEPUCK && words.iter().any(|word| has_key(word, key));
+    let simplifies = any(|word| word.starts_with("--simplify")) || is_in_scene("simplify");
+    let is_coloured = any(|word| word.starts_with("--colours")) || is_in_scene("colours");
     let needs_hdf5 = match package {
         LAB => modelnet_h5_list::is_among(words),
         _ => any(|word| word.starts_with("--layout")) && any(|word| word.contains("modelnet-h5")),
     };
-    let features = [(simplifies, "simplify"), (needs_hdf5, "hdf5")];
+    let features = [(simplifies, "simplify"), (needs_hdf5, "hdf5"), (is_coloured, "textures")];
     features.into_iter().filter(|(is_needed, _)| *is_needed).map(|(_, name)| name).collect()
 }
 
-/// Whether the scene file has a key `simplify` that is not `false`. Where the word
-/// stands for something else, a longer build is all that it costs.
-fn is_simplified(scene: &str) -> bool {
-    std::fs::read_to_string(scene).is_ok_and(|text| has_simplify_key(&text))
+/// Whether the scene file has this key, and not `false`. An error costs a longer build alone.
+fn has_key(scene: &OsString, key: &str) -> bool {
+    scene.to_string_lossy().ends_with(".toml")
+        && std::fs::read_to_string(scene).is_ok_and(|text| is_key_of(&text, key))
 }
 
-fn has_simplify_key(scene: &str) -> bool {
+fn is_key_of(scene: &str, key: &str) -> bool {
     let mut code = scene.lines().map(|line| line.split('#').next().unwrap_or_default());
-    code.any(|code| code.contains("simplify") && !code.contains("false"))
+    code.any(|code| code.contains(key) && !code.contains("false"))
 }
 
 #[cfg(test)]
@@ -83,7 +83,7 @@ mod tests {
             ("simplify = false", false),
             ("# simplify = \"auto\"", false),
         ] {
-            assert_eq!(has_simplify_key(scene), expected, "{scene}");
+            assert_eq!(is_key_of(scene, "simplify"), expected, "{scene}");
         }
     }
 }

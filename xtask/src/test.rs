@@ -89,7 +89,7 @@ fn go_without(
 /// share, so that nothing is built twice.
 fn cargo_on_all(words: &[&str]) -> Command {
     let mut command = cargo(words);
-    command.args(["--workspace", "--features", "edgepuck/hdf5,train/hdf5"]);
+    command.args(["--workspace", "--features", "edgepuck/hdf5,edgepuck/textures,train/hdf5"]);
     if has_cpp_compiler() {
         command.args(["--features", "edgepuck/simplify,edgepuck-lab/simplify,tests/simplify"]);
     }

@@ -9,6 +9,7 @@ use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
 use sim_gpu::config::{self, within};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
+use sim_gpu::material::ColourSource;
 use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::packets;
 use sim_gpu::pose::load_poses;
@@ -72,9 +73,10 @@ pub struct Settings {
     #[arg(long, default_value_t = 1.0, value_name = "R", allow_negative_numbers = true)]
     reflectivity: f64,
 
-    /// Take reflectivities from the colours in the MTL files of the meshes, which must be OBJ files
-    #[arg(long, conflicts_with = "simplify")]
-    mtl: bool,
+    /// Take reflectivities from the colours of the meshes, which must be OBJ files: of the
+    /// materials in their MTL files (`mtl`) or of their vertices (`vertices`)
+    #[arg(long, value_name = "SOURCE", conflicts_with = "simplify")]
+    colours: Option<ColourSource>,
 
     /// Attributes of each point besides its position: range, beam, ring, time, triangle, object,
     /// intensity, power, reflectivity, normal
@@ -178,7 +180,7 @@ impl Settings {
             returns: self.returns.unwrap_or_default(),
             hash: self.hash,
             reflectivity: self.reflectivity,
-            mtl: self.mtl,
+            colours: self.colours,
         })
     }
 

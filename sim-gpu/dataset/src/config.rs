@@ -9,6 +9,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use sim_gpu::config::InvalidValue;
 use sim_gpu::effects::Effects;
+use sim_gpu::material::ColourSource;
 use sim_gpu::mesh::frame::{Normalize, Up};
 use sim_gpu::pose::Pose;
 use sim_gpu::sensor::{Sensor, Views};
@@ -52,10 +53,10 @@ pub struct DatasetConfig {
     /// The meshes' diffuse reflectivity, 0 to 1.
     #[serde(default = "white", skip_serializing_if = "is_white")]
     pub reflectivity: f64,
-    /// Whether OBJ meshes have the diffuse colours of their MTL files; what has none has
-    /// the reflectivity.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub mtl: bool,
+    /// Where OBJ meshes have their colours from, if they have; what has none has the
+    /// reflectivity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colours: Option<ColourSource>,
 }
 
 fn white() -> f64 {

@@ -111,9 +111,9 @@ pub fn prepare(
 
 fn materials(entry: &MeshEntry, config: &DatasetConfig) -> Result<Option<Materials>, MeshFailure> {
     let otherwise = Material::diffuse(config.reflectivity);
-    let choice = MaterialChoice { from_mtl: config.mtl, ..MaterialChoice::default() };
+    let choice = MaterialChoice { colours: config.colours, ..MaterialChoice::default() };
     let load = || Materials::load(&entry.path, &choice, otherwise);
-    config.mtl.then(load).transpose().map_err(|error| match error {
+    config.colours.map(|_| load()).transpose().map_err(|error| match error {
         MaterialError::Mesh(error) => failure(entry, &error),
         other => failed(entry, None, other.to_string()),
     })

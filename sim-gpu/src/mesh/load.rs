@@ -7,7 +7,6 @@ use formats::hash::{FileHash, Hashing};
 
 use super::error::{Malformed, MeshError, ParseError};
 use super::format::MeshFormat;
-use super::obj::{Colour, MaterialNames};
 use super::triangle_mesh::{Mesh, Parsed};
 use super::{obj, off, ply, stl};
 
@@ -54,34 +53,6 @@ pub fn load_hashed(
     Ok((LoadedMesh { mesh, format, dropped_faces }, hashing.of_bytes(&bytes)))
 }
 
-/// The materials of the OBJ file at `path`, by triangle of the mesh that [`load`] makes of it.
-///
-/// # Errors
-///
-/// A file that is no OBJ file or cannot be read.
-pub fn material_names(path: &Path) -> Result<MaterialNames, MeshError> {
-    let malformed =
-        |ParseError { line, cause }| MeshError::Malformed { path: path.into(), line, cause };
-    if MeshFormat::of(path) != Some(MeshFormat::Obj) {
-        let cause = "expected an OBJ file, whose faces name materials, found another format";
-        return Err(malformed(Malformed::Syntax(cause.to_owned()).into()));
-    }
-    MaterialNames::parse(&read(path)?).map_err(malformed)
-}
-
-/// The colours of the materials in the MTL file at `path`.
-///
-/// # Errors
-///
-/// A file that cannot be read, or a colour that is none.
-pub(crate) fn colours(path: &Path) -> Result<Vec<Colour>, MeshError> {
-    obj::parse_colours(&read(path)?).map_err(|ParseError { line, cause }| MeshError::Malformed {
-        path: path.into(),
-        line,
-        cause,
-    })
-}
-
 /// Reads a mesh of `format` from a file's bytes.
 ///
 /// # Errors
@@ -99,7 +70,7 @@ pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
     Ok(parsed)
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
     let failed = |source| MeshError::Read { path: path.into(), source };
     let kind = fs::metadata(path).map_err(failed)?;
     if !kind.is_file() {

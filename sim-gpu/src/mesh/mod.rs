@@ -4,6 +4,7 @@
 //! turns and scales it into the world, [`validate`] says which of its triangles
 //! a ray can meet.
 
+mod appearance;
 mod error;
 mod format;
 pub mod frame;
@@ -20,10 +21,8 @@ mod triangle_mesh;
 pub mod unit_frame;
 pub mod validate;
 
+pub(crate) use appearance::{Appearance, Colour, Face, colours};
 pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
-pub(crate) use load::colours;
-pub use load::{LoadedMesh, load, load_hashed, material_names, parse};
-pub(crate) use obj::Colour;
-pub use obj::MaterialNames;
+pub use load::{LoadedMesh, load, load_hashed, parse};
 pub use triangle_mesh::{Mesh, Parsed};

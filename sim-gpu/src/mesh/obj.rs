@@ -48,7 +48,7 @@ fn append(mesh: &mut Mesh, model: &tobj::Mesh) {
 
 /// Passes on each line, with its number from 1 and how many lines of the file it stands on:
 /// a backslash at its end continues a line on the next one.
-fn for_each_line(
+pub(super) fn for_each_line(
     bytes: &[u8],
     mut take: impl FnMut(usize, &[u8], usize) -> Result<(), ParseError>,
 ) -> Result<(), ParseError> {
@@ -73,112 +73,12 @@ fn for_each_line(
 }
 
 /// What stands in a line before a comment.
-fn data(line: &[u8]) -> &[u8] {
+pub(super) fn data(line: &[u8]) -> &[u8] {
     line.split(|&byte| byte == b'#').next().unwrap_or_default()
 }
 
-fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     data(line).split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
-}
-
-/// A line's first word, and what follows it.
-fn keyed(line: &[u8]) -> (&[u8], &[u8]) {
-    let data = data(line).trim_ascii();
-    let end = data.iter().position(u8::is_ascii_whitespace).unwrap_or(data.len());
-    (&data[..end], data[end..].trim_ascii())
-}
-
-/// A name, which may hold spaces.
-fn text(name: &[u8]) -> String {
-    String::from_utf8_lossy(name).into_owned()
-}
-
-/// The colour of a material in an MTL file.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Colour {
-    pub name: String,
-    /// `Kd`: red, green and blue, sRGB, 0 to 1.
-    pub diffuse: Option<[f64; 3]>,
-    /// Whether an image, `map_Kd`, colours it.
-    pub has_image: bool,
-}
-
-/// The colours of the materials in an MTL file's bytes. (tobj's reader of MTL panics where a
-/// colour lacks a number.)
-pub(super) fn parse_colours(bytes: &[u8]) -> Result<Vec<Colour>, ParseError> {
-    let mut colours: Vec<Colour> = Vec::new();
-    for_each_line(bytes, |number, line, _| {
-        let (key, value) = keyed(line);
-        match (key, colours.last_mut()) {
-            (b"newmtl", _) => {
-                colours.push(Colour { name: text(value), diffuse: None, has_image: false });
-            }
-            (b"Kd", Some(colour)) => {
-                colour.diffuse = Some(srgb(value).map_err(|cause| cause.at(number))?);
-            }
-            (b"map_Kd", Some(colour)) => colour.has_image = true,
-            (b"Kd" | b"map_Kd", None) => {
-                let cause = Malformed::expected("newmtl and a name before it", line);
-                return Err(cause.at(number));
-            }
-            _ => {}
-        }
-        Ok(())
-    })?;
-    Ok(colours)
-}
-
-fn srgb(value: &[u8]) -> Result<[f64; 3], Malformed> {
-    let number = |word| std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
-    let parts: Option<Vec<f64>> = words(value).map(number).collect();
-    let parts = parts.unwrap_or_default();
-    let is_fit = parts.iter().all(|part| (0.0..=1.0).contains(part));
-    match parts[..] {
-        [red, green, blue] if is_fit => Ok([red, green, blue]),
-        // Green and blue are those of red where they are left out.
-        [grey] if is_fit => Ok([grey; 3]),
-        _ => Err(Malformed::expected("one or three numbers within 0..=1 as Kd", value)),
-    }
-}
-
-/// Which material each triangle of an OBJ file has.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct MaterialNames {
-    /// The MTL files, as the OBJ file names them.
-    pub libraries: Vec<String>,
-    /// The names of the materials, in the order of their first use.
-    pub names: Vec<String>,
-    /// For each triangle of the mesh 0 if it has none, or 1 and more: the material's place
-    /// among the names.
-    pub of_triangle: Vec<u32>,
-}
-
-impl MaterialNames {
-    pub(super) fn parse(bytes: &[u8]) -> Result<Self, ParseError> {
-        let (mut found, mut current) = (Self::default(), 0);
-        for_each_line(bytes, |_, line, _| {
-            match keyed(line) {
-                (b"mtllib", library) => found.libraries.push(text(library)),
-                (b"usemtl", name) => current = found.place_of(text(name)),
-                (b"f", corners) => {
-                    let n_triangles = words(corners).count().saturating_sub(2);
-                    let n = found.of_triangle.len() + n_triangles;
-                    found.of_triangle.resize(n, current);
-                }
-                _ => {}
-            }
-            Ok(())
-        })?;
-        Ok(found)
-    }
-
-    fn place_of(&mut self, name: String) -> u32 {
-        let place = self.names.iter().position(|known| *known == name).unwrap_or_else(|| {
-            self.names.push(name);
-            self.names.len() - 1
-        });
-        place as u32 + 1
-    }
 }
 
 /// The positions and faces of an OBJ file, each on the line it came from.

@@ -9,7 +9,7 @@ use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
 use crate::job::CastJob;
 use crate::material::{Material, Materials};
 use crate::resolve::{Hit, Hits};
-use crate::sensor::{Sensor, polar_angle_rad};
+use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
@@ -36,11 +36,16 @@ pub struct ObjectHits<'a> {
 }
 
 impl ObjectHits<'_> {
-    /// What triangle `index` is made of.
-    pub(super) fn material(&self, index: u32) -> Material {
+    /// What the surface is made of where a beam of `pattern` hit it.
+    pub(super) fn material(&self, pattern: &BeamPattern, hit: &Hit) -> Material {
         let (reflectivity, retroreflection) = (self.job.reflectivity.into(), self.retroreflection);
         let one = || Material { reflectivity, retroreflection };
-        self.materials.map_or_else(one, |materials| materials.of(index))
+        let barycentric = || {
+            let ray = self.job.frame.beam(pattern, hit.beam);
+            let surface = &self.job.target.surface;
+            surface.barycentric(hit.triangle, ray.origin + hit.range_m * ray.direction)
+        };
+        self.materials.map_or_else(one, |materials| materials.at(hit.triangle, barycentric))
     }
 }
 
@@ -214,7 +219,8 @@ fn detect(view: &View, found: &ObjectHits, hit: &Hit, beam: DVec3) -> Option<f64
     let Some((detection, limit)) = view.effects.detection.zip(view.limit) else {
         return Some(0.0);
     };
-    let power = power::received(power::brightness(found, hit, beam), hit.range_m);
+    let material = found.material(view.request.pattern, hit);
+    let power = power::received(power::brightness(found, material, hit, beam), hit.range_m);
     let stream = found.job.stream;
     let error = |sigma_m| power::range_error(sigma_m, &limit, power, stream, hit.beam);
     power::is_detected(&detection, &limit, power, stream, hit.beam)
@@ -320,21 +326,24 @@ fn with_attributes(
                 scan.intensity = column(returns, |r| {
                     let found = &objects[r.object];
                     let intensity = HitEffects::of(view.cast_effects, found.hits, r.hit).intensity;
-                    let material = found.materials.map(|all| all.of(hit(r).triangle));
-                    material.map_or(intensity, |own| intensity * own.reflectivity as f32)
+                    let own = found.materials.map(|_| found.material(view.request.pattern, hit(r)));
+                    own.map_or(intensity, |own| intensity * own.reflectivity as f32)
                 });
             }
             Attribute::Power => {
                 scan.power = column(returns, |r| {
                     let (found, hit) = (&objects[r.object], hit(r));
-                    let brightness = power::brightness(found, hit, view.direction(hit.beam));
+                    let material = found.material(view.request.pattern, hit);
+                    let beam = view.direction(hit.beam);
+                    let brightness = power::brightness(found, material, hit, beam);
                     power::received(brightness, hit.range_m).min(f64::from(f32::MAX)) as f32
                 });
             }
             Attribute::Reflectivity => {
                 scan.reflectivity = column(returns, |r| {
-                    let hit = hit(r);
-                    power::calibrated(&objects[r.object], hit, view.direction(hit.beam))
+                    let (found, hit) = (&objects[r.object], hit(r));
+                    let material = found.material(view.request.pattern, hit);
+                    power::calibrated(found, material, hit, view.direction(hit.beam))
                 });
             }
             Attribute::Normal => {

@@ -15,6 +15,7 @@
 use super::assemble::{ObjectHits, unit_normal};
 use crate::cpu::random::{normal_deviate, random_bits};
 use crate::effects::{Detection, DetectionLimit};
+use crate::material::Material;
 use crate::resolve::Hit;
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -33,8 +34,7 @@ const IDEAL_RETRO: f64 = 255.0;
 ///
 /// So is a retro-reflector at any incidence. It returns far more than that; how much no
 /// maker states, so that this is a lower bound.
-pub(super) fn brightness(found: &ObjectHits, hit: &Hit, beam: DVec3) -> f64 {
-    let material = found.material(hit.triangle);
+pub(super) fn brightness(found: &ObjectHits, material: Material, hit: &Hit, beam: DVec3) -> f64 {
     if material.retroreflection > 0.0 {
         return 1.0;
     }
@@ -48,10 +48,10 @@ pub(super) fn received(brightness: f64, range_m: f64) -> f64 {
 }
 
 /// The byte that a sensor with calibrated reflectivity reports.
-pub(super) fn calibrated(found: &ObjectHits, hit: &Hit, beam: DVec3) -> u8 {
-    let byte = match found.material(hit.triangle).retroreflection {
+pub(super) fn calibrated(found: &ObjectHits, material: Material, hit: &Hit, beam: DVec3) -> u8 {
+    let byte = match material.retroreflection {
         retro if retro > 0.0 => LEAST_RETRO + (IDEAL_RETRO - LEAST_RETRO) * retro,
-        _ => WHITE * brightness(found, hit, beam),
+        _ => WHITE * brightness(found, material, hit, beam),
     };
     byte.round() as u8
 }

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::{SceneObject, SceneSensor};
 use crate::config::{InvalidValue, positive, within};
 use crate::effects::Effects;
-use crate::material::{MaterialChoice, MaterialTable};
+use crate::material::{ColourSource, MaterialChoice, MaterialTable};
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::PoseKeys;
 use crate::sensor::Sensor;
@@ -52,8 +52,7 @@ pub(super) struct ObjectTable {
     reflectivity: Option<f64>,
     #[serde(default)]
     retroreflection: f64,
-    #[serde(default)]
-    mtl: bool,
+    colours: Option<ColourSource>,
     #[serde(default)]
     materials: BTreeMap<String, MaterialTable>,
     simplify: Option<OwnSimplify>,
@@ -139,7 +138,7 @@ impl ObjectTable {
             scale: DVec3::from_array(scale),
             reflectivity,
             retroreflection: self.retroreflection,
-            materials: MaterialChoice { from_mtl: self.mtl, by_name },
+            materials: MaterialChoice { colours: self.colours, by_name },
             simplify,
         })
     }

@@ -93,7 +93,10 @@ fn bad_scenes_are_named() {
             object("materials = { a = { reflectivity = -1 } }"),
             "object[0].materials.a.reflectivity: expected a number within 0..=1",
         ),
-        (object("mtl = true\nsimplify = \"auto\""), "object[0].materials: a simplified mesh"),
+        (
+            object("colours = \"mtl\"\nsimplify = \"auto\""),
+            "object[0].materials: a simplified mesh",
+        ),
         (both("effects = { detection = { range_m = 5 } }"), "effects.detection.reflectivity"),
         (object("up = \"x\""), "unknown variant `x`"),
         (object("normalize = \"sphere\""), "unknown variant `sphere`"),

@@ -157,7 +157,7 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
         returns: Returns::default(),
         hash: Hashing::default(),
         reflectivity: 1.0,
-        mtl: false,
+        colours: None,
     })
 }
 
