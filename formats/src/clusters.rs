@@ -125,7 +125,7 @@ impl ClusterWriter {
         Ok(())
     }
 
-    /// Writes the set, atomically, and returns the SHA-256 of the file; the same
+    /// Writes the set, atomically; the same
     /// clusters in the same order give the same bytes. A set may be empty.
     ///
     /// # Errors

@@ -10,7 +10,7 @@
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets and sweeps too |
 //! | `cloud-files` | all of these |
 //! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read |
-//! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`), and a VLP-16's, VLP-32C's (`velodyne`) or Ouster's (`ouster`), read |
+//! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`; whole scans with `dataset` too), and a VLP-16's, VLP-32C's (`velodyne`) or Ouster's (`ouster`), read |
 //! | `weights` | models (`weights`) and what they state about themselves (`model_card`) |
 //! | `chamfer` | the distance of two clouds (`chamfer`) |
 //! | `hdf5` | ModelNet40's HDF5 layout |

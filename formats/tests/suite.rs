@@ -17,9 +17,9 @@ mod ouster;
 mod packed_sets;
 #[cfg(feature = "dataset")]
 mod scan_files;
-#[cfg(feature = "pcap")]
+#[cfg(all(feature = "dataset", feature = "pcap"))]
 mod velodyne;
-#[cfg(feature = "pcap")]
+#[cfg(all(feature = "dataset", feature = "pcap"))]
 mod vlp32c;
 #[cfg(feature = "dataset")]
 mod written_bytes;

@@ -83,6 +83,29 @@ fn what_is_asked_for_is_there_and_nothing_else() {
 }
 
 #[test]
+fn the_hash_changes_the_manifest_alone() {
+    let folder = Folder::with_meshes();
+    let words = "gen-dataset meshes --sensor vlp32c --layout yanx27 --format pcap";
+    let manifest = |hash: &str| {
+        folder.succeeds(&format!("{words} --out {hash} --hash {hash}"));
+        let said = folder.succeeds(&format!("gen-dataset --verify {hash}"));
+        let expected =
+            if hash == "none" { "without hashes to compare, 0 problems" } else { "checked, 0" };
+        assert!(said.contains(expected), "{said}");
+        let text = folder.text(&format!("{hash}/manifest.json"));
+        std::fs::remove_file(folder.at(&format!("{hash}/manifest.json"))).unwrap();
+        text
+    };
+    let [sha256, blake3, none] = ["sha256", "blake3", "none"].map(manifest);
+    let count = |text: &str, key: &str| text.matches(&format!("\"{key}\": \"")).count();
+    assert!(count(&sha256, "sha256") > 0 && count(&sha256, "hash") == 0);
+    assert_eq!(count(&blake3, "blake3"), count(&sha256, "sha256"));
+    assert_eq!((count(&none, "sha256"), count(&none, "blake3"), count(&none, "hash")), (0, 0, 1));
+    folder.assert_same_tree("sha256", "blake3");
+    folder.assert_same_tree("sha256", "none");
+}
+
+#[test]
 fn effects_come_from_a_file_and_dark_meshes_are_not_detected() {
     let folder = Folder::with_meshes();
     // A ball of radius 1, 3 m away: its nearest point is 2 m away.

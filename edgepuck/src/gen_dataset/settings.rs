@@ -74,7 +74,8 @@ pub struct Settings {
     reflectivity: f64,
 
     /// Take reflectivities from the colours of the meshes, which must be OBJ files: of the
-    /// materials in their MTL files (`mtl`) or of their vertices (`vertices`)
+    /// materials in their MTL files (`mtl`) or of their vertices (`vertices`). `--resume` does not
+    /// notice changes of MTL files and images
     #[arg(long, value_name = "SOURCE", conflicts_with = "simplify")]
     colours: Option<ColourSource>,
 
@@ -124,9 +125,10 @@ pub struct Settings {
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     layout: Vec<Layout>,
 
-    /// Hash of each mesh and file in the manifest: sha256, blake3 (faster on processors without
-    /// instructions for SHA-256) or none. Without hashes `--verify` finds only files that are
-    /// missing, added or cannot be read, and `--resume` does not notice a changed mesh
+    /// Hash of each mesh and file in the manifest: sha256, blake3 (faster on x86-64
+    /// processors without instructions for SHA-256) or none. Without hashes `--verify` finds files
+    /// that are missing, added, unreadable or of another number of points or clouds, but no other
+    /// changes, and `--resume` does not notice a changed mesh
     #[arg(long, default_value = "sha256", value_name = "HASH")]
     hash: Hashing,
 }

@@ -238,11 +238,11 @@ impl Capture {
         Ok(Self { file, path: path.to_path_buf(), packet, sequences: 0 })
     }
 
-    /// Appends the next [`SEQUENCES_PER_PACKET`] firing sequences, as [`write()`] does: beam b
+    /// Appends the next [`SEQUENCES_PER_PACKET`] firing sequences, as `write` does: beam b
     /// of `scan` is laser b % 32 of their sequence b / 32.
     ///
     /// # Errors
-    /// As [`write()`].
+    /// As `write`.
     pub fn push(&mut self, scan: &Scan) -> Result<(), FormatError> {
         let fired = measurements(&self.path, &self.packet, scan)?;
         let (packet, first) = (&self.packet, self.sequences);

@@ -40,7 +40,7 @@ fn between(path: &str, first: &Value, second: &Value) -> Option<String> {
 }
 
 fn shown(value: &Value) -> String {
-    let text = if value.is_null() { "nothing".to_owned() } else { value.to_string() };
+    let text = if value.is_null() { "the default".to_owned() } else { value.to_string() };
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text,
@@ -61,7 +61,7 @@ mod tests {
             ("/seed", json!(2), "seed: 1 against 2"),
             ("/sets/1/name", json!("c"), r#"sets[1].name: "b" against "c""#),
             ("/sets/1/views", json!([1]), "sets[1].views: [1,2] against [1]"),
-            ("/sets/0", json!({}), r#"sets[0].name: "a" against nothing"#),
+            ("/sets/0", json!({}), r#"sets[0].name: "a" against the default"#),
         ] {
             let mut other = base.clone();
             *other.pointer_mut(pointer).unwrap() = value;
@@ -72,6 +72,6 @@ mod tests {
     #[test]
     fn long_values_are_cut() {
         let said = difference(&json!({ "beams": vec![1; 1000] }), &json!({})).unwrap();
-        assert!(said.len() < 2 * LONGEST && said.ends_with("... against nothing"), "{said}");
+        assert!(said.len() < 2 * LONGEST && said.ends_with("... against the default"), "{said}");
     }
 }

@@ -10,6 +10,7 @@ use super::mesh::{Output, Prepared, prepare, write_mesh};
 use super::progress::{Progress, Stage};
 use super::record::{Entry, MeshFailure, MeshRecord};
 use crossbeam_channel::{Receiver, Sender, bounded};
+use formats::hash::Hashing;
 use sim_gpu::cast_error::CastError;
 use sim_gpu::caster::{Caster, Casting};
 use sim_gpu::job::{Cast, CastJob, Culling};
@@ -116,12 +117,10 @@ pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError
     Ok(scanned)
 }
 
-/// Whether `record` is of the file that `mesh` names, as it is now. Without a hash its
-/// name must do.
-fn is_of(record: &MeshRecord, mesh: &MeshEntry) -> bool {
-    let Some(recorded) = &record.hash else { return true };
-    let now = recorded.hashing().of_file(&mesh.path);
-    now.is_ok_and(|now| now.as_ref() == Some(recorded))
+/// Whether `record` is of the file that `mesh` names, as it is now. Where no hash is asked
+/// for, its name must do.
+fn is_of(record: &MeshRecord, mesh: &MeshEntry, hashing: Hashing) -> bool {
+    hashing.of_file(&mesh.path).is_ok_and(|now| now == record.hash)
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -140,7 +139,7 @@ impl Shared<'_> {
             }
             match self.journal.find(&Entry::from(mesh)) {
                 Err(error) => return self.stop(error),
-                Ok(Some(record)) if is_of(&record, mesh) => {
+                Ok(Some(record)) if is_of(&record, mesh, self.run.config.hash) => {
                     self.run.progress.meshes.fetch_add(1, Relaxed);
                     lock(&self.scanned).records.push(record);
                     continue;
