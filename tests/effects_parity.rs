@@ -136,8 +136,7 @@ fn the_outputs_of_all_effects_stand_side_by_side() {
         noise: Some(noise),
         dropout: Some(dropout),
         intensity: Some(Intensity),
-        detection: None,
-        quantum: None,
+        ..Effects::default()
     };
     let singles = [
         noisy(noise),

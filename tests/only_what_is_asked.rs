@@ -23,7 +23,8 @@ use std::sync::LazyLock;
 
 use formats::scan::{Attribute, AttributeSet};
 use sim_gpu::effects::{
-    Detection, DetectionLimit, Dropout, Effects, Intensity, Noise, NoiseModel, Quantum,
+    Detection, DetectionLimit, Dropout, Effects, Footprint, Intensity, Noise, NoiseModel, Quantum,
+    ReturnMode,
 };
 
 /// What a scan costs, by what it costs: instructions, bindings, bytes.
@@ -77,7 +78,9 @@ fn asked() -> Vec<Asked> {
     let noise = |model| Some(Noise { mean_m: 0.0, sigma_m: 0.01, model });
     let dropout = Some(Dropout { probability: 0.1 });
     let quantum = Some(Quantum { step_m: Some(0.004) });
-    let effects: [(_, _, &[&[&str]]); 6] = [
+    let footprint = Footprint { samples: 19, divergence_deg: None, separation_m: None };
+    let footprint = (Some(footprint), Some(ReturnMode::Dual));
+    let effects: [(_, _, &[&[&str]]); 7] = [
         (
             "noise along the ray",
             Effects { noise: noise(NoiseModel::Range), ..plain() },
@@ -95,6 +98,11 @@ fn asked() -> Vec<Asked> {
         ),
         ("quantum", Effects { quantum, ..plain() }, &[]),
         ("detection limit", Effects { detection, ..plain() }, &[]),
+        (
+            "wide beams, dual returns",
+            Effects { footprint: footprint.0, returns: footprint.1, ..plain() },
+            &[],
+        ),
         ("intensity effect", with_intensity(), &[MODULE, &["shader, function intensity"]]),
     ];
     let asked = effects.into_iter().map(|(name, effects, own)| {

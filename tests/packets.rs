@@ -11,10 +11,10 @@ use formats::scan::Attribute;
 use formats::vlp32c::{BEAM_CROSSING_M, Returns, Revolution, write};
 use glam::{DQuat, DVec3};
 use sim_gpu::caster::Caster;
-use sim_gpu::effects::{Effects, Noise, NoiseModel};
+use sim_gpu::effects::{Effects, Noise, NoiseModel, ReturnMode};
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
-use sim_gpu::packets::{as_packets_tell, check_effects, revolution};
+use sim_gpu::packets::{as_packets_tell, returns, revolution};
 use sim_gpu::pose::Pose;
 use sim_gpu::scan::ScanRequest;
 use sim_gpu::sensor::{Layout, Rotating, Sensor};
@@ -221,8 +221,14 @@ fn a_sensor_that_packets_cannot_tell_is_refused() {
     let error = revolution(&vlp32c()).unwrap_err().to_string();
     assert!(error.contains("rotating.beam_crossing_m: expected 0.0424, found none"), "{error}");
     let noise = Noise { mean_m: 0.0, sigma_m: 0.01, model: NoiseModel::Xyz };
-    let error = check_effects(&Effects { noise: Some(noise), ..Effects::default() }).unwrap_err();
+    let error = returns(&Effects { noise: Some(noise), ..Effects::default() }, None).unwrap_err();
     assert!(error.to_string().starts_with("effects.noise.model: "), "{error}");
+    let mode = |mode| Effects { returns: Some(mode), ..Effects::default() };
+    let error = returns(&mode(ReturnMode::First), None).unwrap_err().to_string();
+    assert!(error.starts_with("effects.returns: \"first\" is not among theirs; "), "{error}");
+    let error = returns(&mode(ReturnMode::Dual), Some(Returns::Last)).unwrap_err().to_string();
+    assert!(error.starts_with("effects.returns: expected the returns"), "{error}");
+    assert_eq!(returns(&mode(ReturnMode::Dual), None), Ok(Returns::Dual));
 }
 
 #[test]

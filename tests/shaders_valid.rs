@@ -34,8 +34,7 @@ fn variants() -> Vec<(Effects, Vec<&'static str>)> {
                     noise: noise.map(|model| Noise { mean_m: 0.5, sigma_m: 0.25, model }),
                     dropout: dropout.then_some(Dropout { probability: 0.125 }),
                     intensity: intensity.then_some(Intensity),
-                    detection: None,
-                    quantum: None,
+                    ..Effects::default()
                 };
                 variants.push((effects, files(noise, dropout, intensity)));
             }

@@ -5,6 +5,7 @@ mod bvh_properties;
 mod dataset_finish;
 mod dataset_merge;
 mod effects_parity;
+mod footprint;
 mod noise_statistics;
 mod off_properties;
 mod only_what_is_asked;

@@ -100,7 +100,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 fn write(drive: &mut Drive, seconds: f64, out: &Path) -> anyhow::Result<usize> {
     let packet_s = SEQUENCE_US * 1e-6 * f64::from(SEQUENCES_PER_PACKET);
     let n_packets = (seconds / packet_s).ceil() as u32;
-    let mut capture = Capture::create(out, drive.revolution().rpm)?;
+    let mut capture = Capture::create(out, drive.revolution().rpm, drive.returns())?;
     let mut poses = Unfinished::create(&out.with_extension("tum"))?;
     let mut truth = Unfinished::create(&out.with_extension("truth.jsonl"))?;
 

@@ -49,10 +49,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     scene.simplify = args.simplify.or(scene.simplify);
     scene.check_triangles().map_err(|error| Usage(error.to_string()))?;
     flags::need_simplification(scene.simplifies())?;
+    let mut returns = Returns::default();
     if format == ScanFormat::Pcap {
-        cast_as_packets_tell(&mut scene).with_context(|| format!("{}", scene_file.display()))?;
+        returns = cast_as_packets_tell(&mut scene, args.returns)
+            .with_context(|| format!("{}", scene_file.display()))?;
     } else if args.returns.is_some() {
-        let cause = "--returns applies to packets only: expected --out with the extension .pcap";
+        let cause = "--returns applies to packets only: expected --out with the extension .pcap; \
+                     the returns of other files are the scene's: `effects.returns`";
         return Err(Usage(cause.to_owned()).into());
     }
     let caster = args.caster.open(&scene.effects)?;
@@ -79,7 +82,6 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         match format {
             ScanFormat::Pcap => {
                 let revolution = packets::revolution(&asked.sensor)?;
-                let returns = args.returns.unwrap_or_default();
                 vlp32c::write(&file, Hashing::None, &revolution, returns, scan)?;
             }
             _ => {
@@ -120,15 +122,16 @@ fn write_default_scene() -> anyhow::Result<PathBuf> {
 }
 
 /// Gives the sensors the beam geometry that their packets describe, and the scans
-/// the attributes that packets are made of.
-fn cast_as_packets_tell(scene: &mut Scene) -> anyhow::Result<()> {
-    packets::check_effects(&scene.effects)?;
+/// the attributes that packets are made of. Says which returns they hold, where `wanted` does
+/// not say otherwise.
+fn cast_as_packets_tell(scene: &mut Scene, wanted: Option<Returns>) -> anyhow::Result<Returns> {
+    let returns = packets::returns(&scene.effects, wanted)?;
     for (i, sensor) in scene.sensors.iter_mut().enumerate() {
         sensor.sensor = packets::as_packets_tell(&sensor.sensor)
             .with_context(|| format!("sensor[{i}]: no packets of \"{}\"", sensor.sensor.name))?;
     }
     scene.attributes = packets::attributes(&scene.effects, &scene.attributes);
-    Ok(())
+    Ok(returns)
 }
 
 /// `scan.npz` and `left` give `scan_left.npz`.

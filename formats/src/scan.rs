@@ -39,6 +39,8 @@ pub struct Scan {
     /// Calibrated reflectivity as Velodyne's sensors report it, whatever the range: 0 to 100
     /// are percent of a white surface that faces the sensor, 101 to 255 retro-reflectors.
     pub reflectivity: Option<Vec<u8>>,
+    /// Number of the return among those of its beam that the sensor detected, 1 the nearest.
+    pub return_number: Option<Vec<u8>>,
     /// Unit normal of the surface, towards the sensor, in the world's frame.
     pub normal: Option<Vec<[f32; 3]>>,
 }
@@ -67,6 +69,8 @@ crate::named! {
         Power = "power",
         /// [`Scan::reflectivity`].
         Reflectivity = "reflectivity",
+        /// [`Scan::return_number`].
+        Return = "return",
         /// [`Scan::normal`].
         Normal = "normal",
     }
@@ -142,6 +146,7 @@ impl Scan {
             Attribute::Intensity => self.intensity.as_deref().map(Column::F32),
             Attribute::Power => self.power.as_deref().map(Column::F32),
             Attribute::Reflectivity => self.reflectivity.as_deref().map(Column::U8),
+            Attribute::Return => self.return_number.as_deref().map(Column::U8),
             Attribute::Normal => self.normal.as_deref().map(Column::Vector),
         }
     }
@@ -158,6 +163,7 @@ impl Scan {
             Attribute::Intensity => ColumnSlot::F32(&mut self.intensity),
             Attribute::Power => ColumnSlot::F32(&mut self.power),
             Attribute::Reflectivity => ColumnSlot::U8(&mut self.reflectivity),
+            Attribute::Return => ColumnSlot::U8(&mut self.return_number),
             Attribute::Normal => ColumnSlot::Vector(&mut self.normal),
         }
     }

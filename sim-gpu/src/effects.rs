@@ -1,5 +1,5 @@
-//! What a scan does to the ideal ranges: noise, dropout, the detection limit,
-//! quantisation, intensity. An effect that is `None` costs nothing.
+//! What a scan does to the ideal ranges: noise, dropout, the detection limit, wide beams and
+//! their returns, quantisation, intensity. An effect that is `None` costs nothing.
 //!
 //! In TOML and in the manifest:
 //!
@@ -8,6 +8,8 @@
 //! noise = { mean_m = 0.0, sigma_m = 0.01, model = "range" }
 //! dropout = { probability = 0.05 }
 //! detection = { reflectivity = 0.1, range_m = 60 } # or true: the sensor's own limit
+//! footprint = { samples = 19, divergence_deg = [0.18, 0.09], separation_m = 1.0 } # or true
+//! returns = "dual"
 //! quantise_m = 0.004 # or true: the sensor's own quantum
 //! intensity = true
 //! ```
@@ -15,11 +17,13 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
-use crate::sensor::Sensor;
+use crate::sensor::{BeamPattern, Sensor};
 
 pub use detection::{Detection, DetectionLimit};
+pub use footprint::{Footprint, ReturnMode};
 
 mod detection;
+mod footprint;
 
 /// No length of an effect is larger: shaders hold it in f32, with room to
 /// multiply.
@@ -35,6 +39,10 @@ pub struct Effects {
     pub dropout: Option<Dropout>,
     /// The loss of returns that are too weak.
     pub detection: Option<Detection>,
+    /// The width of beams.
+    pub footprint: Option<Footprint>,
+    /// Which returns of a beam are told; `None` is the strongest.
+    pub returns: Option<ReturnMode>,
     /// Rounding of the range.
     pub quantum: Option<Quantum>,
     /// Intensity of the return.
@@ -164,8 +172,8 @@ impl RayEffect {
 
 impl Effects {
     /// The effects that casters compute for each ray, in the order of their
-    /// outputs. The detection limit and the rounding of the range are left out: they come
-    /// after the range, which is solved once all rays are cast.
+    /// outputs. The others are left out: they come after the range, which is solved once
+    /// all rays are cast.
     pub fn per_ray(&self) -> impl Iterator<Item = RayEffect> + use<> {
         let noise = self.noise.map(|noise| match noise.model {
             NoiseModel::Range => RayEffect::NoiseRange(noise),
@@ -199,8 +207,8 @@ impl Effects {
     ///
     /// # Errors
     ///
-    /// If quantisation is wanted and the sensor states no quantum, or its own detection
-    /// limit is and it states none.
+    /// If quantisation is wanted and the sensor states no quantum, or likewise its own
+    /// detection limit or the shape of its beams.
     pub fn for_sensor(&self, sensor: &Sensor) -> Result<Self, InvalidValue> {
         let mut resolved = self.clone();
         if let Some(quantum) = &mut resolved.quantum
@@ -223,7 +231,29 @@ impl Effects {
                 InvalidValue::new("effects.detection", cause)
             })?);
         }
+        if let Some(footprint) = &mut resolved.footprint {
+            *footprint = footprint.for_sensor(sensor)?;
+        }
         Ok(resolved)
+    }
+
+    /// `pattern`, which is of `sensor`, with as many rays for each beam as its footprint asks
+    /// for: the pattern to cast.
+    ///
+    /// # Errors
+    /// If neither the footprint nor the sensor states how wide the beams are; if there are more
+    /// rays than [`MAX_RAYS`](crate::sensor::MAX_RAYS).
+    pub fn widen(
+        &self,
+        pattern: BeamPattern,
+        sensor: &Sensor,
+    ) -> Result<BeamPattern, InvalidValue> {
+        let Some(footprint) = self.footprint else { return Ok(pattern) };
+        let own = footprint.for_sensor(sensor)?;
+        let divergence_deg = own.divergence_deg.unwrap_or_default();
+        pattern
+            .widened(footprint.samples, divergence_deg)
+            .map_err(|cause| InvalidValue::new("effects.footprint.samples", cause))
     }
 
     /// Checks all numbers.
@@ -238,6 +268,9 @@ impl Effects {
         }
         if let Some(detection) = self.detection {
             detection.validate()?;
+        }
+        if let Some(footprint) = self.footprint {
+            footprint.validate()?;
         }
         let probability = self.dropout.map(|dropout| dropout.probability);
         within("effects.dropout.probability", probability, 0.0..=1.0)?;
@@ -257,6 +290,10 @@ struct EffectsTable {
     dropout: Option<Dropout>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     detection: Option<detection::Table>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    footprint: Option<footprint::Table>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    returns: Option<ReturnMode>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     quantise_m: Option<SwitchOrMetres>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -284,8 +321,9 @@ impl TryFrom<EffectsTable> for Effects {
         };
         let intensity = (table.intensity == Some(true)).then_some(Intensity);
         let detection = table.detection.map_or(Ok(None), detection::Table::detection)?;
-        let EffectsTable { noise, dropout, .. } = table;
-        let effects = Self { noise, dropout, detection, quantum, intensity };
+        let footprint = table.footprint.and_then(Option::from);
+        let EffectsTable { noise, dropout, returns, .. } = table;
+        let effects = Self { noise, dropout, detection, footprint, returns, quantum, intensity };
         effects.validate()?;
         Ok(effects)
     }
@@ -297,6 +335,8 @@ impl From<Effects> for EffectsTable {
             noise: effects.noise,
             dropout: effects.dropout,
             detection: effects.detection.map(detection::Table::from),
+            footprint: effects.footprint.map(footprint::Table::from),
+            returns: effects.returns,
             quantise_m: effects.quantum.map(|quantum| {
                 quantum.step_m.map_or(SwitchOrMetres::Switch(true), SwitchOrMetres::Metres)
             }),

@@ -2,10 +2,12 @@
 //! a scan. [`formats::vlp32c`] writes them and says how they decode.
 
 use formats::scan::{Attribute, AttributeSet};
-use formats::vlp32c::{AZIMUTH_UNIT_DEG, BEAM_CROSSING_M, FARTHEST_M, Revolution, SEQUENCE_US};
+use formats::vlp32c::{
+    AZIMUTH_UNIT_DEG, BEAM_CROSSING_M, FARTHEST_M, Returns, Revolution, SEQUENCE_US,
+};
 
 use crate::config::{InvalidValue, within};
-use crate::effects::{Effects, NoiseModel};
+use crate::effects::{Effects, NoiseModel, ReturnMode};
 use crate::sensor::{Layout, Rotating, Sensor};
 
 /// What [`formats::vlp32c`] takes of each point, where these `effects` and attributes are
@@ -59,16 +61,31 @@ pub fn revolution(sensor: &Sensor) -> Result<Revolution, InvalidValue> {
     Ok(Revolution { rpm: rotating.rpm, n_beams: rotating.rays_per_revolution() as u32 })
 }
 
-/// That `effects` leave points on their beams.
+/// Which returns the packets of a scan with these `effects` hold, where `wanted` says so too.
 ///
 /// # Errors
-/// Noise of another model than [`NoiseModel::Range`].
-pub fn check_effects(effects: &Effects) -> Result<(), InvalidValue> {
-    match effects.noise {
-        Some(noise) if noise.model != NoiseModel::Range => {
-            Err(no_packets("effects.noise.model", "moves points off their beams; take \"range\""))
+/// Noise of another model than [`NoiseModel::Range`], which moves points off their beams;
+/// returns that packets do not hold, or other ones than are `wanted`.
+pub fn returns(effects: &Effects, wanted: Option<Returns>) -> Result<Returns, InvalidValue> {
+    if effects.noise.is_some_and(|noise| noise.model != NoiseModel::Range) {
+        let cause = "moves points off their beams; take \"range\"";
+        return Err(no_packets("effects.noise.model", cause));
+    }
+    let Some(mode) = effects.returns else { return Ok(wanted.unwrap_or_default()) };
+    let held = match mode {
+        ReturnMode::Strongest => Some(Returns::Strongest),
+        ReturnMode::Last => Some(Returns::Last),
+        ReturnMode::Dual => Some(Returns::Dual),
+        ReturnMode::First | ReturnMode::SecondStrongest => None,
+    };
+    match held {
+        None => Err(no_packets("effects.returns", format!("\"{mode}\" is not among theirs"))),
+        Some(held) if wanted.is_some_and(|wanted| wanted != held) => {
+            let cause =
+                format!("expected the returns that the packets are to hold, found \"{mode}\"");
+            Err(InvalidValue::new("effects.returns", cause))
         }
-        _ => Ok(()),
+        Some(held) => Ok(held),
     }
 }
 

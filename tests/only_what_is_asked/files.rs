@@ -39,7 +39,7 @@ pub fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
 /// The scan of a unit sphere from this far.
 fn scan(distance_m: f64, effects: &Effects, attributes: &AttributeSet) -> Scan {
     let sensor = Sensor::builtin("vlp32c").unwrap();
-    let pattern = sensor.pattern();
+    let pattern = effects.widen(sensor.pattern(), &sensor).unwrap();
     let pose = Pose::look_at(DVec3::X * distance_m, DVec3::ZERO).unwrap();
     let mut request = ScanRequest::new(&sensor, &pattern, pose);
     request.attributes = attributes.clone();

@@ -80,7 +80,7 @@ pub struct Settings {
     colours: Option<ColourSource>,
 
     /// Attributes of each point besides its position: range, beam, ring, time, triangle, object,
-    /// intensity, power, reflectivity, normal
+    /// intensity, power, reflectivity, return, normal
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 
@@ -153,8 +153,9 @@ impl Settings {
         let effects = self.effects()?;
         within("--reflectivity", self.reflectivity, 0.0..=1.0)
             .map_err(|error| usage(error.to_string()))?;
+        let mut returns = Returns::default();
         if formats.contains(&ScanFormat::Pcap) {
-            cast_as_packets_tell(&mut sets, &effects)?;
+            returns = cast_as_packets_tell(&mut sets, &effects, self.returns)?;
         } else if self.returns.is_some() {
             return Err(usage("--returns applies to packets only: add --format pcap"));
         }
@@ -179,7 +180,7 @@ impl Settings {
             packed_points: self.points,
             min_points: self.min_points,
             layouts: self.layout.clone(),
-            returns: self.returns.unwrap_or_default(),
+            returns,
             hash: self.hash,
             reflectivity: self.reflectivity,
             colours: self.colours,
@@ -206,8 +207,8 @@ impl Settings {
             noise: (self.noise != 0.0 || self.noise_mean != 0.0).then_some(noise),
             dropout: (self.dropout != 0.0).then_some(Dropout { probability: self.dropout }),
             quantum: step_m.map(|step_m| Quantum { step_m }),
-            detection: None,
             intensity,
+            ..Effects::default()
         };
         effects.validate().map_err(|error| usage(error.to_string()))?;
         Ok(effects)
@@ -257,15 +258,20 @@ struct EffectsFile {
 }
 
 /// Gives the sensors the beam geometry that their packets describe.
-fn cast_as_packets_tell(sets: &mut [SetConfig], effects: &Effects) -> anyhow::Result<()> {
+/// Says which returns they hold, where `wanted` does not say otherwise.
+fn cast_as_packets_tell(
+    sets: &mut [SetConfig],
+    effects: &Effects,
+    wanted: Option<Returns>,
+) -> anyhow::Result<Returns> {
     let refuse = |error| usage(format!("--format pcap: {error}"));
-    packets::check_effects(effects).map_err(refuse)?;
+    let returns = packets::returns(effects, wanted).map_err(refuse)?;
     for set in sets {
         let name = &set.sensor.name;
         let refuse = |error| usage(format!("--format pcap: sensor \"{name}\": {error}"));
         set.sensor = packets::as_packets_tell(&set.sensor).map_err(refuse)?;
     }
-    Ok(())
+    Ok(returns)
 }
 
 fn builtin(name: &str) -> anyhow::Result<Sensor> {

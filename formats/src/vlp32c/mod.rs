@@ -13,8 +13,8 @@
 //!
 //! A block is one firing sequence of 55.296 us: lasers 0 to 31, two at a time,
 //! 2.304 us apart. With both returns each sequence has two blocks, of the last
-//! and of the strongest return; where there is but one, as in every scan here,
-//! they are identical (p. 57). A beam that saw nothing has distance 0. Sequences
+//! and of the strongest return, or of the second strongest where the strongest is the last;
+//! where there is but one, they are identical (p. 57). A beam that saw nothing has distance 0. Sequences
 //! are written whether or not they saw something, from the one at azimuth 0 to
 //! the end of the revolution, and on to the end of the last packet without
 //! returns.
@@ -60,7 +60,7 @@ use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::pcap::{self, Sender};
 use crate::scan::{Attribute, Scan};
-use packet::{BLOCKS, LASERS, Measurement};
+use packet::{BLOCKS, LASERS, Measurement, Sequence};
 
 /// From one firing sequence to the next, microseconds.
 pub const SEQUENCE_US: f64 = 55.296;
@@ -116,8 +116,8 @@ crate::named! {
         Strongest = "strongest",
         /// The last.
         Last = "last",
-        /// The last and the strongest: two blocks of each sequence. A scan has one
-        /// return of each beam, so they are identical.
+        /// The last and the strongest, or the second strongest where the strongest is the
+        /// last: two blocks of each sequence.
         Dual = "dual",
     }
 }
@@ -175,12 +175,14 @@ impl Returns {
 /// of sequence b / 32; positions are not looked at. A reflectivity is written as
 /// it is: 0 to 100 for surfaces that scatter 0 to 100 % of the light, 101 to 255 for
 /// retro-reflectors (VLP-32C User Manual 63-9325, 6.1). Without one an intensity becomes a
-/// reflectivity of 0 to 100, and without either it is [`WHITE`]. A range that is not finite, below half a unit or beyond [`FARTHEST_M`] is no
-/// return.
+/// reflectivity of 0 to 100, and without either it is [`WHITE`]. A range that is not finite,
+/// below half a unit or beyond [`FARTHEST_M`] is no return. With both returns a beam may have
+/// two points, of which the second is the last return.
 ///
 /// # Errors
-/// A scan without beams or ranges, or with a beam beyond the revolution's; an
-/// attribute of another length than the positions; what the system reports.
+/// A scan without beams or ranges, or with a beam beyond the revolution's or with more points
+/// than a beam has returns; an attribute of another length than the positions; what the system
+/// reports.
 #[cfg(feature = "dataset")]
 pub fn write(
     path: &Path,
@@ -190,7 +192,7 @@ pub fn write(
     scan: &Scan,
 ) -> Result<Option<FileHash>, FormatError> {
     let sequences_per_packet = BLOCKS / returns.blocks_per_sequence();
-    let fired = measurements(path, revolution, scan)?;
+    let fired = measurements(path, revolution, returns, scan)?;
     atomic::write_hashed(path, hashing, |writer| {
         pcap::write_header(writer)?;
         for (number, fired) in (0..).zip(fired.chunks(sequences_per_packet)) {
@@ -207,7 +209,7 @@ fn write_packet(
     revolution: &Revolution,
     returns: Returns,
     first: u32,
-    fired: &[[Measurement; LASERS]],
+    fired: &[Sequence],
 ) -> io::Result<()> {
     let time_us = (f64::from(first) * SEQUENCE_US).round() as u64;
     let azimuth = |i: usize| revolution.azimuth(first + i as u32);
@@ -217,38 +219,42 @@ fn write_packet(
     pcap::write_packet(writer, &SENSOR, stamp, &payload)
 }
 
-/// A capture of a sensor that keeps turning, written packet by packet, with the strongest
-/// returns. It appears under its name once it is finished.
+/// A capture of a sensor that keeps turning, written piece by piece. It appears under its name once it is finished.
 pub struct Capture {
     file: Unfinished,
     path: PathBuf,
-    packet: Revolution,
+    piece: Revolution,
+    returns: Returns,
     sequences: u32,
 }
 
 impl Capture {
-    /// Begins the capture at `path` of a sensor that turns `rpm` times a minute.
+    /// Begins the capture at `path` of a sensor that turns `rpm` times a minute and tells these
+    /// `returns`.
     ///
     /// # Errors
     /// What the system reports.
-    pub fn create(path: &Path, rpm: f64) -> Result<Self, FormatError> {
+    pub fn create(path: &Path, rpm: f64, returns: Returns) -> Result<Self, FormatError> {
         let mut file = Unfinished::create(path)?;
         file.append(pcap::write_header)?;
-        let packet = Revolution { rpm, n_beams: SEQUENCES_PER_PACKET * LASERS as u32 };
-        Ok(Self { file, path: path.to_path_buf(), packet, sequences: 0 })
+        let piece = Revolution { rpm, n_beams: SEQUENCES_PER_PACKET * LASERS as u32 };
+        Ok(Self { file, path: path.to_path_buf(), piece, returns, sequences: 0 })
     }
 
     /// Appends the next [`SEQUENCES_PER_PACKET`] firing sequences, as `write` does: beam b
-    /// of `scan` is laser b % 32 of their sequence b / 32.
+    /// of `scan` is laser b % 32 of their sequence b / 32. With both returns they are two
+    /// packets.
     ///
     /// # Errors
     /// As `write`.
     pub fn push(&mut self, scan: &Scan) -> Result<(), FormatError> {
-        let fired = measurements(&self.path, &self.packet, scan)?;
-        let (packet, first) = (&self.packet, self.sequences);
-        self.file
-            .append(|writer| write_packet(writer, packet, Returns::Strongest, first, &fired))?;
-        self.sequences += SEQUENCES_PER_PACKET;
+        let Self { piece, returns, .. } = *self;
+        let sequences_per_packet = BLOCKS / returns.blocks_per_sequence();
+        for fired in measurements(&self.path, &piece, returns, scan)?.chunks(sequences_per_packet) {
+            let first = self.sequences;
+            self.file.append(|writer| write_packet(writer, &piece, returns, first, fired))?;
+            self.sequences += fired.len() as u32;
+        }
         Ok(())
     }
 
@@ -265,8 +271,9 @@ impl Capture {
 fn measurements(
     path: &Path,
     revolution: &Revolution,
+    returns: Returns,
     scan: &Scan,
-) -> Result<Vec<[Measurement; LASERS]>, FormatError> {
+) -> Result<Vec<Sequence>, FormatError> {
     scan.check_lengths()?;
     let missing = |attribute: Attribute| FormatError::Length {
         attribute: attribute.name(),
@@ -275,7 +282,9 @@ fn measurements(
     };
     let beams = scan.beam.as_ref().ok_or_else(|| missing(Attribute::Beam))?;
     let ranges_m = scan.range_m.as_ref().ok_or_else(|| missing(Attribute::Range))?;
-    let mut fired = vec![[Measurement::NONE; LASERS]; revolution.sequences() as usize];
+    let most = returns.blocks_per_sequence() as u8;
+    let mut told = vec![0; revolution.n_beams as usize];
+    let mut fired = vec![Sequence::NONE; revolution.sequences() as usize];
     for (i, (&beam, &range_m)) in beams.iter().zip(ranges_m).enumerate() {
         if beam >= revolution.n_beams {
             let cause = format!("{beam} of {} in a revolution", revolution.n_beams);
@@ -287,7 +296,18 @@ fn measurements(
             (None, None) => WHITE,
         };
         let (sequence, laser) = (beam as usize / LASERS, beam as usize % LASERS);
-        fired[sequence][laser] = Measurement::new(range_m, reflectivity);
+        let Sequence { last, other } = &mut fired[sequence];
+        if told[beam as usize] == most {
+            let cause = format!("{beam} has more points than the {most} that \"{returns}\" tells");
+            return Err(FormatError::malformed(path, "beam", cause));
+        }
+        let measured = Measurement::new(range_m, reflectivity);
+        // Of two the nearer comes first; one alone is both.
+        if told[beam as usize] == 0 {
+            other[laser] = measured;
+        }
+        last[laser] = measured;
+        told[beam as usize] += 1;
     }
     Ok(fired)
 }

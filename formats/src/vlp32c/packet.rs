@@ -45,6 +45,21 @@ impl Measurement {
     }
 }
 
+/// What a firing sequence measured, laser by laser.
+#[derive(Clone)]
+pub(super) struct Sequence {
+    /// The last return.
+    pub last: [Measurement; LASERS],
+    /// The other one that dual returns tell: the same where there is but one.
+    pub other: [Measurement; LASERS],
+}
+
+impl Sequence {
+    /// Nothing came back.
+    pub const NONE: Self =
+        Self { last: [Measurement::NONE; LASERS], other: [Measurement::NONE; LASERS] };
+}
+
 /// A packet that begins at `time_us` past the hour. `azimuth` tells what the
 /// encoder reads as the packet's i-th sequence starts; sequences beyond those
 /// that were `fired` saw nothing.
@@ -52,12 +67,15 @@ pub(super) fn payload(
     returns: Returns,
     time_us: u32,
     azimuth: impl Fn(usize) -> u16,
-    fired: &[[Measurement; LASERS]],
+    fired: &[Sequence],
 ) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(PAYLOAD_SIZE);
     for block in 0..BLOCKS {
-        let sequence = block / returns.blocks_per_sequence();
-        let measured = fired.get(sequence).unwrap_or(&[Measurement::NONE; LASERS]);
+        let blocks_per_sequence = returns.blocks_per_sequence();
+        let sequence = block / blocks_per_sequence;
+        let Sequence { last, other } = fired.get(sequence).unwrap_or(&Sequence::NONE);
+        // The manual counts the blocks from 0: even ones hold the last return.
+        let measured = if block % blocks_per_sequence == 0 { last } else { other };
         bytes.extend(FLAG);
         bytes.extend(azimuth(sequence).to_le_bytes());
         for measurement in measured {

@@ -3,7 +3,7 @@
 //! the meshes under way, so memory does not grow with their number.
 
 use super::budget::{Budget, Share};
-use super::config::DatasetConfig;
+use super::config::{DatasetConfig, SetConfig};
 use super::error::DatasetError;
 use super::journal::Journal;
 use super::mesh::{Output, Prepared, prepare, write_mesh};
@@ -81,11 +81,13 @@ struct Shared<'a> {
 /// If a file cannot be written or the adapter fails: the run stops. A mesh
 /// that cannot be read is no error; it is listed as a failure.
 pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError> {
+    let pattern = |set: &SetConfig| run.config.effects.widen(set.sensor.pattern(), &set.sensor);
+    let patterns = run.config.sets.iter().map(pattern).collect::<Result<_, _>>()?;
     let shared = Shared {
         run,
         meshes,
         journal: Journal::of(run.out),
-        patterns: run.config.sets.iter().map(|set| set.sensor.pattern()).collect(),
+        patterns,
         next: AtomicUsize::new(0),
         stopped: AtomicBool::new(false),
         kept: AtomicUsize::new(0),

@@ -12,7 +12,7 @@ use edgepuck_shapes::Sampler;
 use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
-use formats::vlp32c::{Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
+use formats::vlp32c::{Returns, Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -87,9 +87,10 @@ impl<'a> Drive<'a> {
     /// at the origin.
     ///
     /// # Errors
-    /// A sensor that is not a VLP-32C.
+    /// A sensor that is not a VLP-32C; effects whose points or returns packets cannot tell.
     pub fn new(stage: &'a Stage, speed_m_s: f64) -> Result<Self, SceneError> {
         let sensor = packets::as_packets_tell(&stage.sensors[0].sensor)?;
+        packets::returns(stage.sensors[0].caster.effects(), None)?;
         let revolution = packets::revolution(&sensor)?;
         let (recipe, seed) = (stage.recipe(), stage.seed());
         let s = &mut Sampler::new(StreamKey::new(seed, "drive", 0));
@@ -110,6 +111,13 @@ impl<'a> Drive<'a> {
     #[must_use]
     pub fn revolution(&self) -> &Revolution {
         &self.revolution
+    }
+
+    /// Which returns of each beam its packets hold.
+    #[must_use]
+    pub fn returns(&self) -> Returns {
+        let effects = self.street.stage.sensors[0].caster.effects();
+        packets::returns(effects, None).expect("invariant: a new drive has asked")
     }
 
     /// Where the sensor is, `time_s` after the start.
@@ -159,7 +167,9 @@ impl<'a> Drive<'a> {
     fn packet(&self, number: u32, near: &[(u32, &Body)]) -> Result<Packet, SceneError> {
         let Street { stage, parts, .. } = &self.street;
         let first = number * SEQUENCES_PER_PACKET;
+        let caster = &stage.sensors[0].caster;
         let pattern = self.head().pattern_of(first..first + SEQUENCES_PER_PACKET);
+        let pattern = caster.effects().widen(pattern, &self.sensor)?;
         let time_s = (pattern.time_s[0] + pattern.time_s[pattern.len() - 1]) / 2.0;
         let pose = self.pose(time_s);
         let sector = Sector::of(&pattern);
@@ -179,7 +189,7 @@ impl<'a> Drive<'a> {
         let mut request = ScanRequest::new(&self.sensor, &pattern, pose);
         request.attributes = [Attribute::Beam, Attribute::Range, Attribute::Object].into();
         request.stream = StreamKey::new(stage.seed(), "drive/beams", number);
-        let mut scan = scan_objects(&stage.sensors[0].caster, &targets, &request)?.scan;
+        let mut scan = scan_objects(caster, &targets, &request)?.scan;
         for object in scan.object.iter_mut().flatten() {
             *object = (*object as usize).checked_sub(n_parts).map_or(0, |i| ids[i]);
         }
@@ -204,7 +214,7 @@ impl<'a> Drive<'a> {
                 let turn = self.revolution.turn(first + beam / n_lasers);
                 let (points, sum_s) = seen.entry((turn, object)).or_default();
                 *points += 1;
-                *sum_s += pattern.time_s[beam as usize];
+                *sum_s += pattern.time_s[(beam * pattern.rays_per_beam) as usize];
             }
         }
         seen

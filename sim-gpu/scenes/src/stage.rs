@@ -12,6 +12,7 @@ use formats::scan::Attribute;
 use glam::DVec3;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
+use sim_gpu::config::InvalidValue;
 use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::frame::{Normalize, to_world};
@@ -84,9 +85,9 @@ impl Stage {
                 dropout: Some(Dropout { probability: choice.dropout }),
                 ..choice.effects.clone()
             };
-            let fits = effects.for_sensor(&sensor).map(drop);
-            fits.map_err(|invalid| SceneError::from(invalid.in_file(file)))?;
-            let pattern = sensor.pattern();
+            let in_file = |invalid: InvalidValue| SceneError::from(invalid.in_file(file));
+            effects.for_sensor(&sensor).map_err(in_file)?;
+            let pattern = effects.widen(sensor.pattern(), &sensor).map_err(in_file)?;
             sensors.push(Eye { sensor, pattern, caster: open(&effects)? });
         }
         let props = recipe.object.iter().map(|objects| match objects.built_in() {

@@ -254,8 +254,7 @@ mod tests {
             noise: Some(Noise { mean_m: 0.0, sigma_m: 1.0, model: NoiseModel::Xyz }),
             dropout: Some(Dropout { probability: 0.5 }),
             intensity: Some(Intensity),
-            detection: None,
-            quantum: None,
+            ..Effects::default()
         };
         let best = test_support::adapter(adapter::adapters().into_iter().next())?;
         Ok(GpuCaster::open(&best, &effects).unwrap())

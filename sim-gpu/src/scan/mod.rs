@@ -7,6 +7,8 @@
 //! ([`assemble`]).
 
 mod assemble;
+mod echo;
+mod measure;
 mod power;
 mod request;
 

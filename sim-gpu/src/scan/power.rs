@@ -48,10 +48,10 @@ pub(super) fn received(brightness: f64, range_m: f64) -> f64 {
 }
 
 /// The byte that a sensor with calibrated reflectivity reports.
-pub(super) fn calibrated(found: &ObjectHits, material: Material, hit: &Hit, beam: DVec3) -> u8 {
-    let byte = match material.retroreflection {
+pub(super) fn calibrated(brightness: f64, retroreflection: f64) -> u8 {
+    let byte = match retroreflection {
         retro if retro > 0.0 => LEAST_RETRO + (IDEAL_RETRO - LEAST_RETRO) * retro,
-        _ => WHITE * brightness(found, material, hit, beam),
+        _ => WHITE * brightness,
     };
     byte.round() as u8
 }

@@ -103,14 +103,25 @@ impl<'a> ScanRequest<'a> {
     /// with the sensor's own quantum filled in.
     ///
     /// # Errors
-    /// If quantisation is wanted and the sensor states no quantum, or if
-    /// intensity is wanted as an attribute and the caster does not model it.
+    /// As [`Effects::for_sensor`]; if intensity is wanted as an attribute and the caster does
+    /// not model it; if beams are to be wider than those of the pattern.
     pub fn applied_effects(&self, cast_effects: &Effects) -> Result<Effects, InvalidValue> {
         if self.attributes.contains(&Attribute::Intensity) && cast_effects.intensity.is_none() {
             let cause = "expected a caster that models intensity, found one without";
             return Err(InvalidValue::new("attributes", cause));
         }
-        self.effects.as_ref().unwrap_or(cast_effects).for_sensor(self.sensor)
+        let effects = self.effects.as_ref().unwrap_or(cast_effects).for_sensor(self.sensor)?;
+        let found = self.pattern.rays_per_beam;
+        match effects.footprint.map(|footprint| footprint.samples) {
+            Some(expected) if expected != found => {
+                let cause = format!(
+                    "expected a pattern of {expected} rays for each beam, as Effects::widen makes \
+                     it, found {found}"
+                );
+                Err(InvalidValue::new("effects.footprint", cause))
+            }
+            _ => Ok(effects),
+        }
     }
 
     /// The rays of the sensor at `placed`.

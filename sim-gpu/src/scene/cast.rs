@@ -125,7 +125,8 @@ fn cast_sensor(
     caster: &Caster,
     culling: Culling,
 ) -> Result<SceneScan, SceneError> {
-    let pattern = sensor.sensor.pattern();
+    let pattern = scene.effects.widen(sensor.sensor.pattern(), &sensor.sensor);
+    let pattern = pattern.map_err(ScanError::Request)?;
     let placed: Vec<PlacedTarget> = objects
         .iter()
         .zip(&scene.objects)

@@ -14,6 +14,7 @@ use crate::config::{self, ConfigError, InvalidValue};
 use crate::effects::DetectionLimit;
 
 pub use cone::Cone;
+pub use footprint::BeamShape;
 pub use grid::Grid;
 pub(crate) use pattern::starts;
 pub use pattern::{BeamPattern, Directions};
@@ -25,6 +26,7 @@ pub use views::Views;
 
 mod coherence;
 mod cone;
+mod footprint;
 mod grid;
 mod pattern;
 mod profile;
@@ -68,6 +70,9 @@ pub struct Sensor {
     /// What it just detects: applied only where the detection effect is named.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detection: Option<DetectionLimit>,
+    /// How wide its beams are: applied only where the footprint effect is named.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub footprint: Option<BeamShape>,
     /// The arrangement of the beams.
     #[serde(flatten)]
     pub layout: Layout,

@@ -5,8 +5,10 @@ use glam::DVec3;
 use std::ops::Deref;
 use std::sync::Arc;
 
+use super::MAX_RAYS;
 use super::coherence::coherent_order;
 use super::cone::{BlockCone, Cone};
+use super::footprint::{disc, rays_of};
 
 /// Rays of one block share a bounding cone.
 const BLOCK_RAYS: usize = 64;
@@ -55,6 +57,9 @@ pub struct BeamPattern {
     /// How far above the sensor each ray starts, metres along its z axis,
     /// `[n_rays]`; empty where all start at the sensor itself.
     pub start_z_m: Vec<f64>,
+    /// Rays of each beam, which stand side by side, that of its centre first; 1 where beams
+    /// have no width.
+    pub rays_per_beam: u32,
     /// All ray indices once, `[n_rays]`; neighbours in this list point in
     /// neighbouring directions and so traverse a tree together.
     pub order: Vec<u32>,
@@ -76,7 +81,39 @@ impl BeamPattern {
         let blocks = order.chunks(BLOCK_RAYS).map(bound).collect();
         let groups = order.chunks(BLOCK_RAYS * GROUP_BLOCKS).map(bound).collect();
         let directions = Directions(directions.into());
-        Self { directions, ring, time_s, start_z_m: Vec::new(), order, blocks, groups }
+        let (start_z_m, rays_per_beam) = (Vec::new(), 1);
+        Self { directions, ring, time_s, start_z_m, rays_per_beam, order, blocks, groups }
+    }
+
+    /// The same beams with a width: each is `samples` rays of equal power, spread over a
+    /// Gaussian beam with these full angles of divergence along the horizon and across it.
+    ///
+    /// # Errors
+    /// If there are more rays than [`MAX_RAYS`], and how many.
+    pub(crate) fn widened(&self, samples: u32, divergence_deg: [f64; 2]) -> Result<Self, String> {
+        let n_rays = self.len() as u64 * u64::from(samples);
+        if n_rays > MAX_RAYS {
+            return Err(format!("expected at most {MAX_RAYS} rays, found {n_rays}"));
+        }
+        if samples == 1 {
+            return Ok(self.clone());
+        }
+        let disc = disc(samples);
+        let directions = self.directions.iter().flat_map(|&d| rays_of(d, &disc, divergence_deg));
+        let mut widened = Self::new(
+            directions.collect(),
+            for_each_ray(&self.ring, samples),
+            for_each_ray(&self.time_s, samples),
+        );
+        widened.start_z_m = for_each_ray(&self.start_z_m, samples);
+        widened.rays_per_beam = samples;
+        Ok(widened)
+    }
+
+    /// The beam that a ray belongs to, as a number in firing order.
+    #[must_use]
+    pub fn beam_of(&self, ray: u32) -> u32 {
+        ray / self.rays_per_beam
     }
 
     /// Where ray `beam` starts, in the sensor frame, metres; `None` where that
@@ -130,6 +167,11 @@ impl BeamPattern {
         }
         found
     }
+}
+
+/// What is known of each beam, for each of its rays.
+fn for_each_ray<T: Copy>(of_beam: &[T], samples: u32) -> Vec<T> {
+    of_beam.iter().flat_map(|&value| std::iter::repeat_n(value, samples as usize)).collect()
 }
 
 /// Where these rays start, by [`BeamPattern::start_z_m`], in the sensor frame, metres; `None`

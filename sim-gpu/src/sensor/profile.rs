@@ -6,7 +6,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    Grid, Layout, RangeLimits, Rings, Rotating, Sample, Sensor, TypicalNoise, Uniform, Views,
+    BeamShape, Grid, Layout, RangeLimits, Rings, Rotating, Sample, Sensor, TypicalNoise, Uniform,
+    Views,
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
 use crate::effects::DetectionLimit;
@@ -26,6 +27,7 @@ pub(super) struct Profile {
     range: RangeLimits,
     noise: Option<TypicalNoise>,
     detection: Option<DetectionLimit>,
+    footprint: Option<BeamShape>,
     rotating: Option<Rotating>,
     uniform: Option<Uniform>,
     grid: Option<Grid>,
@@ -59,6 +61,9 @@ impl TryFrom<Profile> for Sensor {
         if let Some(limit) = &profile.detection {
             limit.validate("detection")?;
         }
+        if let Some(footprint) = &profile.footprint {
+            footprint.validate("footprint")?;
+        }
         if let Some(rings) = &profile.rings {
             rings.validate()?;
         }
@@ -83,6 +88,7 @@ impl TryFrom<Profile> for Sensor {
             range: profile.range,
             noise: profile.noise,
             detection: profile.detection,
+            footprint: profile.footprint,
             layout,
             decimation: profile.decimation,
             rings: profile.rings,

@@ -206,8 +206,7 @@ fn effect_verdicts(meshes: &[BenchMesh], backend: &Backend) -> Result<Vec<Effect
             noise: Some(Noise { mean_m: 0.1, sigma_m: 0.5, model }),
             dropout: Some(Dropout { probability: 0.25 }),
             intensity: Some(Intensity),
-            detection: None,
-            quantum: None,
+            ..Effects::default()
         };
         let caster = Caster::open(&backend.request(), &effects)?;
         for bench_mesh in meshes {

@@ -129,9 +129,9 @@ pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
     let effects = Effects {
         noise: switches.noise.map(|model| Noise { mean_m: 0.0, sigma_m, model }),
         dropout: switches.dropout.then_some(Dropout { probability: plan.dropout }),
-        detection: None,
         quantum: switches.quantum.then_some(Quantum { step_m: None }),
         intensity: switches.intensity.then_some(Intensity),
+        ..Effects::default()
     };
     let attributes = [(switches.intensity, Attribute::Intensity), (switches.time, Attribute::Time)];
     let attributes = attributes.into_iter().filter(|(is_wanted, _)| *is_wanted);

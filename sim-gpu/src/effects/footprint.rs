@@ -1,0 +1,128 @@
+//! Beams that are as wide as the sensor's: what one meets of several surfaces, and which of
+//! its returns the sensor tells.
+
+use serde::{Deserialize, Serialize};
+
+use super::LARGEST_M;
+use crate::config::{InvalidValue, within};
+use crate::sensor::{BeamShape, Sensor};
+
+/// Beams with a width: each is cast as several rays of equal power, and surfaces that the
+/// sensor cannot tell apart become one return between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Rays of each beam: [`Footprint::SAMPLES`].
+    pub samples: u32,
+    /// The beam's full angles as in [`BeamShape`]; `None` are the sensor's own.
+    pub divergence_deg: Option<[f64; 2]>,
+    /// The distance as in [`BeamShape`]; `None` is the sensor's own.
+    pub separation_m: Option<f64>,
+}
+
+formats::named! {
+    /// Which returns of a beam a sensor tells. Where there is but one, it is that one.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum ReturnMode: "return mode" {
+        /// The strongest; of equals the nearest.
+        #[default]
+        Strongest = "strongest",
+        /// The second strongest.
+        SecondStrongest = "second-strongest",
+        /// The nearest.
+        First = "first",
+        /// The farthest.
+        Last = "last",
+        /// The last and the strongest, or the second strongest where the strongest is the last:
+        /// VLP-32C User Manual 63-9325, 9.3.2.
+        Dual = "dual",
+    }
+}
+
+impl Footprint {
+    /// How many rays a beam may be: a centre and up to three rings around it.
+    pub const SAMPLES: [u32; 4] = [1, 7, 19, 37];
+
+    /// The rays of a beam where nobody says how many.
+    const USUAL_SAMPLES: u32 = 19;
+
+    /// The beam's shape as `sensor` has it, where this does not say otherwise.
+    ///
+    /// # Errors
+    /// If neither states it.
+    pub(super) fn for_sensor(&self, sensor: &Sensor) -> Result<Self, InvalidValue> {
+        let own = sensor.footprint;
+        let missing = |key: &str| {
+            let key = format!("effects.footprint.{key}");
+            let name = &sensor.name;
+            let cause = format!("expected a value, as sensor \"{name}\" has no [footprint]");
+            InvalidValue::new(key, cause)
+        };
+        let divergence_deg = self.divergence_deg.or(own.map(|own| own.divergence_deg));
+        let separation_m = self.separation_m.or(own.map(|own| own.separation_m));
+        Ok(Self {
+            divergence_deg: Some(divergence_deg.ok_or_else(|| missing("divergence_deg"))?),
+            separation_m: Some(separation_m.ok_or_else(|| missing("separation_m"))?),
+            ..*self
+        })
+    }
+
+    pub(super) fn validate(&self) -> Result<(), InvalidValue> {
+        if !Self::SAMPLES.contains(&self.samples) {
+            let cause = format!("expected 1, 7, 19 or 37, found {}", self.samples);
+            return Err(InvalidValue::new("effects.footprint.samples", cause));
+        }
+        if let Some(divergence_deg) = self.divergence_deg {
+            BeamShape::check_divergence("effects.footprint", divergence_deg)?;
+        }
+        within("effects.footprint.separation_m", self.separation_m, 0.0..=LARGEST_M)
+    }
+}
+
+/// [`Footprint`] as written in TOML and JSON.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected true for 19 rays of the sensor's own beam, or a table of samples, \
+                 divergence_deg and separation_m as footprint"
+)]
+pub(super) enum Table {
+    Switch(bool),
+    Numbers(Numbers),
+}
+
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Numbers {
+    #[serde(default = "usual_samples")]
+    samples: u32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    divergence_deg: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    separation_m: Option<f64>,
+}
+
+fn usual_samples() -> u32 {
+    Footprint::USUAL_SAMPLES
+}
+
+impl From<Table> for Option<Footprint> {
+    fn from(table: Table) -> Self {
+        let numbers = match table {
+            Table::Switch(false) => return None,
+            Table::Switch(true) => {
+                Numbers { samples: usual_samples(), divergence_deg: None, separation_m: None }
+            }
+            Table::Numbers(numbers) => numbers,
+        };
+        let Numbers { samples, divergence_deg, separation_m } = numbers;
+        Some(Footprint { samples, divergence_deg, separation_m })
+    }
+}
+
+impl From<Footprint> for Table {
+    fn from(footprint: Footprint) -> Self {
+        let Footprint { samples, divergence_deg, separation_m } = footprint;
+        Self::Numbers(Numbers { samples, divergence_deg, separation_m })
+    }
+}

@@ -1,0 +1,161 @@
+//! What comes back of one beam: the echoes of the surfaces that its rays meet, those that the
+//! receiver cannot tell apart as one, and the returns that the sensor tells of them.
+
+use crate::effects::ReturnMode;
+
+/// Light that comes back from one distance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Echo {
+    /// Where it comes from, metres: the mean of its surfaces, weighed by power.
+    pub range_m: f64,
+    /// How strong it is, where anything asks for it.
+    pub signal: Signal,
+    /// The object, and its hit, that most of it comes from.
+    pub object: usize,
+    pub hit: usize,
+}
+
+/// How strong an echo is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Signal {
+    /// Relative to what a white surface returns that faces the sensor 1 m away.
+    pub power: f64,
+    /// Relative to a white surface that faces the sensor and is as wide as the beam.
+    pub brightness: f64,
+    /// Of the surface that most of it comes from.
+    pub retroreflection: f64,
+}
+
+impl Echo {
+    /// Adds what comes back from farther away, which `strongest` says is the most powerful part
+    /// or not.
+    fn join(&mut self, farther: &Self, is_strongest: bool) {
+        let power = self.signal.power + farther.signal.power;
+        let share = farther.signal.power / power;
+        // Black surfaces have no power to weigh by; one that the sensor touches has all of it.
+        if share.is_finite() {
+            self.range_m += (farther.range_m - self.range_m) * share;
+        }
+        self.signal.power = power;
+        self.signal.brightness += farther.signal.brightness;
+        if is_strongest {
+            self.signal.retroreflection = farther.signal.retroreflection;
+            (self.object, self.hit) = (farther.object, farther.hit);
+        }
+    }
+}
+
+/// Makes one echo of those that lie nearer than `separation_m` behind one another, and puts
+/// them in the order of their ranges.
+///
+/// A slope that leads away is one echo however long it is: its pulse has no gap in it.
+pub(super) fn merge(echoes: &mut Vec<Echo>, separation_m: f64) {
+    echoes.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
+    let (mut count, mut last_m, mut most) = (0, f64::NEG_INFINITY, 0.0);
+    for i in 0..echoes.len() {
+        let echo = echoes[i];
+        let power = echo.signal.power;
+        if count > 0 && echo.range_m - last_m < separation_m {
+            echoes[count - 1].join(&echo, power > most);
+            most = power.max(most);
+        } else {
+            (echoes[count], most) = (echo, power);
+            count += 1;
+        }
+        last_m = echo.range_m;
+    }
+    echoes.truncate(count);
+}
+
+/// Which of `echoes`, at least one, in the order of their ranges, a sensor tells in this mode:
+/// one or two, in the same order.
+pub(super) fn told(echoes: &[Echo], mode: ReturnMode) -> (usize, Option<usize>) {
+    let last = echoes.len() - 1;
+    let strongest = strongest_but(echoes, None).unwrap_or(last);
+    let second = || strongest_but(echoes, Some(strongest)).unwrap_or(strongest);
+    match mode {
+        ReturnMode::Strongest => (strongest, None),
+        ReturnMode::SecondStrongest => (second(), None),
+        ReturnMode::First => (0, None),
+        ReturnMode::Last => (last, None),
+        ReturnMode::Dual if last == 0 => (0, None),
+        ReturnMode::Dual if strongest == last => (second(), Some(last)),
+        ReturnMode::Dual => (strongest, Some(last)),
+    }
+}
+
+/// The strongest of `echoes` besides this one; of equals the nearest.
+fn strongest_but(echoes: &[Echo], other: Option<usize>) -> Option<usize> {
+    let power = |i: usize| echoes[i].signal.power;
+    let all = (0..echoes.len()).filter(|&i| Some(i) != other);
+    all.reduce(|best, i| if power(i) > power(best) { i } else { best })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn echoes(of: &[(f64, f64)]) -> Vec<Echo> {
+        let echo = |(hit, &(range_m, power))| {
+            let signal = Signal { power, brightness: power, retroreflection: 0.0 };
+            Echo { range_m, signal, object: 0, hit }
+        };
+        of.iter().enumerate().map(echo).collect()
+    }
+
+    fn merged(of: &[(f64, f64)], separation_m: f64) -> Vec<Echo> {
+        let mut echoes = echoes(of);
+        merge(&mut echoes, separation_m);
+        echoes
+    }
+
+    #[test]
+    fn echoes_that_lie_apart_stay_as_they_are() {
+        let kept = merged(&[(11.0, 1.0), (10.0, 3.0)], 1.0);
+        assert_eq!(
+            kept.iter().map(|e| (e.range_m, e.hit)).collect::<Vec<_>>(),
+            [(10.0, 1), (11.0, 0)]
+        );
+    }
+
+    #[test]
+    fn echoes_that_lie_together_are_one_at_their_mean_and_of_the_strongest() {
+        let [one] = merged(&[(10.0, 1.0), (10.8, 3.0)], 1.0)[..] else { panic!("expected one") };
+        assert!((one.range_m - 10.6).abs() < 1e-14);
+        assert_eq!((one.hit, one.signal.power, one.signal.brightness), (1, 4.0, 4.0));
+        let slope: Vec<_> = (0..30).map(|i| (10.0 + 0.5 * f64::from(i), 1.0)).collect();
+        assert_eq!(merged(&slope, 1.0).len(), 1);
+    }
+
+    #[test]
+    fn echoes_without_power_or_without_bound_stay_finite_in_range() {
+        for powers in [[0.0; 2], [f64::INFINITY; 2], [f64::INFINITY, 1.0]] {
+            let one = merged(&[(2.0, powers[0]), (2.5, powers[1])], 1.0);
+            assert_eq!((one.len(), one[0].range_m), (1, 2.0), "{powers:?}");
+        }
+    }
+
+    #[test]
+    fn a_separation_of_zero_keeps_all_echoes() {
+        assert_eq!(merged(&[(2.0, 1.0), (2.0, 1.0), (2.5, 1.0)], 0.0).len(), 3);
+    }
+
+    #[test]
+    fn each_mode_tells_its_returns() {
+        use ReturnMode::{Dual, First, Last, SecondStrongest, Strongest};
+        let middle = echoes(&[(1.0, 2.0), (2.0, 3.0), (3.0, 1.0)]);
+        let at_end = echoes(&[(1.0, 1.0), (2.0, 2.0), (3.0, 3.0)]);
+        let equal = echoes(&[(1.0, 1.0), (2.0, 1.0)]);
+        let one = echoes(&[(1.0, 1.0)]);
+        for (mode, expected) in [
+            (Strongest, [(1, None), (2, None), (0, None), (0, None)]),
+            (SecondStrongest, [(0, None), (1, None), (1, None), (0, None)]),
+            (First, [(0, None), (0, None), (0, None), (0, None)]),
+            (Last, [(2, None), (2, None), (1, None), (0, None)]),
+            (Dual, [(1, Some(2)), (1, Some(2)), (0, Some(1)), (0, None)]),
+        ] {
+            let found = [&middle, &at_end, &equal, &one].map(|echoes| told(echoes, mode));
+            assert_eq!(found, expected, "{mode}");
+        }
+    }
+}
