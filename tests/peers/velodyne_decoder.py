@@ -168,6 +168,43 @@ def datasets():
                 assert n > 1000, f"{npz}: {n} points prove little"
 
 
+def two_returns():
+    """Wide beams, of which some have two returns."""
+    # Half of each beam at the edge of the torus sees the wall behind it.
+    (OUT / "edges/torus/train").mkdir(parents=True)
+    (OUT / "edges/torus/train/torus_0001.off").write_text(torus(64, 0.3))
+    (OUT / "dual.toml").write_text('[effects]\nreturns = "dual"\nnoise = { sigma_m = 0.02 }\n'
+                                   "footprint = { samples = 19, divergence_deg = [0.6, 0.3], separation_m = 0.2 }\n")
+    out = OUT / "set-two-returns"
+    run(EDGEPUCK, "gen-dataset", OUT / "edges", "--out", out, "--sensor", "vlp32c", "--format", "pcap",
+        "--effects", OUT / "dual.toml", "--views", 1, "--distance", 4, "--adapter", "cpu",
+        "--attributes", ",".join(ATTRIBUTES + ["return"]))
+    run(EDGEPUCK, "gen-dataset", "--verify", out)
+    pose = json.loads((out / "manifest.json").read_text())["poses"][0]["every_mesh"][0]
+    npz = out / "rotational/noisy/torus/train/torus_0001_v0.npz"
+    points, _ = decode(str(npz.with_suffix(".pcap")))
+    scan = {name: values for name, values in numpy.load(npz).items()}
+    assert len(points) == len(scan["positions"]), f"{len(points)} of {len(scan['positions'])}"
+    # By firing sequence, laser and range: packets have the farther return first.
+    sequence = lambda time_s: numpy.floor(time_s / 55.296e-6 + 0.02)
+    order = numpy.lexsort((numpy.linalg.norm(points[:, :3], axis=1), points[:, 6], sequence(points[:, 4])))
+    points = points[order]
+    order = numpy.lexsort((scan["range"][:, 0], scan["ring"][:, 0], sequence(scan["time"][:, 0])))
+    scan = {name: values[order] if len(values) == len(order) else values for name, values in scan.items()}
+    where = numpy.array(pose["position_m"]), rotation(pose["quaternion_xyzw"])
+    range_m, azimuth_deg, time_s, _ = differences(points, scan, where)
+    assert range_m <= RANGE_M and azimuth_deg <= AZIMUTH_DEG and time_s <= TIME_S
+    beam = numpy.stack([sequence(points[:, 4]), points[:, 6]])
+    same = (beam[:, 1:] == beam[:, :-1]).all(axis=0)
+    nearer, farther = numpy.append(same, False), numpy.append(False, same)
+    kinds = points[:, 7]
+    assert (kinds[nearer] == velodyne_decoder.ReturnMode.STRONGEST.value).all()
+    assert (kinds[farther] == velodyne_decoder.ReturnMode.LAST.value).all()
+    assert (kinds[~nearer & ~farther] == velodyne_decoder.ReturnMode.BOTH.value).all()
+    print(f"two returns: {len(points)} points, of which {nearer.sum()} pairs")
+    assert nearer.sum() > 20
+
+
 def scene(name, mesh, sensor, rpm):
     """A scene's packets, against its NPZ with a profile that says what packets ask for."""
     profile = (ROOT / "assets/sensors/vlp32c.toml").read_text().replace("rpm = 600.0", f"rpm = {rpm}")
@@ -245,5 +282,6 @@ def capture_of(payloads):
 
 
 datasets()
+two_returns()
 scenes()
 reading()

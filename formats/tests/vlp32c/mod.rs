@@ -89,6 +89,15 @@ fn both_returns_of_a_beam_are_the_same_in_blocks_of_one_azimuth() {
 }
 
 #[test]
+fn of_two_returns_the_farther_is_in_the_even_blocks() {
+    let scan = scan(&[(33, 5.0), (33, 7.0), (34, 6.0)]);
+    let (packets, _) = written(&REVOLUTION, Returns::Dual, &scan);
+    let [last, other] = [2, 3].map(|block: usize| &packets[0].blocks[block].measured);
+    assert_eq!([last[1].0, last[2].0, last[3].0], [1750, 1500, 0]);
+    assert_eq!([other[1].0, other[2].0, other[3].0], [1250, 1500, 0]);
+}
+
+#[test]
 fn azimuths_run_clockwise_and_past_360_degrees() {
     let (packets, _) = written(&REVOLUTION, Returns::Strongest, &scan(&[]));
     let azimuths: Vec<f64> = sequences(&packets, Returns::Strongest)
@@ -180,6 +189,7 @@ fn a_scan_that_says_too_little_or_too_much_is_refused() {
             "attribute beam: expected 1 values, one for each point, found 2",
         ),
         (Scan { beam: Some(vec![57_870]), ..whole.clone() }, "beam: 57870 of 57870"),
+        (scan(&[(5, 1.0), (5, 2.0), (5, 3.0)]), "beam: 5 has more points than the 2 that"),
     ] {
         let error: FormatError =
             write(&path, Hashing::None, &REVOLUTION, Returns::Dual, &scan).unwrap_err();
