@@ -22,6 +22,7 @@ pub fn scan(n: usize, origin: [f64; 3]) -> Scan {
         intensity: real(0.01),
         power: real(1e-3),
         reflectivity: Some((0..n).map(|i| i as u8).collect()),
+        return_number: Some((0..n).map(|i| i as u8).collect()),
         normal: Some((0..n).map(|i| [0.0, i as f32, -1.0]).collect()),
     }
 }
@@ -32,7 +33,7 @@ fn a_scan_is_written_as_it_ever_was() {
     let path = folder.path().join("scan");
     let hash_of = |format, n, origin| {
         // The attributes that there were when these hashes were taken.
-        let scan = Scan { power: None, reflectivity: None, ..scan(n, origin) };
+        let scan = Scan { power: None, reflectivity: None, return_number: None, ..scan(n, origin) };
         let told = write_scan(&path, format, Hashing::Sha256, &scan).unwrap();
         assert_eq!(told, Hashing::Sha256.of_file(&path).unwrap(), "{format} of {n} points");
         told
