@@ -18,3 +18,4 @@ mod shaders_valid;
 #[cfg(feature = "simplify")]
 mod simplified;
 mod watertight;
+mod weather;

@@ -28,5 +28,6 @@ pub mod significant_digits;
 #[cfg(feature = "models")]
 pub mod trade_record;
 pub mod trainer;
+pub mod weather;
 
 pub use formats::outcome::{self, Outcome, Usage};

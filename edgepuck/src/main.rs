@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use edgepuck_program::{
     Outcome, adapters, gen_dataset, gen_drive, gen_scenes, gen_shapes, merge_dataset, outcome,
-    preview_scan, sample_surfaces, scan, segment, trainer,
+    preview_scan, sample_surfaces, scan, segment, trainer, weather,
 };
 #[cfg(feature = "models")]
 use edgepuck_program::{advise, detect, export_onnx, import_weights};
@@ -34,6 +34,8 @@ enum Command {
     Scan(scan::Args),
     /// Cut a sweep of a sensor into ground and clusters
     Segment(segment::Args),
+    /// Add rain, snow, fog or haze to a recorded scan, and label each point
+    Weather(weather::Args),
     /// Find and name the objects of a sweep
     #[cfg(feature = "models")]
     Detect(detect::Args),
@@ -79,6 +81,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::SampleSurfaces(args) => sample_surfaces::run(args),
         Command::Scan(args) => scan::run(args),
         Command::Segment(args) => segment::run(args),
+        Command::Weather(args) => weather::run(args),
         #[cfg(feature = "models")]
         Command::Detect(args) => detect::run(args),
         Command::Preview(args) => preview_scan::run(args),

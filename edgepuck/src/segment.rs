@@ -2,7 +2,7 @@
 
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
-use formats::cloud_file::{read_cloud, write_cloud};
+use formats::cloud_file::{read_cloud, read_intensities, write_cloud};
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, atomic, ouster, velodyne};
 use plotters::style::{Color, HSLColor, RGBColor};
@@ -87,8 +87,7 @@ impl SweepArgs {
     /// The points, from the sensor, and their rings if the file is a scan that has
     /// them.
     pub fn read(&self) -> Result<Scan, FormatError> {
-        let sensor = self.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
-        let sensor = sensor.unwrap_or_default();
+        let sensor = self.sensor_m();
         let from_sensor =
             |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - sensor[axis]) as f32);
         if let Some(mut scan) = self.read_capture()? {
@@ -101,6 +100,26 @@ impl SweepArgs {
         // A cloud that is not a scan has no rings.
         let ring = read_scan(&self.sweep).ok().and_then(|scan| scan.ring);
         Ok(Scan { positions, ring, ..Scan::default() })
+    }
+
+    /// The sweep as its file has it, with all that is known of its points.
+    pub fn read_whole(&self) -> Result<Scan, FormatError> {
+        if let Some(scan) = self.read_capture()? {
+            return Ok(scan);
+        }
+        if let Ok(scan) = read_scan(&self.sweep) {
+            return Ok(scan);
+        }
+        let positions = read_cloud(&self.sweep)?;
+        let positions = positions.iter().map(|point| point.map(|x| x as f32)).collect();
+        let intensity = read_intensities(&self.sweep)?;
+        Ok(Scan { positions, intensity, ..Scan::default() })
+    }
+
+    /// Where the sensor is in the sweep, metres.
+    pub fn sensor_m(&self) -> [f64; 3] {
+        let given = self.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
+        given.unwrap_or_default()
     }
 
     /// The first turn, if the sweep is a capture.

@@ -41,6 +41,9 @@ pub struct Scan {
     pub reflectivity: Option<Vec<u8>>,
     /// Number of the return among those of its beam that the sensor detected, 1 the nearest.
     pub return_number: Option<Vec<u8>>,
+    /// What the point is of: 0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray. What is no
+    /// surface has triangle and object 2^32 - 1 and normal 0.
+    pub medium: Option<Vec<u8>>,
     /// Unit normal of the surface, towards the sensor, in the world's frame.
     pub normal: Option<Vec<[f32; 3]>>,
 }
@@ -71,6 +74,8 @@ crate::named! {
         Reflectivity = "reflectivity",
         /// [`Scan::return_number`].
         Return = "return",
+        /// [`Scan::medium`].
+        Medium = "medium",
         /// [`Scan::normal`].
         Normal = "normal",
     }
@@ -133,6 +138,30 @@ impl Scan {
         self.positions.is_empty()
     }
 
+    /// The points of these numbers, in their order, with all that is known of each.
+    ///
+    /// # Panics
+    /// If there is no point of one of these numbers.
+    #[must_use]
+    pub fn select(&self, numbers: &[usize]) -> Self {
+        fn of<T: Copy>(values: &[T], numbers: &[usize]) -> Vec<T> {
+            numbers.iter().map(|&i| values[i]).collect()
+        }
+        let positions = of(&self.positions, numbers);
+        let mut selected = Self { origin: self.origin, positions, ..Self::default() };
+        for (attribute, column) in self.columns() {
+            match (selected.slot(attribute), column) {
+                (ColumnSlot::F32(slot), Column::F32(all)) => *slot = Some(of(all, numbers)),
+                (ColumnSlot::U8(slot), Column::U8(all)) => *slot = Some(of(all, numbers)),
+                (ColumnSlot::U16(slot), Column::U16(all)) => *slot = Some(of(all, numbers)),
+                (ColumnSlot::U32(slot), Column::U32(all)) => *slot = Some(of(all, numbers)),
+                (ColumnSlot::Vector(slot), Column::Vector(all)) => *slot = Some(of(all, numbers)),
+                _ => unreachable!("invariant: a column and its slot are of one type"),
+            }
+        }
+        selected
+    }
+
     /// One attribute's values, if they are known.
     #[must_use]
     pub fn column(&self, attribute: Attribute) -> Option<Column<'_>> {
@@ -147,6 +176,7 @@ impl Scan {
             Attribute::Power => self.power.as_deref().map(Column::F32),
             Attribute::Reflectivity => self.reflectivity.as_deref().map(Column::U8),
             Attribute::Return => self.return_number.as_deref().map(Column::U8),
+            Attribute::Medium => self.medium.as_deref().map(Column::U8),
             Attribute::Normal => self.normal.as_deref().map(Column::Vector),
         }
     }
@@ -164,6 +194,7 @@ impl Scan {
             Attribute::Power => ColumnSlot::F32(&mut self.power),
             Attribute::Reflectivity => ColumnSlot::U8(&mut self.reflectivity),
             Attribute::Return => ColumnSlot::U8(&mut self.return_number),
+            Attribute::Medium => ColumnSlot::U8(&mut self.medium),
             Attribute::Normal => ColumnSlot::Vector(&mut self.normal),
         }
     }

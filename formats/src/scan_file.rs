@@ -7,7 +7,7 @@
 //! | `range`, `time`, `intensity`, `power` | f32 | `[n, 1]` |
 //! | `beam`, `triangle`, `object` | u32 | `[n, 1]` |
 //! | `ring` | u16 | `[n, 1]` |
-//! | `reflectivity` | u8 | `[n, 1]` |
+//! | `reflectivity`, `return`, `medium` | u8 | `[n, 1]` |
 //! | `normal` | f32 | `[n, 3]` |
 //! | `origin`, only if it is not 0 | f64 | `[3]` |
 //!

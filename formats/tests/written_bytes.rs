@@ -23,6 +23,7 @@ pub fn scan(n: usize, origin: [f64; 3]) -> Scan {
         power: real(1e-3),
         reflectivity: Some((0..n).map(|i| i as u8).collect()),
         return_number: Some((0..n).map(|i| i as u8).collect()),
+        medium: Some((0..n).map(|i| i as u8).collect()),
         normal: Some((0..n).map(|i| [0.0, i as f32, -1.0]).collect()),
     }
 }

@@ -1,5 +1,5 @@
 //! What a scan does to the ideal ranges: noise, dropout, the detection limit, wide beams and
-//! their returns, quantisation, intensity. An effect that is `None` costs nothing.
+//! their returns, weather, quantisation, intensity. An effect that is `None` costs nothing.
 //!
 //! In TOML and in the manifest:
 //!
@@ -10,6 +10,7 @@
 //! detection = { reflectivity = 0.1, range_m = 60 } # or true: the sensor's own limit
 //! footprint = { samples = 19, divergence_deg = [0.18, 0.09], separation_m = 1.0 } # or true
 //! returns = "dual"
+//! weather = { rain_mm_h = 25.0 } # and snow_mm_h, fog_visibility_m, haze_visibility_m, volumes
 //! quantise_m = 0.004 # or true: the sensor's own quantum
 //! intensity = true
 //! ```
@@ -21,9 +22,11 @@ use crate::sensor::{BeamPattern, Sensor};
 
 pub use detection::{Detection, DetectionLimit};
 pub use footprint::{Footprint, ReturnMode};
+pub use weather::{FogModel, Volume, Weather};
 
 mod detection;
 mod footprint;
+mod weather;
 
 /// No length of an effect is larger: shaders hold it in f32, with room to
 /// multiply.
@@ -43,6 +46,8 @@ pub struct Effects {
     pub footprint: Option<Footprint>,
     /// Which returns of a beam are told; `None` is the strongest.
     pub returns: Option<ReturnMode>,
+    /// What is in the air; it takes returns below the detection limit, which it asks for.
+    pub weather: Option<Box<Weather>>,
     /// Rounding of the range.
     pub quantum: Option<Quantum>,
     /// Intensity of the return.
@@ -220,6 +225,9 @@ impl Effects {
                 InvalidValue::new("effects.quantise_m", cause)
             })?);
         }
+        if resolved.weather.as_ref().is_some_and(|weather| !weather.is_clear()) {
+            resolved.detection.get_or_insert_default();
+        }
         if let Some(detection) = &mut resolved.detection
             && detection.limit.is_none()
         {
@@ -272,6 +280,9 @@ impl Effects {
         if let Some(footprint) = self.footprint {
             footprint.validate()?;
         }
+        if let Some(weather) = &self.weather {
+            weather.validate()?;
+        }
         let probability = self.dropout.map(|dropout| dropout.probability);
         within("effects.dropout.probability", probability, 0.0..=1.0)?;
         let step_m = self.quantum.and_then(|quantum| quantum.step_m);
@@ -294,6 +305,8 @@ struct EffectsTable {
     footprint: Option<footprint::Table>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     returns: Option<ReturnMode>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    weather: Option<Box<Weather>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     quantise_m: Option<SwitchOrMetres>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -322,8 +335,9 @@ impl TryFrom<EffectsTable> for Effects {
         let intensity = (table.intensity == Some(true)).then_some(Intensity);
         let detection = table.detection.map_or(Ok(None), detection::Table::detection)?;
         let footprint = table.footprint.and_then(Option::from);
-        let EffectsTable { noise, dropout, returns, .. } = table;
-        let effects = Self { noise, dropout, detection, footprint, returns, quantum, intensity };
+        let EffectsTable { noise, dropout, returns, weather, .. } = table;
+        let effects =
+            Self { noise, dropout, detection, footprint, returns, weather, quantum, intensity };
         effects.validate()?;
         Ok(effects)
     }
@@ -337,6 +351,7 @@ impl From<Effects> for EffectsTable {
             detection: effects.detection.map(detection::Table::from),
             footprint: effects.footprint.map(footprint::Table::from),
             returns: effects.returns,
+            weather: effects.weather,
             quantise_m: effects.quantum.map(|quantum| {
                 quantum.step_m.map_or(SwitchOrMetres::Switch(true), SwitchOrMetres::Metres)
             }),

@@ -55,6 +55,7 @@ pub mod sensor;
 pub mod simplify;
 pub mod surface_points;
 pub mod target;
+pub mod weather;
 
 pub use formats;
 pub use glam;

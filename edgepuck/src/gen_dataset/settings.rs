@@ -80,7 +80,7 @@ pub struct Settings {
     colours: Option<ColourSource>,
 
     /// Attributes of each point besides its position: range, beam, ring, time, triangle, object,
-    /// intensity, power, reflectivity, return, normal
+    /// intensity, power, reflectivity, return, medium, normal
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 
@@ -190,7 +190,10 @@ impl Settings {
     fn effects(&self) -> anyhow::Result<Effects> {
         let intensity = self.attributes.contains(&Attribute::Intensity).then_some(Intensity);
         if let Some(file) = &self.effects {
-            let EffectsFile { effects } = config::read(file)?;
+            let EffectsFile { mut effects } = config::read(file)?;
+            if let Some(weather) = &mut effects.weather {
+                weather.empty_beams.get_or_insert(false);
+            }
             return Ok(Effects { intensity: effects.intensity.or(intensity), ..effects });
         }
         let noise = Noise { mean_m: self.noise_mean, sigma_m: self.noise, model: self.noise_model };

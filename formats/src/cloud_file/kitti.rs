@@ -19,26 +19,47 @@ const COLUMN_SIZE: usize = size_of::<f32>();
 
 /// Reads every point up to the end.
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+    let mut points = Vec::new();
+    read_points(reader, name, |number| points.push([0, 1, 2].map(number)))?;
+    Ok(points)
+}
+
+/// The fourth number of every point, its intensity; `None` if the points have three.
+pub(super) fn read_intensities(
+    reader: &mut impl BufRead,
+    name: &Path,
+) -> Result<Option<Vec<f32>>, FormatError> {
+    if columns(name) < KITTI_COLUMNS {
+        return Ok(None);
+    }
+    let mut intensities = Vec::new();
+    read_points(reader, name, |number| intensities.push(number(3) as f32))?;
+    Ok(Some(intensities))
+}
+
+/// Gives the numbers of every point, by their place, to `take`.
+fn read_points(
+    reader: &mut impl BufRead,
+    name: &Path,
+    mut take: impl FnMut(&dyn Fn(usize) -> f64),
+) -> Result<(), FormatError> {
     let start = reader.fill_buf().map_err(|source| FormatError::io(name, source))?;
     if is_velodyne_packets(start) {
         let cause = "expected points, found raw Velodyne packets: decode them first";
         return Err(FormatError::malformed(name, "format", cause));
     }
     let columns = columns(name);
-    let mut points = Vec::new();
-    let rest =
-        records::read_to_end(reader, columns * COLUMN_SIZE, |record| {
-            points.push([0, 1, 2].map(|axis| {
-                NumberType::F32.decode(&record[axis * COLUMN_SIZE..], ByteOrder::Little)
-            }));
-        });
+    let mut count = 0;
+    let rest = records::read_to_end(reader, columns * COLUMN_SIZE, |record| {
+        count += 1;
+        take(&|column| NumberType::F32.decode(&record[column * COLUMN_SIZE..], ByteOrder::Little));
+    });
     match rest.map_err(|source| FormatError::io(name, source))? {
-        0 => Ok(points),
+        0 => Ok(()),
         rest => {
-            let part = format!("point {}", points.len());
             let cause =
                 format!("expected {} bytes, {columns} f32, found {rest}", columns * COLUMN_SIZE);
-            Err(FormatError::malformed(name, part, cause))
+            Err(FormatError::malformed(name, format!("point {count}"), cause))
         }
     }
 }

@@ -61,6 +61,19 @@ pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     read_as(&mut BufReader::new(file), format, path)
 }
 
+/// Reads the intensities of the points at `path`, as they are there; `None` if its format is not
+/// KITTI's or has none.
+///
+/// # Errors
+/// As [`read_cloud`].
+pub fn read_intensities(path: &Path) -> Result<Option<Vec<f32>>, FormatError> {
+    if CloudFormat::of(path)? != CloudFormat::Kitti {
+        return Ok(None);
+    }
+    let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
+    kitti::read_intensities(&mut BufReader::new(file), path)
+}
+
 /// Reads a cloud from `reader`, which errors call `name`.
 ///
 /// Without a `format`, the first bytes tell it. Raw floats (KITTI) cannot be

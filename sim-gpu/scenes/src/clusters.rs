@@ -24,7 +24,8 @@ pub struct LabelledCluster {
     pub points: Vec<u32>,
     /// Its class, an index into [`Stage::classes`].
     pub label: usize,
-    /// The surface that most of its points lie on, as in [`Sweep::surfaces`].
+    /// The surface that most of its points lie on, as in [`Sweep::surfaces`]; of what is in the
+    /// air 2^32 - 1.
     pub surface: u32,
     /// The share of its points that lie on that surface.
     pub truth_share: f32,
@@ -46,15 +47,16 @@ pub fn label_clusters(
 ) -> Vec<LabelledCluster> {
     let (surfaces, visible) = (sweep.surfaces(), sweep.points_by_surface(scene));
     let mut counts = vec![0u32; visible.len()];
+    let air = scene.objects.len() + 1;
     let clusters = found.clusters().map(|cluster| {
         counts.fill(0);
-        cluster.points.iter().for_each(|&i| counts[surfaces[i as usize] as usize] += 1);
+        cluster.points.iter().for_each(|&i| counts[air.min(surfaces[i as usize] as usize)] += 1);
         // Of equal counts, the first.
         let most = (0..counts.len()).rev().max_by_key(|&surface| counts[surface]).unwrap_or(0);
         let share = f64::from(counts[most]) / cluster.points.len() as f64;
         let is_whole = f64::from(counts[most]) >= WHOLE * f64::from(visible[most]);
         let class = match most.checked_sub(1) {
-            Some(object) if share >= PURE && is_whole => {
+            Some(object) if most != air && share >= PURE && is_whole => {
                 &stage.recipe().object[scene.objects[object].entry].class
             }
             _ => OTHER,
@@ -64,7 +66,7 @@ pub fn label_clusters(
         LabelledCluster {
             points: cluster.points.to_vec(),
             label: label.expect("invariant: classes holds those of all objects"),
-            surface: most as u32,
+            surface: if most == air { u32::MAX } else { most as u32 },
             truth_share: share as f32,
             range_m,
             height_m: cluster.ground_z_m.map_or(f32::NAN, |ground_z_m| lowest_m - ground_z_m),

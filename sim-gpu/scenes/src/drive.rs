@@ -191,7 +191,9 @@ impl<'a> Drive<'a> {
         request.stream = StreamKey::new(stage.seed(), "drive/beams", number);
         let mut scan = scan_objects(caster, &targets, &request)?.scan;
         for object in scan.object.iter_mut().flatten() {
-            *object = (*object as usize).checked_sub(n_parts).map_or(0, |i| ids[i]);
+            // What is in the air counts with the ground: it is no object either.
+            let in_sight = (*object as usize).checked_sub(n_parts);
+            *object = in_sight.and_then(|i| ids.get(i)).map_or(0, |id| *id);
         }
         let seen = self.seen(first, &pattern, &scan);
         Ok(Packet { scan, seen })

@@ -270,12 +270,13 @@ impl Sweep {
         self.scan.object.as_deref().expect("invariant: a sweep is scanned with objects")
     }
 
-    /// How many points lie on the ground and on each object of `scene`, whose sweep
-    /// this is.
+    /// How many points lie on the ground, on each object of `scene`, whose sweep this is, and,
+    /// last, on nothing but what is in the air.
     #[must_use]
     pub fn points_by_surface(&self, scene: &Scene) -> Vec<u32> {
-        let mut counts = vec![0; scene.objects.len() + 1];
-        self.surfaces().iter().for_each(|&surface| counts[surface as usize] += 1);
+        let air = scene.objects.len() + 1;
+        let mut counts = vec![0; air + 1];
+        self.surfaces().iter().for_each(|&surface| counts[air.min(surface as usize)] += 1);
         counts
     }
 }

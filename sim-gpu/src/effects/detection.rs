@@ -10,7 +10,7 @@ use crate::config::{InvalidValue, positive, within};
 /// A receiver reports a pulse where its signal crosses a threshold. Here the signal is
 /// the received power; the threshold is the power of the weakest surface that the sensor
 /// is stated to detect.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Detection {
     /// What the sensor still detects; `None` is the sensor's own limit.
     pub limit: Option<DetectionLimit>,

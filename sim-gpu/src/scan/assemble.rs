@@ -1,5 +1,6 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
+use super::echo::Source;
 use super::measure::{HitEffects, Return, View, measure};
 use super::request::{Glass, ScanRequest};
 use crate::config::InvalidValue;
@@ -9,6 +10,7 @@ use crate::job::CastJob;
 use crate::material::{Material, Materials};
 use crate::resolve::{Hit, Hits};
 use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
+use crate::weather::Medium;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
@@ -62,6 +64,9 @@ pub struct Tally {
     pub undetected: u64,
     /// Returns whose measured range is not positive.
     pub negative: u64,
+    /// Points of what is in the air.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub scattered: u64,
 }
 
 fn is_zero(n: &u64) -> bool {
@@ -75,6 +80,7 @@ impl AddAssign for Tally {
         self.dropped += other.dropped;
         self.undetected += other.undetected;
         self.negative += other.negative;
+        self.scattered += other.scattered;
     }
 }
 
@@ -94,6 +100,7 @@ pub fn assemble(
     objects: &[ObjectHits],
 ) -> Result<(Scan, Tally), InvalidValue> {
     let view = View::new(request, cast_effects)?;
+    let hears_empty_beams = view.air.as_ref().is_some_and(|air| air.empty_beams);
     let position_m = request.pose.position_m;
     let origin = origin_for(position_m);
     let mut tally = Tally::default();
@@ -102,11 +109,28 @@ pub fn assemble(
         request.pattern.beam_of(objects[object].hits.hits[hit].beam)
     };
     let (mut returns, mut echoes) = (Vec::with_capacity(nearest.len()), Vec::new());
+    let mut measure = |beam, rays: &[_]| {
+        measure(&view, objects, beam, rays, &mut echoes, &mut tally, &mut returns);
+    };
+    let mut next = 0;
     for rays in nearest.chunk_by(|a, b| beam(a) == beam(b)) {
-        measure(&view, objects, rays, &mut echoes, &mut tally, &mut returns);
+        let beam = beam(&rays[0]);
+        if hears_empty_beams {
+            (next..beam).for_each(|empty| measure(empty, &[]));
+            next = beam + 1;
+        }
+        measure(beam, rays);
+    }
+    if hears_empty_beams {
+        (next..request.pattern.beam_of(request.pattern.len() as u32))
+            .for_each(|empty| measure(empty, &[]));
     }
     post_process(request, &mut returns);
     tally.points = returns.len() as u64;
+    if view.air.is_some() {
+        let is_of_air = |r: &&Return| matches!(r.source, Source::Air { .. });
+        tally.scattered = returns.iter().filter(is_of_air).count() as u64;
+    }
     let scan = Scan {
         origin: origin.to_array(),
         positions: returns.iter().map(|r| f32x3(r.from_sensor + (position_m - origin))).collect(),
@@ -174,43 +198,76 @@ fn with_attributes(
     objects: &[ObjectHits],
     returns: &[Return],
 ) -> Scan {
-    let hit = |r: &Return| &objects[r.object].hits.hits[r.hit];
-    let ray = |r: &Return| hit(r).beam as usize;
+    let surface = |r: &Return| match r.source {
+        Source::Surface { object, hit } => {
+            let found = &objects[object as usize];
+            Some((found, &found.hits.hits[hit as usize], hit as usize))
+        }
+        Source::Air { .. } => None,
+    };
+    let ray = |r: &Return| match r.source {
+        Source::Surface { object, hit } => objects[object as usize].hits.hits[hit as usize].beam,
+        Source::Air { ray, .. } => ray,
+    };
+    let pattern = view.request.pattern;
     let from_start =
-        |r: &Return| view.start(hit(r).beam).map_or(r.from_sensor, |start| r.from_sensor - start);
+        |r: &Return| view.start(ray(r)).map_or(r.from_sensor, |start| r.from_sensor - start);
     for attribute in &view.request.attributes {
         match attribute {
             Attribute::Range => {
                 scan.range_m = column(returns, |r| from_start(r).length() as f32);
             }
-            Attribute::Beam => {
-                scan.beam = column(returns, |r| view.request.pattern.beam_of(hit(r).beam));
-            }
-            Attribute::Ring => scan.ring = column(returns, |r| view.request.pattern.ring[ray(r)]),
+            Attribute::Beam => scan.beam = column(returns, |r| pattern.beam_of(ray(r))),
+            Attribute::Ring => scan.ring = column(returns, |r| pattern.ring[ray(r) as usize]),
             Attribute::Time => {
-                scan.time_s = column(returns, |r| view.request.pattern.time_s[ray(r)] as f32);
+                scan.time_s = column(returns, |r| pattern.time_s[ray(r) as usize] as f32);
             }
-            Attribute::Triangle => scan.triangle = column(returns, |r| hit(r).triangle),
-            Attribute::Object => scan.object = column(returns, |r| objects[r.object].object),
+            Attribute::Triangle => {
+                scan.triangle =
+                    column(returns, |r| surface(r).map_or(NONE, |(_, hit, _)| hit.triangle));
+            }
+            Attribute::Object => {
+                scan.object =
+                    column(returns, |r| surface(r).map_or(NONE, |(found, ..)| found.object));
+            }
+            // Of a surface in clear air it is the effect's, which a caster computes.
+            Attribute::Intensity if view.air.is_some() => {
+                scan.intensity = column(returns, |r| r.brightness);
+            }
             Attribute::Intensity => {
                 scan.intensity = column(returns, |r| {
-                    let found = &objects[r.object];
-                    let intensity = HitEffects::of(view.cast_effects, found.hits, r.hit).intensity;
-                    let own = found.materials.map(|_| found.material(view.request.pattern, hit(r)));
-                    own.map_or(intensity, |own| intensity * own.reflectivity as f32)
+                    surface(r).map_or(0.0, |(found, hit, number)| {
+                        let effects = HitEffects::of(view.cast_effects, found.hits, number);
+                        let own = found.materials.map(|_| found.material(pattern, hit));
+                        own.map_or(effects.intensity, |own| {
+                            effects.intensity * own.reflectivity as f32
+                        })
+                    })
                 });
             }
             Attribute::Power => scan.power = column(returns, |r| r.power),
             Attribute::Reflectivity => scan.reflectivity = column(returns, |r| r.reflectivity),
             Attribute::Return => scan.return_number = column(returns, |r| r.number),
+            Attribute::Medium => {
+                scan.medium = column(returns, |r| match r.source {
+                    Source::Surface { .. } => Medium::Surface as u8,
+                    Source::Air { medium, .. } => medium as u8,
+                });
+            }
             Attribute::Normal => {
-                scan.normal =
-                    column(returns, |r| normal(&objects[r.object], hit(r).triangle, from_start(r)));
+                scan.normal = column(returns, |r| {
+                    surface(r).map_or([0.0; 3], |(found, hit, _)| {
+                        normal(found, hit.triangle, from_start(r))
+                    })
+                });
             }
         }
     }
     scan
 }
+
+/// The triangle and the object of what is no surface.
+const NONE: u32 = u32::MAX;
 
 fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>> {
     Some(returns.iter().map(value).collect())

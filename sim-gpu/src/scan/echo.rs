@@ -2,17 +2,26 @@
 //! receiver cannot tell apart as one, and the returns that the sensor tells of them.
 
 use crate::effects::ReturnMode;
+use crate::weather::Medium;
 
 /// Light that comes back from one distance.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Echo {
     /// Where it comes from, metres: the mean of its surfaces, weighed by power.
     pub range_m: f64,
     /// How strong it is, where anything asks for it.
     pub signal: Signal,
-    /// The object, and its hit, that most of it comes from.
-    pub object: usize,
-    pub hit: usize,
+    /// What most of it comes from.
+    pub source: Source,
+}
+
+/// What an echo comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    /// A surface: the object, and the hit of it, as places in lists.
+    Surface { object: u32, hit: u32 },
+    /// The air along a ray.
+    Air { ray: u32, medium: Medium },
 }
 
 /// How strong an echo is.
@@ -40,7 +49,7 @@ impl Echo {
         self.signal.brightness += farther.signal.brightness;
         if is_strongest {
             self.signal.retroreflection = farther.signal.retroreflection;
-            (self.object, self.hit) = (farther.object, farther.hit);
+            self.source = farther.source;
         }
     }
 }
@@ -96,11 +105,16 @@ mod tests {
     use super::*;
 
     fn echoes(of: &[(f64, f64)]) -> Vec<Echo> {
-        let echo = |(hit, &(range_m, power))| {
+        let echo = |(hit, &(range_m, power)): (u32, &(f64, f64))| {
             let signal = Signal { power, brightness: power, retroreflection: 0.0 };
-            Echo { range_m, signal, object: 0, hit }
+            Echo { range_m, signal, source: Source::Surface { object: 0, hit } }
         };
-        of.iter().enumerate().map(echo).collect()
+        (0..).zip(of).map(echo).collect()
+    }
+
+    fn hit(echo: &Echo) -> u32 {
+        let Source::Surface { hit, .. } = echo.source else { panic!("expected a surface") };
+        hit
     }
 
     fn merged(of: &[(f64, f64)], separation_m: f64) -> Vec<Echo> {
@@ -113,7 +127,7 @@ mod tests {
     fn echoes_that_lie_apart_stay_as_they_are() {
         let kept = merged(&[(11.0, 1.0), (10.0, 3.0)], 1.0);
         assert_eq!(
-            kept.iter().map(|e| (e.range_m, e.hit)).collect::<Vec<_>>(),
+            kept.iter().map(|e| (e.range_m, hit(e))).collect::<Vec<_>>(),
             [(10.0, 1), (11.0, 0)]
         );
     }
@@ -122,7 +136,7 @@ mod tests {
     fn echoes_that_lie_together_are_one_at_their_mean_and_of_the_strongest() {
         let [one] = merged(&[(10.0, 1.0), (10.8, 3.0)], 1.0)[..] else { panic!("expected one") };
         assert!((one.range_m - 10.6).abs() < 1e-14);
-        assert_eq!((one.hit, one.signal.power, one.signal.brightness), (1, 4.0, 4.0));
+        assert_eq!((hit(&one), one.signal.power, one.signal.brightness), (1, 4.0, 4.0));
         let slope: Vec<_> = (0..30).map(|i| (10.0 + 0.5 * f64::from(i), 1.0)).collect();
         assert_eq!(merged(&slope, 1.0).len(), 1);
     }

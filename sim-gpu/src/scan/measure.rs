@@ -1,13 +1,15 @@
 //! From what the rays of a beam hit to the points that the sensor measures.
 
 use super::assemble::{ObjectHits, Tally};
-use super::echo::{Echo, Signal, merge, told};
+use super::echo::{Echo, Signal, Source, merge, told};
 use super::power;
 use super::request::ScanRequest;
 use crate::config::InvalidValue;
+use crate::cpu::effects::{dropout, noise_range, noise_xyz};
 use crate::cpu::random::random_bits;
 use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
 use crate::resolve::{Hit, Hits};
+use crate::weather::{Air, AirBeam, Scattered};
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use glam::DVec3;
@@ -25,6 +27,8 @@ pub(super) struct View<'a> {
     weighs: bool,
     /// The part of a beam's power that each of its rays has, where beams have a width.
     share: Option<f64>,
+    /// What is in the air, where anything is.
+    pub air: Option<Air>,
 }
 
 impl<'a> View<'a> {
@@ -40,7 +44,14 @@ impl<'a> View<'a> {
         let reported = [Attribute::Power, Attribute::Reflectivity];
         let reports = reported.iter().any(|of| request.attributes.contains(of));
         let weighs = limit.is_some() || is_wide || reports;
-        Ok(Self { request, cast_effects, effects, limit, weighs, share })
+        let air = effects.weather.as_ref().filter(|weather| !weather.is_clear());
+        let air = air.zip(limit).map(|(weather, limit)| {
+            let own = || request.sensor.beam_divergence_deg();
+            let asked = effects.footprint.and_then(|footprint| footprint.divergence_deg);
+            let divergence_deg = asked.unwrap_or_else(own);
+            Air::new(weather, divergence_deg, &limit, &request.sensor.range)
+        });
+        Ok(Self { request, cast_effects, effects, limit, weighs, share, air })
     }
 
     /// Where a ray points, in world axes.
@@ -61,11 +72,20 @@ impl<'a> View<'a> {
         Some(self.request.pose.world_from_sensor * start)
     }
 
+    /// Where a ray starts, in the world.
+    fn origin(&self, ray: u32) -> DVec3 {
+        self.request.pose.position_m + self.start(ray).unwrap_or_default()
+    }
+
     /// How strong what comes back from a hit is.
     fn signal(&self, found: &ObjectHits, hit: &Hit) -> Signal {
         let material = found.material(self.request.pattern, hit);
         let whole = power::brightness(found, material, hit, self.direction(hit.beam));
-        let brightness = self.share.map_or(whole, |share| whole * share);
+        let mut brightness = self.share.map_or(whole, |share| whole * share);
+        if let Some(air) = &self.air {
+            let direction = self.direction(hit.beam);
+            brightness *= air.transmission(self.origin(hit.beam), direction, hit.range_m);
+        }
         let power = power::received(brightness, hit.range_m);
         Signal { power, brightness, retroreflection: material.retroreflection }
     }
@@ -74,11 +94,12 @@ impl<'a> View<'a> {
 /// One point on its way into a scan.
 #[derive(Clone, Copy)]
 pub(super) struct Return {
-    pub object: usize,
-    pub hit: usize,
+    pub source: Source,
     /// The point as measured, from the sensor, in world axes.
     pub from_sensor: DVec3,
-    /// As [`Scan::power`](formats::Scan::power), where anything asks for it.
+    /// As [`Signal::brightness`], where anything asks for it.
+    pub brightness: f32,
+    /// As [`Scan::power`](formats::Scan::power), likewise.
     pub power: f32,
     /// As [`Scan::reflectivity`](formats::Scan::reflectivity), likewise.
     pub reflectivity: u8,
@@ -86,24 +107,29 @@ pub(super) struct Return {
     pub number: u8,
 }
 
-/// Appends to `returns` what the sensor makes of the hits of one beam's `rays`, which are places
-/// in `objects` and in its hits, at least one. `echoes` is room to work in.
+/// Appends to `returns` what the sensor makes of one `beam`, whose rays hit what stands at these
+/// places in `objects` and in its hits. `echoes` is room to work in.
 pub(super) fn measure(
     view: &View,
     objects: &[ObjectHits],
+    beam: u32,
     rays: &[(usize, usize)],
     echoes: &mut Vec<Echo>,
     tally: &mut Tally,
     returns: &mut Vec<Return>,
 ) {
     listen(view, objects, rays, echoes, tally);
-    if let (Some(footprint), 2..) = (view.effects.footprint, echoes.len()) {
-        merge(echoes, footprint.separation_m.unwrap_or_default());
+    if let Some(air) = &view.air {
+        listen_to_air(view, air, objects, beam, rays, echoes);
+    }
+    if echoes.len() > 1 {
+        let separation_m = view.effects.footprint.and_then(|footprint| footprint.separation_m);
+        merge(echoes, separation_m.unwrap_or_default());
     }
     if let Some((detection, limit)) = view.effects.detection.zip(view.limit) {
         let before = echoes.len();
         echoes.retain(|echo| {
-            let (stream, ray) = key(objects, echo);
+            let (stream, ray) = key(view, objects, echo);
             power::is_detected(&detection, &limit, echo.signal.power, stream, ray)
         });
         tally.undetected += (before - echoes.len()) as u64;
@@ -131,6 +157,7 @@ fn listen(
     for &(object, hit) in rays {
         let found = &objects[object];
         let nearest = &found.hits.hits[hit];
+        let source = Source::Surface { object: object as u32, hit: hit as u32 };
         if view.share.is_none() && nearest.beam != view.centre(nearest.beam) {
             // The rays around it were cast for a scan of wide beams.
             continue;
@@ -141,7 +168,7 @@ fn listen(
             is_lost = true;
         } else {
             let signal = if view.weighs { view.signal(found, nearest) } else { Signal::default() };
-            echoes.push(Echo { range_m: nearest.range_m, signal, object, hit });
+            echoes.push(Echo { range_m: nearest.range_m, signal, source });
         }
     }
     if echoes.is_empty() {
@@ -150,10 +177,50 @@ fn listen(
     }
 }
 
+/// Appends to `echoes` what comes back from the air along a beam.
+fn listen_to_air(
+    view: &View,
+    air: &Air,
+    objects: &[ObjectHits],
+    beam: u32,
+    rays: &[(usize, usize)],
+    echoes: &mut Vec<Echo>,
+) {
+    let pattern = view.request.pattern;
+    let ray = beam * pattern.rays_per_beam;
+    let max_m = view.request.sensor.range.max_m;
+    let range_m = |&(object, hit): &(usize, usize)| objects[object].hits.hits[hit].range_m;
+    // Light passes by the surfaces that only some of the rays meet.
+    let is_open = view.share.is_some() && rays.len() < pattern.rays_per_beam as usize;
+    let farthest_m = rays.iter().map(range_m).fold(0.0, f64::max);
+    let end_m = if is_open || rays.is_empty() { max_m } else { farthest_m.min(max_m) };
+    let at_end = echoes.iter().find(|echo| echo.range_m == end_m);
+    let in_clear_air = |signal: Signal, transmission: f64| {
+        if transmission > 0.0 { signal.brightness / transmission } else { 0.0 }
+    };
+    let (origin, direction) = (view.origin(ray), view.direction(ray));
+    let transmission = || air.transmission(origin, direction, end_m);
+    let brightness = at_end.map_or(0.0, |echo| in_clear_air(echo.signal, transmission()));
+    let (stream, number) = (view.request.stream, beam);
+    let along = AirBeam { origin, direction, end_m, brightness, stream, number };
+    air.scatter(&along, |scattered| {
+        let Scattered { range_m, power, brightness, medium } = scattered;
+        let signal = Signal { power, brightness, retroreflection: 0.0 };
+        if range_m >= view.request.sensor.range.min_m {
+            echoes.push(Echo { range_m, signal, source: Source::Air { ray, medium } });
+        }
+    });
+}
+
 /// What keys the random numbers of an echo: those of the ray that returned most of it.
-fn key(objects: &[ObjectHits], echo: &Echo) -> (StreamKey, u32) {
-    let found = &objects[echo.object];
-    (found.job.stream, found.hits.hits[echo.hit].beam)
+fn key(view: &View, objects: &[ObjectHits], echo: &Echo) -> (StreamKey, u32) {
+    match echo.source {
+        Source::Surface { object, hit } => {
+            let found = &objects[object as usize];
+            (found.job.stream, found.hits.hits[hit as usize].beam)
+        }
+        Source::Air { ray, .. } => (view.request.stream, ray),
+    }
 }
 
 /// The point that a sensor measures of an echo that it detects, number `place` of its beam.
@@ -164,9 +231,14 @@ fn point(
     place: usize,
     tally: &mut Tally,
 ) -> Option<Return> {
-    let Echo { object, hit, signal, .. } = *echo;
-    let (stream, ray) = key(objects, echo);
-    let effects = HitEffects::of(view.cast_effects, objects[object].hits, hit);
+    let Echo { signal, source, .. } = *echo;
+    let (stream, ray) = key(view, objects, echo);
+    let effects = match source {
+        Source::Surface { object, hit } => {
+            HitEffects::of(view.cast_effects, objects[object as usize].hits, hit as usize)
+        }
+        Source::Air { .. } => HitEffects::in_air(view.cast_effects, stream, ray),
+    };
     if view.effects.dropout.is_some() && effects.dropped {
         tally.dropped += 1;
         return None;
@@ -188,11 +260,12 @@ fn point(
     let sideways = if noise == Some(NoiseModel::Xyz) { effects.noise } else { DVec3::ZERO };
     let from_start = view.direction(view.centre(ray)) * range_m + sideways;
     let from_sensor = view.start(ray).map_or(from_start, |start| from_start + start);
-    let power = signal.power.min(f64::from(f32::MAX)) as f32;
+    let (power, brightness) =
+        (signal.power.min(f64::from(f32::MAX)) as f32, signal.brightness as f32);
     let reflectivity = power::calibrated(signal.brightness, signal.retroreflection);
     // A beam has 37 rays at most.
     let number = place as u8 + 1;
-    Some(Return { object, hit, from_sensor, power, reflectivity, number })
+    Some(Return { source, from_sensor, brightness, power, reflectivity, number })
 }
 
 /// Which random bits of a beam say whether glass returns it; effects use lower
@@ -218,6 +291,16 @@ pub(super) struct HitEffects {
 }
 
 impl HitEffects {
+    /// What `cast_effects` say of a return from the air, which no caster sees.
+    fn in_air(cast_effects: &Effects, stream: StreamKey, ray: u32) -> Self {
+        let noise = cast_effects.noise.map(|noise| match noise.model {
+            NoiseModel::Range => DVec3::X * noise_range(&noise, stream, ray),
+            NoiseModel::Xyz => noise_xyz(&noise, stream, ray),
+        });
+        let dropped = cast_effects.dropout.is_some_and(|model| dropout(&model, stream, ray));
+        Self { noise: noise.unwrap_or_default(), dropped, intensity: 0.0 }
+    }
+
     /// Reads the outputs of `cast_effects` for number `hit` of `hits`.
     pub fn of(cast_effects: &Effects, hits: &Hits, hit: usize) -> Self {
         let per_hit = cast_effects.outputs_per_ray();

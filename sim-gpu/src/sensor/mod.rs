@@ -191,6 +191,12 @@ impl Sensor {
         Self { decimation: self.decimation.saturating_mul(k), ..self.clone() }
     }
 
+    /// Full angles of its beams' divergence, degrees: its own, or else 3 mrad, as LISA has them.
+    #[must_use]
+    pub fn beam_divergence_deg(&self) -> [f64; 2] {
+        self.footprint.map_or([0.172; 2], |footprint| footprint.divergence_deg)
+    }
+
     /// The views this sensor is meant for: its own, or else
     /// [`Views::STATIC`] for a camera and [`Views::ROTATING`] for all others.
     #[must_use]

@@ -1,0 +1,169 @@
+//! `edgepuck weather`: rain, snow, fog and haze for a scan that was recorded in clear air.
+
+use crate::segment::SweepArgs;
+use crate::{Outcome, Usage};
+use formats::Scan;
+use formats::hash::Hashing;
+use formats::rng::StreamKey;
+use formats::scan_file::{ScanFormat, write_scan};
+use glam::DVec3;
+use sim_gpu::config::within;
+use sim_gpu::effects::{Effects, FogModel, Weather};
+use sim_gpu::glam;
+use sim_gpu::sensor::Sensor;
+use sim_gpu::weather::{Air, Fates, Medium, in_weather};
+use std::path::PathBuf;
+
+/// Flags of `weather`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    input: SweepArgs,
+
+    /// File to write: .npz, .ply or .csv. It has the points that are left, the strongest return of
+    /// each beam; `intensity` is what the weather leaves of theirs, and `medium` says what each is
+    /// of: 0 a surface, 1 rain, 2 snow, 3 fog
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+
+    /// Rain, millimetres an hour
+    #[arg(long, value_name = "MM/H", allow_negative_numbers = true)]
+    rain: Option<f64>,
+
+    /// Snow, millimetres of water an hour
+    #[arg(long, value_name = "MM/H", allow_negative_numbers = true)]
+    snow: Option<f64>,
+
+    /// Fog of this visibility, metres
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    fog: Option<f64>,
+
+    /// How strong fog is: `physical`, by the power that it scatters, or `hahner`, in proportion to
+    /// the surface behind it, as in the simulation of Hahner et al. (ICCV 2021)
+    #[arg(long, value_name = "MODEL", default_value = "physical")]
+    fog_model: FogModel,
+
+    /// Haze of this visibility, metres
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    haze: Option<f64>,
+
+    /// Sensor that recorded the scan: a built-in name or a TOML file. Its detection limit, beam
+    /// width and least range decide what is seen
+    #[arg(long, default_value = "vlp32c", value_name = "NAME")]
+    profile: String,
+
+    /// Intensity of a white surface that faces the sensor [default: 1]
+    #[arg(long, value_name = "I", value_parser = crate::flags::positive)]
+    white: Option<f64>,
+
+    /// Reflectivity of all points, from 0 (black) to 1 (white), in place of their intensities
+    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with = "white")]
+    reflectivity: Option<f64>,
+
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+/// Reads the scan, and writes it as it is in the weather.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let usage = |error: &dyn std::fmt::Display| Usage(error.to_string());
+    let format = ScanFormat::of(&args.out)?;
+    if format == ScanFormat::Pcap {
+        let cause = "--out: expected .npz, .ply or .csv, as packets hold a sensor's ranges";
+        return Err(Usage(cause.to_owned()).into());
+    }
+    let weather = args.weather();
+    weather.validate().map_err(|error| usage(&error))?;
+    if weather.is_clear() {
+        return Err(Usage("expected one of --rain, --snow, --fog and --haze".to_owned()).into());
+    }
+    within("--reflectivity", args.reflectivity, 0.0..=1.0).map_err(|error| usage(&error))?;
+    let sensor = Sensor::resolve(&args.profile)?;
+    let asked = Effects { weather: Some(Box::new(weather.clone())), ..Effects::default() };
+    let effects = asked.for_sensor(&sensor).map_err(|error| usage(&error))?;
+    let limit = effects.detection.and_then(|detection| detection.limit);
+    let limit = limit.expect("invariant: weather takes returns below a limit");
+
+    let scan = args.input.read_whole()?;
+    let brightness = args.brightness(&scan)?;
+    let air = Air::new(&weather, sensor.beam_divergence_deg(), &limit, &sensor.range);
+    let stream = StreamKey::new(args.seed, "weather", 0);
+    let sensor_m = DVec3::from_array(args.input.sensor_m());
+    let (mut told, fates) = in_weather(&scan, &brightness, sensor_m, &air, &limit, stream);
+    // Back to the numbers of the file.
+    let white = args.white.unwrap_or(1.0) as f32;
+    told.intensity.iter_mut().flatten().for_each(|intensity| *intensity *= white);
+    write_scan(&args.out, format, Hashing::None, &told)?;
+    report(&fates, &told);
+    eprintln!("{} points: {}", told.len(), args.out.display());
+    Ok(Outcome::Success)
+}
+
+impl Args {
+    fn weather(&self) -> Weather {
+        Weather {
+            rain_mm_h: self.rain,
+            snow_mm_h: self.snow,
+            fog_visibility_m: self.fog,
+            fog_model: self.fog_model,
+            haze_visibility_m: self.haze,
+            ..Weather::default()
+        }
+    }
+
+    /// What part of the light each point returns in clear air.
+    fn brightness(&self, scan: &Scan) -> anyhow::Result<Vec<f32>> {
+        if let Some(reflectivity) = self.reflectivity {
+            return Ok(vec![reflectivity as f32; scan.len()]);
+        }
+        let white = self.white.unwrap_or(1.0) as f32;
+        let intensities = match (&scan.intensity, &scan.reflectivity) {
+            (Some(intensities), _) => intensities.clone(),
+            (None, Some(bytes)) => bytes.iter().map(|&byte| f32::from(byte) / 100.0).collect(),
+            (None, None) => {
+                let sweep = self.input.sweep.display();
+                let cause = format!("{sweep}: its points have no intensity: give --reflectivity");
+                return Err(Usage(cause).into());
+            }
+        };
+        if let Some((i, found)) = (0..).zip(&intensities).find(|(_, i)| !(0.0..).contains(*i)) {
+            let sweep = self.input.sweep.display();
+            anyhow::bail!("{sweep}: point {i}: expected an intensity of 0 or more, found {found}");
+        }
+        if self.white.is_none()
+            && let Some(most) = intensities.iter().copied().reduce(f32::max)
+            && most > 2.55
+        {
+            let sweep = self.input.sweep.display();
+            let cause =
+                format!("{sweep}: expected intensities around 0 to 1, found {most}: give --white");
+            return Err(Usage(cause).into());
+        }
+        Ok(intensities.iter().map(|intensity| intensity / white).collect())
+    }
+}
+
+/// Says what became of the points.
+fn report(fates: &Fates, told: &Scan) {
+    let all = fates.kept + fates.scattered + fates.lost + fates.passed_over;
+    let line = |what: &str, count: usize| {
+        eprintln!("{what:<12}{count:>10}  {:5.1} %", 100.0 * count as f64 / all.max(1) as f64);
+    };
+    line("kept", fates.kept);
+    for medium in Medium::ALL.into_iter().filter(|medium| *medium != Medium::Surface) {
+        let is_of = |of: &&u8| **of == medium as u8;
+        let count = told.medium.iter().flatten().filter(is_of).count();
+        if count > 0 {
+            line(medium.name(), count);
+        }
+    }
+    line("lost", fates.lost);
+    if fates.too_weak_before > 0 {
+        line("  before", fates.too_weak_before);
+        eprintln!("  (too weak for the profile's detection limit in clear air, too)");
+    }
+    if fates.passed_over > 0 {
+        line("no point", fates.passed_over);
+    }
+}

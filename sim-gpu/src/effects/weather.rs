@@ -1,0 +1,109 @@
+//! What is in the air between a sensor and what it looks at.
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::{InvalidValue, within};
+
+/// Rain, snow, fog, haze, dust and spray. What none of them is named for is clear air.
+///
+/// [`crate::weather`] says what they do and by which laws.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Weather {
+    /// Rain, millimetres an hour.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rain_mm_h: Option<f64>,
+    /// Snow, millimetres of water an hour.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snow_mm_h: Option<f64>,
+    /// Fog in which a black object can be told from the sky up to so many metres: its
+    /// meteorological optical range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fog_visibility_m: Option<f64>,
+    /// How strong fog is compared with surfaces.
+    #[serde(default, skip_serializing_if = "FogModel::is_default")]
+    pub fog_model: FogModel,
+    /// Haze in which one can see so many metres by Koschmieder's law. It weakens returns and
+    /// gives none of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub haze_visibility_m: Option<f64>,
+    /// Dust and spray.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub volumes: Vec<Volume>,
+    /// Whether beams that meet no surface return from the air; `None` is yes. `gen-dataset`
+    /// takes `None` for no: clouds of single objects are cut out of what a sensor sees, and are
+    /// without such returns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub empty_beams: Option<bool>,
+}
+
+formats::named! {
+    /// How strong fog is compared with surfaces.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum FogModel: "fog model" {
+        /// By the power that it scatters back, whatever is behind it.
+        #[default]
+        Physical = "physical",
+        /// As the simulation of Hahner et al. (ICCV 2021) has it: in proportion to the surface
+        /// behind it, by a factor that its authors chose by eye.
+        Hahner = "hahner",
+    }
+}
+
+impl FogModel {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// A box of dust or spray, along the world's axes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Volume {
+    /// Its least coordinates, metres.
+    pub min_m: [f64; 3],
+    /// Its largest coordinates, metres.
+    pub max_m: [f64; 3],
+    /// The meteorological optical range inside, metres.
+    pub visibility_m: f64,
+}
+
+/// More than the heaviest rain of a minute that was ever measured, 1872 mm/h, by far.
+const MOST_MM_H: f64 = 1e6;
+
+/// From a wall in front of the sensor to beyond every horizon.
+const VISIBILITIES_M: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
+
+impl Weather {
+    /// Whether there is nothing in the air.
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
+        let is_dry = |rate: Option<f64>| rate.is_none_or(|rate| rate == 0.0);
+        is_dry(self.rain_mm_h)
+            && is_dry(self.snow_mm_h)
+            && self.fog_visibility_m.is_none()
+            && self.haze_visibility_m.is_none()
+            && self.volumes.is_empty()
+    }
+
+    /// Checks all numbers.
+    ///
+    /// # Errors
+    /// On the first that is not finite or out of its bounds.
+    pub fn validate(&self) -> Result<(), InvalidValue> {
+        within("effects.weather.rain_mm_h", self.rain_mm_h, 0.0..=MOST_MM_H)?;
+        within("effects.weather.snow_mm_h", self.snow_mm_h, 0.0..=MOST_MM_H)?;
+        within("effects.weather.fog_visibility_m", self.fog_visibility_m, VISIBILITIES_M)?;
+        within("effects.weather.haze_visibility_m", self.haze_visibility_m, VISIBILITIES_M)?;
+        for (i, volume) in self.volumes.iter().enumerate() {
+            let key = |of: &str| format!("effects.weather.volumes[{i}].{of}");
+            within(&key("visibility_m"), volume.visibility_m, VISIBILITIES_M)?;
+            for (axis, (min_m, max_m)) in volume.min_m.into_iter().zip(volume.max_m).enumerate() {
+                within(&key(&format!("min_m[{axis}]")), min_m, -1e9..=1e9)?;
+                within(&key(&format!("max_m[{axis}]")), max_m, min_m..=1e9)?;
+            }
+        }
+        Ok(())
+    }
+}

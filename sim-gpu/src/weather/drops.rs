@@ -1,0 +1,199 @@
+//! Rain and snow: the drops in a beam that a sensor detects.
+
+use crate::sensor::RangeLimits;
+
+/// A beam that drops fall through.
+pub(super) struct Beam {
+    /// Of its angles of divergence the tangents' geometric mean.
+    pub width: f64,
+    /// Of the air, per metre.
+    pub extinction: f64,
+    /// The least power that is detected.
+    pub least_power: f64,
+    /// Where anything is.
+    pub range: RangeLimits,
+}
+
+/// The drops of one kind in a beam that are detected.
+#[derive(Clone, Debug)]
+pub(super) struct Drops {
+    /// How diameters fall off: 1/mm.
+    slope: f64,
+    /// What a large drop reflects.
+    reflectance: f64,
+    width: f64,
+    extinction: f64,
+    least_power: f64,
+    /// From range to range, metres, at an even pace.
+    from_m: f64,
+    step_m: f64,
+    /// How many are detected up to each of these ranges in the mean.
+    counts: Vec<f64>,
+    /// The probability that a beam that meets no surface has none.
+    none: f64,
+}
+
+/// The smallest drop, millimetres: LISA.
+const SMALLEST_MM: f64 = 0.05;
+
+/// Indices of refraction at 905 nm: LISA.
+const WATER: f64 = 1.328;
+const ICE: f64 = 1.3031;
+
+/// A beam has no more drops of a kind than this.
+const MOST: u32 = 32;
+
+/// Steps of the integral along a beam. It is smooth; Simpson's rule errs by 1e-6 of it.
+const STEPS: usize = 256;
+
+/// The extinction of rain at this rate, per metre.
+pub(super) fn rain_extinction(mm_h: f64) -> f64 {
+    3.67e-4 * mm_h.powf(0.63)
+}
+
+/// The extinction of snow at this rate, per metre.
+pub(super) fn snow_extinction(mm_h: f64) -> f64 {
+    1.447e-3 * mm_h.powf(0.565)
+}
+
+impl Drops {
+    /// Marshall and Palmer's rain.
+    pub fn rain(mm_h: f64, beam: &Beam) -> Self {
+        Self::new(8000.0, 4.1 * mm_h.powf(-0.21), WATER, beam)
+    }
+
+    /// Sekhon and Srivastava's snow.
+    pub fn snow(mm_h: f64, beam: &Beam) -> Self {
+        Self::new(7600.0 * mm_h.powf(-0.87), 2.55 * mm_h.powf(-0.48), ICE, beam)
+    }
+
+    /// Drops of `per_m3_mm * exp(-slope D)` for each cubic metre and millimetre of diameter.
+    fn new(per_m3_mm: f64, slope: f64, refraction: f64, beam: &Beam) -> Self {
+        let from_m = beam.range.min_m.min(beam.range.max_m);
+        let Beam { width, extinction, least_power, .. } = *beam;
+        let mut drops = Self {
+            slope,
+            reflectance: ((refraction - 1.0) / (refraction + 1.0)).powi(2),
+            width,
+            extinction,
+            least_power,
+            from_m,
+            step_m: 0.0,
+            counts: vec![0.0],
+            none: 1.0,
+        };
+        let to_m = drops.last_m(beam.range.max_m);
+        let per_m3 = per_m3_mm / slope * (-slope * SMALLEST_MM).exp();
+        let density = |range_m: f64| {
+            // A circle as wide as the beam.
+            let area = std::f64::consts::PI / 4.0 * (width * range_m).powi(2);
+            per_m3 * area * drops.part_detected(range_m)
+        };
+        let step_m = (to_m - from_m) / STEPS as f64;
+        let mut count = 0.0;
+        let mut counts = vec![count];
+        for i in 0..STEPS {
+            let at = |part: f64| density(from_m + (i as f64 + part) * step_m);
+            count += step_m / 6.0 * (at(0.0) + 4.0 * at(0.5) + at(1.0));
+            counts.push(count);
+        }
+        (drops.step_m, drops.counts, drops.none) = (step_m, counts, (-count).exp());
+        drops
+    }
+
+    /// The smallest drop that is detected at this range, millimetres; infinite if none is.
+    fn least_mm(&self, range_m: f64) -> f64 {
+        let through = (-2.0 * self.extinction * range_m).exp();
+        let whole = self.reflectance * through / range_m.powi(2);
+        if whole < self.least_power {
+            return f64::INFINITY;
+        }
+        let part = (self.least_power / whole).sqrt();
+        (1000.0 * self.width * range_m * part).max(SMALLEST_MM)
+    }
+
+    /// The part of the drops at this range that are detected.
+    fn part_detected(&self, range_m: f64) -> f64 {
+        (-self.slope * (self.least_mm(range_m) - SMALLEST_MM)).exp()
+    }
+
+    /// Beyond this range up to `end_m`, metres, no drop is detected, or less than one of 10^17.
+    fn last_m(&self, end_m: f64) -> f64 {
+        let is_seen = |range_m: f64| self.part_detected(range_m) > 1e-17;
+        if is_seen(end_m) {
+            return end_m;
+        }
+        let (mut seen_m, mut unseen_m) = (self.from_m, end_m);
+        for _ in 0..64 {
+            let middle_m = 0.5 * (seen_m + unseen_m);
+            let half = if is_seen(middle_m) { &mut seen_m } else { &mut unseen_m };
+            *half = middle_m;
+        }
+        unseen_m
+    }
+
+    /// How many drops are detected up to this range in the mean.
+    pub fn mean(&self, range_m: f64) -> f64 {
+        let place = (range_m - self.from_m) / self.step_m;
+        let last = self.counts.len() - 1;
+        match place {
+            place if place > 0.0 && place < last as f64 => {
+                let below = place as usize;
+                let [low, high] = [below, below + 1].map(|i| self.counts[i]);
+                low + (high - low) * (place - below as f64)
+            }
+            place if place >= last as f64 => self.counts[last],
+            _ => 0.0,
+        }
+    }
+
+    /// Gives the range and the power of each drop up to `end_m` to `take`. `bits` are the
+    /// random bits of each draw.
+    pub fn draw(&self, end_m: f64, bits: impl Fn(u32) -> [u32; 4], mut take: impl FnMut(f64, f64)) {
+        let first = bits(0);
+        let uniform = super::unit(first[0]);
+        // A surface only takes drops away. Most beams have none.
+        if uniform < self.none {
+            return;
+        }
+        let mean = self.mean(end_m);
+        if mean.is_nan() || mean <= 0.0 {
+            return;
+        }
+        let count = poisson(mean, uniform);
+        for number in 0..count {
+            let [_, place, size, _] = if number == 0 { first } else { bits(number) };
+            let range_m = self.place(super::unit(place) * mean).min(end_m);
+            let excess_mm = -(-super::unit(size)).ln_1p() / self.slope;
+            let diameter_m = (self.least_mm(range_m) + excess_mm) / 1000.0;
+            let part = (diameter_m / (self.width * range_m)).powi(2).min(1.0);
+            let through = (-2.0 * self.extinction * range_m).exp();
+            let power = self.reflectance * through * part / range_m.powi(2);
+            if power >= self.least_power {
+                take(range_m, power);
+            }
+        }
+    }
+
+    /// Up to where there are so many drops in the mean.
+    fn place(&self, count: f64) -> f64 {
+        let above =
+            self.counts.partition_point(|&sum| sum <= count).clamp(1, self.counts.len() - 1);
+        let [low, high] = [above - 1, above].map(|i| self.counts[i]);
+        let part = if high > low { ((count - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
+        self.from_m + (above as f64 - 1.0 + part) * self.step_m
+    }
+}
+
+/// The number with this `mean` that a uniform number in [0, 1) stands for, by inversion; at most
+/// [`MOST`].
+fn poisson(mean: f64, uniform: f64) -> u32 {
+    let mut term = (-mean).exp();
+    let (mut sum, mut count) = (term, 0);
+    while uniform >= sum && count < MOST {
+        count += 1;
+        term *= mean / f64::from(count);
+        sum += term;
+    }
+    count
+}

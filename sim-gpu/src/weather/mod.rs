@@ -1,0 +1,267 @@
+//! What the air does to a beam: it takes power from what comes back, and scatters some itself.
+//!
+//! All powers are relative to that of a white surface that faces the sensor 1 m away in clear
+//! air. A surface of brightness b (its reflectivity times the cosine of the incidence) at range
+//! R returns
+//!
+//! ```text
+//! P = b exp(-2 a R) / R^2
+//! ```
+//!
+//! with a, the extinction per metre, the sum of all that is in the air. What is scattered by
+//! rain, snow, fog and dust is in the same units, so that one threshold decides what is
+//! detected and which return is the strongest.
+//!
+//! # Rain and snow
+//!
+//! Drops have exponentially distributed diameters D, `N(D) = N0 exp(-L D)`: Marshall and Palmer
+//! 1948 for rain, Sekhon and Srivastava 1970 for snow, with the constants of LISA (Kilic et al.,
+//! arXiv 2107.07004). A drop of diameter D at range r, in a beam of width w(r), returns
+//!
+//! ```text
+//! P = F exp(-2 a r) min(D^2 / w^2, 1) / r^2,    F = ((n - 1) / (n + 1))^2
+//! ```
+//!
+//! with n the index of refraction. The extinction of rain and snow is a power law fitted to
+//! what LISA integrates by Mie's theory, within 0.3 % (0.5 to 100 mm/h) and 0.5 % (0.5 to
+//! 10 mm/h).
+//!
+//! LISA draws all drops in a beam, some ten thousand, and looks for the strongest. Of these only
+//! a few near the sensor are strong enough to be detected. Their number has a Poisson
+//! distribution, whose mean is an integral along the beam, so that they alone are drawn here.
+//! LISA's surfaces have no cosine of the incidence; it belongs to their reflectivity.
+//!
+//! # Fog
+//!
+//! A pulse `sin^2(pi t / 2 T)` of 0 to 2 T comes back from all of the fog that it has passed:
+//!
+//! ```text
+//! I(R) = integral of sin^2(pi t / 2 T) exp(-2 a r) x(r) / r^2 dt,    r = R - c t / 2
+//! ```
+//!
+//! with x(r) the part of the beam that the receiver sees, 0 up to 0.9 m and 1 from 1 m (Rasshofer
+//! et al., Adv. Radio Sci. 9, 2011; Hahner et al., ICCV 2021). Its maximum is the return of the
+//! fog, some 4.6 m away; its power is `pi (c / 2) beta I`, with `beta = 0.046 / visibility` the
+//! backscatter per metre and steradian.
+//!
+//! [`FogModel::Hahner`] is for comparison with that simulation. There fog returns
+//! `b (beta / beta0) I` with `beta0 = 1e-6 / pi`: it is in proportion to the surface behind it,
+//! so that every beam longer than a certain range becomes fog, whatever it hits. The formula for
+//! surfaces lacks a factor 2/c there, and 1e-6 was chosen by eye. Both are kept.
+//!
+//! # Haze
+//!
+//! Kruse's law: `a = 3.912 / V (wavelength / 550 nm)^-q` per kilometre, V the visibility in
+//! kilometres, q 1.6 above 50 km, 1.3 from 6 km, below that 0.585 times the cubic root of V. The
+//! wavelength is 905 nm.
+//!
+//! # Dust and spray
+//!
+//! A box with the extinction of fog. With a probability of d / 0.7, d its optical depth along
+//! the beam, it returns from inside, as MAVS has it (Goodin et al.), at a depth that the
+//! extinction distributes, and with the power of fog of one pulse's length there.
+
+mod drops;
+mod fog;
+mod recorded;
+
+pub use recorded::{Fates, in_weather};
+
+use crate::cpu::random::random_bits;
+use crate::effects::{DetectionLimit, FogModel, Volume, Weather};
+use crate::sensor::RangeLimits;
+use drops::Drops;
+use fog::{Fog, extinction_of};
+use formats::rng::StreamKey;
+use glam::DVec3;
+
+formats::named! {
+    /// What a point is of.
+    #[derive(Default)]
+    pub enum Medium: "medium" {
+        /// A surface.
+        #[default]
+        Surface = "surface",
+        /// A drop of rain.
+        Rain = "rain",
+        /// A flake of snow.
+        Snow = "snow",
+        /// Fog.
+        Fog = "fog",
+        /// Dust or spray.
+        Dust = "dust",
+    }
+}
+
+/// The air of one scan.
+#[derive(Clone, Debug)]
+pub struct Air {
+    /// Of all but the volumes, per metre.
+    extinction: f64,
+    rain: Option<Drops>,
+    snow: Option<Drops>,
+    fog: Option<Fog>,
+    volumes: Vec<Volume>,
+    /// Whether beams that meet no surface return from it.
+    pub empty_beams: bool,
+}
+
+/// A beam in the air.
+#[derive(Clone, Copy, Debug)]
+pub struct AirBeam {
+    /// Where it starts, in the world, metres.
+    pub origin: DVec3,
+    /// Its direction in the world, of unit length.
+    pub direction: DVec3,
+    /// Where it ends, metres: at the farthest surface that it meets, or at the sensor's limit.
+    pub end_m: f64,
+    /// The brightness of the surface at its end; 0 if there is none.
+    pub brightness: f64,
+    /// Keys its random numbers.
+    pub stream: StreamKey,
+    /// And its number.
+    pub number: u32,
+}
+
+/// What comes back from the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scattered {
+    /// From where, metres.
+    pub range_m: f64,
+    /// How strong it is.
+    pub power: f64,
+    /// What a sensor takes for its brightness: its power at 1 m.
+    pub brightness: f64,
+    /// What it is of.
+    pub medium: Medium,
+}
+
+/// Which random bits of a beam place drops, flakes and dust.
+const RAIN_PURPOSE: u32 = 32;
+const SNOW_PURPOSE: u32 = 64;
+const DUST_PURPOSE: u32 = 96;
+
+/// The wavelength of the sensors that the constants are for: 905 nm, in units of 550 nm.
+const WAVELENGTH: f64 = 905.0 / 550.0;
+
+impl Air {
+    /// The air of this `weather` for beams of these angles of divergence, degrees, of a sensor
+    /// that detects no less than `limit` and nothing outside `range`.
+    #[must_use]
+    pub fn new(
+        weather: &Weather,
+        divergence_deg: [f64; 2],
+        limit: &DetectionLimit,
+        range: &RangeLimits,
+    ) -> Self {
+        let of_rate = |rate: Option<f64>| rate.filter(|&rate| rate > 0.0);
+        let (rain_mm_h, snow_mm_h) = (of_rate(weather.rain_mm_h), of_rate(weather.snow_mm_h));
+        let extinction = rain_mm_h.map_or(0.0, drops::rain_extinction)
+            + snow_mm_h.map_or(0.0, drops::snow_extinction)
+            + weather.fog_visibility_m.map_or(0.0, extinction_of)
+            + weather.haze_visibility_m.map_or(0.0, haze_extinction);
+        let width = divergence_deg.map(|deg| deg.to_radians().tan()).iter().product::<f64>().sqrt();
+        let beam = drops::Beam { width, extinction, least_power: limit.power(), range: *range };
+        let model = weather.fog_model;
+        Self {
+            extinction,
+            rain: rain_mm_h.map(|rate| Drops::rain(rate, &beam)),
+            snow: snow_mm_h.map(|rate| Drops::snow(rate, &beam)),
+            fog: weather
+                .fog_visibility_m
+                .map(|visibility_m| Fog::new(visibility_m, extinction, model == FogModel::Hahner)),
+            volumes: weather.volumes.clone(),
+            empty_beams: weather.empty_beams.unwrap_or(true),
+        }
+    }
+
+    /// The part of the light that comes through to this range and back.
+    #[must_use]
+    pub fn transmission(&self, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
+        let in_volumes: f64 =
+            self.volumes.iter().map(|volume| depth(volume, origin, direction, range_m)).sum();
+        (-2.0 * (self.extinction * range_m + in_volumes)).exp()
+    }
+
+    /// Gives what comes back from the air along `beam` to `take`, in no order.
+    pub fn scatter(&self, beam: &AirBeam, mut take: impl FnMut(Scattered)) {
+        let AirBeam { end_m, stream, number, .. } = *beam;
+        let mut drops_of = |drops: &Option<Drops>, purpose, medium| {
+            if let Some(drops) = drops {
+                let bits = |draw| random_bits(stream, number, purpose + draw);
+                drops.draw(end_m, bits, |range_m, power| {
+                    take(Scattered { range_m, power, brightness: power * range_m.powi(2), medium });
+                });
+            }
+        };
+        drops_of(&self.rain, RAIN_PURPOSE, Medium::Rain);
+        drops_of(&self.snow, SNOW_PURPOSE, Medium::Snow);
+        if let Some(scattered) = self.fog.and_then(|fog| fog.scattered(beam)) {
+            take(scattered);
+        }
+        for (volume, i) in self.volumes.iter().zip(0..) {
+            if let Some(scattered) = self.scattered_in(volume, beam, DUST_PURPOSE + i) {
+                take(scattered);
+            }
+        }
+    }
+
+    /// What comes back from inside `volume`.
+    fn scattered_in(&self, volume: &Volume, beam: &AirBeam, purpose: u32) -> Option<Scattered> {
+        let AirBeam { origin, direction, end_m, stream, number, .. } = *beam;
+        let (enters_m, leaves_m) = inside(volume, origin, direction, end_m)?;
+        let extinction = extinction_of(volume.visibility_m);
+        let optical_depth = extinction * (leaves_m - enters_m);
+        let [event, place, ..] = random_bits(stream, number, purpose);
+        // MAVS: a beam loses itself in dust of an optical depth of 0.7.
+        if optical_depth == 0.0 || unit(event) * 0.7 >= optical_depth {
+            return None;
+        }
+        let within = -(unit(place) * (-optical_depth).exp_m1()).ln_1p() / extinction;
+        let range_m = enters_m + within.min(leaves_m - enters_m);
+        let transmission = self.transmission(origin, direction, range_m);
+        let brightness = fog::of_one_pulse(volume.visibility_m) * transmission;
+        let power = brightness / range_m.powi(2);
+        let is_something = power > 0.0 && power.is_finite();
+        is_something.then_some(Scattered { range_m, power, brightness, medium: Medium::Dust })
+    }
+}
+
+/// A number in [0, 1) of 32 bits.
+fn unit(bits: u32) -> f64 {
+    f64::from(bits) * (1.0 / 4_294_967_296.0)
+}
+
+/// The optical depth of a beam in `volume` up to this range.
+fn depth(volume: &Volume, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
+    inside(volume, origin, direction, range_m).map_or(0.0, |(enters_m, leaves_m)| {
+        (leaves_m - enters_m) * extinction_of(volume.visibility_m)
+    })
+}
+
+/// Where a beam is inside `volume`, metres from its start, up to `end_m`.
+fn inside(volume: &Volume, origin: DVec3, direction: DVec3, end_m: f64) -> Option<(f64, f64)> {
+    let (mut enters_m, mut leaves_m) = (0.0f64, end_m);
+    for axis in 0..3 {
+        let inverse = direction[axis].recip();
+        let [a, b] = [volume.min_m[axis], volume.max_m[axis]].map(|m| (m - origin[axis]) * inverse);
+        // NaN where the beam runs within a face: that face does not bound it.
+        enters_m = enters_m.max(a.min(b));
+        leaves_m = leaves_m.min(a.max(b));
+    }
+    (enters_m < leaves_m).then_some((enters_m, leaves_m))
+}
+
+/// The extinction of haze, per metre.
+fn haze_extinction(visibility_m: f64) -> f64 {
+    let visibility_km = visibility_m / 1000.0;
+    let exponent = match visibility_km {
+        above if above > 50.0 => 1.6,
+        above if above > 6.0 => 1.3,
+        below => 0.585 * below.cbrt(),
+    };
+    3.912 / visibility_m * WAVELENGTH.powf(-exponent)
+}
+
+#[cfg(test)]
+mod tests;

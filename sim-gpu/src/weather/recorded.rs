@@ -1,0 +1,114 @@
+//! Weather for points that a sensor measured in clear air.
+
+use super::{Air, AirBeam, Medium, Scattered};
+use crate::effects::DetectionLimit;
+use formats::Scan;
+use formats::rng::StreamKey;
+use glam::DVec3;
+
+/// What became of the points of a scan in the weather.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Fates {
+    /// Points that are where they were, weaker.
+    pub kept: usize,
+    /// Points whose beams returned from the air instead.
+    pub scattered: usize,
+    /// Points that are gone, too weak to be detected.
+    pub lost: usize,
+    /// Those of them that are too weak for the detection limit in clear air, too: whoever
+    /// recorded them has a lower one.
+    pub too_weak_before: usize,
+    /// Points that say nothing: they are not finite or lie in the sensor. They are kept.
+    pub passed_over: usize,
+}
+
+/// `scan`, whose points were measured in clear air from `sensor_m`, as it had been in this `air`
+/// with a sensor that tells the strongest return and detects no less than `limit`.
+///
+/// `brightness` is that of each point: its reflectivity times the cosine of the incidence. It
+/// becomes the scan's intensity. The beam of point i has the random numbers i of `stream`.
+#[must_use]
+pub fn in_weather(
+    scan: &Scan,
+    brightness: &[f32],
+    sensor_m: DVec3,
+    air: &Air,
+    limit: &DetectionLimit,
+    stream: StreamKey,
+) -> (Scan, Fates) {
+    let mut fates = Fates::default();
+    let (mut kept, mut found) = (Vec::new(), Vec::new());
+    for (number, (&point, &brightness)) in (0u32..).zip(scan.positions.iter().zip(brightness)) {
+        let from_sensor =
+            DVec3::from_array(scan.origin) + DVec3::from(point.map(f64::from)) - sensor_m;
+        let end_m = from_sensor.length();
+        if !(end_m.is_finite() && end_m > 0.0) {
+            fates.passed_over += 1;
+            kept.push(number as usize);
+            found.push(Scattered {
+                range_m: f64::NAN,
+                power: 0.0,
+                brightness: brightness.into(),
+                medium: Medium::Surface,
+            });
+            continue;
+        }
+        let (origin, direction) = (sensor_m, from_sensor / end_m);
+        let brightness = f64::from(brightness);
+        let along = AirBeam { origin, direction, end_m, brightness, stream, number };
+        match strongest(air, &along, limit.power()) {
+            None => {
+                fates.lost += 1;
+                let before = brightness / end_m.powi(2);
+                fates.too_weak_before += usize::from(before < limit.power());
+            }
+            Some(one) => {
+                let is_surface = one.medium == Medium::Surface;
+                *(if is_surface { &mut fates.kept } else { &mut fates.scattered }) += 1;
+                kept.push(number as usize);
+                found.push(one);
+            }
+        }
+    }
+    (told(scan, sensor_m, &kept, &found), fates)
+}
+
+/// The strongest return of a beam that ends at a surface; `None` if none is as strong as `least`.
+fn strongest(air: &Air, beam: &AirBeam, least: f64) -> Option<Scattered> {
+    let range_m = beam.end_m;
+    let brightness = beam.brightness * air.transmission(beam.origin, beam.direction, range_m);
+    let power = brightness / range_m.powi(2);
+    let mut best = Scattered { range_m, power, brightness, medium: Medium::Surface };
+    air.scatter(beam, |one| {
+        if one.power > best.power {
+            best = one;
+        }
+    });
+    (best.power >= least).then_some(best)
+}
+
+/// The points of `scan` of these numbers, as they were `found`.
+fn told(scan: &Scan, sensor_m: DVec3, kept: &[usize], found: &[Scattered]) -> Scan {
+    let mut told = scan.select(kept);
+    let is_of_air = |one: &Scattered| one.medium != Medium::Surface;
+    let from_origin = sensor_m - DVec3::from_array(scan.origin);
+    for (i, one) in found.iter().enumerate().filter(|(_, one)| is_of_air(one)) {
+        let from_sensor = DVec3::from(told.positions[i].map(f64::from)) - from_origin;
+        let moved = from_sensor.normalize() * one.range_m + from_origin;
+        told.positions[i] = moved.as_vec3().to_array();
+        if let Some(ranges_m) = &mut told.range_m {
+            ranges_m[i] = one.range_m as f32;
+        }
+        for numbers in [&mut told.triangle, &mut told.object].into_iter().flatten() {
+            numbers[i] = u32::MAX;
+        }
+        if let Some(normals) = &mut told.normal {
+            normals[i] = [0.0; 3];
+        }
+    }
+    told.intensity = Some(found.iter().map(|one| one.brightness as f32).collect());
+    told.medium = Some(found.iter().map(|one| one.medium as u8).collect());
+    // These would be of clear air.
+    (told.power, told.reflectivity) = (None, None);
+    told
+}
