@@ -62,7 +62,7 @@ impl Drops {
         Self::new(8000.0, 4.1 * mm_h.powf(-0.21), WATER, beam)
     }
 
-    /// Sekhon and Srivastava's snow.
+    /// Gunn and Marshall's snow, twice as dense: LISA.
     pub fn snow(mm_h: f64, beam: &Beam) -> Self {
         Self::new(7600.0 * mm_h.powf(-0.87), 2.55 * mm_h.powf(-0.48), ICE, beam)
     }

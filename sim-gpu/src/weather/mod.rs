@@ -14,9 +14,9 @@
 //!
 //! # Rain and snow
 //!
-//! Drops have exponentially distributed diameters D, `N(D) = N0 exp(-L D)`: Marshall and Palmer
-//! 1948 for rain, Sekhon and Srivastava 1970 for snow, with the constants of LISA (Kilic et al.,
-//! arXiv 2107.07004). A drop of diameter D at range r, in a beam of width w(r), returns
+//! Drops have exponentially distributed diameters D, `N(D) = N0 exp(-L D)`: for rain Marshall and
+//! Palmer's of 1948, for snow Gunn and Marshall's of 1958, with the constants of LISA (Kilic et
+//! al., arXiv 2107.07004), whose N0 of snow is twice theirs. A drop of diameter D at range r, in a beam of width w(r), returns
 //!
 //! ```text
 //! P = F exp(-2 a r) min(D^2 / w^2, 1) / r^2,    F = ((n - 1) / (n + 1))^2

@@ -1,0 +1,139 @@
+"""LISA's rain and snow and Hahner et al.'s fog, against `edgepuck weather` on the same clouds.
+
+Both are programs that others may run but that we may not ship (GPL-3; CC BY-NC 4.0). Clone
+https://github.com/velatkilic/LISA and https://github.com/MartinHahner/LiDAR_fog_sim, and name
+their folders in EDGEPUCK_LISA and EDGEPUCK_FOG_SIM. LISA's packages are old: the script makes an
+environment for them beside its output. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
+"""
+
+import json
+import math
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+# A file of this folder has the name of a package: that one must not be imported.
+sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+
+try:
+    import numpy
+except ImportError as error:
+    print(f"SKIPPED: {error}")
+    sys.exit(77)
+
+EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
+OUT = Path(os.environ["EDGEPUCK_OUT"])
+LISA, FOG_SIM = (os.environ.get(name) for name in ("EDGEPUCK_LISA", "EDGEPUCK_FOG_SIM"))
+if not (LISA or FOG_SIM):
+    print("SKIPPED: neither EDGEPUCK_LISA nor EDGEPUCK_FOG_SIM names a clone (see the script)")
+    sys.exit(77)
+
+LISA_PACKAGES = ["numpy==1.26.4", "scipy==1.13.1", "PyMieScatt==1.8.1.1"]
+# 3 mrad; 90 % at 200 m; from 1.5 m: LISA's defaults.
+LISA_SENSOR = """
+name = "lisa"
+range = { min_m = 1.5, max_m = 200.0 }
+detection = { reflectivity = 0.9, range_m = 200.0 }
+footprint = { divergence_deg = [0.17188733853924697, 0.17188733853924697], separation_m = 1.0 }
+[uniform]
+azimuth_from_deg = 0.0
+azimuth_to_deg = 1.0
+azimuth_steps = 2
+elevation_from_deg = 0.0
+elevation_to_deg = 1.0
+elevation_steps = 2
+rpm = 600.0
+"""
+# Hahner et al. lose no point.
+ALL_SEEING = LISA_SENSOR.replace("reflectivity = 0.9, range_m = 200.0", "reflectivity = 1e-9, range_m = 1e9")
+
+# Runs in LISA's own environment.
+ASK_LISA = """
+import json, sys
+import numpy as np
+import atmos_models
+np.random.seed(1)
+kind, rate, n = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+model = atmos_models.LISA(atm_model=kind)
+for range_m, reflectivity in json.loads(sys.argv[4]):
+    cloud = np.tile([range_m, 0.0, 0.0, reflectivity], (n, 1))
+    labels = model.augment(cloud, rate)[:, 4]
+    print("counts", *[int((labels == label).sum()) for label in (0, 1, 2)])
+"""
+
+CASES = [(10.0, 0.1), (30.0, 0.1), (30.0, 0.5), (60.0, 0.1), (100.0, 0.5)]
+WEATHERS = [("rain", 10.0), ("rain", 50.0), ("rain", 100.0), ("snow", 1.0), ("snow", 10.0)]
+N_LISAS, N_OURS = 1500, 40_000
+
+
+def edgepuck_weather(cloud, flags, sensor):
+    """Positions, intensities and media of `cloud` [n, 4] in the weather of `flags`."""
+    (OUT / "sensor.toml").write_text(sensor)
+    numpy.savez(OUT / "clear.npz", positions=cloud[:, :3].astype(numpy.float32),
+                intensity=cloud[:, 3:].astype(numpy.float32))
+    words = ["weather", OUT / "clear.npz", "--out", OUT / "weather.npz", "--profile", OUT / "sensor.toml", *flags]
+    subprocess.run([EDGEPUCK, *map(str, words)], check=True, stderr=subprocess.DEVNULL)
+    told = numpy.load(OUT / "weather.npz")
+    return told["positions"].astype(float), told["intensity"][:, 0].astype(float), told["medium"][:, 0]
+
+
+def lisa():
+    """Of points at one range, as many are lost, scattered and kept as LISA says."""
+    python = OUT.parent / "lisa-venv/bin/python3"
+    if not python.exists():
+        venv.create(python.parents[1], with_pip=True)
+        subprocess.run([python, "-m", "pip", "install", "-q", *LISA_PACKAGES], check=True)
+    for kind, rate in WEATHERS:
+        asked = [python, "-c", ASK_LISA, kind, str(rate), str(N_LISAS), json.dumps(CASES)]
+        answer = subprocess.run(asked, cwd=Path(LISA) / "python_old", check=True, text=True,
+                                stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": "."}).stdout
+        counts = [line.split()[1:] for line in answer.splitlines() if line.startswith("counts")]
+        for (range_m, reflectivity), theirs in zip(CASES, counts, strict=True):
+            cloud = numpy.tile([range_m, 0.0, 0.0, reflectivity], (N_OURS, 1))
+            _, _, media = edgepuck_weather(cloud, [f"--{kind}", rate], LISA_SENSOR)
+            ours = [N_OURS - len(media), (media > 0).sum(), (media == 0).sum()]
+            for label, a, b in zip(["lost", "scattered", "kept"], map(int, theirs), ours, strict=True):
+                p, q = a / N_LISAS, b / N_OURS
+                both = (a + b) / (N_LISAS + N_OURS)
+                sigma = math.sqrt(both * (1 - both) * (1 / N_LISAS + 1 / N_OURS))
+                print(f"{kind} {rate} mm/h, {range_m} m, {reflectivity}: {label} {q:.4f}, LISA {p:.4f}, "
+                      f"standard deviation {sigma:.4f}")
+                # Of 75 comparisons the farthest may be 4 of them; LISA's extinction is Mie's.
+                assert abs(p - q) <= 4 * sigma + 2e-4
+
+
+def fog():
+    """Every point is as far and as bright as Hahner et al. say."""
+    sys.path.insert(0, FOG_SIM)
+    import fog_simulation
+
+    ranges_m = numpy.concatenate([[5, 10, 20, 30, 50, 100], numpy.arange(5.05, 150, 0.37)])
+    cloud = numpy.zeros((len(ranges_m), 4))
+    cloud[:, 0], cloud[:, 3] = ranges_m, 30
+    for alpha in [0.005, 0.02, 0.06, 0.2]:
+        theirs, _, _ = fog_simulation.simulate_fog(fog_simulation.ParameterSet(alpha=alpha), cloud, 0)
+        visibility_m = math.log(20) / alpha
+        flags = ["--fog", repr(visibility_m), "--fog-model", "hahner", "--white", 255]
+        positions, intensities, media = edgepuck_weather(cloud, flags, ALL_SEEING)
+        assert len(positions) == len(cloud)
+        is_fog = theirs[:, 0] < 4.9
+        # They round the intensity of surfaces before they compare.
+        surface = 30 * numpy.exp(-2 * alpha * ranges_m)
+        same = (media == 3) == is_fog
+        of_fog = numpy.where(media == 3, intensities, theirs[:, 3])
+        assert (same | (abs(of_fog - surface) <= 0.5)).all(), f"{alpha}"
+        assert same.mean() > 0.95
+        # Their table of ranges has steps of 0.1 m.
+        assert (abs(positions[same, 0] - theirs[same, 0]) <= 0.1).all(), f"{alpha}"
+        expected = numpy.where(is_fog, theirs[:, 3], surface)[same]
+        assert numpy.allclose(intensities[same], expected, rtol=1e-3, atol=1e-4), f"{alpha}"
+        assert (numpy.round(surface)[~is_fog] == theirs[~is_fog, 3]).all()
+        print(f"fog of {visibility_m:.1f} m: {len(cloud)} points, {is_fog.sum()} of fog; {(~same).sum()} differ by rounding")
+
+
+if LISA:
+    lisa()
+if FOG_SIM:
+    fog()
