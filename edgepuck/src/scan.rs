@@ -89,13 +89,17 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
             }
         }
         eprintln!(
-            "{sensor}: {} points ({} out of range, {}{} dropped, {} with a negative range): {}",
+            "{sensor}: {} points ({}{} out of range, {}{} dropped, {} with a negative range): {}",
             tally.points,
-            tally.out_of_range,
             scene
                 .effects
-                .detection
-                .map_or(String::new(), |_| format!("{} undetected, ", tally.undetected)),
+                .weather
+                .as_ref()
+                .map_or(String::new(), |_| format!("{} of the air, ", tally.scattered)),
+            tally.out_of_range,
+            (scene.effects.detection.is_some() || scene.effects.weather.is_some())
+                .then(|| format!("{} undetected, ", tally.undetected))
+                .unwrap_or_default(),
             tally.dropped,
             tally.negative,
             file.display()

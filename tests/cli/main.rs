@@ -21,6 +21,7 @@ mod scenes;
 mod simplified;
 mod surfaces;
 mod sweeps;
+mod weather;
 
 use formats::Scan;
 use formats::scan_file::read_scan;

@@ -1,0 +1,154 @@
+//! `weather`, and weather and wide beams in scenes, datasets and drives.
+
+use crate::Folder;
+
+/// A wall across the x axis.
+const WALL: &str = "OFF\n4 1 0\n20 -30 -10\n20 30 -10\n20 30 10\n20 -30 10\n4 0 3 2 1\n";
+
+fn scene(effects: &str) -> String {
+    format!(
+        "seed = 3\nattributes = [\"range\", \"beam\", \"ring\", \"medium\", \"return\"]\n\
+         [effects]\n{effects}\n[[object]]\nmesh = \"wall.off\"\nreflectivity = 0.3\n\
+         [[sensor]]\nprofile = \"vlp32c\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n"
+    )
+}
+
+#[test]
+fn a_recorded_scan_is_weathered_and_each_of_its_points_labelled() {
+    let folder = Folder::new();
+    folder.write("wall.off", WALL);
+    folder.write("clear.toml", scene("detection = true\nintensity = true"));
+    let text = folder.text("clear.toml").replace("\"return\"]", "\"intensity\"]");
+    folder.write("clear.toml", text);
+    folder.succeeds("scan clear.toml --adapter cpu --out clear.npz");
+    let clear = folder.scan("clear.npz");
+    for out in ["rain.npz", "again.npz"] {
+        let said = folder.succeeds(&format!("weather clear.npz --rain 50 --out {out}"));
+        for part in ["kept ", "rain ", "lost ", "points: "] {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+    assert!(folder.bytes("rain.npz") == folder.bytes("again.npz"), "the same seed");
+    let rainy = folder.scan("rain.npz");
+    let n_drops = rainy.medium.as_ref().unwrap().iter().filter(|&&medium| medium == 1).count();
+    assert!(n_drops > 50 && n_drops < clear.len() / 5, "{n_drops} of {}", clear.len());
+    assert_eq!(rainy.ring.as_ref().unwrap().len(), rainy.len());
+    folder.succeeds("weather clear.npz --fog 60 --haze 2000 --snow 1 --out fog.ply --seed 4");
+    assert!(folder.scan("fog.ply").medium.unwrap().contains(&3));
+    folder.write("cloud.xyz", "5 0 0\n9 1 0\nnan nan nan\n0 0 0\n");
+    let said = folder.succeeds("weather cloud.xyz --reflectivity 0.5 --rain 1 --out cloud.csv");
+    assert!(said.contains("no point") && said.contains("4 points"), "{said}");
+}
+
+#[test]
+fn effects_work_in_scenes_datasets_and_drives() {
+    const ALL: &str = "footprint = true\nreturns = \"dual\"\nweather = { rain_mm_h = 50, \
+                       fog_visibility_m = 150 }\nnoise = { sigma_m = 0.01 }";
+    let folder = Folder::with_meshes();
+    folder.write("wall.off", WALL);
+    folder.write("scene.toml", scene(ALL));
+    let said = folder.succeeds("scan scene.toml --adapter cpu --out scan.npz");
+    assert!(said.contains(" of the air") && said.contains("undetected"), "{said}");
+    let scan = folder.scan("scan.npz");
+    let numbers = scan.return_number.as_ref().unwrap();
+    assert!(numbers.contains(&1) && numbers.contains(&2));
+    folder.succeeds("scan scene.toml --adapter cpu --out scan.pcap");
+
+    folder.write("effects.toml", format!("[effects]\n{ALL}\n"));
+    for out in ["one", "other"] {
+        folder.succeeds(&format!(
+            "gen-dataset meshes --out {out} --adapter cpu --sensor vlp32c --views 1 --effects \
+             effects.toml --attributes medium,return --format npz,pcap --min-points 1"
+        ));
+    }
+    folder.assert_same_tree("one/rotational", "other/rotational");
+    folder.succeeds("gen-dataset --verify one");
+
+    let effects = ALL.replace('\n', ", ");
+    folder.write(
+        "drive.toml",
+        format!(
+            "variants = 1\n[ground]\nroad_width_m = [8, 8]\n[mount]\nheight_m = [1.5, 1.5]\n\
+             [[sensor]]\nprofile = \"vlp32c\"\neffects = {{ {effects} }}\n\
+             [[object]]\nkind = \"car\"\nclass = \"car\"\ncount = [4, 4]\nplace = \"parked\"\n\
+             distance_m = [4, 30]\n"
+        ),
+    );
+    folder.succeeds("gen-drive drive.toml --seconds 0.2 --out drive.pcap");
+    folder.succeeds("gen-scenes drive.toml --adapter cpu --sweeps 2 --save 1 --out scenes");
+}
+
+#[test]
+fn what_cannot_be_weathered_is_refused() {
+    let folder = Folder::new();
+    folder.write("cloud.xyz", "5 0 0\n9 1 0\n");
+    folder.write("dark.toml", DARK);
+    folder.write("bright.bin", [5f32, 0.0, 0.0, 200.0].map(f32::to_le_bytes).concat());
+    folder.write("black.bin", [5f32, 0.0, 0.0, -1.0].map(f32::to_le_bytes).concat());
+    folder.refuses(
+        2,
+        &[
+            ("weather cloud.xyz --out a.npz", "expected one of --rain, --snow, --fog and --haze"),
+            ("weather cloud.xyz --rain 5 --out a.npz", "have no intensity: give --reflectivity"),
+            ("weather cloud.xyz --rain -1 --out a.npz", "rain_mm_h: expected a number within"),
+            ("weather cloud.xyz --rain nan --out a.npz", "rain_mm_h: expected a number within"),
+            ("weather cloud.xyz --fog 0 --out a.npz", "fog_visibility_m: expected a number within"),
+            ("weather cloud.xyz --rain 5 --reflectivity 2 --out a.npz", "--reflectivity: expected"),
+            ("weather cloud.xyz --rain 5 --out a.pcap", "--out: expected .npz, .ply or .csv"),
+            ("weather bright.bin --rain 5 --out a.npz", "around 0 to 1, found 200: give --white"),
+            (
+                "weather cloud.xyz --rain 5 --reflectivity 1 --profile ./dark.toml --out a.npz",
+                "sensor \"dark\" has no [detection]",
+            ),
+        ],
+    );
+    folder.refuses(
+        1,
+        &[
+            ("weather none.npz --rain 5 --out a.npz", "none.npz"),
+            ("weather black.bin --rain 5 --out a.npz", "point 0: expected an intensity of 0 or"),
+        ],
+    );
+    assert!(!folder.at("a.npz").exists() && !folder.at("a.pcap").exists());
+}
+
+/// A sensor that states no detection limit.
+const DARK: &str = "name = \"dark\"\nrange = { max_m = 50.0 }\n[uniform]\nazimuth_from_deg = 0.0\n\
+                    azimuth_to_deg = 9.0\nazimuth_steps = 9\nelevation_from_deg = 0.0\n\
+                    elevation_to_deg = 9.0\nelevation_steps = 9\nrpm = 600.0\n";
+
+#[test]
+fn effects_that_contradict_or_overreach_are_refused() {
+    let folder = Folder::new();
+    folder.write("wall.off", WALL);
+    folder.write("dark.toml", DARK);
+    for (effects, part) in [
+        ("footprint = { samples = 5 }", "samples: expected 1, 7, 19 or 37, found 5"),
+        ("footprint = { divergence_deg = [91, 0] }", "divergence_deg[0]: expected a number within"),
+        ("footprint = { width = 1 }", "footprint"),
+        ("returns = \"both\"", "returns"),
+        ("weather = { rain_mm_h = 2e6 }", "rain_mm_h: expected a number within"),
+        ("weather = { fog_visibility_m = 0 }", "fog_visibility_m: expected a number within"),
+        ("weather = { hail_mm_h = 1 }", "hail_mm_h"),
+        (
+            "weather = { volumes = [{ min_m = [1, 0, 0], max_m = [0, 0, 0], visibility_m = 1 }] }",
+            "volumes[0].max_m[0]: expected a number within",
+        ),
+    ] {
+        folder.write("scene.toml", scene(effects));
+        let said = folder.exits(1, "scan scene.toml --adapter cpu --out a.npz");
+        assert!(said.contains(part) && said.contains("scene.toml"), "{effects}: {said}");
+    }
+    for (effects, part) in [
+        ("footprint = true", "footprint.divergence_deg: expected a value, as sensor \"dark\""),
+        ("weather = { rain_mm_h = 1 }", "expected reflectivity and range_m, as sensor \"dark\""),
+    ] {
+        folder.write("scene.toml", scene(effects).replace("vlp32c", "./dark.toml"));
+        let said = folder.exits(1, "scan scene.toml --adapter cpu --out a.npz");
+        assert!(said.contains(part), "{effects}: {said}");
+    }
+    folder.write("scene.toml", scene("returns = \"first\""));
+    let said = folder.exits(1, "scan scene.toml --adapter cpu --out a.pcap");
+    assert!(said.contains("effects.returns: \"first\" is not among theirs"), "{said}");
+    assert!(!folder.at("a.npz").exists() && !folder.at("a.pcap").exists());
+}
