@@ -97,9 +97,10 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
                 .as_ref()
                 .map_or(String::new(), |_| format!("{} of the air, ", tally.scattered)),
             tally.out_of_range,
-            (scene.effects.detection.is_some() || scene.effects.weather.is_some())
-                .then(|| format!("{} undetected, ", tally.undetected))
-                .unwrap_or_default(),
+            match (&scene.effects.detection, &scene.effects.weather) {
+                (None, None) => String::new(),
+                _ => format!("{} undetected, ", tally.undetected),
+            },
             tally.dropped,
             tally.negative,
             file.display()

@@ -1,7 +1,7 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
 use super::echo::Source;
-use super::measure::{HitEffects, Return, View, measure};
+use super::measure::{HitEffects, Return, View, measure_all, measure_one};
 use super::request::{Glass, ScanRequest};
 use crate::config::InvalidValue;
 use crate::cpu::oracle;
@@ -100,30 +100,15 @@ pub fn assemble(
     objects: &[ObjectHits],
 ) -> Result<(Scan, Tally), InvalidValue> {
     let view = View::new(request, cast_effects)?;
-    let hears_empty_beams = view.air.as_ref().is_some_and(|air| air.empty_beams);
     let position_m = request.pose.position_m;
     let origin = origin_for(position_m);
     let mut tally = Tally::default();
     let nearest = nearest_per_ray(objects);
-    let beam = |&(object, hit): &(usize, usize)| {
-        request.pattern.beam_of(objects[object].hits.hits[hit].beam)
-    };
-    let (mut returns, mut echoes) = (Vec::with_capacity(nearest.len()), Vec::new());
-    let mut measure = |beam, rays: &[_]| {
-        measure(&view, objects, beam, rays, &mut echoes, &mut tally, &mut returns);
-    };
-    let mut next = 0;
-    for rays in nearest.chunk_by(|a, b| beam(a) == beam(b)) {
-        let beam = beam(&rays[0]);
-        if hears_empty_beams {
-            (next..beam).for_each(|empty| measure(empty, &[]));
-            next = beam + 1;
-        }
-        measure(beam, rays);
-    }
-    if hears_empty_beams {
-        (next..request.pattern.beam_of(request.pattern.len() as u32))
-            .for_each(|empty| measure(empty, &[]));
+    let mut returns = Vec::with_capacity(nearest.len());
+    if view.has_one_echo_a_beam() {
+        returns.extend(nearest.iter().filter_map(|at| measure_one(&view, objects, at, &mut tally)));
+    } else {
+        measure_all(&view, objects, &nearest, &mut tally, &mut returns);
     }
     post_process(request, &mut returns);
     tally.points = returns.len() as u64;
@@ -151,6 +136,9 @@ fn f32x3(v: DVec3) -> [f32; 3] {
 /// Places in `objects` and in its hits: one per ray, ascending. Of equal ranges
 /// the object that comes first wins.
 fn nearest_per_ray(objects: &[ObjectHits]) -> Vec<(usize, usize)> {
+    if let [alone] = objects {
+        return (0..alone.hits.hits.len()).map(|i| (0, i)).collect();
+    }
     let mut all: Vec<(u32, f64, usize, usize)> = objects
         .iter()
         .enumerate()
@@ -159,12 +147,10 @@ fn nearest_per_ray(objects: &[ObjectHits]) -> Vec<(usize, usize)> {
             hits.map(move |(i, hit)| (hit.beam, hit.range_m, object, i))
         })
         .collect();
-    if objects.len() > 1 {
-        all.sort_unstable_by(|p, q| {
-            p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)).then((p.2, p.3).cmp(&(q.2, q.3)))
-        });
-        all.dedup_by_key(|entry| entry.0);
-    }
+    all.sort_unstable_by(|p, q| {
+        p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)).then((p.2, p.3).cmp(&(q.2, q.3)))
+    });
+    all.dedup_by_key(|entry| entry.0);
     all.into_iter().map(|(_, _, object, i)| (object, i)).collect()
 }
 

@@ -54,6 +54,11 @@ impl<'a> View<'a> {
         Ok(Self { request, cast_effects, effects, limit, weighs, share, air })
     }
 
+    /// Whether every beam has at most one echo, and every echo is detected.
+    pub fn has_one_echo_a_beam(&self) -> bool {
+        self.share.is_none() && self.air.is_none() && self.limit.is_none()
+    }
+
     /// Where a ray points, in world axes.
     fn direction(&self, ray: u32) -> DVec3 {
         self.request.pose.world_from_sensor * self.request.pattern.directions[ray as usize]
@@ -107,9 +112,62 @@ pub(super) struct Return {
     pub number: u8,
 }
 
-/// Appends to `returns` what the sensor makes of one `beam`, whose rays hit what stands at these
-/// places in `objects` and in its hits. `echoes` is room to work in.
-pub(super) fn measure(
+/// What the sensor makes of the hit at this place in `objects` and in its hits, where each beam
+/// has one echo.
+pub(super) fn measure_one(
+    view: &View,
+    objects: &[ObjectHits],
+    at: &(usize, usize),
+    tally: &mut Tally,
+) -> Option<Return> {
+    match hear(view, objects, at) {
+        Ok(echo) => point(view, objects, &echo, 0, tally),
+        Err(Silence::OtherScans) => None,
+        Err(Silence::OutOfRange) => {
+            tally.out_of_range += 1;
+            None
+        }
+        Err(Silence::Glass) => {
+            tally.dropped += 1;
+            None
+        }
+    }
+}
+
+/// Appends to `returns` what the sensor makes of its beams, whose rays hit what stands at the
+/// places `nearest` in `objects` and in its hits, ascending.
+pub(super) fn measure_all(
+    view: &View,
+    objects: &[ObjectHits],
+    nearest: &[(usize, usize)],
+    tally: &mut Tally,
+    returns: &mut Vec<Return>,
+) {
+    let pattern = view.request.pattern;
+    let beam_of =
+        |&(object, hit): &(usize, usize)| pattern.beam_of(objects[object].hits.hits[hit].beam);
+    let mut echoes = Vec::new();
+    let mut measure = |beam, rays: &[_]| {
+        measure_beam(view, objects, beam, rays, &mut echoes, tally, returns);
+    };
+    let hears_empty_beams = view.air.as_ref().is_some_and(|air| air.empty_beams);
+    let mut next = 0;
+    for rays in nearest.chunk_by(|a, b| beam_of(a) == beam_of(b)) {
+        let beam = beam_of(&rays[0]);
+        if hears_empty_beams {
+            (next..beam).for_each(|empty| measure(empty, &[]));
+            next = beam + 1;
+        }
+        measure(beam, rays);
+    }
+    if hears_empty_beams {
+        (next..pattern.beam_of(pattern.len() as u32)).for_each(|empty| measure(empty, &[]));
+    }
+}
+
+/// Appends to `returns` what the sensor makes of one `beam`, of which these `rays` hit
+/// something. `echoes` is room to work in.
+fn measure_beam(
     view: &View,
     objects: &[ObjectHits],
     beam: u32,
@@ -143,7 +201,7 @@ pub(super) fn measure(
     }
 }
 
-/// Fills `echoes` with what comes back of a beam.
+/// Fills `echoes` with what comes back of a beam from surfaces.
 fn listen(
     view: &View,
     objects: &[ObjectHits],
@@ -152,29 +210,50 @@ fn listen(
     tally: &mut Tally,
 ) {
     echoes.clear();
-    let limits = &view.request.sensor.range;
     let (mut is_out_of_range, mut is_lost) = (false, false);
-    for &(object, hit) in rays {
-        let found = &objects[object];
-        let nearest = &found.hits.hits[hit];
-        let source = Source::Surface { object: object as u32, hit: hit as u32 };
-        if view.share.is_none() && nearest.beam != view.centre(nearest.beam) {
-            // The rays around it were cast for a scan of wide beams.
-            continue;
-        }
-        if !(limits.min_m..=limits.max_m).contains(&nearest.range_m) {
-            is_out_of_range = true;
-        } else if is_lost_in_glass(view, found, nearest) {
-            is_lost = true;
-        } else {
-            let signal = if view.weighs { view.signal(found, nearest) } else { Signal::default() };
-            echoes.push(Echo { range_m: nearest.range_m, signal, source });
+    for at in rays {
+        match hear(view, objects, at) {
+            Ok(echo) => echoes.push(echo),
+            Err(Silence::OutOfRange) => is_out_of_range = true,
+            Err(Silence::Glass) => is_lost = true,
+            Err(Silence::OtherScans) => {}
         }
     }
     if echoes.is_empty() {
         tally.dropped += u64::from(is_lost);
         tally.out_of_range += u64::from(is_out_of_range && !is_lost);
     }
+}
+
+/// Why a hit has no echo.
+enum Silence {
+    /// Its ray is beside the middle of its beam, and was cast for a scan of wide beams.
+    OtherScans,
+    OutOfRange,
+    Glass,
+}
+
+/// The echo of the hit at this place.
+fn hear(
+    view: &View,
+    objects: &[ObjectHits],
+    &(object, hit): &(usize, usize),
+) -> Result<Echo, Silence> {
+    let found = &objects[object];
+    let nearest = &found.hits.hits[hit];
+    let limits = &view.request.sensor.range;
+    if view.share.is_none() && nearest.beam != view.centre(nearest.beam) {
+        return Err(Silence::OtherScans);
+    }
+    if !(limits.min_m..=limits.max_m).contains(&nearest.range_m) {
+        return Err(Silence::OutOfRange);
+    }
+    if is_lost_in_glass(view, found, nearest) {
+        return Err(Silence::Glass);
+    }
+    let signal = if view.weighs { view.signal(found, nearest) } else { Signal::default() };
+    let source = Source::Surface { object: object as u32, hit: hit as u32 };
+    Ok(Echo { range_m: nearest.range_m, signal, source })
 }
 
 /// Appends to `echoes` what comes back from the air along a beam.
