@@ -7,6 +7,7 @@ use libtest_mimic::Trial;
 use serde::Deserialize;
 
 use crate::classify::Classify;
+use crate::effect::InCube;
 use crate::sample::Sample;
 use crate::scan::Scan;
 use crate::scene::ManyObjects;
@@ -26,6 +27,7 @@ struct File {
     heavy: bool,
     scan: Option<Scan>,
     classify: Option<Classify>,
+    effect: Option<InCube>,
     sample: Option<Sample>,
     scene: Option<ManyObjects>,
     sweep: Option<Sweep>,
@@ -62,16 +64,19 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     if file.derivation.trim().is_empty() {
         return Err("`derivation` is empty".to_owned());
     }
-    let kinds: [(&str, Option<Check>); 5] = [
+    let kinds: [(&str, Option<Check>); 6] = [
         ("scan", file.scan.map(|case| Box::new(move || case.check()) as Check)),
         ("classify", file.classify.map(|case| Box::new(move || case.check()) as Check)),
+        ("effect", file.effect.map(|case| Box::new(move || case.check()) as Check)),
         ("sample", file.sample.map(|case| Box::new(move || case.check()) as Check)),
         ("scene", file.scene.map(|case| Box::new(move || case.check()) as Check)),
         ("sweep", file.sweep.map(|case| Box::new(move || case.check()) as Check)),
     ];
     let mut named = kinds.into_iter().filter_map(|(kind, check)| Some((kind, check?)));
     let (Some((kind, check)), None) = (named.next(), named.next()) else {
-        return Err("a case is one table: scan, classify, sample, scene or sweep".to_owned());
+        return Err(
+            "a case is one table: scan, classify, effect, sample, scene or sweep".to_owned()
+        );
     };
     match path.parent().and_then(Path::file_name) {
         Some(folder) if folder == kind => Ok((file.heavy, check)),

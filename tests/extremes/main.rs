@@ -17,6 +17,7 @@ mod case;
 mod chain;
 mod classify;
 mod cloud;
+mod effect;
 mod model;
 mod rules;
 mod sample;
