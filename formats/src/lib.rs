@@ -38,6 +38,7 @@ mod named;
 pub mod rng;
 pub mod scan;
 pub mod split;
+pub mod trajectory;
 
 #[cfg(feature = "npz")]
 mod archive;

@@ -34,7 +34,7 @@ fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
     assert!(said.contains("0.4 s, ") && said.contains("drives/a.pcap"), "{said}");
     let truth = folder.text("drives/a.truth.jsonl");
     let truth: Vec<Value> = truth.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    let motion = EgoMotion::read_tum(&folder.at("drives/a.tum")).unwrap();
+    let motion = EgoMotion::read(&folder.at("drives/a.tum")).unwrap();
     let decoder = Decoder::new(Model::Vlp32c);
     // Points of a wall, in the sensor's frame and in the world.
     let (mut n, mut n_inside, mut n_inside_as_seen) = (0u32, 0u32, 0u32);

@@ -36,7 +36,7 @@ mod stats;
 mod tracker;
 
 pub use counts::Counts;
-pub use ego_motion::{EgoMotion, EgoMotionError, Pose};
+pub use ego_motion::{EgoMotion, Pose};
 pub use object::{Object, SCHEMA_VERSION};
 pub use pipeline::{Arrival, Decoded, LiveError, LiveOptions, Pipeline};
 #[cfg(feature = "mcap")]

@@ -197,7 +197,7 @@ impl Args {
         let mut options = LiveOptions::default();
         options.min_points = self.min_points;
         options.ego_motion = match (&self.poses, self.twist.as_deref()) {
-            (Some(file), _) => Some(EgoMotion::read_tum(file)?),
+            (Some(file), _) => Some(EgoMotion::read(file)?),
             (None, Some(&[x, y, z, roll, pitch, yaw])) => Some(EgoMotion::Twist {
                 linear_m_s: DVec3::new(x, y, z),
                 angular_rad_s: DVec3::new(roll, pitch, yaw).map(f64::to_radians),

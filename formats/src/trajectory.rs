@@ -1,0 +1,163 @@
+//! Trajectories: where something is at which time.
+//!
+//! | format | a line |
+//! | --- | --- |
+//! | TUM | time in seconds, x y z in metres, quaternion qx qy qz qw (<https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats>) |
+//! | KITTI | twelve numbers, a 3 x 4 matrix row by row, without a time |
+//!
+//! Blanks separate numbers; empty lines and lines that begin with `#` say nothing.
+
+use std::path::Path;
+
+use crate::error::FormatError;
+
+/// A pose at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyedPose {
+    /// When, seconds.
+    pub time_s: f64,
+    /// Where, metres.
+    pub position_m: [f64; 3],
+    /// How it is turned: a quaternion of length 1, x y z w.
+    pub quaternion_xyzw: [f64; 4],
+}
+
+/// Reads a trajectory in TUM's or KITTI's format, whichever its lines have the numbers of. The
+/// poses of KITTI's are `period_s` apart and begin at 0.
+///
+/// # Errors
+/// A file that cannot be read; a line that is no pose, or not later than the one before; no pose
+/// at all.
+pub fn read_trajectory(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
+    let io = |source| FormatError::io(path, source);
+    let text = std::fs::read_to_string(path).map_err(io)?;
+    let flaw =
+        |line: usize, cause: &str| Err(FormatError::malformed(path, format!("line {line}"), cause));
+    let mut poses: Vec<KeyedPose> = Vec::new();
+    for (line, text) in (1..).zip(text.lines()) {
+        if text.trim().is_empty() || text.trim_start().starts_with('#') {
+            continue;
+        }
+        let pose = match pose_of(text, poses.len() as f64 * period_s) {
+            Ok(pose) => pose,
+            Err(cause) => return flaw(line, &cause),
+        };
+        if let Some(before) = poses.last().filter(|before| pose.time_s <= before.time_s) {
+            let (before_s, time_s) = (before.time_s, pose.time_s);
+            return flaw(line, &format!("expected a time after {before_s} s, found {time_s} s"));
+        }
+        poses.push(pose);
+    }
+    if poses.is_empty() {
+        return flaw(1, "expected a pose, found none in the file");
+    }
+    Ok(poses)
+}
+
+fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
+    let numbers: Vec<f64> = line
+        .split_whitespace()
+        .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or(word))
+        .collect::<Result<_, _>>()
+        .map_err(|word| format!("expected a number, found {word:?}"))?;
+    let (time_s, position_m, quaternion) = match numbers[..] {
+        [time_s, x, y, z, qx, qy, qz, qw] => (time_s, [x, y, z], [qx, qy, qz, qw]),
+        [a, b, c, x, d, e, f, y, g, h, i, z] => {
+            (at_s, [x, y, z], quaternion_of([[a, b, c], [d, e, f], [g, h, i]])?)
+        }
+        _ => {
+            let found = numbers.len();
+            return Err(format!(
+                "expected 8 numbers (time, x y z, qx qy qz qw) or 12 (a matrix), found {found}"
+            ));
+        }
+    };
+    let length = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
+    // Files have six digits at times.
+    if (length - 1.0).abs() > 1e-3 {
+        return Err(format!("expected a quaternion of length 1, found length {length}"));
+    }
+    Ok(KeyedPose { time_s, position_m, quaternion_xyzw: quaternion.map(|q| q / length) })
+}
+
+/// The rotation that these rows are, by the largest of the quaternion's numbers (Shepperd 1978).
+fn quaternion_of(rows: [[f64; 3]; 3]) -> Result<[f64; 4], String> {
+    let dot = |i: usize, j: usize| (0..3).map(|k| rows[i][k] * rows[j][k]).sum::<f64>();
+    let [a, b, c] = rows;
+    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let is_rotation = (0..3)
+        .all(|i| (dot(i, i) - 1.0).abs() < 1e-3 && (cross[i] - c[i]).abs() < 1e-3)
+        && dot(0, 1).abs() < 1e-3;
+    if !is_rotation {
+        return Err("expected a rotation in the matrix, found another map".to_owned());
+    }
+    let [xx, yy, zz] = [a[0], b[1], c[2]];
+    // Four times each number squared.
+    let squares = [1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz, 1.0 + xx + yy + zz];
+    let largest = (0..4).max_by(|&i, &j| squares[i].total_cmp(&squares[j])).unwrap_or(3);
+    let sums = [a[1] + b[0], a[2] + c[0], b[2] + c[1]];
+    let differences = [c[1] - b[2], a[2] - c[0], b[0] - a[1]];
+    let s = squares[largest];
+    let quaternion = match largest {
+        0 => [s, sums[0], sums[1], differences[0]],
+        1 => [sums[0], s, sums[2], differences[1]],
+        2 => [sums[1], sums[2], s, differences[2]],
+        _ => [differences[0], differences[1], differences[2], s],
+    };
+    let length = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
+    Ok(quaternion.map(|q| q / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<KeyedPose>, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        let name = file.path().display().to_string();
+        read_trajectory(file.path(), 0.1).map_err(|error| error.to_string().replace(&name, "f"))
+    }
+
+    #[test]
+    fn both_formats_say_the_same() {
+        // A third of a turn about (1, 1, 1), half a turn about z, and a tenth about x.
+        let (sine, cosine) = (std::f64::consts::TAU / 10.0).sin_cos();
+        let (sin_half, cos_half) = (std::f64::consts::TAU / 20.0).sin_cos();
+        let tum = read(&format!(
+            "# t p q\n0 1 2 3 0.5 0.5 0.5 0.5\n\n0.1 0 0 0 0 0 1 0\n0.2 0 0 0 {sin_half} 0 0 {cos_half}\n"
+        ));
+        let kitti = read(&format!(
+            "0 0 1 1 1 0 0 2 0 1 0 3\n-1 0 0 0 0 -1 0 0 0 0 1 0\n1 0 0 0 0 {cosine} {} 0 0 {sine} {cosine} 0\n",
+            -sine
+        ));
+        let (tum, kitti) = (tum.unwrap(), kitti.unwrap());
+        assert_eq!((tum.len(), kitti.len()), (3, 3));
+        for (a, b) in tum.iter().zip(&kitti) {
+            assert!((a.time_s - b.time_s).abs() < 1e-12 && a.position_m == b.position_m);
+            for (p, q) in a.quaternion_xyzw.iter().zip(b.quaternion_xyzw) {
+                assert!((p - q).abs() < 1e-12, "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_no_pose_is_named() {
+        let numbers = "expected 8 numbers (time, x y z, qx qy qz qw) or 12 (a matrix), found 3";
+        let cases = [
+            ("", "f: line 1: expected a pose, found none in the file"),
+            ("1 2 3\n", &format!("f: line 1: {numbers}")),
+            ("1 0 0 0 0 0 0 x", "f: line 1: expected a number, found \"x\""),
+            ("1 0 nan 0 0 0 0 1", "f: line 1: expected a number, found \"nan\""),
+            ("1 0 0 0 0 0 0 2", "f: line 1: expected a quaternion of length 1, found length 2"),
+            ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1", "f: line 2: expected a time after 2 s, found 1 s"),
+            (
+                "1 0 0 0 0 1 0 0 0 0 -1 0\n",
+                "f: line 1: expected a rotation in the matrix, found another map",
+            ),
+        ];
+        for (text, expected) in cases {
+            assert_eq!(read(text).unwrap_err(), expected);
+        }
+    }
+}
