@@ -6,6 +6,7 @@ mod dataset_finish;
 mod dataset_merge;
 mod effects_parity;
 mod footprint;
+mod motion;
 mod noise_statistics;
 mod off_properties;
 mod only_what_is_asked;

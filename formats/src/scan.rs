@@ -44,6 +44,11 @@ pub struct Scan {
     /// What the point is of: 0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray. What is no
     /// surface has triangle and object 2^32 - 1 and normal 0.
     pub medium: Option<Vec<u8>>,
+    /// Where the sensor was when the beam was fired, metres, as positions are.
+    pub sensor_m: Option<Vec<[f32; 3]>>,
+    /// How the sensor was turned then: the rotation from its frame to the world's, as a vector
+    /// along its axis of as many radians.
+    pub attitude_rad: Option<Vec<[f32; 3]>>,
     /// Unit normal of the surface, towards the sensor, in the world's frame.
     pub normal: Option<Vec<[f32; 3]>>,
 }
@@ -76,6 +81,10 @@ crate::named! {
         Return = "return",
         /// [`Scan::medium`].
         Medium = "medium",
+        /// [`Scan::sensor_m`].
+        Sensor = "sensor",
+        /// [`Scan::attitude_rad`].
+        Attitude = "attitude",
         /// [`Scan::normal`].
         Normal = "normal",
     }
@@ -177,6 +186,8 @@ impl Scan {
             Attribute::Reflectivity => self.reflectivity.as_deref().map(Column::U8),
             Attribute::Return => self.return_number.as_deref().map(Column::U8),
             Attribute::Medium => self.medium.as_deref().map(Column::U8),
+            Attribute::Sensor => self.sensor_m.as_deref().map(Column::Vector),
+            Attribute::Attitude => self.attitude_rad.as_deref().map(Column::Vector),
             Attribute::Normal => self.normal.as_deref().map(Column::Vector),
         }
     }
@@ -195,6 +206,8 @@ impl Scan {
             Attribute::Reflectivity => ColumnSlot::U8(&mut self.reflectivity),
             Attribute::Return => ColumnSlot::U8(&mut self.return_number),
             Attribute::Medium => ColumnSlot::U8(&mut self.medium),
+            Attribute::Sensor => ColumnSlot::Vector(&mut self.sensor_m),
+            Attribute::Attitude => ColumnSlot::Vector(&mut self.attitude_rad),
             Attribute::Normal => ColumnSlot::Vector(&mut self.normal),
         }
     }
@@ -230,6 +243,8 @@ impl Attribute {
     pub(crate) fn column_names(self) -> Vec<&'static str> {
         match self {
             Self::Normal => vec!["nx", "ny", "nz"],
+            Self::Sensor => vec!["sensor_x", "sensor_y", "sensor_z"],
+            Self::Attitude => vec!["attitude_x", "attitude_y", "attitude_z"],
             other => vec![other.name()],
         }
     }

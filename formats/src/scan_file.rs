@@ -8,7 +8,7 @@
 //! | `beam`, `triangle`, `object` | u32 | `[n, 1]` |
 //! | `ring` | u16 | `[n, 1]` |
 //! | `reflectivity`, `return`, `medium` | u8 | `[n, 1]` |
-//! | `normal` | f32 | `[n, 3]` |
+//! | `sensor`, `attitude`, `normal` | f32 | `[n, 3]` |
 //! | `origin`, only if it is not 0 | f64 | `[3]` |
 //!
 //! Attributes are columns, not vectors: Open3D 0.20 loads either, but voxel

@@ -24,6 +24,8 @@ pub fn scan(n: usize, origin: [f64; 3]) -> Scan {
         reflectivity: Some((0..n).map(|i| i as u8).collect()),
         return_number: Some((0..n).map(|i| i as u8).collect()),
         medium: Some((0..n).map(|i| i as u8).collect()),
+        sensor_m: Some((0..n).map(|i| [i as f32, 0.0, 1.0]).collect()),
+        attitude_rad: Some((0..n).map(|i| [0.0, 0.0, i as f32]).collect()),
         normal: Some((0..n).map(|i| [0.0, i as f32, -1.0]).collect()),
     }
 }

@@ -2,7 +2,9 @@
 //! one object, and the triangle that each hits.
 
 use crate::cpu::aim::FixedFrame;
-use crate::ray::{RayFrame, TraceRay};
+use crate::lanes::{Vectors, each};
+use crate::motion::Motion;
+use crate::ray::{Ray, RayFrame, Rays, TraceRay};
 use crate::sensor::{BeamPattern, Directions};
 use crate::target::Target;
 use formats::rng::StreamKey;
@@ -15,6 +17,8 @@ pub struct CastJob {
     pub target: Target,
     /// How the sensor sees it.
     pub frame: RayFrame,
+    /// How they move, if they do.
+    pub motion: Option<Motion>,
     /// The beam of each ray, `[n_rays]`.
     pub beams: Vec<u32>,
     /// Where the rays come from.
@@ -67,7 +71,36 @@ impl CastJob {
         reflectivity: f32,
     ) -> Self {
         let (beams, aim) = aim(&frame, pattern, culling, |_| true);
-        Self { target, frame, beams, aim, stream, reflectivity }
+        Self { target, frame, motion: None, beams, aim, stream, reflectivity }
+    }
+
+    /// The ray of `pattern`'s beam of this number, when it fires.
+    #[must_use]
+    pub fn beam(&self, pattern: &BeamPattern, beam: u32) -> Ray {
+        self.motion.as_ref().map_or_else(
+            || self.frame.beam(pattern, beam),
+            |motion| {
+                let time_s = pattern.time_s[beam as usize];
+                motion.frame_at(&self.target.surface, time_s).beam(pattern, beam)
+            },
+        )
+    }
+
+    /// The rays of some of `pattern`'s beams.
+    #[inline(always)]
+    pub(crate) fn rays_of<const N: usize>(
+        &self,
+        pattern: &BeamPattern,
+        beams: [u32; N],
+    ) -> Rays<N> {
+        if self.motion.is_none() {
+            return self.frame.beams(pattern, beams);
+        }
+        let rays = beams.map(|beam| self.beam(pattern, beam));
+        Rays {
+            origin: Vectors::new(each(|lane| rays[lane].origin)),
+            direction: Vectors::new(each(|lane| rays[lane].direction)),
+        }
     }
 
     /// The rays in f64, rounded, `[n_rays]`; made now, unless they are there.

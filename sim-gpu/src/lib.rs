@@ -45,6 +45,7 @@ pub mod job;
 mod lanes;
 pub mod material;
 pub mod mesh;
+pub mod motion;
 pub mod packets;
 pub mod pose;
 pub mod ray;

@@ -12,8 +12,10 @@ use serde::{Deserialize, Serialize};
 use crate::config::{self, ConfigError, InvalidValue};
 
 pub(crate) use orientation::PoseKeys;
+pub use trajectory::Trajectory;
 
 mod orientation;
+mod trajectory;
 
 /// A rigid placement of a sensor in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

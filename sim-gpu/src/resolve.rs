@@ -46,7 +46,7 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
         let triangle = code & !AMBIGUOUS;
         if code & AMBIGUOUS != 0 {
             resolved.decided_in_f64 += 1;
-            let ray = job.frame.beam(pattern, beam);
+            let ray = job.beam(pattern, beam);
             let Some(Crossing { index, .. }) = oracle::nearest(&job.target, &ray) else { continue };
             if index != triangle {
                 // By the same formula whoever found the triangle.
@@ -86,7 +86,7 @@ impl Lanewise for Ranges<'_> {
             let triangles: [u32; LANES] =
                 each(|i| self.cast.codes[of_lane[i] as usize] & !AMBIGUOUS);
             let beams: [u32; LANES] = each(|i| self.job.beams[of_lane[i] as usize]);
-            let of_beam = self.job.frame.beams(self.pattern, beams);
+            let of_beam = self.job.rays_of(self.pattern, beams);
             let found = oracle::ranges_to(&self.job.target.surface, &of_beam, triangles);
             ranges_m.extend(&found[..rays.len()]);
         }

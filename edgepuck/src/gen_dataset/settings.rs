@@ -80,7 +80,7 @@ pub struct Settings {
     colours: Option<ColourSource>,
 
     /// Attributes of each point besides its position: range, beam, ring, time, triangle, object,
-    /// intensity, power, reflectivity, return, medium, normal
+    /// intensity, power, reflectivity, return, medium, sensor, attitude, normal
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 

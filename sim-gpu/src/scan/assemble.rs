@@ -8,6 +8,7 @@ use crate::cpu::oracle;
 use crate::effects::Effects;
 use crate::job::CastJob;
 use crate::material::{Material, Materials};
+use crate::motion::Motion;
 use crate::resolve::{Hit, Hits};
 use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
 use crate::weather::Medium;
@@ -22,7 +23,7 @@ use std::ops::AddAssign;
 pub struct ObjectHits<'a> {
     /// The object's number in its scene.
     pub object: u32,
-    /// Where the object stands.
+    /// Where the object stands, if it does not move.
     pub world_from_object: DAffine3,
     /// Which of it is glass.
     pub glass: Option<&'a Glass>,
@@ -37,12 +38,18 @@ pub struct ObjectHits<'a> {
 }
 
 impl ObjectHits<'_> {
+    /// Where the object is when `ray` of `pattern` is fired.
+    fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
+        let at = |motion: &Motion| motion.world_from_object_at(pattern.time_s[ray as usize]);
+        self.job.motion.as_ref().map_or(self.world_from_object, at)
+    }
+
     /// What the surface is made of where a beam of `pattern` hit it.
     pub(super) fn material(&self, pattern: &BeamPattern, hit: &Hit) -> Material {
         let (reflectivity, retroreflection) = (self.job.reflectivity.into(), self.retroreflection);
         let one = || Material { reflectivity, retroreflection };
         let barycentric = || {
-            let ray = self.job.frame.beam(pattern, hit.beam);
+            let ray = self.job.beam(pattern, hit.beam);
             let surface = &self.job.target.surface;
             surface.barycentric(hit.triangle, ray.origin + hit.range_m * ray.direction)
         };
@@ -100,8 +107,8 @@ pub fn assemble(
     objects: &[ObjectHits],
 ) -> Result<(Scan, Tally), InvalidValue> {
     let view = View::new(request, cast_effects)?;
-    let position_m = request.pose.position_m;
-    let origin = origin_for(position_m);
+    let start = request.pose_at_start();
+    let origin = origin_for(start.position_m);
     let mut tally = Tally::default();
     let nearest = nearest_per_ray(objects);
     let mut returns = Vec::with_capacity(nearest.len());
@@ -118,7 +125,7 @@ pub fn assemble(
     }
     let scan = Scan {
         origin: origin.to_array(),
-        positions: returns.iter().map(|r| f32x3(r.from_sensor + (position_m - origin))).collect(),
+        positions: returns.iter().map(|r| f32x3(view.place(&start, objects, r, origin))).collect(),
         ..Scan::default()
     };
     Ok((with_attributes(scan, &view, objects, &returns), tally))
@@ -191,10 +198,7 @@ fn with_attributes(
         }
         Source::Air { .. } => None,
     };
-    let ray = |r: &Return| match r.source {
-        Source::Surface { object, hit } => objects[object as usize].hits.hits[hit as usize].beam,
-        Source::Air { ray, .. } => ray,
-    };
+    let ray = |r: &Return| r.ray(objects);
     let pattern = view.request.pattern;
     let from_start =
         |r: &Return| view.start(ray(r)).map_or(r.from_sensor, |start| r.from_sensor - start);
@@ -234,6 +238,15 @@ fn with_attributes(
             Attribute::Power => scan.power = column(returns, |r| r.power),
             Attribute::Reflectivity => scan.reflectivity = column(returns, |r| r.reflectivity),
             Attribute::Return => scan.return_number = column(returns, |r| r.number),
+            Attribute::Sensor => {
+                let at = |r: &Return| view.request.pose_at(ray(r)).position_m;
+                let origin = DVec3::from_array(scan.origin);
+                scan.sensor_m = column(returns, |r| f32x3(at(r) - origin));
+            }
+            Attribute::Attitude => {
+                let at = |r: &Return| view.request.pose_at(ray(r)).world_from_sensor;
+                scan.attitude_rad = column(returns, |r| f32x3(at(r).to_scaled_axis()));
+            }
             Attribute::Medium => {
                 scan.medium = column(returns, |r| match r.source {
                     Source::Surface { .. } => Medium::Surface as u8,
@@ -243,7 +256,7 @@ fn with_attributes(
             Attribute::Normal => {
                 scan.normal = column(returns, |r| {
                     surface(r).map_or([0.0; 3], |(found, hit, _)| {
-                        normal(found, hit.triangle, from_start(r))
+                        normal(found, pattern, hit, from_start(r))
                     })
                 });
             }
@@ -260,13 +273,14 @@ fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>>
 }
 
 /// A unit normal of the surface in world axes; zero for a triangle without area.
-pub(super) fn unit_normal(found: &ObjectHits, triangle: u32) -> DVec3 {
-    let in_object = oracle::normal(&found.job.target, triangle);
-    (found.world_from_object.matrix3.inverse().transpose() * in_object).normalize_or_zero()
+pub(super) fn unit_normal(found: &ObjectHits, pattern: &BeamPattern, hit: &Hit) -> DVec3 {
+    let in_object = oracle::normal(&found.job.target, hit.triangle);
+    (found.world_from_object_at(pattern, hit.beam).matrix3.inverse().transpose() * in_object)
+        .normalize_or_zero()
 }
 
 /// The surface's unit normal in world axes, against the `beam` that hit it.
-fn normal(found: &ObjectHits, triangle: u32, beam: DVec3) -> [f32; 3] {
-    let normal = unit_normal(found, triangle);
+fn normal(found: &ObjectHits, pattern: &BeamPattern, hit: &Hit, beam: DVec3) -> [f32; 3] {
+    let normal = unit_normal(found, pattern, hit);
     f32x3(if normal.dot(beam) > 0.0 { -normal } else { normal })
 }

@@ -8,6 +8,7 @@ use crate::config::InvalidValue;
 use crate::cpu::effects::{dropout, noise_range, noise_xyz};
 use crate::cpu::random::random_bits;
 use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
+use crate::pose::Pose;
 use crate::resolve::{Hit, Hits};
 use crate::weather::{Air, AirBeam, Scattered};
 use formats::rng::StreamKey;
@@ -61,7 +62,7 @@ impl<'a> View<'a> {
 
     /// Where a ray points, in world axes.
     fn direction(&self, ray: u32) -> DVec3 {
-        self.request.pose.world_from_sensor * self.request.pattern.directions[ray as usize]
+        self.request.pose_at(ray).world_from_sensor * self.request.pattern.directions[ray as usize]
     }
 
     /// The ray in the middle of the beam that a ray belongs to.
@@ -74,18 +75,33 @@ impl<'a> View<'a> {
     /// itself.
     pub fn start(&self, ray: u32) -> Option<DVec3> {
         let start = self.request.pattern.start(ray)?;
-        Some(self.request.pose.world_from_sensor * start)
+        Some(self.request.pose_at(ray).world_from_sensor * start)
     }
 
     /// Where a ray starts, in the world.
     fn origin(&self, ray: u32) -> DVec3 {
-        self.request.pose.position_m + self.start(ray).unwrap_or_default()
+        self.request.pose_at(ray).position_m + self.start(ray).unwrap_or_default()
+    }
+
+    /// Where a point is told to be, from `origin`, metres. The sensor was at `start` when the
+    /// scan began.
+    pub fn place(&self, start: &Pose, objects: &[ObjectHits], r: &Return, origin: DVec3) -> DVec3 {
+        if self.request.motion.is_none() {
+            return r.from_sensor + (start.position_m - origin);
+        }
+        let pose = self.request.pose_at(r.ray(objects));
+        if self.request.deskew {
+            return r.from_sensor + (pose.position_m - origin);
+        }
+        let in_sensor = pose.world_from_sensor.inverse() * r.from_sensor;
+        start.world_from_sensor * in_sensor + (start.position_m - origin)
     }
 
     /// How strong what comes back from a hit is.
     fn signal(&self, found: &ObjectHits, hit: &Hit) -> Signal {
         let material = found.material(self.request.pattern, hit);
-        let whole = power::brightness(found, material, hit, self.direction(hit.beam));
+        let whole =
+            power::brightness(found, material, self.request.pattern, hit, self.direction(hit.beam));
         let mut brightness = self.share.map_or(whole, |share| whole * share);
         if let Some(air) = &self.air {
             let direction = self.direction(hit.beam);
@@ -110,6 +126,18 @@ pub(super) struct Return {
     pub reflectivity: u8,
     /// As [`Scan::return_number`](formats::Scan::return_number).
     pub number: u8,
+}
+
+impl Return {
+    /// The ray that most of it came back along.
+    pub fn ray(&self, objects: &[ObjectHits]) -> u32 {
+        match self.source {
+            Source::Surface { object, hit } => {
+                objects[object as usize].hits.hits[hit as usize].beam
+            }
+            Source::Air { ray, .. } => ray,
+        }
+    }
 }
 
 /// What the sensor makes of the hit at this place in `objects` and in its hits, where each beam

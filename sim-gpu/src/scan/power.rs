@@ -17,6 +17,7 @@ use crate::cpu::random::{normal_deviate, random_bits};
 use crate::effects::{Detection, DetectionLimit};
 use crate::material::Material;
 use crate::resolve::Hit;
+use crate::sensor::BeamPattern;
 use formats::rng::StreamKey;
 use glam::DVec3;
 
@@ -34,11 +35,17 @@ const IDEAL_RETRO: f64 = 255.0;
 ///
 /// So is a retro-reflector at any incidence. It returns far more than that; how much no
 /// maker states, so that this is a lower bound.
-pub(super) fn brightness(found: &ObjectHits, material: Material, hit: &Hit, beam: DVec3) -> f64 {
+pub(super) fn brightness(
+    found: &ObjectHits,
+    material: Material,
+    pattern: &BeamPattern,
+    hit: &Hit,
+    beam: DVec3,
+) -> f64 {
     if material.retroreflection > 0.0 {
         return 1.0;
     }
-    material.reflectivity * unit_normal(found, hit.triangle).dot(beam).abs().min(1.0)
+    material.reflectivity * unit_normal(found, pattern, hit).dot(beam).abs().min(1.0)
 }
 
 /// The power received from a surface of this brightness at this range.

@@ -4,7 +4,8 @@ use crate::config::InvalidValue;
 use crate::effects::Effects;
 use crate::job::{CastJob, Culling, aim};
 use crate::material::Materials;
-use crate::pose::Pose;
+use crate::motion::Motion;
+use crate::pose::{Pose, Trajectory};
 use crate::ray::RayFrame;
 use crate::sensor::{BeamPattern, Sensor};
 use crate::target::Target;
@@ -12,6 +13,7 @@ use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use glam::DAffine3;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// One sensor at one place, and what is wanted of its scan.
 ///
@@ -35,8 +37,16 @@ pub struct ScanRequest<'a> {
     pub sensor: &'a Sensor,
     /// The beams of the sensor, [`Sensor::pattern`], which many requests share.
     pub pattern: &'a BeamPattern,
-    /// Where the sensor stands.
+    /// Where the sensor stands, if it does not move.
     pub pose: Pose,
+    /// Its poses over time, if it moves.
+    pub motion: Option<Arc<Trajectory>>,
+    /// The time of trajectories at which the scan begins, seconds; 0 by default.
+    pub start_s: f64,
+    /// Whether points of a moving sensor are where it met the surfaces. They are not by
+    /// default: they are where a driver puts them that takes the sensor to stand where the scan
+    /// began.
+    pub deskew: bool,
     /// The effects to apply, which must be among those that the caster models;
     /// `None`, the default, applies all of them.
     pub effects: Option<Effects>,
@@ -55,8 +65,10 @@ pub struct ScanRequest<'a> {
 pub struct PlacedTarget<'a> {
     /// The object.
     pub target: &'a Target,
-    /// Where it stands.
+    /// Where it stands; if it moves, in the frame that moves with it.
     pub world_from_object: DAffine3,
+    /// The poses of that frame over time, if it moves.
+    pub motion: Option<Arc<Trajectory>>,
     /// Its reflectivity, 0 to 1; 1 by default.
     pub reflectivity: f32,
     /// Keys the random numbers of the object's returns; `None`, the default,
@@ -92,6 +104,9 @@ impl<'a> ScanRequest<'a> {
             sensor,
             pattern,
             pose,
+            motion: None,
+            start_s: 0.0,
+            deskew: false,
             effects: None,
             attributes: AttributeSet::new(),
             stream: StreamKey::new(0, "scan", 0),
@@ -142,16 +157,49 @@ impl<'a> ScanRequest<'a> {
         // Materials come in when the triangles that were hit are known.
         let reflectivity = if placed.materials.is_some() { 1.0 } else { *reflectivity };
         let target = (*target).clone();
-        let (beams, aim) = aim(&frame, self.pattern, self.culling, is_wanted);
-        CastJob { target, frame, beams, aim, stream, reflectivity }
+        let motion = self.motion_at(placed);
+        let (beams, aim) = match &motion {
+            None => aim(&frame, self.pattern, self.culling, is_wanted),
+            Some(motion) => motion.aim(&target.surface, self.pattern, self.culling, is_wanted),
+        };
+        CastJob { target, frame, motion, beams, aim, stream, reflectivity }
+    }
+
+    /// Where the sensor is when the scan begins.
+    pub(super) fn pose_at_start(&self) -> Pose {
+        self.motion.as_ref().map_or(self.pose, |motion| motion.at(self.start_s))
+    }
+
+    /// Where the sensor is when `ray` of the pattern is fired.
+    pub(super) fn pose_at(&self, ray: u32) -> Pose {
+        self.motion
+            .as_ref()
+            .map_or(self.pose, |motion| motion.at(self.start_s + self.pattern.time_s[ray as usize]))
+    }
+
+    /// How the sensor and `placed` move, if one of them does.
+    fn motion_at(&self, placed: &PlacedTarget) -> Option<Motion> {
+        (self.motion.is_some() || placed.motion.is_some()).then(|| Motion {
+            pose: self.pose,
+            sensor: self.motion.clone(),
+            world_from_object: placed.world_from_object,
+            object: placed.motion.clone(),
+            start_s: self.start_s,
+        })
     }
 
     /// A distance within which no beam meets `placed`, metres.
     pub(super) fn nearest_m(&self, placed: &PlacedTarget) -> f64 {
+        if self.motion.is_some() || placed.motion.is_some() {
+            return 0.0;
+        }
         self.frame(placed).nearest_m(self.pattern)
     }
 
     fn frame(&self, placed: &PlacedTarget) -> RayFrame {
+        if let Some(motion) = self.motion_at(placed) {
+            return motion.frame_at(&placed.target.surface, 0.0);
+        }
         RayFrame::new(&placed.target.surface, &placed.world_from_object, &self.pose)
     }
 }
@@ -163,6 +211,7 @@ impl<'a> PlacedTarget<'a> {
         Self {
             target,
             world_from_object: DAffine3::IDENTITY,
+            motion: None,
             reflectivity: 1.0,
             stream: None,
             glass: None,

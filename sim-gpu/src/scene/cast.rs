@@ -133,6 +133,7 @@ fn cast_sensor(
         .map(|(placed, object)| {
             let mut target = PlacedTarget::new(&placed.target);
             target.world_from_object = placed.world_from_object;
+            target.motion = object.motion.clone();
             target.reflectivity = object.reflectivity as f32;
             target.retroreflection = object.retroreflection;
             target.materials = placed.materials.as_ref();
@@ -141,6 +142,8 @@ fn cast_sensor(
         })
         .collect();
     let mut request = ScanRequest::new(&sensor.sensor, &pattern, sensor.pose);
+    (request.motion, request.start_s) = (sensor.motion.clone(), sensor.start_s);
+    request.deskew = sensor.deskew;
     request.attributes = scene.attributes.clone();
     request.stream = StreamKey::new(scene.seed, &sensor.name, number);
     request.culling = culling;

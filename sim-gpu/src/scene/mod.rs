@@ -2,6 +2,7 @@
 //! effects and attributes are wanted. [`cast`] loads the meshes and scans them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use formats::scan::{Attribute, AttributeSet};
 use glam::{DAffine3, DQuat, DVec3};
@@ -10,7 +11,7 @@ use crate::config::{self, ConfigError, InvalidValue};
 use crate::effects::Effects;
 use crate::material::MaterialChoice;
 use crate::mesh::frame::{Normalize, Up};
-use crate::pose::Pose;
+use crate::pose::{Pose, Trajectory};
 use crate::sensor::Sensor;
 use crate::simplify::Simplify;
 
@@ -57,6 +58,8 @@ pub struct SceneObject {
     pub position_m: DVec3,
     /// How the mesh is turned, after it was turned upright and scaled.
     pub rotation: DQuat,
+    /// If it moves: the poses over time of the frame in which it stands so.
+    pub motion: Option<Arc<Trajectory>>,
     /// Factors along the mesh's axes once upright, all above 0.
     pub scale: DVec3,
     /// The part of the light that comes back at vertical incidence, 0..=1.
@@ -79,8 +82,15 @@ pub struct SceneSensor {
     pub sensor: Sensor,
     /// Default: the sensor's name.
     pub name: String,
-    /// Where it stands.
+    /// Where it stands; if it moves, when the scan begins.
     pub pose: Pose,
+    /// Its poses over time, if it moves.
+    pub motion: Option<Arc<Trajectory>>,
+    /// The time of all trajectories at which its scan begins, seconds; 0 by default.
+    pub start_s: f64,
+    /// Whether points are where a moving sensor met the surfaces, and not where it would put
+    /// them if it stood still; false by default.
+    pub deskew: bool,
 }
 
 impl Scene {
@@ -127,7 +137,7 @@ impl Scene {
                     in_profile => in_profile,
                 })?;
             effects.for_sensor(&profile).map_err(in_file)?;
-            sensors.push(sensor.validate(i, profile).map_err(in_file)?);
+            sensors.push(sensor.validate(i, folder, profile).map_err(in_file)?);
         }
         check_names("sensor", sensors.iter().map(|sensor| &sensor.name)).map_err(in_file)?;
 
@@ -166,6 +176,12 @@ impl Scene {
         if self.simplifies() && self.attributes.contains(&Attribute::Triangle) {
             let cause = "a simplified mesh does not have the file's triangles, so that the \
                          attribute `triangle` cannot name them";
+            return Err(InvalidValue::new("simplify", cause));
+        }
+        let moves = self.sensors.iter().any(|sensor| sensor.motion.is_some())
+            || self.objects.iter().any(|object| object.motion.is_some());
+        if moves && self.simplifies() {
+            let cause = "what a sensor resolves of a mesh changes where one of them moves";
             return Err(InvalidValue::new("simplify", cause));
         }
         let differ = |object: &SceneObject| {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use formats::scan::{Attribute, AttributeSet};
 use glam::{DQuat, DVec3};
@@ -12,7 +13,7 @@ use crate::config::{InvalidValue, positive, within};
 use crate::effects::Effects;
 use crate::material::{ColourSource, MaterialChoice, MaterialTable};
 use crate::mesh::frame::{Normalize, Up};
-use crate::pose::PoseKeys;
+use crate::pose::{PoseKeys, Trajectory};
 use crate::sensor::Sensor;
 use crate::simplify::Simplify;
 
@@ -48,6 +49,8 @@ pub(super) struct ObjectTable {
     pitch_deg: Option<f64>,
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
+    /// Poses over time, of the frame in which the pose above is.
+    trajectory: Option<PathBuf>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
     #[serde(default)]
@@ -64,12 +67,32 @@ pub(super) struct ObjectTable {
 pub(super) struct SensorTable {
     pub profile: String,
     name: Option<String>,
-    position_m: [f64; 3],
+    position_m: Option<[f64; 3]>,
     look_at_m: Option<[f64; 3]>,
     yaw_deg: Option<f64>,
     pitch_deg: Option<f64>,
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
+    /// Poses over time, in place of the keys above.
+    trajectory: Option<PathBuf>,
+    #[serde(default)]
+    start_s: f64,
+    #[serde(default)]
+    deskew: bool,
+}
+
+/// From pose to pose of a trajectory whose file has no times, seconds: KITTI's sensor turns ten
+/// times a second.
+const PERIOD_S: f64 = 0.1;
+
+/// Reads the trajectory that `key` names.
+fn trajectory(
+    key: String,
+    folder: &Path,
+    file: Option<PathBuf>,
+) -> Result<Option<Arc<Trajectory>>, InvalidValue> {
+    let load = |file: PathBuf| Trajectory::load(&folder.join(file), PERIOD_S).map(Arc::new);
+    file.map(load).transpose().map_err(|error| InvalidValue::new(key, error.to_string()))
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -135,6 +158,7 @@ impl ObjectTable {
             normalize: self.normalize,
             position_m: keys.position_m(&table)?,
             rotation: keys.rotation(&table)?.unwrap_or(DQuat::IDENTITY),
+            motion: trajectory(key("trajectory"), folder, self.trajectory)?,
             scale: DVec3::from_array(scale),
             reflectivity,
             retroreflection: self.retroreflection,
@@ -145,10 +169,33 @@ impl ObjectTable {
 }
 
 impl SensorTable {
-    pub fn validate(self, index: usize, sensor: Sensor) -> Result<SceneSensor, InvalidValue> {
+    pub fn validate(
+        self,
+        index: usize,
+        folder: &Path,
+        sensor: Sensor,
+    ) -> Result<SceneSensor, InvalidValue> {
         let table = format!("sensor[{index}]");
+        let key = |field: &str| format!("{table}.{field}");
+        let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
+        let motion = trajectory(key("trajectory"), folder, self.trajectory)?;
+        let (start_s, deskew) = (self.start_s, self.deskew);
+        // Times of Unix are in the thousands of millions.
+        within(&key("start_s"), start_s, -1e12..=1e12)?;
+        if let Some(motion) = motion {
+            if self.position_m.is_some() {
+                let cause = "cannot stand beside position_m: the trajectory has the poses";
+                return Err(InvalidValue::new(key("trajectory"), cause));
+            }
+            let pose = motion.at(start_s);
+            return Ok(SceneSensor { sensor, name, pose, motion: Some(motion), start_s, deskew });
+        }
+        let Some(position_m) = self.position_m else {
+            let cause = "expected position_m or trajectory, found neither";
+            return Err(InvalidValue::new(table, cause));
+        };
         let keys = PoseKeys {
-            position_m: self.position_m,
+            position_m,
             look_at_m: self.look_at_m,
             yaw_deg: self.yaw_deg,
             pitch_deg: self.pitch_deg,
@@ -156,8 +203,7 @@ impl SensorTable {
             quaternion_xyzw: self.quaternion_xyzw,
         };
         let pose = keys.pose(&table)?;
-        let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
-        Ok(SceneSensor { sensor, name, pose })
+        Ok(SceneSensor { sensor, name, pose, motion, start_s, deskew })
     }
 }
 

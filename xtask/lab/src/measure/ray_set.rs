@@ -70,6 +70,7 @@ impl RaySet {
             })
             .collect();
         let job = CastJob {
+            motion: None,
             target: target.clone(),
             frame,
             beams: (0..rays.len() as u32).collect(),

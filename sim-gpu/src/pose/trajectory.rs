@@ -1,0 +1,96 @@
+//! Poses over time.
+
+use std::path::Path;
+
+use formats::FormatError;
+use formats::trajectory::{KeyedPose, read_trajectory};
+use glam::DQuat;
+
+use super::Pose;
+use crate::config::InvalidValue;
+
+/// Poses at times, ascending. In between, positions are interpolated linearly and rotations
+/// along the shortest turn at an even rate; before the first and after the last they stay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory(Vec<(f64, Pose)>);
+
+impl Trajectory {
+    /// These poses at these times, seconds.
+    ///
+    /// # Errors
+    /// No pose; a time that is not after the one before; numbers that are not finite.
+    pub fn new(poses: Vec<(f64, Pose)>) -> Result<Self, InvalidValue> {
+        if poses.is_empty() {
+            return Err(InvalidValue::new("trajectory", "expected a pose, found none"));
+        }
+        for (i, (time_s, pose)) in poses.iter().enumerate() {
+            let key = || format!("trajectory[{i}]");
+            let is_finite = pose.position_m.is_finite() && pose.world_from_sensor.is_finite();
+            if !(time_s.is_finite() && is_finite) {
+                return Err(InvalidValue::new(key(), "expected finite numbers"));
+            }
+            if i > 0 && *time_s <= poses[i - 1].0 {
+                let cause = format!("expected a time after {} s, found {time_s} s", poses[i - 1].0);
+                return Err(InvalidValue::new(key(), cause));
+            }
+        }
+        Ok(Self(poses))
+    }
+
+    /// Reads the trajectory at `path`, as [`read_trajectory`] does.
+    ///
+    /// # Errors
+    /// As [`read_trajectory`].
+    pub fn load(path: &Path, period_s: f64) -> Result<Self, FormatError> {
+        let pose = |keyed: KeyedPose| {
+            let world_from_sensor = DQuat::from_array(keyed.quaternion_xyzw);
+            (keyed.time_s, Pose { position_m: keyed.position_m.into(), world_from_sensor })
+        };
+        Ok(Self(read_trajectory(path, period_s)?.into_iter().map(pose).collect()))
+    }
+
+    /// The pose at this time.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> Pose {
+        let poses = &self.0;
+        let after = poses.partition_point(|(at_s, _)| *at_s <= time_s);
+        let (Some(a), Some(b)) = (poses.get(after.wrapping_sub(1)), poses.get(after)) else {
+            let end = if after == 0 { poses.first() } else { poses.last() };
+            return end.expect("invariant: there is a pose").1;
+        };
+        let share = (time_s - a.0) / (b.0 - a.0);
+        Pose {
+            position_m: a.1.position_m.lerp(b.1.position_m, share),
+            world_from_sensor: a
+                .1
+                .world_from_sensor
+                .slerp(b.1.world_from_sensor, share)
+                .normalize(),
+        }
+    }
+
+    /// How far, in metres and in radians, it comes at most from where it is at `from_s`, until
+    /// `to_s`.
+    #[must_use]
+    pub fn reach(&self, from_s: f64, to_s: f64) -> (f64, f64) {
+        let start = self.at(from_s);
+        let between = self.0.iter().filter(|(at_s, _)| (from_s..to_s).contains(at_s));
+        let poses: Vec<Pose> = between.map(|(_, pose)| *pose).chain([self.at(to_s)]).collect();
+        let mut turned_rad = 0.0;
+        let (mut far_m, mut before) = (0.0f64, start);
+        for pose in poses {
+            // A straight way between two poses is nowhere farther than at its ends; a turn is
+            // no more than the sum of its parts.
+            far_m = far_m.max(pose.position_m.distance(start.position_m));
+            turned_rad += before.world_from_sensor.angle_between(pose.world_from_sensor);
+            before = pose;
+        }
+        (far_m, turned_rad)
+    }
+
+    /// From when to when poses are known, seconds.
+    #[must_use]
+    pub fn known_s(&self) -> [f64; 2] {
+        [self.0[0].0, self.0[self.0.len() - 1].0]
+    }
+}

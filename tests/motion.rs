@@ -1,0 +1,209 @@
+//! Sensors and objects that move during a scan, against scans of a world that stands still, one
+//! firing after the other, and against closed forms.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
+use formats::rng::StreamKey;
+use formats::scan::{Attribute, Scan};
+use glam::{DAffine3, DQuat, DVec3};
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::{Effects, Weather};
+use sim_gpu::job::Culling;
+use sim_gpu::pose::{Pose, Trajectory};
+use sim_gpu::scan::{PlacedTarget, ScanRequest, scan_objects};
+use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::target::Target;
+use std::num::NonZeroU32;
+use std::sync::Arc;
+use tests::{adapter, casting, meshes};
+
+/// The time of the trajectories at which scans begin: in Unix time, microseconds of which f32
+/// does not hold.
+const START_S: f64 = 1.7e9;
+
+fn pose(position_m: [f64; 3], axis: DVec3, angle_rad: f64) -> Pose {
+    let world_from_sensor = DQuat::from_axis_angle(axis.normalize(), angle_rad);
+    Pose { position_m: position_m.into(), world_from_sensor }
+}
+
+fn moving(poses: &[(f64, Pose)]) -> Option<Arc<Trajectory>> {
+    let poses = poses.iter().map(|(after_s, pose)| (START_S + after_s, *pose)).collect();
+    Some(Arc::new(Trajectory::new(poses).unwrap()))
+}
+
+/// A sensor that swerves, and goes on as it did after a jump.
+fn swerving() -> Option<Arc<Trajectory>> {
+    moving(&[
+        (-1.0, pose([0.0, -1.0, 0.2], DVec3::Z, 0.0)),
+        (0.03, pose([0.5, 0.3, 0.2], DVec3::Z, 0.3)),
+        (0.06, pose([0.6, 0.1, 0.3], DVec3::new(0.1, 0.2, 1.0), 0.5)),
+        (0.0601, pose([1.0, 0.1, 0.3], DVec3::Z, -0.5)),
+        (0.2, pose([2.0, 0.4, 0.0], DVec3::Z, 0.2)),
+    ])
+}
+
+/// An object that turns as it goes by.
+fn passing() -> Option<Arc<Trajectory>> {
+    moving(&[
+        (0.0, pose([4.0, -1.0, 0.0], DVec3::Z, 0.0)),
+        (0.1, pose([4.0, 3.0, 0.5], DVec3::new(0.3, 0.1, 1.0), 2.0)),
+    ])
+}
+
+fn sensor() -> Sensor {
+    Sensor::builtin("vlp32c").unwrap().decimated(NonZeroU32::new(12).unwrap())
+}
+
+fn everything() -> std::collections::BTreeSet<Attribute> {
+    Attribute::ALL.into_iter().filter(|of| *of != Attribute::Intensity).collect()
+}
+
+/// A room, which stands still, and a lump that is scaled unevenly.
+fn targets() -> [Target; 2] {
+    let lump = meshes::mapped(&meshes::icosphere(3), |p| p * DVec3::new(1.0, 0.6, 0.8));
+    [meshes::cuboid(DVec3::splat(-9.0), DVec3::splat(9.0)), lump].map(|mesh| casting::target(&mesh))
+}
+
+fn request<'a>(sensor: &'a Sensor, pattern: &'a BeamPattern) -> ScanRequest<'a> {
+    let mut request = ScanRequest::new(sensor, pattern, pose([0.0; 3], DVec3::Z, 0.0));
+    request.attributes = everything();
+    (request.stream, request.start_s) = (StreamKey([3, 5]), START_S);
+    request
+}
+
+#[test]
+fn a_scan_in_motion_is_a_loop_of_scans_of_a_world_that_stands_still() {
+    let (sensor, targets) = (sensor(), targets());
+    let pattern = sensor.pattern();
+    let stretched = DAffine3::from_scale(DVec3::new(1.0, 1.3, 0.7));
+    for caster in adapter::casters(&Effects::default()) {
+        let mut request = request(&sensor, &pattern);
+        (request.motion, request.deskew) = (swerving(), true);
+        let mut placed = [PlacedTarget::new(&targets[0]), PlacedTarget::new(&targets[1])];
+        (placed[1].motion, placed[1].world_from_object) = (passing(), stretched);
+        let scan = scan_objects(caster, &placed, &request).unwrap().scan;
+        assert_eq!(scan.len(), pattern.len(), "the room has no gaps");
+        let on_lump = scan.object.as_ref().unwrap().iter().filter(|&&object| object == 1).count();
+        assert!(on_lump > 30, "{on_lump}");
+
+        // The pattern's own times, and one frozen scan for each that there is.
+        let mut times_s = pattern.time_s.clone();
+        times_s.dedup();
+        let mut frozen = placed.clone();
+        frozen.iter_mut().for_each(|placed| placed.motion = None);
+        for time_s in times_s.into_iter().step_by(17) {
+            let beams: Vec<usize> =
+                (0..pattern.len()).filter(|&i| pattern.time_s[i] == time_s).collect();
+            let part = BeamPattern::new(
+                beams.iter().map(|&i| pattern.directions[i]).collect(),
+                beams.iter().map(|&i| pattern.ring[i]).collect(),
+                vec![time_s; beams.len()],
+            );
+            let mut still = request.clone();
+            (still.pattern, still.motion) = (&part, None);
+            still.pose = swerving().unwrap().at(START_S + time_s);
+            let body = passing().unwrap().at(START_S + time_s);
+            frozen[1].world_from_object =
+                DAffine3::from_rotation_translation(body.world_from_sensor, body.position_m)
+                    * stretched;
+            let mut expected = scan_objects(caster, &frozen, &still).unwrap().scan;
+            expected
+                .beam
+                .iter_mut()
+                .flatten()
+                .for_each(|beam| *beam = beams[*beam as usize] as u32);
+            assert_eq!(expected.origin, scan.origin);
+            assert_eq!(scan.select(&beams), expected, "{}, {time_s} s", caster.name());
+        }
+    }
+}
+
+#[test]
+fn culling_loses_nothing_of_what_moves() {
+    let (sensor, targets) = (sensor(), targets());
+    let pattern = sensor.pattern();
+    let with = |culling| -> Scan {
+        let mut request = request(&sensor, &pattern);
+        (request.motion, request.culling) = (swerving(), culling);
+        let mut placed = PlacedTarget::new(&targets[1]);
+        placed.motion = passing();
+        scan_objects(&Caster::Cpu(Effects::default()), &[placed], &request).unwrap().scan
+    };
+    assert!(with(Culling::On).len() > 30);
+    assert_eq!(with(Culling::On), with(Culling::Off));
+}
+
+#[test]
+fn a_wall_that_is_approached_comes_nearer_as_the_sensor_goes() {
+    const SPEED_M_S: f64 = 20.0;
+    let sensor = sensor();
+    let pattern = sensor.pattern();
+    let wall = casting::target(&meshes::cuboid(DVec3::new(30.0, -90.0, -40.0), DVec3::splat(91.0)));
+    let mut request = request(&sensor, &pattern);
+    request.motion = moving(&[
+        (0.0, pose([0.0; 3], DVec3::Z, 0.0)),
+        (1.0, pose([SPEED_M_S, 0.0, 0.0], DVec3::Z, 0.0)),
+    ]);
+    let scan =
+        scan_objects(&Caster::Cpu(Effects::default()), &[PlacedTarget::new(&wall)], &request);
+    let scan = scan.unwrap().scan;
+    assert!(scan.len() > 500);
+    let beams = scan.beam.as_ref().unwrap();
+    for (i, &beam) in beams.iter().enumerate() {
+        let (direction, time_s) =
+            (pattern.directions[beam as usize], pattern.time_s[beam as usize]);
+        let expected = (30.0 - SPEED_M_S * time_s) / direction.x;
+        let found = f64::from(scan.range_m.as_ref().unwrap()[i]);
+        // The range is there in f32; Unix time has steps of 0.24 us, of 5 um on the way.
+        let bound = found * 2f64.powi(-24) + 5e-6 / direction.x;
+        assert!((found - expected).abs() <= bound, "{beam}: {found}, not {expected}");
+        // Where the driver of a sensor that stood still would put it, and where the sensor was.
+        let raw = direction * found;
+        let told = DVec3::from(scan.positions[i].map(f64::from));
+        assert!(told.distance(raw) < 1e-4, "{beam}");
+        let at = DVec3::from(scan.sensor_m.as_ref().unwrap()[i].map(f64::from));
+        assert!(at.distance(DVec3::X * SPEED_M_S * time_s) < 6e-6, "{beam}");
+    }
+}
+
+#[test]
+fn what_stands_still_is_where_it_is_once_deskewed() {
+    let (sensor, targets) = (sensor(), targets());
+    let pattern = sensor.pattern();
+    let mut request = request(&sensor, &pattern);
+    (request.motion, request.deskew) = (swerving(), true);
+    let cpu = Caster::Cpu(Effects::default());
+    let scan = scan_objects(&cpu, &[PlacedTarget::new(&targets[0])], &request).unwrap().scan;
+    let off_m = |p: &[f32; 3]| (DVec3::from(p.map(f64::from)).abs().max_element() - 9.0).abs();
+    assert!(scan.positions.iter().all(|p| off_m(p) < 1e-5));
+    request.deskew = false;
+    let raw = scan_objects(&cpu, &[PlacedTarget::new(&targets[0])], &request).unwrap().scan;
+    assert_eq!(raw.range_m, scan.range_m);
+    assert!(raw.positions.iter().filter(|p| off_m(p) > 0.1).count() > raw.len() / 4);
+    // The attitude turns what a beam saw into the world.
+    for i in (0..scan.len()).step_by(53) {
+        let rotation = scan.attitude_rad.as_ref().unwrap()[i].map(f64::from);
+        let direction = pattern.directions[scan.beam.as_ref().unwrap()[i] as usize];
+        let turned = DQuat::from_scaled_axis(rotation.into()) * direction;
+        let from = DVec3::from(scan.sensor_m.as_ref().unwrap()[i].map(f64::from));
+        let point = DVec3::from(scan.positions[i].map(f64::from));
+        assert!((point - from).normalize().distance(turned) < 1e-6);
+    }
+}
+
+#[test]
+fn what_does_not_move_is_as_it_ever_was() {
+    let (sensor, targets) = (sensor(), targets());
+    let pattern = sensor.pattern();
+    let weather = Some(Box::new(Weather { rain_mm_h: Some(50.0), ..Weather::default() }));
+    let caster = Caster::Cpu(Effects { weather, ..Effects::default() });
+    let placed = || [PlacedTarget::new(&targets[0]), PlacedTarget::new(&targets[1])];
+    let still = request(&sensor, &pattern);
+    let mut resting = still.clone();
+    resting.motion = moving(&[(0.0, still.pose)]);
+    let mut rests = placed();
+    rests[1].motion = moving(&[(0.0, pose([0.0; 3], DVec3::Z, 0.0))]);
+    let [a, b] = [(placed(), still), (rests, resting)]
+        .map(|(placed, request)| scan_objects(&caster, &placed, &request).unwrap());
+    assert_eq!((a.scan, a.tally), (b.scan, b.tally));
+}
