@@ -36,7 +36,20 @@ fn a_scan_is_written_as_it_ever_was() {
     let path = folder.path().join("scan");
     let hash_of = |format, n, origin| {
         // The attributes that there were when these hashes were taken.
-        let scan = Scan { power: None, reflectivity: None, return_number: None, ..scan(n, origin) };
+        let all = scan(n, origin);
+        let scan = Scan {
+            origin,
+            positions: all.positions,
+            range_m: all.range_m,
+            beam: all.beam,
+            ring: all.ring,
+            time_s: all.time_s,
+            triangle: all.triangle,
+            object: all.object,
+            intensity: all.intensity,
+            normal: all.normal,
+            ..Scan::default()
+        };
         let told = write_scan(&path, format, Hashing::Sha256, &scan).unwrap();
         assert_eq!(told, Hashing::Sha256.of_file(&path).unwrap(), "{format} of {n} points");
         told

@@ -1,4 +1,4 @@
-//! `weather`, and weather and wide beams in scenes, datasets and drives.
+//! `weather`; weather, wide beams and motion in scenes, datasets and drives.
 
 use crate::Folder;
 
@@ -153,4 +153,42 @@ fn effects_that_contradict_or_overreach_are_refused() {
     let said = folder.exits(1, "scan scene.toml --adapter cpu --out a.pcap");
     assert!(said.contains("effects.returns: \"first\" is not among theirs"), "{said}");
     assert!(!folder.at("a.npz").exists() && !folder.at("a.pcap").exists());
+}
+
+#[test]
+fn sensors_and_objects_of_a_scene_move_along_trajectories() {
+    let folder = Folder::new();
+    folder.write("wall.off", WALL);
+    folder.write("ego.tum", "# t p q\n100 0 0 0 0 0 0 1\n101 10 0 0 0 0 0 1\n");
+    // KITTI's lines have no times.
+    folder.write("car.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 -1 0 1 0 0 0 0 1 0\n");
+    let moves = |sensor: &str| {
+        scene("quantise_m = true")
+            .replace("\"return\"]", "\"sensor\", \"attitude\"]")
+            .replace("position_m = [0, 0, 0]\nyaw_deg = 0\n", sensor)
+            .replace("reflectivity", "trajectory = \"car.txt\"\nreflectivity")
+    };
+    for (name, deskew) in [("raw", false), ("deskewed", true)] {
+        let sensor = format!("trajectory = \"ego.tum\"\nstart_s = 100.0\ndeskew = {deskew}\n");
+        folder.write(&format!("{name}.toml"), moves(&sensor));
+        folder.succeeds(&format!("scan {name}.toml --adapter cpu --out {name}.npz"));
+    }
+    let [raw, deskewed] = ["raw.npz", "deskewed.npz"].map(|file| folder.scan(file));
+    assert_eq!(raw.range_m, deskewed.range_m);
+    assert!(raw.positions != deskewed.positions && raw.len() > 1000);
+    // In a tenth of a second the sensor comes 1 m.
+    let farthest = deskewed.sensor_m.unwrap().iter().fold(0f32, |far, at| far.max(at[0]));
+    assert!((0.9..1.0).contains(&farthest), "{farthest} m");
+    for (sensor, part) in [
+        ("trajectory = \"none.tum\"\n", "sensor[0].trajectory: "),
+        ("trajectory = \"wall.off\"\n", "wall.off: line 1: expected a number, found \"OFF\""),
+        ("trajectory = \"ego.tum\"\nposition_m = [0, 0, 0]\n", "cannot stand beside position_m"),
+        ("trajectory = \"ego.tum\"\nstart_s = inf\n", "start_s: expected a number within"),
+        ("yaw_deg = 3\n", "expected position_m or trajectory, found neither"),
+    ] {
+        folder.write("bad.toml", moves(sensor));
+        let said = folder.exits(1, "scan bad.toml --adapter cpu --out bad.npz");
+        assert!(said.contains(part) && said.contains("bad.toml"), "{sensor}: {said}");
+    }
+    assert!(!folder.at("bad.npz").exists());
 }
