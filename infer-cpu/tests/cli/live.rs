@@ -183,7 +183,7 @@ fn what_cannot_be_listened_to_is_named() {
     refused(
         "--pcap drive.pcap --poses poses.tum",
         1,
-        "error: poses.tum: line 1: expected 8 numbers (time, x y z, qx qy qz qw), found 3",
+        "error: poses.tum: line 1: expected 8 numbers (time, x y z, qx qy qz qw) or 12 (a matrix), found 3",
     );
     refused("--pcap drive.pcap --from 10.0.0.1", 2, "error: expected packets of a VLP-16");
     refused(
