@@ -77,13 +77,19 @@ fn strongest(extinction: f64) -> (f64, f64) {
     // It has one maximum, before the end of the pulse has come through the receiver's blind part.
     let (mut low_m, mut high_m) = (BLIND_M, WHOLE_M + pulse_m);
     let golden = (5f64.sqrt() - 1.0) / 2.0;
-    for _ in 0..32 {
-        let step_m = golden * (high_m - low_m);
-        let (a_m, b_m) = (high_m - step_m, low_m + step_m);
-        if returned(a_m, extinction) < returned(b_m, extinction) {
-            low_m = a_m
+    let at = |part: f64, low_m: f64, high_m: f64| {
+        let range_m = low_m + part * (high_m - low_m);
+        (range_m, returned(range_m, extinction))
+    };
+    let (mut a, mut b) = (at(1.0 - golden, low_m, high_m), at(golden, low_m, high_m));
+    // Each step leaves 0.62 of 6 m: 24 of them 0.06 mm.
+    for _ in 0..24 {
+        if a.1 < b.1 {
+            low_m = a.0;
+            (a, b) = (b, at(golden, low_m, high_m));
         } else {
-            high_m = b_m
+            high_m = b.0;
+            (a, b) = (at(1.0 - golden, low_m, high_m), a);
         }
     }
     let range_m = 0.5 * (low_m + high_m);
@@ -92,7 +98,7 @@ fn strongest(extinction: f64) -> (f64, f64) {
 
 /// I(R), s/m^2, by Simpson's rule on each side of where the receiver sees all of the beam.
 fn returned(range_m: f64, extinction: f64) -> f64 {
-    const STEPS: usize = 32;
+    const STEPS: usize = 16;
     let integrand = |r: f64| {
         let t = 2.0 * (range_m - r) / LIGHT_M_S;
         let seen = ((r - BLIND_M) / (WHOLE_M - BLIND_M)).clamp(0.0, 1.0);
