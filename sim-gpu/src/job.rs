@@ -127,13 +127,13 @@ pub(crate) fn aim(
     };
     beams.retain(|&beam| is_wanted(beam));
     // A beam that starts beside the sensor is for f64 to aim.
-    let is_simple = pattern.start_z_m.is_empty() && pattern.len() <= MOST_DIRECTIONS;
+    let is_simple = pattern.starts_m.is_empty() && pattern.len() <= MOST_DIRECTIONS;
     if let Some(fixed) = frame.fixed().filter(|_| is_simple) {
         let directions = pattern.directions.clone();
         return (beams, Aim::ByCaster { fixed, directions, rays: OnceLock::new() });
     }
     let all = culling == Culling::Off;
-    let (beams, rays) = frame.trace_rays(&pattern.directions, &pattern.start_z_m, beams, all);
+    let (beams, rays) = frame.trace_rays(&pattern.directions, &pattern.starts_m, beams, all);
     (beams, Aim::Rays(rays))
 }
 
@@ -166,7 +166,7 @@ mod tests {
         let target = Target::new(surface, Builder::Sah);
         let pattern = Sensor::builtin("generic-static").unwrap().pattern();
         let mut beside = pattern.clone();
-        beside.start_z_m = vec![0.01; beside.len()];
+        beside.starts_m = vec![DVec3::Z * 0.01; beside.len()];
         let stretched = DAffine3::from_scale(DVec3::new(1.0, 1.0, 2.0));
         for (placed, distance_m, pattern, is_made) in [
             (DAffine3::IDENTITY, 3.0, &pattern, true),

@@ -87,7 +87,7 @@ impl RayFrame {
     /// The rays of some of `pattern`'s beams.
     #[inline(always)]
     pub(crate) fn beams<const N: usize>(&self, pattern: &BeamPattern, beams: [u32; N]) -> Rays<N> {
-        self.rays(&pattern.directions, &pattern.start_z_m, beams)
+        self.rays(&pattern.directions, &pattern.starts_m, beams)
     }
 
     /// The rays of some of the beams of these directions and starts.
@@ -95,12 +95,12 @@ impl RayFrame {
     fn rays<const N: usize>(
         &self,
         directions: &[DVec3],
-        start_z_m: &[f64],
+        starts_m: &[DVec3],
         beams: [u32; N],
     ) -> Rays<N> {
         let directions = each(|lane| directions[beams[lane] as usize]);
         let mut origin = Vectors::new([self.origin; N]);
-        if let Some(starts) = starts(start_z_m, beams) {
+        if let Some(starts) = starts(starts_m, beams) {
             origin = origin + Vectors::new(starts).mapped(&self.unit_from_sensor);
         }
         Rays { origin, direction: Vectors::new(directions).mapped(&self.unit_from_sensor) }
@@ -122,7 +122,7 @@ impl RayFrame {
     pub fn cone(&self, pattern: &BeamPattern) -> Cone {
         let radius = match pattern.farthest_start_m() {
             0.0 => self.radius,
-            along_z_m => self.radius + self.unit_from_sensor.z_axis.length() * along_z_m,
+            farthest_m => self.radius + stretches(&self.unit_from_sensor).1 * farthest_m,
         };
         let everything = Cone { axis: DVec3::X, half_angle_rad: std::f64::consts::PI };
         let distance = self.origin.length();
@@ -169,14 +169,14 @@ impl RayFrame {
     pub(crate) fn trace_rays(
         &self,
         directions: &[DVec3],
-        start_z_m: &[f64],
+        starts_m: &[DVec3],
         mut beams: Vec<u32>,
         all: bool,
     ) -> (Vec<u32>, Vec<TraceRay>) {
         let mut rays = vec![TraceRay::zeroed(); beams.len()];
         let (of_beams, of_rays) = (&mut beams[..], &mut rays[..]);
         let aiming =
-            Aiming { frame: self, directions, start_z_m, beams: of_beams, rays: of_rays, all };
+            Aiming { frame: self, directions, starts_m, beams: of_beams, rays: of_rays, all };
         let kept = widest(aiming);
         beams.truncate(kept);
         rays.truncate(kept);
@@ -189,7 +189,7 @@ impl RayFrame {
 struct Aiming<'a> {
     frame: &'a RayFrame,
     directions: &'a [DVec3],
-    start_z_m: &'a [f64],
+    starts_m: &'a [DVec3],
     beams: &'a mut [u32],
     rays: &'a mut [TraceRay],
     all: bool,
@@ -204,7 +204,7 @@ impl Lanewise for Aiming<'_> {
         for from in (0..self.beams.len()).step_by(LANES) {
             let count = LANES.min(self.beams.len() - from);
             let beams: [u32; LANES] = each(|lane| self.beams[from + lane.min(count - 1)]);
-            let rays = self.frame.rays(self.directions, self.start_z_m, beams);
+            let rays = self.frame.rays(self.directions, self.starts_m, beams);
             let entries = Entries::of(&rays, self.frame.radius);
             let records = entries.records(0);
             for lane in 0..count {

@@ -213,8 +213,8 @@ struct Rays {
     directions: Vec<glam::DVec3>,
     ring: Vec<u16>,
     time_s: Vec<f64>,
-    /// As [`BeamPattern::start_z_m`].
-    start_z_m: Vec<f64>,
+    /// As [`BeamPattern::starts_m`].
+    starts_m: Vec<glam::DVec3>,
 }
 
 impl Rays {
@@ -223,13 +223,13 @@ impl Rays {
             directions: Vec::with_capacity(n_rays),
             ring: Vec::with_capacity(n_rays),
             time_s: Vec::with_capacity(n_rays),
-            start_z_m: Vec::new(),
+            starts_m: Vec::new(),
         }
     }
 
     fn into_pattern(self) -> BeamPattern {
         let mut pattern = BeamPattern::new(self.directions, self.ring, self.time_s);
-        pattern.start_z_m = self.start_z_m;
+        pattern.starts_m = self.starts_m;
         pattern
     }
 

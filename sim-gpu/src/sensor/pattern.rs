@@ -54,9 +54,9 @@ pub struct BeamPattern {
     pub ring: Vec<u16>,
     /// Time since the start of the revolution, `[n_rays]`.
     pub time_s: Vec<f64>,
-    /// How far above the sensor each ray starts, metres along its z axis,
-    /// `[n_rays]`; empty where all start at the sensor itself.
-    pub start_z_m: Vec<f64>,
+    /// Where each ray starts, in the sensor frame, metres, `[n_rays]`; empty where all start at
+    /// the sensor itself.
+    pub starts_m: Vec<DVec3>,
     /// Rays of each beam, which stand side by side, that of its centre first; 1 where beams
     /// have no width.
     pub rays_per_beam: u32,
@@ -81,8 +81,8 @@ impl BeamPattern {
         let blocks = order.chunks(BLOCK_RAYS).map(bound).collect();
         let groups = order.chunks(BLOCK_RAYS * GROUP_BLOCKS).map(bound).collect();
         let directions = Directions(directions.into());
-        let (start_z_m, rays_per_beam) = (Vec::new(), 1);
-        Self { directions, ring, time_s, start_z_m, rays_per_beam, order, blocks, groups }
+        let (starts_m, rays_per_beam) = (Vec::new(), 1);
+        Self { directions, ring, time_s, starts_m, rays_per_beam, order, blocks, groups }
     }
 
     /// The same beams with a width: each is `samples` rays of equal power, spread over a
@@ -105,7 +105,7 @@ impl BeamPattern {
             for_each_ray(&self.ring, samples),
             for_each_ray(&self.time_s, samples),
         );
-        widened.start_z_m = for_each_ray(&self.start_z_m, samples);
+        widened.starts_m = for_each_ray(&self.starts_m, samples);
         widened.rays_per_beam = samples;
         Ok(widened)
     }
@@ -120,13 +120,13 @@ impl BeamPattern {
     /// is the sensor itself.
     #[must_use]
     pub fn start(&self, beam: u32) -> Option<DVec3> {
-        starts(&self.start_z_m, [beam]).map(|[start]| start)
+        starts(&self.starts_m, [beam]).map(|[start]| start)
     }
 
     /// How far from the sensor a ray starts at most, metres.
     #[must_use]
     pub fn farthest_start_m(&self) -> f64 {
-        self.start_z_m.iter().fold(0.0, |farthest, z_m| z_m.abs().max(farthest))
+        self.starts_m.iter().fold(0.0, |farthest, start| start.length().max(farthest))
     }
 
     /// Number of rays.
@@ -174,10 +174,9 @@ fn for_each_ray<T: Copy>(of_beam: &[T], samples: u32) -> Vec<T> {
     of_beam.iter().flat_map(|&value| std::iter::repeat_n(value, samples as usize)).collect()
 }
 
-/// Where these rays start, by [`BeamPattern::start_z_m`], in the sensor frame, metres; `None`
+/// Where these rays start, by [`BeamPattern::starts_m`], in the sensor frame, metres; `None`
 /// where all rays start at the sensor itself.
 #[inline(always)]
-pub(crate) fn starts<const N: usize>(start_z_m: &[f64], beams: [u32; N]) -> Option<[DVec3; N]> {
-    let start = |lane: usize| DVec3::new(0.0, 0.0, start_z_m[beams[lane] as usize]);
-    (!start_z_m.is_empty()).then(|| each(start))
+pub(crate) fn starts<const N: usize>(starts_m: &[DVec3], beams: [u32; N]) -> Option<[DVec3; N]> {
+    (!starts_m.is_empty()).then(|| each(|lane: usize| starts_m[beams[lane] as usize]))
 }

@@ -75,11 +75,15 @@ impl TryFrom<Profile> for Sensor {
         }
         let layout = layout(profile.rotating, profile.uniform, profile.grid)?;
         if let (Layout::Rotating(rotating), Some(_)) = (&layout, &profile.rings)
-            && rotating.beam_crossing_m.is_some()
+            && (rotating.beam_crossing_m.is_some() || rotating.beam_start_m.is_some())
         {
             // Rings are cones around one point, which such beams lack.
             let cause = "cannot stand beside [rings]";
-            return Err(InvalidValue::new("rotating.beam_crossing_m", cause));
+            let key = match rotating.beam_crossing_m {
+                Some(_) => "rotating.beam_crossing_m",
+                None => "rotating.beam_start_m",
+            };
+            return Err(InvalidValue::new(key, cause));
         }
         Ok(Self {
             name: profile.name,

@@ -32,6 +32,10 @@ pub struct Rotating {
     /// where this is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam_crossing_m: Option<f64>,
+    /// Beams start this far from the axis, metres, in the direction that the encoder reads, and
+    /// ranges count from there: Ouster's sensors. Excludes `beam_crossing_m`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam_start_m: Option<f64>,
     /// The beams, in any order; those that fire at one time keep theirs.
     pub beam: Vec<Beam>,
 }
@@ -81,6 +85,11 @@ impl Rotating {
             return Err(InvalidValue::new("rotating.sequence_quantum_deg", cause));
         }
         within("rotating.beam_crossing_m", self.beam_crossing_m, 0.0..=1.0)?;
+        within("rotating.beam_start_m", self.beam_start_m, 0.0..=1.0)?;
+        if self.beam_crossing_m.and(self.beam_start_m).is_some() {
+            let cause = "cannot stand beside rotating.beam_crossing_m";
+            return Err(InvalidValue::new("rotating.beam_start_m", cause));
+        }
         if !(1..=usize::from(u16::MAX)).contains(&self.beam.len()) {
             let cause = format!("expected 1 to {} beams, found {}", u16::MAX, self.beam.len());
             return Err(InvalidValue::new("rotating.beam", cause));
@@ -132,7 +141,12 @@ impl Rotating {
                 let encoder_rad = self.encoder_rad(start_us * 1e-6, time_s);
                 rays.push(direction(laser, encoder_rad), rings[beam], time_s);
                 if let Some(crossing_m) = self.beam_crossing_m {
-                    rays.start_z_m.push(-crossing_m * laser.elevation_deg.to_radians().tan());
+                    let below_m = crossing_m * laser.elevation_deg.to_radians().tan();
+                    rays.starts_m.push(DVec3::new(0.0, 0.0, -below_m));
+                }
+                if let Some(start_m) = self.beam_start_m {
+                    let (sine, cosine) = encoder_rad.sin_cos();
+                    rays.starts_m.push(DVec3::new(cosine, -sine, 0.0) * start_m);
                 }
             }
         }

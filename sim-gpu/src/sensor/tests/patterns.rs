@@ -233,3 +233,17 @@ fn neighbours_in_the_order_point_alike() {
         assert!(mean_deg < patch_deg, "{name}: {mean_deg} of {patch_deg} degrees");
     }
 }
+
+#[test]
+fn beams_that_start_beside_the_axis_start_where_the_encoder_points() {
+    let text = TINY.replace("rpm = 60", "rpm = 60\nbeam_start_m = 0.0158");
+    let (beside, ideal) = (parse(&text).unwrap().pattern(), parse(TINY).unwrap().pattern());
+    assert_eq!(beside.directions, ideal.directions);
+    assert!((beside.farthest_start_m() - 0.0158).abs() < 1e-15);
+    for (ray, time_s) in (0..).zip(&ideal.time_s) {
+        // One turn a second, clockwise.
+        let (sine, cosine) = (std::f64::consts::TAU * time_s).sin_cos();
+        let expected = DVec3::new(cosine, -sine, 0.0) * 0.0158;
+        assert!(beside.start(ray).unwrap().distance(expected) < 1e-12, "{ray}");
+    }
+}

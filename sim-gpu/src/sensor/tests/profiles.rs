@@ -84,6 +84,13 @@ fn bad_profiles_are_named() {
         ),
         (TINY, "rpm = 60", "rpm = 60\nbeam_crossing_m = -0.1", "rotating.beam_crossing_m"),
         (TINY, "rpm = 60", "rpm = 60\nbeam_crossing_m = nan", "rotating.beam_crossing_m"),
+        (TINY, "rpm = 60", "rpm = 60\nbeam_start_m = 2", "rotating.beam_start_m"),
+        (
+            TINY,
+            "rpm = 60",
+            "rpm = 60\nbeam_start_m = 0.01\nbeam_crossing_m = 0.01",
+            "rotating.beam_start_m: cannot stand beside rotating.beam_crossing_m",
+        ),
         (
             crossing.as_str(),
             "elevation_deg = -5",
