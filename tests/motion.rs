@@ -11,7 +11,7 @@ use sim_gpu::effects::{Effects, Weather};
 use sim_gpu::job::Culling;
 use sim_gpu::pose::{Pose, Trajectory};
 use sim_gpu::scan::{PlacedTarget, ScanRequest, scan_objects};
-use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::sensor::{BeamPattern, Layout, Sensor};
 use sim_gpu::target::Target;
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -131,6 +131,26 @@ fn culling_loses_nothing_of_what_moves() {
     };
     assert!(with(Culling::On).len() > 30);
     assert_eq!(with(Culling::On), with(Culling::Off));
+}
+
+#[test]
+fn culling_loses_nothing_of_beams_that_start_beside_the_axis_at_rest_and_in_motion() {
+    let mut sensor = sensor();
+    let Layout::Rotating(head) = &mut sensor.layout else { panic!("a VLP-32C rotates") };
+    head.beam_start_m = Some(0.3);
+    let pattern = sensor.pattern();
+    let near =
+        casting::target(&meshes::mapped(&meshes::icosphere(3), |p| p * 0.8 + DVec3::X * 3.5));
+    for motion in [None, swerving()] {
+        let [culled, all] = [Culling::On, Culling::Off].map(|culling| {
+            let mut request = request(&sensor, &pattern);
+            (request.motion, request.culling) = (motion.clone(), culling);
+            let cpu = Caster::Cpu(Effects::default());
+            scan_objects(&cpu, &[PlacedTarget::new(&near)], &request).unwrap().scan
+        });
+        assert!(culled.len() > 5, "{}", culled.len());
+        assert_eq!(culled, all);
+    }
 }
 
 #[test]
