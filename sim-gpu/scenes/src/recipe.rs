@@ -69,6 +69,10 @@ pub struct Mount {
     /// How far it is from the middle of the road, metres; either side.
     #[serde(default)]
     pub off_road_m: Span,
+    /// How fast it goes along the road while it scans, metres a second; it stands still by
+    /// default. Points are then where a driver puts them that takes it to stand still.
+    #[serde(default)]
+    pub speed_m_s: Span,
 }
 
 /// A sensor and its errors.
@@ -290,6 +294,7 @@ impl Recipe {
         mount.height_m.check("mount.height_m", -10.0, 100.0)?;
         mount.tilt_deg.check("mount.tilt_deg", 0.0, 45.0)?;
         mount.off_road_m.check("mount.off_road_m", 0.0, MOST_M)?;
+        mount.speed_m_s.check("mount.speed_m_s", 0.0, 100.0)?;
         self.glass_returned.check("glass_returned", 0.0, 1.0)?;
         let clearance_m = self.ground_clearance_m.unwrap_or_default();
         clearance_m.check("ground_clearance_m", 0.0, 1.0)?;

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3};
-use sim_gpu::pose::Pose;
+use sim_gpu::pose::{Pose, Trajectory};
 
 use crate::ground::Ground;
 use crate::place::Placing;
@@ -23,6 +23,8 @@ pub struct Scene {
     /// Where the sensor is; the origin is on the ground below it, and the road
     /// runs along x.
     pub pose: Pose,
+    /// How it goes while it scans, metres a second; 0 if it stands still.
+    pub velocity_m_s: DVec3,
     /// The part of the beams that return from glass.
     pub glass_returned: f64,
     /// How low the robot's segmentation takes points for ground, metres; `None`
@@ -71,13 +73,39 @@ impl Scene {
         let glass_returned = recipe.glass_returned.at(s.uniform(0.0, 1.0));
         let share = s.uniform(0.0, 1.0);
         let ground_clearance_m = recipe.ground_clearance_m.map(|span| span.at(share));
+        // By a key of its own, so that the scene is the one that a sensor at rest sees.
+        let speed_m_s = recipe.mount.speed_m_s.at(stream("speed").unit(0));
+        let velocity_m_s = ground.along(speed_m_s);
         let mut placing = Placing::new(&ground, s);
         for (entry, objects) in recipe.object.iter().enumerate() {
             let size = |variant| stage.prop(entry, variant).size_m;
             placing.place(entry, objects, stage.variants(entry), size);
         }
         let objects = placing.objects;
-        Self { number, objects, sensor, pose, glass_returned, ground_clearance_m, ground }
+        Self {
+            number,
+            objects,
+            sensor,
+            pose,
+            velocity_m_s,
+            glass_returned,
+            ground_clearance_m,
+            ground,
+        }
+    }
+
+    /// The sensor's poses while it scans; `None` if it stands still.
+    pub(crate) fn motion(&self) -> Option<Trajectory> {
+        if self.velocity_m_s == DVec3::ZERO {
+            return None;
+        }
+        let after_s = |time_s| {
+            let position_m = self.pose.position_m + self.velocity_m_s * time_s;
+            (time_s, Pose { position_m, ..self.pose })
+        };
+        // Longer than any revolution takes.
+        let poses = vec![after_s(0.0), after_s(60.0)];
+        Some(Trajectory::new(poses).expect("invariant: a recipe's speeds are finite"))
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use edgepuck_shapes::objects::{Object, ObjectKind, object, stand};
 use formats::Scan;
@@ -229,6 +229,7 @@ impl Stage {
         ]
         .into();
         request.culling = self.culling;
+        request.motion = scene.motion().map(Arc::new);
         request.stream = stream(u32::MAX);
         let scan = scan_objects(caster, targets, &request)?.scan;
         Ok(Sweep::of(scan, scene))

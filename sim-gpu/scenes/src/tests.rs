@@ -74,14 +74,19 @@ fn a_scene_is_a_function_of_recipe_seed_and_number() {
 
 #[test]
 fn every_point_lies_on_the_surface_that_it_is_said_to_lie_on() {
-    let stage = stage(RECIPE);
-    for number in 0..4 {
+    let moving = RECIPE.replace("off_road_m = [0, 3]", "off_road_m = [0, 3]\nspeed_m_s = [20, 20]");
+    for (stage, number) in [(stage(RECIPE), 0), (stage(RECIPE), 1), (stage(&moving), 1)] {
         let scene = Scene::draw(&stage, number);
         let sweep = stage.sweep(&scene).unwrap();
         assert!(sweep.points().len() > 5_000, "{}", sweep.points().len());
-        for (point, &surface) in sweep.points().iter().zip(sweep.surfaces()) {
+        let times_s = sweep.scan.time_s.as_ref().unwrap();
+        for ((point, &surface), &time_s) in
+            sweep.points().iter().zip(sweep.surfaces()).zip(times_s)
+        {
             let in_sensor = DVec3::from_array(point.map(f64::from));
-            let point = scene.pose.position_m + scene.pose.world_from_sensor * in_sensor;
+            // Where the sensor was when the beam fired.
+            let position_m = scene.pose.position_m + scene.velocity_m_s * f64::from(time_s);
+            let point = position_m + scene.pose.world_from_sensor * in_sensor;
             let Some(i) = (surface as usize).checked_sub(1) else {
                 // Roughness is 1 cm, uniform, so at most 1.8 cm; a kerb's face is
                 // as high as the kerb.

@@ -11,6 +11,7 @@ pub mod plan;
 mod positions;
 mod rows;
 mod sets;
+mod street;
 mod summary;
 #[cfg(test)]
 mod tests;
@@ -44,7 +45,17 @@ pub struct Args {
     #[arg(long, value_name = "TOML")]
     plan: Option<PathBuf>,
 
-    /// Folder for ablations.csv and all intermediate files; an interrupted run is resumed
+    /// Compare street scenes with one effect more each, and the networks that learn from them,
+    /// on simulated and on real objects; see assets/ablations/street.toml
+    #[arg(long, conflicts_with = "meshes")]
+    street: bool,
+
+    /// Labelled clusters of real scans that the networks of --street are tested on, in NPZ files
+    /// as `eval --data` takes them; repeat the flag
+    #[arg(long, value_name = "NPZ", requires = "street")]
+    real: Vec<PathBuf>,
+
+    /// Folder for ablations.csv (street/street.csv) and all intermediate files; an interrupted run is resumed
     #[arg(long, value_name = "DIR", default_value = "data/ablations")]
     out: PathBuf,
 }
@@ -56,6 +67,10 @@ const SHAPES: [u32; 2] = [40, 10];
 /// Makes, trains, tests and compares what is not there yet; writes
 /// `ablations.csv` and `tables.txt`, and prints the latter.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    if args.street {
+        let plan = plans::read(args.plan.as_deref(), args.quick)?;
+        return street::run(&plan, &args.real, &args.out.join("street"));
+    }
     need_folder_of_meshes(args.meshes.as_deref())?;
     let plan: Plan = plans::read(args.plan.as_deref(), args.quick)?;
     let work = args.out.join("work");
