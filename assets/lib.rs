@@ -1,7 +1,7 @@
 //! The files of Edgepuck that its programs embed.
 
 /// The built-in sensor profiles: a sensor's name and its TOML.
-pub const SENSORS: [(&str, &str); 8] = [
+pub const SENSORS: [(&str, &str); 21] = [
     ("vlp32c", include_str!("sensors/vlp32c.toml")),
     ("blainder-ultrapuck", include_str!("sensors/blainder-ultrapuck.toml")),
     ("generic-static", include_str!("sensors/generic-static.toml")),
@@ -10,6 +10,19 @@ pub const SENSORS: [(&str, &str); 8] = [
     ("hdl64e", include_str!("sensors/hdl64e.toml")),
     ("modelnet40c-lidar", include_str!("sensors/modelnet40c-lidar.toml")),
     ("hdl32e", include_str!("sensors/hdl32e.toml")),
+    ("vls128", include_str!("sensors/vls128.toml")),
+    ("os0-128", include_str!("sensors/os0-128.toml")),
+    ("os1-128", include_str!("sensors/os1-128.toml")),
+    ("os2-128", include_str!("sensors/os2-128.toml")),
+    ("xt32", include_str!("sensors/xt32.toml")),
+    ("pandar64", include_str!("sensors/pandar64.toml")),
+    ("qt64", include_str!("sensors/qt64.toml")),
+    ("rs-lidar-32", include_str!("sensors/rs-lidar-32.toml")),
+    ("helios-5515", include_str!("sensors/helios-5515.toml")),
+    ("avia", include_str!("sensors/avia.toml")),
+    ("mid70", include_str!("sensors/mid70.toml")),
+    ("ld19", include_str!("sensors/ld19.toml")),
+    ("rplidar-a1", include_str!("sensors/rplidar-a1.toml")),
 ];
 
 /// Diffuse reflectivities of materials, by name, as TOML.

@@ -50,6 +50,9 @@ pub fn revolution(sensor: &Sensor) -> Result<Revolution, InvalidValue> {
     if sensor.decimation.get() != 1 {
         return Err(no_packets("decimation", "leaves out firing sequences"));
     }
+    if sensor.revolutions.get() != 1 {
+        return Err(no_packets("revolutions", "is not 1"));
+    }
     if sensor.rings.is_some() {
         return Err(no_packets("rings", "moves points off their beams"));
     }

@@ -220,7 +220,7 @@ impl Settings {
     fn sets(&self) -> anyhow::Result<Vec<SetConfig>> {
         match &self.sensor {
             Some(name) => {
-                let sensor = Sensor::resolve(name)?;
+                let sensor = Sensor::resolve(name)?.trimmed();
                 let set = match sensor.layout {
                     BeamLayout::Rotating(_) | BeamLayout::Uniform(_) => "rotational",
                     BeamLayout::Grid(_) => "static",

@@ -111,6 +111,30 @@ impl Metadata {
         self.columns_per_frame - sent
     }
 
+    /// Columns of a turn.
+    #[must_use]
+    pub fn columns_per_frame(&self) -> u16 {
+        self.columns_per_frame
+    }
+
+    /// Turns a second.
+    #[must_use]
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Altitude, and azimuth clockwise from where the encoder points, of each row, degrees.
+    #[must_use]
+    pub fn beams_deg(&self) -> &[[f64; 2]] {
+        &self.beams_deg
+    }
+
+    /// x and z of where beams begin while the encoder is at 0, metres, in the lidar frame.
+    #[must_use]
+    pub fn origin_m(&self) -> [f64; 2] {
+        self.origin_m
+    }
+
     /// How the lidar is turned in the sensor's frame, radians counterclockwise.
     #[must_use]
     pub fn yaw_rad(&self) -> f64 {

@@ -1,6 +1,7 @@
 //! A scene as TOML holds it, and its checks.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -50,7 +51,7 @@ pub(super) struct ObjectTable {
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
     /// Poses over time, of the frame in which the pose above is.
-    trajectory: Option<PathBuf>,
+    trajectory: Option<TrajectoryTable>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
     #[serde(default)]
@@ -74,7 +75,8 @@ pub(super) struct SensorTable {
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
     /// Poses over time, in place of the keys above.
-    trajectory: Option<PathBuf>,
+    trajectory: Option<TrajectoryTable>,
+    revolutions: Option<NonZeroU32>,
     #[serde(default)]
     start_s: f64,
     #[serde(default)]
@@ -85,14 +87,60 @@ pub(super) struct SensorTable {
 /// times a second.
 const PERIOD_S: f64 = 0.1;
 
-/// Reads the trajectory that `key` names.
+/// Poses over time.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a file's name or a list of poses as trajectory")]
+enum TrajectoryTable {
+    File(PathBuf),
+    Poses(Vec<TimedPose>),
+}
+
+/// A pose at a time.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TimedPose {
+    time_s: f64,
+    position_m: [f64; 3],
+    look_at_m: Option<[f64; 3]>,
+    yaw_deg: Option<f64>,
+    pitch_deg: Option<f64>,
+    roll_deg: Option<f64>,
+    quaternion_xyzw: Option<[f64; 4]>,
+}
+
+/// The trajectory that stands at `key`, if there is one.
 fn trajectory(
     key: String,
     folder: &Path,
-    file: Option<PathBuf>,
+    table: Option<TrajectoryTable>,
 ) -> Result<Option<Arc<Trajectory>>, InvalidValue> {
-    let load = |file: PathBuf| Trajectory::load(&folder.join(file), PERIOD_S).map(Arc::new);
-    file.map(load).transpose().map_err(|error| InvalidValue::new(key, error.to_string()))
+    let found = match table {
+        None => return Ok(None),
+        Some(TrajectoryTable::File(file)) => Trajectory::load(&folder.join(file), PERIOD_S)
+            .map_err(|error| InvalidValue::new(key, error.to_string()))?,
+        Some(TrajectoryTable::Poses(poses)) => {
+            let timed = |(i, pose): (usize, TimedPose)| {
+                Ok((pose.time_s, pose.keys().pose(&format!("{key}[{i}]"))?))
+            };
+            let poses: Result<_, InvalidValue> = poses.into_iter().enumerate().map(timed).collect();
+            Trajectory::new(poses?)
+                .map_err(|invalid| InvalidValue::new(key, invalid.to_string()))?
+        }
+    };
+    Ok(Some(Arc::new(found)))
+}
+
+impl TimedPose {
+    fn keys(&self) -> PoseKeys {
+        PoseKeys {
+            position_m: self.position_m,
+            look_at_m: self.look_at_m,
+            yaw_deg: self.yaw_deg,
+            pitch_deg: self.pitch_deg,
+            roll_deg: self.roll_deg,
+            quaternion_xyzw: self.quaternion_xyzw,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -178,6 +226,12 @@ impl SensorTable {
         let table = format!("sensor[{index}]");
         let key = |field: &str| format!("{table}.{field}");
         let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
+        let sensor = match self.revolutions {
+            None => sensor,
+            Some(revolutions) => sensor
+                .with_revolutions(revolutions)
+                .map_err(|invalid| InvalidValue::new(key("revolutions"), invalid.cause))?,
+        };
         let motion = trajectory(key("trajectory"), folder, self.trajectory)?;
         let (start_s, deskew) = (self.start_s, self.deskew);
         // Times of Unix are in the thousands of millions.

@@ -18,9 +18,11 @@ pub use footprint::BeamShape;
 pub use grid::Grid;
 pub(crate) use pattern::starts;
 pub use pattern::{BeamPattern, Directions};
+pub use risley::{Line, Prism, Risley};
 pub use rings::{Rings, polar_angle_rad};
 pub use rotating::{Beam, Rotating};
 pub use sample::Sample;
+pub use table::Table;
 pub use uniform::Uniform;
 pub use views::Views;
 
@@ -29,11 +31,14 @@ mod cone;
 mod footprint;
 mod grid;
 mod pattern;
+mod ouster;
 mod profile;
 mod rings;
+mod risley;
 mod rotating;
 mod sample;
 mod step;
+mod table;
 mod uniform;
 mod views;
 
@@ -78,6 +83,9 @@ pub struct Sensor {
     pub layout: Layout,
     /// Only each so-manyth azimuth step or pixel column is kept; 1 keeps all.
     pub decimation: NonZeroU32,
+    /// Revolutions that one scan holds, or frames of a sensor that does not turn; 1 by default.
+    #[serde(skip_serializing_if = "is_one")]
+    pub revolutions: NonZeroU32,
     /// Points are snapped to rings after the scan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rings: Option<Rings>,
@@ -87,6 +95,10 @@ pub struct Sensor {
     /// The views this sensor is meant to be used with.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub views: Option<Views>,
+}
+
+fn is_one(number: &NonZeroU32) -> bool {
+    *number == NonZeroU32::MIN
 }
 
 /// The ranges that a sensor measures.
@@ -122,6 +134,10 @@ pub enum Layout {
     Uniform(Uniform),
     /// The pixels of a camera.
     Grid(Grid),
+    /// Lines of lasers behind turning prisms.
+    Risley(Risley),
+    /// A table of directions.
+    Table(Table),
 }
 
 impl Sensor {
@@ -133,13 +149,18 @@ impl Sensor {
         Some(sensor.expect("invariant: a test parses all built-in profiles"))
     }
 
-    /// Reads a profile.
+    /// Reads a profile; or, where `file` ends with `.json`, the metadata that an Ouster tells of
+    /// itself.
     ///
     /// # Errors
     ///
     /// Names the file, the key and the cause.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        let profile: profile::Profile = config::read(file)?;
+        if file.extension().is_some_and(|extension| extension == "json") {
+            return ouster::load(file);
+        }
+        let mut profile: profile::Profile = config::read(file)?;
+        profile.load_table(file.parent().unwrap_or(Path::new("")))?;
         Self::try_from(profile).map_err(|invalid| invalid.in_file(file))
     }
 
@@ -163,7 +184,8 @@ impl Sensor {
             return Ok(sensor);
         }
         let file = folder.join(name_or_path);
-        let meant_as_path = name_or_path.contains(['/', '\\']) || name_or_path.ends_with(".toml");
+        let meant_as_path = name_or_path.contains(['/', '\\'])
+            || [".toml", ".json"].iter().any(|extension| name_or_path.ends_with(extension));
         if meant_as_path || file.exists() {
             return Self::load(&file);
         }
@@ -174,13 +196,52 @@ impl Sensor {
     /// The beams of one revolution or image.
     #[must_use]
     pub fn pattern(&self) -> BeamPattern {
-        let keep_each = self.decimation.get();
+        let (keep_each, revolutions) = (self.decimation.get(), self.revolutions.get());
         let rays = match &self.layout {
-            Layout::Rotating(rotating) => rotating.rays(keep_each),
+            Layout::Rotating(rotating) => rotating.rays(keep_each, revolutions),
             Layout::Uniform(uniform) => uniform.rays(keep_each),
             Layout::Grid(grid) => grid.rays(keep_each),
+            Layout::Risley(risley) => risley.rays(keep_each, revolutions),
+            Layout::Table(table) => table.rays(keep_each, revolutions),
         };
         rays.into_pattern()
+    }
+
+    /// The same sensor with so many revolutions, or frames, in one scan.
+    ///
+    /// # Errors
+    /// A sensor that makes the same scan again each time; too many rays.
+    pub fn with_revolutions(self, revolutions: NonZeroU32) -> Result<Self, InvalidValue> {
+        let repeated = Self { revolutions, ..self };
+        repeated.check_revolutions()?;
+        Ok(repeated)
+    }
+
+    fn check_revolutions(&self) -> Result<(), InvalidValue> {
+        let revolutions = self.revolutions.get();
+        if revolutions == 1 {
+            return Ok(());
+        }
+        let rays_of_one = match &self.layout {
+            Layout::Uniform(_) | Layout::Grid(_) => {
+                let cause = "expected 1, as all scans of [uniform] and [grid] are alike";
+                return Err(InvalidValue::new("revolutions", cause));
+            }
+            Layout::Rotating(rotating) => rotating.rays_per_revolution() + 1,
+            Layout::Risley(risley) => risley.rays_per_scan(),
+            Layout::Table(table) => table.rays_per_scan(),
+        };
+        checked_ray_count("revolutions", rays_of_one.saturating_mul(revolutions.into()))
+    }
+
+    /// The same sensor without what its scans do not need: the rows of a table after the last
+    /// that is fired.
+    #[must_use]
+    pub fn trimmed(mut self) -> Self {
+        if let Layout::Table(table) = &mut self.layout {
+            table.trim(self.revolutions.get());
+        }
+        self
     }
 
     /// The same sensor with only each `k`-th azimuth step, or column of
@@ -203,7 +264,7 @@ impl Sensor {
     pub fn default_views(&self) -> Views {
         self.views.clone().unwrap_or(match self.layout {
             Layout::Grid(_) => Views::STATIC,
-            Layout::Rotating(_) | Layout::Uniform(_) => Views::ROTATING,
+            _ => Views::ROTATING,
         })
     }
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    BeamShape, Grid, Layout, RangeLimits, Rings, Rotating, Sample, Sensor, TypicalNoise, Uniform,
-    Views,
+    BeamShape, Grid, Layout, RangeLimits, Rings, Risley, Rotating, Sample, Sensor, Table,
+    TypicalNoise, Uniform, Views,
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
 use crate::effects::DetectionLimit;
@@ -31,15 +31,26 @@ pub(super) struct Profile {
     rotating: Option<Rotating>,
     uniform: Option<Uniform>,
     grid: Option<Grid>,
-    #[serde(default = "keep_all")]
+    risley: Option<Risley>,
+    table: Option<Table>,
+    #[serde(default = "one")]
     decimation: NonZeroU32,
+    #[serde(default = "one")]
+    revolutions: NonZeroU32,
     rings: Option<Rings>,
     sample: Option<Sample>,
     views: Option<Views>,
 }
 
-fn keep_all() -> NonZeroU32 {
+fn one() -> NonZeroU32 {
     NonZeroU32::MIN
+}
+
+impl Profile {
+    /// Reads the table of directions that it names, relative to `folder`.
+    pub(super) fn load_table(&mut self, folder: &Path) -> Result<(), ConfigError> {
+        self.table.as_mut().map_or(Ok(()), |table| table.load(folder))
+    }
 }
 
 /// Parses a profile that stands in `file`.
@@ -73,7 +84,14 @@ impl TryFrom<Profile> for Sensor {
         if let Some(views) = &profile.views {
             views.validate()?;
         }
-        let layout = layout(profile.rotating, profile.uniform, profile.grid)?;
+        let layouts = [
+            profile.rotating.map(Layout::Rotating),
+            profile.uniform.map(Layout::Uniform),
+            profile.grid.map(Layout::Grid),
+            profile.risley.map(Layout::Risley),
+            profile.table.map(Layout::Table),
+        ];
+        let layout = only_layout(layouts)?;
         if let (Layout::Rotating(rotating), Some(_)) = (&layout, &profile.rings)
             && (rotating.beam_crossing_m.is_some() || rotating.beam_start_m.is_some())
         {
@@ -85,7 +103,7 @@ impl TryFrom<Profile> for Sensor {
             };
             return Err(InvalidValue::new(key, cause));
         }
-        Ok(Self {
+        let sensor = Self {
             name: profile.name,
             description: profile.description,
             sources: profile.sources,
@@ -95,35 +113,32 @@ impl TryFrom<Profile> for Sensor {
             footprint: profile.footprint,
             layout,
             decimation: profile.decimation,
+            revolutions: profile.revolutions,
             rings: profile.rings,
             sample: profile.sample,
             views: profile.views,
-        })
+        };
+        sensor.check_revolutions()?;
+        Ok(sensor)
     }
 }
 
-fn layout(
-    rotating: Option<Rotating>,
-    uniform: Option<Uniform>,
-    grid: Option<Grid>,
-) -> Result<Layout, InvalidValue> {
-    let layout = match (rotating, uniform, grid) {
-        (Some(rotating), None, None) => Layout::Rotating(rotating),
-        (None, Some(uniform), None) => Layout::Uniform(uniform),
-        (None, None, Some(grid)) => Layout::Grid(grid),
-        (None, None, None) => {
-            let cause = "expected one of [rotating], [uniform] and [grid], found none";
-            return Err(InvalidValue::new("rotating", cause));
-        }
-        _ => {
-            let cause = "expected one of [rotating], [uniform] and [grid], found several";
-            return Err(InvalidValue::new("rotating, uniform, grid", cause));
-        }
+/// The one layout that is there, checked.
+fn only_layout(layouts: [Option<Layout>; 5]) -> Result<Layout, InvalidValue> {
+    let mut found = layouts.into_iter().flatten();
+    let expected = "expected one of [rotating], [uniform], [grid], [risley] and [table]";
+    let Some(layout) = found.next() else {
+        return Err(InvalidValue::new("rotating", format!("{expected}, found none")));
     };
+    if found.next().is_some() {
+        return Err(InvalidValue::new("rotating", format!("{expected}, found several")));
+    }
     match &layout {
         Layout::Rotating(rotating) => rotating.validate()?,
         Layout::Uniform(uniform) => uniform.validate()?,
         Layout::Grid(grid) => grid.validate()?,
+        Layout::Risley(risley) => risley.validate()?,
+        Layout::Table(table) => table.validate()?,
     }
     Ok(layout)
 }

@@ -57,8 +57,14 @@ impl Rotating {
     /// that the last sequence may be cut short.
     #[must_use]
     pub fn rays_per_revolution(&self) -> u64 {
+        self.rays_in(1)
+    }
+
+    /// Rays in so many revolutions of a head that keeps turning.
+    fn rays_in(&self, revolutions: u32) -> u64 {
+        let turns = f64::from(revolutions);
         // A float converts to an integer by saturation.
-        (self.beam.len() as f64 * 60e6 / (self.rpm * self.sequence_us)) as u64
+        (turns * self.beam.len() as f64 * 60e6 / (self.rpm * self.sequence_us)) as u64
     }
 
     /// Seconds of one revolution.
@@ -109,10 +115,10 @@ impl Rotating {
         checked_ray_count("rotating", self.rays_per_revolution())
     }
 
-    /// The rays of one revolution, of which only each `keep_each`-th firing
+    /// The rays of so many revolutions, of which only each `keep_each`-th firing
     /// sequence is kept.
-    pub(super) fn rays(&self, keep_each: u32) -> Rays {
-        let n_rays = self.rays_per_revolution();
+    pub(super) fn rays(&self, keep_each: u32, revolutions: u32) -> Rays {
+        let n_rays = self.rays_in(revolutions);
         // Checked: no pattern has more than 2^26 rays.
         let sequences = 0..n_rays.div_ceil(self.beam.len() as u64) as u32;
         self.rays_of(sequences.step_by(keep_each as usize), n_rays)

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Layout, Sensor};
+use super::{BeamPattern, Layout, Sensor};
 
 /// Beams closer together than this are one beam that fires twice.
 const SAME_BEAM_RAD: f64 = 1e-9;
@@ -10,6 +10,8 @@ const SAME_BEAM_RAD: f64 = 1e-9;
 impl Sensor {
     /// The least angle between neighbouring beams in radians, along a row or
     /// along a column, whichever is less; `None` for a single beam.
+    ///
+    /// Of rosettes and tables it is the median angle from each shot of a line to its next.
     ///
     /// Azimuths count as angles of the table, however high the beam: towards
     /// the zenith real rays stand closer together.
@@ -36,6 +38,7 @@ impl Sensor {
                 );
                 [azimuth.map(|step| keep_each * step), elevation]
             }
+            Layout::Risley(_) | Layout::Table(_) => [shot_to_shot(&self.pattern()), None],
             Layout::Grid(grid) => {
                 let (left, up) = grid.tangents();
                 let kept = left.into_iter().step_by(self.decimation.get() as usize);
@@ -47,6 +50,15 @@ impl Sensor {
         };
         steps.into_iter().flatten().filter(|&step| step > SAME_BEAM_RAD).reduce(f64::min)
     }
+}
+
+/// The median angle from each shot of a line to its next, radians.
+fn shot_to_shot(pattern: &BeamPattern) -> Option<f64> {
+    let lines = usize::from(pattern.ring.iter().max()?.saturating_add(1));
+    let pairs = pattern.directions.iter().zip(pattern.directions.iter().skip(lines));
+    let mut angles: Vec<f64> = pairs.map(|(a, b)| 2.0 * ((*a - *b).length() / 2.0).asin()).collect();
+    angles.sort_unstable_by(f64::total_cmp);
+    angles.get(angles.len() / 2).copied()
 }
 
 /// The least difference of two of `angles` that are not the same.

@@ -30,6 +30,19 @@ fn every_sensor_has_its_number_of_rays() {
         ("vlp16", 28_935),              // floor(16 x 0.1 s / 55.296 us)
         ("hdl64e", 133_333),            // floor(64 x 0.1 s / 48 us)
         ("modelnet40c-lidar", 777_600), // 1080 x 720
+        ("vls128", 240_150),            // floor(128 x 0.1 s / 53.3 us)
+        ("os0-128", 131_072),           // 128 x 1024
+        ("os1-128", 131_072),
+        ("os2-128", 131_072),
+        ("xt32", 64_000),       // 32 x 2000
+        ("pandar64", 115_200),  // 64 x 1800
+        ("qt64", 38_400),       // 64 x 600
+        ("rs-lidar-32", 57_636), // floor(32 x 0.1 s / 55.52 us)
+        ("helios-5515", 57_600), // 32 x 1800
+        ("avia", 24_000),       // 6 x 40 kHz x 0.1 s
+        ("mid70", 10_000),
+        ("ld19", 450),
+        ("rplidar-a1", 1_454), // floor(8000 / 5.5)
     ] {
         assert_eq!(sensor(name).pattern().len(), n_rays, "{name}");
     }
@@ -52,7 +65,8 @@ fn every_direction_is_of_unit_length_and_every_ray_once_in_the_order() {
 #[test]
 fn rings_are_ranked_from_below() {
     for name in builtin_names() {
-        if let Layout::Grid(_) = sensor(name).layout {
+        // Lines behind prisms are told apart by their place.
+        if let Layout::Grid(_) | Layout::Risley(_) = sensor(name).layout {
             continue;
         }
         let pattern = sensor(name).pattern();
@@ -246,4 +260,105 @@ fn beams_that_start_beside_the_axis_start_where_the_encoder_points() {
         let expected = DVec3::new(cosine, -sine, 0.0) * 0.0158;
         assert!(beside.start(ray).unwrap().distance(expected) < 1e-12, "{ray}");
     }
+}
+
+#[test]
+fn more_revolutions_go_on_where_the_first_ends() {
+    let five = NonZeroU32::new(5).unwrap();
+    for name in ["vlp32c", "os1-128", "avia"] {
+        let (one, all) = (sensor(name), sensor(name).with_revolutions(five).unwrap());
+        let (one, all) = (one.pattern(), all.pattern());
+        assert!(all.len() >= 5 * one.len(), "{name}");
+        assert_eq!(all.directions[..one.len()], one.directions[..], "{name}");
+        assert_eq!(all.time_s[..one.len()], one.time_s[..], "{name}");
+        assert!(all.time_s.is_sorted() && (0.499..0.5).contains(all.time_s.last().unwrap()));
+    }
+    // A head comes around again, and prisms do not.
+    let again = |name: &str| {
+        let all = sensor(name).with_revolutions(five).unwrap().pattern();
+        let one = sensor(name).pattern().len();
+        all.directions[one].distance(all.directions[0])
+    };
+    assert!(again("os1-128") < 1e-9 && again("avia") > 0.1);
+    let too_many = sensor("os1-128").with_revolutions(NonZeroU32::MAX).unwrap_err();
+    assert!(too_many.to_string().contains("revolutions: expected at most 67108864 rays"));
+    let alike = sensor("generic-static").with_revolutions(five).unwrap_err().to_string();
+    assert!(alike.contains("revolutions: expected 1, as all scans of [uniform] and [grid]"));
+}
+
+/// Livox states 70.4 degrees of both; the rosette of an Avia is higher than wide.
+#[test]
+fn rosettes_fill_the_fields_of_view_that_their_maker_states() {
+    let thirty = NonZeroU32::new(30).unwrap();
+    for (name, width_deg, height_deg) in [("avia", 70.4, 77.2), ("mid70", 70.4, 70.4)] {
+        let pattern = sensor(name).with_revolutions(thirty).unwrap().pattern();
+        let spread = |of: fn(&DVec3) -> f64| {
+            let angles = pattern.directions.iter().map(|d| of(d).to_degrees());
+            let ends = angles.fold([90.0f64, -90.0], |[a, b], x| [a.min(x), b.max(x)]);
+            ends[1] - ends[0]
+        };
+        let (wide, high) = (spread(|d| d.y.atan2(d.x)), spread(|d| d.z.asin()));
+        assert!((wide - width_deg).abs() < 0.05 * width_deg, "{name}: {wide} wide");
+        assert!((high - height_deg).abs() < 0.05 * height_deg, "{name}: {high} high");
+    }
+}
+
+const TABLE: &str = r#"
+name = "own"
+range = { max_m = 10 }
+[table]
+pulse_hz = 40
+period_s = 0.1
+lines = 2
+"#;
+
+#[test]
+fn a_table_is_fired_row_by_row_again_and_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let in_folder = |name: &str| folder.path().join(name);
+    // Livox's columns: the first is a row's number, and zenith 90 is the horizon.
+    let csv = "Time/s,Azimuth/deg,Zenith/deg\n1,0,90\n2,90,45\n3,180,90\n4,270,120\n5,30,90\n6,60,90\n";
+    std::fs::write(in_folder("rows.csv"), csv).unwrap();
+    std::fs::write(in_folder("own.toml"), TABLE.to_owned() + "file = \"rows.csv\"\n").unwrap();
+    let own = Sensor::load(&in_folder("own.toml")).unwrap();
+    let pattern = own.pattern();
+    assert_eq!(pattern.ring, [0, 1, 0, 1]);
+    for (ray, (elevation_deg, azimuth_deg)) in
+        [(0.0, 0.0), (45.0, 90.0), (0.0, 180.0), (-30.0, 270.0)].into_iter().enumerate()
+    {
+        assert_near(pattern.directions[ray], at(elevation_deg, azimuth_deg));
+        assert_eq!(pattern.time_s[ray], ray as f64 / 40.0);
+    }
+    let twice = own.clone().with_revolutions(NonZeroU32::new(2).unwrap()).unwrap().pattern();
+    assert_near(twice.directions[4], at(0.0, 30.0));
+    assert_eq!(twice.directions[6], pattern.directions[0]);
+    // What a scan does not need is not kept, and the scan is the same.
+    let trimmed = own.clone().trimmed();
+    assert!(matches!(&trimmed.layout, Layout::Table(table) if table.directions_deg.len() == 4));
+    assert_eq!(trimmed.pattern(), pattern);
+    let json = serde_json::to_string(&trimmed).unwrap();
+    assert_eq!(serde_json::from_str::<Sensor>(&json).unwrap(), trimmed);
+}
+
+#[test]
+fn a_table_that_cannot_be_used_is_named_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let profile = folder.path().join("own.toml");
+    std::fs::write(&profile, TABLE.to_owned() + "file = \"rows.csv\"\n").unwrap();
+    for (rows, expected) in [
+        ("a,b\n1,2\n", "rows.csv: line 1: expected a column azimuth_deg, found none"),
+        ("azimuth_deg,b\n1,2\n", "expected a column elevation_deg, found none"),
+        ("azimuth_deg,elevation_deg\n1,x\n", "rows.csv: line 2: expected a number, found \"x\""),
+        ("azimuth_deg,elevation_deg\n1\n", "rows.csv: line 2"),
+        ("azimuth_deg,elevation_deg\n1,nan\n", "expected a number, found \"nan\""),
+        ("azimuth_deg,elevation_deg\n1,91\n", "own.toml: table.directions_deg[0][1]"),
+        ("azimuth_deg,elevation_deg\n", "own.toml: table.directions_deg: expected a row"),
+    ] {
+        std::fs::write(folder.path().join("rows.csv"), rows).unwrap();
+        let error = Sensor::load(&profile).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    std::fs::remove_file(folder.path().join("rows.csv")).unwrap();
+    let error = Sensor::load(&profile).unwrap_err().to_string();
+    assert!(error.contains("rows.csv: No such file"), "{error}");
 }

@@ -1,0 +1,62 @@
+//! The profile of one Ouster, from the metadata that it tells of itself.
+
+use std::num::NonZeroU32;
+use std::path::Path;
+
+use formats::ouster::Metadata;
+
+use super::{Beam, Layout, RangeLimits, Rotating, Sensor};
+use crate::config::{ConfigError, InvalidValue};
+
+/// The unit of ranges in most of its packets, metres.
+const QUANTUM_M: f64 = 0.001;
+
+/// The farthest range that 19 bits of millimetres hold, metres.
+const FARTHEST_M: f64 = 524.0;
+
+/// Reads the metadata in `file`. The sensor's frame is Ouster's lidar frame.
+pub(super) fn load(file: &Path) -> Result<Sensor, ConfigError> {
+    let metadata = Metadata::read(file).map_err(|error| ConfigError::Syntax {
+        file: file.to_owned(),
+        message: error.to_string(),
+    })?;
+    let [start_m, height_m] = metadata.origin_m();
+    if height_m != 0.0 {
+        let cause = format!("expected beams that begin at height 0, found {height_m} m");
+        return Err(InvalidValue::new("beam_to_lidar_transform", cause).in_file(file));
+    }
+    let rate_hz = metadata.rate_hz();
+    let columns = f64::from(metadata.columns_per_frame());
+    let beam = metadata.beams_deg().iter().map(|&[elevation_deg, azimuth_deg]| Beam {
+        // The head turns clockwise; a beam's azimuth counts clockwise from where it points.
+        azimuth_offset_deg: -azimuth_deg,
+        elevation_deg,
+        firing_us: 0.0,
+    });
+    let rotating = Rotating {
+        rpm: 60.0 * rate_hz,
+        sequence_us: 1e6 / (rate_hz * columns),
+        azimuth_quantum_deg: None,
+        sequence_quantum_deg: None,
+        beam_crossing_m: None,
+        beam_start_m: Some(start_m),
+        beam: beam.collect(),
+    };
+    rotating.validate().map_err(|invalid| invalid.in_file(file))?;
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Sensor {
+        name,
+        description: format!("Ouster of {} beams", metadata.beams_deg().len()),
+        sources: vec![file.display().to_string()],
+        range: RangeLimits { min_m: 0.0, max_m: FARTHEST_M, quantum_m: Some(QUANTUM_M) },
+        noise: None,
+        detection: None,
+        footprint: None,
+        layout: Layout::Rotating(rotating),
+        decimation: NonZeroU32::MIN,
+        revolutions: NonZeroU32::MIN,
+        rings: None,
+        sample: None,
+        views: None,
+    })
+}

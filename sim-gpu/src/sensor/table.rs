@@ -1,0 +1,157 @@
+//! Directions that a user brings in a table, as makers of scanners without a formula give them.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::{MAX_RAYS, MAX_RINGS, Rays, checked_ray_count};
+use crate::config::{ConfigError, InvalidValue, positive, within};
+
+/// Where the beams point, one after the other, again and again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// CSV file with the columns `azimuth_deg` and `elevation_deg`, or with `Azimuth/deg` and
+    /// `Zenith/deg` as Livox has them; other columns are passed over. Relative to the profile.
+    /// A sensor that is loaded has its rows in `directions_deg`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Rows a second.
+    pub pulse_hz: f64,
+    /// What one scan holds, seconds.
+    pub period_s: f64,
+    /// When the first scan begins, seconds since the first row.
+    #[serde(default)]
+    pub start_s: f64,
+    /// How many lines of lasers take turns, row by row; a point's ring is the place of its line.
+    #[serde(default = "one_line")]
+    pub lines: u16,
+    /// Azimuth, counterclockwise from forward, and elevation of each row, in place of a file.
+    #[serde(default)]
+    pub directions_deg: Vec<[f64; 2]>,
+}
+
+fn one_line() -> u16 {
+    1
+}
+
+impl Table {
+    /// Reads the file that it names, relative to `folder`, if it names one.
+    pub(super) fn load(&mut self, folder: &Path) -> Result<(), ConfigError> {
+        if let Some(file) = self.file.take() {
+            if !self.directions_deg.is_empty() {
+                let cause = "cannot stand beside table.directions_deg";
+                return Err(InvalidValue::new("table.file", cause).in_file(&file));
+            }
+            self.directions_deg = read(&folder.join(file))?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn validate(&self) -> Result<(), InvalidValue> {
+        if let Some(file) = &self.file {
+            let cause = format!("expected a profile in a file, to find {} by", file.display());
+            return Err(InvalidValue::new("table.file", cause));
+        }
+        positive("table.pulse_hz", self.pulse_hz)?;
+        positive("table.period_s", self.period_s)?;
+        within("table.start_s", self.start_s, 0.0..=1e9)?;
+        within("table.lines", f64::from(self.lines), 1.0..=MAX_RINGS)?;
+        if self.directions_deg.is_empty() {
+            let cause = "expected a row at least, or table.file, found none";
+            return Err(InvalidValue::new("table.directions_deg", cause));
+        }
+        for (i, [azimuth_deg, elevation_deg]) in self.directions_deg.iter().enumerate() {
+            let key = |column: u8| format!("table.directions_deg[{i}][{column}]");
+            within(&key(0), *azimuth_deg, -360.0..=360.0)?;
+            within(&key(1), *elevation_deg, -90.0..=90.0)?;
+        }
+        checked_ray_count("table", self.rays_per_scan())
+    }
+
+    /// Rays of one scan.
+    pub(super) fn rays_per_scan(&self) -> u64 {
+        self.rows(1)
+    }
+
+    /// Rows of so many scans.
+    fn rows(&self, scans: u32) -> u64 {
+        // A float converts to an integer by saturation.
+        (self.pulse_hz * self.period_s * f64::from(scans)).round() as u64
+    }
+
+    /// The row of the table that is number `row` of the scan.
+    fn place(&self, row: u64) -> usize {
+        let start = (self.start_s * self.pulse_hz).round() as u64;
+        ((start + row) % self.directions_deg.len() as u64) as usize
+    }
+
+    /// Without the rows that so many scans do not need.
+    pub(super) fn trim(&mut self, scans: u32) {
+        let needed = self.rows(scans);
+        let in_turn = u64::from(self.lines);
+        if needed < self.directions_deg.len() as u64 && self.place(0) as u64 % in_turn == 0 {
+            self.directions_deg =
+                (0..needed).map(|row| self.directions_deg[self.place(row)]).collect();
+            self.start_s = 0.0;
+        }
+    }
+
+    pub(super) fn rays(&self, keep_each: u32, scans: u32) -> Rays {
+        let rows = self.rows(scans);
+        let mut rays = Rays::with_capacity(rows.div_ceil(u64::from(keep_each)) as usize);
+        let in_turn = u64::from(self.lines);
+        // All lines of a turn are kept, or none.
+        for row in (0..rows).filter(|row| (row / in_turn).is_multiple_of(keep_each.into())) {
+            let place = self.place(row);
+            let [azimuth_rad, elevation_rad] = self.directions_deg[place].map(f64::to_radians);
+            let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
+            let (sine, cosine) = elevation_rad.sin_cos();
+            let direction = DVec3::new(cosine * cos_azimuth, cosine * sin_azimuth, sine);
+            let line = place % usize::from(self.lines);
+            rays.push(direction, line as u16, row as f64 / self.pulse_hz);
+        }
+        rays
+    }
+}
+
+/// The directions of a CSV file.
+fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
+    let failed = |line: u64, cause: String| {
+        let message = if line > 0 { format!("line {line}: {cause}") } else { cause };
+        ConfigError::Syntax { file: file.to_owned(), message }
+    };
+    let opened = std::fs::File::open(file)
+        .map_err(|source| ConfigError::Read { file: file.to_owned(), source })?;
+    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(opened);
+    let line_of = |error: &csv::Error| error.position().map_or(0, csv::Position::line);
+    let heading = csv.headers().map_err(|error| failed(line_of(&error), error.to_string()))?;
+    let column = |name: &str| {
+        heading.iter().position(|found| found.to_ascii_lowercase().starts_with(name))
+    };
+    let missing = |name: &str| failed(1, format!("expected a column {name}, found none"));
+    let azimuth = column("azimuth").ok_or_else(|| missing("azimuth_deg"))?;
+    let (upright, is_zenith) = match (column("elevation"), column("zenith")) {
+        (Some(column), _) => (column, false),
+        (None, Some(column)) => (column, true),
+        (None, None) => return Err(missing("elevation_deg")),
+    };
+    let mut directions_deg = Vec::new();
+    for record in csv.records() {
+        let record = record.map_err(|error| failed(line_of(&error), error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |column: usize| {
+            let word = &record[column];
+            let found = word.parse::<f64>().ok().filter(|x| x.is_finite());
+            found.ok_or_else(|| failed(line, format!("expected a number, found \"{word}\"")))
+        };
+        let upright_deg = number(upright)?;
+        let elevation_deg = if is_zenith { 90.0 - upright_deg } else { upright_deg };
+        directions_deg.push([number(azimuth)?, elevation_deg]);
+        if directions_deg.len() as u64 > MAX_RAYS {
+            return Err(failed(line, format!("expected at most {MAX_RAYS} rows, found more")));
+        }
+    }
+    Ok(directions_deg)
+}
