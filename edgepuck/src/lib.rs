@@ -19,6 +19,7 @@ pub mod import_weights;
 pub mod merge_dataset;
 pub mod preview;
 pub mod preview_scan;
+pub mod profile;
 pub mod sample_surfaces;
 #[cfg(feature = "models")]
 pub mod sampler_config;

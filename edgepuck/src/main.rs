@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use edgepuck_program::{
     Outcome, adapters, gen_dataset, gen_drive, gen_scenes, gen_shapes, merge_dataset, outcome,
-    preview_scan, sample_surfaces, scan, segment, trainer, weather,
+    preview_scan, profile, sample_surfaces, scan, segment, trainer, weather,
 };
 #[cfg(feature = "models")]
 use edgepuck_program::{advise, detect, export_onnx, import_weights};
@@ -41,6 +41,8 @@ enum Command {
     Detect(detect::Args),
     /// Draw a picture of a scan from the side, from above and from the front
     Preview(preview_scan::Args),
+    /// List the built-in sensors, or check and describe a sensor profile
+    Profile(profile::Args),
     /// List the adapters (GPUs and CPU) that can cast rays
     Adapters,
     /// Merge the shards of a dataset into one dataset
@@ -85,6 +87,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         #[cfg(feature = "models")]
         Command::Detect(args) => detect::run(args),
         Command::Preview(args) => preview_scan::run(args),
+        Command::Profile(args) => profile::run(args),
         Command::Adapters => adapters::run(),
         Command::MergeDataset(args) => merge_dataset::run(args),
         #[cfg(feature = "models")]

@@ -17,6 +17,7 @@ mod meshes;
 mod packets;
 mod reference;
 mod scenes;
+mod sensors;
 #[cfg(feature = "simplify")]
 mod simplified;
 mod surfaces;

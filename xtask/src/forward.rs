@@ -16,7 +16,7 @@ pub const LAB: &str = "edgepuck-lab";
 /// leaves out the feature `models`: infer-cpu, and readers and writers of PyTorch's
 /// and ONNX's files.
 const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes gen-drive gen-shapes sample-surfaces scan \
-     segment preview adapters merge-dataset";
+     segment weather corrupt preview profile adapters merge-dataset";
 
 /// Runs the program of `package` with `words` in the caller's folder and gives
 /// the exit code that it ended with.

@@ -224,6 +224,8 @@ impl Settings {
                 let set = match sensor.layout {
                     BeamLayout::Rotating(_) | BeamLayout::Uniform(_) => "rotational",
                     BeamLayout::Grid(_) => "static",
+                    BeamLayout::Risley(_) => "rosette",
+                    BeamLayout::Table(_) => "table",
                 };
                 Ok(vec![self.set(set, sensor, self.views)?])
             }

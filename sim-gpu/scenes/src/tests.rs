@@ -80,8 +80,7 @@ fn every_point_lies_on_the_surface_that_it_is_said_to_lie_on() {
         let sweep = stage.sweep(&scene).unwrap();
         assert!(sweep.points().len() > 5_000, "{}", sweep.points().len());
         let times_s = sweep.scan.time_s.as_ref().unwrap();
-        for ((point, &surface), &time_s) in
-            sweep.points().iter().zip(sweep.surfaces()).zip(times_s)
+        for ((point, &surface), &time_s) in sweep.points().iter().zip(sweep.surfaces()).zip(times_s)
         {
             let in_sensor = DVec3::from_array(point.map(f64::from));
             // Where the sensor was when the beam fired.

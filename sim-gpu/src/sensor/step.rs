@@ -56,7 +56,8 @@ impl Sensor {
 fn shot_to_shot(pattern: &BeamPattern) -> Option<f64> {
     let lines = usize::from(pattern.ring.iter().max()?.saturating_add(1));
     let pairs = pattern.directions.iter().zip(pattern.directions.iter().skip(lines));
-    let mut angles: Vec<f64> = pairs.map(|(a, b)| 2.0 * ((*a - *b).length() / 2.0).asin()).collect();
+    let mut angles: Vec<f64> =
+        pairs.map(|(a, b)| 2.0 * ((*a - *b).length() / 2.0).asin()).collect();
     angles.sort_unstable_by(f64::total_cmp);
     angles.get(angles.len() / 2).copied()
 }

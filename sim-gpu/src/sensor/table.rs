@@ -127,9 +127,8 @@ fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
     let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(opened);
     let line_of = |error: &csv::Error| error.position().map_or(0, csv::Position::line);
     let heading = csv.headers().map_err(|error| failed(line_of(&error), error.to_string()))?;
-    let column = |name: &str| {
-        heading.iter().position(|found| found.to_ascii_lowercase().starts_with(name))
-    };
+    let column =
+        |name: &str| heading.iter().position(|found| found.to_ascii_lowercase().starts_with(name));
     let missing = |name: &str| failed(1, format!("expected a column {name}, found none"));
     let azimuth = column("azimuth").ok_or_else(|| missing("azimuth_deg"))?;
     let (upright, is_zenith) = match (column("elevation"), column("zenith")) {

@@ -34,12 +34,12 @@ fn every_sensor_has_its_number_of_rays() {
         ("os0-128", 131_072),           // 128 x 1024
         ("os1-128", 131_072),
         ("os2-128", 131_072),
-        ("xt32", 64_000),       // 32 x 2000
-        ("pandar64", 115_200),  // 64 x 1800
-        ("qt64", 38_400),       // 64 x 600
+        ("xt32", 64_000),        // 32 x 2000
+        ("pandar64", 115_200),   // 64 x 1800
+        ("qt64", 38_400),        // 64 x 600
         ("rs-lidar-32", 57_636), // floor(32 x 0.1 s / 55.52 us)
         ("helios-5515", 57_600), // 32 x 1800
-        ("avia", 24_000),       // 6 x 40 kHz x 0.1 s
+        ("avia", 24_000),        // 6 x 40 kHz x 0.1 s
         ("mid70", 10_000),
         ("ld19", 450),
         ("rplidar-a1", 1_454), // floor(8000 / 5.5)
@@ -317,7 +317,8 @@ fn a_table_is_fired_row_by_row_again_and_again() {
     let folder = tempfile::tempdir().unwrap();
     let in_folder = |name: &str| folder.path().join(name);
     // Livox's columns: the first is a row's number, and zenith 90 is the horizon.
-    let csv = "Time/s,Azimuth/deg,Zenith/deg\n1,0,90\n2,90,45\n3,180,90\n4,270,120\n5,30,90\n6,60,90\n";
+    let csv =
+        "Time/s,Azimuth/deg,Zenith/deg\n1,0,90\n2,90,45\n3,180,90\n4,270,120\n5,30,90\n6,60,90\n";
     std::fs::write(in_folder("rows.csv"), csv).unwrap();
     std::fs::write(in_folder("own.toml"), TABLE.to_owned() + "file = \"rows.csv\"\n").unwrap();
     let own = Sensor::load(&in_folder("own.toml")).unwrap();

@@ -147,7 +147,9 @@ fn bad_profiles_are_named() {
     }
     let error = parse("name = \"a\"\nrange = { max_m = 1 }").unwrap_err().to_string();
     assert!(
-        error.contains("expected one of [rotating], [uniform], [grid], [risley] and [table], found none"),
+        error.contains(
+            "expected one of [rotating], [uniform], [grid], [risley] and [table], found none"
+        ),
         "{error}"
     );
     let no_beam = "name = \"a\"\nrange = { max_m = 1 }\n\

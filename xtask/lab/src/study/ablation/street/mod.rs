@@ -104,7 +104,8 @@ impl Study<'_> {
     fn answers_of(&self, row: &Row, seed: u64) -> anyhow::Result<Vec<Answer>> {
         let base = &self.plan.row[0];
         let network = self.network(row, seed)?;
-        let mut answers = self.answers(&network, (row, base), seed, &[self.test_set(base, seed)?])?;
+        let mut answers =
+            self.answers(&network, (row, base), seed, &[self.test_set(base, seed)?])?;
         if row.name != base.name {
             let own = [self.test_set(row, seed)?];
             answers.extend(self.answers(&network, (row, row), seed, &own)?);
@@ -219,9 +220,8 @@ fn costs(plan: &Plan) -> anyhow::Result<Vec<Spread>> {
         let scenes: Vec<Scene> =
             (0..plan.cost_scenes).map(|number| Scene::draw(&stage, number)).collect();
         workloads.push(Box::new(move || {
-            let (scanned, cost) = measured(|| scenes.iter().try_for_each(|scene| {
-                stage.sweep(scene).map(|_| ())
-            }));
+            let (scanned, cost) =
+                measured(|| scenes.iter().try_for_each(|scene| stage.sweep(scene).map(|_| ())));
             scanned?;
             Ok(cost)
         }));

@@ -1,0 +1,156 @@
+//! `edgepuck profile`: lists the built-in sensors, and checks and describes a profile.
+
+use crate::significant_digits::digits;
+use crate::{Outcome, Usage};
+use formats::atomic;
+use glam::DVec3;
+use sim_gpu::glam;
+use sim_gpu::sensor::{BeamPattern, Layout, Sensor, builtin_names};
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Flags of `profile`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Sensor to check and describe: a built-in name, a TOML file, or the metadata (JSON) of an
+    /// Ouster [default: list the built-in sensors]
+    #[arg(value_name = "SENSOR")]
+    sensor: Option<String>,
+
+    /// Write every beam of a scan to this CSV file: time_s, ring, azimuth_deg (counterclockwise
+    /// from forward), elevation_deg, and where it starts: x_m, y_m, z_m
+    #[arg(long, value_name = "FILE", requires = "sensor")]
+    beams: Option<PathBuf>,
+}
+
+/// Lists or describes; says on the error stream what of a valid profile looks odd.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let Some(name) = &args.sensor else {
+        for name in builtin_names() {
+            let sensor = Sensor::builtin(name).expect("invariant: a built-in name");
+            println!("{name:<20} {}", sensor.description);
+        }
+        return Ok(Outcome::Success);
+    };
+    let sensor = Sensor::resolve(name)?;
+    let pattern = sensor.pattern();
+    print!("{}", described(&sensor, &pattern));
+    for oddity in oddities(&sensor, &pattern) {
+        eprintln!("warning: {oddity}");
+    }
+    if let Some(file) = &args.beams {
+        if file.extension().is_none_or(|extension| extension != "csv") {
+            let found = file.display();
+            return Err(Usage(format!("--beams: expected a name with .csv, found {found}")).into());
+        }
+        atomic::write_bytes(file, beams(&pattern))?;
+    }
+    Ok(Outcome::Success)
+}
+
+/// What a scan of the sensor is, a line for each fact.
+fn described(sensor: &Sensor, pattern: &BeamPattern) -> String {
+    let mut text = format!("{}: {}\n", sensor.name, sensor.description);
+    let mut line = |what: &str, says: String| {
+        writeln!(text, "{what:<18} {says}").expect("invariant: a string takes all");
+    };
+    let kind = match &sensor.layout {
+        Layout::Rotating(head) => format!("{} beams on a head that turns", head.beam.len()),
+        Layout::Uniform(_) => "regular angles".to_owned(),
+        Layout::Grid(grid) => format!("{} x {} pixels", grid.width, grid.height),
+        Layout::Risley(risley) => {
+            format!("{} lines behind {} prisms", risley.line.len(), risley.prism.len())
+        }
+        Layout::Table(table) => format!("a table of {} directions", table.directions_deg.len()),
+    };
+    line("layout", kind);
+    line("rays of a scan", pattern.len().to_string());
+    let last_s = pattern.time_s.iter().fold(0.0, |last: f64, time_s| last.max(*time_s));
+    if last_s > 0.0 {
+        line("time of a scan", format!("{} s", digits(last_s)));
+    }
+    let [lowest, highest] = ends(pattern.directions.iter().map(elevation_deg));
+    line("elevations", format!("{lowest:.3} to {highest:.3} degrees"));
+    if let Some(step_rad) = sensor.angular_step_rad() {
+        line("least step", format!("{} degrees", digits(step_rad.to_degrees())));
+    }
+    let range = &sensor.range;
+    let quantum = range.quantum_m.map(|m| format!(", in steps of {m} m")).unwrap_or_default();
+    line("range", format!("{} to {} m{quantum}", range.min_m, range.max_m));
+    let stated = |found: Option<String>| found.unwrap_or_else(|| "not stated".to_owned());
+    line("noise", stated(sensor.noise.map(|noise| format!("{} m", noise.typical_sigma_m))));
+    line(
+        "detects",
+        stated(sensor.detection.map(|limit| {
+            format!("{} % at {} m", digits(100.0 * limit.reflectivity), limit.range_m)
+        })),
+    );
+    line(
+        "beams are",
+        stated(sensor.footprint.map(|shape| {
+            let [wide, high] = shape.divergence_deg;
+            format!("{wide} x {high} degrees wide; returns {} m apart", shape.separation_m)
+        })),
+    );
+    for source in &sensor.sources {
+        line("source", source.clone());
+    }
+    text
+}
+
+/// What of a valid profile is seldom meant.
+fn oddities(sensor: &Sensor, pattern: &BeamPattern) -> Vec<String> {
+    let mut found = Vec::new();
+    if sensor.sources.is_empty() {
+        found.push("sources: expected where the numbers are from, found none".to_owned());
+    }
+    let [lowest, highest] = ends(pattern.directions.iter().map(elevation_deg));
+    let half_turn = std::f64::consts::FRAC_PI_2;
+    if pattern.ring.iter().any(|&ring| ring > 0) && lowest >= -half_turn && highest <= half_turn {
+        found.push(format!(
+            "all elevations lie within {lowest:.3} to {highest:.3} degrees: are they in radians?"
+        ));
+    }
+    if let Some(limit) = sensor.detection
+        && limit.power() * sensor.range.max_m.powi(2) > 1.0 + 1e-9
+    {
+        let reach_m = limit.power().recip().sqrt();
+        found.push(format!(
+            "detection: even a white surface is lost beyond {reach_m:.1} m, before range.max_m = {} m",
+            sensor.range.max_m
+        ));
+    }
+    if let Layout::Rotating(head) = &sensor.layout {
+        for (i, beam) in head.beam.iter().enumerate() {
+            let same = |other: &&sim_gpu::sensor::Beam| {
+                other.elevation_deg == beam.elevation_deg
+                    && other.azimuth_offset_deg == beam.azimuth_offset_deg
+            };
+            if let Some(first) = head.beam[..i].iter().position(|other| same(&other)) {
+                found.push(format!("rotating.beam[{i}] points as rotating.beam[{first}] does"));
+            }
+        }
+    }
+    found
+}
+
+fn beams(pattern: &BeamPattern) -> String {
+    let mut text = "time_s,ring,azimuth_deg,elevation_deg,x_m,y_m,z_m\n".to_owned();
+    for (ray, direction) in (0..).zip(&pattern.directions) {
+        let [time_s, ring] = [pattern.time_s[ray as usize], pattern.ring[ray as usize].into()];
+        let azimuth_deg = direction.y.atan2(direction.x).to_degrees();
+        let [x, y, z] = pattern.start(ray).unwrap_or(DVec3::ZERO).to_array();
+        let elevation_deg = elevation_deg(direction);
+        writeln!(text, "{time_s},{ring},{azimuth_deg},{elevation_deg},{x},{y},{z}")
+            .expect("invariant: a string takes all");
+    }
+    text
+}
+
+fn elevation_deg(direction: &DVec3) -> f64 {
+    direction.z.clamp(-1.0, 1.0).asin().to_degrees()
+}
+
+fn ends(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
+    numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)])
+}
