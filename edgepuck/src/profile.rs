@@ -139,7 +139,8 @@ fn beams(pattern: &BeamPattern) -> String {
     for (ray, direction) in (0..).zip(&pattern.directions) {
         let [time_s, ring] = [pattern.time_s[ray as usize], pattern.ring[ray as usize].into()];
         let azimuth_deg = direction.y.atan2(direction.x).to_degrees();
-        let [x, y, z] = pattern.start(ray).unwrap_or(DVec3::ZERO).to_array();
+        // Without minus zero.
+        let [x, y, z] = (pattern.start(ray).unwrap_or_default() + DVec3::ZERO).to_array();
         let elevation_deg = elevation_deg(direction);
         writeln!(text, "{time_s},{ring},{azimuth_deg},{elevation_deg},{x},{y},{z}")
             .expect("invariant: a string takes all");

@@ -66,8 +66,14 @@ impl Motion {
             if all { pattern.order.clone() } else { pattern.within(&self.cone(surface, pattern)) };
         beams.retain(|&beam| is_wanted(beam));
         let (mut kept, mut rays) = (Vec::new(), Vec::new());
+        // Rays of a wide beam stand side by side and fire at once.
+        let mut last = (f64::NAN, self.frame_at(surface, 0.0));
         for beam in beams {
-            let frame = self.frame_at(surface, pattern.time_s[beam as usize]);
+            let time_s = pattern.time_s[beam as usize];
+            if time_s != last.0 {
+                last = (time_s, self.frame_at(surface, time_s));
+            }
+            let frame = &last.1;
             let ray = frame.beam(pattern, beam);
             let record = match frame.trace_ray(&ray, 0) {
                 None if all => Some(frame.trace_ray_unculled(&ray, 0)),

@@ -1,6 +1,7 @@
 """ouster-sdk, Ouster's own programs, on packets that it writes and on real ones.
 
 `segment` reads the first whole frame of a capture to the points that ouster-sdk makes of it.
+Beams of our profiles, and of metadata taken for a profile, lie where it puts them.
 Run by `cargo xtask test`, which sets EDGEPUCK_PROGRAM, EDGEPUCK_ROOT and EDGEPUCK_OUT.
 """
 
@@ -8,6 +9,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 import warnings
 from pathlib import Path
 
@@ -136,5 +138,38 @@ def real():
         compare(capture.name, capture, told.read_text(), points(frame, info))
 
 
+def beams():
+    """Every beam of a turn, where ouster-sdk puts a point of 10 m that it measures."""
+    identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    for name in ["os0-128", "os1-128", "os2-128"]:
+        profile = tomllib.loads((ROOT / f"assets/sensors/{name}.toml").read_text())["rotating"]
+        start_mm = 1000 * profile["beam_start_m"]
+        told = metadata("OS-1-128", 128, 0, start_mm, "LEGACY") | {
+            "beam_altitude_angles": [beam["elevation_deg"] for beam in profile["beam"]],
+            "beam_azimuth_angles": [-beam["azimuth_offset_deg"] for beam in profile["beam"]],
+            # Our sensor frame is the lidar's.
+            "lidar_to_sensor_transform": identity,
+        }
+        text = json.dumps(told)
+        (OUT / "unit.json").write_text(text)
+        range_mm = numpy.full([128, COLUMNS], 10_000, numpy.uint32)
+        expected = core.XYZLut(core.SensorInfo(text))(range_mm).swapaxes(0, 1).reshape(-1, 3)
+        for sensor in [name, OUT / "unit.json"]:
+            words = [EDGEPUCK, "profile", sensor, "--beams", OUT / "beams.csv"]
+            subprocess.run([str(word) for word in words], check=True, stdout=subprocess.DEVNULL)
+            rows = numpy.loadtxt(OUT / "beams.csv", delimiter=",", skiprows=1)
+            azimuth, elevation = numpy.radians(rows[:, 2:4].T)
+            level = numpy.cos(elevation)
+            directions = numpy.stack(
+                [level * numpy.cos(azimuth), level * numpy.sin(azimuth), numpy.sin(elevation)], 1)
+            # Ouster's ranges count from the axis, ours from where the beam begins.
+            ours = rows[:, 4:7] + directions * (10 - start_mm / 1000)
+            apart_m = numpy.linalg.norm(ours - expected, axis=1).max()
+            print(f"{sensor}: {len(ours)} beams, farthest from ouster-sdk's {apart_m:.1e} m", flush=True)
+            # Angles of degrees in f64, ours through a decimal of 17 digits: some 1e-15 of 10 m.
+            assert len(ours) == len(expected) and apart_m < 1e-11, sensor
+
+
+beams()
 written()
 real()

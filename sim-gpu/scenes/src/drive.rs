@@ -1,23 +1,22 @@
 //! A drive through a street, as the packets of a VLP-32C that turns all the while.
 //!
-//! Everything moves while the head turns. The beams of one packet are cast together, with all
-//! that moves where it is in the middle of the packet. So a point is off by at most v x 0.33 ms,
-//! where v is how fast its surface and the sensor near each other: 6 mm at 17 m/s, less than
-//! the noise of the sensor; 15 mm, as much as that, at 45 m/s.
+//! Everything moves while the head turns: each beam is cast from where the sensor is when it
+//! fires, at where everything is then.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use edgepuck_shapes::Sampler;
 use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use formats::vlp32c::{Returns, Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 use sim_gpu::packets;
-use sim_gpu::pose::Pose;
+use sim_gpu::pose::{Pose, Trajectory};
 use sim_gpu::scan::{ScanRequest, scan_objects};
 use sim_gpu::sensor::{BeamPattern, Layout, Rotating, Sensor};
 
@@ -170,23 +169,33 @@ impl<'a> Drive<'a> {
         let caster = &stage.sensors[0].caster;
         let pattern = self.head().pattern_of(first..first + SEQUENCES_PER_PACKET);
         let pattern = caster.effects().widen(pattern, &self.sensor)?;
-        let time_s = (pattern.time_s[0] + pattern.time_s[pattern.len() - 1]) / 2.0;
+        let [from_s, to_s] = [pattern.time_s[0], pattern.time_s[pattern.len() - 1]];
+        let time_s = (from_s + to_s) / 2.0;
         let pose = self.pose(time_s);
         let sector = Sector::of(&pattern);
         let sensor_from_world = pose.world_from_sensor.inverse();
         let in_sight = near.iter().filter(|(_, body)| {
             let from_sensor = body.centre_m(time_s) - pose.position_m;
+            // How far they come to or from each other, from the middle of the packet on.
+            let speed_m_s = (body.velocity_m_s - self.velocity_m_s).length();
+            let moves_m = speed_m_s * (to_s - time_s);
             from_sensor.length() <= self.sight_m()
-                && sector.meets(sensor_from_world * from_sensor, body.radius_m())
+                && sector.meets(sensor_from_world * from_sensor, body.radius_m() + moves_m)
         });
-        let (ids, objects): (Vec<u32>, Vec<_>) =
-            in_sight.map(|(id, body)| (*id, body.at(time_s))).unzip();
+        let (ids, bodies): (Vec<u32>, Vec<&Body>) = in_sight.copied().unzip();
         let parts = parts.range(self.street.parts_in_sight(pose.position_m.x));
         let mut targets: Vec<_> = parts.map(|(_, part)| stage.ground(part, 0)).collect();
         let n_parts = targets.len();
-        targets.extend(objects.iter().map(|object| stage.target(object, self.glass_returned)));
+        let origin = Pose { position_m: DVec3::ZERO, world_from_sensor: DQuat::IDENTITY };
+        targets.extend(bodies.iter().map(|body| {
+            let mut target = stage.target(&body.object, self.glass_returned);
+            target.motion = moving(origin, body.velocity_m_s, [from_s, to_s]);
+            target
+        }));
 
         let mut request = ScanRequest::new(&self.sensor, &pattern, pose);
+        request.motion = moving(self.start, self.velocity_m_s, [from_s, to_s]);
+        request.deskew = true;
         request.attributes = [Attribute::Beam, Attribute::Range, Attribute::Object].into();
         request.stream = StreamKey::new(stage.seed(), "drive/beams", number);
         let mut scan = scan_objects(caster, &targets, &request)?.scan;
@@ -260,6 +269,19 @@ impl Sightings {
     pub fn finish(self, drive: &Drive) -> Vec<Sighting> {
         self.0.into_iter().map(|(key, sum)| drive.sighting(key, sum)).collect()
     }
+}
+
+/// The poses between two times of what is at `start` at time 0; `None` if it stands still.
+fn moving(start: Pose, velocity_m_s: DVec3, times_s: [f64; 2]) -> Option<Arc<Trajectory>> {
+    if velocity_m_s == DVec3::ZERO {
+        return None;
+    }
+    let at = |time_s| {
+        let position_m = start.position_m + velocity_m_s * time_s;
+        (time_s, Pose { position_m, ..start })
+    };
+    let trajectory = Trajectory::new(times_s.map(at).into());
+    Some(Arc::new(trajectory.expect("invariant: a packet takes time, and speeds are finite")))
 }
 
 /// The azimuths of a packet's beams, in the sensor's frame.

@@ -27,13 +27,6 @@ pub struct Body {
 }
 
 impl Body {
-    /// The object at `time_s`.
-    #[must_use]
-    pub fn at(&self, time_s: f64) -> PlacedObject {
-        let position = self.object.position + self.velocity_m_s * time_s;
-        PlacedObject { position, ..self.object.clone() }
-    }
-
     /// Of a sphere around that middle that holds it.
     pub(crate) fn radius_m(&self) -> f64 {
         self.size_m.length() / 2.0
