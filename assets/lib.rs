@@ -28,6 +28,9 @@ pub const SENSORS: [(&str, &str); 21] = [
 /// Diffuse reflectivities of materials, by name, as TOML.
 pub const MATERIALS: &str = include_str!("materials.toml");
 
+/// What `edgepuck corrupt` makes, as TOML.
+pub const CORRUPTIONS: &str = include_str!("corruptions.toml");
+
 /// The built-in scene recipes, the default one first: a recipe's name and its TOML.
 pub const SCENE_RECIPES: [(&str, &str); 3] = [
     ("street", include_str!("scenes/street.toml")),

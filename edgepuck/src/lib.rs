@@ -3,8 +3,10 @@
 pub mod adapters;
 #[cfg(feature = "models")]
 pub mod advise;
+mod brightness;
 pub mod caster;
 pub mod checkout;
+pub mod corrupt;
 #[cfg(feature = "models")]
 pub mod detect;
 #[cfg(feature = "models")]

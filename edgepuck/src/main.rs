@@ -2,8 +2,8 @@
 
 use clap::{Parser, Subcommand};
 use edgepuck_program::{
-    Outcome, adapters, gen_dataset, gen_drive, gen_scenes, gen_shapes, merge_dataset, outcome,
-    preview_scan, profile, sample_surfaces, scan, segment, trainer, weather,
+    Outcome, adapters, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes, merge_dataset,
+    outcome, preview_scan, profile, sample_surfaces, scan, segment, trainer, weather,
 };
 #[cfg(feature = "models")]
 use edgepuck_program::{advise, detect, export_onnx, import_weights};
@@ -36,6 +36,8 @@ enum Command {
     Segment(segment::Args),
     /// Add rain, snow, fog or haze to a recorded scan, and label each point
     Weather(weather::Args),
+    /// Make what goes wrong with a sweep, or with scans of meshes, as test sets of robustness
+    Corrupt(Box<corrupt::Args>),
     /// Find and name the objects of a sweep
     #[cfg(feature = "models")]
     Detect(detect::Args),
@@ -84,6 +86,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Scan(args) => scan::run(args),
         Command::Segment(args) => segment::run(args),
         Command::Weather(args) => weather::run(args),
+        Command::Corrupt(args) => corrupt::run(args),
         #[cfg(feature = "models")]
         Command::Detect(args) => detect::run(args),
         Command::Preview(args) => preview_scan::run(args),

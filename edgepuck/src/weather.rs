@@ -1,5 +1,6 @@
 //! `edgepuck weather`: rain, snow, fog and haze for a scan that was recorded in clear air.
 
+use crate::brightness::BrightnessArgs;
 use crate::segment::SweepArgs;
 use crate::{Outcome, Usage};
 use formats::Scan;
@@ -7,7 +8,6 @@ use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
-use sim_gpu::config::within;
 use sim_gpu::effects::{Effects, FogModel, Weather};
 use sim_gpu::glam;
 use sim_gpu::sensor::Sensor;
@@ -52,13 +52,8 @@ pub struct Args {
     #[arg(long, default_value = "vlp32c", value_name = "NAME")]
     profile: String,
 
-    /// Intensity of a white surface that faces the sensor [default: 1]
-    #[arg(long, value_name = "I", value_parser = crate::flags::positive)]
-    white: Option<f64>,
-
-    /// Reflectivity of all points, from 0 (black) to 1 (white), in place of their intensities
-    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with = "white")]
-    reflectivity: Option<f64>,
+    #[command(flatten)]
+    brightness: BrightnessArgs,
 
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
@@ -78,7 +73,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if weather.is_clear() {
         return Err(Usage("expected one of --rain, --snow, --fog and --haze".to_owned()).into());
     }
-    within("--reflectivity", args.reflectivity, 0.0..=1.0).map_err(|error| usage(&error))?;
+    args.brightness.check()?;
     let sensor = Sensor::resolve(&args.profile)?;
     let asked = Effects { weather: Some(Box::new(weather.clone())), ..Effects::default() };
     let effects = asked.for_sensor(&sensor).map_err(|error| usage(&error))?;
@@ -86,14 +81,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let limit = limit.expect("invariant: weather takes returns below a limit");
 
     let scan = args.input.read_whole()?;
-    let brightness = args.brightness(&scan)?;
+    let brightness = args.brightness.of(&scan, &args.input.sweep)?;
     let air = Air::new(&weather, sensor.beam_divergence_deg(), &limit, &sensor.range);
     let stream = StreamKey::new(args.seed, "weather", 0);
     let sensor_m = DVec3::from_array(args.input.sensor_m());
     let (mut told, fates) = in_weather(&scan, &brightness, sensor_m, &air, &limit, stream);
     // Back to the numbers of the file.
-    let white = args.white.unwrap_or(1.0) as f32;
-    told.intensity.iter_mut().flatten().for_each(|intensity| *intensity *= white);
+    args.brightness.restore(&mut told);
     write_scan(&args.out, format, Hashing::None, &told)?;
     report(&fates, &told);
     eprintln!("{} points: {}", told.len(), args.out.display());
@@ -110,37 +104,6 @@ impl Args {
             haze_visibility_m: self.haze,
             ..Weather::default()
         }
-    }
-
-    /// What part of the light each point returns in clear air.
-    fn brightness(&self, scan: &Scan) -> anyhow::Result<Vec<f32>> {
-        if let Some(reflectivity) = self.reflectivity {
-            return Ok(vec![reflectivity as f32; scan.len()]);
-        }
-        let white = self.white.unwrap_or(1.0) as f32;
-        let intensities = match (&scan.intensity, &scan.reflectivity) {
-            (Some(intensities), _) => intensities.clone(),
-            (None, Some(bytes)) => bytes.iter().map(|&byte| f32::from(byte) / 100.0).collect(),
-            (None, None) => {
-                let sweep = self.input.sweep.display();
-                let cause = format!("{sweep}: its points have no intensity: give --reflectivity");
-                return Err(Usage(cause).into());
-            }
-        };
-        if let Some((i, found)) = (0..).zip(&intensities).find(|(_, i)| !(0.0..).contains(*i)) {
-            let sweep = self.input.sweep.display();
-            anyhow::bail!("{sweep}: point {i}: expected an intensity of 0 or more, found {found}");
-        }
-        if self.white.is_none()
-            && let Some(most) = intensities.iter().copied().reduce(f32::max)
-            && most > 2.55
-        {
-            let sweep = self.input.sweep.display();
-            let cause =
-                format!("{sweep}: expected intensities around 0 to 1, found {most}: give --white");
-            return Err(Usage(cause).into());
-        }
-        Ok(intensities.iter().map(|intensity| intensity / white).collect())
     }
 }
 

@@ -37,6 +37,7 @@ pub mod bvh;
 pub mod cast_error;
 pub mod caster;
 pub mod config;
+pub mod corruption;
 pub mod cpu;
 pub mod effects;
 #[cfg(feature = "gpu")]

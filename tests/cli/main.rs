@@ -5,6 +5,7 @@
 mod advise;
 mod bad_input;
 mod checkpoints;
+mod corrupt;
 mod datasets;
 mod drives;
 mod end_to_end;

@@ -3,6 +3,7 @@
 use formats::FormatError;
 use sim_gpu::cast_error::CastError;
 use sim_gpu::config::InvalidValue;
+use sim_gpu::scan::ScanError;
 use std::path::{Path, PathBuf};
 
 /// Why a dataset cannot be made, merged or verified. A bad mesh is no such
@@ -73,6 +74,9 @@ pub enum DatasetError {
     /// The adapter failed.
     #[error(transparent)]
     Gpu(#[from] CastError),
+    /// A scan cannot be made.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
 }
 
 impl DatasetError {

@@ -3,11 +3,13 @@
 //! [`config`] says what is wanted, [`pipeline`] makes the scans and keeps a
 //! [`journal`] so that a killed run can go on, [`finish`] packs them and
 //! writes the manifest, which [`verify`] checks a dataset against. [`merge`]
-//! makes one dataset of parts. [`surfaces`] draws what scans are compared with.
+//! makes one dataset of parts. [`surfaces`] draws what scans are compared with, and
+//! [`corrupted`] makes sets in which something goes wrong.
 
 mod budget;
 mod clouds;
 pub mod config;
+pub mod corrupted;
 pub mod difference;
 pub mod error;
 mod export_layouts;

@@ -1,0 +1,66 @@
+//! How bright the points of a recorded scan are.
+
+use crate::Usage;
+use formats::Scan;
+use sim_gpu::config::within;
+use std::path::Path;
+
+/// Flags that say what a file's intensities mean.
+#[derive(clap::Args)]
+pub struct BrightnessArgs {
+    /// Intensity of a white surface that faces the sensor [default: 1]
+    #[arg(long, value_name = "I", value_parser = crate::flags::positive)]
+    white: Option<f64>,
+
+    /// Reflectivity of all points, from 0 (black) to 1 (white), in place of their intensities
+    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with = "white")]
+    reflectivity: Option<f64>,
+}
+
+impl BrightnessArgs {
+    /// That the numbers make sense.
+    ///
+    /// # Errors
+    /// A usage error that names the flag.
+    pub fn check(&self) -> Result<(), Usage> {
+        within("--reflectivity", self.reflectivity, 0.0..=1.0)
+            .map_err(|error| Usage(error.to_string()))
+    }
+
+    /// What part of the light each point returns in clear air.
+    pub fn of(&self, scan: &Scan, sweep: &Path) -> anyhow::Result<Vec<f32>> {
+        if let Some(reflectivity) = self.reflectivity {
+            return Ok(vec![reflectivity as f32; scan.len()]);
+        }
+        let white = self.white.unwrap_or(1.0) as f32;
+        let intensities = match (&scan.intensity, &scan.reflectivity) {
+            (Some(intensities), _) => intensities.clone(),
+            (None, Some(bytes)) => bytes.iter().map(|&byte| f32::from(byte) / 100.0).collect(),
+            (None, None) => {
+                let sweep = sweep.display();
+                let cause = format!("{sweep}: its points have no intensity: give --reflectivity");
+                return Err(Usage(cause).into());
+            }
+        };
+        if let Some((i, found)) = (0..).zip(&intensities).find(|(_, i)| !(0.0..).contains(*i)) {
+            let sweep = sweep.display();
+            anyhow::bail!("{sweep}: point {i}: expected an intensity of 0 or more, found {found}");
+        }
+        if self.white.is_none()
+            && let Some(most) = intensities.iter().copied().reduce(f32::max)
+            && most > 2.55
+        {
+            let sweep = sweep.display();
+            let cause =
+                format!("{sweep}: expected intensities around 0 to 1, found {most}: give --white");
+            return Err(Usage(cause).into());
+        }
+        Ok(intensities.iter().map(|intensity| intensity / white).collect())
+    }
+
+    /// Turns the intensities of `scan`, which are brightnesses, back to the numbers of the file.
+    pub fn restore(&self, scan: &mut Scan) {
+        let white = self.white.unwrap_or(1.0) as f32;
+        scan.intensity.iter_mut().flatten().for_each(|intensity| *intensity *= white);
+    }
+}

@@ -1,0 +1,121 @@
+//! `edgepuck corrupt`: the corruptions of Robo3D and ModelNet-C that a sensor can suffer, by
+//! physics.
+
+mod objects;
+mod plan;
+mod sweep;
+
+use crate::brightness::BrightnessArgs;
+use crate::caster::CasterArgs;
+use crate::segment::SweepArgs;
+use crate::{Outcome, Usage};
+use plan::{Entry, Plan};
+use sim_gpu::sensor::Sensor;
+use std::path::PathBuf;
+
+/// Flags of `corrupt`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+SWEEP may also be a folder of meshes, as for gen-dataset: OUT then has one packed set of clouds
+for each corruption and severity of ModelNet-C, jitter-1-test.npz and so on, and clean-test.npz,
+of the same views of its test meshes. Of a sweep, OUT has fog-1.npz and so on, by Robo3D.
+`edgepuck corrupt --list` says what each is, and what is left out.")]
+pub struct Args {
+    #[command(flatten)]
+    input: Option<SweepArgs>,
+
+    /// Folder for the corrupted scans, or the packed sets, and corruptions.csv
+    #[arg(long, value_name = "DIR", default_value = "data/corrupted")]
+    out: PathBuf,
+
+    /// Corruptions to make, separated by commas [default: all]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    only: Vec<String>,
+
+    /// Severities to make, separated by commas; 1 is the mildest [default: all]
+    #[arg(long, value_name = "N", value_delimiter = ',')]
+    severity: Vec<u32>,
+
+    /// Corruptions of your own, in a TOML file like assets/corruptions.toml
+    #[arg(long, value_name = "TOML")]
+    plan: Option<PathBuf>,
+
+    /// Say what each corruption is and what is left out, and make nothing
+    #[arg(long, exclusive = true)]
+    list: bool,
+
+    /// Sensor that recorded the sweep, or that scans the meshes: a built-in name or a file
+    #[arg(long, default_value = "vlp32c", value_name = "NAME")]
+    profile: String,
+
+    #[command(flatten)]
+    brightness: BrightnessArgs,
+
+    #[command(flatten)]
+    objects: objects::ObjectArgs,
+
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+
+    #[command(flatten)]
+    caster: CasterArgs,
+}
+
+/// Makes the corruptions that are asked for.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let plan = Plan::read(args.plan.as_deref())?;
+    if args.list {
+        print!("{}", listed(&plan));
+        return Ok(Outcome::Success);
+    }
+    let Some(input) = &args.input else {
+        let cause = "expected a sweep or a folder of meshes, or --list, found neither";
+        return Err(Usage(cause.to_owned()).into());
+    };
+    let sensor = Sensor::resolve(&args.profile)?;
+    if input.sweep.is_dir() {
+        return objects::run(args, &input.sweep, &plan, &sensor);
+    }
+    sweep::run(args, input, &plan, &sensor)
+}
+
+fn listed(plan: &Plan) -> String {
+    let mut text = String::new();
+    let mut line = |of: &str, name: &str, severities: usize, by: &str| {
+        text += &format!("{of:<8} {name:<16} {severities}  {by}\n");
+    };
+    for Entry { name, by, severity } in &plan.sweep {
+        line("sweep", name, severity.len(), by);
+    }
+    for Entry { name, by, severity } in &plan.object {
+        line("object", name, severity.len(), by);
+    }
+    for plan::LeftOut { name, of, because } in &plan.left_out {
+        line("-", name, 0, &format!("left out of {of}: {because}"));
+    }
+    text
+}
+
+/// A line of `corruptions.csv`.
+#[derive(serde::Serialize)]
+struct Made<'a> {
+    file: String,
+    corruption: &'a str,
+    severity: u32,
+    /// Points of the scan, or clouds of the set.
+    count: usize,
+    by: &'a str,
+}
+
+/// Writes what was made, as CSV.
+fn write_list(made: &[Made<'_>], out: &std::path::Path) -> anyhow::Result<()> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    made.iter().try_for_each(|line| csv.serialize(line))?;
+    Ok(formats::atomic::write_bytes(&out.join("corruptions.csv"), csv.into_inner()?)?)
+}
+
+/// A usage error of this cause.
+fn usage(error: impl std::fmt::Display) -> Usage {
+    Usage(error.to_string())
+}

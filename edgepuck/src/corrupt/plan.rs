@@ -1,0 +1,118 @@
+//! Which corruptions there are.
+
+use anyhow::Context;
+use edgepuck_assets::CORRUPTIONS;
+use edgepuck_dataset::corrupted::ObjectCorruption;
+use serde::Deserialize;
+use sim_gpu::config;
+use sim_gpu::corruption::Corruption;
+use std::path::Path;
+
+use crate::Usage;
+
+/// Corruptions of sweeps and of objects, and those that are left out.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Of recorded sweeps.
+    #[serde(default)]
+    pub sweep: Vec<Entry<Corruption>>,
+    /// Of scans of meshes.
+    #[serde(default)]
+    pub object: Vec<Entry<ObjectCorruption>>,
+    /// Of those that others have.
+    #[serde(default)]
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A corruption.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry<T> {
+    /// What it is called.
+    pub name: String,
+    /// By what physics.
+    pub by: String,
+    /// Its numbers, from the mildest on; severity 1 is the first.
+    pub severity: Vec<T>,
+}
+
+/// A corruption that others have and this program has not.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LeftOut {
+    /// What it is called.
+    pub name: String,
+    /// Who has it.
+    pub of: String,
+    /// Why it is not here.
+    pub because: String,
+}
+
+impl Plan {
+    /// The plan in `file`, or the built-in one.
+    ///
+    /// # Errors
+    /// A file that is not a plan, with the key and the cause.
+    pub fn read(file: Option<&Path>) -> anyhow::Result<Self> {
+        let plan: Self = match file {
+            Some(file) => config::read(file)?,
+            None => config::parse(CORRUPTIONS, Path::new("corruptions.toml"))?,
+        };
+        let name = file.unwrap_or(Path::new("corruptions.toml")).display();
+        plan.check().with_context(|| name.to_string())?;
+        Ok(plan)
+    }
+
+    fn check(&self) -> anyhow::Result<()> {
+        for (i, entry) in self.sweep.iter().enumerate() {
+            check_name(&format!("sweep[{i}]"), &entry.name)?;
+            for (n, corruption) in entry.severity.iter().enumerate() {
+                corruption.validate(&format!("sweep[{i}].severity[{n}]"))?;
+            }
+        }
+        for (i, entry) in self.object.iter().enumerate() {
+            check_name(&format!("object[{i}]"), &entry.name)?;
+            for (n, corruption) in entry.severity.iter().enumerate() {
+                corruption.validate(&format!("object[{i}].severity[{n}]"))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// That a file may be called so.
+fn check_name(key: &str, name: &str) -> anyhow::Result<()> {
+    let is_fine =
+        !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    anyhow::ensure!(is_fine, "{key}.name: expected letters, digits and -, found \"{name}\"");
+    Ok(())
+}
+
+/// Each of `entries` that is among `names`, or all if that is empty, at each of its severities
+/// that is among `severities`.
+///
+/// # Errors
+/// A name or a severity that none has.
+pub fn chosen<'a, T>(
+    entries: &'a [Entry<T>],
+    names: &[String],
+    severities: &[u32],
+) -> Result<Vec<(&'a Entry<T>, u32, &'a T)>, Usage> {
+    let known = || entries.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>().join(", ");
+    if let Some(name) = names.iter().find(|name| entries.iter().all(|e| e.name != **name)) {
+        return Err(Usage(format!("--only: expected some of {}, found {name}", known())));
+    }
+    let most = entries.iter().map(|entry| entry.severity.len()).max().unwrap_or(0);
+    if let Some(found) = severities.iter().find(|n| !(1..=most as u32).contains(n)) {
+        return Err(Usage(format!("--severity: expected 1 to {most}, found {found}")));
+    }
+    let is_wanted = |entry: &&Entry<T>| names.is_empty() || names.contains(&entry.name);
+    let chosen = entries.iter().filter(is_wanted).flat_map(|entry| {
+        let numbered = (1..).zip(&entry.severity);
+        numbered
+            .filter(|(n, _)| severities.is_empty() || severities.contains(n))
+            .map(move |(n, numbers)| (entry, n, numbers))
+    });
+    Ok(chosen.collect())
+}

@@ -1,0 +1,92 @@
+//! Corruptions of a recorded sweep.
+
+use super::plan::{Plan, chosen};
+use super::{Args, Made, usage, write_list};
+use crate::Outcome;
+use crate::segment::SweepArgs;
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
+use formats::Scan;
+use formats::hash::Hashing;
+use formats::rng::StreamKey;
+use formats::scan_file::{ScanFormat, write_scan};
+use glam::DVec3;
+use sim_gpu::corruption::{Corruption, Recorded};
+use sim_gpu::effects::{Detection, Effects};
+use sim_gpu::glam;
+use sim_gpu::sensor::Sensor;
+use sim_gpu::weather::{Air, in_weather};
+
+/// Writes the sweep once for each corruption and severity.
+pub(super) fn run(
+    args: &Args,
+    input: &SweepArgs,
+    plan: &Plan,
+    sensor: &Sensor,
+) -> anyhow::Result<Outcome> {
+    let chosen = chosen(&plan.sweep, &args.only, &args.severity)?;
+    args.brightness.check()?;
+    let asked = Effects { detection: Some(Detection::default()), ..Effects::default() };
+    let effects = asked.for_sensor(sensor).map_err(usage)?;
+    let limit = effects.detection.and_then(|detection| detection.limit);
+    let limit = limit.expect("invariant: a sensor's own limit was asked for");
+    let scan = input.read_whole()?;
+    let brightness = args.brightness.of(&scan, &input.sweep)?;
+    let sensor_m = DVec3::from_array(input.sensor_m());
+    let is_ground = ground(&scan, sensor_m)?;
+
+    let mut made = Vec::new();
+    for (entry, severity, corruption) in chosen {
+        let stream = StreamKey::new(args.seed, &format!("corrupt/{}", entry.name), severity);
+        let (scan, brightness, is_ground) = (&scan, &brightness[..], &is_ground[..]);
+        let max_range_m = sensor.range.max_m;
+        let recorded =
+            Recorded { scan, brightness, is_ground, sensor_m, limit, max_range_m, stream };
+        let name = format!("{}-{severity}", entry.name);
+        let Some(mut found) = corrupted(&recorded, corruption, sensor) else {
+            let lacks = match corruption {
+                Corruption::Motion { .. } => "times",
+                _ => "rings",
+            };
+            eprintln!("{name}: left out, since the points of the sweep have no {lacks}");
+            continue;
+        };
+        args.brightness.restore(&mut found);
+        let file = format!("{name}.npz");
+        write_scan(&args.out.join(&file), ScanFormat::Npz, Hashing::None, &found)?;
+        eprintln!("{name:<20} {:>9} of {} points", found.len(), scan.len());
+        let (corruption, by, count) = (&*entry.name, &*entry.by, found.len());
+        made.push(Made { file, corruption, severity, count, by });
+    }
+    write_list(&made, &args.out)?;
+    eprintln!("{} scans: {}", made.len(), args.out.display());
+    Ok(Outcome::Success)
+}
+
+/// The scan with this corruption; `None` if it lacks what that takes.
+fn corrupted(recorded: &Recorded, corruption: &Corruption, sensor: &Sensor) -> Option<Scan> {
+    match corruption {
+        Corruption::Weather(weather) => {
+            let Recorded { scan, brightness, sensor_m, limit, stream, .. } = *recorded;
+            let air = Air::new(weather, sensor.beam_divergence_deg(), &limit, &sensor.range);
+            Some(in_weather(scan, brightness, sensor_m, &air, &limit, stream).0)
+        }
+        Corruption::WetGround { film_m } => Some(recorded.wet_ground(*film_m)),
+        Corruption::Motion { speed_m_s, yaw_rate_deg_s } => {
+            recorded.motion(*speed_m_s, *yaw_rate_deg_s)
+        }
+        Corruption::BeamsMissing { share } => recorded.beams_missing(*share),
+        Corruption::Crosstalk { share } => Some(recorded.crosstalk(*share)),
+        Corruption::DirtyWindow { transmission } => Some(recorded.dirty_window(*transmission)),
+        Corruption::FewerBeams { lasers, keep_each } => recorded.fewer_beams(*lasers, *keep_each),
+    }
+}
+
+/// Whether each point lies on the ground, by the segmentation that a robot runs.
+fn ground(scan: &Scan, sensor_m: DVec3) -> anyhow::Result<Vec<bool>> {
+    let origin = DVec3::from_array(scan.origin) - sensor_m;
+    let from_sensor = |point: &[f32; 3]| (origin + DVec3::from(point.map(f64::from))).as_vec3();
+    let points: Vec<[f32; 3]> = scan.positions.iter().map(|p| from_sensor(p).to_array()).collect();
+    let mut segmenter = Segmenter::new(Settings::default()).map_err(usage)?;
+    let found = segmenter.segment(&Sweep { points: &points, rings: scan.ring.as_deref() })?;
+    Ok(found.labels().iter().map(|label| *label == Label::Ground).collect())
+}

@@ -1,0 +1,139 @@
+//! `corrupt`: what goes wrong with sweeps and with scans of meshes.
+
+use crate::Folder;
+use formats::labelled::read_labelled;
+use std::collections::BTreeMap;
+
+const STREET: &str = "attributes = [\"range\", \"ring\", \"time\", \"intensity\"]\n\
+    [effects]\nintensity = true\n\
+    [[object]]\nmesh = \"ground.off\"\nreflectivity = 0.2\n\
+    [[object]]\nmesh = \"wall.off\"\nreflectivity = 0.6\n\
+    [[sensor]]\nprofile = \"vlp32c\"\nposition_m = [0, 0, 1.8]\nyaw_deg = 0\n";
+const GROUND: &str = "OFF\n4 1 0\n-50 -50 0\n50 -50 0\n50 50 0\n-50 50 0\n4 0 1 2 3\n";
+const WALL: &str = "OFF\n4 1 0\n20 -30 0\n20 30 0\n20 30 6\n20 -30 6\n4 0 3 2 1\n";
+
+/// What `corruptions.csv` says: how many points or clouds each file has.
+fn counts(folder: &Folder, file: &str) -> BTreeMap<String, usize> {
+    let text = folder.text(file);
+    let line = |line: &str| {
+        let words: Vec<&str> = line.split(',').collect();
+        (words[0].to_owned(), words[3].parse().unwrap())
+    };
+    text.lines().skip(1).map(line).collect()
+}
+
+#[test]
+fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
+    let folder = Folder::new();
+    folder.write("ground.off", GROUND);
+    folder.write("wall.off", WALL);
+    folder.write("street.toml", STREET);
+    folder.succeeds("scan street.toml --adapter cpu --out sweep.npz");
+    let sweep = folder.scan("sweep.npz");
+    for out in ["one", "other"] {
+        folder.succeeds(&format!("corrupt sweep.npz --sensor 0 0 1.8 --out {out}"));
+    }
+    folder.assert_same_tree("one", "other");
+    let found = counts(&folder, "one/corruptions.csv");
+    assert_eq!(found.len(), 24);
+    for (file, count) in &found {
+        let scan = folder.scan(&format!("one/{file}"));
+        assert_eq!(scan.len(), *count, "{file}");
+        assert!(scan.positions != sweep.positions || scan.intensity != sweep.intensity, "{file}");
+    }
+    // The more it goes wrong, the less is left.
+    for name in ["wet-ground", "beam-missing", "incomplete-echo", "cross-sensor"] {
+        let left = |n: u32| found[&format!("{name}-{n}.npz")];
+        assert!(sweep.len() >= left(1) && left(1) >= left(2) && left(2) > left(3), "{name}");
+    }
+    // At 30 m/s, for a tenth of a second.
+    let moved = folder.scan("one/motion-blur-3.npz");
+    let farthest = sweep.positions.iter().zip(&moved.positions);
+    let farthest = farthest.map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+    assert!((2.0..5.0).contains(&farthest), "{farthest}");
+
+    // Bare points have no rings and no times, and what needs them is left out and named.
+    folder.write("cloud.xyz", "5 0 0\n9 1 0\n0 0 0\nnan nan nan\n");
+    let said = folder.succeeds("corrupt cloud.xyz --reflectivity 0.5 --out bare");
+    for part in ["motion-blur-1: left out", "no times", "cross-sensor-3: left out", "no rings"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    assert_eq!(counts(&folder, "bare/corruptions.csv").len(), 15);
+}
+
+#[test]
+fn meshes_are_scanned_once_for_each_corruption_and_severity() {
+    let folder = Folder::new();
+    folder.succeeds("gen-shapes --out shapes --train 1 --test 1");
+    let words = "corrupt shapes --adapter cpu --views 1 --points 256 --severity 1,5";
+    for out in ["one", "other"] {
+        folder.succeeds(&format!("{words} --out {out}"));
+    }
+    folder.assert_same_tree("one", "other");
+    let found = counts(&folder, "one/corruptions.csv");
+    assert_eq!(found.len(), 11);
+    let raw = |name: &str| {
+        let set = read_labelled(&folder.at(&format!("one/{name}-test.npz"))).unwrap();
+        assert_eq!(set.len(), found[&format!("{name}-test.npz")], "{name}");
+        assert_eq!(set.classes.as_ref().unwrap().len(), 10, "{name}");
+        set
+    };
+    let clean = raw("clean");
+    assert_eq!(clean.len(), 10);
+    for name in ["jitter", "drop-global", "drop-local", "add-global", "add-local"] {
+        for severity in [1, 5] {
+            let set = raw(&format!("{name}-{severity}"));
+            assert!(set.points != clean.points && set.len() <= clean.len(), "{name}");
+        }
+    }
+    folder.write("odd/chair/test/odd.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
+    let said = folder.exits(1, "corrupt odd --adapter cpu --out odd-sets --only jitter");
+    assert!(said.contains("odd.off"), "{said}");
+}
+
+#[test]
+fn corruptions_of_one_s_own_and_what_is_refused() {
+    let folder = Folder::new();
+    folder.write("cloud.xyz", "5 0 0\n9 1 0\n");
+    let own = "[[sweep]]\nname = \"gone\"\nby = \"all is lost\"\n\
+               severity = [{ dirty-window = { transmission = 0 } }]\n";
+    folder.write("own.toml", own);
+    folder.succeeds("corrupt cloud.xyz --reflectivity 1 --plan own.toml --out out");
+    assert!(folder.scan("out/gone-1.npz").is_empty());
+    folder.write("typo.toml", own.replace("transmission", "transmision"));
+    folder.write("many.toml", own.replace("= 0 }", "= 2 }"));
+    folder.write("path.toml", own.replace("\"gone\"", "\"../gone\""));
+    folder.write("empty/readme.txt", "");
+    let list = folder.succeeds("corrupt --list");
+    assert!(list.contains("wet-ground") && list.contains("left out of ModelNet-C"), "{list}");
+    folder.refuses(
+        1,
+        &[
+            ("corrupt cloud.xyz --reflectivity 1 --plan typo.toml", "typo.toml: TOML parse error"),
+            (
+                "corrupt cloud.xyz --reflectivity 1 --plan many.toml",
+                "many.toml: sweep[0].severity[0].transmission: expected a number within 0..=1",
+            ),
+            (
+                "corrupt cloud.xyz --reflectivity 1 --plan path.toml",
+                "expected letters, digits and -",
+            ),
+            ("corrupt empty", "no mesh found"),
+            ("corrupt nowhere.npz", "nowhere.npz"),
+        ],
+    );
+    folder.refuses(
+        2,
+        &[
+            ("corrupt", "<SWEEP>"),
+            ("corrupt cloud.xyz", "its points have no intensity: give --reflectivity"),
+            ("corrupt cloud.xyz --reflectivity 1 --only fgo", "expected some of fog, wet-ground"),
+            ("corrupt cloud.xyz --reflectivity 1 --severity 4", "expected 1 to 3, found 4"),
+            (
+                "corrupt cloud.xyz --reflectivity 2",
+                "--reflectivity: expected a number within 0..=1",
+            ),
+        ],
+    );
+    assert!(!folder.at("data").exists(), "nothing is left half-made");
+}
