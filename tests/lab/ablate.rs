@@ -124,3 +124,53 @@ fn what_cannot_be_run_is_refused_before_anything_is_made() {
     let said = exits(1, Path::new(LAB), at, "ablate --quick --out other");
     assert!(said.contains("an earlier run had another plan or other data"), "{said}");
 }
+
+#[test]
+fn effects_of_streets_are_compared_on_simulated_and_on_real_objects() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let row = |name: &str, more: &str| format!("[[row]]\nname = \"{name}\"\n{more}\n");
+    let plan = format!(
+        "about = \"a test\"\nscenes = 20\nseeds = [0]\nmin_points = 40\nknown = [\"car\"]\n\
+         cost_rounds = 1\ncost_scenes = 1\n\
+         recipe = {{ epochs = 1, clouds_per_epoch = 128, network = {{ trunk = [8, 16], head = [8] }} }}\n{}{}{}",
+        row("none", "sensors = [\"vlp16\"]\nobject.count = [0, 2]"),
+        row(
+            "driving",
+            "sensors = [\"vlp16\"]\nobject.count = [0, 2]\nscene.mount = { speed_m_s = [9, 9] }"
+        ),
+        row(
+            "unturned",
+            "sensors = [\"vlp16\"]\nobject.count = [0, 2]\nrecipe = { normalization = \"metric\" }"
+        ),
+    );
+    std::fs::write(at.join("plan.toml"), plan).unwrap();
+    let words = "ablate --street --plan plan.toml --out out";
+    let ran = run(Path::new(LAB), at, words);
+    assert!(ran.status.success(), "{}", said(&ran));
+    // Simulated clusters stand in for real ones.
+    let real = "out/street/scenes/none-0/test.npz";
+    std::fs::copy(at.join(real), at.join("real.npz")).unwrap();
+    std::fs::remove_dir_all(at.join("out")).unwrap();
+    let words = format!("{words} --real real.npz");
+    let ran = run(Path::new(LAB), at, &words);
+    assert!(ran.status.success() && said(&ran).contains("driving"), "{}", said(&ran));
+    let found = lines(&at.join("out/street/street.csv"));
+    let of = |trained: &str, tested: &str| -> Vec<String> {
+        let is_it = |line: &&BTreeMap<String, String>| {
+            line["trained_on"] == trained && line["tested_on"] == tested
+        };
+        found.iter().filter(is_it).map(|line| format!("{} {}", line["right"], line["of"])).collect()
+    };
+    // The stand-ins are the first row's own test scenes.
+    for name in ["none", "driving", "unturned"] {
+        assert_eq!(of(name, "none"), of(name, "real"), "{name}");
+        assert_eq!(of(name, "real").len(), 2, "car and negatives");
+    }
+    assert!(!of("none", "driving").is_empty() && !of("driving", "driving").is_empty());
+    assert!(!at.join("out/street/scenes/unturned-0").exists(), "the same scenes are made once");
+    let table = std::fs::read_to_string(at.join("out/street/street.md")).unwrap();
+    assert!(table.contains("| driving |"), "{table}");
+    let again = run(Path::new(LAB), at, "ablate --street --plan plan.toml --out out");
+    assert!(said(&again).contains("an earlier run had another plan or other data"));
+}

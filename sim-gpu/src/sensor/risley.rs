@@ -93,7 +93,8 @@ impl Risley {
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
         positive("risley.pulse_hz", self.pulse_hz)?;
         positive("risley.period_s", self.period_s)?;
-        within("risley.start_s", self.start_s, 0.0..=1e9)?;
+        // Eleven days: the prisms' phases still have eight digits.
+        within("risley.start_s", self.start_s, 0.0..=1e6)?;
         let count = |key: &str, found: usize, most: f64| {
             if (1.0..=most).contains(&(found as f64)) {
                 return Ok(());

@@ -56,7 +56,7 @@ impl Table {
         }
         positive("table.pulse_hz", self.pulse_hz)?;
         positive("table.period_s", self.period_s)?;
-        within("table.start_s", self.start_s, 0.0..=1e9)?;
+        within("table.start_s", self.start_s, 0.0..=1e6)?;
         within("table.lines", f64::from(self.lines), 1.0..=MAX_RINGS)?;
         if self.directions_deg.is_empty() {
             let cause = "expected a row at least, or table.file, found none";

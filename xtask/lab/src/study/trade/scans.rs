@@ -49,8 +49,8 @@ pub fn scan_all(
     rounds: usize,
     test_set: &str,
 ) -> Result<Vec<Scanned>> {
-    let patterns: Vec<BeamPattern> =
-        settings.iter().map(|setting| setting.sensor.pattern()).collect();
+    let patterns = settings.iter().map(|s| s.effects().widen(s.sensor.pattern(), &s.sensor));
+    let patterns: Vec<BeamPattern> = patterns.collect::<Result<_, _>>()?;
     let energy = Energy::here();
     let mut joules: Vec<f64> = vec![0.0; settings.len()];
     let mut workloads: Vec<Workload<'_>> = Vec::new();
@@ -108,10 +108,15 @@ fn assess(
         let ranges = made.scan.range_m.iter().flatten();
         for (range_m, exact_m) in ranges.zip(&made.exact_m) {
             let error = (f64::from(*range_m) - exact_m).abs();
+            if error.is_nan() {
+                // The middle of a wide beam met nothing.
+                continue;
+            }
             (sum, worst, n) = (sum + error * error, worst.max(error), n + 1);
         }
     }
     let clouds: Vec<Cloud> = made.into_iter().map(|made| made.scan.positions).collect();
+    let n_points: usize = clouds.iter().map(Vec::len).sum();
     let row = Row {
         part: Part::Scan,
         knob: setting.parameter.to_owned(),
@@ -124,7 +129,7 @@ fn assess(
         caster: "cpu f32 watertight, f64 range".to_owned(),
         culling: "on".to_owned(),
         megabytes: Some(file_bytes(&clouds)? * 1e-6),
-        points_per_scan: Some(n as f64 / clouds.len().max(1) as f64),
+        points_per_scan: Some(n_points as f64 / clouds.len().max(1) as f64),
         range_rms_m: (n > 0).then(|| (sum / n as f64).sqrt()),
         range_worst_m: (n > 0).then_some(worst),
         chamfer_m: mean_chamfer(truth, &clouds),
@@ -148,7 +153,9 @@ fn scan<'a>(
     let made = |sim_gpu::scan::Scanned { scan, hits, .. }| {
         let hits = &hits[0].hits;
         let exact = |beam: &u32| {
-            let at = hits.binary_search_by_key(beam, |hit| hit.beam);
+            // That in the middle of a wide beam.
+            let ray = beam * pattern.rays_per_beam;
+            let at = hits.binary_search_by_key(&ray, |hit| hit.beam);
             at.map_or(f64::NAN, |at| hits[at].range_m)
         };
         let exact_m = scan.beam.iter().flatten().map(exact).collect();

@@ -1,7 +1,8 @@
 //! The VLP-32C, and the sensors and settings compared with it.
 
 use crate::study::uniform_raster::as_even_grid;
-use sim_gpu::effects::{Effects, Noise, NoiseModel, Quantum};
+use sim_gpu::effects::{Detection, DetectionLimit, Effects, Footprint, Noise, NoiseModel, Quantum};
+use sim_gpu::effects::{ReturnMode, Weather};
 use sim_gpu::sensor::{Layout, Sensor};
 use std::num::NonZeroU32;
 
@@ -20,6 +21,8 @@ pub struct Scanning {
     pub noise_m: f64,
     /// 0: ranges are not rounded.
     pub range_quantum_m: f64,
+    /// What else the sensor and the air do.
+    pub further: Effects,
 }
 
 /// From gen-dataset's defaults.
@@ -37,6 +40,7 @@ impl Scanning {
             distance_m: DISTANCE_M,
             noise_m: NOISE_M,
             range_quantum_m: 0.0,
+            further: Effects::default(),
         }
     }
 
@@ -45,14 +49,14 @@ impl Scanning {
         Self { distance_m, noise_m: 0.0, ..Self::reference() }
     }
 
-    /// Noise and rounding, where they are asked for.
+    /// Noise, rounding and all else, where they are asked for.
     pub fn effects(&self) -> Effects {
         let noise = Noise { mean_m: 0.0, sigma_m: self.noise_m, model: NoiseModel::Range };
         Effects {
             noise: (self.noise_m > 0.0).then_some(noise),
             quantum: (self.range_quantum_m > 0.0)
                 .then_some(Quantum { step_m: Some(self.range_quantum_m) }),
-            ..Effects::default()
+            ..self.further.clone()
         }
     }
 
@@ -62,10 +66,12 @@ impl Scanning {
             Layout::Rotating(rotating) => rotating.beam.len(),
             Layout::Uniform(uniform) => uniform.elevation_steps as usize,
             Layout::Grid(camera) => camera.height as usize,
+            Layout::Risley(rosette) => rosette.line.len(),
+            Layout::Table(table) => usize::from(table.lines),
         }
     }
 
-    /// From one firing to the next; a camera has none.
+    /// From one firing to the next; cameras and rosettes have none.
     pub fn azimuth_step_deg(&self) -> Option<f64> {
         let step_deg = match &self.sensor.layout {
             Layout::Rotating(rotating) => 360.0 * rotating.sequence_us * 1e-6 / rotating.period_s(),
@@ -73,7 +79,7 @@ impl Scanning {
                 let span_deg = uniform.azimuth_to_deg - uniform.azimuth_from_deg;
                 span_deg / f64::from(uniform.azimuth_steps.max(2) - 1)
             }
-            Layout::Grid(_) => return None,
+            Layout::Grid(_) | Layout::Risley(_) | Layout::Table(_) => return None,
         };
         Some(step_deg * f64::from(self.sensor.decimation.get()))
     }
@@ -116,9 +122,12 @@ pub fn one_at_a_time() -> Vec<Scanning> {
     let grid = as_even_grid(vlp32c()).expect("invariant: the VLP-32C has a table of beams");
     let name = "even grid of 32 rows".to_owned();
     all.push(Scanning { name, sensor: grid, ..reference().varying("beam table") });
-    let blainder = Sensor::builtin("blainder-ultrapuck").expect("invariant: it is built in");
-    let name = blainder.name.clone();
-    all.push(Scanning { name, sensor: blainder, ..reference().varying("beam table") });
+    for name in ["blainder-ultrapuck", "os1-128", "vls128", "xt32", "avia"] {
+        let sensor = Sensor::builtin(name).expect("invariant: it is built in");
+        let name = name.to_owned();
+        all.push(Scanning { name, sensor, ..reference().varying("beam table") });
+    }
+    all.extend(effects());
     all.extend([1, 4, 8].map(|k| reference().with_azimuth(k).varying("azimuth step")));
     all.extend([0.004, 0.02].map(|range_quantum_m| Scanning {
         range_quantum_m,
@@ -133,6 +142,40 @@ pub fn one_at_a_time() -> Vec<Scanning> {
             .map(|distance_m| Scanning { distance_m, ..reference().varying("distance") }),
     );
     all
+}
+
+/// One effect more each.
+fn effects() -> Vec<Scanning> {
+    let none = Effects::default;
+    let weather = |weather| Effects { weather: Some(Box::new(weather)), ..none() };
+    let wide = |samples| Footprint { samples, divergence_deg: None, separation_m: None };
+    // A limit near the object: white surfaces 3 m away are lost where they turn away by 89.4
+    // degrees, and those that face the sensor are off by 7 mm.
+    let limit = DetectionLimit { reflectivity: 0.1, range_m: 9.0 };
+    let near_limit =
+        Detection { limit: Some(limit), threshold_to_noise: Some(5.0), range_sigma_m: Some(0.06) };
+    let all = [
+        ("detection limit", Effects { detection: Some(near_limit), ..none() }),
+        ("7 rays a beam", Effects { footprint: Some(wide(7)), ..none() }),
+        ("19 rays a beam", Effects { footprint: Some(wide(19)), ..none() }),
+        (
+            "last return, 7 rays a beam",
+            Effects { footprint: Some(wide(7)), returns: Some(ReturnMode::Last), ..none() },
+        ),
+        ("rain 25 mm/h", weather(Weather { rain_mm_h: Some(25.0), ..Weather::default() })),
+        ("snow 2 mm/h", weather(Weather { snow_mm_h: Some(2.0), ..Weather::default() })),
+        ("fog 50 m", weather(Weather { fog_visibility_m: Some(50.0), ..Weather::default() })),
+    ];
+    let setting = |(name, further): (&str, Effects)| {
+        let reference = Scanning::reference().varying("effect");
+        // As in gen-dataset, whose clouds are of single objects.
+        let further = Effects {
+            weather: further.weather.map(|w| Box::new(Weather { empty_beams: Some(false), ..*w })),
+            ..further
+        };
+        Scanning { name: format!("{}, {name}", reference.name), further, ..reference }
+    };
+    all.into_iter().map(setting).collect()
 }
 
 /// Fewer beams and fewer azimuth steps in all combinations, near and far: what
