@@ -36,7 +36,7 @@ OUT = Path(os.environ["EDGEPUCK_OUT"])
 
 SECONDS = 10
 SPEEDS_M_S = [5, 15]
-# In the first turn of the drive of seed 0 a truck that passes takes half of all returns.
+# Not 0: a truck that comes towards the sensor takes half of all returns of that drive's first turn.
 SEED = 3
 # A car that pitches by half a degree lifts what it sees 12 m ahead by 0.1 m. So much the ground
 # must rise and fall here, where nothing pitches, for rings to wander as they do on real cars.
@@ -74,16 +74,17 @@ def main():
         # the sensor goes in it; of a sweep deskewed to its middle, a quarter. Less were no test.
         assert raw_m >= 0.02 * speed_m_s, f"raw points are {raw_m} m off: hardly skewed"
         assert skew_m <= SKEW_LEFT * raw_m, f"{skew_m} m of {raw_m} m of skew are left"
-        # All sweeps of an even, straight drive are skewed alike, and match each other also raw.
-        # Deskewed, they may drift by no more than the raw ones and what KISS-ICP drifts anyway.
-        worse = max(drifts[length] - found[False][0][length] for length in drifts)
-        assert worse <= DRIFT / 2, f"{speed_m_s} m/s: deskewing adds {100 * worse:.2f} % of drift"
+        # All sweeps of an even, straight drive are skewed alike and match each other even so:
+        # deskewing gains little here, but must not lose.
+        means = [numpy.mean(list(found[deskew][0].values())) for deskew in (True, False)]
+        assert means[0] <= means[1], f"{speed_m_s} m/s: drifts {means}, the first deskewed"
 
 
 def drive(capture, speed_m_s):
     """Drives along the street of the recipe, over rougher ground."""
     recipe = (ROOT / "assets/scenes/street.toml").read_text()
-    recipe, n = re.subn(r"(?m)^roughness_m = .*$", f"roughness_m = [{ROUGHNESS_M}, {ROUGHNESS_M}]", recipe)
+    rough = f"roughness_m = [{ROUGHNESS_M}, {ROUGHNESS_M}]"
+    recipe, n = re.subn(r"(?m)^roughness_m = .*$", rough, recipe)
     assert n == 1, "the recipe has another form"
     (OUT / "rough.toml").write_text(recipe)
     words = ["gen-drive", OUT / "rough.toml", "--seconds", SECONDS, "--speed", speed_m_s,

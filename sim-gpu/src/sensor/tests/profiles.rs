@@ -44,6 +44,20 @@ fn a_file_too_long_or_not_text_is_refused() {
     assert!(matches!(Sensor::load(&file), Err(ConfigError::Read { .. })));
 }
 
+/// What SENSORS.md tells people to write can be read.
+#[test]
+fn the_profiles_of_the_documentation_are_sound() {
+    let page = include_str!("../../../SENSORS.md");
+    let blocks = page.split("```toml").skip(1).map(|block| block.split("```").next().unwrap());
+    let blocks: Vec<&str> = blocks.collect();
+    let [common, rotating, risley, table] = blocks[..] else { panic!("{} blocks", blocks.len()) };
+    assert_eq!(parse(&format!("{common}{rotating}")).unwrap().pattern().len(), 4_000);
+    assert_eq!(parse(&format!("{common}{risley}")).unwrap().pattern().len(), 10_000);
+    // That of a table is read where its file is.
+    let error = parse(&format!("{common}{table}")).unwrap_err().to_string();
+    assert!(error.contains("table.file: expected a profile in a file, to find mid360.csv"));
+}
+
 /// Each row replaces the first text by the second in a sound profile, and the
 /// error must hold the third.
 #[test]
