@@ -135,7 +135,7 @@ fn append(truth: &mut Unfinished, sightings: &[Sighting]) -> anyhow::Result<()> 
 }
 
 /// Writes the sensor's poses in the format of the TUM RGB-D benchmark, to the end of the drive
-/// and one beyond. The sensor moves evenly, so that what lies between two is between them.
+/// and one beyond. Between two the sensor goes evenly, and turns evenly within 1e-3 degrees.
 fn write_poses(file: &mut Unfinished, drive: &Drive, seconds: f64) -> anyhow::Result<()> {
     file.append(|writer| writeln!(writer, "# timestamp tx ty tz qx qy qz qw"))?;
     for n in 0..=(seconds * f64::from(POSES_HZ)).ceil() as u32 {

@@ -105,31 +105,29 @@ def cut(capture):
 
 
 class Truth:
-    """Where the sensor was."""
+    """Where the sensor was, and how it was turned."""
 
     def __init__(self, tum):
         self.rows = numpy.loadtxt(tum)
-        assert (self.rows[:, 4:] == self.rows[0, 4:]).all(), "the sensor turns"
-        x, y, z, w = self.rows[0, 4:]
-        self.world_from_sensor = numpy.array([
+
+    def poses(self, times_s):
+        at = [numpy.interp(times_s, self.rows[:, 0], self.rows[:, i]) for i in range(1, 8)]
+        # Poses are 10 ms apart: what lies between two quaternions is a line as good as an arc.
+        x, y, z, w = numpy.array(at[3:]) / numpy.linalg.norm(at[3:], axis=0)
+        poses = numpy.tile(numpy.eye(4), (len(times_s), 1, 1))
+        poses[:, :3, :3] = numpy.array([
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ])
-
-    def positions(self, times_s):
-        axes = (numpy.interp(times_s, self.rows[:, 0], self.rows[:, axis]) for axis in (1, 2, 3))
-        return numpy.stack(list(axes), -1)
-
-    def poses(self, times_s):
-        poses = numpy.tile(numpy.eye(4), (len(times_s), 1, 1))
-        poses[:, :3, :3], poses[:, :3, 3] = self.world_from_sensor, self.positions(times_s)
+        ]).transpose(2, 0, 1)
+        poses[:, :3, 3] = numpy.stack(at[:3], -1)
         return poses
 
     def deskewed(self, points, times_s, at_s):
         """Points as the sensor would see them from where it was at one time."""
-        moved = self.positions(times_s) - self.positions(numpy.array([at_s]))
-        return points + moved @ self.world_from_sensor
+        poses, [at] = self.poses(times_s), self.poses(numpy.array([at_s]))
+        world = numpy.einsum("nij,nj->ni", poses[:, :3, :3], points) + poses[:, :3, 3]
+        return (world - at[:3, 3]) @ at[:3, :3]
 
 
 def reference(config):

@@ -4,6 +4,7 @@
 //! fires, at where everything is then.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -23,6 +24,7 @@ use sim_gpu::sensor::{BeamPattern, Layout, Rotating, Sensor};
 use crate::error::SceneError;
 use crate::ground::Ground;
 use crate::place::OWN_RADIUS_M;
+use crate::recipe::Span;
 use crate::scene::mount;
 use crate::stage::Stage;
 use crate::street::{Body, Street};
@@ -39,8 +41,25 @@ pub struct Drive<'a> {
     /// The sensor's at time 0.
     start: Pose,
     velocity_m_s: DVec3,
+    sway: Sway,
     glass_returned: f64,
 }
+
+/// How a car's body pitches and rolls as it goes.
+struct Sway {
+    /// The standard deviation of each angle, radians.
+    rad: f64,
+    /// The phases of pitch and roll, by frequency, radians.
+    phases_rad: [[f64; 3]; 2],
+}
+
+/// Frequencies, and the share of the variance that each has: the road's rise and fall, and the body
+/// on its springs, at 1 to 2 Hz. An assumption: a sway of 0.5 degrees then turns by 1.5 degrees a
+/// second, as the gyroscopes of cars in towns tell.
+const SWAY: [(f64, f64); 3] = [(0.2, 0.7), (0.6, 0.25), (1.4, 0.05)];
+
+/// Below this speed, metres a second, a car sways less, in proportion.
+const SWAYS_FROM_M_S: f64 = 5.0;
 
 /// What the sensor sees in one packet.
 #[derive(Clone, Debug)]
@@ -103,7 +122,8 @@ impl<'a> Drive<'a> {
         ground.road_y_m = off_road_m.min(most_m).max(0.0);
         let velocity_m_s = ground.along(speed_m_s);
         let street = Street::new(stage, ground, s);
-        Ok(Self { street, sensor, revolution, start, velocity_m_s, glass_returned })
+        let sway = Sway::draw(recipe.mount.sway_deg, speed_m_s, seed);
+        Ok(Self { street, sensor, revolution, start, velocity_m_s, sway, glass_returned })
     }
 
     /// How the head turns.
@@ -122,7 +142,9 @@ impl<'a> Drive<'a> {
     /// Where the sensor is, `time_s` after the start.
     #[must_use]
     pub fn pose(&self, time_s: f64) -> Pose {
-        Pose { position_m: self.start.position_m + self.velocity_m_s * time_s, ..self.start }
+        let position_m = self.start.position_m + self.velocity_m_s * time_s;
+        let world_from_sensor = self.start.world_from_sensor * self.sway.at(time_s);
+        Pose { position_m, world_from_sensor }
     }
 
     /// The object that scans and sightings call `object`; `None` for the ground.
@@ -172,13 +194,17 @@ impl<'a> Drive<'a> {
         let [from_s, to_s] = [pattern.time_s[0], pattern.time_s[pattern.len() - 1]];
         let time_s = (from_s + to_s) / 2.0;
         let pose = self.pose(time_s);
+        let turned_rad = [from_s, to_s]
+            .map(|end_s| pose.world_from_sensor.angle_between(self.pose(end_s).world_from_sensor));
+        let turned_rad = turned_rad[0].max(turned_rad[1]);
         let sector = Sector::of(&pattern);
         let sensor_from_world = pose.world_from_sensor.inverse();
         let in_sight = near.iter().filter(|(_, body)| {
             let from_sensor = body.centre_m(time_s) - pose.position_m;
-            // How far they come to or from each other, from the middle of the packet on.
+            // How far they come to or from each other, from the middle of the packet on, and how
+            // far it moves in the sensor's frame as that turns.
             let speed_m_s = (body.velocity_m_s - self.velocity_m_s).length();
-            let moves_m = speed_m_s * (to_s - time_s);
+            let moves_m = speed_m_s * (to_s - time_s) + turned_rad * from_sensor.length();
             from_sensor.length() <= self.sight_m()
                 && sector.meets(sensor_from_world * from_sensor, body.radius_m() + moves_m)
         });
@@ -186,15 +212,18 @@ impl<'a> Drive<'a> {
         let parts = parts.range(self.street.parts_in_sight(pose.position_m.x));
         let mut targets: Vec<_> = parts.map(|(_, part)| stage.ground(part, 0)).collect();
         let n_parts = targets.len();
-        let origin = Pose { position_m: DVec3::ZERO, world_from_sensor: DQuat::IDENTITY };
+        let ends = [(from_s, self.pose(from_s)), (to_s, self.pose(to_s))];
         targets.extend(bodies.iter().map(|body| {
             let mut target = stage.target(&body.object, self.glass_returned);
-            target.motion = moving(origin, body.velocity_m_s, [from_s, to_s]);
+            target.motion = moving([from_s, to_s].map(|time_s| {
+                let position_m = body.velocity_m_s * time_s;
+                (time_s, Pose { position_m, world_from_sensor: DQuat::IDENTITY })
+            }));
             target
         }));
 
         let mut request = ScanRequest::new(&self.sensor, &pattern, pose);
-        request.motion = moving(self.start, self.velocity_m_s, [from_s, to_s]);
+        request.motion = moving(ends);
         request.deskew = true;
         request.attributes = [Attribute::Beam, Attribute::Range, Attribute::Object].into();
         request.stream = StreamKey::new(stage.seed(), "drive/beams", number);
@@ -271,17 +300,36 @@ impl Sightings {
     }
 }
 
-/// The poses between two times of what is at `start` at time 0; `None` if it stands still.
-fn moving(start: Pose, velocity_m_s: DVec3, times_s: [f64; 2]) -> Option<Arc<Trajectory>> {
-    if velocity_m_s == DVec3::ZERO {
-        return None;
+/// The way between two poses; `None` if they are the same.
+fn moving(ends: [(f64, Pose); 2]) -> Option<Arc<Trajectory>> {
+    let moves = ends[0].1 != ends[1].1;
+    let trajectory = || Trajectory::new(ends.into());
+    moves
+        .then(|| Arc::new(trajectory().expect("invariant: a packet takes time, speeds are finite")))
+}
+
+impl Sway {
+    fn draw(sway_deg: Span, speed_m_s: f64, seed: u64) -> Self {
+        let key = StreamKey::new(seed, "drive/sway", 0);
+        let phase_rad = |axis: u64, i: u64| TAU * key.unit(1 + 3 * axis + i);
+        Self {
+            rad: sway_deg.at(key.unit(0)).to_radians() * (speed_m_s / SWAYS_FROM_M_S).min(1.0),
+            phases_rad: [0, 1].map(|axis| [0, 1, 2].map(|i| phase_rad(axis, i))),
+        }
     }
-    let at = |time_s| {
-        let position_m = start.position_m + velocity_m_s * time_s;
-        (time_s, Pose { position_m, ..start })
-    };
-    let trajectory = Trajectory::new(times_s.map(at).into());
-    Some(Arc::new(trajectory.expect("invariant: a packet takes time, and speeds are finite")))
+
+    /// How the sensor is turned from where it was mounted. The road runs along x, so that it
+    /// pitches about y and rolls about x, whichever way it was turned.
+    fn at(&self, time_s: f64) -> DQuat {
+        let [pitch_rad, roll_rad] = self.phases_rad.map(|phases_rad| {
+            let waves = SWAY.iter().zip(phases_rad).map(|((hz, share), phase_rad)| {
+                // The variance of a sine is half of its amplitude squared.
+                (2.0 * share).sqrt() * (TAU * hz * time_s + phase_rad).sin()
+            });
+            self.rad * waves.sum::<f64>()
+        });
+        DQuat::from_rotation_y(pitch_rad) * DQuat::from_rotation_x(roll_rad)
+    }
 }
 
 /// The azimuths of a packet's beams, in the sensor's frame.

@@ -73,6 +73,10 @@ pub struct Mount {
     /// default. Points are then where a driver puts them that takes it to stand still.
     #[serde(default)]
     pub speed_m_s: Span,
+    /// By how much it pitches and rolls in a drive, degrees: the standard deviation of each,
+    /// drawn for each drive. It does not by default.
+    #[serde(default)]
+    pub sway_deg: Span,
 }
 
 /// A sensor and its errors.
@@ -295,6 +299,7 @@ impl Recipe {
         mount.tilt_deg.check("mount.tilt_deg", 0.0, 45.0)?;
         mount.off_road_m.check("mount.off_road_m", 0.0, MOST_M)?;
         mount.speed_m_s.check("mount.speed_m_s", 0.0, 100.0)?;
+        mount.sway_deg.check("mount.sway_deg", 0.0, 10.0)?;
         self.glass_returned.check("glass_returned", 0.0, 1.0)?;
         let clearance_m = self.ground_clearance_m.unwrap_or_default();
         clearance_m.check("ground_clearance_m", 0.0, 1.0)?;
