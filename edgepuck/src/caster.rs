@@ -1,7 +1,6 @@
 //! Opens the adapter that a command line asks for.
 
 use anyhow::Context;
-use sim_gpu::cast_error::CastError;
 use sim_gpu::caster::AdapterRequest;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
@@ -27,25 +26,21 @@ pub struct CasterArgs {
 impl CasterArgs {
     /// Opens the adapter for `effects` and says which it is.
     pub fn open(&self, effects: &Effects) -> anyhow::Result<Caster> {
-        let (caster, passed_over) = self.open_quietly(effects)?;
+        if self.adapter != AdapterRequest::Auto {
+            let caster = Caster::open(&self.adapter, effects).context("cannot open the adapter")?;
+            eprintln!("Casting on {}.", caster.name());
+            return Ok(caster);
+        }
+        let (caster, passed_over) = Caster::open_best(effects);
         for error in &passed_over {
             eprintln!("Skipped an adapter: {error}.");
         }
-        if self.adapter == AdapterRequest::Auto && matches!(caster, Caster::Cpu(_)) {
+        if matches!(caster, Caster::Cpu(_)) {
             eprintln!("No GPU was found, so the CPU casts.");
         } else {
             eprintln!("Casting on {}.", caster.name());
         }
         Ok(caster)
-    }
-
-    /// The same without a word: the caster, and why adapters were passed over.
-    pub fn open_quietly(&self, effects: &Effects) -> anyhow::Result<(Caster, Vec<CastError>)> {
-        if self.adapter == AdapterRequest::Auto {
-            return Ok(Caster::open_best(effects));
-        }
-        let caster = Caster::open(&self.adapter, effects).context("cannot open the adapter")?;
-        Ok((caster, Vec::new()))
     }
 
     /// Whether beams that cannot hit are cast.

@@ -32,6 +32,12 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         }
         return Ok(Outcome::Success);
     };
+    if let Some(file) = args.beams.as_deref()
+        && file.extension().is_none_or(|extension| extension != "csv")
+    {
+        let found = file.display();
+        return Err(Usage(format!("--beams: expected a name with .csv, found {found}")).into());
+    }
     let sensor = Sensor::resolve(name)?;
     let pattern = sensor.pattern();
     print!("{}", described(&sensor, &pattern));
@@ -39,10 +45,6 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         eprintln!("warning: {oddity}");
     }
     if let Some(file) = &args.beams {
-        if file.extension().is_none_or(|extension| extension != "csv") {
-            let found = file.display();
-            return Err(Usage(format!("--beams: expected a name with .csv, found {found}")).into());
-        }
         atomic::write_bytes(file, beams(&pattern))?;
     }
     Ok(Outcome::Success)
@@ -105,8 +107,9 @@ fn oddities(sensor: &Sensor, pattern: &BeamPattern) -> Vec<String> {
         found.push("sources: expected where the numbers are from, found none".to_owned());
     }
     let [lowest, highest] = ends(pattern.directions.iter().map(elevation_deg));
-    let half_turn = std::f64::consts::FRAC_PI_2;
-    if pattern.ring.iter().any(|&ring| ring > 0) && lowest >= -half_turn && highest <= half_turn {
+    // Of those that are in radians, none is beyond a quarter turn.
+    let most = std::f64::consts::FRAC_PI_2;
+    if pattern.ring.iter().any(|&ring| ring > 0) && lowest >= -most && highest <= most {
         found.push(format!(
             "all elevations lie within {lowest:.3} to {highest:.3} degrees: are they in radians?"
         ));

@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
 use crate::effects::{DetectionLimit, Weather};
+use crate::weather::without_surface;
 
 /// Index of refraction of water over that of air.
 const WATER: f64 = 1.33 / 1.0003;
@@ -44,7 +45,7 @@ pub enum Corruption {
     },
     /// The sensor moves evenly while it turns, and nobody takes that out of its points.
     Motion {
-        /// Forward, metres a second.
+        /// Along x of the points, metres a second.
         speed_m_s: f64,
         /// To the left, degrees a second.
         yaw_rate_deg_s: f64,
@@ -54,7 +55,7 @@ pub enum Corruption {
         /// Which part of them, 0 to 1.
         share: f64,
     },
-    /// Pulses of another sensor arrive first: at any time, and as strong as what is there.
+    /// Pulses of another sensor are taken for returns: at any time, and of any strength.
     Crosstalk {
         /// Of so many points, 0 to 1.
         share: f64,
@@ -85,9 +86,9 @@ pub struct Recorded<'a> {
     pub sensor_m: DVec3,
     /// The weakest return that it detects.
     pub limit: DetectionLimit,
-    /// How far it measures, metres.
-    pub max_range_m: f64,
-    /// Keys all random numbers; those of point i have its number.
+    /// From where to where it measures, metres.
+    pub range_m: [f64; 2],
+    /// Keys all random numbers.
     pub stream: StreamKey,
 }
 
@@ -99,7 +100,9 @@ impl Corruption {
     pub fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         let share = |field: &str, x: f64| within(&format!("{key}.{field}"), x, 0.0..=1.0);
         match self {
-            Self::Weather(weather) => weather.validate(),
+            Self::Weather(weather) => weather
+                .validate()
+                .map_err(|error| InvalidValue { key: format!("{key}.{}", error.key), ..error }),
             Self::WetGround { film_m } => within(&format!("{key}.film_m"), *film_m, 0.0..=1.0),
             Self::Motion { speed_m_s, yaw_rate_deg_s } => {
                 within(&format!("{key}.speed_m_s"), *speed_m_s, -300.0..=300.0)?;
@@ -116,16 +119,30 @@ impl Corruption {
     }
 }
 
+/// Of each scan that is returned, `intensity` is the brightness of its points.
 impl Recorded<'_> {
+    /// How many points are too weak for the detection limit as they were recorded: whoever
+    /// recorded them has a lower one.
+    #[must_use]
+    pub fn too_weak_before(&self) -> usize {
+        let is_too_weak = |i: &usize| self.power(*i, 1.0) < self.limit.power();
+        (0..self.scan.len()).filter(is_too_weak).count()
+    }
+
+    /// The power of point `i` if this part of it is left.
+    fn power(&self, i: usize, left: f64) -> f64 {
+        f64::from(self.brightness[i]) * left / self.from_sensor(i).length_squared()
+    }
+
     /// The scan on wet ground: the points whose returns are still detected, weaker.
     #[must_use]
     pub fn wet_ground(&self, film_m: f64) -> Scan {
         let share = (film_m / TEXTURE_M).min(1.0);
         self.dimmed(|i, from_sensor| {
-            if !self.is_ground[i] {
+            let Some(direction) = from_sensor.try_normalize().filter(|_| self.is_ground[i]) else {
                 return 1.0;
-            }
-            let cos_incidence = from_sensor.normalize().z.abs();
+            };
+            let cos_incidence = direction.z.abs();
             let rho = (f64::from(self.brightness[i]) / cos_incidence.max(1e-3)).min(1.0);
             1.0 - share + share * wet(rho, cos_incidence)
         })
@@ -141,22 +158,22 @@ impl Recorded<'_> {
     /// `left` of the power is left; their brightness is the scan's intensity.
     fn dimmed(&self, left: impl Fn(usize, DVec3) -> f64) -> Scan {
         let of_point = |i: usize| {
-            let from_sensor = self.from_sensor(i);
-            let brightness = f64::from(self.brightness[i]) * left(i, from_sensor);
-            let power = brightness / from_sensor.length_squared();
-            // A point in the sensor itself, or one that is not finite, says nothing.
-            (!power.is_finite() || power >= self.limit.power()).then_some((i, brightness as f32))
+            let left = left(i, self.from_sensor(i));
+            let power = self.power(i, left);
+            // A point in the sensor itself, or one that is not finite, says nothing; and what
+            // loses nothing was detected.
+            let is_detected = left >= 1.0 || !power.is_finite() || power >= self.limit.power();
+            is_detected.then(|| (i, (f64::from(self.brightness[i]) * left) as f32))
         };
         let (kept, brightness): (Vec<usize>, Vec<f32>) =
             (0..self.scan.len()).filter_map(of_point).unzip();
         let mut scan = self.scan.select(&kept);
-        scan.intensity = Some(brightness);
-        // These would be of the scan as it was.
-        (scan.power, scan.reflectivity) = (None, None);
+        set_brightness(&mut scan, brightness);
         scan
     }
 
-    /// The scan of a sensor that goes forward and turns to the left; `None` if it has no times.
+    /// The scan of a sensor that goes along x and turns to the left; `None` if it has no times.
+    /// Normals and poses are left out, since they would be of the scan as it was.
     #[must_use]
     pub fn motion(&self, speed_m_s: f64, yaw_rate_deg_s: f64) -> Option<Scan> {
         let times_s = self.scan.time_s.as_ref()?;
@@ -178,6 +195,8 @@ impl Recorded<'_> {
                 ranges_m[i] = seen.length() as f32;
             }
         }
+        (scan.normal, scan.sensor_m, scan.attitude_rad) = (None, None, None);
+        set_brightness(&mut scan, self.brightness.to_vec());
         Some(scan)
     }
 
@@ -200,25 +219,20 @@ impl Recorded<'_> {
     pub fn crosstalk(&self, share: f64) -> Scan {
         let mut scan = self.scan.clone();
         let mut brightness = self.brightness.to_vec();
-        for (i, point) in scan.positions.iter_mut().enumerate() {
+        for i in 0..scan.len() {
             let from_sensor = self.from_sensor(i);
             let draw = |n: u64| self.stream.unit(3 * i as u64 + n);
             let Some(direction) = from_sensor.try_normalize() else { continue };
             if !from_sensor.is_finite() || draw(0) >= share {
                 continue;
             }
-            let range_m = self.max_range_m * draw(1);
-            *point = self.in_file(direction * range_m);
+            let [nearest_m, farthest_m] = self.range_m;
+            let range_m = nearest_m + (farthest_m - nearest_m) * draw(1);
+            scan.positions[i] = self.in_file(direction * range_m);
             brightness[i] = draw(2) as f32;
-            if let Some(ranges_m) = &mut scan.range_m {
-                ranges_m[i] = range_m as f32;
-            }
-            for numbers in [&mut scan.triangle, &mut scan.object].into_iter().flatten() {
-                numbers[i] = u32::MAX;
-            }
+            without_surface(&mut scan, i, range_m);
         }
-        scan.intensity = Some(brightness);
-        (scan.power, scan.reflectivity) = (None, None);
+        set_brightness(&mut scan, brightness);
         scan
     }
 
@@ -245,7 +259,9 @@ impl Recorded<'_> {
 
     fn where_point(&self, is_kept: impl Fn(usize) -> bool) -> Scan {
         let kept: Vec<usize> = (0..self.scan.len()).filter(|&i| is_kept(i)).collect();
-        self.scan.select(&kept)
+        let mut scan = self.scan.select(&kept);
+        set_brightness(&mut scan, kept.iter().map(|&i| self.brightness[i]).collect());
+        scan
     }
 
     /// Where point `i` is, from the sensor.
@@ -259,6 +275,13 @@ impl Recorded<'_> {
         let at = from_sensor + self.sensor_m - DVec3::from_array(self.scan.origin);
         at.as_vec3().to_array()
     }
+}
+
+/// Tells these brightnesses as the intensities of `scan`; what else it has of power would be of
+/// the scan as it was.
+fn set_brightness(scan: &mut Scan, brightness: Vec<f32>) {
+    scan.intensity = Some(brightness);
+    (scan.power, scan.reflectivity) = (None, None);
 }
 
 /// What a film of water leaves of the light that a ground of reflectivity `rho` returns to where
@@ -299,7 +322,8 @@ mod tests {
     fn recorded<'a>(scan: &'a Scan, brightness: &'a [f32], is_ground: &'a [bool]) -> Recorded<'a> {
         let limit = DetectionLimit { reflectivity: 0.1, range_m: 30.0 };
         let (stream, sensor_m) = (StreamKey([1, 2]), DVec3::ZERO);
-        Recorded { scan, brightness, is_ground, sensor_m, limit, max_range_m: 100.0, stream }
+        let range_m = [0.0, 100.0];
+        Recorded { scan, brightness, is_ground, sensor_m, limit, range_m, stream }
     }
 
     #[test]
@@ -325,6 +349,11 @@ mod tests {
         let bright = vec![0.4; scan.len()];
         let at = recorded(&scan, &bright, &is_ground);
         assert_eq!(at.wet_ground(0.0).positions, scan.positions);
+        assert_eq!(at.too_weak_before(), 0);
+        // What loses nothing stays, however weak the limit takes it to be.
+        let black = vec![1e-6; scan.len()];
+        let black = recorded(&scan, &black, &is_ground);
+        assert_eq!((black.dirty_window(1.0).len(), black.too_weak_before()), (800, 800));
         let wet = at.wet_ground(1.0);
         let intensity = wet.intensity.as_ref().unwrap();
         for (point, &left) in wet.positions.iter().zip(intensity) {

@@ -59,13 +59,42 @@ fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
         assert!(said.contains(part), "{part}: {said}");
     }
     assert_eq!(counts(&folder, "bare/corruptions.csv").len(), 15);
+    // What needs no light needs no intensities and no detection limit.
+    folder.succeeds("corrupt cloud.xyz --only crosstalk --profile kinect-v2 --out lightless");
+    assert!(folder.scan("lightless/crosstalk-1.npz").intensity.is_none());
+}
+
+#[test]
+fn intensities_stay_in_the_numbers_of_the_file() {
+    let folder = Folder::new();
+    folder.write("ground.off", GROUND);
+    folder.write("wall.off", WALL);
+    folder.write("street.toml", STREET);
+    folder.succeeds("scan street.toml --adapter cpu --out sweep.npz");
+    let mut sweep = folder.scan("sweep.npz");
+    sweep.intensity.iter_mut().flatten().for_each(|intensity| *intensity *= 128.0);
+    let hashing = formats::hash::Hashing::None;
+    let npz = formats::scan_file::ScanFormat::Npz;
+    formats::scan_file::write_scan(&folder.at("bytes.npz"), npz, hashing, &sweep).unwrap();
+    folder.succeeds("corrupt bytes.npz --sensor 0 0 1.8 --white 128 --out out --severity 1");
+    let most = |scan: &formats::Scan| scan.intensity.iter().flatten().copied().fold(0.0, f32::max);
+    for (file, _) in counts(&folder, "out/corruptions.csv") {
+        let found = most(&folder.scan(&format!("out/{file}")));
+        let expected = match file.as_str() {
+            "fog-1.npz" | "snow-1.npz" => 50.0..77.0,
+            "incomplete-echo-1.npz" => 15.0..20.0,
+            "crosstalk-1.npz" => 76.0..128.0,
+            _ => 70.0..77.0,
+        };
+        assert!(expected.contains(&found), "{file}: {found} of {}", most(&sweep));
+    }
 }
 
 #[test]
 fn meshes_are_scanned_once_for_each_corruption_and_severity() {
     let folder = Folder::new();
     folder.succeeds("gen-shapes --out shapes --train 1 --test 1");
-    let words = "corrupt shapes --adapter cpu --views 1 --points 256 --severity 1,5";
+    let words = "corrupt shapes --views 1 --points 256 --severity 1,5";
     for out in ["one", "other"] {
         folder.succeeds(&format!("{words} --out {out}"));
     }
@@ -87,8 +116,9 @@ fn meshes_are_scanned_once_for_each_corruption_and_severity() {
         }
     }
     folder.write("odd/chair/test/odd.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
-    let said = folder.exits(1, "corrupt odd --adapter cpu --out odd-sets --only jitter");
+    let said = folder.exits(1, "corrupt odd --out odd-sets --only jitter");
     assert!(said.contains("odd.off"), "{said}");
+    assert_eq!(counts(&folder, "odd-sets/corruptions.csv").len(), 6);
 }
 
 #[test]
@@ -103,6 +133,10 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
     folder.write("typo.toml", own.replace("transmission", "transmision"));
     folder.write("many.toml", own.replace("= 0 }", "= 2 }"));
     folder.write("path.toml", own.replace("\"gone\"", "\"../gone\""));
+    folder.write("twice.toml", own.to_owned() + own);
+    folder.write("none.toml", "[[object]]\nname = \"a\"\nby = \"b\"\nseverity = [{}]\n");
+    let wet = "severity = [{ weather = { rain_mm_h = -1 } }]";
+    folder.write("wet.toml", format!("[[sweep]]\nname = \"a\"\nby = \"b\"\n{wet}\n"));
     folder.write("empty/readme.txt", "");
     let list = folder.succeeds("corrupt --list");
     assert!(list.contains("wet-ground") && list.contains("left out of ModelNet-C"), "{list}");
@@ -118,6 +152,11 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
                 "corrupt cloud.xyz --reflectivity 1 --plan path.toml",
                 "expected letters, digits and -",
             ),
+            ("corrupt cloud.xyz --reflectivity 1 --plan twice.toml", "is the name of sweep[0] too"),
+            (
+                "corrupt cloud.xyz --reflectivity 1 --plan wet.toml",
+                "wet.toml: sweep[0].severity[0].effects.weather.rain_mm_h: expected",
+            ),
             ("corrupt empty", "no mesh found"),
             ("corrupt nowhere.npz", "nowhere.npz"),
         ],
@@ -126,6 +165,10 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
         2,
         &[
             ("corrupt", "<SWEEP>"),
+            (
+                "corrupt cloud.xyz --reflectivity 1 --plan none.toml",
+                "--plan: expected a corruption",
+            ),
             ("corrupt cloud.xyz", "its points have no intensity: give --reflectivity"),
             ("corrupt cloud.xyz --reflectivity 1 --only fgo", "expected some of fog, wet-ground"),
             ("corrupt cloud.xyz --reflectivity 1 --severity 4", "expected 1 to 3, found 4"),

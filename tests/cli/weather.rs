@@ -160,13 +160,13 @@ fn sensors_and_objects_of_a_scene_move_along_trajectories() {
     let folder = Folder::new();
     folder.write("wall.off", WALL);
     folder.write("ego.tum", "# t p q\n100 0 0 0 0 0 0 1\n101 10 0 0 0 0 0 1\n");
-    // KITTI's lines have no times.
-    folder.write("car.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 -1 0 1 0 0 0 0 1 0\n");
+    // It comes 1 m nearer in a tenth of a second.
+    folder.write("car.tum", "100 0 0 0 0 0 0 1\n100.1 -1 0 0 0 0 0 1\n");
     let moves = |sensor: &str| {
         scene("quantise_m = true")
             .replace("\"return\"]", "\"sensor\", \"attitude\"]")
             .replace("position_m = [0, 0, 0]\nyaw_deg = 0\n", sensor)
-            .replace("reflectivity", "trajectory = \"car.txt\"\nreflectivity")
+            .replace("reflectivity", "trajectory = \"car.tum\"\nreflectivity")
     };
     for (name, deskew) in [("raw", false), ("deskewed", true)] {
         let sensor = format!("trajectory = \"ego.tum\"\nstart_s = 100.0\ndeskew = {deskew}\n");
@@ -179,8 +179,18 @@ fn sensors_and_objects_of_a_scene_move_along_trajectories() {
     // In a tenth of a second the sensor comes 1 m.
     let farthest = deskewed.sensor_m.unwrap().iter().fold(0f32, |far, at| far.max(at[0]));
     assert!((0.9..1.0).contains(&farthest), "{farthest} m");
+    let [nearest, farthest] = [f32::min, f32::max]
+        .map(|ends| deskewed.positions.iter().map(|at| at[0]).reduce(ends).unwrap());
+    assert!(nearest < 19.1 && farthest > 19.9, "the wall comes from 20 m: {nearest} {farthest}");
+    // KITTI's lines have no times: they begin at 0.
+    folder.write("car.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 -1 0 1 0 0 0 0 1 0\n");
+    let early = moves("trajectory = \"ego.tum\"\nstart_s = 100\n").replace("car.tum", "car.txt");
+    folder.write("early.toml", early);
+    let said = folder.exits(1, "scan early.toml --adapter cpu --out bad.npz");
+    assert!(said.contains("object[0].trajectory: expected poses around 100 s"), "{said}");
     for (sensor, part) in [
         ("trajectory = \"none.tum\"\n", "sensor[0].trajectory: "),
+        ("trajectory = \"ego.tum\"\n", "sensor[0].trajectory: expected poses from 0 s"),
         ("trajectory = \"wall.off\"\n", "wall.off: line 1: expected a number, found \"OFF\""),
         ("trajectory = \"ego.tum\"\nposition_m = [0, 0, 0]\n", "cannot stand beside position_m"),
         ("trajectory = \"ego.tum\"\nstart_s = inf\n", "start_s: expected a number within"),

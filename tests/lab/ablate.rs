@@ -164,8 +164,8 @@ fn effects_of_streets_are_compared_on_simulated_and_on_real_objects() {
     };
     // The stand-ins are the first row's own test scenes.
     for name in ["none", "driving", "unturned"] {
-        assert_eq!(of(name, "none"), of(name, "real"), "{name}");
-        assert_eq!(of(name, "real").len(), 2, "car and negatives");
+        assert_eq!(of(name, "none"), of(name, "real objects"), "{name}");
+        assert_eq!(of(name, "real objects").len(), 2, "car and negatives");
     }
     assert!(!of("none", "driving").is_empty() && !of("driving", "driving").is_empty());
     assert!(!at.join("out/street/scenes/unturned-0").exists(), "the same scenes are made once");

@@ -6,7 +6,6 @@ mod plan;
 mod sweep;
 
 use crate::brightness::BrightnessArgs;
-use crate::caster::CasterArgs;
 use crate::segment::SweepArgs;
 use crate::{Outcome, Usage};
 use plan::{Entry, Plan};
@@ -57,9 +56,6 @@ pub struct Args {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
-
-    #[command(flatten)]
-    caster: CasterArgs,
 }
 
 /// Makes the corruptions that are asked for.
@@ -69,10 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         print!("{}", listed(&plan));
         return Ok(Outcome::Success);
     }
-    let Some(input) = &args.input else {
-        let cause = "expected a sweep or a folder of meshes, or --list, found neither";
-        return Err(Usage(cause.to_owned()).into());
-    };
+    let input = args.input.as_ref().expect("invariant: without --list it is asked for");
     let sensor = Sensor::resolve(&args.profile)?;
     if input.sweep.is_dir() {
         return objects::run(args, &input.sweep, &plan, &sensor);
@@ -105,6 +98,8 @@ struct Made<'a> {
     severity: u32,
     /// Points of the scan, or clouds of the set.
     count: usize,
+    /// Points of the sweep, or clouds of which a point may be seen.
+    of: usize,
     by: &'a str,
 }
 

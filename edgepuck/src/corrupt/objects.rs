@@ -7,9 +7,7 @@ use crate::gen_dataset::report_failures;
 use anyhow::Context;
 use edgepuck_dataset::corrupted::{Corrupted, CorruptedSet, ObjectCorruption};
 use formats::Split;
-use formats::labelled::read_labelled;
 use indicatif::{ProgressBar, ProgressStyle};
-use sim_gpu::effects::Effects;
 use sim_gpu::mesh::frame::Up;
 use sim_gpu::mesh::tree::discover;
 use sim_gpu::sensor::{Sensor, Views};
@@ -37,9 +35,6 @@ pub(super) struct ObjectArgs {
     up: Option<Up>,
 }
 
-/// Scans with fewer points are left out.
-const MIN_POINTS: u32 = 16;
-
 /// Writes one packed set for each corruption and severity, and one of clean scans.
 pub(super) fn run(
     args: &Args,
@@ -54,10 +49,8 @@ pub(super) fn run(
     let meshes = discover(folder, args.seed)?;
     let tested = meshes.iter().filter(|entry| entry.split == Split::Test).count();
     anyhow::ensure!(tested > 0, "{}: expected a mesh for testing, found none", folder.display());
-    args.caster.open(&Effects::default())?;
     let set = |name: String, corruption: &ObjectCorruption| {
-        let open = |effects: &Effects| Ok::<_, anyhow::Error>(args.caster.open_quietly(effects)?.0);
-        CorruptedSet::new(name.clone(), corruption.clone(), sensor, open).context(name)
+        CorruptedSet::new(name.clone(), corruption.clone(), sensor).context(name)
     };
     let mut sets = vec![set("clean".to_owned(), &ObjectCorruption::default())?];
     for (entry, severity, corruption) in &chosen {
@@ -65,21 +58,26 @@ pub(super) fn run(
     }
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} meshes, {per_sec}, {eta} left")?;
     let bar = ProgressBar::new(tested as u64).with_style(style);
-    let (out, seed, min_points) = (&*args.out, args.seed, MIN_POINTS);
-    let corrupted = Corrupted { out, sensor, views, up, points, min_points, seed };
-    let failures = corrupted.write(&meshes, &sets, || bar.inc(1))?;
+    let (out, seed) = (&*args.out, args.seed);
+    let corrupted = Corrupted { out, sensor, views, up, points, seed };
+    let written = corrupted.write(&meshes, &sets, || bar.inc(1))?;
     bar.finish_and_clear();
-    report_failures(&failures);
+    report_failures(&written.failures);
 
     let clean = ("clean", 0, "nothing");
     let named = chosen.iter().map(|(entry, severity, _)| (&*entry.name, *severity, &*entry.by));
-    let mut made = Vec::new();
-    for ((corruption, severity, by), set) in std::iter::once(clean).chain(named).zip(&sets) {
-        let file = format!("{}-test.npz", set.name);
-        let count = read_labelled(&out.join(&file))?.len();
-        made.push(Made { file, corruption, severity, count, by });
-    }
+    let named = std::iter::once(clean).chain(named).zip(&sets).zip(&written.clouds);
+    let of = written.of;
+    let made: Vec<Made<'_>> = named
+        .map(|(((corruption, severity, by), set), &count)| {
+            if count < of {
+                eprintln!("{}: of {} of {of} views nothing is seen", set.name, of - count);
+            }
+            let file = format!("{}-test.npz", set.name);
+            Made { file, corruption, severity, count, of, by }
+        })
+        .collect();
     write_list(&made, out)?;
     eprintln!("{} sets of {tested} meshes: {}", made.len(), out.display());
-    Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+    Ok(if written.failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
 }

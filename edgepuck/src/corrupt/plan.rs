@@ -1,10 +1,10 @@
 //! Which corruptions there are.
 
-use anyhow::Context;
+use anyhow::{Context, bail, ensure};
 use edgepuck_assets::CORRUPTIONS;
 use edgepuck_dataset::corrupted::ObjectCorruption;
 use serde::Deserialize;
-use sim_gpu::config;
+use sim_gpu::config::{self, InvalidValue};
 use sim_gpu::corruption::Corruption;
 use std::path::Path;
 
@@ -65,27 +65,31 @@ impl Plan {
     }
 
     fn check(&self) -> anyhow::Result<()> {
-        for (i, entry) in self.sweep.iter().enumerate() {
-            check_name(&format!("sweep[{i}]"), &entry.name)?;
-            for (n, corruption) in entry.severity.iter().enumerate() {
-                corruption.validate(&format!("sweep[{i}].severity[{n}]"))?;
-            }
-        }
-        for (i, entry) in self.object.iter().enumerate() {
-            check_name(&format!("object[{i}]"), &entry.name)?;
-            for (n, corruption) in entry.severity.iter().enumerate() {
-                corruption.validate(&format!("object[{i}].severity[{n}]"))?;
-            }
-        }
-        Ok(())
+        check_all("sweep", &self.sweep, Corruption::validate)?;
+        check_all("object", &self.object, ObjectCorruption::validate)
     }
 }
 
-/// That a file may be called so.
-fn check_name(key: &str, name: &str) -> anyhow::Result<()> {
-    let is_fine =
-        !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
-    anyhow::ensure!(is_fine, "{key}.name: expected letters, digits and -, found \"{name}\"");
+/// That all entries of a kind have a name of their own, and numbers that make sense.
+fn check_all<T>(
+    kind: &str,
+    entries: &[Entry<T>],
+    validate: impl Fn(&T, &str) -> Result<(), InvalidValue>,
+) -> anyhow::Result<()> {
+    for (i, Entry { name, severity, .. }) in entries.iter().enumerate() {
+        let is_fine = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        ensure!(
+            !name.is_empty() && name.chars().all(is_fine),
+            "{kind}[{i}].name: expected letters, digits and -, found \"{name}\""
+        );
+        if let Some(first) = entries[..i].iter().position(|other| other.name == *name) {
+            bail!("{kind}[{i}].name: \"{name}\" is the name of {kind}[{first}] too");
+        }
+        ensure!(!severity.is_empty(), "{kind}[{i}].severity: expected one at least, found none");
+        for (n, corruption) in severity.iter().enumerate() {
+            validate(corruption, &format!("{kind}[{i}].severity[{n}]"))?;
+        }
+    }
     Ok(())
 }
 
@@ -99,15 +103,19 @@ pub fn chosen<'a, T>(
     names: &[String],
     severities: &[u32],
 ) -> Result<Vec<(&'a Entry<T>, u32, &'a T)>, Usage> {
+    if entries.is_empty() {
+        return Err(Usage("--plan: expected a corruption of what is given, found none".to_owned()));
+    }
     let known = || entries.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>().join(", ");
     if let Some(name) = names.iter().find(|name| entries.iter().all(|e| e.name != **name)) {
         return Err(Usage(format!("--only: expected some of {}, found {name}", known())));
     }
-    let most = entries.iter().map(|entry| entry.severity.len()).max().unwrap_or(0);
+    let is_wanted = |entry: &&Entry<T>| names.is_empty() || names.contains(&entry.name);
+    let most = entries.iter().filter(is_wanted).map(|entry| entry.severity.len()).max();
+    let most = most.unwrap_or(0);
     if let Some(found) = severities.iter().find(|n| !(1..=most as u32).contains(n)) {
         return Err(Usage(format!("--severity: expected 1 to {most}, found {found}")));
     }
-    let is_wanted = |entry: &&Entry<T>| names.is_empty() || names.contains(&entry.name);
     let chosen = entries.iter().filter(is_wanted).flat_map(|entry| {
         let numbered = (1..).zip(&entry.severity);
         numbered

@@ -11,7 +11,7 @@ use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
 use sim_gpu::corruption::{Corruption, Recorded};
-use sim_gpu::effects::{Detection, Effects};
+use sim_gpu::effects::{Detection, DetectionLimit, Effects};
 use sim_gpu::glam;
 use sim_gpu::sensor::Sensor;
 use sim_gpu::weather::{Air, in_weather};
@@ -25,22 +25,30 @@ pub(super) fn run(
 ) -> anyhow::Result<Outcome> {
     let chosen = chosen(&plan.sweep, &args.only, &args.severity)?;
     args.brightness.check()?;
-    let asked = Effects { detection: Some(Detection::default()), ..Effects::default() };
-    let effects = asked.for_sensor(sensor).map_err(usage)?;
-    let limit = effects.detection.and_then(|detection| detection.limit);
-    let limit = limit.expect("invariant: a sensor's own limit was asked for");
+    let any = |is: fn(&Corruption) -> bool| chosen.iter().any(|(_, _, corruption)| is(corruption));
     let scan = input.read_whole()?;
-    let brightness = args.brightness.of(&scan, &input.sweep)?;
+    let brightness = match args.brightness.of(&scan, &input.sweep) {
+        Ok(brightness) => Some(brightness),
+        Err(error) if any(takes_light) => return Err(error),
+        Err(_) => None,
+    };
+    let limit = any(takes_light).then(|| limit_of(sensor)).transpose()?;
+    let limit = limit.unwrap_or(DetectionLimit { reflectivity: 1.0, range_m: 1.0 });
     let sensor_m = DVec3::from_array(input.sensor_m());
-    let is_ground = ground(&scan, sensor_m)?;
+    let is_ground = match any(|corruption| matches!(corruption, Corruption::WetGround { .. })) {
+        true => ground(&scan, sensor_m)?,
+        false => Vec::new(),
+    };
 
-    let mut made = Vec::new();
+    let is_dark = brightness.is_none();
+    let (mut made, mut too_weak_before) = (Vec::new(), 0);
     for (entry, severity, corruption) in chosen {
         let stream = StreamKey::new(args.seed, &format!("corrupt/{}", entry.name), severity);
-        let (scan, brightness, is_ground) = (&scan, &brightness[..], &is_ground[..]);
-        let max_range_m = sensor.range.max_m;
-        let recorded =
-            Recorded { scan, brightness, is_ground, sensor_m, limit, max_range_m, stream };
+        let dark = vec![0.0; scan.len()];
+        let (scan, is_ground) = (&scan, &is_ground[..]);
+        let range_m = [sensor.range.min_m, sensor.range.max_m];
+        let brightness = brightness.as_deref().unwrap_or(&dark);
+        let recorded = Recorded { scan, brightness, is_ground, sensor_m, limit, range_m, stream };
         let name = format!("{}-{severity}", entry.name);
         let Some(mut found) = corrupted(&recorded, corruption, sensor) else {
             let lacks = match corruption {
@@ -50,16 +58,42 @@ pub(super) fn run(
             eprintln!("{name}: left out, since the points of the sweep have no {lacks}");
             continue;
         };
+        if is_dark {
+            found.intensity = None;
+        }
         args.brightness.restore(&mut found);
         let file = format!("{name}.npz");
         write_scan(&args.out.join(&file), ScanFormat::Npz, Hashing::None, &found)?;
         eprintln!("{name:<20} {:>9} of {} points", found.len(), scan.len());
-        let (corruption, by, count) = (&*entry.name, &*entry.by, found.len());
-        made.push(Made { file, corruption, severity, count, by });
+        if takes_light(corruption) {
+            too_weak_before = too_weak_before.max(recorded.too_weak_before());
+        }
+        let (corruption, by, count, of) = (&*entry.name, &*entry.by, found.len(), scan.len());
+        made.push(Made { file, corruption, severity, count, of, by });
     }
     write_list(&made, &args.out)?;
+    if too_weak_before > 0 {
+        eprintln!(
+            "warning: {too_weak_before} of the points are below the profile's detection limit as \
+             they were recorded: see --profile, --white and --reflectivity"
+        );
+    }
     eprintln!("{} scans: {}", made.len(), args.out.display());
     Ok(Outcome::Success)
+}
+
+/// Whether it depends on how much light comes back.
+fn takes_light(corruption: &Corruption) -> bool {
+    use Corruption::{DirtyWindow, Weather, WetGround};
+    matches!(corruption, Weather(_) | WetGround { .. } | DirtyWindow { .. })
+}
+
+/// The weakest return that `sensor` detects.
+fn limit_of(sensor: &Sensor) -> anyhow::Result<DetectionLimit> {
+    let asked = Effects { detection: Some(Detection::default()), ..Effects::default() };
+    let effects = asked.for_sensor(sensor).map_err(usage)?;
+    let limit = effects.detection.and_then(|detection| detection.limit);
+    Ok(limit.expect("invariant: a sensor's own limit was asked for"))
 }
 
 /// The scan with this corruption; `None` if it lacks what that takes.

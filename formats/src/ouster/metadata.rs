@@ -111,6 +111,12 @@ impl Metadata {
         self.columns_per_frame - sent
     }
 
+    /// The unit of the ranges in its packets, metres.
+    #[must_use]
+    pub fn range_unit_m(&self) -> f64 {
+        if self.profile == Profile::LowRate { 0.008 } else { 0.001 }
+    }
+
     /// Columns of a turn.
     #[must_use]
     pub fn columns_per_frame(&self) -> u16 {

@@ -43,10 +43,20 @@ pub struct CorruptedSet {
     pub name: String,
     /// What goes wrong with it.
     pub corruption: ObjectCorruption,
-    /// Casts its rays, with its effects.
-    pub caster: Caster,
+    /// Casts its rays: on the CPU, since test sets are small and have many effects.
+    caster: Caster,
     /// The beams that it casts.
-    pub pattern: BeamPattern,
+    pattern: BeamPattern,
+}
+
+/// What was written.
+pub struct Written {
+    /// Clouds of each set, in their order.
+    pub clouds: Vec<usize>,
+    /// Clouds that each would have if a point of everything were seen.
+    pub of: usize,
+    /// The meshes that cannot be used.
+    pub failures: Vec<MeshFailure>,
 }
 
 /// What all sets have in common.
@@ -59,10 +69,8 @@ pub struct Corrupted<'a> {
     pub views: Views,
     /// The meshes' upward axis; `None` is each format's default.
     pub up: Option<Up>,
-    /// Points of each cloud.
+    /// Points of each cloud; of a scan with fewer, some are there more than once.
     pub points: u32,
-    /// Scans with fewer points are left out.
-    pub min_points: u32,
     /// Keys every random number.
     pub seed: u64,
 }
@@ -83,42 +91,48 @@ impl ObjectCorruption {
     /// # Errors
     /// On the first that is not finite or out of its bounds.
     pub fn validate(&self, key: &str) -> Result<(), InvalidValue> {
-        self.effects.validate()?;
+        let here =
+            |error: InvalidValue| InvalidValue::new(format!("{key}.{}", error.key), error.cause);
+        self.effects.validate().map_err(here)?;
         within(&format!("{key}.occluders"), f64::from(self.occluders), 0.0..=1000.0)?;
-        within(&format!("{key}.radius_m"), self.radius_m, 0.0..=1000.0)
+        within(&format!("{key}.radius_m"), self.radius_m, 0.0..=1000.0)?;
+        if (self.occluders > 0) != (self.radius_m > 0.0) {
+            let cause = "expected occluders and radius_m together, found one of them";
+            return Err(InvalidValue::new(format!("{key}.occluders"), cause));
+        }
+        Ok(())
     }
 }
 
 impl CorruptedSet {
-    /// The set `name` by `sensor`, cast by what `open` opens.
+    /// The set `name` by `sensor`.
     ///
     /// # Errors
-    /// Effects that do not fit the sensor; what `open` reports.
-    pub fn new<E: From<InvalidValue>>(
+    /// Effects that do not fit the sensor.
+    pub fn new(
         name: String,
         corruption: ObjectCorruption,
         sensor: &Sensor,
-        open: impl FnOnce(&Effects) -> Result<Caster, E>,
-    ) -> Result<Self, E> {
+    ) -> Result<Self, InvalidValue> {
         corruption.effects.for_sensor(sensor)?;
         let pattern = corruption.effects.widen(sensor.pattern(), sensor)?;
-        let caster = open(&corruption.effects)?;
+        let caster = Caster::Cpu(corruption.effects.clone());
         Ok(Self { name, corruption, caster, pattern })
     }
 }
 
 impl Corrupted<'_> {
     /// Writes `sets` of those of `meshes` that are for testing. Labels count the classes of all
-    /// meshes. `each` is called after each mesh. Returns the meshes that cannot be used.
+    /// meshes. `each` is called after each mesh.
     ///
     /// # Errors
-    /// No mesh for testing; a caster that fails; a file that cannot be written.
+    /// A caster that fails; a file that cannot be written.
     pub fn write(
         &self,
         meshes: &[MeshEntry],
         sets: &[CorruptedSet],
         each: impl Fn() + Sync,
-    ) -> Result<Vec<MeshFailure>, DatasetError> {
+    ) -> Result<Written, DatasetError> {
         let classes: BTreeSet<&String> = meshes.iter().map(|entry| &entry.class).collect();
         let classes: Vec<String> = classes.into_iter().cloned().collect();
         let tested: Vec<&MeshEntry> =
@@ -128,7 +142,7 @@ impl Corrupted<'_> {
             let path = self.out.join(format!("{}-test.npz", set.name));
             writers.push(PackedWriter::create(&path, self.points as usize, classes.clone())?);
         }
-        let mut failures = Vec::new();
+        let (mut failures, mut of) = (Vec::new(), 0);
         for some in tested.chunks(AT_ONCE) {
             let clouds: Vec<Result<_, MeshFailure>> = some
                 .par_iter()
@@ -142,14 +156,18 @@ impl Corrupted<'_> {
                 let label = classes.partition_point(|class| *class < entry.class);
                 match clouds {
                     Err(failure) => failures.push(failure),
-                    Ok(views) => push(&mut writers, entry, label, views)?,
+                    Ok(views) => {
+                        of += views.len();
+                        push(&mut writers, entry, label, views)?;
+                    }
                 }
             }
         }
+        let clouds = writers.iter().map(PackedWriter::len).collect();
         for writer in writers {
             writer.finish(Hashing::None)?;
         }
-        Ok(failures)
+        Ok(Written { clouds, of, failures })
     }
 
     /// The clouds of one mesh, by view and by set.
@@ -196,10 +214,13 @@ impl Corrupted<'_> {
         let from_middle = |point: &[f32; 3]| origin + DVec3::from(point.map(f64::from));
         let mut points: Vec<DVec3> = scan.positions.iter().map(from_middle).collect();
         let ObjectCorruption { occluders, radius_m, .. } = set.corruption;
+        // Points of the cloud are drawn by the stream itself.
+        let [a, b] = stream.0;
+        let places = StreamKey::new(u64::from(a) << 32 | u64::from(b), "corrupted/occluders", 0);
         let balls: Vec<DVec3> = (0..occluders)
             .filter(|_| !points.is_empty())
             .map(|n| {
-                let hidden = points[stream.below(points.len() as u64, n.into()) as usize];
+                let hidden = points[places.below(points.len() as u64, n.into()) as usize];
                 pose.position_m.lerp(hidden, 2.0 / 3.0)
             })
             .collect();
@@ -212,9 +233,6 @@ impl Corrupted<'_> {
     }
 
     fn cloud(&self, points: &[[f32; 3]], stream: StreamKey) -> Drawn {
-        if (points.len() as u64) < u64::from(self.min_points.max(1)) {
-            return None;
-        }
         let mut cloud = resample(points, self.points as usize, stream)?;
         normalize_unit_sphere(&mut cloud);
         Some((cloud, points.len() as u32))

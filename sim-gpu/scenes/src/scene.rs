@@ -94,8 +94,8 @@ impl Scene {
         }
     }
 
-    /// The sensor's poses while it scans; `None` if it stands still.
-    pub(crate) fn motion(&self) -> Option<Trajectory> {
+    /// The sensor's poses from when it begins to scan to `until_s`; `None` if it stands still.
+    pub(crate) fn motion(&self, until_s: f64) -> Option<Trajectory> {
         if self.velocity_m_s == DVec3::ZERO {
             return None;
         }
@@ -103,8 +103,7 @@ impl Scene {
             let position_m = self.pose.position_m + self.velocity_m_s * time_s;
             (time_s, Pose { position_m, ..self.pose })
         };
-        // Longer than any revolution takes.
-        let poses = vec![after_s(0.0), after_s(60.0)];
+        let poses = vec![after_s(0.0), after_s(until_s.max(1.0))];
         Some(Trajectory::new(poses).expect("invariant: a recipe's speeds are finite"))
     }
 }

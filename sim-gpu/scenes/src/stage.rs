@@ -229,7 +229,8 @@ impl Stage {
         ]
         .into();
         request.culling = self.culling;
-        request.motion = scene.motion().map(Arc::new);
+        let last_s = pattern.time_s.last().copied().unwrap_or(0.0);
+        request.motion = scene.motion(last_s).map(Arc::new);
         request.stream = stream(u32::MAX);
         let scan = scan_objects(caster, targets, &request)?.scan;
         Ok(Sweep::of(scan, scene))

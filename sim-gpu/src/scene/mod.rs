@@ -140,6 +140,12 @@ impl Scene {
             sensors.push(sensor.validate(i, folder, profile).map_err(in_file)?);
         }
         check_names("sensor", sensors.iter().map(|sensor| &sensor.name)).map_err(in_file)?;
+        for (i, object) in objects.iter().enumerate() {
+            if let Some(trajectory) = &object.motion {
+                let key = format!("object[{i}].trajectory");
+                table::check_moves(&key, trajectory, &sensors).map_err(in_file)?;
+            }
+        }
 
         let scene = Self {
             seed: table.seed,

@@ -51,7 +51,7 @@ pub(super) struct ObjectTable {
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
     /// Poses over time, of the frame in which the pose above is.
-    trajectory: Option<TrajectoryTable>,
+    trajectory: Option<toml::Value>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
     #[serde(default)]
@@ -75,7 +75,7 @@ pub(super) struct SensorTable {
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
     /// Poses over time, in place of the keys above.
-    trajectory: Option<TrajectoryTable>,
+    trajectory: Option<toml::Value>,
     revolutions: Option<NonZeroU32>,
     #[serde(default)]
     start_s: f64,
@@ -86,14 +86,6 @@ pub(super) struct SensorTable {
 /// From pose to pose of a trajectory whose file has no times, seconds: KITTI's sensor turns ten
 /// times a second.
 const PERIOD_S: f64 = 0.1;
-
-/// Poses over time.
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a file's name or a list of poses as trajectory")]
-enum TrajectoryTable {
-    File(PathBuf),
-    Poses(Vec<TimedPose>),
-}
 
 /// A pose at a time.
 #[derive(Deserialize)]
@@ -112,22 +104,71 @@ struct TimedPose {
 fn trajectory(
     key: String,
     folder: &Path,
-    table: Option<TrajectoryTable>,
+    table: Option<toml::Value>,
 ) -> Result<Option<Arc<Trajectory>>, InvalidValue> {
+    let wrong = |cause: String| InvalidValue::new(key.clone(), cause);
     let found = match table {
         None => return Ok(None),
-        Some(TrajectoryTable::File(file)) => Trajectory::load(&folder.join(file), PERIOD_S)
-            .map_err(|error| InvalidValue::new(key, error.to_string()))?,
-        Some(TrajectoryTable::Poses(poses)) => {
-            let timed = |(i, pose): (usize, TimedPose)| {
-                Ok((pose.time_s, pose.keys().pose(&format!("{key}[{i}]"))?))
+        Some(toml::Value::String(file)) => Trajectory::load(&folder.join(file), PERIOD_S)
+            .map_err(|error| wrong(error.to_string()))?,
+        Some(toml::Value::Array(poses)) => {
+            let timed = |(i, pose): (usize, toml::Value)| {
+                let key = format!("{key}[{i}]");
+                let pose: TimedPose = pose.try_into().map_err(|error: toml::de::Error| {
+                    InvalidValue::new(&key, error.message().to_owned())
+                })?;
+                Ok((pose.time_s, pose.keys().pose(&key)?))
             };
             let poses: Result<_, InvalidValue> = poses.into_iter().enumerate().map(timed).collect();
-            Trajectory::new(poses?)
-                .map_err(|invalid| InvalidValue::new(key, invalid.to_string()))?
+            Trajectory::new(poses?).map_err(|invalid| wrong(invalid.to_string()))?
+        }
+        Some(other) => {
+            let found = other.type_str();
+            return Err(wrong(format!("expected a file's name or a list of poses, found {found}")));
         }
     };
     Ok(Some(Arc::new(found)))
+}
+
+/// That poses are known from the scan's begin to its end; one pose alone is of all times.
+fn check_known(
+    key: &str,
+    trajectory: &Trajectory,
+    [from_s, to_s]: [f64; 2],
+) -> Result<(), InvalidValue> {
+    let [first_s, last_s] = trajectory.known_s();
+    // A recording may end within its last revolution.
+    if first_s == last_s || (first_s <= from_s && to_s <= last_s + PERIOD_S) {
+        return Ok(());
+    }
+    let cause = format!(
+        "expected poses from {from_s} s, where the scan begins (start_s), to {to_s} s, found poses \
+         from {first_s} s to {last_s} s"
+    );
+    Err(InvalidValue::new(key, cause))
+}
+
+/// That an object's poses are of the time at which a sensor scans: it stands before its first and
+/// after its last.
+pub(super) fn check_moves(
+    key: &str,
+    trajectory: &Trajectory,
+    sensors: &[SceneSensor],
+) -> Result<(), InvalidValue> {
+    let [first_s, last_s] = trajectory.known_s();
+    let is_seen = |sensor: &SceneSensor| {
+        let end_s = sensor.start_s + PERIOD_S * f64::from(sensor.sensor.revolutions.get());
+        sensor.start_s <= last_s && end_s >= first_s
+    };
+    if first_s == last_s || sensors.is_empty() || sensors.iter().any(is_seen) {
+        return Ok(());
+    }
+    let start_s = sensors[0].start_s;
+    let cause = format!(
+        "expected poses around {start_s} s, where the scan begins (start_s of the sensor), found \
+         poses from {first_s} s to {last_s} s"
+    );
+    Err(InvalidValue::new(key, cause))
 }
 
 impl TimedPose {
@@ -241,6 +282,8 @@ impl SensorTable {
                 let cause = "cannot stand beside position_m: the trajectory has the poses";
                 return Err(InvalidValue::new(key("trajectory"), cause));
             }
+            let last_s = sensor.pattern().time_s.iter().fold(0.0, |last: f64, t| last.max(*t));
+            check_known(&key("trajectory"), &motion, [start_s, start_s + last_s])?;
             let pose = motion.at(start_s);
             return Ok(SceneSensor { sensor, name, pose, motion: Some(motion), start_s, deskew });
         }

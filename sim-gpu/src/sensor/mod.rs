@@ -160,7 +160,7 @@ impl Sensor {
             return ouster::load(file);
         }
         let mut profile: profile::Profile = config::read(file)?;
-        profile.load_table(file.parent().unwrap_or(Path::new("")))?;
+        profile.load_table(file)?;
         Self::try_from(profile).map_err(|invalid| invalid.in_file(file))
     }
 
@@ -222,16 +222,16 @@ impl Sensor {
         if revolutions == 1 {
             return Ok(());
         }
-        let rays_of_one = match &self.layout {
+        let n_rays = match &self.layout {
             Layout::Uniform(_) | Layout::Grid(_) => {
                 let cause = "expected 1, as all scans of [uniform] and [grid] are alike";
                 return Err(InvalidValue::new("revolutions", cause));
             }
-            Layout::Rotating(rotating) => rotating.rays_per_revolution() + 1,
-            Layout::Risley(risley) => risley.rays_per_scan(),
-            Layout::Table(table) => table.rays_per_scan(),
+            Layout::Rotating(rotating) => rotating.rays_in(revolutions),
+            Layout::Risley(risley) => risley.rays_in(revolutions),
+            Layout::Table(table) => table.rays_in(revolutions),
         };
-        checked_ray_count("revolutions", rays_of_one.saturating_mul(revolutions.into()))
+        checked_ray_count("revolutions", n_rays)
     }
 
     /// The same sensor without what its scans do not need: the rows of a table after the last

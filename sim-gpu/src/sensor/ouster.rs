@@ -8,9 +8,6 @@ use formats::ouster::Metadata;
 use super::{Beam, Layout, RangeLimits, Rotating, Sensor};
 use crate::config::{ConfigError, InvalidValue};
 
-/// The unit of ranges in most of its packets, metres.
-const QUANTUM_M: f64 = 0.001;
-
 /// The farthest range that 19 bits of millimetres hold, metres.
 const FARTHEST_M: f64 = 524.0;
 
@@ -24,6 +21,11 @@ pub(super) fn load(file: &Path) -> Result<Sensor, ConfigError> {
     if height_m != 0.0 {
         let cause = format!("expected beams that begin at height 0, found {height_m} m");
         return Err(InvalidValue::new("beam_to_lidar_transform", cause).in_file(file));
+    }
+    if metadata.n_columns_unsent() > 0 {
+        let unsent = metadata.n_columns_unsent();
+        let cause = format!("expected all columns of a turn, found {unsent} that are not sent");
+        return Err(InvalidValue::new("column_window", cause).in_file(file));
     }
     let rate_hz = metadata.rate_hz();
     let columns = f64::from(metadata.columns_per_frame());
@@ -42,13 +44,19 @@ pub(super) fn load(file: &Path) -> Result<Sensor, ConfigError> {
         beam_start_m: Some(start_m),
         beam: beam.collect(),
     };
-    rotating.validate().map_err(|invalid| invalid.in_file(file))?;
+    rotating.validate().map_err(|InvalidValue { key, cause }| {
+        InvalidValue::new(format!("as a profile, {key}"), cause).in_file(file)
+    })?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Ok(Sensor {
         name,
         description: format!("Ouster of {} beams", metadata.beams_deg().len()),
         sources: vec![file.display().to_string()],
-        range: RangeLimits { min_m: 0.0, max_m: FARTHEST_M, quantum_m: Some(QUANTUM_M) },
+        range: RangeLimits {
+            min_m: 0.0,
+            max_m: FARTHEST_M,
+            quantum_m: Some(metadata.range_unit_m()),
+        },
         noise: None,
         detection: None,
         footprint: None,

@@ -47,9 +47,9 @@ fn one() -> NonZeroU32 {
 }
 
 impl Profile {
-    /// Reads the table of directions that it names, relative to `folder`.
-    pub(super) fn load_table(&mut self, folder: &Path) -> Result<(), ConfigError> {
-        self.table.as_mut().map_or(Ok(()), |table| table.load(folder))
+    /// Reads the table of directions that it names; it itself stands in `file`.
+    pub(super) fn load_table(&mut self, file: &Path) -> Result<(), ConfigError> {
+        self.table.as_mut().map_or(Ok(()), |table| table.load(file))
     }
 }
 

@@ -54,7 +54,7 @@ pub struct Line {
 
 impl Prism {
     /// `ray` after both faces, `time_s` after the tilted face stood upright; `None` where it is
-    /// reflected totally inside.
+    /// not let through.
     fn refract(&self, ray: DVec3, time_s: f64) -> Option<DVec3> {
         let (sin_tilt, cos_tilt) = self.wedge_deg.abs().to_radians().sin_cos();
         // By whole turns first: the phase keeps its digits however late it is.
@@ -73,11 +73,12 @@ impl Prism {
 }
 
 /// Snell's law: the unit vector `ray` behind a face with this `normal` against it, where `ratio`
-/// is the index before the face over that behind it.
+/// is the index before the face over that behind it; `None` if it does not get there.
 fn refract(ray: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
     let cos_in = -ray.dot(normal);
     let cos2_out = 1.0 - ratio * ratio * (1.0 - cos_in * cos_in);
-    (cos2_out >= 0.0)
+    // Light that comes from behind does not meet the face.
+    (cos_in > 0.0 && cos2_out >= 0.0)
         .then(|| (ratio * ray + (ratio * cos_in - cos2_out.sqrt()) * normal).normalize())
 }
 
@@ -92,8 +93,9 @@ impl Line {
 impl Risley {
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
         positive("risley.pulse_hz", self.pulse_hz)?;
+        within("risley.pulse_hz", self.pulse_hz, 0.0..=1e9)?;
         positive("risley.period_s", self.period_s)?;
-        // Eleven days: the prisms' phases still have eight digits.
+        // Eleven days: at 100 turns a second the phases still have eight digits.
         within("risley.start_s", self.start_s, 0.0..=1e6)?;
         let count = |key: &str, found: usize, most: f64| {
             if (1.0..=most).contains(&(found as f64)) {
@@ -114,18 +116,18 @@ impl Risley {
             within(&key("azimuth_deg"), line.azimuth_deg, -60.0..=60.0)?;
             within(&key("elevation_deg"), line.elevation_deg, -60.0..=60.0)?;
         }
-        checked_ray_count("risley", self.rays_per_scan())?;
+        checked_ray_count("risley", self.rays_in(1))?;
         let pulses = 0..self.pulses(1) as u32;
         if let Some((_, i)) = pulses.flat_map(|n| self.lines(n)).find(|(ray, _)| ray.is_none()) {
-            let cause = "expected prisms that let its light through, found total reflection";
+            let cause = "expected prisms that let its light through, found total reflection or a face turned away";
             return Err(InvalidValue::new(format!("risley.line[{i}]"), cause));
         }
         Ok(())
     }
 
-    /// Rays of one scan.
-    pub(super) fn rays_per_scan(&self) -> u64 {
-        self.pulses(1).saturating_mul(self.line.len() as u64)
+    /// Rays of so many scans.
+    pub(super) fn rays_in(&self, scans: u32) -> u64 {
+        self.pulses(scans).saturating_mul(self.line.len() as u64)
     }
 
     /// Pulses of each line in so many scans.
@@ -194,6 +196,12 @@ mod tests {
         assert!((ray.z.asin() + expected_rad).abs() < 1e-14, "{ray}");
         // sin(45 degrees) x 1.5 is above 1.
         assert!(prism(-45.0).refract(DVec3::X, 0.0).is_none());
+    }
+
+    #[test]
+    fn light_that_a_face_is_turned_away_from_does_not_get_through() {
+        let up = DVec3::new(0.5, 0.0, 0.75f64.sqrt());
+        assert!(prism(60.0).refract(up, 0.0).is_none());
     }
 
     #[test]

@@ -61,7 +61,7 @@ impl Rotating {
     }
 
     /// Rays in so many revolutions of a head that keeps turning.
-    fn rays_in(&self, revolutions: u32) -> u64 {
+    pub(super) fn rays_in(&self, revolutions: u32) -> u64 {
         let turns = f64::from(revolutions);
         // A float converts to an integer by saturation.
         (turns * self.beam.len() as f64 * 60e6 / (self.rpm * self.sequence_us)) as u64

@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::{BeamPattern, Layout, Sensor};
+use glam::DVec3;
+
+use super::{Layout, Sensor};
 
 /// Beams closer together than this are one beam that fires twice.
 const SAME_BEAM_RAD: f64 = 1e-9;
@@ -11,7 +13,7 @@ impl Sensor {
     /// The least angle between neighbouring beams in radians, along a row or
     /// along a column, whichever is less; `None` for a single beam.
     ///
-    /// Of rosettes and tables it is the median angle from each shot of a line to its next.
+    /// Of rosettes and tables it is that between any two of a scan.
     ///
     /// Azimuths count as angles of the table, however high the beam: towards
     /// the zenith real rays stand closer together.
@@ -38,7 +40,7 @@ impl Sensor {
                 );
                 [azimuth.map(|step| keep_each * step), elevation]
             }
-            Layout::Risley(_) | Layout::Table(_) => [shot_to_shot(&self.pattern()), None],
+            Layout::Risley(_) | Layout::Table(_) => [least_angle(&self.pattern().directions), None],
             Layout::Grid(grid) => {
                 let (left, up) = grid.tangents();
                 let kept = left.into_iter().step_by(self.decimation.get() as usize);
@@ -52,14 +54,25 @@ impl Sensor {
     }
 }
 
-/// The median angle from each shot of a line to its next, radians.
-fn shot_to_shot(pattern: &BeamPattern) -> Option<f64> {
-    let lines = usize::from(pattern.ring.iter().max()?.saturating_add(1));
-    let pairs = pattern.directions.iter().zip(pattern.directions.iter().skip(lines));
-    let mut angles: Vec<f64> =
-        pairs.map(|(a, b)| 2.0 * ((*a - *b).length() / 2.0).asin()).collect();
-    angles.sort_unstable_by(f64::total_cmp);
-    angles.get(angles.len() / 2).copied()
+/// The least angle between two of `directions` that are not the same, radians.
+fn least_angle(directions: &[DVec3]) -> Option<f64> {
+    let mut sorted = directions.to_vec();
+    sorted.sort_unstable_by(|a, b| a.z.total_cmp(&b.z));
+    let same = 2.0 * (SAME_BEAM_RAD / 2.0).sin();
+    let mut least = f64::INFINITY;
+    for (i, &a) in sorted.iter().enumerate() {
+        for &b in &sorted[i + 1..] {
+            // What is farther along z is farther away.
+            if b.z - a.z >= least {
+                break;
+            }
+            let chord = a.distance(b);
+            if chord > same {
+                least = least.min(chord);
+            }
+        }
+    }
+    least.is_finite().then(|| 2.0 * (least / 2.0).min(1.0).asin())
 }
 
 /// The least difference of two of `angles` that are not the same.
@@ -76,6 +89,18 @@ mod tests {
 
     fn step_deg(sensor: &Sensor) -> f64 {
         sensor.angular_step_rad().unwrap().to_degrees()
+    }
+
+    #[test]
+    fn of_directions_it_is_the_angle_of_the_two_that_are_nearest() {
+        let at = |deg: f64| DVec3::new(deg.to_radians().cos(), 0.0, deg.to_radians().sin());
+        let found = least_angle(&[at(10.0), at(-20.0), at(10.0), at(12.0), at(60.0)]).unwrap();
+        assert!((found.to_degrees() - 2.0).abs() < 1e-9, "{}", found.to_degrees());
+        let opposite = least_angle(&[at(0.0), at(180.0)]).unwrap();
+        assert!((opposite.to_degrees() - 180.0).abs() < 1e-6);
+        assert_eq!(least_angle(&[at(3.0), at(3.0)]), None);
+        // A rosette crosses itself: less than from one shot of a line to its next.
+        assert!(step_deg(&Sensor::builtin("mid70").unwrap()) < 0.1);
     }
 
     #[test]

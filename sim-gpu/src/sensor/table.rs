@@ -37,13 +37,14 @@ fn one_line() -> u16 {
 }
 
 impl Table {
-    /// Reads the file that it names, relative to `folder`, if it names one.
-    pub(super) fn load(&mut self, folder: &Path) -> Result<(), ConfigError> {
+    /// Reads the file that it names, beside the `profile`, if it names one.
+    pub(super) fn load(&mut self, profile: &Path) -> Result<(), ConfigError> {
         if let Some(file) = self.file.take() {
             if !self.directions_deg.is_empty() {
                 let cause = "cannot stand beside table.directions_deg";
-                return Err(InvalidValue::new("table.file", cause).in_file(&file));
+                return Err(InvalidValue::new("table.file", cause).in_file(profile));
             }
+            let folder = profile.parent().unwrap_or(Path::new(""));
             self.directions_deg = read(&folder.join(file))?;
         }
         Ok(())
@@ -55,6 +56,7 @@ impl Table {
             return Err(InvalidValue::new("table.file", cause));
         }
         positive("table.pulse_hz", self.pulse_hz)?;
+        within("table.pulse_hz", self.pulse_hz, 0.0..=1e9)?;
         positive("table.period_s", self.period_s)?;
         within("table.start_s", self.start_s, 0.0..=1e6)?;
         within("table.lines", f64::from(self.lines), 1.0..=MAX_RINGS)?;
@@ -62,17 +64,22 @@ impl Table {
             let cause = "expected a row at least, or table.file, found none";
             return Err(InvalidValue::new("table.directions_deg", cause));
         }
+        let (rows, lines) = (self.directions_deg.len(), self.lines);
+        if !rows.is_multiple_of(lines.into()) {
+            let cause = format!("expected rows of {lines} lines in turn, found {rows} rows");
+            return Err(InvalidValue::new("table.lines", cause));
+        }
         for (i, [azimuth_deg, elevation_deg]) in self.directions_deg.iter().enumerate() {
             let key = |column: u8| format!("table.directions_deg[{i}][{column}]");
             within(&key(0), *azimuth_deg, -360.0..=360.0)?;
             within(&key(1), *elevation_deg, -90.0..=90.0)?;
         }
-        checked_ray_count("table", self.rays_per_scan())
+        checked_ray_count("table", self.rays_in(1))
     }
 
-    /// Rays of one scan.
-    pub(super) fn rays_per_scan(&self) -> u64 {
-        self.rows(1)
+    /// Rays of so many scans.
+    pub(super) fn rays_in(&self, scans: u32) -> u64 {
+        self.rows(scans)
     }
 
     /// Rows of so many scans.

@@ -65,6 +65,7 @@ mod drops;
 mod fog;
 mod recorded;
 
+pub(crate) use recorded::without_surface;
 pub use recorded::{Fates, in_weather};
 
 use crate::cpu::random::random_bits;

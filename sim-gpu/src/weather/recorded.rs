@@ -87,6 +87,19 @@ fn strongest(air: &Air, beam: &AirBeam, least: f64) -> Option<Scattered> {
     (best.power >= least).then_some(best)
 }
 
+/// Point `i` of `scan` is at this range and of no surface.
+pub(crate) fn without_surface(scan: &mut Scan, i: usize, range_m: f64) {
+    if let Some(ranges_m) = &mut scan.range_m {
+        ranges_m[i] = range_m as f32;
+    }
+    for numbers in [&mut scan.triangle, &mut scan.object].into_iter().flatten() {
+        numbers[i] = u32::MAX;
+    }
+    if let Some(normals) = &mut scan.normal {
+        normals[i] = [0.0; 3];
+    }
+}
+
 /// The points of `scan` of these numbers, as they were `found`.
 fn told(scan: &Scan, sensor_m: DVec3, kept: &[usize], found: &[Scattered]) -> Scan {
     let mut told = scan.select(kept);
@@ -96,15 +109,7 @@ fn told(scan: &Scan, sensor_m: DVec3, kept: &[usize], found: &[Scattered]) -> Sc
         let from_sensor = DVec3::from(told.positions[i].map(f64::from)) - from_origin;
         let moved = from_sensor.normalize() * one.range_m + from_origin;
         told.positions[i] = moved.as_vec3().to_array();
-        if let Some(ranges_m) = &mut told.range_m {
-            ranges_m[i] = one.range_m as f32;
-        }
-        for numbers in [&mut told.triangle, &mut told.object].into_iter().flatten() {
-            numbers[i] = u32::MAX;
-        }
-        if let Some(normals) = &mut told.normal {
-            normals[i] = [0.0; 3];
-        }
+        without_surface(&mut told, i, one.range_m);
     }
     told.intensity = Some(found.iter().map(|one| one.brightness as f32).collect());
     told.medium = Some(found.iter().map(|one| one.medium as u8).collect());

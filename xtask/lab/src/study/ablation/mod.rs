@@ -37,7 +37,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
-    /// Use only a few meshes; this takes two minutes
+    /// Use only a few meshes or scenes; this takes two minutes
     #[arg(long, conflicts_with = "plan")]
     quick: bool,
 

@@ -16,7 +16,7 @@ use edgepuck_scenes::{Scene, SceneError, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::{atomic, hash};
 use infer_cpu::Options;
-use plan::{Plan, Row};
+use plan::{NETWORK, Plan, Row, STREET};
 use serde::{Deserialize, Serialize};
 use sim_gpu::caster::Caster;
 use std::fs;
@@ -30,7 +30,7 @@ use train::run::MOST_POINTS;
 const NEGATIVES: &str = "negatives";
 
 /// What the real objects are called as a set to test on.
-const REAL: &str = "real";
+const REAL: &str = "real objects";
 
 /// The answers of one network to one set: a line of `street.csv`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,10 +78,14 @@ fn keep_terms(plan: &Plan, real: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     struct Terms<'a> {
         version: &'a str,
         real: Vec<String>,
+        street: String,
+        network: String,
         plan: &'a Plan,
     }
     let real = real.iter().map(|path| hash::of_file(path)).collect::<Result<_, _>>()?;
-    let text = toml::to_string(&Terms { version: env!("CARGO_PKG_VERSION"), real, plan })?;
+    let [street, network] = [STREET, NETWORK].map(|text| hash::of_bytes(text.as_bytes()));
+    let version = env!("CARGO_PKG_VERSION");
+    let text = toml::to_string(&Terms { version, real, street, network, plan })?;
     resume::keep_terms(&text, &out.join("terms.toml"))
 }
 

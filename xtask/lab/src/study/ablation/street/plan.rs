@@ -1,5 +1,6 @@
 //! Which street scenes are compared: a base, and in each row what it changes.
 
+use super::REAL;
 use crate::study::plan;
 use anyhow::{Context, ensure};
 use edgepuck_scenes::Recipe as Scenes;
@@ -9,8 +10,8 @@ use toml::{Table, Value};
 use train::recipe::Recipe;
 
 /// The street and the recipe of its network, which rows change.
-const STREET: &str = include_str!("../../../../../../assets/scenes/street.toml");
-const NETWORK: &str = include_str!("../../../../../../assets/recipes/street-128.toml");
+pub(super) const STREET: &str = include_str!("../../../../../../assets/scenes/street.toml");
+pub(super) const NETWORK: &str = include_str!("../../../../../../assets/recipes/street-128.toml");
 
 /// The study's sizes and rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,11 +72,18 @@ impl plan::Plan for Plan {
         ensure!(self.cost_rounds > 0, "cost_rounds: expected 1 or more, found 0");
         ensure!(self.cost_scenes > 0, "cost_scenes: expected 1 or more, found 0");
         ensure!(!self.row.is_empty(), "row: expected at least one, found none");
+        let known: BTreeSet<&String> = self.known.iter().collect();
+        ensure!(
+            !known.is_empty() && known.len() == self.known.len(),
+            "known: expected classes, each once, found {:?}",
+            self.known
+        );
         let mut folders = BTreeSet::new();
         for row in &self.row {
             let name = &row.name;
             ensure!(!row.folder().is_empty(), "row: expected a name of letters, found \"{name}\"");
-            ensure!(folders.insert(row.folder()), "row \"{name}\": expected another name");
+            let is_free = name != REAL && folders.insert(row.folder());
+            ensure!(is_free, "row \"{name}\": expected another name");
             let scenes = row.scenes().with_context(|| format!("row \"{name}\""))?;
             let recipe = self.recipe_of(row, 0).with_context(|| format!("row \"{name}\""))?;
             let classes = scenes.classes();
