@@ -131,7 +131,7 @@ impl Recorded<'_> {
 
     /// The power of point `i` if this part of it is left.
     fn power(&self, i: usize, left: f64) -> f64 {
-        f64::from(self.brightness[i]) * left / self.from_sensor(i).length_squared()
+        f64::from(self.brightness[i]) * left / self.seen_from_sensor(i).length_squared()
     }
 
     /// The scan on wet ground: the points whose returns are still detected, weaker.
@@ -158,7 +158,7 @@ impl Recorded<'_> {
     /// `left` of the power is left; their brightness is the scan's intensity.
     fn dimmed(&self, left: impl Fn(usize, DVec3) -> f64) -> Scan {
         let of_point = |i: usize| {
-            let left = left(i, self.from_sensor(i));
+            let left = left(i, self.seen_from_sensor(i));
             let power = self.power(i, left);
             // A point in the sensor itself, or one that is not finite, says nothing; and what
             // loses nothing was detected.
@@ -189,7 +189,7 @@ impl Recorded<'_> {
                 let radius_m = speed_m_s / rate_rad_s;
                 DVec3::new(turned_rad.sin(), 1.0 - turned_rad.cos(), 0.0) * radius_m
             };
-            let seen = DQuat::from_rotation_z(-turned_rad) * (self.from_sensor(i) - gone_m);
+            let seen = DQuat::from_rotation_z(-turned_rad) * (self.seen_from_sensor(i) - gone_m);
             *point = self.in_file(seen);
             if let Some(ranges_m) = &mut scan.range_m {
                 ranges_m[i] = seen.length() as f32;
@@ -219,8 +219,8 @@ impl Recorded<'_> {
     pub fn crosstalk(&self, share: f64) -> Scan {
         let mut scan = self.scan.clone();
         let mut brightness = self.brightness.to_vec();
-        for i in 0..scan.len() {
-            let from_sensor = self.from_sensor(i);
+        for (i, brightness) in brightness.iter_mut().enumerate() {
+            let from_sensor = self.seen_from_sensor(i);
             let draw = |n: u64| self.stream.unit(3 * i as u64 + n);
             let Some(direction) = from_sensor.try_normalize() else { continue };
             if !from_sensor.is_finite() || draw(0) >= share {
@@ -229,7 +229,7 @@ impl Recorded<'_> {
             let [nearest_m, farthest_m] = self.range_m;
             let range_m = nearest_m + (farthest_m - nearest_m) * draw(1);
             scan.positions[i] = self.in_file(direction * range_m);
-            brightness[i] = draw(2) as f32;
+            *brightness = draw(2) as f32;
             without_surface(&mut scan, i, range_m);
         }
         set_brightness(&mut scan, brightness);
@@ -265,7 +265,7 @@ impl Recorded<'_> {
     }
 
     /// Where point `i` is, from the sensor.
-    fn from_sensor(&self, i: usize) -> DVec3 {
+    fn seen_from_sensor(&self, i: usize) -> DVec3 {
         let point = DVec3::from(self.scan.positions[i].map(f64::from));
         DVec3::from_array(self.scan.origin) + point - self.sensor_m
     }

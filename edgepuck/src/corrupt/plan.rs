@@ -93,6 +93,9 @@ fn check_all<T>(
     Ok(())
 }
 
+/// A corruption, its severity and its numbers.
+pub type Chosen<'a, T> = (&'a Entry<T>, u32, &'a T);
+
 /// Each of `entries` that is among `names`, or all if that is empty, at each of its severities
 /// that is among `severities`.
 ///
@@ -102,7 +105,7 @@ pub fn chosen<'a, T>(
     entries: &'a [Entry<T>],
     names: &[String],
     severities: &[u32],
-) -> Result<Vec<(&'a Entry<T>, u32, &'a T)>, Usage> {
+) -> Result<Vec<Chosen<'a, T>>, Usage> {
     if entries.is_empty() {
         return Err(Usage("--plan: expected a corruption of what is given, found none".to_owned()));
     }

@@ -98,7 +98,9 @@ impl Table {
     pub(super) fn trim(&mut self, scans: u32) {
         let needed = self.rows(scans);
         let in_turn = u64::from(self.lines);
-        if needed < self.directions_deg.len() as u64 && self.place(0) as u64 % in_turn == 0 {
+        if needed < self.directions_deg.len() as u64
+            && (self.place(0) as u64).is_multiple_of(in_turn)
+        {
             self.directions_deg =
                 (0..needed).map(|row| self.directions_deg[self.place(row)]).collect();
             self.start_s = 0.0;
