@@ -130,3 +130,25 @@ fn rosettes_tables_and_many_revolutions_make_scenes_and_datasets() {
         ],
     );
 }
+
+#[test]
+fn scans_of_other_times_have_other_noise() {
+    let folder = Folder::new();
+    folder.write("wall.off", "OFF\n4 1 0\n5 -30 -10\n5 30 -10\n5 30 10\n5 -30 10\n4 0 3 2 1\n");
+    let scan = |start: &str| {
+        folder.write(
+            "scene.toml",
+            format!(
+                "[effects]\nnoise = {{ sigma_m = 0.05 }}\n[[object]]\nmesh = \"wall.off\"\n\
+                 [[sensor]]\nprofile = \"ld19\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n{start}\n"
+            ),
+        );
+        folder.succeeds("scan scene.toml --adapter cpu --out scan.npz");
+        folder.scan("scan.npz").positions
+    };
+    let first = scan("");
+    assert_eq!(scan("start_s = 0"), first);
+    let later = scan("start_s = 0.1");
+    let n_same = first.iter().zip(&later).filter(|(a, b)| a == b).count();
+    assert!(first.len() > 100 && n_same == 0, "{n_same} of {}", first.len());
+}

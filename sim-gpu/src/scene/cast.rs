@@ -127,6 +127,9 @@ fn cast_sensor(
 ) -> Result<SceneScan, SceneError> {
     let pattern = scene.effects.widen(sensor.sensor.pattern(), &sensor.sensor);
     let pattern = pattern.map_err(ScanError::Request)?;
+    // Scans of other times have other noise, other drops and other losses.
+    let at = if sensor.start_s == 0.0 { String::new() } else { format!("@{}", sensor.start_s) };
+    let stream = |name: &str| StreamKey::new(scene.seed, &format!("{name}{at}"), number);
     let placed: Vec<PlacedTarget> = objects
         .iter()
         .zip(&scene.objects)
@@ -137,7 +140,7 @@ fn cast_sensor(
             target.reflectivity = object.reflectivity as f32;
             target.retroreflection = object.retroreflection;
             target.materials = placed.materials.as_ref();
-            target.stream = Some(StreamKey::new(scene.seed, &object.name, number));
+            target.stream = Some(stream(&object.name));
             target
         })
         .collect();
@@ -145,7 +148,7 @@ fn cast_sensor(
     (request.motion, request.start_s) = (sensor.motion.clone(), sensor.start_s);
     request.deskew = sensor.deskew;
     request.attributes = scene.attributes.clone();
-    request.stream = StreamKey::new(scene.seed, &sensor.name, number);
+    request.stream = stream(&sensor.name);
     request.culling = culling;
     let Scanned { scan, tally, cast_on_cpu, .. } = scan_objects(caster, &placed, &request)?;
     let simplified = objects.iter().map(|placed| placed.simplified).collect();
