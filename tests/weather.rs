@@ -155,6 +155,20 @@ fn what_is_in_the_air_is_no_surface() {
         let (scan, _) = on_cpu(&in_weather(hahner.clone()), reflectivity);
         assert_eq!(count(&scan, Medium::Fog), 0, "30 m is not beyond it");
     }
+    // An extinction of 0.15 has its range at 17.0 m (by Hahner et al.'s tables), also for
+    // beams that are many rays.
+    let thick = Weather { fog_visibility_m: Some(20f64.ln() / 0.15), ..hahner };
+    let footprint =
+        Some(Footprint { samples: 7, divergence_deg: Some([0.1; 2]), separation_m: Some(1.0) });
+    for footprint in [None, footprint] {
+        // Its fog is weaker than 90 % at 200 m.
+        let limit = Some(DetectionLimit { reflectivity: 0.9, range_m: 1000.0 });
+        let detection = Some(Detection { limit, ..Detection::default() });
+        let effects = Effects { footprint, detection, ..in_weather(thick.clone()) };
+        let (scan, tally) = on_cpu(&effects, 1.0);
+        assert!(tally.points > 50_000 && count(&scan, Medium::Fog) as u64 == tally.points);
+        assert!(scan.range_m.unwrap().iter().all(|range_m| (range_m - 4.56).abs() < 0.05));
+    }
 }
 
 #[test]

@@ -130,7 +130,7 @@ fn write_default_scene() -> anyhow::Result<PathBuf> {
 /// the attributes that packets are made of. Says which returns they hold, where `wanted` does
 /// not say otherwise.
 fn cast_as_packets_tell(scene: &mut Scene, wanted: Option<Returns>) -> anyhow::Result<Returns> {
-    let returns = packets::returns(&scene.effects, wanted)?;
+    let returns = packets::settle_returns(&mut scene.effects, wanted)?;
     for (i, sensor) in scene.sensors.iter_mut().enumerate() {
         sensor.sensor = packets::as_packets_tell(&sensor.sensor)
             .with_context(|| format!("sensor[{i}]: no packets of \"{}\"", sensor.sensor.name))?;

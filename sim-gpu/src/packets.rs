@@ -92,6 +92,26 @@ pub fn returns(effects: &Effects, wanted: Option<Returns>) -> Result<Returns, In
     }
 }
 
+/// As [`returns`]; where beams have several returns, as in weather and with a width, and `effects`
+/// do not say which are told, they tell those that are `wanted` from here on.
+///
+/// # Errors
+/// As [`returns`].
+pub fn settle_returns(
+    effects: &mut Effects,
+    wanted: Option<Returns>,
+) -> Result<Returns, InvalidValue> {
+    let held = returns(effects, wanted)?;
+    if effects.footprint.is_some() || effects.weather.is_some() {
+        effects.returns.get_or_insert(match held {
+            Returns::Strongest => ReturnMode::Strongest,
+            Returns::Last => ReturnMode::Last,
+            Returns::Dual => ReturnMode::Dual,
+        });
+    }
+    Ok(held)
+}
+
 /// That the head is a VLP-32C's: packets name lasers, drivers have the table.
 fn check_head(rotating: &Rotating) -> Result<(), InvalidValue> {
     let Some(Sensor { layout: Layout::Rotating(vlp32c), .. }) = Sensor::builtin("vlp32c") else {

@@ -150,12 +150,12 @@ impl Settings {
                 "--simplify renumbers the triangles of a mesh: leave `triangle` out of --attributes",
             ));
         }
-        let effects = self.effects()?;
+        let mut effects = self.effects()?;
         within("--reflectivity", self.reflectivity, 0.0..=1.0)
             .map_err(|error| usage(error.to_string()))?;
         let mut returns = Returns::default();
         if formats.contains(&ScanFormat::Pcap) {
-            returns = cast_as_packets_tell(&mut sets, &effects, self.returns)?;
+            returns = cast_as_packets_tell(&mut sets, &mut effects, self.returns)?;
         } else if self.returns.is_some() {
             return Err(usage("--returns applies to packets only: add --format pcap"));
         }
@@ -263,14 +263,14 @@ struct EffectsFile {
 }
 
 /// Gives the sensors the beam geometry that their packets describe.
-/// Says which returns they hold, where `wanted` does not say otherwise.
+/// Says which returns they hold, where `wanted` does not say otherwise, and lets the scans tell them.
 fn cast_as_packets_tell(
     sets: &mut [SetConfig],
-    effects: &Effects,
+    effects: &mut Effects,
     wanted: Option<Returns>,
 ) -> anyhow::Result<Returns> {
     let refuse = |error| usage(format!("--format pcap: {error}"));
-    let returns = packets::returns(effects, wanted).map_err(refuse)?;
+    let returns = packets::settle_returns(effects, wanted).map_err(refuse)?;
     for set in sets {
         let name = &set.sensor.name;
         let refuse = |error| usage(format!("--format pcap: sensor \"{name}\": {error}"));

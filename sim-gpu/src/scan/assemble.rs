@@ -14,7 +14,7 @@ use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
 use crate::weather::Medium;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -245,7 +245,9 @@ fn with_attributes(
             }
             Attribute::Attitude => {
                 let at = |r: &Return| view.request.pose_at(ray(r)).world_from_sensor;
-                scan.attitude_rad = column(returns, |r| f32x3(at(r).to_scaled_axis()));
+                // Of the two quaternions of a rotation the one that turns by half a turn at most.
+                let shorter = |q: DQuat| if q.w < 0.0 { -q } else { q };
+                scan.attitude_rad = column(returns, |r| f32x3(shorter(at(r)).to_scaled_axis()));
             }
             Attribute::Medium => {
                 scan.medium = column(returns, |r| match r.source {

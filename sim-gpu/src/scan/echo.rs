@@ -20,8 +20,8 @@ pub(super) struct Echo {
 pub(super) enum Source {
     /// A surface: the object, and the hit of it, as places in lists.
     Surface { object: u32, hit: u32 },
-    /// The air along a ray.
-    Air { ray: u32, medium: Medium },
+    /// The air along a ray: which of the beam's returns from the air.
+    Air { ray: u32, medium: Medium, draw: u32 },
 }
 
 /// How strong an echo is.
@@ -35,10 +35,43 @@ pub(super) struct Signal {
     pub retroreflection: f64,
 }
 
+impl Source {
+    /// Whether both are of one object, or of one medium.
+    fn is_of_the_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Surface { object: a, .. }, Self::Surface { object: b, .. }) => a == b,
+            (Self::Air { medium: a, .. }, Self::Air { medium: b, .. }) => a == b,
+            _ => false,
+        }
+    }
+}
+
 impl Echo {
-    /// Adds what comes back from farther away, which `strongest` says is the most powerful part
-    /// or not.
-    fn join(&mut self, farther: &Self, is_strongest: bool) {
+    /// These parts, in the order of their ranges, as one. It is told to be of the object or
+    /// medium that most of its light comes from, and there of the strongest part.
+    fn of(parts: &[Self]) -> Self {
+        let mut one = parts[0];
+        parts[1..].iter().for_each(|farther| one.join(farther));
+        let power_of = |source: &Source| -> f64 {
+            let same = parts.iter().filter(|part| part.source.is_of_the_same(source));
+            same.map(|part| part.signal.power).sum()
+        };
+        let weight = |part: &Self| (power_of(&part.source), part.signal.power);
+        let mut most = weight(&parts[0]);
+        for part in &parts[1..] {
+            // Of equals the nearest.
+            let found = weight(part);
+            if found > most {
+                most = found;
+                (one.source, one.signal.retroreflection) =
+                    (part.source, part.signal.retroreflection);
+            }
+        }
+        one
+    }
+
+    /// Adds what comes back from farther away.
+    fn join(&mut self, farther: &Self) {
         let power = self.signal.power + farther.signal.power;
         let share = farther.signal.power / power;
         // Black surfaces have no power to weigh by; one that the sensor touches has all of it.
@@ -47,10 +80,6 @@ impl Echo {
         }
         self.signal.power = power;
         self.signal.brightness += farther.signal.brightness;
-        if is_strongest {
-            self.signal.retroreflection = farther.signal.retroreflection;
-            self.source = farther.source;
-        }
     }
 }
 
@@ -60,18 +89,14 @@ impl Echo {
 /// A slope that leads away is one echo however long it is: its pulse has no gap in it.
 pub(super) fn merge(echoes: &mut Vec<Echo>, separation_m: f64) {
     echoes.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
-    let (mut count, mut last_m, mut most) = (0, f64::NEG_INFINITY, 0.0);
+    let (mut count, mut first) = (0, 0);
     for i in 0..echoes.len() {
-        let echo = echoes[i];
-        let power = echo.signal.power;
-        if count > 0 && echo.range_m - last_m < separation_m {
-            echoes[count - 1].join(&echo, power > most);
-            most = power.max(most);
-        } else {
-            (echoes[count], most) = (echo, power);
-            count += 1;
+        let goes_on =
+            echoes.get(i + 1).is_some_and(|next| next.range_m - echoes[i].range_m < separation_m);
+        if !goes_on {
+            echoes[count] = if first == i { echoes[i] } else { Echo::of(&echoes[first..=i]) };
+            (count, first) = (count + 1, i + 1);
         }
-        last_m = echo.range_m;
     }
     echoes.truncate(count);
 }
@@ -147,6 +172,22 @@ mod tests {
             let one = merged(&[(2.0, powers[0]), (2.5, powers[1])], 1.0);
             assert_eq!((one.len(), one[0].range_m), (1, 2.0), "{powers:?}");
         }
+    }
+
+    #[test]
+    fn an_echo_is_of_what_most_of_its_light_comes_from() {
+        // Fog takes all of a beam, and a wall behind it 19 rays of it, each of which is weaker.
+        let medium = Medium::Fog;
+        let mut echoes = echoes(&[(5.0, 5.8e-4); 19]);
+        let signal = Signal { power: 1.65e-3, brightness: 0.0, retroreflection: 0.0 };
+        let source = Source::Air { ray: 0, medium, draw: 0 };
+        echoes.push(Echo { range_m: 4.65, signal, source });
+        let mut thick = echoes.clone();
+        thick[19].signal.power = 1.2e-2;
+        merge(&mut echoes, 1.0);
+        assert_eq!((echoes.len(), hit(&echoes[0])), (1, 0));
+        merge(&mut thick, 1.0);
+        assert_eq!(thick[0].source, source);
     }
 
     #[test]

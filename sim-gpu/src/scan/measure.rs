@@ -60,6 +60,13 @@ impl<'a> View<'a> {
         self.share.is_none() && self.air.is_none() && self.limit.is_none()
     }
 
+    /// How far apart two surfaces, or what is in the air, give two echoes, metres.
+    fn separation_m(&self) -> f64 {
+        let asked = self.effects.footprint.and_then(|footprint| footprint.separation_m);
+        let own = || self.request.sensor.footprint.map(|shape| shape.separation_m);
+        asked.or_else(own).unwrap_or_default()
+    }
+
     /// Where a ray points, in world axes.
     fn direction(&self, ray: u32) -> DVec3 {
         self.request.pose_at(ray).world_from_sensor * self.request.pattern.directions[ray as usize]
@@ -209,8 +216,7 @@ fn measure_beam(
         listen_to_air(view, air, objects, beam, rays, echoes);
     }
     if echoes.len() > 1 {
-        let separation_m = view.effects.footprint.and_then(|footprint| footprint.separation_m);
-        merge(echoes, separation_m.unwrap_or_default());
+        merge(echoes, view.separation_m());
     }
     if let Some((detection, limit)) = view.effects.detection.zip(view.limit) {
         let before = echoes.len();
@@ -296,26 +302,32 @@ fn listen_to_air(
     let pattern = view.request.pattern;
     let ray = beam * pattern.rays_per_beam;
     let max_m = view.request.sensor.range.max_m;
-    let range_m = |&(object, hit): &(usize, usize)| objects[object].hits.hits[hit].range_m;
+    let hit_of = |&(object, hit): &(usize, usize)| &objects[object].hits.hits[hit];
+    // Beside the middle of a beam there is light only where beams have a width.
+    let is_lit = |hit: &&Hit| view.share.is_some() || hit.beam == ray;
+    let hits = || rays.iter().map(hit_of).filter(is_lit);
     // Light passes by the surfaces that only some of the rays meet.
-    let is_open = view.share.is_some() && rays.len() < pattern.rays_per_beam as usize;
-    let farthest_m = rays.iter().map(range_m).fold(0.0, f64::max);
-    let end_m = if is_open || rays.is_empty() { max_m } else { farthest_m.min(max_m) };
-    let at_end = echoes.iter().find(|echo| echo.range_m == end_m);
-    let in_clear_air = |signal: Signal, transmission: f64| {
-        if transmission > 0.0 { signal.brightness / transmission } else { 0.0 }
-    };
+    let n_rays = if view.share.is_some() { pattern.rays_per_beam as usize } else { 1 };
+    let is_open = hits().count() < n_rays;
+    let farthest_m = hits().map(|hit| hit.range_m).fold(0.0, f64::max);
+    let end_m = if is_open { max_m } else { farthest_m.min(max_m) };
     let (origin, direction) = (view.origin(ray), view.direction(ray));
-    let transmission = || air.transmission(origin, direction, end_m);
-    let brightness = at_end.map_or(0.0, |echo| in_clear_air(echo.signal, transmission()));
+    let in_clear_air = |echo: &Echo| {
+        let transmission = air.transmission(origin, direction, echo.range_m);
+        if transmission > 0.0 { echo.signal.brightness / transmission } else { 0.0 }
+    };
+    let brightness =
+        if air.asks_for_brightness() { echoes.iter().map(in_clear_air).sum() } else { 0.0 };
     let (stream, number) = (view.request.stream, beam);
     let along = AirBeam { origin, direction, end_m, brightness, stream, number };
+    let mut draw = 0;
     air.scatter(&along, |scattered| {
         let Scattered { range_m, power, brightness, medium } = scattered;
         let signal = Signal { power, brightness, retroreflection: 0.0 };
         if range_m >= view.request.sensor.range.min_m {
-            echoes.push(Echo { range_m, signal, source: Source::Air { ray, medium } });
+            echoes.push(Echo { range_m, signal, source: Source::Air { ray, medium, draw } });
         }
+        draw += 1;
     });
 }
 
@@ -326,9 +338,16 @@ fn key(view: &View, objects: &[ObjectHits], echo: &Echo) -> (StreamKey, u32) {
             let found = &objects[object as usize];
             (found.job.stream, found.hits.hits[hit as usize].beam)
         }
-        Source::Air { ray, .. } => (view.request.stream, ray),
+        Source::Air { ray, draw, .. } => {
+            // Each return from the air has a stream of its own, which is no surface's either.
+            let StreamKey([a, b]) = view.request.stream;
+            (StreamKey([a, b ^ AIR_STREAM.wrapping_mul(draw + 1)]), ray)
+        }
     }
 }
+
+/// Tells the streams of returns from the air apart: the golden ratio's bits, an odd number.
+const AIR_STREAM: u32 = 0x9E37_79B9;
 
 /// The point that a sensor measures of an echo that it detects, number `place` of its beam.
 fn point(

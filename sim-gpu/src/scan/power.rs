@@ -58,7 +58,8 @@ pub(super) fn received(brightness: f64, range_m: f64) -> f64 {
 pub(super) fn calibrated(brightness: f64, retroreflection: f64) -> u8 {
     let byte = match retroreflection {
         retro if retro > 0.0 => LEAST_RETRO + (IDEAL_RETRO - LEAST_RETRO) * retro,
-        _ => WHITE * brightness,
+        // Drops may be brighter than white.
+        _ => (WHITE * brightness).min(WHITE),
     };
     byte.round() as u8
 }

@@ -64,15 +64,15 @@ impl Table {
             let cause = "expected a row at least, or table.file, found none";
             return Err(InvalidValue::new("table.directions_deg", cause));
         }
-        let (rows, lines) = (self.directions_deg.len(), self.lines);
-        if !rows.is_multiple_of(lines.into()) {
-            let cause = format!("expected rows of {lines} lines in turn, found {rows} rows");
-            return Err(InvalidValue::new("table.lines", cause));
-        }
         for (i, [azimuth_deg, elevation_deg]) in self.directions_deg.iter().enumerate() {
             let key = |column: u8| format!("table.directions_deg[{i}][{column}]");
             within(&key(0), *azimuth_deg, -360.0..=360.0)?;
             within(&key(1), *elevation_deg, -90.0..=90.0)?;
+        }
+        let (rows, lines) = (self.directions_deg.len(), self.lines);
+        if !rows.is_multiple_of(lines.into()) {
+            let cause = format!("expected rows of {lines} lines in turn, found {rows} rows");
+            return Err(InvalidValue::new("table.lines", cause));
         }
         checked_ray_count("table", self.rays_in(1))
     }

@@ -9,6 +9,9 @@ const LIGHT_M_S: f64 = 299_792_458.0;
 /// Half of the pulse's length: Hahner et al.
 const HALF_PULSE_S: f64 = 20e-9;
 
+/// Of how much of the way there and back light comes back at once, metres: the pulse's length.
+const PULSE_M: f64 = LIGHT_M_S * HALF_PULSE_S;
+
 /// The receiver sees nothing up to here, and all of the beam from there: Hahner et al.
 const BLIND_M: f64 = 0.9;
 const WHOLE_M: f64 = 1.0;
@@ -22,10 +25,14 @@ const HAHNERS_SURFACE: f64 = 1e-6 / PI;
 /// The return of fog.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fog {
-    /// Where it comes from, metres.
-    range_m: f64,
+    /// Where I(R) has its maximum, metres.
+    peak_m: f64,
     /// Its power; where it is in proportion to the surface behind it, for one of brightness 1.
     power: f64,
+    /// Power by I(R).
+    factor: f64,
+    /// Per metre, of all that is in the air.
+    extinction: f64,
     is_in_proportion: bool,
 }
 
@@ -35,51 +42,62 @@ pub(super) fn extinction_of(visibility_m: f64) -> f64 {
     20f64.ln() / visibility_m
 }
 
-/// What the fog of this visibility returns to a pulse of its own length, 1 m away.
-pub(super) fn of_one_pulse(visibility_m: f64) -> f64 {
-    // The integral of sin^2 over the pulse is half of its length.
-    PI * LIGHT_M_S / 2.0 * BACKSCATTER / visibility_m * HALF_PULSE_S
+/// The brightness of so much fog of this visibility, metres, if nothing is before it: of no more
+/// of it than lies within a pulse's length.
+pub(super) fn of_one_pulse(visibility_m: f64, length_m: f64) -> f64 {
+    let twice_extinction = 2.0 * extinction_of(visibility_m);
+    let length_m = length_m.min(PULSE_M / 2.0);
+    -PI * BACKSCATTER / visibility_m * (-twice_extinction * length_m).exp_m1() / twice_extinction
 }
 
 impl Fog {
     /// Fog of this visibility in air of this extinction, all in all.
     pub fn new(visibility_m: f64, extinction: f64, is_in_proportion: bool) -> Self {
-        let (range_m, most) = strongest(extinction);
+        let (peak_m, most) = strongest(extinction);
         let backscatter = BACKSCATTER / visibility_m;
-        let power = if is_in_proportion {
-            backscatter / HAHNERS_SURFACE * most
+        let factor = if is_in_proportion {
+            backscatter / HAHNERS_SURFACE
         } else {
-            PI * LIGHT_M_S / 2.0 * backscatter * most
+            PI * LIGHT_M_S / 2.0 * backscatter
         };
-        Self { range_m, power, is_in_proportion }
+        Self { peak_m, power: factor * most, factor, extinction, is_in_proportion }
+    }
+
+    /// Whether it is in proportion to the surface behind it.
+    pub fn is_in_proportion(&self) -> bool {
+        self.is_in_proportion
     }
 
     /// What comes back along `beam`.
     pub fn scattered(&self, beam: &AirBeam) -> Option<Scattered> {
-        let Self { range_m, .. } = *self;
-        if range_m >= beam.end_m {
-            return None;
-        }
-        let (power, brightness) = if self.is_in_proportion {
+        let (range_m, power, brightness) = if self.is_in_proportion {
             let power = self.power * beam.brightness;
             // As that simulation reports it: as if it were as far as the surface.
-            (power, (power * beam.end_m.powi(2)).min(1.0))
+            (self.peak_m, power, (power * beam.end_m.powi(2)).min(1.0))
         } else {
-            (self.power, self.power * range_m.powi(2))
+            // The pulse of a surface peaks half of its length after it begins to come back, and
+            // the sensor tells the surface to be where it is.
+            let range_m = (self.peak_m - PULSE_M / 2.0).max(BLIND_M);
+            let power = if beam.end_m < self.peak_m {
+                self.factor * returned(self.peak_m, self.extinction, beam.end_m)
+            } else {
+                self.power
+            };
+            (range_m, power, power * range_m.powi(2))
         };
-        (power > 0.0).then_some(Scattered { range_m, power, brightness, medium: Medium::Fog })
+        let is_something = power > 0.0 && range_m < beam.end_m;
+        is_something.then_some(Scattered { range_m, power, brightness, medium: Medium::Fog })
     }
 }
 
 /// Where I(R) is largest, metres, and how large it is there, s/m^2.
 fn strongest(extinction: f64) -> (f64, f64) {
-    let pulse_m = LIGHT_M_S * HALF_PULSE_S;
     // It has one maximum, before the end of the pulse has come through the receiver's blind part.
-    let (mut low_m, mut high_m) = (BLIND_M, WHOLE_M + pulse_m);
+    let (mut low_m, mut high_m) = (BLIND_M, WHOLE_M + PULSE_M);
     let golden = (5f64.sqrt() - 1.0) / 2.0;
     let at = |part: f64, low_m: f64, high_m: f64| {
         let range_m = low_m + part * (high_m - low_m);
-        (range_m, returned(range_m, extinction))
+        (range_m, returned(range_m, extinction, f64::INFINITY))
     };
     let (mut a, mut b) = (at(1.0 - golden, low_m, high_m), at(golden, low_m, high_m));
     // Each step leaves 0.62 of 6 m: 24 of them 0.06 mm.
@@ -93,11 +111,12 @@ fn strongest(extinction: f64) -> (f64, f64) {
         }
     }
     let range_m = 0.5 * (low_m + high_m);
-    (range_m, returned(range_m, extinction))
+    (range_m, returned(range_m, extinction, f64::INFINITY))
 }
 
-/// I(R), s/m^2, by Simpson's rule on each side of where the receiver sees all of the beam.
-fn returned(range_m: f64, extinction: f64) -> f64 {
+/// I(R) of the fog up to `end_m`, s/m^2, by Simpson's rule on each side of where the receiver sees
+/// all of the beam.
+fn returned(range_m: f64, extinction: f64, end_m: f64) -> f64 {
     const STEPS: usize = 16;
     let integrand = |r: f64| {
         let t = 2.0 * (range_m - r) / LIGHT_M_S;
@@ -111,10 +130,11 @@ fn returned(range_m: f64, extinction: f64) -> f64 {
         let thirds = |i: usize| at(2 * i) + 4.0 * at(2 * i + 1) + at(2 * i + 2);
         step_m / 6.0 * (0..STEPS).map(thirds).sum::<f64>()
     };
-    let nearest_m = BLIND_M.max(range_m - LIGHT_M_S * HALF_PULSE_S);
-    let bend_m = WHOLE_M.clamp(nearest_m, range_m.max(nearest_m));
+    let nearest_m = BLIND_M.max(range_m - PULSE_M);
+    let farthest_m = range_m.min(end_m).max(nearest_m);
+    let bend_m = WHOLE_M.clamp(nearest_m, farthest_m);
     // dt is 2/c of dr.
-    2.0 / LIGHT_M_S * (between(nearest_m, bend_m) + between(bend_m, range_m.max(bend_m)))
+    2.0 / LIGHT_M_S * (between(nearest_m, bend_m) + between(bend_m, farthest_m))
 }
 
 #[cfg(test)]
@@ -130,6 +150,35 @@ mod tests {
             let (found_m, found) = strongest(extinction);
             assert!((found * 1e9 / most - 1.0).abs() < 2e-4, "{extinction}: {found:e}");
             assert!((found_m - range_m).abs() < 0.011, "{extinction}: {found_m} m");
+        }
+    }
+
+    #[test]
+    fn physical_fog_lies_where_a_surface_of_its_light_would_and_is_no_brighter_than_endless_fog() {
+        // Single scattering of endless fog: pi beta / (2 a), whatever the visibility.
+        let endless = PI * BACKSCATTER / (2.0 * 20f64.ln());
+        assert!((endless - 0.0241).abs() < 1e-4);
+        for visibility_m in [0.5, 2.0, 10.0, 50.0, 500.0] {
+            let fog = Fog::new(visibility_m, extinction_of(visibility_m), false);
+            let along = |end_m| AirBeam {
+                origin: glam::DVec3::ZERO,
+                direction: glam::DVec3::X,
+                end_m,
+                brightness: 0.0,
+                stream: formats::rng::StreamKey([1, 2]),
+                number: 0,
+            };
+            let far = fog.scattered(&along(100.0)).unwrap();
+            assert!(far.brightness <= endless, "{visibility_m}: {}", far.brightness);
+            assert!((BLIND_M..1.8).contains(&far.range_m), "{visibility_m}: {}", far.range_m);
+            // A wall takes away the fog behind it, and all of it if it stands before it.
+            let near = fog.scattered(&along(2.0)).unwrap();
+            assert!(near.power < far.power && near.power > 0.3 * far.power, "{visibility_m}");
+            assert!(fog.scattered(&along(0.9)).is_none());
+            // So it is of dust, as thick as it may be.
+            assert!(of_one_pulse(visibility_m, f64::INFINITY) <= endless);
+            let thin = of_one_pulse(visibility_m, 1e-6) / 1e-6;
+            assert!((thin / (PI * BACKSCATTER / visibility_m) - 1.0).abs() < 1e-4);
         }
     }
 

@@ -16,7 +16,8 @@
 //!
 //! Drops have exponentially distributed diameters D, `N(D) = N0 exp(-L D)`: for rain Marshall and
 //! Palmer's of 1948, for snow Gunn and Marshall's of 1958, with the constants of LISA (Kilic et
-//! al., arXiv 2107.07004), whose N0 of snow is twice theirs. A drop of diameter D at range r, in a beam of width w(r), returns
+//! al., arXiv 2107.07004), whose N0 of snow is twice theirs. A drop of diameter D at range r, in
+//! a beam of width w(r), returns
 //!
 //! ```text
 //! P = F exp(-2 a r) min(D^2 / w^2, 1) / r^2,    F = ((n - 1) / (n + 1))^2
@@ -40,14 +41,16 @@
 //! ```
 //!
 //! with x(r) the part of the beam that the receiver sees, 0 up to 0.9 m and 1 from 1 m (Rasshofer
-//! et al., Adv. Radio Sci. 9, 2011; Hahner et al., ICCV 2021). Its maximum is the return of the
-//! fog, some 4.6 m away; its power is `pi (c / 2) beta I`, with `beta = 0.046 / visibility` the
-//! backscatter per metre and steradian.
+//! et al., Adv. Radio Sci. 9, 2011; Hahner et al., ICCV 2021). Its maximum, at some 4.6 m, is the
+//! return of the fog; its power is `pi (c / 2) beta I`, with `beta = 0.046 / visibility` the
+//! backscatter per metre and steradian. The return of a surface has its maximum `c T / 2 = 3 m`
+//! behind the surface by the same formula, and a sensor tells where the surface is, so that fog is
+//! told to be some 1.6 m away. A surface nearer than 4.6 m takes away the fog behind it.
 //!
 //! [`FogModel::Hahner`] is for comparison with that simulation. There fog returns
 //! `b (beta / beta0) I` with `beta0 = 1e-6 / pi`: it is in proportion to the surface behind it,
-//! so that every beam longer than a certain range becomes fog, whatever it hits. The formula for
-//! surfaces lacks a factor 2/c there, and 1e-6 was chosen by eye. Both are kept.
+//! so that every beam longer than a certain range becomes fog, whatever it hits, 4.6 m away. The
+//! formula for surfaces lacks a factor 2/c there, and 1e-6 was chosen by eye. Both are kept.
 //!
 //! # Haze
 //!
@@ -59,7 +62,14 @@
 //!
 //! A box with the extinction of fog. With a probability of d / 0.7, d its optical depth along
 //! the beam, it returns from inside, as MAVS has it (Goodin et al.), at a depth that the
-//! extinction distributes, and with the power of fog of one pulse's length there.
+//! extinction distributes, and with the power of as much of the box as lies within a pulse's
+//! length behind that:
+//!
+//! ```text
+//! brightness = pi beta (1 - exp(-2 a L)) / (2 a)
+//! ```
+//!
+//! times what comes through to it, at most pi beta / (2 a) = 0.024, that of endless fog.
 
 mod drops;
 mod fog;
@@ -179,26 +189,45 @@ impl Air {
     /// The part of the light that comes through to this range and back.
     #[must_use]
     pub fn transmission(&self, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
-        let in_volumes: f64 =
-            self.volumes.iter().map(|volume| depth(volume, origin, direction, range_m)).sum();
+        let in_volumes = self.depth_in_volumes(origin, direction, range_m);
         (-2.0 * (self.extinction * range_m + in_volumes)).exp()
+    }
+
+    /// The optical depth of the volumes along a beam up to this range.
+    fn depth_in_volumes(&self, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
+        self.volumes.iter().map(|volume| depth(volume, origin, direction, range_m)).sum()
+    }
+
+    /// Whether what it returns depends on the brightness of what is behind it.
+    #[must_use]
+    pub fn asks_for_brightness(&self) -> bool {
+        self.fog.is_some_and(|fog| fog.is_in_proportion())
     }
 
     /// Gives what comes back from the air along `beam` to `take`, in no order.
     pub fn scatter(&self, beam: &AirBeam, mut take: impl FnMut(Scattered)) {
-        let AirBeam { end_m, stream, number, .. } = *beam;
+        let AirBeam { origin, direction, end_m, stream, number, .. } = *beam;
+        // Drops and fog are drawn in the air between the volumes, which weaken them.
+        let behind_volumes = |one: Scattered| {
+            if self.volumes.is_empty() {
+                return one;
+            }
+            let left = (-2.0 * self.depth_in_volumes(origin, direction, one.range_m)).exp();
+            Scattered { power: one.power * left, brightness: one.brightness * left, ..one }
+        };
         let mut drops_of = |drops: &Option<Drops>, purpose, medium| {
             if let Some(drops) = drops {
                 let bits = |draw| random_bits(stream, number, purpose + draw);
                 drops.draw(end_m, bits, |range_m, power| {
-                    take(Scattered { range_m, power, brightness: power * range_m.powi(2), medium });
+                    let brightness = power * range_m.powi(2);
+                    take(behind_volumes(Scattered { range_m, power, brightness, medium }));
                 });
             }
         };
         drops_of(&self.rain, RAIN_PURPOSE, Medium::Rain);
         drops_of(&self.snow, SNOW_PURPOSE, Medium::Snow);
         if let Some(scattered) = self.fog.and_then(|fog| fog.scattered(beam)) {
-            take(scattered);
+            take(behind_volumes(scattered));
         }
         for (volume, i) in self.volumes.iter().zip(0..) {
             if let Some(scattered) = self.scattered_in(volume, beam, DUST_PURPOSE + i) {
@@ -221,7 +250,7 @@ impl Air {
         let within = -(unit(place) * (-optical_depth).exp_m1()).ln_1p() / extinction;
         let range_m = enters_m + within.min(leaves_m - enters_m);
         let transmission = self.transmission(origin, direction, range_m);
-        let brightness = fog::of_one_pulse(volume.visibility_m) * transmission;
+        let brightness = fog::of_one_pulse(volume.visibility_m, leaves_m - range_m) * transmission;
         let power = brightness / range_m.powi(2);
         let is_something = power > 0.0 && power.is_finite();
         is_something.then_some(Scattered { range_m, power, brightness, medium: Medium::Dust })
@@ -244,9 +273,16 @@ fn depth(volume: &Volume, origin: DVec3, direction: DVec3, range_m: f64) -> f64 
 fn inside(volume: &Volume, origin: DVec3, direction: DVec3, end_m: f64) -> Option<(f64, f64)> {
     let (mut enters_m, mut leaves_m) = (0.0f64, end_m);
     for axis in 0..3 {
+        let faces = [volume.min_m[axis], volume.max_m[axis]];
+        if direction[axis] == 0.0 {
+            // Along a face is inside.
+            if !(faces[0]..=faces[1]).contains(&origin[axis]) {
+                return None;
+            }
+            continue;
+        }
         let inverse = direction[axis].recip();
-        let [a, b] = [volume.min_m[axis], volume.max_m[axis]].map(|m| (m - origin[axis]) * inverse);
-        // NaN where the beam runs within a face: that face does not bound it.
+        let [a, b] = faces.map(|m| (m - origin[axis]) * inverse);
         enters_m = enters_m.max(a.min(b));
         leaves_m = leaves_m.min(a.max(b));
     }
@@ -258,7 +294,7 @@ fn haze_extinction(visibility_m: f64) -> f64 {
     let visibility_km = visibility_m / 1000.0;
     let exponent = match visibility_km {
         above if above > 50.0 => 1.6,
-        above if above > 6.0 => 1.3,
+        above if above >= 6.0 => 1.3,
         below => 0.585 * below.cbrt(),
     };
     3.912 / visibility_m * WAVELENGTH.powf(-exponent)

@@ -96,8 +96,39 @@ fn fog_weakens_by_its_visibility_and_returns_by_itself() {
     let through = air.transmission(DVec3::ZERO, DVec3::X, 50.0);
     assert!((through - 0.05 * 0.05).abs() < 1e-12);
     let [fog] = scattered(&air, &beam(30.0, 0))[..] else { panic!("expected one return") };
-    assert!((fog.range_m - 4.64).abs() < 0.02 && fog.medium == Medium::Fog);
-    assert!(scattered(&air, &beam(4.0, 0)).is_empty(), "a surface before it");
+    // The maximum of its pulse, 4.64 m, less half of the pulse's length of 6 m.
+    assert!((fog.range_m - 1.64).abs() < 0.02 && fog.medium == Medium::Fog);
+    assert!(scattered(&air, &beam(1.5, 0)).is_empty(), "a surface before it");
+    let hahner = lisa(&Weather { fog_model: FogModel::Hahner, ..weather });
+    let bright = AirBeam { brightness: 1.0, ..beam(30.0, 0) };
+    let [fog] = scattered(&hahner, &bright)[..] else { panic!("expected one return") };
+    assert!((fog.range_m - 4.64).abs() < 0.02, "as in their tables");
+}
+
+#[test]
+fn beams_along_a_face_of_a_box_are_inside_and_what_is_behind_it_is_weaker() {
+    let volume = Volume { min_m: [0.0, -1.0, 0.0], max_m: [3.0, 1.0, 3.0], visibility_m: 5.0 };
+    let dusty = Weather { volumes: vec![volume], ..rain(50.0) };
+    // All of them start at z = 0, and go along it.
+    let [air, clear] = [lisa(&dusty), lisa(&rain(50.0))];
+    let left = air.transmission(DVec3::ZERO, DVec3::X, 10.0);
+    let of_rain = clear.transmission(DVec3::ZERO, DVec3::X, 10.0);
+    let of_box = (-2.0 * 20f64.ln() / 5.0 * 3.0).exp();
+    assert!((left / of_rain - of_box).abs() < 1e-12);
+    let outside = DVec3::new(0.0, 1.5, 0.0);
+    assert_eq!(air.transmission(outside, DVec3::X, 10.0), of_rain);
+    let mut behind = 0;
+    for number in 0..3000 {
+        let drops = |air: &Air| -> Vec<Scattered> {
+            let all = scattered(air, &beam(10.0, number)).into_iter();
+            all.filter(|one| one.medium == Medium::Rain && one.range_m > 3.0).collect()
+        };
+        for (weak, strong) in drops(&air).iter().zip(drops(&clear)) {
+            assert!((weak.power / strong.power / of_box - 1.0).abs() < 1e-9);
+            behind += 1;
+        }
+    }
+    assert!(behind > 100, "{behind}");
 }
 
 #[test]
