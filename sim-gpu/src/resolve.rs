@@ -94,14 +94,23 @@ impl Lanewise for Ranges<'_> {
     }
 }
 
+/// Of so many beams one is cast at an object that few beams may meet.
+const SPARSE: usize = 16;
+
 /// The rays of `job` that hit, in the order of their beams, each of which has at
 /// most one.
 fn by_beam(job: &CastJob, cast: &Cast, n_beams: usize) -> Vec<u32> {
+    let hits =
+        || (0..).zip(job.beams.iter().zip(&cast.codes)).filter(|(_, (_, code))| **code != MISS);
+    // A small object of a scene meets few beams: sorting them is faster than a place for each.
+    if job.beams.len() < n_beams / SPARSE {
+        let mut hits: Vec<(u32, u32)> = hits().map(|(ray, (&beam, _))| (beam, ray)).collect();
+        hits.sort_unstable();
+        return hits.into_iter().map(|(_, ray)| ray).collect();
+    }
     let mut ray_of = vec![u32::MAX; n_beams];
-    for (ray, (&beam, &code)) in (0..).zip(job.beams.iter().zip(&cast.codes)) {
-        if code != MISS {
-            ray_of[beam as usize] = ray;
-        }
+    for (ray, (&beam, _)) in hits() {
+        ray_of[beam as usize] = ray;
     }
     ray_of.retain(|&ray| ray != u32::MAX);
     ray_of

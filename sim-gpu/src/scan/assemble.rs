@@ -110,7 +110,7 @@ pub fn assemble(
     let start = request.pose_at_start();
     let origin = origin_for(start.position_m);
     let mut tally = Tally::default();
-    let nearest = nearest_per_ray(objects);
+    let nearest = nearest_per_ray(objects, request.pattern.len());
     let mut returns = Vec::with_capacity(nearest.len());
     if view.has_one_echo_a_beam() {
         returns.extend(nearest.iter().filter_map(|at| measure_one(&view, objects, at, &mut tally)));
@@ -140,25 +140,24 @@ fn f32x3(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
-/// Places in `objects` and in its hits: one per ray, ascending. Of equal ranges
+/// Places in `objects` and in its hits: one per ray of the `n_rays`, ascending. Of equal ranges
 /// the object that comes first wins.
-fn nearest_per_ray(objects: &[ObjectHits]) -> Vec<(usize, usize)> {
+fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<(usize, usize)> {
     if let [alone] = objects {
         return (0..alone.hits.hits.len()).map(|i| (0, i)).collect();
     }
-    let mut all: Vec<(u32, f64, usize, usize)> = objects
-        .iter()
-        .enumerate()
-        .flat_map(|(object, found)| {
-            let hits = found.hits.hits.iter().enumerate();
-            hits.map(move |(i, hit)| (hit.beam, hit.range_m, object, i))
-        })
-        .collect();
-    all.sort_unstable_by(|p, q| {
-        p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)).then((p.2, p.3).cmp(&(q.2, q.3)))
-    });
-    all.dedup_by_key(|entry| entry.0);
-    all.into_iter().map(|(_, _, object, i)| (object, i)).collect()
+    const NOTHING: u32 = u32::MAX;
+    let mut nearest = vec![(f64::INFINITY, NOTHING, 0u32); n_rays];
+    for (object, found) in (0u32..).zip(objects) {
+        for (hit, i) in found.hits.hits.iter().zip(0u32..) {
+            let best = &mut nearest[hit.beam as usize];
+            if best.1 == NOTHING || hit.range_m.total_cmp(&best.0).is_lt() {
+                *best = (hit.range_m, object, i);
+            }
+        }
+    }
+    let found = nearest.into_iter().filter(|(_, object, _)| *object != NOTHING);
+    found.map(|(_, object, i)| (object as usize, i as usize)).collect()
 }
 
 /// The rings and the drawing of points that a sensor's profile may ask for.
