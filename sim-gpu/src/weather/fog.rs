@@ -29,10 +29,8 @@ pub(super) struct Fog {
     peak_m: f64,
     /// Its power; where it is in proportion to the surface behind it, for one of brightness 1.
     power: f64,
-    /// Power by I(R).
-    factor: f64,
-    /// Per metre, of all that is in the air.
-    extinction: f64,
+    /// The part of that power which the fog up to some ranges returns, of physical fog.
+    up_to: [f64; CELLS + 1],
     is_in_proportion: bool,
 }
 
@@ -60,7 +58,8 @@ impl Fog {
         } else {
             PI * LIGHT_M_S / 2.0 * backscatter
         };
-        Self { peak_m, power: factor * most, factor, extinction, is_in_proportion }
+        let up_to = if is_in_proportion { [1.0; CELLS + 1] } else { shares(peak_m, extinction) };
+        Self { peak_m, power: factor * most, up_to, is_in_proportion }
     }
 
     /// Whether it is in proportion to the surface behind it.
@@ -78,16 +77,42 @@ impl Fog {
             // The pulse of a surface peaks half of its length after it begins to come back, and
             // the sensor tells the surface to be where it is.
             let range_m = (self.peak_m - PULSE_M / 2.0).max(BLIND_M);
-            let power = if beam.end_m < self.peak_m {
-                self.factor * returned(self.peak_m, self.extinction, beam.end_m)
-            } else {
-                self.power
-            };
+            let power = self.power * self.share_up_to(beam.end_m);
             (range_m, power, power * range_m.powi(2))
         };
         let is_something = power > 0.0 && range_m < beam.end_m;
         is_something.then_some(Scattered { range_m, power, brightness, medium: Medium::Fog })
     }
+
+    /// The part of its power that the fog before a surface at `end_m` returns.
+    fn share_up_to(&self, end_m: f64) -> f64 {
+        let place = (end_m - BLIND_M) / (self.peak_m - BLIND_M) * CELLS as f64;
+        if !(0.0..CELLS as f64).contains(&place) {
+            return if place < 0.0 { 0.0 } else { 1.0 };
+        }
+        let cell = place as usize;
+        let [a, b] = [self.up_to[cell], self.up_to[cell + 1]];
+        a + (b - a) * (place - cell as f64)
+    }
+}
+
+/// Cells of the table of shares: each is some 6 cm wide.
+const CELLS: usize = 64;
+
+/// The part of I(R) at its maximum that comes from before each border of cells from the blind
+/// part to the maximum.
+fn shares(peak_m: f64, extinction: f64) -> [f64; CELLS + 1] {
+    let cell_m = (peak_m - BLIND_M) / CELLS as f64;
+    let mut sums = [0.0; CELLS + 1];
+    for cell in 0..CELLS {
+        let from_m = BLIND_M + cell_m * cell as f64;
+        let at = |part: f64| integrand(from_m + part * cell_m, peak_m, extinction);
+        // Simpson's rule; the widths cancel.
+        sums[cell + 1] = sums[cell] + at(0.0) + 4.0 * at(0.5) + at(1.0);
+    }
+    let all = sums[CELLS];
+    // Of fog so thick that nothing comes back, everything comes from anywhere.
+    sums.map(|sum| if all > 0.0 { sum / all } else { 1.0 })
 }
 
 /// Where I(R) is largest, metres, and how large it is there, s/m^2.
@@ -97,7 +122,7 @@ fn strongest(extinction: f64) -> (f64, f64) {
     let golden = (5f64.sqrt() - 1.0) / 2.0;
     let at = |part: f64, low_m: f64, high_m: f64| {
         let range_m = low_m + part * (high_m - low_m);
-        (range_m, returned(range_m, extinction, f64::INFINITY))
+        (range_m, returned(range_m, extinction))
     };
     let (mut a, mut b) = (at(1.0 - golden, low_m, high_m), at(golden, low_m, high_m));
     // Each step leaves 0.62 of 6 m: 24 of them 0.06 mm.
@@ -111,30 +136,31 @@ fn strongest(extinction: f64) -> (f64, f64) {
         }
     }
     let range_m = 0.5 * (low_m + high_m);
-    (range_m, returned(range_m, extinction, f64::INFINITY))
+    (range_m, returned(range_m, extinction))
 }
 
-/// I(R) of the fog up to `end_m`, s/m^2, by Simpson's rule on each side of where the receiver sees
-/// all of the beam.
-fn returned(range_m: f64, extinction: f64, end_m: f64) -> f64 {
+/// I(R), s/m^2, by Simpson's rule on each side of where the receiver sees all of the beam.
+fn returned(range_m: f64, extinction: f64) -> f64 {
     const STEPS: usize = 16;
-    let integrand = |r: f64| {
-        let t = 2.0 * (range_m - r) / LIGHT_M_S;
-        let seen = ((r - BLIND_M) / (WHOLE_M - BLIND_M)).clamp(0.0, 1.0);
-        let pulse = (PI * t / (2.0 * HALF_PULSE_S)).sin().powi(2);
-        pulse * (-2.0 * extinction * r).exp() * seen / (r * r)
-    };
     let between = |from_m: f64, to_m: f64| {
         let step_m = (to_m - from_m) / STEPS as f64;
-        let at = |place: usize| integrand(from_m + place as f64 * step_m / 2.0);
+        let at =
+            |place: usize| integrand(from_m + place as f64 * step_m / 2.0, range_m, extinction);
         let thirds = |i: usize| at(2 * i) + 4.0 * at(2 * i + 1) + at(2 * i + 2);
         step_m / 6.0 * (0..STEPS).map(thirds).sum::<f64>()
     };
     let nearest_m = BLIND_M.max(range_m - PULSE_M);
-    let farthest_m = range_m.min(end_m).max(nearest_m);
-    let bend_m = WHOLE_M.clamp(nearest_m, farthest_m);
+    let bend_m = WHOLE_M.clamp(nearest_m, range_m.max(nearest_m));
     // dt is 2/c of dr.
-    2.0 / LIGHT_M_S * (between(nearest_m, bend_m) + between(bend_m, farthest_m))
+    2.0 / LIGHT_M_S * (between(nearest_m, bend_m) + between(bend_m, range_m.max(bend_m)))
+}
+
+/// What I(R) integrates, of the fog at r.
+fn integrand(r: f64, range_m: f64, extinction: f64) -> f64 {
+    let t = 2.0 * (range_m - r) / LIGHT_M_S;
+    let seen = ((r - BLIND_M) / (WHOLE_M - BLIND_M)).clamp(0.0, 1.0);
+    let pulse = (PI * t / (2.0 * HALF_PULSE_S)).sin().powi(2);
+    pulse * (-2.0 * extinction * r).exp() * seen / (r * r)
 }
 
 #[cfg(test)]
@@ -175,6 +201,16 @@ mod tests {
             let near = fog.scattered(&along(2.0)).unwrap();
             assert!(near.power < far.power && near.power > 0.3 * far.power, "{visibility_m}");
             assert!(fog.scattered(&along(0.9)).is_none());
+            // By the integral itself, in a hundred thousand steps.
+            let extinction = extinction_of(visibility_m);
+            let (peak_m, _) = strongest(extinction);
+            let up_to = |end_m: f64| {
+                let step_m = (end_m - BLIND_M) * 1e-5;
+                let at = |i: u32| BLIND_M + (f64::from(i) + 0.5) * step_m;
+                (0..100_000).map(|i| integrand(at(i), peak_m, extinction)).sum::<f64>() * step_m
+            };
+            let (found, expected) = (near.power / far.power, up_to(2.0) / up_to(peak_m));
+            assert!((found - expected).abs() < 2e-3, "{visibility_m}: {found} {expected}");
             // So it is of dust, as thick as it may be.
             assert!(of_one_pulse(visibility_m, f64::INFINITY) <= endless);
             let thin = of_one_pulse(visibility_m, 1e-6) / 1e-6;
