@@ -67,7 +67,7 @@ fn described(sensor: &Sensor, pattern: &BeamPattern) -> String {
     };
     line("layout", kind);
     line("rays of a scan", pattern.len().to_string());
-    let last_s = pattern.time_s.iter().fold(0.0, |last: f64, time_s| last.max(*time_s));
+    let last_s = pattern.last_s();
     if last_s > 0.0 {
         line("time of a scan", format!("{} s", digits(last_s)));
     }

@@ -11,6 +11,7 @@
 //! footprint = { samples = 19, divergence_deg = [0.18, 0.09], separation_m = 1.0 } # or true
 //! returns = "dual"
 //! weather = { rain_mm_h = 25.0 } # and snow_mm_h, fog_visibility_m, haze_visibility_m, volumes
+//! motion = { velocity_m_s = [10.0, 0.0, 0.0], yaw_rate_deg_s = 5.0 }
 //! quantise_m = 0.004 # or true: the sensor's own quantum
 //! intensity = true
 //! ```
@@ -22,10 +23,12 @@ use crate::sensor::{BeamPattern, Sensor};
 
 pub use detection::{Detection, DetectionLimit};
 pub use footprint::{Footprint, ReturnMode};
+pub use motion::EvenMotion;
 pub use weather::{FogModel, Volume, Weather};
 
 mod detection;
 mod footprint;
+mod motion;
 mod weather;
 
 /// No length of an effect is larger: shaders hold it in f32, with room to
@@ -48,6 +51,8 @@ pub struct Effects {
     pub returns: Option<ReturnMode>,
     /// What is in the air; it takes returns below the detection limit, which it asks for.
     pub weather: Option<Box<Weather>>,
+    /// How a sensor moves that has no trajectory.
+    pub motion: Option<EvenMotion>,
     /// Rounding of the range.
     pub quantum: Option<Quantum>,
     /// Intensity of the return.
@@ -195,10 +200,10 @@ impl Effects {
         self.per_ray().map(|effect| effect.width()).sum()
     }
 
-    /// What is left of them in a clean scan: all that leaves its points alone.
+    /// What is left of them in a clean scan: all that leaves its ranges exact.
     #[must_use]
     pub fn clean(&self) -> Self {
-        Self { intensity: self.intensity, ..Self::default() }
+        Self { intensity: self.intensity, motion: self.motion, ..Self::default() }
     }
 
     /// Whether no effect is wanted.
@@ -283,6 +288,9 @@ impl Effects {
         if let Some(weather) = &self.weather {
             weather.validate()?;
         }
+        if let Some(motion) = &self.motion {
+            motion.validate()?;
+        }
         let probability = self.dropout.map(|dropout| dropout.probability);
         within("effects.dropout.probability", probability, 0.0..=1.0)?;
         let step_m = self.quantum.and_then(|quantum| quantum.step_m);
@@ -307,6 +315,8 @@ struct EffectsTable {
     returns: Option<ReturnMode>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     weather: Option<Box<Weather>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    motion: Option<EvenMotion>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     quantise_m: Option<SwitchOrMetres>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -335,9 +345,18 @@ impl TryFrom<EffectsTable> for Effects {
         let intensity = (table.intensity == Some(true)).then_some(Intensity);
         let detection = table.detection.map_or(Ok(None), detection::Table::detection)?;
         let footprint = table.footprint.and_then(Option::from);
-        let EffectsTable { noise, dropout, returns, weather, .. } = table;
-        let effects =
-            Self { noise, dropout, detection, footprint, returns, weather, quantum, intensity };
+        let EffectsTable { noise, dropout, returns, weather, motion, .. } = table;
+        let effects = Self {
+            noise,
+            dropout,
+            detection,
+            footprint,
+            returns,
+            weather,
+            motion,
+            quantum,
+            intensity,
+        };
         effects.validate()?;
         Ok(effects)
     }
@@ -352,6 +371,7 @@ impl From<Effects> for EffectsTable {
             footprint: effects.footprint.map(footprint::Table::from),
             returns: effects.returns,
             weather: effects.weather,
+            motion: effects.motion,
             quantise_m: effects.quantum.map(|quantum| {
                 quantum.step_m.map_or(SwitchOrMetres::Switch(true), SwitchOrMetres::Metres)
             }),

@@ -91,7 +91,7 @@ impl Motion {
     fn cone(&self, surface: &Surface, pattern: &BeamPattern) -> Cone {
         let everything = Cone { axis: DVec3::X, half_angle_rad: std::f64::consts::PI };
         let from_s = self.start_s;
-        let to_s = from_s + pattern.time_s.iter().fold(0.0, |last: f64, time_s| last.max(*time_s));
+        let to_s = from_s + pattern.last_s();
         let reach = |of: &Option<Arc<Trajectory>>| {
             of.as_ref().map_or((0.0, 0.0), |trajectory| trajectory.reach(from_s, to_s))
         };

@@ -195,10 +195,79 @@ fn sensors_and_objects_of_a_scene_move_along_trajectories() {
         ("trajectory = \"ego.tum\"\nposition_m = [0, 0, 0]\n", "cannot stand beside position_m"),
         ("trajectory = \"ego.tum\"\nstart_s = inf\n", "start_s: expected a number within"),
         ("yaw_deg = 3\n", "expected position_m or trajectory, found neither"),
+        (
+            "trajectory = \"ego.tum\"\nstart_s = 100\n#ringed",
+            "sensor[0].trajectory: cannot move a sensor whose profile has [rings]",
+        ),
     ] {
-        folder.write("bad.toml", moves(sensor));
+        let ringed = if sensor.contains("ringed") { "modelnet40c-lidar" } else { "vlp32c" };
+        let text = moves(sensor).replace("\"vlp32c\"", &format!("\"{ringed}\""));
+        folder.write("bad.toml", text.replace("quantise_m = true", ""));
         let said = folder.exits(1, "scan bad.toml --adapter cpu --out bad.npz");
         assert!(said.contains(part) && said.contains("bad.toml"), "{sensor}: {said}");
     }
     assert!(!folder.at("bad.npz").exists());
+}
+
+#[test]
+fn a_sensor_moves_evenly_where_its_effects_say_so() {
+    let folder = Folder::with_meshes();
+    folder.write("wall.off", WALL);
+    let motion = "motion = { velocity_m_s = [10, 0, 0], yaw_rate_deg_s = 30 }";
+    let attributes = |text: String| text.replace("\"return\"]", "\"time\"]");
+    folder.write("moves.toml", attributes(scene(motion)));
+    folder.write("rests.toml", attributes(scene("")));
+    for name in ["moves", "rests"] {
+        folder.succeeds(&format!("scan {name}.toml --adapter cpu --out {name}.npz"));
+    }
+    let ranges = |name: &str| {
+        let scan = folder.scan(name);
+        let beams = scan.beam.unwrap().into_iter();
+        let seen = scan.range_m.unwrap().into_iter().zip(scan.time_s.unwrap());
+        beams.zip(seen).collect::<std::collections::BTreeMap<_, _>>()
+    };
+    let (moves, rests) = (ranges("moves.npz"), ranges("rests.npz"));
+    // Ahead the wall comes nearer by 10 m/s; the first beams are fired forward, the last again.
+    let ahead = rests.iter().filter(|(_, (range_m, _))| (20.0..20.1).contains(range_m));
+    let mut n = 0;
+    for (beam, (range_m, time_s)) in ahead {
+        let Some((found_m, _)) = moves.get(beam) else { continue };
+        let off_m = f64::from(range_m - found_m) - 10.0 * f64::from(*time_s);
+        // The turn of 3 degrees lengthens it by 1 / cos, 0.03 m.
+        assert!(off_m.abs() < 0.2, "beam {beam} at {time_s} s: {off_m}");
+        n += 1;
+    }
+    assert!(n > 50, "{n}");
+
+    folder.write("effects.toml", "[effects]\nmotion = { velocity_m_s = [0, 20, 0] }\n");
+    for (out, flags) in
+        [("one", "--effects effects.toml"), ("two", "--effects effects.toml"), ("none", "")]
+    {
+        folder.succeeds(&format!(
+            "gen-dataset meshes --out {out} --adapter cpu --sensor vlp32c --views 2 {flags}"
+        ));
+    }
+    folder.assert_same_tree("one/rotational", "two/rotational");
+    folder.succeeds("gen-dataset --verify one");
+    let scans = tests::tree::files(&folder.at("none/rotational/clean"));
+    let differ = scans.iter().filter(|(path, content)| {
+        let moved = std::fs::read(folder.at("one/rotational/clean").join(path)).unwrap();
+        moved != **content
+    });
+    assert_eq!(differ.count(), scans.len(), "all views are seen while the sensor moves");
+    folder.write("fast.toml", "[effects]\nmotion = { velocity_m_s = [0, 1e4, 0] }\n");
+    folder.write(
+        "street.toml",
+        "object = [{ kind = \"car\", class = \"car\", count = [1, 1], place = \"road\", \
+         distance_m = [3, 9] }]\nmount = { height_m = [1, 1] }\nsensor = [{ profile = \"vlp32c\", \
+         effects = { motion = { yaw_rate_deg_s = 9 } } }]\n",
+    );
+    folder.refuses(
+        1,
+        &[("gen-drive street.toml --out a.pcap", "effects.motion: expected none in a drive")],
+    );
+    let said =
+        folder.edgepuck("gen-dataset meshes --out bad --effects fast.toml").output().unwrap();
+    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(said.contains("effects.motion.velocity_m_s[1]: expected a number within"), "{said}");
 }

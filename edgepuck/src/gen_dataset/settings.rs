@@ -151,6 +151,11 @@ impl Settings {
             ));
         }
         let mut effects = self.effects()?;
+        if self.simplify.is_some() && effects.motion.is_some() {
+            let cause = "--simplify: what a sensor resolves of a mesh changes as it moves \
+                         (effects.motion)";
+            return Err(usage(cause));
+        }
         within("--reflectivity", self.reflectivity, 0.0..=1.0)
             .map_err(|error| usage(error.to_string()))?;
         let mut returns = Returns::default();

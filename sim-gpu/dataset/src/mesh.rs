@@ -19,8 +19,9 @@ use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::mesh::{LoadedMesh, Mesh, MeshError, load_hashed};
+use sim_gpu::motion::Motion;
 use sim_gpu::packets;
-use sim_gpu::pose::Pose;
+use sim_gpu::pose::{Pose, Trajectory};
 use sim_gpu::ray::RayFrame;
 use sim_gpu::resolve::{Hits, resolve};
 use sim_gpu::scan::{ObjectHits, ScanRequest, assemble};
@@ -28,6 +29,7 @@ use sim_gpu::sensor::BeamPattern;
 use sim_gpu::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
 use sim_gpu::target::{Surface, Target};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A mesh and everything that is to be cast at it.
@@ -50,6 +52,8 @@ pub struct PlannedView {
     pub view: u32,
     /// Where the sensor stands.
     pub pose: Pose,
+    /// How it moves, if it does.
+    pub motion: Option<Arc<Trajectory>>,
 }
 
 /// Reads the mesh of `entry` and aims every beam that may hit it.
@@ -68,7 +72,7 @@ pub fn prepare(
         .map_err(|error| failure(entry, &error))?;
     let materials = materials(entry, config)?;
     let id = record.entry.id();
-    let views = plan(config, &id);
+    let views = plan(config, &id, patterns);
     let surface = match config.simplify {
         None => Surface::new(mesh, kept),
         Some(simplify) => {
@@ -98,7 +102,13 @@ pub fn prepare(
             let stream = set.stream(config.seed, &id, view.view);
             // Materials come in when the triangles that were hit are known.
             let reflectivity = if materials.is_some() { 1.0 } else { config.reflectivity as f32 };
-            CastJob::aim(target.clone(), frame, &patterns[view.set], culling, stream, reflectivity)
+            let (target, pattern) = (target.clone(), &patterns[view.set]);
+            match view.moves() {
+                None => CastJob::aim(target, frame, pattern, culling, stream, reflectivity),
+                Some(motion) => {
+                    CastJob::aim_in_motion(target, motion, pattern, culling, stream, reflectivity)
+                }
+            }
         };
         views.iter().zip(frames).map(aim).collect()
     });
@@ -119,12 +129,24 @@ fn materials(entry: &MeshEntry, config: &DatasetConfig) -> Result<Option<Materia
     })
 }
 
-fn plan(config: &DatasetConfig, id: &str) -> Vec<PlannedView> {
+fn plan(config: &DatasetConfig, id: &str, patterns: &[BeamPattern]) -> Vec<PlannedView> {
     let of_set = |(set, set_config): (usize, &SetConfig)| {
         let poses = set_config.poses(config.seed, id).into_iter().zip(0..);
-        poses.map(move |(pose, view)| PlannedView { set, view, pose })
+        let to_s = config.effects.motion.map_or(0.0, |_| patterns[set].last_s());
+        poses.map(move |(pose, view)| {
+            let motion = config.effects.motion.map(|motion| motion.trajectory(pose, [0.0, to_s]));
+            PlannedView { set, view, pose, motion: motion.map(Arc::new) }
+        })
     };
     config.sets.iter().enumerate().flat_map(of_set).collect()
+}
+
+impl PlannedView {
+    fn moves(&self) -> Option<Motion> {
+        let sensor = Some(self.motion.clone()?);
+        let world_from_object = DAffine3::IDENTITY;
+        Some(Motion { pose: self.pose, sensor, world_from_object, object: None, start_s: 0.0 })
+    }
 }
 
 /// Each set's sensor, where it stands.
@@ -239,6 +261,7 @@ fn write_view(
         let mut request =
             ScanRequest::new(&set.sensor, &output.patterns[planned.set], planned.pose);
         request.effects = Some(config.effects_of(set, variant)?);
+        request.motion.clone_from(&planned.motion);
         (request.attributes, request.stream) = (config.attributes.clone(), job.stream);
         let (scan, tally) = output
             .progress

@@ -16,6 +16,7 @@ use formats::vlp32c::{Returns, Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET, ST
 use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
+use sim_gpu::config::InvalidValue;
 use sim_gpu::packets;
 use sim_gpu::pose::{Pose, Trajectory};
 use sim_gpu::scan::{ScanRequest, scan_objects};
@@ -108,7 +109,12 @@ impl<'a> Drive<'a> {
     /// A sensor that is not a VLP-32C; effects whose points or returns packets cannot tell.
     pub fn new(stage: &'a Stage, speed_m_s: f64) -> Result<Self, SceneError> {
         let sensor = packets::as_packets_tell(&stage.sensors[0].sensor)?;
-        packets::returns(stage.sensors[0].caster.effects(), None)?;
+        let effects = stage.sensors[0].caster.effects();
+        packets::returns(effects, None)?;
+        if effects.motion.is_some() {
+            let cause = "expected none in a drive, whose speed says how the sensor moves";
+            return Err(InvalidValue::new("effects.motion", cause).into());
+        }
         let revolution = packets::revolution(&sensor)?;
         let (recipe, seed) = (stage.recipe(), stage.seed());
         let s = &mut Sampler::new(StreamKey::new(seed, "drive", 0));

@@ -229,8 +229,7 @@ impl Stage {
         ]
         .into();
         request.culling = self.culling;
-        let last_s = pattern.time_s.last().copied().unwrap_or(0.0);
-        request.motion = scene.motion(last_s).map(Arc::new);
+        request.motion = scene.motion(pattern.last_s()).map(Arc::new);
         request.stream = stream(u32::MAX);
         let scan = scan_objects(caster, targets, &request)?.scan;
         Ok(Sweep::of(scan, scene))

@@ -95,6 +95,23 @@ fn scan_all(
     caster: &Caster,
     requests: &[(&[PlacedTarget], &ScanRequest)],
 ) -> Result<Vec<Scanned>, ScanError> {
+    let moves = |(_, request): &(&[PlacedTarget], &ScanRequest)| {
+        request.effects.as_ref().unwrap_or(caster.effects()).motion.is_some()
+    };
+    if !requests.iter().any(moves) {
+        return scan_as_asked(caster, requests);
+    }
+    let moved = requests.iter().map(|(_, request)| request.in_motion(caster.effects()));
+    let moved: Vec<ScanRequest> = moved.collect();
+    let objects = requests.iter().map(|(objects, _)| *objects);
+    scan_as_asked(caster, &objects.zip(&moved).collect::<Vec<_>>())
+}
+
+/// The scans of requests that have the poses of their sensors.
+fn scan_as_asked(
+    caster: &Caster,
+    requests: &[(&[PlacedTarget], &ScanRequest)],
+) -> Result<Vec<Scanned>, ScanError> {
     let targets = requests.iter().flat_map(|(objects, _)| *objects).map(|object| object.target);
     let fits = targets.into_iter().all(|target| caster.fits(target));
     if !fits || matches!(caster, Caster::Cpu(_)) {

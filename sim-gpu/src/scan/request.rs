@@ -139,6 +139,18 @@ impl<'a> ScanRequest<'a> {
         }
     }
 
+    /// The same request; if its effects move the sensor, and it has no poses over time, with
+    /// those.
+    pub(super) fn in_motion(&self, cast_effects: &Effects) -> Self {
+        let mut request = self.clone();
+        let effects = self.effects.as_ref().unwrap_or(cast_effects);
+        if let (None, Some(motion)) = (&self.motion, effects.motion) {
+            let times_s = [self.start_s, self.start_s + self.pattern.last_s()];
+            request.motion = Some(Arc::new(motion.trajectory(self.pose, times_s)));
+        }
+        request
+    }
+
     /// The rays of the sensor at `placed`.
     #[must_use]
     pub fn aim(&self, placed: &PlacedTarget) -> CastJob {

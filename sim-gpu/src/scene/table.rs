@@ -282,7 +282,12 @@ impl SensorTable {
                 let cause = "cannot stand beside position_m: the trajectory has the poses";
                 return Err(InvalidValue::new(key("trajectory"), cause));
             }
-            let last_s = sensor.pattern().time_s.iter().fold(0.0, |last: f64, t| last.max(*t));
+            if sensor.rings.is_some() {
+                // Rings are cones around one place, in the axes of the world.
+                let cause = "cannot move a sensor whose profile has [rings]";
+                return Err(InvalidValue::new(key("trajectory"), cause));
+            }
+            let last_s = sensor.pattern().last_s();
             check_known(&key("trajectory"), &motion, [start_s, start_s + last_s])?;
             let pose = motion.at(start_s);
             return Ok(SceneSensor { sensor, name, pose, motion: Some(motion), start_s, deskew });

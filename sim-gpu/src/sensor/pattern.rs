@@ -123,6 +123,12 @@ impl BeamPattern {
         starts(&self.starts_m, [beam]).map(|[start]| start)
     }
 
+    /// When the last ray is fired, seconds.
+    #[must_use]
+    pub fn last_s(&self) -> f64 {
+        self.time_s.iter().fold(0.0, |last, &time_s| time_s.max(last))
+    }
+
     /// How far from the sensor a ray starts at most, metres.
     #[must_use]
     pub fn farthest_start_m(&self) -> f64 {

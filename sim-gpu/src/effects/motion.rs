@@ -1,0 +1,69 @@
+//! A sensor that moves evenly while it scans.
+
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::config::{InvalidValue, within};
+use crate::pose::{Pose, Trajectory};
+
+/// How a sensor that has no trajectory of its own moves while it scans. Points are where a driver
+/// puts them that takes it to stand where the scan began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EvenMotion {
+    /// Its velocity, metres a second, along x, y and z of its frame as the scan begins.
+    #[serde(default)]
+    pub velocity_m_s: [f64; 3],
+    /// How fast it turns to the left about its z axis, degrees a second.
+    #[serde(default)]
+    pub yaw_rate_deg_s: f64,
+}
+
+/// A turn between two poses, degrees: the shortest way between them is then this one.
+const TURN_DEG: f64 = 45.0;
+
+impl EvenMotion {
+    /// The poses of a sensor that is at `pose` at the first of these times, up to the second.
+    #[must_use]
+    pub fn trajectory(&self, pose: Pose, [from_s, to_s]: [f64; 2]) -> Trajectory {
+        let velocity_m_s = pose.world_from_sensor * DVec3::from_array(self.velocity_m_s);
+        let seconds = (to_s - from_s).max(1e-3);
+        let turns = (self.yaw_rate_deg_s.abs() * seconds / TURN_DEG).ceil().max(1.0) as u32;
+        let at = |i: u32| {
+            let after_s = seconds * f64::from(i) / f64::from(turns);
+            let turned = DQuat::from_rotation_z(self.yaw_rate_deg_s.to_radians() * after_s);
+            let position_m = pose.position_m + velocity_m_s * after_s;
+            let world_from_sensor = (pose.world_from_sensor * turned).normalize();
+            (from_s + after_s, Pose { position_m, world_from_sensor })
+        };
+        let poses = (0..=turns).map(at).collect();
+        Trajectory::new(poses).expect("invariant: checked numbers are finite")
+    }
+
+    pub(super) fn validate(&self) -> Result<(), InvalidValue> {
+        for (axis, velocity_m_s) in self.velocity_m_s.into_iter().enumerate() {
+            let key = format!("effects.motion.velocity_m_s[{axis}]");
+            within(&key, velocity_m_s, -300.0..=300.0)?;
+        }
+        within("effects.motion.yaw_rate_deg_s", self.yaw_rate_deg_s, -3600.0..=3600.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_goes_straight_and_turns_to_the_left_however_fast() {
+        let pose = Pose::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 9.0, 3.0)).unwrap();
+        let motion = EvenMotion { velocity_m_s: [10.0, 0.0, 1.0], yaw_rate_deg_s: 3600.0 };
+        let trajectory = motion.trajectory(pose, [5.0, 5.1]);
+        let at = trajectory.at(5.05);
+        // Forward is along y, and half a turn is 0.05 s.
+        assert!(at.position_m.distance(DVec3::new(1.0, 2.5, 3.05)) < 1e-12);
+        let forward = at.world_from_sensor * DVec3::X;
+        assert!(forward.distance(DVec3::NEG_Y) < 1e-9, "{forward}");
+        let quarter = trajectory.at(5.025).world_from_sensor * DVec3::X;
+        assert!(quarter.distance(DVec3::NEG_X) < 1e-9, "to the left: {quarter}");
+    }
+}
