@@ -23,8 +23,8 @@ use std::sync::LazyLock;
 
 use formats::scan::{Attribute, AttributeSet};
 use sim_gpu::effects::{
-    Detection, DetectionLimit, Dropout, Effects, Footprint, Intensity, Noise, NoiseModel, Quantum,
-    ReturnMode,
+    Detection, DetectionLimit, Dropout, Effects, EvenMotion, Footprint, Intensity, Noise,
+    NoiseModel, Quantum, ReturnMode, Weather,
 };
 
 /// What a scan costs, by what it costs: instructions, bindings, bytes.
@@ -80,7 +80,15 @@ fn asked() -> Vec<Asked> {
     let quantum = Some(Quantum { step_m: Some(0.004) });
     let footprint = Footprint { samples: 19, divergence_deg: None, separation_m: None };
     let footprint = (Some(footprint), Some(ReturnMode::Dual));
-    let effects: [(_, _, &[&[&str]]); 7] = [
+    let air = Weather {
+        rain_mm_h: Some(25.0),
+        fog_visibility_m: Some(500.0),
+        empty_beams: Some(false),
+        ..Weather::default()
+    };
+    let weather = Some(Box::new(air));
+    let motion = Some(EvenMotion { velocity_m_s: [10.0, 0.0, 0.0], yaw_rate_deg_s: 5.0 });
+    let effects: [(_, _, &[&[&str]]); 9] = [
         (
             "noise along the ray",
             Effects { noise: noise(NoiseModel::Range), ..plain() },
@@ -103,6 +111,8 @@ fn asked() -> Vec<Asked> {
             Effects { footprint: footprint.0, returns: footprint.1, ..plain() },
             &[],
         ),
+        ("weather", Effects { weather, ..plain() }, &[]),
+        ("motion", Effects { motion, ..plain() }, &[]),
         ("intensity effect", with_intensity(), &[MODULE, &["shader, function intensity"]]),
     ];
     let asked = effects.into_iter().map(|(name, effects, own)| {
