@@ -87,7 +87,8 @@ fn asked() -> Vec<Asked> {
         ..Weather::default()
     };
     let weather = Some(Box::new(air));
-    let motion = Some(EvenMotion { velocity_m_s: [10.0, 0.0, 0.0], yaw_rate_deg_s: 5.0 });
+    let motion = EvenMotion { velocity_m_s: [10.0, 0.0, 0.0], yaw_rate_deg_s: 5.0 };
+    let motion = Some(Box::new(motion));
     let effects: [(_, _, &[&[&str]]); 9] = [
         (
             "noise along the ray",

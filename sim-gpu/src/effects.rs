@@ -52,7 +52,7 @@ pub struct Effects {
     /// What is in the air; it takes returns below the detection limit, which it asks for.
     pub weather: Option<Box<Weather>>,
     /// How a sensor moves that has no trajectory.
-    pub motion: Option<EvenMotion>,
+    pub motion: Option<Box<EvenMotion>>,
     /// Rounding of the range.
     pub quantum: Option<Quantum>,
     /// Intensity of the return.
@@ -203,7 +203,7 @@ impl Effects {
     /// What is left of them in a clean scan: all that leaves its ranges exact.
     #[must_use]
     pub fn clean(&self) -> Self {
-        Self { intensity: self.intensity, motion: self.motion, ..Self::default() }
+        Self { intensity: self.intensity, motion: self.motion.clone(), ..Self::default() }
     }
 
     /// Whether no effect is wanted.
@@ -316,7 +316,7 @@ struct EffectsTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     weather: Option<Box<Weather>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    motion: Option<EvenMotion>,
+    motion: Option<Box<EvenMotion>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     quantise_m: Option<SwitchOrMetres>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

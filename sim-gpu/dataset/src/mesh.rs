@@ -132,9 +132,10 @@ fn materials(entry: &MeshEntry, config: &DatasetConfig) -> Result<Option<Materia
 fn plan(config: &DatasetConfig, id: &str, patterns: &[BeamPattern]) -> Vec<PlannedView> {
     let of_set = |(set, set_config): (usize, &SetConfig)| {
         let poses = set_config.poses(config.seed, id).into_iter().zip(0..);
-        let to_s = config.effects.motion.map_or(0.0, |_| patterns[set].last_s());
+        let moves = config.effects.motion.as_deref();
+        let to_s = moves.map_or(0.0, |_| patterns[set].last_s());
         poses.map(move |(pose, view)| {
-            let motion = config.effects.motion.map(|motion| motion.trajectory(pose, [0.0, to_s]));
+            let motion = moves.map(|motion| motion.trajectory(pose, [0.0, to_s]));
             PlannedView { set, view, pose, motion: motion.map(Arc::new) }
         })
     };

@@ -144,7 +144,7 @@ impl<'a> ScanRequest<'a> {
     pub(super) fn in_motion(&self, cast_effects: &Effects) -> Self {
         let mut request = self.clone();
         let effects = self.effects.as_ref().unwrap_or(cast_effects);
-        if let (None, Some(motion)) = (&self.motion, effects.motion) {
+        if let (None, Some(motion)) = (&self.motion, &effects.motion) {
             let times_s = [self.start_s, self.start_s + self.pattern.last_s()];
             request.motion = Some(Arc::new(motion.trajectory(self.pose, times_s)));
         }
