@@ -7,7 +7,8 @@ use formats::scan::{Attribute, Scan};
 use glam::DVec3;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{
-    Detection, DetectionLimit, Effects, FogModel, Footprint, ReturnMode, Volume, Weather,
+    Detection, DetectionLimit, Dropout, Effects, FogModel, Footprint, Noise, NoiseModel,
+    ReturnMode, Volume, Weather,
 };
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
@@ -36,6 +37,17 @@ fn rain(mm_h: f64) -> Weather {
 }
 
 fn scan(caster: &Caster, mesh: &Mesh, reflectivity: f32, culling: Culling) -> (Scan, Tally) {
+    scan_with(caster, mesh, reflectivity, culling, None)
+}
+
+/// A scan with these `effects` of the caster's, or all of them.
+fn scan_with(
+    caster: &Caster,
+    mesh: &Mesh,
+    reflectivity: f32,
+    culling: Culling,
+    effects: Option<Effects>,
+) -> (Scan, Tally) {
     let sensor = Sensor::builtin("vlp32c").unwrap();
     let pattern = caster.effects().widen(sensor.pattern(), &sensor).unwrap();
     let target = casting::target(mesh);
@@ -46,6 +58,7 @@ fn scan(caster: &Caster, mesh: &Mesh, reflectivity: f32, culling: Culling) -> (S
     request.attributes = Attribute::ALL.into_iter().collect();
     request.attributes.remove(&Attribute::Intensity);
     (request.stream, request.culling) = (StreamKey([3, 5]), culling);
+    request.effects = effects;
     let scanned = scan_objects(caster, &[placed], &request).unwrap();
     (scanned.scan, scanned.tally)
 }
@@ -149,26 +162,102 @@ fn what_is_in_the_air_is_no_surface() {
     let thinner = Weather { fog_visibility_m: Some(80.0), ..weather };
     let last = Effects { returns: Some(ReturnMode::Last), ..in_weather(thinner.clone()) };
     assert!(count(&on_cpu(&last, 1.0).0, Medium::Surface) > 50_000);
-    // By Hahner's model every beam beyond a range is fog, whatever it meets.
-    let hahner = Weather { fog_model: FogModel::Hahner, ..thinner };
-    for reflectivity in [0.2, 1.0] {
-        let (scan, _) = on_cpu(&in_weather(hahner.clone()), reflectivity);
-        assert_eq!(count(&scan, Medium::Fog), 0, "30 m is not beyond it");
+}
+
+/// The effects of fog by Hahner's model for a sensor that detects everything.
+fn in_hahners_fog(visibility_m: f64, footprint: Option<Footprint>) -> Effects {
+    let limit = Some(DetectionLimit { reflectivity: 1e-9, range_m: 1e9 });
+    let detection = Some(Detection { limit, ..Detection::default() });
+    let fog_visibility_m = Some(visibility_m);
+    let fog_model = FogModel::Hahner;
+    let weather = Weather { fog_visibility_m, fog_model, ..Weather::default() };
+    Effects { detection, footprint, ..in_weather(weather) }
+}
+
+const SEVEN_RAYS: Footprint = Footprint { samples: 7, divergence_deg: None, separation_m: None };
+
+#[test]
+fn by_hahners_model_beams_beyond_a_range_become_fog_whatever_they_meet() {
+    // The range is 54 m in fog of 80 m and 24 m in fog of 30 m.
+    let wall =
+        || meshes::mapped(&meshes::icosphere(0), |p| DVec3::new(WALL_M, 20.0 * p.y, 9.0 * p.z));
+    for footprint in [None, Some(SEVEN_RAYS)] {
+        for reflectivity in [0.2, 1.0] {
+            let of = |visibility_m, mesh: &Mesh| {
+                let caster = Caster::Cpu(in_hahners_fog(visibility_m, footprint));
+                scan(&caster, mesh, reflectivity, Culling::On).0
+            };
+            let thin = of(80.0, &ball());
+            assert!(thin.len() > 50_000 && count(&thin, Medium::Fog) == 0, "30 m is not beyond it");
+            // And where some rays of a beam pass by the wall's edge.
+            for mesh in [ball(), wall()] {
+                let thick = of(30.0, &mesh);
+                assert!(thick.len() > 1000);
+                assert_eq!(count(&thick, Medium::Fog), thick.len(), "30 m is beyond it");
+            }
+        }
     }
-    // An extinction of 0.15 has its range at 17.0 m (by Hahner et al.'s tables), also for
-    // beams that are many rays.
-    let thick = Weather { fog_visibility_m: Some(20f64.ln() / 0.15), ..hahner };
-    let footprint =
-        Some(Footprint { samples: 7, divergence_deg: Some([0.1; 2]), separation_m: Some(1.0) });
-    for footprint in [None, footprint] {
-        // Its fog is weaker than 90 % at 200 m.
-        let limit = Some(DetectionLimit { reflectivity: 0.9, range_m: 1000.0 });
-        let detection = Some(Detection { limit, ..Detection::default() });
-        let effects = Effects { footprint, detection, ..in_weather(thick.clone()) };
-        let (scan, tally) = on_cpu(&effects, 1.0);
-        assert!(tally.points > 50_000 && count(&scan, Medium::Fog) as u64 == tally.points);
-        assert!(scan.range_m.unwrap().iter().all(|range_m| (range_m - 4.56).abs() < 0.05));
+}
+
+#[test]
+fn rays_for_scans_of_wide_beams_are_none_of_narrow_ones_in_weather() {
+    let mesh = meshes::mapped(&meshes::icosphere(3), |p| p * 2.0 + DVec3::X * 15.0);
+    for empty_beams in [None, Some(false)] {
+        let weather = Weather { fog_visibility_m: Some(200.0), empty_beams, ..rain(100.0) };
+        let hahner = Weather { fog_model: FogModel::Hahner, ..weather.clone() };
+        for weather in [weather, hahner] {
+            let narrow = in_weather(weather);
+            let wide = Effects { footprint: Some(SEVEN_RAYS), ..narrow.clone() };
+            let alone = scan(&Caster::Cpu(narrow.clone()), &mesh, 0.5, Culling::On);
+            let among = scan_with(&Caster::Cpu(wide), &mesh, 0.5, Culling::On, Some(narrow));
+            assert!(alone.0 == among.0 && alone.1 == among.1, "{:?}, {:?}", alone.1, among.1);
+        }
     }
+}
+
+/// The ranges of both returns of each beam that has two.
+fn pairs(scan: &Scan) -> std::collections::BTreeMap<u32, [f64; 2]> {
+    let mut pairs = std::collections::BTreeMap::new();
+    let (beams, numbers) = (scan.beam.as_ref().unwrap(), scan.return_number.as_ref().unwrap());
+    for ((beam, number), range_m) in beams.iter().zip(numbers).zip(scan.range_m.as_ref().unwrap()) {
+        pairs.entry(*beam).or_insert([f64::NAN; 2])[usize::from(*number) - 1] = (*range_m).into();
+    }
+    pairs.retain(|_, [fog_m, wall_m]| fog_m.is_finite() && wall_m.is_finite());
+    pairs
+}
+
+#[test]
+fn each_return_of_a_beam_has_noise_and_dropout_of_its_own() {
+    let weather = Weather { fog_visibility_m: Some(80.0), ..Weather::default() };
+    let quiet = Effects { returns: Some(ReturnMode::Dual), ..in_weather(weather) };
+    let noise = Some(Noise { mean_m: 0.0, sigma_m: 0.02, model: NoiseModel::Range });
+    let dropout = Some(Dropout { probability: 0.5 });
+    let clean = pairs(&on_cpu(&quiet, 1.0).0);
+    let noisy = pairs(&on_cpu(&Effects { noise, ..quiet.clone() }, 1.0).0);
+    assert!(clean.len() > 50_000 && noisy.len() == clean.len());
+    let mut product = 0.0;
+    for (beam, [fog_m, wall_m]) in &noisy {
+        product += (fog_m - clean[beam][0]) * (wall_m - clean[beam][1]) / 0.02f64.powi(2);
+    }
+    let correlation = product / noisy.len() as f64;
+    assert!(correlation.abs() < 4.0 / (noisy.len() as f64).sqrt(), "{correlation}");
+    let left = pairs(&on_cpu(&Effects { dropout, ..quiet }, 1.0).0).len() as f64;
+    let expected = 0.25 * clean.len() as f64;
+    assert!((left - expected).abs() < 4.0 * (0.75 * expected).sqrt(), "{left}, not {expected}");
+}
+
+#[test]
+fn fog_and_a_surface_are_one_return_where_the_sensor_cannot_tell_them_apart() {
+    let weather = Weather { fog_visibility_m: Some(50.0), ..Weather::default() };
+    let effects = Effects { returns: Some(ReturnMode::Dual), ..in_weather(weather) };
+    let of = |range_m: f64| {
+        let mesh = meshes::mapped(&meshes::icosphere(5), |p| p * range_m);
+        scan(&Caster::Cpu(effects.clone()), &mesh, 0.5, Culling::On).0
+    };
+    let (near, far) = (of(2.0), of(4.0));
+    assert!(near.len() > 50_000 && pairs(&near).is_empty(), "the sensor's own metre");
+    assert_eq!(count(&near, Medium::Surface), near.len());
+    assert_eq!(pairs(&far).len(), far.len() / 2);
 }
 
 #[test]

@@ -78,6 +78,12 @@ impl<'a> View<'a> {
         pattern.beam_of(ray) * pattern.rays_per_beam
     }
 
+    /// Whether there is light along a ray: beside the middle of a beam only where beams have a
+    /// width. Other rays were cast for other scans.
+    fn is_lit(&self, ray: u32) -> bool {
+        self.share.is_some() || ray == self.centre(ray)
+    }
+
     /// Where a ray starts, from the sensor, in world axes; `None` where that is the sensor
     /// itself.
     pub fn start(&self, ray: u32) -> Option<DVec3> {
@@ -179,8 +185,8 @@ pub(super) fn measure_all(
     returns: &mut Vec<Return>,
 ) {
     let pattern = view.request.pattern;
-    let beam_of =
-        |&(object, hit): &(usize, usize)| pattern.beam_of(objects[object].hits.hits[hit].beam);
+    let ray_of = |&(object, hit): &(usize, usize)| objects[object].hits.hits[hit].beam;
+    let beam_of = |at: &(usize, usize)| pattern.beam_of(ray_of(at));
     let mut echoes = Vec::new();
     let mut measure = |beam, rays: &[_]| {
         measure_beam(view, objects, beam, rays, &mut echoes, tally, returns);
@@ -192,6 +198,8 @@ pub(super) fn measure_all(
         if hears_empty_beams {
             (next..beam).for_each(|empty| measure(empty, &[]));
             next = beam + 1;
+        } else if !rays.iter().any(|at| view.is_lit(ray_of(at))) {
+            continue;
         }
         measure(beam, rays);
     }
@@ -276,7 +284,7 @@ fn hear(
     let found = &objects[object];
     let nearest = &found.hits.hits[hit];
     let limits = &view.request.sensor.range;
-    if view.share.is_none() && nearest.beam != view.centre(nearest.beam) {
+    if !view.is_lit(nearest.beam) {
         return Err(Silence::OtherScans);
     }
     if !(limits.min_m..=limits.max_m).contains(&nearest.range_m) {
@@ -303,9 +311,7 @@ fn listen_to_air(
     let ray = beam * pattern.rays_per_beam;
     let max_m = view.request.sensor.range.max_m;
     let hit_of = |&(object, hit): &(usize, usize)| &objects[object].hits.hits[hit];
-    // Beside the middle of a beam there is light only where beams have a width.
-    let is_lit = |hit: &&Hit| view.share.is_some() || hit.beam == ray;
-    let hits = || rays.iter().map(hit_of).filter(is_lit);
+    let hits = || rays.iter().map(hit_of).filter(|hit| view.is_lit(hit.beam));
     // Light passes by the surfaces that only some of the rays meet.
     let n_rays = if view.share.is_some() { pattern.rays_per_beam as usize } else { 1 };
     let is_open = hits().count() < n_rays;
