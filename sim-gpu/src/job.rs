@@ -74,21 +74,6 @@ impl CastJob {
         Self { target, frame, motion: None, beams, aim, stream, reflectivity }
     }
 
-    /// As [`CastJob::aim`], where the sensor or the object moves.
-    #[must_use]
-    pub fn aim_in_motion(
-        target: Target,
-        motion: Motion,
-        pattern: &BeamPattern,
-        culling: Culling,
-        stream: StreamKey,
-        reflectivity: f32,
-    ) -> Self {
-        let frame = motion.frame_at(&target.surface, 0.0);
-        let (beams, aim) = motion.aim(&target.surface, pattern, culling, |_| true);
-        Self { target, frame, motion: Some(motion), beams, aim, stream, reflectivity }
-    }
-
     /// The ray of `pattern`'s beam of this number, when it fires.
     #[must_use]
     pub fn beam(&self, pattern: &BeamPattern, beam: u32) -> Ray {

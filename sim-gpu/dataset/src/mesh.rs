@@ -19,12 +19,11 @@ use sim_gpu::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::mesh::{LoadedMesh, Mesh, MeshError, load_hashed};
-use sim_gpu::motion::Motion;
 use sim_gpu::packets;
 use sim_gpu::pose::{Pose, Trajectory};
 use sim_gpu::ray::RayFrame;
 use sim_gpu::resolve::{Hits, resolve};
-use sim_gpu::scan::{ObjectHits, ScanRequest, assemble};
+use sim_gpu::scan::{ObjectHits, PlacedTarget, ScanRequest, assemble};
 use sim_gpu::sensor::BeamPattern;
 use sim_gpu::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
 use sim_gpu::target::{Surface, Target};
@@ -84,33 +83,29 @@ pub fn prepare(
             surface
         }
     };
-    let frames: Vec<RayFrame> =
-        views.iter().map(|v| RayFrame::new(&surface, &DAffine3::IDENTITY, &v.pose)).collect();
     let rays = views
         .iter()
-        .zip(&frames)
-        .map(|(view, frame)| {
+        .map(|view| {
             let pattern = &patterns[view.set];
+            let frame = RayFrame::new(&surface, &DAffine3::IDENTITY, &view.pose);
             pattern.within(&frame.cone(pattern)).len()
         })
         .sum();
     let builder = Builder::for_rays(surface.len(), rays);
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {
-        let aim = |(view, frame): (&PlannedView, RayFrame)| {
+        let aim = |view: &PlannedView| {
             let set = &config.sets[view.set];
-            let stream = set.stream(config.seed, &id, view.view);
-            // Materials come in when the triangles that were hit are known.
-            let reflectivity = if materials.is_some() { 1.0 } else { config.reflectivity as f32 };
-            let (target, pattern) = (target.clone(), &patterns[view.set]);
-            match view.moves() {
-                None => CastJob::aim(target, frame, pattern, culling, stream, reflectivity),
-                Some(motion) => {
-                    CastJob::aim_in_motion(target, motion, pattern, culling, stream, reflectivity)
-                }
-            }
+            let mut placed = PlacedTarget::new(&target);
+            (placed.reflectivity, placed.materials) =
+                (config.reflectivity as f32, materials.as_ref());
+            let mut request = ScanRequest::new(&set.sensor, &patterns[view.set], view.pose);
+            request.motion.clone_from(&view.motion);
+            request.stream = set.stream(config.seed, &id, view.view);
+            request.culling = culling;
+            request.aim(&placed)
         };
-        views.iter().zip(frames).map(aim).collect()
+        views.iter().map(aim).collect()
     });
     let cast: usize = jobs.iter().map(|job| job.beams.len()).sum();
     let beams: usize = views.iter().map(|view| patterns[view.set].len()).sum();
@@ -140,14 +135,6 @@ fn plan(config: &DatasetConfig, id: &str, patterns: &[BeamPattern]) -> Vec<Plann
         })
     };
     config.sets.iter().enumerate().flat_map(of_set).collect()
-}
-
-impl PlannedView {
-    fn moves(&self) -> Option<Motion> {
-        let sensor = Some(self.motion.clone()?);
-        let world_from_object = DAffine3::IDENTITY;
-        Some(Motion { pose: self.pose, sensor, world_from_object, object: None, start_s: 0.0 })
-    }
 }
 
 /// Each set's sensor, where it stands.
