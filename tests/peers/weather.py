@@ -65,7 +65,7 @@ for range_m, reflectivity in json.loads(sys.argv[4]):
 
 CASES = [(10.0, 0.1), (30.0, 0.1), (30.0, 0.5), (60.0, 0.1), (100.0, 0.5)]
 WEATHERS = [("rain", 10.0), ("rain", 50.0), ("rain", 100.0), ("snow", 1.0), ("snow", 10.0)]
-N_LISAS, N_OURS = 1500, 40_000
+N_LISAS, N_OURS = 20_000, 100_000
 
 
 def edgepuck_weather(cloud, flags, sensor):
@@ -113,8 +113,10 @@ def fog():
     cloud = numpy.zeros((len(ranges_m), 4))
     cloud[:, 0], cloud[:, 3] = ranges_m, 30
     for alpha in [0.005, 0.02, 0.06, 0.2]:
-        theirs, _, _ = fog_simulation.simulate_fog(fog_simulation.ParameterSet(alpha=alpha), cloud, 0)
         visibility_m = math.log(20) / alpha
+        # Left to themselves they keep the backscatter of alpha = 0.06 for every alpha.
+        fog = fog_simulation.ParameterSet(alpha=alpha, mor=visibility_m, beta=0.046 / visibility_m)
+        theirs, _, _ = fog_simulation.simulate_fog(fog, cloud, 0)
         flags = ["--fog", repr(visibility_m), "--fog-model", "hahner", "--white", 255]
         positions, intensities, media = edgepuck_weather(cloud, flags, ALL_SEEING)
         assert len(positions) == len(cloud)

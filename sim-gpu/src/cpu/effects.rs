@@ -65,6 +65,8 @@ pub fn dropout(dropout: &Dropout, stream: StreamKey, beam: u32) -> bool {
 /// incidence times the reflectivity, BLAINDER's model.
 #[must_use]
 pub fn intensity(target: &Target, ray: &Ray, index: u32, reflectivity: f64) -> f64 {
-    let cosine = oracle::normal(target, index).dot(ray.direction.normalize()).abs();
+    // As a caster is given it, so that every way to ask gives the same.
+    let direction = ray.direction.as_vec3().as_dvec3();
+    let cosine = oracle::normal(target, index).dot(direction.normalize()).abs();
     cosine.min(1.0) * reflectivity
 }

@@ -1,7 +1,7 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
 use super::echo::Source;
-use super::measure::{HitEffects, Return, View, measure_all, measure_one};
+use super::measure::{HitEffects, LastNormal, Return, View, measure_all, measure_one};
 use super::request::{Glass, ScanRequest};
 use crate::config::InvalidValue;
 use crate::cpu::oracle;
@@ -42,6 +42,11 @@ impl ObjectHits<'_> {
     fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
         let at = |motion: &Motion| motion.world_from_object_at(pattern.time_s[ray as usize]);
         self.job.motion.as_ref().map_or(self.world_from_object, at)
+    }
+
+    /// Whether its normals change from beam to beam.
+    pub(super) fn turns(&self) -> bool {
+        self.job.motion.is_some()
     }
 
     /// What the surface is made of where a beam of `pattern` hit it.
@@ -113,7 +118,9 @@ pub fn assemble(
     let nearest = nearest_per_ray(objects, request.pattern.len());
     let mut returns = Vec::with_capacity(nearest.len());
     if view.has_one_echo_a_beam() {
-        returns.extend(nearest.iter().filter_map(|at| measure_one(&view, objects, at, &mut tally)));
+        let mut seen = LastNormal::default();
+        let measured = |at| measure_one(&view, objects, at, &mut seen, &mut tally);
+        returns.extend(nearest.iter().filter_map(measured));
     } else {
         measure_all(&view, objects, &nearest, &mut tally, &mut returns);
     }
@@ -226,7 +233,7 @@ fn with_attributes(
             Attribute::Intensity => {
                 scan.intensity = column(returns, |r| {
                     surface(r).map_or(0.0, |(found, hit, number)| {
-                        let effects = HitEffects::of(view.cast_effects, found.hits, number);
+                        let effects = HitEffects::of(view, found, number);
                         let own = found.materials.map(|_| found.material(pattern, hit));
                         own.map_or(effects.intensity, |own| {
                             effects.intensity * own.reflectivity as f32

@@ -1,15 +1,16 @@
 //! From what the rays of a beam hit to the points that the sensor measures.
 
-use super::assemble::{ObjectHits, Tally};
+use super::assemble::{ObjectHits, Tally, unit_normal};
 use super::echo::{Echo, Signal, Source, merge, told};
 use super::power;
 use super::request::ScanRequest;
 use crate::config::InvalidValue;
-use crate::cpu::effects::{dropout, noise_range, noise_xyz};
+use crate::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
 use crate::cpu::random::random_bits;
 use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
 use crate::pose::Pose;
 use crate::resolve::{Hit, Hits};
+use crate::sensor::BeamPattern;
 use crate::weather::{Air, AirBeam, Scattered};
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
@@ -111,10 +112,11 @@ impl<'a> View<'a> {
     }
 
     /// How strong what comes back from a hit is.
-    fn signal(&self, found: &ObjectHits, hit: &Hit) -> Signal {
-        let material = found.material(self.request.pattern, hit);
-        let whole =
-            power::brightness(found, material, self.request.pattern, hit, self.direction(hit.beam));
+    fn signal(&self, found: &ObjectHits, hit: &Hit, seen: &mut LastNormal) -> Signal {
+        let pattern = self.request.pattern;
+        let material = found.material(pattern, hit);
+        let cosine = || seen.normal(found, pattern, hit).dot(self.direction(hit.beam)).abs();
+        let whole = power::brightness(material, cosine);
         let mut brightness = self.share.map_or(whole, |share| whole * share);
         if let Some(air) = &self.air {
             let direction = self.direction(hit.beam);
@@ -122,6 +124,25 @@ impl<'a> View<'a> {
         }
         let power = power::received(brightness, hit.range_m);
         Signal { power, brightness, retroreflection: material.retroreflection }
+    }
+}
+
+/// The normal of the triangle that was asked for last: rays of one beam often meet the same.
+#[derive(Default)]
+pub(super) struct LastNormal(Option<(u32, u32, DVec3)>);
+
+impl LastNormal {
+    /// The unit normal where `hit` is, in world axes.
+    fn normal(&mut self, found: &ObjectHits, pattern: &BeamPattern, hit: &Hit) -> DVec3 {
+        let (object, triangle) = (found.object, hit.triangle);
+        match self.0 {
+            Some((of, at, normal)) if (of, at) == (object, triangle) && !found.turns() => normal,
+            _ => {
+                let normal = unit_normal(found, pattern, hit);
+                self.0 = Some((object, triangle, normal));
+                normal
+            }
+        }
     }
 }
 
@@ -159,9 +180,10 @@ pub(super) fn measure_one(
     view: &View,
     objects: &[ObjectHits],
     at: &(usize, usize),
+    seen: &mut LastNormal,
     tally: &mut Tally,
 ) -> Option<Return> {
-    match hear(view, objects, at) {
+    match hear(view, objects, at, seen) {
         Ok(echo) => point(view, objects, &echo, 0, tally),
         Err(Silence::OtherScans) => None,
         Err(Silence::OutOfRange) => {
@@ -187,9 +209,9 @@ pub(super) fn measure_all(
     let pattern = view.request.pattern;
     let ray_of = |&(object, hit): &(usize, usize)| objects[object].hits.hits[hit].beam;
     let beam_of = |at: &(usize, usize)| pattern.beam_of(ray_of(at));
-    let mut echoes = Vec::new();
+    let mut room = Room::default();
     let mut measure = |beam, rays: &[_]| {
-        measure_beam(view, objects, beam, rays, &mut echoes, tally, returns);
+        measure_beam(view, objects, beam, rays, &mut room, tally, returns);
     };
     let hears_empty_beams = view.air.as_ref().is_some_and(|air| air.empty_beams);
     let mut next = 0;
@@ -209,17 +231,18 @@ pub(super) fn measure_all(
 }
 
 /// Appends to `returns` what the sensor makes of one `beam`, of which these `rays` hit
-/// something. `echoes` is room to work in.
+/// something.
 fn measure_beam(
     view: &View,
     objects: &[ObjectHits],
     beam: u32,
     rays: &[(usize, usize)],
-    echoes: &mut Vec<Echo>,
+    room: &mut Room,
     tally: &mut Tally,
     returns: &mut Vec<Return>,
 ) {
-    listen(view, objects, rays, echoes, tally);
+    listen(view, objects, rays, room, tally);
+    let echoes = &mut room.echoes;
     if let Some(air) = &view.air {
         listen_to_air(view, air, objects, beam, rays, echoes);
     }
@@ -243,18 +266,25 @@ fn measure_beam(
     }
 }
 
-/// Fills `echoes` with what comes back of a beam from surfaces.
+/// Room to work in, from beam to beam.
+#[derive(Default)]
+struct Room {
+    echoes: Vec<Echo>,
+    seen: LastNormal,
+}
+
+/// Fills the `echoes` of `room` with what comes back of a beam from surfaces.
 fn listen(
     view: &View,
     objects: &[ObjectHits],
     rays: &[(usize, usize)],
-    echoes: &mut Vec<Echo>,
+    Room { echoes, seen }: &mut Room,
     tally: &mut Tally,
 ) {
     echoes.clear();
     let (mut is_out_of_range, mut is_lost) = (false, false);
     for at in rays {
-        match hear(view, objects, at) {
+        match hear(view, objects, at, seen) {
             Ok(echo) => echoes.push(echo),
             Err(Silence::OutOfRange) => is_out_of_range = true,
             Err(Silence::Glass) => is_lost = true,
@@ -280,6 +310,7 @@ fn hear(
     view: &View,
     objects: &[ObjectHits],
     &(object, hit): &(usize, usize),
+    seen: &mut LastNormal,
 ) -> Result<Echo, Silence> {
     let found = &objects[object];
     let nearest = &found.hits.hits[hit];
@@ -293,7 +324,7 @@ fn hear(
     if is_lost_in_glass(view, found, nearest) {
         return Err(Silence::Glass);
     }
-    let signal = if view.weighs { view.signal(found, nearest) } else { Signal::default() };
+    let signal = if view.weighs { view.signal(found, nearest, seen) } else { Signal::default() };
     let source = Source::Surface { object: object as u32, hit: hit as u32 };
     Ok(Echo { range_m: nearest.range_m, signal, source })
 }
@@ -367,9 +398,9 @@ fn point(
     let (stream, ray) = key(view, objects, echo);
     let effects = match source {
         Source::Surface { object, hit } => {
-            HitEffects::of(view.cast_effects, objects[object as usize].hits, hit as usize)
+            HitEffects::of(view, &objects[object as usize], hit as usize)
         }
-        Source::Air { .. } => HitEffects::in_air(view.cast_effects, stream, ray),
+        Source::Air { .. } => HitEffects::of_ray(view.cast_effects, stream, ray),
     };
     if view.effects.dropout.is_some() && effects.dropped {
         tally.dropped += 1;
@@ -423,20 +454,36 @@ pub(super) struct HitEffects {
 }
 
 impl HitEffects {
-    /// What `cast_effects` say of a return from the air, which no caster sees.
-    fn in_air(cast_effects: &Effects, stream: StreamKey, ray: u32) -> Self {
+    /// The outputs of the effects that were cast for number `hit` of what was `found`.
+    pub fn of(view: &View, found: &ObjectHits, hit: usize) -> Self {
+        let (cast_effects, Hits { hits, effect_outputs, .. }) = (view.cast_effects, found.hits);
+        let per_hit = cast_effects.outputs_per_ray();
+        if let Some(outputs) = effect_outputs.get(hit * per_hit..(hit + 1) * per_hit) {
+            return Self::read(cast_effects, outputs);
+        }
+        let (job, Hit { beam, triangle, .. }) = (found.job, &hits[hit]);
+        let mut own = Self::of_ray(cast_effects, job.stream, *beam);
+        if cast_effects.intensity.is_some() {
+            let ray = job.beam(view.request.pattern, *beam);
+            own.intensity = intensity(&job.target, &ray, *triangle, job.reflectivity.into()) as f32;
+        }
+        own
+    }
+
+    /// What `cast_effects` say of a ray, whatever it meets.
+    fn of_ray(cast_effects: &Effects, stream: StreamKey, ray: u32) -> Self {
         let noise = cast_effects.noise.map(|noise| match noise.model {
             NoiseModel::Range => DVec3::X * noise_range(&noise, stream, ray),
             NoiseModel::Xyz => noise_xyz(&noise, stream, ray),
         });
         let dropped = cast_effects.dropout.is_some_and(|model| dropout(&model, stream, ray));
-        Self { noise: noise.unwrap_or_default(), dropped, intensity: 0.0 }
+        // As a caster answers.
+        let noise = noise.unwrap_or_default().as_vec3().as_dvec3();
+        Self { noise, dropped, intensity: 0.0 }
     }
 
-    /// Reads the outputs of `cast_effects` for number `hit` of `hits`.
-    pub fn of(cast_effects: &Effects, hits: &Hits, hit: usize) -> Self {
-        let per_hit = cast_effects.outputs_per_ray();
-        let mut outputs = &hits.effect_outputs[hit * per_hit..(hit + 1) * per_hit];
+    /// Reads what a caster of `cast_effects` answered for one hit.
+    fn read(cast_effects: &Effects, mut outputs: &[f32]) -> Self {
         let mut found = Self::default();
         for effect in cast_effects.per_ray() {
             let (own, others) = outputs.split_at(effect.width());

@@ -19,7 +19,8 @@ use crate::cast_error::CastError;
 use crate::caster::Caster;
 use crate::config::InvalidValue;
 use crate::cpu;
-use crate::job::CastJob;
+use crate::effects::Effects;
+use crate::job::{Cast, CastJob};
 use crate::resolve::{Hits, resolve};
 use crate::target::Target;
 use formats::Scan;
@@ -46,7 +47,8 @@ pub struct Scanned {
     /// What became of the returns.
     pub tally: Tally,
     /// What the beams hit before any effect, by object. Where the CPU casts at
-    /// several objects, beams that end on a nearer object may be missing.
+    /// several objects, beams that end on a nearer object may be missing. The CPU gives no
+    /// outputs of effects: it asks them of what becomes a point.
     pub hits: Vec<Hits>,
     /// Whether the CPU cast because an object was too large for the adapter.
     pub cast_on_cpu: bool,
@@ -116,7 +118,7 @@ fn scan_as_asked(
     let fits = targets.into_iter().all(|target| caster.fits(target));
     if !fits || matches!(caster, Caster::Cpu(_)) {
         let scan = |(objects, request): &(&[PlacedTarget], &ScanRequest)| {
-            let (jobs, hits) = cast_nearest_first(caster, objects, request);
+            let (jobs, hits) = cast_nearest_first(objects, request);
             finish(caster, objects, request, &jobs, hits, !fits)
         };
         return requests.par_iter().map(scan).collect();
@@ -149,7 +151,6 @@ fn scan_as_asked(
 /// Casts on the CPU at the nearest object first, so that a beam that ends there is
 /// not cast at what stands wholly behind.
 fn cast_nearest_first(
-    caster: &Caster,
     objects: &[PlacedTarget],
     request: &ScanRequest,
 ) -> (Vec<CastJob>, Vec<Hits>) {
@@ -162,8 +163,10 @@ fn cast_nearest_first(
     let mut cast: Vec<Option<(CastJob, Hits)>> = vec![None; objects.len()];
     for i in order {
         let job = request.aim_where(&objects[i], |beam| ends_m[beam as usize] >= distances_m[i]);
-        let answers = cpu::trace::cast(&job, caster.effects());
-        let hits = resolve(&job, &answers, request.pattern, caster.effects());
+        let codes = cpu::trace::trace(&job.target.bvh.wide, job.rays());
+        let answers = Cast { codes, effect_outputs: vec![] };
+        // What effects say is asked of those hits alone that become points.
+        let hits = resolve(&job, &answers, request.pattern, &Effects::default());
         for hit in &hits.hits {
             let end_m = &mut ends_m[hit.beam as usize];
             *end_m = end_m.min(hit.range_m);

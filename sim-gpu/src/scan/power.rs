@@ -12,14 +12,10 @@
 //! range is known in f64 only once it is resolved, and a threshold must fall alike on
 //! every adapter.
 
-use super::assemble::{ObjectHits, unit_normal};
 use crate::cpu::random::{normal_deviate, random_bits};
 use crate::effects::{Detection, DetectionLimit};
 use crate::material::Material;
-use crate::resolve::Hit;
-use crate::sensor::BeamPattern;
 use formats::rng::StreamKey;
-use glam::DVec3;
 
 /// Which random bits of a beam are the receiver's noise and the error of its timing.
 const RECEIVER_PURPOSE: u32 = 3;
@@ -30,22 +26,16 @@ const WHITE: f64 = 100.0;
 const LEAST_RETRO: f64 = 101.0;
 const IDEAL_RETRO: f64 = 255.0;
 
-/// How bright a hit is to a sensor whose beam has this direction in the world, 0 to 1: a
-/// white surface that faces the sensor is 1.
+/// How bright a surface is whose normal has this `cosine` to the beam, 0 to 1: a white one that
+/// faces the sensor is 1.
 ///
 /// So is a retro-reflector at any incidence. It returns far more than that; how much no
 /// maker states, so that this is a lower bound.
-pub(super) fn brightness(
-    found: &ObjectHits,
-    material: Material,
-    pattern: &BeamPattern,
-    hit: &Hit,
-    beam: DVec3,
-) -> f64 {
+pub(super) fn brightness(material: Material, cosine: impl FnOnce() -> f64) -> f64 {
     if material.retroreflection > 0.0 {
         return 1.0;
     }
-    material.reflectivity * unit_normal(found, pattern, hit).dot(beam).abs().min(1.0)
+    material.reflectivity * cosine().min(1.0)
 }
 
 /// The power received from a surface of this brightness at this range.

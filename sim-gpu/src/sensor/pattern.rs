@@ -75,8 +75,13 @@ impl BeamPattern {
     /// the sensor itself.
     #[must_use]
     pub fn new(directions: Vec<DVec3>, ring: Vec<u16>, time_s: Vec<f64>) -> Self {
-        debug_assert!(directions.len() == ring.len() && directions.len() == time_s.len());
         let order = coherent_order(&directions);
+        Self::ordered(directions, ring, time_s, order)
+    }
+
+    /// As [`BeamPattern::new`], of rays that are coherent in this `order`.
+    fn ordered(directions: Vec<DVec3>, ring: Vec<u16>, time_s: Vec<f64>, order: Vec<u32>) -> Self {
+        debug_assert!(directions.len() == ring.len() && directions.len() == time_s.len());
         let bound = |rays: &[u32]| BlockCone::around(rays.iter().map(|&i| directions[i as usize]));
         let blocks = order.chunks(BLOCK_RAYS).map(bound).collect();
         let groups = order.chunks(BLOCK_RAYS * GROUP_BLOCKS).map(bound).collect();
@@ -100,10 +105,14 @@ impl BeamPattern {
         }
         let disc = disc(samples);
         let directions = self.directions.iter().flat_map(|&d| rays_of(d, &disc, divergence_deg));
-        let mut widened = Self::new(
+        // The rays of a beam stay side by side, as they lie in memory: they are alike more than
+        // those of any two beams.
+        let order = self.order.iter().flat_map(|&beam| beam * samples..(beam + 1) * samples);
+        let mut widened = Self::ordered(
             directions.collect(),
             for_each_ray(&self.ring, samples),
             for_each_ray(&self.time_s, samples),
+            order.collect(),
         );
         widened.starts_m = for_each_ray(&self.starts_m, samples);
         widened.rays_per_beam = samples;
