@@ -4,6 +4,7 @@ mod analytic;
 mod bvh_properties;
 mod dataset_finish;
 mod dataset_merge;
+mod dataset_on_demand;
 mod effects_parity;
 mod footprint;
 mod motion;

@@ -113,6 +113,15 @@ pub(crate) fn finite(key: &str, value: impl Into<Option<f64>>) -> Result<(), Inv
     expect(key, value, format_args!("a finite number"), |_| true)
 }
 
+/// That `value`, if there is one, is finite and no less than `least`.
+pub(crate) fn at_least(
+    key: &str,
+    value: impl Into<Option<f64>>,
+    least: f64,
+) -> Result<(), InvalidValue> {
+    expect(key, value, format_args!("a number of at least {least}"), |value| value >= least)
+}
+
 /// That `value`, if there is one, is finite and above 0.
 pub(crate) fn positive(key: &str, value: impl Into<Option<f64>>) -> Result<(), InvalidValue> {
     expect(key, value, format_args!("a number above 0"), |value| value > 0.0)

@@ -142,8 +142,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 /// Prints which meshes failed, and why.
 pub fn report_failures(failures: &[MeshFailure]) {
     for failure in failures {
-        let line = failure.line.map(|line| format!(":{line}")).unwrap_or_default();
-        eprintln!("failed: {}{line}: {}", failure.source, failure.cause);
+        eprintln!("failed: {failure}");
     }
 }
 

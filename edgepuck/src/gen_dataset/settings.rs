@@ -16,6 +16,7 @@ use sim_gpu::pose::load_poses;
 use sim_gpu::sensor::{Layout as BeamLayout, Sensor, Views};
 use sim_gpu::simplify::Simplify;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// Flags that decide what a dataset holds.
 #[derive(clap::Parser)]
@@ -30,16 +31,23 @@ pub struct Settings {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
     views: Option<u32>,
 
-    /// Distance from the mesh's centre to the sensor, metres [default: the sensor's own, or 3]
-    #[arg(long, value_name = "M")]
-    distance: Option<f64>,
+    /// Distance from the mesh's centre to the sensor, metres; of two numbers, between which each
+    /// view has one drawn [default: the sensor's own, or 3]
+    #[arg(long, value_name = "M[,M]")]
+    distance: Option<FromTo>,
 
-    /// Elevation of the sensor above the mesh, degrees [default: the sensor's own, or 20]
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
-    elevation: Option<f64>,
+    /// Elevation of the sensor above the mesh, degrees; of two numbers, between which each view has
+    /// one drawn [default: the sensor's own, or 20]
+    #[arg(long, value_name = "DEG[,DEG]", allow_hyphen_values = true)]
+    elevation: Option<FromTo>,
+
+    /// Turn each view around the mesh by a random angle of at most this, degrees; 180 gives views
+    /// from any side [default: the sensor's own, or 0]
+    #[arg(long, value_name = "DEG")]
+    azimuth_jitter: Option<f64>,
 
     /// File of sensor poses, which replaces the viewpoints around the mesh
-    #[arg(long, value_name = "TOML", conflicts_with_all = ["views", "distance", "elevation"])]
+    #[arg(long, value_name = "TOML", conflicts_with_all = ["views", "distance", "elevation", "azimuth_jitter"])]
     poses: Option<PathBuf>,
 
     /// Standard deviation of the noise, metres; 0 writes clean scans only
@@ -246,17 +254,44 @@ impl Settings {
             Some(file) => Viewpoints::Poses(load_poses(file)?),
             None => {
                 let defaults = sensor.default_views();
-                let views = Views {
-                    count: views.unwrap_or(defaults.count),
-                    distance_m: self.distance.unwrap_or(defaults.distance_m),
-                    elevation_deg: self.elevation.unwrap_or(defaults.elevation_deg),
-                    ..defaults
-                };
+                let mut views = Views { count: views.unwrap_or(defaults.count), ..defaults };
+                if let Some(FromTo { from, to }) = self.distance {
+                    (views.distance_m, views.distance_to_m) = (from, to);
+                }
+                if let Some(FromTo { from, to }) = self.elevation {
+                    (views.elevation_deg, views.elevation_to_deg) = (from, to);
+                }
+                if let Some(jitter_deg) = self.azimuth_jitter {
+                    views.azimuth_jitter_deg = jitter_deg;
+                }
                 views.validate().map_err(|error| usage(error.to_string()))?;
                 Viewpoints::Views(views)
             }
         };
         Ok(SetConfig { name: name.to_owned(), sensor, viewpoints })
+    }
+}
+
+/// A number, or two between which one is drawn.
+#[derive(Clone, Copy, Debug)]
+struct FromTo {
+    from: f64,
+    to: Option<f64>,
+}
+
+impl FromStr for FromTo {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| {
+            text.trim().parse::<f64>().map_err(|_| {
+                format!("expected a number, or two with a comma between them, found {text:?}")
+            })
+        };
+        match text.split_once(',') {
+            Some((from, to)) => Ok(Self { from: number(from)?, to: Some(number(to)?) }),
+            None => Ok(Self { from: number(text)?, to: None }),
+        }
     }
 }
 

@@ -37,7 +37,7 @@ pub(super) struct Source<'a> {
 impl Cloud {
     /// The cloud of `scan`; `None` if it has fewer than
     /// [`DatasetConfig::min_points`] points, or none.
-    fn draw(config: &DatasetConfig, source: Source, scan: &Scan) -> Option<Self> {
+    pub(super) fn draw(config: &DatasetConfig, source: Source, scan: &Scan) -> Option<Self> {
         if (scan.len() as u64) < u64::from(config.min_points) {
             return None;
         }

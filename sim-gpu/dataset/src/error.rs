@@ -1,5 +1,6 @@
 //! Why a dataset cannot be made, merged or verified.
 
+use super::record::MeshFailure;
 use formats::FormatError;
 use sim_gpu::cast_error::CastError;
 use sim_gpu::config::InvalidValue;
@@ -64,6 +65,24 @@ pub enum DatasetError {
         path: PathBuf,
         /// Why.
         cause: String,
+    },
+    /// A mesh of which a cloud is wanted cannot be scanned.
+    #[error("{0}")]
+    Mesh(MeshFailure),
+    /// No view that was tried of a mesh has enough points for a cloud.
+    #[error(
+        "{source_file}: expected a view of at least {least} points, found at most {most} in \
+         {tried} views"
+    )]
+    Sparse {
+        /// The mesh, from the dataset's folder.
+        source_file: String,
+        /// How many points a cloud takes.
+        least: u32,
+        /// How many points the best view has.
+        most: u64,
+        /// How many views were tried.
+        tried: u32,
     },
     /// A setting is bad.
     #[error(transparent)]

@@ -4,7 +4,8 @@
 //! [`journal`] so that a killed run can go on, [`finish`] packs them and
 //! writes the manifest, which [`verify`] checks a dataset against. [`merge`]
 //! makes one dataset of parts. [`surfaces`] draws what scans are compared with, and
-//! [`corrupted`] makes sets in which something goes wrong.
+//! [`corrupted`] makes sets in which something goes wrong. [`on_demand`] casts the clouds of a
+//! dataset as they are asked for, and writes none.
 
 mod budget;
 mod clouds;
@@ -19,6 +20,7 @@ pub mod layout;
 pub mod manifest;
 pub mod merge;
 mod mesh;
+pub mod on_demand;
 mod pack;
 pub mod pipeline;
 pub mod progress;

@@ -95,15 +95,9 @@ pub fn prepare(
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {
         let aim = |view: &PlannedView| {
-            let set = &config.sets[view.set];
-            let mut placed = PlacedTarget::new(&target);
-            (placed.reflectivity, placed.materials) =
-                (config.reflectivity as f32, materials.as_ref());
-            let mut request = ScanRequest::new(&set.sensor, &patterns[view.set], view.pose);
-            request.motion.clone_from(&view.motion);
-            request.stream = set.stream(config.seed, &id, view.view);
+            let mut request = view.request(config, patterns, &id);
             request.culling = culling;
-            request.aim(&placed)
+            request.aim(&placed(config, &target, materials.as_ref()))
         };
         views.iter().map(aim).collect()
     });
@@ -114,7 +108,37 @@ pub fn prepare(
     Ok(Prepared { record, views, jobs, materials })
 }
 
-fn materials(entry: &MeshEntry, config: &DatasetConfig) -> Result<Option<Materials>, MeshFailure> {
+impl PlannedView {
+    /// The scan of this view of the mesh called `id`: clean, unless effects are added.
+    pub(super) fn request<'a>(
+        &self,
+        config: &'a DatasetConfig,
+        patterns: &'a [BeamPattern],
+        id: &str,
+    ) -> ScanRequest<'a> {
+        let set = &config.sets[self.set];
+        let mut request = ScanRequest::new(&set.sensor, &patterns[self.set], self.pose);
+        request.motion.clone_from(&self.motion);
+        request.stream = set.stream(config.seed, id, self.view);
+        request
+    }
+}
+
+/// A mesh where every mesh of a dataset stands.
+pub(super) fn placed<'a>(
+    config: &DatasetConfig,
+    target: &'a Target,
+    materials: Option<&'a Materials>,
+) -> PlacedTarget<'a> {
+    let mut placed = PlacedTarget::new(target);
+    (placed.reflectivity, placed.materials) = (config.reflectivity as f32, materials);
+    placed
+}
+
+pub(super) fn materials(
+    entry: &MeshEntry,
+    config: &DatasetConfig,
+) -> Result<Option<Materials>, MeshFailure> {
     let otherwise = Material::diffuse(config.reflectivity);
     let choice = MaterialChoice { colours: config.colours, ..MaterialChoice::default() };
     let load = || Materials::load(&entry.path, &choice, otherwise);
@@ -124,7 +148,7 @@ fn materials(entry: &MeshEntry, config: &DatasetConfig) -> Result<Option<Materia
     })
 }
 
-fn plan(config: &DatasetConfig, id: &str, patterns: &[BeamPattern]) -> Vec<PlannedView> {
+pub(super) fn plan(config: &DatasetConfig, id: &str, patterns: &[BeamPattern]) -> Vec<PlannedView> {
     let of_set = |(set, set_config): (usize, &SetConfig)| {
         let poses = set_config.poses(config.seed, id).into_iter().zip(0..);
         let moves = config.effects.motion.as_deref();
@@ -234,23 +258,12 @@ fn write_view(
 ) -> Result<ScanRecord, DatasetError> {
     let config = output.config;
     let set = &config.sets[planned.set];
-    let world_from_object = DAffine3::IDENTITY;
-    let objects = [ObjectHits {
-        object: 0,
-        world_from_object,
-        glass: None,
-        retroreflection: 0.0,
-        materials,
-        job,
-        hits,
-    }];
+    let objects = [ObjectHits::alone(job, hits, materials)];
     let mut variants = Vec::new();
     for &variant in &config.variants {
-        let mut request =
-            ScanRequest::new(&set.sensor, &output.patterns[planned.set], planned.pose);
+        let mut request = planned.request(config, output.patterns, &record.entry.id());
         request.effects = Some(config.effects_of(set, variant)?);
-        request.motion.clone_from(&planned.motion);
-        (request.attributes, request.stream) = (config.attributes.clone(), job.stream);
+        request.attributes = config.attributes.clone();
         let (scan, tally) = output
             .progress
             .time(Stage::Resolve, || assemble(&request, output.cast_effects, &objects))?;

@@ -10,6 +10,7 @@ use sim_gpu::mesh::tree::MeshEntry;
 use sim_gpu::mesh::validate::MeshDefects;
 use sim_gpu::scan::Tally;
 use sim_gpu::simplify::Simplified;
+use std::fmt;
 
 /// Which mesh of a dataset: orders everything that is listed.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -113,6 +114,13 @@ pub struct MeshFailure {
     pub line: Option<u64>,
     /// Why.
     pub cause: String,
+}
+
+impl fmt::Display for MeshFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let line = self.line.map(|line| format!(":{line}")).unwrap_or_default();
+        write!(f, "{}{line}: {}", self.source, self.cause)
+    }
 }
 
 impl From<&MeshEntry> for Entry {

@@ -37,7 +37,15 @@ pub struct ObjectHits<'a> {
     pub hits: &'a Hits,
 }
 
-impl ObjectHits<'_> {
+impl<'a> ObjectHits<'a> {
+    /// What the only object returned, which stands in the world as its mesh does.
+    #[must_use]
+    pub fn alone(job: &'a CastJob, hits: &'a Hits, materials: Option<&'a Materials>) -> Self {
+        let world_from_object = DAffine3::IDENTITY;
+        let (object, retroreflection, glass) = (0, 0.0, None);
+        Self { object, world_from_object, glass, retroreflection, materials, job, hits }
+    }
+
     /// Where the object is when `ray` of `pattern` is fired.
     fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
         let at = |motion: &Motion| motion.world_from_object_at(pattern.time_s[ray as usize]);

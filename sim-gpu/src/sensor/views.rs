@@ -4,7 +4,7 @@ use formats::rng::StreamKey;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{InvalidValue, positive, within};
+use crate::config::{InvalidValue, at_least, positive, within};
 use crate::mesh::frame::Normalize;
 use crate::pose::{Pose, ring_of_views};
 
@@ -16,8 +16,14 @@ pub struct Views {
     pub count: u32,
     /// From the object's origin, metres.
     pub distance_m: f64,
+    /// Each view's distance is drawn evenly from the one above to this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_to_m: Option<f64>,
     /// Above the world's x-y plane.
     pub elevation_deg: f64,
+    /// Each view's elevation is drawn evenly from the one above to this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elevation_to_deg: Option<f64>,
     /// Of the first view, counterclockwise from world x.
     pub azimuth_deg: f64,
     /// Each view's azimuth is moved by a uniform random angle of at most this.
@@ -33,7 +39,9 @@ impl Views {
     pub const ROTATING: Self = Self {
         count: 4,
         distance_m: 3.0,
+        distance_to_m: None,
         elevation_deg: 20.0,
+        elevation_to_deg: None,
         azimuth_deg: 0.0,
         azimuth_jitter_deg: 0.0,
         normalize: None,
@@ -43,27 +51,36 @@ impl Views {
     pub const STATIC: Self = Self { count: 1, azimuth_deg: 45.0, ..Self::ROTATING };
 
     /// The poses around `target_m`. The jitter of view k is number k of the
-    /// stream `key`, which nothing else depends on.
+    /// stream `key`, which nothing else depends on; its distance and its elevation, where they
+    /// are drawn, are numbers of that stream as well.
     #[must_use]
     pub fn poses(&self, target_m: DVec3, key: StreamKey) -> Vec<Pose> {
-        let elevation_rad = self.elevation_deg.to_radians();
         let first_azimuth_rad = self.azimuth_deg.to_radians();
-        if self.azimuth_jitter_deg == 0.0 {
+        let is_regular = self.azimuth_jitter_deg == 0.0;
+        if is_regular && self.distance_to_m.is_none() && self.elevation_to_deg.is_none() {
             return ring_of_views(
                 self.count,
                 self.distance_m,
-                elevation_rad,
+                self.elevation_deg.to_radians(),
                 first_azimuth_rad,
                 target_m,
             );
         }
-        let view = |k: u32| {
-            let regular_deg = self.azimuth_deg + 360.0 * f64::from(k) / f64::from(self.count);
-            let jitter_deg = self.azimuth_jitter_deg * (2.0 * key.unit(u64::from(k)) - 1.0);
-            let azimuth_rad = (regular_deg + jitter_deg).to_radians();
-            Pose::view(self.distance_m, elevation_rad, azimuth_rad, target_m)
+        (0..self.count).map(|view| self.pose(view, target_m, key)).collect()
+    }
+
+    /// The pose of one view whose place is drawn.
+    fn pose(&self, view: u32, target_m: DVec3, key: StreamKey) -> Pose {
+        let drawn = |from: f64, to: Option<f64>, what: u64| {
+            let share = || key.unit(u64::from(view) | what << 32);
+            to.map_or(from, |to| from + share() * (to - from))
         };
-        (0..self.count).map(view).collect()
+        let regular_deg = self.azimuth_deg + 360.0 * f64::from(view) / f64::from(self.count);
+        let jitter_deg = self.azimuth_jitter_deg * (2.0 * key.unit(u64::from(view)) - 1.0);
+        let distance_m = drawn(self.distance_m, self.distance_to_m, 1);
+        let elevation_deg = drawn(self.elevation_deg, self.elevation_to_deg, 2);
+        let azimuth_rad = (regular_deg + jitter_deg).to_radians();
+        Pose::view(distance_m, elevation_deg.to_radians(), azimuth_rad, target_m)
     }
 
     /// Checks all numbers.
@@ -74,7 +91,9 @@ impl Views {
     pub fn validate(&self) -> Result<(), InvalidValue> {
         within("views.count", f64::from(self.count), 0.0..=f64::from(u16::MAX))?;
         positive("views.distance_m", self.distance_m)?;
+        at_least("views.distance_to_m", self.distance_to_m, self.distance_m)?;
         within("views.elevation_deg", self.elevation_deg, -90.0..=90.0)?;
+        within("views.elevation_to_deg", self.elevation_to_deg, self.elevation_deg..=90.0)?;
         within("views.azimuth_deg", self.azimuth_deg, -360.0..=360.0)?;
         within("views.azimuth_jitter_deg", self.azimuth_jitter_deg, 0.0..=180.0)
     }

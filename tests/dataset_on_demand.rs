@@ -1,0 +1,123 @@
+//! Clouds that are cast as they are asked for are those that a dataset of the same settings
+//! holds.
+
+use edgepuck_dataset::finish::finish;
+use edgepuck_dataset::journal::Terms;
+use edgepuck_dataset::on_demand::{Clouds, seed_of_epoch};
+use edgepuck_dataset::pipeline::{Run, scan_all};
+use edgepuck_dataset::progress::Progress;
+use edgepuck_dataset::start::{Begin, begin};
+use edgepuck_dataset::{DatasetConfig, DatasetError, SetConfig, Variant, Viewpoints, layout};
+use formats::Split;
+use formats::labelled::read_labelled;
+use sim_gpu::caster::Caster;
+use sim_gpu::effects::{Effects, Noise, NoiseModel};
+use sim_gpu::job::Culling;
+use sim_gpu::mesh::tree::{MeshEntry, discover};
+use sim_gpu::sensor::{Sensor, Views};
+use std::path::Path;
+use tests::written_dataset::config;
+
+const CACHE_BYTES: usize = 1 << 20;
+
+/// Two noisy views of each mesh, from random places.
+fn asked(seed: u64) -> DatasetConfig {
+    let noise = Noise { mean_m: 0.0, sigma_m: 0.02, model: NoiseModel::Range };
+    let views = Views {
+        count: 2,
+        distance_to_m: Some(6.0),
+        elevation_deg: -20.0,
+        elevation_to_deg: Some(60.0),
+        azimuth_jitter_deg: 180.0,
+        ..Views::ROTATING
+    };
+    DatasetConfig {
+        seed,
+        effects: Effects { noise: Some(noise), ..Effects::default() },
+        variants: vec![Variant::Noisy],
+        sets: vec![SetConfig {
+            name: "rotational".to_owned(),
+            sensor: Sensor::builtin("vlp32c").unwrap(),
+            viewpoints: Viewpoints::Views(views),
+        }],
+        layouts: vec![],
+        formats: vec![formats::scan_file::ScanFormat::Npz],
+        ..config()
+    }
+}
+
+/// Meshes of all built-in classes, two to train with and one to test with.
+fn meshes(folder: &Path) -> Vec<MeshEntry> {
+    edgepuck_shapes::write_tree(folder, 3, 2, 1).unwrap();
+    discover(folder, 0).unwrap()
+}
+
+fn clouds(meshes: &[MeshEntry], config: DatasetConfig, cache_bytes: usize) -> Clouds {
+    let train = meshes.iter().filter(|mesh| mesh.split == Split::Train).cloned().collect();
+    let mut classes: Vec<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
+    classes.dedup();
+    Clouds::new(config, train, classes, cache_bytes).unwrap()
+}
+
+fn cpu(clouds: &Clouds) -> Caster {
+    Caster::Cpu(clouds.cast_effects())
+}
+
+#[test]
+fn clouds_on_demand_are_those_of_the_packed_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, meshes) = (folder.path().join("out"), meshes(&folder.path().join("meshes")));
+    let config = asked(seed_of_epoch(7, 2));
+    let caster = Caster::Cpu(config.cast_effects());
+    let terms = Terms::new(config.clone(), &caster, &meshes, None);
+    begin(&out, &terms, Begin::Fresh).unwrap();
+    let (progress, culling) = (Progress::default(), Culling::On);
+    let run = Run { out: &out, config: &config, caster: &caster, culling, progress: &progress };
+    let scanned = scan_all(&run, &meshes).unwrap();
+    finish(&out, &terms, scanned.records, scanned.failures).unwrap();
+    let packed = layout::packed(&out, &config.sets[0], Variant::Noisy, Split::Train);
+    let expected = read_labelled(&packed).unwrap();
+
+    let clouds = clouds(&meshes, asked(7), CACHE_BYTES);
+    assert_eq!(clouds.len(), expected.len(), "no view of this seed has too few points");
+    let all: Vec<usize> = (0..clouds.len()).collect();
+    let drawn = clouds.draw(&cpu(&clouds), seed_of_epoch(7, 2), &all).unwrap();
+    for (i, found) in drawn.iter().enumerate() {
+        assert_eq!(found.label, expected.labels[i] as usize, "{i}");
+        assert_eq!(found.points, expected.cloud(i), "{i}");
+    }
+}
+
+#[test]
+fn a_cloud_depends_on_its_number_and_the_seed_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let meshes = meshes(folder.path());
+    let whole = clouds(&meshes, asked(7), usize::MAX);
+    let uncached = clouds(&meshes, asked(7), 0);
+    let numbers = [5, 0, 11, 5, 38];
+    let together = whole.draw(&cpu(&whole), 7, &numbers).unwrap();
+    for (number, together) in numbers.into_iter().zip(together) {
+        let [alone] = &uncached.draw(&cpu(&uncached), 7, &[number]).unwrap()[..] else {
+            panic!("one cloud was asked for");
+        };
+        assert_eq!(alone.points, together.points, "{number}");
+        let others = whole.draw(&cpu(&whole), 8, &[number]).unwrap();
+        assert_ne!(others[0].points, together.points, "{number}");
+    }
+}
+
+#[test]
+fn a_mesh_that_no_view_sees_well_enough_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let meshes = meshes(folder.path());
+    let config = DatasetConfig { min_points: 1 << 20, ..asked(7) };
+    let clouds = clouds(&meshes, config, CACHE_BYTES);
+    match clouds.draw(&cpu(&clouds), 7, &[3]) {
+        Err(error @ DatasetError::Sparse { .. }) => {
+            let text = error.to_string();
+            assert!(text.starts_with("airplane/train/airplane_"), "{text}");
+            assert!(text.contains("expected a view of at least 1048576 points"), "{text}");
+        }
+        other => panic!("{:?}", other.map(|clouds| clouds.len())),
+    }
+}
