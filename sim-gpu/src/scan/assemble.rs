@@ -1,7 +1,7 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
 use super::echo::Source;
-use super::measure::{HitEffects, LastNormal, Return, View, measure_all, measure_one};
+use super::measure::{HitEffects, Normals, Return, View, measure_all, measure_one};
 use super::request::{Glass, ScanRequest};
 use crate::config::InvalidValue;
 use crate::cpu::oracle;
@@ -14,7 +14,7 @@ use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
 use crate::weather::Medium;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -126,8 +126,8 @@ pub fn assemble(
     let nearest = nearest_per_ray(objects, request.pattern.len());
     let mut returns = Vec::with_capacity(nearest.len());
     if view.has_one_echo_a_beam() {
-        let mut seen = LastNormal::default();
-        let measured = |at| measure_one(&view, objects, at, &mut seen, &mut tally);
+        let mut normals = Normals::new(objects);
+        let measured = |at| measure_one(&view, objects, at, &mut normals, &mut tally);
         returns.extend(nearest.iter().filter_map(measured));
     } else {
         measure_all(&view, objects, &nearest, &mut tally, &mut returns);
@@ -290,9 +290,14 @@ fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>>
 
 /// A unit normal of the surface in world axes; zero for a triangle without area.
 pub(super) fn unit_normal(found: &ObjectHits, pattern: &BeamPattern, hit: &Hit) -> DVec3 {
-    let in_object = oracle::normal(&found.job.target, hit.triangle);
-    (found.world_from_object_at(pattern, hit.beam).matrix3.inverse().transpose() * in_object)
+    let world_from_object = found.world_from_object_at(pattern, hit.beam);
+    (of_normals(&world_from_object) * oracle::normal(&found.job.target, hit.triangle))
         .normalize_or_zero()
+}
+
+/// What turns normals as `world_from_object` turns points, but for their length.
+pub(super) fn of_normals(world_from_object: &DAffine3) -> DMat3 {
+    world_from_object.matrix3.inverse().transpose()
 }
 
 /// The surface's unit normal in world axes, against the `beam` that hit it.

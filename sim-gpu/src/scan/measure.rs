@@ -1,20 +1,20 @@
 //! From what the rays of a beam hit to the points that the sensor measures.
 
-use super::assemble::{ObjectHits, Tally, unit_normal};
+use super::assemble::{ObjectHits, Tally, of_normals, unit_normal};
 use super::echo::{Echo, Signal, Source, merge, told};
 use super::power;
 use super::request::ScanRequest;
 use crate::config::InvalidValue;
 use crate::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
+use crate::cpu::oracle;
 use crate::cpu::random::random_bits;
 use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
 use crate::pose::Pose;
 use crate::resolve::{Hit, Hits};
-use crate::sensor::BeamPattern;
 use crate::weather::{Air, AirBeam, Scattered};
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// A request, and what its effects come to.
 pub(super) struct View<'a> {
@@ -112,10 +112,15 @@ impl<'a> View<'a> {
     }
 
     /// How strong what comes back from a hit is.
-    fn signal(&self, found: &ObjectHits, hit: &Hit, seen: &mut LastNormal) -> Signal {
-        let pattern = self.request.pattern;
-        let material = found.material(pattern, hit);
-        let cosine = || seen.normal(found, pattern, hit).dot(self.direction(hit.beam)).abs();
+    fn signal(
+        &self,
+        object: usize,
+        found: &ObjectHits,
+        hit: &Hit,
+        normals: &mut Normals,
+    ) -> Signal {
+        let material = found.material(self.request.pattern, hit);
+        let cosine = || normals.at(object, found, self, hit).dot(self.direction(hit.beam)).abs();
         let whole = power::brightness(material, cosine);
         let mut brightness = self.share.map_or(whole, |share| whole * share);
         if let Some(air) = &self.air {
@@ -127,19 +132,31 @@ impl<'a> View<'a> {
     }
 }
 
-/// The normal of the triangle that was asked for last: rays of one beam often meet the same.
-#[derive(Default)]
-pub(super) struct LastNormal(Option<(u32, u32, DVec3)>);
+/// The normals of objects that do not turn, of which rays of one beam often ask for the same.
+pub(super) struct Normals {
+    /// From each object to the world, `[n_objects]`.
+    of_object: Vec<DMat3>,
+    /// The object and the triangle that were asked for last, and what was answered.
+    last: Option<(usize, u32, DVec3)>,
+}
 
-impl LastNormal {
-    /// The unit normal where `hit` is, in world axes.
-    fn normal(&mut self, found: &ObjectHits, pattern: &BeamPattern, hit: &Hit) -> DVec3 {
-        let (object, triangle) = (found.object, hit.triangle);
-        match self.0 {
-            Some((of, at, normal)) if (of, at) == (object, triangle) && !found.turns() => normal,
+impl Normals {
+    pub fn new(objects: &[ObjectHits]) -> Self {
+        let of_object = objects.iter().map(|found| of_normals(&found.world_from_object));
+        Self { of_object: of_object.collect(), last: None }
+    }
+
+    /// The unit normal where object number `object`, which is `found`, was hit, in world axes.
+    fn at(&mut self, object: usize, found: &ObjectHits, view: &View, hit: &Hit) -> DVec3 {
+        if found.turns() {
+            return unit_normal(found, view.request.pattern, hit);
+        }
+        match self.last {
+            Some((of, at, normal)) if (of, at) == (object, hit.triangle) => normal,
             _ => {
-                let normal = unit_normal(found, pattern, hit);
-                self.0 = Some((object, triangle, normal));
+                let in_object = oracle::normal(&found.job.target, hit.triangle);
+                let normal = (self.of_object[object] * in_object).normalize_or_zero();
+                self.last = Some((object, hit.triangle, normal));
                 normal
             }
         }
@@ -180,10 +197,10 @@ pub(super) fn measure_one(
     view: &View,
     objects: &[ObjectHits],
     at: &(usize, usize),
-    seen: &mut LastNormal,
+    normals: &mut Normals,
     tally: &mut Tally,
 ) -> Option<Return> {
-    match hear(view, objects, at, seen) {
+    match hear(view, objects, at, normals) {
         Ok(echo) => point(view, objects, &echo, 0, tally),
         Err(Silence::OtherScans) => None,
         Err(Silence::OutOfRange) => {
@@ -209,7 +226,7 @@ pub(super) fn measure_all(
     let pattern = view.request.pattern;
     let ray_of = |&(object, hit): &(usize, usize)| objects[object].hits.hits[hit].beam;
     let beam_of = |at: &(usize, usize)| pattern.beam_of(ray_of(at));
-    let mut room = Room::default();
+    let mut room = Room { echoes: Vec::new(), normals: Normals::new(objects) };
     let mut measure = |beam, rays: &[_]| {
         measure_beam(view, objects, beam, rays, &mut room, tally, returns);
     };
@@ -267,10 +284,9 @@ fn measure_beam(
 }
 
 /// Room to work in, from beam to beam.
-#[derive(Default)]
 struct Room {
     echoes: Vec<Echo>,
-    seen: LastNormal,
+    normals: Normals,
 }
 
 /// Fills the `echoes` of `room` with what comes back of a beam from surfaces.
@@ -278,13 +294,13 @@ fn listen(
     view: &View,
     objects: &[ObjectHits],
     rays: &[(usize, usize)],
-    Room { echoes, seen }: &mut Room,
+    Room { echoes, normals }: &mut Room,
     tally: &mut Tally,
 ) {
     echoes.clear();
     let (mut is_out_of_range, mut is_lost) = (false, false);
     for at in rays {
-        match hear(view, objects, at, seen) {
+        match hear(view, objects, at, normals) {
             Ok(echo) => echoes.push(echo),
             Err(Silence::OutOfRange) => is_out_of_range = true,
             Err(Silence::Glass) => is_lost = true,
@@ -310,7 +326,7 @@ fn hear(
     view: &View,
     objects: &[ObjectHits],
     &(object, hit): &(usize, usize),
-    seen: &mut LastNormal,
+    normals: &mut Normals,
 ) -> Result<Echo, Silence> {
     let found = &objects[object];
     let nearest = &found.hits.hits[hit];
@@ -324,7 +340,8 @@ fn hear(
     if is_lost_in_glass(view, found, nearest) {
         return Err(Silence::Glass);
     }
-    let signal = if view.weighs { view.signal(found, nearest, seen) } else { Signal::default() };
+    let signal =
+        if view.weighs { view.signal(object, found, nearest, normals) } else { Signal::default() };
     let source = Source::Surface { object: object as u32, hit: hit as u32 };
     Ok(Echo { range_m: nearest.range_m, signal, source })
 }
