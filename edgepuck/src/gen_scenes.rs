@@ -102,7 +102,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 }
 
 /// A built-in recipe by its name, or else a file.
-pub(crate) fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
+pub fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
     let built_in = SCENE_RECIPES.iter().find(|(name, _)| Path::new(name) == recipe);
     Ok(match built_in {
         Some((_, text)) => Recipe::parse(text, recipe)?,

@@ -6,6 +6,7 @@ pub mod advise;
 mod brightness;
 pub mod caster;
 pub mod checkout;
+pub mod cli;
 pub mod corrupt;
 #[cfg(feature = "models")]
 pub mod detect;

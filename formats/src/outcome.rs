@@ -2,7 +2,6 @@
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
-use std::process::ExitCode;
 
 /// The exit status of a completed command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,15 +22,15 @@ pub struct Usage(pub String);
 /// Prints the error, if there is one, and gives the program's exit code: 0 for
 /// success, 1 for a failure, 2 for a [`Usage`]. When the reader of the output has
 /// gone, the command succeeds.
-pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
+pub fn exit_code(result: anyhow::Result<Outcome>) -> u8 {
     match result {
-        Ok(Outcome::Success) => ExitCode::SUCCESS,
-        Ok(Outcome::SomeFailed) => ExitCode::from(1),
-        Ok(Outcome::ChildExit(code)) => ExitCode::from(code),
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Ok(Outcome::Success) => 0,
+        Ok(Outcome::SomeFailed) => 1,
+        Ok(Outcome::ChildExit(code)) => code,
+        Err(error) if is_broken_pipe(&error) => 0,
         Err(error) => {
             say(format_args!("error: {}", joined_causes(&error)));
-            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+            if error.is::<Usage>() { 2 } else { 1 }
         }
     }
 }

@@ -7,5 +7,5 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
-    formats::outcome::exit_code(cli::run(&cli::Cli::parse()))
+    formats::outcome::exit_code(cli::run(&cli::Cli::parse())).into()
 }

@@ -40,5 +40,5 @@ fn main() -> ExitCode {
         Command::ComparePoints(args) => compare_points::run(&args),
         Command::Serve(args) => serve::run(&args),
     };
-    exit_code(done.map(|()| Outcome::Success))
+    exit_code(done.map(|()| Outcome::Success)).into()
 }

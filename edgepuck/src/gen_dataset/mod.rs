@@ -70,12 +70,14 @@ pub struct Args {
     caster: CasterArgs,
 }
 
-/// The configuration of a dataset that is made without flags.
+/// The configuration of a dataset that is made with these `flags`, such as `--distance=2,10`.
 ///
 /// # Errors
-/// A built-in sensor is missing.
-pub fn default_config() -> anyhow::Result<DatasetConfig> {
-    Settings::parse_from(["gen-dataset"]).config()
+/// A flag that is none or has no such value; a sensor that is missing or does not go with the
+/// others.
+pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
+    let words = std::iter::once("gen-dataset").chain(flags.iter().map(String::as_str));
+    Settings::try_parse_from(words)?.config()
 }
 
 /// Part `number` (from 0) of `of` parts.

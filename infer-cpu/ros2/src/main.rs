@@ -40,7 +40,7 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    exit_code(run(&Args::parse()))
+    exit_code(run(&Args::parse())).into()
 }
 
 fn run(args: &Args) -> anyhow::Result<Outcome> {

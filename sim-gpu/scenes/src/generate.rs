@@ -63,7 +63,7 @@ pub fn generate<E: From<SceneError>>(
         let numbers = first..count.min(first.saturating_add(BATCH));
         let batch: Vec<Generation> = numbers
             .into_par_iter()
-            .map(|number| one(stage, number, settings))
+            .map(|number| Generation::new(stage, number, settings))
             .collect::<Result<_, SceneError>>()?;
         for done in &batch {
             let is_test = done.scene.number % TEST_EACH == TEST_EACH - 1;
@@ -78,19 +78,26 @@ pub fn generate<E: From<SceneError>>(
     Ok(Counts { train: train_counts, test: test_counts })
 }
 
-fn one(stage: &Stage, number: u32, settings: &Settings) -> Result<Generation, SceneError> {
-    let scene = Scene::draw(stage, number);
-    let mut settings = settings.clone();
-    if let Some(clearance_m) = scene.ground_clearance_m {
-        settings.ground_clearance_m = clearance_m as f32;
+impl Generation {
+    /// Draws scene number `number` of `stage`, scans it, and cuts it with `settings`.
+    ///
+    /// # Errors
+    /// If it cannot be scanned or segmented.
+    pub fn new(stage: &Stage, number: u32, settings: &Settings) -> Result<Self, SceneError> {
+        let scene = Scene::draw(stage, number);
+        let mut settings = settings.clone();
+        if let Some(clearance_m) = scene.ground_clearance_m {
+            settings.ground_clearance_m = clearance_m as f32;
+        }
+        let unfit = |error: String| SceneError::Segment(error);
+        let mut segmenter = Segmenter::new(settings).map_err(|e| unfit(e.to_string()))?;
+        let sweep = stage.sweep(&scene)?;
+        let points = Points { points: sweep.points(), rings: Some(sweep.rings()) };
+        let found = segmenter.segment(&points).map_err(|e| unfit(e.to_string()))?;
+        let clusters = label_clusters(stage, &scene, &sweep, found);
+        let labels = found.labels().to_vec();
+        Ok(Self { scene, sweep, labels, clusters })
     }
-    let mut segmenter = Segmenter::new(settings).map_err(|e| SceneError::Segment(e.to_string()))?;
-    let sweep = stage.sweep(&scene)?;
-    let points = Points { points: sweep.points(), rings: Some(sweep.rings()) };
-    let found = segmenter.segment(&points).map_err(|e| SceneError::Segment(e.to_string()))?;
-    let clusters = label_clusters(stage, &scene, &sweep, found);
-    let labels = found.labels().to_vec();
-    Ok(Generation { scene, sweep, labels, clusters })
 }
 
 fn pack(

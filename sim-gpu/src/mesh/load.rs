@@ -80,8 +80,11 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
     fs::read(path).map_err(failed)
 }
 
-/// What every mesh must satisfy, whatever its format and reader.
-fn check(mesh: &Mesh) -> Result<(), ParseError> {
+/// What every mesh must satisfy, whatever its format and reader: as [`LoadedMesh::mesh`] has it.
+///
+/// # Errors
+/// A vertex that is not finite, an index out of range, or no triangle.
+pub fn check(mesh: &Mesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
     Malformed::check_vertex_count(n_vertices)?;
     if let Some(vertex) = mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {

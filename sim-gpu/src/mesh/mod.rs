@@ -24,5 +24,5 @@ pub mod validate;
 pub(crate) use appearance::{Appearance, Colour, Face, colours};
 pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
-pub use load::{LoadedMesh, load, load_hashed, parse};
+pub use load::{LoadedMesh, check, load, load_hashed, parse};
 pub use triangle_mesh::{Mesh, Parsed};

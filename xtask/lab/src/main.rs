@@ -36,7 +36,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    outcome::exit_code(run(&Cli::parse().command))
+    outcome::exit_code(run(&Cli::parse().command)).into()
 }
 
 fn run(command: &Command) -> anyhow::Result<Outcome> {

@@ -10,7 +10,7 @@ use edgepuck_dataset::config::DatasetConfig;
 use edgepuck_dataset::journal::{Journal, Terms};
 use edgepuck_dataset::pipeline::{Run, scan_all};
 use edgepuck_dataset::progress::{Progress, Stage};
-use edgepuck_program::gen_dataset::default_config;
+use edgepuck_program::gen_dataset;
 use serde::Serialize;
 use sim_gpu::caster::Caster;
 use sim_gpu::job::Culling;
@@ -42,7 +42,7 @@ pub fn measure(
     rounds: usize,
 ) -> Result<Vec<Dataset>> {
     let meshes = some_of(root, limit)?;
-    let config = default_config()?;
+    let config = gen_dataset::config(&[])?;
     let mut datasets = Vec::new();
     for backend in backends {
         let caster = Caster::open(&backend.request(), &config.cast_effects())?;

@@ -1,0 +1,116 @@
+//! The command line of the program `edgepuck`, which its binary and its Python package start.
+
+use crate::{
+    Outcome, adapters, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes, merge_dataset,
+    outcome, preview_scan, profile, sample_surfaces, scan, segment, trainer, weather,
+};
+#[cfg(feature = "models")]
+use crate::{advise, detect, export_onnx, import_weights};
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+
+/// Turns CAD meshes into realistic LiDAR training data.
+#[derive(Parser)]
+#[command(name = "edgepuck", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Scan a folder of meshes into a LiDAR dataset (default: built-in procedural shapes)
+    #[command(alias = "gen")]
+    GenDataset(Box<gen_dataset::Args>),
+    /// Scan street scenes and cut them into labelled clusters (default: built-in objects)
+    GenScenes(gen_scenes::Args),
+    /// Simulate a drive through a street, as one capture of a VLP-32C's packets with its truth
+    GenDrive(gen_drive::Args),
+    /// Write the procedural shapes that gen-dataset uses by default as OFF files
+    GenShapes(gen_shapes::Args),
+    /// Sample points uniformly from the surfaces of meshes, as in ModelNet40's point clouds
+    SampleSurfaces(sample_surfaces::Args),
+    /// Scan one scene
+    Scan(scan::Args),
+    /// Cut a sweep of a sensor into ground and clusters
+    Segment(segment::Args),
+    /// Add rain, snow, fog or haze to a recorded scan, and label each point
+    Weather(weather::Args),
+    /// Make what goes wrong with a sweep, or with scans of meshes, as test sets of robustness
+    Corrupt(Box<corrupt::Args>),
+    /// Find and name the objects of a sweep
+    #[cfg(feature = "models")]
+    Detect(detect::Args),
+    /// Draw a picture of a scan from the side, from above and from the front
+    Preview(preview_scan::Args),
+    /// List the built-in sensors, or check and describe a sensor profile
+    Profile(profile::Args),
+    /// List the adapters (GPUs and CPU) that can cast rays
+    Adapters,
+    /// Merge the shards of a dataset into one dataset
+    MergeDataset(merge_dataset::Args),
+    /// Convert a PyTorch checkpoint into a model file for infer-cpu
+    #[cfg(feature = "models")]
+    ImportWeights(import_weights::Args),
+    /// Convert a model file to ONNX, for other inference engines
+    #[cfg(feature = "models")]
+    ExportOnnx(export_onnx::Args),
+    /// Train a network: `edgepuck train --help`
+    #[command(disable_help_flag = true)]
+    Train(trainer::Args),
+    /// Measure a model's accuracy on labelled clouds: `edgepuck eval --help`
+    #[command(disable_help_flag = true)]
+    Eval(trainer::Args),
+    /// Show which points determined a prediction: `edgepuck explain --help`
+    #[command(disable_help_flag = true)]
+    Explain(trainer::Args),
+    /// Compute the Chamfer distance of two clouds: `edgepuck compare-points A B`
+    #[command(disable_help_flag = true)]
+    ComparePoints(trainer::Args),
+    /// Recommend one configuration of the classifier for a device, based on measurements
+    #[cfg(feature = "models")]
+    Advise(advise::Args),
+}
+
+/// Does what the command line `words` asks for, of which the first is the program's name, and
+/// gives the exit code. Errors and help are printed.
+pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
+    match Cli::try_parse_from(words) {
+        Ok(cli) => outcome::exit_code(run(&cli.command)),
+        Err(error) => {
+            // A closed standard error does not change the exit code.
+            let _ = error.print();
+            error.exit_code() as u8
+        }
+    }
+}
+
+fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::GenDataset(args) => gen_dataset::run(args),
+        Command::GenScenes(args) => gen_scenes::run(args),
+        Command::GenDrive(args) => gen_drive::run(args),
+        Command::GenShapes(args) => gen_shapes::run(args),
+        Command::SampleSurfaces(args) => sample_surfaces::run(args),
+        Command::Scan(args) => scan::run(args),
+        Command::Segment(args) => segment::run(args),
+        Command::Weather(args) => weather::run(args),
+        Command::Corrupt(args) => corrupt::run(args),
+        #[cfg(feature = "models")]
+        Command::Detect(args) => detect::run(args),
+        Command::Preview(args) => preview_scan::run(args),
+        Command::Profile(args) => profile::run(args),
+        Command::Adapters => adapters::run(),
+        Command::MergeDataset(args) => merge_dataset::run(args),
+        #[cfg(feature = "models")]
+        Command::ImportWeights(args) => import_weights::run(args),
+        #[cfg(feature = "models")]
+        Command::ExportOnnx(args) => export_onnx::run(args),
+        Command::Train(args) => trainer::run("train", args),
+        Command::Eval(args) => trainer::run("eval", args),
+        Command::Explain(args) => trainer::run("explain", args),
+        Command::ComparePoints(args) => trainer::run("compare-points", args),
+        #[cfg(feature = "models")]
+        Command::Advise(args) => advise::run(args),
+    }
+}

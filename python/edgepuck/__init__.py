@@ -1,0 +1,38 @@
+"""LiDAR scans of triangle meshes as NumPy arrays, and a classifier of what a sensor sees.
+
+>>> import edgepuck as ep
+>>> lidar = ep.Sensor("vlp32c")
+>>> cube = ep.Mesh(*ep.box((1.0, 2.0, 0.5)))
+>>> scan = lidar.scan(cube, distance=4, elevation=10, noise=0.01, seed=7)
+>>> scan.positions.shape[1], scan.positions.dtype, len(scan.ring) == len(scan)
+(3, dtype('float32'), True)
+
+`Dataset` and `Scenes` cast as they are read, in the workers of a `DataLoader` too. Lengths are
+metres, angles degrees, times seconds. World and sensor have z up; sensors look along x.
+"""
+
+from ._edgepuck import Error, adapters, set_num_threads
+from .classifier import Classifier, Prediction
+from .dataset import Dataset
+from .mesh import Mesh, box
+from .scan import Scan
+from .scenes import Scene, Scenes, scan_scene
+from .segment import segment
+from .sensor import Sensor
+
+__all__ = [
+    "Classifier",
+    "Dataset",
+    "Error",
+    "Mesh",
+    "Prediction",
+    "Scan",
+    "Scene",
+    "Scenes",
+    "Sensor",
+    "adapters",
+    "box",
+    "scan_scene",
+    "segment",
+    "set_num_threads",
+]

@@ -1,0 +1,89 @@
+"""The classifier."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _edgepuck
+from .scan import Scan
+
+
+@dataclass
+class Prediction:
+    """What a network says of a cloud."""
+
+    label: str
+    """The class's name; of an object that the model is not to tell apart, its nearest class."""
+    index: int
+    """The class's place among `Classifier.classes`."""
+    is_unknown: bool
+    """Whether the object is none that the model is to tell apart."""
+    confidence: float
+    """The probability that the network gives the class."""
+    logits: NDArray[np.float32]
+    """The outputs of the network, [n_classes]."""
+
+
+class Classifier:
+    """A PointNet behind a sampler, on one thread of the CPU.
+
+    Args:
+        model: A bundled model, `edge-64` (the classes of ModelNet40) or `street-128` (cars and
+            persons among other things), or the path of a model file.
+        precision: What it computes in: f32, f32-fc16, f16 or i8.
+        sampler: How points are chosen: all, random, fps, voxel or cpl. By default, as in training.
+        points: How many are chosen.
+
+    Raises:
+        Error: The model cannot be read, or a setting does not fit it.
+
+    >>> Classifier("edge-64").classes[:3]
+    ['airplane', 'bathtub', 'bed']
+    """
+
+    def __init__(
+        self,
+        model: str | os.PathLike[str] = "edge-64",
+        *,
+        precision: str = "f32",
+        sampler: str | None = None,
+        points: int | None = None,
+    ) -> None:
+        self._arguments = (os.fspath(model), precision, sampler, points)
+        self._classifier = _edgepuck.Classifier(*self._arguments)
+
+    @property
+    def classes(self) -> list[str]:
+        """The classes' names."""
+        return self._classifier.classes
+
+    def __call__(self, cloud: Scan | ArrayLike, *, ground_z: float | None = None) -> Prediction:
+        """Classify a cloud, [n, 3], z up.
+
+        Args:
+            cloud: The points. Those that are not finite are an error.
+            ground_z: The height of the ground below the object, metres, for models such as
+                `street-128` that have learnt with it.
+        """
+        points = cloud.positions if isinstance(cloud, Scan) else cloud
+        return Prediction(**self._classifier.classify(points_of(points), ground_z))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, self._arguments
+
+
+def points_of(cloud: ArrayLike) -> NDArray[np.float32]:
+    """`cloud` as points of shape [n, 3]."""
+    points = np.ascontiguousarray(cloud, dtype=np.float32)
+    if points.ndim != 2:
+        raise _edgepuck.Error(f"expected points of shape [n, 3], found {list(points.shape)}")
+    return points
+
+
+def _again(model: str, precision: str, sampler: str | None, points: int | None) -> Classifier:
+    return Classifier(model, precision=precision, sampler=sampler, points=points)

@@ -1,0 +1,106 @@
+"""Triangle meshes."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _edgepuck
+
+Axis = Literal["y", "z"]
+Normalize = Literal["unit-sphere", "bbox", "none"]
+
+
+class Mesh:
+    """A triangle mesh where sensors find it: at the origin, z up.
+
+    Args:
+        source: The path of an OBJ, OFF, PLY or STL file; vertices, of shape [n, 3]; or anything
+            with `vertices` and `faces`, such as a mesh of trimesh.
+        faces: The indices of each triangle's vertices, of shape [m, 3], if `source` is vertices.
+        normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the
+            farthest of them to 1 m. `bbox` moves the middle of the bounding box there and scales its
+            longest side to 2 m. `none` moves only, and takes the unit of length for a metre.
+        up: The upward axis of `source`: y or z. By default, y of OBJ files and z of all else.
+
+    Raises:
+        Error: The file cannot be read, a number is not finite, an index is out of range, or there
+            is no triangle.
+
+    >>> len(Mesh(*box((1.0, 1.0, 1.0))))
+    12
+    """
+
+    _mesh: _edgepuck.Mesh
+
+    def __init__(
+        self,
+        source: str | os.PathLike[str] | ArrayLike | Any,
+        faces: ArrayLike | None = None,
+        *,
+        normalize: Normalize = "unit-sphere",
+        up: Axis | None = None,
+    ) -> None:
+        if faces is None and isinstance(source, (str, os.PathLike)):
+            self._arguments: tuple[Any, ...] = (os.fspath(source), None, normalize, up)
+            self._mesh = _edgepuck.Mesh.read(os.fspath(source), up, normalize)
+            return
+        if faces is None and hasattr(source, "vertices") and hasattr(source, "faces"):
+            source, faces = source.vertices, source.faces
+        if faces is None:
+            raise _edgepuck.Error(
+                "expected a path, a mesh with vertices and faces, or vertices and faces, found "
+                f"{type(source).__name__} alone"
+            )
+        vertices = np.ascontiguousarray(source, dtype=np.float64)
+        indices = _indices(faces)
+        for name, array in [("vertices", vertices), ("faces", indices)]:
+            if array.ndim != 2:
+                shape = list(array.shape)
+                raise _edgepuck.Error(f"expected {name} of shape [n, 3], found {shape}")
+        self._arguments = (vertices, indices, normalize, up)
+        self._mesh = _edgepuck.Mesh.of_arrays(vertices, indices, up or "z", normalize)
+
+    def __len__(self) -> int:
+        """The number of triangles."""
+        return len(self._mesh)
+
+    @property
+    def scale(self) -> float:
+        """Metres for each unit of length of the source."""
+        return self._mesh.scale
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """What became the origin, in the source's units, z up."""
+        return np.array(self._mesh.centre)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, self._arguments
+
+
+def _indices(faces: ArrayLike) -> NDArray[np.int64]:
+    found = np.asarray(faces)
+    if found.size and not np.issubdtype(found.dtype, np.integer):
+        raise _edgepuck.Error(f"expected faces of whole numbers, found {found.dtype}")
+    return np.ascontiguousarray(found, dtype=np.int64)
+
+
+def _again(source: Any, faces: Any, normalize: Normalize, up: Axis | None) -> Mesh:
+    return Mesh(source, faces, normalize=normalize, up=up)
+
+
+def box(size: tuple[float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The vertices and faces of a box of this length, width and height around the origin.
+
+    >>> vertices, faces = box((2.0, 1.0, 1.0))
+    >>> vertices.max(axis=0).tolist(), faces.shape
+    ([1.0, 0.5, 0.5], (12, 3))
+    """
+    corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)]) - 0.5
+    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    faces = [[a, *pair] for a, b, c, d in quads for pair in ([b, c], [c, d])]
+    return corners * np.asarray(size, dtype=np.float64), np.array(faces, dtype=np.int64)

@@ -1,0 +1,80 @@
+"""What a sensor saw."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# The names of columns in files that are no names in Python, or say too little there.
+_NAMES = {"return": "return_number", "sensor": "sensor_position"}
+
+
+@dataclass
+class Scan:
+    """The points of one scan, and what is known of each. What was not asked for is None.
+
+    The arrays are those that the scan was cast into: nothing is copied. `np.asarray(scan)` is
+    `positions`, and `torch.from_dlpack(scan.positions)` shares its memory.
+    """
+
+    positions: NDArray[np.float32]
+    """Where the beams ended, metres, from `origin`, [n, 3]."""
+    origin: NDArray[np.float64]
+    """What to add to each position, metres, [3]; zero but for sensors far from the origin."""
+    range: NDArray[np.float32] | None = None
+    """Distance from where the beam starts, metres, [n]."""
+    beam: NDArray[np.uint32] | None = None
+    """Number of the beam in firing order, [n]."""
+    ring: NDArray[np.uint16] | None = None
+    """Row of the beam, from below, [n]."""
+    time: NDArray[np.float32] | None = None
+    """Seconds since the revolution began, [n]."""
+    triangle: NDArray[np.uint32] | None = None
+    """Index of the triangle in its mesh, [n]."""
+    object: NDArray[np.uint32] | None = None
+    """Index of the object in its scene, [n]."""
+    intensity: NDArray[np.float32] | None = None
+    """Cosine of the incidence times the reflectivity, 0 to 1, [n]."""
+    power: NDArray[np.float32] | None = None
+    """Received power, relative to a white surface that faces the sensor 1 m away, [n]."""
+    reflectivity: NDArray[np.uint8] | None = None
+    """Calibrated reflectivity: 0 to 100 % diffuse, 101 to 255 retro-reflectors, [n]."""
+    return_number: NDArray[np.uint8] | None = None
+    """Number of the return among those of its beam, from 1, [n]."""
+    medium: NDArray[np.uint8] | None = None
+    """0 of a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray, [n]."""
+    sensor_position: NDArray[np.float32] | None = None
+    """Where the sensor was when the beam was fired, metres, [n, 3]."""
+    attitude: NDArray[np.float32] | None = None
+    """How the sensor was turned then, a rotation vector, radians, [n, 3]."""
+    normal: NDArray[np.float32] | None = None
+    """Unit normal of the surface, towards the sensor, [n, 3]."""
+
+    def __len__(self) -> int:
+        """The number of points."""
+        return len(self.positions)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        array = self.positions if dtype is None else self.positions.astype(dtype, copy=False)
+        return array.copy() if copy else array
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an NPZ file that `edgepuck preview` and `edgepuck segment` read."""
+        names = {name: column for column, name in _NAMES.items()}
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        known = {names.get(name, name): of for name, of in columns.items() if of is not None}
+        if not known["origin"].any():
+            del known["origin"]
+        with open(path, "wb") as file:
+            np.savez(file, **known)
+
+
+def scan_of(columns: Mapping[str, Any]) -> Scan:
+    """The scan of columns by their names in files."""
+    named = {_NAMES.get(column, column): of for column, of in columns.items()}
+    return Scan(**{**named, "origin": np.array(named["origin"])})

@@ -1,0 +1,95 @@
+"""Streets, yards and rooms, and scenes in files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _edgepuck
+from .scan import Scan, scan_of
+
+
+@dataclass
+class Scene:
+    """A scene, what its sensor saw, and what segmentation made of that."""
+
+    sensor: str
+    """The sensor's name."""
+    scan: Scan
+    """The points, in the sensor's frame; `object` 0 is the ground, and `i` is `objects[i - 1]`."""
+    objects: list[dict[str, Any]]
+    """`class`, `position` (the middle of its footprint), `size` and `yaw_deg` of each object, x along
+    the road, from the ground below the sensor."""
+    cluster: NDArray[np.int32]
+    """The cluster of each point, as `segment` gives it, [n]."""
+    cluster_class: NDArray[np.int64]
+    """The class of each cluster, an index into `Scenes.classes`, [n_clusters]."""
+    cluster_truth_share: NDArray[np.float32]
+    """The share of each cluster's points that lie on one surface, [n_clusters]."""
+    cluster_height: NDArray[np.float32]
+    """The height of each cluster's lowest point above the ground, metres, [n_clusters]."""
+
+
+class Scenes:
+    """Scenes that a recipe draws, each cast when it is read: a map-style dataset.
+
+    Args:
+        recipe: `street`, `yard`, `room`, or the path of a recipe in TOML.
+        length: How many scenes there are.
+        sensors: Sensors to use in place of the recipe's.
+        meshes: The folder of a user's own meshes, if the recipe has objects of kind "mesh".
+        seed: Of all random numbers.
+
+    Raises:
+        Error: The recipe or a mesh cannot be read.
+
+    >>> scene = Scenes("street", seed=3)[0]
+    >>> len(scene.cluster) == len(scene.scan)
+    True
+    """
+
+    def __init__(
+        self,
+        recipe: str | os.PathLike[str] = "street",
+        *,
+        length: int = 1000,
+        sensors: Sequence[str] = (),
+        meshes: str | os.PathLike[str] | None = None,
+        seed: int = 0,
+    ) -> None:
+        folder = None if meshes is None else os.fspath(meshes)
+        self._arguments = (os.fspath(recipe), list(sensors), folder, seed)
+        self._length = length
+        self._scenes = _edgepuck.Scenes(*self._arguments)
+
+    def __len__(self) -> int:
+        """The number of scenes."""
+        return self._length
+
+    @property
+    def classes(self) -> list[str]:
+        """The classes' names, `other` among them."""
+        return self._scenes.classes
+
+    def __getitem__(self, index: int) -> Scene:
+        if not -self._length <= index < self._length:
+            raise IndexError(f"expected the number of one of {self._length} scenes, found {index}")
+        told = self._scenes.draw(index % self._length)
+        return Scene(**{**told, "scan": scan_of(told["scan"])})
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"arguments": self._arguments, "length": self._length}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._arguments, self._length = state["arguments"], state["length"]
+        self._scenes = _edgepuck.Scenes(*self._arguments)
+
+
+def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:
+    """Scan the scene in a TOML file, as `edgepuck scan` does: the scan of each sensor by its name."""
+    return {name: scan_of(told) for name, told in _edgepuck.scan_scene(os.fspath(file), adapter)}

@@ -1,0 +1,38 @@
+"""Segmentation of sweeps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _edgepuck
+from .classifier import points_of
+from .scan import Scan
+
+
+def segment(
+    sweep: Scan | ArrayLike,
+    *,
+    rings: ArrayLike | None = None,
+    radius: float | None = None,
+    min_points: int | None = None,
+) -> NDArray[np.int32]:
+    """The cluster of each point of a sweep, from 0; -1 is ground, -2 what is in no cluster, and -3 a
+    point that is not finite.
+
+    Args:
+        sweep: A scan, or points of shape [n, 3], metres, with the sensor at the origin and z up.
+        rings: The ring of each point, from below, [n]; a scan has its own.
+        radius: Take the connected components of points within this many metres instead, for clouds
+            that are not sweeps of a sensor. There is no ground then.
+        min_points: The fewest points of a cluster.
+
+    >>> post = [[5.0, 0.0, 0.05 * i - 1.0] for i in range(30)]
+    >>> int(segment(post)[20])
+    0
+    """
+    if isinstance(sweep, Scan):
+        rings = sweep.ring if rings is None else rings
+        sweep = sweep.positions
+    of_points = None if rings is None else np.ascontiguousarray(rings, dtype=np.uint16)
+    return _edgepuck.segment(points_of(sweep), of_points, radius, min_points)

@@ -1,0 +1,118 @@
+"""Sensors."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _edgepuck
+from .mesh import Mesh
+from .scan import Scan, scan_of
+
+
+class Sensor:
+    """A LiDAR with its beams.
+
+    Args:
+        name: A built-in sensor, such as `vlp32c` (`edgepuck profile` lists them), or the path of a
+            profile in TOML or of an Ouster's metadata in JSON.
+        adapter: What casts: `cpu`, `auto` (a GPU if there is one), or a part of a GPU's name. Each
+            process opens it when it first casts.
+
+    Raises:
+        Error: There is no such sensor, or its profile is wrong.
+
+    >>> Sensor("vlp32c").directions.shape
+    (57888, 3)
+    """
+
+    def __init__(self, name: str | os.PathLike[str], *, adapter: str = "cpu") -> None:
+        self._arguments = (os.fspath(name), adapter)
+        self._sensor = _edgepuck.Sensor(os.fspath(name), adapter)
+
+    @property
+    def name(self) -> str:
+        """The sensor's name."""
+        return self._sensor.name
+
+    @property
+    def directions(self) -> NDArray[np.float64]:
+        """Unit vectors of all beams of a revolution, in firing order, [n_beams, 3]."""
+        return self._sensor.directions
+
+    @property
+    def rings(self) -> NDArray[np.uint16]:
+        """The ring of each beam, from below, [n_beams]."""
+        return self._sensor.rings
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Seconds from the start of a revolution to each beam, [n_beams]."""
+        return self._sensor.times
+
+    def scan(
+        self,
+        mesh: Mesh,
+        *,
+        distance: float = 3.0,
+        elevation: float = 20.0,
+        azimuth: float = 0.0,
+        pose: ArrayLike | None = None,
+        noise: float = 0.0,
+        dropout: float = 0.0,
+        effects: Mapping[str, Any] | None = None,
+        attributes: Iterable[str] = ("range", "beam", "ring", "time"),
+        seed: int = 0,
+    ) -> Scan:
+        """Scan a mesh from a place around it.
+
+        Args:
+            mesh: The mesh, at the origin.
+            distance: From the origin to the sensor, metres.
+            elevation: Of the sensor above the horizon, degrees.
+            azimuth: Of the sensor, counterclockwise from x, degrees.
+            pose: Where the sensor stands, in place of these three: a matrix of shape [4, 4] from the
+                sensor's frame (x forward, z up) to the world.
+            noise: Standard deviation of the noise of the ranges, metres.
+            dropout: Probability that a return is missing.
+            effects: More effects, as the table `[effects]` of a scene has them:
+                `{"footprint": {"samples": 7}, "returns": "last"}`.
+            attributes: What is wanted of each point besides its position: range, beam, ring, time,
+                triangle, object, intensity, power, reflectivity, return, medium, normal.
+            seed: Of all random numbers.
+
+        Raises:
+            Error: A value is out of its bounds or there is no such attribute or effect.
+        """
+        wanted: dict[str, Any] = dict(effects or {})
+        if noise != 0:
+            wanted["noise"] = {"sigma_m": noise, "mean_m": 0.0, "model": "range"}
+        if dropout != 0:
+            wanted["dropout"] = {"probability": dropout}
+        place = [distance, elevation, azimuth] if pose is None else np.asarray(pose).ravel().tolist()
+        told = json.dumps(_plain(wanted))
+        return scan_of(self._sensor.scan(mesh._mesh, place, told, list(attributes), seed))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, self._arguments
+
+    def __repr__(self) -> str:
+        return f"Sensor({self.name!r})"
+
+
+def _plain(value: Any) -> Any:
+    """`value` with numbers of NumPy as numbers of Python."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(of) for key, of in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(of) for of in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _again(name: str, adapter: str) -> Sensor:
+    return Sensor(name, adapter=adapter)

@@ -1,0 +1,86 @@
+//! The classifier.
+
+use crate::arrays::points;
+use crate::error::raised;
+use infer_cpu::Options;
+use infer_cpu::sampler::SamplerSpec;
+use numpy::{IntoPyArray, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// The models that are part of the package.
+const BUNDLED: [(&str, &[u8]); 2] =
+    [("edge-64", edgepuck_assets::EDGE_64), ("street-128", edgepuck_assets::STREET_128)];
+
+/// A network, and how it computes: on the caller's thread.
+#[pyclass(module = "edgepuck._edgepuck", frozen)]
+pub struct Classifier {
+    classifier: Mutex<infer_cpu::Classifier>,
+}
+
+#[pymethods]
+impl Classifier {
+    /// A bundled model by its name, or one in a file.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        model: &str,
+        precision: &str,
+        sampler: Option<&str>,
+        n_points: Option<usize>,
+    ) -> PyResult<Self> {
+        let mut options =
+            Options { precision: precision.parse().map_err(raised)?, ..Options::default() };
+        if let Some(kind) = sampler {
+            let kind = kind.parse().map_err(raised)?;
+            options.sampler = Some(SamplerSpec { kind, ..SamplerSpec::default() });
+        }
+        if let Some(points) = n_points {
+            options.sampler.get_or_insert_default().points = points;
+        }
+        let bundled = BUNDLED.iter().find(|(name, _)| *name == model);
+        let loaded = py.detach(|| match bundled {
+            Some((_, bytes)) => infer_cpu::Classifier::from_bytes(bytes, &options),
+            None => infer_cpu::Classifier::load(Path::new(model), &options),
+        });
+        Ok(Self { classifier: Mutex::new(loaded.map_err(raised)?) })
+    }
+
+    /// The classes' names, in the order of the logits.
+    #[getter]
+    fn classes(&self) -> Vec<String> {
+        self.lock().classes().iter().map(|class| class.to_string()).collect()
+    }
+
+    /// Classify a cloud, `[n, 3]`, that stands on ground of this height, if it is known.
+    fn classify<'py>(
+        &self,
+        py: Python<'py>,
+        cloud: PyReadonlyArray2<'py, f32>,
+        ground_z: Option<f32>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let cloud = points(&cloud)?;
+        let found = py.detach(|| {
+            let mut classifier = self.lock();
+            classifier.classify_on_ground(&cloud, ground_z).cloned()
+        });
+        let found = found.map_err(raised)?;
+        let told = PyDict::new(py);
+        told.set_item("label", &*found.label)?;
+        told.set_item("index", found.class)?;
+        told.set_item("is_unknown", found.is_unknown)?;
+        told.set_item("confidence", found.confidence())?;
+        told.set_item("logits", found.logits.clone().into_pyarray(py))?;
+        Ok(told)
+    }
+}
+
+impl Classifier {
+    /// The network, which one thread at a time uses. A fork finds it locked only while another
+    /// thread of the parent classifies.
+    fn lock(&self) -> std::sync::MutexGuard<'_, infer_cpu::Classifier> {
+        self.classifier.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

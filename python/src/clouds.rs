@@ -1,0 +1,106 @@
+//! The clouds of a dataset, cast as they are asked for.
+
+use crate::error::{raised, raised_with_causes};
+use crate::process::{self, LazyCaster};
+use edgepuck_dataset::on_demand;
+use formats::Split;
+use numpy::ndarray::Array3;
+use numpy::{IntoPyArray, PyArray1, PyArray3};
+use pyo3::prelude::*;
+use sim_gpu::mesh::tree::discover;
+use std::path::PathBuf;
+
+/// A folder of meshes, seen from places around them.
+#[pyclass(module = "edgepuck._edgepuck", frozen)]
+pub struct Clouds {
+    clouds: on_demand::Clouds,
+    n_points: usize,
+    caster: LazyCaster,
+}
+
+#[pymethods]
+impl Clouds {
+    /// The clouds of the meshes in a folder, of one split or of both, as `gen-dataset` makes them
+    /// with `flags`.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        meshes: PathBuf,
+        split: Option<&str>,
+        flags: Vec<String>,
+        cache_bytes: usize,
+        adapter: &str,
+    ) -> PyResult<Self> {
+        let split: Option<Split> = split.map(str::parse).transpose().map_err(raised)?;
+        let config = edgepuck_program::gen_dataset::config(&flags).map_err(raised_with_causes)?;
+        let n_points = config.packed_points as usize;
+        let clouds = process::run(py, || {
+            let mut found = discover(&meshes, config.seed)?;
+            let mut classes: Vec<String> = found.iter().map(|mesh| mesh.class.clone()).collect();
+            classes.dedup();
+            found.retain(|mesh| split.is_none_or(|split| mesh.split == split));
+            Ok(on_demand::Clouds::new(config, found, classes, cache_bytes)?)
+        })?;
+        let clouds = clouds.map_err(raised_with_causes)?;
+        Ok(Self { clouds, n_points, caster: LazyCaster::new(adapter) })
+    }
+
+    fn __len__(&self) -> usize {
+        self.clouds.len()
+    }
+
+    /// The classes' names, sorted.
+    #[getter]
+    fn classes(&self) -> Vec<&str> {
+        self.clouds.classes().iter().map(String::as_str).collect()
+    }
+
+    /// The class of each cloud, `[len]`.
+    #[getter]
+    fn labels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let labels = (0..self.clouds.len()).map(|index| self.clouds.label(index) as i64);
+        labels.collect::<Vec<_>>().into_pyarray(py)
+    }
+
+    /// The file of the mesh that cloud `index` is of, from the folder of meshes.
+    fn source(&self, index: usize) -> PyResult<&str> {
+        self.check(index)?;
+        Ok(&self.clouds.mesh(index).relative)
+    }
+
+    /// The clouds of these numbers, `[n, points, 3]`, and their classes, `[n]`.
+    fn draw<'py>(
+        &self,
+        py: Python<'py>,
+        seed: u64,
+        indices: Vec<usize>,
+    ) -> PyResult<(Bound<'py, PyArray3<f32>>, Bound<'py, PyArray1<i64>>)> {
+        indices.iter().try_for_each(|&index| self.check(index))?;
+        let caster = self.caster.open(&self.clouds.cast_effects())?;
+        let drawn = process::run(py, || self.clouds.draw(&caster, seed, &indices))?;
+        let drawn = drawn.map_err(raised)?;
+        let labels: Vec<i64> = drawn.iter().map(|cloud| cloud.label as i64).collect();
+        let mut points = Vec::with_capacity(drawn.len() * self.n_points * 3);
+        drawn.iter().for_each(|cloud| points.extend_from_slice(cloud.points.as_flattened()));
+        let shape = (drawn.len(), self.n_points, 3);
+        let points = Array3::from_shape_vec(shape, points).map_err(raised)?;
+        Ok((points.into_pyarray(py), labels.into_pyarray(py)))
+    }
+}
+
+impl Clouds {
+    fn check(&self, index: usize) -> PyResult<()> {
+        let n = self.clouds.len();
+        if index < n {
+            return Ok(());
+        }
+        let cause = format!("expected the number of one of {n} clouds, found {index}");
+        Err(pyo3::exceptions::PyIndexError::new_err(cause))
+    }
+}
+
+/// The seed of an epoch, in which the dataset that has `seed` shows other views.
+#[pyfunction]
+pub fn seed_of_epoch(seed: u64, epoch: u32) -> u64 {
+    on_demand::seed_of_epoch(seed, epoch)
+}

@@ -1,0 +1,36 @@
+//! The Python module `edgepuck._edgepuck`: what the package in `python/edgepuck` is made of.
+//!
+//! Python's side has the names, the defaults and the documentation. Here, numbers are in the
+//! units of the libraries, and whatever takes long runs on the threads of this very process
+//! ([`process`]), without Python's lock.
+
+mod arrays;
+mod classifier;
+mod clouds;
+mod error;
+mod mesh;
+mod process;
+mod scenes;
+mod segment;
+mod sensor;
+
+/// What the package in `python/edgepuck` is made of.
+#[pyo3::pymodule]
+mod _edgepuck {
+    #[pymodule_export]
+    use super::classifier::Classifier;
+    #[pymodule_export]
+    use super::clouds::{Clouds, seed_of_epoch};
+    #[pymodule_export]
+    use super::error::Error;
+    #[pymodule_export]
+    use super::mesh::Mesh;
+    #[pymodule_export]
+    use super::process::{adapters, main, set_num_threads};
+    #[pymodule_export]
+    use super::scenes::{Scenes, scan_scene};
+    #[pymodule_export]
+    use super::segment::segment;
+    #[pymodule_export]
+    use super::sensor::Sensor;
+}

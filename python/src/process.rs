@@ -1,0 +1,133 @@
+//! What belongs to one process: its threads and its adapters.
+//!
+//! A process that forks leaves its threads behind: a pool of the parent's never answers in the
+//! child, and an adapter that the parent opened is not the child's. So both are made when they are
+//! first needed and kept with the number of the process. Nothing is started by an import.
+
+use crate::error::raised;
+use pyo3::prelude::*;
+use pyo3::types::PyAnyMethods;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use sim_gpu::caster::{AdapterRequest, Caster};
+use sim_gpu::effects::Effects;
+use std::ffi::OsString;
+use std::mem;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Something and the process that made it.
+struct Own<T>(u32, T);
+
+impl<T> Own<T> {
+    /// What is kept, if this process made it.
+    fn of_this_process(own: &Option<Self>) -> Option<&T> {
+        own.as_ref().filter(|Self(process, _)| *process == std::process::id()).map(|Self(_, t)| t)
+    }
+
+    /// Keeps `new`. What a parent made is never dropped: its threads and its device are not here.
+    fn replace(own: &mut Option<Self>, new: T) {
+        if let Some(old) = own.replace(Self(std::process::id(), new)) {
+            if old.0 == std::process::id() { drop(old) } else { mem::forget(old) }
+        }
+    }
+}
+
+/// The pool of this process. It is locked by holders of Python's lock alone, so that no fork finds
+/// it locked.
+static POOL: Mutex<Option<Own<Arc<ThreadPool>>>> = Mutex::new(None);
+
+/// How many threads the user asked for; 0 if they did not.
+static THREADS: AtomicUsize = AtomicUsize::new(0);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Does `work` on the threads of this process, without Python's lock.
+pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let pool = pool(py)?;
+    Ok(py.detach(|| pool.install(work)))
+}
+
+fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
+    let mut pool = lock(&POOL);
+    if let Some(pool) = Own::of_this_process(&pool) {
+        return Ok(Arc::clone(pool));
+    }
+    let threads = match THREADS.load(Relaxed) {
+        // As many as there are cores, or as RAYON_NUM_THREADS says.
+        0 if !is_worker(py)? => 0,
+        0 => 1,
+        asked => asked,
+    };
+    let built = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|number| format!("edgepuck-{number}"))
+        .build()
+        .map_err(raised)?;
+    let built = Arc::new(built);
+    Own::replace(&mut pool, Arc::clone(&built));
+    Ok(built)
+}
+
+/// Whether this is a child that `multiprocessing` started, such as a worker of a `DataLoader`.
+fn is_worker(py: Python<'_>) -> PyResult<bool> {
+    // A process that has not imported it is no child of it.
+    let modules = py.import("sys")?.getattr("modules")?;
+    let multiprocessing = modules.call_method1("get", ("multiprocessing.process",))?;
+    if multiprocessing.is_none() {
+        return Ok(false);
+    }
+    Ok(!multiprocessing.call_method0("parent_process")?.is_none())
+}
+
+/// Use this many threads from now on; 0 is the default.
+#[pyfunction]
+pub fn set_num_threads(threads: usize) {
+    THREADS.store(threads, Relaxed);
+    let mut pool = lock(&POOL);
+    if Own::of_this_process(&pool).is_some() {
+        *pool = None;
+    }
+}
+
+/// An adapter and its effects, opened by each process that casts.
+pub struct LazyCaster {
+    request: AdapterRequest,
+    opened: Mutex<Option<Own<(Effects, Arc<Caster>)>>>,
+}
+
+impl LazyCaster {
+    pub fn new(adapter: &str) -> Self {
+        let Ok(request) = adapter.parse();
+        Self { request, opened: Mutex::new(None) }
+    }
+
+    /// The caster of this process for `effects`.
+    pub fn open(&self, effects: &Effects) -> PyResult<Arc<Caster>> {
+        let mut opened = lock(&self.opened);
+        if let Some((modelled, caster)) = Own::of_this_process(&opened)
+            && modelled == effects
+        {
+            return Ok(Arc::clone(caster));
+        }
+        let caster = Arc::new(Caster::open(&self.request, effects).map_err(raised)?);
+        Own::replace(&mut opened, (effects.clone(), Arc::clone(&caster)));
+        Ok(caster)
+    }
+}
+
+/// The names of the adapters that can cast, the CPU last.
+#[pyfunction]
+pub fn adapters(py: Python<'_>) -> Vec<String> {
+    let found = py.detach(sim_gpu::gpu::list_adapters);
+    let names = found.into_iter().map(|adapter| adapter.name);
+    names.chain(["cpu".to_owned()]).collect()
+}
+
+/// Run the program `edgepuck` with these words, of which the first is its name, and return its exit
+/// code.
+#[pyfunction]
+pub fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| edgepuck_program::cli::main(words))
+}

@@ -1,0 +1,91 @@
+//! Scenes: those that recipes draw, and those that files describe.
+
+use crate::error::{raised, raised_with_causes};
+use crate::process::{self, LazyCaster};
+use crate::{arrays, segment};
+use edgepuck_scenes::{Generation, SceneError, Stage};
+use edgepuck_segment::Settings;
+use numpy::IntoPyArray;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use sim_gpu::caster::Caster;
+use sim_gpu::job::Culling;
+use sim_gpu::scene::{Scene, cast};
+use std::path::PathBuf;
+
+/// The scenes of a recipe.
+#[pyclass(module = "edgepuck._edgepuck", frozen)]
+pub struct Scenes {
+    stage: Stage,
+}
+
+#[pymethods]
+impl Scenes {
+    /// A built-in recipe by its name, or one in a file. The CPU casts.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        recipe: PathBuf,
+        sensors: Vec<String>,
+        meshes: Option<PathBuf>,
+        seed: u64,
+    ) -> PyResult<Self> {
+        let stage = process::run(py, || {
+            let mut scenes = edgepuck_program::gen_scenes::read_recipe(&recipe)?;
+            scenes.use_sensors(&sensors);
+            let open = |effects: &_| Ok::<_, SceneError>(Caster::Cpu(Clone::clone(effects)));
+            Ok(Stage::new(scenes, &recipe, meshes.as_deref(), seed, open)?)
+        })?;
+        Ok(Self { stage: stage.map_err(raised_with_causes)? })
+    }
+
+    /// The classes' names, sorted.
+    #[getter]
+    fn classes(&self) -> Vec<&str> {
+        self.stage.classes().iter().map(String::as_str).collect()
+    }
+
+    /// Scene number `number`: its scan, the cluster of each point, and what clusters and objects
+    /// are.
+    fn draw<'py>(&self, py: Python<'py>, number: u32) -> PyResult<Bound<'py, PyDict>> {
+        let settings = Settings::default();
+        let drawn = process::run(py, || Generation::new(&self.stage, number, &settings))?;
+        let Generation { scene, sweep, labels, clusters } = drawn.map_err(raised)?;
+        let told = PyDict::new(py);
+        told.set_item("sensor", &self.stage.sensor(&scene).name)?;
+        told.set_item("cluster", segment::numbers(&labels).into_pyarray(py))?;
+        let of_clusters = |of: &dyn Fn(&edgepuck_scenes::LabelledCluster) -> f32| {
+            clusters.iter().map(of).collect::<Vec<_>>().into_pyarray(py)
+        };
+        let classes: Vec<i64> = clusters.iter().map(|cluster| cluster.label as i64).collect();
+        told.set_item("cluster_class", classes.into_pyarray(py))?;
+        told.set_item("cluster_truth_share", of_clusters(&|cluster| cluster.truth_share))?;
+        told.set_item("cluster_height", of_clusters(&|cluster| cluster.height_m))?;
+        let objects = PyList::empty(py);
+        for (i, object) in scene.objects.iter().enumerate() {
+            let of_object = PyDict::new(py);
+            of_object.set_item("class", &self.stage.recipe().object[object.entry].class)?;
+            of_object.set_item("position", object.position.to_array())?;
+            of_object.set_item("size", self.stage.size_m(&scene, i).to_array())?;
+            of_object.set_item("yaw_deg", object.yaw_rad.to_degrees())?;
+            objects.append(of_object)?;
+        }
+        told.set_item("objects", objects)?;
+        told.set_item("scan", arrays::scan(py, sweep.scan)?)?;
+        Ok(told)
+    }
+}
+
+/// Scan the scene in a TOML file: for each of its sensors the name and the scan.
+#[pyfunction]
+pub fn scan_scene<'py>(
+    py: Python<'py>,
+    file: PathBuf,
+    adapter: &str,
+) -> PyResult<Vec<(String, Bound<'py, PyDict>)>> {
+    let scene = process::run(py, || Scene::load(&file))?.map_err(raised)?;
+    let caster = LazyCaster::new(adapter).open(&scene.effects)?;
+    let scans = process::run(py, || cast(&scene, &caster, Culling::On))?.map_err(raised)?;
+    let told = scans.into_iter().map(|of| Ok((of.sensor, arrays::scan(py, of.scan)?)));
+    told.collect()
+}

@@ -1,0 +1,146 @@
+//! A sensor, and its scan of one mesh.
+
+use crate::arrays;
+use crate::error::{raised, raised_with_causes};
+use crate::mesh::Mesh;
+use crate::process::{self, LazyCaster};
+use formats::rng::StreamKey;
+use formats::scan::Attribute;
+use glam::{DMat3, DQuat, DVec3};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sim_gpu::effects::{Effects, Intensity};
+use sim_gpu::pose::Pose;
+use sim_gpu::scan::{ScanRequest, scan};
+use sim_gpu::sensor::BeamPattern;
+use std::sync::{Arc, OnceLock};
+
+/// A sensor and its beams.
+#[pyclass(module = "edgepuck._edgepuck", frozen)]
+pub struct Sensor {
+    sensor: sim_gpu::sensor::Sensor,
+    pattern: OnceLock<Arc<BeamPattern>>,
+    caster: LazyCaster,
+}
+
+#[pymethods]
+impl Sensor {
+    /// A built-in sensor by its name, or the profile in a file.
+    #[new]
+    fn new(name: &str, adapter: &str) -> PyResult<Self> {
+        let sensor = sim_gpu::sensor::Sensor::resolve(name).map_err(raised)?;
+        Ok(Self { sensor, pattern: OnceLock::new(), caster: LazyCaster::new(adapter) })
+    }
+
+    /// The sensor's name.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.sensor.name
+    }
+
+    /// Unit vectors of all beams in the sensor's frame, `[n_beams, 3]`.
+    #[getter]
+    fn directions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let pattern = self.pattern(py)?;
+        let flat = pattern.directions.iter().flat_map(|d| d.to_array()).collect();
+        let array = Array2::from_shape_vec((pattern.len(), 3), flat).map_err(raised)?;
+        Ok(array.into_pyarray(py))
+    }
+
+    /// The ring of each beam, counted from below, `[n_beams]`.
+    #[getter]
+    fn rings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
+        Ok(self.pattern(py)?.ring.clone().into_pyarray(py))
+    }
+
+    /// Seconds from the start of the revolution to each beam, `[n_beams]`.
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(self.pattern(py)?.time_s.clone().into_pyarray(py))
+    }
+
+    /// Scan a mesh from where `pose` stands: position and quaternion (x, y, z, w), or distance,
+    /// elevation and azimuth.
+    fn scan<'py>(
+        &self,
+        py: Python<'py>,
+        mesh: &Mesh,
+        pose: Vec<f64>,
+        effects: &str,
+        attributes: Vec<String>,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let pose = pose_of(&pose)?;
+        let mut effects: Effects =
+            serde_json::from_str(effects).map_err(|error| raised(format!("effects: {error}")))?;
+        let mut request_attributes = std::collections::BTreeSet::new();
+        for name in attributes {
+            request_attributes.insert(name.parse::<Attribute>().map_err(raised)?);
+        }
+        if request_attributes.contains(&Attribute::Intensity) {
+            effects.intensity.get_or_insert(Intensity);
+        }
+        effects.validate().map_err(raised)?;
+        effects.for_sensor(&self.sensor).map_err(raised)?;
+        let (pattern, caster) = (self.pattern(py)?, self.caster.open(&effects)?);
+        let scanned = process::run(py, || {
+            let widened;
+            let pattern = match effects.footprint {
+                None => &*pattern,
+                Some(_) => {
+                    widened = effects.widen((*pattern).clone(), &self.sensor)?;
+                    &widened
+                }
+            };
+            let mut request = ScanRequest::new(&self.sensor, pattern, pose);
+            request.attributes = request_attributes;
+            request.stream = StreamKey::new(seed, "scan", 0);
+            Ok(scan(&caster, &mesh.target, &request)?)
+        })?;
+        arrays::scan(py, scanned.map_err(raised_with_causes)?)
+    }
+}
+
+impl Sensor {
+    fn pattern(&self, py: Python<'_>) -> PyResult<Arc<BeamPattern>> {
+        if let Some(pattern) = self.pattern.get() {
+            return Ok(Arc::clone(pattern));
+        }
+        let made = process::run(py, || Arc::new(self.sensor.pattern()))?;
+        Ok(Arc::clone(self.pattern.get_or_init(|| made)))
+    }
+}
+
+/// The pose that these numbers tell.
+fn pose_of(numbers: &[f64]) -> PyResult<Pose> {
+    if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
+        return Err(raised(format!(
+            "expected finite numbers as the sensor's place, found {number}"
+        )));
+    }
+    match *numbers {
+        [distance_m, elevation_deg, azimuth_deg] => {
+            if distance_m <= 0.0 {
+                return Err(raised(format!("expected a distance above 0, found {distance_m}")));
+            }
+            let (elevation, azimuth) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
+            Ok(Pose::view(distance_m, elevation, azimuth, DVec3::ZERO))
+        }
+        // A matrix of four rows.
+        [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] => {
+            let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
+            let is_rotation = (rotation * rotation.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-6)
+                && rotation.determinant() > 0.0;
+            if !is_rotation {
+                return Err(raised(
+                    "pose: expected a rotation in the first three rows and columns",
+                ));
+            }
+            let world_from_sensor = DQuat::from_mat3(&rotation).normalize();
+            Ok(Pose { position_m: DVec3::new(x, y, z), world_from_sensor })
+        }
+        _ => Err(raised("pose: expected a matrix of shape [4, 4] whose last row is 0, 0, 0, 1")),
+    }
+}
