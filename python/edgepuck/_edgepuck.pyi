@@ -4,6 +4,21 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Classifier",
+    "Clouds",
+    "Error",
+    "Mesh",
+    "Scenes",
+    "Sensor",
+    "adapters",
+    "main",
+    "scan_scene",
+    "seed_of_epoch",
+    "segment",
+    "set_num_threads",
+]
+
 class Error(ValueError): ...
 
 @final

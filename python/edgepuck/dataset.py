@@ -148,7 +148,8 @@ class Dataset:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._arguments, self._seed = state["arguments"], state["seed"]
         self._clouds = _edgepuck.Clouds(*self._arguments)
-        self._epoch = state["shared"] or multiprocessing.RawValue("Q", state["epoch"])
+        shared = state["shared"]
+        self._epoch = multiprocessing.RawValue("Q", state["epoch"]) if shared is None else shared
 
 
 def _from_to(value: Range) -> str:

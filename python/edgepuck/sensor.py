@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -28,7 +29,7 @@ class Sensor:
         Error: There is no such sensor, or its profile is wrong.
 
     >>> Sensor("vlp32c").directions.shape
-    (57888, 3)
+    (57870, 3)
     """
 
     def __init__(self, name: str | os.PathLike[str], *, adapter: str = "cpu") -> None:
@@ -95,7 +96,7 @@ class Sensor:
         if dropout != 0:
             wanted["dropout"] = {"probability": dropout}
         place = [distance, elevation, azimuth] if pose is None else np.asarray(pose).ravel().tolist()
-        told = json.dumps(_plain(wanted))
+        told = json.dumps(_plain(wanted, "effects"))
         return scan_of(self._sensor.scan(mesh._mesh, place, told, list(attributes), seed))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -105,13 +106,16 @@ class Sensor:
         return f"Sensor({self.name!r})"
 
 
-def _plain(value: Any) -> Any:
-    """`value` with numbers of NumPy as numbers of Python."""
+def _plain(value: Any, key: str) -> Any:
+    """`value`, which stands at `key`, in what JSON has."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(of) for key, of in value.items()}
+        return {str(name): _plain(of, f"{key}.{name}") for name, of in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(of) for of in value]
-    return value.item() if isinstance(value, np.generic) else value
+        return [_plain(of, f"{key}[{i}]") for i, of in enumerate(value)]
+    plain = value.item() if isinstance(value, np.generic) else value
+    if isinstance(plain, float) and not math.isfinite(plain):
+        raise _edgepuck.Error(f"{key}: expected a finite number, found {plain}")
+    return plain
 
 
 def _again(name: str, adapter: str) -> Sensor:

@@ -1,0 +1,91 @@
+"""Meshes come from arrays, and scans are arrays."""
+
+import pickle
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import edgepuck as ep
+
+
+def test_points_lie_on_the_mesh_at_their_ranges(cube: tuple) -> None:
+    mesh = ep.Mesh(*cube, normalize="none")
+    scan = ep.Sensor("vlp32c").scan(mesh, distance=4, elevation=0, attributes=["range", "normal"])
+    assert scan.positions.dtype == np.float32
+    distance = np.abs(scan.positions).max(axis=1)
+    np.testing.assert_allclose(distance, 0.5, atol=1e-6)
+    sensor = np.array([4.0, 0.0, 0.0])
+    np.testing.assert_allclose(np.linalg.norm(scan.positions - sensor, axis=1), scan.range, rtol=1e-6)
+    np.testing.assert_array_equal(scan.normal, np.tile(np.float32([1, 0, 0]), (len(scan), 1)))
+
+
+def test_arrays_are_views_of_what_was_cast(cube: tuple) -> None:
+    scan = ep.Sensor("vlp32c").scan(ep.Mesh(*cube))
+    assert not scan.positions.flags.owndata
+    assert np.shares_memory(np.from_dlpack(scan.positions), scan.positions)
+    assert np.shares_memory(np.asarray(scan), scan.positions)
+
+
+def test_a_pose_is_a_matrix(cube: tuple) -> None:
+    lidar, mesh = ep.Sensor("vlp32c"), ep.Mesh(*cube)
+    # At (3, 0, 0), looking back along x.
+    pose = np.array([[-1, 0, 0, 3], [0, -1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
+    there = lidar.scan(mesh, pose=pose)
+    around = lidar.scan(mesh, distance=3, elevation=0)
+    np.testing.assert_allclose(there.positions, around.positions, atol=1e-6)
+
+
+def test_effects_change_a_scan_and_a_seed_its_noise(cube: tuple) -> None:
+    lidar, mesh = ep.Sensor("vlp32c"), ep.Mesh(*cube)
+    clean = lidar.scan(mesh)
+    noisy = [lidar.scan(mesh, noise=0.05, seed=seed).range for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(noisy[0], noisy[1])
+    assert not np.array_equal(noisy[0], noisy[2])
+    assert np.std(noisy[0] - clean.range) == pytest.approx(0.05, rel=0.1)
+    dual = lidar.scan(
+        mesh, effects={"footprint": {"samples": np.int64(7)}, "returns": "dual"},
+        attributes=["return"],
+    )
+    assert len(dual) > len(clean)
+
+
+def test_meshes_of_other_libraries_are_taken(cube: tuple) -> None:
+    vertices, faces = cube
+    other = SimpleNamespace(vertices=vertices, faces=faces.astype(np.uint32))
+    scan = ep.Sensor("vlp32c").scan(ep.Mesh(other))
+    np.testing.assert_array_equal(scan.positions, ep.Sensor("vlp32c").scan(ep.Mesh(*cube)).positions)
+
+
+def test_meshes_of_trimesh_are_taken() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    scan = ep.Sensor("vlp32c").scan(ep.Mesh(ball), distance=3)
+    np.testing.assert_allclose(np.linalg.norm(scan.positions, axis=1), 1.0, atol=2e-3)
+
+
+def test_objects_are_pickled_by_what_they_were_made_of(cube: tuple) -> None:
+    mesh, lidar, classify = ep.Mesh(*cube), ep.Sensor("vlp32c"), ep.Classifier("edge-64")
+    again = [pickle.loads(pickle.dumps(it)) for it in (mesh, lidar, classify)]
+    scan = lidar.scan(mesh)
+    np.testing.assert_array_equal(again[1].scan(again[0]).positions, scan.positions)
+    np.testing.assert_array_equal(again[2](scan).logits, classify(scan).logits)
+
+
+def test_a_classifier_knows_a_chair(shapes) -> None:
+    classify = ep.Classifier("edge-64", precision="i8")
+    (file, *_) = sorted((shapes / "chair/test").glob("*.off"))
+    found = classify(ep.Sensor("vlp32c").scan(ep.Mesh(file), distance=3))
+    assert found.label in classify.classes
+    assert found.index == int(np.argmax(found.logits))
+    assert 0 < found.confidence <= 1
+
+
+def test_clusters_are_numbered_and_ground_is_told() -> None:
+    scene = ep.Scenes("street", seed=2)[4]
+    assert scene.cluster.max() + 1 == len(scene.cluster_class)
+    assert {-1, 0} <= set(scene.cluster)
+    own = ep.segment(scene.scan)
+    # The recipe draws how low a robot takes points for ground; alone, it is the default.
+    assert (own == -1).any()
+    assert own.max() > 5

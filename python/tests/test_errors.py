@@ -1,0 +1,98 @@
+"""What cannot be used is named, with the cause, in an exception."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import edgepuck as ep
+
+SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ep.Mesh("missing.off"), "missing.off: cannot be read"),
+        (lambda: ep.Mesh(SQUARE), "found list alone"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1, 3]]), "index"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1, -1]]), "expected indices of 3 vertices, found -1"),
+        (lambda: ep.Mesh(SQUARE, [[0.5, 1, 2]]), "expected faces of whole numbers"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1]]), "expected faces of shape"),
+        (lambda: ep.Mesh(SQUARE, []), "expected faces of shape"),
+        (lambda: ep.Mesh(SQUARE, np.zeros((0, 3), int)), "at least one triangle"),
+        (lambda: ep.Mesh([[0, 0, np.nan], *SQUARE], [[0, 1, 2]]), "finite coordinates"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], up="x"), "expected one of y, z"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], normalize="no"), "unit-sphere"),
+        (lambda: ep.Sensor("vlp99"), "vlp99"),
+        (lambda: ep.Classifier("edge-65"), "edge-65"),
+        (lambda: ep.Classifier("edge-64", precision="i9"), "i9"),
+        (lambda: ep.Classifier("edge-64")(np.zeros((5, 2))), "expected points of shape"),
+        (lambda: ep.Classifier("edge-64")(np.zeros(5)), "expected points of shape"),
+        (lambda: ep.Classifier("edge-64")(np.full((5, 3), np.nan)), "finite"),
+        (lambda: ep.segment(np.zeros((5, 4))), "expected points of shape"),
+        (lambda: ep.segment(np.zeros((5, 3)), rings=[1, 2]), "ring"),
+        (lambda: ep.Scenes("moon"), "moon"),
+        (lambda: ep.scan_scene("missing.toml"), "missing.toml"),
+        (lambda: ep.Dataset("missing"), "missing: cannot be read"),
+    ],
+)
+def test_what_cannot_be_used_is_named(make, message: str) -> None:
+    with pytest.raises(ep.Error, match="(?s)") as caught:
+        make()
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        ({"distance": 0}, "distance above 0, found 0"),
+        ({"distance": float("nan")}, "finite"),
+        ({"noise": float("inf")}, "sigma"),
+        ({"dropout": 2}, "probability"),
+        ({"attributes": ["colour"]}, "colour"),
+        ({"effects": {"mist": 1}}, "mist"),
+        ({"effects": {"footprint": {"samples": 5}}}, "samples"),
+        ({"pose": np.eye(3)}, "shape"),
+        ({"pose": 2 * np.diag([1, 1, 1, 0.5])}, "rotation"),
+    ],
+)
+def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, message: str) -> None:
+    with pytest.raises(ep.Error) as caught:
+        ep.Sensor("vlp32c").scan(ep.Mesh(*cube), **wanted)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        ({"sensor": "vlp99"}, "vlp99"),
+        ({"distance": (5, 2)}, "at least 5"),
+        ({"noise": -1}, "sigma"),
+        ({"split": "dev"}, "dev"),
+        ({"points": 0}, "points"),
+        ({"min_points": 1 << 24}, "expected a view of at least 16777216 points"),
+    ],
+)
+def test_a_dataset_that_cannot_be_drawn_says_why(shapes: Path, wanted: dict, message: str) -> None:
+    with pytest.raises(ep.Error) as caught:
+        ep.Dataset(shapes, **wanted)[0]
+    assert message in str(caught.value)
+
+
+def test_a_bad_mesh_of_a_dataset_is_named_when_it_is_drawn(tmp_path: Path) -> None:
+    (tmp_path / "cup/train").mkdir(parents=True)
+    (tmp_path / "cup/train/a.off").write_text("OFF\n3 1 0\n0 0 nan\n")
+    dataset = ep.Dataset(tmp_path)
+    with pytest.raises(ep.Error, match=r"^cup/train/a.off:3: expected a finite coordinate"):
+        dataset[0]
+    with pytest.raises(IndexError, match="one of 1 clouds, found 1"):
+        dataset[1]
+
+
+def test_huge_and_tiny_meshes_are_ordinary(cube: tuple) -> None:
+    vertices, faces = cube
+    for size in [1e-200, 1e200]:
+        scan = ep.Sensor("vlp32c").scan(ep.Mesh(vertices * size, faces))
+        assert len(scan) > 1000
+        assert np.isfinite(scan.positions).all()

@@ -1,0 +1,24 @@
+"""The stubs of the compiled module say what it has, and the package's types agree."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import edgepuck
+
+
+def test_stubs_are_those_of_the_module() -> None:
+    pytest.importorskip("mypy")
+    run("mypy.stubtest", "edgepuck._edgepuck")
+
+
+def test_the_package_is_typed() -> None:
+    pytest.importorskip("mypy")
+    run("mypy", "--strict", "--ignore-missing-imports", str(Path(edgepuck.__file__).parent))
+
+
+def run(*words: str) -> None:
+    done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
