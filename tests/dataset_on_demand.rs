@@ -37,7 +37,7 @@ fn asked(seed: u64) -> DatasetConfig {
         variants: vec![Variant::Noisy],
         sets: vec![SetConfig {
             name: "rotational".to_owned(),
-            sensor: Sensor::builtin("vlp32c").unwrap(),
+            sensor: Sensor::builtin("vlp32c").expect("a built-in sensor"),
             viewpoints: Viewpoints::Views(views),
         }],
         layouts: vec![],
@@ -48,15 +48,15 @@ fn asked(seed: u64) -> DatasetConfig {
 
 /// Meshes of all built-in classes, two to train with and one to test with.
 fn meshes(folder: &Path) -> Vec<MeshEntry> {
-    edgepuck_shapes::write_tree(folder, 3, 2, 1).unwrap();
-    discover(folder, 0).unwrap()
+    edgepuck_shapes::write_tree(folder, 3, 2, 1).expect("meshes are written");
+    discover(folder, 0).expect("meshes are there")
 }
 
 fn clouds(meshes: &[MeshEntry], config: DatasetConfig, cache_bytes: usize) -> Clouds {
     let train = meshes.iter().filter(|mesh| mesh.split == Split::Train).cloned().collect();
     let mut classes: Vec<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
     classes.dedup();
-    Clouds::new(config, train, classes, cache_bytes).unwrap()
+    Clouds::new(config, train, classes, cache_bytes).expect("a dataset")
 }
 
 fn cpu(clouds: &Clouds) -> Caster {

@@ -10,6 +10,9 @@ use pyo3::prelude::*;
 use sim_gpu::mesh::tree::discover;
 use std::path::PathBuf;
 
+/// Clouds, `[n, points, 3]`, and their classes, `[n]`.
+type Batch<'py> = (Bound<'py, PyArray3<f32>>, Bound<'py, PyArray1<i64>>);
+
 /// A folder of meshes, seen from places around them.
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
 pub struct Clouds {
@@ -69,12 +72,7 @@ impl Clouds {
     }
 
     /// The clouds of these numbers, `[n, points, 3]`, and their classes, `[n]`.
-    fn draw<'py>(
-        &self,
-        py: Python<'py>,
-        seed: u64,
-        indices: Vec<usize>,
-    ) -> PyResult<(Bound<'py, PyArray3<f32>>, Bound<'py, PyArray1<i64>>)> {
+    fn draw<'py>(&self, py: Python<'py>, seed: u64, indices: Vec<usize>) -> PyResult<Batch<'py>> {
         indices.iter().try_for_each(|&index| self.check(index))?;
         let caster = self.caster.open(&self.clouds.cast_effects())?;
         let drawn = process::run(py, || self.clouds.draw(&caster, seed, &indices))?;

@@ -94,7 +94,7 @@ pub fn set_num_threads(threads: usize) {
 /// An adapter and its effects, opened by each process that casts.
 pub struct LazyCaster {
     request: AdapterRequest,
-    opened: Mutex<Option<Own<(Effects, Arc<Caster>)>>>,
+    opened: Mutex<Option<Own<Arc<Caster>>>>,
 }
 
 impl LazyCaster {
@@ -106,13 +106,12 @@ impl LazyCaster {
     /// The caster of this process for `effects`.
     pub fn open(&self, effects: &Effects) -> PyResult<Arc<Caster>> {
         let mut opened = lock(&self.opened);
-        if let Some((modelled, caster)) = Own::of_this_process(&opened)
-            && modelled == effects
-        {
-            return Ok(Arc::clone(caster));
+        match Own::of_this_process(&opened) {
+            Some(caster) if caster.effects() == effects => return Ok(Arc::clone(caster)),
+            _ => {}
         }
         let caster = Arc::new(Caster::open(&self.request, effects).map_err(raised)?);
-        Own::replace(&mut opened, (effects.clone(), Arc::clone(&caster)));
+        Own::replace(&mut opened, Arc::clone(&caster));
         Ok(caster)
     }
 }

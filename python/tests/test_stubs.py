@@ -2,11 +2,8 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-
-import edgepuck
 
 
 def test_stubs_are_those_of_the_module() -> None:
@@ -16,7 +13,7 @@ def test_stubs_are_those_of_the_module() -> None:
 
 def test_the_package_is_typed() -> None:
     pytest.importorskip("mypy")
-    run("mypy", "--strict", "--ignore-missing-imports", str(Path(edgepuck.__file__).parent))
+    run("mypy", "--strict", "--package", "edgepuck")
 
 
 def run(*words: str) -> None:

@@ -3,6 +3,7 @@
 mod fuzz;
 mod meanwhile;
 mod peers;
+mod python;
 mod sanitize;
 mod targets;
 mod test_programs;
@@ -70,6 +71,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
     targets::run(summary, install);
+    python::run(summary, install);
     peers::run(summary, packages);
     fuzz::run(summary, args.fuzz_seconds, fuzz_targets);
 }
