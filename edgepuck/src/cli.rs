@@ -85,6 +85,14 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
+/// As [`main`], but the error is the caller's to tell, and help is none.
+///
+/// # Errors
+/// What the command reports.
+pub fn run_words(words: impl IntoIterator<Item = OsString>) -> anyhow::Result<Outcome> {
+    run(&Cli::try_parse_from(words)?.command)
+}
+
 fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::GenDataset(args) => gen_dataset::run(args),

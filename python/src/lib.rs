@@ -26,7 +26,7 @@ mod _edgepuck {
     #[pymodule_export]
     use super::mesh::Mesh;
     #[pymodule_export]
-    use super::process::{adapters, main, set_num_threads};
+    use super::process::{adapters, main, run_command, set_num_threads};
     #[pymodule_export]
     use super::scenes::{Scenes, scan_scene};
     #[pymodule_export]

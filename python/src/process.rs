@@ -4,7 +4,7 @@
 //! child, and an adapter that the parent opened is not the child's. So both are made when they are
 //! first needed and kept with the number of the process. Nothing is started by an import.
 
-use crate::error::raised;
+use crate::error::{raised, raised_with_causes};
 use pyo3::prelude::*;
 use pyo3::types::PyAnyMethods;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -122,6 +122,13 @@ pub fn adapters(py: Python<'_>) -> Vec<String> {
     let found = py.detach(sim_gpu::gpu::list_adapters);
     let names = found.into_iter().map(|adapter| adapter.name);
     names.chain(["cpu".to_owned()]).collect()
+}
+
+/// Run a command of the program `edgepuck`, whose name comes first, and raise what it reports.
+#[pyfunction(name = "run")]
+pub fn run_command(py: Python<'_>, words: Vec<OsString>) -> PyResult<()> {
+    py.detach(|| edgepuck_program::cli::run_words(words)).map_err(raised_with_causes)?;
+    Ok(())
 }
 
 /// Run the program `edgepuck` with these words, of which the first is its name, and return its exit

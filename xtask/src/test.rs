@@ -71,7 +71,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
     targets::run(summary, install);
-    python::run(summary, install);
+    python::run(summary, install, args.peers == peers::Which::All);
     peers::run(summary, packages);
     fuzz::run(summary, args.fuzz_seconds, fuzz_targets);
 }

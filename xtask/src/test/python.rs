@@ -25,8 +25,9 @@ const TARGET: &str = "aarch64-unknown-linux-gnu";
 #[cfg(not(target_arch = "aarch64"))]
 const TARGET: &str = "x86_64-unknown-linux-gnu";
 
-/// Builds the wheel and tests it. Other systems build theirs as they are released.
-pub fn run(summary: &mut Summary, install: bool) {
+/// Builds the wheel and tests it, with PyTorch if asked for. Other systems build theirs as they are
+/// released.
+pub fn run(summary: &mut Summary, install: bool, with_pytorch: bool) {
     summary.step("python", |summary| {
         if !cfg!(target_os = "linux") {
             return Ok(summary.skip("python", 1, "wheels are tested on Linux"));
@@ -37,13 +38,13 @@ pub fn run(summary: &mut Summary, install: bool) {
             made => made.map(Option::unwrap_or_default),
         };
         match tools {
-            Ok(tools) => test(&tools),
+            Ok(tools) => test(&tools, with_pytorch),
             Err(cause) => Ok(summary.skip("python", 1, &cause)),
         }
     });
 }
 
-fn test(tools: &Path) -> anyhow::Result<Counts> {
+fn test(tools: &Path, with_pytorch: bool) -> anyhow::Result<Counts> {
     let wheel = build(tools)?;
     let judge = |words: &[&str]| {
         let mut command = Command::new(tools);
@@ -56,7 +57,7 @@ fn test(tools: &Path) -> anyhow::Result<Counts> {
         shown.split_whitespace().collect::<Vec<_>>().join(" ").contains(PLATFORM),
         "auditwheel: expected a wheel for {PLATFORM}, found: {shown}"
     );
-    Ok(Counts { passed: 2, ..Counts::default() }.and(run_tests(tools, &wheel)?))
+    Ok(Counts { passed: 2, ..Counts::default() }.and(run_tests(tools, &wheel, with_pytorch)?))
 }
 
 /// The wheel, for Pythons from 3.10 on.
@@ -78,7 +79,7 @@ fn build(tools: &Path) -> anyhow::Result<PathBuf> {
 }
 
 /// The tests of the wheel in a new environment, away from the package's source.
-fn run_tests(tools: &Path, wheel: &Path) -> anyhow::Result<Counts> {
+fn run_tests(tools: &Path, wheel: &Path, with_pytorch: bool) -> anyhow::Result<Counts> {
     let folder = cache_dir().join("python-test-venv");
     let made = Command::new(tools).args(["-m", "venv", "--clear"]).arg(&folder).status()?;
     ensure!(made.success(), "{}: the environment cannot be made", folder.display());
@@ -86,6 +87,9 @@ fn run_tests(tools: &Path, wheel: &Path) -> anyhow::Result<Counts> {
     let mut install = Command::new(&python);
     install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     install.arg(wheel).arg("-r").arg(root().join("python/tests/requirements.txt"));
+    if with_pytorch {
+        install.arg("-r").arg(root().join("tests/peers/pytorch-requirements.txt"));
+    }
     succeeds(&mut install).map_err(|cause| anyhow!(cause))?;
 
     let mut tests = Command::new(&python);
