@@ -103,3 +103,23 @@ def test_threads_are_those_that_were_asked_for(dataset: ep.Dataset) -> None:
     np.testing.assert_array_equal(dataset.batch(range(8))[0], points)
     ep.set_num_threads(0)
     np.testing.assert_array_equal(dataset.batch(range(8))[0], points)
+
+
+def draw_into(dataset: ep.Dataset, answers) -> None:
+    answers.put(dataset.batch(BATCHES[0])[0])
+
+
+def test_a_child_opens_the_adapter_for_itself(shapes: Path) -> None:
+    if not any("llvmpipe" in name for name in ep.adapters()):
+        pytest.skip("this system has no software Vulkan")
+    dataset = ep.Dataset(shapes, points=64, adapter="llvmpipe")
+    expected, _ = dataset.batch(BATCHES[0])
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+    child = context.Process(target=draw_into, args=(dataset, answers))
+    child.start()
+    np.testing.assert_array_equal(answers.get(timeout=TIMEOUT_S), expected)
+    child.join(TIMEOUT_S)
+    # Of noise in f32 and in f64; positions are below 1.
+    on_cpu, _ = ep.Dataset(shapes, points=64).batch(BATCHES[0])
+    np.testing.assert_allclose(expected, on_cpu, atol=1e-6)
