@@ -19,6 +19,7 @@ use sim_gpu::mesh::tree::discover;
 use sim_gpu::sensor::{Sensor, builtin_names};
 use std::fs;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use tests::tree::files;
 use tests::written_dataset::{MIN_POINTS, PACKED_POINTS, config, entry, failure, terms, write};
 
@@ -179,7 +180,8 @@ fn clouds_that_a_run_keeps_are_those_that_its_files_give() {
     let config = &terms.config;
     let caster = Caster::Cpu(config.cast_effects());
     let (culling, progress) = (Culling::On, &Progress::default());
-    let run = Run { out: &out, config, caster: &caster, culling, progress };
+    let is_over = &AtomicBool::new(false);
+    let run = Run { out: &out, config, caster: &caster, culling, progress, is_over };
     let records = scan_all(&run, &discover(&meshes, config.seed).unwrap()).unwrap().records;
     let mut read_again = records.clone();
     let scans = read_again.iter_mut().flat_map(|mesh| &mut mesh.scans);

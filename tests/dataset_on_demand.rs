@@ -16,6 +16,7 @@ use sim_gpu::job::Culling;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use sim_gpu::sensor::{Sensor, Views};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use tests::written_dataset::config;
 
 const CACHE_BYTES: usize = 1 << 20;
@@ -72,7 +73,8 @@ fn clouds_on_demand_are_those_of_the_packed_set() {
     let terms = Terms::new(config.clone(), &caster, &meshes, None);
     begin(&out, &terms, Begin::Fresh).unwrap();
     let (progress, culling) = (Progress::default(), Culling::On);
-    let run = Run { out: &out, config: &config, caster: &caster, culling, progress: &progress };
+    let (config, progress, is_over) = (&config, &progress, &AtomicBool::new(false));
+    let run = Run { out: &out, config, caster: &caster, culling, progress, is_over };
     let scanned = scan_all(&run, &meshes).unwrap();
     finish(&out, &terms, scanned.records, scanned.failures).unwrap();
     let packed = layout::packed(&out, &config.sets[0], Variant::Noisy, Split::Train);

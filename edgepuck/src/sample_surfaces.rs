@@ -53,5 +53,5 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let failures = write_surfaces(&args.out, &config, &meshes)?;
     report_failures(&failures);
     eprintln!("{} meshes: {}", meshes.len() - failures.len(), args.out.display());
-    Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+    Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }

@@ -10,6 +10,11 @@ pub enum Outcome {
     Success,
     /// Some inputs failed, and were named.
     SomeFailed,
+    /// All is done, but for some inputs that were refused and named: to try again is no use. A
+    /// scheduler tells it from a failure by its code.
+    SomeRefused,
+    /// The work was stopped by SIGTERM, and may go on from where it was.
+    Interrupted,
     /// The work was done by a child process, which ended with this code.
     ChildExit(u8),
 }
@@ -20,12 +25,15 @@ pub enum Outcome {
 pub struct Usage(pub String);
 
 /// Prints the error, if there is one, and gives the program's exit code: 0 for
-/// success, 1 for a failure, 2 for a [`Usage`]. When the reader of the output has
+/// success, 1 for a failure, 2 for a [`Usage`], 3 and 75 as [`Outcome`] says. When the reader of the output has
 /// gone, the command succeeds.
 pub fn exit_code(result: anyhow::Result<Outcome>) -> u8 {
     match result {
         Ok(Outcome::Success) => 0,
         Ok(Outcome::SomeFailed) => 1,
+        Ok(Outcome::SomeRefused) => 3,
+        // EX_TEMPFAIL of sysexits.h: try again later.
+        Ok(Outcome::Interrupted) => 75,
         Ok(Outcome::ChildExit(code)) => code,
         Err(error) if is_broken_pipe(&error) => 0,
         Err(error) => {

@@ -2,7 +2,7 @@
 
 use crate::{Folder, meshes};
 use formats::rng::StreamKey;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Number `n` of this process.
@@ -33,6 +33,31 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     folder.assert_same_tree("unbroken", "broken");
     let again = folder.succeeds(words);
     assert!(again.contains("already complete"), "{again}");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_run_that_is_told_to_end_says_so_and_goes_on_later() {
+    let folder = Folder::with_meshes();
+    folder.succeeds("gen-dataset meshes --out unbroken --adapter cpu");
+    let words = "gen-dataset meshes --out broken --adapter cpu --resume";
+    let mut codes = Vec::new();
+    // Sooner or later the signal comes while meshes are scanned.
+    for milliseconds in (0..40).map(|n| 3 + 4 * n) {
+        let mut child = folder.edgepuck(words).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        let sent = Command::new("kill").arg(child.id().to_string()).status().unwrap();
+        let code = child.wait().unwrap().code();
+        // A program that has not yet begun is ended by the signal itself.
+        assert!(matches!(code, Some(0 | 75) | None), "{code:?}");
+        codes.push(code);
+        if code == Some(0) || !sent.success() {
+            break;
+        }
+    }
+    folder.succeeds(words);
+    folder.assert_same_tree("unbroken", "broken");
+    assert!(codes.contains(&Some(75)), "{codes:?}");
 }
 
 #[test]

@@ -43,7 +43,7 @@ fn a_bad_mesh_is_named_and_the_others_go_on() {
     let folder = with_shapes();
     folder.write("shapes/cup/test/flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2");
     folder.write("shapes/cup/test/torn.off", "OFF\n3 1 0\n0 0 0\n1 0");
-    let said = folder.exits(1, "sample-surfaces shapes --out out --points 50");
+    let said = folder.exits(3, "sample-surfaces shapes --out out --points 50");
     for part in
         ["cup/test/flat.off: no triangle with an area", "cup/test/torn.off:4", "20 meshes: out"]
     {

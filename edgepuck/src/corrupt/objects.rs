@@ -79,5 +79,5 @@ pub(super) fn run(
         .collect();
     write_list(&made, out)?;
     eprintln!("{} sets of {tested} meshes: {}", made.len(), out.display());
-    Ok(if written.failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+    Ok(if written.failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }

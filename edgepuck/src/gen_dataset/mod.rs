@@ -3,13 +3,13 @@
 mod bar;
 mod example;
 mod settings;
+mod shard;
 mod summary;
 
 use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, flags, gen_shapes};
 use anyhow::Context;
 use clap::Parser;
-use edgepuck_dataset::MeshFailure;
 use edgepuck_dataset::check_layouts;
 use edgepuck_dataset::config::DatasetConfig;
 use edgepuck_dataset::finish::finish;
@@ -19,14 +19,18 @@ use edgepuck_dataset::pipeline::{Run, scan_all};
 use edgepuck_dataset::progress::Progress;
 use edgepuck_dataset::start::{Begin, Start, begin};
 use edgepuck_dataset::verify::verify;
+use edgepuck_dataset::{DatasetError, MeshFailure};
 use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
 use settings::Settings;
+use shard::Shard;
+use signal_hook::consts::SIGTERM;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Where the meshes of a run without meshes are written, a seed behind it.
@@ -59,8 +63,10 @@ pub struct Args {
     #[arg(long)]
     overwrite: bool,
 
-    /// Make only part I of N of the dataset; `merge-dataset` joins the parts
-    #[arg(long, value_name = "I/N")]
+    /// Make only part I of N of the dataset; `merge-dataset` joins the parts. `auto/N` takes the
+    /// part from the environment of a job array, counted from 0: SLURM_ARRAY_TASK_ID,
+    /// JOB_COMPLETION_INDEX (Kubernetes) or HQ_TASK_ID (HyperQueue). `auto` asks Slurm for N, too
+    #[arg(long, value_name = "I/N|auto/N|auto")]
     shard: Option<Shard>,
 
     #[command(flatten)]
@@ -78,27 +84,6 @@ pub struct Args {
 pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
     let words = std::iter::once("gen-dataset").chain(flags.iter().map(String::as_str));
     Settings::try_parse_from(words)?.config()
-}
-
-/// Part `number` (from 0) of `of` parts.
-#[derive(Clone, Copy, Debug)]
-struct Shard {
-    number: u32,
-    of: u32,
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (number, of) = text.split_once('/').ok_or("expected I/N, such as 1/4")?;
-        match (number.parse::<u32>(), of.parse::<u32>()) {
-            (Ok(number), Ok(of)) if 1 <= number && number <= of => {
-                Ok(Self { number: number - 1, of })
-            }
-            _ => Err("expected I/N with whole I from 1 to N".to_owned()),
-        }
-    }
 }
 
 /// Makes or verifies a dataset.
@@ -132,12 +117,21 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let progress = Progress::default();
     let (config, culling) = (&terms.config, args.caster.culling());
-    let run = Run { out: &out, config, caster: &caster, culling, progress: &progress };
-    let scanned = bar::beside(&progress, meshes.len(), || scan_all(&run, &meshes))?;
+    let is_over = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(SIGTERM, Arc::clone(&is_over))?;
+    let (caster, progress) = (&caster, &progress);
+    let run = Run { out: &out, config, caster, culling, progress, is_over: &is_over };
+    let scanned = match bar::beside(progress, meshes.len(), || scan_all(&run, &meshes)) {
+        Err(stopped @ DatasetError::Interrupted { .. }) => {
+            eprintln!("{}: {stopped}", out.display());
+            return Ok(Outcome::Interrupted);
+        }
+        scanned => scanned?,
+    };
     report_failures(&scanned.failures);
     let packing = Instant::now();
     let manifest = finish(&out, &terms, scanned.records, scanned.failures)?;
-    summary::print(&out, &manifest, &progress, started.elapsed(), packing.elapsed());
+    summary::print(&out, &manifest, progress, started.elapsed(), packing.elapsed());
     end(&out, &manifest)
 }
 
@@ -154,7 +148,7 @@ pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
         Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
         None => eprintln!("No scan holds a point, so no example picture was drawn."),
     }
-    Ok(if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+    Ok(if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }
 
 fn check(folder: &Path) -> anyhow::Result<Outcome> {

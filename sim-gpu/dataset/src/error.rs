@@ -34,6 +34,14 @@ pub enum DatasetError {
         /// The manifest's place.
         path: PathBuf,
     },
+    /// The run was told to end.
+    #[error("stopped after {done} of {meshes} meshes; continue with --resume")]
+    Interrupted {
+        /// Meshes that are scanned, or listed as failures.
+        done: usize,
+        /// Meshes in all.
+        meshes: usize,
+    },
     /// A layout that cannot hold the dataset.
     #[error("layout {layout}: {cause}")]
     Layout {

@@ -51,6 +51,8 @@ pub struct Run<'a> {
     pub culling: Culling,
     /// Counters.
     pub progress: &'a Progress,
+    /// Set by whoever wants the run to end after the meshes under way.
+    pub is_over: &'a AtomicBool,
 }
 
 /// What a run makes of its meshes, each list sorted by entry.
@@ -78,8 +80,9 @@ struct Shared<'a> {
 /// Scans `meshes`, but for those whose scans the journal says are there.
 ///
 /// # Errors
-/// If a file cannot be written or the adapter fails: the run stops. A mesh
-/// that cannot be read is no error; it is listed as a failure.
+/// If a file cannot be written or the adapter fails, or if the run was told to end before all
+/// meshes were scanned: the run stops. A mesh that cannot be read is no error; it is listed as a
+/// failure.
 pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError> {
     let pattern = |set: &SetConfig| run.config.effects.widen(set.sensor.pattern(), &set.sensor);
     let patterns = run.config.sets.iter().map(pattern).collect::<Result<_, _>>()?;
@@ -114,6 +117,10 @@ pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError
         return Err(error);
     }
     let mut scanned = std::mem::take(&mut *lock(&shared.scanned));
+    let done = scanned.records.len() + scanned.failures.len();
+    if done < meshes.len() {
+        return Err(DatasetError::Interrupted { done, meshes: meshes.len() });
+    }
     scanned.records.sort_unstable_by(|p, q| p.entry.cmp(&q.entry));
     scanned.failures.sort_unstable_by(|p, q| p.entry.cmp(&q.entry));
     Ok(scanned)
@@ -136,7 +143,7 @@ impl Shared<'_> {
         let rays: u64 =
             sets.map(|(set, pattern)| set.viewpoints.count() as u64 * pattern.len() as u64).sum();
         while let Some(mesh) = self.meshes.get(self.next.fetch_add(1, SeqCst)) {
-            if self.stopped.load(SeqCst) {
+            if self.stopped.load(SeqCst) || self.run.is_over.load(SeqCst) {
                 return;
             }
             match self.journal.find(&Entry::from(mesh)) {

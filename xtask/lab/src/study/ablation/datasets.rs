@@ -21,6 +21,7 @@ use sim_gpu::caster::{AdapterRequest, Caster};
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::tree::MeshEntry;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// A dataset on disk.
 pub struct Made {
@@ -54,7 +55,8 @@ pub fn make(
                 Start::Complete(manifest) => *manifest,
                 Start::Go => {
                     let (config, caster, progress) = (&terms.config, &caster, &Progress::default());
-                    let run = Run { out, config, caster, culling: Culling::On, progress };
+                    let is_over = &AtomicBool::new(false);
+                    let run = Run { out, config, caster, culling: Culling::On, progress, is_over };
                     let scanned = scan_all(&run, meshes)?;
                     finish(out, &terms, scanned.records, scanned.failures)?
                 }

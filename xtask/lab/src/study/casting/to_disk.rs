@@ -16,6 +16,7 @@ use sim_gpu::caster::Caster;
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::tree::MeshEntry;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// One dataset on one adapter.
@@ -59,7 +60,8 @@ fn once(config: &DatasetConfig, caster: &Caster, meshes: &[MeshEntry]) -> Result
     let terms = Terms::new(config.clone(), caster, meshes, None);
     Journal::of(folder.path()).begin(&terms)?;
     let progress = Progress::default();
-    let run = Run { out: folder.path(), config, caster, culling: Culling::On, progress: &progress };
+    let (out, culling, is_over) = (folder.path(), Culling::On, &AtomicBool::new(false));
+    let run = Run { out, config, caster, culling, progress: &progress, is_over };
     let (scanned, cost) = measured(|| scan_all(&run, meshes));
     let scanned = scanned.context("making the default dataset")?;
     Ok(Dataset {

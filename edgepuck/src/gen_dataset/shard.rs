@@ -1,0 +1,118 @@
+//! Which part of a dataset one task of a job array makes.
+
+use std::str::FromStr;
+
+/// The variables that tell a task of an array its number: of Slurm, of Kubernetes' Indexed Jobs and
+/// of HyperQueue.
+const NUMBERS: [&str; 3] = ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX", "HQ_TASK_ID"];
+
+/// Part `number` (from 0) of `of` parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    pub number: u32,
+    pub of: u32,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::parse(text, |name| std::env::var(name).ok())
+    }
+}
+
+impl Shard {
+    /// The part that `text` names, in an environment of these variables.
+    fn parse(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
+        match text.split_once('/') {
+            Some(("auto", of)) => {
+                let of = of.parse().ok().filter(|of| *of > 0);
+                let of = of.ok_or("expected auto/N with a whole N of at least 1")?;
+                Self::of_array(of, variable)
+            }
+            None if text == "auto" => Self::of_array(tasks_of_slurm(&variable)?, variable),
+            Some((number, of)) => match (number.parse::<u32>(), of.parse::<u32>()) {
+                (Ok(number), Ok(of)) if 1 <= number && number <= of => {
+                    Ok(Self { number: number - 1, of })
+                }
+                _ => Err("expected I/N with whole I from 1 to N".to_owned()),
+            },
+            None => Err("expected I/N, such as 1/4, auto/N, or auto".to_owned()),
+        }
+    }
+
+    /// The part of this task of an array of `of` tasks.
+    fn of_array(of: u32, variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
+        let told = NUMBERS.iter().find_map(|name| Some((name, variable(name)?)));
+        let (name, number) = told.ok_or_else(|| {
+            format!("auto: expected one of the variables {}, found none", NUMBERS.join(", "))
+        })?;
+        match number.parse() {
+            Ok(number) if number < of => Ok(Self { number, of }),
+            _ => Err(format!("auto: expected {name} from 0 to {}, found {number}", of - 1)),
+        }
+    }
+}
+
+/// How many tasks the array of Slurm has that this is a task of.
+fn tasks_of_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<u32, String> {
+    let number = |name: &str| variable(name).and_then(|value| value.parse::<u32>().ok());
+    let [first, last, count] =
+        ["SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_MAX", "SLURM_ARRAY_TASK_COUNT"].map(number);
+    match (first, last, count) {
+        (Some(0), Some(last), Some(count)) if last.checked_add(1) == Some(count) => Ok(count),
+        (None, None, None) => {
+            let cause = "auto: expected an array of Slurm, found none of its variables; elsewhere, \
+                         auto/N says of how many tasks";
+            Err(cause.to_owned())
+        }
+        // A part of the array that is run again says nothing of the whole.
+        _ => Err("auto: expected a whole array from 0, as `sbatch --array=0-7` makes it; auto/N \
+                  says of how many tasks the whole is"
+            .to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str, variables: &[(&str, &str)]) -> Result<(u32, u32), String> {
+        let variable = |name: &str| {
+            variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
+        };
+        Shard::parse(text, variable).map(|Shard { number, of }| (number, of))
+    }
+
+    #[test]
+    fn each_scheduler_tells_a_task_its_part() {
+        assert_eq!(parsed("2/4", &[]), Ok((1, 4)));
+        for name in NUMBERS {
+            assert_eq!(parsed("auto/8", &[(name, "7")]), Ok((7, 8)), "{name}");
+            assert!(parsed("auto/8", &[(name, "8")]).unwrap_err().contains("from 0 to 7"));
+        }
+        let array = [
+            ("SLURM_ARRAY_TASK_ID", "3"),
+            ("SLURM_ARRAY_TASK_MIN", "0"),
+            ("SLURM_ARRAY_TASK_MAX", "7"),
+            ("SLURM_ARRAY_TASK_COUNT", "8"),
+        ];
+        assert_eq!(parsed("auto", &array), Ok((3, 8)));
+    }
+
+    #[test]
+    fn what_is_no_part_of_a_whole_is_refused() {
+        for text in ["0/4", "5/4", "1/0", "auto/0", "auto/x", "auto/8", "auto", "4", "1/4/2"] {
+            assert!(parsed(text, &[]).is_err(), "{text}");
+        }
+        // Tasks 3 and 5 of an array that is run again in part.
+        let again = [
+            ("SLURM_ARRAY_TASK_ID", "5"),
+            ("SLURM_ARRAY_TASK_MIN", "3"),
+            ("SLURM_ARRAY_TASK_MAX", "5"),
+            ("SLURM_ARRAY_TASK_COUNT", "2"),
+        ];
+        assert!(parsed("auto", &again).unwrap_err().contains("auto/N"));
+        assert_eq!(parsed("auto/8", &again), Ok((5, 8)));
+    }
+}
