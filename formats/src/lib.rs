@@ -9,7 +9,7 @@
 //! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY and KITTI's `.bin` |
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets and sweeps too |
 //! | `cloud-files` | all of these |
-//! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read |
+//! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read; tars of WebDataset, written |
 //! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`; whole scans with `dataset` too), and a VLP-16's, VLP-32C's (`velodyne`) or Ouster's (`ouster`), read |
 //! | `weights` | models (`weights`) and what they state about themselves (`model_card`) |
 //! | `chamfer` | the distance of two clouds (`chamfer`) |
@@ -88,6 +88,8 @@ pub mod velodyne;
 pub mod vlp32c;
 #[cfg(feature = "dataset")]
 mod waiting_points;
+#[cfg(feature = "dataset")]
+pub mod webdataset;
 #[cfg(feature = "weights")]
 pub mod weights;
 #[cfg(feature = "dataset")]

@@ -99,7 +99,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     }
 }
 
-fn write_npz<W: Write + Seek>(npz: &mut NpzWriter<W>, scan: &Scan) -> io::Result<()> {
+pub(crate) fn write_npz<W: Write + Seek>(npz: &mut NpzWriter<W>, scan: &Scan) -> io::Result<()> {
     write_columns(npz, "positions", scan.positions.as_flattened(), 3)?;
     for (attribute, column) in scan.columns() {
         let key = attribute.name();

@@ -1,5 +1,7 @@
 """Arrays in Python hold the bytes that the program writes."""
 
+import io
+import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,24 @@ def test_clouds_of_a_dataset_are_those_that_gen_dataset_packs(shapes: Path, tmp_
     np.testing.assert_array_equal(labels, packed["labels"])
     np.testing.assert_array_equal(labels, dataset.labels)
     np.testing.assert_array_equal(points, packed["points"])
+
+
+def test_tars_hold_the_clouds_of_the_dataset(shapes: Path, tmp_path: Path) -> None:
+    flags = ["--sensor", "vlp32c", "--views", 2, "--distance", "2,6", "--azimuth-jitter", 180]
+    flags += ["--points", 64, "--seed", 5, "--layout", "webdataset", "--tar-clouds", 25]
+    edgepuck("gen-dataset", shapes, "--out", tmp_path / "out", "--adapter", "cpu", *flags)
+    packed = []
+    for file in sorted((tmp_path / "out").glob("train-*.tar")):
+        with tarfile.open(file) as tar:
+            packed += [np.load(io.BytesIO(tar.extractfile(name).read())) for name in tar.getnames()]
+    dataset = ep.Dataset(
+        shapes, "vlp32c", split="train", views=2, distance=(2, 6), points=64, seed=5
+    )
+    points, labels = dataset.batch(range(len(dataset)))
+    expected = {cloud.tobytes(): label for cloud, label in zip(points, labels, strict=True)}
+    found = [pair for npz in packed for pair in zip(npz["points"], npz["labels"], strict=True)]
+    assert len(found) == len(expected) == len(dataset)
+    assert all(expected[cloud.tobytes()] == label for cloud, label in found)
 
 
 def test_scenes_in_files_are_scanned_as_by_the_program(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ mod sensors;
 mod simplified;
 mod surfaces;
 mod sweeps;
+mod tars;
 mod weather;
 
 use formats::Scan;

@@ -5,13 +5,14 @@ mod example;
 mod settings;
 mod shard;
 mod summary;
+mod tars;
 
 use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, flags, gen_shapes};
 use anyhow::Context;
 use clap::Parser;
 use edgepuck_dataset::check_layouts;
-use edgepuck_dataset::config::DatasetConfig;
+use edgepuck_dataset::config::{DatasetConfig, Layout};
 use edgepuck_dataset::finish::finish;
 use edgepuck_dataset::journal::Terms;
 use edgepuck_dataset::manifest::Manifest;
@@ -70,6 +71,9 @@ pub struct Args {
     shard: Option<Shard>,
 
     #[command(flatten)]
+    tars: tars::TarArgs,
+
+    #[command(flatten)]
     settings: Settings,
 
     #[command(flatten)]
@@ -98,7 +102,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         None => (write_default_shapes(config.seed)?, PathBuf::from(DEFAULT_OUT)),
     };
     let out = args.out.clone().unwrap_or(default_out);
-    let meshes = shard(discover(&meshes_folder, config.seed)?, args.shard);
+    let meshes = discover(&meshes_folder, config.seed)?;
+    if config.layouts.contains(&Layout::Webdataset) {
+        return tars::run(args, &out, &config, &meshes);
+    }
+    let meshes = shard(meshes, args.shard);
     let classes: BTreeSet<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
     check_layouts(&config, &Vec::from_iter(classes))?;
     let caster = args.caster.open(&config.cast_effects())?;
@@ -152,6 +160,9 @@ pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
 }
 
 fn check(folder: &Path) -> anyhow::Result<Outcome> {
+    if edgepuck_dataset::tars::root_file(folder).exists() {
+        return tars::check(folder);
+    }
     let report = verify(folder)?;
     let mut out = std::io::stdout().lock();
     for problem in &report.problems {

@@ -129,7 +129,8 @@ pub struct Settings {
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,
 
-    /// Additional dataset layouts, for other projects: yanx27, modelnet-h5
+    /// Additional dataset layouts, for other projects: yanx27, modelnet-h5. `webdataset` writes tars of
+    /// the noisy clouds of one sensor in place of all other files
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     layout: Vec<Layout>,
 

@@ -113,6 +113,8 @@ formats::named! {
         Yanx27 = "yanx27",
         /// ModelNet40's HDF5 files.
         ModelnetH5 = "modelnet-h5",
+        /// Tars of samples, and no other file: see [`tars`](crate::tars).
+        Webdataset = "webdataset",
     }
 }
 

@@ -35,12 +35,24 @@ pub enum DatasetError {
         path: PathBuf,
     },
     /// The run was told to end.
-    #[error("stopped after {done} of {meshes} meshes; continue with --resume")]
+    #[error("stopped after {done} of {of} {what}; continue with --resume")]
     Interrupted {
-        /// Meshes that are scanned, or listed as failures.
+        /// What is done.
         done: usize,
-        /// Meshes in all.
-        meshes: usize,
+        /// Of how many.
+        of: usize,
+        /// Meshes or tars.
+        what: &'static str,
+    },
+    /// Tars are complete, but the command that takes them failed.
+    #[error("{tars} tars were not handed over, {first} the first: {cause}; --resume tries again")]
+    NotHandedOver {
+        /// How many.
+        tars: usize,
+        /// The name of the first.
+        first: String,
+        /// Why it was not.
+        cause: String,
     },
     /// A layout that cannot hold the dataset.
     #[error("layout {layout}: {cause}")]

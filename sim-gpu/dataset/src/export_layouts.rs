@@ -6,6 +6,7 @@ use super::error::DatasetError;
 use super::layout;
 use super::manifest::LayoutFile;
 use super::record::{Entry, MeshRecord};
+use formats::scan_file::ScanFormat;
 use formats::yanx27::Yanx27Writer;
 use formats::{Split, hash};
 use std::collections::BTreeMap;
@@ -31,6 +32,12 @@ pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), D
                 let without = "this build has no HDF5: build with `--features hdf5`";
                 refuse_if(cfg!(not(feature = "hdf5")), layout, without)?;
                 refuse_if(classes.len() > 256, layout, "it has room for 256 classes")?;
+            }
+            Layout::Webdataset => {
+                let others = config.layouts.len() > 1 || config.formats != [ScanFormat::Npz];
+                refuse_if(others, layout, "it writes tars alone: name no other layout or format")?;
+                let cause = "it holds the clouds of one sensor: name it with --sensor";
+                refuse_if(config.sets.len() != 1, layout, cause)?;
             }
         }
     }
@@ -60,6 +67,7 @@ pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<LayoutFile>, DatasetErr
                     Layout::ModelnetH5 => write_modelnet_h5(scans, &parts, &folder)?,
                     #[cfg(not(feature = "hdf5"))]
                     Layout::ModelnetH5 => unreachable!("invariant: check_layouts refuses it"),
+                    Layout::Webdataset => unreachable!("invariant: it is made by `tars`"),
                 });
             }
         }

@@ -5,7 +5,7 @@
 //! writes the manifest, which [`verify`] checks a dataset against. [`merge`]
 //! makes one dataset of parts. [`surfaces`] draws what scans are compared with, and
 //! [`corrupted`] makes sets in which something goes wrong. [`on_demand`] casts the clouds of a
-//! dataset as they are asked for, and writes none.
+//! dataset as they are asked for, and writes none; [`tars`] writes them as WebDataset reads them.
 
 mod budget;
 mod clouds;
@@ -27,6 +27,7 @@ pub mod progress;
 pub mod record;
 pub mod start;
 pub mod surfaces;
+pub mod tars;
 pub mod verify;
 
 pub use config::{DatasetConfig, SetConfig, Variant, Viewpoints};

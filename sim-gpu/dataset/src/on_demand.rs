@@ -9,6 +9,7 @@ use super::config::{DatasetConfig, Variant, Viewpoints};
 use super::error::DatasetError;
 use super::mesh::{PlannedView, failure, materials, placed, plan, read};
 use super::record::{Cloud, MeshRecord};
+use formats::Scan;
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use rayon::prelude::*;
@@ -119,6 +120,18 @@ impl Clouds {
         self.classes.partition_point(|known| known < class)
     }
 
+    /// What the clouds are of.
+    #[must_use]
+    pub fn config(&self) -> &DatasetConfig {
+        &self.config
+    }
+
+    /// Which view of its mesh cloud `index` is of.
+    #[must_use]
+    pub fn view(&self, index: usize) -> u32 {
+        (index % self.views()) as u32
+    }
+
     /// The effects that a caster of these clouds models.
     #[must_use]
     pub fn cast_effects(&self) -> Effects {
@@ -136,10 +149,59 @@ impl Clouds {
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Labelled>, DatasetError> {
-        let mut drawn: Vec<Option<Labelled>> = indices.iter().map(|_| None).collect();
+        self.draw_each(caster, seed, indices)?.into_iter().collect()
+    }
+
+    /// As [`Clouds::draw`], where each cloud may fail by itself.
+    ///
+    /// # Errors
+    /// A failing adapter.
+    pub fn draw_each(
+        &self,
+        caster: &Caster,
+        seed: u64,
+        indices: &[usize],
+    ) -> Result<Vec<Result<Labelled, DatasetError>>, DatasetError> {
+        let n_points = self.config.packed_points as usize;
+        let drawn = self.make_each(caster, seed, indices, |config, source, scan| {
+            Cloud::draw(config, source, &scan).map(|cloud| cloud.points)
+        })?;
+        let labelled = |(made, &index): (Result<Vec<[f32; 3]>, _>, _)| {
+            made.map(|points| Labelled { points, label: self.label(index) })
+        };
+        let drawn: Vec<_> = drawn.into_iter().zip(indices).map(labelled).collect();
+        debug_assert!(drawn.iter().flatten().all(|cloud| cloud.points.len() == n_points));
+        Ok(drawn)
+    }
+
+    /// The scans that those clouds are of, each of which may fail by itself.
+    ///
+    /// # Errors
+    /// A failing adapter.
+    pub fn scan_each(
+        &self,
+        caster: &Caster,
+        seed: u64,
+        indices: &[usize],
+    ) -> Result<Vec<Result<Scan, DatasetError>>, DatasetError> {
+        self.make_each(caster, seed, indices, |config, _, scan| {
+            (scan.len() as u64 >= u64::from(config.min_points)).then_some(scan)
+        })
+    }
+
+    /// What `make` makes of the scan of each view, or of one that takes its place if it makes
+    /// nothing of it.
+    fn make_each<T: Send>(
+        &self,
+        caster: &Caster,
+        seed: u64,
+        indices: &[usize],
+        make: impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync,
+    ) -> Result<Vec<Result<T, DatasetError>>, DatasetError> {
         let mut most_points = vec![0; indices.len()];
+        let mut made: Vec<Option<Result<T, DatasetError>>> = indices.iter().map(|_| None).collect();
         for attempt in 0..ATTEMPTS {
-            let missing: Vec<usize> = (0..indices.len()).filter(|&i| drawn[i].is_none()).collect();
+            let missing: Vec<usize> = (0..indices.len()).filter(|&i| made[i].is_none()).collect();
             if missing.is_empty() {
                 break;
             }
@@ -149,46 +211,58 @@ impl Clouds {
             };
             let config = DatasetConfig { seed, ..self.config.clone() };
             let asked: Vec<usize> = missing.iter().map(|&i| indices[i]).collect();
-            for (&i, (points, cloud)) in missing.iter().zip(self.cast(caster, &config, &asked)?) {
-                most_points[i] = points.max(most_points[i]);
-                drawn[i] = cloud
-                    .map(|cloud| Labelled { points: cloud.points, label: self.label(indices[i]) });
+            for (&i, found) in missing.iter().zip(self.cast(caster, &config, &asked, &make)?) {
+                match found {
+                    Ok((points, of_view)) => {
+                        most_points[i] = points.max(most_points[i]);
+                        made[i] = of_view.map(Ok);
+                    }
+                    Err(error) => made[i] = Some(Err(error)),
+                }
             }
         }
-        let found = drawn.into_iter().zip(indices).zip(most_points);
-        let found = found.map(|((drawn, &index), most)| {
-            drawn.ok_or_else(|| DatasetError::Sparse {
-                source_file: self.mesh(index).relative.clone(),
-                least: self.config.min_points,
-                most,
-                tried: ATTEMPTS,
-            })
-        });
-        found.collect()
+        let made = made.into_iter().zip(indices).zip(most_points);
+        let sparse = |index, most| DatasetError::Sparse {
+            source_file: self.mesh(index).relative.clone(),
+            least: self.config.min_points,
+            most,
+            tried: ATTEMPTS,
+        };
+        Ok(made
+            .map(|((made, &index), most)| made.unwrap_or_else(|| Err(sparse(index, most))))
+            .collect())
     }
 
     fn views(&self) -> usize {
         self.config.sets[0].viewpoints.count()
     }
 
-    /// Casts some clouds together. Of each, how many points its scan has, and the cloud if they
-    /// are enough.
-    fn cast(
+    /// Casts some views together. Of each, how many points its scan has, and what `make` makes of
+    /// it.
+    #[expect(clippy::type_complexity, reason = "what may fail for each view, and what for all")]
+    fn cast<T: Send>(
         &self,
         caster: &Caster,
         config: &DatasetConfig,
         indices: &[usize],
-    ) -> Result<Vec<(u64, Option<Cloud>)>, DatasetError> {
-        let aimed: Vec<Aimed> = indices
-            .par_iter()
-            .map(|&index| self.aim(config, index))
-            .collect::<Result<_, DatasetError>>()?;
-        let fits = aimed.iter().all(|aimed| caster.fits(&aimed.job.target));
-        let jobs: Vec<CastJob> = aimed.iter().map(|aimed| aimed.job.clone()).collect();
+        make: &(impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync),
+    ) -> Result<Vec<Result<(u64, Option<T>), DatasetError>>, DatasetError> {
+        let aimed: Vec<Result<Aimed, DatasetError>> =
+            indices.par_iter().map(|&index| self.aim(config, index)).collect();
+        let jobs: Vec<CastJob> = aimed.iter().flatten().map(|aimed| aimed.job.clone()).collect();
+        let fits = jobs.iter().all(|job| caster.fits(&job.target));
         let casts = if fits { caster.cast(&jobs)? } else { caster.cast_on_cpu(&jobs) };
         let effects = config.cast_effects();
-        let cloud = |(aimed, cast)| self.cloud(config, &effects, aimed, cast);
-        aimed.par_iter().zip(&casts).map(cloud).collect()
+        let mut casts = casts.into_iter();
+        let aimed: Vec<_> = aimed
+            .into_iter()
+            .map(|aimed| aimed.map(|aimed| (aimed, casts.next().unwrap_or_default())))
+            .collect();
+        let made = aimed.into_par_iter().map(|aimed| {
+            let (aimed, cast) = aimed?;
+            self.make(config, &effects, &aimed, &cast, make)
+        });
+        Ok(made.collect())
     }
 
     fn aim(&self, config: &DatasetConfig, index: usize) -> Result<Aimed, DatasetError> {
@@ -200,21 +274,23 @@ impl Clouds {
         Ok(Aimed { mesh, planned, job })
     }
 
-    fn cloud(
+    fn make<T>(
         &self,
         config: &DatasetConfig,
         cast_effects: &Effects,
         Aimed { mesh, planned, job }: &Aimed,
         cast: &Cast,
-    ) -> Result<(u64, Option<Cloud>), DatasetError> {
+        make: &impl Fn(&DatasetConfig, Source, Scan) -> Option<T>,
+    ) -> Result<(u64, Option<T>), DatasetError> {
         let (set, entry) = (&config.sets[0], &mesh.record.entry);
         let hits = resolve(job, cast, &self.patterns[0], cast_effects);
         let objects = [ObjectHits::alone(job, &hits, mesh.materials.as_ref())];
         let mut request = planned.request(config, &self.patterns, &entry.id());
         request.effects = Some(config.effects_of(set, self.variant)?);
+        request.attributes = config.attributes.clone();
         let (scan, tally) = assemble(&request, cast_effects, &objects)?;
         let source = Source { set, variant: self.variant, entry, view: planned.view };
-        Ok((tally.points, Cloud::draw(config, source, &scan)))
+        Ok((tally.points, make(config, source, scan)))
     }
 
     /// The mesh of this number, read if it is not in memory.

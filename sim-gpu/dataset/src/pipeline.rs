@@ -119,7 +119,7 @@ pub fn scan_all(run: &Run, meshes: &[MeshEntry]) -> Result<Scanned, DatasetError
     let mut scanned = std::mem::take(&mut *lock(&shared.scanned));
     let done = scanned.records.len() + scanned.failures.len();
     if done < meshes.len() {
-        return Err(DatasetError::Interrupted { done, meshes: meshes.len() });
+        return Err(DatasetError::Interrupted { done, of: meshes.len(), what: "meshes" });
     }
     scanned.records.sort_unstable_by(|p, q| p.entry.cmp(&q.entry));
     scanned.failures.sort_unstable_by(|p, q| p.entry.cmp(&q.entry));

@@ -1,0 +1,152 @@
+//! `gen-dataset --layout webdataset`: tars, each of which is handed over when it is complete.
+
+use crate::{Outcome, Usage};
+use edgepuck_dataset::config::DatasetConfig;
+use edgepuck_dataset::tars::{self, Cut, PartManifest, Run, Sample};
+use edgepuck_dataset::{DatasetError, check_layouts};
+use signal_hook::consts::SIGTERM;
+use sim_gpu::mesh::tree::MeshEntry;
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// How often a command is tried, with a pause of this many seconds before it is tried again.
+const PAUSES_S: [u64; 3] = [1, 4, 16];
+
+/// Flags of tars.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Tars (--layout webdataset)")]
+pub struct TarArgs {
+    /// What a sample of a tar is: `clouds` (1,024 packed clouds with their labels) or `scan` (one scan,
+    /// its label and what it is of)
+    #[arg(long, default_value = "clouds", value_name = "clouds|scan")]
+    sample: Sample,
+
+    /// Number of clouds or scans in each tar; by default a tar of clouds of 1,024 points takes 800 MB
+    #[arg(long, default_value_t = 65_536, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    tar_clouds: u32,
+
+    /// Command of the shell to run when a tar is complete, with its path in place of {}, such as
+    /// 'rclone copyto {} remote:bucket/{name}'; {name} is the name of its file. A command that fails is
+    /// tried four times
+    #[arg(long, value_name = "COMMAND")]
+    on_shard: Option<String>,
+}
+
+/// Makes the tars of one part of the dataset.
+pub fn run(
+    args: &super::Args,
+    out: &Path,
+    config: &DatasetConfig,
+    meshes: &[MeshEntry],
+) -> anyhow::Result<Outcome> {
+    check_layouts(config, &[])?;
+    if config.simplify.is_some() {
+        let cause = "--simplify does not go with --layout webdataset, which reads a mesh again for \
+                     each tar";
+        return Err(Usage(cause.to_owned()).into());
+    }
+    let part = args.shard.map_or((0, 1), |shard| (shard.number, shard.of));
+    refuse_what_is_there(args, out)?;
+    let caster = args.caster.open(&config.cast_effects())?;
+    let is_over = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(SIGTERM, Arc::clone(&is_over))?;
+    let TarArgs { sample, tar_clouds, on_shard } = &args.tars;
+    let run = Run {
+        out,
+        config,
+        cut: Cut { sample: *sample, clouds_per_tar: *tar_clouds },
+        part,
+        caster: &caster,
+        is_over: &is_over,
+        hand_over: &|tar| on_shard.as_ref().map_or(Ok(()), |command| hand_over(command, tar)),
+        say: &|line| eprintln!("{line}"),
+    };
+    match tars::make(&run, meshes) {
+        Ok(made) => Ok(end(out, &made)),
+        Err(stopped @ DatasetError::Interrupted { .. }) => {
+            eprintln!("{}: {stopped}", out.display());
+            Ok(Outcome::Interrupted)
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Tars that are there are gone on with or made anew only if that is asked for.
+fn refuse_what_is_there(args: &super::Args, out: &Path) -> anyhow::Result<()> {
+    let is_tar = |name: &str| {
+        let stem = name.strip_suffix(".tar").or_else(|| name.strip_suffix(".json"));
+        stem.is_some_and(|stem| {
+            ["train-", "test-", "part-"].iter().any(|prefix| stem.starts_with(prefix))
+                || stem == "dataset"
+        })
+    };
+    let there = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
+    let ours =
+        there.filter(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_tar));
+    for path in ours {
+        if args.overwrite {
+            std::fs::remove_file(&path)?;
+        } else if !args.resume {
+            let (path, what) = (out.to_owned(), "tars");
+            return Err(DatasetError::Occupied { path, what }.into());
+        }
+    }
+    Ok(())
+}
+
+fn end(out: &Path, made: &PartManifest) -> Outcome {
+    let mut failures: Vec<_> = made.tars.iter().flat_map(|tar| &tar.failures).collect();
+    failures.sort_by(|p, q| p.source.cmp(&q.source));
+    failures.dedup_by(|p, q| p.source == q.source);
+    for failure in &failures {
+        eprintln!("failed: {failure}");
+    }
+    let clouds: u64 = made.tars.iter().map(|tar| tar.clouds).sum();
+    let bytes: u64 = made.tars.iter().map(|tar| tar.bytes).sum();
+    let (tars, mib) = (made.tars.len(), bytes >> 20);
+    eprintln!("{tars} tars, {clouds} clouds, {mib} MiB: {}", out.display());
+    if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused }
+}
+
+/// Runs `command` for the file `tar` until it succeeds, or says why it did not.
+fn hand_over(command: &str, tar: &Path) -> Result<(), String> {
+    let name = tar.file_name().unwrap_or_default().to_string_lossy();
+    let words =
+        command.replace("{name}", &quoted(&name)).replace("{}", &quoted(&tar.to_string_lossy()));
+    let mut pauses_s = PAUSES_S.iter();
+    loop {
+        let (shell, flag) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
+        let cause = match Command::new(shell).arg(flag).arg(&words).status() {
+            Ok(status) if status.success() => return Ok(()),
+            Ok(status) => format!("`{words}` ended with {status}"),
+            Err(error) => format!("{shell}: {error}"),
+        };
+        let Some(&pause_s) = pauses_s.next() else { return Err(cause) };
+        eprintln!("{cause}; trying again in {pause_s} s");
+        std::thread::sleep(Duration::from_secs(pause_s));
+    }
+}
+
+/// A word of the shell.
+fn quoted(word: &str) -> String {
+    if cfg!(windows) {
+        return format!("\"{word}\"");
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+/// Checks the tars of a finished dataset.
+pub fn check(folder: &Path) -> anyhow::Result<Outcome> {
+    let problems = tars::verify(folder)?;
+    let mut out = std::io::stdout().lock();
+    for problem in &problems {
+        writeln!(out, "{problem}")?;
+    }
+    eprintln!("{}: {} problems.", folder.display(), problems.len());
+    Ok(if problems.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+}

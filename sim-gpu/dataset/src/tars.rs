@@ -1,0 +1,461 @@
+//! A dataset as tars, as WebDataset reads them. Each is cast, written, hashed and handed over by
+//! itself, and there is no file besides: so a billion clouds are some thousands of files, and nothing
+//! ever has to walk more.
+//!
+//! `train-000012.tar` has a record beside it, `train-000012.json`. Each part of a run has a list of its
+//! records, `part-0003-of-0008.json`, and the last part that ends writes `dataset.json`, the list of
+//! parts. All have the same bytes whenever, wherever and by however many they are made.
+
+use super::config::DatasetConfig;
+use super::error::DatasetError;
+use super::journal::{read_json, write_json};
+use super::layout;
+use super::manifest::TOOL;
+use super::on_demand::Clouds;
+use super::record::MeshFailure;
+use formats::hash::{FileHash, Hashing};
+use formats::rng::StreamKey;
+use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
+use formats::{Split, atomic};
+use serde::{Deserialize, Serialize};
+use sim_gpu::caster::Caster;
+use sim_gpu::mesh::tree::MeshEntry;
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+
+/// Clouds of one sample, where samples are of clouds: 12 MiB at 1,024 points.
+const CLOUDS_PER_SAMPLE: usize = 1024;
+
+/// Scans that are in memory together.
+const SCANS_AT_ONCE: usize = 256;
+
+/// Bytes of meshes that stay in memory.
+const CACHE_BYTES: usize = 1 << 30;
+
+formats::named! {
+    /// What one sample of a tar is.
+    #[derive(Default, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Sample: "sample" {
+        /// 1,024 clouds of equal size and their labels.
+        #[default]
+        Clouds = "clouds",
+        /// One scan, its label, and what it is of.
+        Scan = "scan",
+    }
+}
+
+/// How a dataset is cut into tars.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Cut {
+    /// What a sample is.
+    pub sample: Sample,
+    /// Clouds, or scans, of each tar but the last.
+    pub clouds_per_tar: u32,
+}
+
+/// A part of a dataset to be made.
+pub struct Run<'a> {
+    /// The folder of the tars.
+    pub out: &'a Path,
+    /// What they are to hold: of one set.
+    pub config: &'a DatasetConfig,
+    /// How they are cut.
+    pub cut: Cut,
+    /// Part (number from 0, of how many): every so manieth tar.
+    pub part: (u32, u32),
+    /// Casts the rays.
+    pub caster: &'a Caster,
+    /// Set by whoever wants the run to end; the tar that is being made is left out.
+    pub is_over: &'a AtomicBool,
+    /// Given each tar once it is complete; says why it could not be handed over.
+    pub hand_over: &'a dyn Fn(&Path) -> Result<(), String>,
+    /// Given a line when a tar is done.
+    pub say: &'a dyn Fn(String),
+}
+
+/// What is known of one tar.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TarRecord {
+    /// Its name.
+    pub file: String,
+    /// The hash of its bytes, if the configuration asks for one.
+    #[serde(flatten)]
+    pub hash: Option<FileHash>,
+    /// Bytes.
+    pub bytes: u64,
+    /// Clouds or scans in it.
+    pub clouds: u64,
+    /// Of meshes that cannot be read or that no view sees well enough, once each.
+    pub failures: Vec<MeshFailure>,
+    /// Whether it was handed over.
+    pub handed_over: bool,
+    /// A digest of all that decides its bytes.
+    pub made_by: String,
+}
+
+/// The tars of one part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartManifest {
+    /// [`TOOL`].
+    pub tool: String,
+    /// Its version.
+    pub version: String,
+    /// (Number from 0, of how many.)
+    pub part: (u32, u32),
+    /// What the whole is to hold.
+    pub config: DatasetConfig,
+    /// How it is cut.
+    pub cut: Cut,
+    /// All classes of the whole, sorted; labels are places among them.
+    pub classes: Vec<String>,
+    /// By split and number.
+    pub tars: Vec<TarRecord>,
+}
+
+/// All parts of a dataset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RootManifest {
+    /// [`TOOL`].
+    pub tool: String,
+    /// Its version.
+    pub version: String,
+    /// What it holds.
+    pub config: DatasetConfig,
+    /// How it is cut.
+    pub cut: Cut,
+    /// All classes, sorted.
+    pub classes: Vec<String>,
+    /// By number.
+    pub parts: Vec<PartRecord>,
+}
+
+/// What is known of one part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartRecord {
+    /// The name of its manifest.
+    pub file: String,
+    /// The hash of that, if the configuration asks for one.
+    #[serde(flatten)]
+    pub hash: Option<FileHash>,
+    /// Tars.
+    pub tars: u64,
+    /// Clouds or scans in them.
+    pub clouds: u64,
+    /// Bytes of the tars.
+    pub bytes: u64,
+}
+
+/// Makes the tars of a part that are not there yet, of `meshes`, which are all of the dataset.
+///
+/// # Errors
+/// More sets than one or effects that do not fit the sensor; tars of another dataset in the folder; a
+/// file that cannot be written; a failing adapter; [`DatasetError::Interrupted`] if the run was told to
+/// end; [`DatasetError::NotHandedOver`].
+pub fn make(run: &Run, meshes: &[MeshEntry]) -> Result<PartManifest, DatasetError> {
+    let mut classes: Vec<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
+    classes.dedup();
+    let made_by = made_by(run, meshes);
+    let (mut tars, mut not_handed_over) = (Vec::new(), Vec::new());
+    let (mut done, mut wanted) = (0, 0);
+    for split in Split::ALL {
+        let own: Vec<MeshEntry> =
+            meshes.iter().filter(|mesh| mesh.split == split).cloned().collect();
+        let clouds = Clouds::new(run.config.clone(), own, classes.clone(), CACHE_BYTES)?;
+        let half = Half { run, split, order: Order::new(run.config.seed, split, &clouds), clouds };
+        let numbers = (run.part.0..half.tars()).step_by(run.part.1 as usize);
+        wanted += numbers.len();
+        for number in numbers {
+            match half.tar(number, &made_by)? {
+                None => continue,
+                Some(record) => tars.push(record),
+            }
+            done += 1;
+            if let Some(record) = tars.last_mut().filter(|record| !record.handed_over) {
+                match (run.hand_over)(&run.out.join(&record.file)) {
+                    Ok(()) => {
+                        record.handed_over = true;
+                        write_json(&half.record(number), record)?;
+                    }
+                    Err(cause) => not_handed_over.push((record.file.clone(), cause)),
+                }
+            }
+        }
+    }
+    if done < wanted {
+        return Err(DatasetError::Interrupted { done, of: wanted, what: "tars" });
+    }
+    if let Some((first, cause)) = not_handed_over.first().cloned() {
+        return Err(DatasetError::NotHandedOver { tars: not_handed_over.len(), first, cause });
+    }
+    let (tool, version) = (TOOL.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
+    let Run { config, cut, part, out, .. } = *run;
+    let manifest = PartManifest { tool, version, part, config: config.clone(), cut, classes, tars };
+    write_json(&out.join(part_file(part)), &manifest)?;
+    write_root(out, &manifest)?;
+    Ok(manifest)
+}
+
+/// The tars of one split.
+struct Half<'a> {
+    run: &'a Run<'a>,
+    split: Split,
+    clouds: Clouds,
+    order: Order,
+}
+
+/// In which order clouds are put into tars: each mesh once, in random order, then each once more from
+/// another side. So every tar has all classes.
+struct Order {
+    meshes: Vec<usize>,
+    views: usize,
+}
+
+impl Order {
+    fn new(seed: u64, split: Split, clouds: &Clouds) -> Self {
+        let views = clouds.config().sets[0].viewpoints.count().max(1);
+        let key = StreamKey::new(seed, &format!("tars/{split}"), 0);
+        let mut meshes: Vec<usize> = (0..clouds.len() / views).collect();
+        meshes.sort_by_cached_key(|&mesh| (key.words([mesh as u32, 0, 0, 0]), mesh));
+        Self { meshes, views }
+    }
+
+    fn len(&self) -> usize {
+        self.meshes.len() * self.views
+    }
+
+    /// The number among [`Clouds`] of what comes at this place.
+    fn at(&self, place: usize) -> usize {
+        let (view, rank) = (place / self.meshes.len(), place % self.meshes.len());
+        self.meshes[rank] * self.views + view
+    }
+}
+
+impl Half<'_> {
+    fn tars(&self) -> u32 {
+        self.order.len().div_ceil(self.run.cut.clouds_per_tar as usize) as u32
+    }
+
+    fn name(&self, number: u32) -> String {
+        format!("{}-{number:06}", self.split)
+    }
+
+    fn record(&self, number: u32) -> PathBuf {
+        self.run.out.join(self.name(number) + ".json")
+    }
+
+    /// The record of tar `number`, which is made if there is none; `None` if the run is over.
+    fn tar(&self, number: u32, made_by: &str) -> Result<Option<TarRecord>, DatasetError> {
+        let path = self.record(number);
+        if path.exists() {
+            let record: TarRecord = read_json(&path)?;
+            if record.made_by == made_by {
+                return Ok(Some(record));
+            }
+            let difference = "other settings, other meshes or another version".to_owned();
+            return Err(DatasetError::Different { path, difference });
+        }
+        if self.run.is_over.load(SeqCst) {
+            return Ok(None);
+        }
+        let Some(record) = self.write(number, made_by)? else { return Ok(None) };
+        write_json(&path, &record)?;
+        let TarRecord { file, bytes, clouds, .. } = &record;
+        (self.run.say)(format!("{file}: {clouds} clouds, {} MiB", bytes >> 20));
+        Ok(Some(record))
+    }
+
+    /// Writes tar `number`, all of it or, if the run is over, nothing.
+    fn write(&self, number: u32, made_by: &str) -> Result<Option<TarRecord>, DatasetError> {
+        let size = self.run.cut.clouds_per_tar as usize;
+        let first = number as usize * size;
+        let places: Vec<usize> = (first..self.order.len().min(first + size)).collect();
+        let file = self.name(number) + ".tar";
+        let path = self.run.out.join(&file);
+        let (mut clouds, mut failures, mut stopped) = (0, BTreeMap::new(), None);
+        let hash = atomic::write_hashed(&path, self.run.config.hash, |tar| {
+            let at_once = match self.run.cut.sample {
+                Sample::Clouds => CLOUDS_PER_SAMPLE,
+                Sample::Scan => SCANS_AT_ONCE,
+            };
+            for (nth, places) in places.chunks(at_once).enumerate() {
+                if self.run.is_over.load(SeqCst) {
+                    stopped = Some(None);
+                    return Err(io::Error::other("the run is over"));
+                }
+                let key = format!("{}-{nth:03}", self.name(number));
+                match self.samples(tar, &key, places, &mut failures) {
+                    Ok(n) => clouds += n,
+                    Err(DatasetError::Format(formats::FormatError::Io { source, .. })) => {
+                        return Err(source);
+                    }
+                    Err(error) => {
+                        stopped = Some(Some(error));
+                        return Err(io::Error::other("stopped"));
+                    }
+                }
+            }
+            end(tar)
+        });
+        match (stopped, hash) {
+            (Some(None), _) => Ok(None),
+            (Some(Some(error)), _) => Err(error),
+            (None, hash) => {
+                let hash = hash?;
+                let bytes = std::fs::metadata(&path).map_err(|e| DatasetError::io(&path, e))?.len();
+                let failures = failures.into_values().collect();
+                let (made_by, handed_over) = (made_by.to_owned(), false);
+                Ok(Some(TarRecord { file, hash, bytes, clouds, failures, handed_over, made_by }))
+            }
+        }
+    }
+
+    /// Appends the samples of these places; of how many clouds.
+    fn samples(
+        &self,
+        tar: &mut impl io::Write,
+        key: &str,
+        places: &[usize],
+        failures: &mut BTreeMap<String, MeshFailure>,
+    ) -> Result<u64, DatasetError> {
+        let indices: Vec<usize> = places.iter().map(|&place| self.order.at(place)).collect();
+        let (caster, seed) = (self.run.caster, self.run.config.seed);
+        let io = |source| DatasetError::io(Path::new(key), source);
+        let mut refuse = |index: usize, error: DatasetError| {
+            let mesh = self.clouds.mesh(index);
+            let failure = match error {
+                DatasetError::Mesh(failure) => failure,
+                sparse @ DatasetError::Sparse { .. } => {
+                    super::mesh::failed(mesh, None, sparse.to_string())
+                }
+                other => return Err(other),
+            };
+            failures.insert(mesh.relative.clone(), failure);
+            Ok(())
+        };
+        let mut n = 0;
+        match self.run.cut.sample {
+            Sample::Clouds => {
+                let mut clouds = Vec::with_capacity(indices.len());
+                for (drawn, &index) in
+                    self.clouds.draw_each(caster, seed, &indices)?.into_iter().zip(&indices)
+                {
+                    match drawn {
+                        Ok(cloud) => clouds.push((cloud.points, cloud.label)),
+                        Err(error) => refuse(index, error)?,
+                    }
+                }
+                n += clouds.len() as u64;
+                let n_points = self.run.config.packed_points as usize;
+                let npz = npz_of_clouds(&clouds, n_points).map_err(io)?;
+                append_file(tar, &format!("{key}.npz"), &npz).map_err(io)?;
+            }
+            Sample::Scan => {
+                let scans = self.clouds.scan_each(caster, seed, &indices)?;
+                for ((scan, &index), place) in scans.into_iter().zip(&indices).zip(places) {
+                    match scan {
+                        Ok(scan) => {
+                            self.append_scan(tar, *place, index, &scan).map_err(io)?;
+                            n += 1;
+                        }
+                        Err(error) => refuse(index, error)?,
+                    }
+                }
+            }
+        }
+        Ok(n)
+    }
+
+    /// Appends a sample of one scan, whose key is its number in the split.
+    fn append_scan(
+        &self,
+        tar: &mut impl io::Write,
+        place: usize,
+        index: usize,
+        scan: &formats::Scan,
+    ) -> io::Result<()> {
+        let (mesh, view) = (self.clouds.mesh(index), self.clouds.view(index));
+        let told = serde_json::json!({
+            "class": mesh.class, "mesh": mesh.relative, "view": view, "points": scan.len(),
+        });
+        append_file(
+            tar,
+            &format!("{place:012}.cls"),
+            self.clouds.label(index).to_string().as_bytes(),
+        )?;
+        append_file(tar, &format!("{place:012}.json"), told.to_string().as_bytes())?;
+        append_file(tar, &format!("{place:012}.npz"), &npz_of_scan(scan)?)
+    }
+}
+
+/// A digest of what decides the bytes of all tars. Of meshes it takes the names and the sizes of their
+/// files: to hash their contents would take as long as to read them all.
+fn made_by(run: &Run, meshes: &[MeshEntry]) -> String {
+    let size = |mesh: &MeshEntry| std::fs::metadata(&mesh.path).map_or(0, |file| file.len());
+    let meshes: Vec<(&str, u64)> =
+        meshes.iter().map(|mesh| (mesh.relative.as_str(), size(mesh))).collect();
+    let all = serde_json::json!([env!("CARGO_PKG_VERSION"), run.config, run.cut, meshes]);
+    formats::hash::of_bytes(all.to_string().as_bytes())
+}
+
+fn part_file((number, of): (u32, u32)) -> String {
+    format!("part-{number:04}-of-{of:04}.json")
+}
+
+/// Writes `dataset.json` if all parts are there. Two that end at once write the same bytes.
+fn write_root(out: &Path, own: &PartManifest) -> Result<(), DatasetError> {
+    let mut parts = Vec::new();
+    for number in 0..own.part.1 {
+        let file = part_file((number, own.part.1));
+        let path = out.join(&file);
+        if !path.exists() {
+            return Ok(());
+        }
+        let part: PartManifest = read_json(&path)?;
+        if (&part.config, part.cut) != (&own.config, own.cut) {
+            let difference = "this part has other settings".to_owned();
+            return Err(DatasetError::Different { path, difference });
+        }
+        let hash = own.config.hash.of_file(&path)?;
+        let sum = |of: fn(&TarRecord) -> u64| part.tars.iter().map(of).sum();
+        let (clouds, bytes) = (sum(|tar| tar.clouds), sum(|tar| tar.bytes));
+        parts.push(PartRecord { file, hash, tars: part.tars.len() as u64, clouds, bytes });
+    }
+    let PartManifest { tool, version, config, cut, classes, .. } = own.clone();
+    let root = RootManifest { tool, version, config, cut, classes, parts };
+    write_json(&root_file(out), &root)
+}
+
+/// Where the list of parts is.
+#[must_use]
+pub fn root_file(out: &Path) -> PathBuf {
+    out.join("dataset.json")
+}
+
+/// Checks the tars of a finished dataset against their records; says what is wrong.
+///
+/// # Errors
+/// If there is no list of parts.
+pub fn verify(out: &Path) -> Result<Vec<String>, DatasetError> {
+    let root: RootManifest = read_json(&root_file(out))?;
+    let mut problems = Vec::new();
+    for PartRecord { file, hash, .. } in &root.parts {
+        let path = out.join(file);
+        check(&path, &root.config.hash, hash.as_ref(), &mut problems);
+        let Ok(part) = read_json::<PartManifest>(&path) else { continue };
+        for tar in &part.tars {
+            check(&out.join(&tar.file), &root.config.hash, tar.hash.as_ref(), &mut problems);
+        }
+    }
+    Ok(problems)
+}
+
+fn check(path: &Path, hashing: &Hashing, hash: Option<&FileHash>, problems: &mut Vec<String>) {
+    match hashing.of_file(path) {
+        Ok(found) if found.as_ref() == hash && path.exists() => {}
+        Ok(_) => problems.push(format!("{}: is not as recorded", layout::slashed(path))),
+        Err(error) => problems.push(error.to_string()),
+    }
+}

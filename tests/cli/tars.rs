@@ -1,0 +1,125 @@
+//! Tars of samples are the same by however many they are made, and are handed over once.
+
+use crate::Folder;
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const WORDS: &str = "gen-dataset meshes --adapter cpu --layout webdataset --sensor vlp32c --views 3 \
+                     --points 64 --azimuth-jitter 180 --tar-clouds 4";
+
+#[test]
+fn parts_that_are_killed_and_gone_on_with_are_the_whole() {
+    let folder = Folder::with_meshes();
+    folder.succeeds(&format!("{WORDS} --out whole"));
+    for part in [2, 0, 1] {
+        let words = format!("{WORDS} --out parts --resume --shard auto/3");
+        for milliseconds in [5, 20, 60, 60_000] {
+            let mut run = folder.edgepuck(&words);
+            let run = run.env("SLURM_ARRAY_TASK_ID", part.to_string()).stderr(Stdio::null());
+            let mut child = run.spawn().unwrap();
+            let killed_at = Instant::now() + Duration::from_millis(milliseconds);
+            while child.try_wait().unwrap().is_none() && Instant::now() < killed_at {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let _ = child.kill();
+            child.wait().unwrap();
+        }
+    }
+    let tars = |out: &str| {
+        let entries = fs::read_dir(folder.at(out)).unwrap().map(|entry| entry.unwrap().path());
+        let mut tars: Vec<_> = entries.filter(|path| path.extension().unwrap() == "tar").collect();
+        tars.sort();
+        tars.iter()
+            .map(|path| (path.file_name().unwrap().to_owned(), fs::read(path).unwrap()))
+            .collect::<Vec<_>>()
+    };
+    assert!(tars("whole").len() > 4);
+    assert!(tars("whole") == tars("parts"));
+    folder.succeeds("gen-dataset --verify parts");
+    let root = fs::read_to_string(folder.at("parts/dataset.json")).unwrap();
+    assert!(root.contains("part-0002-of-0003.json"), "{root}");
+    fs::write(folder.at("parts/train-000001.tar"), "torn").unwrap();
+    let problems = folder.exits(1, "gen-dataset --verify parts");
+    assert!(problems.contains("train-000001.tar: is not as recorded"), "{problems}");
+}
+
+#[test]
+fn what_is_there_is_refused_unless_it_is_gone_on_with() {
+    let folder = Folder::with_meshes();
+    folder.succeeds(&format!("{WORDS} --out out"));
+    let other = format!("{WORDS} --out out --seed 1");
+    folder.refuses(
+        1,
+        &[
+            (&format!("{WORDS} --out out"), "holds tars already"),
+            (&format!("{other} --resume"), "was begun with other settings"),
+        ],
+    );
+    folder.succeeds(&format!("{other} --overwrite"));
+    folder.refuses(
+        1,
+        &[
+            ("gen-dataset meshes --out x --layout webdataset", "name it with --sensor"),
+            (&format!("{WORDS} --out x --layout webdataset,yanx27"), "it writes tars alone"),
+        ],
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn a_tar_is_handed_over_once_and_a_failing_command_is_tried_again() {
+    let folder = Folder::with_meshes();
+    let run = |command: &str| {
+        let words = format!("{WORDS} --out out --resume --on-shard");
+        folder.edgepuck(&words).arg(command).output().unwrap()
+    };
+    // It fails for the first tar until there is a folder for it.
+    let late = "test -d store || { test -e tried && mkdir store; touch tried; exit 1; }; cp {} store/{name}";
+    let done = run(late);
+    assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+    for tar in fs::read_dir(folder.at("store")).unwrap().map(|tar| tar.unwrap()) {
+        let own = folder.at("out").join(tar.file_name());
+        assert_eq!(fs::read(own).unwrap(), fs::read(tar.path()).unwrap());
+    }
+    // All were handed over: another command is not run.
+    assert_eq!(run("touch again; false").status.code(), Some(0));
+    assert!(!folder.at("again").exists());
+}
+
+#[test]
+fn a_mesh_that_cannot_be_read_is_left_out_and_named() {
+    let folder = Folder::with_meshes();
+    folder.write("meshes/ring/train/broken.off", "OFF\n1 1 0\n");
+    let said = folder.exits(3, &format!("{WORDS} --out out"));
+    assert!(said.contains("failed: ring/train/broken.off"), "{said}");
+    folder.succeeds("gen-dataset --verify out");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_run_that_is_told_to_end_leaves_no_half_of_a_tar() {
+    let folder = Folder::with_meshes();
+    let words = format!("{WORDS} --out out --resume --shard 1/2");
+    let words = words.replace("--views 3", "--views 900").replace("clouds 4", "clouds 1500");
+    let mut codes = Vec::new();
+    // Sooner or later the signal comes while a tar is written.
+    for milliseconds in (0..60).map(|n| 20 + 10 * n) {
+        let mut child = folder.edgepuck(&words).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        Command::new("kill").arg(child.id().to_string()).status().unwrap();
+        let code = child.wait().unwrap().code();
+        // A program that has not yet begun is ended by the signal itself.
+        assert!(matches!(code, Some(0 | 75) | None), "{code:?}");
+        for file in fs::read_dir(folder.at("out")).into_iter().flatten() {
+            let path = file.unwrap().path();
+            assert!(path.with_extension("json").exists(), "{} has no record", path.display());
+        }
+        codes.push(code);
+        if matches!(code, Some(0 | 75)) {
+            break;
+        }
+    }
+    assert_eq!(codes.last(), Some(&Some(75)), "{codes:?}");
+    folder.succeeds(&words);
+}
