@@ -1,8 +1,9 @@
 //! The command line of the program `edgepuck`, which its binary and its Python package start.
 
 use crate::{
-    Outcome, adapters, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes, merge_dataset,
-    outcome, preview_scan, profile, sample_surfaces, scan, segment, trainer, weather,
+    Outcome, adapters, cluster, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes,
+    merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment, trainer,
+    weather,
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect, export_onnx, import_weights};
@@ -49,6 +50,8 @@ enum Command {
     Adapters,
     /// Merge the shards of a dataset into one dataset
     MergeDataset(merge_dataset::Args),
+    /// Print the job file of a dataset that many machines make: Slurm, Kubernetes or HyperQueue
+    Cluster(cluster::Args),
     /// Convert a PyTorch checkpoint into a model file for infer-cpu
     #[cfg(feature = "models")]
     ImportWeights(import_weights::Args),
@@ -110,6 +113,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Profile(args) => profile::run(args),
         Command::Adapters => adapters::run(),
         Command::MergeDataset(args) => merge_dataset::run(args),
+        Command::Cluster(args) => cluster::run(args),
         #[cfg(feature = "models")]
         Command::ImportWeights(args) => import_weights::run(args),
         #[cfg(feature = "models")]

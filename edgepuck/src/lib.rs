@@ -7,6 +7,7 @@ mod brightness;
 pub mod caster;
 pub mod checkout;
 pub mod cli;
+pub mod cluster;
 pub mod corrupt;
 #[cfg(feature = "models")]
 pub mod detect;

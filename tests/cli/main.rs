@@ -5,6 +5,7 @@
 mod advise;
 mod bad_input;
 mod checkpoints;
+mod clusters;
 mod corrupt;
 mod datasets;
 mod drives;
