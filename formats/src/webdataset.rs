@@ -38,7 +38,8 @@ pub fn end(tar: &mut impl Write) -> io::Result<()> {
     tar.write_all(&[0; 2 * BLOCK])
 }
 
-/// The NPZ file of some clouds of `n_points` points each: `points` f32 [m, n, 3], `labels` i64 [m].
+/// The NPZ file of some clouds of `n_points` points each: `points` f32
+/// `[m, n, 3]`, `labels` i64 `[m]`.
 ///
 /// # Errors
 /// None but those of memory.

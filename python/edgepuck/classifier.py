@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
+from ._arguments import place, whole
 from .scan import Scan
 
 
-@dataclass
+@dataclass(eq=False)
 class Prediction:
     """What a network says of a cloud."""
 
@@ -54,7 +55,8 @@ class Classifier:
         sampler: str | None = None,
         points: int | None = None,
     ) -> None:
-        self._arguments = (os.fspath(model), precision, sampler, points)
+        wanted = None if points is None else whole("points", points, 1, 2**32)
+        self._arguments = (place(model), precision, sampler, wanted)
         self._classifier = _edgepuck.Classifier(*self._arguments)
 
     @property

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _edgepuck
+from . import _arguments, _edgepuck
+from ._arguments import number, place, whole
 
 Range = float | tuple[float, float]
 
@@ -21,12 +22,14 @@ class Dataset:
 
     It is a map-style dataset of PyTorch, but needs no PyTorch: `dataset[i]` is a cloud of shape
     [points, 3] in the unit sphere, and its class. What it is depends on the seed, the epoch and `i`
-    alone: not on batches, on workers or on the machine. In epoch 0, the clouds are those that
-    `edgepuck gen-dataset` packs with the same settings.
+    alone, not on batches or workers, and on one adapter not on the machine. In epoch 0, the clouds are
+    those that `edgepuck gen-dataset` packs with the same settings; a view of too few points, which that
+    leaves out, is replaced by another.
 
     Args:
         meshes: The folder: `CLASS/{train,test}/NAME.off`, or any other layout, in which a hash
-            puts about one mesh in five into the test set.
+            of the seed, the class and the name puts about one mesh in five into the test set: there, the
+            sets to train and to test with must have one seed.
         sensor: As of `Sensor`.
         split: `train`, `test`, or None for both.
         points: Points of each cloud.
@@ -35,7 +38,7 @@ class Dataset:
         elevation: Of the sensor above the mesh, degrees; of two, a random one between them.
         azimuth_jitter: Each view is turned around the mesh by a random angle of at most this,
             degrees: 180 is any side.
-        noise: Standard deviation of the noise of the ranges, metres.
+        noise: Standard deviation of the noise of the ranges, metres; 0.01 if there are no effects.
         dropout: Probability that a return is missing.
         effects: The path of a TOML file with a table `[effects]`, in place of noise and dropout.
         seed: Of all random numbers.
@@ -61,8 +64,8 @@ class Dataset:
         distance: Range = 3.0,
         elevation: Range = 20.0,
         azimuth_jitter: float = 180.0,
-        noise: float = 0.01,
-        dropout: float = 0.0,
+        noise: float | None = None,
+        dropout: float | None = None,
         effects: str | os.PathLike[str] | None = None,
         seed: int = 0,
         normalize: str = "unit-sphere",
@@ -72,23 +75,24 @@ class Dataset:
         adapter: str = "cpu",
     ) -> None:
         flags = {
-            "sensor": os.fspath(sensor),
+            "sensor": place(sensor),
             "points": points,
             "views": views,
             "distance": _from_to(distance),
             "elevation": _from_to(elevation),
             "azimuth-jitter": azimuth_jitter,
-            "seed": seed,
+            "seed": _arguments.seed(seed),
             "normalize": normalize,
             "up": up,
             "min-points": min_points,
-            "effects": None if effects is None else os.fspath(effects),
+            "effects": None if effects is None else place(effects),
+            "noise": noise,
+            "dropout": dropout,
         }
-        if effects is None:
-            flags |= {"noise": noise, "dropout": dropout}
         words = [f"--{flag}={value}" for flag, value in flags.items() if value is not None]
         self._seed = seed
-        self._arguments = (os.fspath(meshes), split, words, cache_mb << 20, adapter)
+        cache = whole("cache_mb", cache_mb, 0, 2**30) << 20
+        self._arguments = (place(meshes), split, words, cache, adapter)
         self._clouds = _edgepuck.Clouds(*self._arguments)
         # Shared, so that workers that outlive an epoch see the next one.
         self._epoch = multiprocessing.RawValue("Q", 0)
@@ -115,7 +119,7 @@ class Dataset:
     def set_epoch(self, epoch: int) -> None:
         """Draw other views from now on, of epoch number `epoch`. Workers of a `DataLoader` follow
         at once, so call it between two iterations."""
-        self._epoch.value = epoch
+        self._epoch.value = whole("epoch", epoch, 0, 2**32 - 1)
 
     def source(self, index: int) -> str:
         """The mesh file that cloud `index` is of, from the folder of meshes."""
@@ -135,10 +139,7 @@ class Dataset:
         return list(zip(clouds, labels.tolist(), strict=True))
 
     def _number(self, index: int) -> int:
-        found = int(index)
-        if not -len(self) <= found < len(self):
-            raise IndexError(f"expected the number of one of {len(self)} clouds, found {found}")
-        return found % len(self)
+        return number("clouds", index, len(self))
 
     def __getstate__(self) -> dict[str, Any]:
         # The shared epoch goes to the children of this process alone.

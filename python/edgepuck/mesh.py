@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
+from ._arguments import place
 
 Axis = Literal["y", "z"]
 Normalize = Literal["unit-sphere", "bbox", "none"]
@@ -45,8 +46,9 @@ class Mesh:
         up: Axis | None = None,
     ) -> None:
         if faces is None and isinstance(source, (str, os.PathLike)):
-            self._arguments: tuple[Any, ...] = (os.fspath(source), None, normalize, up)
-            self._mesh = _edgepuck.Mesh.read(os.fspath(source), up, normalize)
+            path = place(source)
+            self._arguments: tuple[Any, ...] = (path, None, normalize, up)
+            self._mesh = _edgepuck.Mesh.read(path, up, normalize)
             return
         if faces is None and hasattr(source, "vertices") and hasattr(source, "faces"):
             source, faces = source.vertices, source.faces
@@ -55,7 +57,8 @@ class Mesh:
                 "expected a path, a mesh with vertices and faces, or vertices and faces, found "
                 f"{type(source).__name__} alone"
             )
-        vertices = np.ascontiguousarray(source, dtype=np.float64)
+        # A copy, which stays as it is.
+        vertices = np.array(source, dtype=np.float64, order="C")
         indices = _indices(faces)
         for name, array in [("vertices", vertices), ("faces", indices)]:
             if array.ndim != 2:
@@ -86,7 +89,7 @@ def _indices(faces: ArrayLike) -> NDArray[np.int64]:
     found = np.asarray(faces)
     if found.size and not np.issubdtype(found.dtype, np.integer):
         raise _edgepuck.Error(f"expected faces of whole numbers, found {found.dtype}")
-    return np.ascontiguousarray(found, dtype=np.int64)
+    return np.array(found, dtype=np.int64, order="C")
 
 
 def _again(source: Any, faces: Any, normalize: Normalize, up: Axis | None) -> Mesh:

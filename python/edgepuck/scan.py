@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 _NAMES = {"return": "return_number", "sensor": "sensor_position"}
 
 
-@dataclass
+@dataclass(eq=False)
 class Scan:
     """The points of one scan, and what is known of each. What was not asked for is None.
 
@@ -54,6 +54,8 @@ class Scan:
     """How the sensor was turned then, a rotation vector, radians, [n, 3]."""
     normal: NDArray[np.float32] | None = None
     """Unit normal of the surface, towards the sensor, [n, 3]."""
+    pose: NDArray[np.float64] | None = None
+    """From the sensor's frame to that of the positions, [4, 4]; None if that is the sensor's own."""
 
     def __len__(self) -> int:
         """The number of points."""
@@ -63,10 +65,18 @@ class Scan:
         array = self.positions if dtype is None else self.positions.astype(dtype, copy=False)
         return array.copy() if copy else array
 
+    def in_sensor_frame(self) -> NDArray[np.float32]:
+        """The positions from the sensor, x forward and z up, metres, [n, 3]."""
+        if self.pose is None:
+            return self.positions
+        from_sensor = self.positions + (self.origin - self.pose[:3, 3])
+        return np.ascontiguousarray(from_sensor @ self.pose[:3, :3], dtype=np.float32)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an NPZ file that `edgepuck preview` and `edgepuck segment` read."""
         names = {name: column for column, name in _NAMES.items()}
         columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        del columns["pose"]
         known = {names.get(name, name): of for name, of in columns.items() if of is not None}
         if not known["origin"].any():
             del known["origin"]
@@ -77,4 +87,6 @@ class Scan:
 def scan_of(columns: Mapping[str, Any]) -> Scan:
     """The scan of columns by their names in files."""
     named = {_NAMES.get(column, column): of for column, of in columns.items()}
-    return Scan(**{**named, "origin": np.array(named["origin"])})
+    pose = named.get("pose")
+    pose = None if pose is None else np.array(pose).reshape(4, 4)
+    return Scan(**{**named, "origin": np.array(named["origin"]), "pose": pose})

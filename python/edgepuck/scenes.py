@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _edgepuck
+from . import _arguments, _edgepuck
+from ._arguments import number, place, whole
 from .scan import Scan, scan_of
 
 
-@dataclass
+@dataclass(eq=False)
 class Scene:
     """A scene, what its sensor saw, and what segmentation made of that."""
 
@@ -26,7 +27,7 @@ class Scene:
     """`class`, `position` (the middle of its footprint), `size` and `yaw_deg` of each object, x along
     the road, from the ground below the sensor."""
     cluster: NDArray[np.int32]
-    """The cluster of each point, as `segment` gives it, [n]."""
+    """The cluster of each point, as `segment` numbers them, for ground as low as the recipe draws, [n]."""
     cluster_class: NDArray[np.int64]
     """The class of each cluster, an index into `Scenes.classes`, [n_clusters]."""
     cluster_truth_share: NDArray[np.float32]
@@ -62,9 +63,12 @@ class Scenes:
         meshes: str | os.PathLike[str] | None = None,
         seed: int = 0,
     ) -> None:
-        folder = None if meshes is None else os.fspath(meshes)
-        self._arguments = (os.fspath(recipe), list(sensors), folder, seed)
-        self._length = length
+        if isinstance(sensors, str):
+            raise _edgepuck.Error(f"sensors: expected a list of names, found {sensors!r}")
+        folder = None if meshes is None else place(meshes)
+        names = [place(sensor) for sensor in sensors]
+        self._arguments = (place(recipe), names, folder, _arguments.seed(seed))
+        self._length = whole("length", length, 0, 2**32)
         self._scenes = _edgepuck.Scenes(*self._arguments)
 
     def __len__(self) -> int:
@@ -77,9 +81,7 @@ class Scenes:
         return self._scenes.classes
 
     def __getitem__(self, index: int) -> Scene:
-        if not -self._length <= index < self._length:
-            raise IndexError(f"expected the number of one of {self._length} scenes, found {index}")
-        told = self._scenes.draw(index % self._length)
+        told = self._scenes.draw(number("scenes", index, self._length))
         return Scene(**{**told, "scan": scan_of(told["scan"])})
 
     def __getstate__(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ def segment(
     point that is not finite.
 
     Args:
-        sweep: A scan, or points of shape [n, 3], metres, with the sensor at the origin and z up.
+        sweep: A scan, or points of shape [n, 3], metres, from the sensor, z up.
         rings: The ring of each point, from below, [n]; a scan has its own.
         radius: Take the connected components of points within this many metres instead, for clouds
             that are not sweeps of a sensor. There is no ground then.
@@ -33,6 +33,11 @@ def segment(
     """
     if isinstance(sweep, Scan):
         rings = sweep.ring if rings is None else rings
-        sweep = sweep.positions
-    of_points = None if rings is None else np.ascontiguousarray(rings, dtype=np.uint16)
+        sweep = sweep.in_sensor_frame()
+    of_points = None
+    if rings is not None:
+        found = np.asarray(rings)
+        if found.ndim != 1 or (found.size and not (0 <= found.min() and found.max() < 2**16)):
+            raise _edgepuck.Error("rings: expected whole numbers from 0 to 65535 of shape [n]")
+        of_points = np.ascontiguousarray(found, dtype=np.uint16)
     return _edgepuck.segment(points_of(sweep), of_points, radius, min_points)

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _edgepuck
+from . import _arguments, _edgepuck
+from ._arguments import place
 from .mesh import Mesh
 from .scan import Scan, scan_of
 
@@ -33,8 +34,8 @@ class Sensor:
     """
 
     def __init__(self, name: str | os.PathLike[str], *, adapter: str = "cpu") -> None:
-        self._arguments = (os.fspath(name), adapter)
-        self._sensor = _edgepuck.Sensor(os.fspath(name), adapter)
+        self._arguments = (place(name), adapter)
+        self._sensor = _edgepuck.Sensor(*self._arguments)
 
     @property
     def name(self) -> str:
@@ -90,14 +91,28 @@ class Sensor:
         Raises:
             Error: A value is out of its bounds or there is no such attribute or effect.
         """
+        if not isinstance(mesh, Mesh):
+            raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
+        if isinstance(attributes, str):
+            raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
         wanted: dict[str, Any] = dict(effects or {})
+        for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
+            if given and name in wanted:
+                raise _edgepuck.Error(f"{name}: expected it once, found it in effects as well")
         if noise != 0:
             wanted["noise"] = {"sigma_m": noise, "mean_m": 0.0, "model": "range"}
         if dropout != 0:
             wanted["dropout"] = {"probability": dropout}
-        place = [distance, elevation, azimuth] if pose is None else np.asarray(pose).ravel().tolist()
+        at = [float(distance), float(elevation), float(azimuth)]
+        if pose is not None:
+            matrix = np.asarray(pose, dtype=np.float64)
+            if matrix.shape != (4, 4):
+                found = list(matrix.shape)
+                raise _edgepuck.Error(f"pose: expected a matrix of shape [4, 4], found {found}")
+            at = matrix.ravel().tolist()
         told = json.dumps(_plain(wanted, "effects"))
-        return scan_of(self._sensor.scan(mesh._mesh, place, told, list(attributes), seed))
+        key = _arguments.seed(seed)
+        return scan_of(self._sensor.scan(mesh._mesh, at, told, list(attributes), key))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _again, self._arguments

@@ -82,8 +82,7 @@ def export(
         state = {name: value.cpu() for name, value in model.state_dict().items()}
         torch.save({"model_state_dict": state}, checkpoint)
         names.write_text("\n".join(classes) + "\n")
-        words = ["import-weights", checkpoint, "--out", path, "--classes", names]
-        words += ["--sampler", sampler, "--points", points]
-        words += ["--provenance", "edgepuck.torch.export"]
-        words += ["--training-set", training_set] if training_set else []
+        words = ["import-weights", checkpoint, f"--out={os.fspath(path)}", f"--classes={names}"]
+        words += [f"--sampler={sampler}", f"--points={points}", "--provenance=edgepuck.torch.export"]
+        words += [f"--training-set={training_set}"] if training_set else []
         _edgepuck.run(["edgepuck", *map(str, words)])

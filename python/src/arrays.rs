@@ -2,10 +2,12 @@
 
 use crate::error::raised;
 use formats::Scan;
+use glam::DMat4;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use sim_gpu::pose::Pose;
 
 /// `[n, 3]`.
 pub fn vectors(py: Python<'_>, vectors: Vec<[f32; 3]>) -> PyResult<Bound<'_, PyAny>> {
@@ -20,6 +22,13 @@ pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
         return Err(raised(format!("expected points of shape [n, 3], found {:?}", array.shape())));
     }
     Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+}
+
+/// From the sensor's frame to the world's, row by row.
+pub fn matrix(pose: &Pose) -> Vec<f64> {
+    let world_from_sensor =
+        DMat4::from_rotation_translation(pose.world_from_sensor, pose.position_m);
+    world_from_sensor.transpose().to_cols_array().to_vec()
 }
 
 /// The columns of `scan` by their names in files.

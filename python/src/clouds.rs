@@ -35,7 +35,8 @@ impl Clouds {
         adapter: &str,
     ) -> PyResult<Self> {
         let split: Option<Split> = split.map(str::parse).transpose().map_err(raised)?;
-        let config = edgepuck_program::gen_dataset::config(&flags).map_err(raised_with_causes)?;
+        let config = edgepuck_program::gen_dataset::config(&flags);
+        let config = config.map_err(|error| raised(of_flags(&error)))?;
         let n_points = config.packed_points as usize;
         let clouds = process::run(py, || {
             let mut found = discover(&meshes, config.seed)?;
@@ -84,6 +85,13 @@ impl Clouds {
         let points = Array3::from_shape_vec(shape, points).map_err(raised)?;
         Ok((points.into_pyarray(py), labels.into_pyarray(py)))
     }
+}
+
+/// What is wrong with flags, in the words of one who gave arguments.
+fn of_flags(error: &anyhow::Error) -> String {
+    let text = formats::outcome::joined_causes(error);
+    let cause = text.split("\n\n").next().unwrap_or_default();
+    cause.trim_start_matches("error: ").trim_end().replace("'--", "'")
 }
 
 impl Clouds {

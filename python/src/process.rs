@@ -5,6 +5,7 @@
 //! first needed and kept with the number of the process. Nothing is started by an import.
 
 use crate::error::{raised, raised_with_causes};
+use edgepuck_program::Outcome;
 use pyo3::prelude::*;
 use pyo3::types::PyAnyMethods;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -12,32 +13,40 @@ use sim_gpu::caster::{AdapterRequest, Caster};
 use sim_gpu::effects::Effects;
 use std::ffi::OsString;
 use std::mem;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Something and the process that made it.
-struct Own<T>(u32, T);
+/// Something and the process that made it. It is dropped by that process alone: what a parent made,
+/// its threads and its device, are not in its children.
+struct Own<T> {
+    process: u32,
+    of: Option<T>,
+}
 
 impl<T> Own<T> {
-    /// What is kept, if this process made it.
-    fn of_this_process(own: &Option<Self>) -> Option<&T> {
-        own.as_ref().filter(|Self(process, _)| *process == std::process::id()).map(|Self(_, t)| t)
+    fn new(of: T) -> Self {
+        Self { process: std::process::id(), of: Some(of) }
     }
 
-    /// Keeps `new`. What a parent made is never dropped: its threads and its device are not here.
-    fn replace(own: &mut Option<Self>, new: T) {
-        if let Some(old) = own.replace(Self(std::process::id(), new)) {
-            if old.0 == std::process::id() { drop(old) } else { mem::forget(old) }
+    /// What is kept, if this process made it.
+    fn of_this_process(own: &Option<Self>) -> Option<&T> {
+        own.as_ref().filter(|own| own.process == std::process::id())?.of.as_ref()
+    }
+}
+
+impl<T> Drop for Own<T> {
+    fn drop(&mut self) {
+        if self.process != std::process::id() {
+            mem::forget(self.of.take());
         }
     }
 }
 
-/// The pool of this process. It is locked by holders of Python's lock alone, so that no fork finds
-/// it locked.
+/// The pool of this process. Whoever locks it holds Python's lock and runs nothing of Python's until it
+/// is unlocked: so no thread waits for the other lock, and no fork finds this one locked.
 static POOL: Mutex<Option<Own<Arc<ThreadPool>>>> = Mutex::new(None);
 
-/// How many threads the user asked for; 0 if they did not.
-static THREADS: AtomicUsize = AtomicUsize::new(0);
+/// How many threads the user of this process asked for; 0 if they did not.
+static THREADS: Mutex<Option<Own<usize>>> = Mutex::new(None);
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -50,14 +59,13 @@ pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult
 }
 
 fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
-    let mut pool = lock(&POOL);
-    if let Some(pool) = Own::of_this_process(&pool) {
+    if let Some(pool) = Own::of_this_process(&lock(&POOL)) {
         return Ok(Arc::clone(pool));
     }
-    let threads = match THREADS.load(Relaxed) {
-        // As many as there are cores, or as RAYON_NUM_THREADS says.
-        0 if !is_worker(py)? => 0,
-        0 => 1,
+    let asked = Own::of_this_process(&lock(&THREADS)).copied().unwrap_or_default();
+    let threads = match asked {
+        0 if is_worker(py)? => 1,
+        // 0 is as many as there are cores, or as RAYON_NUM_THREADS says.
         asked => asked,
     };
     let built = ThreadPoolBuilder::new()
@@ -65,12 +73,18 @@ fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
         .thread_name(|number| format!("edgepuck-{number}"))
         .build()
         .map_err(raised)?;
+    let mut pool = lock(&POOL);
+    // Another thread may have been as quick.
+    if let Some(pool) = Own::of_this_process(&pool) {
+        return Ok(Arc::clone(pool));
+    }
     let built = Arc::new(built);
-    Own::replace(&mut pool, Arc::clone(&built));
+    *pool = Some(Own::new(Arc::clone(&built)));
     Ok(built)
 }
 
-/// Whether this is a child that `multiprocessing` started, such as a worker of a `DataLoader`.
+/// Whether this is a child that `multiprocessing` started, such as a worker of a `DataLoader`, or is
+/// about to be one: a child that is not forked reads what it is to work on before it knows its parent.
 fn is_worker(py: Python<'_>) -> PyResult<bool> {
     // A process that has not imported it is no child of it.
     let modules = py.import("sys")?.getattr("modules")?;
@@ -78,17 +92,17 @@ fn is_worker(py: Python<'_>) -> PyResult<bool> {
     if multiprocessing.is_none() {
         return Ok(false);
     }
-    Ok(!multiprocessing.call_method0("parent_process")?.is_none())
+    let process = multiprocessing.call_method0("current_process")?;
+    let reads = process.getattr_opt("_inheriting")?;
+    Ok(reads.is_some() || !multiprocessing.call_method0("parent_process")?.is_none())
 }
 
-/// Use this many threads from now on; 0 is the default.
+/// Use this many threads in this process from now on; 0 is the default.
 #[pyfunction]
 pub fn set_num_threads(threads: usize) {
-    THREADS.store(threads, Relaxed);
-    let mut pool = lock(&POOL);
-    if Own::of_this_process(&pool).is_some() {
-        *pool = None;
-    }
+    *lock(&THREADS) = Some(Own::new(threads));
+    let old = lock(&POOL).take();
+    drop(old);
 }
 
 /// An adapter and its effects, opened by each process that casts.
@@ -111,7 +125,7 @@ impl LazyCaster {
             _ => {}
         }
         let caster = Arc::new(Caster::open(&self.request, effects).map_err(raised)?);
-        Own::replace(&mut opened, Arc::clone(&caster));
+        *opened = Some(Own::new(Arc::clone(&caster)));
         Ok(caster)
     }
 }
@@ -127,8 +141,10 @@ pub fn adapters(py: Python<'_>) -> Vec<String> {
 /// Run a command of the program `edgepuck`, whose name comes first, and raise what it reports.
 #[pyfunction(name = "run")]
 pub fn run_command(py: Python<'_>, words: Vec<OsString>) -> PyResult<()> {
-    py.detach(|| edgepuck_program::cli::run_words(words)).map_err(raised_with_causes)?;
-    Ok(())
+    match py.detach(|| edgepuck_program::cli::run_words(words)).map_err(raised_with_causes)? {
+        Outcome::Success => Ok(()),
+        other => Err(raised(format!("the command ended with {other:?}"))),
+    }
 }
 
 /// Run the program `edgepuck` with these words, of which the first is its name, and return its exit

@@ -86,6 +86,10 @@ pub fn scan_scene<'py>(
     let scene = process::run(py, || Scene::load(&file))?.map_err(raised)?;
     let caster = LazyCaster::new(adapter).open(&scene.effects)?;
     let scans = process::run(py, || cast(&scene, &caster, Culling::On))?.map_err(raised)?;
-    let told = scans.into_iter().map(|of| Ok((of.sensor, arrays::scan(py, of.scan)?)));
+    let told = scans.into_iter().zip(&scene.sensors).map(|(of, asked)| {
+        let told = arrays::scan(py, of.scan)?;
+        told.set_item("pose", arrays::matrix(&asked.pose))?;
+        Ok((of.sensor, told))
+    });
     told.collect()
 }

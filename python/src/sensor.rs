@@ -99,7 +99,9 @@ impl Sensor {
             request.stream = StreamKey::new(seed, "scan", 0);
             Ok(scan(&caster, &mesh.target, &request)?)
         })?;
-        arrays::scan(py, scanned.map_err(raised_with_causes)?)
+        let told = arrays::scan(py, scanned.map_err(raised_with_causes)?)?;
+        told.set_item("pose", arrays::matrix(&pose))?;
+        Ok(told)
     }
 }
 

@@ -81,6 +81,25 @@ def test_a_classifier_knows_a_chair(shapes) -> None:
     assert 0 < found.confidence <= 1
 
 
+def test_a_mesh_keeps_what_it_was_given(cube: tuple) -> None:
+    vertices = cube[0].copy()
+    mesh = ep.Mesh(vertices, cube[1], normalize="none")
+    vertices *= 0.1
+    again = pickle.loads(pickle.dumps(mesh))
+    lidar = ep.Sensor("vlp32c")
+    np.testing.assert_array_equal(lidar.scan(again).positions, lidar.scan(mesh).positions)
+
+
+def test_a_scan_around_a_mesh_is_segmented_from_its_sensor(cube: tuple) -> None:
+    mesh = ep.Mesh(cube[0] + [0, 0, 0], cube[1], normalize="none")
+    scan = ep.Sensor("vlp32c").scan(mesh, distance=6, elevation=0, azimuth=70)
+    from_sensor = scan.in_sensor_frame()
+    np.testing.assert_allclose(np.linalg.norm(from_sensor, axis=1), scan.range, rtol=1e-5)
+    assert (from_sensor[:, 0] > 5).all()
+    np.testing.assert_array_equal(ep.segment(scan), ep.segment(from_sensor, rings=scan.ring))
+    assert (ep.segment(scan) >= 0).any()
+
+
 def test_clusters_are_numbered_and_ground_is_told() -> None:
     scene = ep.Scenes("street", seed=2)[4]
     assert scene.cluster.max() + 1 == len(scene.cluster_class)

@@ -54,6 +54,11 @@ def test_what_cannot_be_used_is_named(make, message: str) -> None:
         ({"effects": {"mist": 1}}, "mist"),
         ({"effects": {"footprint": {"samples": 5}}}, "samples"),
         ({"pose": np.eye(3)}, "shape"),
+        ({"pose": [3, 0, 0]}, "shape [4, 4], found [3]"),
+        ({"seed": -1}, "seed: expected a whole number"),
+        ({"seed": 2**64}, "seed"),
+        ({"attributes": "range"}, "list of names"),
+        ({"noise": 0.1, "effects": {"noise": {"sigma_m": 0.1}}}, "expected it once"),
         ({"pose": 2 * np.diag([1, 1, 1, 0.5])}, "rotation"),
     ],
 )
@@ -71,6 +76,12 @@ def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, messag
         ({"noise": -1}, "sigma"),
         ({"split": "dev"}, "dev"),
         ({"points": 0}, "points"),
+        ({"views": 0}, "views"),
+        ({"views": 70_000}, "views"),
+        ({"seed": -1}, "seed"),
+        ({"cache_mb": -1}, "cache_mb"),
+        ({"distance": "far"}, "distance"),
+        ({"noise": 0.1, "effects": __file__}, "cannot be used with"),
         ({"min_points": 1 << 24}, "expected a view of at least 16777216 points"),
     ],
 )
@@ -88,6 +99,29 @@ def test_a_bad_mesh_of_a_dataset_is_named_when_it_is_drawn(tmp_path: Path) -> No
         dataset[0]
     with pytest.raises(IndexError, match="one of 1 clouds, found 1"):
         dataset[1]
+
+
+def test_what_is_no_number_of_a_cloud_is_refused(shapes: Path) -> None:
+    dataset = ep.Dataset(shapes)
+    for epoch in [-1, 2**32, 0.5]:
+        with pytest.raises(ep.Error, match="epoch"):
+            dataset.set_epoch(epoch)
+    with pytest.raises(TypeError):
+        dataset[1.7]
+    np.testing.assert_array_equal(dataset[np.int64(1)][0], dataset[1 - len(dataset)][0])
+    with pytest.raises(ep.Error, match="length"):
+        ep.Scenes(length=-1)
+    with pytest.raises(ep.Error, match="expected an edgepuck.Mesh"):
+        ep.Sensor("vlp32c").scan("chair.off")
+
+
+def test_paths_stay_right_in_another_folder(
+    shapes: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(shapes.parent)
+    dataset = ep.Dataset(shapes.name)
+    monkeypatch.chdir(tmp_path)
+    assert dataset[0][0].shape == (1024, 3)
 
 
 def test_huge_and_tiny_meshes_are_ordinary(cube: tuple) -> None:

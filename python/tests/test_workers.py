@@ -4,6 +4,9 @@ parent did before, and gives the same clouds to any number of them."""
 import faulthandler
 import multiprocessing
 import queue
+import subprocess
+import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -103,6 +106,74 @@ def test_threads_are_those_that_were_asked_for(dataset: ep.Dataset) -> None:
     np.testing.assert_array_equal(dataset.batch(range(8))[0], points)
     ep.set_num_threads(0)
     np.testing.assert_array_equal(dataset.batch(range(8))[0], points)
+
+
+def count_threads(dataset: ep.Dataset, answers) -> None:
+    dataset.batch(BATCHES[0])
+    names = [path.read_text().strip() for path in Path("/proc/self/task").glob("*/comm")]
+    answers.put(sum(name.startswith("edgepuck-") for name in names))
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system has no /proc")
+@pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
+def test_a_worker_casts_on_one_thread(
+    dataset: ep.Dataset, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Even where a pool would have more, and whatever the parent has asked for.
+    monkeypatch.setenv("RAYON_NUM_THREADS", "5")
+    ep.set_num_threads(3)
+    context = multiprocessing.get_context(method)
+    answers = context.Queue()
+    child = context.Process(target=count_threads, args=(dataset, answers))
+    child.start()
+    assert answers.get(timeout=TIMEOUT_S) == 1
+    child.join(TIMEOUT_S)
+    ep.set_num_threads(0)
+
+
+def run_script(script: str) -> None:
+    """Runs Python in a process of its own, which must end in time."""
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], timeout=TIMEOUT_S, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_threads_that_cast_at_once_do_not_wait_for_each_other_for_ever() -> None:
+    run_script(
+        """
+        import sys, threading
+        import edgepuck as ep
+        sys.setswitchinterval(1e-6)
+        lidar, mesh = ep.Sensor("vlp32c"), ep.Mesh(*ep.box((1, 1, 1)))
+        def cast():
+            for _ in range(100):
+                ep.set_num_threads(0)
+                lidar.scan(mesh, distance=9)
+        threads = [threading.Thread(target=cast) for _ in range(4)]
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+        """
+    )
+
+
+@pytest.mark.parametrize("end", ["del lidar", "import gc; lidar.me = lidar; del lidar; gc.collect()", "pass"])
+def test_a_child_leaves_what_its_parent_opened(end: str) -> None:
+    if not any("llvmpipe" in name for name in ep.adapters()):
+        pytest.skip("this system has no software Vulkan")
+    run_script(
+        f"""
+        import os, sys
+        import edgepuck as ep
+        lidar, mesh = ep.Sensor("vlp32c", adapter="llvmpipe"), ep.Mesh(*ep.box((1, 1, 1)))
+        lidar.scan(mesh)
+        child = os.fork()
+        if child == 0:
+            {end}
+            sys.exit(0)
+        assert os.waitpid(child, 0)[1] == 0
+        """
+    )
 
 
 def draw_into(dataset: ep.Dataset, answers) -> None:

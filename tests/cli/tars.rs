@@ -1,6 +1,6 @@
 //! Tars of samples are the same by however many they are made, and are handed over once.
 
-use crate::Folder;
+use crate::{Folder, meshes};
 use std::fs;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -64,6 +64,54 @@ fn what_is_there_is_refused_unless_it_is_gone_on_with() {
             (&format!("{WORDS} --out x --layout webdataset,yanx27"), "it writes tars alone"),
         ],
     );
+}
+
+#[test]
+fn one_part_leaves_the_others_alone() {
+    let folder = Folder::with_meshes();
+    for part in [1, 2] {
+        folder.succeeds(&format!("{WORDS} --out out --shard {part}/2"));
+    }
+    folder.write("out/train-config.json", "mine");
+    let before = folder.bytes("out/train-000001.tar");
+    folder.succeeds(&format!("{WORDS} --out out --shard 1/2 --overwrite"));
+    assert_eq!(folder.bytes("out/train-000001.tar"), before);
+    assert_eq!(folder.text("out/train-config.json"), "mine");
+    folder.succeeds("gen-dataset --verify out");
+    // Meshes of another class would change what labels mean.
+    folder.write("meshes/aaa/train/a.off", meshes::off(8, 0.5));
+    let other = format!("{WORDS} --out out --shard 2/2 --overwrite");
+    folder.refuses(1, &[(&other, "this part has other settings, other meshes")]);
+}
+
+#[test]
+fn what_is_missing_is_made_again_and_what_is_torn_is_found() {
+    let folder = Folder::with_meshes();
+    let words = format!("{WORDS} --out out --hash none");
+    folder.succeeds(&words);
+    let whole = folder.bytes("out/train-000000.tar");
+    folder.write("out/train-000000.tar", &whole[..100]);
+    let problems = folder.exits(1, "gen-dataset --verify out");
+    assert!(problems.contains("train-000000.tar: is not as recorded"), "{problems}");
+    folder.succeeds(&format!("{words} --resume"));
+    assert_eq!(folder.bytes("out/train-000000.tar"), whole);
+    folder.write("out/part-0000-of-0001.json", "{");
+    assert!(folder.exits(1, "gen-dataset --verify out").contains("part-0000-of-0001.json"));
+    folder.succeeds("gen-dataset meshes --out ordinary --adapter cpu");
+    folder.refuses(1, &[(&format!("{WORDS} --out ordinary"), "a dataset of another layout")]);
+}
+
+#[test]
+#[cfg(unix)]
+fn tars_that_are_there_are_handed_over_later() {
+    let folder = Folder::with_meshes();
+    folder.succeeds(&format!("{WORDS} --out out"));
+    let words = format!("{WORDS} --out out --resume --on-shard");
+    let done = folder.edgepuck(&words).arg("echo {name} >> handed").output().unwrap();
+    assert!(done.status.success());
+    let entries = fs::read_dir(folder.at("out")).unwrap().map(|entry| entry.unwrap().path());
+    let tars = entries.filter(|path| path.extension().is_some_and(|e| e == "tar")).count();
+    assert_eq!(folder.text("handed").lines().count(), tars);
 }
 
 #[test]

@@ -31,7 +31,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::Instant;
 
 /// Where the meshes of a run without meshes are written, a seed behind it.
@@ -126,6 +126,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let progress = Progress::default();
     let (config, culling) = (&terms.config, args.caster.culling());
     let is_over = Arc::new(AtomicBool::new(false));
+    // Once all is scanned, SIGTERM ends the program as it ends any.
+    let is_scanned = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register_conditional_default(SIGTERM, Arc::clone(&is_scanned))?;
     signal_hook::flag::register(SIGTERM, Arc::clone(&is_over))?;
     let (caster, progress) = (&caster, &progress);
     let run = Run { out: &out, config, caster, culling, progress, is_over: &is_over };
@@ -136,6 +139,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         }
         scanned => scanned?,
     };
+    is_scanned.store(true, SeqCst);
     report_failures(&scanned.failures);
     let packing = Instant::now();
     let manifest = finish(&out, &terms, scanned.records, scanned.failures)?;

@@ -2,7 +2,8 @@
 
 use crate::{Outcome, Usage};
 use edgepuck_dataset::config::DatasetConfig;
-use edgepuck_dataset::tars::{self, Cut, PartManifest, Run, Sample};
+use edgepuck_dataset::layout;
+use edgepuck_dataset::tars::{self, Cut, HandOver, PartManifest, Run, Sample};
 use edgepuck_dataset::{DatasetError, check_layouts};
 use signal_hook::consts::SIGTERM;
 use sim_gpu::mesh::tree::MeshEntry;
@@ -10,7 +11,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::Duration;
 
 /// How often a command is tried, with a pause of this many seconds before it is tried again.
@@ -31,8 +32,8 @@ pub struct TarArgs {
     tar_clouds: u32,
 
     /// Command of the shell to run when a tar is complete, with its path in place of {}, such as
-    /// 'rclone copyto {} remote:bucket/{name}'; {name} is the name of its file. A command that fails is
-    /// tried four times
+    /// 'rclone copyto {} remote:bucket/{name}'; {name} is the name of its file. Both are quoted
+    /// already. A command that fails is tried four times
     #[arg(long, value_name = "COMMAND")]
     on_shard: Option<String>,
 }
@@ -51,11 +52,15 @@ pub fn run(
         return Err(Usage(cause.to_owned()).into());
     }
     let part = args.shard.map_or((0, 1), |shard| (shard.number, shard.of));
-    refuse_what_is_there(args, out)?;
     let caster = args.caster.open(&config.cast_effects())?;
+    refuse_what_is_there(args, out, part)?;
     let is_over = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(SIGTERM, Arc::clone(&is_over))?;
     let TarArgs { sample, tar_clouds, on_shard } = &args.tars;
+    let hands_over = on_shard.as_ref().map(|command| {
+        let is_over = Arc::clone(&is_over);
+        move |tar: &Path| hand_over(command, tar, &is_over)
+    });
     let run = Run {
         out,
         config,
@@ -63,7 +68,7 @@ pub fn run(
         part,
         caster: &caster,
         is_over: &is_over,
-        hand_over: &|tar| on_shard.as_ref().map_or(Ok(()), |command| hand_over(command, tar)),
+        hand_over: hands_over.as_ref().map(|hand_over| hand_over as HandOver),
         say: &|line| eprintln!("{line}"),
     };
     match tars::make(&run, meshes) {
@@ -76,24 +81,34 @@ pub fn run(
     }
 }
 
-/// Tars that are there are gone on with or made anew only if that is asked for.
-fn refuse_what_is_there(args: &super::Args, out: &Path) -> anyhow::Result<()> {
-    let is_tar = |name: &str| {
-        let stem = name.strip_suffix(".tar").or_else(|| name.strip_suffix(".json"));
-        stem.is_some_and(|stem| {
-            ["train-", "test-", "part-"].iter().any(|prefix| stem.starts_with(prefix))
-                || stem == "dataset"
-        })
+/// Tars of this part that are there are gone on with or made anew only if that is asked for. What is not
+/// ours, or another part's, stays.
+fn refuse_what_is_there(
+    args: &super::Args,
+    out: &Path,
+    (number, of): (u32, u32),
+) -> anyhow::Result<()> {
+    let occupied = |what| DatasetError::Occupied { path: out.to_owned(), what };
+    if layout::manifest(out).exists() || layout::journal(out).exists() {
+        return Err(occupied("a dataset of another layout").into());
+    }
+    let is_own = |name: &str| {
+        let Some((stem, "tar" | "json")) = name.split_once('.') else { return false };
+        let tar = stem.strip_prefix("train-").or_else(|| stem.strip_prefix("test-"));
+        let digits = tar.filter(|digits| digits.len() >= 6);
+        let digits = digits.filter(|digits| digits.bytes().all(|digit| digit.is_ascii_digit()));
+        let tar = digits.and_then(|digits| digits.parse::<u32>().ok());
+        tar.is_some_and(|tar| tar % of == number)
+            || name == tars::part_file((number, of))
+            || name == "dataset.json"
     };
     let there = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
-    let ours =
-        there.filter(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_tar));
-    for path in ours {
+    let is_own = |path: &Path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_own);
+    for path in there.filter(|path| is_own(path)) {
         if args.overwrite {
             std::fs::remove_file(&path)?;
         } else if !args.resume {
-            let (path, what) = (out.to_owned(), "tars");
-            return Err(DatasetError::Occupied { path, what }.into());
+            return Err(occupied("tars").into());
         }
     }
     Ok(())
@@ -114,21 +129,43 @@ fn end(out: &Path, made: &PartManifest) -> Outcome {
 }
 
 /// Runs `command` for the file `tar` until it succeeds, or says why it did not.
-fn hand_over(command: &str, tar: &Path) -> Result<(), String> {
+fn hand_over(command: &str, tar: &Path, is_over: &AtomicBool) -> Result<(), String> {
     let name = tar.file_name().unwrap_or_default().to_string_lossy();
     let words =
         command.replace("{name}", &quoted(&name)).replace("{}", &quoted(&tar.to_string_lossy()));
     let mut pauses_s = PAUSES_S.iter();
     loop {
-        let (shell, flag) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
-        let cause = match Command::new(shell).arg(flag).arg(&words).status() {
+        let cause = match shell(&words).status() {
             Ok(status) if status.success() => return Ok(()),
             Ok(status) => format!("`{words}` ended with {status}"),
-            Err(error) => format!("{shell}: {error}"),
+            Err(error) => format!("the shell: {error}"),
         };
         let Some(&pause_s) = pauses_s.next() else { return Err(cause) };
         eprintln!("{cause}; trying again in {pause_s} s");
-        std::thread::sleep(Duration::from_secs(pause_s));
+        for _ in 0..10 * pause_s {
+            if is_over.load(SeqCst) {
+                return Err(cause);
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+}
+
+/// A command of the system's shell.
+fn shell(words: &str) -> Command {
+    #[cfg(windows)]
+    {
+        use std::os::windows::process::CommandExt;
+        let mut shell = Command::new("cmd");
+        // Quoted as it is, it would be quoted again.
+        shell.raw_arg("/C").raw_arg(words);
+        shell
+    }
+    #[cfg(not(windows))]
+    {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", words]);
+        shell
     }
 }
 

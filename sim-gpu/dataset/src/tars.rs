@@ -1,10 +1,9 @@
 //! A dataset as tars, as WebDataset reads them. Each is cast, written, hashed and handed over by
-//! itself, and there is no file besides: so a billion clouds are some thousands of files, and nothing
-//! ever has to walk more.
+//! itself, and no scan is a file of its own: a billion clouds are some 15,000 tars of the default size.
 //!
 //! `train-000012.tar` has a record beside it, `train-000012.json`. Each part of a run has a list of its
 //! records, `part-0003-of-0008.json`, and the last part that ends writes `dataset.json`, the list of
-//! parts. All have the same bytes whenever, wherever and by however many they are made.
+//! parts. Cast by one adapter, all have the same bytes whenever and by however many they are made.
 
 use super::config::DatasetConfig;
 use super::error::DatasetError;
@@ -27,6 +26,9 @@ use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 
 /// Clouds of one sample, where samples are of clouds: 12 MiB at 1,024 points.
 const CLOUDS_PER_SAMPLE: usize = 1024;
+
+/// Points of one sample at most, but for one cloud: 768 MiB.
+const POINTS_PER_SAMPLE: usize = 1 << 26;
 
 /// Scans that are in memory together.
 const SCANS_AT_ONCE: usize = 256;
@@ -56,6 +58,9 @@ pub struct Cut {
     pub clouds_per_tar: u32,
 }
 
+/// Takes a complete tar to where it is to be kept.
+pub type HandOver<'a> = &'a dyn Fn(&Path) -> Result<(), String>;
+
 /// A part of a dataset to be made.
 pub struct Run<'a> {
     /// The folder of the tars.
@@ -64,14 +69,14 @@ pub struct Run<'a> {
     pub config: &'a DatasetConfig,
     /// How they are cut.
     pub cut: Cut,
-    /// Part (number from 0, of how many): every so manieth tar.
+    /// Part (number from 0, of N): every N-th tar.
     pub part: (u32, u32),
     /// Casts the rays.
     pub caster: &'a Caster,
     /// Set by whoever wants the run to end; the tar that is being made is left out.
     pub is_over: &'a AtomicBool,
-    /// Given each tar once it is complete; says why it could not be handed over.
-    pub hand_over: &'a dyn Fn(&Path) -> Result<(), String>,
+    /// Given each tar once it is complete, if anybody takes them; says why it could not be handed over.
+    pub hand_over: Option<HandOver<'a>>,
     /// Given a line when a tar is done.
     pub say: &'a dyn Fn(String),
 }
@@ -90,7 +95,7 @@ pub struct TarRecord {
     pub clouds: u64,
     /// Of meshes that cannot be read or that no view sees well enough, once each.
     pub failures: Vec<MeshFailure>,
-    /// Whether it was handed over.
+    /// Whether it was handed over to a command; if so, it may be gone from here.
     pub handed_over: bool,
     /// A digest of all that decides its bytes.
     pub made_by: String,
@@ -111,6 +116,8 @@ pub struct PartManifest {
     pub cut: Cut,
     /// All classes of the whole, sorted; labels are places among them.
     pub classes: Vec<String>,
+    /// As [`TarRecord::made_by`].
+    pub made_by: String,
     /// By split and number.
     pub tars: Vec<TarRecord>,
 }
@@ -173,8 +180,13 @@ pub fn make(run: &Run, meshes: &[MeshEntry]) -> Result<PartManifest, DatasetErro
                 Some(record) => tars.push(record),
             }
             done += 1;
-            if let Some(record) = tars.last_mut().filter(|record| !record.handed_over) {
-                match (run.hand_over)(&run.out.join(&record.file)) {
+            if let Some(record) = tars.last_mut().filter(|record| !record.handed_over)
+                && let Some(hand_over) = run.hand_over
+            {
+                if run.is_over.load(SeqCst) {
+                    return Err(DatasetError::Interrupted { done, of: wanted, what: "tars" });
+                }
+                match hand_over(&run.out.join(&record.file)) {
                     Ok(()) => {
                         record.handed_over = true;
                         write_json(&half.record(number), record)?;
@@ -192,7 +204,8 @@ pub fn make(run: &Run, meshes: &[MeshEntry]) -> Result<PartManifest, DatasetErro
     }
     let (tool, version) = (TOOL.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
     let Run { config, cut, part, out, .. } = *run;
-    let manifest = PartManifest { tool, version, part, config: config.clone(), cut, classes, tars };
+    let manifest =
+        PartManifest { tool, version, part, config: config.clone(), cut, classes, made_by, tars };
     write_json(&out.join(part_file(part)), &manifest)?;
     write_root(out, &manifest)?;
     Ok(manifest)
@@ -207,7 +220,7 @@ struct Half<'a> {
 }
 
 /// In which order clouds are put into tars: each mesh once, in random order, then each once more from
-/// another side. So every tar has all classes.
+/// another side. So a tar has all classes if it has as many clouds as there are meshes.
 struct Order {
     meshes: Vec<usize>,
     views: usize,
@@ -251,10 +264,15 @@ impl Half<'_> {
         let path = self.record(number);
         if path.exists() {
             let record: TarRecord = read_json(&path)?;
-            if record.made_by == made_by {
+            if record.made_by == made_by && (record.handed_over || self.is_there(&record)) {
                 return Ok(Some(record));
             }
-            let difference = "other settings, other meshes or another version".to_owned();
+            if record.made_by == made_by {
+                layout::remove(&path)?;
+                return self.tar(number, made_by);
+            }
+            let difference =
+                "other settings, other meshes, another adapter or another version".to_owned();
             return Err(DatasetError::Different { path, difference });
         }
         if self.run.is_over.load(SeqCst) {
@@ -267,6 +285,12 @@ impl Half<'_> {
         Ok(Some(record))
     }
 
+    /// Whether the tar of `record` is complete.
+    fn is_there(&self, record: &TarRecord) -> bool {
+        std::fs::metadata(self.run.out.join(&record.file))
+            .is_ok_and(|file| file.len() == record.bytes)
+    }
+
     /// Writes tar `number`, all of it or, if the run is over, nothing.
     fn write(&self, number: u32, made_by: &str) -> Result<Option<TarRecord>, DatasetError> {
         let size = self.run.cut.clouds_per_tar as usize;
@@ -277,7 +301,7 @@ impl Half<'_> {
         let (mut clouds, mut failures, mut stopped) = (0, BTreeMap::new(), None);
         let hash = atomic::write_hashed(&path, self.run.config.hash, |tar| {
             let at_once = match self.run.cut.sample {
-                Sample::Clouds => CLOUDS_PER_SAMPLE,
+                Sample::Clouds => clouds_per_sample(self.run.config.packed_points),
                 Sample::Scan => SCANS_AT_ONCE,
             };
             for (nth, places) in places.chunks(at_once).enumerate() {
@@ -396,11 +420,19 @@ fn made_by(run: &Run, meshes: &[MeshEntry]) -> String {
     let size = |mesh: &MeshEntry| std::fs::metadata(&mesh.path).map_or(0, |file| file.len());
     let meshes: Vec<(&str, u64)> =
         meshes.iter().map(|mesh| (mesh.relative.as_str(), size(mesh))).collect();
-    let all = serde_json::json!([env!("CARGO_PKG_VERSION"), run.config, run.cut, meshes]);
+    let adapter = run.caster.name();
+    let all = serde_json::json!([env!("CARGO_PKG_VERSION"), adapter, run.config, run.cut, meshes]);
     formats::hash::of_bytes(all.to_string().as_bytes())
 }
 
-fn part_file((number, of): (u32, u32)) -> String {
+/// Clouds of this many points that one sample holds.
+fn clouds_per_sample(n_points: u32) -> usize {
+    (POINTS_PER_SAMPLE / n_points.max(1) as usize).clamp(1, CLOUDS_PER_SAMPLE)
+}
+
+/// The name of the manifest of a part.
+#[must_use]
+pub fn part_file((number, of): (u32, u32)) -> String {
     format!("part-{number:04}-of-{of:04}.json")
 }
 
@@ -414,8 +446,10 @@ fn write_root(out: &Path, own: &PartManifest) -> Result<(), DatasetError> {
             return Ok(());
         }
         let part: PartManifest = read_json(&path)?;
-        if (&part.config, part.cut) != (&own.config, own.cut) {
-            let difference = "this part has other settings".to_owned();
+        if part.made_by != own.made_by {
+            let difference =
+                "this part has other settings, other meshes, another adapter or another version";
+            let difference = difference.to_owned();
             return Err(DatasetError::Different { path, difference });
         }
         let hash = own.config.hash.of_file(&path)?;
@@ -443,18 +477,33 @@ pub fn verify(out: &Path) -> Result<Vec<String>, DatasetError> {
     let mut problems = Vec::new();
     for PartRecord { file, hash, .. } in &root.parts {
         let path = out.join(file);
-        check(&path, &root.config.hash, hash.as_ref(), &mut problems);
-        let Ok(part) = read_json::<PartManifest>(&path) else { continue };
-        for tar in &part.tars {
-            check(&out.join(&tar.file), &root.config.hash, tar.hash.as_ref(), &mut problems);
+        check(&path, root.config.hash, hash.as_ref(), None, &mut problems);
+        match read_json::<PartManifest>(&path) {
+            Ok(part) => {
+                for TarRecord { file, hash, bytes, .. } in &part.tars {
+                    let path = out.join(file);
+                    check(&path, root.config.hash, hash.as_ref(), Some(*bytes), &mut problems);
+                }
+            }
+            Err(error) => problems.push(error.to_string()),
         }
     }
     Ok(problems)
 }
 
-fn check(path: &Path, hashing: &Hashing, hash: Option<&FileHash>, problems: &mut Vec<String>) {
+fn check(
+    path: &Path,
+    hashing: Hashing,
+    hash: Option<&FileHash>,
+    bytes: Option<u64>,
+    problems: &mut Vec<String>,
+) {
+    let size = match std::fs::metadata(path) {
+        Ok(file) => file.len(),
+        Err(error) => return problems.push(DatasetError::io(path, error).to_string()),
+    };
     match hashing.of_file(path) {
-        Ok(found) if found.as_ref() == hash && path.exists() => {}
+        Ok(found) if found.as_ref() == hash && bytes.is_none_or(|bytes| bytes == size) => {}
         Ok(_) => problems.push(format!("{}: is not as recorded", layout::slashed(path))),
         Err(error) => problems.push(error.to_string()),
     }
