@@ -2,7 +2,7 @@
 //!
 //! Python's side has the names, the defaults and the documentation. Here, numbers are in the
 //! units of the libraries, and whatever takes long runs on the threads of this very process
-//! ([`process`]), without Python's lock.
+//! (`process.rs`), without Python's lock.
 
 mod arrays;
 mod classifier;
