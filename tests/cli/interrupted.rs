@@ -1,8 +1,8 @@
 //! A run that is killed at any moment goes on to the same bytes.
 
-use crate::{Folder, meshes};
+use crate::{Folder, meshes, terminate};
 use formats::rng::StreamKey;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 /// Number `n` of this process.
@@ -46,12 +46,12 @@ fn a_run_that_is_told_to_end_says_so_and_goes_on_later() {
     for milliseconds in (0..40).map(|n| 3 + 4 * n) {
         let mut child = folder.edgepuck(words).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(milliseconds));
-        let sent = Command::new("kill").arg(child.id().to_string()).status().unwrap();
+        let was_there = terminate(&child);
         let code = child.wait().unwrap().code();
         // A program that has not yet begun is ended by the signal itself.
         assert!(matches!(code, Some(0 | 75) | None), "{code:?}");
         codes.push(code);
-        if code == Some(0) || !sent.success() {
+        if code == Some(0) || !was_there {
             break;
         }
     }

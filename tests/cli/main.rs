@@ -107,6 +107,14 @@ impl Folder {
     }
 }
 
+/// Sends SIGTERM to `child`; says whether it was there. Shells know `kill`, even where there is no
+/// program of that name.
+#[cfg(unix)]
+fn terminate(child: &std::process::Child) -> bool {
+    let kill = format!("kill {}", child.id());
+    Command::new("sh").args(["-c", &kill]).status().unwrap().success()
+}
+
 fn said(output: &Output) -> String {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     text(&output.stdout) + &text(&output.stderr)

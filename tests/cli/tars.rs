@@ -1,8 +1,8 @@
 //! Tars of samples are the same by however many they are made, and are handed over once.
 
-use crate::{Folder, meshes};
+use crate::{Folder, meshes, terminate};
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 const WORDS: &str = "gen-dataset meshes --adapter cpu --layout webdataset --sensor vlp32c --views 3 \
@@ -155,7 +155,7 @@ fn a_run_that_is_told_to_end_leaves_no_half_of_a_tar() {
     for milliseconds in (0..60).map(|n| 20 + 10 * n) {
         let mut child = folder.edgepuck(&words).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(milliseconds));
-        Command::new("kill").arg(child.id().to_string()).status().unwrap();
+        let _ = terminate(&child);
         let code = child.wait().unwrap().code();
         // A program that has not yet begun is ended by the signal itself.
         assert!(matches!(code, Some(0 | 75) | None), "{code:?}");
