@@ -157,11 +157,21 @@ impl SetConfig {
     pub fn poses(&self, seed: u64, id: &str) -> Vec<Pose> {
         match &self.viewpoints {
             Viewpoints::Poses(poses) => poses.clone(),
-            Viewpoints::Views(views) => {
-                let name = format!("views/{}/{id}", self.name);
-                views.poses(DVec3::ZERO, StreamKey::new(seed, &name, 0))
-            }
+            Viewpoints::Views(views) => views.poses(DVec3::ZERO, self.views_key(seed, id)),
         }
+    }
+
+    /// Number `view` of [`SetConfig::poses`].
+    #[must_use]
+    pub fn pose(&self, seed: u64, id: &str, view: u32) -> Pose {
+        match &self.viewpoints {
+            Viewpoints::Poses(poses) => poses[view as usize],
+            Viewpoints::Views(views) => views.pose(view, DVec3::ZERO, self.views_key(seed, id)),
+        }
+    }
+
+    fn views_key(&self, seed: u64, id: &str) -> StreamKey {
+        StreamKey::new(seed, &format!("views/{}/{id}", self.name), 0)
     }
 
     /// The random stream of view `view` of the mesh called `id`.

@@ -109,6 +109,19 @@ pub fn prepare(
 }
 
 impl PlannedView {
+    /// A view of set number `set` from this pose.
+    pub(super) fn new(
+        config: &DatasetConfig,
+        patterns: &[BeamPattern],
+        set: usize,
+        view: u32,
+        pose: Pose,
+    ) -> Self {
+        let moves = config.effects.motion.as_deref();
+        let motion = moves.map(|motion| motion.trajectory(pose, [0.0, patterns[set].last_s()]));
+        Self { set, view, pose, motion: motion.map(Arc::new) }
+    }
+
     /// The scan of this view of the mesh called `id`: clean, unless effects are added.
     pub(super) fn request<'a>(
         &self,
@@ -148,15 +161,10 @@ pub(super) fn materials(
     })
 }
 
-pub(super) fn plan(config: &DatasetConfig, id: &str, patterns: &[BeamPattern]) -> Vec<PlannedView> {
+fn plan(config: &DatasetConfig, id: &str, patterns: &[BeamPattern]) -> Vec<PlannedView> {
     let of_set = |(set, set_config): (usize, &SetConfig)| {
         let poses = set_config.poses(config.seed, id).into_iter().zip(0..);
-        let moves = config.effects.motion.as_deref();
-        let to_s = moves.map_or(0.0, |_| patterns[set].last_s());
-        poses.map(move |(pose, view)| {
-            let motion = moves.map(|motion| motion.trajectory(pose, [0.0, to_s]));
-            PlannedView { set, view, pose, motion: motion.map(Arc::new) }
-        })
+        poses.map(move |(pose, view)| PlannedView::new(config, patterns, set, view, pose))
     };
     config.sets.iter().enumerate().flat_map(of_set).collect()
 }

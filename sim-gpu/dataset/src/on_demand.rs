@@ -7,7 +7,7 @@
 use super::clouds::Source;
 use super::config::{DatasetConfig, Variant, Viewpoints};
 use super::error::DatasetError;
-use super::mesh::{PlannedView, failure, materials, placed, plan, read};
+use super::mesh::{PlannedView, failure, materials, placed, read};
 use super::record::{Cloud, MeshRecord};
 use formats::Scan;
 use formats::hash::Hashing;
@@ -162,16 +162,13 @@ impl Clouds {
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Result<Labelled, DatasetError>>, DatasetError> {
-        let n_points = self.config.packed_points as usize;
         let drawn = self.make_each(caster, seed, indices, |config, source, scan| {
             Cloud::draw(config, source, &scan).map(|cloud| cloud.points)
         })?;
         let labelled = |(made, &index): (Result<Vec<[f32; 3]>, _>, _)| {
             made.map(|points| Labelled { points, label: self.label(index) })
         };
-        let drawn: Vec<_> = drawn.into_iter().zip(indices).map(labelled).collect();
-        debug_assert!(drawn.iter().flatten().all(|cloud| cloud.points.len() == n_points));
-        Ok(drawn)
+        Ok(drawn.into_iter().zip(indices).map(labelled).collect())
     }
 
     /// The scans that those clouds are of, each of which may fail by itself.
@@ -268,7 +265,9 @@ impl Clouds {
     fn aim(&self, config: &DatasetConfig, index: usize) -> Result<Aimed, DatasetError> {
         let mesh = self.ready(index / self.views())?;
         let id = mesh.record.entry.id();
-        let planned = plan(config, &id, &self.patterns).swap_remove(index % self.views());
+        let view = (index % self.views()) as u32;
+        let pose = config.sets[0].pose(config.seed, &id, view);
+        let planned = PlannedView::new(config, &self.patterns, 0, view, pose);
         let request = planned.request(config, &self.patterns, &id);
         let job = request.aim(&placed(config, &mesh.target, mesh.materials.as_ref()));
         Ok(Aimed { mesh, planned, job })

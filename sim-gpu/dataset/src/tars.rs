@@ -18,6 +18,7 @@ use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
 use formats::{Split, atomic};
 use serde::{Deserialize, Serialize};
 use sim_gpu::caster::Caster;
+use sim_gpu::config::InvalidValue;
 use sim_gpu::mesh::tree::MeshEntry;
 use std::collections::BTreeMap;
 use std::io;
@@ -29,6 +30,9 @@ const CLOUDS_PER_SAMPLE: usize = 1024;
 
 /// Points of one sample at most, but for one cloud: 768 MiB.
 const POINTS_PER_SAMPLE: usize = 1 << 26;
+
+/// As many tars as their names have digits for, so that they are sorted by name.
+const MOST_TARS: u32 = 1_000_000;
 
 /// Scans that are in memory together.
 const SCANS_AT_ONCE: usize = 256;
@@ -172,7 +176,7 @@ pub fn make(run: &Run, meshes: &[MeshEntry]) -> Result<PartManifest, DatasetErro
             meshes.iter().filter(|mesh| mesh.split == split).cloned().collect();
         let clouds = Clouds::new(run.config.clone(), own, classes.clone(), CACHE_BYTES)?;
         let half = Half { run, split, order: Order::new(run.config.seed, split, &clouds), clouds };
-        let numbers = (run.part.0..half.tars()).step_by(run.part.1 as usize);
+        let numbers = (run.part.0..half.tars()?).step_by(run.part.1 as usize);
         wanted += numbers.len();
         for number in numbers {
             match half.tar(number, &made_by)? {
@@ -247,8 +251,11 @@ impl Order {
 }
 
 impl Half<'_> {
-    fn tars(&self) -> u32 {
-        self.order.len().div_ceil(self.run.cut.clouds_per_tar as usize) as u32
+    fn tars(&self) -> Result<u32, InvalidValue> {
+        let tars = self.order.len().div_ceil(self.run.cut.clouds_per_tar as usize);
+        let too_many = || format!("expected at most {MOST_TARS} tars of a split, found {tars}");
+        let number = u32::try_from(tars).ok().filter(|tars| *tars <= MOST_TARS);
+        number.ok_or_else(|| InvalidValue::new("clouds_per_tar", too_many()))
     }
 
     fn name(&self, number: u32) -> String {

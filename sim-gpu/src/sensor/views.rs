@@ -1,12 +1,14 @@
 //! The places from which a sensor is meant to look at an object.
 
+use std::f64::consts::TAU;
+
 use formats::rng::StreamKey;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, at_least, positive, within};
 use crate::mesh::frame::Normalize;
-use crate::pose::{Pose, ring_of_views};
+use crate::pose::Pose;
 
 /// Views of an object, evenly spread over azimuth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,22 +57,19 @@ impl Views {
     /// are drawn, are numbers of that stream as well.
     #[must_use]
     pub fn poses(&self, target_m: DVec3, key: StreamKey) -> Vec<Pose> {
-        let first_azimuth_rad = self.azimuth_deg.to_radians();
-        let is_regular = self.azimuth_jitter_deg == 0.0;
-        if is_regular && self.distance_to_m.is_none() && self.elevation_to_deg.is_none() {
-            return ring_of_views(
-                self.count,
-                self.distance_m,
-                self.elevation_deg.to_radians(),
-                first_azimuth_rad,
-                target_m,
-            );
-        }
         (0..self.count).map(|view| self.pose(view, target_m, key)).collect()
     }
 
-    /// The pose of one view whose place is drawn.
-    fn pose(&self, view: u32, target_m: DVec3, key: StreamKey) -> Pose {
+    /// Number `view` of the poses.
+    #[must_use]
+    pub fn pose(&self, view: u32, target_m: DVec3, key: StreamKey) -> Pose {
+        let is_regular = self.azimuth_jitter_deg == 0.0;
+        if is_regular && self.distance_to_m.is_none() && self.elevation_to_deg.is_none() {
+            let turn = TAU * f64::from(view) / f64::from(self.count);
+            let azimuth_rad = self.azimuth_deg.to_radians() + turn;
+            let elevation_rad = self.elevation_deg.to_radians();
+            return Pose::view(self.distance_m, elevation_rad, azimuth_rad, target_m);
+        }
         let drawn = |from: f64, to: Option<f64>, what: u64| {
             let share = || key.unit(u64::from(view) | what << 32);
             to.map_or(from, |to| from + share() * (to - from))

@@ -70,7 +70,11 @@ fn build(tools: &Path) -> anyhow::Result<PathBuf> {
     maturin.args(["-m", "maturin", "build", "--release", "--zig", "--locked"]);
     maturin.args(["--compatibility", PLATFORM, "--target", TARGET, "--out"]).arg(&wheels);
     maturin.arg("--manifest-path").arg(root().join("python/Cargo.toml"));
-    // maturin starts zig by the name that this environment's Python has.
+    // maturin asks the first Python on the path for zig.
+    let own = tools.parent().into_iter().map(Path::to_path_buf);
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(own.chain(std::env::split_paths(&others)))?;
+    maturin.env("PATH", path);
     let status = maturin.status().context("cannot start maturin")?;
     ensure!(status.success(), "maturin: {status}");
     let built = fs::read_dir(&wheels).with_context(|| wheels.display().to_string())?;
