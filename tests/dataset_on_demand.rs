@@ -54,10 +54,7 @@ fn meshes(folder: &Path) -> Vec<MeshEntry> {
 }
 
 fn clouds(meshes: &[MeshEntry], config: DatasetConfig, cache_bytes: usize) -> Clouds {
-    let train = meshes.iter().filter(|mesh| mesh.split == Split::Train).cloned().collect();
-    let mut classes: Vec<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
-    classes.dedup();
-    Clouds::new(config, train, classes, cache_bytes).expect("a dataset")
+    Clouds::new(config, meshes, Some(Split::Train), cache_bytes).expect("a dataset")
 }
 
 fn cpu(clouds: &Clouds) -> Caster {

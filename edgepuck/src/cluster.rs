@@ -1,6 +1,7 @@
 //! `edgepuck cluster`: the job file of a dataset that many machines make, to be read and submitted by
 //! the user.
 
+use crate::shell::posix_quoted;
 use crate::{Outcome, Usage};
 use std::fmt::Write;
 
@@ -187,11 +188,11 @@ exit \"$code\"
     )
 }
 
-/// A word of the shell.
+/// A word of a POSIX shell, in quotes if it needs them.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=:@+".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
     }
-    format!("'{}'", word.replace('\'', "'\\''"))
+    posix_quoted(word)
 }

@@ -29,6 +29,7 @@ pub mod sample_surfaces;
 pub mod sampler_config;
 pub mod scan;
 pub mod segment;
+mod shell;
 pub mod significant_digits;
 #[cfg(feature = "models")]
 pub mod trade_record;

@@ -49,11 +49,7 @@ pub struct Args {
 /// Cuts the sweep.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let scan = args.input.read()?;
-    let mut settings = Settings::default();
-    if args.radius.is_some() {
-        settings.radius_m = args.radius;
-        settings.max_size_m = f32::INFINITY;
-    }
+    let settings = args.radius.map_or_else(Settings::default, Settings::of_components);
     let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
     let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
     // A robot's second sweep and all that follow find the memory of the first.

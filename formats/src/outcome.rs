@@ -25,8 +25,8 @@ pub enum Outcome {
 pub struct Usage(pub String);
 
 /// Prints the error, if there is one, and gives the program's exit code: 0 for
-/// success, 1 for a failure, 2 for a [`Usage`], 3 and 75 as [`Outcome`] says. When the reader of the output has
-/// gone, the command succeeds.
+/// success, 1 for a failure, 2 for a [`Usage`], 3 where inputs were refused, and 75 for an
+/// interruption. When the reader of the output has gone, the command succeeds.
 pub fn exit_code(result: anyhow::Result<Outcome>) -> u8 {
     match result {
         Ok(Outcome::Success) => 0,

@@ -1,12 +1,23 @@
-"""Checks of what callers give."""
+"""Checks of what callers give, and what keeps it."""
 
 from __future__ import annotations
 
+import functools
 import operator
 import os
 from typing import Any
 
 from ._edgepuck import Error
+
+
+class Remade:
+    """Something that is pickled by what it was made of, and made again from that."""
+
+    _made_of: tuple[tuple[Any, ...], dict[str, Any]]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        positional, named = self._made_of
+        return functools.partial(type(self), *positional, **named), ()
 
 
 def whole(name: str, value: Any, least: int, most: int) -> int:

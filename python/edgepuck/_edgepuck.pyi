@@ -48,7 +48,7 @@ class Sensor:
     @property
     def times(self) -> NDArray[np.float64]: ...
     def scan(
-        self, mesh: Mesh, pose: Sequence[float], effects: str, attributes: Sequence[str], seed: int
+        self, mesh: Mesh, place: Sequence[float], effects: str, attributes: Sequence[str], seed: int
     ) -> dict[str, Any]: ...
 
 @final

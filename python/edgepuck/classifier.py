@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
-from ._arguments import place, whole
+from ._arguments import Remade, place, whole
 from .scan import Scan
 
 
@@ -30,7 +29,7 @@ class Prediction:
     """The outputs of the network, [n_classes]."""
 
 
-class Classifier:
+class Classifier(Remade):
     """A PointNet behind a sampler, on one thread of the CPU.
 
     Args:
@@ -56,8 +55,9 @@ class Classifier:
         points: int | None = None,
     ) -> None:
         wanted = None if points is None else whole("points", points, 1, 2**32)
-        self._arguments = (place(model), precision, sampler, wanted)
-        self._classifier = _edgepuck.Classifier(*self._arguments)
+        file = place(model)
+        self._made_of = (file,), {"precision": precision, "sampler": sampler, "points": wanted}
+        self._classifier = _edgepuck.Classifier(file, precision, sampler, wanted)
 
     @property
     def classes(self) -> list[str]:
@@ -75,9 +75,6 @@ class Classifier:
         points = cloud.positions if isinstance(cloud, Scan) else cloud
         return Prediction(**self._classifier.classify(points_of(points), ground_z))
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _again, self._arguments
-
 
 def points_of(cloud: ArrayLike) -> NDArray[np.float32]:
     """`cloud` as points of shape [n, 3]."""
@@ -85,7 +82,3 @@ def points_of(cloud: ArrayLike) -> NDArray[np.float32]:
     if points.ndim != 2:
         raise _edgepuck.Error(f"expected points of shape [n, 3], found {list(points.shape)}")
     return points
-
-
-def _again(model: str, precision: str, sampler: str | None, points: int | None) -> Classifier:
-    return Classifier(model, precision=precision, sampler=sampler, points=points)

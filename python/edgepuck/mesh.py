@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
-from ._arguments import place
+from ._arguments import Remade, place
 
 Axis = Literal["y", "z"]
 Normalize = Literal["unit-sphere", "bbox", "none"]
 
 
-class Mesh:
+class Mesh(Remade):
     """A triangle mesh where sensors find it: at the origin, z up.
 
     Args:
@@ -47,7 +47,7 @@ class Mesh:
     ) -> None:
         if faces is None and isinstance(source, (str, os.PathLike)):
             path = place(source)
-            self._arguments: tuple[Any, ...] = (path, None, normalize, up)
+            self._made_of = (path,), {"normalize": normalize, "up": up}
             self._mesh = _edgepuck.Mesh.read(path, up, normalize)
             return
         if faces is None and hasattr(source, "vertices") and hasattr(source, "faces"):
@@ -64,7 +64,7 @@ class Mesh:
             if array.ndim != 2:
                 shape = list(array.shape)
                 raise _edgepuck.Error(f"expected {name} of shape [n, 3], found {shape}")
-        self._arguments = (vertices, indices, normalize, up)
+        self._made_of = (vertices, indices), {"normalize": normalize, "up": up}
         self._mesh = _edgepuck.Mesh.of_arrays(vertices, indices, up or "z", normalize)
 
     def __len__(self) -> int:
@@ -81,19 +81,12 @@ class Mesh:
         """What became the origin, in the source's units, z up."""
         return np.array(self._mesh.centre)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _again, self._arguments
-
 
 def _indices(faces: ArrayLike) -> NDArray[np.int64]:
     found = np.asarray(faces)
     if found.size and not np.issubdtype(found.dtype, np.integer):
         raise _edgepuck.Error(f"expected faces of whole numbers, found {found.dtype}")
     return np.array(found, dtype=np.int64, order="C")
-
-
-def _again(source: Any, faces: Any, normalize: Normalize, up: Axis | None) -> Mesh:
-    return Mesh(source, faces, normalize=normalize, up=up)
 
 
 def box(size: tuple[float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _arguments, _edgepuck
-from ._arguments import number, place, whole
+from ._arguments import Remade, number, place, whole
 from .scan import Scan, scan_of
 
 
@@ -36,7 +36,7 @@ class Scene:
     """The height of each cluster's lowest point above the ground, metres, [n_clusters]."""
 
 
-class Scenes:
+class Scenes(Remade):
     """Scenes that a recipe draws, each cast when it is read: a map-style dataset.
 
     Args:
@@ -67,9 +67,11 @@ class Scenes:
             raise _edgepuck.Error(f"sensors: expected a list of names, found {sensors!r}")
         folder = None if meshes is None else place(meshes)
         names = [place(sensor) for sensor in sensors]
-        self._arguments = (place(recipe), names, folder, _arguments.seed(seed))
+        file, key = place(recipe), _arguments.seed(seed)
         self._length = whole("length", length, 0, 2**32)
-        self._scenes = _edgepuck.Scenes(*self._arguments)
+        named = {"length": self._length, "sensors": names, "meshes": folder, "seed": key}
+        self._made_of = (file,), named
+        self._scenes = _edgepuck.Scenes(file, names, folder, key)
 
     def __len__(self) -> int:
         """The number of scenes."""
@@ -83,13 +85,6 @@ class Scenes:
     def __getitem__(self, index: int) -> Scene:
         told = self._scenes.draw(number("scenes", index, self._length))
         return Scene(**{**told, "scan": scan_of(told["scan"])})
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"arguments": self._arguments, "length": self._length}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self._arguments, self._length = state["arguments"], state["length"]
-        self._scenes = _edgepuck.Scenes(*self._arguments)
 
 
 def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:

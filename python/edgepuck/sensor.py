@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _arguments, _edgepuck
-from ._arguments import place
+from ._arguments import Remade, place
 from .mesh import Mesh
 from .scan import Scan, scan_of
 
 
-class Sensor:
+class Sensor(Remade):
     """A LiDAR with its beams.
 
     Args:
@@ -34,8 +34,9 @@ class Sensor:
     """
 
     def __init__(self, name: str | os.PathLike[str], *, adapter: str = "cpu") -> None:
-        self._arguments = (place(name), adapter)
-        self._sensor = _edgepuck.Sensor(*self._arguments)
+        profile = place(name)
+        self._made_of = (profile,), {"adapter": adapter}
+        self._sensor = _edgepuck.Sensor(profile, adapter)
 
     @property
     def name(self) -> str:
@@ -114,9 +115,6 @@ class Sensor:
         key = _arguments.seed(seed)
         return scan_of(self._sensor.scan(mesh._mesh, at, told, list(attributes), key))
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _again, self._arguments
-
     def __repr__(self) -> str:
         return f"Sensor({self.name!r})"
 
@@ -131,7 +129,3 @@ def _plain(value: Any, key: str) -> Any:
     if isinstance(plain, float) and not math.isfinite(plain):
         raise _edgepuck.Error(f"{key}: expected a finite number, found {plain}")
     return plain
-
-
-def _again(name: str, adapter: str) -> Sensor:
-    return Sensor(name, adapter=adapter)

@@ -2,9 +2,10 @@
 
 use crate::error::raised;
 use formats::Scan;
+use formats::scan::{Attribute, ColumnSlot};
 use glam::DMat4;
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, IntoPyArray, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::pose::Pose;
@@ -32,36 +33,29 @@ pub fn matrix(pose: &Pose) -> Vec<f64> {
 }
 
 /// The columns of `scan` by their names in files.
-pub fn scan(py: Python<'_>, scan: Scan) -> PyResult<Bound<'_, PyDict>> {
+pub fn scan(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
     let columns = PyDict::new(py);
     columns.set_item("origin", scan.origin)?;
-    columns.set_item("positions", vectors(py, scan.positions)?)?;
-    let put = |name: &str, column: Option<Bound<'_, PyAny>>| match column {
-        Some(column) => columns.set_item(name, column),
-        None => Ok(()),
-    };
-    macro_rules! numbers {
-        ($($name:literal: $column:expr),* $(,)?) => {
-            $(put($name, $column.map(|column| column.into_pyarray(py).into_any()))?;)*
+    columns.set_item("positions", vectors(py, std::mem::take(&mut scan.positions))?)?;
+    for attribute in Attribute::ALL {
+        let column = match scan.slot(attribute) {
+            ColumnSlot::F32(slot) => numbers(py, slot),
+            ColumnSlot::U8(slot) => numbers(py, slot),
+            ColumnSlot::U16(slot) => numbers(py, slot),
+            ColumnSlot::U32(slot) => numbers(py, slot),
+            ColumnSlot::Vector(slot) => slot.take().map(|taken| vectors(py, taken)).transpose()?,
         };
-    }
-    numbers! {
-        "range": scan.range_m,
-        "beam": scan.beam,
-        "ring": scan.ring,
-        "time": scan.time_s,
-        "triangle": scan.triangle,
-        "object": scan.object,
-        "intensity": scan.intensity,
-        "power": scan.power,
-        "reflectivity": scan.reflectivity,
-        "return": scan.return_number,
-        "medium": scan.medium,
-    }
-    for (name, column) in
-        [("sensor", scan.sensor_m), ("attitude", scan.attitude_rad), ("normal", scan.normal)]
-    {
-        put(name, column.map(|column| vectors(py, column)).transpose()?)?;
+        if let Some(column) = column {
+            columns.set_item(attribute.name(), column)?;
+        }
     }
     Ok(columns)
+}
+
+/// `[n]`, where there are any.
+fn numbers<'py, T: Element>(
+    py: Python<'py>,
+    slot: &mut Option<Vec<T>>,
+) -> Option<Bound<'py, PyAny>> {
+    slot.take().map(|taken| taken.into_pyarray(py).into_any())
 }

@@ -39,11 +39,8 @@ impl Clouds {
         let config = config.map_err(|error| raised(of_flags(&error)))?;
         let n_points = config.packed_points as usize;
         let clouds = process::run(py, || {
-            let mut found = discover(&meshes, config.seed)?;
-            let mut classes: Vec<String> = found.iter().map(|mesh| mesh.class.clone()).collect();
-            classes.dedup();
-            found.retain(|mesh| split.is_none_or(|split| mesh.split == split));
-            Ok(on_demand::Clouds::new(config, found, classes, cache_bytes)?)
+            let meshes = discover(&meshes, config.seed)?;
+            Ok(on_demand::Clouds::new(config, &meshes, split, cache_bytes)?)
         })?;
         let clouds = clouds.map_err(raised_with_causes)?;
         Ok(Self { clouds, n_points, caster: LazyCaster::new(adapter) })

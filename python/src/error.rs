@@ -18,8 +18,5 @@ pub fn raised(error: impl Display) -> PyErr {
 
 /// The exception for an error with causes.
 pub fn raised_with_causes(error: anyhow::Error) -> PyErr {
-    match error.downcast::<PyErr>() {
-        Ok(exception) => exception,
-        Err(error) => Error::new_err(formats::outcome::joined_causes(&error)),
-    }
+    raised(formats::outcome::joined_causes(&error))
 }

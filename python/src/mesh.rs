@@ -7,7 +7,6 @@ use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use sim_gpu::bvh::Builder;
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
-use sim_gpu::mesh::validate::triangle_stats;
 use sim_gpu::mesh::{self, LoadedMesh};
 use sim_gpu::target::{Surface, Target};
 use std::path::PathBuf;
@@ -80,9 +79,8 @@ impl Mesh {
 impl Mesh {
     fn new(mesh: &mesh::Mesh, up: Up, normalize: Normalize) -> Self {
         let world = to_world(mesh, up, normalize);
-        let kept = triangle_stats(&world.mesh).kept;
         let (scale, centre) = (world.scale, world.centre.to_array());
-        let target = Target::new(Surface::new(world.mesh, kept), Builder::Sah);
+        let target = Target::new(Surface::of_mesh(world.mesh), Builder::Sah);
         Self { target, n_triangles: mesh.triangles.len(), scale, centre }
     }
 }

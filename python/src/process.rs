@@ -7,7 +7,6 @@
 use crate::error::{raised, raised_with_causes};
 use edgepuck_program::Outcome;
 use pyo3::prelude::*;
-use pyo3::types::PyAnyMethods;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use sim_gpu::caster::{AdapterRequest, Caster};
 use sim_gpu::effects::Effects;

@@ -30,11 +30,7 @@ pub fn segment<'py>(
 ) -> PyResult<Bound<'py, PyArray1<i32>>> {
     let cloud = points(&cloud)?;
     let rings = rings.map(|rings| rings.as_array().to_vec());
-    let mut settings = Settings::default();
-    if radius.is_some() {
-        settings.radius_m = radius;
-        settings.max_size_m = f32::INFINITY;
-    }
+    let mut settings = radius.map_or_else(Settings::default, Settings::of_components);
     if let Some(min_points) = min_points {
         settings.min_points = min_points;
     }

@@ -5,7 +5,7 @@ use crate::error::{raised, raised_with_causes};
 use crate::mesh::Mesh;
 use crate::process::{self, LazyCaster};
 use formats::rng::StreamKey;
-use formats::scan::Attribute;
+use formats::scan::{Attribute, AttributeSet};
 use glam::{DMat3, DQuat, DVec3};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
@@ -61,25 +61,22 @@ impl Sensor {
         Ok(self.pattern(py)?.time_s.clone().into_pyarray(py))
     }
 
-    /// Scan a mesh from where `pose` stands: position and quaternion (x, y, z, w), or distance,
-    /// elevation and azimuth.
+    /// Scan a mesh from this place.
     fn scan<'py>(
         &self,
         py: Python<'py>,
         mesh: &Mesh,
-        pose: Vec<f64>,
+        place: Place,
         effects: &str,
         attributes: Vec<String>,
         seed: u64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let pose = pose_of(&pose)?;
+        let pose = place.pose()?;
         let mut effects: Effects =
             serde_json::from_str(effects).map_err(|error| raised(format!("effects: {error}")))?;
-        let mut request_attributes = std::collections::BTreeSet::new();
-        for name in attributes {
-            request_attributes.insert(name.parse::<Attribute>().map_err(raised)?);
-        }
-        if request_attributes.contains(&Attribute::Intensity) {
+        let attributes = attributes.iter().map(|name| name.parse::<Attribute>());
+        let attributes: AttributeSet = attributes.collect::<Result<_, _>>().map_err(raised)?;
+        if attributes.contains(&Attribute::Intensity) {
             effects.intensity.get_or_insert(Intensity);
         }
         effects.validate().map_err(raised)?;
@@ -95,7 +92,7 @@ impl Sensor {
                 }
             };
             let mut request = ScanRequest::new(&self.sensor, pattern, pose);
-            request.attributes = request_attributes;
+            request.attributes = attributes;
             request.stream = StreamKey::new(seed, "scan", 0);
             Ok(scan(&caster, &mesh.target, &request)?)
         })?;
@@ -115,34 +112,53 @@ impl Sensor {
     }
 }
 
-/// The pose that these numbers tell.
-fn pose_of(numbers: &[f64]) -> PyResult<Pose> {
-    if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
-        return Err(raised(format!(
-            "expected finite numbers as the sensor's place, found {number}"
-        )));
-    }
-    match *numbers {
-        [distance_m, elevation_deg, azimuth_deg] => {
-            if distance_m <= 0.0 {
-                return Err(raised(format!("expected a distance above 0, found {distance_m}")));
-            }
-            let (elevation, azimuth) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
-            Ok(Pose::view(distance_m, elevation, azimuth, DVec3::ZERO))
+/// Where a sensor stands.
+#[derive(FromPyObject)]
+enum Place {
+    /// Around the origin: distance in metres, elevation and azimuth in degrees.
+    Around([f64; 3]),
+    /// From the sensor's frame to the world's, row by row.
+    Matrix([f64; 16]),
+}
+
+impl Place {
+    fn pose(&self) -> PyResult<Pose> {
+        let numbers = match self {
+            Self::Around(numbers) => &numbers[..],
+            Self::Matrix(numbers) => numbers,
+        };
+        if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
+            return Err(raised(format!(
+                "expected finite numbers as the sensor's place, found {number}"
+            )));
         }
-        // A matrix of four rows.
-        [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] => {
-            let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
-            let is_rotation = (rotation * rotation.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-6)
-                && rotation.determinant() > 0.0;
-            if !is_rotation {
-                return Err(raised(
-                    "pose: expected a rotation in the first three rows and columns",
-                ));
-            }
-            let world_from_sensor = DQuat::from_mat3(&rotation).normalize();
-            Ok(Pose { position_m: DVec3::new(x, y, z), world_from_sensor })
+        match *self {
+            Self::Around(around) => view(around),
+            Self::Matrix(rows) => pose_of(&rows),
         }
-        _ => Err(raised("pose: expected a matrix of shape [4, 4] whose last row is 0, 0, 0, 1")),
     }
+}
+
+fn view([distance_m, elevation_deg, azimuth_deg]: [f64; 3]) -> PyResult<Pose> {
+    if distance_m <= 0.0 {
+        return Err(raised(format!("expected a distance above 0, found {distance_m}")));
+    }
+    let (elevation, azimuth) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
+    Ok(Pose::view(distance_m, elevation, azimuth, DVec3::ZERO))
+}
+
+/// The pose that a matrix of four rows tells.
+fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
+    let [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] = *rows else {
+        let cause = "pose: expected a matrix of shape [4, 4] whose last row is 0, 0, 0, 1";
+        return Err(raised(cause));
+    };
+    let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
+    let is_rotation = (rotation * rotation.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-6)
+        && rotation.determinant() > 0.0;
+    if !is_rotation {
+        return Err(raised("pose: expected a rotation in the first three rows and columns"));
+    }
+    let world_from_sensor = DQuat::from_mat3(&rotation).normalize();
+    Ok(Pose { position_m: DVec3::new(x, y, z), world_from_sensor })
 }

@@ -28,6 +28,7 @@ use shard::Shard;
 use signal_hook::consts::SIGTERM;
 use sim_gpu::mesh::tree::{MeshEntry, discover};
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -165,20 +166,25 @@ pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
 
 fn check(folder: &Path) -> anyhow::Result<Outcome> {
     if edgepuck_dataset::tars::root_file(folder).exists() {
-        return tars::check(folder);
+        let problems = edgepuck_dataset::tars::verify(folder)?;
+        return tell_problems(&problems, &format!("{}: ", folder.display()));
     }
     let report = verify(folder)?;
-    let mut out = std::io::stdout().lock();
-    for problem in &report.problems {
-        writeln!(out, "{problem}")?;
-    }
     let by = match report.hash {
         Hashing::None => "read, without hashes to compare",
         Hashing::Sha256 | Hashing::Blake3 => "checked",
     };
-    let (folder, files, problems) = (folder.display(), report.files, report.problems.len());
-    eprintln!("{folder}: {files} files {by}, {problems} problems.");
-    Ok(if report.problems.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+    tell_problems(&report.problems, &format!("{}: {} files {by}, ", folder.display(), report.files))
+}
+
+/// Prints what is wrong with a dataset, a line each, and how much that is behind `introduction`.
+fn tell_problems(problems: &[impl Display], introduction: &str) -> anyhow::Result<Outcome> {
+    let mut out = std::io::stdout().lock();
+    for problem in problems {
+        writeln!(out, "{problem}")?;
+    }
+    eprintln!("{introduction}{} problems.", problems.len());
+    Ok(if problems.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
 }
 
 fn write_default_shapes(seed: u64) -> anyhow::Result<PathBuf> {

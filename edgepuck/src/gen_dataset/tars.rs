@@ -1,15 +1,13 @@
 //! `gen-dataset --layout webdataset`: tars, each of which is handed over when it is complete.
 
-use crate::{Outcome, Usage};
+use crate::{Outcome, Usage, shell};
 use edgepuck_dataset::config::DatasetConfig;
 use edgepuck_dataset::layout;
 use edgepuck_dataset::tars::{self, Cut, HandOver, PartManifest, Run, Sample};
 use edgepuck_dataset::{DatasetError, check_layouts};
 use signal_hook::consts::SIGTERM;
 use sim_gpu::mesh::tree::MeshEntry;
-use std::io::Write;
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::Duration;
@@ -83,27 +81,16 @@ pub fn run(
 
 /// Tars of this part that are there are gone on with or made anew only if that is asked for. What is not
 /// ours, or another part's, stays.
-fn refuse_what_is_there(
-    args: &super::Args,
-    out: &Path,
-    (number, of): (u32, u32),
-) -> anyhow::Result<()> {
+fn refuse_what_is_there(args: &super::Args, out: &Path, part: (u32, u32)) -> anyhow::Result<()> {
     let occupied = |what| DatasetError::Occupied { path: out.to_owned(), what };
     if layout::manifest(out).exists() || layout::journal(out).exists() {
         return Err(occupied("a dataset of another layout").into());
     }
-    let is_own = |name: &str| {
-        let Some((stem, "tar" | "json")) = name.split_once('.') else { return false };
-        let tar = stem.strip_prefix("train-").or_else(|| stem.strip_prefix("test-"));
-        let digits = tar.filter(|digits| digits.len() >= 6);
-        let digits = digits.filter(|digits| digits.bytes().all(|digit| digit.is_ascii_digit()));
-        let tar = digits.and_then(|digits| digits.parse::<u32>().ok());
-        tar.is_some_and(|tar| tar % of == number)
-            || name == tars::part_file((number, of))
-            || name == "dataset.json"
-    };
     let there = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_own = |path: &Path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_own);
+    let is_own = |path: &Path| {
+        let name = path.file_name().and_then(|name| name.to_str());
+        name.is_some_and(|name| tars::is_of_part(name, part))
+    };
     for path in there.filter(|path| is_own(path)) {
         if args.overwrite {
             std::fs::remove_file(&path)?;
@@ -131,11 +118,12 @@ fn end(out: &Path, made: &PartManifest) -> Outcome {
 /// Runs `command` for the file `tar` until it succeeds, or says why it did not.
 fn hand_over(command: &str, tar: &Path, is_over: &AtomicBool) -> Result<(), String> {
     let name = tar.file_name().unwrap_or_default().to_string_lossy();
-    let words =
-        command.replace("{name}", &quoted(&name)).replace("{}", &quoted(&tar.to_string_lossy()));
+    let words = command
+        .replace("{name}", &shell::quoted(&name))
+        .replace("{}", &shell::quoted(&tar.to_string_lossy()));
     let mut pauses_s = PAUSES_S.iter();
     loop {
-        let cause = match shell(&words).status() {
+        let cause = match shell::command(&words).status() {
             Ok(status) if status.success() => return Ok(()),
             Ok(status) => format!("`{words}` ended with {status}"),
             Err(error) => format!("the shell: {error}"),
@@ -149,41 +137,4 @@ fn hand_over(command: &str, tar: &Path, is_over: &AtomicBool) -> Result<(), Stri
             std::thread::sleep(Duration::from_millis(100));
         }
     }
-}
-
-/// A command of the system's shell.
-fn shell(words: &str) -> Command {
-    #[cfg(windows)]
-    {
-        use std::os::windows::process::CommandExt;
-        let mut shell = Command::new("cmd");
-        // Quoted as it is, it would be quoted again.
-        shell.raw_arg("/C").raw_arg(words);
-        shell
-    }
-    #[cfg(not(windows))]
-    {
-        let mut shell = Command::new("sh");
-        shell.args(["-c", words]);
-        shell
-    }
-}
-
-/// A word of the shell.
-fn quoted(word: &str) -> String {
-    if cfg!(windows) {
-        return format!("\"{word}\"");
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
-}
-
-/// Checks the tars of a finished dataset.
-pub fn check(folder: &Path) -> anyhow::Result<Outcome> {
-    let problems = tars::verify(folder)?;
-    let mut out = std::io::stdout().lock();
-    for problem in &problems {
-        writeln!(out, "{problem}")?;
-    }
-    eprintln!("{}: {} problems.", folder.display(), problems.len());
-    Ok(if problems.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
 }

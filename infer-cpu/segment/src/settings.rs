@@ -70,6 +70,13 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Connected components of points within `radius_m` of each other, of any size, for clouds that
+    /// are not sweeps of a sensor.
+    #[must_use]
+    pub fn of_components(radius_m: f32) -> Self {
+        Self { radius_m: Some(radius_m), max_size_m: f32::INFINITY, ..Self::default() }
+    }
+
     /// Checks every number.
     ///
     /// # Errors

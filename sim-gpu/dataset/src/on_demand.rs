@@ -8,10 +8,10 @@ use super::clouds::Source;
 use super::config::{DatasetConfig, Variant, Viewpoints};
 use super::error::DatasetError;
 use super::mesh::{PlannedView, failure, materials, placed, read};
-use super::record::{Cloud, MeshRecord};
-use formats::Scan;
+use super::record::{Cloud, Entry};
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
+use formats::{Scan, Split};
 use rayon::prelude::*;
 use sim_gpu::bvh::Builder;
 use sim_gpu::caster::Caster;
@@ -42,7 +42,7 @@ pub struct Clouds {
 
 /// A mesh in memory.
 struct Ready {
-    record: MeshRecord,
+    entry: Entry,
     target: Target,
     materials: Option<Materials>,
 }
@@ -56,17 +56,17 @@ pub struct Labelled {
 }
 
 impl Clouds {
-    /// The clouds of `meshes` for the one set of `config`, noisy ones where it asks for noise.
-    /// Labels are places in `classes`, which are sorted. Meshes that were read stay in memory up
-    /// to `cache_bytes`.
+    /// The clouds of those of `meshes` that are of `split`, or of all, for the one set of `config`,
+    /// noisy ones where it asks for noise. `meshes`, sorted by class, are all of the dataset: labels
+    /// are places among their classes. Meshes that were read stay in memory up to `cache_bytes`.
     ///
     /// # Errors
     /// If there is not one set, if meshes are to be simplified, or if the effects do not fit the
     /// sensor.
     pub fn new(
         config: DatasetConfig,
-        meshes: Vec<MeshEntry>,
-        classes: Vec<String>,
+        meshes: &[MeshEntry],
+        split: Option<Split>,
         cache_bytes: usize,
     ) -> Result<Self, InvalidValue> {
         let [set] = &config.sets[..] else {
@@ -86,6 +86,10 @@ impl Clouds {
             if config.variants.contains(&Variant::Noisy) { Variant::Noisy } else { Variant::Clean };
         let cache = Mutex::new(Cache::new(cache_bytes));
         let config = DatasetConfig { hash: Hashing::None, ..config };
+        let mut classes: Vec<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
+        classes.dedup();
+        let is_asked = |mesh: &&MeshEntry| split.is_none_or(|split| mesh.split == split);
+        let meshes = meshes.iter().filter(is_asked).cloned().collect();
         Ok(Self { config, variant, meshes, classes, patterns, cache })
     }
 
@@ -264,8 +268,7 @@ impl Clouds {
 
     fn aim(&self, config: &DatasetConfig, index: usize) -> Result<Aimed, DatasetError> {
         let mesh = self.ready(index / self.views())?;
-        let id = mesh.record.entry.id();
-        let view = (index % self.views()) as u32;
+        let (id, view) = (mesh.entry.id(), self.view(index));
         let pose = config.sets[0].pose(config.seed, &id, view);
         let planned = PlannedView::new(config, &self.patterns, 0, view, pose);
         let request = planned.request(config, &self.patterns, &id);
@@ -281,7 +284,7 @@ impl Clouds {
         cast: &Cast,
         make: &impl Fn(&DatasetConfig, Source, Scan) -> Option<T>,
     ) -> Result<(u64, Option<T>), DatasetError> {
-        let (set, entry) = (&config.sets[0], &mesh.record.entry);
+        let (set, entry) = (&config.sets[0], &mesh.entry);
         let hits = resolve(job, cast, &self.patterns[0], cast_effects);
         let objects = [ObjectHits::alone(job, &hits, mesh.materials.as_ref())];
         let mut request = planned.request(config, &self.patterns, &entry.id());
@@ -304,7 +307,7 @@ impl Clouds {
         let materials = materials(entry, config).map_err(DatasetError::Mesh)?;
         // It is cast at in every epoch.
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
-        let ready = Arc::new(Ready { record, target, materials });
+        let ready = Arc::new(Ready { entry: record.entry, target, materials });
         lock().put(number, &ready);
         Ok(ready)
     }

@@ -10,9 +10,9 @@ use super::error::DatasetError;
 use super::journal::{read_json, write_json};
 use super::layout;
 use super::manifest::TOOL;
-use super::on_demand::Clouds;
+use super::mesh::failed;
+use super::on_demand::{Clouds, Labelled};
 use super::record::MeshFailure;
-use formats::hash::{FileHash, Hashing};
 use formats::rng::StreamKey;
 use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
 use formats::{Split, atomic};
@@ -25,14 +25,18 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 
+use manifest::{MOST_TARS, other_dataset, part_file, tar_stem, write_root};
+pub use manifest::{
+    PartManifest, PartRecord, RootManifest, TarRecord, is_of_part, root_file, verify,
+};
+
+mod manifest;
+
 /// Clouds of one sample, where samples are of clouds: 12 MiB at 1,024 points.
 const CLOUDS_PER_SAMPLE: usize = 1024;
 
 /// Points of one sample at most, but for one cloud: 768 MiB.
 const POINTS_PER_SAMPLE: usize = 1 << 26;
-
-/// As many tars as their names have digits for, so that they are sorted by name.
-const MOST_TARS: u32 = 1_000_000;
 
 /// Scans that are in memory together.
 const SCANS_AT_ONCE: usize = 256;
@@ -85,80 +89,6 @@ pub struct Run<'a> {
     pub say: &'a dyn Fn(String),
 }
 
-/// What is known of one tar.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TarRecord {
-    /// Its name.
-    pub file: String,
-    /// The hash of its bytes, if the configuration asks for one.
-    #[serde(flatten)]
-    pub hash: Option<FileHash>,
-    /// Bytes.
-    pub bytes: u64,
-    /// Clouds or scans in it.
-    pub clouds: u64,
-    /// Of meshes that cannot be read or that no view sees well enough, once each.
-    pub failures: Vec<MeshFailure>,
-    /// Whether it was handed over to a command; if so, it may be gone from here.
-    pub handed_over: bool,
-    /// A digest of all that decides its bytes.
-    pub made_by: String,
-}
-
-/// The tars of one part.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PartManifest {
-    /// [`TOOL`].
-    pub tool: String,
-    /// Its version.
-    pub version: String,
-    /// (Number from 0, of how many.)
-    pub part: (u32, u32),
-    /// What the whole is to hold.
-    pub config: DatasetConfig,
-    /// How it is cut.
-    pub cut: Cut,
-    /// All classes of the whole, sorted; labels are places among them.
-    pub classes: Vec<String>,
-    /// As [`TarRecord::made_by`].
-    pub made_by: String,
-    /// By split and number.
-    pub tars: Vec<TarRecord>,
-}
-
-/// All parts of a dataset.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RootManifest {
-    /// [`TOOL`].
-    pub tool: String,
-    /// Its version.
-    pub version: String,
-    /// What it holds.
-    pub config: DatasetConfig,
-    /// How it is cut.
-    pub cut: Cut,
-    /// All classes, sorted.
-    pub classes: Vec<String>,
-    /// By number.
-    pub parts: Vec<PartRecord>,
-}
-
-/// What is known of one part.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PartRecord {
-    /// The name of its manifest.
-    pub file: String,
-    /// The hash of that, if the configuration asks for one.
-    #[serde(flatten)]
-    pub hash: Option<FileHash>,
-    /// Tars.
-    pub tars: u64,
-    /// Clouds or scans in them.
-    pub clouds: u64,
-    /// Bytes of the tars.
-    pub bytes: u64,
-}
-
 /// Makes the tars of a part that are not there yet, of `meshes`, which are all of the dataset.
 ///
 /// # Errors
@@ -166,15 +96,13 @@ pub struct PartRecord {
 /// file that cannot be written; a failing adapter; [`DatasetError::Interrupted`] if the run was told to
 /// end; [`DatasetError::NotHandedOver`].
 pub fn make(run: &Run, meshes: &[MeshEntry]) -> Result<PartManifest, DatasetError> {
-    let mut classes: Vec<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
-    classes.dedup();
     let made_by = made_by(run, meshes);
+    let mut classes = Vec::new();
     let (mut tars, mut not_handed_over) = (Vec::new(), Vec::new());
     let (mut done, mut wanted) = (0, 0);
     for split in Split::ALL {
-        let own: Vec<MeshEntry> =
-            meshes.iter().filter(|mesh| mesh.split == split).cloned().collect();
-        let clouds = Clouds::new(run.config.clone(), own, classes.clone(), CACHE_BYTES)?;
+        let clouds = Clouds::new(run.config.clone(), meshes, Some(split), CACHE_BYTES)?;
+        classes = clouds.classes().to_vec();
         let half = Half { run, split, order: Order::new(run.config.seed, split, &clouds), clouds };
         let numbers = (run.part.0..half.tars()?).step_by(run.part.1 as usize);
         wanted += numbers.len();
@@ -223,6 +151,15 @@ struct Half<'a> {
     order: Order,
 }
 
+/// What a tar was filled with.
+#[derive(Default)]
+struct Filled {
+    /// Clouds or scans.
+    clouds: u64,
+    /// By mesh.
+    failures: BTreeMap<String, MeshFailure>,
+}
+
 /// In which order clouds are put into tars: each mesh once, in random order, then each once more from
 /// another side. So a tar has all classes if it has as many clouds as there are meshes.
 struct Order {
@@ -259,7 +196,7 @@ impl Half<'_> {
     }
 
     fn name(&self, number: u32) -> String {
-        format!("{}-{number:06}", self.split)
+        tar_stem(self.split, number)
     }
 
     fn record(&self, number: u32) -> PathBuf {
@@ -278,9 +215,7 @@ impl Half<'_> {
                 layout::remove(&path)?;
                 return self.tar(number, made_by);
             }
-            let difference =
-                "other settings, other meshes, another adapter or another version".to_owned();
-            return Err(DatasetError::Different { path, difference });
+            return Err(other_dataset(path, ""));
         }
         if self.run.is_over.load(SeqCst) {
             return Ok(None);
@@ -300,103 +235,105 @@ impl Half<'_> {
 
     /// Writes tar `number`, all of it or, if the run is over, nothing.
     fn write(&self, number: u32, made_by: &str) -> Result<Option<TarRecord>, DatasetError> {
+        let file = self.name(number) + ".tar";
+        let path = self.run.out.join(&file);
+        let mut filled = Ok(None);
+        let hash = atomic::write_hashed(&path, self.run.config.hash, |tar| {
+            filled = self.fill(tar, number, &path);
+            match &filled {
+                Ok(Some(_)) => Ok(()),
+                // What was written so far is removed.
+                _ => Err(io::Error::other("the tar is not complete")),
+            }
+        });
+        let Some(Filled { clouds, failures }) = filled? else { return Ok(None) };
+        let hash = hash?;
+        let bytes = std::fs::metadata(&path).map_err(|error| DatasetError::io(&path, error))?.len();
+        let failures = failures.into_values().collect();
+        let (made_by, handed_over) = (made_by.to_owned(), false);
+        Ok(Some(TarRecord { file, hash, bytes, clouds, failures, handed_over, made_by }))
+    }
+
+    /// Writes the samples of tar `number`, which is at `path`; `None` if the run is over before all
+    /// are there.
+    fn fill(
+        &self,
+        tar: &mut impl io::Write,
+        number: u32,
+        path: &Path,
+    ) -> Result<Option<Filled>, DatasetError> {
         let size = self.run.cut.clouds_per_tar as usize;
         let first = number as usize * size;
         let places: Vec<usize> = (first..self.order.len().min(first + size)).collect();
-        let file = self.name(number) + ".tar";
-        let path = self.run.out.join(&file);
-        let (mut clouds, mut failures, mut stopped) = (0, BTreeMap::new(), None);
-        let hash = atomic::write_hashed(&path, self.run.config.hash, |tar| {
-            let at_once = match self.run.cut.sample {
-                Sample::Clouds => clouds_per_sample(self.run.config.packed_points),
-                Sample::Scan => SCANS_AT_ONCE,
+        let at_once = match self.run.cut.sample {
+            Sample::Clouds => clouds_per_sample(self.run.config.packed_points),
+            Sample::Scan => SCANS_AT_ONCE,
+        };
+        let mut filled = Filled::default();
+        for (nth, places) in places.chunks(at_once).enumerate() {
+            if self.run.is_over.load(SeqCst) {
+                return Ok(None);
+            }
+            let indices: Vec<usize> = places.iter().map(|&place| self.order.at(place)).collect();
+            let (caster, seed) = (self.run.caster, self.run.config.seed);
+            let written = match self.run.cut.sample {
+                Sample::Clouds => {
+                    let drawn = self.clouds.draw_each(caster, seed, &indices)?;
+                    let clouds = self.kept(drawn, &indices, &mut filled)?;
+                    let key = format!("{}-{nth:03}", self.name(number));
+                    self.append_clouds(tar, &key, clouds)
+                }
+                Sample::Scan => {
+                    let cast = self.clouds.scan_each(caster, seed, &indices)?;
+                    let scans = self.kept(cast, &indices, &mut filled)?;
+                    scans.into_iter().try_for_each(|(nth, scan)| {
+                        self.append_scan(tar, places[nth], indices[nth], &scan)
+                    })
+                }
             };
-            for (nth, places) in places.chunks(at_once).enumerate() {
-                if self.run.is_over.load(SeqCst) {
-                    stopped = Some(None);
-                    return Err(io::Error::other("the run is over"));
-                }
-                let key = format!("{}-{nth:03}", self.name(number));
-                match self.samples(tar, &key, places, &mut failures) {
-                    Ok(n) => clouds += n,
-                    Err(DatasetError::Format(formats::FormatError::Io { source, .. })) => {
-                        return Err(source);
-                    }
-                    Err(error) => {
-                        stopped = Some(Some(error));
-                        return Err(io::Error::other("stopped"));
-                    }
-                }
-            }
-            end(tar)
-        });
-        match (stopped, hash) {
-            (Some(None), _) => Ok(None),
-            (Some(Some(error)), _) => Err(error),
-            (None, hash) => {
-                let hash = hash?;
-                let bytes = std::fs::metadata(&path).map_err(|e| DatasetError::io(&path, e))?.len();
-                let failures = failures.into_values().collect();
-                let (made_by, handed_over) = (made_by.to_owned(), false);
-                Ok(Some(TarRecord { file, hash, bytes, clouds, failures, handed_over, made_by }))
-            }
+            written.map_err(|error| DatasetError::io(path, error))?;
         }
+        end(tar).map_err(|error| DatasetError::io(path, error))?;
+        Ok(Some(filled))
     }
 
-    /// Appends the samples of these places; of how many clouds.
-    fn samples(
+    /// What was made of the clouds of these `indices`, with the place of each among them, and counted
+    /// in `filled`; meshes of which nothing can be made become failures there.
+    fn kept<T>(
+        &self,
+        made: Vec<Result<T, DatasetError>>,
+        indices: &[usize],
+        filled: &mut Filled,
+    ) -> Result<Vec<(usize, T)>, DatasetError> {
+        let mut kept = Vec::with_capacity(made.len());
+        for (nth, made) in made.into_iter().enumerate() {
+            let mesh = self.clouds.mesh(indices[nth]);
+            let failure = match made {
+                Ok(made) => {
+                    kept.push((nth, made));
+                    continue;
+                }
+                Err(DatasetError::Mesh(failure)) => failure,
+                Err(sparse @ DatasetError::Sparse { .. }) => failed(mesh, None, sparse.to_string()),
+                Err(other) => return Err(other),
+            };
+            filled.failures.insert(mesh.relative.clone(), failure);
+        }
+        filled.clouds += kept.len() as u64;
+        Ok(kept)
+    }
+
+    /// Appends a sample of clouds.
+    fn append_clouds(
         &self,
         tar: &mut impl io::Write,
         key: &str,
-        places: &[usize],
-        failures: &mut BTreeMap<String, MeshFailure>,
-    ) -> Result<u64, DatasetError> {
-        let indices: Vec<usize> = places.iter().map(|&place| self.order.at(place)).collect();
-        let (caster, seed) = (self.run.caster, self.run.config.seed);
-        let io = |source| DatasetError::io(Path::new(key), source);
-        let mut refuse = |index: usize, error: DatasetError| {
-            let mesh = self.clouds.mesh(index);
-            let failure = match error {
-                DatasetError::Mesh(failure) => failure,
-                sparse @ DatasetError::Sparse { .. } => {
-                    super::mesh::failed(mesh, None, sparse.to_string())
-                }
-                other => return Err(other),
-            };
-            failures.insert(mesh.relative.clone(), failure);
-            Ok(())
-        };
-        let mut n = 0;
-        match self.run.cut.sample {
-            Sample::Clouds => {
-                let mut clouds = Vec::with_capacity(indices.len());
-                for (drawn, &index) in
-                    self.clouds.draw_each(caster, seed, &indices)?.into_iter().zip(&indices)
-                {
-                    match drawn {
-                        Ok(cloud) => clouds.push((cloud.points, cloud.label)),
-                        Err(error) => refuse(index, error)?,
-                    }
-                }
-                n += clouds.len() as u64;
-                let n_points = self.run.config.packed_points as usize;
-                let npz = npz_of_clouds(&clouds, n_points).map_err(io)?;
-                append_file(tar, &format!("{key}.npz"), &npz).map_err(io)?;
-            }
-            Sample::Scan => {
-                let scans = self.clouds.scan_each(caster, seed, &indices)?;
-                for ((scan, &index), place) in scans.into_iter().zip(&indices).zip(places) {
-                    match scan {
-                        Ok(scan) => {
-                            self.append_scan(tar, *place, index, &scan).map_err(io)?;
-                            n += 1;
-                        }
-                        Err(error) => refuse(index, error)?,
-                    }
-                }
-            }
-        }
-        Ok(n)
+        clouds: Vec<(usize, Labelled)>,
+    ) -> io::Result<()> {
+        let clouds: Vec<_> =
+            clouds.into_iter().map(|(_, cloud)| (cloud.points, cloud.label)).collect();
+        let npz = npz_of_clouds(&clouds, self.run.config.packed_points as usize)?;
+        append_file(tar, &format!("{key}.npz"), &npz)
     }
 
     /// Appends a sample of one scan, whose key is its number in the split.
@@ -411,11 +348,8 @@ impl Half<'_> {
         let told = serde_json::json!({
             "class": mesh.class, "mesh": mesh.relative, "view": view, "points": scan.len(),
         });
-        append_file(
-            tar,
-            &format!("{place:012}.cls"),
-            self.clouds.label(index).to_string().as_bytes(),
-        )?;
+        let label = self.clouds.label(index).to_string();
+        append_file(tar, &format!("{place:012}.cls"), label.as_bytes())?;
         append_file(tar, &format!("{place:012}.json"), told.to_string().as_bytes())?;
         append_file(tar, &format!("{place:012}.npz"), &npz_of_scan(scan)?)
     }
@@ -435,83 +369,4 @@ fn made_by(run: &Run, meshes: &[MeshEntry]) -> String {
 /// Clouds of this many points that one sample holds.
 fn clouds_per_sample(n_points: u32) -> usize {
     (POINTS_PER_SAMPLE / n_points.max(1) as usize).clamp(1, CLOUDS_PER_SAMPLE)
-}
-
-/// The name of the manifest of a part.
-#[must_use]
-pub fn part_file((number, of): (u32, u32)) -> String {
-    format!("part-{number:04}-of-{of:04}.json")
-}
-
-/// Writes `dataset.json` if all parts are there. Two that end at once write the same bytes.
-fn write_root(out: &Path, own: &PartManifest) -> Result<(), DatasetError> {
-    let mut parts = Vec::new();
-    for number in 0..own.part.1 {
-        let file = part_file((number, own.part.1));
-        let path = out.join(&file);
-        if !path.exists() {
-            return Ok(());
-        }
-        let part: PartManifest = read_json(&path)?;
-        if part.made_by != own.made_by {
-            let difference =
-                "this part has other settings, other meshes, another adapter or another version";
-            let difference = difference.to_owned();
-            return Err(DatasetError::Different { path, difference });
-        }
-        let hash = own.config.hash.of_file(&path)?;
-        let sum = |of: fn(&TarRecord) -> u64| part.tars.iter().map(of).sum();
-        let (clouds, bytes) = (sum(|tar| tar.clouds), sum(|tar| tar.bytes));
-        parts.push(PartRecord { file, hash, tars: part.tars.len() as u64, clouds, bytes });
-    }
-    let PartManifest { tool, version, config, cut, classes, .. } = own.clone();
-    let root = RootManifest { tool, version, config, cut, classes, parts };
-    write_json(&root_file(out), &root)
-}
-
-/// Where the list of parts is.
-#[must_use]
-pub fn root_file(out: &Path) -> PathBuf {
-    out.join("dataset.json")
-}
-
-/// Checks the tars of a finished dataset against their records; says what is wrong.
-///
-/// # Errors
-/// If there is no list of parts.
-pub fn verify(out: &Path) -> Result<Vec<String>, DatasetError> {
-    let root: RootManifest = read_json(&root_file(out))?;
-    let mut problems = Vec::new();
-    for PartRecord { file, hash, .. } in &root.parts {
-        let path = out.join(file);
-        check(&path, root.config.hash, hash.as_ref(), None, &mut problems);
-        match read_json::<PartManifest>(&path) {
-            Ok(part) => {
-                for TarRecord { file, hash, bytes, .. } in &part.tars {
-                    let path = out.join(file);
-                    check(&path, root.config.hash, hash.as_ref(), Some(*bytes), &mut problems);
-                }
-            }
-            Err(error) => problems.push(error.to_string()),
-        }
-    }
-    Ok(problems)
-}
-
-fn check(
-    path: &Path,
-    hashing: Hashing,
-    hash: Option<&FileHash>,
-    bytes: Option<u64>,
-    problems: &mut Vec<String>,
-) {
-    let size = match std::fs::metadata(path) {
-        Ok(file) => file.len(),
-        Err(error) => return problems.push(DatasetError::io(path, error).to_string()),
-    };
-    match hashing.of_file(path) {
-        Ok(found) if found.as_ref() == hash && bytes.is_none_or(|bytes| bytes == size) => {}
-        Ok(_) => problems.push(format!("{}: is not as recorded", layout::slashed(path))),
-        Err(error) => problems.push(error.to_string()),
-    }
 }

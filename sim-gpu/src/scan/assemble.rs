@@ -1,10 +1,11 @@
 //! From hits to the points of a scan: effects, clipping, attributes.
 
 use super::echo::Source;
-use super::measure::{HitEffects, Normals, Return, View, measure_all, measure_one};
+use super::hit_effects::HitEffects;
+use super::measure::{Return, View, measure_all, measure_one};
+use super::normals::{Normals, unit_normal};
 use super::request::{Glass, ScanRequest};
 use crate::config::InvalidValue;
-use crate::cpu::oracle;
 use crate::effects::Effects;
 use crate::job::CastJob;
 use crate::material::{Material, Materials};
@@ -14,7 +15,7 @@ use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
 use crate::weather::Medium;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
-use glam::{DAffine3, DMat3, DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -47,7 +48,7 @@ impl<'a> ObjectHits<'a> {
     }
 
     /// Where the object is when `ray` of `pattern` is fired.
-    fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
+    pub(super) fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
         let at = |motion: &Motion| motion.world_from_object_at(pattern.time_s[ray as usize]);
         self.job.motion.as_ref().map_or(self.world_from_object, at)
     }
@@ -241,7 +242,7 @@ fn with_attributes(
             Attribute::Intensity => {
                 scan.intensity = column(returns, |r| {
                     surface(r).map_or(0.0, |(found, hit, number)| {
-                        let effects = HitEffects::of(view, found, number);
+                        let effects = HitEffects::of(view.cast_effects, pattern, found, number);
                         let own = found.materials.map(|_| found.material(pattern, hit));
                         own.map_or(effects.intensity, |own| {
                             effects.intensity * own.reflectivity as f32
@@ -286,18 +287,6 @@ const NONE: u32 = u32::MAX;
 
 fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>> {
     Some(returns.iter().map(value).collect())
-}
-
-/// A unit normal of the surface in world axes; zero for a triangle without area.
-pub(super) fn unit_normal(found: &ObjectHits, pattern: &BeamPattern, hit: &Hit) -> DVec3 {
-    let world_from_object = found.world_from_object_at(pattern, hit.beam);
-    (of_normals(&world_from_object) * oracle::normal(&found.job.target, hit.triangle))
-        .normalize_or_zero()
-}
-
-/// What turns normals as `world_from_object` turns points, but for their length.
-pub(super) fn of_normals(world_from_object: &DAffine3) -> DMat3 {
-    world_from_object.matrix3.inverse().transpose()
 }
 
 /// The surface's unit normal in world axes, against the `beam` that hit it.

@@ -1,20 +1,20 @@
 //! From what the rays of a beam hit to the points that the sensor measures.
 
-use super::assemble::{ObjectHits, Tally, of_normals, unit_normal};
+use super::assemble::{ObjectHits, Tally};
 use super::echo::{Echo, Signal, Source, merge, told};
+use super::hit_effects::HitEffects;
+use super::normals::Normals;
 use super::power;
 use super::request::ScanRequest;
 use crate::config::InvalidValue;
-use crate::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
-use crate::cpu::oracle;
 use crate::cpu::random::random_bits;
-use crate::effects::{DetectionLimit, Effects, NoiseModel, RayEffect};
+use crate::effects::{DetectionLimit, Effects, NoiseModel};
 use crate::pose::Pose;
-use crate::resolve::{Hit, Hits};
+use crate::resolve::Hit;
 use crate::weather::{Air, AirBeam, Scattered};
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// A request, and what its effects come to.
 pub(super) struct View<'a> {
@@ -120,7 +120,9 @@ impl<'a> View<'a> {
         normals: &mut Normals,
     ) -> Signal {
         let material = found.material(self.request.pattern, hit);
-        let cosine = || normals.at(object, found, self, hit).dot(self.direction(hit.beam)).abs();
+        let cosine = || {
+            normals.at(object, found, self.request.pattern, hit).dot(self.direction(hit.beam)).abs()
+        };
         let whole = power::brightness(material, cosine);
         let mut brightness = self.share.map_or(whole, |share| whole * share);
         if let Some(air) = &self.air {
@@ -129,37 +131,6 @@ impl<'a> View<'a> {
         }
         let power = power::received(brightness, hit.range_m);
         Signal { power, brightness, retroreflection: material.retroreflection }
-    }
-}
-
-/// The normals of objects that do not turn, of which rays of one beam often ask for the same.
-pub(super) struct Normals {
-    /// From each object to the world, `[n_objects]`.
-    of_object: Vec<DMat3>,
-    /// The object and the triangle that were asked for last, and what was answered.
-    last: Option<(usize, u32, DVec3)>,
-}
-
-impl Normals {
-    pub fn new(objects: &[ObjectHits]) -> Self {
-        let of_object = objects.iter().map(|found| of_normals(&found.world_from_object));
-        Self { of_object: of_object.collect(), last: None }
-    }
-
-    /// The unit normal where object number `object`, which is `found`, was hit, in world axes.
-    fn at(&mut self, object: usize, found: &ObjectHits, view: &View, hit: &Hit) -> DVec3 {
-        if found.turns() {
-            return unit_normal(found, view.request.pattern, hit);
-        }
-        match self.last {
-            Some((of, at, normal)) if (of, at) == (object, hit.triangle) => normal,
-            _ => {
-                let in_object = oracle::normal(&found.job.target, hit.triangle);
-                let normal = (self.of_object[object] * in_object).normalize_or_zero();
-                self.last = Some((object, hit.triangle, normal));
-                normal
-            }
-        }
     }
 }
 
@@ -415,7 +386,8 @@ fn point(
     let (stream, ray) = key(view, objects, echo);
     let effects = match source {
         Source::Surface { object, hit } => {
-            HitEffects::of(view, &objects[object as usize], hit as usize)
+            let (pattern, found) = (view.request.pattern, &objects[object as usize]);
+            HitEffects::of(view.cast_effects, pattern, found, hit as usize)
         }
         Source::Air { .. } => HitEffects::of_ray(view.cast_effects, stream, ray),
     };
@@ -459,61 +431,4 @@ fn is_lost_in_glass(view: &View, found: &ObjectHits, hit: &Hit) -> bool {
     };
     let [bits, ..] = random_bits(found.job.stream, view.centre(hit.beam), GLASS_PURPOSE);
     f64::from(bits) >= glass.returned * 2f64.powi(32)
-}
-
-/// What the effects say of one hit.
-#[derive(Default)]
-pub(super) struct HitEffects {
-    /// Along the ray in x where the noise is of the range.
-    noise: DVec3,
-    dropped: bool,
-    pub intensity: f32,
-}
-
-impl HitEffects {
-    /// The outputs of the effects that were cast for number `hit` of what was `found`.
-    pub fn of(view: &View, found: &ObjectHits, hit: usize) -> Self {
-        let (cast_effects, Hits { hits, effect_outputs, .. }) = (view.cast_effects, found.hits);
-        let per_hit = cast_effects.outputs_per_ray();
-        if let Some(outputs) = effect_outputs.get(hit * per_hit..(hit + 1) * per_hit) {
-            return Self::read(cast_effects, outputs);
-        }
-        let (job, Hit { beam, triangle, .. }) = (found.job, &hits[hit]);
-        let mut own = Self::of_ray(cast_effects, job.stream, *beam);
-        if cast_effects.intensity.is_some() {
-            let ray = job.beam(view.request.pattern, *beam);
-            own.intensity = intensity(&job.target, &ray, *triangle, job.reflectivity.into()) as f32;
-        }
-        own
-    }
-
-    /// What `cast_effects` say of a ray, whatever it meets.
-    fn of_ray(cast_effects: &Effects, stream: StreamKey, ray: u32) -> Self {
-        let noise = cast_effects.noise.map(|noise| match noise.model {
-            NoiseModel::Range => DVec3::X * noise_range(&noise, stream, ray),
-            NoiseModel::Xyz => noise_xyz(&noise, stream, ray),
-        });
-        let dropped = cast_effects.dropout.is_some_and(|model| dropout(&model, stream, ray));
-        // As a caster answers.
-        let noise = noise.unwrap_or_default().as_vec3().as_dvec3();
-        Self { noise, dropped, intensity: 0.0 }
-    }
-
-    /// Reads what a caster of `cast_effects` answered for one hit.
-    fn read(cast_effects: &Effects, mut outputs: &[f32]) -> Self {
-        let mut found = Self::default();
-        for effect in cast_effects.per_ray() {
-            let (own, others) = outputs.split_at(effect.width());
-            outputs = others;
-            match effect {
-                RayEffect::NoiseRange(_) => found.noise.x = own[0].into(),
-                RayEffect::NoiseXyz(_) => {
-                    found.noise = DVec3::new(own[0].into(), own[1].into(), own[2].into());
-                }
-                RayEffect::Dropout(_) => found.dropped = own[0] != 0.0,
-                RayEffect::Intensity => found.intensity = own[0],
-            }
-        }
-        found
-    }
 }

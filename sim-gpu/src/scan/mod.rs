@@ -8,7 +8,9 @@
 
 mod assemble;
 mod echo;
+mod hit_effects;
 mod measure;
+mod normals;
 mod power;
 mod request;
 

@@ -1,14 +1,12 @@
 //! The places from which a sensor is meant to look at an object.
 
-use std::f64::consts::TAU;
-
 use formats::rng::StreamKey;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, at_least, positive, within};
 use crate::mesh::frame::Normalize;
-use crate::pose::Pose;
+use crate::pose::{Pose, azimuth_on_ring};
 
 /// Views of an object, evenly spread over azimuth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,8 +63,8 @@ impl Views {
     pub fn pose(&self, view: u32, target_m: DVec3, key: StreamKey) -> Pose {
         let is_regular = self.azimuth_jitter_deg == 0.0;
         if is_regular && self.distance_to_m.is_none() && self.elevation_to_deg.is_none() {
-            let turn = TAU * f64::from(view) / f64::from(self.count);
-            let azimuth_rad = self.azimuth_deg.to_radians() + turn;
+            let first_azimuth_rad = self.azimuth_deg.to_radians();
+            let azimuth_rad = azimuth_on_ring(view, self.count, first_azimuth_rad);
             let elevation_rad = self.elevation_deg.to_radians();
             return Pose::view(self.distance_m, elevation_rad, azimuth_rad, target_m);
         }

@@ -42,7 +42,7 @@ pub enum Which {
 }
 
 /// The interpreter that has a script's packages, or why there is none.
-type Python = Result<PathBuf, String>;
+pub type Python = Result<PathBuf, String>;
 
 /// The environments of packages by which scripts are run.
 pub struct Packages {
@@ -79,7 +79,8 @@ fn python_of(name: &str, which: Which, install: bool) -> Option<Python> {
     Some(interpreter(&Environment { name: &folder, requirements: &requirements, size }, install))
 }
 
-fn interpreter(environment: &Environment<'_>, install: bool) -> Python {
+/// The interpreter of `environment`, which is made if it may be.
+pub fn interpreter(environment: &Environment<'_>, install: bool) -> Python {
     match install {
         true => environment.interpreter(),
         false => environment.made()?.ok_or_else(|| "its packages are missing".to_owned()),

@@ -1,6 +1,7 @@
 //! The Python package: a wheel is built and judged, and its tests run in an environment that has
 //! nothing else of ours.
 
+use super::peers::interpreter;
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow, ensure};
 use std::fs;
@@ -32,12 +33,7 @@ pub fn run(summary: &mut Summary, install: bool, with_pytorch: bool) {
         if !cfg!(target_os = "linux") {
             return Ok(summary.skip("python", 1, "wheels are tested on Linux"));
         }
-        let tools = match BUILD.made() {
-            Ok(None) if install => BUILD.interpreter(),
-            Ok(None) => Err("its packages are missing".to_owned()),
-            made => made.map(Option::unwrap_or_default),
-        };
-        match tools {
+        match interpreter(&BUILD, install) {
             Ok(tools) => test(&tools, with_pytorch),
             Err(cause) => Ok(summary.skip("python", 1, &cause)),
         }

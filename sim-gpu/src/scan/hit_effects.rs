@@ -1,0 +1,71 @@
+//! What the effects say of one hit.
+
+use super::assemble::ObjectHits;
+use crate::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
+use crate::effects::{Effects, NoiseModel, RayEffect};
+use crate::resolve::{Hit, Hits};
+use crate::sensor::BeamPattern;
+use formats::rng::StreamKey;
+use glam::DVec3;
+
+/// What the effects say of one hit.
+#[derive(Default)]
+pub(super) struct HitEffects {
+    /// Along the ray in x where the noise is of the range.
+    pub noise: DVec3,
+    pub dropped: bool,
+    pub intensity: f32,
+}
+
+impl HitEffects {
+    /// The outputs of the effects that were cast for number `hit` of what was `found`.
+    pub fn of(
+        cast_effects: &Effects,
+        pattern: &BeamPattern,
+        found: &ObjectHits,
+        hit: usize,
+    ) -> Self {
+        let Hits { hits, effect_outputs, .. } = found.hits;
+        let per_hit = cast_effects.outputs_per_ray();
+        if let Some(outputs) = effect_outputs.get(hit * per_hit..(hit + 1) * per_hit) {
+            return Self::read(cast_effects, outputs);
+        }
+        let (job, Hit { beam, triangle, .. }) = (found.job, &hits[hit]);
+        let mut own = Self::of_ray(cast_effects, job.stream, *beam);
+        if cast_effects.intensity.is_some() {
+            let ray = job.beam(pattern, *beam);
+            own.intensity = intensity(&job.target, &ray, *triangle, job.reflectivity.into()) as f32;
+        }
+        own
+    }
+
+    /// What `cast_effects` say of a ray, whatever it meets.
+    pub fn of_ray(cast_effects: &Effects, stream: StreamKey, ray: u32) -> Self {
+        let noise = cast_effects.noise.map(|noise| match noise.model {
+            NoiseModel::Range => DVec3::X * noise_range(&noise, stream, ray),
+            NoiseModel::Xyz => noise_xyz(&noise, stream, ray),
+        });
+        let dropped = cast_effects.dropout.is_some_and(|model| dropout(&model, stream, ray));
+        // As a caster answers.
+        let noise = noise.unwrap_or_default().as_vec3().as_dvec3();
+        Self { noise, dropped, intensity: 0.0 }
+    }
+
+    /// Reads what a caster of `cast_effects` answered for one hit.
+    fn read(cast_effects: &Effects, mut outputs: &[f32]) -> Self {
+        let mut found = Self::default();
+        for effect in cast_effects.per_ray() {
+            let (own, others) = outputs.split_at(effect.width());
+            outputs = others;
+            match effect {
+                RayEffect::NoiseRange(_) => found.noise.x = own[0].into(),
+                RayEffect::NoiseXyz(_) => {
+                    found.noise = DVec3::new(own[0].into(), own[1].into(), own[2].into());
+                }
+                RayEffect::Dropout(_) => found.dropped = own[0] != 0.0,
+                RayEffect::Intensity => found.intensity = own[0],
+            }
+        }
+        found
+    }
+}
