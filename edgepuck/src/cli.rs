@@ -1,7 +1,7 @@
 //! The command line of the program `edgepuck`, which its binary and its Python package start.
 
 use crate::{
-    Outcome, adapters, cluster, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes,
+    Outcome, adapters, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes,
     merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment, trainer,
     weather,
 };
@@ -50,6 +50,8 @@ enum Command {
     Adapters,
     /// Merge the shards of a dataset into one dataset
     MergeDataset(merge_dataset::Args),
+    /// Describe a finished dataset for publishing: a card (README.md) and Croissant metadata
+    Card(card::Args),
     /// Print the job file of a dataset that many machines make: Slurm, Kubernetes or HyperQueue
     Cluster(cluster::Args),
     /// Convert a PyTorch checkpoint into a model file for infer-cpu
@@ -113,6 +115,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Profile(args) => profile::run(args),
         Command::Adapters => adapters::run(),
         Command::MergeDataset(args) => merge_dataset::run(args),
+        Command::Card(args) => card::run(args),
         Command::Cluster(args) => cluster::run(args),
         #[cfg(feature = "models")]
         Command::ImportWeights(args) => import_weights::run(args),

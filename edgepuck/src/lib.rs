@@ -4,6 +4,7 @@ pub mod adapters;
 #[cfg(feature = "models")]
 pub mod advise;
 mod brightness;
+pub mod card;
 pub mod caster;
 pub mod checkout;
 pub mod cli;

@@ -4,6 +4,7 @@
 
 mod advise;
 mod bad_input;
+mod cards;
 mod checkpoints;
 mod clusters;
 mod corrupt;

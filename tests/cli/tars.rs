@@ -61,6 +61,10 @@ fn what_is_there_is_refused_unless_it_is_gone_on_with() {
         1,
         &[
             ("gen-dataset meshes --out x --layout webdataset", "name it with --sensor"),
+            (
+                "gen-dataset meshes --out x --views 70000",
+                "expected at most 65535 where each scan is a file",
+            ),
             (&format!("{WORDS} --out x --layout webdataset,yanx27"), "it writes tars alone"),
         ],
     );
@@ -170,4 +174,19 @@ fn a_run_that_is_told_to_end_leaves_no_half_of_a_tar() {
     }
     assert_eq!(codes.last(), Some(&Some(75)), "{codes:?}");
     folder.succeeds(&words);
+}
+
+/// A billion views of nine meshes: one part of a hundred million is made like any other.
+#[test]
+fn a_task_of_a_very_large_dataset_does_its_part_alone() {
+    let folder = Folder::with_meshes();
+    let words = WORDS
+        .replace("--views 3", "--views 4000000000")
+        .replace("--tar-clouds 4", "--tar-clouds 64");
+    let too_many = format!("{words} --out out --shard 7/1000000");
+    folder.refuses(1, &[(&too_many, "clouds_per_tar: expected at most 1000000 tars of a split")]);
+    let words = words.replace("4000000000", "4000000");
+    folder.succeeds(&format!("{words} --out out --shard 7/900000"));
+    let part = folder.text("out/part-0006-of-900000.json");
+    assert!(part.contains("train-000006.tar"), "{part}");
 }

@@ -28,7 +28,7 @@ pub struct Settings {
     sensor: Option<String>,
 
     /// Number of viewpoints around the mesh [default: the sensor's own, or 4]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     views: Option<u32>,
 
     /// Distance from the mesh's centre to the sensor, metres; of two numbers, between which each

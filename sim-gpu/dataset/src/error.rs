@@ -22,6 +22,12 @@ pub enum DatasetError {
         /// What it holds.
         what: &'static str,
     },
+    /// A dataset that has been described already.
+    #[error("{}: is there already; replace it with --overwrite", path.display())]
+    Published {
+        /// The file.
+        path: PathBuf,
+    },
     /// A run that was not finished.
     #[error("{}: is not finished; continue it with --resume", path.display())]
     Unfinished {

@@ -9,18 +9,22 @@ use super::record::{Entry, MeshRecord};
 use formats::scan_file::ScanFormat;
 use formats::yanx27::Yanx27Writer;
 use formats::{Split, hash};
+use sim_gpu::config::InvalidValue;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Hexadecimal digits of a hash that set equal names apart.
 const HASH_DIGITS: usize = 12;
 
+/// Views of a mesh at most where each scan is a file of its own.
+const MOST_VIEWS: usize = 65_535;
+
 /// Checks that the layouts that `config` asks for can hold a dataset of
 /// `classes`: before a run, since they are written at its very end.
 ///
 /// # Errors
-/// A layout this build cannot write, or one without room for the classes or
-/// the size of a cloud.
+/// A layout this build cannot write, or one without room for the classes, the size of a cloud or
+/// the number of views.
 pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), DatasetError> {
     for &layout in &config.layouts {
         match layout {
@@ -40,6 +44,15 @@ pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), D
                 refuse_if(config.sets.len() != 1, layout, cause)?;
             }
         }
+    }
+    let counts = config.sets.iter().map(|set| set.viewpoints.count());
+    let most = counts.max().unwrap_or(0);
+    if most > MOST_VIEWS && !config.layouts.contains(&Layout::Webdataset) {
+        let cause = format!(
+            "expected at most {MOST_VIEWS} where each scan is a file, found {most}; the layout \
+             webdataset takes any number"
+        );
+        return Err(InvalidValue::new("views", cause).into());
     }
     Ok(())
 }

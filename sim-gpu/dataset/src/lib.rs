@@ -6,6 +6,7 @@
 //! makes one dataset of parts. [`surfaces`] draws what scans are compared with, and
 //! [`corrupted`] makes sets in which something goes wrong. [`on_demand`] casts the clouds of a
 //! dataset as they are asked for, and writes none; [`tars`] writes them as WebDataset reads them.
+//! [`publish`] describes a finished dataset to those who find it.
 
 mod budget;
 mod clouds;
@@ -24,6 +25,7 @@ pub mod on_demand;
 mod pack;
 pub mod pipeline;
 pub mod progress;
+pub mod publish;
 pub mod record;
 pub mod start;
 pub mod surfaces;

@@ -59,7 +59,7 @@ pub struct SetPoses {
 pub enum Poses {
     /// The same around every mesh.
     EveryMesh(Vec<Pose>),
-    /// Each mesh has its own, since views are jittered. Sorted.
+    /// Each mesh has its own, since views are drawn. Sorted.
     EachMesh(Vec<MeshPoses>),
 }
 
@@ -228,9 +228,8 @@ pub(super) fn poses(config: &DatasetConfig, records: &[MeshRecord]) -> Vec<SetPo
 }
 
 fn set_poses(config: &DatasetConfig, set: &SetConfig, records: &[MeshRecord]) -> Poses {
-    let jittered =
-        matches!(&set.viewpoints, Viewpoints::Views(views) if views.azimuth_jitter_deg != 0.0);
-    if !jittered {
+    let drawn = matches!(&set.viewpoints, Viewpoints::Views(views) if !views.is_regular());
+    if !drawn {
         return Poses::EveryMesh(set.poses(config.seed, ""));
     }
     let ids: BTreeSet<String> = records.iter().map(|record| record.entry.id()).collect();

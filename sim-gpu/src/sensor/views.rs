@@ -58,11 +58,17 @@ impl Views {
         (0..self.count).map(|view| self.pose(view, target_m, key)).collect()
     }
 
+    /// Whether nothing is drawn, so that the poses around all objects are the same.
+    #[must_use]
+    pub fn is_regular(&self) -> bool {
+        let Self { azimuth_jitter_deg, distance_to_m, elevation_to_deg, .. } = self;
+        *azimuth_jitter_deg == 0.0 && distance_to_m.is_none() && elevation_to_deg.is_none()
+    }
+
     /// Number `view` of the poses.
     #[must_use]
     pub fn pose(&self, view: u32, target_m: DVec3, key: StreamKey) -> Pose {
-        let is_regular = self.azimuth_jitter_deg == 0.0;
-        if is_regular && self.distance_to_m.is_none() && self.elevation_to_deg.is_none() {
+        if self.is_regular() {
             let first_azimuth_rad = self.azimuth_deg.to_radians();
             let azimuth_rad = azimuth_on_ring(view, self.count, first_azimuth_rad);
             let elevation_rad = self.elevation_deg.to_radians();
@@ -86,12 +92,30 @@ impl Views {
     ///
     /// On the first number that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
-        within("views.count", f64::from(self.count), 0.0..=f64::from(u16::MAX))?;
         positive("views.distance_m", self.distance_m)?;
         at_least("views.distance_to_m", self.distance_to_m, self.distance_m)?;
         within("views.elevation_deg", self.elevation_deg, -90.0..=90.0)?;
         within("views.elevation_to_deg", self.elevation_to_deg, self.elevation_deg..=90.0)?;
         within("views.azimuth_deg", self.azimuth_deg, -360.0..=360.0)?;
         within("views.azimuth_jitter_deg", self.azimuth_jitter_deg, 0.0..=180.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_are_regular_if_nothing_of_them_is_drawn() {
+        assert!(Views::ROTATING.is_regular());
+        for drawn in [
+            Views { azimuth_jitter_deg: 1.0, ..Views::ROTATING },
+            Views { distance_to_m: Some(4.0), ..Views::ROTATING },
+            Views { elevation_to_deg: Some(30.0), ..Views::ROTATING },
+        ] {
+            assert!(!drawn.is_regular(), "{drawn:?}");
+            let pose = |object| drawn.pose(1, DVec3::ZERO, StreamKey::new(0, object, 0));
+            assert_ne!(pose("chair"), pose("table"));
+        }
     }
 }

@@ -1,0 +1,206 @@
+//! The metadata of a dataset in Croissant 1.1 (MLCommons, <https://docs.mlcommons.org/croissant/docs/croissant-spec-1.1.html>).
+//!
+//! The hash of the manifest stands for those of all files, which the manifest lists; so the metadata of
+//! a billion scans are as short as those of a hundred.
+
+use super::{Facts, Form, Publication};
+use crate::config::Variant;
+use crate::tars::Sample;
+use formats::Split;
+use formats::scan::{Attribute, ColumnSlot, Scan};
+use serde_json::{Map, Value, json};
+
+/// The words of Croissant that are used here, as its specification maps them.
+const CONTEXT: &str = include_str!("context.json");
+
+/// The metadata of a dataset.
+pub fn metadata(publication: &Publication, facts: &Facts) -> Value {
+    let context: Value = serde_json::from_str(CONTEXT).expect("invariant: the context is JSON");
+    let (manifest, sha256) = &facts.manifest;
+    let mut files = vec![json!({
+        "@type": "cr:FileObject", "@id": manifest, "name": manifest, "contentUrl": manifest,
+        "encodingFormat": "application/json", "sha256": sha256,
+    })];
+    let mut records = vec![splits(), classes(&facts.classes)];
+    match &facts.form {
+        Form::Files { .. } => {
+            files.push(file_set("scan-files", "application/x-npz", scan_patterns(facts), None));
+            files.push(file_set(
+                "packed-files",
+                "application/x-npz",
+                vec!["packed/*.npz".into()],
+                None,
+            ));
+            records.push(listed(manifest, "packed", &["file", "clouds"]));
+            records.push(scans("scan-files", facts));
+            records.push(clouds("packed-files", facts));
+        }
+        Form::Tars { cut, .. } => {
+            let all = |pattern: &str| vec![pattern.to_owned()];
+            files.push(file_set("part-manifests", "application/json", all("part-*.json"), None));
+            files.push(file_set("tar-files", "application/x-tar", all("*.tar"), None));
+            files.push(file_set(
+                "sample-files",
+                "application/x-npz",
+                all("*.npz"),
+                Some("tar-files"),
+            ));
+            records.push(listed("part-manifests", "tars", &["file", "clouds", "bytes"]));
+            records.push(match cut.sample {
+                Sample::Clouds => clouds("sample-files", facts),
+                Sample::Scan => scans("sample-files", facts),
+            });
+        }
+    }
+    let mut dataset = json!({
+        "@context": context,
+        "@type": "sc:Dataset",
+        "conformsTo": "http://mlcommons.org/croissant/1.1",
+        "name": publication.name,
+        "description": super::card::summary(facts),
+        "keywords": super::card::TAGS,
+        "version": "1.0.0",
+        "distribution": files,
+        "recordSet": records,
+    });
+    let known = dataset.as_object_mut().expect("invariant: it is an object");
+    add_what_the_publisher_knows(known, publication);
+    dataset
+}
+
+fn add_what_the_publisher_knows(dataset: &mut Map<String, Value>, publication: &Publication) {
+    let Publication { license, url, creator, published, .. } = publication;
+    let license = license.as_ref().map(|id| format!("https://spdx.org/licenses/{id}.html"));
+    let texts = [("license", &license), ("url", url), ("datePublished", published)];
+    for (key, text) in texts {
+        if let Some(text) = text {
+            dataset.insert(key.to_owned(), json!(text));
+        }
+    }
+    if let Some(name) = creator {
+        let known = [Some(name), published.as_ref(), url.as_ref()].into_iter().flatten();
+        let known: Vec<&str> = known.map(String::as_str).collect();
+        let cited = format!("{}. {}", publication.name, known.join(", "));
+        dataset.insert("citeAs".to_owned(), json!(cited));
+        dataset.insert("creator".to_owned(), json!({"@type": "sc:Person", "name": name}));
+    }
+}
+
+/// The files whose names are like one of `patterns`, in the archives of the set `within`, if that is
+/// one.
+fn file_set(id: &str, format: &str, patterns: Vec<String>, within: Option<&str>) -> Value {
+    let mut set = json!({
+        "@type": "cr:FileSet", "@id": id, "name": id, "encodingFormat": format,
+        "includes": patterns,
+    });
+    if let Some(within) = within {
+        set["containedIn"] = json!({"@id": within});
+    }
+    set
+}
+
+fn scan_patterns(facts: &Facts) -> Vec<String> {
+    let variants = |set: &str| {
+        let of = |variant: &Variant| format!("{set}/{variant}/*.npz");
+        facts.config.variants.iter().map(of).collect::<Vec<_>>()
+    };
+    facts.config.sets.iter().flat_map(|set| variants(&set.name)).collect()
+}
+
+fn record_set(id: &str, fields: Vec<Value>) -> Value {
+    json!({"@type": "cr:RecordSet", "@id": id, "name": id, "field": fields})
+}
+
+fn field(set: &str, name: &str, data_type: &str) -> Value {
+    let id = format!("{set}/{name}");
+    json!({"@type": "cr:Field", "@id": id, "name": name, "dataType": data_type})
+}
+
+/// A field of NPZ files of `file_set`: an array of this shape, -1 where it differs by file.
+fn array(set: &str, name: &str, file_set: &str, shape: &str, what: &str) -> Value {
+    let data_type = if name == "labels" { "sc:Integer" } else { "sc:Float" };
+    let mut array = field(set, name, data_type);
+    array["description"] = json!(what);
+    array["isArray"] = json!(true);
+    array["arrayShape"] = json!(shape);
+    array["source"] = json!({"fileSet": {"@id": file_set}, "extract": {"fileProperty": "content"}});
+    array
+}
+
+fn splits() -> Value {
+    let fields = vec![field("splits", "name", "sc:Text"), field("splits", "url", "sc:URL")];
+    let urls = [(Split::Train, "cr:TrainingSplit"), (Split::Test, "cr:TestSplit")];
+    let data = urls.map(|(split, url)| json!({"splits/name": split, "splits/url": url}));
+    let mut set = record_set("splits", fields);
+    set["dataType"] = json!("cr:Split");
+    set["key"] = json!({"@id": "splits/name"});
+    set["data"] = json!(data);
+    set
+}
+
+fn classes(names: &[String]) -> Value {
+    let fields = vec![field("classes", "label", "sc:Integer"), field("classes", "name", "sc:Text")];
+    let row = |(label, name)| json!({"classes/label": label, "classes/name": name});
+    let mut set = record_set("classes", fields);
+    set["dataType"] = json!("sc:Enumeration");
+    set["key"] = json!({"@id": "classes/label"});
+    set["data"] = names.iter().enumerate().map(row).collect();
+    set
+}
+
+/// The list `list` in JSON files: by entry, the values of `keys`.
+fn listed(files: &str, list: &str, keys: &[&str]) -> Value {
+    let of = |key: &&str| {
+        let data_type = if *key == "file" { "sc:Text" } else { "sc:Integer" };
+        let mut one = field(list, key, data_type);
+        let kind = if files == "part-manifests" { "fileSet" } else { "fileObject" };
+        one["source"] = json!({
+            kind: {"@id": files}, "extract": {"jsonPath": format!("$.{list}[*].{key}")},
+        });
+        one
+    };
+    record_set(list, keys.iter().map(of).collect())
+}
+
+fn clouds(file_set: &str, facts: &Facts) -> Value {
+    let shape = format!("-1,{},3", facts.config.packed_points);
+    let what = "By cloud and point: x, y, z, of mean 0 and scaled into the unit sphere";
+    let mut labels = array("clouds", "labels", file_set, "-1", "The class of each cloud");
+    labels["references"] = json!({"field": {"@id": "classes/label"}});
+    record_set("clouds", vec![array("clouds", "points", file_set, &shape, what), labels])
+}
+
+fn scans(file_set: &str, facts: &Facts) -> Value {
+    let what = "By point: x, y, z, metres, z upwards";
+    let mut fields = vec![array("scan", "positions", file_set, "-1,3", what)];
+    fields.extend(facts.config.attributes.iter().map(|attribute| {
+        let shape = match Scan::default().slot(*attribute) {
+            ColumnSlot::Vector(_) => "-1,3",
+            _ => "-1,1",
+        };
+        array("scan", attribute.name(), file_set, shape, unit(*attribute))
+    }));
+    record_set("scan", fields)
+}
+
+/// What an attribute says of each point, as [`Scan`] has it.
+fn unit(attribute: Attribute) -> &'static str {
+    match attribute {
+        Attribute::Range => "Distance from where the beam starts, metres",
+        Attribute::Beam => "Number of the beam in the sensor's firing order",
+        Attribute::Ring => "Row of the beam, from the lowest elevation",
+        Attribute::Time => "Seconds since the revolution began",
+        Attribute::Triangle => "Triangle that was hit, in its mesh file's order",
+        Attribute::Object => "Object that was hit",
+        Attribute::Intensity => "Returned intensity, 0 to 1",
+        Attribute::Power => {
+            "Received power, relative to a white surface 1 m away that faces the sensor"
+        }
+        Attribute::Reflectivity => "Calibrated reflectivity, 0 to 255",
+        Attribute::Return => "Number of the return among those of its beam, 1 the nearest",
+        Attribute::Medium => "0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray",
+        Attribute::Sensor => "Where the sensor was when the beam was fired, metres",
+        Attribute::Attitude => "How the sensor was turned then: a vector along the axis, radians",
+        Attribute::Normal => "Unit normal of the surface, towards the sensor",
+    }
+}

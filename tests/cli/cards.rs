@@ -1,0 +1,49 @@
+//! A finished dataset is described for those who find it; `tests/peers/croissant.py` reads what is
+//! written.
+
+use crate::Folder;
+
+const WORDS: &str =
+    "gen-dataset meshes --adapter cpu --sensor vlp32c --views 2 --distance 2,3 --points 64";
+const PUBLICATION: &str =
+    "--license CC-BY-4.0 --url https://example.org/d --creator Ada --published 2026-11-25";
+
+#[test]
+fn a_dataset_of_either_form_has_a_card_and_metadata() {
+    let folder = Folder::with_meshes();
+    folder.succeeds(&format!("{WORDS} --out files"));
+    folder.succeeds(&format!("{WORDS} --out tars --layout webdataset --tar-clouds 4"));
+    for (out, manifest) in [("files", "manifest.json"), ("tars", "dataset.json")] {
+        folder.succeeds(&format!("card {out} {PUBLICATION}"));
+        let (card, metadata) = (
+            folder.text(&format!("{out}/README.md")),
+            folder.text(&format!("{out}/croissant.json")),
+        );
+        assert!(card.starts_with("---\nlicense: \"cc-by-4.0\"\npretty_name: "), "{card}");
+        assert!(card.contains("at 2 to 3 m and an elevation of 20 degrees"), "{card}");
+        let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
+        assert_eq!(metadata["name"], out);
+        assert_eq!(metadata["license"], "https://spdx.org/licenses/CC-BY-4.0.html");
+        assert_eq!(metadata["distribution"][0]["contentUrl"], manifest);
+        folder.succeeds(&format!("gen-dataset --verify {out}"));
+    }
+}
+
+#[test]
+fn what_cannot_be_described_is_refused_and_nothing_is_replaced() {
+    let folder = Folder::with_meshes();
+    folder.succeeds(&format!("{WORDS} --out out"));
+    folder.succeeds(&format!("{WORDS} --out part --shard 1/2"));
+    folder.write("out/croissant.json", "mine");
+    folder.refuses(
+        1,
+        &[
+            ("card out", "out/croissant.json: is there already; replace it with --overwrite"),
+            ("card meshes", "meshes/manifest.json: expected a finished dataset's manifest"),
+            ("card part", "expected a whole dataset, found part 0 of 2"),
+        ],
+    );
+    assert!(!folder.at("out/README.md").exists());
+    folder.refuses(2, &[("card out --published 25.11.2026", "expected a day such as 2026-11-25")]);
+    folder.succeeds("card out --overwrite");
+}
