@@ -6,32 +6,19 @@ the card. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 
 import json
 import os
-import subprocess
-import sys
 from importlib.metadata import version
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import OUT, edgepuck, run, skipped_if_missing
 
 # Nothing is asked of the Hub.
 os.environ["HF_HUB_OFFLINE"] = "1"
-try:
+with skipped_if_missing():
     import datasets
     import mlcroissant
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 FLAGS = ["--sensor", "vlp32c", "--points", "128", "--adapter", "cpu", "--attributes", "ring,normal"]
 PUBLICATION = ["--name", "Some shapes", "--license", "MIT", "--url", "https://example.org/shapes",
                "--creator", "Ada", "--published", "2026-11-25"]
-
-
-def edgepuck(*words):
-    subprocess.run([EDGEPUCK, *map(str, words)], check=True, stderr=subprocess.DEVNULL)
 
 
 def described(folder, *words):
@@ -71,6 +58,6 @@ files, shapes = described(OUT / "files")
 packed = {row["packed/file"].decode() for row in files.records("packed")}
 assert packed == {f"packed/{path.name}" for path in (OUT / "files/packed").iterdir()}
 manifest = json.loads((OUT / "files/croissant.json").read_text())["distribution"][0]
-hashed = subprocess.run(["sha256sum", OUT / "files/manifest.json"], capture_output=True, text=True)
+hashed = run("sha256sum", OUT / "files/manifest.json")
 assert hashed.stdout.split()[0] == manifest["sha256"]
 print(f"mlcroissant {version('mlcroissant')}, datasets {version('datasets')}: three datasets are described")

@@ -15,15 +15,14 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 import time
 from pathlib import Path
 
-OUT = Path(os.environ["EDGEPUCK_OUT"])
-REPOSITORY = Path(os.environ["EDGEPUCK_ROOT"])
+from peer import OUT, ROOT, edgepuck, run, skip
+
 CARGO_DEB = "3.8.0"
 TOOLS = ["cargo", "lintian", "dpkg", "deb-systemd-helper", "strip", "qemu-aarch64", "unshare"]
-TARGET = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 PI = "aarch64-unknown-linux-musl"
 # Root of one's own user namespace installs, and changes the root folder.
 AS_ROOT = [] if os.geteuid() == 0 else ["unshare", "--map-root-user"]
@@ -45,7 +44,7 @@ OPTIONS = f"--udp {PORT} --interface 127.0.0.1"
 
 def main():
     missing = [tool for tool in TOOLS if shutil.which(tool) is None]
-    if missing or subprocess.run([*AS_ROOT, "true"], check=False).returncode != 0:
+    if missing or run(*AS_ROOT, "true", check=False).returncode != 0:
         skip(f"{', '.join(missing) or 'a user namespace'} is not to be had")
     if not (TARGET / PI / "pi/infer-cpu").is_file():
         skip("`cargo xtask build-pi` has not built the program for arm64")
@@ -63,20 +62,11 @@ def main():
     assert not left, f"purged, and still there: {left}"
 
 
-def skip(cause):
-    print(f"SKIPPED: {cause}")
-    sys.exit(77)
-
-
-def run(*command, **more):
-    subprocess.run([str(word) for word in command], check=True, **more)
-
-
 def packages():
     """The packages that cargo-deb makes of what is built."""
     tools = OUT.parent.parent / "cargo-deb"
-    version = [tools / "bin/cargo-deb", "--version"]
-    if not version[0].exists() or CARGO_DEB not in subprocess.check_output(version, text=True):
+    cargo_deb = tools / "bin/cargo-deb"
+    if not cargo_deb.exists() or CARGO_DEB not in run(cargo_deb, "--version").stdout:
         fetched = subprocess.run(
             ["cargo", "install", f"cargo-deb@{CARGO_DEB}", "--locked", "--debug",
              "--no-default-features", "--root", tools, "--target-dir", tools / "target"],
@@ -88,8 +78,8 @@ def packages():
     program.parent.mkdir(parents=True)
     run("strip", "-o", program, os.environ["EDGEPUCK_INFER"])
     for folder, flags in ((TARGET, ["--target", PI, "--profile", "pi"]), (OUT / "target", [])):
-        run(tools / "bin/cargo-deb", "--no-build", *flags, "-o", f"{OUT}/", env={
-            **os.environ, "CARGO_TARGET_DIR": str(folder)}, cwd=REPOSITORY / "infer-cpu")
+        run(cargo_deb, "--no-build", *flags, "-o", f"{OUT}/", cwd=ROOT / "infer-cpu",
+            env={**os.environ, "CARGO_TARGET_DIR": str(folder)})
     return [next(OUT.glob(f"*_{architecture}.deb")) for architecture in ("arm64", "amd64")]
 
 
@@ -131,8 +121,7 @@ def check_unit(root):
     text = (root / "usr/lib/systemd/system/infer-cpu.service").read_text()
     unit.write_text(text.replace("/usr/bin/infer-cpu", f"{root}/usr/bin/infer-cpu"))
     run("systemd-analyze", "verify", "--man=no", unit)
-    told = subprocess.run(["systemd-analyze", "security", "--no-pager", "--offline=true", unit],
-                          stdout=subprocess.PIPE, text=True, check=False).stdout
+    told = run("systemd-analyze", "security", "--no-pager", "--offline=true", unit, check=False).stdout
     exposure = float(re.search(r"exposure level for .*: ([\d.]+)", told).group(1))
     print(f"systemd-analyze security: {exposure} of 10")
     assert exposure <= MOST_EXPOSED, told
@@ -144,7 +133,7 @@ def serve(root):
     manager.bind(f"\0edgepuck-{os.getpid()}")
     manager.settimeout(START_S)
     emulator = shutil.which("qemu-aarch64")
-    libraries = re.findall(r"(/\S+) \(0x", subprocess.check_output(["ldd", emulator], text=True))
+    libraries = re.findall(r"(/\S+) \(0x", run("ldd", emulator).stdout)
     for file in [emulator, *libraries]:
         inside = root / file.lstrip("/")
         inside.parent.mkdir(parents=True, exist_ok=True)
@@ -182,7 +171,7 @@ def serve(root):
 def send():
     """Sends the packets of half a second of a drive at their times; gives their number."""
     capture = OUT / "drive.pcap"
-    run(os.environ["EDGEPUCK_PROGRAM"], "gen-drive", "--seconds", "0.5", "--out", capture)
+    edgepuck("gen-drive", "--seconds", "0.5", "--out", capture)
     content, at, n_packets = capture.read_bytes(), 24, 0
     start = time.monotonic()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:

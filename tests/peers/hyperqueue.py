@@ -4,32 +4,18 @@ HyperQueue runs in this process, on a cluster of this machine. Run by `cargo xta
 xtask/src/test/peers.rs.
 """
 
-import os
 import shutil
-import subprocess
-import sys
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import EDGEPUCK, OUT, edgepuck, run, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import hyperqueue
     from hyperqueue import Job, LocalCluster
     from hyperqueue.cluster import WorkerConfig
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 PARTS = 4
 WORDS = ["gen-dataset", str(OUT / "shapes"), "--layout", "webdataset", "--sensor", "vlp32c", "--views",
          "4", "--points", "128", "--adapter", "cpu", "--tar-clouds", "30", "--resume"]
-
-
-def edgepuck(*words):
-    subprocess.run([EDGEPUCK, *map(str, words)], check=True, stderr=subprocess.DEVNULL)
 
 
 def tars(folder):
@@ -49,9 +35,7 @@ def by_hyperqueue():
 
 def by_parallel():
     command = [EDGEPUCK, *WORDS, "--shard", f"{{}}/{PARTS}", "--out", str(OUT / "parallel")]
-    numbers = [str(number) for number in range(1, PARTS + 1)]
-    subprocess.run(["parallel", "--will-cite", "--jobs", "2", *command, ":::", *numbers], check=True,
-                   stderr=subprocess.DEVNULL)
+    run("parallel", "--will-cite", "--jobs", 2, *command, ":::", *range(1, PARTS + 1))
 
 
 edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 4, "--test", 1)

@@ -10,29 +10,16 @@ behind by some percent, or finds the sensor standing where it does not even pitc
 say so of real sweeps that begin in motion (PRBonn/kiss-icp, issue 151; PRBonn/kiss-slam, issue 35).
 """
 
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
-# Files of this folder have the names of packages: they must not be imported.
-HERE = Path(__file__).resolve().parent
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != HERE]
+from peer import OUT, ROOT, edgepuck, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import numpy
     import velodyne_decoder
     from kiss_icp.config.parser import load_config
     from kiss_icp.kiss_icp import KissICP
     from kiss_icp.preprocess import get_preprocessor
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
-
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 
 SECONDS = 10
 SPEEDS_M_S = [5, 15]
@@ -83,10 +70,8 @@ def drive(capture, speed_m_s):
     recipe, n = re.subn(r"(?m)^roughness_m = .*$", rough, recipe)
     assert n == 1, "the recipe has another form"
     (OUT / "rough.toml").write_text(recipe)
-    words = ["gen-drive", OUT / "rough.toml", "--seconds", SECONDS, "--speed", speed_m_s,
-             "--seed", SEED, "--out", capture]
-    print("+", *words, flush=True)
-    subprocess.run([EDGEPUCK, *map(str, words)], check=True, stderr=subprocess.DEVNULL)
+    edgepuck("gen-drive", OUT / "rough.toml", "--seconds", SECONDS, "--speed", speed_m_s,
+             "--seed", SEED, "--out", capture)
 
 
 def cut(capture):

@@ -5,27 +5,16 @@ xtask/src/test/peers.rs.
 """
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import edgepuck, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import kubernetes
     import yaml
     from kubernetes.client import ApiClient, V1Job
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
 words = "cluster kubernetes --parts 5 -- meshes --layout webdataset --sensor vlp32c --out out".split()
-file = subprocess.run([os.environ["EDGEPUCK_PROGRAM"], *words], check=True, stdout=subprocess.PIPE).stdout
-told = yaml.safe_load(file)
-
-
+told = yaml.safe_load(edgepuck(*words).stdout)
 client = ApiClient()
 job = client.deserialize(json.dumps(told), "V1Job", "application/json")
 assert isinstance(job, V1Job)

@@ -5,21 +5,14 @@ infer-cpu gets. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 """
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
-try:
+from peer import OUT, ROOT, edgepuck, infer, skipped_if_missing
+
+with skipped_if_missing():
     import numpy
     import onnx
     import onnxruntime
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 WEIGHTS = ROOT / "assets/weights"
 # With batch norms, with and without T-Nets, and with a ReLU before the pooling.
 NARROW = ROOT / "infer-cpu/tests/golden"
@@ -95,7 +88,7 @@ def compare_surroundings(name, clouds, files):
     session = exported(name, name)
     worst = 0.0
     for n_kept in (1, 64, 4096):
-        ours = logits(model, files, "--sampler", "first", "--points", str(n_kept))
+        ours = logits(model, files, "--sampler", "first", "--points", n_kept)
         for points, expected in zip(clouds, ours):
             seen = {"points": points[None, :n_kept], "cloud": points[None]}
             (found,) = session.run(["logits"], seen)
@@ -105,8 +98,8 @@ def compare_surroundings(name, clouds, files):
 
 def compare_critical_points(model, n_kept, clouds, files):
     """How many clouds got other points than infer-cpu chooses."""
-    session = exported(model, f"{model.stem}-cpl", "--critical-points", "--points", str(n_kept))
-    ours = logits(model, files, "--sampler", "cpl", "--points", str(n_kept))
+    session = exported(model, f"{model.stem}-cpl", "--critical-points", "--points", n_kept)
+    ours = logits(model, files, "--sampler", "cpl", "--points", n_kept)
     apart = []
     for points, expected in zip(clouds, ours):
         found, kept = session.run(["logits", "kept"], {"cloud": points[None]})
@@ -122,7 +115,7 @@ def compare_critical_points(model, n_kept, clouds, files):
 def exported(model, name, *flags):
     """A session of ONNX Runtime with the model, once ONNX's checker took it."""
     file = OUT / f"{name}.onnx"
-    run([os.environ["EDGEPUCK_PROGRAM"], "export-onnx", str(model), "--out", str(file), *flags])
+    edgepuck("export-onnx", model, "--out", file, *flags)
     graph = onnx.load(file)
     onnx.checker.check_model(graph, full_check=True)
     assert [(o.domain, o.version) for o in graph.opset_import] == [("", OPSET)]
@@ -136,10 +129,9 @@ def exported(model, name, *flags):
 
 
 def logits(model, files, *sampler):
-    command = [os.environ["EDGEPUCK_INFER"], "classify", "--json", "--allow-untrained"]
-    command += ["--model", str(model), "--normalize", "none"]
-    command += [*(sampler or ("--sampler", "all")), *map(str, files)]
-    return [json.loads(line)["logits"] for line in run(command).splitlines()]
+    done = infer("classify", "--json", "--allow-untrained", "--model", model, "--normalize", "none",
+                 *(sampler or ("--sampler", "all")), *files)
+    return [json.loads(line)["logits"] for line in done.stdout.splitlines()]
 
 
 def difference(name, found, expected):
@@ -157,13 +149,6 @@ def distance(found, expected):
 
 def report(name, worst, remark=""):
     print(f"  {name}: logits within {worst:.1e} of the largest{remark}")
-
-
-def run(command):
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 main()

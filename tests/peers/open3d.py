@@ -5,26 +5,13 @@ sensor's profile, are cast by Embree. Run by `cargo xtask test`; see
 xtask/src/test/peers.rs.
 """
 
-import os
-import subprocess
-import sys
-from pathlib import Path
+from peer import OUT, ROOT, edgepuck, skipped_if_missing
 
-# This file's own name is that of the package: it must not import itself.
-HERE = Path(__file__).resolve().parent
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != HERE]
-
-try:
+with skipped_if_missing("(Debian: apt-get install libusb-1.0-0 libgomp1; Python 3.11)"):
     import tomllib
 
     import numpy
     import open3d
-except ImportError as error:
-    print(f"SKIPPED: {error} (Debian: apt-get install libusb-1.0-0 libgomp1; Python 3.11)")
-    sys.exit(77)
-
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 
 # Objects are 1 m long and some 2 m away. Embree holds rays and vertices in f32,
 # whose steps at 2 m are 2.4e-7 m, and is wrong by some of them over the cosine
@@ -124,10 +111,7 @@ def scanned(placed_mesh, sensor, position, adapter):
         f'scale = {float(scale)!r}\nposition_m = {[float(x) for x in place]}\n'
         f'[[sensor]]\nprofile = "{sensor}"\nposition_m = {position}\nlook_at_m = {TARGET_M}\n'
     )
-    command = [os.environ["EDGEPUCK_PROGRAM"], "scan", str(scene), "--out", str(scan)]
-    done = subprocess.run([*command, "--adapter", adapter], capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
+    edgepuck("scan", scene, "--out", scan, "--adapter", adapter)
     return numpy.load(scan)
 
 

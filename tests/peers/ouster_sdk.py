@@ -2,31 +2,22 @@
 
 `segment` reads the first whole frame of a capture to the points that ouster-sdk makes of it.
 Beams of our profiles, and of metadata taken for a profile, lie where it puts them.
-Run by `cargo xtask test`, which sets EDGEPUCK_PROGRAM, EDGEPUCK_ROOT and EDGEPUCK_OUT.
+Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 """
 
 import json
-import os
-import subprocess
-import sys
 import tomllib
 import warnings
-from pathlib import Path
 
-try:
+from peer import OUT, ROOT, edgepuck, skipped_if_missing
+
+with skipped_if_missing():
     import numpy
     import plyfile
     from ouster.sdk import core, open_source, pcap
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
 # Formats of older firmware are what this is about.
 warnings.simplefilter("ignore")
-
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 
 # Both compute in f64, and we round to f32: half of 2^-23 of a coordinate, and for f64, which holds
 # 1 km to 1.1e-13 m, a few dozen roundings.
@@ -93,8 +84,7 @@ def compare(name, capture, text, expected):
     """That `segment` reads `expected` from a capture, by the metadata `text`."""
     told = OUT / "metadata.json"
     told.write_text(text)
-    words = [EDGEPUCK, "segment", capture, "--metadata", told, "--out", OUT / "clusters"]
-    subprocess.run([str(word) for word in words], check=True, stderr=subprocess.DEVNULL)
+    edgepuck("segment", capture, "--metadata", told, "--out", OUT / "clusters")
     vertices = plyfile.PlyData.read(str(OUT / "clusters/sweep.ply"))["vertex"]
     ours = numpy.stack([vertices[axis] for axis in "xyz"], 1).astype(float)
     assert ours.shape == expected.shape, f"{name}: {len(ours)} points of {len(expected)}"
@@ -155,8 +145,7 @@ def beams():
         range_mm = numpy.full([128, COLUMNS], 10_000, numpy.uint32)
         expected = core.XYZLut(core.SensorInfo(text))(range_mm).swapaxes(0, 1).reshape(-1, 3)
         for sensor in [name, OUT / "unit.json"]:
-            words = [EDGEPUCK, "profile", sensor, "--beams", OUT / "beams.csv"]
-            subprocess.run([str(word) for word in words], check=True, stdout=subprocess.DEVNULL)
+            edgepuck("profile", sensor, "--beams", OUT / "beams.csv")
             rows = numpy.loadtxt(OUT / "beams.csv", delimiter=",", skiprows=1)
             azimuth, elevation = numpy.radians(rows[:, 2:4].T)
             level = numpy.cos(elevation)

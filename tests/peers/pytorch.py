@@ -6,22 +6,14 @@ torch.save and `cargo xtask import-weights`; once with bundled weights. Run by
 """
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
-try:
+from peer import OUT, ROOT, edgepuck, infer, skipped_if_missing
+
+with skipped_if_missing():
     import numpy
     import torch
     from safetensors.torch import load_file
     from torch import nn
-except (ImportError, OSError) as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
-
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 
 # Of the largest logit, or of 1 where that is less: see onnx_runtime.py.
 TOLERANCE = 1e-5
@@ -138,7 +130,7 @@ def untrained(widths, t_nets, random):
     name = f"random{len(widths)}"
     checkpoint, file = OUT / f"{name}.pth", OUT / f"{name}.safetensors"
     torch.save({"model_state_dict": model.state_dict()}, checkpoint)
-    run([os.environ["EDGEPUCK_PROGRAM"], "import-weights", str(checkpoint), "--out", str(file)])
+    edgepuck("import-weights", checkpoint, "--out", file)
     return model, file
 
 
@@ -165,16 +157,9 @@ def compare(name, model, file, clouds, files):
 
 
 def logits(model, files):
-    command = [os.environ["EDGEPUCK_INFER"], "classify", "--json", "--model", str(model)]
-    command += ["--normalize", "none", "--sampler", "all", *map(str, files)]
-    return [numpy.array(json.loads(line)["logits"]) for line in run(command).splitlines()]
-
-
-def run(command):
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
-    return done.stdout
+    done = infer("classify", "--json", "--model", model, "--normalize", "none", "--sampler", "all",
+                 *files)
+    return [numpy.array(json.loads(line)["logits"]) for line in done.stdout.splitlines()]
 
 
 main()

@@ -1,41 +1,23 @@
 """Open3D, NumPy, plyfile, laspy and h5py on every file that we write.
 
 Each finds the numbers that the NPZ of the same scan holds. Run by `cargo xtask
-test`, which sets EDGEPUCK_PROGRAM, EDGEPUCK_INFER and EDGEPUCK_OUT.
+test`; see xtask/src/test/peers.rs.
 """
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
-# Scripts beside this one bear the names of packages.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import EDGEPUCK, OUT, infer, run, skipped_if_missing
 
-try:
+with skipped_if_missing("(Debian: apt-get install libusb-1.0-0 libgomp1)"):
     import h5py
     import laspy
     import numpy
     import open3d
     import plyfile
-except ImportError as error:
-    print(f"SKIPPED: {error} (Debian: apt-get install libusb-1.0-0 libgomp1)")
-    sys.exit(77)
-
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-INFER = os.environ["EDGEPUCK_INFER"]
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 
 N_POINTS = 128
 COLUMNS = {"range": "f4", "beam": "u4", "ring": "u2", "time": "f4", "triangle": "u4",
            "object": "u4", "intensity": "f4", "normal": "f4"}
-
-
-def run(*words, allowed=(0,)):
-    print("+", *words[1:], flush=True)
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True)
-    assert done.returncode in allowed, done.stderr
-    return done
 
 
 def same(found, expected, what):
@@ -62,7 +44,7 @@ def write_dataset():
     words = [EDGEPUCK, "gen-dataset", OUT / "meshes", "--out", OUT / "set", "--sensor", "vlp32c",
              "--views", 2, "--points", N_POINTS, "--format", "ply,csv", "--attributes",
              ",".join(COLUMNS), "--adapter", "cpu", "--layout"]
-    done = run(*words, "yanx27,modelnet-h5", allowed=(0, 1))
+    done = run(*words, "yanx27,modelnet-h5", check=False)
     if done.returncode == 0:
         return True
     assert "build with `--features hdf5`" in done.stderr, done.stderr
@@ -204,7 +186,7 @@ def clouds(npz):
     expected = numpy.load(npz)["positions"]
     in_format = lambda extension: OUT / f"cloud.{extension}"
     for extension in ["npz", "npy", "ply", "pcd", "xyz", "csv", "bin"]:
-        run(INFER, "sample", "--sampler", "all", npz, in_format(extension))
+        infer("sample", "--sampler", "all", npz, in_format(extension))
     read = {
         "npz": lambda path: numpy.load(path)["positions"],
         "npy": numpy.load,
@@ -225,7 +207,7 @@ def clouds(npz):
 
 def las(npz, expected):
     """Both ways: what we write, and what laspy writes."""
-    run(INFER, "sample", "--sampler", "all", npz, OUT / "cloud.las")
+    infer("sample", "--sampler", "all", npz, OUT / "cloud.las")
     ours = laspy.read(OUT / "cloud.las")
     assert str(ours.header.version) == "1.2" and ours.header.point_format.id == 0
     steps = ours.header.scales
@@ -239,7 +221,7 @@ def las(npz, expected):
     theirs.header.scales, theirs.header.offsets = [1e-5] * 3, [100.0, -200.0, 0.0]
     theirs.xyz = expected.astype(float)
     theirs.write(OUT / "peer.las")
-    run(INFER, "sample", "--sampler", "all", OUT / "peer.las", OUT / "from_las.npy")
+    infer("sample", "--sampler", "all", OUT / "peer.las", OUT / "from_las.npy")
     found = numpy.load(OUT / "from_las.npy")
     # Both multiply and add in f64; 200 m are held to 2.8e-14 m.
     assert abs(found - laspy.read(OUT / "peer.las").xyz).max() <= 1e-13, "LAS, laspy's"

@@ -7,26 +7,18 @@ those of the JSON lines. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 import json
 import math
 import os
-import subprocess
 import sys
 from collections import Counter, defaultdict
 from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-HERE = Path(__file__).resolve().parent
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != HERE]
+from peer import OUT, ROOT, edgepuck, infer, run, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import numpy
     import velodyne_decoder
     from mcap_ros2.reader import read_ros2_messages
     from rosbags.highlevel import AnyReader
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-OUT = Path(os.environ["EDGEPUCK_OUT"])
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
 SECONDS, TURNS_PER_S = 2, 10
 TYPES = {
     "/points": "sensor_msgs/msg/PointCloud2",
@@ -48,23 +40,16 @@ ROUNDING = 0.0005 + 1e-12
 
 def main():
     capture, recording = OUT / "drive.pcap", OUT / "run.mcap"
-    run(os.environ["EDGEPUCK_PROGRAM"], "gen-drive", "street", "--seconds", str(SECONDS),
-        "--out", str(capture))
-    lines = run(os.environ["EDGEPUCK_INFER"], "live", "--pcap", str(capture), "--poses",
-                str(capture.with_suffix(".tum")), "--json", "--mcap", str(recording), "--model",
-                str(ROOT / "assets/weights/street-128.safetensors"))
-    objects = [json.loads(line) for line in lines.splitlines()]
+    edgepuck("gen-drive", "street", "--seconds", SECONDS, "--out", capture)
+    live = infer("live", "--pcap", capture, "--poses", capture.with_suffix(".tum"), "--json", "--mcap",
+                 recording, "--model", ROOT / "assets/weights/street-128.safetensors")
+    objects = [json.loads(line) for line in live.stdout.splitlines()]
     messages = rosbags_messages(recording)
     compare_points(messages["/points"], capture)
     compare_objects(messages["/objects"], messages["/objects/markers"], objects)
     compare_poses(messages["/tf"], messages["/tf_static"], capture.with_suffix(".tum"))
     compare_readers(recording, messages)
     convert(recording)
-
-
-def run(*command):
-    ran = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
-    return ran.stdout
 
 
 def rosbags_messages(recording):
@@ -176,7 +161,7 @@ def convert(recording):
     run(rerun, "analytics", "disable")
     out = OUT / "run.rrd"
     run(rerun, "mcap", "convert", recording, "-o", out)
-    shown = run(rerun, "rrd", "print", out)
+    shown = run(rerun, "rrd", "print", out).stdout
     for name in ("Points3D", "Transform3D"):
         assert name in shown, f"{name} is not in what Rerun made of {recording}"
     print("Rerun: points and transforms are shown")

@@ -2,10 +2,12 @@
 clouds drawn and turned, tabs and tips at work, on a desktop and on a phone."""
 
 import os
-import pathlib
 import shutil
-import subprocess
-import sys
+
+from peer import OUT, run, skip, skipped_if_missing
+
+with skipped_if_missing():
+    from playwright.sync_api import sync_playwright
 
 PROGRAMS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
 FLAGS = [
@@ -33,12 +35,9 @@ COLOURS_OF = """canvas => {
 def main():
     browser_path = next(filter(None, map(shutil.which, PROGRAMS)), None)
     if browser_path is None:
-        print("SKIPPED: no Chromium on the PATH")
-        sys.exit(77)
-    from playwright.sync_api import sync_playwright
-
-    page_file = pathlib.Path(os.environ["EDGEPUCK_OUT"]) / "report.html"
-    subprocess.run([os.environ["EDGEPUCK_LAB"], "report", "--out", page_file], check=True)
+        skip("no Chromium on the PATH")
+    page_file = OUT / "report.html"
+    run(os.environ["EDGEPUCK_LAB"], "report", "--out", page_file)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path, args=FLAGS)
         for size in (DESKTOP, PHONE):

@@ -11,16 +11,12 @@ import json
 import os
 import socket
 import subprocess
-import sys
 import time
 from collections import defaultdict
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-HERE = Path(__file__).resolve().parent
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != HERE]
+from peer import OUT, ROOT, edgepuck, run, skip, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import numpy
     from cyclonedds.core import Policy, Qos
     from cyclonedds.domain import DomainParticipant
@@ -31,17 +27,11 @@ try:
     from mcap.writer import Writer
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Nodetype
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 if [name for _, name in socket.if_nameindex()] == ["lo"]:
-    print("SKIPPED: DDS finds others by multicast, and there is no network")
-    sys.exit(77)
+    skip("DDS finds others by multicast, and there is no network")
 
-OUT = Path(os.environ["EDGEPUCK_OUT"])
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
 LIVE = [os.environ["EDGEPUCK_INFER"], "live", "--model",
-        str(ROOT / "assets/weights/street-128.safetensors"), "--pcap", str(OUT / "drive.pcap")]
+        ROOT / "assets/weights/street-128.safetensors", "--pcap", OUT / "drive.pcap"]
 SECONDS = 6
 # One that other programs of this machine do not use.
 DOMAIN = 40 + os.getpid() % 60
@@ -56,20 +46,14 @@ TOPICS = {
 
 
 def main():
-    run(os.environ["EDGEPUCK_PROGRAM"], "gen-drive", "street", "--seconds", str(SECONDS), "--out",
-        str(OUT / "drive.pcap"))
-    lines = run(*LIVE, "--json", "--mcap", str(OUT / "run.mcap"))
+    edgepuck("gen-drive", "street", "--seconds", SECONDS, "--out", OUT / "drive.pcap")
+    lines = run(*LIVE, "--json", "--mcap", OUT / "run.mcap").stdout
     with AnyReader([OUT / "run.mcap"]) as reader:
         connections = {connection.topic: connection for connection in reader.connections}
         recorded = [(c.topic, time_ns, bytes(raw)) for c, time_ns, raw in reader.messages()]
         subscriber = Subscriber(reader.typestore)
         compare_lines(subscriber, [json.loads(line) for line in lines.splitlines()])
         compare_recording(subscriber, reader.typestore, connections, recorded)
-
-
-def run(*command):
-    ran = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
-    return ran.stdout
 
 
 class Subscriber:

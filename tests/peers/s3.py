@@ -11,21 +11,14 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import EDGEPUCK, OUT, edgepuck, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import boto3
     import moto
     from moto.server import ThreadedMotoServer
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 BUCKET = "lidar"
 UPLOAD = """
 import boto3, sys, time
@@ -54,8 +47,7 @@ upload = shlex.join([sys.executable, str(OUT / "upload.py"), endpoint])
 words = ["gen-dataset", OUT / "shapes", "--layout", "webdataset", "--sensor", "vlp32c", "--views", "6",
          "--points", "256", "--adapter", "cpu", "--tar-clouds", "60", "--out", OUT / "out", "--resume",
          "--on-shard", upload + " {} {name}"]
-subprocess.run([EDGEPUCK, "gen-shapes", "--out", OUT / "shapes", "--train", "4", "--test", "1"], check=True,
-               stderr=subprocess.DEVNULL)
+edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 4, "--test", 1)
 run = subprocess.Popen([EDGEPUCK, *words], stderr=subprocess.DEVNULL, start_new_session=True)
 while not stored() and run.poll() is None:
     time.sleep(0.02)
@@ -63,7 +55,7 @@ while not stored() and run.poll() is None:
 os.killpg(run.pid, signal.SIGKILL)
 assert run.wait() != 0, "the run ended before it was killed"
 before = stored()
-subprocess.run([EDGEPUCK, *words], check=True, stderr=subprocess.DEVNULL)
+edgepuck(*words)
 tars = {tar.name: tar.read_bytes() for tar in (OUT / "out").glob("*.tar")}
 assert 0 < len(before) < len(tars)
 assert stored() == tars

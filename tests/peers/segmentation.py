@@ -7,29 +7,18 @@ xtask/src/test/peers.rs.
 """
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 import time
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-HERE = Path(__file__).resolve().parent
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != HERE]
+from peer import OUT, ROOT, edgepuck, run, skipped_if_missing
 
-try:
+with skipped_if_missing("(Debian: apt-get install libusb-1.0-0 libgomp1; Python 3.11)"):
     import numpy
     import open3d
     import plyfile
     import pypatchworkpp
-except ImportError as error:
-    print(f"SKIPPED: {error} (Debian: apt-get install libusb-1.0-0 libgomp1; Python 3.11)")
-    sys.exit(77)
 
-OUT = Path(os.environ["EDGEPUCK_OUT"])
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
 N_SWEEPS = 12
 RADII_M = [0.2, 0.5, 1.0]
 # `segment` writes clusters of at least so many points.
@@ -53,8 +42,8 @@ NOBODYS = -1
 
 
 def main():
-    run("gen-scenes", "--sweeps", str(N_SWEEPS), "--save", str(N_SWEEPS), "--seed", "2718",
-        "--adapter", "cpu", "--out", str(OUT / "street"))
+    edgepuck("gen-scenes", "--sweeps", N_SWEEPS, "--save", N_SWEEPS, "--seed", 2718,
+             "--adapter", "cpu", "--out", OUT / "street")
     sweeps = sorted((OUT / "street/sweeps").glob("*.npz"))
     assert len(sweeps) == N_SWEEPS, sweeps
     for radius in RADII_M:
@@ -73,7 +62,7 @@ def main():
 def compare_components(sweep, radius):
     """Both find the same sets of points."""
     folder = OUT / f"components-{radius}"
-    run("segment", str(sweep), "--radius", str(radius), "--out", str(folder))
+    edgepuck("segment", sweep, "--radius", radius, "--out", folder)
     ours = {as_set(numpy.load(file)) for file in folder.glob("cluster-*.npy")}
     loaded = numpy.load(sweep)
     points = (loaded if sweep.suffix == ".npy" else loaded["positions"]).astype(numpy.float64)
@@ -115,7 +104,7 @@ def compare_ground(sweeps):
 
 def our_ground(sweep):
     folder = OUT / "clusters"
-    said = run("segment", str(sweep), "--out", str(folder))
+    said = edgepuck("segment", sweep, "--out", folder).stderr
     vertices = plyfile.PlyData.read(str(folder / "sweep.ply"))["vertex"]
     colours = numpy.stack([vertices[name] for name in ("red", "green", "blue")], 1)
     return (colours == GROUND).all(1), float(re.search(r"([0-9.]+) ms", said)[1])
@@ -232,9 +221,8 @@ def pcl_ms(cloud, radius, labels):
     shutil.rmtree(OUT / "pcl", ignore_errors=True)
     (OUT / "pcl").mkdir()
     open3d.io.write_point_cloud(str(OUT / "pcl/rest.pcd"), cloud)
-    said = subprocess.run([program, "rest.pcd", "cluster.pcd", "-tolerance", str(radius), "-min",
-                           str(MIN_POINTS), "-max", str(len(labels))], cwd=OUT / "pcl",
-                          capture_output=True, text=True, check=True).stdout
+    said = run(program, "rest.pcd", "cluster.pcd", "-tolerance", radius, "-min", MIN_POINTS, "-max",
+               len(labels), cwd=OUT / "pcl").stdout
     milliseconds, n_clusters = re.search(r"done, ([0-9.]+) ms : (\d+) clusters", said).groups()
     assert int(n_clusters) == (numpy.bincount(labels) >= MIN_POINTS).sum(), said
     return float(milliseconds)
@@ -279,15 +267,6 @@ def height_over_ground(points, is_ground):
 
 def as_set(points):
     return frozenset(map(tuple, points.astype(numpy.float32).tolist()))
-
-
-def run(*arguments):
-    done = subprocess.run(
-        [os.environ["EDGEPUCK_PROGRAM"], *arguments], capture_output=True, text=True
-    )
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(arguments)}\n{done.stdout}{done.stderr}")
-    return done.stderr
 
 
 main()

@@ -5,29 +5,31 @@ Debian's slurm-wlm and munge, on one node, without systemd. It needs root, since
 root or Slurm it is skipped. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 """
 
+import atexit
 import os
 import shutil
 import signal
 import socket
 import subprocess
-import sys
+import tempfile
 import time
 from pathlib import Path
 
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-OUT = Path(os.environ["EDGEPUCK_OUT"])
+from peer import EDGEPUCK, OUT, edgepuck, run, skip
+
 PARTS = 8
-SPOOL = Path("/tmp/edgepuck-slurm")
 # /usr/sbin may not be on the path.
 os.environ["PATH"] += ":/usr/sbin"
-WORDS = [str(OUT / "shapes"), "--layout", "webdataset", "--sensor", "vlp32c", "--views", "24",
+WORDS = [OUT / "shapes", "--layout", "webdataset", "--sensor", "vlp32c", "--views", "24",
          "--points", "256", "--azimuth-jitter", "180", "--adapter", "cpu", "--tar-clouds", "400"]
 
 missing = [name for name in ("munged", "slurmctld", "slurmd", "sbatch") if not shutil.which(name)]
 if missing or os.getuid() != 0:
-    print(f"SKIPPED: {' and '.join(missing) + ' are missing' if missing else 'slurmd needs root'}")
-    sys.exit(77)
+    skip(f"{' and '.join(missing)} are missing" if missing else "slurmd needs root")
 
+# Paths of sockets must be short, which those in OUT may not be.
+SPOOL = Path(tempfile.mkdtemp())
+atexit.register(shutil.rmtree, SPOOL, ignore_errors=True)
 HOST = socket.gethostname().split(".")[0]
 CONF = f"""
 ClusterName=edgepuck
@@ -47,16 +49,10 @@ StateSaveLocation={SPOOL}/state
 SlurmdSpoolDir={SPOOL}/spool
 SlurmctldPidFile={SPOOL}/slurmctld.pid
 SlurmdPidFile={SPOOL}/slurmd.pid
-SlurmctldLogFile={SPOOL}/slurmctld.log
-SlurmdLogFile={SPOOL}/slurmd.log
 SchedulerParameters=sched_interval=1
 NodeName={HOST} NodeAddr=127.0.0.1 CPUs={os.cpu_count()} State=UNKNOWN
 PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 """
-
-
-def run(*words, **kwargs):
-    return subprocess.run([*map(str, words)], check=True, text=True, **kwargs)
 
 
 def wait_for(what, seconds, condition):
@@ -68,52 +64,48 @@ def wait_for(what, seconds, condition):
 
 
 def start():
-    shutil.rmtree(SPOOL, ignore_errors=True)
     for folder in ("state", "spool", "munge"):
-        (SPOOL / folder).mkdir(parents=True, mode=0o755)
+        (SPOOL / folder).mkdir(mode=0o755)
     os.chmod(SPOOL, 0o755)
     (SPOOL / "slurm.conf").write_text(CONF)
     os.environ["SLURM_CONF"] = str(SPOOL / "slurm.conf")
     (SPOOL / "munge/munge.key").write_bytes(os.urandom(128))
     os.chmod(SPOOL / "munge/munge.key", 0o600)
+    munged = ["munged", "--foreground", "--force", f"--key-file={SPOOL}/munge/munge.key",
+              f"--socket={SPOOL}/munge.socket", f"--pid-file={SPOOL}/munge/munged.pid",
+              f"--seed-file={SPOOL}/munge/seed"]
     daemons = []
     try:
-        run("munged", "--force", f"--key-file={SPOOL}/munge/munge.key", f"--socket={SPOOL}/munge.socket",
-            f"--pid-file={SPOOL}/munge/munged.pid", f"--log-file={SPOOL}/munge/munged.log",
-            f"--seed-file={SPOOL}/munge/seed")
-        for name in ("slurmctld", "slurmd"):
-            daemons.append(subprocess.Popen([name, "-D"], stderr=subprocess.DEVNULL))
+        for command in (munged, ["slurmctld", "-D"], ["slurmd", "-D"]):
+            log = OUT / f"{command[0]}.log"
+            daemons.append(subprocess.Popen(command, stderr=log.open("w")))
+            # The others ask it when they start.
+            wait_for("munged's socket", 20, (SPOOL / "munge.socket").exists)
         wait_for("an idle node", 60, is_idle)
-        run("srun", "true", timeout=60, stderr=subprocess.DEVNULL)
+        run("srun", "true", timeout=60)
     except (AssertionError, OSError, subprocess.SubprocessError) as error:
         # A container may not be allowed what Slurm does.
         stop(daemons)
-        log = SPOOL / "slurmd.log"
-        last = log.read_text().splitlines()[-1:] if log.exists() else []
-        print(f"SKIPPED: Slurm does not run here: {error}; {' '.join(last)}")
-        sys.exit(77)
+        skip(f"Slurm does not run here: {error};", *log.read_text().splitlines()[-1:])
     return daemons
 
 
 def is_idle():
-    return "idle" in subprocess.run(["sinfo", "-h", "-o", "%t"], capture_output=True, text=True).stdout
+    return "idle" in run("sinfo", "-h", "-o", "%t", check=False).stdout
 
 
 def stop(daemons):
-    for daemon in daemons:
+    # What is started first is used by the others.
+    for daemon in reversed(daemons):
         daemon.terminate()
-    for daemon in daemons:
         daemon.wait(20)
-    pid = SPOOL / "munge/munged.pid"
-    if pid.exists():
-        os.kill(int(pid.read_text()), signal.SIGTERM)
 
 
 def array():
     """Submits the job file, kills two tasks midway, and waits for all."""
     shared = OUT / "shared"
-    file = run(EDGEPUCK, "cluster", "slurm", "--parts", PARTS, "--cpus", 1, "--memory", 1, "--", *WORDS,
-               "--out", shared, stdout=subprocess.PIPE).stdout
+    file = edgepuck("cluster", "slurm", "--parts", PARTS, "--cpus", 1, "--memory", 1, "--", *WORDS,
+                    "--out", shared).stdout
     bin_folder = OUT / "bin"
     bin_folder.mkdir()
     (bin_folder / "edgepuck").symlink_to(EDGEPUCK)
@@ -121,12 +113,12 @@ def array():
     file = "\n".join(line for line in file.splitlines() if "--mem=" not in line) + "\n"
     (OUT / "job.sh").write_text(file)
     env = {**os.environ, "PATH": f"{bin_folder}:{os.environ['PATH']}"}
-    told = run("sbatch", "--parsable", OUT / "job.sh", stdout=subprocess.PIPE, env=env, cwd=OUT).stdout
+    told = run("sbatch", "--parsable", OUT / "job.sh", env=env, cwd=OUT).stdout
     job = told.strip().split(";")[0]
     killed = set()
 
     def queue():
-        shown = run("squeue", "-h", "-r", "-j", job, "-o", "%K %t %r", stdout=subprocess.PIPE).stdout
+        shown = run("squeue", "-h", "-r", "-j", job, "-o", "%K %t %r").stdout
         return [line.split(maxsplit=2) for line in shown.splitlines()]
 
     def work_is_done():
@@ -155,8 +147,8 @@ def array():
     return killed
 
 
-run(EDGEPUCK, "gen-shapes", "--out", OUT / "shapes", "--train", 16, "--test", 4, stderr=subprocess.DEVNULL)
-run(EDGEPUCK, "gen-dataset", *WORDS, "--out", OUT / "alone", stderr=subprocess.DEVNULL)
+edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 16, "--test", 4)
+edgepuck("gen-dataset", *WORDS, "--out", OUT / "alone")
 daemons = start()
 try:
     killed = array()
@@ -165,6 +157,6 @@ finally:
 alone = {tar.name: tar.read_bytes() for tar in (OUT / "alone").glob("*.tar")}
 shared = {tar.name: tar.read_bytes() for tar in (OUT / "shared").glob("*.tar")}
 assert len(alone) > PARTS and alone == shared, (sorted(alone), sorted(shared))
-run(EDGEPUCK, "gen-dataset", "--verify", OUT / "shared", stderr=subprocess.DEVNULL)
-version = run("sinfo", "--version", stdout=subprocess.PIPE).stdout.strip()
+edgepuck("gen-dataset", "--verify", OUT / "shared")
+version = run("sinfo", "--version").stdout.strip()
 print(f"{version}: {len(shared)} tars of {PARTS} tasks, {len(killed)} of them killed, are those of one run")

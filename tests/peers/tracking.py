@@ -10,29 +10,18 @@ same clusters; the truth is the drive's. Run by
 
 import json
 import math
-import os
-import subprocess
-import sys
 from collections import defaultdict
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-HERE = Path(__file__).resolve().parent
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != HERE]
+from peer import OUT, ROOT, edgepuck, infer, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import numpy
 
     # TrackEval 1.3.0 uses names that NumPy 1.24 took away.
     numpy.float, numpy.int = float, int
     import trackeval
     from scipy.optimize import linear_sum_assignment
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-OUT = Path(os.environ["EDGEPUCK_OUT"])
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
 SECONDS = 12
 SEEDS = [0, 1, 2]
 # Unix time at the start of a drive, and the time of a turn.
@@ -60,13 +49,10 @@ def main():
 def drive(seed):
     """HOTA of `live` and of the Hungarian method on the drive of this seed."""
     capture = OUT / f"drive-{seed}.pcap"
-    program = os.environ["EDGEPUCK_PROGRAM"]
-    run(program, "gen-drive", "street", "--seconds", str(SECONDS), "--seed", str(seed), "--out",
-        str(capture))
-    model = ROOT / "assets/weights/street-128.safetensors"
-    lines = run(os.environ["EDGEPUCK_INFER"], "live", "--pcap", str(capture), "--poses",
-                str(capture.with_suffix(".tum")), "--model", str(model))
-    found = [json.loads(line) for line in lines.splitlines()]
+    edgepuck("gen-drive", "street", "--seconds", SECONDS, "--seed", seed, "--out", capture)
+    live = infer("live", "--pcap", capture, "--poses", capture.with_suffix(".tum"), "--model",
+                 ROOT / "assets/weights/street-128.safetensors")
+    found = [json.loads(line) for line in live.stdout.splitlines()]
     truth_file = capture.with_suffix(".truth.jsonl")
     truth = [json.loads(line) for line in truth_file.read_text().splitlines()]
     turns = judged(truth, found)
@@ -221,12 +207,6 @@ def hungarian(found, poses):
                 numbers[id(cluster)] = n
                 tracks.append(Track(n, cluster))
     return numbers
-
-
-def run(program, *words):
-    done = subprocess.run([program, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 main()

@@ -2,30 +2,19 @@
 
 It decodes `--format pcap` to the points of the NPZ of the same scan, and what `segment` reads
 of a capture, also of a real VLP-16's, to the same points. Run by
-`cargo xtask test`, which sets EDGEPUCK_PROGRAM, EDGEPUCK_ROOT and EDGEPUCK_OUT.
+`cargo xtask test`; see xtask/src/test/peers.rs.
 """
 
 import json
-import os
 import struct
-import subprocess
-import sys
 from pathlib import Path
 
-# This file's own name is that of the package: it must not import itself.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import OUT, ROOT, edgepuck, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import numpy
     import plyfile
     import velodyne_decoder
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
-
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-ROOT = Path(os.environ["EDGEPUCK_ROOT"])
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 
 # Half a unit of 4 mm. f32 holds 16 m to 9.6e-7 m; coordinates, in the world
 # and in the decoder, are each off by half of that, three at a time.
@@ -56,11 +45,6 @@ KINDS = {
 }
 
 ATTRIBUTES = ["range", "ring", "time", "intensity"]
-
-
-def run(*words):
-    print("+", *words[1:], flush=True)
-    subprocess.run([str(word) for word in words], check=True, stderr=subprocess.DEVNULL)
 
 
 def torus(segments, thickness):
@@ -154,10 +138,10 @@ def datasets():
     (meshes / "torus_0001.off").write_text(torus(64, 0.3))
     for returns in KINDS:
         out = OUT / f"set-{returns}"
-        run(EDGEPUCK, "gen-dataset", OUT / "meshes", "--out", out, "--sensor", "vlp32c", "--format",
-            "pcap", "--returns", returns, "--views", 3, "--distance", 2.5, "--noise", 0.02,
-            "--dropout", 0.1, "--attributes", ",".join(ATTRIBUTES), "--adapter", "cpu")
-        run(EDGEPUCK, "gen-dataset", "--verify", out)
+        edgepuck("gen-dataset", OUT / "meshes", "--out", out, "--sensor", "vlp32c", "--format",
+                 "pcap", "--returns", returns, "--views", 3, "--distance", 2.5, "--noise", 0.02,
+                 "--dropout", 0.1, "--attributes", ",".join(ATTRIBUTES), "--adapter", "cpu")
+        edgepuck("gen-dataset", "--verify", out)
         manifest = json.loads((out / "manifest.json").read_text())
         poses = manifest["poses"][0]["every_mesh"]
         for view, pose in enumerate(poses):
@@ -176,10 +160,10 @@ def two_returns():
     (OUT / "dual.toml").write_text('[effects]\nreturns = "dual"\nnoise = { sigma_m = 0.02 }\n'
                                    "footprint = { samples = 19, divergence_deg = [0.6, 0.3], separation_m = 0.2 }\n")
     out = OUT / "set-two-returns"
-    run(EDGEPUCK, "gen-dataset", OUT / "edges", "--out", out, "--sensor", "vlp32c", "--format", "pcap",
-        "--effects", OUT / "dual.toml", "--views", 1, "--distance", 4, "--adapter", "cpu",
-        "--attributes", ",".join(ATTRIBUTES + ["return"]))
-    run(EDGEPUCK, "gen-dataset", "--verify", out)
+    edgepuck("gen-dataset", OUT / "edges", "--out", out, "--sensor", "vlp32c", "--format", "pcap",
+             "--effects", OUT / "dual.toml", "--views", 1, "--distance", 4, "--adapter", "cpu",
+             "--attributes", ",".join(ATTRIBUTES + ["return"]))
+    edgepuck("gen-dataset", "--verify", out)
     pose = json.loads((out / "manifest.json").read_text())["poses"][0]["every_mesh"][0]
     npz = out / "rotational/noisy/torus/train/torus_0001_v0.npz"
     points, _ = decode(str(npz.with_suffix(".pcap")))
@@ -218,8 +202,8 @@ def scene(name, mesh, sensor, rpm):
             f"effects = {{ intensity = true }}\n"
             f"[[object]]\nmesh = \"{name}.off\"\nreflectivity = 0.9\n"
             f"[[sensor]]\nprofile = \"./{name}-{extension}-sensor.toml\"\n{sensor}\n")
-        run(EDGEPUCK, "scan", OUT / f"{name}-{extension}.toml", "--out", OUT / f"{name}.{extension}",
-            "--adapter", "cpu")
+        edgepuck("scan", OUT / f"{name}-{extension}.toml", "--out", OUT / f"{name}.{extension}",
+                 "--adapter", "cpu")
     return str(OUT / f"{name}.pcap"), OUT / f"{name}.npz"
 
 
@@ -254,7 +238,7 @@ def reading():
         print("a real VLP-16's packets are not here")
     config = velodyne_decoder.Config(timestamp_first_packet=True, min_range=0, max_range=1000)
     for pcap in captures:
-        run(EDGEPUCK, "segment", pcap, "--out", OUT / "clusters")
+        edgepuck("segment", pcap, "--out", OUT / "clusters")
         vertices = plyfile.PlyData.read(str(OUT / "clusters/sweep.ply"))["vertex"]
         ours = numpy.stack([vertices[axis] for axis in "xyz"], 1).astype(float)
         scans = [points for _, points in velodyne_decoder.read_pcap(str(pcap), config)]

@@ -9,26 +9,18 @@ environment for them beside its output. Run by `cargo xtask test`; see xtask/src
 import json
 import math
 import os
-import subprocess
 import sys
 import venv
 from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import OUT, edgepuck, run, skip, skipped_if_missing
 
-try:
+with skipped_if_missing():
     import numpy
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 LISA, FOG_SIM = (os.environ.get(name) for name in ("EDGEPUCK_LISA", "EDGEPUCK_FOG_SIM"))
 if not (LISA or FOG_SIM):
-    print("SKIPPED: neither EDGEPUCK_LISA nor EDGEPUCK_FOG_SIM names a clone (see the script)")
-    sys.exit(77)
+    skip("neither EDGEPUCK_LISA nor EDGEPUCK_FOG_SIM names a clone (see the script)")
 
 LISA_PACKAGES = ["numpy==1.26.4", "scipy==1.13.1", "PyMieScatt==1.8.1.1"]
 # 3 mrad; 90 % at 200 m; from 1.5 m: LISA's defaults.
@@ -73,8 +65,7 @@ def edgepuck_weather(cloud, flags, sensor):
     (OUT / "sensor.toml").write_text(sensor)
     numpy.savez(OUT / "clear.npz", positions=cloud[:, :3].astype(numpy.float32),
                 intensity=cloud[:, 3:].astype(numpy.float32))
-    words = ["weather", OUT / "clear.npz", "--out", OUT / "weather.npz", "--profile", OUT / "sensor.toml", *flags]
-    subprocess.run([EDGEPUCK, *map(str, words)], check=True, stderr=subprocess.DEVNULL)
+    edgepuck("weather", OUT / "clear.npz", "--out", OUT / "weather.npz", "--profile", OUT / "sensor.toml", *flags)
     told = numpy.load(OUT / "weather.npz")
     return told["positions"].astype(float), told["intensity"][:, 0].astype(float), told["medium"][:, 0]
 
@@ -84,11 +75,10 @@ def lisa():
     python = OUT.parent / "lisa-venv/bin/python3"
     if not python.exists():
         venv.create(python.parents[1], with_pip=True)
-        subprocess.run([python, "-m", "pip", "install", "-q", *LISA_PACKAGES], check=True)
+        run(python, "-m", "pip", "install", "-q", *LISA_PACKAGES)
     for kind, rate in WEATHERS:
-        asked = [python, "-c", ASK_LISA, kind, str(rate), str(N_LISAS), json.dumps(CASES)]
-        answer = subprocess.run(asked, cwd=Path(LISA) / "python_old", check=True, text=True,
-                                stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": "."}).stdout
+        answer = run(python, "-c", ASK_LISA, kind, rate, N_LISAS, json.dumps(CASES),
+                     cwd=Path(LISA) / "python_old", env={**os.environ, "PYTHONPATH": "."}).stdout
         counts = [line.split()[1:] for line in answer.splitlines() if line.startswith("counts")]
         for (range_m, reflectivity), theirs in zip(CASES, counts, strict=True):
             cloud = numpy.tile([range_m, 0.0, 0.0, reflectivity], (N_OURS, 1))

@@ -7,31 +7,18 @@ Both give each sample as it was written, and the labels are the classes of the l
 import io
 import json
 import os
-import subprocess
-import sys
-from pathlib import Path
 
-# A file of this folder has the name of a package: that one must not be imported.
-sys.path = [entry for entry in sys.path if Path(entry).resolve() != Path(__file__).parent]
+from peer import OUT, edgepuck, skipped_if_missing
 
 # Nothing is asked of the Hub.
 os.environ["HF_HUB_OFFLINE"] = "1"
-try:
+with skipped_if_missing():
     import datasets
     import numpy
     import webdataset
-except ImportError as error:
-    print(f"SKIPPED: {error}")
-    sys.exit(77)
 
-EDGEPUCK = os.environ["EDGEPUCK_PROGRAM"]
-OUT = Path(os.environ["EDGEPUCK_OUT"])
 FLAGS = ["--layout", "webdataset", "--sensor", "vlp32c", "--views", "8", "--points", "128",
          "--adapter", "cpu", "--azimuth-jitter", "180"]
-
-
-def edgepuck(*words):
-    subprocess.run([EDGEPUCK, *map(str, words)], check=True, stderr=subprocess.DEVNULL)
 
 
 def arrays(npz):

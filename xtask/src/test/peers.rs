@@ -1,8 +1,8 @@
 //! The scripts in `tests/peers`, which compare our programs with other software.
 //!
 //! Python runs each in an environment of pinned packages from PyPI. `EDGEPUCK_PROGRAM`,
-//! `EDGEPUCK_LAB`, `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_ROOT` is the
-//! workspace, and `EDGEPUCK_OUT` an empty folder. It ends with 0 if all is well and with [`SKIPPED`]
+//! `EDGEPUCK_LAB`, `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_OUT` is an empty
+//! folder, and [`SUPPORT`] is on `PYTHONPATH`. It ends with 0 if all is well and with [`SKIPPED`]
 //! if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, unless there is
 //! an `x-requirements.txt`: of packages that others do not go with, or that are very large.
 
@@ -19,6 +19,9 @@ use xtask::workspace::{executable, output, root};
 
 /// The folder of the scripts.
 const SCRIPTS: &str = "tests/peers";
+
+/// The folder of the module that they share.
+const SUPPORT: &str = "tests/peers/support";
 
 /// What a script ends with that cannot run, having said why.
 const SKIPPED: i32 = 77;
@@ -136,10 +139,8 @@ fn check(
     // -B keeps compiled files from lying beside the scripts.
     let mut command = Command::new(python);
     command.arg("-B").arg(script).current_dir(&out);
-    // Scripts are named after packages, which must not be taken for them.
-    command.env("PYTHONSAFEPATH", "1");
+    command.env("PYTHONPATH", root().join(SUPPORT)).env("EDGEPUCK_OUT", &out);
     command.envs(programs.iter().map(|(variable, program)| (variable, program)));
-    command.env("EDGEPUCK_ROOT", root()).env("EDGEPUCK_OUT", &out);
     let (status, said) = Meanwhile::start(&format!("peer-{name}"), &mut command)?.end()?;
     eprintln!("== {peer}: {SCRIPTS}/{name}.py\n{said}");
     Ok(match status.code() {
