@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs what tests need beyond Rust: software Vulkan, a C++ compiler for the
-# fuzz targets, what Open3D links to, PCL, a browser, what judges Debian packages, Slurm and GNU
-# parallel, for the Raspberry Pi an emulator and a model of its core, and the standard libraries of the targets
+# fuzz targets, what Open3D links to, PCL, a browser, what judges Debian packages, Slurm, GNU
+# parallel, PyTorch for the documentation's examples, for the Raspberry Pi an emulator and a model of its core, and the standard libraries of the targets
 # that code is checked for: the Raspberry Pi, and systems of Metal and of Direct3D 12.
 # Both the README and CI run this, through `cargo xtask test`.
 set -eu
@@ -37,6 +37,10 @@ has_llvm_mca() {
     return 1
 }
 
+has_pytorch() {
+    /usr/bin/python3 -c "import torch" 2>/dev/null
+}
+
 has_browser() {
     command -v chromium >/dev/null 2>&1 || command -v google-chrome >/dev/null 2>&1
 }
@@ -50,8 +54,9 @@ esac
 missing="$missing_backported$missing_plain"
 has_llvm_mca || missing="$missing llvm"
 has_browser || missing="$missing chromium"
+has_pytorch || missing="$missing python3-torch"
 if [ -z "$missing" ]; then
-    echo "All packages are there: $backported $plain llvm chromium"
+    echo "All packages are there: $backported $plain llvm chromium python3-torch"
     exit 0
 fi
 if ! command -v apt-get >/dev/null 2>&1; then
@@ -84,9 +89,12 @@ if ! has_llvm_mca; then
         fi
     done
 fi
-# Where there is none to be had the report's test says that it is skipped.
+# Where there is none to be had, what needs it says that it is skipped.
 if ! has_browser && apt-cache show chromium >/dev/null 2>&1; then
     missing_plain="$missing_plain chromium"
+fi
+if ! has_pytorch && apt-cache show python3-torch >/dev/null 2>&1; then
+    missing_plain="$missing_plain python3-torch"
 fi
 # The backport of qemu-user is left out: it cannot load plugins.
 install="$root apt-get install -y -qq --no-install-recommends"

@@ -37,9 +37,10 @@ def seed(value: Any) -> int:
 
 
 def place(name_or_path: str | os.PathLike[str]) -> str:
-    """A name as it is; the path of what exists so that it stays right in another folder."""
+    """A name as it is, though a folder may be called so; a file's path so that it stays right in
+    another folder."""
     text = os.fspath(name_or_path)
-    return os.path.abspath(text) if os.path.exists(text) else text
+    return os.path.abspath(text) if os.path.isfile(text) else text
 
 
 def number(name: str, index: Any, length: int) -> int:

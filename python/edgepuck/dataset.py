@@ -92,7 +92,7 @@ class Dataset:
         words = [f"--{flag}={value}" for flag, value in flags.items() if value is not None]
         self._seed = seed
         cache = whole("cache_mb", cache_mb, 0, 2**30) << 20
-        self._arguments = (place(meshes), split, words, cache, adapter)
+        self._arguments = (os.path.abspath(meshes), split, words, cache, adapter)
         self._clouds = _edgepuck.Clouds(*self._arguments)
         # Shared, so that workers that outlive an epoch see the next one.
         self._epoch = multiprocessing.RawValue("Q", 0)

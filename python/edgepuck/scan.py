@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 _NAMES = {"return": "return_number", "sensor": "sensor_position"}
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Scan:
     """The points of one scan, and what is known of each. What was not asked for is None.
 
@@ -60,6 +60,11 @@ class Scan:
     def __len__(self) -> int:
         """The number of points."""
         return len(self.positions)
+
+    def __repr__(self) -> str:
+        columns = (field.name for field in fields(self) if field.name not in ("origin", "pose"))
+        known = ", ".join(name for name in columns if getattr(self, name) is not None)
+        return f"<Scan of {len(self)} points: {known}>"
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         array = self.positions if dtype is None else self.positions.astype(dtype, copy=False)

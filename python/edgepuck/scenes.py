@@ -15,7 +15,7 @@ from ._arguments import Remade, number, place, whole
 from .scan import Scan, scan_of
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Scene:
     """A scene, what its sensor saw, and what segmentation made of that."""
 
@@ -34,6 +34,10 @@ class Scene:
     """The share of each cluster's points that lie on one surface, [n_clusters]."""
     cluster_height: NDArray[np.float32]
     """The height of each cluster's lowest point above the ground, metres, [n_clusters]."""
+
+    def __repr__(self) -> str:
+        clusters = len(self.cluster_class)
+        return f"<Scene of {self.sensor}: {self.scan!r}, {len(self.objects)} objects, {clusters} clusters>"
 
 
 class Scenes(Remade):
@@ -65,7 +69,7 @@ class Scenes(Remade):
     ) -> None:
         if isinstance(sensors, str):
             raise _edgepuck.Error(f"sensors: expected a list of names, found {sensors!r}")
-        folder = None if meshes is None else place(meshes)
+        folder = None if meshes is None else os.path.abspath(meshes)
         names = [place(sensor) for sensor in sensors]
         file, key = place(recipe), _arguments.seed(seed)
         self._length = whole("length", length, 0, 2**32)

@@ -27,6 +27,11 @@ def test_arrays_are_views_of_what_was_cast(cube: tuple) -> None:
     assert np.shares_memory(np.asarray(scan), scan.positions)
 
 
+def test_what_is_printed_of_a_scan_is_short(cube: tuple) -> None:
+    scan = ep.Sensor("vlp32c").scan(ep.Mesh(*cube), attributes=["ring"])
+    assert repr(scan) == f"<Scan of {len(scan)} points: positions, ring>"
+
+
 def test_a_pose_is_a_matrix(cube: tuple) -> None:
     lidar, mesh = ep.Sensor("vlp32c"), ep.Mesh(*cube)
     # At (3, 0, 0), looking back along x.

@@ -1,5 +1,6 @@
 //! `cargo xtask test`: everything a change must pass.
 
+mod docs;
 mod fuzz;
 mod meanwhile;
 mod peers;
@@ -57,6 +58,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
     let packages = peers::Packages::fetch_meanwhile(args.peers, install);
     let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
     let _pi_binary = targets::build_meanwhile();
+    let mdbook = docs::build_meanwhile(install);
     summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
     let mut lints = cargo_on_all(&["clippy", "--all-targets"]);
     summary.command("lints", lints.args(["--", "--deny", "warnings"]));
@@ -71,6 +73,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
     targets::run(summary, install);
+    docs::build_site(summary, mdbook);
     python::run(summary, install, args.peers == peers::Which::All);
     peers::run(summary, packages);
     fuzz::run(summary, args.fuzz_seconds, fuzz_targets);

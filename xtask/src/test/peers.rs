@@ -164,10 +164,10 @@ fn scripts() -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// The variables that tell scripts of our programs, and the programs.
-type Programs = [(&'static str, PathBuf); 4];
+pub type Programs = [(&'static str, PathBuf); 4];
 
 /// Our programs as the tests have built them: nothing is built for the peers alone.
-fn programs() -> anyhow::Result<Programs> {
+pub fn programs() -> anyhow::Result<Programs> {
     let mut cargo = cargo_on_all(&["test", "--no-run"]);
     cargo.args(["--message-format", "json-render-diagnostics"]);
     let messages = output(cargo.stderr(Stdio::inherit()))?;

@@ -1,6 +1,7 @@
 //! The Python package: a wheel is built and judged, and its tests run in an environment that has
 //! nothing else of ours.
 
+use super::docs;
 use super::peers::interpreter;
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow, ensure};
@@ -26,38 +27,54 @@ const TARGET: &str = "aarch64-unknown-linux-gnu";
 #[cfg(not(target_arch = "aarch64"))]
 const TARGET: &str = "x86_64-unknown-linux-gnu";
 
-/// Builds the wheel and tests it, with PyTorch if asked for. Other systems build theirs as they are
-/// released.
+/// A wheel of the package.
+pub struct Wheel {
+    /// The interpreter that has the tools of [`BUILD`].
+    pub tools: PathBuf,
+    /// Where it is.
+    pub file: PathBuf,
+}
+
+/// Builds the wheel and tests it, with PyTorch of PyPI if asked for, and runs the documentation with
+/// it. Other systems build theirs as they are released.
 pub fn run(summary: &mut Summary, install: bool, with_pytorch: bool) {
+    let mut wheel = Err("there is no wheel to run it with".to_owned());
     summary.step("python", |summary| {
         if !cfg!(target_os = "linux") {
             return Ok(summary.skip("python", 1, "wheels are tested on Linux"));
         }
-        match interpreter(&BUILD, install) {
-            Ok(tools) => test(&tools, with_pytorch),
-            Err(cause) => Ok(summary.skip("python", 1, &cause)),
-        }
+        let tools = match interpreter(&BUILD, install) {
+            Ok(tools) => tools,
+            Err(cause) => return Ok(summary.skip("python", 1, &cause)),
+        };
+        let built = build(&tools)?;
+        let counts = judge(&built)?;
+        let counts = counts.and(run_tests(&built, with_pytorch)?);
+        wheel = Ok(built);
+        Ok(counts)
+    });
+    summary.step("documentation's examples", |summary| match &wheel {
+        Ok(wheel) => docs::run_blocks(wheel),
+        Err(cause) => Ok(summary.skip("documentation's examples", 1, cause)),
     });
 }
 
-fn test(tools: &Path, with_pytorch: bool) -> anyhow::Result<Counts> {
-    let wheel = build(tools)?;
-    let judge = |words: &[&str]| {
-        let mut command = Command::new(tools);
-        succeeds(command.arg("-m").args(words).arg(&wheel)).map_err(|cause| anyhow!(cause))
-    };
-    judge(&["abi3audit", "--strict"])?;
-    let mut auditwheel = Command::new(tools);
-    let shown = output(auditwheel.args(["-m", "auditwheel", "show"]).arg(&wheel))?;
+/// Checks that the wheel runs on the Pythons and the systems that its name promises.
+fn judge(wheel: &Wheel) -> anyhow::Result<Counts> {
+    let mut abi3audit = Command::new(&wheel.tools);
+    abi3audit.args(["-m", "abi3audit", "--strict"]).arg(&wheel.file);
+    succeeds(&mut abi3audit).map_err(|cause| anyhow!(cause))?;
+    let mut auditwheel = Command::new(&wheel.tools);
+    let shown = output(auditwheel.args(["-m", "auditwheel", "show"]).arg(&wheel.file))?;
     ensure!(
         shown.split_whitespace().collect::<Vec<_>>().join(" ").contains(PLATFORM),
         "auditwheel: expected a wheel for {PLATFORM}, found: {shown}"
     );
-    Ok(Counts { passed: 2, ..Counts::default() }.and(run_tests(tools, &wheel, with_pytorch)?))
+    Ok(Counts { passed: 2, ..Counts::default() })
 }
 
 /// The wheel, for Pythons from 3.10 on.
-fn build(tools: &Path) -> anyhow::Result<PathBuf> {
+fn build(tools: &Path) -> anyhow::Result<Wheel> {
     let wheels = cache_dir().join("wheels");
     if wheels.exists() {
         fs::remove_dir_all(&wheels).with_context(|| wheels.display().to_string())?;
@@ -75,31 +92,44 @@ fn build(tools: &Path) -> anyhow::Result<PathBuf> {
     ensure!(status.success(), "maturin: {status}");
     let built = fs::read_dir(&wheels).with_context(|| wheels.display().to_string())?;
     let mut built = built.filter_map(|entry| Some(entry.ok()?.path()));
-    built.next().ok_or_else(|| anyhow!("{}: expected a wheel, found none", wheels.display()))
+    let file = built.next();
+    let file = file.ok_or_else(|| anyhow!("{}: expected a wheel, found none", wheels.display()))?;
+    Ok(Wheel { tools: tools.to_path_buf(), file })
 }
 
 /// The tests of the wheel in a new environment, away from the package's source.
-fn run_tests(tools: &Path, wheel: &Path, with_pytorch: bool) -> anyhow::Result<Counts> {
+fn run_tests(wheel: &Wheel, with_pytorch: bool) -> anyhow::Result<Counts> {
     let folder = cache_dir().join("python-test-venv");
-    let made = Command::new(tools).args(["-m", "venv", "--clear"]).arg(&folder).status()?;
+    let made = Command::new(&wheel.tools).args(["-m", "venv", "--clear"]).arg(&folder).status()?;
     ensure!(made.success(), "{}: the environment cannot be made", folder.display());
     let python = folder.join("bin/python");
     let mut install = Command::new(&python);
     install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
-    install.arg(wheel).arg("-r").arg(root().join("python/tests/requirements.txt"));
+    install.arg(&wheel.file).arg("-r").arg(root().join("python/tests/requirements.txt"));
     if with_pytorch {
         install.arg("-r").arg(root().join("tests/peers/pytorch-requirements.txt"));
     }
     succeeds(&mut install).map_err(|cause| anyhow!(cause))?;
 
-    let mut tests = Command::new(&python);
-    tests.args(["-B", "-m", "pytest", "-p", "no:cacheprovider", "--doctest-modules"]);
+    let mut tests = pytest(&python, &folder);
+    tests.arg("--doctest-modules");
     // `edgepuck.torch` alone needs PyTorch.
     tests.arg("--doctest-ignore-import-errors");
     tests.arg(root().join("python/tests")).args(["--pyargs", "edgepuck"]);
-    // A folder in which no package lies that could be taken for the installed one.
-    tests.current_dir(&folder).env("PYTHONSAFEPATH", "1");
-    let done = tests.output().context("cannot start pytest")?;
+    counts(&mut tests)
+}
+
+/// pytest in `folder`, in which no package must lie that could be taken for the installed one.
+pub fn pytest(python: &Path, folder: &Path) -> Command {
+    let mut pytest = Command::new(python);
+    pytest.args(["-B", "-m", "pytest", "-p", "no:cacheprovider"]);
+    pytest.current_dir(folder).env("PYTHONSAFEPATH", "1");
+    pytest
+}
+
+/// Runs `pytest` and counts its tests.
+pub fn counts(pytest: &mut Command) -> anyhow::Result<Counts> {
+    let done = pytest.output().context("cannot start pytest")?;
     let said = String::from_utf8_lossy(&done.stdout);
     eprintln!("{said}");
     let counts = closing_line(&said).ok_or_else(|| anyhow!("pytest ended with {}", done.status))?;
