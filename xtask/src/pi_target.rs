@@ -1,8 +1,7 @@
-//! The Raspberry Pi as a compilation target: its standard library, how
-//! programs for it are linked without a C compiler, and how they run here.
+//! The Raspberry Pi as a compilation target: how programs for it are linked
+//! without a C compiler, and how they run here.
 
 use crate::workspace;
-use anyhow::{Context, bail};
 use std::process::Command;
 
 /// Static binaries that run on any 64-bit Raspberry Pi, whatever its system.
@@ -17,25 +16,6 @@ const EMULATOR: &str = "qemu-aarch64";
 /// The core of a Raspberry Pi 5. It has fp16 and dot products and no newer
 /// extension, so that a kernel which strays beyond traps.
 const CORE: &str = "cortex-a76";
-
-/// Fetches the target's standard library through rustup unless it is there.
-///
-/// # Errors
-/// There is no rustup, or it cannot fetch the library.
-pub fn need_standard_library() -> anyhow::Result<()> {
-    if workspace::standard_library(TRIPLE)?.is_dir() {
-        return Ok(());
-    }
-    eprintln!("fetching Rust's standard library for {TRIPLE}: rustup target add {TRIPLE}");
-    let status = Command::new("rustup").args(["target", "add", TRIPLE]).status();
-    let status = status.with_context(|| {
-        format!("there is no rustup here to fetch it; install {TRIPLE}'s standard library yourself")
-    })?;
-    if !status.success() {
-        bail!("rustup could not fetch {TRIPLE}; is this machine offline?");
-    }
-    Ok(())
-}
 
 /// Runs a program for the Pi on this machine; `None` where nothing can.
 pub fn emulator() -> Option<Command> {

@@ -1,6 +1,7 @@
 //! `cargo xtask release-check`: what a release must pass besides the tests.
 
 use crate::summary::{Counts, Summary, check};
+use crate::test::python;
 use anyhow::{Context, bail};
 use serde_json::Value;
 use std::process::Command;
@@ -17,6 +18,7 @@ pub fn run() -> anyhow::Result<u8> {
     });
     summary.step("advisories", advisories);
     summary.step("semantic versions", semantic_versions);
+    python::run_emulated(&mut summary);
     Ok(summary.end())
 }
 

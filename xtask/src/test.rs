@@ -4,7 +4,7 @@ mod docs;
 mod fuzz;
 mod meanwhile;
 mod peers;
-mod python;
+pub mod python;
 mod sanitize;
 mod targets;
 mod test_programs;

@@ -43,6 +43,25 @@ pub fn standard_library(target: &str) -> anyhow::Result<PathBuf> {
     Ok(PathBuf::from(folder.trim()))
 }
 
+/// Fetches the standard library for `target` through rustup unless it is there.
+///
+/// # Errors
+/// There is no rustup, or it cannot fetch the library.
+pub fn need_standard_library(target: &str) -> anyhow::Result<()> {
+    if standard_library(target)?.is_dir() {
+        return Ok(());
+    }
+    eprintln!("fetching Rust's standard library for {target}: rustup target add {target}");
+    let status = Command::new("rustup").args(["target", "add", target]).status();
+    let status = status.with_context(|| {
+        format!("there is no rustup here to fetch it; install {target}'s standard library yourself")
+    })?;
+    if !status.success() {
+        bail!("rustup could not fetch {target}; is this machine offline?");
+    }
+    Ok(())
+}
+
 /// What a command prints.
 ///
 /// # Errors

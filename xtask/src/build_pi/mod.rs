@@ -21,7 +21,7 @@ pub struct Args {
 
 /// Builds, checks and, where QEMU is there, tries the binary.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    pi_target::need_standard_library()?;
+    workspace::need_standard_library(pi_target::TRIPLE)?;
     let built = build(&[])?;
     let binary = match &args.out {
         Some(out) => copy(&built, out)?,

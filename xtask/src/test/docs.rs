@@ -67,11 +67,7 @@ pub fn run_blocks(wheel: &Wheel) -> anyhow::Result<Counts> {
     make.args(["-m", "venv", "--clear", "--without-pip", "--system-site-packages"]).arg(&folder);
     succeeds(&mut make).map_err(|cause| anyhow!(cause))?;
     let python = folder.join("bin/python");
-    let mut install = Command::new(&wheel.tools);
-    install.args(["-m", "pip", "--python"]).arg(&python);
-    install.args(["install", "--quiet", "--disable-pip-version-check"]);
-    install.arg(&wheel.file).arg("-r").arg(root().join("docs/requirements.txt"));
-    succeeds(&mut install).map_err(|cause| anyhow!(cause))?;
+    wheel.install(&python, &["docs/requirements.txt"])?;
 
     let mut tests = pytest(&python, &folder);
     tests.arg(root().join("docs")).arg(root().join("python/tests/test_readme.py"));

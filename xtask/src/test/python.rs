@@ -8,8 +8,9 @@ use anyhow::{Context, anyhow, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use xtask::pi_target;
 use xtask::venv::{Environment, cache_dir, succeeds};
-use xtask::workspace::{output, root};
+use xtask::workspace::{need_standard_library, output, root};
 
 /// What builds wheels and judges them.
 const BUILD: Environment<'_> = Environment {
@@ -18,14 +19,30 @@ const BUILD: Environment<'_> = Environment {
     size: "some 100 MB",
 };
 
+/// What lists the packages that all tests need.
+const TESTS_NEED: &str = "python/tests/requirements.txt";
+
 /// The systems that a wheel of Linux runs on: all since glibc 2.28.
 const PLATFORM: &str = "manylinux_2_28";
 
-/// The target that the wheel is built for.
-#[cfg(target_arch = "aarch64")]
-const TARGET: &str = "aarch64-unknown-linux-gnu";
-#[cfg(not(target_arch = "aarch64"))]
-const TARGET: &str = "x86_64-unknown-linux-gnu";
+const AARCH64: &str = "aarch64-unknown-linux-gnu";
+
+/// The target of the wheel for this processor.
+const NATIVE: &str =
+    if cfg!(target_arch = "aarch64") { AARCH64 } else { "x86_64-unknown-linux-gnu" };
+
+/// How a wheel is built and tested.
+struct Plan<'a> {
+    target: &'a str,
+    /// Cargo's profile that it is built by.
+    profile: &'a str,
+    /// A new environment to test it in.
+    folder: PathBuf,
+    /// Lists of packages that tests need.
+    requirements: &'a [&'a str],
+    /// Which tests are run, an expression of pytest's `-k`; if empty, all.
+    tests: &'a str,
+}
 
 /// A wheel of the package.
 pub struct Wheel {
@@ -47,9 +64,9 @@ pub fn run(summary: &mut Summary, install: bool, with_pytorch: bool) {
             Ok(tools) => tools,
             Err(cause) => return Ok(summary.skip("python", 1, &cause)),
         };
-        let built = build(&tools)?;
-        let counts = judge(&built)?;
-        let counts = counts.and(run_tests(&built, with_pytorch)?);
+        let plan = native(&tools, with_pytorch)?;
+        let built = build(tools, &plan)?;
+        let counts = test(&built, &plan)?;
         wheel = Ok(built);
         Ok(counts)
     });
@@ -59,29 +76,60 @@ pub fn run(summary: &mut Summary, install: bool, with_pytorch: bool) {
     });
 }
 
-/// Checks that the wheel runs on the Pythons and the systems that its name promises.
-fn judge(wheel: &Wheel) -> anyhow::Result<Counts> {
-    let mut abi3audit = Command::new(&wheel.tools);
-    abi3audit.args(["-m", "abi3audit", "--strict"]).arg(&wheel.file);
-    succeeds(&mut abi3audit).map_err(|cause| anyhow!(cause))?;
-    let mut auditwheel = Command::new(&wheel.tools);
-    let shown = output(auditwheel.args(["-m", "auditwheel", "show"]).arg(&wheel.file))?;
-    ensure!(
-        shown.split_whitespace().collect::<Vec<_>>().join(" ").contains(PLATFORM),
-        "auditwheel: expected a wheel for {PLATFORM}, found: {shown}"
-    );
-    Ok(Counts { passed: 2, ..Counts::default() })
+fn native(tools: &Path, with_pytorch: bool) -> anyhow::Result<Plan<'static>> {
+    let folder = cache_dir().join("python-test-venv");
+    let mut venv = Command::new(tools);
+    let made = venv.args(["-m", "venv", "--clear", "--without-pip"]).arg(&folder).status()?;
+    ensure!(made.success(), "{}: the environment cannot be made", folder.display());
+    let requirements: &[&str] = match with_pytorch {
+        true => &[TESTS_NEED, "tests/peers/pytorch-requirements.txt"],
+        false => &[TESTS_NEED],
+    };
+    Ok(Plan { target: NATIVE, profile: "release", folder, requirements, tests: "" })
+}
+
+/// Builds the wheel of aarch64 as releases hold it, and tests it under an emulator if there is one.
+pub fn run_emulated(summary: &mut Summary) {
+    let name = "wheel of aarch64";
+    summary.step(name, |summary| {
+        let folder = cache_dir().join("aarch64-python");
+        let tools = match prepare_emulated(&folder) {
+            Ok(tools) => tools,
+            Err(cause) => return Ok(summary.skip(name, 1, &cause)),
+        };
+        summary.remark(format!(
+            "{name}: SKIPPED, test_memory.py, which would measure the emulator's memory, and tests \
+             that fork: QEMU aborts once a child of a process with threads starts one"
+        ));
+        let tests = "not (test_memory.py or fork- or [fork])";
+        let requirements = &[TESTS_NEED];
+        let plan = Plan { target: AARCH64, profile: "dist", folder, requirements, tests };
+        test(&build(tools, &plan)?, &plan)
+    });
+}
+
+/// Makes `folder` an environment of an emulated Python, and gives the interpreter that builds.
+fn prepare_emulated(folder: &Path) -> Result<PathBuf, String> {
+    if NATIVE == AARCH64 {
+        return Err("this processor is of its kind, so `cargo xtask test` tests it".to_owned());
+    }
+    let emulator = pi_target::emulator().ok_or(pi_target::NO_EMULATOR)?;
+    need_standard_library(AARCH64).map_err(|error| format!("{error:#}"))?;
+    let mut make = Command::new("sh");
+    make.arg(root().join("xtask/emulated-python.sh")).arg(folder);
+    succeeds(make.arg(emulator.get_program()).args(emulator.get_args()))?;
+    interpreter(&BUILD, true)
 }
 
 /// The wheel, for Pythons from 3.10 on.
-fn build(tools: &Path) -> anyhow::Result<Wheel> {
+fn build(tools: PathBuf, plan: &Plan<'_>) -> anyhow::Result<Wheel> {
     let wheels = cache_dir().join("wheels");
     if wheels.exists() {
         fs::remove_dir_all(&wheels).with_context(|| wheels.display().to_string())?;
     }
-    let mut maturin = Command::new(tools);
-    maturin.args(["-m", "maturin", "build", "--release", "--zig", "--locked"]);
-    maturin.args(["--compatibility", PLATFORM, "--target", TARGET, "--out"]).arg(&wheels);
+    let mut maturin = Command::new(&tools);
+    maturin.args(["-m", "maturin", "build", "--profile", plan.profile, "--zig", "--locked"]);
+    maturin.args(["--compatibility", PLATFORM, "--target", plan.target, "--out"]).arg(&wheels);
     maturin.arg("--manifest-path").arg(root().join("python/Cargo.toml"));
     // maturin asks the first Python on the path for zig.
     let own = tools.parent().into_iter().map(Path::to_path_buf);
@@ -91,32 +139,44 @@ fn build(tools: &Path) -> anyhow::Result<Wheel> {
     let status = maturin.status().context("cannot start maturin")?;
     ensure!(status.success(), "maturin: {status}");
     let built = fs::read_dir(&wheels).with_context(|| wheels.display().to_string())?;
-    let mut built = built.filter_map(|entry| Some(entry.ok()?.path()));
-    let file = built.next();
+    let file = built.filter_map(|entry| Some(entry.ok()?.path())).next();
     let file = file.ok_or_else(|| anyhow!("{}: expected a wheel, found none", wheels.display()))?;
-    Ok(Wheel { tools: tools.to_path_buf(), file })
+    Ok(Wheel { tools, file })
 }
 
-/// The tests of the wheel in a new environment, away from the package's source.
-fn run_tests(wheel: &Wheel, with_pytorch: bool) -> anyhow::Result<Counts> {
-    let folder = cache_dir().join("python-test-venv");
-    let made = Command::new(&wheel.tools).args(["-m", "venv", "--clear"]).arg(&folder).status()?;
-    ensure!(made.success(), "{}: the environment cannot be made", folder.display());
-    let python = folder.join("bin/python");
-    let mut install = Command::new(&python);
-    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
-    install.arg(&wheel.file).arg("-r").arg(root().join("python/tests/requirements.txt"));
-    if with_pytorch {
-        install.arg("-r").arg(root().join("tests/peers/pytorch-requirements.txt"));
-    }
-    succeeds(&mut install).map_err(|cause| anyhow!(cause))?;
-
-    let mut tests = pytest(&python, &folder);
+/// Checks that the wheel runs on the Pythons and the systems that its name promises, and tests it in
+/// an environment of its own, away from the package's source.
+fn test(wheel: &Wheel, plan: &Plan<'_>) -> anyhow::Result<Counts> {
+    let mut abi3audit = Command::new(&wheel.tools);
+    abi3audit.args(["-m", "abi3audit", "--strict"]).arg(&wheel.file);
+    succeeds(&mut abi3audit).map_err(|cause| anyhow!(cause))?;
+    let mut auditwheel = Command::new(&wheel.tools);
+    let shown = output(auditwheel.args(["-m", "auditwheel", "show"]).arg(&wheel.file))?;
+    ensure!(
+        shown.split_whitespace().collect::<Vec<_>>().join(" ").contains(PLATFORM),
+        "auditwheel: expected a wheel for {PLATFORM}, found: {shown}"
+    );
+    let python = plan.folder.join("bin/python");
+    wheel.install(&python, plan.requirements)?;
+    let mut tests = pytest(&python, &plan.folder);
     tests.arg("--doctest-modules");
     // `edgepuck.torch` alone needs PyTorch.
     tests.arg("--doctest-ignore-import-errors");
-    tests.arg(root().join("python/tests")).args(["--pyargs", "edgepuck"]);
-    counts(&mut tests)
+    tests.args(["-k", plan.tests]).arg(root().join("python/tests")).args(["--pyargs", "edgepuck"]);
+    Ok(Counts { passed: 2, ..Counts::default() }.and(counts(&mut tests)?))
+}
+
+impl Wheel {
+    /// Installs it, and the packages of these lists, for the interpreter `python`, which needs no pip.
+    pub fn install(&self, python: &Path, requirements: &[&str]) -> anyhow::Result<()> {
+        let mut install = Command::new(&self.tools);
+        install.args(["-m", "pip", "--python"]).arg(python);
+        install.args(["install", "--quiet", "--disable-pip-version-check"]).arg(&self.file);
+        for list in requirements {
+            install.arg("-r").arg(root().join(list));
+        }
+        succeeds(&mut install).map_err(|cause| anyhow!(cause))
+    }
 }
 
 /// pytest in `folder`, in which no package must lie that could be taken for the installed one.
@@ -147,7 +207,7 @@ fn closing_line(said: &str) -> Option<Counts> {
         found.filter_map(|(number, _)| number.parse::<u64>().ok()).sum()
     };
     let (passed, failed) = (count(&["passed"]), count(&["failed", "error", "errors"]));
-    let counts = Counts { passed, failed, skipped: count(&["skipped"]) };
+    let counts = Counts { passed, failed, skipped: count(&["skipped", "deselected"]) };
     (counts != Counts::default()).then_some(counts)
 }
 
@@ -158,9 +218,9 @@ mod tests {
     #[test]
     fn the_closing_line_tells_what_passed_failed_and_was_skipped() {
         let counts = |line| closing_line(&format!("one line in 2 parts\n{line}\n"));
-        let told = Counts { passed: 73, failed: 2, skipped: 1 };
-        let line =
-            "=== 1 failed, 73 passed, 1 skipped, 3 warnings, 1 error in 15.23s (0:00:15) ===";
+        let told = Counts { passed: 73, failed: 2, skipped: 5 };
+        let line = "=== 1 failed, 73 passed, 1 skipped, 4 deselected, 3 warnings, 1 error in \
+                    15.23s (0:00:15) ===";
         assert_eq!(counts(line), Some(told));
         assert_eq!(counts("74 passed in 15.36s").map(|counts| counts.passed), Some(74));
         assert_eq!(counts("no tests ran in 0.01s"), None);

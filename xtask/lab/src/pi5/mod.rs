@@ -146,7 +146,7 @@ struct Board {
 impl Board {
     fn open(llvm_mca: Option<&str>) -> Result<Self> {
         let mca = mca::Mca::find(llvm_mca)?;
-        pi_target::need_standard_library()?;
+        workspace::need_standard_library(pi_target::TRIPLE)?;
         let folder = workspace::root().join("target/pi-model");
         std::fs::create_dir_all(&folder)?;
         let listing = folder.join("infer-cpu.s");

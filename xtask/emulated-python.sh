@@ -1,0 +1,37 @@
+#!/bin/sh
+# Makes FOLDER an environment of a CPython for aarch64 which EMULATOR runs:
+#     sh emulated-python.sh FOLDER EMULATOR...
+# The CPython is Debian's. apt and dpkg fetch and unpack it into FOLDER alone: nobody need be root,
+# and the system's own packages and architectures stay as they are.
+set -eu
+
+folder="$1"
+shift
+rm -rf "$folder"
+mkdir -p "$folder/apt/lists/partial" "$folder/apt/archives/partial" "$folder/bin"
+
+# The oldest release whose Python has wheels of the tests' NumPy.
+keys=/usr/share/keyrings/debian-archive-keyring.gpg
+echo "deb [signed-by=$keys] http://deb.debian.org/debian bookworm main" >"$folder/apt/sources.list"
+# No package is installed yet.
+: >"$folder/apt/status"
+apt() {
+    apt-get -qq -o APT::Architecture=arm64 -o APT::Architectures=arm64 -o APT::Sandbox::User=root \
+        -o Dir::State="$folder/apt" -o Dir::State::status="$folder/apt/status" -o Dir::Cache="$folder/apt" \
+        -o Dir::Etc::sourcelist="$folder/apt/sources.list" -o Dir::Etc::sourceparts=- "$@"
+}
+apt -o APT::Update::Error-Mode=any update
+# NumPy's wheels need the library of C++.
+apt install --download-only --no-install-recommends --yes python3 libstdc++6
+for package in "$folder"/apt/archives/*.deb; do
+    dpkg-deb --extract "$package" "$folder/debian"
+done
+
+# Python takes argument 0 for its path, so that processes which tests start are emulated as well.
+cat >"$folder/bin/python" <<END
+#!/bin/sh
+exec $* -L "$folder/debian" -0 "\$0" "$folder/debian/usr/bin/python3" "\$@"
+END
+chmod +x "$folder/bin/python"
+# Makes Python take the folder for an environment, as `python -m venv` would.
+echo "home = $folder/debian/usr/bin" >"$folder/pyvenv.cfg"
