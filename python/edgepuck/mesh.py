@@ -72,6 +72,16 @@ class Mesh(Remade):
         return len(self._mesh)
 
     @property
+    def vertices(self) -> NDArray[np.float64]:
+        """The vertices where sensors find them, as scans have their positions, metres, [n, 3]."""
+        return self._mesh.vertices
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """The indices of each triangle's vertices, [m, 3]: `trimesh.Trimesh(mesh.vertices, mesh.faces)`."""
+        return self._mesh.faces
+
+    @property
     def scale(self) -> float:
         """Metres for each unit of length of the source."""
         return self._mesh.scale

@@ -3,7 +3,7 @@
 use crate::error::raised;
 use crate::process;
 use glam::DVec3;
-use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use sim_gpu::bvh::Builder;
 use sim_gpu::mesh::frame::{Normalize, Up, to_world};
@@ -15,7 +15,6 @@ use std::path::PathBuf;
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
 pub struct Mesh {
     pub target: Target,
-    n_triangles: usize,
     #[pyo3(get)]
     scale: f64,
     #[pyo3(get)]
@@ -72,7 +71,23 @@ impl Mesh {
 
     /// How many triangles there are.
     fn __len__(&self) -> usize {
-        self.n_triangles
+        self.target.surface.triangles().len()
+    }
+
+    /// The vertices in the world's frame, metres, `[n, 3]`.
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let vertices = self.target.surface.vertices();
+        let numbers: Vec<f64> = vertices.iter().flat_map(|vertex| vertex.to_array()).collect();
+        numbers.into_pyarray(py).reshape([vertices.len(), 3])
+    }
+
+    /// The triangles as indices of vertices, `[m, 3]`.
+    #[getter]
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let triangles = self.target.surface.triangles();
+        let indices = triangles.as_flattened().iter().copied().map(i64::from);
+        indices.collect::<Vec<_>>().into_pyarray(py).reshape([triangles.len(), 3])
     }
 }
 
@@ -81,6 +96,6 @@ impl Mesh {
         let world = to_world(mesh, up, normalize);
         let (scale, centre) = (world.scale, world.centre.to_array());
         let target = Target::new(Surface::of_mesh(world.mesh), Builder::Sah);
-        Self { target, n_triangles: mesh.triangles.len(), scale, centre }
+        Self { target, scale, centre }
     }
 }

@@ -69,6 +69,18 @@ def test_meshes_of_trimesh_are_taken() -> None:
     np.testing.assert_allclose(np.linalg.norm(scan.positions, axis=1), 1.0, atol=2e-3)
 
 
+def test_meshes_go_to_trimesh_where_scans_find_them() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    mesh = ep.Mesh(trimesh.creation.box((4.0, 2.0, 2.0)))
+    back = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    assert len(back.faces) == len(mesh)
+    # Farthest 1 m from the origin: a box of 4 : 2 : 2.
+    np.testing.assert_allclose(back.extents, np.array([4, 2, 2]) / 6**0.5, atol=1e-12)
+    scan = ep.Sensor("vlp32c").scan(mesh, distance=3)
+    # Each point is on a side of it.
+    np.testing.assert_allclose(np.abs(2 * scan.positions / back.extents).max(axis=1), 1, atol=1e-6)
+
+
 def test_objects_are_pickled_by_what_they_were_made_of(cube: tuple) -> None:
     mesh, lidar, classify = ep.Mesh(*cube), ep.Sensor("vlp32c"), ep.Classifier("edge-64")
     again = [pickle.loads(pickle.dumps(it)) for it in (mesh, lidar, classify)]

@@ -77,7 +77,7 @@ def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, messag
         ({"split": "dev"}, "dev"),
         ({"points": 0}, "points"),
         ({"views": 0}, "views"),
-        ({"views": 70_000}, "views"),
+        ({"views": 2**32}, "views"),
         ({"seed": -1}, "seed"),
         ({"cache_mb": -1}, "cache_mb"),
         ({"distance": "far"}, "distance"),

@@ -44,6 +44,18 @@ impl Surface {
         Self::new(mesh, kept)
     }
 
+    /// The vertices, in the object's frame.
+    #[must_use]
+    pub fn vertices(&self) -> &[DVec3] {
+        &self.vertices
+    }
+
+    /// All triangles of the mesh, as indices of vertices.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
     /// The triangles of `mesh` whose indices `kept` lists, ascending;
     /// `mesh::validate::triangle_stats` lists those that are neither degenerate nor
     /// duplicates.
