@@ -47,7 +47,7 @@ static POOL: Mutex<Option<Own<Arc<ThreadPool>>>> = Mutex::new(None);
 /// How many threads the user of this process asked for; 0 if they did not.
 static THREADS: Mutex<Option<Own<usize>>> = Mutex::new(None);
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

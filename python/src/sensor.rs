@@ -11,17 +11,19 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_gpu::effects::{Effects, Intensity};
+use sim_gpu::effects::{Effects, Footprint, Intensity};
 use sim_gpu::pose::Pose;
 use sim_gpu::scan::{ScanRequest, scan};
 use sim_gpu::sensor::BeamPattern;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// A sensor and its beams.
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
 pub struct Sensor {
     sensor: sim_gpu::sensor::Sensor,
     pattern: OnceLock<Arc<BeamPattern>>,
+    /// The rays of its beams for the footprint that was asked for last.
+    widened: Mutex<Option<(Footprint, Arc<BeamPattern>)>>,
     caster: LazyCaster,
 }
 
@@ -31,7 +33,8 @@ impl Sensor {
     #[new]
     fn new(name: &str, adapter: &str) -> PyResult<Self> {
         let sensor = sim_gpu::sensor::Sensor::resolve(name).map_err(raised)?;
-        Ok(Self { sensor, pattern: OnceLock::new(), caster: LazyCaster::new(adapter) })
+        let (pattern, widened) = (OnceLock::new(), Mutex::new(None));
+        Ok(Self { sensor, pattern, widened, caster: LazyCaster::new(adapter) })
     }
 
     /// The sensor's name.
@@ -81,17 +84,9 @@ impl Sensor {
         }
         effects.validate().map_err(raised)?;
         effects.for_sensor(&self.sensor).map_err(raised)?;
-        let (pattern, caster) = (self.pattern(py)?, self.caster.open(&effects)?);
+        let (pattern, caster) = (self.rays(py, &effects)?, self.caster.open(&effects)?);
         let scanned = process::run(py, || {
-            let widened;
-            let pattern = match effects.footprint {
-                None => &*pattern,
-                Some(_) => {
-                    widened = effects.widen((*pattern).clone(), &self.sensor)?;
-                    &widened
-                }
-            };
-            let mut request = ScanRequest::new(&self.sensor, pattern, pose);
+            let mut request = ScanRequest::new(&self.sensor, &pattern, pose);
             request.attributes = attributes;
             request.stream = StreamKey::new(seed, "scan", 0);
             Ok(scan(&caster, &mesh.target, &request)?)
@@ -109,6 +104,22 @@ impl Sensor {
         }
         let made = process::run(py, || Arc::new(self.sensor.pattern()))?;
         Ok(Arc::clone(self.pattern.get_or_init(|| made)))
+    }
+
+    /// The rays that are cast for `effects`. Nothing of Python runs while the lock is held, so that no
+    /// fork finds it locked.
+    fn rays(&self, py: Python<'_>, effects: &Effects) -> PyResult<Arc<BeamPattern>> {
+        let pattern = self.pattern(py)?;
+        let Some(footprint) = effects.footprint else { return Ok(pattern) };
+        if let Some((of, rays)) = &*process::lock(&self.widened)
+            && *of == footprint
+        {
+            return Ok(Arc::clone(rays));
+        }
+        let made = process::run(py, || effects.widen((*pattern).clone(), &self.sensor))?;
+        let rays = Arc::new(made.map_err(raised)?);
+        *process::lock(&self.widened) = Some((footprint, Arc::clone(&rays)));
+        Ok(rays)
     }
 }
 
