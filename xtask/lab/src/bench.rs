@@ -8,7 +8,7 @@
 //! errors, [`devices`] and [`gpu`] about adapters, [`sensor`] about how true a profile is to real
 //! sweeps, [`frames`] about what is found in them, [`sydney`] about what a network that has
 //! learnt from simulated scenes gives to one of real objects, [`robustness`] about what
-//! classifiers make of strays, turns and few points.
+//! classifiers make of strays, turns and few points, [`scale`] about what many scans cost.
 
 use crate::measure::machine::{self, Machine};
 use crate::measure::{backends, bench_mesh};
@@ -16,7 +16,7 @@ use crate::pi5;
 use crate::render::table::Table;
 use crate::rivals::{casting as peers, infer};
 use crate::study::casting::{builders, scenes, simplify, speed, to_disk, watertightness};
-use crate::study::{devices, frames, gpu, numerics, robustness, sensor, sydney};
+use crate::study::{devices, frames, gpu, numerics, robustness, scale, sensor, sydney};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -71,6 +71,8 @@ enum Benchmark {
     Sydney(sydney::SydneyArgs),
     /// Measure classifiers of whole objects on strays, turned and sparse clouds, and on no objects.
     Robustness(robustness::RobustnessArgs),
+    /// Measure tasks of `gen-dataset --layout webdataset`, and model what 1e6, 1e9 and 1e12 scans cost.
+    Scale(scale::ScaleArgs),
 }
 
 #[derive(Args, Debug)]
@@ -158,6 +160,7 @@ pub fn run(args: &BenchArgs) -> Result<Outcome> {
         Benchmark::Frames(args) => frames::run(args),
         Benchmark::Sydney(args) => sydney::run(args),
         Benchmark::Robustness(args) => robustness::run(args),
+        Benchmark::Scale(args) => scale::run(args),
     }?;
     Ok(Outcome::Success)
 }

@@ -11,6 +11,7 @@ mod plan;
 pub mod reproduction;
 mod resume;
 pub mod robustness;
+pub mod scale;
 pub mod sensor;
 pub mod sydney;
 #[cfg(test)]
