@@ -11,7 +11,7 @@ use super::journal::{read_json, write_json};
 use super::layout;
 use super::manifest::TOOL;
 use super::mesh::failed;
-use super::on_demand::{Clouds, Labelled};
+use super::on_demand::Clouds;
 use super::record::MeshFailure;
 use formats::rng::StreamKey;
 use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
@@ -67,7 +67,7 @@ pub struct Cut {
 }
 
 /// Takes a complete tar to where it is to be kept.
-pub type HandOver<'a> = &'a dyn Fn(&Path) -> Result<(), String>;
+pub type HandOver<'a> = &'a (dyn Fn(&Path) -> Result<(), String> + Sync);
 
 /// A part of a dataset to be made.
 pub struct Run<'a> {
@@ -86,7 +86,7 @@ pub struct Run<'a> {
     /// Given each tar once it is complete, if anybody takes them; says why it could not be handed over.
     pub hand_over: Option<HandOver<'a>>,
     /// Given a line when a tar is done.
-    pub say: &'a dyn Fn(String),
+    pub say: &'a (dyn Fn(String) + Sync),
 }
 
 /// Makes the tars of a part that are not there yet, of `meshes`, which are all of the dataset.
@@ -158,6 +158,14 @@ struct Filled {
     clouds: u64,
     /// By mesh.
     failures: BTreeMap<String, MeshFailure>,
+}
+
+/// What was cast and is to be written.
+enum Cast {
+    /// Points and labels.
+    Clouds(Vec<(Vec<[f32; 3]>, usize)>),
+    /// Scans, each with its place in the split and its number among [`Clouds`].
+    Scans(Vec<(usize, usize, formats::Scan)>),
 }
 
 /// In which order clouds are put into tars: each mesh once, in random order, then each once more from
@@ -255,10 +263,10 @@ impl Half<'_> {
     }
 
     /// Writes the samples of tar `number`, which is at `path`; `None` if the run is over before all
-    /// are there.
+    /// are there. One sample is written while the next is cast.
     fn fill(
         &self,
-        tar: &mut impl io::Write,
+        tar: &mut (impl io::Write + Send),
         number: u32,
         path: &Path,
     ) -> Result<Option<Filled>, DatasetError> {
@@ -270,31 +278,60 @@ impl Half<'_> {
             Sample::Scan => SCANS_AT_ONCE,
         };
         let mut filled = Filled::default();
-        for (nth, places) in places.chunks(at_once).enumerate() {
+        let mut cast: Option<Cast> = None;
+        for (nth, next) in places.chunks(at_once).map(Some).chain([None]).enumerate() {
             if self.run.is_over.load(SeqCst) {
                 return Ok(None);
             }
-            let indices: Vec<usize> = places.iter().map(|&place| self.order.at(place)).collect();
-            let (caster, seed) = (self.run.caster, self.run.config.seed);
-            let written = match self.run.cut.sample {
-                Sample::Clouds => {
-                    let drawn = self.clouds.draw_each(caster, seed, &indices)?;
-                    let clouds = self.kept(drawn, &indices, &mut filled)?;
-                    let key = format!("{}-{nth:03}", self.name(number));
-                    self.append_clouds(tar, &key, clouds)
-                }
-                Sample::Scan => {
-                    let cast = self.clouds.scan_each(caster, seed, &indices)?;
-                    let scans = self.kept(cast, &indices, &mut filled)?;
-                    scans.into_iter().try_for_each(|(nth, scan)| {
-                        self.append_scan(tar, places[nth], indices[nth], &scan)
-                    })
-                }
-            };
+            let (written, made) = rayon::join(
+                || cast.map_or(Ok(()), |cast| self.append(tar, number, nth - 1, cast)),
+                || next.map(|places| self.cast(places, &mut filled)).transpose(),
+            );
             written.map_err(|error| DatasetError::io(path, error))?;
+            cast = made?;
         }
         end(tar).map_err(|error| DatasetError::io(path, error))?;
         Ok(Some(filled))
+    }
+
+    /// Casts what comes at these `places`.
+    fn cast(&self, places: &[usize], filled: &mut Filled) -> Result<Cast, DatasetError> {
+        let indices: Vec<usize> = places.iter().map(|&place| self.order.at(place)).collect();
+        let (caster, seed) = (self.run.caster, self.run.config.seed);
+        Ok(match self.run.cut.sample {
+            Sample::Clouds => {
+                let drawn = self.clouds.draw_each(caster, seed, &indices)?;
+                let kept = self.kept(drawn, &indices, filled)?;
+                Cast::Clouds(
+                    kept.into_iter().map(|(_, cloud)| (cloud.points, cloud.label)).collect(),
+                )
+            }
+            Sample::Scan => {
+                let cast = self.clouds.scan_each(caster, seed, &indices)?;
+                let kept = self.kept(cast, &indices, filled)?;
+                let placed = |(nth, scan)| (places[nth], indices[nth], scan);
+                Cast::Scans(kept.into_iter().map(placed).collect())
+            }
+        })
+    }
+
+    /// Appends what was cast: sample `nth` of tar `number`, or a sample of each scan.
+    fn append(
+        &self,
+        tar: &mut impl io::Write,
+        number: u32,
+        nth: usize,
+        cast: Cast,
+    ) -> io::Result<()> {
+        match cast {
+            Cast::Clouds(clouds) => {
+                let npz = npz_of_clouds(&clouds, self.run.config.packed_points as usize)?;
+                append_file(tar, &format!("{}-{nth:03}.npz", self.name(number)), &npz)
+            }
+            Cast::Scans(scans) => scans
+                .iter()
+                .try_for_each(|(place, index, scan)| self.append_scan(tar, *place, *index, scan)),
+        }
     }
 
     /// What was made of the clouds of these `indices`, with the place of each among them, and counted
@@ -321,19 +358,6 @@ impl Half<'_> {
         }
         filled.clouds += kept.len() as u64;
         Ok(kept)
-    }
-
-    /// Appends a sample of clouds.
-    fn append_clouds(
-        &self,
-        tar: &mut impl io::Write,
-        key: &str,
-        clouds: Vec<(usize, Labelled)>,
-    ) -> io::Result<()> {
-        let clouds: Vec<_> =
-            clouds.into_iter().map(|(_, cloud)| (cloud.points, cloud.label)).collect();
-        let npz = npz_of_clouds(&clouds, self.run.config.packed_points as usize)?;
-        append_file(tar, &format!("{key}.npz"), &npz)
     }
 
     /// Appends a sample of one scan, whose key is its number in the split.
