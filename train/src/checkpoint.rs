@@ -16,11 +16,12 @@ use crate::trainer::Trainer;
 const MEAN: &str = ".adam_mean";
 const SQUARE: &str = ".adam_square";
 
-/// Writes the state of `trainer` to `path`, atomically, with `notes`.
+/// Writes the state of `trainer`, which learns from the data of this `digest`, to `path`, atomically, with
+/// `notes`.
 ///
 /// # Errors
 /// What the system reports.
-pub fn write(path: &Path, trainer: &mut Trainer, notes: &str) -> Result<(), Error> {
+pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> Result<(), Error> {
     let mut tensors = model_file::tensors(&mut trainer.model);
     for parameter in trainer.model.parameters() {
         for (suffix, values) in [(MEAN, &parameter.mean), (SQUARE, &parameter.square)] {
@@ -32,17 +33,20 @@ pub fn write(path: &Path, trainer: &mut Trainer, notes: &str) -> Result<(), Erro
         ("recipe", trainer.recipe.to_toml()?),
         ("step", trainer.step.to_string()),
         ("epoch", trainer.epoch.to_string()),
+        ("data", digest.to_owned()),
         ("notes", notes.to_owned()),
     ];
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value)).into();
     Ok(write_weights(path, &tensors, &metadata)?)
 }
 
-/// Sets `trainer` to the state in the checkpoint at `path`; returns its notes.
+/// Sets `trainer`, which learns from the data of this `digest`, to the state in the checkpoint at `path`;
+/// returns its notes.
 ///
 /// # Errors
-/// A file that is not a checkpoint, or a checkpoint of another recipe.
-pub fn read(path: &Path, trainer: &mut Trainer) -> Result<String, Error> {
+/// A file that is not a checkpoint, or a checkpoint of another recipe, of other data, or of more epochs
+/// than are wanted.
+pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, Error> {
     let mut file = WeightsFile::open(path)?;
     let metadata = file.metadata();
     let bad =
@@ -55,6 +59,9 @@ pub fn read(path: &Path, trainer: &mut Trainer) -> Result<String, Error> {
         text(key)?.parse().map_err(|_| bad(key, "expected a whole number"))
     };
     check_recipe(path, &text("recipe")?, &trainer.recipe)?;
+    if text("data")? != digest {
+        return Err(other_run(path, "its training data differ"));
+    }
     for Parameter { name, value, mean, square, .. } in trainer.model.parameters() {
         model_file::read_into(&mut file, name, value)?;
         model_file::read_into(&mut file, &format!("{name}{MEAN}"), mean)?;
@@ -65,6 +72,10 @@ pub fn read(path: &Path, trainer: &mut Trainer) -> Result<String, Error> {
     }
     trainer.step = number("step")?;
     trainer.epoch = number("epoch")? as u32;
+    if trainer.epoch > trainer.recipe.epochs {
+        let (has, wanted) = (trainer.epoch, trainer.recipe.epochs);
+        return Err(other_run(path, &format!("it has {has} epochs of {wanted}")));
+    }
     Ok(text("notes")?)
 }
 
@@ -76,10 +87,12 @@ fn check_recipe(path: &Path, before: &str, now: &Recipe) -> Result<(), Error> {
     let of_any_length = matches!(now.schedule, Schedule::Step { .. });
     let epochs = if of_any_length { now.epochs } else { before.epochs };
     if (Recipe { epochs, ..before }) != *now {
-        return Err(Error::OtherRun {
-            path: path.to_path_buf(),
-            cause: "its recipe differs; choose another --out, or remove it".to_owned(),
-        });
+        return Err(other_run(path, "its recipe differs"));
     }
     Ok(())
+}
+
+fn other_run(path: &Path, cause: &str) -> Error {
+    let cause = format!("{cause}; choose another --out, or remove it");
+    Error::OtherRun { path: path.to_path_buf(), cause }
 }

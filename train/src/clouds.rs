@@ -42,6 +42,17 @@ fn read_hdf5(path: &Path, _: Split) -> Result<LabelledSet, Error> {
 }
 
 impl Clouds {
+    /// A digest of all points, labels and classes.
+    #[must_use]
+    pub fn digest(&self) -> String {
+        let LabelledSet { points, labels, offsets, .. } = &self.set;
+        let mut bytes: Vec<u8> = points.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let numbers = labels.iter().chain(offsets);
+        bytes.extend(numbers.flat_map(|&number| (number as u64).to_le_bytes()));
+        bytes.extend(self.classes.join("\n").bytes());
+        formats::hash::of_bytes(&bytes)
+    }
+
     /// Reads the `split` of the data at `path`, and normalises it. `path` is a
     /// packed NPZ file; the common start of two names, as gen-dataset packs them
     /// (`rotational-noisy` for `rotational-noisy-train.npz` and

@@ -116,6 +116,8 @@ struct Run {
     metrics: Metrics,
     classes: Vec<String>,
     training_set: String,
+    /// Of what it learns from.
+    digest: String,
 }
 
 impl Run {
@@ -126,10 +128,11 @@ impl Run {
         let trainer = Trainer::new(job.recipe.clone(), classes.len())?;
         let training_set = job.data_name.to_owned();
         let metrics = Metrics::default();
-        let mut run = Self { folder, trainer, metrics, classes, training_set };
+        let digest = clouds.digest();
+        let mut run = Self { folder, trainer, metrics, classes, training_set, digest };
         let path = run.folder.join("checkpoint.safetensors");
         if path.is_file() {
-            let notes = checkpoint::read(&path, &mut run.trainer)?;
+            let notes = checkpoint::read(&path, &mut run.trainer, &run.digest)?;
             eprintln!("resuming after epoch {} of {}", run.trainer.epoch, job.recipe.epochs);
             run.metrics = Metrics::from_notes(&notes)
                 .map_err(|cause| FormatError::malformed(&path, "metadata `notes`", cause))?;
@@ -163,7 +166,7 @@ impl Run {
         self.metrics.write(&self.folder)?;
         let notes = self.metrics.to_notes();
         let path = self.folder.join("checkpoint.safetensors");
-        checkpoint::write(&path, &mut self.trainer, &notes)
+        checkpoint::write(&path, &mut self.trainer, &self.digest, &notes)
     }
 
     /// Learns for one epoch, with a progress bar on standard error.

@@ -46,9 +46,9 @@ fn a_resumed_run_is_the_unbroken_one_to_the_bit() {
     let mut broken = Trainer::new(recipe(), 3).unwrap();
     for (epoch, loss) in losses.iter().enumerate() {
         assert_eq!(broken.learn(&clouds, |_| {}).unwrap().loss, *loss, "epoch {epoch}");
-        checkpoint::write(&path, &mut broken, "a note").unwrap();
+        checkpoint::write(&path, &mut broken, "data", "a note").unwrap();
         broken = Trainer::new(recipe(), 3).unwrap();
-        assert_eq!(checkpoint::read(&path, &mut broken).unwrap(), "a note");
+        assert_eq!(checkpoint::read(&path, &mut broken, "data").unwrap(), "a note");
     }
     assert_eq!(parameters(&mut broken), parameters(&mut unbroken));
 }
@@ -69,17 +69,28 @@ fn the_number_of_threads_changes_nothing() {
 }
 
 #[test]
-fn a_checkpoint_of_another_recipe_is_refused() {
+fn a_checkpoint_of_another_recipe_or_of_other_data_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint.safetensors");
-    checkpoint::write(&path, &mut Trainer::new(recipe(), 3).unwrap(), "").unwrap();
+    checkpoint::write(&path, &mut Trainer::new(recipe(), 3).unwrap(), "data", "").unwrap();
     let mut longer = Trainer::new(Recipe { epochs: 9, ..recipe() }, 3).unwrap();
-    checkpoint::read(&path, &mut longer).unwrap();
+    checkpoint::read(&path, &mut longer, "data").unwrap();
     let mut other = Trainer::new(Recipe { batch: 9, ..recipe() }, 3).unwrap();
-    let error = checkpoint::read(&path, &mut other).unwrap_err();
-    assert!(matches!(error, Error::OtherRun { .. }), "{error}");
+    let mut shorter = Trainer::new(recipe(), 3).unwrap();
+    shorter.recipe.epochs = 0;
+    longer.epoch = 2;
+    checkpoint::write(&path, &mut longer, "data", "").unwrap();
+    for (trainer, data, cause) in [
+        (&mut other, "data", "its recipe differs"),
+        (&mut longer, "other data", "its training data differ"),
+        (&mut shorter, "data", "it has 2 epochs of 0"),
+    ] {
+        let error = checkpoint::read(&path, trainer, data).unwrap_err();
+        assert!(matches!(error, Error::OtherRun { .. }), "{error}");
+        assert!(error.to_string().contains(cause), "{error}");
+    }
     std::fs::write(&path, b"no checkpoint").unwrap();
-    assert!(checkpoint::read(&path, &mut longer).is_err());
+    assert!(checkpoint::read(&path, &mut longer, "data").is_err());
 }
 
 #[test]
