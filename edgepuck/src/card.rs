@@ -1,11 +1,12 @@
 //! `edgepuck card`: what a finished dataset is published with.
 
-use crate::{Outcome, Usage};
+use crate::Outcome;
+use anyhow::Context;
 use edgepuck_dataset::publish::{Publication, publish};
 use std::path::PathBuf;
 
 /// Flags of `card`.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct Args {
     /// Folder of a finished dataset
     #[arg(value_name = "DIR")]
@@ -17,7 +18,7 @@ pub struct Args {
 
     /// Licence of the dataset, as an identifier of SPDX, such as CC-BY-4.0. It is yours to know: the
     /// scans derive from your meshes
-    #[arg(long, value_name = "SPDX")]
+    #[arg(long, value_name = "SPDX", value_parser = license)]
     license: Option<String>,
 
     /// Address where the dataset will be found
@@ -39,24 +40,36 @@ pub struct Args {
 
 /// Writes the card and the metadata.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let own_name = || args.folder.canonicalize().ok()?.file_name()?.to_str().map(str::to_owned);
-    let name = args.name.clone().or_else(own_name);
-    let name = name.ok_or_else(|| Usage(format!("{}: expected a name", args.folder.display())))?;
-    let Args { license, url, creator, published, .. } = args;
-    let (license, url, creator) = (license.clone(), url.clone(), creator.clone());
-    let publication = Publication { name, license, url, creator, published: published.clone() };
-    for file in publish(&args.folder, &publication, args.overwrite)? {
+    let Args { folder, name, license, url, creator, published, overwrite } = args.clone();
+    let full = folder.canonicalize().with_context(|| folder.display().to_string())?;
+    let own_name = || full.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name = name.unwrap_or_else(own_name);
+    let publication = Publication { name, license, url, creator, published };
+    for file in publish(&folder, &publication, overwrite)? {
         eprintln!("{}", file.display());
     }
     Ok(Outcome::Success)
 }
 
+/// An identifier of SPDX, <https://spdx.org/licenses/>.
+fn license(text: &str) -> Result<String, String> {
+    let is_id = |c: char| c.is_ascii_alphanumeric() || "-.+".contains(c);
+    match !text.is_empty() && text.chars().all(is_id) {
+        true => Ok(text.to_owned()),
+        false => Err("expected an identifier of SPDX such as CC-BY-4.0".to_owned()),
+    }
+}
+
 /// A day, as ISO 8601 writes it.
 fn day(text: &str) -> Result<String, String> {
-    let is_of =
-        |pattern: char, c: char| if pattern == '0' { c.is_ascii_digit() } else { c == pattern };
-    let pattern = "0000-00-00";
-    let is_day =
-        text.len() == pattern.len() && pattern.chars().zip(text.chars()).all(|(p, c)| is_of(p, c));
-    if is_day { Ok(text.to_owned()) } else { Err("expected a day such as 2026-11-25".to_owned()) }
+    let numbers: Vec<u32> = text.split('-').filter_map(|part| part.parse().ok()).collect();
+    let is_written = |year: u32, month: u32, day: u32| {
+        (1..=12).contains(&month)
+            && (1..=31).contains(&day)
+            && text == format!("{year:04}-{month:02}-{day:02}")
+    };
+    match numbers[..] {
+        [year, month, day] if is_written(year, month, day) => Ok(text.to_owned()),
+        _ => Err("expected a day such as 2026-11-25".to_owned()),
+    }
 }

@@ -2,7 +2,7 @@
 //! the user.
 
 use crate::shell::posix_quoted;
-use crate::{Outcome, Usage};
+use crate::{Outcome, Usage, gen_dataset};
 use std::fmt::Write;
 
 formats::named! {
@@ -59,15 +59,12 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-fn job_file(args: &Args) -> Result<String, Usage> {
+fn job_file(args: &Args) -> anyhow::Result<String> {
     let own = ["--shard", "--resume", "--overwrite", "--verify"];
     if let Some(word) = args.words.iter().find(|word| own.iter().any(|own| word.starts_with(own))) {
-        return Err(Usage(format!("{word}: each task is told that by the job file")));
+        return Err(Usage(format!("{word}: each task is told that by the job file")).into());
     }
-    if !args.words.iter().any(|word| word.contains("webdataset")) {
-        let cause = "expected --layout webdataset among the words: tars are what tasks share";
-        return Err(Usage(cause.to_owned()));
-    }
+    gen_dataset::check_words_of_tasks(&args.words)?;
     let words: Vec<String> = args.words.iter().map(|word| quoted(word)).collect();
     let command =
         format!("edgepuck gen-dataset {} --resume --shard auto/{}", words.join(" "), args.parts);

@@ -34,6 +34,7 @@ fn what_cannot_be_described_is_refused_and_nothing_is_replaced() {
     let folder = Folder::with_meshes();
     folder.succeeds(&format!("{WORDS} --out out"));
     folder.succeeds(&format!("{WORDS} --out part --shard 1/2"));
+    folder.succeeds(&format!("{WORDS} --out tars --layout webdataset --shard 1/2"));
     folder.write("out/croissant.json", "mine");
     folder.refuses(
         1,
@@ -41,9 +42,19 @@ fn what_cannot_be_described_is_refused_and_nothing_is_replaced() {
             ("card out", "out/croissant.json: is there already; replace it with --overwrite"),
             ("card meshes", "meshes/manifest.json: expected a finished dataset's manifest"),
             ("card part", "expected a whole dataset, found part 0 of 2"),
+            ("card tars", "tars: is not finished; continue it with --resume"),
+            ("gen-dataset --verify tars", "tars: is not finished; continue it with --resume"),
+            ("card nowhere", "nowhere: No such file"),
         ],
     );
     assert!(!folder.at("out/README.md").exists());
-    folder.refuses(2, &[("card out --published 25.11.2026", "expected a day such as 2026-11-25")]);
+    folder.refuses(
+        2,
+        &[
+            ("card out --published 25.11.2026", "expected a day such as 2026-11-25"),
+            ("card out --published 2026-13-45", "expected a day such as 2026-11-25"),
+            ("card out --license Any:thing", "expected an identifier of SPDX such as CC-BY-4.0"),
+        ],
+    );
     folder.succeeds("card out --overwrite");
 }

@@ -42,7 +42,11 @@ fn words_that_the_job_file_settles_are_refused() {
     let folder = Folder::new();
     let cases = [
         ("cluster slurm --parts 3 -- meshes --layout webdataset --shard 1/3", "--shard: each task"),
-        ("cluster slurm --parts 3 -- meshes", "expected --layout webdataset"),
+        ("cluster slurm --parts 3 -- meshes --out o", "expected --layout webdataset"),
+        ("cluster slurm --parts 3 -- --layout webdataset --out o", "expected the folder"),
+        ("cluster slurm --parts 3 -- meshes --layout webdataset", "expected --out"),
+        ("cluster slurm --parts 3 -- meshes --out o --sensr vlp32c", "'--sensr'"),
+        ("cluster slurm --parts 3 -- meshes --out o --layout webdataset --help", "--help"),
         ("cluster slurm --parts 0 -- meshes", "--parts"),
         ("cluster pbs --parts 3 -- meshes", "pbs"),
         ("cluster slurm --parts 3", "WORDS"),

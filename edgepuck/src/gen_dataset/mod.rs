@@ -91,6 +91,33 @@ pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
     Settings::try_parse_from(words)?.config()
 }
 
+/// Checks words that are to be given to the tasks of a cluster, which read and write the same folders.
+/// These need not be here.
+///
+/// # Errors
+/// As [`config`]; no meshes, no output folder, or no tars.
+pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
+    #[derive(Parser)]
+    struct Words {
+        #[command(flatten)]
+        args: Args,
+    }
+    let words = std::iter::once("gen-dataset").chain(words.iter().map(String::as_str));
+    let Words { args } = Words::try_parse_from(words)
+        .map_err(|error| Usage(error.to_string().trim_start_matches("error: ").to_owned()))?;
+    let config = args.settings.config()?;
+    let missing = [
+        (args.meshes.is_none(), "the folder of the meshes"),
+        (args.out.is_none(), "--out"),
+        (!config.layouts.contains(&Layout::Webdataset), "--layout webdataset"),
+    ];
+    if let Some((_, word)) = missing.into_iter().find(|(is_missing, _)| *is_missing) {
+        let cause = format!("expected {word} among the words: tasks share folders and make tars");
+        return Err(Usage(cause).into());
+    }
+    Ok(check_layouts(&config, &[])?)
+}
+
 /// Makes or verifies a dataset.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if let Some(folder) = &args.verify {

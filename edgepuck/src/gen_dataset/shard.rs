@@ -45,7 +45,11 @@ impl Shard {
     fn of_array(of: u32, variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         let told = NUMBERS.iter().find_map(|name| Some((name, variable(name)?)));
         let (name, number) = told.ok_or_else(|| {
-            format!("auto: expected one of the variables {}, found none", NUMBERS.join(", "))
+            format!(
+                "auto: expected one of the variables {}, found none; outside a job array, give the \
+                 part, such as 1/{of}",
+                NUMBERS.join(", ")
+            )
         })?;
         match number.parse() {
             Ok(number) if number < of => Ok(Self { number, of }),

@@ -5,7 +5,7 @@ use edgepuck_dataset::config::DatasetConfig;
 use edgepuck_dataset::layout;
 use edgepuck_dataset::tars::{self, Cut, HandOver, PartManifest, Run, Sample};
 use edgepuck_dataset::{DatasetError, check_layouts};
-use signal_hook::consts::SIGTERM;
+use signal_hook::consts::{SIGINT, SIGTERM};
 use sim_gpu::mesh::tree::MeshEntry;
 use std::path::Path;
 use std::sync::Arc;
@@ -53,7 +53,11 @@ pub fn run(
     let caster = args.caster.open(&config.cast_effects())?;
     refuse_what_is_there(args, out, part)?;
     let is_over = Arc::new(AtomicBool::new(false));
-    signal_hook::flag::register(SIGTERM, Arc::clone(&is_over))?;
+    // A second signal ends the program at once.
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_default(signal, Arc::clone(&is_over))?;
+        signal_hook::flag::register(signal, Arc::clone(&is_over))?;
+    }
     let TarArgs { sample, tar_clouds, on_shard } = &args.tars;
     let hands_over = on_shard.as_ref().map(|command| {
         let is_over = Arc::clone(&is_over);
@@ -85,6 +89,10 @@ fn refuse_what_is_there(args: &super::Args, out: &Path, part: (u32, u32)) -> any
     let occupied = |what| DatasetError::Occupied { path: out.to_owned(), what };
     if layout::manifest(out).exists() || layout::journal(out).exists() {
         return Err(occupied("a dataset of another layout").into());
+    }
+    if part.1 == 1 && (args.overwrite || args.resume) {
+        // No other task writes here: what a killed run left is no one's.
+        formats::atomic::sweep_leftovers(out)?;
     }
     let there = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
     let is_own = |path: &Path| {

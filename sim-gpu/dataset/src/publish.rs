@@ -9,7 +9,7 @@ use super::error::DatasetError;
 use super::journal::{read_json, write_json};
 use super::layout;
 use super::manifest::Manifest;
-use super::tars::{Cut, PartManifest, RootManifest, Sample, root_file};
+use super::tars::{Cut, PartManifest, RootManifest, Sample, is_unfinished, root_file};
 use formats::hash::Hashing;
 use formats::{Split, atomic};
 use std::path::{Path, PathBuf};
@@ -73,7 +73,7 @@ impl Facts {
     fn of(out: &Path) -> Result<Self, DatasetError> {
         let is_of_tars = root_file(out).exists();
         let path = if is_of_tars { root_file(out) } else { layout::manifest(out) };
-        if layout::journal(out).exists() {
+        if layout::journal(out).exists() || is_unfinished(out) {
             return Err(DatasetError::Unfinished { path: out.into() });
         }
         let (version, config, classes, form) = if is_of_tars {

@@ -27,7 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 
 use manifest::{MOST_TARS, other_dataset, part_file, tar_stem, write_root};
 pub use manifest::{
-    PartManifest, PartRecord, RootManifest, TarRecord, is_of_part, root_file, verify,
+    PartManifest, PartRecord, RootManifest, TarRecord, is_of_part, is_unfinished, root_file, verify,
 };
 
 mod manifest;

@@ -156,6 +156,15 @@ pub fn root_file(out: &Path) -> PathBuf {
     out.join(ROOT_FILE)
 }
 
+/// Whether tars or lists of some parts are in `out`, but not the list of all parts.
+#[must_use]
+pub fn is_unfinished(out: &Path) -> bool {
+    let names = std::fs::read_dir(out).into_iter().flatten().flatten();
+    let mut names = names.filter_map(|entry| entry.file_name().into_string().ok());
+    let is_part = |name: &str| name.starts_with("part-") && name.ends_with(".json");
+    !root_file(out).exists() && names.any(|name| is_part(&name) || is_of_part(&name, (0, 1)))
+}
+
 /// Checks the tars of a finished dataset against their records; says what is wrong.
 ///
 /// # Errors
