@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_scenes::{Generation, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
@@ -106,6 +106,10 @@ pub fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
     let built_in = SCENE_RECIPES.iter().find(|(name, _)| Path::new(name) == recipe);
     Ok(match built_in {
         Some((_, text)) => Recipe::parse(text, recipe)?,
+        None if !recipe.exists() => {
+            let names = SCENE_RECIPES.map(|(name, _)| name).join(", ");
+            bail!("{}: expected a recipe's file, or one of {names}", recipe.display())
+        }
         None => Recipe::load(recipe)?,
     })
 }

@@ -11,6 +11,8 @@
 metres, angles degrees, times seconds. World and sensor have z up; sensors look along x.
 """
 
+from importlib.metadata import version as _version
+
 from ._edgepuck import Error, adapters, set_num_threads
 from .classifier import Classifier, Prediction
 from .dataset import Dataset
@@ -19,6 +21,8 @@ from .scan import Scan
 from .scenes import Scene, Scenes, scan_scene
 from .segment import segment
 from .sensor import Sensor
+
+__version__ = _version("edgepuck")
 
 __all__ = [
     "Classifier",

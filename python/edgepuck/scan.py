@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._edgepuck import Error
+
 # The names of columns in files that are no names in Python, or say too little there.
 _NAMES = {"return": "return_number", "sensor": "sensor_position"}
 
@@ -78,7 +80,13 @@ class Scan:
         return np.ascontiguousarray(from_sensor @ self.pose[:3, :3], dtype=np.float32)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an NPZ file that `edgepuck preview` and `edgepuck segment` read."""
+        """Write a file in NPZ that `edgepuck preview` and `edgepuck segment` read.
+
+        Raises:
+            Error: The file's name does not end in `.npz`.
+        """
+        if not os.fspath(path).endswith(".npz"):
+            raise Error(f"{os.fspath(path)}: expected a file that ends in .npz")
         names = {name: column for column, name in _NAMES.items()}
         columns = {field.name: getattr(self, field.name) for field in fields(self)}
         del columns["pose"]

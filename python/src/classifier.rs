@@ -41,6 +41,10 @@ impl Classifier {
             options.sampler.get_or_insert_default().points = points;
         }
         let bundled = BUNDLED.iter().find(|(name, _)| *name == model);
+        if bundled.is_none() && !Path::new(model).exists() {
+            let names = BUNDLED.map(|(name, _)| name).join(", ");
+            return Err(raised(format!("{model}: expected a model file, or one of {names}")));
+        }
         let loaded = py.detach(|| match bundled {
             Some((_, bytes)) => infer_cpu::Classifier::from_bytes(bytes, &options),
             None => infer_cpu::Classifier::load(Path::new(model), &options),

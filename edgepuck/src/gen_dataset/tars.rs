@@ -53,9 +53,9 @@ pub fn run(
     let caster = args.caster.open(&config.cast_effects())?;
     refuse_what_is_there(args, out, part)?;
     let is_over = Arc::new(AtomicBool::new(false));
-    // A second signal ends the program at once.
+    // A second Ctrl-C ends the program at once; schedulers may repeat SIGTERM.
+    signal_hook::flag::register_conditional_default(SIGINT, Arc::clone(&is_over))?;
     for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_default(signal, Arc::clone(&is_over))?;
         signal_hook::flag::register(signal, Arc::clone(&is_over))?;
     }
     let TarArgs { sample, tar_clouds, on_shard } = &args.tars;
