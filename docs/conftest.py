@@ -53,6 +53,8 @@ def unknown(example: Example) -> None:
 def enter(namespace: dict) -> None:
     namespace["folder"] = tempfile.TemporaryDirectory()
     namespace["torch_is_here"] = importlib.util.find_spec("torch") is not None
+    # Pages show scripts.
+    namespace["__name__"] = "__main__"
     namespace["before"] = os.getcwd()
     os.chdir(namespace["folder"].name)
 
