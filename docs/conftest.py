@@ -7,22 +7,25 @@ Each page is followed from its beginning in an empty folder of its own:
 - `python`: run, or with `>>>` compared with the answers that it shows;
 - `toml`: a file, whose name is the comment in its first line.
 
-A block of another language fails, so that none is left out.
+A block of another language, or of none, fails, so that none is left out.
 """
 
 import doctest
 import importlib.util
 import os
+import re
 import subprocess
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
-from sybil import Document, Example, Sybil
+from sybil import Document, Example, Region, Sybil
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipParser
 
 DIFFERENCES = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-# Minutes that a block may take.
+# The longest time of a block.
 LONGEST_S = 300
+LANGUAGES = ["sh", "text", "python", "toml"]
 
 
 def sh(example: Example) -> None:
@@ -46,8 +49,15 @@ def toml(example: Example) -> None:
     Path(name).write_text(example.parsed)
 
 
-def unknown(example: Example) -> None:
-    raise AssertionError("expected a block of sh, text, python or toml")
+def strangers(document: Document) -> Iterator[Region]:
+    """Blocks that no parser takes."""
+    for block in re.finditer(r"^[ \t]*(`{3,}|~{3,})([^\n]*)\n.*?^[ \t]*\1", document.text, re.DOTALL | re.MULTILINE):
+        if block[2] not in LANGUAGES:
+            yield Region(block.start(), block.end(), block[2], refuse)
+
+
+def refuse(example: Example) -> None:
+    raise AssertionError(f"expected a block of {', '.join(LANGUAGES)}, found {example.parsed!r}")
 
 
 def enter(namespace: dict) -> None:
@@ -71,7 +81,7 @@ pytest_collect_file = Sybil(
         CodeBlockParser("sh", sh),
         CodeBlockParser("text", text),
         CodeBlockParser("toml", toml),
-        CodeBlockParser("(?!(?:sh|text|python|toml)\\b)[a-z]*", unknown),
+        strangers,
     ],
     pattern="*.md",
     setup=enter,

@@ -1,9 +1,10 @@
 #!/bin/sh
-# Installs what tests need beyond Rust: software Vulkan, a C++ compiler for the
-# fuzz targets, what Open3D links to, PCL, a browser, what judges Debian packages, Slurm, GNU
-# parallel, PyTorch for the documentation's examples, for the Raspberry Pi an emulator and a model of its core, and the standard libraries of the targets
-# that code is checked for: the Raspberry Pi, and systems of Metal and of Direct3D 12.
-# Both the README and CI run this, through `cargo xtask test`.
+# Installs what tests need beyond Rust: software Vulkan, a C++ compiler for the fuzz targets,
+# what Open3D links to, PCL, a browser, what judges Debian packages, Slurm, GNU parallel,
+# PyTorch for the documentation's examples, for the Raspberry Pi an emulator and a model of its
+# core, and the standard libraries of the targets that code is checked for: the Raspberry Pi,
+# and systems of Metal and of Direct3D 12. Both the README and CI run this, through `cargo xtask
+# test`.
 set -eu
 
 backported="mesa-vulkan-drivers libvulkan1"

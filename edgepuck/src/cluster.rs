@@ -109,6 +109,7 @@ fn hyperqueue(Args { parts, cpus, .. }: &Args, command: &str) -> String {
     format!(
         "#!/bin/sh
 # A task array of HyperQueue: sh THIS_FILE, where a server runs and workers wait (`hq worker start`).
+# A task that was told to end has failed: submit this again, and what is there is kept.
 exec hq submit --name edgepuck --array 0-{last} --cpus {cpus} --crash-limit 20 -- sh -c {task}
 "
     )

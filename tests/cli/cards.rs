@@ -41,7 +41,7 @@ fn what_cannot_be_described_is_refused_and_nothing_is_replaced() {
         &[
             ("card out", "out/croissant.json: is there already; replace it with --overwrite"),
             ("card meshes", "meshes/manifest.json: expected a finished dataset's manifest"),
-            ("card part", "expected a whole dataset, found part 0 of 2"),
+            ("card part", "expected a whole dataset, found part 1 of 2"),
             ("card tars", "tars: is not finished; continue it with --resume"),
             ("gen-dataset --verify tars", "tars: is not finished; continue it with --resume"),
             ("card nowhere", "nowhere: No such file"),
@@ -57,4 +57,7 @@ fn what_cannot_be_described_is_refused_and_nothing_is_replaced() {
         ],
     );
     folder.succeeds("card out --overwrite");
+    // What is made anew is not what the card tells of.
+    folder.succeeds(&format!("{WORDS} --out out --overwrite --seed 1"));
+    assert!(!folder.at("out/README.md").exists() && !folder.at("out/croissant.json").exists());
 }

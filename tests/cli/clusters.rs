@@ -46,7 +46,14 @@ fn words_that_the_job_file_settles_are_refused() {
         ("cluster slurm --parts 3 -- --layout webdataset --out o", "expected the folder"),
         ("cluster slurm --parts 3 -- meshes --layout webdataset", "expected --out"),
         ("cluster slurm --parts 3 -- meshes --out o --sensr vlp32c", "'--sensr'"),
-        ("cluster slurm --parts 3 -- meshes --out o --layout webdataset --help", "--help"),
+        (
+            "cluster slurm --parts 3 -- meshes --out o --layout webdataset --help",
+            "--help: tasks make",
+        ),
+        (
+            "cluster slurm --parts 3 -- m --out o --layout webdataset --sensor vlp32c --simplify auto",
+            "--simplify",
+        ),
         ("cluster slurm --parts 0 -- meshes", "--parts"),
         ("cluster pbs --parts 3 -- meshes", "pbs"),
         ("cluster slurm --parts 3", "WORDS"),

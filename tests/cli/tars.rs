@@ -190,3 +190,19 @@ fn a_task_of_a_very_large_dataset_does_its_part_alone() {
     let part = folder.text("out/part-0006-of-900000.json");
     assert!(part.contains("train-000006.tar"), "{part}");
 }
+
+/// A scheduler's signal ends the command as well: the task is to be gone on with, and has not failed.
+#[test]
+#[cfg(unix)]
+fn a_run_that_is_told_to_end_while_a_tar_is_handed_over_is_interrupted() {
+    let folder = Folder::with_meshes();
+    let run = |command: &str| {
+        let words = format!("{WORDS} --out out --resume --tar-clouds 1000 --on-shard");
+        folder.edgepuck(&words.replace("--tar-clouds 4 ", "")).arg(command).output().unwrap()
+    };
+    let done = run("case {name} in test*) kill -TERM $PPID; exit 1;; esac");
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(75), "{said}");
+    assert!(said.contains("stopped after 2 of 2 tars"), "{said}");
+    assert_eq!(run("true").status.code(), Some(0));
+}

@@ -59,8 +59,14 @@ pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, 
         text(key)?.parse().map_err(|_| bad(key, "expected a whole number"))
     };
     check_recipe(path, &text("recipe")?, &trainer.recipe)?;
-    if text("data")? != digest {
+    // Checkpoints of earlier versions do not tell.
+    if metadata.get("data").is_none_or(|data| data != digest) {
         return Err(other_run(path, "its training data differ"));
+    }
+    let epoch = number("epoch")? as u32;
+    if epoch > trainer.recipe.epochs {
+        let cause = format!("expected at most {} epochs, found {epoch}", trainer.recipe.epochs);
+        return Err(other_run(path, &cause));
     }
     for Parameter { name, value, mean, square, .. } in trainer.model.parameters() {
         model_file::read_into(&mut file, name, value)?;
@@ -71,11 +77,7 @@ pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, 
         model_file::read_into(&mut file, &name, values)?;
     }
     trainer.step = number("step")?;
-    trainer.epoch = number("epoch")? as u32;
-    if trainer.epoch > trainer.recipe.epochs {
-        let (has, wanted) = (trainer.epoch, trainer.recipe.epochs);
-        return Err(other_run(path, &format!("it has {has} epochs of {wanted}")));
-    }
+    trainer.epoch = epoch;
     Ok(text("notes")?)
 }
 

@@ -46,11 +46,11 @@ impl Clouds {
     #[must_use]
     pub fn digest(&self) -> String {
         let LabelledSet { points, labels, offsets, .. } = &self.set;
-        let mut bytes: Vec<u8> = points.iter().flat_map(|x| x.to_le_bytes()).collect();
-        let numbers = labels.iter().chain(offsets);
-        bytes.extend(numbers.flat_map(|&number| (number as u64).to_le_bytes()));
-        bytes.extend(self.classes.join("\n").bytes());
-        formats::hash::of_bytes(&bytes)
+        let coordinates = |points: &[f32]| points.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let numbers = labels.iter().chain(offsets).flat_map(|&n| (n as u64).to_le_bytes());
+        let others = [numbers.collect(), self.classes.join("\n").into_bytes()];
+        let parts = points.chunks(1 << 16).map(coordinates).chain(others);
+        formats::hash::of_parts::<Vec<u8>>(parts)
     }
 
     /// Reads the `split` of the data at `path`, and normalises it. `path` is a

@@ -11,6 +11,7 @@ use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, flags, gen_shapes};
 use anyhow::Context;
 use clap::Parser;
+use clap::error::ErrorKind;
 use edgepuck_dataset::check_layouts;
 use edgepuck_dataset::config::{DatasetConfig, Layout};
 use edgepuck_dataset::finish::finish;
@@ -103,8 +104,10 @@ pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
         args: Args,
     }
     let words = std::iter::once("gen-dataset").chain(words.iter().map(String::as_str));
-    let Words { args } = Words::try_parse_from(words)
-        .map_err(|error| Usage(error.to_string().trim_start_matches("error: ").to_owned()))?;
+    let Words { args } = Words::try_parse_from(words).map_err(|error| match error.kind() {
+        ErrorKind::DisplayHelp => Usage("--help: tasks make a dataset".to_owned()),
+        _ => Usage(error.to_string().trim_start_matches("error: ").to_owned()),
+    })?;
     let config = args.settings.config()?;
     let missing = [
         (args.meshes.is_none(), "the folder of the meshes"),
@@ -115,7 +118,7 @@ pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
         let cause = format!("expected {word} among the words: tasks share folders and make tars");
         return Err(Usage(cause).into());
     }
-    Ok(check_layouts(&config, &[])?)
+    tars::check(&config)
 }
 
 /// Makes or verifies a dataset.

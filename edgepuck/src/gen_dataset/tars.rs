@@ -3,6 +3,7 @@
 use crate::{Outcome, Usage, shell};
 use edgepuck_dataset::config::DatasetConfig;
 use edgepuck_dataset::layout;
+use edgepuck_dataset::publish::retract;
 use edgepuck_dataset::tars::{self, Cut, HandOver, PartManifest, Run, Sample};
 use edgepuck_dataset::{DatasetError, check_layouts};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -43,12 +44,7 @@ pub fn run(
     config: &DatasetConfig,
     meshes: &[MeshEntry],
 ) -> anyhow::Result<Outcome> {
-    check_layouts(config, &[])?;
-    if config.simplify.is_some() {
-        let cause = "--simplify does not go with --layout webdataset, which reads a mesh again for \
-                     each tar";
-        return Err(Usage(cause.to_owned()).into());
-    }
+    check(config)?;
     let part = args.shard.map_or((0, 1), |shard| (shard.number, shard.of));
     let caster = args.caster.open(&config.cast_effects())?;
     refuse_what_is_there(args, out, part)?;
@@ -83,6 +79,17 @@ pub fn run(
     }
 }
 
+/// Checks that tars can hold what is asked for.
+pub fn check(config: &DatasetConfig) -> anyhow::Result<()> {
+    check_layouts(config, &[])?;
+    if config.simplify.is_some() {
+        let cause = "--simplify does not go with --layout webdataset, which reads a mesh again for \
+                     each tar";
+        return Err(Usage(cause.to_owned()).into());
+    }
+    Ok(())
+}
+
 /// Tars of this part that are there are gone on with or made anew only if that is asked for. What is not
 /// ours, or another part's, stays.
 fn refuse_what_is_there(args: &super::Args, out: &Path, part: (u32, u32)) -> anyhow::Result<()> {
@@ -90,9 +97,8 @@ fn refuse_what_is_there(args: &super::Args, out: &Path, part: (u32, u32)) -> any
     if layout::manifest(out).exists() || layout::journal(out).exists() {
         return Err(occupied("a dataset of another layout").into());
     }
-    if part.1 == 1 && (args.overwrite || args.resume) {
-        // No other task writes here: what a killed run left is no one's.
-        formats::atomic::sweep_leftovers(out)?;
+    if args.overwrite {
+        retract(out)?;
     }
     let there = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
     let is_own = |path: &Path| {

@@ -9,7 +9,8 @@ use super::error::DatasetError;
 use super::journal::{read_json, write_json};
 use super::layout;
 use super::manifest::Manifest;
-use super::tars::{Cut, PartManifest, RootManifest, Sample, is_unfinished, root_file};
+use super::tars::{Cut, PartManifest, PartRecord, RootManifest, Sample, root_file};
+use super::verify::is_unfinished;
 use formats::hash::Hashing;
 use formats::{Split, atomic};
 use std::path::{Path, PathBuf};
@@ -38,7 +39,7 @@ struct Facts {
     classes: Vec<String>,
     form: Form,
     /// The manifest's name and, in hexadecimal digits, its SHA-256.
-    manifest: (&'static str, String),
+    manifest: (String, String),
 }
 
 /// How a dataset is kept.
@@ -48,6 +49,9 @@ enum Form {
     /// Tars: of each split how many tars, and how many clouds or scans.
     Tars { cut: Cut, splits: Vec<(Split, u64, u64)> },
 }
+
+/// The card and the metadata.
+const FILES: [&str; 2] = ["README.md", "croissant.json"];
 
 /// Writes the card and the metadata of the finished dataset in `out`, and returns where they are.
 ///
@@ -60,44 +64,64 @@ pub fn publish(
     replace: bool,
 ) -> Result<[PathBuf; 2], DatasetError> {
     let facts = Facts::of(out)?;
-    let files = ["README.md", "croissant.json"].map(|name| out.join(name));
+    let files = FILES.map(|name| out.join(name));
     if let Some(path) = files.iter().find(|path| !replace && path.exists()) {
         return Err(DatasetError::Published { path: path.clone() });
     }
-    atomic::write_bytes(&files[0], card::card(publication, &facts))?;
-    write_json(&files[1], &croissant::metadata(publication, &facts))?;
+    let (card, metadata) =
+        (card::card(publication, &facts), croissant::metadata(publication, &facts));
+    write_json(&files[1], &metadata)?;
+    atomic::write_bytes(&files[0], card)?;
     Ok(files)
+}
+
+/// Removes what [`publish`] wrote into `out`, which is not true of what replaces the dataset there. A
+/// `README.md` that it did not write stays.
+///
+/// # Errors
+/// A file that cannot be read or removed.
+pub fn retract(out: &Path) -> Result<(), DatasetError> {
+    let [card, metadata] = FILES.map(|name| out.join(name));
+    if !metadata.exists() {
+        return Ok(());
+    }
+    layout::remove(&metadata)?;
+    match std::fs::read_to_string(&card) {
+        Ok(text) if text.ends_with(card::CLOSE) => layout::remove(&card),
+        _ => Ok(()),
+    }
 }
 
 impl Facts {
     fn of(out: &Path) -> Result<Self, DatasetError> {
-        let is_of_tars = root_file(out).exists();
-        let path = if is_of_tars { root_file(out) } else { layout::manifest(out) };
-        if layout::journal(out).exists() || is_unfinished(out) {
+        if is_unfinished(out) {
             return Err(DatasetError::Unfinished { path: out.into() });
         }
-        let (version, config, classes, form) = if is_of_tars {
-            let root: RootManifest = read_json(&path)?;
-            let form = Form::Tars { cut: root.cut, splits: splits(out, &root)? };
-            (root.version, root.config, root.classes, form)
-        } else {
-            let manifest = Manifest::read(&path)?;
-            if let Some((number, of)) = manifest.shard {
-                let cause =
-                    format!("expected a whole dataset, found part {number} of {of}; merge them");
-                return Err(DatasetError::Shard { path: out.into(), cause });
-            }
-            let classes = manifest.classes();
-            let scans = manifest.meshes.iter().flat_map(|mesh| &mesh.scans);
-            let scans = scans.map(|scan| scan.variants.len() as u64).sum();
-            let packed = manifest.packed.into_iter().map(|file| (file.file, file.clouds));
-            let form = Form::Files { scans, packed: packed.collect() };
-            (manifest.version, manifest.config, classes, form)
-        };
-        let name = if is_of_tars { "dataset.json" } else { "manifest.json" };
-        let hash = Hashing::Sha256.of_file(&path)?;
-        let digits = hash.map(|hash| hash.digits().to_owned()).unwrap_or_default();
-        Ok(Self { version, config, classes, form, manifest: (name, digits) })
+        if root_file(out).exists() { Self::of_tars(out) } else { Self::of_files(out) }
+    }
+
+    fn of_tars(out: &Path) -> Result<Self, DatasetError> {
+        let path = root_file(out);
+        let RootManifest { version, config, cut, classes, parts, .. } = read_json(&path)?;
+        let form = Form::Tars { cut, splits: splits(out, &parts)? };
+        Ok(Self { version, config, classes, form, manifest: named_hash(&path)? })
+    }
+
+    fn of_files(out: &Path) -> Result<Self, DatasetError> {
+        let path = layout::manifest(out);
+        let manifest = Manifest::read(&path)?;
+        if let Some((number, of)) = manifest.shard {
+            let part = number + 1;
+            let cause = format!("expected a whole dataset, found part {part} of {of}; merge them");
+            return Err(DatasetError::Shard { path: out.into(), cause });
+        }
+        let classes = manifest.classes();
+        let scans = manifest.meshes.iter().flat_map(|mesh| &mesh.scans);
+        let scans = scans.map(|scan| scan.variants.len() as u64).sum();
+        let packed = manifest.packed.into_iter().map(|file| (file.file, file.clouds)).collect();
+        let form = Form::Files { scans, packed };
+        let (version, config) = (manifest.version, manifest.config);
+        Ok(Self { version, config, classes, form, manifest: named_hash(&path)? })
     }
 
     /// How many clouds, or scans, there are in all.
@@ -117,10 +141,17 @@ impl Facts {
     }
 }
 
+/// A file's name and its SHA-256.
+fn named_hash(path: &Path) -> Result<(String, String), DatasetError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let hash = Hashing::Sha256.of_file(path)?.expect("invariant: SHA-256 was asked for");
+    Ok((name, hash.digits().to_owned()))
+}
+
 /// The splits that have tars, each with how many it has and how many clouds or scans they hold.
-fn splits(out: &Path, root: &RootManifest) -> Result<Vec<(Split, u64, u64)>, DatasetError> {
+fn splits(out: &Path, parts: &[PartRecord]) -> Result<Vec<(Split, u64, u64)>, DatasetError> {
     let mut tars = Vec::new();
-    for part in &root.parts {
+    for part in parts {
         tars.extend(read_json::<PartManifest>(&out.join(&part.file))?.tars);
     }
     let of = |split: Split| {

@@ -5,6 +5,7 @@ use super::error::DatasetError;
 use super::journal::{Journal, Terms};
 use super::layout;
 use super::manifest::{Manifest, is_plain};
+use super::publish::retract;
 use formats::atomic;
 use std::path::Path;
 
@@ -84,6 +85,7 @@ fn remove(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
     } else if let Ok(begun) = Journal::of(out).terms() {
         names.extend(layout::top_level(&begun.config));
     }
+    retract(out)?;
     // What a damaged journal calls a set must not lead out of the folder.
     names.iter().filter(|name| is_plain(name)).try_for_each(|name| layout::remove(&out.join(name)))
 }

@@ -35,11 +35,12 @@ mod manifest;
 /// Clouds of one sample, where samples are of clouds: 12 MiB at 1,024 points.
 const CLOUDS_PER_SAMPLE: usize = 1024;
 
-/// Points of one sample at most, but for one cloud: 768 MiB.
-const POINTS_PER_SAMPLE: usize = 1 << 26;
+/// Points of one sample at most, but for one cloud: 384 MiB. While one sample is written, the next is in
+/// memory as well.
+const POINTS_PER_SAMPLE: usize = 1 << 25;
 
-/// Scans that are in memory together.
-const SCANS_AT_ONCE: usize = 256;
+/// Scans that are cast together; as many are written meanwhile.
+const SCANS_AT_ONCE: usize = 128;
 
 /// Bytes of meshes that stay in memory.
 const CACHE_BYTES: usize = 1 << 30;
@@ -99,37 +100,40 @@ pub fn make(run: &Run, meshes: &[MeshEntry]) -> Result<PartManifest, DatasetErro
     let made_by = made_by(run, meshes);
     let mut classes = Vec::new();
     let (mut tars, mut not_handed_over) = (Vec::new(), Vec::new());
-    let (mut done, mut wanted) = (0, 0);
+    let mut halves = Vec::new();
     for split in Split::ALL {
         let clouds = Clouds::new(run.config.clone(), meshes, Some(split), CACHE_BYTES)?;
         classes = clouds.classes().to_vec();
         let half = Half { run, split, order: Order::new(run.config.seed, split, &clouds), clouds };
         let numbers = (run.part.0..half.tars()?).step_by(run.part.1 as usize);
-        wanted += numbers.len();
+        halves.push((half, numbers));
+    }
+    let wanted = halves.iter().map(|(_, numbers)| numbers.len()).sum();
+    let interrupted = |done| DatasetError::Interrupted { done, of: wanted, what: "tars" };
+    for (half, numbers) in halves {
         for number in numbers {
             match half.tar(number, &made_by)? {
-                None => continue,
+                None => return Err(interrupted(tars.len())),
                 Some(record) => tars.push(record),
             }
-            done += 1;
+            let done = tars.len();
             if let Some(record) = tars.last_mut().filter(|record| !record.handed_over)
                 && let Some(hand_over) = run.hand_over
             {
                 if run.is_over.load(SeqCst) {
-                    return Err(DatasetError::Interrupted { done, of: wanted, what: "tars" });
+                    return Err(interrupted(done));
                 }
                 match hand_over(&run.out.join(&record.file)) {
                     Ok(()) => {
                         record.handed_over = true;
                         write_json(&half.record(number), record)?;
                     }
+                    // The signal may have ended the command as well.
+                    Err(_) if run.is_over.load(SeqCst) => return Err(interrupted(done)),
                     Err(cause) => not_handed_over.push((record.file.clone(), cause)),
                 }
             }
         }
-    }
-    if done < wanted {
-        return Err(DatasetError::Interrupted { done, of: wanted, what: "tars" });
     }
     if let Some((first, cause)) = not_handed_over.first().cloned() {
         return Err(DatasetError::NotHandedOver { tars: not_handed_over.len(), first, cause });

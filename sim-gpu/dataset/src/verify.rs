@@ -5,7 +5,7 @@ use super::finish::failure_lines;
 use super::journal::Journal;
 use super::layout;
 use super::manifest::Manifest;
-use super::tars::is_unfinished;
+use super::tars;
 use formats::hash::{FileHash, Hashing};
 use formats::labelled::read_labelled;
 use formats::scan_file::{ScanFormat, read_scan};
@@ -58,7 +58,7 @@ impl Report {
 /// [`DatasetError::Unfinished`] or [`DatasetError::NoManifest`]; a manifest
 /// that cannot be read. What is wrong with other files is in the report.
 pub fn verify(out: &Path) -> Result<Report, DatasetError> {
-    if Journal::of(out).exists() || is_unfinished(out) {
+    if is_unfinished(out) {
         return Err(DatasetError::Unfinished { path: out.into() });
     }
     let manifest = Manifest::read(&layout::manifest(out))?;
@@ -78,6 +78,11 @@ pub fn verify(out: &Path) -> Result<Report, DatasetError> {
         hash: manifest.config.hash,
         problems,
     })
+}
+
+/// Whether a run in `out` is to be gone on with.
+pub(super) fn is_unfinished(out: &Path) -> bool {
+    Journal::of(out).exists() || tars::is_unfinished(out)
 }
 
 /// A file that the manifest names.

@@ -83,7 +83,7 @@ fn a_checkpoint_of_another_recipe_or_of_other_data_is_refused() {
     for (trainer, data, cause) in [
         (&mut other, "data", "its recipe differs"),
         (&mut longer, "other data", "its training data differ"),
-        (&mut shorter, "data", "it has 2 epochs of 0"),
+        (&mut shorter, "data", "expected at most 0 epochs, found 2"),
     ] {
         let error = checkpoint::read(&path, trainer, data).unwrap_err();
         assert!(matches!(error, Error::OtherRun { .. }), "{error}");

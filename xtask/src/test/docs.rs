@@ -81,3 +81,12 @@ pub fn run_blocks(wheel: &Wheel) -> anyhow::Result<Counts> {
     tests.env("PATH", join_paths(path)?);
     counts(&mut tests)
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn releases_build_the_site_with_the_version_that_is_tested() {
+        let release = include_str!("../../../.github/workflows/docs.yml");
+        assert!(release.contains(&format!("mdbook --version {} ", super::MDBOOK)));
+    }
+}

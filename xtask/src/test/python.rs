@@ -92,11 +92,15 @@ fn native(tools: &Path, with_pytorch: bool) -> anyhow::Result<Plan<'static>> {
 pub fn run_emulated(summary: &mut Summary) {
     let name = "wheel of aarch64";
     summary.step(name, |summary| {
-        let folder = cache_dir().join("aarch64-python");
-        let tools = match prepare_emulated(&folder) {
-            Ok(tools) => tools,
-            Err(cause) => return Ok(summary.skip(name, 1, &cause)),
+        if NATIVE == AARCH64 {
+            let reason = "this processor is of its kind, so `cargo xtask test` tests it";
+            return Ok(summary.skip(name, 1, reason));
+        }
+        let Some(emulator) = pi_target::emulator() else {
+            return Ok(summary.skip(name, 1, pi_target::NO_EMULATOR));
         };
+        let folder = cache_dir().join("aarch64-python");
+        let tools = prepare_emulated(&emulator, &folder)?;
         summary.remark(format!(
             "{name}: SKIPPED, test_memory.py, which would measure the emulator's memory, and tests \
              that fork: QEMU aborts once a child of a process with threads starts one"
@@ -109,16 +113,13 @@ pub fn run_emulated(summary: &mut Summary) {
 }
 
 /// Makes `folder` an environment of an emulated Python, and gives the interpreter that builds.
-fn prepare_emulated(folder: &Path) -> Result<PathBuf, String> {
-    if NATIVE == AARCH64 {
-        return Err("this processor is of its kind, so `cargo xtask test` tests it".to_owned());
-    }
-    let emulator = pi_target::emulator().ok_or(pi_target::NO_EMULATOR)?;
-    need_standard_library(AARCH64).map_err(|error| format!("{error:#}"))?;
+fn prepare_emulated(emulator: &Command, folder: &Path) -> anyhow::Result<PathBuf> {
+    need_standard_library(AARCH64)?;
     let mut make = Command::new("sh");
     make.arg(root().join("xtask/emulated-python.sh")).arg(folder);
-    succeeds(make.arg(emulator.get_program()).args(emulator.get_args()))?;
-    interpreter(&BUILD, true)
+    succeeds(make.arg(emulator.get_program()).args(emulator.get_args()))
+        .and_then(|()| interpreter(&BUILD, true))
+        .map_err(|cause| anyhow!(cause))
 }
 
 /// The wheel, for Pythons from 3.10 on.

@@ -4,11 +4,15 @@
 use super::{Facts, Form, Publication};
 use crate::config::{SetConfig, Viewpoints};
 use crate::tars::Sample;
+use formats::hash::Hashing;
 use sim_gpu::sensor::Views;
 use std::fmt::Write;
 
 /// What such datasets are found by.
 pub const TAGS: [&str; 4] = ["lidar", "point-cloud", "simulation", "synthetic"];
+
+/// How a card ends, by which it is known for one.
+pub const CLOSE: &str = "<!-- Written by `edgepuck card`. -->\n";
 
 /// How Hugging Face sorts datasets by size: the least number of samples, and the word.
 const SIZES: [(u64, &str); 11] = [
@@ -39,11 +43,16 @@ pub fn card(publication: &Publication, facts: &Facts) -> String {
     add("## How it was made");
     let sensors: Vec<String> = facts.config.sets.iter().map(sensor).collect();
     add(&sensors.join("\n"));
-    let effects = serde_json::to_string_pretty(&facts.config.effects).unwrap_or_default();
+    let effects = serde_json::to_string_pretty(&facts.config.effects)
+        .expect("invariant: effects are read from such files");
     add(&format!("Effects, as a scene of Edgepuck has them:\n\n```json\n{effects}\n```"));
     let (manifest, _) = &facts.manifest;
+    let hashes = match facts.config.hash {
+        Hashing::None => "",
+        Hashing::Sha256 | Hashing::Blake3 => " and leads to the hash of every file",
+    };
     add(&format!(
-        "`{manifest}` has the whole configuration and leads to the hash of every file. With it, the \
+        "`{manifest}` has the whole configuration{hashes}. With it, the \
          same version of Edgepuck ({}) makes the same bytes of the same meshes, on any number of \
          machines that have the same adapter. `edgepuck gen-dataset --verify FOLDER` checks the files.",
         facts.version
@@ -52,8 +61,9 @@ pub fn card(publication: &Publication, facts: &Facts) -> String {
     card.push_str(
         "It trains and compares classifiers of LiDAR point clouds where real scans with labels are \
          missing. Each scan holds one object without a background. It is simulated: an accuracy on it \
-         does not tell the accuracy on what a real sensor sees.\n",
+         does not tell the accuracy on what a real sensor sees.\n\n",
     );
+    card.push_str(CLOSE);
     card
 }
 
@@ -109,9 +119,12 @@ fn contents(facts: &Facts) -> String {
             }
             let sets: Vec<String> =
                 facts.config.sets.iter().map(|set| format!("`{}/`", set.name)).collect();
+            let variants: Vec<String> =
+                facts.config.variants.iter().map(|variant| format!("`{variant}`")).collect();
             format!(
-                "{table}\n| {} | {scans} scans, in metres, z upwards: `clean` or `noisy`, class, split |",
-                sets.join(", ")
+                "{table}\n| {} | {scans} scans, in metres, z upwards: {}, then class and split |",
+                sets.join(", "),
+                variants.join(" or "),
             )
         }
         Form::Tars { cut, splits } => {
@@ -151,8 +164,9 @@ fn viewpoints(views: &Views) -> String {
     let between =
         |from: f64, to: Option<f64>| to.map_or(format!("{from}"), |to| format!("{from} to {to}"));
     format!(
-        "{} views around each mesh, at {} m and an elevation of {} degrees",
+        "{} {} each mesh, at {} m and an elevation of {} degrees",
         views.count,
+        if views.count == 1 { "view of" } else { "views around" },
         between(views.distance_m, views.distance_to_m),
         between(views.elevation_deg, views.elevation_to_deg),
     )

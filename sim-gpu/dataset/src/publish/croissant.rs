@@ -1,13 +1,13 @@
 //! The metadata of a dataset in Croissant 1.1 (MLCommons, <https://docs.mlcommons.org/croissant/docs/croissant-spec-1.1.html>).
 //!
-//! The hash of the manifest stands for those of all files, which the manifest lists; so the metadata of
-//! a billion scans are as short as those of a hundred.
+//! The hash of the manifest stands for those of all files, which the manifest lists if the dataset has
+//! any; so the metadata of a billion scans are as short as those of a hundred. mlcroissant reads the classes
+//! and the list of files. It does not open NPZ files: their arrays are described for people and for search.
 
 use super::{Facts, Form, Publication};
 use crate::config::Variant;
 use crate::tars::Sample;
-use formats::Split;
-use formats::scan::{Attribute, ColumnSlot, Scan};
+use formats::scan::{ColumnSlot, Scan};
 use serde_json::{Map, Value, json};
 
 /// The words of Croissant that are used here, as its specification maps them.
@@ -21,7 +21,7 @@ pub fn metadata(publication: &Publication, facts: &Facts) -> Value {
         "@type": "cr:FileObject", "@id": manifest, "name": manifest, "contentUrl": manifest,
         "encodingFormat": "application/json", "sha256": sha256,
     })];
-    let mut records = vec![splits(), classes(&facts.classes)];
+    let mut records = vec![classes(&facts.classes)];
     match &facts.form {
         Form::Files { .. } => {
             files.push(file_set("scan-files", "application/x-npz", scan_patterns(facts), None));
@@ -46,6 +46,10 @@ pub fn metadata(publication: &Publication, facts: &Facts) -> Value {
                 Some("tar-files"),
             ));
             records.push(listed("part-manifests", "tars", &["file", "clouds", "bytes"]));
+            if cut.sample == Sample::Scan {
+                files.push(file_set("label-files", "text/plain", all("*.cls"), Some("tar-files")));
+                records.push(labels());
+            }
             records.push(match cut.sample {
                 Sample::Clouds => clouds("sample-files", facts),
                 Sample::Scan => scans("sample-files", facts),
@@ -116,26 +120,14 @@ fn field(set: &str, name: &str, data_type: &str) -> Value {
     json!({"@type": "cr:Field", "@id": id, "name": name, "dataType": data_type})
 }
 
-/// A field of NPZ files of `file_set`: an array of this shape, -1 where it differs by file.
-fn array(set: &str, name: &str, file_set: &str, shape: &str, what: &str) -> Value {
+/// A field of NPZ files of `file_set`: the array of this name and shape, -1 where it differs by file.
+fn array(set: &str, name: &str, file_set: &str, shape: &str) -> Value {
     let data_type = if name == "labels" { "sc:Integer" } else { "sc:Float" };
     let mut array = field(set, name, data_type);
-    array["description"] = json!(what);
     array["isArray"] = json!(true);
     array["arrayShape"] = json!(shape);
-    array["source"] = json!({"fileSet": {"@id": file_set}, "extract": {"fileProperty": "content"}});
+    array["source"] = json!({"fileSet": {"@id": file_set}, "extract": {"column": name}});
     array
-}
-
-fn splits() -> Value {
-    let fields = vec![field("splits", "name", "sc:Text"), field("splits", "url", "sc:URL")];
-    let urls = [(Split::Train, "cr:TrainingSplit"), (Split::Test, "cr:TestSplit")];
-    let data = urls.map(|(split, url)| json!({"splits/name": split, "splits/url": url}));
-    let mut set = record_set("splits", fields);
-    set["dataType"] = json!("cr:Split");
-    set["key"] = json!({"@id": "splits/name"});
-    set["data"] = json!(data);
-    set
 }
 
 fn classes(names: &[String]) -> Value {
@@ -164,43 +156,32 @@ fn listed(files: &str, list: &str, keys: &[&str]) -> Value {
 
 fn clouds(file_set: &str, facts: &Facts) -> Value {
     let shape = format!("-1,{},3", facts.config.packed_points);
-    let what = "By cloud and point: x, y, z, of mean 0 and scaled into the unit sphere";
-    let mut labels = array("clouds", "labels", file_set, "-1", "The class of each cloud");
+    let mut labels = array("clouds", "labels", file_set, "-1");
     labels["references"] = json!({"field": {"@id": "classes/label"}});
-    record_set("clouds", vec![array("clouds", "points", file_set, &shape, what), labels])
+    let mut set = record_set("clouds", vec![array("clouds", "points", file_set, &shape), labels]);
+    set["description"] = json!("Points: x, y, z, of mean 0 and scaled into the unit sphere");
+    set
 }
 
 fn scans(file_set: &str, facts: &Facts) -> Value {
-    let what = "By point: x, y, z, metres, z upwards";
-    let mut fields = vec![array("scan", "positions", file_set, "-1,3", what)];
+    let mut fields = vec![array("scan", "positions", file_set, "-1,3")];
     fields.extend(facts.config.attributes.iter().map(|attribute| {
         let shape = match Scan::default().slot(*attribute) {
             ColumnSlot::Vector(_) => "-1,3",
             _ => "-1,1",
         };
-        array("scan", attribute.name(), file_set, shape, unit(*attribute))
+        array("scan", attribute.name(), file_set, shape)
     }));
-    record_set("scan", fields)
+    let mut set = record_set("scan", fields);
+    set["description"] = json!("By point: metres, z upwards; seconds; radians");
+    set
 }
 
-/// What an attribute says of each point, as [`Scan`] has it.
-fn unit(attribute: Attribute) -> &'static str {
-    match attribute {
-        Attribute::Range => "Distance from where the beam starts, metres",
-        Attribute::Beam => "Number of the beam in the sensor's firing order",
-        Attribute::Ring => "Row of the beam, from the lowest elevation",
-        Attribute::Time => "Seconds since the revolution began",
-        Attribute::Triangle => "Triangle that was hit, in its mesh file's order",
-        Attribute::Object => "Object that was hit",
-        Attribute::Intensity => "Returned intensity, 0 to 1",
-        Attribute::Power => {
-            "Received power, relative to a white surface 1 m away that faces the sensor"
-        }
-        Attribute::Reflectivity => "Calibrated reflectivity, 0 to 255",
-        Attribute::Return => "Number of the return among those of its beam, 1 the nearest",
-        Attribute::Medium => "0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray",
-        Attribute::Sensor => "Where the sensor was when the beam was fired, metres",
-        Attribute::Attitude => "How the sensor was turned then: a vector along the axis, radians",
-        Attribute::Normal => "Unit normal of the surface, towards the sensor",
-    }
+/// The label of each scan of a tar, a file beside it.
+fn labels() -> Value {
+    let mut label = field("label", "label", "sc:Integer");
+    label["source"] =
+        json!({"fileSet": {"@id": "label-files"}, "extract": {"fileProperty": "content"}});
+    label["references"] = json!({"field": {"@id": "classes/label"}});
+    record_set("label", vec![label])
 }

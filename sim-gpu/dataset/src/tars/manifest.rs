@@ -7,8 +7,8 @@ use crate::error::DatasetError;
 use crate::journal::{read_json, write_json};
 use crate::layout;
 use crate::record::MeshFailure;
-use formats::Split;
 use formats::hash::{FileHash, Hashing};
+use formats::{Split, atomic};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -144,7 +144,10 @@ pub(super) fn write_root(out: &Path, own: &PartManifest) -> Result<(), DatasetEr
     }
     let PartManifest { tool, version, config, cut, classes, .. } = own.clone();
     let root = RootManifest { tool, version, config, cut, classes, parts };
-    write_json(&root_file(out), &root)
+    write_json(&root_file(out), &root)?;
+    // All tasks have ended: what killed ones left is no one's.
+    atomic::sweep_leftovers(out)?;
+    Ok(())
 }
 
 /// The name of the list of parts.
