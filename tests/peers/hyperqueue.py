@@ -1,4 +1,5 @@
-"""Tasks of HyperQueue and jobs of GNU parallel make the dataset that one run makes.
+"""Tasks of HyperQueue and jobs of GNU parallel, two of which are killed midway, make the dataset that one
+run makes.
 
 HyperQueue runs in this process, on a cluster of this machine. Run by `cargo xtask test`; see
 xtask/src/test/peers.rs.
@@ -23,19 +24,38 @@ def tars(folder):
     return {tar.name: tar.read_bytes() for tar in (OUT / folder).glob("*.tar")}
 
 
+def killed_once(task, scheduler):
+    """What two tasks do with their first tar: they are killed, and their next attempt is not."""
+    mark = f"{OUT}/{scheduler}-{task}"
+    return f"test {task} -gt 2 || test -e {mark} || {{ touch {mark}; kill -KILL $PPID; }}"
+
+
+def killed(scheduler):
+    return len(list(OUT.glob(f"{scheduler}-[0-9]")))
+
+
 def by_hyperqueue():
+    words = ["--shard", f"auto/{PARTS}", "--out", str(OUT / "hyperqueue"), "--on-shard"]
     with LocalCluster() as cluster:
         cluster.start_worker(WorkerConfig(cores=2))
         client = cluster.client()
-        job = Job()
-        for _ in range(PARTS):
-            job.program([EDGEPUCK, *WORDS, "--shard", f"auto/{PARTS}", "--out", str(OUT / "hyperqueue")])
-        client.wait_for_jobs([client.submit(job)])
+
+        def submitted():
+            job = Job()
+            for _ in range(PARTS):
+                job.program([EDGEPUCK, *WORDS, *words, killed_once("$((HQ_TASK_ID + 1))", "hq")])
+            return client.submit(job)
+
+        assert not client.wait_for_jobs([submitted()], raise_on_error=False)
+        assert killed("hq") == 2
+        client.wait_for_jobs([submitted()])
 
 
 def by_parallel():
-    command = [EDGEPUCK, *WORDS, "--shard", f"{{}}/{PARTS}", "--out", str(OUT / "parallel")]
-    run("parallel", "--will-cite", "--jobs", 2, *command, ":::", *range(1, PARTS + 1))
+    words = ["--shard", f"{{}}/{PARTS}", "--out", OUT / "parallel", "--on-shard", killed_once("{}", "parallel")]
+    options = ["--will-cite", "--quote", "--jobs", 2, "--retries", 2]
+    run("parallel", *options, EDGEPUCK, *WORDS, *words, ":::", *range(1, PARTS + 1))
+    assert killed("parallel") == 2
 
 
 edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 4, "--test", 1)
@@ -49,4 +69,4 @@ if shutil.which("parallel"):
     by_parallel()
     assert tars("parallel") == alone
     said += " and GNU parallel"
-print(f"{said}: {len(alone)} tars of {PARTS} tasks are those of one run")
+print(f"{said}: {len(alone)} tars of {PARTS} tasks, two of which were killed, are those of one run")
