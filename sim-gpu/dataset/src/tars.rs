@@ -112,26 +112,17 @@ pub fn make(run: &Run, meshes: &[MeshEntry]) -> Result<PartManifest, DatasetErro
     let interrupted = |done| DatasetError::Interrupted { done, of: wanted, what: "tars" };
     for (half, numbers) in halves {
         for number in numbers {
-            match half.tar(number, &made_by)? {
-                None => return Err(interrupted(tars.len())),
-                Some(record) => tars.push(record),
-            }
-            let done = tars.len();
-            if let Some(record) = tars.last_mut().filter(|record| !record.handed_over)
-                && let Some(hand_over) = run.hand_over
-            {
-                if run.is_over.load(SeqCst) {
-                    return Err(interrupted(done));
-                }
-                match hand_over(&run.out.join(&record.file)) {
-                    Ok(()) => {
-                        record.handed_over = true;
-                        write_json(&half.record(number), record)?;
-                    }
-                    // The signal may have ended the command as well.
-                    Err(_) if run.is_over.load(SeqCst) => return Err(interrupted(done)),
-                    Err(cause) => not_handed_over.push((record.file.clone(), cause)),
-                }
+            let Some(mut record) = half.tar(number, &made_by)? else {
+                return Err(interrupted(tars.len()));
+            };
+            let cause = half.hand_over(number, &mut record)?;
+            let file = record.file.clone();
+            tars.push(record);
+            match cause {
+                None => {}
+                // The signal may have ended the command as well.
+                Some(_) if run.is_over.load(SeqCst) => return Err(interrupted(tars.len())),
+                Some(cause) => not_handed_over.push((file, cause)),
             }
         }
     }
@@ -237,6 +228,26 @@ impl Half<'_> {
         let TarRecord { file, bytes, clouds, .. } = &record;
         (self.run.say)(format!("{file}: {clouds} clouds, {} MiB", bytes >> 20));
         Ok(Some(record))
+    }
+
+    /// Hands tar `number` over, unless it was or nobody takes it; says why it could not be.
+    fn hand_over(
+        &self,
+        number: u32,
+        record: &mut TarRecord,
+    ) -> Result<Option<String>, DatasetError> {
+        let Some(hand_over) = self.run.hand_over.filter(|_| !record.handed_over) else {
+            return Ok(None);
+        };
+        if self.run.is_over.load(SeqCst) {
+            return Ok(Some("the run is over".to_owned()));
+        }
+        if let Err(cause) = hand_over(&self.run.out.join(&record.file)) {
+            return Ok(Some(cause));
+        }
+        record.handed_over = true;
+        write_json(&self.record(number), record)?;
+        Ok(None)
     }
 
     /// Whether the tar of `record` is complete.
