@@ -13,7 +13,6 @@ use super::manifest::TOOL;
 use super::mesh::failed;
 use super::on_demand::Clouds;
 use super::record::MeshFailure;
-use formats::rng::StreamKey;
 use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
 use formats::{Split, atomic};
 use serde::{Deserialize, Serialize};
@@ -29,8 +28,10 @@ use manifest::{MOST_TARS, other_dataset, part_file, tar_stem, write_root};
 pub use manifest::{
     PartManifest, PartRecord, RootManifest, TarRecord, is_of_part, is_unfinished, root_file, verify,
 };
+use order::Order;
 
 mod manifest;
+mod order;
 
 /// Clouds of one sample, where samples are of clouds: 12 MiB at 1,024 points.
 const CLOUDS_PER_SAMPLE: usize = 1024;
@@ -161,33 +162,6 @@ enum Cast {
     Clouds(Vec<(Vec<[f32; 3]>, usize)>),
     /// Scans, each with its place in the split and its number among [`Clouds`].
     Scans(Vec<(usize, usize, formats::Scan)>),
-}
-
-/// In which order clouds are put into tars: each mesh once, in random order, then each once more from
-/// another side. So a tar has all classes if it has as many clouds as there are meshes.
-struct Order {
-    meshes: Vec<usize>,
-    views: usize,
-}
-
-impl Order {
-    fn new(seed: u64, split: Split, clouds: &Clouds) -> Self {
-        let views = clouds.config().sets[0].viewpoints.count().max(1);
-        let key = StreamKey::new(seed, &format!("tars/{split}"), 0);
-        let mut meshes: Vec<usize> = (0..clouds.len() / views).collect();
-        meshes.sort_by_cached_key(|&mesh| (key.words([mesh as u32, 0, 0, 0]), mesh));
-        Self { meshes, views }
-    }
-
-    fn len(&self) -> usize {
-        self.meshes.len() * self.views
-    }
-
-    /// The number among [`Clouds`] of what comes at this place.
-    fn at(&self, place: usize) -> usize {
-        let (view, rank) = (place / self.meshes.len(), place % self.meshes.len());
-        self.meshes[rank] * self.views + view
-    }
 }
 
 impl Half<'_> {

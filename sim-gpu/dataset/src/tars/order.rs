@@ -1,0 +1,32 @@
+//! Which cloud comes at which place of a split.
+
+use crate::on_demand::Clouds;
+use formats::Split;
+use formats::rng::StreamKey;
+
+/// In which order clouds are put into tars: each mesh once, in random order, then each once more from
+/// another side. So a tar has all classes if it has as many clouds as there are meshes.
+pub(super) struct Order {
+    meshes: Vec<usize>,
+    views: usize,
+}
+
+impl Order {
+    pub(super) fn new(seed: u64, split: Split, clouds: &Clouds) -> Self {
+        let views = clouds.config().sets[0].viewpoints.count().max(1);
+        let key = StreamKey::new(seed, &format!("tars/{split}"), 0);
+        let mut meshes: Vec<usize> = (0..clouds.len() / views).collect();
+        meshes.sort_by_cached_key(|&mesh| (key.words([mesh as u32, 0, 0, 0]), mesh));
+        Self { meshes, views }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.meshes.len() * self.views
+    }
+
+    /// The number among [`Clouds`] of what comes at this place.
+    pub(super) fn at(&self, place: usize) -> usize {
+        let (view, rank) = (place / self.meshes.len(), place % self.meshes.len());
+        self.meshes[rank] * self.views + view
+    }
+}
