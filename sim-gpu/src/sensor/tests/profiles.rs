@@ -151,7 +151,7 @@ fn bad_profiles_are_named() {
         (recipe, "keep_to = 0.75", "keep_to = 0.25", "rings.keep_to"),
         (recipe, "points = 768", "points = 0", "sample.points"),
         (recipe, "before_rings = 1024", "before_rings = 0", "sample.before_rings"),
-        (recipe, "count = 5", "count = 70000", "views.count"),
+        (recipe, "count = 5", "count = 4294967296", "expected u32"),
         (recipe, "distance_m = 5.0", "distance_m = 0", "views.distance_m"),
         (recipe, "normalize = \"bbox\"", "normalize = \"box\"", "unknown variant `box`"),
     ] {
