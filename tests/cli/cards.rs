@@ -13,6 +13,8 @@ fn a_dataset_of_either_form_has_a_card_and_metadata() {
     let folder = Folder::with_meshes();
     folder.succeeds(&format!("{WORDS} --out files"));
     folder.succeeds(&format!("{WORDS} --out tars --layout webdataset --tar-clouds 4"));
+    // Beside a manifest, other files are the user's.
+    folder.write("files/train-000001.tar", "mine");
     for (out, manifest) in [("files", "manifest.json"), ("tars", "dataset.json")] {
         folder.succeeds(&format!("card {out} {PUBLICATION}"));
         let (card, metadata) = (

@@ -41,7 +41,8 @@ def by_hyperqueue():
         client = cluster.client()
 
         def submitted():
-            job = Job()
+            # What tasks print lies there.
+            job = Job(default_workdir=OUT)
             for _ in range(PARTS):
                 job.program([EDGEPUCK, *WORDS, *words, killed_once("$((HQ_TASK_ID + 1))", "hq")])
             return client.submit(job)

@@ -88,8 +88,12 @@ pub struct Args {
 /// A flag that is none or has no such value; a sensor that is missing or does not go with the
 /// others.
 pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
-    let words = std::iter::once("gen-dataset").chain(flags.iter().map(String::as_str));
-    Settings::try_parse_from(words)?.config()
+    Settings::try_parse_from(behind_name(flags))?.config()
+}
+
+/// A command line of these `words`, which begins with the program's name.
+fn behind_name(words: &[String]) -> impl Iterator<Item = &str> {
+    std::iter::once("gen-dataset").chain(words.iter().map(String::as_str))
 }
 
 /// Checks words that are to be given to the tasks of a cluster, which read and write the same folders.
@@ -103,8 +107,8 @@ pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
         #[command(flatten)]
         args: Args,
     }
-    let words = std::iter::once("gen-dataset").chain(words.iter().map(String::as_str));
-    let Words { args } = Words::try_parse_from(words).map_err(|error| match error.kind() {
+    let parsed = Words::try_parse_from(behind_name(words));
+    let Words { args } = parsed.map_err(|error| match error.kind() {
         ErrorKind::DisplayHelp => Usage("--help: tasks make a dataset".to_owned()),
         _ => Usage(error.to_string().trim_start_matches("error: ").to_owned()),
     })?;

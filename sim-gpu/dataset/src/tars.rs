@@ -185,14 +185,14 @@ impl Half<'_> {
         let path = self.record(number);
         if path.exists() {
             let record: TarRecord = read_json(&path)?;
-            if record.made_by == made_by && (record.handed_over || self.is_there(&record)) {
+            if record.made_by != made_by {
+                return Err(other_dataset(path, ""));
+            }
+            if record.handed_over || self.is_there(&record) {
                 return Ok(Some(record));
             }
-            if record.made_by == made_by {
-                layout::remove(&path)?;
-                return self.tar(number, made_by);
-            }
-            return Err(other_dataset(path, ""));
+            // Its tar is torn or gone.
+            layout::remove(&path)?;
         }
         if self.run.is_over.load(SeqCst) {
             return Ok(None);

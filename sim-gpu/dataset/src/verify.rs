@@ -82,7 +82,8 @@ pub fn verify(out: &Path) -> Result<Report, DatasetError> {
 
 /// Whether a run in `out` is to be gone on with.
 pub(super) fn is_unfinished(out: &Path) -> bool {
-    Journal::of(out).exists() || tars::is_unfinished(out)
+    // Beside a manifest, other files are the user's.
+    Journal::of(out).exists() || !layout::manifest(out).exists() && tars::is_unfinished(out)
 }
 
 /// A file that the manifest names.

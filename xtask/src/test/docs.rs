@@ -2,10 +2,9 @@
 
 use super::meanwhile::Meanwhile;
 use super::peers::programs;
-use super::python::{Wheel, counts, pytest};
+use super::python::{Wheel, counts, environment, path_behind, pytest};
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow, ensure};
-use std::env::{join_paths, split_paths, var_os};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use xtask::venv::{cache_dir, succeeds};
@@ -59,13 +58,10 @@ pub fn build_site(summary: &mut Summary, mdbook_build: Option<anyhow::Result<Mea
 /// Runs the code blocks of all pages, and the Python package's examples of PyTorch, as a user who
 /// has installed the `wheel`.
 pub fn run_blocks(wheel: &Wheel) -> anyhow::Result<Counts> {
-    let folder = cache_dir().join("docs-venv");
     let has_pytorch = succeeds(Command::new(SYSTEM_PYTHON).args(["-c", "import torch"])).is_ok();
     let base = if has_pytorch { Path::new(SYSTEM_PYTHON) } else { &wheel.tools };
-    let mut make = Command::new(base);
     // Debian's Python has no pip to put there: that of the tools installs one.
-    make.args(["-m", "venv", "--clear", "--without-pip", "--system-site-packages"]).arg(&folder);
-    succeeds(&mut make).map_err(|cause| anyhow!(cause))?;
+    let folder = environment(base, "docs-venv", &["--system-site-packages"])?;
     let python = folder.join("bin/python");
     wheel.install(&python, &["docs/requirements.txt"])?;
 
@@ -74,11 +70,11 @@ pub fn run_blocks(wheel: &Wheel) -> anyhow::Result<Counts> {
     // `pip install edgepuck` finds the wheel; our other programs are those that the tests have built.
     let wheels = wheel.file.parent().context("invariant: a file is in a folder")?;
     tests.env("PIP_FIND_LINKS", wheels).env("PIP_NO_INDEX", "1");
-    let programs = programs()?;
-    let built = programs.iter().filter_map(|(_, program)| program.parent()).map(Path::to_path_buf);
-    let others = var_os("PATH").unwrap_or_default();
-    let path = [folder.join("bin")].into_iter().chain(built.take(1)).chain(split_paths(&others));
-    tests.env("PATH", join_paths(path)?);
+    let [(_, program), ..] = programs()?;
+    tests.env(
+        "PATH",
+        path_behind([Some(&*folder.join("bin")), program.parent()].into_iter().flatten())?,
+    );
     counts(&mut tests)
 }
 

@@ -5,6 +5,7 @@ use super::docs;
 use super::peers::interpreter;
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow, ensure};
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -77,10 +78,7 @@ pub fn run(summary: &mut Summary, install: bool, with_pytorch: bool) {
 }
 
 fn native(tools: &Path, with_pytorch: bool) -> anyhow::Result<Plan<'static>> {
-    let folder = cache_dir().join("python-test-venv");
-    let mut venv = Command::new(tools);
-    let made = venv.args(["-m", "venv", "--clear", "--without-pip"]).arg(&folder).status()?;
-    ensure!(made.success(), "{}: the environment cannot be made", folder.display());
+    let folder = environment(tools, "python-test-venv", &[])?;
     let requirements: &[&str] = match with_pytorch {
         true => &[TESTS_NEED, "tests/peers/pytorch-requirements.txt"],
         false => &[TESTS_NEED],
@@ -133,10 +131,7 @@ fn build(tools: PathBuf, plan: &Plan<'_>) -> anyhow::Result<Wheel> {
     maturin.args(["--compatibility", PLATFORM, "--target", plan.target, "--out"]).arg(&wheels);
     maturin.arg("--manifest-path").arg(root().join("python/Cargo.toml"));
     // maturin asks the first Python on the path for zig.
-    let own = tools.parent().into_iter().map(Path::to_path_buf);
-    let others = std::env::var_os("PATH").unwrap_or_default();
-    let path = std::env::join_paths(own.chain(std::env::split_paths(&others)))?;
-    maturin.env("PATH", path);
+    maturin.env("PATH", path_behind(tools.parent())?);
     let status = maturin.status().context("cannot start maturin")?;
     ensure!(status.success(), "maturin: {status}");
     let built = fs::read_dir(&wheels).with_context(|| wheels.display().to_string())?;
@@ -178,6 +173,22 @@ impl Wheel {
         }
         succeeds(&mut install).map_err(|cause| anyhow!(cause))
     }
+}
+
+/// A new environment of this name and without pip, for Python `base`.
+pub fn environment(base: &Path, name: &str, options: &[&str]) -> anyhow::Result<PathBuf> {
+    let folder = cache_dir().join(name);
+    let mut make = Command::new(base);
+    make.args(["-m", "venv", "--clear", "--without-pip"]).args(options).arg(&folder);
+    succeeds(&mut make).map_err(|cause| anyhow!("{}: {cause}", folder.display()))?;
+    Ok(folder)
+}
+
+/// The path on which programs are looked for, with these `folders` before all others.
+pub fn path_behind<'a>(folders: impl IntoIterator<Item = &'a Path>) -> anyhow::Result<OsString> {
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let folders = folders.into_iter().map(Path::to_path_buf);
+    Ok(std::env::join_paths(folders.chain(std::env::split_paths(&others)))?)
 }
 
 /// pytest in `folder`, in which no package must lie that could be taken for the installed one.

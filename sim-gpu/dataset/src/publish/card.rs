@@ -15,7 +15,7 @@ pub const TAGS: [&str; 4] = ["lidar", "point-cloud", "simulation", "synthetic"];
 pub const CLOSE: &str = "<!-- Written by `edgepuck card`. -->\n";
 
 /// How Hugging Face sorts datasets by size: the least number of samples, and the word.
-const SIZES: [(u64, &str); 11] = [
+const SIZES: [(u64, &str); 10] = [
     (1_000_000_000_000, "n>1T"),
     (100_000_000_000, "100B<n<1T"),
     (10_000_000_000, "10B<n<100B"),
@@ -26,8 +26,10 @@ const SIZES: [(u64, &str); 11] = [
     (100_000, "100K<n<1M"),
     (10_000, "10K<n<100K"),
     (1_000, "1K<n<10K"),
-    (0, "n<1K"),
 ];
+
+/// The word for fewer than all of these.
+const SMALLEST: &str = "n<1K";
 
 /// The card of a dataset.
 pub fn card(publication: &Publication, facts: &Facts) -> String {
@@ -89,7 +91,7 @@ fn front_matter(publication: &Publication, facts: &Facts) -> String {
     lines.push(format!("pretty_name: {}", quoted(&publication.name)));
     lines.push("task_categories: [other]".to_owned());
     let size =
-        SIZES.iter().find(|(least, _)| facts.count() >= *least).map_or("n<1K", |size| size.1);
+        SIZES.iter().find(|(least, _)| facts.count() >= *least).map_or(SMALLEST, |size| size.1);
     lines.push(format!("size_categories: [{}]", quoted(size)));
     if let Form::Tars { splits, .. } = &facts.form {
         tags.push("webdataset");

@@ -31,7 +31,8 @@ pub fn metadata(publication: &Publication, facts: &Facts) -> Value {
                 vec!["packed/*.npz".into()],
                 None,
             ));
-            records.push(listed(manifest, "packed", &["file", "clouds"]));
+            let lists = json!({"fileObject": {"@id": manifest}});
+            records.push(listed(&lists, "packed", &["file", "clouds"]));
             records.push(scans("scan-files", facts));
             records.push(clouds("packed-files", facts));
         }
@@ -45,7 +46,8 @@ pub fn metadata(publication: &Publication, facts: &Facts) -> Value {
                 all("*.npz"),
                 Some("tar-files"),
             ));
-            records.push(listed("part-manifests", "tars", &["file", "clouds", "bytes"]));
+            let lists = json!({"fileSet": {"@id": "part-manifests"}});
+            records.push(listed(&lists, "tars", &["file", "clouds", "bytes"]));
             if cut.sample == Sample::Scan {
                 files.push(file_set("label-files", "text/plain", all("*.cls"), Some("tar-files")));
                 records.push(labels());
@@ -140,15 +142,13 @@ fn classes(names: &[String]) -> Value {
     set
 }
 
-/// The list `list` in JSON files: by entry, the values of `keys`.
-fn listed(files: &str, list: &str, keys: &[&str]) -> Value {
+/// The list `list` in the JSON files of `source`: by entry, the values of `keys`.
+fn listed(source: &Value, list: &str, keys: &[&str]) -> Value {
     let of = |key: &&str| {
         let data_type = if *key == "file" { "sc:Text" } else { "sc:Integer" };
         let mut one = field(list, key, data_type);
-        let kind = if files == "part-manifests" { "fileSet" } else { "fileObject" };
-        one["source"] = json!({
-            kind: {"@id": files}, "extract": {"jsonPath": format!("$.{list}[*].{key}")},
-        });
+        one["source"] = source.clone();
+        one["source"]["extract"] = json!({"jsonPath": format!("$.{list}[*].{key}")});
         one
     };
     record_set(list, keys.iter().map(of).collect())

@@ -59,6 +59,7 @@ pub fn run(args: &ScaleArgs) -> Result<()> {
         cast_cpu_s,
         bytes: task.bytes as f64 / task.clouds as f64,
     });
+    let [small, large] = equal.each_ref().map(|task| task.costs.cpu_s().median);
     let tasks: Vec<Task> = start_ups.into_iter().chain(equal).chain(samples).collect();
     let tables = [
         measured(&tasks),
@@ -67,8 +68,7 @@ pub fn run(args: &ScaleArgs) -> Result<()> {
         links(&clouds, &scans),
         shares(&clouds),
     ];
-    let ratio = tasks[3].costs.cpu_s().median / tasks[4].costs.cpu_s().median;
-    let mut text = heading(&machine, cast_cpu_s, ratio);
+    let mut text = heading(&machine, cast_cpu_s, small / large);
     tables.iter().for_each(|table| text += &(table.markdown() + "\n"));
     text += NOTES;
     print!("{text}");
