@@ -10,9 +10,16 @@ shift
 rm -rf "$folder"
 mkdir -p "$folder/apt/lists/partial" "$folder/apt/archives/partial" "$folder/bin"
 
+# shellcheck disable=SC2016
+mirror="$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Origin: Debian' \
+    'Component: main' | head -n 1)"
+if [ -z "$mirror" ]; then
+    echo "expected a mirror of Debian among the sources of apt, found none" >&2
+    exit 1
+fi
 # The oldest release whose Python has wheels of the tests' NumPy.
 keys=/usr/share/keyrings/debian-archive-keyring.gpg
-echo "deb [signed-by=$keys] http://deb.debian.org/debian bookworm main" >"$folder/apt/sources.list"
+echo "deb [signed-by=$keys] $mirror bookworm main" >"$folder/apt/sources.list"
 # No package is installed yet.
 : >"$folder/apt/status"
 apt() {

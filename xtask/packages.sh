@@ -73,15 +73,45 @@ if [ "$(id -u)" -ne 0 ]; then
     root="sudo"
 fi
 
+# Adds the backports of this Debian from the mirror that the machine's own sources name, with the
+# options of that source.
+add_backports() {
+    # shellcheck disable=SC2016
+    entry="$(apt-get indextargets --format '$(SOURCESENTRY)' "Codename: $VERSION_CODENAME" \
+        'Created-By: Packages' 'Origin: Debian' 'Component: main' | head -n 1)"
+    file="${entry%:*}"
+    number="${entry##*:}"
+    added="/etc/apt/sources.list.d/edgepuck-backports.${file##*.}"
+    # Entry `number` is a paragraph of a .sources file, and a line of a .list file.
+    source="$(case "$file" in
+        *.sources) awk -v RS= -v number="$number" -v suites="Suites: $backports" 'NR == number {
+            sub(/Suites:[^\n]*(\n[ \t][^\n]*)*/, suites); print }' "$file" ;;
+        *.list) sed -nE "${number}s|^(deb[[:blank:]]+(\[[^]]*\][[:blank:]]*)?[^[:blank:]]+)\
+[[:blank:]]+[^[:blank:]]+|\1 $backports|p" "$file" ;;
+    esac)"
+    [ -n "$source" ] || return 1
+    echo "$source" | $root tee "$added" >/dev/null
+    $root apt-get update -qq -o Dir::Etc::sourcelist="$added" -o Dir::Etc::sourceparts=- \
+        -o APT::Get::List-Cleanup=0 -o APT::Update::Error-Mode=any && return 0
+    $root rm "$added"
+    return 1
+}
+
 echo "Installing:$missing"
+$root apt-get update -qq
 . /etc/os-release
 release=""
-if [ "${VERSION_CODENAME:-}" = bookworm ]; then
-    echo "deb http://deb.debian.org/debian bookworm-backports main" |
-        $root tee /etc/apt/sources.list.d/edgepuck-backports.list >/dev/null
-    release="-t bookworm-backports"
+if [ "${VERSION_CODENAME:-}" = bookworm ] && [ -n "$missing_backported" ]; then
+    backports="$VERSION_CODENAME-backports"
+    # shellcheck disable=SC2016
+    known="$(apt-get indextargets --format '$(CODENAME)' "Codename: $backports")"
+    if [ -n "$known" ] || add_backports; then
+        release="-t $backports"
+    else
+        echo "The sources of apt name no mirror with $backports:" \
+            "installing$missing_backported of $VERSION_CODENAME." >&2
+    fi
 fi
-$root apt-get update -qq
 if ! has_llvm_mca; then
     for llvm in $llvms; do
         if apt-cache show "llvm-$llvm" >/dev/null 2>&1; then
