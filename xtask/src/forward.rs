@@ -4,13 +4,10 @@ use anyhow::Context;
 use formats::modelnet_h5_list;
 use std::ffi::OsString;
 use std::process::Command;
-use xtask::workspace::cargo_run;
+use xtask::workspace::{LAB, cargo_run};
 
 /// The product.
 pub const EDGEPUCK: &str = "edgepuck";
-
-/// The laboratory, which measures.
-pub const LAB: &str = "edgepuck-lab";
 
 /// Commands of the product that read or write no network. A first build for them
 /// leaves out the feature `models`: infer-cpu, and readers and writers of PyTorch's

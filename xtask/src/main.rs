@@ -6,10 +6,11 @@ mod summary;
 mod test;
 
 use clap::{Parser, Subcommand};
-use forward::{EDGEPUCK, LAB};
+use forward::EDGEPUCK;
 use std::ffi::OsString;
 use std::process::ExitCode;
 use xtask::build_pi;
+use xtask::workspace::LAB;
 
 /// Runs the developer commands of Edgepuck's repository.
 ///

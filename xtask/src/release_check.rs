@@ -96,7 +96,7 @@ mod tests {
         for name in ["edgepuck", "edgepuck-formats", "sim-gpu", "infer-cpu"] {
             assert!(is_published(name), "{name}");
         }
-        for name in ["xtask", "tests", "edgepuck-lab"] {
+        for name in ["xtask", "tests"] {
             assert!(!is_published(name), "{name}");
         }
     }

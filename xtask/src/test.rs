@@ -9,10 +9,10 @@ mod sanitize;
 mod targets;
 mod test_programs;
 
-use crate::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary, check};
 use anyhow::{bail, ensure};
 use std::process::Command;
-use xtask::workspace::{cargo, output, root};
+use xtask::workspace::{cargo, cargo_in_lab, output, root};
 
 /// The script that lists and installs the packages that tests need.
 const PACKAGES: &str = "xtask/packages.sh";
@@ -69,6 +69,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
         summary.command(&name, lints.args(["--", "--deny", "warnings"]));
     }
     summary.step("tests", |summary| tests(summary, install));
+    summary.step("laboratory", |summary| laboratory(summary, install));
     let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
     summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
     summary.step("dependencies", |_| infer_cpu_is_light());
@@ -96,9 +97,29 @@ fn cargo_on_all(words: &[&str]) -> Command {
     let mut command = cargo(words);
     command.args(["--workspace", "--features", "edgepuck/hdf5,edgepuck/textures,train/hdf5"]);
     if has_cpp_compiler() {
-        command.args(["--features", "edgepuck/simplify,edgepuck-lab/simplify,tests/simplify"]);
+        command.args(["--features", "edgepuck/simplify,tests/simplify"]);
     }
     command
+}
+
+/// A command of Cargo on the laboratory's workspace.
+fn cargo_on_lab(words: &[&str]) -> Command {
+    let mut command = cargo_in_lab(words);
+    command.args(["--features", if has_cpp_compiler() { "hdf5,simplify" } else { "hdf5" }]);
+    command
+}
+
+/// The format, lints and tests of the laboratory.
+fn laboratory(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
+    let manifest = root().join("xtask/lab/Cargo.toml");
+    check("format", cargo(&["fmt", "--check", "--manifest-path"]).arg(manifest))?;
+    let mut lints = cargo_on_lab(&["clippy", "--all-targets"]);
+    check("lints", lints.args(["--", "--deny", "warnings"]))?;
+    let mut tests = cargo_on_lab(&["test", "--no-fail-fast"]);
+    if required {
+        tests.env(test_support::REQUIRE_ADAPTER, "1");
+    }
+    test_programs::run(summary, &mut tests)
 }
 
 /// The tests of all crates.

@@ -6,6 +6,9 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// The laboratory, which measures: a workspace of its own.
+pub const LAB: &str = "edgepuck-lab";
+
 /// The workspace's root.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
@@ -18,6 +21,22 @@ pub fn cargo(args: &[&str]) -> Command {
     command
 }
 
+/// Cargo, at the root, on the laboratory's workspace.
+pub fn cargo_in_lab(args: &[&str]) -> Command {
+    let mut command = cargo(args);
+    of_lab(&mut command);
+    command
+}
+
+/// Names the laboratory's workspace to Cargo, and the product's folder of build results, in
+/// which both find the same builds of other packages.
+fn of_lab(cargo: &mut Command) {
+    cargo.arg("--manifest-path").arg(root().join("xtask/lab/Cargo.toml"));
+    if std::env::var_os("CARGO_TARGET_DIR").is_none() {
+        cargo.arg("--target-dir").arg(root().join("target"));
+    }
+}
+
 /// The Cargo that runs us.
 fn cargo_command() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
@@ -28,7 +47,10 @@ fn cargo_command() -> Command {
 pub fn cargo_run(package: &str) -> Command {
     let mut command = cargo_command();
     command.args(["run", "--release", "--package", package, "--bin", package]);
-    command.arg("--manifest-path").arg(root().join("Cargo.toml"));
+    match package {
+        LAB => of_lab(&mut command),
+        _ => _ = command.arg("--manifest-path").arg(root().join("Cargo.toml")),
+    }
     command
 }
 

@@ -6,7 +6,7 @@
 //! if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, unless there is
 //! an `x-requirements.txt`: of packages that others do not go with, or that are very large.
 
-use super::{cargo_on_all, meanwhile::Meanwhile};
+use super::{cargo_on_all, cargo_on_lab, meanwhile::Meanwhile};
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow};
 use std::fs;
@@ -15,7 +15,7 @@ use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::thread::JoinHandle;
 use xtask::venv::{Environment, cache_dir};
-use xtask::workspace::{executable, output, root};
+use xtask::workspace::{LAB, executable, output, root};
 
 /// The folder of the scripts.
 const SCRIPTS: &str = "tests/peers";
@@ -168,12 +168,14 @@ pub type Programs = [(&'static str, PathBuf); 4];
 
 /// Our programs as the tests have built them: nothing is built for the peers alone.
 pub fn programs() -> anyhow::Result<Programs> {
-    let mut cargo = cargo_on_all(&["test", "--no-run"]);
-    cargo.args(["--message-format", "json-render-diagnostics"]);
-    let messages = output(cargo.stderr(Stdio::inherit()))?;
+    let built = |cargo: fn(&[&str]) -> Command| {
+        let mut cargo = cargo(&["test", "--no-run", "--message-format", "json-render-diagnostics"]);
+        output(cargo.stderr(Stdio::inherit()))
+    };
+    let messages = built(cargo_on_all)?;
     Ok([
         ("EDGEPUCK_PROGRAM", executable(&messages, "edgepuck")?),
-        ("EDGEPUCK_LAB", executable(&messages, "edgepuck-lab")?),
+        ("EDGEPUCK_LAB", executable(&built(cargo_on_lab)?, LAB)?),
         ("EDGEPUCK_INFER", executable(&messages, "infer-cpu")?),
         ("EDGEPUCK_ROS2", executable(&messages, "edgepuck-ros2")?),
     ])

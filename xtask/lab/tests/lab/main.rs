@@ -1,24 +1,17 @@
-//! The laboratory's command line as a user meets it: the real programs, in
-//! folders of their own.
+//! The laboratory's program as users run it, in temporary folders.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
 mod ablate;
 mod gpu;
+mod manifest;
 mod trade;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 /// The laboratory's program.
 const LAB: &str = env!("CARGO_BIN_EXE_edgepuck-lab");
-
-/// Another program of the workspace, which lies beside the laboratory's
-/// whenever all tests are built.
-fn beside(name: &str) -> Option<PathBuf> {
-    let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
-    Some(Path::new(LAB).with_file_name(file)).filter(|path| path.is_file())
-}
 
 /// Runs `program` with the words, separated by spaces, in `folder`.
 fn run(program: &Path, folder: &Path, words: &str) -> Output {

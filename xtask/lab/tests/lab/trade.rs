@@ -1,7 +1,9 @@
 //! `trade` and `report`: what was measured, and one page of everything.
 
-use crate::{LAB, beside, exits, said, succeeds};
+use crate::{LAB, exits, succeeds};
+use edgepuck_program::cli;
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 
@@ -47,15 +49,15 @@ fn the_chain_is_measured_advised_and_shown() {
     casters_differ_as_they_should(&rows);
     fp32_is_the_reference(&rows);
 
-    let edgepuck = beside("edgepuck").expect("`cargo test --workspace` builds edgepuck");
-    let advice = "advise --record assets/reports/trade/trade.csv --device";
-    let advised = said(&succeeds(&edgepuck, at, &format!("{advice} here --max-ms 1000")));
-    assert!(advised.contains("infer-cpu classify --model"), "{advised}");
-    let refused = exits(1, &edgepuck, at, &format!("{advice} here --max-ms 1e-9"));
-    assert!(refused.contains("the fastest:"), "{refused}");
+    let advise = |words: &str| {
+        let given = ["edgepuck", "advise", "--record"].map(OsString::from);
+        let record = OsString::from(&record);
+        cli::main(given.into_iter().chain([record]).chain(words.split(' ').map(OsString::from)))
+    };
+    assert_eq!(advise("--device here --max-ms 1000"), 0);
+    assert_eq!(advise("--device here --max-ms 1e-9"), 1);
     // A quick run does not model a Raspberry Pi.
-    let refused = exits(1, &edgepuck, at, &format!("{advice} pi5 --max-ms 1000"));
-    assert!(refused.contains("`cargo xtask trade`"), "{refused}");
+    assert_eq!(advise("--device pi5 --max-ms 1000"), 1);
 
     succeeds(lab(), at, "report --assets assets --out page/report.html");
     let page = fs::read_to_string(at.join("page/report.html")).unwrap();
