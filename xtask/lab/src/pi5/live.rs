@@ -56,9 +56,6 @@ struct Work {
 
 /// Counts both captures of a drive, of which one is longer, and tells of what is between their
 /// ends, in which no model is loaded.
-///
-/// # Errors
-/// If QEMU or the program fails, or the longer capture has no more turns.
 pub fn table(counter: &Counter, captures: &[impl AsRef<Path>], machine: Machine) -> Result<String> {
     let [short, long] = captures else { anyhow::bail!("--live: expected two captures") };
     let (short, long) = (Work::of(counter, short.as_ref())?, Work::of(counter, long.as_ref())?);

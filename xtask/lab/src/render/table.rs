@@ -62,9 +62,6 @@ impl Table {
     }
 
     /// The rows of a CSV file.
-    ///
-    /// # Errors
-    /// Bytes that are not CSV, with the line.
     pub fn from_csv(title: &str, bytes: &[u8]) -> anyhow::Result<Self> {
         let mut csv = csv::Reader::from_reader(bytes);
         let mut table = Self::new(title, &csv.headers()?.iter().collect::<Vec<_>>());

@@ -29,9 +29,6 @@ struct Measured {
 }
 
 /// Every record in `bench`.
-///
-/// # Errors
-/// A file that `bench` did not write.
 pub fn body(bench: &Path) -> Result<Markup> {
     let records: Vec<_> = entries(bench)?.into_iter().filter(|path| path.is_dir()).collect();
     if records.is_empty() {

@@ -26,9 +26,6 @@ struct Growth {
 }
 
 /// Drawings of the record in `folder`, and what else lies beside it.
-///
-/// # Errors
-/// A file that `bench growth` did not write.
 pub fn body(folder: &Path) -> Result<Markup> {
     let path = folder.join("growth.csv");
     let Some(rows) = lines::<Growth>(&path)? else {

@@ -49,9 +49,6 @@ const SMALL: usize = 1;
 const UNKNOWN: usize = 2;
 
 /// A turn of the street, and what the network says of it.
-///
-/// # Errors
-/// If the turn cannot be cast.
 pub fn body() -> Result<Markup> {
     let (scan, classes) = turn()?;
     let found = Detector::open(Path::new(MODEL), &Options::default(), MIN_POINTS)?.detect(&scan)?;

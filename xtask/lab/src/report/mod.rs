@@ -36,9 +36,6 @@ pub struct Args {
 }
 
 /// Writes the page.
-///
-/// # Errors
-/// A record that is not what its name says; what the system reports.
 pub fn run(args: &Args) -> Result<Outcome> {
     let assets = args.assets.clone().unwrap_or_else(|| workspace::root().join("assets"));
     ensure!(assets.is_dir(), "--assets: expected a folder, found {}", assets.display());
@@ -89,9 +86,6 @@ fn missing(record: &Path, command: &str) -> Markup {
 }
 
 /// The file's text; nothing where there is no file.
-///
-/// # Errors
-/// A file that is there and cannot be read.
 fn text(path: &Path) -> Result<Option<String>> {
     match fs::read_to_string(path) {
         Ok(text) => Ok(Some(text)),
@@ -101,9 +95,6 @@ fn text(path: &Path) -> Result<Option<String>> {
 }
 
 /// The lines of a record; nothing where there is no file.
-///
-/// # Errors
-/// A file that is there and is not such a record.
 fn lines<T: DeserializeOwned>(csv: &Path) -> Result<Option<Vec<T>>> {
     let Some(text) = text(csv)? else { return Ok(None) };
     let lines: Result<Vec<T>, csv::Error> =
@@ -112,9 +103,6 @@ fn lines<T: DeserializeOwned>(csv: &Path) -> Result<Option<Vec<T>>> {
 }
 
 /// What stands in `folder`, sorted; nothing where there is no such folder.
-///
-/// # Errors
-/// A folder that is there and cannot be read.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.exists() {
         return Ok(Vec::new());

@@ -10,9 +10,6 @@ use std::path::Path;
 use xtask::workspace::file_name;
 
 /// The records on real objects and sensors in `folder`, each a Markdown file.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn reality(folder: &Path) -> Result<Markup> {
     const MAIN: &str = "README.md";
     let Some(main) = text(&folder.join(MAIN))? else {
@@ -34,9 +31,6 @@ fn title(text: &str) -> &str {
 }
 
 /// How much each effect matters, of the record in `folder`.
-///
-/// # Errors
-/// A file that is not CSV.
 pub fn ablations(folder: &Path) -> Result<Markup> {
     let path = folder.join("ablations.csv");
     let (Some(rows), Some(csv)) = (lines(&path)?, text(&path)?) else {
@@ -106,9 +100,6 @@ struct Cell {
 }
 
 /// The paper's experiments, of the newest record in `reports`.
-///
-/// # Errors
-/// A file that `reproduce` did not write.
 pub fn reproduction(reports: &Path) -> Result<Markup> {
     let records = entries(reports)?;
     let Some(folder) = records.iter().rev().find(|path| path.join("report.csv").is_file()) else {

@@ -29,9 +29,6 @@ const AZIMUTH_DEG: f64 = 45.0;
 const MOST_POINTS: usize = 6000;
 
 /// One mesh of `assets`, as each of the sensors sees it.
-///
-/// # Errors
-/// A mesh that cannot be read.
 pub fn body(assets: &Path) -> Result<Markup> {
     let folder = assets.join("meshes");
     let entries = if folder.exists() { discover(&folder, 0)? } else { Vec::new() };

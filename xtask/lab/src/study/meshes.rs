@@ -9,9 +9,6 @@ use std::path::{Path, PathBuf};
 
 /// The folder that was asked for, or else `folder`, to which built-in shapes are
 /// written: so many of each class to train on and to test with.
-///
-/// # Errors
-/// Shapes that cannot be written.
 pub fn folder(
     asked: Option<&Path>,
     folder: &Path,

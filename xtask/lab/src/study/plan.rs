@@ -12,16 +12,10 @@ pub trait Plan: DeserializeOwned {
     const QUICK: &'static str;
 
     /// Checks that every value is in its range.
-    ///
-    /// # Errors
-    /// The first that is not, with its key.
     fn check(&self) -> anyhow::Result<()>;
 }
 
 /// The plan at `path`, or a bundled one.
-///
-/// # Errors
-/// A file that is not a valid plan, with the key and the cause.
 pub fn read<P: Plan>(path: Option<&Path>, quick: bool) -> anyhow::Result<P> {
     let (name, text) = match path {
         Some(path) => {

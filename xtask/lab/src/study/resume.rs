@@ -14,9 +14,6 @@ use train::run::Job;
 
 /// Trains the network called `name` by `recipe` on `clouds` and writes it to
 /// `out`, unless it is there.
-///
-/// # Errors
-/// A network of another recipe under that name; what training reports.
 pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyhow::Result<()> {
     if out.is_file() {
         let trained = Recipe::read(&out.with_extension("run").join("recipe.toml"))?;
@@ -34,9 +31,6 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
 
 /// The result in the JSON file at `path`, or else the one that `make` gives, which
 /// is then written there.
-///
-/// # Errors
-/// A file that holds something else; what `make` reports.
 pub fn result<T: Serialize + DeserializeOwned>(
     path: &Path,
     make: impl FnOnce() -> anyhow::Result<T>,
@@ -52,9 +46,6 @@ pub fn result<T: Serialize + DeserializeOwned>(
 
 /// Writes `terms`, all that the results depend on, to `path`, unless an earlier run
 /// has written the same.
-///
-/// # Errors
-/// Terms that differ from those of an earlier run.
 pub fn keep_terms(terms: &str, path: &Path) -> anyhow::Result<()> {
     if path.is_file() {
         ensure!(

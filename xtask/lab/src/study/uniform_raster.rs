@@ -5,9 +5,6 @@ use sim_gpu::sensor::{Layout, Rotating, Sensor, Uniform};
 
 /// The same sensor with as many rows and columns, evenly spread between its
 /// lowest and its highest beam and all around.
-///
-/// # Errors
-/// A sensor that has no table of beams.
 pub fn as_even_grid(sensor: Sensor) -> anyhow::Result<Sensor> {
     let Layout::Rotating(table) = &sensor.layout else {
         bail!("{}: has no table of beams", sensor.name);

@@ -14,9 +14,6 @@ use std::path::Path;
 /// CPU seconds of a mesh with all its views in each dataset, from `file` or else
 /// measured and written to it. Every round makes all datasets of some of `meshes`,
 /// one after the other, in `scratch`.
-///
-/// # Errors
-/// As [`make`].
 pub fn costs(
     plan: &Plan,
     meshes: &[MeshEntry],

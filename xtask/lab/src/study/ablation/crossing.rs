@@ -17,9 +17,6 @@ use train::evaluate::confusion;
 
 /// Trains the networks of `design` that `out` does not hold yet, tests them, and
 /// writes the answers to `answers.csv`. The sets' paths are relative to `folder`.
-///
-/// # Errors
-/// A design or data that cannot be used, or that differ from an earlier run's.
 pub fn run(design: &Design, folder: &Path, out: &Path) -> anyhow::Result<Vec<Answer>> {
     let sets = sets::read(design, folder)?;
     resume::keep_terms(&terms(design, &sets)?, &out.join("terms.toml"))?;

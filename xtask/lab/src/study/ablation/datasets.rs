@@ -37,9 +37,6 @@ pub struct Made {
 }
 
 /// Makes the dataset `name` of `meshes` in `out`, unless it is there.
-///
-/// # Errors
-/// A folder that holds another dataset; a file that cannot be written.
 pub fn make(
     (name, source): (&'static str, Source),
     plan: &Plan,
@@ -93,9 +90,6 @@ pub fn clouds(source: Source, folder: &Path) -> PathBuf {
 
 /// Bytes of a cloud on disk: of a scan's file, or of a packed cloud where there
 /// are no scans.
-///
-/// # Errors
-/// A file that cannot be looked at.
 pub fn bytes_per_cloud(made: &Made, source: Source) -> anyhow::Result<f64> {
     let (mut files, mut n) = (made.scans.clone(), made.scans.len());
     if files.is_empty() {

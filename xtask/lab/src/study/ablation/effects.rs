@@ -116,9 +116,6 @@ const SET: &str = "rotational";
 const SEED: u64 = 0;
 
 /// A dataset of scans with `switches`.
-///
-/// # Errors
-/// A sensor that states no noise where the plan has none.
 pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
     let sensor = Sensor::builtin("vlp32c").context("no built-in sensor vlp32c")?;
     let stated = sensor.noise.map(|noise| noise.typical_sigma_m);

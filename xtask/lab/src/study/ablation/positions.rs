@@ -7,9 +7,6 @@ use std::path::Path;
 
 /// Compares all positions of two datasets of the same meshes and views, bit by
 /// bit; how many scans there are.
-///
-/// # Errors
-/// Names the first scan that differs, or that one dataset lacks.
 pub fn compare(with: &Made, without: &Made) -> anyhow::Result<usize> {
     let (n, other) = (with.scans.len(), without.scans.len());
     ensure!(n == other, "expected as many scans in both, found {n} and {other}");

@@ -26,9 +26,6 @@ pub fn sha256(sets: &Sets, name: &'static str) -> String {
 }
 
 /// Reads all sets of `design`, which lies in `folder`.
-///
-/// # Errors
-/// Data that cannot be used; sets of other classes than the first.
 pub fn read(design: &Design, folder: &Path) -> anyhow::Result<Sets> {
     let mut sets = Sets::new();
     for set in &design.sets {

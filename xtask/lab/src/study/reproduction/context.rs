@@ -39,9 +39,6 @@ pub struct ExperimentContext {
 
 impl ExperimentContext {
     /// Checks that the data are large enough for the plan.
-    ///
-    /// # Errors
-    /// Data that cannot be used, or not by this plan.
     pub fn check(&self) -> anyhow::Result<()> {
         let (train, test) = (self.clouds(Split::Train)?, self.clouds(Split::Test)?);
         ensure!(
@@ -63,9 +60,6 @@ impl ExperimentContext {
     }
 
     /// All that a report depends on: the program, the plan, the data.
-    ///
-    /// # Errors
-    /// Data that cannot be read.
     pub fn terms(&self) -> anyhow::Result<String> {
         #[derive(Serialize)]
         struct Terms<'a> {
@@ -94,9 +88,6 @@ impl ExperimentContext {
     }
 
     /// One half of ModelNet40's clouds, or of as many as the plan wants.
-    ///
-    /// # Errors
-    /// Data that cannot be used.
     pub fn clouds(&self, split: Split) -> anyhow::Result<Rc<Clouds>> {
         self.remember(&format!("clouds {split}"), || {
             let most = self.plan.most_points();
@@ -112,9 +103,6 @@ impl ExperimentContext {
 
     /// One half of the set `name` of scans or surfaces, such as
     /// `lidar/packed/rotational-noisy`.
-    ///
-    /// # Errors
-    /// Data that cannot be used.
     pub fn scans(&self, name: &str, split: Split) -> anyhow::Result<Rc<Clouds>> {
         self.remember(&format!("{name} {split}"), || {
             Ok(Clouds::read(&self.scans.join(name), split, self.plan.most_points())?)
@@ -146,9 +134,6 @@ impl ExperimentContext {
 
     /// The network called `name`, trained by `recipe` on `clouds` unless it is
     /// there.
-    ///
-    /// # Errors
-    /// Another recipe under that name; what training reports.
     pub fn network(&self, name: &str, recipe: Recipe, clouds: &Clouds) -> anyhow::Result<PathBuf> {
         let out = self.model(name);
         resume::network(&out, name, recipe, clouds)?;
@@ -156,9 +141,6 @@ impl ExperimentContext {
     }
 
     /// The confusion of `model` on the test clouds of the set `name`.
-    ///
-    /// # Errors
-    /// Data that cannot be used; what infer-cpu refuses.
     pub fn test_on(&self, name: &str, model: &Path) -> anyhow::Result<Evaluation> {
         test(model, &*self.scans(name, Split::Test)?, None)
     }
@@ -171,9 +153,6 @@ pub fn sampler(kind: SamplerKind, points: usize) -> SamplerSpec {
 }
 
 /// The confusion of `model` on `clouds`, behind `sampler` or as trained.
-///
-/// # Errors
-/// What infer-cpu refuses.
 pub fn test(
     model: &Path,
     clouds: &Clouds,

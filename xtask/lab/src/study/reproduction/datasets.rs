@@ -11,9 +11,6 @@ const SIGMAS: [&str; 3] = ["0.02", "0.05", "0.1"];
 
 /// Makes the datasets of `meshes` in `scans` that are missing. A finished dataset
 /// is kept.
-///
-/// # Errors
-/// Meshes that cannot be used, datasets of other meshes, a command that fails.
 pub fn make(meshes: &Path, scans: &Path) -> anyhow::Result<()> {
     let source = meshes.canonicalize()?.display().to_string();
     resume::keep_terms(&source, &scans.join("meshes.txt"))?;

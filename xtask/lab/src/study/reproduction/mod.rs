@@ -64,9 +64,6 @@ pub struct Args {
 
 /// Makes the datasets, runs the experiments that are not done yet, and writes
 /// `report.html` and `report.csv`.
-///
-/// # Errors
-/// Data that cannot be used; another plan than that of an earlier run.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     need_folder_of_meshes(args.meshes.as_deref())?;
     let plan = plans::read(args.plan.as_deref(), args.quick)?;

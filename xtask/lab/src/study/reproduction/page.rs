@@ -11,9 +11,6 @@ use xtask::workspace::command_line;
 const TITLE: &str = "The paper's experiments, repeated";
 
 /// All sections as a page.
-///
-/// # Errors
-/// A plan that cannot be written as TOML.
 pub fn of(sections: &[Section], plan: &Plan) -> anyhow::Result<String> {
     let plan_text = toml::to_string(plan)?;
     let lead = html! {

@@ -66,9 +66,6 @@ impl Table {
     }
 
     /// Adds a row of cells that are measured one after another.
-    ///
-    /// # Errors
-    /// The first cell that could not be measured.
     pub fn measure(
         &mut self,
         name: impl Into<String>,
@@ -157,9 +154,6 @@ impl Cell {
 }
 
 /// Writes the numbers of all sections as CSV, a line a cell.
-///
-/// # Errors
-/// What the system reports.
 pub fn write_csv(sections: &[Section], path: &Path) -> anyhow::Result<()> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     csv.write_record(["table", "row", "column", "value", "low", "high", "text"])?;

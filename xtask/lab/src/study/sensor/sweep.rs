@@ -30,9 +30,6 @@ pub struct Return {
 }
 
 /// The returns of `sweep` by sensor, each of which has `n_lasers`.
-///
-/// # Errors
-/// A sweep without lasers or times, or of another number of lasers.
 pub fn by_sensor(sweep: &LabelledSweep, n_lasers: usize) -> Result<Vec<Vec<Return>>> {
     let lasers = sweep.lasers.as_ref().context("expected `laser`, found none")?;
     let times = sweep.times_s.as_ref().context("expected `offset_ns`, found none")?;

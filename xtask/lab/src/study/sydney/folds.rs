@@ -19,10 +19,6 @@ pub struct Folds {
 
 impl Folds {
     /// Reads all `files`. The classes are the sorted labels of the data's source.
-    ///
-    /// # Errors
-    /// A file that is not of clusters or names no folds or raw labels; fewer than two
-    /// folds in all.
     pub fn read(files: &[PathBuf]) -> anyhow::Result<Self> {
         let mut sets = Vec::new();
         for path in files {

@@ -42,9 +42,6 @@ struct Aimed {
 }
 
 /// Casts the clean reference scans by every method, in turns.
-///
-/// # Errors
-/// An adapter that fails.
 pub fn cast_all(
     objects: &[Object],
     backends: &[Backend],

@@ -79,9 +79,6 @@ pub struct Costs {
 
 impl TestSet {
     /// Clouds from a packed NPZ with class names, at most `limit` spread over it.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or without clouds or names.
     pub fn read(path: &Path, limit: usize) -> Result<Self> {
         let set = read_labelled(path)?;
         ensure!(!set.is_empty(), "{}: no clouds", path.display());
@@ -108,9 +105,6 @@ impl TestSet {
     }
 
     /// Fails if `model` does not know one of the classes.
-    ///
-    /// # Errors
-    /// Names model and class.
     pub fn fits(&self, model: &Path) -> Result<()> {
         let classifier = Classifier::load(model, &Options::default())?;
         let known = classifier.classes();
@@ -129,9 +123,6 @@ impl TestSet {
 impl Classifying {
     /// The sampler and the points that a model was trained with, or random points
     /// where it names none to choose by, in fp32.
-    ///
-    /// # Errors
-    /// A model that cannot be read.
     pub fn as_trained(model: &Path) -> Result<Self> {
         let card = inspect(model)?.card;
         let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
@@ -151,9 +142,6 @@ impl Classifying {
     }
 
     /// Loads the model as asked for, for clouds of at most `capacity` points.
-    ///
-    /// # Errors
-    /// A model that cannot be read, or that lacks what the sampler needs.
     pub fn load(&self, capacity: usize) -> Result<Classifier> {
         let SamplerConfig { kind, front, .. } = self.sampler;
         let sampler = SamplerSpec { kind, front, points: self.points, ..SamplerSpec::default() };
@@ -169,9 +157,6 @@ impl Classifying {
     }
 
     /// Classifies `clouds`.
-    ///
-    /// # Errors
-    /// As [`Self::load`]; a cloud that cannot be classified.
     pub fn answers(&self, clouds: &[Cloud]) -> Result<Answers> {
         let capacity = most_points(clouds);
         // Answers do not depend on the number of threads.
@@ -191,9 +176,6 @@ impl Classifying {
 
     /// Times some of `clouds`, spread over all, one after another, and adds them to
     /// `costs`.
-    ///
-    /// # Errors
-    /// As [`Self::answers`].
     pub fn time(&self, clouds: &[Cloud], energy: Option<&Energy>, costs: &mut Costs) -> Result<()> {
         let mut classifier = self.load(most_points(clouds))?;
         let each = clouds.len().div_ceil(TIMED).max(1);

@@ -52,10 +52,6 @@ impl Sweep {
 /// Rows of one parameter at a time, then of combinations of the promising ones, for
 /// `model` on `set`, with modelled times of a Raspberry Pi 5 unless the run is `quick`;
 /// what the model or the clouds do not allow is left out.
-///
-/// # Errors
-/// A model that cannot be read or does not know the classes; a set that does
-/// not fit.
 pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<Vec<Row>> {
     let sweep = if quick { Sweep::quick() } else { Sweep::whole() };
     let say = |error: &anyhow::Error| eprintln!("No modelled times of a Raspberry Pi: {error:#}");
@@ -234,9 +230,6 @@ fn pi_ms(setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Option<Ve
 
 /// The bundled models that know the classes of `set`, of those the ones with the fewest
 /// classes.
-///
-/// # Errors
-/// A folder that cannot be read.
 pub fn bundled(set: &TestSet) -> Result<Vec<PathBuf>> {
     let folder = xtask::workspace::root().join("assets/weights");
     let entries =

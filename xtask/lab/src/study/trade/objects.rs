@@ -36,10 +36,6 @@ pub struct Place<'a> {
 }
 
 /// The test objects of the tree at `folder`, at most `per_class` of each class.
-///
-/// # Errors
-/// A folder without test meshes of at least two classes, a mesh that cannot be
-/// read.
 pub fn read(folder: &Path, per_class: u32) -> Result<Vec<Object>> {
     let mut entries = discover(folder, SEED)?;
     meshes::keep_at_most([0, per_class], &mut entries);

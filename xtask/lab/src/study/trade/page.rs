@@ -17,9 +17,6 @@ const CAPTION: &str = "Filled dots are Pareto-optimal: no other setting is as fa
      Touch or point at a dot for its figures.";
 
 /// Writes `trade.html` and the two charts to `folder`.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     for (part, name) in [(Part::Classifier, "classifier"), (Part::Scan, "scan")] {
         let svg = chart(rows, part).file();

@@ -40,9 +40,6 @@ pub struct Scanned {
 }
 
 /// Scans `objects` with all of `settings`, in turns, `rounds` times each.
-///
-/// # Errors
-/// A scan that cannot be written.
 pub fn scan_all(
     objects: &[Object],
     settings: &[Scanning],

@@ -48,10 +48,6 @@ struct Answer {
 
 /// Makes, trains, tests and compares what `out` lacks; writes `street.csv`,
 /// `street-costs.csv` and `street.md`, and prints the latter.
-///
-/// # Errors
-/// Scenes that cannot be scanned, real objects that cannot be read, a file that cannot be
-/// written.
 pub fn run(plan: &Plan, real: &[PathBuf], out: &Path) -> anyhow::Result<Outcome> {
     fs::create_dir_all(out.join("networks"))
         .with_context(|| format!("cannot make {}", out.display()))?;

@@ -97,9 +97,6 @@ impl plan::Plan for Plan {
 
 impl Plan {
     /// How the network of `row` is trained.
-    ///
-    /// # Errors
-    /// What is changed makes no recipe.
     pub fn recipe_of(&self, row: &Row, seed: u64) -> anyhow::Result<Recipe> {
         let mut recipe: Table = toml::from_str(NETWORK)?;
         change(&mut recipe, &self.recipe);
@@ -112,9 +109,6 @@ impl Plan {
 
 impl Row {
     /// The scenes of this row.
-    ///
-    /// # Errors
-    /// What is changed makes no scene recipe.
     pub fn scenes(&self) -> anyhow::Result<Scenes> {
         let mut scenes: Table = toml::from_str(STREET)?;
         change(&mut scenes, &self.scene);
