@@ -23,9 +23,10 @@ use std::sync::LazyLock;
 
 use formats::scan::{Attribute, AttributeSet};
 use sim_gpu::effects::{
-    Detection, DetectionLimit, Dropout, Effects, EvenMotion, Footprint, Intensity, Noise,
-    NoiseModel, Quantum, ReturnMode, Weather,
+    Detection, Dropout, Effects, EvenMotion, Footprint, Intensity, Noise, NoiseModel, Quantum,
+    ReturnMode, Weather,
 };
+use sim_gpu::sensor::DetectionLimit;
 
 /// What a scan costs, by what it costs: instructions, bindings, bytes.
 type Rows = BTreeMap<String, u64>;

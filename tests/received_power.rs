@@ -7,13 +7,13 @@ use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
 use sim_gpu::caster::Caster;
-use sim_gpu::effects::{Detection, DetectionLimit, Effects};
+use sim_gpu::effects::{Detection, Effects};
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
 use sim_gpu::scene::{Scene, cast};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::sensor::{DetectionLimit, Sensor};
 use std::fs;
 use tests::{adapter, casting, meshes};
 

@@ -7,14 +7,14 @@ use formats::scan::{Attribute, Scan};
 use glam::DVec3;
 use sim_gpu::caster::Caster;
 use sim_gpu::effects::{
-    Detection, DetectionLimit, Dropout, Effects, FogModel, Footprint, Noise, NoiseModel,
-    ReturnMode, Volume, Weather,
+    Detection, Dropout, Effects, FogModel, Footprint, Noise, NoiseModel, ReturnMode, Volume,
+    Weather,
 };
 use sim_gpu::job::Culling;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::pose::Pose;
 use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::sensor::{DetectionLimit, Sensor};
 use sim_gpu::weather::Medium;
 use tests::{adapter, casting, meshes};
 

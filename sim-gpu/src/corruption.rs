@@ -23,7 +23,8 @@ use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
-use crate::effects::{DetectionLimit, Weather};
+use crate::effects::Weather;
+use crate::sensor::DetectionLimit;
 use crate::weather::without_surface;
 
 /// Index of refraction of water over that of air.

@@ -19,9 +19,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
-use crate::sensor::{BeamPattern, Sensor};
+use crate::sensor::{BeamPattern, LARGEST_M, Sensor};
 
-pub use detection::{Detection, DetectionLimit};
+pub use detection::Detection;
 pub use footprint::{Footprint, ReturnMode};
 pub use motion::EvenMotion;
 pub use weather::{FogModel, Volume, Weather};
@@ -30,10 +30,6 @@ mod detection;
 mod footprint;
 mod motion;
 mod weather;
-
-/// No length of an effect is larger: shaders hold it in f32, with room to
-/// multiply.
-const LARGEST_M: f64 = 1e9;
 
 /// The effects of one scene or run. The default is none: a clean scan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

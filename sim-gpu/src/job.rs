@@ -1,62 +1,33 @@
-//! What a caster is given and what it answers: the rays of one sensor against
-//! one object, and the triangle that each hits.
+//! The input and the output of casters: the rays of one sensor at one object, and the triangle
+//! that each hits.
 
-use crate::cpu::aim::FixedFrame;
+use crate::aim::aim;
 use crate::lanes::{Vectors, each};
 use crate::motion::Motion;
 use crate::ray::{Ray, RayFrame, Rays, TraceRay};
-use crate::sensor::{BeamPattern, Directions};
+use crate::sensor::BeamPattern;
 use crate::target::Target;
 use formats::rng::StreamKey;
-use std::sync::OnceLock;
 
-/// The rays of one sensor against one object.
+pub use crate::aim::{Aim, Culling};
+
+/// The rays of one sensor at one object.
 #[derive(Clone, Debug)]
 pub struct CastJob {
     /// The object.
     pub target: Target,
-    /// How the sensor sees it.
+    /// The frame of the sensor and the object.
     pub frame: RayFrame,
-    /// How they move, if they do.
+    /// Their motion, if they move.
     pub motion: Option<Motion>,
     /// The beam of each ray, `[n_rays]`.
     pub beams: Vec<u32>,
-    /// Where the rays come from.
+    /// The source of the rays.
     pub aim: Aim,
-    /// Keys the random numbers of this sensor and object.
+    /// The key of the random numbers of this sensor and object.
     pub stream: StreamKey,
     /// The object's reflectivity, 0 to 1.
     pub reflectivity: f32,
-}
-
-/// Where the rays of a job come from.
-#[derive(Clone, Debug)]
-pub enum Aim {
-    /// Each caster makes them: a GPU in its shader, the CPU in f64.
-    ByCaster {
-        /// How the sensor sees the object, for the shader.
-        fixed: FixedFrame,
-        /// The directions of all beams of the pattern.
-        directions: Directions,
-        /// The rays as the CPU makes them, once it has to.
-        rays: OnceLock<Vec<TraceRay>>,
-    },
-    /// They are here, `[n_rays]`; roots are relative to the target's tree.
-    Rays(Vec<TraceRay>),
-}
-
-/// The most beams of a pattern whose directions a GPU is given: 48 MiB of them, of the
-/// 128 MiB that every adapter can bind.
-pub(crate) const MOST_DIRECTIONS: usize = 1 << 22;
-
-/// Whether beams that cannot hit are cast. The answers are the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Culling {
-    /// Only beams that may hit the object's bounding sphere are cast.
-    #[default]
-    On,
-    /// All beams are cast: for tests and measurements.
-    Off,
 }
 
 impl CastJob {
@@ -74,7 +45,7 @@ impl CastJob {
         Self { target, frame, motion: None, beams, aim, stream, reflectivity }
     }
 
-    /// The ray of `pattern`'s beam of this number, when it fires.
+    /// Ray number `beam` of `pattern`, at the time when it fires.
     #[must_use]
     pub fn beam(&self, pattern: &BeamPattern, beam: u32) -> Ray {
         self.motion.as_ref().map_or_else(
@@ -86,7 +57,7 @@ impl CastJob {
         )
     }
 
-    /// The rays of some of `pattern`'s beams.
+    /// Some of the rays of `pattern`.
     #[inline(always)]
     pub(crate) fn rays_of<const N: usize>(
         &self,
@@ -103,7 +74,7 @@ impl CastJob {
         }
     }
 
-    /// The rays in f64, rounded, `[n_rays]`; made now, unless they are there.
+    /// The rays, computed in f64 and rounded, `[n_rays]`; computed by the first call.
     #[must_use]
     pub fn rays(&self) -> &[TraceRay] {
         match &self.aim {
@@ -114,38 +85,14 @@ impl CastJob {
     }
 }
 
-/// Those beams of `pattern` that `is_wanted`, and how they are aimed through `frame`.
-pub(crate) fn aim(
-    frame: &RayFrame,
-    pattern: &BeamPattern,
-    culling: Culling,
-    is_wanted: impl Fn(u32) -> bool,
-) -> (Vec<u32>, Aim) {
-    let mut beams = match culling {
-        Culling::On => pattern.within(&frame.cone(pattern)),
-        Culling::Off => pattern.order.clone(),
-    };
-    beams.retain(|&beam| is_wanted(beam));
-    // A beam that starts beside the sensor is for f64 to aim.
-    let is_simple = pattern.starts_m.is_empty() && pattern.len() <= MOST_DIRECTIONS;
-    if let Some(fixed) = frame.fixed().filter(|_| is_simple) {
-        let directions = pattern.directions.clone();
-        return (beams, Aim::ByCaster { fixed, directions, rays: OnceLock::new() });
-    }
-    let all = culling == Culling::Off;
-    let (beams, rays) = frame.trace_rays(&pattern.directions, &pattern.starts_m, beams, all);
-    (beams, Aim::Rays(rays))
-}
-
-/// What a caster answers for one job.
+/// A caster's answer for one job.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cast {
     /// Per ray: triangle index, [`crate::ray::MISS`] or
     /// [`crate::ray::AMBIGUOUS`]; `[n_rays]`.
     pub codes: Vec<u32>,
-    /// The effects' outputs, [`Effects::per_ray`](crate::effects::Effects::per_ray)
-    /// side by side, of no meaning where the code is a miss;
-    /// `[n_rays, outputs_per_ray]`.
+    /// The outputs of [`Effects::per_ray`](crate::effects::Effects::per_ray) side by side, not
+    /// meaningful for a miss; `[n_rays, outputs_per_ray]`.
     pub effect_outputs: Vec<f32>,
 }
 
@@ -160,7 +107,7 @@ mod tests {
     use glam::{DAffine3, DVec3};
 
     #[test]
-    fn casters_make_the_rays_where_whole_numbers_are_exact_enough() {
+    fn casters_make_the_rays_where_integers_are_exact_enough() {
         let vertices = vec![DVec3::X, DVec3::Y, DVec3::Z];
         let surface = Surface::new(Mesh { vertices, triangles: vec![[0, 1, 2]] }, vec![0]);
         let target = Target::new(surface, Builder::Sah);

@@ -33,6 +33,7 @@
 //! BVH, target, sensor and scene, casting (on a GPU or on the CPU), scan,
 //! packets.
 
+mod aim;
 pub mod bvh;
 pub mod cast_error;
 pub mod caster;
@@ -40,6 +41,7 @@ pub mod config;
 pub mod corruption;
 pub mod cpu;
 pub mod effects;
+mod fixed_frame;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod job;

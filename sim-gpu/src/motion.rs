@@ -1,43 +1,43 @@
-//! Sensors and objects that move while a scan lasts: each beam is cast from where the sensor is
-//! when it fires, at where the object is then. Trees stay as they are; rays move.
+//! Sensors and objects that move during a scan: each ray is cast with the poses of the sensor and
+//! of the object at the time when it fires. Trees stay as they are; the rays are moved.
 
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use crate::job::{Aim, Culling};
+use crate::aim::{Aim, Culling};
 use crate::pose::{Pose, Trajectory};
 use crate::ray::RayFrame;
 use crate::sensor::{BeamPattern, Cone};
 use crate::target::Surface;
 
-/// How a sensor and an object move.
+/// The motion of a sensor and of an object.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Where the sensor stands, if it does not move.
+    /// The pose of a sensor that does not move.
     pub pose: Pose,
-    /// Its poses, if it moves.
+    /// The poses of a sensor that moves.
     pub sensor: Option<Arc<Trajectory>>,
-    /// Where the object stands; if it moves, in the frame that moves with it.
+    /// The pose of the object in the world or, if it moves, in the frame that moves with it.
     pub world_from_object: DAffine3,
-    /// The poses of that frame, if it moves.
+    /// The poses of the frame of an object that moves.
     pub object: Option<Arc<Trajectory>>,
-    /// The trajectories' time when the scan begins, seconds.
+    /// The time of the trajectories at which the scan begins, seconds.
     pub start_s: f64,
 }
 
-/// A beam that is up to this much farther, radians, may round into the cone.
+/// The margin of the cone for rounding, radians.
 const ANGLE_MARGIN_RAD: f64 = 1e-6;
 
 impl Motion {
-    /// Where the sensor is, `time_s` after the scan began.
+    /// The pose of the sensor `time_s` after the scan began.
     #[must_use]
     pub fn pose_at(&self, time_s: f64) -> Pose {
         let at = |sensor: &Arc<Trajectory>| sensor.at(self.start_s + time_s);
         self.sensor.as_ref().map_or(self.pose, at)
     }
 
-    /// Where the object is, `time_s` after the scan began.
+    /// The pose of the object `time_s` after the scan began.
     #[must_use]
     pub fn world_from_object_at(&self, time_s: f64) -> DAffine3 {
         self.object.as_ref().map_or(self.world_from_object, |object| {
@@ -47,13 +47,13 @@ impl Motion {
         })
     }
 
-    /// How the sensor sees the object, `time_s` after the scan began.
+    /// The frame of the sensor and the object `time_s` after the scan began.
     #[must_use]
     pub fn frame_at(&self, surface: &Surface, time_s: f64) -> RayFrame {
         RayFrame::new(surface, &self.world_from_object_at(time_s), &self.pose_at(time_s))
     }
 
-    /// Those beams of `pattern` that may meet `surface` and `is_wanted`, and their rays.
+    /// The wanted beams of `pattern` that may meet `surface`, and their rays.
     pub(crate) fn aim(
         &self,
         surface: &Surface,
@@ -66,7 +66,7 @@ impl Motion {
             if all { pattern.order.clone() } else { pattern.within(&self.cone(surface, pattern)) };
         beams.retain(|&beam| is_wanted(beam));
         let (mut kept, mut rays) = (Vec::new(), Vec::new());
-        // Rays of a wide beam stand side by side and fire at once.
+        // The rays of a wide beam are neighbours and fire at the same time: they share a frame.
         let mut last = (f64::NAN, self.frame_at(surface, 0.0));
         for beam in beams {
             let time_s = pattern.time_s[beam as usize];
@@ -98,9 +98,9 @@ impl Motion {
         let ((sensor_m, sensor_rad), (object_m, object_rad)) =
             (reach(&self.sensor), reach(&self.object));
         let centre = surface.frame.to_object(DVec3::ZERO);
-        // The middle goes around the frame's origin as the frame turns.
+        // The object's centre moves around the origin of its frame as the frame turns.
         let around_m = self.world_from_object.transform_point3(centre).length() * object_rad;
-        // The root of the sum of squares bounds how far a map stretches.
+        // The Frobenius norm bounds how far a map stretches vectors.
         let squares = self.world_from_object.matrix3.to_cols_array().map(|x| x * x);
         let stretch = squares.iter().sum::<f64>().sqrt();
         let radius_m = surface.radius * surface.frame.scale * stretch;

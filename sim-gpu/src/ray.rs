@@ -1,6 +1,6 @@
-//! Rays in an object's own frame.
+//! Rays in the unit frame of an object.
 
-use crate::cpu::aim::FixedFrame;
+use crate::fixed_frame::FixedFrame;
 use crate::lanes::{Avx2, LANES, Lanewise, Vectors, each, widest};
 use crate::pose::Pose;
 use crate::sensor::{BeamPattern, Cone, starts};
@@ -8,13 +8,13 @@ use crate::target::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// One ray as casters read it. `shaders/shared/ray.wgsl` declares the same; a
-/// test compares size and offsets.
+/// A ray as casters read it. `shaders/shared/ray.wgsl` declares the same record; a test compares
+/// sizes and offsets.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct TraceRay {
-    /// Where the ray starts, in the unit frame: on the object's bounding
-    /// sphere, or the sensor itself if it is inside.
+    /// The start of the ray in the unit frame: on the object's bounding sphere, or the sensor if
+    /// it is inside.
     pub origin: [f32; 3],
     /// The root node of the object's tree in the caster's buffer.
     pub root: u32,
@@ -24,27 +24,31 @@ pub struct TraceRay {
     pub skipped: f32,
 }
 
-/// What a caster answers where a ray hits nothing.
+/// A caster's answer for a ray that hits nothing.
 pub const MISS: u32 = u32::MAX;
 
-/// The distance of a ray that hits nothing, unit lengths: beyond every other
-/// distance, and finite.
+/// The first direction of a view whose rays are sent to the GPU instead of made there.
+#[cfg(feature = "gpu")]
+pub(crate) const SENT: u32 = u32::MAX;
+
+/// The distance for a ray that hits nothing, unit lengths: finite, and beyond every other
+/// distance.
 pub const NO_HIT: f32 = 1e30;
 
-/// Set in a caster's answer where another triangle may be truly nearer by
-/// more than the promised accuracy, and f64 must decide.
+/// A bit of a caster's answer: another triangle may truly be nearer by more than the promised
+/// accuracy, and f64 must decide.
 pub const AMBIGUOUS: u32 = 1 << 31;
 
 /// A ray in f64. `origin + t * direction` is `t` metres from the ray's start.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// Where the ray starts, in the unit frame: the sensor, or near it.
+    /// The start of the ray in the unit frame: the sensor, or near it.
     pub origin: DVec3,
-    /// One metre along the beam, in the unit frame.
+    /// One metre along the ray, in the unit frame.
     pub direction: DVec3,
 }
 
-/// How one sensor sees one object: sends beams into the object's unit frame.
+/// The map from the frame of one sensor to the unit frame of one object.
 #[derive(Clone, Copy, Debug)]
 pub struct RayFrame {
     origin: DVec3,
@@ -53,11 +57,11 @@ pub struct RayFrame {
 }
 
 impl RayFrame {
-    /// The frame of a sensor at `pose` that looks at `surface`, placed in the
-    /// world by `world_from_object`.
+    /// The frame of a sensor at `pose` and of `surface`, placed in the world by
+    /// `world_from_object`.
     ///
-    /// Differences of positions are taken first, so that a scene far from the
-    /// world's origin loses nothing but what its own coordinates lack.
+    /// Positions are subtracted before anything else, so that a scene far from the world's origin
+    /// loses no more accuracy than its own coordinates have.
     #[must_use]
     pub fn new(surface: &Surface, world_from_object: &DAffine3, pose: &Pose) -> Self {
         let object_from_world = world_from_object.matrix3.inverse();
@@ -70,27 +74,26 @@ impl RayFrame {
         }
     }
 
-    /// The beam that leaves the sensor in `direction`, a unit vector in the
-    /// sensor frame.
+    /// The ray from the sensor in `direction`, a unit vector in the sensor frame.
     #[must_use]
     pub fn ray(&self, direction: DVec3) -> Ray {
         Ray { origin: self.origin, direction: self.unit_from_sensor * direction }
     }
 
-    /// The ray of `pattern`'s beam of this number, from where that beam starts.
+    /// Ray number `beam` of `pattern`.
     #[must_use]
     pub fn beam(&self, pattern: &BeamPattern, beam: u32) -> Ray {
         let ray = self.beams(pattern, [beam]);
         Ray { origin: ray.origin.lane(0), direction: ray.direction.lane(0) }
     }
 
-    /// The rays of some of `pattern`'s beams.
+    /// Some of the rays of `pattern`.
     #[inline(always)]
     pub(crate) fn beams<const N: usize>(&self, pattern: &BeamPattern, beams: [u32; N]) -> Rays<N> {
         self.rays(&pattern.directions, &pattern.starts_m, beams)
     }
 
-    /// The rays of some of the beams of these directions and starts.
+    /// Some of the rays with these directions and starts.
     #[inline(always)]
     fn rays<const N: usize>(
         &self,
@@ -106,18 +109,17 @@ impl RayFrame {
         Rays { origin, direction: Vectors::new(directions).mapped(&self.unit_from_sensor) }
     }
 
-    /// This frame in whole numbers, if they are exact enough for it.
+    /// This frame in integers, if they are exact enough for it.
     #[must_use]
     pub fn fixed(&self) -> Option<FixedFrame> {
         FixedFrame::new(self.origin, &self.unit_from_sensor, self.radius)
     }
 
-    /// The cone of directions in which `pattern`'s beams may hit the object's
-    /// bounding sphere.
+    /// The cone of directions in which `pattern`'s rays may hit the object's bounding sphere.
     ///
-    /// A beam that starts beside the sensor hits the sphere if one from the
-    /// sensor, in the same direction, hits the sphere moved as far the other
-    /// way. A sphere that is larger by the farthest start holds all of these.
+    /// A ray that starts beside the sensor hits the sphere if a parallel ray from the sensor hits
+    /// the sphere moved as far the other way. A sphere enlarged by the farthest start holds all of
+    /// these spheres.
     #[must_use]
     pub fn cone(&self, pattern: &BeamPattern) -> Cone {
         let radius = match pattern.farthest_start_m() {
@@ -138,34 +140,33 @@ impl RayFrame {
         Cone { axis, half_angle_rad: sine.asin() }
     }
 
-    /// A distance from where `pattern`'s beams start, metres, within which there is
-    /// nothing of the object; 0 if the sensor is inside its bounding sphere.
+    /// A lower bound of the distance from the start of any of `pattern`'s rays to the object,
+    /// metres; 0 if the sensor is inside its bounding sphere.
     #[must_use]
     pub fn nearest_m(&self, pattern: &BeamPattern) -> f64 {
         let unit_per_m = stretches(&self.unit_from_sensor).1;
         let from_sensor_m = (self.origin.length() - self.radius) / unit_per_m;
         let nearest_m = from_sensor_m - pattern.farthest_start_m();
-        // One part in 10^9 less, for rounding; NaN gives 0.
+        // Less one part in 10^9, for rounding; NaN gives 0.
         (nearest_m * (1.0 - 1e-9)).max(0.0)
     }
 
-    /// The record of `ray` for a tree whose root is node `root`; `None` if the
-    /// ray passes the bounding sphere by.
+    /// The record of `ray` for a tree whose root is node `root`; `None` if the ray misses the
+    /// bounding sphere.
     #[must_use]
     pub fn trace_ray(&self, ray: &Ray, root: u32) -> Option<TraceRay> {
-        let entry = Entries::of(&Rays::one(ray), self.radius);
+        let entry = Entries::new(&Rays::one(ray), self.radius);
         entry.is_hit[0].then(|| entry.records(root)[0])
     }
 
-    /// The record of a ray whether or not it can hit: what is cast when
-    /// culling is off.
+    /// The record of a ray whether or not it can hit, for casting without culling.
     #[must_use]
     pub fn trace_ray_unculled(&self, ray: &Ray, root: u32) -> TraceRay {
-        Entries::of(&Rays::one(ray), self.radius).records(root)[0]
+        Entries::new(&Rays::one(ray), self.radius).records(root)[0]
     }
 
-    /// Those of `beams`, by number among these directions and starts, that meet the
-    /// bounding sphere, or all of them, and their records for a tree whose root is node 0.
+    /// Those of `beams`, as indices of these directions and starts, that meet the bounding sphere,
+    /// or `all` of them; and their records for a tree whose root is node 0.
     pub(crate) fn trace_rays(
         &self,
         directions: &[DVec3],
@@ -184,8 +185,8 @@ impl RayFrame {
     }
 }
 
-/// Moves the beams that [`RayFrame::trace_rays`] keeps to the front, their records
-/// too, and says how many there are.
+/// Moves the beams that [`RayFrame::trace_rays`] keeps and their records to the front, and returns
+/// their number.
 struct Aiming<'a> {
     frame: &'a RayFrame,
     directions: &'a [DVec3],
@@ -205,9 +206,10 @@ impl Lanewise for Aiming<'_> {
             let count = LANES.min(self.beams.len() - from);
             let beams: [u32; LANES] = each(|lane| self.beams[from + lane.min(count - 1)]);
             let rays = self.frame.rays(self.directions, self.starts_m, beams);
-            let entries = Entries::of(&rays, self.frame.radius);
+            let entries = Entries::new(&rays, self.frame.radius);
             let records = entries.records(0);
             for lane in 0..count {
+                // Written always and kept by the count: faster than a branch for each ray.
                 (self.beams[kept], self.rays[kept]) = (beams[lane], records[lane]);
                 kept += usize::from(entries.is_hit[lane] || self.all);
             }
@@ -216,7 +218,7 @@ impl Lanewise for Aiming<'_> {
     }
 }
 
-/// Rays in f64, side by side.
+/// Rays in f64, one in each lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Rays<const N: usize> {
     pub origin: Vectors<N>,
@@ -232,27 +234,27 @@ impl Rays<1> {
 
 /// Where rays enter a bounding sphere.
 struct Entries<const N: usize> {
-    /// Where each ray starts.
+    /// The starts of the rays.
     origin: Vectors<N>,
     /// Unit directions.
     direction: Vectors<N>,
-    /// How far from its start each ray enters the sphere; for a ray that passes it
-    /// by, a distance in which it meets nothing.
+    /// The distance from its start at which each ray enters the sphere; for a ray that misses it,
+    /// a distance within which it meets nothing.
     skipped: [f64; N],
-    /// Whether it meets the sphere.
+    /// Whether each ray meets the sphere.
     is_hit: [bool; N],
 }
 
 impl<const N: usize> Entries<N> {
     #[inline(always)]
-    fn of(rays: &Rays<N>, radius: f64) -> Self {
+    fn new(rays: &Rays<N>, radius: f64) -> Self {
         let (origin, direction) = (rays.origin, rays.direction.normalize());
         let along = origin.dot(&direction);
         let along = each(|i| -along[i]);
         let closest = origin + direction * along;
         let closest_squared = closest.dot(&closest);
         let half_chord_squared: [f64; N] = each(|i| radius * radius - closest_squared[i]);
-        // Not a number for a ray that passes by, or whose numbers overflow.
+        // NaN for a ray that misses the sphere or overflows.
         let half_chord: [f64; N] = each(|i| half_chord_squared[i].sqrt());
         let is_hit = each(|i| along[i] + half_chord[i] >= 0.0);
         let skipped = each(|i| {
@@ -275,15 +277,14 @@ impl<const N: usize> Entries<N> {
     }
 }
 
-/// Largest over smallest stretch of a map; 1 for a uniform scale. An object
-/// scaled unevenly looks wider than its unit sphere by at most this.
+/// The largest over the smallest stretch of a map; 1 for a uniform scale. It bounds how much wider
+/// than its unit sphere an unevenly scaled object looks.
 fn anisotropy(map: &DMat3) -> f64 {
     let (least, most) = stretches(map);
     if least > 0.0 { most / least } else { f64::INFINITY }
 }
 
-/// Bounds of how far a map stretches a vector: at least the first, at most the
-/// second.
+/// The lower and the upper bound of how far a map stretches vectors.
 fn stretches(map: &DMat3) -> (f64, f64) {
     let gram = map.transpose() * *map;
     let (low, high) = (0..3).map(|i| gram.col(i).to_array().map(f64::abs)).enumerate().fold(

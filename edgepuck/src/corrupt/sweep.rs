@@ -11,9 +11,9 @@ use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
 use sim_gpu::corruption::{Corruption, Recorded};
-use sim_gpu::effects::{Detection, DetectionLimit, Effects};
+use sim_gpu::effects::{Detection, Effects};
 use sim_gpu::glam;
-use sim_gpu::sensor::Sensor;
+use sim_gpu::sensor::{DetectionLimit, Sensor};
 use sim_gpu::weather::{Air, in_weather};
 
 /// Writes the sweep once for each corruption and severity.

@@ -3,9 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::LARGEST_M;
 use crate::config::{InvalidValue, within};
-use crate::sensor::{BeamShape, Sensor};
+use crate::sensor::{BeamShape, LARGEST_M, Sensor};
 
 /// Beams with a width: each is cast as several rays of equal power, and surfaces that the
 /// sensor cannot tell apart become one return between them.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::sensor::DetectionLimit;
 
 #[test]
 fn no_effect_is_the_default_and_plain() {

@@ -3,7 +3,8 @@
 use super::adapters;
 use super::batch::View;
 use super::compose::constants;
-use crate::cpu::aim::{FixedFrame, fixed_direction, tests};
+use crate::cpu::aim::tests;
+use crate::fixed_frame::{FixedFrame, fixed_direction};
 use crate::ray::TraceRay;
 use edgepuck_shaders as shaders;
 use test_support::need;

@@ -1,19 +1,18 @@
 //! Many meshes and views laid side by side for one dispatch.
 
 use super::compose::reads_random_bits;
+use crate::aim::{Aim, MOST_DIRECTIONS};
 use crate::bvh::{Bvh, LeafTriangle, Node};
-use crate::cpu::aim::FixedFrame;
 use crate::effects::Effects;
-use crate::job::{Aim, CastJob, MOST_DIRECTIONS};
+use crate::fixed_frame::FixedFrame;
+use crate::job::CastJob;
+use crate::ray::SENT;
 use crate::sensor::Directions;
 use crate::target::Target;
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Stands for [`View::first_direction`] where the rays are sent.
-pub(super) const SENT: u32 = u32::MAX;
 
 /// How a sensor sees an object, and where its rays and beams begin in their buffers.
 /// `shaders/aim.wgsl` declares the same; a test compares size and offsets. What a

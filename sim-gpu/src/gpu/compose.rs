@@ -2,13 +2,12 @@
 //! `edgepuck_shaders`. A variant holds the sources of the effects that it
 //! models and no others.
 
-use super::batch::SENT;
 use crate::bvh::MAX_DEPTH;
 use crate::cpu::aim::BEFORE;
 use crate::cpu::intersect::{DISPLACEMENT, STEEPEST};
 use crate::cpu::traverse::{ACCURACY, FAR_SCALE, LEAST_COMPONENT};
 use crate::effects::{Effects, RayEffect, RayInput};
-use crate::ray::{AMBIGUOUS, MISS, NO_HIT};
+use crate::ray::{AMBIGUOUS, MISS, NO_HIT, SENT};
 use edgepuck_shaders as shaders;
 
 /// Rays of one workgroup. Lavapipe and GPUs trace alike from 32 to 256.

@@ -5,7 +5,7 @@ use super::batch::Batch;
 use super::clock::Clock;
 use super::compose::{WORKGROUP_SIZE, reads_random_bits};
 use super::pipeline::Pipeline;
-use crate::cpu::aim::fixed_direction;
+use crate::fixed_frame::fixed_direction;
 use crate::sensor::Directions;
 use std::sync::mpsc::{Receiver, Sender, channel};
 

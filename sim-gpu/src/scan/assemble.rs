@@ -2,116 +2,26 @@
 
 use super::echo::Source;
 use super::hit_effects::HitEffects;
-use super::measure::{Return, View, measure_all, measure_one};
-use super::normals::{Normals, unit_normal};
-use super::request::{Glass, ScanRequest};
+use super::measure::{Return, measure};
+use super::normals::unit_normal;
+use super::object_hits::{HitId, ObjectHits, Tally};
+use super::receiver::Receiver;
+use super::request::ScanRequest;
 use crate::config::InvalidValue;
 use crate::effects::Effects;
-use crate::job::CastJob;
-use crate::material::{Material, Materials};
-use crate::motion::Motion;
-use crate::resolve::{Hit, Hits};
-use crate::sensor::{BeamPattern, Sensor, polar_angle_rad};
+use crate::pose::Pose;
+use crate::sensor::{Sensor, polar_angle_rad};
 use crate::weather::Medium;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
-use glam::{DAffine3, DQuat, DVec3};
-use serde::{Deserialize, Serialize};
-use std::ops::AddAssign;
+use glam::{DQuat, DVec3};
 
-/// What one object returned.
-#[derive(Clone, Copy, Debug)]
-pub struct ObjectHits<'a> {
-    /// The object's number in its scene.
-    pub object: u32,
-    /// Where the object stands, if it does not move.
-    pub world_from_object: DAffine3,
-    /// Which of it is glass.
-    pub glass: Option<&'a Glass>,
-    /// As [`PlacedTarget::retroreflection`](super::PlacedTarget::retroreflection).
-    pub retroreflection: f64,
-    /// The materials of its triangles, where they differ.
-    pub materials: Option<&'a Materials>,
-    /// The rays that were cast at it.
-    pub job: &'a CastJob,
-    /// What they hit.
-    pub hits: &'a Hits,
-}
-
-impl<'a> ObjectHits<'a> {
-    /// What the only object returned, which stands in the world as its mesh does.
-    #[must_use]
-    pub fn alone(job: &'a CastJob, hits: &'a Hits, materials: Option<&'a Materials>) -> Self {
-        let world_from_object = DAffine3::IDENTITY;
-        let (object, retroreflection, glass) = (0, 0.0, None);
-        Self { object, world_from_object, glass, retroreflection, materials, job, hits }
-    }
-
-    /// Where the object is when `ray` of `pattern` is fired.
-    pub(super) fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
-        let at = |motion: &Motion| motion.world_from_object_at(pattern.time_s[ray as usize]);
-        self.job.motion.as_ref().map_or(self.world_from_object, at)
-    }
-
-    /// Whether its normals change from beam to beam.
-    pub(super) fn turns(&self) -> bool {
-        self.job.motion.is_some()
-    }
-
-    /// What the surface is made of where a beam of `pattern` hit it.
-    pub(super) fn material(&self, pattern: &BeamPattern, hit: &Hit) -> Material {
-        let (reflectivity, retroreflection) = (self.job.reflectivity.into(), self.retroreflection);
-        let one = || Material { reflectivity, retroreflection };
-        let barycentric = || {
-            let ray = self.job.beam(pattern, hit.beam);
-            let surface = &self.job.target.surface;
-            surface.barycentric(hit.triangle, ray.origin + hit.range_m * ray.direction)
-        };
-        self.materials.map_or_else(one, |materials| materials.at(hit.triangle, barycentric))
-    }
-}
-
-/// What became of a scan's returns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Tally {
-    /// Points in the scan.
-    pub points: u64,
-    /// Beams whose nearest surface lies outside the sensor's range.
-    pub out_of_range: u64,
-    /// Returns lost to dropout or in glass.
-    pub dropped: u64,
-    /// Returns too weak to be detected.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub undetected: u64,
-    /// Returns whose measured range is not positive.
-    pub negative: u64,
-    /// Points of what is in the air.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub scattered: u64,
-}
-
-fn is_zero(n: &u64) -> bool {
-    *n == 0
-}
-
-impl AddAssign for Tally {
-    fn add_assign(&mut self, other: Self) {
-        self.points += other.points;
-        self.out_of_range += other.out_of_range;
-        self.dropped += other.dropped;
-        self.undetected += other.undetected;
-        self.negative += other.negative;
-        self.scattered += other.scattered;
-    }
-}
-
-/// Beyond this, positions are stored from an origin near the sensor: f32 holds
-/// 1 km to 0.06 mm and no better.
+/// Positions beyond this are stored relative to an origin near the sensor: f32 resolves 1 km to
+/// 0.06 mm.
 const ORIGIN_BEYOND_M: f64 = 1024.0;
 
-/// The scan that `request` asks for over all `objects`, at which a caster of
-/// `cast_effects` has cast: for each beam the nearest surface, in the order of
-/// firing.
+/// Assembles the scan that `request` asks for from the hits of all `objects`, which a caster of
+/// `cast_effects` computed. Points are in firing order.
 ///
 /// # Errors
 /// As [`ScanRequest::applied_effects`].
@@ -120,63 +30,70 @@ pub fn assemble(
     cast_effects: &Effects,
     objects: &[ObjectHits],
 ) -> Result<(Scan, Tally), InvalidValue> {
-    let view = View::new(request, cast_effects)?;
-    let start = request.pose_at_start();
-    let origin = origin_for(start.position_m);
-    let mut tally = Tally::default();
+    let receiver = Receiver::new(request, cast_effects, objects)?;
     let nearest = nearest_per_ray(objects, request.pattern.len());
-    let mut returns = Vec::with_capacity(nearest.len());
-    if view.has_one_echo_a_beam() {
-        let mut normals = Normals::new(objects);
-        let measured = |at| measure_one(&view, objects, at, &mut normals, &mut tally);
-        returns.extend(nearest.iter().filter_map(measured));
-    } else {
-        measure_all(&view, objects, &nearest, &mut tally, &mut returns);
-    }
+    let (mut returns, mut tally) = measure(&receiver, &nearest);
     post_process(request, &mut returns);
     tally.points = returns.len() as u64;
-    if view.air.is_some() {
+    if receiver.air.is_some() {
         let is_of_air = |r: &&Return| matches!(r.source, Source::Air { .. });
         tally.scattered = returns.iter().filter(is_of_air).count() as u64;
     }
+    let start = request.pose_at_start();
+    let origin = origin_for(start.position_m);
+    let position = |r: &Return| f32x3(position(&receiver, &start, r, origin));
     let scan = Scan {
         origin: origin.to_array(),
-        positions: returns.iter().map(|r| f32x3(view.place(&start, objects, r, origin))).collect(),
+        positions: returns.iter().map(position).collect(),
         ..Scan::default()
     };
-    Ok((with_attributes(scan, &view, objects, &returns), tally))
+    Ok((with_attributes(scan, &receiver, &returns), tally))
 }
 
-/// Zero near the world's origin, else whole metres near the sensor.
+/// The origin of positions: zero near the world's, else whole metres near the sensor.
 fn origin_for(position_m: DVec3) -> DVec3 {
     if position_m.abs().max_element() < ORIGIN_BEYOND_M { DVec3::ZERO } else { position_m.round() }
+}
+
+/// Where a point is stored, relative to `origin`, metres. The sensor was at `start` when the scan
+/// began.
+fn position(receiver: &Receiver, start: &Pose, r: &Return, origin: DVec3) -> DVec3 {
+    let request = receiver.request;
+    if request.motion.is_none() {
+        return r.from_sensor + (start.position_m - origin);
+    }
+    let pose = request.pose_at(receiver.ray_of(r.source));
+    if request.deskew {
+        return r.from_sensor + (pose.position_m - origin);
+    }
+    let in_sensor = pose.world_from_sensor.inverse() * r.from_sensor;
+    start.world_from_sensor * in_sensor + (start.position_m - origin)
 }
 
 fn f32x3(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
-/// Places in `objects` and in its hits: one per ray of the `n_rays`, ascending. Of equal ranges
-/// the object that comes first wins.
-fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<(usize, usize)> {
+/// The nearest hit of each of the `n_rays` rays that hit anything, by ray. The first of several
+/// objects at the same range wins.
+fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<HitId> {
     if let [alone] = objects {
-        return (0..alone.hits.hits.len()).map(|i| (0, i)).collect();
+        return (0..alone.hits.hits.len() as u32).map(|hit| HitId { object: 0, hit }).collect();
     }
-    const NOTHING: u32 = u32::MAX;
-    let mut nearest = vec![(f64::INFINITY, NOTHING, 0u32); n_rays];
-    for (object, found) in (0u32..).zip(objects) {
-        for (hit, i) in found.hits.hits.iter().zip(0u32..) {
-            let best = &mut nearest[hit.beam as usize];
-            if best.1 == NOTHING || hit.range_m.total_cmp(&best.0).is_lt() {
-                *best = (hit.range_m, object, i);
+    const NO_HIT: HitId = HitId { object: u32::MAX, hit: 0 };
+    let mut nearest = vec![(f64::INFINITY, NO_HIT); n_rays];
+    for (object, of_object) in (0..).zip(objects) {
+        for (hit, found) in (0..).zip(&of_object.hits.hits) {
+            let best = &mut nearest[found.beam as usize];
+            if best.1 == NO_HIT || found.range_m.total_cmp(&best.0).is_lt() {
+                *best = (found.range_m, HitId { object, hit });
             }
         }
     }
-    let found = nearest.into_iter().filter(|(_, object, _)| *object != NOTHING);
-    found.map(|(_, object, i)| (object as usize, i as usize)).collect()
+    nearest.into_iter().map(|(_, id)| id).filter(|&id| id != NO_HIT).collect()
 }
 
-/// The rings and the drawing of points that a sensor's profile may ask for.
+/// Applies the rings and the sampling of points that a sensor's profile may ask for.
 fn post_process(request: &ScanRequest, returns: &mut Vec<Return>) {
     let Sensor { rings, sample, .. } = request.sensor;
     if let (Some(sample), Some(_)) = (sample, rings) {
@@ -200,24 +117,16 @@ fn post_process(request: &ScanRequest, returns: &mut Vec<Return>) {
     }
 }
 
-fn with_attributes(
-    mut scan: Scan,
-    view: &View,
-    objects: &[ObjectHits],
-    returns: &[Return],
-) -> Scan {
+fn with_attributes(mut scan: Scan, receiver: &Receiver, returns: &[Return]) -> Scan {
     let surface = |r: &Return| match r.source {
-        Source::Surface { object, hit } => {
-            let found = &objects[object as usize];
-            Some((found, &found.hits.hits[hit as usize], hit as usize))
-        }
+        Source::Surface(id) => Some(id),
         Source::Air { .. } => None,
     };
-    let ray = |r: &Return| r.ray(objects);
-    let pattern = view.request.pattern;
+    let (request, pattern) = (receiver.request, receiver.pattern());
+    let ray = |r: &Return| receiver.ray_of(r.source);
     let from_start =
-        |r: &Return| view.start(ray(r)).map_or(r.from_sensor, |start| r.from_sensor - start);
-    for attribute in &view.request.attributes {
+        |r: &Return| receiver.start(ray(r)).map_or(r.from_sensor, |start| r.from_sensor - start);
+    for attribute in &request.attributes {
         match attribute {
             Attribute::Range => {
                 scan.range_m = column(returns, |r| from_start(r).length() as f32);
@@ -228,39 +137,32 @@ fn with_attributes(
                 scan.time_s = column(returns, |r| pattern.time_s[ray(r) as usize] as f32);
             }
             Attribute::Triangle => {
-                scan.triangle =
-                    column(returns, |r| surface(r).map_or(NONE, |(_, hit, _)| hit.triangle));
+                let triangle = |id| receiver.hit(id).triangle;
+                scan.triangle = column(returns, |r| surface(r).map_or(NONE, triangle));
             }
             Attribute::Object => {
-                scan.object =
-                    column(returns, |r| surface(r).map_or(NONE, |(found, ..)| found.object));
+                let object = |id| receiver.object(id).object;
+                scan.object = column(returns, |r| surface(r).map_or(NONE, object));
             }
-            // Of a surface in clear air it is the effect's, which a caster computes.
-            Attribute::Intensity if view.air.is_some() => {
+            // In clear air the intensity is that of the effect, which casters compute.
+            Attribute::Intensity if receiver.air.is_some() => {
                 scan.intensity = column(returns, |r| r.brightness);
             }
             Attribute::Intensity => {
-                scan.intensity = column(returns, |r| {
-                    surface(r).map_or(0.0, |(found, hit, number)| {
-                        let effects = HitEffects::of(view.cast_effects, pattern, found, number);
-                        let own = found.materials.map(|_| found.material(pattern, hit));
-                        own.map_or(effects.intensity, |own| {
-                            effects.intensity * own.reflectivity as f32
-                        })
-                    })
-                });
+                let intensity = |id| intensity(receiver, id);
+                scan.intensity = column(returns, |r| surface(r).map_or(0.0, intensity));
             }
             Attribute::Power => scan.power = column(returns, |r| r.power),
             Attribute::Reflectivity => scan.reflectivity = column(returns, |r| r.reflectivity),
             Attribute::Return => scan.return_number = column(returns, |r| r.number),
             Attribute::Sensor => {
-                let at = |r: &Return| view.request.pose_at(ray(r)).position_m;
+                let at = |r: &Return| request.pose_at(ray(r)).position_m;
                 let origin = DVec3::from_array(scan.origin);
                 scan.sensor_m = column(returns, |r| f32x3(at(r) - origin));
             }
             Attribute::Attitude => {
-                let at = |r: &Return| view.request.pose_at(ray(r)).world_from_sensor;
-                // Of the two quaternions of a rotation the one that turns by half a turn at most.
+                let at = |r: &Return| request.pose_at(ray(r)).world_from_sensor;
+                // The quaternion of the two that turns by at most half a turn.
                 let shorter = |q: DQuat| if q.w < 0.0 { -q } else { q };
                 scan.attitude_rad = column(returns, |r| f32x3(shorter(at(r)).to_scaled_axis()));
             }
@@ -272,9 +174,8 @@ fn with_attributes(
             }
             Attribute::Normal => {
                 scan.normal = column(returns, |r| {
-                    surface(r).map_or([0.0; 3], |(found, hit, _)| {
-                        normal(found, pattern, hit, from_start(r))
-                    })
+                    let normal = |id| normal(receiver, id, from_start(r));
+                    surface(r).map_or([0.0; 3], normal)
                 });
             }
         }
@@ -282,15 +183,27 @@ fn with_attributes(
     scan
 }
 
-/// The triangle and the object of what is no surface.
+/// The triangle and the object of points that are not of a surface.
 const NONE: u32 = u32::MAX;
 
 fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>> {
     Some(returns.iter().map(value).collect())
 }
 
-/// The surface's unit normal in world axes, against the `beam` that hit it.
-fn normal(found: &ObjectHits, pattern: &BeamPattern, hit: &Hit, beam: DVec3) -> [f32; 3] {
-    let normal = unit_normal(found, pattern, hit);
+/// The intensity of a hit as an effect, times the reflectivity of its material.
+fn intensity(receiver: &Receiver, id: HitId) -> f32 {
+    let (object, pattern) = (receiver.object(id), receiver.pattern());
+    let HitEffects { intensity, .. } =
+        HitEffects::of_hit(receiver.cast_effects, pattern, object, id);
+    // Casters took the reflectivity of an object with materials for 1.
+    match object.materials {
+        Some(_) => intensity * object.material(pattern, receiver.hit(id)).reflectivity as f32,
+        None => intensity,
+    }
+}
+
+/// The surface's unit normal in world axes, facing against the `beam` that hit it.
+fn normal(receiver: &Receiver, id: HitId, beam: DVec3) -> [f32; 3] {
+    let normal = unit_normal(receiver.object(id), receiver.pattern(), receiver.hit(id));
     f32x3(if normal.dot(beam) > 0.0 { -normal } else { normal })
 }

@@ -1,45 +1,46 @@
-//! What comes back of one beam: the echoes of the surfaces that its rays meet, those that the
-//! receiver cannot tell apart as one, and the returns that the sensor tells of them.
+//! The echoes of one beam, merged where the receiver cannot resolve them, and the returns that
+//! the sensor reports of them.
 
+use super::object_hits::HitId;
 use crate::effects::ReturnMode;
 use crate::weather::Medium;
 
-/// Light that comes back from one distance.
+/// Light that returns from one distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Echo {
-    /// Where it comes from, metres: the mean of its surfaces, weighed by power.
+    /// Its distance, metres: the mean of its surfaces, weighted by power.
     pub range_m: f64,
-    /// How strong it is, where anything asks for it.
+    /// Its strength; all 0 unless an effect or attribute needs it.
     pub signal: Signal,
-    /// What most of it comes from.
+    /// The source of most of its light.
     pub source: Source,
 }
 
-/// What an echo comes from.
+/// The source of an echo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
-    /// A surface: the object, and the hit of it, as places in lists.
-    Surface { object: u32, hit: u32 },
-    /// The air along a ray: which of the beam's returns from the air.
+    /// A surface.
+    Surface(HitId),
+    /// The air along a ray; `draw` counts the echoes of the air along its beam.
     Air { ray: u32, medium: Medium, draw: u32 },
 }
 
-/// How strong an echo is.
+/// The strength of an echo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Signal {
-    /// Relative to what a white surface returns that faces the sensor 1 m away.
+    /// Relative to the power of a white surface that faces the sensor at 1 m.
     pub power: f64,
-    /// Relative to a white surface that faces the sensor and is as wide as the beam.
+    /// Relative to a white surface that faces the sensor and fills the beam.
     pub brightness: f64,
-    /// Of the surface that most of it comes from.
+    /// That of the surface that returns most of the light.
     pub retroreflection: f64,
 }
 
 impl Source {
-    /// Whether both are of one object, or of one medium.
-    fn is_of_the_same(&self, other: &Self) -> bool {
+    /// Whether both are the same object or the same medium.
+    fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Surface { object: a, .. }, Self::Surface { object: b, .. }) => a == b,
+            (Self::Surface(a), Self::Surface(b)) => a.object == b.object,
             (Self::Air { medium: a, .. }, Self::Air { medium: b, .. }) => a == b,
             _ => false,
         }
@@ -47,34 +48,33 @@ impl Source {
 }
 
 impl Echo {
-    /// These parts, in the order of their ranges, as one. It is told to be of the object or
-    /// medium that most of its light comes from, and there of the strongest part.
-    fn of(parts: &[Self]) -> Self {
-        let mut one = parts[0];
-        parts[1..].iter().for_each(|farther| one.join(farther));
+    /// Merges `parts`, which are sorted by range. The source is the strongest part of the object
+    /// or medium that returns most of the light.
+    fn merged(parts: &[Self]) -> Self {
+        let mut merged = parts[0];
+        parts[1..].iter().for_each(|farther| merged.add(farther));
         let power_of = |source: &Source| -> f64 {
-            let same = parts.iter().filter(|part| part.source.is_of_the_same(source));
+            let same = parts.iter().filter(|part| part.source.is_same(source));
             same.map(|part| part.signal.power).sum()
         };
         let weight = |part: &Self| (power_of(&part.source), part.signal.power);
         let mut most = weight(&parts[0]);
         for part in &parts[1..] {
-            // Of equals the nearest.
-            let found = weight(part);
-            if found > most {
-                most = found;
-                (one.source, one.signal.retroreflection) =
+            // Strictly more: the nearest of equals wins.
+            if weight(part) > most {
+                most = weight(part);
+                (merged.source, merged.signal.retroreflection) =
                     (part.source, part.signal.retroreflection);
             }
         }
-        one
+        merged
     }
 
-    /// Adds what comes back from farther away.
-    fn join(&mut self, farther: &Self) {
+    /// Adds the light of a farther echo.
+    fn add(&mut self, farther: &Self) {
         let power = self.signal.power + farther.signal.power;
         let share = farther.signal.power / power;
-        // Black surfaces have no power to weigh by; one that the sensor touches has all of it.
+        // Not finite for two black surfaces, and for one at range 0, whose power is infinite.
         if share.is_finite() {
             self.range_m += (farther.range_m - self.range_m) * share;
         }
@@ -83,10 +83,10 @@ impl Echo {
     }
 }
 
-/// Makes one echo of those that lie nearer than `separation_m` behind one another, and puts
-/// them in the order of their ranges.
+/// Sorts echoes by range, and merges each with the next if they lie less than `separation_m`
+/// apart.
 ///
-/// A slope that leads away is one echo however long it is: its pulse has no gap in it.
+/// A receding slope is thus one echo however long it is: its pulse has no gap.
 pub(super) fn merge(echoes: &mut Vec<Echo>, separation_m: f64) {
     echoes.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
     let (mut count, mut first) = (0, 0);
@@ -94,16 +94,16 @@ pub(super) fn merge(echoes: &mut Vec<Echo>, separation_m: f64) {
         let goes_on =
             echoes.get(i + 1).is_some_and(|next| next.range_m - echoes[i].range_m < separation_m);
         if !goes_on {
-            echoes[count] = if first == i { echoes[i] } else { Echo::of(&echoes[first..=i]) };
+            echoes[count] = if first == i { echoes[i] } else { Echo::merged(&echoes[first..=i]) };
             (count, first) = (count + 1, i + 1);
         }
     }
     echoes.truncate(count);
 }
 
-/// Which of `echoes`, at least one, in the order of their ranges, a sensor tells in this mode:
-/// one or two, in the same order.
-pub(super) fn told(echoes: &[Echo], mode: ReturnMode) -> (usize, Option<usize>) {
+/// The indices of the one or two `echoes` that a sensor reports in this mode, ascending. There
+/// is at least one echo, and they are sorted by range.
+pub(super) fn select_returns(echoes: &[Echo], mode: ReturnMode) -> (usize, Option<usize>) {
     let last = echoes.len() - 1;
     let strongest = strongest_but(echoes, None).unwrap_or(last);
     let second = || strongest_but(echoes, Some(strongest)).unwrap_or(strongest);
@@ -118,10 +118,10 @@ pub(super) fn told(echoes: &[Echo], mode: ReturnMode) -> (usize, Option<usize>) 
     }
 }
 
-/// The strongest of `echoes` besides this one; of equals the nearest.
-fn strongest_but(echoes: &[Echo], other: Option<usize>) -> Option<usize> {
+/// The strongest of `echoes`, except for one; the nearest of equals.
+fn strongest_but(echoes: &[Echo], excluded: Option<usize>) -> Option<usize> {
     let power = |i: usize| echoes[i].signal.power;
-    let all = (0..echoes.len()).filter(|&i| Some(i) != other);
+    let all = (0..echoes.len()).filter(|&i| Some(i) != excluded);
     all.reduce(|best, i| if power(i) > power(best) { i } else { best })
 }
 
@@ -132,14 +132,14 @@ mod tests {
     fn echoes(of: &[(f64, f64)]) -> Vec<Echo> {
         let echo = |(hit, &(range_m, power)): (u32, &(f64, f64))| {
             let signal = Signal { power, brightness: power, retroreflection: 0.0 };
-            Echo { range_m, signal, source: Source::Surface { object: 0, hit } }
+            Echo { range_m, signal, source: Source::Surface(HitId { object: 0, hit }) }
         };
         (0..).zip(of).map(echo).collect()
     }
 
     fn hit(echo: &Echo) -> u32 {
-        let Source::Surface { hit, .. } = echo.source else { panic!("expected a surface") };
-        hit
+        let Source::Surface(id) = echo.source else { panic!("expected a surface") };
+        id.hit
     }
 
     fn merged(of: &[(f64, f64)], separation_m: f64) -> Vec<Echo> {
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn each_mode_tells_its_returns() {
+    fn each_mode_selects_its_returns() {
         use ReturnMode::{Dual, First, Last, SecondStrongest, Strongest};
         let middle = echoes(&[(1.0, 2.0), (2.0, 3.0), (3.0, 1.0)]);
         let at_end = echoes(&[(1.0, 1.0), (2.0, 2.0), (3.0, 3.0)]);
@@ -209,7 +209,7 @@ mod tests {
             (Last, [(2, None), (2, None), (1, None), (0, None)]),
             (Dual, [(1, Some(2)), (1, Some(2)), (0, Some(1)), (0, None)]),
         ] {
-            let found = [&middle, &at_end, &equal, &one].map(|echoes| told(echoes, mode));
+            let found = [&middle, &at_end, &equal, &one].map(|echoes| select_returns(echoes, mode));
             assert_eq!(found, expected, "{mode}");
         }
     }

@@ -1,6 +1,6 @@
-//! What the effects say of one hit.
+//! The outputs of the effects for one hit.
 
-use super::assemble::ObjectHits;
+use super::object_hits::{HitId, ObjectHits};
 use crate::cpu::effects::{dropout, intensity, noise_range, noise_xyz};
 use crate::effects::{Effects, NoiseModel, RayEffect};
 use crate::resolve::{Hit, Hits};
@@ -8,29 +8,30 @@ use crate::sensor::BeamPattern;
 use formats::rng::StreamKey;
 use glam::DVec3;
 
-/// What the effects say of one hit.
+/// The outputs of the effects for one hit.
 #[derive(Default)]
 pub(super) struct HitEffects {
-    /// Along the ray in x where the noise is of the range.
+    /// Metres, in world axes; range noise is in x alone.
     pub noise: DVec3,
     pub dropped: bool,
     pub intensity: f32,
 }
 
 impl HitEffects {
-    /// The outputs of the effects that were cast for number `hit` of what was `found`.
-    pub fn of(
+    /// The outputs for a hit of `object`: as its caster computed them, or else computed here.
+    pub fn of_hit(
         cast_effects: &Effects,
         pattern: &BeamPattern,
-        found: &ObjectHits,
-        hit: usize,
+        object: &ObjectHits,
+        id: HitId,
     ) -> Self {
-        let Hits { hits, effect_outputs, .. } = found.hits;
+        let Hits { hits, effect_outputs, .. } = object.hits;
+        let hit = id.hit as usize;
         let per_hit = cast_effects.outputs_per_ray();
         if let Some(outputs) = effect_outputs.get(hit * per_hit..(hit + 1) * per_hit) {
             return Self::read(cast_effects, outputs);
         }
-        let (job, Hit { beam, triangle, .. }) = (found.job, &hits[hit]);
+        let (job, Hit { beam, triangle, .. }) = (object.job, &hits[hit]);
         let mut own = Self::of_ray(cast_effects, job.stream, *beam);
         if cast_effects.intensity.is_some() {
             let ray = job.beam(pattern, *beam);
@@ -39,19 +40,19 @@ impl HitEffects {
         own
     }
 
-    /// What `cast_effects` say of a ray, whatever it meets.
+    /// The outputs that do not depend on the surface, for a ray.
     pub fn of_ray(cast_effects: &Effects, stream: StreamKey, ray: u32) -> Self {
         let noise = cast_effects.noise.map(|noise| match noise.model {
             NoiseModel::Range => DVec3::X * noise_range(&noise, stream, ray),
             NoiseModel::Xyz => noise_xyz(&noise, stream, ray),
         });
         let dropped = cast_effects.dropout.is_some_and(|model| dropout(&model, stream, ray));
-        // As a caster answers.
+        // Casters answer in f32.
         let noise = noise.unwrap_or_default().as_vec3().as_dvec3();
         Self { noise, dropped, intensity: 0.0 }
     }
 
-    /// Reads what a caster of `cast_effects` answered for one hit.
+    /// Reads the outputs that a caster of `cast_effects` computed for one hit.
     fn read(cast_effects: &Effects, mut outputs: &[f32]) -> Self {
         let mut found = Self::default();
         for effect in cast_effects.per_ray() {

@@ -11,10 +11,13 @@ mod echo;
 mod hit_effects;
 mod measure;
 mod normals;
+mod object_hits;
 mod power;
+mod receiver;
 mod request;
 
-pub use assemble::{ObjectHits, Tally, assemble};
+pub use assemble::assemble;
+pub use object_hits::{ObjectHits, Tally};
 pub use request::{Glass, PlacedTarget, ScanRequest};
 
 use crate::cast_error::CastError;

@@ -13,8 +13,9 @@
 //! every adapter.
 
 use crate::cpu::random::{normal_deviate, random_bits};
-use crate::effects::{Detection, DetectionLimit};
+use crate::effects::Detection;
 use crate::material::Material;
+use crate::sensor::DetectionLimit;
 use formats::rng::StreamKey;
 
 /// Which random bits of a beam are the receiver's noise and the error of its timing.

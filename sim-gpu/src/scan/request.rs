@@ -1,8 +1,9 @@
 //! What is wanted of one scan.
 
+use crate::aim::{Culling, aim};
 use crate::config::InvalidValue;
 use crate::effects::Effects;
-use crate::job::{CastJob, Culling, aim};
+use crate::job::CastJob;
 use crate::material::Materials;
 use crate::motion::Motion;
 use crate::pose::{Pose, Trajectory};

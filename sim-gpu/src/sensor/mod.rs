@@ -11,9 +11,10 @@ use edgepuck_assets::SENSORS;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, ConfigError, InvalidValue};
-use crate::effects::DetectionLimit;
 
 pub use cone::Cone;
+pub use detection_limit::DetectionLimit;
+pub(crate) use detection_limit::LARGEST_M;
 pub use footprint::BeamShape;
 pub use grid::Grid;
 pub(crate) use pattern::starts;
@@ -28,6 +29,7 @@ pub use views::Views;
 
 mod coherence;
 mod cone;
+mod detection_limit;
 mod footprint;
 mod grid;
 mod ouster;

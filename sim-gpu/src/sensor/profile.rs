@@ -6,11 +6,10 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    BeamShape, Grid, Layout, RangeLimits, Rings, Risley, Rotating, Sample, Sensor, Table,
-    TypicalNoise, Uniform, Views,
+    BeamShape, DetectionLimit, Grid, Layout, RangeLimits, Rings, Risley, Rotating, Sample, Sensor,
+    Table, TypicalNoise, Uniform, Views,
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
-use crate::effects::DetectionLimit;
 
 /// Farther than any sensor sees, and its square is still finite in f32.
 const MAX_RANGE_M: f64 = 1e9;

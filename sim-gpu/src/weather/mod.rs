@@ -79,8 +79,8 @@ pub(crate) use recorded::without_surface;
 pub use recorded::{Fates, in_weather};
 
 use crate::cpu::random::random_bits;
-use crate::effects::{DetectionLimit, FogModel, Volume, Weather};
-use crate::sensor::RangeLimits;
+use crate::effects::{FogModel, Volume, Weather};
+use crate::sensor::{DetectionLimit, RangeLimits};
 use drops::Drops;
 use fog::{Fog, extinction_of};
 use formats::rng::StreamKey;

@@ -1,7 +1,7 @@
 //! Weather for points that a sensor measured in clear air.
 
 use super::{Air, AirBeam, Medium, Scattered};
-use crate::effects::DetectionLimit;
+use crate::sensor::DetectionLimit;
 use formats::Scan;
 use formats::rng::StreamKey;
 use glam::DVec3;

@@ -1,8 +1,9 @@
 //! Rays made in whole numbers pass as near to the true ones as the module says.
 
 use super::*;
+use crate::fixed_frame::fixed_direction;
 use formats::rng::StreamKey;
-use glam::DQuat;
+use glam::{DMat3, DQuat, DVec3};
 
 /// A multiple of which all errors are stated.
 const U: f64 = 1.0 / 16_777_216.0;

@@ -1,9 +1,9 @@
 //! The VLP-32C, and the sensors and settings compared with it.
 
 use crate::study::uniform_raster::as_even_grid;
-use sim_gpu::effects::{Detection, DetectionLimit, Effects, Footprint, Noise, NoiseModel, Quantum};
+use sim_gpu::effects::{Detection, Effects, Footprint, Noise, NoiseModel, Quantum};
 use sim_gpu::effects::{ReturnMode, Weather};
-use sim_gpu::sensor::{Layout, Sensor};
+use sim_gpu::sensor::{DetectionLimit, Layout, Sensor};
 use std::num::NonZeroU32;
 
 /// The settings of a scan.

@@ -1,0 +1,108 @@
+//! What the beams of one scan hit of one object, and what became of a scan's returns.
+
+use super::request::Glass;
+use crate::job::CastJob;
+use crate::material::{Material, Materials};
+use crate::motion::Motion;
+use crate::resolve::{Hit, Hits};
+use crate::sensor::BeamPattern;
+use glam::DAffine3;
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// A hit, by its place in the lists of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct HitId {
+    /// The place of its object among the scan's objects.
+    pub object: u32,
+    /// Its place among the object's hits.
+    pub hit: u32,
+}
+
+/// The hits of one object.
+#[derive(Clone, Copy, Debug)]
+pub struct ObjectHits<'a> {
+    /// The object's number in its scene.
+    pub object: u32,
+    /// The pose of an object that does not move.
+    pub world_from_object: DAffine3,
+    /// Its panes.
+    pub glass: Option<&'a Glass>,
+    /// As [`PlacedTarget::retroreflection`](super::PlacedTarget::retroreflection).
+    pub retroreflection: f64,
+    /// The materials of its triangles, if they differ.
+    pub materials: Option<&'a Materials>,
+    /// The rays that were cast at it.
+    pub job: &'a CastJob,
+    /// The hits of these rays.
+    pub hits: &'a Hits,
+}
+
+impl<'a> ObjectHits<'a> {
+    /// The hits of the only object of a scan, whose mesh has world coordinates.
+    #[must_use]
+    pub fn alone(job: &'a CastJob, hits: &'a Hits, materials: Option<&'a Materials>) -> Self {
+        let world_from_object = DAffine3::IDENTITY;
+        let (object, retroreflection, glass) = (0, 0.0, None);
+        Self { object, world_from_object, glass, retroreflection, materials, job, hits }
+    }
+
+    /// The pose of the object when `ray` of `pattern` is fired.
+    pub(super) fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
+        let at = |motion: &Motion| motion.world_from_object_at(pattern.time_s[ray as usize]);
+        self.job.motion.as_ref().map_or(self.world_from_object, at)
+    }
+
+    /// Whether its normals may change from ray to ray.
+    pub(super) fn moves(&self) -> bool {
+        self.job.motion.is_some()
+    }
+
+    /// The material of the surface at a hit of a ray of `pattern`.
+    pub(super) fn material(&self, pattern: &BeamPattern, hit: &Hit) -> Material {
+        let (reflectivity, retroreflection) = (self.job.reflectivity.into(), self.retroreflection);
+        let Some(materials) = self.materials else {
+            return Material { reflectivity, retroreflection };
+        };
+        let barycentric = || {
+            let ray = self.job.beam(pattern, hit.beam);
+            let surface = &self.job.target.surface;
+            surface.barycentric(hit.triangle, ray.origin + hit.range_m * ray.direction)
+        };
+        materials.at(hit.triangle, barycentric)
+    }
+}
+
+/// Counts of what became of a scan's returns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Points in the scan.
+    pub points: u64,
+    /// Beams whose nearest surface lies outside the sensor's range.
+    pub out_of_range: u64,
+    /// Returns lost to dropout or in glass.
+    pub dropped: u64,
+    /// Returns too weak to be detected.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub undetected: u64,
+    /// Returns whose measured range is not positive.
+    pub negative: u64,
+    /// Points of rain, snow, fog or dust.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub scattered: u64,
+}
+
+fn is_zero(n: &u64) -> bool {
+    *n == 0
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.points += other.points;
+        self.out_of_range += other.out_of_range;
+        self.dropped += other.dropped;
+        self.undetected += other.undetected;
+        self.negative += other.negative;
+        self.scattered += other.scattered;
+    }
+}

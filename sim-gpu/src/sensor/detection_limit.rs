@@ -1,0 +1,40 @@
+//! The weakest surface that a sensor detects, as its maker states it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::{InvalidValue, positive, within};
+
+/// The upper bound of every length that effects use: shaders hold lengths in f32 and multiply
+/// them.
+pub(crate) const LARGEST_M: f64 = 1e9;
+
+/// A surface that a sensor just detects if it faces the sensor in clear air: what makers
+/// state as "80 % at 120 m".
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DetectionLimit {
+    /// The surface's diffuse reflectivity, above 0 and at most 1.
+    pub reflectivity: f64,
+    /// Its distance in metres.
+    pub range_m: f64,
+}
+
+impl DetectionLimit {
+    /// The least power that is detected, relative to that received from a white surface
+    /// that faces the sensor 1 m away.
+    #[must_use]
+    pub fn power(&self) -> f64 {
+        self.reflectivity / self.range_m.powi(2)
+    }
+
+    /// Checks both numbers, under the names that begin with `key`.
+    ///
+    /// # Errors
+    /// On the first that is not finite or out of its bounds.
+    pub(crate) fn validate(&self, key: &str) -> Result<(), InvalidValue> {
+        positive(&format!("{key}.reflectivity"), self.reflectivity)?;
+        within(&format!("{key}.reflectivity"), self.reflectivity, 0.0..=1.0)?;
+        positive(&format!("{key}.range_m"), self.range_m)?;
+        within(&format!("{key}.range_m"), self.range_m, 0.0..=LARGEST_M)
+    }
+}
