@@ -1,11 +1,10 @@
-//! Vectors in f64 side by side, a lane each: plain loops that the compiler turns into
-//! vector instructions, of AVX2 or AVX-512 where [`widest`] finds them. Each lane is to the bit
-//! what glam gives for one vector.
+//! Vectors in f64, one in each lane: plain loops that the compiler vectorizes, for AVX2 or AVX-512
+//! if [`widest`] finds them. Each lane equals the result of glam for one vector to the bit.
 
 use glam::{DMat3, DVec3};
 use std::ops::{Add, Mul, Sub};
 
-/// What `of` says of each lane: `array::from_fn` and `map` are not always inlined.
+/// The value of `of` for each lane. Unlike this, `array::from_fn` and `map` are not always inlined.
 #[inline(always)]
 pub(crate) fn each<T: Copy + Default, const N: usize>(of: impl Fn(usize) -> T) -> [T; N] {
     let mut lanes = [T::default(); N];
@@ -15,7 +14,7 @@ pub(crate) fn each<T: Copy + Default, const N: usize>(of: impl Fn(usize) -> T) -
     lanes
 }
 
-/// How many rays are aimed, and ranges solved, at once.
+/// How many rays are aimed, or ranges computed, at once.
 pub(crate) const LANES: usize = 8;
 
 /// `N` vectors.
@@ -57,7 +56,7 @@ impl<const N: usize> Vectors<N> {
         *self * each(|i| 1.0 / length_squared[i].sqrt())
     }
 
-    /// Each vector as `map` maps it.
+    /// Each vector mapped by `map`.
     #[inline(always)]
     pub fn mapped(&self, map: &DMat3) -> Self {
         let row = |i: usize| {

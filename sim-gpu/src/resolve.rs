@@ -1,8 +1,8 @@
-//! From a caster's codes to ranges, in f64.
+//! Turns a caster's codes into ranges, in f64.
 //!
-//! A caster finds which triangle a ray hits; this solves where. So ranges are
-//! the same to the last bit on every adapter that finds the same triangle,
-//! and as accurate near grazing as elsewhere.
+//! Casters find the triangle that a ray hits; this module computes where. Ranges are thus the same
+//! to the last bit on every adapter that finds the same triangle, and accurate at grazing
+//! incidence too.
 
 use crate::cpu::effects::append_outputs;
 use crate::cpu::oracle::{self, Crossing};
@@ -12,29 +12,29 @@ use crate::lanes::{Avx2, LANES, Lanewise, each, widest};
 use crate::ray::{AMBIGUOUS, MISS};
 use crate::sensor::BeamPattern;
 
-/// One beam's nearest surface.
+/// The nearest surface along a ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hit {
-    /// The beam, as an index into its pattern.
+    /// The ray, as an index into its pattern.
     pub beam: u32,
     /// The triangle, as an index into its mesh.
     pub triangle: u32,
-    /// Distance from where the beam starts, metres, without any effect.
+    /// The distance from the start of the ray, metres, before any effect.
     pub range_m: f64,
 }
 
-/// The hits of one job and what the effects say of each.
+/// The hits of one job, and the outputs of effects for each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hits {
-    /// By beam, ascending.
+    /// The hits, ascending by ray.
     pub hits: Vec<Hit>,
     /// The effects' outputs, as in [`Cast`]; `[n_hits, outputs_per_ray]`.
     pub effect_outputs: Vec<f32>,
-    /// Rays for which f32 left more than one surface in question.
+    /// The number of rays for which f32 could not decide between surfaces.
     pub decided_in_f64: usize,
 }
 
-/// Solves the ranges of `job`'s hits and puts them in the order of beams.
+/// Computes the ranges of `job`'s hits and sorts them by ray.
 #[must_use]
 pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effects) -> Hits {
     let per_ray = effects.outputs_per_ray();
@@ -49,7 +49,7 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
             let ray = job.beam(pattern, beam);
             let Some(Crossing { index, .. }) = oracle::nearest(&job.target, &ray) else { continue };
             if index != triangle {
-                // By the same formula whoever found the triangle.
+                // By the same formula as for all other hits.
                 let Some(range_m) = oracle::range_to(&job.target, &ray, index) else { continue };
                 resolved.hits.push(Hit { beam, triangle: index, range_m });
                 append_outputs(&mut resolved.effect_outputs, effects, job, beam, &ray, index);
@@ -66,8 +66,8 @@ pub fn resolve(job: &CastJob, cast: &Cast, pattern: &BeamPattern, effects: &Effe
     resolved
 }
 
-/// How far each of the rays of these numbers goes to the triangle that its code names;
-/// NaN where that lies behind the sensor.
+/// Computes the range from each of these rays to the triangle that its code names; NaN if that
+/// lies behind the sensor.
 struct Ranges<'a> {
     job: &'a CastJob,
     cast: &'a Cast,
@@ -94,15 +94,14 @@ impl Lanewise for Ranges<'_> {
     }
 }
 
-/// Of so many beams one is cast at an object that few beams may meet.
+/// A job is sparse if it casts less than one in this many of the pattern's beams.
 const SPARSE: usize = 16;
 
-/// The rays of `job` that hit, in the order of their beams, each of which has at
-/// most one.
+/// The rays of `job` that hit anything, by beam. Each beam has at most one ray.
 fn by_beam(job: &CastJob, cast: &Cast, n_beams: usize) -> Vec<u32> {
     let hits =
         || (0..).zip(job.beams.iter().zip(&cast.codes)).filter(|(_, (_, code))| **code != MISS);
-    // A small object of a scene meets few beams: sorting them is faster than a place for each.
+    // For a sparse job, sorting its hits is faster than a table of all beams.
     if job.beams.len() < n_beams / SPARSE {
         let mut hits: Vec<(u32, u32)> = hits().map(|(ray, (&beam, _))| (beam, ray)).collect();
         hits.sort_unstable();

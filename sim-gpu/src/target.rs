@@ -65,7 +65,7 @@ impl Surface {
             .iter()
             .flat_map(|&t| mesh.triangles[t as usize])
             .map(|v| mesh.vertices[v as usize]);
-        let frame = UnitFrame::of(used.clone());
+        let frame = UnitFrame::around(used.clone());
         let farthest = used.map(|v| frame.to_unit(v).length_squared()).fold(0.0, f64::max).sqrt();
         let mut vertices = mesh.vertices;
         vertices.iter_mut().for_each(|v| *v = frame.to_unit(*v));

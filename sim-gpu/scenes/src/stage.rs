@@ -341,7 +341,7 @@ fn mesh_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder)?;
     let mut files =
         entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<PathBuf>>>()?;
-    files.retain(|file| MeshFormat::of(file).is_some());
+    files.retain(|file| MeshFormat::from_path(file).is_some());
     files.sort();
     Ok(files)
 }

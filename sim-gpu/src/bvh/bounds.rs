@@ -12,28 +12,28 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box of nothing, for growing. A ray test that takes the corners in
-    /// any order hits it always: trees hold [`Bounds::NOWHERE`] instead.
+    /// The empty box, to be grown. A ray test that takes the corners in any order always hits
+    /// it: trees hold [`Bounds::NOWHERE`] instead.
     pub const EMPTY: Self = Self { min: Vec3A::splat(f32::MAX), max: Vec3A::splat(f32::MIN) };
 
-    /// A box that no ray hits: a point beyond all distances that casters know.
-    /// Finite, so that no ray arithmetic makes a NaN of it.
+    /// A box that no ray hits: a point beyond all distances of casters. It is finite, so that the
+    /// arithmetic of rays does not turn it into NaN.
     pub const NOWHERE: Self = Self { min: Vec3A::splat(f32::MAX), max: Vec3A::splat(f32::MAX) };
 
-    /// The box of three corners.
+    /// The bounds of three corners.
     #[must_use]
-    pub fn of(corners: &[[f32; 3]; 3]) -> Self {
+    pub fn around(corners: &[[f32; 3]; 3]) -> Self {
         let [a, b, c] = corners.map(Vec3A::from_array);
         Self { min: a.min(b).min(c), max: a.max(b).max(c) }
     }
 
-    /// The smallest box around both.
+    /// The bounds of both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Grown to hold `point`.
+    /// The box grown to hold `point`.
     #[must_use]
     pub fn with(self, point: Vec3A) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
@@ -52,7 +52,7 @@ impl Bounds {
         self.min + self.max
     }
 
-    /// Grown by `margin` on all sides; the empty box stays empty.
+    /// The box grown by `margin` on all sides; the empty box stays empty.
     #[must_use]
     pub fn padded(self, margin: f32) -> Self {
         Self { min: self.min - margin, max: self.max + margin }

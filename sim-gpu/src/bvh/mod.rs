@@ -1,8 +1,8 @@
 //! Bounding volume hierarchies over triangles in the unit frame.
 //!
-//! Shaders read two-wide nodes of 64 bytes that hold the boxes of both children
-//! (Aila and Laine 2009), and triangles of 48 bytes sorted so that each leaf's
-//! lie side by side. The CPU searches the same tree collapsed to eight-wide nodes.
+//! Shaders read two-wide nodes of 64 bytes that hold the boxes of both children (Aila and Laine
+//! 2009), and triangles of 48 bytes, those of one leaf side by side. The CPU searches the same
+//! tree collapsed to eight-wide nodes.
 
 mod bounds;
 mod choose;
@@ -20,26 +20,25 @@ pub use traverse::{Entered, Search, Stack, boxes_that, traverse};
 pub use validate::assert_well_formed;
 pub use wide::{LEAF, Leaf4, WIDTH, WideBvh, WideChild, WideNode};
 
-/// No path from the root to a leaf is longer; casters size their stacks by it.
+/// The longest path from the root to a leaf; casters size their stacks by it.
 pub const MAX_DEPTH: usize = 64;
 
-/// Builders switch from their own split to halving below this depth, so that
+/// The depth below which builders halve nodes instead of choosing a split, so that
 /// `HALVING_DEPTH + log2(triangles) <= MAX_DEPTH` for up to 2^31 triangles.
 const HALVING_DEPTH: usize = 32;
 
-/// Leaves hold at most this many triangles.
+/// The most triangles of a leaf.
 const MAX_LEAF: usize = 4;
 
-/// How far boxes reach beyond their triangles, in the unit frame (every
-/// coordinate at most 1).
+/// How far boxes reach beyond their triangles, in the unit frame, whose coordinates are at
+/// most 1.
 ///
-/// A triangle test may accept a ray that passes outside the triangle by its
-/// own rounding: 48 units of 2^-24 by the account in `cpu::intersect`. A slab
-/// test moves the box's planes by 4 more (`cpu::traverse`). The box must not
-/// reject a ray that the triangle takes: 2^-18 is 64 such units.
+/// A box must not reject a ray that a triangle inside it accepts. By rounding, a triangle test
+/// may accept a ray that passes 48 units of 2^-24 outside the triangle (`cpu::intersect`), and a
+/// slab test moves the planes of a box by 4 more (`cpu::traverse`). 2^-18 is 64 such units.
 const BOX_PADDING: f32 = 1.0 / (1 << 18) as f32;
 
-/// Which algorithm builds the hierarchy.
+/// An algorithm that builds hierarchies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Builder {
     /// Binned surface area heuristic (Wald 2007), in parallel: the fastest
@@ -61,7 +60,7 @@ pub struct Bvh {
     pub wide: WideBvh,
 }
 
-/// One triangle on its way into a tree.
+/// A triangle to be put into a tree.
 #[derive(Clone, Copy)]
 struct Primitive {
     bounds: Bounds,
@@ -69,15 +68,15 @@ struct Primitive {
 }
 
 impl Bvh {
-    /// Builds over `corners`, each triangle's corners in the unit frame, whose
-    /// indices for the caster's answer are `indices`. Both `[n_triangles]`.
+    /// Builds a hierarchy over triangles with these `corners`, in the unit frame, and these
+    /// `indices`, which casters answer with. Both `[n_triangles]`.
     #[must_use]
     pub fn build(builder: Builder, corners: &[[[f32; 3]; 3]], indices: &[u32]) -> Self {
         debug_assert_eq!(corners.len(), indices.len());
         let mut primitives: Vec<Primitive> = corners
             .iter()
             .zip(0..)
-            .map(|(corners, triangle)| Primitive { bounds: Bounds::of(corners), triangle })
+            .map(|(corners, triangle)| Primitive { bounds: Bounds::around(corners), triangle })
             .collect();
         let nodes = match builder {
             Builder::Sah => sah::build(&mut primitives),

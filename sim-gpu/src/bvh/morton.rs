@@ -28,6 +28,8 @@ pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
     with_root(nodes, root)
 }
 
+/// Appends the subtree over `primitives`, whose first is number `first` in leaf order, to `nodes`,
+/// and returns its entry in the parent.
 fn subtree(
     primitives: &[Primitive],
     codes: &[u32],
@@ -40,6 +42,7 @@ fn subtree(
         return Child { bounds, first, count: primitives.len() as u32 };
     }
     let middle = split(codes, depth);
+    // Parents stand before their children: the collapse to wide nodes relies on it.
     let at = nodes.len();
     nodes.push(Node::new(Child::NONE, Child::NONE));
     let (left, right) = primitives.split_at(middle);
@@ -50,17 +53,18 @@ fn subtree(
     Child { bounds: left.bounds.union(right.bounds), first: at as u32, count: 0 }
 }
 
-/// Where the highest differing bit changes, or half way if no bit differs.
+/// The place where the highest differing bit changes, or half way if no bit differs.
 fn split(codes: &[u32], depth: usize) -> usize {
     let differing = codes[0] ^ codes[codes.len() - 1];
     if differing == 0 || depth >= HALVING_DEPTH {
         return codes.len() / 2;
     }
     let bit = 1 << (31 - differing.leading_zeros());
+    // Codes are sorted and agree in all higher bits.
     codes.partition_point(|code| code & bit == 0)
 }
 
-/// The Morton code of a doubled centre within the box of all of them.
+/// The Morton code of a doubled centre within the bounds of all of them.
 fn code(centre: Vec3A, centres: Bounds) -> u32 {
     let cells = (1 << BITS) as f32;
     let size = (centres.max - centres.min).max(Vec3A::splat(f32::MIN_POSITIVE));
@@ -69,7 +73,7 @@ fn code(centre: Vec3A, centres: Bounds) -> u32 {
     spread(0) << 2 | spread(1) << 1 | spread(2)
 }
 
-/// The ten low bits of `x`, two zeros between each.
+/// Spreads the ten low bits of `x`, with two zeros between neighbours.
 fn spread_bits(mut x: u32) -> u32 {
     x = (x | x << 16) & 0x0300_00FF;
     x = (x | x << 8) & 0x0300_F00F;

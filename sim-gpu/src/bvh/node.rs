@@ -1,10 +1,10 @@
-//! The records that casters read. `shaders/shared/bvh.wgsl` declares the same
-//! two; a test compares size and offsets.
+//! The records that casters read. `shaders/shared/bvh.wgsl` declares the same two; a test
+//! compares their sizes and offsets.
 
 use super::{BOX_PADDING, Bounds};
 use bytemuck::{Pod, Zeroable};
 
-/// An inner node: both children's boxes, and where each child is.
+/// An inner node: the boxes and the places of both children.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Node {
@@ -44,7 +44,7 @@ pub struct LeafTriangle {
     pub _padding_c: u32,
 }
 
-/// A child as builders see it.
+/// A child of a node under construction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Child {
     pub bounds: Bounds,
@@ -53,7 +53,7 @@ pub(super) struct Child {
 }
 
 impl Child {
-    /// A child that no ray can hit, for trees of one leaf.
+    /// A child that no ray hits, for trees of one leaf.
     pub(super) const NONE: Self = Self { bounds: Bounds::NOWHERE, first: 0, count: 1 };
 }
 
@@ -90,7 +90,7 @@ impl Node {
     }
 }
 
-/// `nodes`, with one above `root` if that is a leaf or nothing.
+/// `nodes`, or, if the whole tree is one leaf or empty, a node above it.
 pub(super) fn with_root(mut nodes: Vec<Node>, root: Child) -> Vec<Node> {
     if nodes.is_empty() {
         let leaf = if root.count == 0 { Child::NONE } else { root };
@@ -108,10 +108,9 @@ impl LeafTriangle {
 
 /// The corners in lexicographic order of their coordinates.
 ///
-/// Two triangles that share an edge then evaluate its edge function on the
-/// same endpoints in the same order, so that both get exactly opposite values
-/// however the compiler contracts it. By position, not by index: CAD files
-/// repeat vertices.
+/// Two triangles that share an edge then evaluate its edge function on the same endpoints in the
+/// same order, so that both get exactly opposite values however the compiler contracts it. The
+/// order is by position, not by index, because CAD files repeat vertices.
 #[must_use]
 pub fn canonical_corners(mut corners: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
     corners.sort_unstable_by(|p, q| {

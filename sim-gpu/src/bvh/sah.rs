@@ -10,14 +10,14 @@ const BINS: usize = 16;
 const BINS_OF_FEW: usize = 8;
 const FEW: usize = 64;
 
-/// Nodes of at most so many triangles try each of their orders' splits: that
-/// takes less than to fill bins.
+/// Nodes of at most this many triangles try every split along every axis, which takes less time
+/// than filling bins.
 const EXACT: usize = 8;
 
 /// Cost of a triangle test in units of a node visit.
 const TRIANGLE_COST: f32 = 1.0;
 
-/// Smaller subtrees are built on the thread at hand.
+/// Subtrees of more triangles are built in parallel.
 const PARALLEL_ABOVE: usize = 8192;
 
 /// Sorts `primitives` into leaf order and returns the nodes above them.
@@ -27,8 +27,8 @@ pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
     with_root(nodes, root)
 }
 
-/// Appends the subtree over `primitives`, whose first is number `first` of the
-/// mesh, to `nodes` and describes it to its parent.
+/// Appends the subtree over `primitives`, whose first is number `first` in leaf order, to `nodes`,
+/// and returns its entry in the parent.
 fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut Vec<Node>) -> Child {
     let (bounds, centres) = extent(primitives);
     let leaf = Child { bounds, first, count: primitives.len() as u32 };
@@ -42,6 +42,7 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
         halve(primitives, centres)
     } else if primitives.len() <= EXACT {
         let (middle, cost) = split_exactly(primitives);
+        // Areas stand for probabilities of a visit; a split also costs one visit of this node.
         let leaf_cost = TRIANGLE_COST * primitives.len() as f32 * bounds.half_area();
         if primitives.len() <= MAX_LEAF && leaf_cost <= cost + bounds.half_area() {
             return leaf;
@@ -51,6 +52,7 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
         split_between_bins(primitives, centres)
     };
     let (left, right) = primitives.split_at_mut(middle);
+    // Parents stand before their children: the collapse to wide nodes relies on it.
     let at = nodes.len();
     nodes.push(Node::new(Child::NONE, Child::NONE));
     let right_first = first + middle as u32;
@@ -64,7 +66,7 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
     Child { bounds, first: at as u32, count: 0 }
 }
 
-/// Both subtrees at once, appended to `nodes` in order.
+/// Builds both subtrees in parallel and appends them to `nodes`, left before right.
 fn in_parallel(
     left: (&mut [Primitive], u32),
     right: (&mut [Primitive], u32),
@@ -78,6 +80,7 @@ fn in_parallel(
     };
     let (left, right) = rayon::join(|| build(left), || build(right));
     let mut append = |(mut child, subtree): (Child, Vec<Node>)| {
+        // Each subtree numbered its nodes from 0; triangles have their final places already.
         let base = nodes.len() as u32;
         nodes.extend(subtree.iter().map(|node| node.moved(base, 0)));
         if child.count == 0 {
@@ -88,7 +91,7 @@ fn in_parallel(
     (append(left), append(right))
 }
 
-/// The box of the primitives and the box of their doubled centres.
+/// The bounds of the primitives, and of their doubled centres.
 pub(super) fn extent(primitives: &[Primitive]) -> (Bounds, Bounds) {
     primitives.iter().fold((Bounds::EMPTY, Bounds::EMPTY), |(bounds, centres), p| {
         (bounds.union(p.bounds), centres.with(p.bounds.doubled_centre()))
@@ -106,6 +109,7 @@ struct Split {
 }
 
 impl Split {
+    /// Repeats the arithmetic of [`best_split`], so that no primitive falls into another bin.
     fn is_left(&self, primitive: &Primitive) -> bool {
         let centre = primitive.bounds.doubled_centre()[self.axis];
         let bin = ((centre - self.origin) * self.bins_per_unit) as usize;
@@ -113,8 +117,8 @@ impl Split {
     }
 }
 
-/// Sorts the left side of the cheapest split between bins to the front; how
-/// many they are. Where no split parts the centres, halves them.
+/// Moves the left side of the cheapest split between bins to the front, and returns its size. If
+/// no split separates the centres, halves the primitives instead.
 fn split_between_bins(primitives: &mut [Primitive], centres: Bounds) -> usize {
     let split = if primitives.len() <= FEW {
         best_split::<BINS_OF_FEW>(primitives, centres)
@@ -125,9 +129,8 @@ fn split_between_bins(primitives: &mut [Primitive], centres: Bounds) -> usize {
     if middle == 0 || middle == primitives.len() { halve(primitives, centres) } else { middle }
 }
 
-/// Sorts `primitives` along the axis whose cheapest split is the cheapest of
-/// all; how many come left of it, and its cost. Ties go by triangle, so that
-/// the tree is the same on every run.
+/// Sorts `primitives` along the axis of the cheapest split, and returns the size of the left side
+/// and the cost. Triangle numbers break ties, so that the tree is the same on every run.
 fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
     let sort = |primitives: &mut [Primitive], axis: usize| {
         primitives.sort_unstable_by(|p, q| {
@@ -145,6 +148,7 @@ fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
             (best_axis, best) = (axis, (last_left + 1, cost));
         }
     }
+    // They are still sorted along the last axis.
     if best_axis != 2 {
         sort(primitives, best_axis);
     }
@@ -154,6 +158,7 @@ fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
 /// The cheapest split between bins on any axis; `None` if all centres agree.
 fn best_split<const BINS: usize>(primitives: &[Primitive], centres: Bounds) -> Option<Split> {
     let size = centres.max - centres.min;
+    // 0 along axes on which all centres agree, which are skipped below.
     let bins_per_unit = Vec3A::from_array(size.to_array().map(|s| {
         let scale = BINS as f32 / s;
         if scale.is_finite() { scale } else { 0.0 }
@@ -178,10 +183,11 @@ fn best_split<const BINS: usize>(primitives: &[Primitive], centres: Bounds) -> O
         .min_by(|p, q| p.cost.total_cmp(&q.cost))
 }
 
-/// The last bin on the left of the cheapest boundary, and its cost: area times
-/// triangles, summed over both sides. Of at most [`BINS`] bins.
+/// The last bin on the left of the cheapest boundary between at most [`BINS`] bins, and its cost:
+/// the sum over both sides of area times triangles.
 #[inline]
 fn cheapest_boundary(bins: &[(Bounds, u32)]) -> (usize, f32) {
+    // Two sweeps: right sides are summed from the right, then left sides from the left.
     let mut right_cost = [0.0; BINS];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     for i in (1..bins.len()).rev() {
@@ -202,7 +208,7 @@ fn cheapest_boundary(bins: &[(Bounds, u32)]) -> (usize, f32) {
     best
 }
 
-/// Moves the primitives that satisfy `is_left` to the front; how many they are.
+/// Moves the primitives that satisfy `is_left` to the front, and returns their number.
 fn partition(primitives: &mut [Primitive], is_left: impl Fn(&Primitive) -> bool) -> usize {
     let mut left = 0;
     for i in 0..primitives.len() {
@@ -214,8 +220,8 @@ fn partition(primitives: &mut [Primitive], is_left: impl Fn(&Primitive) -> bool)
     left
 }
 
-/// Sorts the half with the lower centres along the longest axis to the front.
-/// Ties go by triangle, so that the tree is the same on every run.
+/// Moves the half with the lower centres along the longest axis to the front. Triangle numbers
+/// break ties, so that the tree is the same on every run.
 fn halve(primitives: &mut [Primitive], centres: Bounds) -> usize {
     let size = (centres.max - centres.min).to_array();
     let axis = (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0);

@@ -1,36 +1,36 @@
-//! The search through a tree that all users on the CPU share.
+//! The traversal of trees on the CPU.
 
 use super::MAX_DEPTH;
 use super::wide::{Leaf4, WIDTH, WideBvh, WideChild, WideNode};
 
-/// Which of a node's boxes matter, a bit each, and how far away each begins.
+/// A bit for each of a node's boxes that matters, and the distance at which each begins.
 pub type Entered<Distance> = (u32, [Distance; WIDTH]);
 
-/// The boxes that `matter`, a bit each.
+/// A bit for each box that `matters`.
 #[inline(always)]
-pub fn boxes_that(matter: impl Fn(usize) -> bool) -> u32 {
-    (0..WIDTH).fold(0, |bits, i| bits | u32::from(matter(i)) << i)
+pub fn boxes_that(matters: impl Fn(usize) -> bool) -> u32 {
+    (0..WIDTH).fold(0, |bits, i| bits | u32::from(matters(i)) << i)
 }
 
-/// What is looked for in a tree.
+/// A search for triangles in a tree.
 pub trait Search {
-    /// What says how far away something begins.
+    /// The type of distances.
     type Distance: PartialOrd + Copy + Default;
 
-    /// Which boxes of `node` matter, and how far away each begins.
+    /// The boxes of `node` that matter, and the distance at which each begins.
     fn enter(&self, node: &WideNode) -> Entered<Self::Distance>;
 
-    /// Whether what begins at `distance` still matters, now that its turn has come.
+    /// Whether a box that begins at `distance` still matters when it is popped.
     fn matters(&self, distance: Self::Distance) -> bool;
 
-    /// Looks at the triangles of `leaf`.
+    /// Examines the triangles of `leaf`.
     fn visit(&mut self, leaf: &Leaf4);
 }
 
-/// What a search has still to visit. The caller keeps it, so that a search does
-/// not begin by filling it.
+/// The nodes and leaves that a search has yet to visit. Callers reuse it, because filling a new
+/// one takes longer than many a search.
 pub struct Stack<Distance> {
-    /// On each level of the tree all children but one may have to wait.
+    /// Each level of the tree pushes at most all children but one.
     waiting: [(WideChild, Distance); (WIDTH - 1) * MAX_DEPTH],
     height: usize,
 }
@@ -42,7 +42,7 @@ impl<Distance: Copy + Default> Default for Stack<Distance> {
 }
 
 impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
-    /// Forgets what a search that has ended early left.
+    /// Drops what an earlier search left.
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
         self.height = 0;
@@ -54,7 +54,7 @@ impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
         self.height += 1;
     }
 
-    /// Takes the last child that `matters`, and forgets those after it.
+    /// Pops children until one `matters`.
     #[inline(always)]
     fn pop(&mut self, search: &impl Search<Distance = Distance>) -> Option<WideChild> {
         loop {
@@ -66,13 +66,15 @@ impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
         }
     }
 
-    /// Pushes the children that are `entered`, the nearest last.
+    /// Pushes the `entered` children of `node`, the nearest last.
     #[inline(always)]
     fn push_sorted(&mut self, node: &WideNode, (mut entered, distances): Entered<Distance>) {
         let base = self.height;
         while entered != 0 {
+            // The remainder changes nothing, and saves the bounds checks.
             let i = entered.trailing_zeros() as usize % WIDTH;
             entered &= entered - 1;
+            // Insertion sort: there are eight children at most, and mostly three or four.
             let mut at = self.height;
             while at > base && self.waiting[at - 1].1 < distances[i] {
                 self.waiting[at] = self.waiting[at - 1];
@@ -84,7 +86,7 @@ impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
     }
 }
 
-/// Visits the leaves at or below `from` that matter to `search`, nearer ones first.
+/// Visits the leaves at or below `from` that matter to `search`, in order of their boxes' distances.
 #[inline(always)]
 pub fn traverse<S: Search>(
     tree: &WideBvh,
@@ -99,7 +101,7 @@ pub fn traverse<S: Search>(
     }
 }
 
-/// One step of [`traverse`]: visits the node or leaf `at`, and says which is next.
+/// One step of [`traverse`]: visits the node or leaf `at`, and returns the next.
 #[inline(always)]
 pub(crate) fn step<S: Search>(
     tree: &WideBvh,
@@ -113,12 +115,13 @@ pub(crate) fn step<S: Search>(
     }
     let node = &tree.nodes[at.node()];
     let (entered, distances) = search.enter(node);
+    // All entered boxes but the lowest.
     let rest = entered & entered.wrapping_sub(1);
     if entered == 0 || rest & rest.wrapping_sub(1) != 0 {
         stack.push_sorted(node, (entered, distances));
         return stack.pop(search);
     }
-    // Most often one or two are entered: these need no sort.
+    // One or two boxes, the common case, need no sort.
     let first = entered.trailing_zeros() as usize % WIDTH;
     if rest == 0 {
         return Some(node.children[first]);

@@ -1,4 +1,4 @@
-//! What every tree must hold, whoever built it.
+//! Checks of the invariants of trees.
 
 use super::{Bounds, Bvh, LEAF, MAX_DEPTH, MAX_LEAF, Node, WIDTH, WideChild};
 use glam::Vec3A;
@@ -38,7 +38,7 @@ fn assert_narrow_well_formed(bvh: &Bvh) {
             for (i, triangle) in bvh.triangles[first..first + count].iter().enumerate() {
                 seen[first + i] += 1;
                 let corners = [triangle.a, triangle.b, triangle.c];
-                assert!(bounds.contains(Bounds::of(&corners)), "node {at} cuts its triangle");
+                assert!(bounds.contains(Bounds::around(&corners)), "node {at} cuts its triangle");
             }
         }
     }
@@ -66,7 +66,8 @@ fn assert_wide_well_formed(Bvh { wide, triangles, .. }: &Bvh) {
             let leaf = &wide.leaves[leaf];
             for i in 0..LEAF {
                 let triangle = leaf.corners.map(|corner| corner.map(|axis| axis[i]));
-                let inside = bounds.is_some_and(|bounds| bounds.contains(Bounds::of(&triangle)));
+                let inside =
+                    bounds.is_some_and(|bounds| bounds.contains(Bounds::around(&triangle)));
                 assert!(inside, "wide leaf {at:?} leaves its box");
                 if let Some(&index) = leaf.indices().get(i) {
                     found.push((index, triangle));

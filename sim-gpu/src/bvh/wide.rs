@@ -1,9 +1,9 @@
-//! The hierarchy that the CPU searches: nodes of eight children, leaves of up
-//! to four triangles, each coordinate of all of them side by side.
+//! The hierarchy that the CPU searches: nodes of eight children and leaves of up to four
+//! triangles, with each coordinate of all of them side by side.
 //!
-//! A test of eight boxes takes little longer than a test of one, and the tree is a
-//! third as deep: Dammertz, Hanika, Keller, "Shallow bounding volume hierarchies
-//! for fast SIMD ray tracing of incoherent rays", EGSR 2008.
+//! Testing eight boxes takes little longer than testing one, and the tree is a third as deep:
+//! Dammertz, Hanika, Keller, "Shallow bounding volume hierarchies for fast SIMD ray tracing of
+//! incoherent rays", EGSR 2008.
 
 use super::{Bounds, LeafTriangle, MAX_LEAF, Node};
 use glam::Vec3A;
@@ -16,9 +16,8 @@ pub const LEAF: usize = 4;
 
 const _: () = assert!(MAX_LEAF <= LEAF);
 
-/// An inner node: the boxes of its children, and where each child is. A child
-/// that is missing has the box [`Bounds::NOWHERE`] and is leaf 0, for rays of numbers
-/// that are none, which enter every box.
+/// An inner node: the boxes and the places of its children. A missing child has the box
+/// [`Bounds::NOWHERE`] and is the empty leaf 0, because rays with NaN coordinates enter every box.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub struct WideNode {
@@ -29,12 +28,11 @@ pub struct WideNode {
     pub children: [WideChild; WIDTH],
 }
 
-/// Where a child is: the number of a node, or, with the highest bit, of a leaf.
+/// The place of a child: the number of a node or, with the highest bit set, of a leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WideChild(u32);
 
-/// A leaf of up to four triangles. In place of a missing one stands a triangle
-/// without area, which no ray hits.
+/// A leaf of up to four triangles. Unused places hold a triangle without area, which no ray hits.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf4 {
@@ -46,12 +44,12 @@ pub struct Leaf4 {
     pub len: u32,
 }
 
-/// A tree of such nodes. The root is node 0.
+/// A tree of wide nodes. The root is node 0.
 #[derive(Clone, Debug)]
 pub struct WideBvh {
     /// Never empty.
     pub nodes: Vec<WideNode>,
-    /// The leaves. Leaf 0 holds nothing.
+    /// The leaves. Leaf 0 is empty.
     pub leaves: Vec<Leaf4>,
 }
 
@@ -61,13 +59,13 @@ impl WideChild {
     const IS_LEAF: u32 = 1 << 31;
     const NOTHING: Self = Self(Self::IS_LEAF);
 
-    /// The number of a leaf.
+    /// The number of the leaf, if this is one.
     #[inline]
     pub(crate) fn leaf(self) -> Option<usize> {
         (self.0 & Self::IS_LEAF != 0).then_some((self.0 & !Self::IS_LEAF) as usize)
     }
 
-    /// The number of a node, unless this is a leaf.
+    /// The number of the node; not meaningful for a leaf.
     #[inline]
     pub(crate) fn node(self) -> usize {
         self.0 as usize
@@ -98,7 +96,7 @@ impl Leaf4 {
     const NOTHING: Self =
         Self { corners: [[[0.0; LEAF]; 3]; 3], indices: [u32::MAX; LEAF], len: 0 };
 
-    /// `triangles` are one to four.
+    /// A leaf of one to four `triangles`.
     fn new(triangles: &[LeafTriangle]) -> Self {
         let first = &triangles[0];
         let without_area = LeafTriangle { b: first.a, c: first.a, ..*first };
@@ -118,13 +116,13 @@ impl Leaf4 {
     #[must_use]
     #[inline(always)]
     pub fn indices(&self) -> &[u32] {
+        // The remainder changes nothing, and saves the bounds check.
         &self.indices[..self.len as usize % (LEAF + 1)]
     }
 }
 
 impl WideBvh {
-    /// The wide tree over the same triangles as the two-wide tree of `nodes`. Its boxes
-    /// are some of that tree's.
+    /// Collapses the two-wide tree of `nodes`: the wide tree has some of its boxes.
     #[must_use]
     pub(super) fn collapsed(nodes: &[Node], triangles: &[LeafTriangle]) -> Self {
         let to = Self { nodes: vec![WideNode::EMPTY], leaves: vec![Leaf4::NOTHING] };
@@ -141,9 +139,9 @@ impl WideBvh {
     }
 }
 
-/// Chooses, of all ways to collapse a tree of two-wide nodes, one whose search costs
-/// least by the surface area heuristic: Ylitie, Karras, Laine, "Efficient incoherent ray
-/// traversal on GPUs through compressed wide BVHs", HPG 2017, section 3.1.
+/// Collapses a tree of two-wide nodes so that its search costs least by the surface area
+/// heuristic: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through
+/// compressed wide BVHs", HPG 2017, section 3.1.
 struct Collapse<'a> {
     nodes: &'a [Node],
     triangles: &'a [LeafTriangle],
@@ -152,12 +150,12 @@ struct Collapse<'a> {
     to: WideBvh,
 }
 
-/// What the search of the subtree of a two-wide node costs, in areas of its box.
+/// The cost of searching the subtree of a two-wide node, in areas of its box.
 #[derive(Clone, Copy, Default)]
 struct Cost {
-    /// As at most 1, 2, ... children of one wide node.
+    /// The cost if it becomes at most 1, 2, ... children of one wide node.
     as_children: [f32; WIDTH],
-    /// The first triangle, and how many there are.
+    /// The first triangle, and the number of triangles.
     first: u32,
     count: u32,
     is_leaf: bool,
@@ -167,7 +165,7 @@ struct Cost {
 #[derive(Clone, Copy)]
 struct Subtree {
     bounds: Bounds,
-    /// `None` for a leaf; of no triangles where there is no child.
+    /// `None` for a leaf; a missing child is a leaf without triangles.
     node: Option<u32>,
     first: u32,
     count: u32,
@@ -194,8 +192,8 @@ impl Collapse<'_> {
         ]
     }
 
-    /// What `subtree` costs as at most 1, 2, ... children. To visit a leaf costs as much
-    /// as to visit a node (`bench sim`).
+    /// The cost of `subtree` as at most 1, 2, ... children. A visit of a leaf costs as much as a
+    /// visit of a node (`bench sim`).
     fn costs(&self, subtree: &Subtree) -> [f32; WIDTH] {
         match subtree.node {
             Some(node) => self.costs[node as usize].as_children,
@@ -204,17 +202,18 @@ impl Collapse<'_> {
         }
     }
 
-    /// The least cost of two-wide node `at` as `n` children, two or more, and how many of
-    /// these its left child becomes.
+    /// The least cost of two subtrees as `n` children, two or more, and how many of these the
+    /// left one becomes.
     fn distributed(&self, [left, right]: &[[f32; WIDTH]; 2], n: usize) -> (f32, usize) {
         let split = |on_left: usize| (left[on_left - 1] + right[n - on_left - 1], on_left);
         let first = split(1);
         (2..n).map(split).fold(first, |best, next| if next.0 < best.0 { next } else { best })
     }
 
-    /// From the leaves up. Nodes stand before their children.
+    /// Computes `costs` from the leaves up.
     fn count_costs(&mut self) {
         self.costs = vec![Cost::default(); self.nodes.len()];
+        // Builders put nodes before their children.
         for at in (0..self.nodes.len()).rev() {
             let children = self.children(at);
             let [left, right] = &children;
@@ -234,7 +233,7 @@ impl Collapse<'_> {
         }
     }
 
-    /// Makes wide node `to` hold what two-wide node `at` does.
+    /// Fills wide node `to` with the children that two-wide node `at` becomes.
     fn fill(&mut self, at: u32, to: usize) {
         let mut subtrees = Vec::with_capacity(WIDTH);
         self.gather(at, WIDTH, &mut subtrees);
@@ -256,14 +255,14 @@ impl Collapse<'_> {
         }
     }
 
-    /// Gathers the `n` children or fewer, two or more, that two-wide node `at` becomes.
+    /// Gathers the at most `n` children, two or more, that two-wide node `at` becomes.
     fn gather(&self, at: u32, n: usize, to: &mut Vec<Subtree>) {
         let children = self.children(at as usize);
         let costs = children.each_ref().map(|child| self.costs(child));
         let on_left = self.distributed(&costs, n).1;
         for (child, costs, n) in [(0, costs[0], on_left), (1, costs[1], n - on_left)] {
             let child = children[child];
-            // As few as cost as little.
+            // The fewest children of the same cost.
             let n = (1..n).find(|&fewer| costs[fewer - 1] <= costs[n - 1]).unwrap_or(n);
             match child.node {
                 Some(node) if n > 1 => self.gather(node, n, to),

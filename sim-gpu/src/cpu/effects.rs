@@ -1,5 +1,5 @@
-//! What each effect gives for a ray, in f64. Counterparts of
-//! `shaders/effects/`, each under the name of its shader.
+//! The outputs of each effect for a ray, in f64. Each function is the counterpart of the shader
+//! of its name in `shaders/effects/`.
 
 use super::oracle;
 use super::random::{normal_deviate, random_bits};
@@ -53,8 +53,8 @@ pub fn noise_xyz(noise: &Noise, stream: StreamKey, beam: u32) -> DVec3 {
     DVec3::splat(noise.mean_m) + noise.sigma_m * DVec3::new(x, y, z)
 }
 
-/// Whether the return of `beam` is lost. The probability counts as f32 and the
-/// random number has 24 bits, so that every adapter drops the same returns.
+/// Whether the return of `beam` is lost. The probability is rounded to f32 and the random number
+/// has 24 bits, so that every adapter drops the same returns.
 #[must_use]
 pub fn dropout(dropout: &Dropout, stream: StreamKey, beam: u32) -> bool {
     let unit = (random_bits(stream, beam, 2)[0] >> 8) as f32 * (1.0 / 16_777_216.0);
@@ -65,7 +65,7 @@ pub fn dropout(dropout: &Dropout, stream: StreamKey, beam: u32) -> bool {
 /// incidence times the reflectivity, BLAINDER's model.
 #[must_use]
 pub fn intensity(target: &Target, ray: &Ray, index: u32, reflectivity: f64) -> f64 {
-    // As a caster is given it, so that every way to ask gives the same.
+    // Rounded as casters get it, so that both sources of a direction give the same intensity.
     let direction = ray.direction.as_vec3().as_dvec3();
     let cosine = oracle::normal(target, index).dot(direction.normalize()).abs();
     cosine.min(1.0) * reflectivity

@@ -1,41 +1,40 @@
-//! What bounds a few rays that run side by side: Reshetov, Soupikov, Hurley,
-//! "Multi-level ray tracing algorithm", SIGGRAPH 2005.
+//! Frusta, which bound a few coherent rays: Reshetov, Soupikov, Hurley, "Multi-level ray tracing
+//! algorithm", SIGGRAPH 2005.
 
 use super::intersect::axes_by_size;
 use crate::bvh::{WIDTH, WideNode};
 use crate::ray::TraceRay;
 
-/// Rays whose slopes differ by more than this do not run side by side.
+/// Rays whose slopes differ by more than this are not coherent.
 const WIDEST: f32 = 0.3;
 
 /// How much wider a frustum is than its rays, unit lengths.
 ///
-/// In units u = 2^-24, boxes within 1 of the origin, origins within 2 and slopes
-/// within 1.3: a slope is off by 3u, a crossing by 13u, their sum at a box by 23u. A
-/// triangle may answer that lies 48u beside its ray (`intersect::DISPLACEMENT`).
+/// In units u = 2^-24, with boxes within 1 of the origin, origins within 2 and slopes within
+/// 1.3: a slope is off by 3u, a crossing by 13u, their sum at a box by 23u. The triangle test
+/// accepts triangles up to 48u from the ray (`intersect::DISPLACEMENT`).
 const MARGIN: f32 = 128.0 / 16_777_216.0;
 
-/// The least and the largest of some values.
+/// A lower and an upper bound.
 type Interval = [f32; 2];
 
-/// Bounds of rays that all run the same way along their largest axis, the main one.
+/// Bounds of rays that share the axis of their largest component, the main axis, and its sign.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
     /// The other two axes, and the main one.
     axes: [usize; 3],
     /// Whether the rays run towards higher coordinates along the main axis.
     is_forward: bool,
-    /// The coordinate on the main axis before which no ray starts.
+    /// The coordinate on the main axis where the first ray starts.
     start: f32,
-    /// On each of the other axes, where the rays cross 0 of the main axis, and how far
-    /// they go for each unit along it.
+    /// On each of the other axes: the rays' coordinates where the main axis is 0, and their
+    /// slopes along the main axis.
     crossing: [Interval; 2],
     slope: [Interval; 2],
 }
 
 impl Frustum {
-    /// The frustum of `rays`; `None` if they do not run side by side, or if a number is
-    /// not finite.
+    /// The frustum of `rays`; `None` if they are not coherent, or if a number is not finite.
     #[inline(always)]
     pub fn around<const N: usize>(rays: &[TraceRay; N]) -> Option<Self> {
         let axes = axes_by_size(rays[0].direction.map(f32::abs));
@@ -51,7 +50,7 @@ impl Frustum {
             let crossings: [f32; N] =
                 std::array::from_fn(|n| rays[n].origin[axis] - slopes[n] * start[n]);
             (crossing[i], slope[i]) = (interval(&crossings), interval(&slopes));
-            // Fails where a number is not one.
+            // A comparison with NaN is false.
             is_narrow &= slope[i][1] - slope[i][0] <= WIDEST && slope[i][0].abs() <= 1.0 + WIDEST;
             is_narrow &= crossing[i].iter().all(|c| c.is_finite());
         }
@@ -60,14 +59,15 @@ impl Frustum {
         is_narrow.then_some(Self { axes, is_forward, start, crossing, slope })
     }
 
-    /// The boxes of `node` that a ray may enter, a bit each. A plain loop over all
-    /// boxes, which the compiler turns into vector instructions.
+    /// A bit for each box of `node` that a ray may enter. The compiler vectorizes this plain
+    /// loop over all boxes.
     #[inline(always)]
     pub fn may_enter(&self, node: &WideNode) -> u32 {
         let [low, high] = &node.boxes;
         let main = self.axes[2];
         let mut entered = 0;
         for i in 0..WIDTH {
+            // The part of the main axis where both the box and the rays are.
             let (from, to) = match self.is_forward {
                 true => (low[main][i].max(self.start - MARGIN), high[main][i]),
                 false => (low[main][i], high[main][i].min(self.start + MARGIN)),
@@ -75,6 +75,7 @@ impl Frustum {
             let mut may = from <= to;
             for (j, &axis) in self.axes[..2].iter().enumerate() {
                 let [least, most] = self.slope[j];
+                // Bilinear in slope and coordinate, so the extremes lie at the corners.
                 let [a, b, c, d] = [from * least, to * least, from * most, to * most];
                 let leftmost = a.min(b).min(c.min(d)) + (self.crossing[j][0] - MARGIN);
                 let rightmost = a.max(b).max(c.max(d)) + (self.crossing[j][1] + MARGIN);

@@ -1,6 +1,5 @@
-//! Rays that run in all directions, several at once, each a step in its turn: while
-//! one waits for a node to come from memory, the others go on. Kocberber, Falsafi,
-//! Grot, "Asynchronous memory access chaining", VLDB 2015.
+//! Traces incoherent rays, several at once, one step of each in turn: while one waits for memory,
+//! the others proceed. Kocberber, Falsafi, Grot, "Asynchronous memory access chaining", VLDB 2015.
 
 use super::traverse::{Along, Instructions, Nearest, Prepared};
 use crate::bvh::{Stack, WideBvh, WideChild, step};
@@ -8,21 +7,21 @@ use crate::ray::TraceRay;
 use bytemuck::Zeroable;
 use std::iter::repeat_with;
 
-/// A tree of so many bytes stays in the cache, where one ray after another is faster:
-/// measured with 1,000 to 100,000 triangles (`bench sim`).
+/// The size in bytes up to which a tree stays in the cache, where tracing one ray after another
+/// is faster: measured with 1,000 to 100,000 triangles (`bench sim`).
 const CACHED: usize = 2 << 20;
 
-/// How many rays are under way in a larger tree: more make none faster.
-const UNDER_WAY: usize = 8;
+/// The number of rays in flight in larger trees: more do not raise the speed.
+const IN_FLIGHT: usize = 8;
 
-/// The rays under way.
+/// The rays in flight.
 pub struct Interleaved {
     walks: Vec<Walk>,
 }
 
-/// A ray under way.
+/// A ray in flight.
 struct Walk {
-    /// Its number.
+    /// Its place among the rays to trace.
     number: usize,
     ray: Prepared,
     nearest: Nearest,
@@ -42,7 +41,7 @@ impl Walk {
 }
 
 impl Interleaved {
-    /// Room for as many rays as `tree` makes worthwhile.
+    /// Allocates as many walks as are worthwhile in `tree`.
     pub fn for_tree(tree: &WideBvh) -> Self {
         let nowhere = TraceRay::zeroed();
         let walk = || Walk {
@@ -52,11 +51,11 @@ impl Interleaved {
             stack: Stack::default(),
             at: WideChild::ROOT,
         };
-        let under_way = if tree.bytes() <= CACHED { 1 } else { UNDER_WAY };
-        Self { walks: repeat_with(walk).take(under_way).collect() }
+        let in_flight = if tree.bytes() <= CACHED { 1 } else { IN_FLIGHT };
+        Self { walks: repeat_with(walk).take(in_flight).collect() }
     }
 
-    /// The code of each of `rays`.
+    /// Fills `codes` with the code of each of `rays`.
     #[inline(always)]
     pub fn trace(
         &mut self,
@@ -66,16 +65,17 @@ impl Interleaved {
         by: impl Instructions,
     ) {
         let mut to_begin = rays.iter().enumerate();
-        let under_way = self.walks.len().min(rays.len());
-        let mut walks = &mut self.walks[..under_way];
+        let in_flight = self.walks.len().min(rays.len());
+        let mut walks = &mut self.walks[..in_flight];
         walks.iter_mut().zip(&mut to_begin).for_each(|(walk, ray)| walk.begin(ray));
         while !walks.is_empty() {
             let mut turn = 0;
             while turn < walks.len() {
                 let Walk { number, ray, nearest, stack, at } = &mut walks[turn];
                 if let Some(next) = step(tree, *at, stack, &mut Along { ray, nearest, by }) {
+                    // The node arrives while the other rays take their turns.
                     *at = next;
-                    fetch(tree, next);
+                    prefetch(tree, next);
                     turn += 1;
                     continue;
                 }
@@ -92,9 +92,9 @@ impl Interleaved {
     }
 }
 
-/// Asks for the node or leaf `at` to be brought from memory.
+/// Prefetches the node or leaf `at` into the cache.
 #[inline(always)]
-fn fetch(tree: &WideBvh, at: WideChild) {
+fn prefetch(tree: &WideBvh, at: WideChild) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
@@ -109,7 +109,8 @@ fn fetch(tree: &WideBvh, at: WideChild) {
             }
         };
         for line in (0..size).step_by(CACHE_LINE) {
-            // SAFETY: a prefetch reads nothing, whatever the address.
+            // SAFETY: SSE is part of x86-64, and a prefetch neither reads nor faults, whatever the
+            // address.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(begin.wrapping_add(line)) };
         }
     }

@@ -30,17 +30,17 @@ pub struct Shear {
     pub(super) per_z: f32,
 }
 
-/// What a ray meets of the triangles of a leaf, a lane each.
+/// The crossings of a ray with the triangles of a leaf, one in each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidates4 {
-    /// The lanes that the ray meets, a bit each.
+    /// A bit for each lane whose triangle the ray meets.
     pub met: u32,
     /// Distance from the ray's origin, unit lengths.
     pub t: [f32; LEAF],
-    /// How far the true distance may be from `t`.
+    /// Bound of the difference between `t` and the true distance.
     pub error: [f32; LEAF],
-    /// The lowest distance at which the ray may truly meet something else than
-    /// this triangle, as far as this test can know; `NO_HIT` if nothing.
+    /// Lower bound of the distance of another surface that the ray may truly meet instead,
+    /// because it passes near an edge or starts near the triangle; else `NO_HIT`.
     pub rival: [f32; LEAF],
 }
 
@@ -62,7 +62,7 @@ pub const DISPLACEMENT: f32 = 48.0 / 16_777_216.0;
 /// accuracy: 1 / tan(0.1 degree).
 pub const STEEPEST: f32 = 573.0;
 
-/// The axes in an even order, that of the largest of `sizes` last.
+/// The axes in cyclic order, the one of largest size last.
 #[must_use]
 #[inline(always)]
 pub(super) fn axes_by_size<T: PartialOrd>([x, y, z]: [T; 3]) -> [usize; 3] {
@@ -79,7 +79,7 @@ impl Shear {
     /// The shear of a ray along `direction`.
     #[must_use]
     #[inline]
-    pub fn of(direction: Vec3) -> Self {
+    pub fn along(direction: Vec3) -> Self {
         let axes = axes_by_size(direction.abs().to_array());
         let d = axes.map(|axis| direction[axis]);
         let per_z = 1.0 / d[2];
@@ -87,11 +87,11 @@ impl Shear {
     }
 }
 
-/// Points as the sheared ray sees them, before their distance is asked for.
+/// Points in the sheared space of a ray.
 struct Sheared {
     x: Vec4,
     y: Vec4,
-    /// Along the largest axis, not yet divided.
+    /// Along the largest axis, not yet scaled by `per_z`.
     along: Vec4,
 }
 
@@ -110,8 +110,8 @@ fn edge(px: Vec4, py: Vec4, qx: Vec4, qy: Vec4) -> Vec4 {
     px * qy - py * qx
 }
 
-/// Which of a leaf's triangles a ray meets and where, both faces alike, edges
-/// included; `None` if it meets none.
+/// Intersects a ray with a leaf's triangles; `None` if it meets none of them. Both faces count,
+/// and edges belong to the triangle.
 #[inline(always)]
 #[must_use]
 pub fn intersect4(origin: Vec3, shear: &Shear, leaf: &Leaf4) -> Option<Candidates4> {
@@ -126,7 +126,7 @@ pub fn intersect4(origin: Vec3, shear: &Shear, leaf: &Leaf4) -> Option<Candidate
     let negative = u.cmplt(zero) | v.cmplt(zero) | w.cmplt(zero);
     let positive = u.cmpgt(zero) | v.cmpgt(zero) | w.cmpgt(zero);
     let determinant = u + v + w;
-    // A determinant that is not a number fails here too.
+    // A NaN, which is not equal to 0, passes here and fails the comparison for `met`.
     let inside = !(negative & positive) & determinant.cmpne(zero);
     if !inside.any() {
         return None;
@@ -147,12 +147,12 @@ pub fn intersect4(origin: Vec3, shear: &Shear, leaf: &Leaf4) -> Option<Candidate
     let near_edge = within(u, c.x - b.x, c.y - b.y)
         | within(v, c.x - a.x, c.y - a.y)
         | within(w, b.x - a.x, b.y - a.y);
-    // Near an edge the ray may truly pass it and meet the neighbour, whose plane
-    // parts from this one by both slopes. Or else the triangle may truly lie
-    // behind the ray's origin.
-    let beside = t - 2.0 * error - DISPLACEMENT * STEEPEST;
-    let behind = Vec4::select(t.cmplt(error), t - error, Vec4::splat(NO_HIT));
-    let rival = Vec4::select(near_edge, beside, behind);
+    // Near an edge the ray may truly miss the triangle and meet its neighbour. Within the
+    // displacement the two planes part by at most the slopes of both.
+    let neighbour = t - 2.0 * error - DISPLACEMENT * STEEPEST;
+    // A triangle within its error of the origin may truly lie behind it.
+    let if_behind = Vec4::select(t.cmplt(error), t - error, Vec4::splat(NO_HIT));
+    let rival = Vec4::select(near_edge, neighbour, if_behind);
     let met = (inside & (t + error).cmpge(zero)).bitmask();
     let [t, error, rival] = [t, error, rival].map(|lanes| lanes.to_array());
     Some(Candidates4 { met, t, error, rival })

@@ -1,5 +1,5 @@
-//! The CPU twins of the shaders in `shaders/`, file by file under the same
-//! names, and the f64 oracle that both are held to.
+//! The CPU twins of the shaders in `shaders/`, in files of the same names, and the f64 oracle
+//! that tests compare both with.
 
 pub mod aim;
 pub mod effects;

@@ -1,5 +1,5 @@
-//! The f64 twin: the same test on the same tree, in double precision. Every
-//! range that leaves this crate was solved here, whoever found the triangle.
+//! The f64 twin: the same tests on the same tree in double precision. Every range of a scan is
+//! computed here, on whatever adapter the triangle was found.
 
 use super::intersect::axes_by_size;
 use crate::bvh::{Entered, Leaf4, Search, Stack, WIDTH, WideChild, WideNode, boxes_that, traverse};
@@ -28,7 +28,7 @@ pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
     let mut search = NearestInF64 {
         surface: &target.surface,
         origin: ray.origin,
-        shear: Shear::of(ray.direction),
+        shear: Shear::along(ray.direction),
         per_direction: reciprocal(ray.direction),
         best: None,
     };
@@ -72,18 +72,17 @@ impl Search for NearestInF64<'_> {
     }
 }
 
-/// The range at which `ray` meets the plane of triangle `index`, which a
-/// caster found it to hit; never outside the triangle's own extent along the
-/// ray, however grazing. `None` if all of it lies behind the sensor. The order
-/// of the triangle's corners has no say, to the last bit.
+/// The range at which `ray` meets the plane of triangle `index`, which a caster found it to hit,
+/// clamped to the triangle's extent along the ray. `None` if all of the triangle lies behind the
+/// sensor. The order of the triangle's corners does not change a bit of it.
 #[must_use]
 pub fn range_to(target: &Target, ray: &Ray, index: u32) -> Option<f64> {
     let [range_m] = ranges_to(&target.surface, &Rays::one(ray), [index]);
     (!range_m.is_nan()).then_some(range_m)
 }
 
-/// As [`range_to`] for several rays, each with a triangle of its own; NaN where all of
-/// the triangle lies behind the sensor.
+/// As [`range_to`] for several rays, each with its own triangle; NaN if all of the triangle lies
+/// behind the sensor.
 #[inline(always)]
 pub(crate) fn ranges_to<const N: usize>(
     surface: &Surface,
@@ -102,6 +101,7 @@ pub(crate) fn ranges_to<const N: usize>(
         let [of_a, of_b, of_c] = [of_a, of_b, of_c].map(|along| along[i] / length_squared[i]);
         let (low, high) = (of_a.min(of_b).min(of_c), of_a.max(of_b).max(of_c));
         let t = height[i] / drop[i];
+        // Grazing rays divide by a `drop` near 0: the quotient may be anything.
         let t = if t.is_finite() && t > low { t } else { low };
         let t = if t > high { high } else { t };
         let t = if t > 0.0 { t } else { 0.0 };
@@ -109,19 +109,19 @@ pub(crate) fn ranges_to<const N: usize>(
     })
 }
 
-/// The unit normal of triangle `index` in the unit frame; zero if it has none.
+/// The unit normal of triangle `index` in the unit frame; zero if its area is.
 #[must_use]
 pub fn normal(target: &Target, index: u32) -> DVec3 {
     let [a, b, c] = target.surface.corners(index);
     (b - a).cross(c - a).normalize_or_zero()
 }
 
-/// Bounds the rounding of near and far together: Ize 2013, in f64. Boxes are
-/// padded by 2^-18, which also covers that they were rounded to f32.
+/// Bounds the rounding of near and far distances together: Ize 2013, in f64. The boxes' padding
+/// of 2^-18 also covers their rounding to f32.
 const FAR_SCALE: f64 = 1.0 + 1e-14;
 
-/// Which of the node's boxes the ray enters before `farthest`, and where, in its
-/// own units.
+/// The boxes of `node` that the ray enters before `farthest`, and the distances, in units of the
+/// direction's length.
 fn enter(node: &WideNode, origin: DVec3, per_direction: DVec3, farthest: f64) -> Entered<f64> {
     let (mut near, mut far) = ([0.0f64; WIDTH], [farthest; WIDTH]);
     for axis in 0..3 {
@@ -151,7 +151,7 @@ struct Shear {
 }
 
 impl Shear {
-    fn of(direction: DVec3) -> Self {
+    fn along(direction: DVec3) -> Self {
         let axes = axes_by_size(direction.abs().to_array());
         let d = axes.map(|axis| direction[axis]);
         Self { axes, x: d[0] / d[2], y: d[1] / d[2], z: 1.0 / d[2] }

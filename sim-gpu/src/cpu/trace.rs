@@ -1,5 +1,5 @@
-//! One ray per call: the nearest triangle's code, and what the effects asked
-//! for. Twin of `shaders/trace.wgsl`.
+//! Traces rays on all cores: the code of the nearest triangle of each, and the outputs of
+//! effects. Twin of `shaders/trace.wgsl`.
 
 use super::effects::append_outputs;
 use super::frustum::Frustum;
@@ -13,7 +13,7 @@ use crate::ray::{AMBIGUOUS, MISS, Ray, TraceRay};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Rays that one task traces: enough to hide the cost of handing it over.
+/// Rays per task: enough to hide the cost of scheduling it.
 const TASK: usize = 2048;
 
 /// The code of each ray, on all cores. `[n_rays]`, in order.
@@ -27,7 +27,7 @@ pub fn trace(tree: &WideBvh, rays: &[TraceRay]) -> Vec<u32> {
     codes
 }
 
-/// Some rays, and where the code of each goes.
+/// The rays of one task, and the place of their codes.
 struct Task<'a> {
     tree: &'a WideBvh,
     rays: &'a [TraceRay],
@@ -48,17 +48,17 @@ impl Lanewise for Task<'_> {
 }
 
 impl Task<'_> {
-    /// Traces packets of rays that run side by side together, and the others interleaved.
+    /// Traces coherent rays in packets, and the others interleaved.
     #[inline(always)]
     fn trace<I: Instructions>(self, by: I) {
         let Self { tree, rays, codes } = self;
         let mut stacks = I::Stacks::default();
-        let mut apart = Interleaved::for_tree(tree);
+        let mut interleaved = Interleaved::for_tree(tree);
         let mut from = 0;
         while from < rays.len() {
             let packet = next_packet(rays, from);
             let at = packet.as_ref().map_or(rays.len(), |(at, ..)| *at);
-            apart.trace(tree, &rays[from..at], &mut codes[from..at], by);
+            interleaved.trace(tree, &rays[from..at], &mut codes[from..at], by);
             from = at;
             if let Some((_, rays, frustum)) = packet {
                 from += PACKET;
@@ -68,8 +68,7 @@ impl Task<'_> {
     }
 }
 
-/// The first packet of rays that run side by side, from number `from` on, where one begins;
-/// and at which number it does.
+/// The first packet of coherent rays from number `from` on, and the number of its first ray.
 #[inline(always)]
 fn next_packet(rays: &[TraceRay], from: usize) -> Option<(usize, &[TraceRay; PACKET], Frustum)> {
     for (rays, at) in rays[from..].as_chunks().0.iter().zip((from..).step_by(PACKET)) {
@@ -94,7 +93,7 @@ pub fn cast(job: &CastJob, effects: &Effects) -> Cast {
             effect_outputs.resize(effect_outputs.len() + per_ray, 0.0);
             continue;
         }
-        // Only the direction matters to an effect, and f32 holds it well.
+        // Effects use the direction alone, for which f32 is accurate enough.
         let ray = Ray {
             origin: Vec3::from_array(ray.origin).as_dvec3(),
             direction: Vec3::from_array(ray.direction).as_dvec3(),

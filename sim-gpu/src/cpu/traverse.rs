@@ -7,41 +7,39 @@ use crate::ray::{AMBIGUOUS, MISS, NO_HIT, TraceRay};
 use bytemuck::{must_cast, must_cast_ref};
 use glam::{Vec3, Vec4};
 
-/// Directions closer to zero than this count as this: a reciprocal stays
-/// finite and boxes are padded by far more than a ray drifts by it.
+/// Components of a direction closer to zero than this are replaced by this, so that their
+/// reciprocals stay finite. Boxes are padded by far more than a ray drifts by it.
 pub const LEAST_COMPONENT: f32 = 1e-20;
 
-/// Bounds the rounding of near and far together: Ize, "Robust BVH ray
-/// traversal", JCGT 2(2), 2013; twice his 1 + 2 gamma(3), and room for the
-/// 2.5 ULP that WGSL allows a division.
+/// Bounds the rounding of near and far distances together: Ize, "Robust BVH ray traversal",
+/// JCGT 2(2), 2013. Twice his 1 + 2 gamma(3), for the 2.5 ULP that WGSL allows a division.
 pub const FAR_SCALE: f32 = 1.0 + 32.0 / 16_777_216.0;
 
-/// Relative accuracy that a range found in f32 must allow; where it does not,
-/// f64 decides.
+/// The relative accuracy that casters promise: where f32 cannot keep it, f64 decides.
 pub const ACCURACY: f32 = 1e-6;
 
-/// What is known of the nearest surface while a ray is traced.
+/// The nearest surface along a ray so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
     /// Distance from the ray's origin, unit lengths.
     pub t: f32,
-    /// How far the true distance may be from `t`.
+    /// Bound of the difference between `t` and the true distance.
     pub error: f32,
     /// The triangle's index in its mesh, or [`MISS`].
     pub index: u32,
-    /// No surface that starts beyond this can be the nearest.
+    /// Surfaces that begin beyond this are not the nearest.
     pub(super) farthest: f32,
-    /// The lowest distance that another surface may truly have.
+    /// Lower bound of the true distance of every other surface that the ray may meet.
     pub(super) rival: f32,
 }
 
-/// A ray as boxes and triangles are tested against it.
+/// A ray prepared for tests against boxes and triangles.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Prepared {
     pub origin: Vec3,
     pub shear: Shear,
-    /// The ray meets a plane at x where x * `per_direction` + `offset`. Rounding
-    /// moves the plane by 4 * 2^-24 at most, for which boxes are padded.
+    /// The ray meets the plane at x at distance x * `per_direction` + `offset`. Rounding moves
+    /// the plane by at most 4 * 2^-24, for which boxes are padded.
     pub per_direction: [f32; 3],
     pub offset: [f32; 3],
 }
@@ -59,11 +57,10 @@ impl Prepared {
         let [x, y, z] = ray.origin;
         let offset = [-(x * per_direction[0]), -(y * per_direction[1]), -(z * per_direction[2])];
         let origin = Vec3::from_array(ray.origin);
-        Self { origin, shear: Shear::of(direction), per_direction, offset }
+        Self { origin, shear: Shear::along(direction), per_direction, offset }
     }
 
-    /// Finds the nearest triangle of those at or below `from` and of what `nearest`
-    /// already knows.
+    /// Updates `nearest` with the triangles at or below `from`.
     #[inline(always)]
     pub fn trace(
         &self,
@@ -77,7 +74,7 @@ impl Prepared {
     }
 }
 
-/// The search along a ray.
+/// The search for the nearest triangle along a ray.
 pub(super) struct Along<'a, I> {
     pub ray: &'a Prepared,
     pub nearest: &'a mut Nearest,
@@ -103,18 +100,18 @@ impl<I: Instructions> Search for Along<'_, I> {
     }
 }
 
-/// How many rays that run side by side are traced together.
+/// How many coherent rays are traced together.
 pub(super) const PACKET: usize = 8;
 
-/// What rays are traced by. All ways give the same codes.
+/// The instruction sets that trace rays. All give the same codes.
 pub(super) trait Instructions: Copy {
-    /// What rays have still to visit.
+    /// The traversal stacks.
     type Stacks: Default;
 
-    /// Which boxes of `node` the ray enters before `farthest`, and where.
+    /// The boxes of `node` that the ray enters before `farthest`, and at which distances.
     fn enter(self, ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32>;
 
-    /// The codes of `rays`, which run side by side within `frustum`.
+    /// The codes of coherent `rays`, which `frustum` bounds.
     fn trace(
         self,
         tree: &WideBvh,
@@ -124,7 +121,7 @@ pub(super) trait Instructions: Copy {
     ) -> [u32; PACKET];
 }
 
-/// Those of every processor: four boxes at once, one ray after another.
+/// Instructions of every processor: tests four boxes at once, and traces rays one by one.
 #[derive(Clone, Copy)]
 pub(super) struct Portable;
 
@@ -168,6 +165,7 @@ impl Nearest {
 
     #[inline(always)]
     fn consider(&mut self, t: f32, error: f32, rival: f32, index: u32) {
+        // Equal distances go to the lower index, so that the order of the tree has no say.
         let wins = t < self.t || (t == self.t && index < self.index);
         let loser = if wins { self.t - self.error } else { t - error };
         self.rival = self.rival.min(loser).min(rival);
@@ -183,13 +181,15 @@ impl Nearest {
         let Some(found) = intersect4(ray.origin, &ray.shear, leaf) else { return };
         let mut met = found.met;
         while met != 0 {
+            // The remainder changes nothing, and saves the bounds checks.
             let i = met.trailing_zeros() as usize % LEAF;
             met &= met - 1;
             self.consider(found.t[i], found.error[i], found.rival[i], leaf.indices[i]);
         }
     }
 
-    /// The caster's answer: index, [`MISS`], and whether f64 must decide.
+    /// The caster's answer: [`MISS`], or the index, with [`AMBIGUOUS`] if f64 must decide.
+    /// `skipped` is the distance from the sensor to the ray's origin.
     #[must_use]
     pub fn code(&self, skipped: f32) -> u32 {
         if self.index == MISS {

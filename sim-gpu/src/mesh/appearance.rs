@@ -54,7 +54,7 @@ impl Appearance {
     /// # Errors
     /// A file that is no OBJ file or cannot be read; an index or a number that is none.
     pub fn load(path: &Path) -> Result<Self, MeshError> {
-        if MeshFormat::of(path) != Some(MeshFormat::Obj) {
+        if MeshFormat::from_path(path) != Some(MeshFormat::Obj) {
             let cause = "expected an OBJ file, whose faces have colours, found another format";
             return Err(malformed(path)(Malformed::Syntax(cause.to_owned()).into()));
         }

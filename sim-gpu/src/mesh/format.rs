@@ -25,7 +25,7 @@ formats::named! {
 impl MeshFormat {
     /// The format that the extension of `path` stands for, in either case.
     #[must_use]
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn from_path(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?;
         Self::ALL.into_iter().find(|format| extension.eq_ignore_ascii_case(format.name()))
     }

@@ -44,7 +44,8 @@ pub fn load_hashed(
     path: &Path,
     hashing: Hashing,
 ) -> Result<(LoadedMesh, Option<FileHash>), MeshError> {
-    let format = MeshFormat::of(path).ok_or_else(|| MeshError::UnknownFormat { path: path.into() });
+    let format =
+        MeshFormat::from_path(path).ok_or_else(|| MeshError::UnknownFormat { path: path.into() });
     let bytes = read(path)?;
     let format = format?;
     let Parsed { mesh, dropped_faces } = parse(&bytes, format).map_err(|error| {

@@ -19,7 +19,7 @@ use super::triangle_mesh::{Mesh, Parsed};
 /// order in which they are first named. Polygons become fans around their
 /// first corner; faces of fewer than three corners are dropped and counted.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let geometry = Geometry::of(bytes)?;
+    let geometry = Geometry::parse(bytes)?;
     let options = LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -89,7 +89,7 @@ struct Geometry {
 }
 
 impl Geometry {
-    fn of(bytes: &[u8]) -> Result<Self, ParseError> {
+    fn parse(bytes: &[u8]) -> Result<Self, ParseError> {
         let mut geometry =
             Self { text: Vec::with_capacity(bytes.len()), n_vertices: 0, dropped_faces: 0 };
         for_each_line(bytes, |number, line, n_lines| {

@@ -113,14 +113,16 @@ fn mesh_files(root: &Path) -> Result<Vec<PathBuf>, TreeError> {
     {
         match item {
             Ok(item) if item.file_type().is_dir() => {}
-            Ok(item) if MeshFormat::of(item.path()).is_some() => files.push(item.into_path()),
+            Ok(item) if MeshFormat::from_path(item.path()).is_some() => {
+                files.push(item.into_path())
+            }
             Ok(_) => {}
             Err(error) if error.loop_ancestor().is_some() => {}
             Err(error) => {
                 let path = error.path().unwrap_or(root).to_path_buf();
                 // A link to nowhere: if it should be a mesh, loading says so.
                 if path.is_symlink() && path != root {
-                    files.extend(MeshFormat::of(&path).is_some().then_some(path));
+                    files.extend(MeshFormat::from_path(&path).is_some().then_some(path));
                 } else {
                     return Err(TreeError::Read { path, source: error.into() });
                 }

@@ -15,7 +15,7 @@ pub struct UnitFrame {
 impl UnitFrame {
     /// The frame of these vertices; the identity if there are none.
     #[must_use]
-    pub fn of(vertices: impl Iterator<Item = DVec3>) -> Self {
+    pub fn around(vertices: impl Iterator<Item = DVec3>) -> Self {
         let (low, high) = bounding_box(vertices);
         if low.x > high.x {
             return Self { centre: DVec3::ZERO, scale: 1.0 };
@@ -68,7 +68,7 @@ mod tests {
         let known = [(0.5, 0.5), (0.50001, 1.0), (0.75, 1.0), (1.0, 1.0), (1.01, 2.0), (2.0, 2.0)];
         let others = [1e-300, 0.4, 1.5, 3e7, 1.7e12, 1e300].map(|half| (half, 0.0));
         for (half, scale) in known.into_iter().chain(others) {
-            let frame = UnitFrame::of([DVec3::splat(-half), DVec3::splat(half)].into_iter());
+            let frame = UnitFrame::around([DVec3::splat(-half), DVec3::splat(half)].into_iter());
             let unit = frame.to_unit(DVec3::splat(half)).x;
             assert!(unit > 0.5 && unit <= 1.0, "{half} maps to {unit}");
             assert_eq!(frame.scale.to_bits() << 12, 0, "{} is a power of two", frame.scale);
@@ -78,12 +78,12 @@ mod tests {
 
     #[test]
     fn a_point_keeps_its_scale() {
-        assert_eq!(UnitFrame::of([DVec3::ONE].into_iter()).scale, 1.0);
+        assert_eq!(UnitFrame::around([DVec3::ONE].into_iter()).scale, 1.0);
     }
 
     #[test]
     fn a_huge_box_does_not_overflow() {
-        let frame = UnitFrame::of([DVec3::splat(-1e308), DVec3::splat(1e308)].into_iter());
+        let frame = UnitFrame::around([DVec3::splat(-1e308), DVec3::splat(1e308)].into_iter());
         assert!(frame.centre.is_finite() && frame.scale.is_finite());
     }
 }

@@ -70,7 +70,8 @@ pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
 /// named at the origin.
 fn rounded_positions(mesh: &Mesh, named: &[bool]) -> Vec<Vec3> {
     let vertices = || mesh.vertices.iter().copied().zip(named);
-    let frame = UnitFrame::of(vertices().filter(|(_, named)| **named).map(|(vertex, _)| vertex));
+    let frame =
+        UnitFrame::around(vertices().filter(|(_, named)| **named).map(|(vertex, _)| vertex));
     let rounded = |vertex| frame.to_unit(vertex).as_vec3();
     vertices().map(|(vertex, &named)| if named { rounded(vertex) } else { Vec3::ZERO }).collect()
 }

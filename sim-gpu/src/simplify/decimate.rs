@@ -33,7 +33,7 @@ pub(super) fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
         return None;
     }
     let surface = Surface::new(mesh.clone(), kept.to_vec());
-    let welded = Welded::of(mesh, kept, &surface.frame);
+    let welded = Welded::new(mesh, kept, &surface.frame);
     let most = (WORTH_IT * welded.corners.len() as f64) as usize;
     // No error is larger than the whole mesh, which fits a box of side 2.
     let error = SHARE * (bound / surface.frame.scale).min(2.0);
@@ -111,7 +111,7 @@ struct Welded {
 }
 
 impl Welded {
-    fn of(mesh: &Mesh, kept: &[u32], frame: &UnitFrame) -> Self {
+    fn new(mesh: &Mesh, kept: &[u32], frame: &UnitFrame) -> Self {
         const NOT_SEEN: u32 = u32::MAX;
         let mut welded = Self {
             positions: Vec::new(),
@@ -200,7 +200,7 @@ mod tests {
         let mesh = Mesh { vertices, triangles };
         let kept = triangle_stats(&mesh).kept;
         let surface = Surface::new(mesh.clone(), kept.clone());
-        let welded = Welded::of(&mesh, &kept, &surface.frame);
+        let welded = Welded::new(&mesh, &kept, &surface.frame);
         let original = Target::new(surface, Builder::Morton);
         // Half a floor twice, up to 0.7 m below the roof, and three of four sides.
         let nth = |vertex: usize| {

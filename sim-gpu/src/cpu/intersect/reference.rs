@@ -95,7 +95,7 @@ fn each_lane_does_what_one_triangle_does() {
         let Some(direction) = (point(17 * i + 14) - origin).try_normalize() else { continue };
         let bvh = Bvh::build(Builder::Morton, &corners, &[0, 1, 2, 3][..n]);
         let leaf = &bvh.wide.leaves[1];
-        let lanes = intersect4(origin, &Shear::of(direction), leaf);
+        let lanes = intersect4(origin, &Shear::along(direction), leaf);
         for lane in 0..4 {
             let corner = |c: usize| leaf.corners[c].map(|axis| axis[lane]);
             let expected = intersect(origin, direction, [0, 1, 2].map(corner));
