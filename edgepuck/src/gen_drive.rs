@@ -5,11 +5,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use edgepuck_scenes::{Drive, SceneError, Sighting, Sightings, Stage};
+use edgepuck_scenes::{Drive, Sighting, Sightings, Stage};
 use formats::atomic::Unfinished;
 use formats::vlp32c::{Capture, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
 use indicatif::{ProgressBar, ProgressStyle};
-use sim_gpu::caster::Caster;
 
 use crate::gen_scenes::read_recipe;
 use crate::{Outcome, Usage};
@@ -21,22 +20,22 @@ pub struct Args {
     #[arg(value_name = "RECIPE", default_value = "street")]
     recipe: PathBuf,
 
-    /// Capture to write (.pcap); the sensor's poses (.tum) and what it saw (.truth.jsonl) are
-    /// written beside it
+    /// Capture to write (.pcap); the sensor's poses (.tum) and the objects that it saw
+    /// (.truth.jsonl) are written beside it
     #[arg(long, default_value = "data/drive.pcap", value_name = "FILE")]
     out: PathBuf,
 
-    /// How long the drive takes, seconds
+    /// Duration of the drive, seconds
     #[arg(long, default_value_t = 60.0, value_name = "S")]
     #[arg(value_parser = seconds, allow_negative_numbers = true)]
     seconds: f64,
 
-    /// How fast the sensor goes along the road, metres a second; 0 stands still
+    /// Speed of the sensor along the road, metres a second
     #[arg(long, default_value_t = 5.0, value_name = "M/S")]
     #[arg(value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
 
-    /// Sensor: vlp32c, as the recipe has it, or the path of a VLP-32C's profile
+    /// Sensor: vlp32c, with the recipe's noise and effects, or the path of a VLP-32C's profile
     #[arg(long, default_value = "vlp32c", value_name = "NAME")]
     sensor: String,
 
@@ -49,15 +48,15 @@ pub struct Args {
     seed: u64,
 }
 
-/// A capture of a day has 16 GB.
+/// The longest drive: a capture of one day has 16 GB.
 const MOST_SECONDS: f64 = 86_400.0;
 
 const MOST_SPEED_M_S: f64 = 100.0;
 
-/// Packets that are fired together, on all cores: about a turn.
+/// The number of packets that are fired together, on all cores: about one revolution.
 const BATCH: usize = 150;
 
-/// Poses in each second.
+/// The frequency of the poses.
 const POSES_HZ: u32 = 100;
 
 fn seconds(word: &str) -> Result<f64, String> {
@@ -74,7 +73,7 @@ fn speed(word: &str) -> Result<f64, String> {
     }
 }
 
-/// Drives, and writes the capture and its truth.
+/// Simulates the drive and writes the capture, the poses and the ground truth.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.out.extension() != Some(OsStr::new("pcap")) {
         let found = args.out.display();
@@ -82,8 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
-    let cast = |effects: &_| Ok::<_, SceneError>(Caster::Cpu(Clone::clone(effects)));
-    let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed, cast)?;
+    let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;
     let mut drive = Drive::new(&stage, args.speed)?;
     let started = Instant::now();
     let n_points = write(&mut drive, args.seconds, &args.out)?;
@@ -96,7 +94,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Writes the three files of a drive, and returns the number of points.
+/// Writes the three files of a drive and returns the number of points.
 fn write(drive: &mut Drive, seconds: f64, out: &Path) -> anyhow::Result<usize> {
     let packet_s = SEQUENCE_US * 1e-6 * f64::from(SEQUENCES_PER_PACKET);
     let n_packets = (seconds / packet_s).ceil() as u32;
@@ -134,8 +132,8 @@ fn append(truth: &mut Unfinished, sightings: &[Sighting]) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// Writes the sensor's poses in the format of the TUM RGB-D benchmark, to the end of the drive
-/// and one beyond. Between two the sensor goes evenly, and turns evenly within 1e-3 degrees.
+/// Writes the sensor's poses in the format of the TUM RGB-D benchmark, up to the first pose after
+/// the end of the drive. Linear interpolation of the orientation is exact to 1e-3 degrees.
 fn write_poses(file: &mut Unfinished, drive: &Drive, seconds: f64) -> anyhow::Result<()> {
     file.append(|writer| writeln!(writer, "# timestamp tx ty tz qx qy qz qw"))?;
     for n in 0..=(seconds * f64::from(POSES_HZ)).ceil() as u32 {

@@ -1,11 +1,11 @@
-//! `edgepuck gen-scenes`: street scenes, scanned, and their clusters as a training set.
+//! `edgepuck gen-scenes`: scans street scenes and packs their clusters as a training set.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
 use edgepuck_assets::SCENE_RECIPES;
-use edgepuck_scenes::{Generation, Recipe, Stage, generate};
+use edgepuck_scenes::{LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::atomic;
 use formats::hash::Hashing;
@@ -52,13 +52,14 @@ pub struct Args {
     caster: CasterArgs,
 }
 
-/// Draws, scans, cuts and packs.
+/// Draws and scans the scenes, and packs their clusters.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
-    let stage =
-        Stage::new(recipe, &args.recipe, meshes, args.seed, |effects| args.caster.open(effects))?;
+    let stage = Stage::with_casters(recipe, &args.recipe, meshes, args.seed, |effects| {
+        args.caster.open(effects)
+    })?;
     let stage = stage.with_culling(args.caster.culling());
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
@@ -69,7 +70,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         bar.inc(1);
         n_points += done.sweep.points().len();
         if done.scene.number == 0 {
-            let Generation { sweep, labels, .. } = done;
+            let LabelledScene { sweep, labels, .. } = done;
             let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
             preview::draw_from_above(
                 &sweep.scan,
@@ -101,7 +102,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// A built-in recipe by its name, or else a file.
+/// Reads a built-in recipe by its name, or the recipe in a file.
 pub fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
     let built_in = SCENE_RECIPES.iter().find(|(name, _)| Path::new(name) == recipe);
     Ok(match built_in {
@@ -114,8 +115,8 @@ pub fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
     })
 }
 
-/// Writes the sweep as a scan, and what stands in the scene as JSON.
-fn save(stage: &Stage, done: &Generation, out: &Path) -> anyhow::Result<()> {
+/// Writes the sweep as a scan, and the objects of the scene as JSON.
+fn save(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
     let name = format!("sweeps/{:06}", done.scene.number);
     let file = out.join(format!("{name}.npz"));
     write_scan(&file, ScanFormat::Npz, Hashing::None, &done.sweep.scan)?;
@@ -124,7 +125,7 @@ fn save(stage: &Stage, done: &Generation, out: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn description(stage: &Stage, done: &Generation) -> Value {
+fn description(stage: &Stage, done: &LabelledScene) -> Value {
     let scene = &done.scene;
     let points = done.sweep.points_by_surface(scene);
     let objects = scene.objects.iter().enumerate().map(|(i, object)| {

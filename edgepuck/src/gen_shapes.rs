@@ -1,4 +1,4 @@
-//! `edgepuck gen-shapes`: writes the procedural shapes as files.
+//! `edgepuck gen-shapes`: writes procedural shapes as mesh files.
 
 use crate::Outcome;
 use anyhow::Context;

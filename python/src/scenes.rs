@@ -3,12 +3,11 @@
 use crate::error::{raised, raised_with_causes};
 use crate::process::{self, LazyCaster};
 use crate::{arrays, segment};
-use edgepuck_scenes::{Generation, SceneError, Stage};
+use edgepuck_scenes::{LabelledScene, Stage};
 use edgepuck_segment::Settings;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sim_gpu::caster::Caster;
 use sim_gpu::job::Culling;
 use sim_gpu::scene::{Scene, cast};
 use std::path::PathBuf;
@@ -33,8 +32,7 @@ impl Scenes {
         let stage = process::run(py, || {
             let mut scenes = edgepuck_program::gen_scenes::read_recipe(&recipe)?;
             scenes.use_sensors(&sensors);
-            let open = |effects: &_| Ok::<_, SceneError>(Caster::Cpu(Clone::clone(effects)));
-            Ok(Stage::new(scenes, &recipe, meshes.as_deref(), seed, open)?)
+            Ok(Stage::new(scenes, &recipe, meshes.as_deref(), seed)?)
         })?;
         Ok(Self { stage: stage.map_err(raised_with_causes)? })
     }
@@ -49,8 +47,8 @@ impl Scenes {
     /// are.
     fn draw<'py>(&self, py: Python<'py>, number: u32) -> PyResult<Bound<'py, PyDict>> {
         let settings = Settings::default();
-        let drawn = process::run(py, || Generation::new(&self.stage, number, &settings))?;
-        let Generation { scene, sweep, labels, clusters } = drawn.map_err(raised)?;
+        let drawn = process::run(py, || LabelledScene::new(&self.stage, number, &settings))?;
+        let LabelledScene { scene, sweep, labels, clusters } = drawn.map_err(raised)?;
         let told = PyDict::new(py);
         told.set_item("sensor", &self.stage.sensor(&scene).name)?;
         told.set_item("cluster", segment::numbers(&labels).into_pyarray(py))?;

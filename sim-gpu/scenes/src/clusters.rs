@@ -1,43 +1,44 @@
-//! Clusters cut from a sweep, and what they truly are.
+//! Labels the clusters of a sweep with the objects that they show.
 
 use edgepuck_segment::Segmentation;
 
 use crate::scene::Scene;
-use crate::stage::{Stage, Sweep};
+use crate::stage::Stage;
+use crate::sweep::Sweep;
 
-/// The class of what is no single object: mostly ground, two objects in one
-/// cluster, or a small part of one.
+/// The class of clusters that do not show one whole object: ground, two objects in one cluster, or
+/// a small part of an object.
 pub const OTHER: &str = "other";
 
-/// A cluster holds an object if at least this share of its points lie on it.
-/// Below, it is two things in one.
-const PURE: f64 = 0.7;
+/// The least fraction of a cluster's points that lie on the object that it shows. Clusters below
+/// mix objects.
+const MIN_PURITY: f64 = 0.7;
 
-/// A cluster holds an object if at least this share of the points that the sensor
-/// has of it are in the cluster. Below, the object is cut in pieces.
-const WHOLE: f64 = 0.4;
+/// The least fraction of an object's points in the cluster that shows it. Clusters below are
+/// pieces of an object.
+const MIN_COMPLETENESS: f64 = 0.4;
 
-/// A cluster and its truth.
+/// A cluster with its ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelledCluster {
-    /// Its points, as indices into the sweep.
+    /// The indices of its points in the sweep.
     pub points: Vec<u32>,
-    /// Its class, an index into [`Stage::classes`].
+    /// The index of its class in [`Stage::classes`].
     pub label: usize,
-    /// The surface that most of its points lie on, as in [`Sweep::surfaces`]; of what is in the
-    /// air 2^32 - 1.
+    /// The surface that most of its points lie on, numbered as in [`Sweep::surfaces`]; `u32::MAX`
+    /// if most are in the air.
     pub surface: u32,
-    /// The share of its points that lie on that surface.
+    /// The fraction of its points that lie on that surface.
     pub truth_share: f32,
-    /// Mean horizontal distance of its points from the sensor, metres.
+    /// The mean horizontal distance of its points from the sensor, metres.
     pub range_m: f32,
-    /// Height of its lowest point above the ground below it, metres; NaN where the
-    /// ground is not known.
+    /// The height of its lowest point above the ground, metres; NaN where the segmentation found
+    /// no ground.
     pub height_m: f32,
 }
 
-/// The clusters that were `found` in `sweep`, each with the class of what most of
-/// its points lie on.
+/// Labels each cluster that a segmentation `found` in `sweep` with the class of the object that
+/// most of its points lie on.
 #[must_use]
 pub fn label_clusters(
     stage: &Stage,
@@ -51,21 +52,21 @@ pub fn label_clusters(
     let clusters = found.clusters().map(|cluster| {
         counts.fill(0);
         cluster.points.iter().for_each(|&i| counts[air.min(surfaces[i as usize] as usize)] += 1);
-        // Of equal counts, the first.
+        // `max_by_key` returns the last of equal counts; reversed, the first surface wins.
         let most = (0..counts.len()).rev().max_by_key(|&surface| counts[surface]).unwrap_or(0);
         let share = f64::from(counts[most]) / cluster.points.len() as f64;
-        let is_whole = f64::from(counts[most]) >= WHOLE * f64::from(visible[most]);
+        let is_complete = f64::from(counts[most]) >= MIN_COMPLETENESS * f64::from(visible[most]);
         let class = match most.checked_sub(1) {
-            Some(object) if most != air && share >= PURE && is_whole => {
+            Some(object) if most != air && share >= MIN_PURITY && is_complete => {
                 &stage.recipe().object[scene.objects[object].entry].class
             }
             _ => OTHER,
         };
         let label = stage.classes().binary_search_by(|known| known.as_str().cmp(class));
-        let (range_m, lowest_m) = place(sweep.points(), cluster.points);
+        let (range_m, lowest_m) = range_and_lowest(sweep.points(), cluster.points);
         LabelledCluster {
             points: cluster.points.to_vec(),
-            label: label.expect("invariant: classes holds those of all objects"),
+            label: label.expect("invariant: a stage has the classes of all its objects"),
             surface: if most == air { u32::MAX } else { most as u32 },
             truth_share: share as f32,
             range_m,
@@ -75,8 +76,8 @@ pub fn label_clusters(
     clusters.collect()
 }
 
-/// Mean horizontal distance and lowest height of `chosen` points.
-fn place(points: &[[f32; 3]], chosen: &[u32]) -> (f32, f32) {
+/// The mean horizontal distance and the lowest height of the `chosen` points.
+fn range_and_lowest(points: &[[f32; 3]], chosen: &[u32]) -> (f32, f32) {
     let chosen = chosen.iter().map(|&i| points[i as usize]);
     let (sum, lowest, n) = chosen
         .fold((0.0, f32::INFINITY, 0u32), |(sum, lowest, n), [x, y, z]| {

@@ -1,4 +1,4 @@
-//! Why there is no scene.
+//! The errors of this crate.
 
 use formats::FormatError;
 use sim_gpu::config::{ConfigError, InvalidValue};
@@ -6,11 +6,11 @@ use sim_gpu::mesh::MeshError;
 use sim_gpu::scan::ScanError;
 use std::path::PathBuf;
 
-/// Why scenes cannot be drawn, scanned or packed.
+/// An error in drawing, scanning or packing scenes.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// The recipe, or a sensor that it names, cannot be used.
+    /// The recipe, or a sensor profile that it names, is missing or invalid.
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// A value of the recipe does not fit a sensor.
@@ -19,13 +19,13 @@ pub enum SceneError {
     /// A user's mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A user's mesh cannot be scaled to a height.
+    /// A user's mesh cannot be scaled to a height, because it is flat.
     #[error("{}: expected a mesh with a height, found all of it at one height", file.display())]
     FlatMesh {
-        /// The mesh.
+        /// The mesh file.
         file: PathBuf,
     },
-    /// The recipe asks for a user's meshes, and there are none.
+    /// The recipe uses a folder of meshes that holds none.
     #[error("{}: expected a folder with OBJ, OFF, PLY or STL files, {cause}", folder.display())]
     NoMeshes {
         /// The folder.
@@ -33,7 +33,7 @@ pub enum SceneError {
         /// What was found instead.
         cause: String,
     },
-    /// The adapter failed.
+    /// The caster failed.
     #[error(transparent)]
     Scan(#[from] ScanError),
     /// The sweep cannot be segmented.

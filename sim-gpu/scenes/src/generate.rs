@@ -1,4 +1,4 @@
-//! Many scenes, scanned and cut, as a training set.
+//! Makes a training set of clusters from many scenes.
 
 use std::path::Path;
 
@@ -9,104 +9,106 @@ use rayon::prelude::*;
 use crate::clusters::{LabelledCluster, label_clusters};
 use crate::error::SceneError;
 use crate::scene::Scene;
-use crate::stage::{Stage, Sweep};
+use crate::stage::Stage;
+use crate::sweep::Sweep;
 
-/// Scenes that are in memory together: enough for all cores, and few.
+/// The number of scenes in memory at once: enough to keep all cores busy.
 const BATCH: u32 = 32;
 
-/// One scene in so many is for testing.
+/// One scene of this many goes to the test set.
 const TEST_EACH: u32 = 10;
 
-/// What became of one scene.
-pub struct Generation {
+/// A scene with its sweep, segmented and labelled.
+pub struct LabelledScene {
     /// The scene.
     pub scene: Scene,
-    /// What its sensor saw.
+    /// The sweep of its sensor.
     pub sweep: Sweep,
-    /// What segmentation made of each of its points.
+    /// The segmentation's label of each point.
     pub labels: Vec<Label>,
-    /// The clusters, with their truth.
+    /// The clusters with their ground truth.
     pub clusters: Vec<LabelledCluster>,
 }
 
-/// How many clusters were packed, by class.
+/// The number of packed clusters by class, in the order of [`Stage::classes`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// In the half for training.
+pub struct ClusterCounts {
+    /// Clusters in the training set.
     pub train: Vec<usize>,
-    /// In the half for testing.
+    /// Clusters in the test set.
     pub test: Vec<usize>,
 }
 
-/// Scans the first `count` scenes of `stage`, cuts them with `settings`, and packs
-/// the clusters into `train.npz` and `test.npz` in `folder`; each tenth scene is
-/// for testing. Each scene goes to `each`, in order.
+/// Scans the first `count` scenes of `stage`, segments them with `settings`, and packs the
+/// clusters into `train.npz` and `test.npz` in `folder`; every tenth scene goes to the test set.
+/// `each` is called with every scene, in order.
 ///
 /// # Errors
-/// If a scene cannot be scanned or segmented, a file cannot be written, or `each`
-/// fails.
+/// A scene that cannot be scanned or segmented, a file that cannot be written, or an error of
+/// `each`.
 pub fn generate<E: From<SceneError>>(
     stage: &Stage,
     settings: &Settings,
     count: u32,
     folder: &Path,
-    mut each: impl FnMut(&Generation) -> Result<(), E>,
-) -> Result<Counts, E> {
+    mut each: impl FnMut(&LabelledScene) -> Result<(), E>,
+) -> Result<ClusterCounts, E> {
     let classes = stage.classes().to_vec();
     let n_classes = classes.len();
     let writer = |name: &str| ClusterWriter::create(&folder.join(name), classes.clone());
-    let mut halves = [
+    let mut splits = [
         (writer("train.npz").map_err(SceneError::from)?, vec![0; n_classes]),
         (writer("test.npz").map_err(SceneError::from)?, vec![0; n_classes]),
     ];
     for first in (0..count).step_by(BATCH as usize) {
         let numbers = first..count.min(first.saturating_add(BATCH));
-        let batch: Vec<Generation> = numbers
+        let batch: Vec<LabelledScene> = numbers
             .into_par_iter()
-            .map(|number| Generation::new(stage, number, settings))
+            .map(|number| LabelledScene::new(stage, number, settings))
             .collect::<Result<_, SceneError>>()?;
         for done in &batch {
             let is_test = done.scene.number % TEST_EACH == TEST_EACH - 1;
-            let (writer, counts) = &mut halves[usize::from(is_test)];
+            let (writer, counts) = &mut splits[usize::from(is_test)];
             pack(stage, done, writer, counts)?;
             each(done)?;
         }
     }
-    let [(train, train_counts), (test, test_counts)] = halves;
+    let [(train, train_counts), (test, test_counts)] = splits;
     train.finish().map_err(SceneError::from)?;
     test.finish().map_err(SceneError::from)?;
-    Ok(Counts { train: train_counts, test: test_counts })
+    Ok(ClusterCounts { train: train_counts, test: test_counts })
 }
 
-impl Generation {
-    /// Draws scene number `number` of `stage`, scans it, and cuts it with `settings`.
+impl LabelledScene {
+    /// Draws scene number `number` of `stage`, scans it, and segments it with `settings`.
     ///
     /// # Errors
-    /// If it cannot be scanned or segmented.
+    /// The scene cannot be scanned or segmented.
     pub fn new(stage: &Stage, number: u32, settings: &Settings) -> Result<Self, SceneError> {
         let scene = Scene::draw(stage, number);
         let mut settings = settings.clone();
         if let Some(clearance_m) = scene.ground_clearance_m {
             settings.ground_clearance_m = clearance_m as f32;
         }
-        let unfit = |error: String| SceneError::Segment(error);
-        let mut segmenter = Segmenter::new(settings).map_err(|e| unfit(e.to_string()))?;
+        let mut segmenter =
+            Segmenter::new(settings).map_err(|e| SceneError::Segment(e.to_string()))?;
         let sweep = stage.sweep(&scene)?;
         let points = Points { points: sweep.points(), rings: Some(sweep.rings()) };
-        let found = segmenter.segment(&points).map_err(|e| unfit(e.to_string()))?;
+        let found = segmenter.segment(&points).map_err(|e| SceneError::Segment(e.to_string()))?;
         let clusters = label_clusters(stage, &scene, &sweep, found);
         let labels = found.labels().to_vec();
         Ok(Self { scene, sweep, labels, clusters })
     }
 }
 
+/// Adds the clusters of a scene to a set.
 fn pack(
     stage: &Stage,
-    done: &Generation,
+    done: &LabelledScene,
     writer: &mut ClusterWriter,
     counts: &mut [usize],
 ) -> Result<(), SceneError> {
-    let Generation { scene, sweep, clusters, .. } = done;
+    let LabelledScene { scene, sweep, clusters, .. } = done;
     let sensor = &stage.sensor(scene).name;
     let mut points = Vec::new();
     for (cluster, n) in clusters.iter().zip(0..) {
@@ -115,7 +117,7 @@ fn pack(
         counts[cluster.label] += 1;
         let class = &stage.classes()[cluster.label];
         let remarks = Remarks {
-            // Training keeps what is of one name together: a scene.
+            // Training never splits the clusters of one name: those of a scene stay together.
             name: &format!("scene{:06}_v{n}", scene.number),
             id: &format!("{:06}#{class}{}", scene.number, cluster.surface),
             sensor,

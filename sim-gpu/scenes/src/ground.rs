@@ -1,4 +1,4 @@
-//! The ground: a slope with a road between two pavements, more or less rough.
+//! The ground: a rough slope with a road between two pavements.
 
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
@@ -7,26 +7,32 @@ use sim_gpu::mesh::Mesh;
 
 use crate::recipe;
 
-/// Spacing of the grid near the sensor, metres; it grows with the distance.
+/// The least and the greatest width of a pavement, metres.
+pub(crate) const PAVEMENT_M: [f64; 2] = [1.5, 4.5];
+
+/// The radius around the sensor that its own vehicle covers, metres.
+pub(crate) const OWN_RADIUS_M: f64 = 1.2;
+
+/// The spacing of the grid near the sensor, metres; it grows with the distance.
 const STEP_M: f64 = 0.5;
 
-/// How much the spacing grows from one line to the next.
+/// The ratio of two neighbouring spacings of the grid.
 const GROWTH: f64 = 1.08;
 
 /// The width of a kerb's face, metres: kerbs lean back a little.
 const KERB_FACE_M: f64 = 0.03;
 
-/// The ground of one scene; the origin is on it, below the sensor.
+/// The ground of one scene. The origin is on it, below the sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct Ground {
-    /// Half of its edge.
+    /// Half the length of its edge.
     pub(crate) half_m: f64,
-    /// Rise for each metre along x and y.
+    /// The rise for each metre along x and along y.
     slope: DVec2,
     roughness_m: f64,
-    /// Where the middle of the road is.
+    /// y of the middle of the road.
     pub(crate) road_y_m: f64,
-    /// Half of the road's width.
+    /// Half the width of the road.
     pub(crate) road_half_m: f64,
     kerb_m: f64,
     stream: StreamKey,
@@ -48,27 +54,27 @@ impl Ground {
         Self { half_m, slope, roughness_m, road_y_m, road_half_m, kerb_m, stream }
     }
 
-    /// Height at (x, y), roughness aside.
+    /// The height at (x, y) without the roughness.
     pub(crate) fn height_m(&self, at: DVec2) -> f64 {
         let on_road = |y: f64| (y - self.road_y_m).abs() <= self.road_half_m;
         let step_m = |y: f64| if on_road(y) { 0.0 } else { self.kerb_m };
         self.slope.dot(at) + step_m(at.y) - step_m(0.0)
     }
 
-    /// `x_m` along the road.
+    /// The point of the slope `x_m` along the road from the origin.
     pub(crate) fn along(&self, x_m: f64) -> DVec3 {
         DVec3::new(x_m, 0.0, self.slope.x * x_m)
     }
 
-    /// The surface as triangles.
+    /// The ground of a scene as triangles.
     pub(crate) fn mesh(&self) -> Mesh {
         let xs = self.lines(&[]);
         self.surface(&xs, |row, column| (row * xs.len() + column) as u64)
     }
 
-    /// The part of an endless surface from x = `number` x `length_m` on, `length_m` long.
-    /// Neighbours have the vertices between them in common.
-    pub(crate) fn part(&self, number: i32, length_m: f64) -> Mesh {
+    /// Tile `number` of an endless ground: it begins at x = `number` * `length_m` and is
+    /// `length_m` long. Neighbouring tiles share the vertices on their border.
+    pub(crate) fn tile(&self, number: i32, length_m: f64) -> Mesh {
         let n_steps = if self.roughness_m > 0.0 { (length_m / STEP_M).ceil() as i32 } else { 1 };
         let line = |column: i32| number * n_steps + column;
         let step_m = length_m / f64::from(n_steps);
@@ -76,7 +82,8 @@ impl Ground {
         self.surface(&xs, |row, column| u64::from(line(column as i32) as u32) << 32 | row as u64)
     }
 
-    /// The surface above the lines `xs`; `vertex` numbers what lies at a row and a column.
+    /// The surface above the grid lines `xs`. `vertex` numbers the vertex at a row and a column;
+    /// the number keys its roughness.
     fn surface(&self, xs: &[f64], vertex: impl Fn(usize, usize) -> u64) -> Mesh {
         let kerbs = [-1.0, 1.0].map(|side| self.road_y_m + side * self.road_half_m);
         let faces = [kerbs[0] - KERB_FACE_M, kerbs[0], kerbs[1], kerbs[1] + KERB_FACE_M];
@@ -99,11 +106,11 @@ impl Ground {
         mesh
     }
 
-    /// Coordinates of the grid's lines, ascending, those at `besides` among them.
-    /// Even ground needs no others than its ends.
-    fn lines(&self, besides: &[f64]) -> Vec<f64> {
+    /// The coordinates of the grid's lines in ascending order, with those in `required`. Even
+    /// ground needs only these and the lines at its ends.
+    fn lines(&self, required: &[f64]) -> Vec<f64> {
         let mut lines = vec![-self.half_m, self.half_m];
-        lines.extend(besides.iter().filter(|at| at.abs() < self.half_m));
+        lines.extend(required.iter().filter(|at| at.abs() < self.half_m));
         if self.roughness_m > 0.0 {
             lines.push(0.0);
             let (mut at_m, mut step_m) = (STEP_M, STEP_M);
@@ -118,8 +125,8 @@ impl Ground {
         lines
     }
 
-    /// A number of mean 0 and variance 1 for one vertex: uniform, since no gravel
-    /// stands out by more.
+    /// A random number of mean 0 and variance 1 for one vertex. It is uniform, because the height
+    /// of gravel is bounded.
     fn bump(&self, vertex: u64) -> f64 {
         (2.0 * self.stream.unit(vertex) - 1.0) * 3f64.sqrt()
     }

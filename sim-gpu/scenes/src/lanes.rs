@@ -1,69 +1,69 @@
-//! The lanes of a street. All that goes in one lane keeps its speed, and lanes lie beside each
-//! other, so that nothing that moves meets anything.
+//! The lanes of a street. All objects in a lane have the same velocity, and lanes do not overlap,
+//! so that moving objects never collide.
 
 use edgepuck_shapes::Sampler;
 
-use crate::ground::Ground;
-use crate::place::{OWN_RADIUS_M, PAVEMENT_M};
+use crate::ground::{Ground, OWN_RADIUS_M, PAVEMENT_M};
 use crate::recipe::{Place, Recipe, Span};
 use crate::stage::Stage;
 
-/// Lanes leave this much of the road to parked cars on each side where there is room, metres.
+/// The strip at each edge of the road that lanes leave to parked cars, metres.
 const PARKING_M: f64 = 2.2;
 
-/// How far the first walkers keep from the kerb, metres.
+/// The distance of the first lane on a pavement from the kerb, metres.
 const KERB_DISTANCE_M: f64 = 0.3;
 
-/// Space between the widest object of a lane and its edges, metres.
+/// The space between the widest object of a lane and the lane's edges, metres.
 const MARGIN_M: f64 = 0.15;
 
-/// A strip along x.
+/// A strip along x, in which objects move.
 pub(crate) struct Lane {
-    /// Where its middle is.
+    /// y of its middle.
     pub(crate) y_m: f64,
-    /// Half of its width.
+    /// Half its width.
     pub(crate) half_m: f64,
-    /// Along x, metres a second.
+    /// The velocity of its objects along x, metres a second.
     pub(crate) velocity_m_s: f64,
-    /// Which of the recipe's `[[object]]` go in it.
+    /// The entries of the recipe whose objects move in it.
     pub(crate) entries: Vec<usize>,
 }
 
-/// The room for lanes on one side of the road.
-struct Room<'a> {
+/// One side of a street, filled with lanes from the middle of the road outwards.
+struct StreetSide<'a> {
     stage: &'a Stage,
     ground: &'a Ground,
-    /// 1 or -1.
+    /// The sign of y, 1 or -1.
     side: f64,
     /// Where the next lane may begin, metres from the middle of the road.
     next_m: f64,
 }
 
-/// The lanes of a street on `ground`, of what moves in the recipe. What has no room for a lane
-/// has none.
+/// Draws the lanes of a street on `ground` for the moving objects of the recipe. A lane that does
+/// not fit is left out.
 pub(crate) fn lanes(stage: &Stage, ground: &Ground, s: &mut Sampler) -> Vec<Lane> {
     let mut lanes = Vec::new();
     for side in [-1.0, 1.0] {
-        let mut room = Room { stage, ground, side, next_m: 0.0 };
+        let mut street_side = StreetSide { stage, ground, side, next_m: 0.0 };
         for group in groups(stage.recipe(), Place::Road) {
-            // The sensor's way is the first on its side.
-            let is_first = side > 0.0 && room.next_m == 0.0;
+            // On the right, the sensor's own way takes the place of the first lane.
+            let is_first = side > 0.0 && street_side.next_m == 0.0;
             let end_m = ground.road_half_m - if is_first { 0.0 } else { PARKING_M };
-            // Traffic keeps to its side.
-            lanes.extend(room.lane(group, -side, end_m, s));
+            // Traffic keeps to the right.
+            lanes.extend(street_side.lane(group, -side, end_m, s));
         }
-        room.next_m = ground.road_half_m + KERB_DISTANCE_M;
+        street_side.next_m = ground.road_half_m + KERB_DISTANCE_M;
         for direction in [-side, side] {
             for group in groups(stage.recipe(), Place::Pavement) {
                 let end_m = ground.road_half_m + PAVEMENT_M[1];
-                lanes.extend(room.lane(group, direction, end_m, s));
+                lanes.extend(street_side.lane(group, direction, end_m, s));
             }
         }
     }
     lanes
 }
 
-/// What moves at `place`, by what can go at one speed: the speeds, and the entries.
+/// The entries that move at `place`, grouped so that the entries of a group have speeds in
+/// common, and these speeds.
 fn groups(recipe: &Recipe, place: Place) -> Vec<(Span, Vec<usize>)> {
     let mut groups: Vec<(Span, Vec<usize>)> = Vec::new();
     let moving = recipe.object.iter().enumerate();
@@ -83,9 +83,9 @@ fn groups(recipe: &Recipe, place: Place) -> Vec<(Span, Vec<usize>)> {
     groups
 }
 
-impl Room<'_> {
-    /// A lane for what goes at `speeds`, beside the sensor's way, up to `end_m` from the middle
-    /// of the road.
+impl StreetSide<'_> {
+    /// Draws a lane for a group of entries with common `speeds`. It leaves the sensor's own way
+    /// free and ends at most `end_m` from the middle of the road; `None` if it does not fit.
     fn lane(
         &mut self,
         (speeds, entries): (Span, Vec<usize>),
@@ -108,9 +108,9 @@ impl Room<'_> {
         })
     }
 
-    /// How wide an object of this entry is at most.
+    /// The width of the widest object of this entry.
     fn widest_m(&self, entry: usize) -> f64 {
-        let width_m = |variant| self.stage.prop(entry, variant).size_m.y;
+        let width_m = |variant| self.stage.model(entry, variant).size_m.y;
         let widest_m = (0..self.stage.variants(entry)).map(width_m).fold(0.0, f64::max);
         widest_m * self.stage.recipe().object[entry].scale.most
     }

@@ -1,14 +1,14 @@
-//! Scenes of streets, yards and rooms, as a robot's LiDAR sees them.
+//! Streets, yards and rooms as the LiDAR of a robot sees them.
 //!
-//! A [`Recipe`] is a distribution of scenes, read from TOML. [`Scene::draw`] draws
-//! one of them by its number; [`Stage::sweep`] scans it whole, ground and objects
-//! together; [`label_clusters`] cuts the sweep into clusters by the segmentation
-//! that a robot runs, and labels each by what most of its points lie on.
-//! [`generate`] does all of it for many scenes and packs the clusters as a
-//! training set.
+//! A [`Recipe`] is a distribution of scenes, read from TOML. [`Scene::draw`] draws one scene by
+//! its number. [`Stage::sweep`] scans the whole scene, ground and objects together.
+//! [`label_clusters`] takes the clusters that the robot's segmentation found in the sweep, and
+//! labels each with the class of the object that most of its points lie on. [`generate`] does all
+//! of this for many scenes and packs the clusters as a training set. A [`Drive`] moves a sensor
+//! along an endless street and returns its packets.
 //!
-//! The same recipe, seed and number give the same scene, sweep and clusters on
-//! every machine, whatever the number of threads.
+//! The same recipe, seed and number give the same scene, sweep and clusters on every machine,
+//! with any number of threads.
 
 mod clusters;
 mod drive;
@@ -17,11 +17,17 @@ mod footprint;
 mod generate;
 mod ground;
 mod lanes;
+mod model;
 mod place;
+mod placed_object;
 mod recipe;
 mod scene;
+mod sector;
+mod sightings;
 mod stage;
 mod street;
+mod sway;
+mod sweep;
 
 #[cfg(test)]
 mod tests;
@@ -32,10 +38,13 @@ mod tests;
 struct Readme;
 
 pub use clusters::{LabelledCluster, OTHER, label_clusters};
-pub use drive::{Drive, Packet, Sighting, Sightings};
+pub use drive::{Drive, Packet};
 pub use error::SceneError;
-pub use generate::{Counts, Generation, generate};
-pub use recipe::{Objects, Place, Recipe, Span};
-pub use scene::{PlacedObject, Scene};
-pub use stage::{Stage, Sweep};
-pub use street::Body;
+pub use generate::{ClusterCounts, LabelledScene, generate};
+pub use placed_object::PlacedObject;
+pub use recipe::{Ground, Mount, Objects, Place, Recipe, SensorChoice, Span};
+pub use scene::Scene;
+pub use sightings::{Sighting, Sightings};
+pub use stage::Stage;
+pub use street::StreetObject;
+pub use sweep::Sweep;

@@ -1,4 +1,4 @@
-//! Where the objects of a scene stand.
+//! Draws the places of the objects in a scene.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -6,62 +6,59 @@ use edgepuck_shapes::Sampler;
 use glam::{DVec2, DVec3};
 
 use crate::footprint::Footprint;
-use crate::ground::Ground;
+use crate::ground::{Ground, OWN_RADIUS_M, PAVEMENT_M};
 use crate::lanes::Lane;
-use crate::recipe::{Objects, Place};
-use crate::scene::PlacedObject;
+use crate::placed_object::PlacedObject;
+use crate::recipe::{Objects, Place, Span};
+use crate::stage::Stage;
 
-/// How often a place is drawn for an object before the scene goes without it.
-const TRIES: usize = 12;
+/// How many places are drawn for an object before it is left out.
+const MAX_TRIES: usize = 12;
 
-/// The sensor's own vehicle covers this much around it, metres.
-pub(crate) const OWN_RADIUS_M: f64 = 1.2;
-
-/// Width of a pavement, metres.
-pub(crate) const PAVEMENT_M: [f64; 2] = [1.5, 4.5];
-
-/// How far behind the pavements houses begin, metres.
+/// The least and the greatest distance of a house from its pavement, metres.
 const FRONT_GARDEN_M: [f64; 2] = [0.0, 6.0];
 
-/// How precisely drivers and builders keep to the road's direction: standard
-/// deviation, radians.
+/// The standard deviation of an object's direction from that of the road, radians.
 const SKEW_RAD: f64 = 0.04;
 
-/// The share of places in a row of parked cars that are free.
+/// The fraction of free places in a row of parked cars.
 const FREE: f64 = 0.25;
 
-/// What goes along the street keeps as far away from what is ahead as it goes in this time,
-/// seconds.
+/// The least time between two objects in a lane, seconds.
 const HEADWAY_S: f64 = 0.25;
 
-/// Takes objects into a scene or a block of a street, one after the other.
-pub(crate) struct Placing<'a> {
-    pub(crate) ground: &'a Ground,
-    pub(crate) s: &'a mut Sampler,
+/// Places objects one after the other in a scene or in a block of a street.
+pub(crate) struct Placer<'a> {
+    stage: &'a Stage,
+    ground: &'a Ground,
+    s: &'a mut Sampler,
     taken: Vec<Footprint>,
-    /// Nothing reaches farther along x.
+    /// The greatest |x| of an object.
     half_length_m: f64,
     pub(crate) objects: Vec<PlacedObject>,
 }
 
-/// An object that has no place yet.
+/// An object without a place.
 struct Unplaced {
     entry: usize,
     variant: u32,
     scale: DVec3,
-    /// Half of its footprint, metres.
+    /// Half the size of its footprint, metres.
     half: DVec2,
 }
 
-impl<'a> Placing<'a> {
-    pub(crate) fn new(ground: &'a Ground, s: &'a mut Sampler) -> Self {
+impl<'a> Placer<'a> {
+    /// Starts a scene, in which the sensor's own vehicle has its place.
+    pub(crate) fn new(stage: &'a Stage, ground: &'a Ground, s: &'a mut Sampler) -> Self {
         let half = DVec2::splat(OWN_RADIUS_M);
-        let own = Footprint { centre: DVec2::ZERO, half, yaw_rad: 0.0 };
-        Self { ground, s, taken: vec![own], half_length_m: f64::INFINITY, objects: Vec::new() }
+        let taken = vec![Footprint { centre: DVec2::ZERO, half, yaw_rad: 0.0 }];
+        Self { stage, ground, s, taken, half_length_m: f64::INFINITY, objects: Vec::new() }
     }
 
-    /// In a block of a street, `length_m` long, beside the sensor's way and the `lanes`.
+    /// Starts a block of a street, `length_m` long, in which the sensor's way and the `lanes` stay
+    /// free.
     pub(crate) fn in_block(
+        stage: &'a Stage,
         ground: &'a Ground,
         s: &'a mut Sampler,
         length_m: f64,
@@ -75,25 +72,24 @@ impl<'a> Placing<'a> {
         };
         let mut taken = vec![strip(0.0, OWN_RADIUS_M)];
         taken.extend(lanes.iter().map(|lane| strip(lane.y_m, lane.half_m)));
-        Self { ground, s, taken, half_length_m, objects: Vec::new() }
+        Self { stage, ground, s, taken, half_length_m, objects: Vec::new() }
     }
 
-    /// In a block of a lane, `length_m` long.
-    pub(crate) fn in_lane(ground: &'a Ground, s: &'a mut Sampler, length_m: f64) -> Self {
+    /// Starts a block of a lane, `length_m` long.
+    pub(crate) fn in_lane(
+        stage: &'a Stage,
+        ground: &'a Ground,
+        s: &'a mut Sampler,
+        length_m: f64,
+    ) -> Self {
         let half_length_m = length_m / 2.0;
-        Self { ground, s, taken: Vec::new(), half_length_m, objects: Vec::new() }
+        Self { stage, ground, s, taken: Vec::new(), half_length_m, objects: Vec::new() }
     }
 
-    /// Places the objects of one entry of a recipe, number `entry`, of which there
-    /// are `n_variants`; `size` tells how large one is.
-    pub(crate) fn place(
-        &mut self,
-        entry: usize,
-        objects: &Objects,
-        n_variants: u32,
-        size: impl Fn(u32) -> DVec3,
-    ) {
-        let mut queue = self.draw(entry, objects, n_variants, size);
+    /// Places the objects of entry number `entry` of the recipe.
+    pub(crate) fn place(&mut self, entry: usize) {
+        let objects = &self.stage.recipe().object[entry];
+        let mut queue = self.draw(entry);
         match objects.place {
             Place::Anywhere => self.scatter(objects, queue, Self::anywhere),
             Place::Road => self.scatter(objects, queue, Self::on_road),
@@ -110,26 +106,17 @@ impl<'a> Placing<'a> {
         }
     }
 
-    /// Places those objects of one entry, as [`Placing::place`] draws them, that go in `lane`:
-    /// a `share` of them.
-    pub(crate) fn place_in(
-        &mut self,
-        lane: &Lane,
-        share: f64,
-        entry: usize,
-        objects: &Objects,
-        n_variants: u32,
-        size: impl Fn(u32) -> DVec3,
-    ) {
+    /// Places a `share` of the objects of entry number `entry` in `lane`.
+    pub(crate) fn place_in(&mut self, lane: &Lane, share: f64, entry: usize) {
         let headway_m = HEADWAY_S * lane.velocity_m_s.abs();
         let heading_rad = if lane.velocity_m_s < 0.0 { PI } else { 0.0 };
-        for mut object in self.draw(entry, objects, n_variants, size) {
+        for mut object in self.draw(entry) {
             if !self.s.chance(share) {
                 continue;
             }
             let beside_m = lane.half_m - object.half.y;
             object.half.x += headway_m;
-            for _ in 0..TRIES {
+            for _ in 0..MAX_TRIES {
                 let x_m = self.half_length_m * self.s.uniform(-1.0, 1.0);
                 let y_m = lane.y_m + beside_m * self.s.uniform(-1.0, 1.0);
                 if self.try_at(&object, DVec2::new(x_m, y_m), heading_rad) {
@@ -139,27 +126,23 @@ impl<'a> Placing<'a> {
         }
     }
 
-    /// Draws the objects of one entry.
-    fn draw(
-        &mut self,
-        entry: usize,
-        objects: &Objects,
-        n_variants: u32,
-        size: impl Fn(u32) -> DVec3,
-    ) -> Vec<Unplaced> {
+    /// Draws the objects of entry number `entry`.
+    fn draw(&mut self, entry: usize) -> Vec<Unplaced> {
+        let stage = self.stage;
+        let objects = &stage.recipe().object[entry];
         let [least, most] = objects.count.map(|n| n as usize);
         let n = self.s.count(least, most);
         (0..n)
             .map(|_| {
-                let variant = self.s.count(0, n_variants as usize - 1) as u32;
+                let variant = self.s.count(0, stage.variants(entry) as usize - 1) as u32;
                 let scale = DVec3::from_array([(); 3].map(|()| self.within(objects.scale)));
-                let half = (size(variant) * scale / 2.0).truncate();
+                let half = (stage.model(entry, variant).size_m * scale / 2.0).truncate();
                 Unplaced { entry, variant, scale, half }
             })
             .collect()
     }
 
-    fn within(&mut self, span: crate::recipe::Span) -> f64 {
+    fn within(&mut self, span: Span) -> f64 {
         span.at(self.s.uniform(0.0, 1.0))
     }
 
@@ -175,7 +158,7 @@ impl<'a> Placing<'a> {
         objects.distance_m.at_log(self.s.uniform(0.0, 1.0))
     }
 
-    /// Takes `object` if it is free there.
+    /// Places `object` if nothing else is there, and returns whether it did.
     fn try_at(&mut self, object: &Unplaced, centre: DVec2, yaw_rad: f64) -> bool {
         let footprint = Footprint { centre, half: object.half, yaw_rad };
         if centre.x.abs() + footprint.reach(DVec2::X) > self.half_length_m {
@@ -191,7 +174,7 @@ impl<'a> Placing<'a> {
         true
     }
 
-    /// Places each object by itself.
+    /// Places each object on its own.
     fn scatter(
         &mut self,
         objects: &Objects,
@@ -199,7 +182,7 @@ impl<'a> Placing<'a> {
         draw: fn(&mut Self, &Objects) -> (DVec2, f64),
     ) {
         for object in queue {
-            for _ in 0..TRIES {
+            for _ in 0..MAX_TRIES {
                 let (centre, yaw_rad) = draw(self, objects);
                 if self.try_at(&object, centre, yaw_rad) {
                     break;
@@ -218,12 +201,12 @@ impl<'a> Placing<'a> {
         let Ground { road_y_m, road_half_m, .. } = *self.ground;
         let y_m = road_y_m + road_half_m * self.s.uniform(-0.8, 0.8);
         let x_m = self.side() * self.distance(objects);
-        // Traffic keeps to its side.
+        // Traffic keeps to the right.
         let heading_rad = if y_m > road_y_m { PI } else { 0.0 };
         (DVec2::new(x_m, y_m), heading_rad + self.skew())
     }
 
-    /// Some objects around one point of a pavement.
+    /// Places a group of objects around one point of a pavement.
     fn group(&mut self, objects: &Objects, group: Vec<Unplaced>) {
         let side = self.side();
         let beside_m = self.s.uniform(0.3, PAVEMENT_M[1]);
@@ -231,7 +214,7 @@ impl<'a> Placing<'a> {
         let anchor = DVec2::new(self.side() * self.distance(objects), y_m);
         let heading_rad = self.s.uniform(0.0, TAU);
         for object in group {
-            for _ in 0..TRIES {
+            for _ in 0..MAX_TRIES {
                 let off = DVec2::from_angle(self.s.uniform(0.0, TAU))
                     * (object.half.max_element() + self.within(objects.gap_m));
                 let yaw_rad = heading_rad + self.s.uniform(-0.5, 0.5);
@@ -242,9 +225,9 @@ impl<'a> Placing<'a> {
         }
     }
 
-    /// Rows along the road, on both sides. `stand` says how far from the road's
-    /// edge an object's middle is, and how it is turned; `free` is the share of
-    /// places that are left out.
+    /// Places objects in rows along both sides of the road. `stand` returns the distance of an
+    /// object's middle from the edge of the road, and its yaw; `free` is the fraction of places
+    /// that stay empty.
     fn rows(
         &mut self,
         objects: &Objects,
@@ -277,7 +260,7 @@ impl<'a> Placing<'a> {
                 }
                 let centre = DVec2::new(x_m, y_m);
                 if centre.length() >= objects.distance_m.least {
-                    // A house keeps its front to the road.
+                    // Houses always face the road.
                     let is_turned = self.s.chance(0.5) && objects.place != Place::Front;
                     let heading_rad = yaw_rad + if is_turned { PI } else { 0.0 };
                     let skew_rad = self.skew();
@@ -307,14 +290,14 @@ impl<'a> Placing<'a> {
     }
 }
 
-/// What the objects of one row have in common.
+/// The properties that the objects of one row share.
 struct RowStyle {
-    /// On which side of the road the row is, 1 or -1.
+    /// The side of the road, 1 or -1.
     side: f64,
-    /// Whether cars are parked across the road's direction.
+    /// Whether cars are parked across the road.
     across: bool,
-    /// Width of the pavement, metres.
+    /// The width of the pavement, metres.
     pavement_m: f64,
-    /// Depth of what is between the pavement and a house, metres.
+    /// The depth of the front gardens, metres.
     garden_m: f64,
 }

@@ -1,4 +1,4 @@
-//! A distribution of scenes, as TOML holds it.
+//! Recipes: distributions of scenes, read from TOML.
 
 use std::path::Path;
 
@@ -8,73 +8,73 @@ use sim_gpu::config::{self, ConfigError, InvalidValue, within};
 use sim_gpu::effects::Effects;
 use sim_gpu::sensor::Sensor;
 
-/// Everything a scene is drawn from.
+/// A distribution of scenes.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// One line for people.
+    /// A description in one line.
     #[serde(default)]
     pub description: String,
-    /// How many different objects of each kind there are; they are scaled a
-    /// little each time.
+    /// The number of different models of each built-in object. Each placed object is scaled a
+    /// little.
     #[serde(default = "variants")]
     pub variants: u32,
     /// The ground.
     #[serde(default)]
     pub ground: Ground,
-    /// Where the sensor is mounted.
+    /// The mount of the sensor.
     pub mount: Mount,
-    /// The sensors; each sweep is of one of them.
+    /// The sensors; each scene has one of them.
     #[serde(default)]
     pub sensor: Vec<SensorChoice>,
-    /// The part of the beams that return from glass; drawn for each scene.
+    /// The fraction of the beams that return from glass; drawn for each scene.
     #[serde(default)]
     pub glass_returned: Span,
-    /// How low segmentation takes points for ground, metres; drawn for each scene,
-    /// since robots differ. Low numbers leave strips of ground under objects, high
-    /// ones take their feet away. By default that of the segmentation.
+    /// The height below which segmentation takes points for ground, metres; drawn for each scene,
+    /// because robots differ. Small values leave strips of ground under objects, large ones cut
+    /// off the feet of objects. By default segmentation uses its own value.
     pub ground_clearance_m: Option<Span>,
     /// The objects, placed in this order.
     #[serde(default)]
     pub object: Vec<Objects>,
 }
 
-/// The ground, metres. Each number is drawn for each scene.
+/// The ground. Each value is drawn for each scene.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ground {
-    /// Half of its edge.
+    /// Half the length of its edge, metres.
     pub half_m: f64,
-    /// How steep it is, in any direction, degrees.
+    /// The slope in a random direction, degrees.
     pub slope_deg: Span,
-    /// Standard deviation of its height from a smooth surface.
+    /// The standard deviation of the height from a smooth surface, metres.
     pub roughness_m: Span,
-    /// Width of the road, which runs along x.
+    /// The width of the road, which runs along x, metres.
     pub road_width_m: Span,
-    /// How far the pavements on both sides stand above the road.
+    /// The height of the pavements on both sides above the road, metres.
     pub kerb_m: Span,
-    /// The part of the light that comes back at vertical incidence; all of it by default.
+    /// The fraction of the light that is reflected at vertical incidence; 1 by default.
     pub reflectivity: Span,
 }
 
-/// Where the sensor is. Each number is drawn for each scene.
+/// The mount of the sensor. Each value is drawn for each scene.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mount {
-    /// Height above the ground, metres.
+    /// The height above the ground, metres.
     pub height_m: Span,
-    /// By how much it leans, in any direction, degrees.
+    /// The tilt in a random direction, degrees.
     #[serde(default)]
     pub tilt_deg: Span,
-    /// How far it is from the middle of the road, metres; either side.
+    /// The distance from the middle of the road to either side, metres.
     #[serde(default)]
     pub off_road_m: Span,
-    /// How fast it goes along the road while it scans, metres a second; it stands still by
-    /// default. Points are then where a driver puts them that takes it to stand still.
+    /// The speed along the road during a scan, metres a second; 0 by default. Points are then
+    /// motion-distorted, as a driver that ignores ego-motion reports them.
     #[serde(default)]
     pub speed_m_s: Span,
-    /// By how much it pitches and rolls in a drive, degrees: the standard deviation of each,
-    /// drawn for each drive. It does not by default.
+    /// The standard deviations of pitch and roll in a drive, degrees, drawn for each drive; 0 by
+    /// default.
     #[serde(default)]
     pub sway_deg: Span,
 }
@@ -83,9 +83,9 @@ pub struct Mount {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorChoice {
-    /// A built-in sensor, or the path of a profile, relative to the recipe.
+    /// The name of a built-in sensor, or the path of a profile relative to the recipe.
     pub profile: String,
-    /// Standard deviation of the range, metres; the profile's own by default.
+    /// The standard deviation of the range, metres; that of the profile by default.
     pub noise_m: Option<f64>,
     /// The probability that a return is lost.
     #[serde(default)]
@@ -95,37 +95,37 @@ pub struct SensorChoice {
     pub effects: Effects,
 }
 
-/// Objects of one kind.
+/// An entry of a recipe: objects of one kind.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Objects {
-    /// A kind of built-in objects, or `mesh` for those of `meshes`.
+    /// A built-in kind of object, or `mesh` for the meshes in the folder `meshes`.
     pub kind: String,
-    /// What a network is to call it.
+    /// The class that a network learns for the objects.
     pub class: String,
-    /// How many stand in a scene, at least and at most.
+    /// The least and the greatest number of these objects in a scene.
     pub count: [u32; 2],
     /// Where they stand.
     pub place: Place,
-    /// Distance from the sensor, metres; drawn with a uniform logarithm.
+    /// The distance from the sensor, metres; its logarithm is uniform.
     pub distance_m: Span,
-    /// Space to the next one in a row or a group, metres.
+    /// The space to the next object in a row or a group, metres.
     #[serde(default = "gap")]
     pub gap_m: Span,
-    /// Factors of the size, drawn for each axis.
+    /// The scale factor, drawn for each axis.
     #[serde(default = "scale")]
     pub scale: Span,
-    /// How fast they go along the street in a drive, metres a second; they stand by default, and
-    /// in every scene.
+    /// The speed along the street in a drive, metres a second; 0 by default. In a scene all
+    /// objects stand.
     #[serde(default)]
     pub speed_m_s: Span,
-    /// The part of the light that comes back at vertical incidence, drawn for each object;
-    /// all of it by default.
+    /// The fraction of the light that is reflected at vertical incidence, drawn for each object;
+    /// 1 by default.
     #[serde(default = "white")]
     pub reflectivity: Span,
     /// For `kind = "mesh"`: the folder of the meshes, inside that of `--meshes`.
     pub meshes: Option<String>,
-    /// For `kind = "mesh"`: the height to which a mesh is scaled, metres.
+    /// For `kind = "mesh"`: the height to which each mesh is scaled, metres.
     pub height_m: Option<Span>,
 }
 
@@ -134,13 +134,13 @@ formats::named! {
     #[derive(Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Place: "place" {
-        /// Anywhere around the sensor, turned in any way.
+        /// Anywhere around the sensor, in any direction.
         Anywhere = "anywhere",
         /// On the road, along it.
         Road = "road",
         /// In rows at the edges of the road, along it or across.
         Parked = "parked",
-        /// On the pavements, in groups, turned in any way.
+        /// On the pavements, in groups, in any direction.
         Pavement = "pavement",
         /// In rows along the far edges of the pavements, end to end.
         Line = "line",
@@ -195,13 +195,13 @@ impl Default for Ground {
 }
 
 impl Span {
-    /// The number that lies at `share` (0 to 1) of the range.
+    /// The value at `share` (0 to 1) of the range.
     #[must_use]
     pub fn at(self, share: f64) -> f64 {
         self.least + share * (self.most - self.least)
     }
 
-    /// As [`Span::at`], where the logarithm grows evenly.
+    /// The value at `share` of the range on a logarithmic scale.
     #[must_use]
     pub fn at_log(self, share: f64) -> f64 {
         self.least * (self.most / self.least).powf(share)
@@ -219,32 +219,32 @@ impl Span {
     }
 }
 
-/// Nothing in a recipe is longer, metres.
+/// The greatest length in a recipe, metres.
 const MOST_M: f64 = 1000.0;
 
 impl Recipe {
     /// Reads the recipe in `file`.
     ///
     /// # Errors
-    /// Names the file, the key and the cause.
+    /// The file is missing or invalid; the error names the key and the cause.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
         let recipe: Self = config::read(file)?;
         recipe.check().map_err(|invalid| invalid.in_file(file))?;
         Ok(recipe)
     }
 
-    /// Parses the recipe `text`, which stands in `file`; `file` need not exist.
+    /// Parses the recipe `text`. Errors name `file`, which need not exist.
     ///
     /// # Errors
-    /// As [`Recipe::load`].
+    /// The recipe is invalid; the error names the key and the cause.
     pub fn parse(text: &str, file: &Path) -> Result<Self, ConfigError> {
         let recipe: Self = config::parse(text, file)?;
         recipe.check().map_err(|invalid| invalid.in_file(file))?;
         Ok(recipe)
     }
 
-    /// Replaces the sensors by those of these `names`, if there are any. A sensor
-    /// that the recipe has keeps its errors.
+    /// Replaces the sensors by those with these `names`, unless `names` is empty. Sensors of the
+    /// recipe keep their noise, dropout and effects.
     pub fn use_sensors(&mut self, names: &[String]) {
         if names.is_empty() {
             return;
@@ -261,8 +261,7 @@ impl Recipe {
         self.sensor = names.iter().map(choice).collect();
     }
 
-    /// The classes that a network learns: those of the objects, and [`OTHER`],
-    /// sorted by name.
+    /// The classes of the objects and [`OTHER`], sorted by name.
     ///
     /// [`OTHER`]: crate::OTHER
     #[must_use]
@@ -275,10 +274,10 @@ impl Recipe {
         classes
     }
 
-    /// The sensors, read relative to the folder of `file`.
+    /// Reads the sensor profiles, relative to the folder of `file`.
     ///
     /// # Errors
-    /// A profile that is missing or wrong.
+    /// A profile is missing or invalid.
     pub fn sensors(&self, file: &Path) -> Result<Vec<Sensor>, ConfigError> {
         let folder = file.parent().unwrap_or(Path::new(""));
         self.sensor.iter().map(|sensor| Sensor::resolve_in(folder, &sensor.profile)).collect()
@@ -327,7 +326,7 @@ impl SensorChoice {
             [("noise", self.effects.noise.is_some()), ("dropout", self.effects.dropout.is_some())]
         {
             if is_there {
-                let cause = "expected noise_m and dropout of the sensor itself in its place";
+                let cause = "expected the sensor's own noise_m and dropout instead";
                 return Err(InvalidValue::new(format!("{key}.effects.{own}"), cause));
             }
         }
@@ -335,17 +334,17 @@ impl SensorChoice {
     }
 }
 
-/// The kind whose meshes a user brings.
+/// The kind of objects that are the user's own meshes.
 const MESH: &str = "mesh";
 
 impl Objects {
-    /// The kind of built-in objects; `None` for a user's meshes.
+    /// The built-in kind; `None` for the user's meshes.
     #[must_use]
     pub fn built_in(&self) -> Option<ObjectKind> {
         self.kind.parse().ok()
     }
 
-    /// Whether they go along the street in a drive.
+    /// Whether they move along the street in a drive.
     #[must_use]
     pub fn moves(&self) -> bool {
         self.speed_m_s.most > 0.0
@@ -364,7 +363,8 @@ impl Objects {
             [("meshes", self.meshes.is_some()), ("height_m", self.height_m.is_some())]
         {
             if is_there != is_mesh {
-                let cause = format!("expected with kind = \"{MESH}\", and only there");
+                let expected = if is_mesh { "a value for" } else { "it only with" };
+                let cause = format!("expected {expected} kind = \"{MESH}\"");
                 return Err(InvalidValue::new(at(field), cause));
             }
         }

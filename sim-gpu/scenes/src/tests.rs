@@ -1,4 +1,4 @@
-//! Scenes as a whole: what is drawn, what is seen of it, and what is cut.
+//! Tests of whole scenes and drives: drawing, scanning, segmenting.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,11 +7,10 @@ use edgepuck_segment::{Segmenter, Settings, Sweep as Points};
 use formats::Scan;
 use glam::{DVec2, DVec3};
 use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
 use sim_gpu::scan::PlacedTarget;
 use sim_gpu::target::{Surface, Target};
 
-use crate::{Drive, OTHER, Packet, Recipe, Scene, SceneError, Sightings, Stage, label_clusters};
+use crate::{Drive, OTHER, Packet, Recipe, Scene, Sightings, Stage, label_clusters};
 
 const RECIPE: &str = r#"
 variants = 3
@@ -57,8 +56,7 @@ distance_m = [3, 15]
 fn stage(recipe: &str) -> Stage {
     let file = Path::new("test.toml");
     let recipe = Recipe::parse(recipe, file).unwrap();
-    Stage::new(recipe, file, None, 5, |effects| Ok::<_, SceneError>(Caster::Cpu(effects.clone())))
-        .unwrap()
+    Stage::new(recipe, file, None, 5).unwrap()
 }
 
 #[test]
@@ -73,7 +71,7 @@ fn a_scene_is_a_function_of_recipe_seed_and_number() {
 }
 
 #[test]
-fn every_point_lies_on_the_surface_that_it_is_said_to_lie_on() {
+fn every_point_lies_on_its_surface() {
     let moving = RECIPE.replace("off_road_m = [0, 3]", "off_road_m = [0, 3]\nspeed_m_s = [20, 20]");
     for (stage, number) in [(stage(RECIPE), 0), (stage(RECIPE), 1), (stage(&moving), 1)] {
         let scene = Scene::draw(&stage, number);
@@ -102,10 +100,10 @@ fn every_point_lies_on_the_surface_that_it_is_said_to_lie_on() {
     }
 }
 
-/// Silhouettes are where a beam may pass one and meet the other: the hierarchies hold their
-/// triangles in f32, each in a frame of its own.
+/// The two may differ at silhouettes, because hierarchies hold their triangles in f32, each in a
+/// frame of its own.
 #[test]
-fn a_sweep_of_many_objects_is_that_of_one_mesh_of_them_all() {
+fn a_sweep_of_the_objects_equals_a_sweep_of_one_mesh_of_all() {
     let opaque = RECIPE.replace("glass_returned = [0, 0]", "glass_returned = [1, 1]");
     let stage = stage(&opaque);
     for number in 0..3 {
@@ -162,7 +160,7 @@ fn glass_that_returns_nothing_leaves_holes_in_cars() {
 }
 
 #[test]
-fn what_is_dark_is_detected_less_far() {
+fn dark_objects_are_detected_at_shorter_ranges() {
     let with = |effects: &str, reflectivity: &str| {
         let text = RECIPE.replacen("noise_m = 0", &format!("noise_m = 0\n{effects}"), 1);
         let text = text.replace("kind = \"car\"", &format!("kind = \"car\"\n{reflectivity}"));
@@ -187,7 +185,7 @@ fn what_is_dark_is_detected_less_far() {
 }
 
 #[test]
-fn a_cluster_of_one_object_has_its_class_and_a_mixed_one_has_none() {
+fn clusters_of_one_object_have_its_class() {
     let stage = stage(RECIPE);
     let mut segmenter = Segmenter::new(Settings::default()).unwrap();
     let mut seen = std::collections::BTreeSet::new();
@@ -212,7 +210,7 @@ fn a_cluster_of_one_object_has_its_class_and_a_mixed_one_has_none() {
 }
 
 #[test]
-fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
+fn an_invalid_recipe_gives_an_error_with_the_key_and_the_cause() {
     for (from, to, expected) in [
         ("kind = \"car\"", "kind = \"cra\"", "object[0].kind: expected mesh or one of car, truck"),
         ("count = [4, 6]", "count = [6, 4]", "object[0].count: expected two ascending numbers"),
@@ -236,7 +234,7 @@ fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
         (
             "noise_m = 0",
             "effects = { dropout = { probability = 0.1 } }",
-            "sensor[0].effects.dropout: expected noise_m and dropout of the sensor itself",
+            "sensor[0].effects.dropout: expected the sensor's own noise_m and dropout",
         ),
         (
             "[ground]",
@@ -244,7 +242,7 @@ fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
             "ground.reflectivity: expected two ascending",
         ),
         ("variants = 3", "variants = 0", "variants: expected at least 1, found 0"),
-        ("kind = \"car\"", "kind = \"mesh\"", "object[0].meshes: expected with kind = \"mesh\""),
+        ("kind = \"car\"", "kind = \"mesh\"", "object[0].meshes: expected a value"),
     ] {
         let error = Recipe::parse(&RECIPE.replacen(from, to, 1), Path::new("r.toml")).unwrap_err();
         let error = error.to_string();
@@ -259,7 +257,7 @@ fn a_recipe_that_cannot_be_used_names_the_key_and_the_cause() {
     );
 }
 
-/// The scene's recipe for a drive: its persons walk, and cars go along the road.
+/// The recipe with walking persons and moving cars.
 fn drive_recipe() -> String {
     let walking =
         RECIPE.replace("distance_m = [2, 12]", "distance_m = [2, 12]\nspeed_m_s = [1, 2]");
@@ -268,7 +266,7 @@ fn drive_recipe() -> String {
     walking.replace("vlp16", "vlp32c") + cars
 }
 
-/// The first packets of a drive at 6 m/s, so many in each batch.
+/// The first `n` packets of a drive at 6 m/s, fired in batches of `batch`.
 fn packets(stage: &Stage, n: u32, batch: u32) -> Vec<Packet> {
     let mut drive = Drive::new(stage, 6.0).unwrap();
     let batches = (0..n).step_by(batch as usize);
@@ -286,9 +284,9 @@ fn a_drive_is_the_same_in_batches_and_threads_of_any_number() {
     }
 }
 
-/// While it goes on and the sensor does, every point of it lies in its box at that time.
+/// Object and sensor move while the head turns; the box is that at the time of each point.
 #[test]
-fn what_moves_is_seen_where_it_is() {
+fn points_on_moving_objects_lie_in_their_boxes() {
     let stage = stage(&drive_recipe());
     let mut drive = Drive::new(&stage, 6.0).unwrap();
     let packets = drive.fire(0..452).unwrap();
@@ -298,41 +296,41 @@ fn what_moves_is_seen_where_it_is() {
         let objects = packet.scan.object.iter().flatten();
         let beams = packet.scan.beam.iter().flatten();
         for ((position, &object), &beam) in packet.scan.positions.iter().zip(objects).zip(beams) {
-            let Some(body) = drive.body(object) else { continue };
+            let Some(truth) = drive.object(object) else { continue };
             // A packet has 12 sequences of 55.296 us, in which two lasers of 32 fire at once.
             let time_s = f64::from(number * 12 + beam / 32) * 55.296e-6;
             let time_s = time_s + f64::from(beam % 32 / 2) * 2.304e-6;
             let at = DVec3::from_array(position.map(f64::from)) + origin;
-            let from_centre = at - body.centre_m(time_s);
-            let in_box = glam::DQuat::from_rotation_z(-body.object.yaw_rad) * from_centre;
+            let from_centre = at - truth.centre_m(time_s);
+            let in_box = glam::DQuat::from_rotation_z(-truth.placed.yaw_rad) * from_centre;
             // A mesh may stand out of its box by the rounding of its vertices.
             let margin_m = 1e-3;
-            let outside = (in_box.abs() - body.size_m / 2.0).max_element();
+            let outside = (in_box.abs() - truth.size_m / 2.0).max_element();
             assert!(outside < margin_m, "object {object} of packet {number}: {outside} m outside");
-            n_moving += usize::from(body.velocity_m_s != DVec3::ZERO);
+            n_moving += usize::from(truth.velocity_m_s != DVec3::ZERO);
         }
     }
-    assert!(n_moving > 200, "{n_moving} points on what moves");
+    assert!(n_moving > 200, "{n_moving} points on moving objects");
 }
 
 #[test]
-fn sightings_tell_every_point_once_with_its_turn() {
+fn sightings_count_every_point_once_in_its_revolution() {
     let stage = stage(&drive_recipe());
     let mut drive = Drive::new(&stage, 6.0).unwrap();
     let packets = drive.fire(0..452).unwrap();
     let mut sightings = Sightings::default();
-    let mut told: Vec<_> =
+    let mut found: Vec<_> =
         packets.chunks(100).flat_map(|packets| sightings.add(&drive, packets)).collect();
-    told.extend(sightings.finish(&drive));
+    found.extend(sightings.finish(&drive));
     let on_objects =
         |packet: &Packet| packet.scan.object.iter().flatten().filter(|&&object| object > 0).count();
-    let n_points: u32 = told.iter().map(|sighting| sighting.points).sum();
+    let n_points: u32 = found.iter().map(|sighting| sighting.points).sum();
     assert_eq!(n_points as usize, packets.iter().map(on_objects).sum::<usize>());
-    let keys: Vec<_> = told.iter().map(|sighting| (sighting.turn, sighting.object)).collect();
-    assert!(keys.is_sorted_by(|a, b| a < b), "once each, in order");
+    let keys: Vec<_> = found.iter().map(|sighting| (sighting.turn, sighting.object)).collect();
+    assert!(keys.is_sorted_by(|a, b| a < b), "expected each once, in order");
     // 452 packets of 0.66 ms at 10 turns a second.
     assert_eq!(keys.last().unwrap().0, 2);
-    for sighting in &told {
+    for sighting in &found {
         let since_s = sighting.time_s - 946_684_800.0;
         let turn = f64::from(sighting.turn);
         assert!((turn..turn + 1.0).contains(&(since_s * 10.0)), "{sighting:?}");
@@ -340,7 +338,7 @@ fn sightings_tell_every_point_once_with_its_turn() {
 }
 
 #[test]
-fn the_built_in_recipes_can_be_used() {
+fn the_built_in_recipes_are_valid() {
     for (name, text) in edgepuck_assets::SCENE_RECIPES {
         let file = Path::new(name);
         let recipe = Recipe::parse(text, file).unwrap();

@@ -7,20 +7,22 @@ mod wing;
 
 use glam::DVec3;
 
-use crate::primitives::{Builder, Make, Sampler};
+use crate::primitives::{Builder, Makes, Sampler};
 use details::{gear, jet_engine, propeller, struts};
 use fuselage::Fuselage;
 use jet::{delta, fighter};
 use wing::{Wing, fin};
 
-/// The makes, some of them more frequent.
-const MAKES: [Make; 11] =
-    [liner, liner, liner, light, light, biplane, fighter, fighter, delta, glider, flying_wing];
-
-/// Builds an airplane that flies to -y, of the size of real ones.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.pick(&MAKES)(b, s);
-}
+/// The makes, with their weights. Airplanes have the size of real ones and fly to -y.
+pub const MAKES: Makes = &[
+    (3, liner),
+    (2, light),
+    (1, biplane),
+    (2, fighter),
+    (1, delta),
+    (1, glider),
+    (1, flying_wing),
+];
 
 /// A low or high swept wing, engines under it or at the tail.
 fn liner(b: &mut Builder, s: &mut Sampler) {
@@ -50,7 +52,7 @@ fn liner(b: &mut Builder, s: &mut Sampler) {
     let engine_m = length_m * s.uniform(0.055, 0.09);
     if rear_engines {
         let at = DVec3::new(1.45 * r, 0.27 * length_m, 0.45 * r);
-        b.mirrored(|b| jet_engine(b, at, 0.3 * engine_m, 1.2 * engine_m));
+        b.mirrored_x(|b| jet_engine(b, at, 0.3 * engine_m, 1.2 * engine_m));
     } else {
         engines(b, s, &wing, engine_m, high);
     }
@@ -66,7 +68,7 @@ fn engines(b: &mut Builder, s: &mut Sampler, wing: &Wing, size_m: f64, high: boo
     for &station in stations {
         let nose = wing.leading_edge(station);
         let radius_m = 0.32 * size_m;
-        b.mirrored(|b| {
+        b.mirrored_x(|b| {
             if props {
                 let front = nose - 0.7 * size_m * DVec3::Y;
                 details::nacelle(b, front, 0.25 * size_m, 2.0 * size_m);
@@ -219,7 +221,7 @@ fn flying_wing(b: &mut Builder, s: &mut Sampler) {
     let middle = wing.root + 0.5 * wing.root_chord_m * DVec3::Y;
     b.shifted(middle, |b| body.build(b));
     let hump = wing.leading_edge(0.16) + DVec3::new(0.0, 0.1, 0.04) * half_span_m;
-    b.mirrored(|b| details::nacelle(b, hump, 0.04 * half_span_m, 0.35 * half_span_m));
+    b.mirrored_x(|b| details::nacelle(b, hump, 0.04 * half_span_m, 0.35 * half_span_m));
     if s.chance(0.4) {
         wing.winglets(b, 0.15 * half_span_m);
     }

@@ -142,9 +142,10 @@ fn trigger(b: &mut Builder, s: &mut Sampler, f: &Form) {
     let lever = [(-0.7, -0.1), (-0.8, -0.6), (-1.05, -1.0)];
     let lever = lever.map(|(y, dz)| DVec3::new(0.0, y * size_m, z + dz * size_m));
     smooth_tube(b, &lever, 2, 0.1 * size_m);
-    let nozzle = DAffine3::from_translation(DVec3::new(0.0, -1.1 * size_m, z))
-        * DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
-    b.place(nozzle, |b| cylinder(b, DVec3::ZERO, 0.15 * size_m, 0.25 * size_m));
+    let forwards = DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    b.turned(DVec3::new(0.0, -1.1 * size_m, z), forwards, |b| {
+        cylinder(b, DVec3::ZERO, 0.15 * size_m, 0.25 * size_m);
+    });
 }
 
 /// A jug's handle from the neck to the body.

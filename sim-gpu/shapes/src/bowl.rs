@@ -70,5 +70,5 @@ fn lugs(b: &mut Builder, s: &mut Sampler, rim_m: f64, height_m: f64) {
         DVec3::new(0.8 * rim_m, side_m, z),
     ];
     let path = smooth(b, &points, 3);
-    b.mirrored(|b| tube(b, &path, 0.06 * rim_m));
+    b.mirrored_x(|b| tube(b, &path, 0.06 * rim_m));
 }

@@ -83,10 +83,21 @@ impl Builder {
         self.place(DAffine3::from_translation(origin), build);
     }
 
-    /// Runs `build` as it is and once more mirrored at the plane x = 0.
-    pub fn mirrored(&mut self, build: impl Fn(&mut Self)) {
+    /// Runs `build` in a frame at `origin` that is rotated by `turn`.
+    pub fn turned(&mut self, origin: DVec3, turn: DAffine3, build: impl FnOnce(&mut Self)) {
+        self.place(DAffine3::from_translation(origin) * turn, build);
+    }
+
+    /// Runs `build` twice, the second time mirrored at the plane x = 0.
+    pub fn mirrored_x(&mut self, build: impl Fn(&mut Self)) {
         build(self);
         self.place(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)), build);
+    }
+
+    /// Runs `build` twice, the second time mirrored at the plane y = 0.
+    pub fn mirrored_y(&mut self, build: impl Fn(&mut Self)) {
+        build(self);
+        self.place(DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0)), build);
     }
 
     /// Segments for a circle of `radius_m`, at least `least`.
@@ -176,7 +187,7 @@ mod tests {
     #[test]
     fn mirroring_adds_the_same_part_on_the_other_side() {
         let mut builder = Builder::new(1.0, 1.0);
-        builder.mirrored(|b| {
+        builder.mirrored_x(|b| {
             b.grid(&[vec![DVec3::X, DVec3::X * 2.0], vec![DVec3::new(1.0, 1.0, 0.0)]], false);
         });
         let (mesh, _) = builder.finish();

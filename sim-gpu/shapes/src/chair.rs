@@ -124,7 +124,7 @@ fn arms(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
         end,
     ];
     let path = smooth(b, &points, 3);
-    b.mirrored(|b| {
+    b.mirrored_x(|b| {
         if kind == Arms::Posts {
             bar(b, DVec3::new(x, front, z), DVec3::new(x, rear, z), wide_m, 0.02);
             for y in [0.8 * front, 0.45 * seat.half.y] {
@@ -156,7 +156,7 @@ fn club_chair(b: &mut Builder, s: &mut Sampler) {
     block_between(b, DVec3::new(-base.x, -base.y, feet_m), base);
     soft(b, [-inner_m, -deep_m, base_top_m], [inner_m, 0.6 * deep_m, seat_m]);
     soft(b, [-half_m, 0.55 * deep_m, feet_m], [half_m, deep_m + 0.06, back_top_m]);
-    b.mirrored(|b| {
+    b.mirrored_x(|b| {
         soft(b, [inner_m, -deep_m, feet_m], [half_m, deep_m, arm_top_m]);
         for y in [-0.8 * deep_m, 0.8 * deep_m] {
             let x = half_m - 0.06;

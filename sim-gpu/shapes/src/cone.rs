@@ -5,17 +5,12 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DVec2, DVec3};
 
 use crate::primitives::{
-    Builder, Make, Profile, Sampler, Section, Vessel, Wall, ellipsoid, outline, prism,
+    Builder, Makes, Profile, Sampler, Section, Vessel, Wall, ellipsoid, outline, prism,
 };
 
-/// The makes, some of them more frequent.
-const MAKES: [Make; 8] =
-    [plain, plain, plain, traffic_cone, traffic_cone, party_hat, ice_cream, funnel];
-
-/// Builds a cone.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.pick(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes =
+    &[(3, plain), (2, traffic_cone), (1, party_hat), (1, ice_cream), (1, funnel)];
 
 /// A cone or frustum, round or many-sided, closed or open below, upright or
 /// on its tip.

@@ -7,21 +7,21 @@ use std::f64::consts::{PI, TAU};
 use glam::{DAffine3, DVec2, DVec3};
 
 use crate::primitives::{
-    Builder, Make, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, frustum,
+    Builder, Makes, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, frustum,
     rod, smooth_tube,
 };
 use shade::shade;
 
-/// The makes, some of them more frequent.
-const MAKES: [Make; 10] = [
-    table_lamp, table_lamp, table_lamp, floor_lamp, tripod, arc_lamp, desk_lamp, desk_lamp,
-    gooseneck, pendant,
+/// The makes, with their weights.
+pub const MAKES: Makes = &[
+    (3, table_lamp),
+    (1, floor_lamp),
+    (1, tripod),
+    (1, arc_lamp),
+    (2, desk_lamp),
+    (1, gooseneck),
+    (1, pendant),
 ];
-
-/// Builds a lamp.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.pick(&MAKES)(b, s);
-}
 
 /// A turned or plain body like a vase, with a shade above it.
 fn table_lamp(b: &mut Builder, s: &mut Sampler) {
@@ -147,9 +147,8 @@ fn desk_lamp(b: &mut Builder, s: &mut Sampler) {
         ellipsoid(b, joint, DVec3::new(3.6 * r, 2.2 * r, 2.2 * r));
     }
     let tilt_rad = s.uniform(-0.7, 0.1);
-    let frame = DAffine3::from_translation(wrist) * DAffine3::from_rotation_x(tilt_rad);
     let size_m = arm_m * s.uniform(0.25, 0.4);
-    b.place(frame, |b| head(b, s, size_m));
+    b.turned(wrist, DAffine3::from_rotation_x(tilt_rad), |b| head(b, s, size_m));
 }
 
 /// A head on a bent neck.
@@ -165,8 +164,7 @@ fn gooseneck(b: &mut Builder, s: &mut Sampler) {
     }
     smooth_tube(b, &points, 2, 0.012 * height_m + 0.003);
     frustum(b, DVec3::ZERO, [foot_m, foot_m * s.uniform(0.6, 1.0)], 0.2 * foot_m);
-    let frame = DAffine3::from_translation(points[6]) * DAffine3::from_rotation_x(-0.4);
-    b.place(frame, |b| head(b, s, 0.35 * reach_m));
+    b.turned(points[6], DAffine3::from_rotation_x(-0.4), |b| head(b, s, 0.35 * reach_m));
 }
 
 /// A shade, a globe or a cluster of them on cords from a ceiling plate.

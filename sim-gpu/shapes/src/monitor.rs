@@ -5,7 +5,8 @@ mod screen;
 use glam::{DAffine3, DVec2, DVec3};
 
 use crate::primitives::{
-    Builder, Make, Sampler, bar, block, cap_start, cylinder, loft, outline, prism, rod, sheet, skin,
+    Builder, Makes, Sampler, bar, block, cap_start, cylinder, loft, outline, prism, rod, sheet,
+    skin,
 };
 use screen::Screen;
 
@@ -13,13 +14,8 @@ use screen::Screen;
 /// argument is half the size of the foot.
 type Stand = fn(&mut Builder, &mut Sampler, &Screen, f64, DVec2);
 
-/// The makes, some of them more frequent.
-const MAKES: [Make; 7] = [flat, flat, flat, flat, tube_monitor, tube_monitor, pair];
-
-/// Builds a monitor.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.pick(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes = &[(4, flat), (2, tube_monitor), (1, pair)];
 
 /// One flat screen on a stand of some kind.
 fn flat(b: &mut Builder, s: &mut Sampler) {
@@ -28,9 +24,8 @@ fn flat(b: &mut Builder, s: &mut Sampler) {
     let middle_m = gap_m + 0.5 * screen.height_m;
     let tilt_rad = if s.chance(0.5) { s.uniform(-0.25, 0.0) } else { 0.0 };
     stand(b, s, &screen, gap_m);
-    let frame =
-        DAffine3::from_translation(middle_m * DVec3::Z) * DAffine3::from_rotation_y(tilt_rad);
-    b.place(frame, |b| screen.build(b, s));
+    let tilt = DAffine3::from_rotation_y(tilt_rad);
+    b.turned(middle_m * DVec3::Z, tilt, |b| screen.build(b, s));
 }
 
 fn stand(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64) {
@@ -156,9 +151,8 @@ fn pair(b: &mut Builder, s: &mut Sampler) {
     let middle_m = gap_m + 0.5 * screen.height_m;
     for side in [-1.0, 1.0] {
         let y = side * 0.52 * screen.width_m * turn_rad.cos();
-        let frame = DAffine3::from_translation(DVec3::new(0.0, y, middle_m))
-            * DAffine3::from_rotation_z(-side * turn_rad);
-        b.place(frame, |b| screen.build(b, s));
+        let turn = DAffine3::from_rotation_z(-side * turn_rad);
+        b.turned(DVec3::new(0.0, y, middle_m), turn, |b| screen.build(b, s));
     }
     let back_m = -screen.depth_m - 0.04;
     let reach = DVec3::new(back_m, 0.5 * screen.width_m, middle_m);

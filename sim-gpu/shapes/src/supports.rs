@@ -178,12 +178,12 @@ pub fn crossed_legs(b: &mut Builder, half: DVec2, top_m: f64, width_m: f64) {
 pub fn sledge(b: &mut Builder, half: DVec2, top_m: f64, radius_m: f64) {
     let corners = [(1.0, top_m), (1.08, radius_m), (-1.08, radius_m), (-1.0, top_m)]
         .map(|(y, z)| DVec3::new(half.x, y * half.y, z));
-    b.mirrored(|b| corners.windows(2).for_each(|ends| tube(b, ends, radius_m)));
+    b.mirrored_x(|b| corners.windows(2).for_each(|ends| tube(b, ends, radius_m)));
 }
 
 /// Two side panels across the whole depth.
 pub fn side_panels(b: &mut Builder, half: DVec2, top_m: f64, thickness_m: f64) {
-    b.mirrored(|b| {
+    b.mirrored_x(|b| {
         let low = DVec3::new(half.x - thickness_m, -half.y, 0.0);
         block_between(b, low, DVec3::new(half.x, half.y, top_m));
     });

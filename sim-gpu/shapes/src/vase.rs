@@ -118,7 +118,7 @@ fn handles(b: &mut Builder, s: &mut Sampler, form: &Form) {
         (0.97 * form.belly_m, form.belly_at),
     ];
     let path = smooth(b, &points.map(|(x, z)| DVec3::new(x, 0.0, form.at(z))), 3);
-    b.mirrored(|b| tube(b, &path, thick_m));
+    b.mirrored_x(|b| tube(b, &path, thick_m));
 }
 
 /// A few stems with leaves or blossoms.
@@ -133,9 +133,8 @@ fn flowers(b: &mut Builder, s: &mut Sampler, form: &Form) {
         let tip = ((0.6 * form.neck_m + spread_m) * out).extend(height_m);
         smooth_tube(b, &[base, mouth, tip], 3, r);
         let size_m = form.height_m * s.uniform(0.12, 0.3);
-        let turn = DAffine3::from_translation(tip)
-            * DAffine3::from_rotation_z(out.to_angle() + s.uniform(-1.0, 1.0));
-        b.place(turn, |b| leaf(b, size_m));
+        let turn = DAffine3::from_rotation_z(out.to_angle() + s.uniform(-1.0, 1.0));
+        b.turned(tip, turn, |b| leaf(b, size_m));
     }
 }
 

@@ -49,9 +49,8 @@ pub fn propeller(b: &mut Builder, front: DVec3, radius_m: f64, n_blades: usize) 
     ellipsoid(b, front, DVec3::new(0.14, 0.25, 0.14) * radius_m);
     for blade in 0..n_blades {
         let turn_rad = (blade as f64 + 0.2) / n_blades as f64 * TAU;
-        let frame = DAffine3::from_translation(front - 0.05 * radius_m * DVec3::Y)
-            * DAffine3::from_rotation_y(turn_rad);
-        b.place(frame, |b| {
+        let hub = front - 0.05 * radius_m * DVec3::Y;
+        b.turned(hub, DAffine3::from_rotation_y(turn_rad), |b| {
             sheet(b, [radius_m, 0.12 * radius_m], |u, v| {
                 let (sin, cos) = (1.0 - 0.6 * u).sin_cos();
                 let across = (v - 0.5) * 0.16 * radius_m * (1.0 - 0.5 * u * u);
@@ -72,7 +71,7 @@ pub fn struts(b: &mut Builder, wing: &Wing, foot_m: f64) {
     let top = wing.leading_edge(0.5) + 0.35 * chord * DVec3::Y;
     let foot = DVec3::new(0.0, top.y, foot_m);
     let r = 0.025 * chord;
-    b.mirrored(|b| rod(b, foot, top, [r, r]));
+    b.mirrored_x(|b| rod(b, foot, top, [r, r]));
 }
 
 /// Two struts a side between the wings of a biplane.
@@ -81,7 +80,7 @@ pub fn wing_struts(b: &mut Builder, lower: &Wing, upper: &Wing, station: f64) {
     for chordwise in [0.15, 0.75] {
         let at =
             |wing: &Wing| wing.leading_edge(station) + chordwise * wing.chord_m(station) * DVec3::Y;
-        b.mirrored(|b| rod(b, at(lower), at(upper), [r, r]));
+        b.mirrored_x(|b| rod(b, at(lower), at(upper), [r, r]));
     }
 }
 
@@ -93,8 +92,8 @@ pub fn gear(b: &mut Builder, body: &Fuselage, floor_m: f64, wheel_m: f64) {
     for (x, y) in [(-aside_m, main_y), (aside_m, main_y), (0.0, nose_y)] {
         let hub = DVec3::new(x, y, floor_m + wheel_m);
         rod(b, hub, DVec3::new(0.5 * x, y, -0.2 * body.radius_m()), [0.15 * wheel_m; 2]);
-        let axle = DAffine3::from_translation(hub - 0.2 * wheel_m * DVec3::X)
-            * DAffine3::from_rotation_y(FRAC_PI_2);
-        b.place(axle, |b| cylinder(b, DVec3::ZERO, wheel_m, 0.4 * wheel_m));
+        b.turned(hub - 0.2 * wheel_m * DVec3::X, DAffine3::from_rotation_y(FRAC_PI_2), |b| {
+            cylinder(b, DVec3::ZERO, wheel_m, 0.4 * wheel_m);
+        });
     }
 }

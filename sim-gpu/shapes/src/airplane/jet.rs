@@ -40,7 +40,7 @@ fn jet(b: &mut Builder, s: &mut Sampler, delta: bool) {
     let root = DVec3::new(0.0, 0.46 * length_m - fin_m, 0.5 * r);
     if s.chance(0.5) {
         let aside = 0.8 * r * DVec3::X;
-        b.mirrored(|b| fin(b, root + aside, fin_m, fin_m, 0.7));
+        b.mirrored_x(|b| fin(b, root + aside, fin_m, fin_m, 0.7));
     } else {
         fin(b, root, fin_m, 1.1 * fin_m, 0.8);
     }
@@ -55,9 +55,9 @@ fn jet(b: &mut Builder, s: &mut Sampler, delta: bool) {
     }
     let intake_m = 0.6 * r;
     let at = DVec3::new(1.1 * r, -0.1 * length_m, -0.1 * r);
-    b.mirrored(|b| details::nacelle(b, at, intake_m, 0.55 * length_m));
+    b.mirrored_x(|b| details::nacelle(b, at, intake_m, 0.55 * length_m));
     if s.chance(0.4) {
         let tip = wing.leading_edge(0.98) - 0.03 * length_m * DVec3::Y;
-        b.mirrored(|b| details::nacelle(b, tip, 0.12 * r, 0.18 * length_m));
+        b.mirrored_x(|b| details::nacelle(b, tip, 0.12 * r, 0.18 * length_m));
     }
 }

@@ -42,14 +42,14 @@ impl Wing {
             let (nose, chord) = (self.leading_edge(share), self.chord_m(share));
             section.iter().map(|p| nose + chord * DVec3::new(0.0, p.x, p.y)).collect()
         });
-        b.mirrored(|b| open_at_root(b, &ends));
+        b.mirrored_x(|b| open_at_root(b, &ends));
     }
 
     /// Adds small fins at both tips.
     pub fn winglets(&self, b: &mut Builder, high_m: f64) {
         let chord = self.chord_m(1.0);
         let tip = self.leading_edge(1.0);
-        b.mirrored(|b| fin(b, tip, high_m, chord, 0.7));
+        b.mirrored_x(|b| fin(b, tip, high_m, chord, 0.7));
     }
 }
 

@@ -31,8 +31,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let back = Back { half_m: seat.side_m(seat.rear_m()) * s.uniform(0.86, 1.04), high_m };
     let lean_rad = s.uniform(0.02, 0.32);
     let foot = DVec3::new(0.0, seat.rear_m(), seat.top_m - 0.6 * seat.thick_m);
-    let frame = DAffine3::from_translation(foot) * DAffine3::from_rotation_x(-lean_rad);
-    b.place(frame, |b| s.pick(&MAKES)(b, s, back));
+    b.turned(foot, DAffine3::from_rotation_x(-lean_rad), |b| s.pick(&MAKES)(b, s, back));
 }
 
 /// Two posts and the board or net between them.
@@ -46,7 +45,7 @@ fn panel(b: &mut Builder, s: &mut Sampler, back: Back) {
 
 fn posts(b: &mut Builder, back: Back, r: f64) {
     let x = back.half_m - r;
-    b.mirrored(|b| rod(b, x * DVec3::X, DVec3::new(x, 0.0, back.high_m), [r, r]));
+    b.mirrored_x(|b| rod(b, x * DVec3::X, DVec3::new(x, 0.0, back.high_m), [r, r]));
 }
 
 /// A thick cushion before two short posts.

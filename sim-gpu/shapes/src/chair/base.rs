@@ -47,7 +47,7 @@ fn cantilever(b: &mut Builder, seat: &Seat, radius_m: f64) {
         (0.9 * y, radius_m),
     ];
     let path = smooth(b, &points.map(|(y, z)| DVec3::new(x, y, z)), 1);
-    b.mirrored(|b| tube(b, &path, radius_m));
+    b.mirrored_x(|b| tube(b, &path, radius_m));
     let rear = DVec3::new(x, 0.9 * y, radius_m);
     tube(b, &[rear, rear * DVec3::new(-1.0, 1.0, 1.0)], radius_m);
 }
@@ -61,7 +61,7 @@ fn rocker(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let points = [(-1.9, 0.16), (-1.0, 0.045), (0.0, 0.0), (1.0, 0.045), (2.3, 0.22)];
     let path = smooth(b, &points.map(|(along, rise)| at(along * y, runner_m + rise)), 2);
     let section = outline::rectangle(DVec2::splat(runner_m));
-    b.mirrored(|b| {
+    b.mirrored_x(|b| {
         sweep(b, &path, &section);
         for side in [-y, y] {
             tube(b, &[at(side, runner_m + 0.045), at(0.95 * side, seat.under_m())], 0.9 * runner_m);

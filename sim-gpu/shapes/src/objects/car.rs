@@ -29,12 +29,6 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     extras::build(b, s, &form, &body);
 }
 
-/// Runs `build` as it is and once more mirrored at the plane y = 0.
-pub(super) fn on_both_sides(b: &mut Builder, build: impl Fn(&mut Builder)) {
-    build(b);
-    b.place(DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0)), build);
-}
-
 /// Four wheels; those in front are sometimes turned.
 fn wheels(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     let width_m = s.uniform(0.165, 0.255);
@@ -44,9 +38,10 @@ fn wheels(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     for (axle, turn_rad) in [(form.axles[0], 0.0), (form.axles[1], steered_rad)] {
         for side in [-1.0, 1.0] {
             let y = side * (body.plan_y(axle) - recess_m);
-            let place = DAffine3::from_translation(DVec3::new(axle, y, form.wheel_m))
-                * DAffine3::from_rotation_z(turn_rad);
-            b.place(place, |b| wheel::wheel(b, [form.wheel_m, width_m, dish_m], side));
+            let hub = DVec3::new(axle, y, form.wheel_m);
+            b.turned(hub, DAffine3::from_rotation_z(turn_rad), |b| {
+                wheel::wheel(b, [form.wheel_m, width_m, dish_m], side)
+            });
         }
     }
 }

@@ -1,14 +1,9 @@
 //! What stands in rooms, at its real size.
 
-mod cabinet;
-mod door;
-mod shelf;
-mod sofa;
-
-pub use cabinet::build as cabinet;
-pub use door::build as door;
-pub use shelf::build as shelf;
-pub use sofa::build as sofa;
+pub mod cabinet;
+pub mod door;
+pub mod shelf;
+pub mod sofa;
 
 use std::f64::consts::FRAC_PI_2;
 

@@ -1,10 +1,7 @@
 //! Lorries, buses and coaches.
 
-mod bus;
+pub mod bus;
 mod cab;
 mod cargo;
 mod shell;
-mod truck;
-
-pub use bus::bus;
-pub use truck::truck;
+pub mod truck;

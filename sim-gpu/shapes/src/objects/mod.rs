@@ -23,41 +23,47 @@ pub use standing::{Object, stand};
 
 use formats::rng::StreamKey;
 
-use crate::primitives::{Make, Sampler};
+use crate::primitives::{Makes, Sampler, build_one};
+use building::{barrier, fence, house_front, wall};
+use furniture::{cabinet, door, shelf, sofa};
+use heavy_vehicle::{bus, truck};
+use plant::{bush, hedge, tree, trunk};
+use pole::{lamp_post, traffic_light, traffic_sign};
+use street_furniture::{bench, bin, clutter, cone};
 
-/// The builder of each kind, in the order of [`ObjectKind`].
-const BUILDERS: [Make; 31] = [
-    car::build,
-    heavy_vehicle::truck,
-    heavy_vehicle::bus,
-    two_wheeler::bicycle,
-    two_wheeler::cyclist,
-    two_wheeler::motorcycle,
-    two_wheeler::motorcyclist,
-    person::build,
-    plant::tree,
-    plant::bush,
-    plant::hedge,
-    plant::trunk,
-    pole::pole,
-    pole::lamp_post,
-    pole::traffic_sign,
-    pole::traffic_light,
-    building::wall,
-    building::house_front,
-    building::fence,
-    building::barrier,
-    street_furniture::cone,
-    street_furniture::bench,
-    street_furniture::bin,
-    street_furniture::clutter,
-    furniture::chair,
-    furniture::table,
-    furniture::sofa,
-    furniture::shelf,
-    furniture::door,
-    furniture::cabinet,
-    person::child,
+/// The makes of each kind, in the order of [`ObjectKind`].
+const MAKES: [Makes; 31] = [
+    &[(1, car::build)],
+    truck::MAKES,
+    &[(1, bus::build)],
+    &[(1, two_wheeler::bicycle)],
+    &[(1, two_wheeler::cyclist)],
+    &[(1, two_wheeler::motorcycle)],
+    &[(1, two_wheeler::motorcyclist)],
+    &[(1, person::build)],
+    tree::MAKES,
+    bush::MAKES,
+    &[(1, hedge::build)],
+    &[(1, trunk::build)],
+    pole::MAKES,
+    lamp_post::MAKES,
+    traffic_sign::MAKES,
+    traffic_light::MAKES,
+    &[(1, wall::build)],
+    &[(1, house_front::build)],
+    &[(1, fence::build)],
+    barrier::MAKES,
+    &[(1, cone::build)],
+    &[(1, bench::build)],
+    bin::MAKES,
+    clutter::MAKES,
+    &[(1, furniture::chair)],
+    &[(1, furniture::table)],
+    &[(1, sofa::build)],
+    &[(1, shelf::build)],
+    &[(1, door::build)],
+    &[(1, cabinet::build)],
+    &[(1, person::child)],
 ];
 
 formats::named! {
@@ -128,9 +134,9 @@ formats::named! {
     }
 }
 
-/// The object of `kind` number `instance`.
+/// Builds object number `instance` of `kind` under `seed`.
 #[must_use]
 pub fn object(kind: ObjectKind, seed: u64, instance: u32) -> Object {
     let mut sampler = Sampler::new(StreamKey::new(seed, &format!("objects/{kind}"), instance));
-    Object::built(|b| BUILDERS[kind as usize](b, &mut sampler))
+    Object::built(|b| build_one(MAKES[kind as usize], b, &mut sampler))
 }

@@ -1,28 +1,19 @@
 //! Poles and what they carry: lamps, signs, lights.
 
-mod lamp_post;
-mod traffic_light;
-mod traffic_sign;
-
-pub use lamp_post::build as lamp_post;
-pub use traffic_light::build as traffic_light;
-pub use traffic_sign::build as traffic_sign;
+pub mod lamp_post;
+pub mod traffic_light;
+pub mod traffic_sign;
 
 use glam::{DVec2, DVec3};
 
 use crate::primitives::{
-    Builder, Make, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid, frustum,
+    Builder, Makes, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid, frustum,
     outline, prism, rod,
 };
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 6] =
-    [(3, bollard), (4, post), (3, utility), (4, pillar), (1, delineator), (2, meter)];
-
-/// Builds a pole.
-pub fn pole(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes =
+    &[(3, bollard), (4, post), (3, utility), (4, pillar), (1, delineator), (2, meter)];
 
 /// An upright shaft of `radii_m` at its foot and top, from the ground up.
 fn shaft(b: &mut Builder, radii_m: [f64; 2], height_m: f64, section: Section) {

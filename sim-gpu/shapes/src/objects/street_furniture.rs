@@ -1,11 +1,6 @@
 //! What stands on pavements and in yards.
 
-mod bench;
-mod bin;
-mod clutter;
-mod cone;
-
-pub use bench::build as bench;
-pub use bin::build as bin;
-pub use clutter::build as clutter;
-pub use cone::build as cone;
+pub mod bench;
+pub mod bin;
+pub mod clutter;
+pub mod cone;

@@ -23,5 +23,14 @@ pub use spline::smooth;
 pub use sweep::{bar, rod, smooth_tube, sweep, tube};
 pub use vessel::{Vessel, Wall};
 
-/// Builds one make of a class.
+/// A function that builds one shape or object.
 pub type Make = fn(&mut Builder, &mut Sampler);
+
+/// The makes of a class or kind, with their weights.
+pub type Makes = &'static [(usize, Make)];
+
+/// Builds one of `makes`. A single make draws no random number.
+pub fn build_one(makes: Makes, b: &mut Builder, s: &mut Sampler) {
+    let make = if let [(_, make)] = makes { *make } else { s.weighted(makes) };
+    make(b, s);
+}

@@ -4,13 +4,12 @@ use crate::render::page::Cloud;
 use anyhow::Result;
 use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_program::detect::{Detections, Detector};
-use edgepuck_scenes::{Drive, Recipe, SceneError, Stage};
+use edgepuck_scenes::{Drive, Recipe, Stage};
 use edgepuck_segment::Label;
 use formats::Scan;
 use formats::vlp32c::{SEQUENCE_US, SEQUENCES_PER_PACKET};
 use infer_cpu::Options;
 use maud::{Markup, html};
-use sim_gpu::caster::Caster;
 use sim_gpu::sensor::Sensor;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -86,8 +85,7 @@ fn turn() -> Result<(Scan, Vec<String>)> {
         .expect("invariant: the recipe is built in");
     let mut recipe = Recipe::parse(text, Path::new(RECIPE))?;
     recipe.use_sensors(&[SENSOR.to_owned()]);
-    let cast = |effects: &_| Ok::<_, SceneError>(Caster::Cpu(Clone::clone(effects)));
-    let stage = Stage::new(recipe, Path::new(RECIPE), None, 0, cast)?;
+    let stage = Stage::new(recipe, Path::new(RECIPE), None, 0)?;
     let mut drive = Drive::new(&stage, SPEED_M_S)?;
     let (mut scan, mut objects, mut rings) = (Scan::default(), Vec::new(), Vec::new());
     let pattern = Sensor::builtin(SENSOR).expect("invariant: it is built in").pattern();
@@ -106,9 +104,8 @@ fn turn() -> Result<(Scan, Vec<String>)> {
     }
     let most = objects.iter().copied().max().unwrap_or_default();
     let class = |object| {
-        drive
-            .body(object)
-            .map_or_else(String::new, |body| stage.recipe().object[body.object.entry].class.clone())
+        let class = |entry: usize| stage.recipe().object[entry].class.clone();
+        drive.object(object).map_or_else(String::new, |object| class(object.placed.entry))
     };
     let classes = (0..=most).map(class).collect();
     (scan.ring, scan.object) = (Some(rings), Some(objects));

@@ -2,16 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::primitives::{Builder, Make, Sampler, block, cylinder, loft, outline, rod, skin};
+use crate::primitives::{Builder, Makes, Sampler, block, cylinder, loft, outline, rod, skin};
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 5] =
-    [(4, guard_rail), (3, concrete), (2, boards), (2, crowd), (1, filled)];
-
-/// Builds a barrier.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes = &[(4, guard_rail), (3, concrete), (2, boards), (2, crowd), (1, filled)];
 
 /// A steel beam with two waves, 0.31 m high and 0.08 m deep (AASHTO M 180),
 /// its top 0.75 m up (EN 1317 systems; 0.79 m in the USA), on posts 1.33 to

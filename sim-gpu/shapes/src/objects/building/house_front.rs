@@ -139,7 +139,7 @@ fn side_walls(b: &mut Builder, s: &mut Sampler, front: &Front) {
     for (deep_m, side) in deep_m.into_iter().zip([1.0, 0.0]) {
         let middle = DVec3::new(-0.5 * deep_m, side * front.wide_m(), 0.0);
         let turned = DAffine3::from_rotation_z((2.0 * side - 1.0) * turn_rad);
-        b.place(DAffine3::from_translation(middle) * turned, |b| blank(b, wall(deep_m)));
+        b.turned(middle, turned, |b| blank(b, wall(deep_m)));
     }
 }
 

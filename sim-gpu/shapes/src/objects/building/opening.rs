@@ -47,8 +47,6 @@ pub enum Filling {
     Panes,
     /// A door, a roller blind, or a curtain behind the glass.
     Solid,
-    /// Nothing: a passage.
-    Nothing,
 }
 
 /// An opening in a wall.
@@ -76,23 +74,18 @@ impl Opening {
     /// filling.
     pub fn build(self, b: &mut Builder, cell: Rect) {
         let inner = self.hole.shrunk(self.frame_m);
-        let mut rows = vec![cell.corners(0.0), self.hole.corners(0.0)];
-        rows.push(self.hole.corners(-self.recess_m));
-        if self.filling == Filling::Nothing {
-            return b.grid(&rows, true);
-        }
-        rows.push(inner.corners(-self.recess_m));
-        b.grid(&rows, true);
+        let [outside, inside] = [self.hole, inner].map(|rect| rect.corners(-self.recess_m));
+        b.grid(&[cell.corners(0.0), self.hole.corners(0.0), outside, inside.clone()], true);
         let middle = inner.middle();
         let centre = DVec3::new(-self.recess_m, middle.x, middle.y);
-        let pane = [inner.corners(-self.recess_m), vec![centre]];
+        let pane = [inside, vec![centre]];
         match self.filling {
-            Filling::Solid | Filling::Nothing => b.grid(&pane, true),
+            Filling::Solid => b.grid(&pane, true),
             Filling::Glass => b.glass(|b| b.grid(&pane, true)),
             Filling::Panes => {
                 b.glass(|b| b.grid(&pane, true));
                 let bar = DVec3::new(0.05, 0.08, inner.size_m().y);
-                block(b, DVec3::new(-self.recess_m, middle.x, middle.y), bar);
+                block(b, centre, bar);
             }
         }
     }

@@ -38,8 +38,8 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     if s.chance(0.2) {
         let side_m = s.uniform(0.5, 0.6 * long_m + 0.5);
         let turned = DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2);
-        let corner = DAffine3::from_translation(0.5 * side_m * DVec3::NEG_X) * turned;
-        b.place(corner, |b| masonry.piece(b, s, side_m, high_m));
+        let corner = 0.5 * side_m * DVec3::NEG_X;
+        b.turned(corner, turned, |b| masonry.piece(b, s, side_m, high_m));
     }
 }
 

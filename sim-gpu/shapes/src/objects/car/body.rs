@@ -4,7 +4,6 @@
 use glam::{DVec2, DVec3};
 
 use super::form::{Form, Style};
-use super::on_both_sides;
 use super::panel::{Arch, in_order, lid, lower_edge_m};
 use crate::primitives::{Builder, Sampler, block_between};
 
@@ -152,7 +151,7 @@ impl<'a> Body<'a> {
         };
         b.grid(&[ring(floor_m), ring(rim_m)], true);
         b.surface([1, 1], |u, v| corner(from + u * (to - from), 2.0 * v - 1.0, floor_m));
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             b.surface([1, 1], |u, v| {
                 let x = from + u * (to - from);
                 DVec3::new(x, y + v * (self.shoulder_y(x) - y), form.top_m(x))

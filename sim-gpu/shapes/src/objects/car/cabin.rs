@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::body::Body;
 use super::form::{Form, Style};
-use super::on_both_sides;
 use super::panel::{Column, lid, wall};
 use crate::primitives::{Builder, Sampler};
 
@@ -71,7 +70,7 @@ impl Cabin {
     }
 
     pub fn build(&self, b: &mut Builder) {
-        on_both_sides(b, |b| wall(b, &self.columns));
+        b.mirrored_y(|b| wall(b, &self.columns));
         let heads: Vec<_> = self.columns.iter().map(|column| column.head).collect();
         lid(b, &heads, 0.7 * self.crown_m);
     }

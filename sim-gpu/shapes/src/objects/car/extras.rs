@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 
 use super::body::Body;
 use super::form::{Form, Style};
-use super::{on_both_sides, wheel};
+use super::wheel;
 use crate::primitives::{Builder, Sampler, bar, block, cushion};
 
 /// Builds the mirrors and what some cars carry.
@@ -14,7 +14,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     let roof_m = form.height_m - 0.04;
     let [front, rear] = [form.screen[1] - 0.25, form.rear[1] + 0.2];
     match form.style {
-        Style::Estate | Style::Suv | Style::Minivan if s.chance(0.4) => on_both_sides(b, |b| {
+        Style::Estate | Style::Suv | Style::Minivan if s.chance(0.4) => b.mirrored_y(|b| {
             let rail = |x: f64| DVec3::new(x, roof_y, roof_m + 0.03);
             bar(b, rail(rear), rail(front), 0.04, 0.05);
         }),
@@ -28,8 +28,8 @@ pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     }
     if form.style == Style::Suv && s.chance(0.12) {
         let at = DVec3::new(0.12 - form.half.x, s.uniform(-0.2, 0.1), form.top_m(form.rear[0]));
-        let turned = DAffine3::from_rotation_z(90f64.to_radians());
-        b.place(DAffine3::from_translation(at - 0.12 * DVec3::Z) * turned, |b| {
+        let turn = DAffine3::from_rotation_z(90f64.to_radians());
+        b.turned(at - 0.12 * DVec3::Z, turn, |b| {
             b.shifted(0.2 * DVec3::Y, |b| wheel::wheel(b, [form.wheel_m, 0.22, 0.02], 1.0));
         });
     }
@@ -43,7 +43,7 @@ fn mirrors(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     let size = DVec3::new(0.09, s.uniform(0.16, 0.24), height_m);
     let lift_m = 0.5 * height_m + s.uniform(-0.02, 0.06);
     let at = DVec3::new(x, body.shoulder_y(x) + 0.04 + 0.5 * size.y, form.top_m(x) + lift_m);
-    on_both_sides(b, |b| {
+    b.mirrored_y(|b| {
         block(b, at, size);
         block(b, at - DVec3::new(0.0, 0.5 * size.y, 0.4 * height_m), DVec3::new(0.05, 0.14, 0.04));
     });
@@ -56,7 +56,7 @@ fn rack(b: &mut Builder, [rear, front]: [f64; 2], roof_y: f64, roof_m: f64) {
         let at = |side: f64| DVec3::new(x, side * roof_y, roof_m + 0.15);
         bar(b, at(-1.0), at(1.0), 0.04, 0.04);
     }
-    on_both_sides(b, |b| {
+    b.mirrored_y(|b| {
         let at = |x: f64| DVec3::new(x, roof_y, roof_m + 0.17);
         bar(b, at(rear), at(front), 0.03, 0.06);
     });

@@ -3,7 +3,6 @@
 use glam::{DAffine3, DVec3};
 
 use super::form::{Form, Style};
-use super::on_both_sides;
 use crate::primitives::{Builder, Sampler, block, block_between, ellipsoid};
 
 /// Builds the dashboard, seats with head rests, sometimes a driver, and the bulkhead
@@ -19,7 +18,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form) {
     block_between(b, low, DVec3::new(dash[1], inner_y, belt_m - 0.03));
     let front_x = form.middle_pillar_x() + s.uniform(-0.05, 0.15);
     let seat = Seat { y: 0.45 * form.half.y, width_m: 0.5, floor_m, belt_m };
-    on_both_sides(b, |b| seat.build(b, front_x));
+    b.mirrored_y(|b| seat.build(b, front_x));
     if s.chance(0.35) {
         let y = s.pick(&[-1.0, 1.0]) * seat.y;
         driver(b, DVec3::new(front_x + 0.18, y, floor_m + 0.25));
@@ -32,7 +31,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form) {
         Style::PickUp | Style::Coupe => {}
         _ => {
             let bench_x = (front_x - s.uniform(0.8, 0.95)).max(form.rear[0] + 0.35);
-            on_both_sides(b, |b| seat.build(b, bench_x));
+            b.mirrored_y(|b| seat.build(b, bench_x));
         }
     }
 }
@@ -53,9 +52,8 @@ impl Seat {
         let middle = DVec3::new(x + 0.25, self.y, cushion_m - 0.1);
         block(b, middle, DVec3::new(0.5, self.width_m, 0.2));
         // Backs are reclined by some 20 degrees.
-        let place = DAffine3::from_translation(DVec3::new(x, self.y, cushion_m))
-            * DAffine3::from_rotation_y(-20f64.to_radians());
-        b.place(place, |b| {
+        let reclined = DAffine3::from_rotation_y(-20f64.to_radians());
+        b.turned(DVec3::new(x, self.y, cushion_m), reclined, |b| {
             block(b, 0.5 * back_m * DVec3::Z, DVec3::new(0.13, self.width_m, back_m));
             block(b, (back_m + 0.13) * DVec3::Z, DVec3::new(0.09, 0.26, 0.17));
         });

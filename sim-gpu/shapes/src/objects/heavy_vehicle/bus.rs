@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 use super::shell::Shell;
 use crate::objects::car::panel::Arch;
-use crate::objects::car::{on_both_sides, wheel};
+use crate::objects::car::wheel;
 use crate::primitives::{Builder, Sampler, block, block_between};
 
 /// What sets a bus apart. Lengths are metres.
@@ -105,7 +105,7 @@ impl Bus {
 
 /// Builds a bus within Directive 96/53/EC's limits: 13.5 m with two axles, 18.75 m
 /// articulated, 2.55 m wide.
-pub fn bus(b: &mut Builder, s: &mut Sampler) {
+pub fn build(b: &mut Builder, s: &mut Sampler) {
     let bus = Bus::draw(s);
     let rear_x = -bus.length_m;
     let front_axle = -s.uniform(2.5, 2.8) * (bus.length_m / 12.0).min(1.0);
@@ -154,9 +154,7 @@ fn wheels(b: &mut Builder, bus: &Bus, axles: &[f64]) {
     for &x in axles {
         for side in [-1.0, 1.0] {
             let at = DVec3::new(x, side * (bus.half_width_m - 0.05), bus.wheel_m);
-            b.place(DAffine3::from_translation(at), |b| {
-                wheel::wheel(b, [bus.wheel_m, 0.29, 0.08], side);
-            });
+            b.shifted(at, |b| wheel::wheel(b, [bus.wheel_m, 0.29, 0.08], side));
         }
     }
 }
@@ -194,7 +192,7 @@ fn mirrors(b: &mut Builder, s: &mut Sampler, bus: &Bus) {
     let size = DVec3::new(0.12, 0.22, s.uniform(0.35, 0.6));
     let ahead_m = s.uniform(-0.2, 0.3);
     let at = DVec3::new(ahead_m, bus.half_width_m + 0.12, bus.lintel_m - s.uniform(0.2, 0.6));
-    on_both_sides(b, |b| {
+    b.mirrored_y(|b| {
         block(b, at, size);
         let arm = DVec3::new(-0.3 * ahead_m.abs() - 0.1, -0.12, 0.5 * size.z);
         block(b, at + arm, DVec3::new(0.3, 0.08, 0.06));

@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::shell::Shell;
-use crate::objects::car::on_both_sides;
 use crate::objects::car::panel::Arch;
 use crate::primitives::{Builder, Sampler, block, block_between, loft};
 
@@ -77,7 +76,7 @@ impl Cab {
         let low = DVec3::new(front_x - 0.65, -y, floor_m);
         block_between(b, low, DVec3::new(front_x - 0.3, y, waist_m - 0.05));
         let x = (front_x - s.uniform(1.35, 1.5)).max(self.rear_x + 0.15);
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             let back = DVec3::new(x, 0.55 * y, floor_m + 0.75);
             block(b, back, DVec3::new(0.14, 0.5, 0.75));
             block(b, back + DVec3::new(0.3, 0.0, -0.4), DVec3::new(0.5, 0.5, 0.2));
@@ -89,7 +88,7 @@ impl Cab {
         let high_m = s.uniform(0.35, 0.8);
         let x = front_x - s.uniform(0.05, 0.25);
         let at = DVec3::new(x, self.half_width_m + 0.16, waist_m + 0.1 + 0.5 * high_m);
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             block(b, at, DVec3::new(0.1, 0.2, high_m));
             block(b, at - DVec3::new(0.05, 0.12, -0.45 * high_m), DVec3::new(0.05, 0.2, 0.05));
         });
@@ -112,7 +111,7 @@ impl Cab {
         loft(b, &sections);
         let outer = self.half_width_m;
         block_between(b, DVec3::new(-0.25, -outer, 0.4), DVec3::new(0.0, outer, 0.75));
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             b.surface([6, 1], |u, v| {
                 let (sin, cos) = (u * std::f64::consts::PI).sin_cos();
                 let r = self.wheel_m + 0.1;

@@ -2,7 +2,6 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::objects::car::on_both_sides;
 use crate::primitives::{
     Builder, Sampler, bar, block, block_between, cap, cushion, loft, outline, rod,
 };
@@ -35,7 +34,7 @@ impl Space {
         block_between(b, self.at(0.0, -1.0, self.deck_m), self.at(1.0, 1.0, self.top_m));
         if s.chance(0.3) {
             let ribs = (self.length_m() / 0.6).round() as usize;
-            on_both_sides(b, |b| {
+            b.mirrored_y(|b| {
                 for k in 0..=ribs {
                     let foot = self.at(k as f64 / ribs as f64, 1.0, self.deck_m);
                     bar(b, foot, foot.with_z(self.top_m), 0.06, 0.08);
@@ -71,7 +70,7 @@ impl Space {
         b.grid(&[foot.clone(), rim], true);
         cap(b, &foot);
         let ribs = (self.length_m() / 0.8).round() as usize;
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             for k in 1..ribs {
                 let along = k as f64 / ribs as f64;
                 bar(b, self.at(along, 0.92, floor_m), self.at(along, 1.0, top_m), 0.08, 0.1);
@@ -104,7 +103,7 @@ impl Space {
         );
         if s.chance(0.6) {
             let high = floor_m + s.uniform(0.35, 0.8);
-            on_both_sides(b, |b| {
+            b.mirrored_y(|b| {
                 block_between(b, self.at(0.0, 0.975, floor_m), self.at(1.0, 1.0, high));
             });
             block_between(

@@ -1,22 +1,15 @@
 //! Lorries: rigid ones, tractors with semi-trailers, and delivery trucks.
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 use super::cab::Cab;
 use super::cargo::{Cargo, Space};
-use crate::objects::car::{on_both_sides, wheel};
-use crate::primitives::{Builder, Sampler, block_between, cylinder, rod};
+use crate::objects::car::wheel;
+use crate::primitives::{Builder, Makes, Sampler, block_between, cylinder, rod};
 
-/// Builds a lorry within the limits of Directive 96/53/EC: 12 m, or 16.5 m with a
-/// semi-trailer; 2.55 m wide and 4 m high.
-pub fn truck(b: &mut Builder, s: &mut Sampler) {
-    let make: fn(&mut Builder, &mut Sampler) = s.weighted(&[
-        (4, delivery as fn(&mut Builder, &mut Sampler)),
-        (5, rigid),
-        (3, articulated),
-    ]);
-    make(b, s);
-}
+/// The makes, with their weights. They keep to the limits of Directive 96/53/EC: 12 m long, or
+/// 16.5 m with a semi-trailer; 2.55 m wide and 4 m high.
+pub const MAKES: Makes = &[(4, delivery), (5, rigid), (3, articulated)];
 
 /// The frame under a body: two rails, axles, and what hangs between them.
 struct Frame {
@@ -30,7 +23,7 @@ struct Frame {
 impl Frame {
     fn build(&self, b: &mut Builder, s: &mut Sampler, rear_axles: &[f64]) {
         let [low, high] = [self.top_m - 0.26, self.top_m];
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             let from = DVec3::new(self.rear_x, 0.34, low);
             block_between(b, from, DVec3::new(self.front_x, 0.43, high));
         });
@@ -41,7 +34,7 @@ impl Frame {
         let y = 0.92 * self.half_width_m;
         block_between(b, DVec3::new(self.rear_x, -y, 0.42), DVec3::new(self.rear_x + 0.1, y, 0.56));
         if s.chance(0.7) {
-            on_both_sides(b, |b| {
+            b.mirrored_y(|b| {
                 for x in rear_axles {
                     let rear = x - self.wheel_m - 0.08;
                     let low = DVec3::new(rear, 0.55 * self.half_width_m, 0.3);
@@ -58,7 +51,7 @@ impl Frame {
         for side in [-1.0, 1.0] {
             let at = DVec3::new(x, side * (self.half_width_m - 0.02), self.wheel_m);
             let size = [self.wheel_m, width_m, dish_m];
-            b.place(DAffine3::from_translation(at), |b| wheel::wheel(b, size, side));
+            b.shifted(at, |b| wheel::wheel(b, size, side));
         }
         let end = DVec3::new(x, self.half_width_m - 0.4, self.wheel_m);
         rod(b, end, end * DVec3::new(1.0, -1.0, 1.0), [0.09, 0.09]);
@@ -207,7 +200,7 @@ fn articulated(b: &mut Builder, s: &mut Sampler) {
     trailer.build(b, s, &axles);
     // Landing legs, and guards along the sides.
     let legs_x = space.front_x - 2.6;
-    on_both_sides(b, |b| cylinder(b, DVec3::new(legs_x, 0.85, 0.35), 0.07, 0.9));
+    b.mirrored_y(|b| cylinder(b, DVec3::new(legs_x, 0.85, 0.35), 0.07, 0.9));
     trailer.flanks(b, s, [last + 1.31 * axles.len() as f64, legs_x - 0.3]);
     let cargo = s.weighted(&[
         (7, Space::closed as Cargo),

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 
 use super::body::Measures;
 use super::pose::Pose;
-use crate::objects::car::{on_both_sides, wheel};
+use crate::objects::car::wheel;
 use crate::primitives::{Builder, Profile, Sampler, Section, block, cushion, ellipsoid, rod, skin};
 
 /// A thing that is carried, and where the hand that holds it is.
@@ -92,8 +92,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, it: &Carried, measures: &Measures
         Carried::Umbrella(hand) => umbrella(b, s, hand, h),
         Carried::Suitcase(hand) => {
             let foot = DVec3::new(hand.x - 0.45, hand.y, 0.0);
-            let lean = DAffine3::from_rotation_y(0.5);
-            b.place(DAffine3::from_translation(foot) * lean, |b| {
+            b.turned(foot, DAffine3::from_rotation_y(0.5), |b| {
                 let size = DVec3::new(0.24, s.uniform(0.35, 0.48), s.uniform(0.5, 0.7));
                 soft(b, (0.5 * size.z + 0.05) * DVec3::Z, size);
             });
@@ -123,7 +122,7 @@ fn pram(b: &mut Builder, s: &mut Sampler, handle: DVec3) {
     let wheel_m = s.uniform(0.09, 0.15);
     let middle = handle + DVec3::new(s.uniform(0.45, 0.6), 0.0, 0.0);
     rod(b, handle - half_y * DVec3::Y, handle + half_y * DVec3::Y, [0.02, 0.02]);
-    on_both_sides(b, |b| {
+    b.mirrored_y(|b| {
         let y = half_y * DVec3::Y;
         let front = middle.with_z(wheel_m) + 0.35 * DVec3::X;
         let rear = middle.with_z(wheel_m) - 0.22 * DVec3::X;

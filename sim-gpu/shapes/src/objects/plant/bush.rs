@@ -7,16 +7,11 @@ use glam::{DAffine3, DVec2, DVec3};
 use super::foliage::{Clump, blade, fill, leaf, leaf_length_m};
 use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem};
-use crate::primitives::{Builder, Make, Sampler};
+use crate::primitives::{Builder, Makes, Sampler};
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 6] =
-    [(5, loose), (6, trimmed), (2, thicket), (1, bare), (1, grass), (1, standard)];
-
-/// Builds a bush.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes =
+    &[(5, loose), (6, trimmed), (2, thicket), (1, bare), (1, grass), (1, standard)];
 
 /// Clumps of leaves about a common root, with a ragged outline.
 fn loose(b: &mut Builder, s: &mut Sampler) {

@@ -10,16 +10,10 @@ use glam::{DVec2, DVec3};
 use super::foliage::{Clump, fill, leaf, leaf_length_m};
 use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem, bough};
-use crate::primitives::{Builder, Make, Sampler};
+use crate::primitives::{Builder, Makes, Sampler};
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 5] =
-    [(6, broadleaved), (2, conifer), (2, bare), (1, column), (1, palm)];
-
-/// Builds a tree.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes = &[(6, broadleaved), (2, conifer), (2, bare), (1, column), (1, palm)];
 
 /// The sizes of a tree with a crown.
 struct Form {

@@ -4,17 +4,12 @@ use glam::{DAffine3, DVec3};
 
 use super::shaft;
 use crate::primitives::{
-    Builder, Make, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid, frustum, rod,
+    Builder, Makes, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid, frustum, rod,
     smooth_tube,
 };
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 3] = [(4, arm), (3, post_top), (2, lantern)];
-
-/// Builds a lamp post.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes = &[(4, arm), (3, post_top), (2, lantern)];
 
 /// A column that tapers upwards from a wider foot with a door in it.
 fn column(b: &mut Builder, s: &mut Sampler, height_m: f64) {

@@ -9,15 +9,10 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DVec3};
 
 use super::shaft;
-use crate::primitives::{Builder, Make, Sampler, Section, block, cushion, rod, sheet};
+use crate::primitives::{Builder, Makes, Sampler, Section, block, cushion, rod, sheet};
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 3] = [(4, mast), (2, gantry), (2, pedestrian)];
-
-/// Builds a traffic light.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes = &[(4, mast), (2, gantry), (2, pedestrian)];
 
 /// A head of `n` lenses which looks to +x, its middle at `centre`.
 fn head(b: &mut Builder, s: &mut Sampler, centre: DVec3, n: usize, lens_m: f64) {
@@ -57,7 +52,7 @@ fn mast(b: &mut Builder, s: &mut Sampler) {
         let out = DVec3::new(radius_m + 0.13, y, middle_m);
         rod(b, middle_m * DVec3::Z, out, [0.03, 0.03]);
         let turn = DAffine3::from_rotation_z(s.pick(&[0.0, 0.0, 0.4, 1.6]));
-        b.place(DAffine3::from_translation(out) * turn, |b| head(b, s, DVec3::ZERO, n, lens_m));
+        b.turned(out, turn, |b| head(b, s, DVec3::ZERO, n, lens_m));
     }
     if s.chance(0.2) {
         let panel = DVec3::new(0.02, s.uniform(0.4, 1.6), s.uniform(0.25, 0.6));

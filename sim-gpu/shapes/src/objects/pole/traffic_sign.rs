@@ -11,22 +11,16 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::{draw_section, shaft};
-use crate::primitives::{Builder, Make, Sampler, Section, block, outline, prism};
+use crate::primitives::{Builder, Makes, Sampler, Section, block, outline, prism};
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 5] =
-    [(6, single), (3, board), (2, low_panel), (1, street_name), (2, stele)];
-
-/// Builds a traffic sign.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
+/// The makes, with their weights.
+pub const MAKES: Makes = &[(6, single), (3, board), (2, low_panel), (1, street_name), (2, stele)];
 
 /// Adds a plate across x whose middle is at `centre`; `outline` is up and to
 /// the left.
 fn plate(b: &mut Builder, outline: &[DVec2], centre: DVec3, thick_m: f64) {
     let upright = DAffine3::from_rotation_y(-FRAC_PI_2);
-    b.place(DAffine3::from_translation(centre) * upright, |b| {
+    b.turned(centre, upright, |b| {
         prism(b, outline, -0.5 * thick_m, 0.5 * thick_m, 1.0);
     });
 }

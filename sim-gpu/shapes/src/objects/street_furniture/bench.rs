@@ -23,11 +23,10 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     let foot = DVec3::new(-0.5 * deep_m, 0.0, seat_m);
     let back_m = s.uniform(0.35, 0.5);
     // The back is a seat set upright.
-    let frame = DAffine3::from_translation(foot)
-        * DAffine3::from_rotation_y(-lean_rad - std::f64::consts::FRAC_PI_2);
+    let upright = DAffine3::from_rotation_y(-lean_rad - std::f64::consts::FRAC_PI_2);
     if backed {
         let panel = DVec3::new(back_m - 0.08, long_m, 0.03);
-        b.place(frame, |b| slats(b, s, panel, DVec3::new(0.5 * back_m + 0.05, 0.0, 0.0)));
+        b.turned(foot, upright, |b| slats(b, s, panel, DVec3::new(0.5 * back_m + 0.05, 0.0, 0.0)));
     }
     let arms = backed && s.chance(0.5);
     let solid = s.chance(0.3);

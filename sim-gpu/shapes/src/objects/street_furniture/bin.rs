@@ -3,24 +3,19 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use crate::primitives::{
-    Builder, Make, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, loft,
+    Builder, Makes, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, loft,
     outline, prism, rod,
 };
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 6] =
-    [(3, litter), (4, two_wheels), (3, four_wheels), (1, skip), (1, bottle_bank), (2, group)];
+/// The makes, with their weights.
+pub const MAKES: Makes =
+    &[(3, litter), (4, two_wheels), (3, four_wheels), (1, skip), (1, bottle_bank), (2, group)];
 
 /// The two-wheeled bins of EN 840-1 of 120, 240 and 360 litres: depth, width and
 /// height, metres.
 const TWO_WHEELS_M: [[f64; 3]; 3] = [[0.55, 0.48, 0.93], [0.74, 0.58, 1.07], [0.86, 0.62, 1.10]];
 /// The four-wheeled bins of EN 840-2 and EN 840-3 of 660, 770 and 1,100 litres.
 const FOUR_WHEELS_M: [[f64; 3]; 3] = [[0.78, 1.26, 1.22], [0.78, 1.37, 1.32], [1.08, 1.37, 1.46]];
-
-/// Builds a bin.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
 
 /// One of the sizes, as makers differ a little.
 fn sized(s: &mut Sampler, sizes_m: &[[f64; 3]]) -> [f64; 3] {
@@ -85,13 +80,12 @@ fn lid(b: &mut Builder, s: &mut Sampler, size: DVec3, rim_m: f64) {
     let open = s.chance(0.08);
     let turn_rad = if open { -s.uniform(1.7, 4.3) } else { -s.uniform(-0.03, 0.06) };
     let hinge = DVec3::new(-0.46 * size.x, 0.0, rim_m);
-    let frame = DAffine3::from_translation(hinge) * DAffine3::from_rotation_y(turn_rad);
     let row = |share: f64, z: f64| -> Vec<DVec3> {
         let outline = outline::rectangle(0.5 * share * size.truncate());
         outline.iter().map(|p| (p + 0.46 * size.x * DVec2::X).extend(z)).collect()
     };
     let rows = [row(1.0, 0.0), row(1.0, 0.4 * size.z), row(0.8, size.z)];
-    b.place(frame, |b| loft(b, &rows));
+    b.turned(hinge, DAffine3::from_rotation_y(turn_rad), |b| loft(b, &rows));
 }
 
 fn wheel(b: &mut Builder, centre: DVec3, radius_m: f64) {
@@ -164,9 +158,9 @@ fn bottle_bank(b: &mut Builder, s: &mut Sampler) {
 fn group(b: &mut Builder, s: &mut Sampler) {
     let mut y = 0.0;
     for _ in 0..s.count(2, 4) {
-        let frame = DAffine3::from_translation(DVec3::new(s.uniform(-0.08, 0.08), y, 0.0))
-            * DAffine3::from_rotation_z(s.uniform(-0.15, 0.15));
-        b.place(frame, |b| two_wheels(b, s));
+        let place = DVec3::new(s.uniform(-0.08, 0.08), y, 0.0);
+        let turn = DAffine3::from_rotation_z(s.uniform(-0.15, 0.15));
+        b.turned(place, turn, |b| two_wheels(b, s));
         y += s.uniform(0.66, 0.8);
     }
 }

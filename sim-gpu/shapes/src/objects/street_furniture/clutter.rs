@@ -2,11 +2,14 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
+use crate::objects::plant::bush;
 use crate::objects::plant::uneven::{Lump, Ripple, direction};
-use crate::primitives::{Builder, Make, Profile, Sampler, Section, block, outline, rod};
+use crate::primitives::{
+    Builder, Makes, Profile, Sampler, Section, block, build_one, outline, rod,
+};
 
-/// The makes and their frequencies.
-const MAKES: [(usize, Make); 9] = [
+/// The makes, with their weights.
+pub const MAKES: Makes = &[
     (3, boxes),
     (3, rocks),
     (1, hydrant),
@@ -17,11 +20,6 @@ const MAKES: [(usize, Make); 9] = [
     (2, pallets),
     (2, drum),
 ];
-
-/// Builds a piece of clutter.
-pub fn build(b: &mut Builder, s: &mut Sampler) {
-    s.weighted(&MAKES)(b, s);
-}
 
 /// Cardboard boxes beside and upon each other, none quite straight.
 fn boxes(b: &mut Builder, s: &mut Sampler) {
@@ -35,7 +33,7 @@ fn boxes(b: &mut Builder, s: &mut Sampler) {
             1.2 * s.uniform(0.4, 1.0) * direction(s).with_z(0.0)
         };
         let middle = low + 0.5 * size.z * DVec3::Z;
-        b.place(DAffine3::from_translation(middle) * turn, |b| block(b, DVec3::ZERO, size));
+        b.turned(middle, turn, |b| block(b, DVec3::ZERO, size));
         top = low + size.z * DVec3::Z;
     }
 }
@@ -105,7 +103,7 @@ fn flower_tub(b: &mut Builder, s: &mut Sampler) {
     let plants = s.uniform(0.25, 0.5);
     let lift = DAffine3::from_translation((high_m - 0.06) * DVec3::Z);
     let size = DAffine3::from_scale(DVec3::splat(plants));
-    b.place(lift * size, |b| crate::objects::plant::bush(b, s));
+    b.place(lift * size, |b| build_one(bush::MAKES, b, s));
 }
 
 /// A shopping trolley of wire on four wheels.
@@ -139,9 +137,9 @@ fn a_board(b: &mut Builder, s: &mut Sampler) {
     let size = DVec3::new(0.025, s.uniform(0.5, 0.8), high_m);
     let lean_rad = s.uniform(0.12, 0.35);
     for side in [-1.0, 1.0] {
-        let frame = DAffine3::from_translation(high_m * lean_rad.cos() * DVec3::Z)
-            * DAffine3::from_rotation_y(-side * lean_rad);
-        b.place(frame, |b| block(b, -0.5 * high_m * DVec3::Z, size));
+        let top = high_m * lean_rad.cos() * DVec3::Z;
+        let lean = DAffine3::from_rotation_y(-side * lean_rad);
+        b.turned(top, lean, |b| block(b, -0.5 * high_m * DVec3::Z, size));
     }
 }
 
@@ -150,9 +148,8 @@ fn a_board(b: &mut Builder, s: &mut Sampler) {
 fn pallets(b: &mut Builder, s: &mut Sampler) {
     let n = s.count(2, 10);
     for pallet in 0..n {
-        let frame = DAffine3::from_translation(0.144 * pallet as f64 * DVec3::Z)
-            * DAffine3::from_rotation_z(s.uniform(-0.05, 0.05));
-        b.place(frame, |b| {
+        let turn = DAffine3::from_rotation_z(s.uniform(-0.05, 0.05));
+        b.turned(0.144 * pallet as f64 * DVec3::Z, turn, |b| {
             block(b, 0.133 * DVec3::Z, DVec3::new(0.8, 1.2, 0.022));
             for x in [-0.35, 0.0, 0.35] {
                 block(b, DVec3::new(x, 0.0, 0.011), DVec3::new(0.1, 1.2, 0.022));

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
-use crate::objects::car::on_both_sides;
 use crate::primitives::{Builder, Sampler, block, cushion, ellipsoid, rod, tube};
 
 /// The measures of a bicycle, metres. The middle between its axles is at x = 0.
@@ -104,7 +103,7 @@ impl Bicycle {
         rod(b, head, top, [r, r]);
         rod(b, crown, stem, [r, r]);
         handlebar(b, stem, self.grip, 0.014);
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             let side = 0.06 * DVec3::Y;
             rod(b, rear + side, self.crank + 0.5 * side, [0.6 * r, 0.7 * r]);
             rod(b, rear + side, clamp, [0.5 * r, 0.6 * r]);
@@ -133,14 +132,14 @@ impl Bicycle {
         let rack = DVec3::new(rear.x - 0.03, 0.0, rack_m);
         if s.chance(0.6) {
             block(b, rack, DVec3::new(0.38, 0.13, 0.015));
-            on_both_sides(b, |b| {
+            b.mirrored_y(|b| {
                 rod(b, rear + 0.07 * DVec3::Y, rack + 0.06 * DVec3::Y, [0.006, 0.006]);
             });
             let load = s.uniform(0.0, 1.0);
             if load < 0.15 {
                 // A pair of bags beside the wheel.
                 let size = DVec3::new(s.uniform(0.28, 0.38), s.uniform(0.1, 0.17), 0.33);
-                on_both_sides(b, |b| {
+                b.mirrored_y(|b| {
                     cushion(b, rack + DVec3::new(0.0, 0.09 + 0.5 * size.y, -0.17), size, 0.03);
                 });
             } else if load < 0.23 {

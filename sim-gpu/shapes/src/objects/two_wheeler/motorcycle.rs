@@ -4,7 +4,6 @@ use glam::{DVec2, DVec3};
 
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
-use crate::objects::car::on_both_sides;
 use crate::primitives::{Builder, Sampler, block, cushion, ellipsoid, loft, outline, rod, sheet};
 
 /// The measures of a motorcycle, metres. The middle between its axles is at x = 0.
@@ -81,7 +80,7 @@ impl Motorcycle {
         }
         if !self.scooter && s.chance(0.15) {
             let at = DVec3::new(rear.x + 0.02, self.half_m + 0.14, self.saddle.z - 0.15);
-            on_both_sides(b, |b| cushion(b, at, DVec3::new(0.45, 0.2, 0.32), 0.05));
+            b.mirrored_y(|b| cushion(b, at, DVec3::new(0.45, 0.2, 0.32), 0.05));
         }
     }
 
@@ -90,7 +89,7 @@ impl Motorcycle {
         let stem = DVec3::new(self.grip.x + 0.06, 0.0, self.grip.z - 0.06);
         handlebar(b, stem, self.grip, 0.018);
         let fork_y = 0.5 * self.tyre_m[1] + 0.035;
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             let aside = fork_y * DVec3::Y;
             rod(b, front + aside, stem + aside - 0.05 * DVec3::Z, [0.028, 0.022]);
             let mirror = self.grip + DVec3::new(0.08, -0.03, 0.2);
@@ -135,7 +134,7 @@ impl Motorcycle {
         let engine = DVec3::new(0.02, 0.0, 0.42);
         cushion(b, engine, DVec3::new(0.5, 1.7 * w, 0.4), 0.08);
         block(b, DVec3::new(0.5 * front.x, 0.0, 0.5), DVec3::new(0.1, 1.5 * w, 0.3));
-        on_both_sides(b, |b| {
+        b.mirrored_y(|b| {
             let aside = 0.6 * w * DVec3::Y;
             let pivot = DVec3::new(-0.22, 0.0, 0.4) + aside;
             rod(b, rear + aside, pivot, [0.025, 0.035]);

@@ -25,8 +25,7 @@ pub fn wheel(b: &mut Builder, axle: DVec3, width_m: f64, filling: Filling) {
         .line(outer_m - 0.5 * half_m, half_m)
         .line(rim_m, 0.7 * half_m)
         .line(rim_m, -0.7 * half_m);
-    let upright = DAffine3::from_translation(axle) * DAffine3::from_rotation_x(-FRAC_PI_2);
-    b.place(upright, |b| {
+    b.turned(axle, DAffine3::from_rotation_x(-FRAC_PI_2), |b| {
         tyre.revolve(b, Section::Round);
         match filling {
             Filling::Disc => {

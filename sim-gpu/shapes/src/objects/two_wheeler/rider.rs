@@ -27,7 +27,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, contacts: Contacts, motorised: bo
     });
     let neck = trunk.transform_point3(DVec3::Z * measures.neck_m());
     let bowed = DAffine3::from_rotation_y(0.4 * lean_rad + s.uniform(-0.1, 0.2));
-    b.place(DAffine3::from_translation(neck) * bowed, |b| {
+    b.turned(neck, bowed, |b| {
         measures.head(b);
         let half_m = measures.head_m();
         if motorised {

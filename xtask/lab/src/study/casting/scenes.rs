@@ -7,7 +7,6 @@ use clap::Args;
 use edgepuck_scenes::{Recipe, Scene, Stage};
 use edgepuck_segment::{Segmenter, Settings, Sweep};
 use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
 use sim_gpu::scan::PlacedTarget;
 use sim_gpu::target::{Surface, Target};
 use std::path::PathBuf;
@@ -47,8 +46,7 @@ struct Measured {
 pub fn run(args: &ScenesArgs) -> Result<()> {
     let mut recipe = Recipe::load(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
-    let open = |effects: &_| Ok::<_, anyhow::Error>(Caster::Cpu(Clone::clone(effects)));
-    let stage = Stage::new(recipe, &args.recipe, None, 0, open)?;
+    let stage = Stage::new(recipe, &args.recipe, None, 0)?;
     let scenes = (0..args.scenes).map(|number| measure(&stage, number, args.rounds.into()));
     let scenes = scenes.collect::<Result<Vec<_>>>()?;
     print!("{}", table(&scenes));

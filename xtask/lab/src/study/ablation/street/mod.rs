@@ -18,7 +18,6 @@ use formats::{atomic, hash};
 use infer_cpu::Options;
 use plan::{NETWORK, Plan, Row, STREET};
 use serde::{Deserialize, Serialize};
-use sim_gpu::caster::Caster;
 use std::fs;
 use std::path::{Path, PathBuf};
 use train::clouds::Clouds;
@@ -207,8 +206,7 @@ fn class_of<'a>(object: &Object, labels: &'a Labels) -> &'a str {
 }
 
 fn stage(row: &Row, seed: u64) -> anyhow::Result<Stage> {
-    let cast = |effects: &_| Ok::<_, SceneError>(Caster::Cpu(Clone::clone(effects)));
-    Ok(Stage::new(row.scenes()?, "street.toml".as_ref(), None, seed, cast)?)
+    Ok(Stage::new(row.scenes()?, "street.toml".as_ref(), None, seed)?)
 }
 
 /// CPU seconds of a scan of each row's scenes, in rounds so that what disturbs the machine

@@ -1,0 +1,142 @@
+//! Sweeps: scans of a whole scene, each over one revolution of its sensor.
+
+use std::sync::Arc;
+
+use formats::Scan;
+use formats::rng::StreamKey;
+use formats::scan::Attribute;
+use glam::DVec3;
+use sim_gpu::bvh::Builder;
+use sim_gpu::mesh::Mesh;
+use sim_gpu::scan::{PlacedTarget, ScanRequest, scan_objects};
+use sim_gpu::sensor::Sensor;
+
+use crate::error::SceneError;
+use crate::model::target;
+use crate::scene::Scene;
+use crate::stage::{Stage, StageSensor};
+
+/// One revolution of a sensor in a scene.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    /// The points in the order of firing, in the sensor's frame, metres, with range, beam, ring,
+    /// time and object. Object 0 is the ground, and object `i` is `i - 1` of [`Scene::objects`].
+    pub scan: Scan,
+}
+
+impl Stage {
+    /// The sensor of `scene`.
+    #[must_use]
+    pub fn sensor(&self, scene: &Scene) -> &Sensor {
+        &self.sensors[scene.sensor].sensor
+    }
+
+    /// The length, width and height of object `i` of `scene`, metres.
+    #[must_use]
+    pub fn size_m(&self, scene: &Scene, i: usize) -> DVec3 {
+        self.size_of(&scene.objects[i])
+    }
+
+    /// Scans the ground and all objects of `scene`.
+    ///
+    /// # Errors
+    /// The caster fails.
+    pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
+        let ground = target(scene.ground.mesh(), Builder::Morton);
+        let mut targets = vec![self.place_ground(&ground, scene.number)];
+        let objects = scene.objects.iter();
+        targets.extend(objects.map(|object| self.place_object(object, scene.glass_returned)));
+        self.sweep_targets(scene, &mut targets)
+    }
+
+    /// Scans `targets` with the sensor of `scene`, in place of its ground and objects.
+    ///
+    /// # Errors
+    /// The caster fails.
+    #[doc(hidden)]
+    pub fn sweep_targets(
+        &self,
+        scene: &Scene,
+        targets: &mut [PlacedTarget<'_>],
+    ) -> Result<Sweep, SceneError> {
+        let StageSensor { sensor, pattern, caster } = &self.sensors[scene.sensor];
+        let stream =
+            |part: u32| StreamKey::new(self.seed(), &format!("scene/{}/beams", scene.number), part);
+        for (target, part) in targets.iter_mut().zip(0..) {
+            target.stream = Some(stream(part));
+        }
+        let mut request = ScanRequest::new(sensor, pattern, scene.pose);
+        request.attributes = [
+            Attribute::Range,
+            Attribute::Beam,
+            Attribute::Ring,
+            Attribute::Time,
+            Attribute::Object,
+        ]
+        .into();
+        request.culling = self.culling;
+        request.motion = scene.motion(pattern.last_s()).map(Arc::new);
+        request.stream = stream(u32::MAX);
+        let scan = scan_objects(caster, targets, &request)?.scan;
+        Ok(Sweep::new(scan, scene))
+    }
+
+    /// The ground and the objects of `scene` as one mesh, in which the objects lose their numbers
+    /// and materials.
+    #[must_use]
+    pub fn mesh(&self, scene: &Scene) -> Mesh {
+        let mut whole = scene.ground.mesh();
+        for object in &scene.objects {
+            let world_from_object = object.world_from_object();
+            let surface = &self.model(object.entry, object.variant).target.surface;
+            for &index in surface.kept() {
+                let first = whole.vertices.len() as u32;
+                let corners = surface.corners(index).map(|corner| surface.frame.to_object(corner));
+                whole.vertices.extend(corners.map(|at| world_from_object.transform_point3(at)));
+                whole.triangles.push([first, first + 1, first + 2]);
+            }
+        }
+        whole
+    }
+}
+
+impl Sweep {
+    /// Moves the points of `scan` from the scene's frame to the sensor's.
+    fn new(mut scan: Scan, scene: &Scene) -> Self {
+        let sensor_from_world = scene.pose.world_from_sensor.inverse();
+        let origin = DVec3::from_array(std::mem::take(&mut scan.origin)) - scene.pose.position_m;
+        for point in &mut scan.positions {
+            let from_sensor = DVec3::from_array(point.map(f64::from)) + origin;
+            *point = (sensor_from_world * from_sensor).as_vec3().to_array();
+        }
+        Self { scan }
+    }
+
+    /// The points in the sensor's frame, metres.
+    #[must_use]
+    pub fn points(&self) -> &[[f32; 3]] {
+        &self.scan.positions
+    }
+
+    /// The ring of each point, counted from the lowest elevation.
+    #[must_use]
+    pub fn rings(&self) -> &[u16] {
+        self.scan.ring.as_deref().expect("invariant: a sweep is scanned with rings")
+    }
+
+    /// The surface that each point lies on, numbered as in [`Sweep::scan`].
+    #[must_use]
+    pub fn surfaces(&self) -> &[u32] {
+        self.scan.object.as_deref().expect("invariant: a sweep is scanned with objects")
+    }
+
+    /// The number of points on the ground, on each object of `scene`, and, last, in the air.
+    /// `scene` must be the scene of this sweep.
+    #[must_use]
+    pub fn points_by_surface(&self, scene: &Scene) -> Vec<u32> {
+        let air = scene.objects.len() + 1;
+        let mut counts = vec![0; air + 1];
+        self.surfaces().iter().for_each(|&surface| counts[air.min(surface as usize)] += 1);
+        counts
+    }
+}
