@@ -1,10 +1,10 @@
-//! Draws a shape's proportions from its own random stream.
+//! Random numbers for the proportions of shapes.
 
 use std::iter::repeat_n;
 
 use formats::rng::StreamKey;
 
-/// Consecutive numbers of one stream.
+/// Draws the consecutive numbers of one random stream.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     key: StreamKey,
@@ -24,6 +24,11 @@ impl Sampler {
         low + (high - low) * unit
     }
 
+    /// A number in the range `[low, high]`.
+    pub fn within(&mut self, [low, high]: [f64; 2]) -> f64 {
+        self.uniform(low, high)
+    }
+
     /// A number in `low..high` whose logarithm is uniform; both above 0.
     pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
         self.uniform(low.ln(), high.ln()).exp()
@@ -41,12 +46,12 @@ impl Sampler {
         low + drawn as usize
     }
 
-    /// One of `choices`, each as likely as the others; not empty.
+    /// One of `choices`, all equally likely. `choices` must not be empty.
     pub fn pick<T: Clone>(&mut self, choices: &[T]) -> T {
         choices[self.count(0, choices.len() - 1)].clone()
     }
 
-    /// One of `choices`, each as likely as its weight says; not empty.
+    /// One of `choices` with a probability proportional to its weight. `choices` must not be empty.
     pub fn weighted<T: Clone>(&mut self, choices: &[(usize, T)]) -> T {
         let copies = choices.iter().flat_map(|(weight, choice)| repeat_n(choice, *weight));
         self.pick(&copies.collect::<Vec<_>>()).clone()
