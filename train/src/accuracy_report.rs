@@ -1,33 +1,31 @@
-//! What an evaluation found, as a line of text, as CSV and as a drawing.
+//! The results of an evaluation as a line of text, as CSV and as a drawing.
 
 use std::path::Path;
 
 use formats::interval::wilson;
 use infer_cpu::Evaluation;
-use svg::Document;
-use svg::node::element::Rectangle;
 
-use crate::svg_text::text;
+use crate::svg::{self, text};
 
-/// The accuracies with their intervals, in one line.
+/// The accuracies and their intervals in one line.
 #[must_use]
 pub fn summary(found: &Evaluation, data: &Path) -> String {
     let (n, correct) = (found.total(), found.correct());
     let (low, high) = wilson(correct, n);
     let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();
-    let (class, half) = found.class_accuracy();
+    let (class_mean, half_width) = found.class_accuracy();
     format!(
         "{correct} of {n} ({:.2} %, 95 % interval {:.2} to {:.2} %), mean over classes {:.2} % \
          (± {:.2}), on {name}",
         100.0 * found.instance_accuracy(),
         100.0 * low,
         100.0 * high,
-        100.0 * class,
-        100.0 * half,
+        100.0 * class_mean,
+        100.0 * half_width,
     )
 }
 
-/// The matrix as CSV: one row for each true class, one column for each answer.
+/// The confusion matrix as CSV, with a row for each true class and a column for each answer.
 #[must_use]
 pub fn to_csv(found: &Evaluation, classes: &[String]) -> Vec<u8> {
     let mut csv = csv::Writer::from_writer(Vec::new());
@@ -43,39 +41,33 @@ pub fn to_csv(found: &Evaluation, classes: &[String]) -> Vec<u8> {
     csv.into_inner().expect("invariant: memory takes all")
 }
 
-/// The matrix as a drawing: the share of each true class's clouds that got each
-/// answer, darker for more.
+/// Draws the confusion matrix as SVG. A darker cell is a larger share of the clouds of a true
+/// class.
 #[must_use]
-pub fn drawing(found: &Evaluation, classes: &[String]) -> Document {
+pub fn drawing(found: &Evaluation, classes: &[String]) -> String {
     const CELL: f64 = 16.0;
     const MARGIN: f64 = 110.0;
-    let n = classes.len() as f64;
-    let side = MARGIN + n * CELL + 10.0;
-    let text = |words: &str, x: f64, y: f64| text(words, x, y, 10);
-    let background = Rectangle::new().set("width", side).set("height", side).set("fill", "white");
-    let mut document = Document::new().set("viewBox", (0, 0, side, side)).add(background);
+    let side = MARGIN + classes.len() as f64 * CELL + 10.0;
+    let mut parts = String::new();
     for (row, (class, answers)) in classes.iter().zip(&found.confusion).enumerate() {
         let y = MARGIN + row as f64 * CELL;
-        document = document.add(text(class, MARGIN - 6.0, y + 12.0).set("text-anchor", "end")).add(
-            text(class, 0.0, 0.0)
-                .set("transform", format!("translate({} {}) rotate(-60)", y + 12.0, MARGIN - 6.0)),
-        );
+        let [line, edge] = [y + 12.0, MARGIN - 6.0];
+        parts += &text(class, edge, line, 10, "text-anchor='end'");
+        let turned = format!("transform='translate({line} {edge}) rotate(-60)'");
+        parts += &text(class, 0.0, 0.0, 10, &turned);
         let total: usize = answers.iter().sum();
         for (column, &count) in answers.iter().enumerate().filter(|(_, count)| **count > 0) {
-            let share = count as f64 / total as f64;
+            let x = MARGIN + column as f64 * CELL;
             let colour = if row == column { "#06c" } else { "#c30" };
-            let cell = Rectangle::new()
-                .set("x", MARGIN + column as f64 * CELL)
-                .set("y", y)
-                .set("width", CELL)
-                .set("height", CELL)
-                .set("fill", colour)
-                // The root makes rare confusions visible.
-                .set("fill-opacity", format!("{:.3}", share.sqrt()));
-            document = document.add(cell);
+            // The root makes rare confusions visible.
+            let opacity = (count as f64 / total as f64).sqrt();
+            parts += &format!(
+                "<rect x='{x}' y='{y}' width='{CELL}' height='{CELL}' fill='{colour}' \
+                 fill-opacity='{opacity:.3}'/>\n"
+            );
         }
     }
-    document
+    svg::drawing(side, side, &parts)
 }
 
 #[cfg(test)]
@@ -87,7 +79,7 @@ mod tests {
         let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 2]] };
         let classes = ["cup".to_owned(), "vase".to_owned()];
         assert_eq!(to_csv(&found, &classes), b"class,cup,vase\ncup,3,1\nvase,0,2\n");
-        assert_eq!(drawing(&found, &classes).to_string().matches("<rect").count(), 4);
+        assert_eq!(drawing(&found, &classes).matches("<rect").count(), 4);
     }
 
     #[test]

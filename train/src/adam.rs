@@ -1,4 +1,4 @@
-//! Adam with L2 in the gradient, as PyTorch's `Adam(weight_decay)` (Kingma and
+//! Adam with an L2 term in the gradient, as in PyTorch's `Adam(weight_decay)` (Kingma and
 //! Ba 2015, algorithm 1).
 
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::layer::Module;
 use crate::parameter::Parameter;
 
-/// Elements that one thread takes at a time.
+/// Number of elements that one thread updates at a time.
 const CHUNK: usize = 1 << 14;
 
 /// Adam's constants.
@@ -27,14 +27,14 @@ pub struct Adam {
 }
 
 impl Default for Adam {
-    /// The baseline's (yanx27, `train_classification.py`).
+    /// The baseline's constants (yanx27, `train_classification.py`).
     fn default() -> Self {
         Self { rate: 1e-3, beta1: 0.9, beta2: 0.999, epsilon: 1e-8, l2: 1e-4 }
     }
 }
 
 impl Adam {
-    /// Takes step number `step` (the first is 1) with learning rate `rate`.
+    /// Updates all parameters in step number `step`, counted from 1, with learning rate `rate`.
     pub fn step(&self, network: &mut dyn Module, step: u64, rate: f64) {
         network.parameters().into_iter().for_each(|p| self.update(p, step, rate));
     }

@@ -1,7 +1,7 @@
-//! Augmentation: the points of a cloud are chosen, dropped and moved.
+//! Augmentation: chooses, drops and moves the points of a cloud.
 //!
-//! Random numbers are keyed by the run's seed, the epoch and the cloud, so that a
-//! cloud does not depend on the thread or the batch.
+//! Random numbers are keyed by the run's seed, the epoch and the cloud, so that an
+//! augmented cloud does not depend on the thread or the batch.
 
 use std::borrow::Cow;
 
@@ -18,17 +18,16 @@ use crate::recipe::{Augment, Axis, Recipe, Sampling};
 pub struct TrainingCloud {
     /// Its points.
     pub points: Vec<[f32; 3]>,
-    /// All points that these were chosen from, moved in the same way, if the
-    /// network has EdgeConv layers; otherwise empty.
+    /// All points from which `points` were chosen, moved in the same way. Empty if the
+    /// network has no EdgeConv layer.
     pub neighborhood: Vec<[f32; 3]>,
-    /// How often the first point counts: once, and once for each dropped point.
+    /// The weight of the first point: 1, plus 1 for each dropped point.
     pub first_weight: f32,
     /// The target share of each class.
     pub target: Vec<f32>,
 }
 
-/// Cloud `i` of `clouds`, drawn for the `turn`th time, from 0, in `epoch` of
-/// `recipe`.
+/// Augments cloud `i` of `clouds` for its draw number `turn`, counted from 0, in `epoch`.
 #[must_use]
 pub fn augment(
     clouds: &Clouds,
@@ -57,7 +56,7 @@ pub fn augment(
     }
     let mut moves = recipe.augment.clone();
     if recipe.normalization.is_metric() {
-        // Errors came before the centring.
+        // `cluster::varied` added these errors before the centring.
         (moves.jitter, moves.sensor_noise) = (0.0, 0.0);
     }
     let n = points.len();
@@ -65,7 +64,7 @@ pub fn augment(
         drop_points(&mut points, moves.drop, &mut draws);
         transform(&mut points, &moves, &mut draws);
     } else {
-        // All points are moved together, so that chosen points stay among them.
+        // All points move together, so that the chosen points stay among them.
         drop_points(&mut places, moves.drop, &mut draws);
         transform(&mut neighborhood, &moves, &mut draws);
         points = places.iter().map(|&place| neighborhood[place]).collect();
@@ -74,8 +73,8 @@ pub fn augment(
     TrainingCloud { points, neighborhood, first_weight, target }
 }
 
-/// `held`, and each of its clouds once more as training varies and turns it, so that a
-/// checkpoint is not chosen for clouds alone that nothing has happened to.
+/// The validation clouds `held`, followed by a copy of each, varied and turned as in
+/// training, so that the choice of a checkpoint also depends on disturbed clouds.
 #[must_use]
 pub fn varied_too(held: &Clouds, recipe: &Recipe) -> Clouds {
     let mut both = held.clone();
@@ -90,12 +89,12 @@ pub fn varied_too(held: &Clouds, recipe: &Recipe) -> Clouds {
     both
 }
 
-/// The points of a cloud that the network sees.
+/// The points of a cloud that were chosen for the network.
 struct ChosenPoints {
     points: Vec<[f32; 3]>,
-    /// All points, if the network has EdgeConv layers; otherwise empty.
+    /// All points. Empty if the network has no EdgeConv layer.
     neighborhood: Vec<[f32; 3]>,
-    /// The place of each of `points` in `neighborhood`.
+    /// The index in `neighborhood` of each of `points`.
     places: Vec<usize>,
 }
 
@@ -103,8 +102,8 @@ fn one_hot(label: usize, n_classes: usize) -> Vec<f32> {
     (0..n_classes).map(|class| f32::from(u8::from(class == label))).collect()
 }
 
-/// Chooses the points of `cloud` that the network sees; a cluster in metres is
-/// varied and centred before.
+/// Chooses the points of cloud `i` for the network, after varying and centring a cluster in
+/// metres.
 fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
     let cloud = clouds.set.cloud(i);
     let cloud: Cow<'_, [[f32; 3]]> = if recipe.normalization.is_metric() {
@@ -139,7 +138,7 @@ fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> Chos
     }
 }
 
-/// Replaces a random part of `points` by points of `other`; returns its share.
+/// Replaces a random part of `points` by points of `other`. Returns the replaced share.
 fn mix(points: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
     let n = (draws.unit() * points.len().min(other.len()) as f64) as usize;
     let all = points.len();
@@ -151,8 +150,8 @@ fn mix(points: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
     n as f32 / all as f32
 }
 
-/// Drops each point with a chance that is uniform below `most`. The first point
-/// stays, because the baseline moves dropped points onto it.
+/// Drops points at random. The chance is the same for all points of a cloud, and uniform
+/// from 0 to `most`. The first point stays, because the baseline moves dropped points onto it.
 fn drop_points<T>(points: &mut Vec<T>, most: f64, draws: &mut Draws) {
     let chance = most * draws.unit();
     let mut is_first = true;
@@ -198,7 +197,7 @@ fn axes(up: Axis) -> [usize; 3] {
     }
 }
 
-/// A sensor's position as in gen-dataset by default, at a random azimuth.
+/// A sensor's position at gen-dataset's default distance and elevation, and a random azimuth.
 fn sensor(up: Axis, draws: &mut Draws) -> [f64; 3] {
     const DISTANCE: f64 = 3.0;
     let (elevation, azimuth) = (20f64.to_radians(), draws.between(0.0, std::f64::consts::TAU));

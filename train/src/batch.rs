@@ -2,42 +2,41 @@
 
 use ndarray::ArrayView2;
 
-use crate::layer::Rows;
 use crate::matrix::Matrix;
+use crate::rows::Rows;
 
 /// Clouds and their targets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
     /// Points of all clouds, `[rows, 3]`, each once.
     pub coordinates: Vec<[f32; 3]>,
-    /// How often each point counts in statistics.
+    /// The weight of each point in statistics.
     pub weights: Vec<f32>,
-    /// Where each cloud's rows begin, and where the last cloud's end.
+    /// The first row of each cloud, and the end of the last cloud.
     pub starts: Vec<usize>,
-    /// All points of the clouds, in which EdgeConv layers search neighbors; empty
-    /// without such layers.
+    /// All points of the clouds, among which EdgeConv layers search for neighbors. Empty if the
+    /// network has no such layer.
     pub neighborhood: Vec<[f32; 3]>,
-    /// Where each cloud's points begin in `neighborhood`, and where the last
-    /// cloud's end.
+    /// The index in `neighborhood` of each cloud's first point, and the end of the last cloud.
     pub neighborhood_starts: Vec<usize>,
     /// The target share of each class, `[clouds, classes]`.
     pub targets: Matrix,
 }
 
 impl Batch {
-    /// How many clouds there are.
+    /// The number of clouds.
     #[must_use]
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether there is none.
+    /// Whether the batch has no cloud.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The points among which cloud `cloud` searches neighbors.
+    /// The points among which cloud `cloud` searches for neighbors.
     #[must_use]
     pub fn neighborhood_of(&self, cloud: usize) -> &[[f32; 3]] {
         match self.neighborhood_starts.get(cloud..cloud + 2) {

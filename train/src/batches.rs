@@ -1,4 +1,4 @@
-//! An epoch's batches, prepared in advance on other threads.
+//! The batches of an epoch, which other threads prepare in advance.
 
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::Scope;
@@ -12,21 +12,22 @@ use crate::clouds::Clouds;
 use crate::matrix::Matrix;
 use crate::recipe::Recipe;
 
-/// Prepared batches that wait for the network, at most.
+/// Largest number of prepared batches that wait for the network.
 const AHEAD: usize = 3;
 
-/// How many whole batches an epoch of `n` clouds has.
+/// The number of complete batches in an epoch of a set of `n` clouds.
 #[must_use]
 pub fn count(n: usize, recipe: &Recipe) -> usize {
     size(n, recipe) / recipe.batch
 }
 
-/// How many clouds are drawn for an epoch of a set of `n`.
+/// The number of clouds drawn for an epoch of a set of `n` clouds.
 fn size(n: usize, recipe: &Recipe) -> usize {
     recipe.clouds_per_epoch.unwrap_or(n)
 }
 
-/// The batches of `epoch`, in an order that depends on seed and epoch.
+/// Starts preparing the batches of `epoch`, in an order that depends on the seed and the
+/// epoch.
 pub fn start<'s>(
     scope: &'s Scope<'s, '_>,
     clouds: &'s Clouds,
@@ -48,14 +49,14 @@ pub fn start<'s>(
     receiver
 }
 
-/// The clouds of an epoch in random order, each with how often it came before. With
-/// `balance` a class of `n` clouds has a share in proportion to n^(1 - balance), give or
-/// take one.
+/// The clouds of an epoch in random order, each with the number of its earlier draws. With
+/// `balance`, the share of a class of n clouds is in proportion to n^(1 - balance), give or
+/// take one cloud.
 fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec<(usize, u32)> {
     let all = 0..labels.len();
     let groups: Vec<Vec<usize>> = if recipe.balance > 0.0 {
-        let of = |class| all.clone().filter(|&i| labels[i] == class).collect();
-        (0..n_classes).map(of).filter(|group: &Vec<usize>| !group.is_empty()).collect()
+        let members = |class| all.clone().filter(|&i| labels[i] == class).collect();
+        (0..n_classes).map(members).filter(|group: &Vec<usize>| !group.is_empty()).collect()
     } else {
         vec![all.collect()]
     };
@@ -66,7 +67,7 @@ fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec
     let mut weighed = 0.0;
     for (number, group) in groups.iter().enumerate() {
         weighed += weight(group);
-        // What the groups up to this one have together is rounded, so that all have `size`.
+        // Rounds the total of the groups up to this one, so that all groups have `size`.
         let share = (size as f64 * weighed / total).round() as usize - order.len();
         for turn in 0..share / group.len() {
             order.extend(group.iter().map(|&i| (i, turn as u32)));
@@ -80,14 +81,14 @@ fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec
     order
 }
 
-/// Fisher and Yates.
+/// The shuffle of Fisher and Yates.
 fn shuffle<T>(values: &mut [T], stream: StreamKey) {
     for i in (1..values.len()).rev() {
         values.swap(i, stream.below(i as u64 + 1, i as u64) as usize);
     }
 }
 
-/// One batch of some clouds.
+/// Joins clouds to one batch.
 #[must_use]
 pub fn joined(drawn: &[TrainingCloud]) -> Batch {
     let n_classes = drawn.first().map_or(0, |cloud| cloud.target.len());

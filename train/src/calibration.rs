@@ -1,20 +1,20 @@
-//! How sure a network may be, and when it must say that it does not know: fitted to
-//! clouds that it did not learn from.
+//! The calibration of a network on validation clouds: the temperature of its confidences, and
+//! the energy above which it answers `unknown`.
 
 use infer_cpu::energy;
 
-/// Where a temperature is looked for.
+/// The range of temperatures that is searched.
 const TEMPERATURES: [f64; 2] = [0.05, 20.0];
-/// Steps of the search; each leaves 0.618 of the range, so that 40 leave 3e-8 of its
-/// logarithm's 6.
+/// Steps of the search. Each leaves 0.618 of the range, so that 40 steps leave 3e-8 of the
+/// range of the logarithm, which is 6.
 const STEPS: usize = 40;
 
 /// The temperature at which the mean negative log-likelihood of `labels` under
 /// softmax(`logits` / temperature) is smallest (Guo et al. 2017, "On calibration of
 /// modern neural networks").
 ///
-/// The likelihood has one minimum, because it is convex in the temperature's
-/// inverse: a golden-section search of the logarithm finds it. Without clouds it is 1.
+/// This mean is convex in the inverse of the temperature, so that a golden-section search
+/// over the logarithm finds its only minimum. Without clouds the temperature is 1.
 #[must_use]
 pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
     if logits.is_empty() {
@@ -22,11 +22,11 @@ pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
     }
     let cost = |log: f64| {
         let t = log.exp();
-        // -ln p of the label: its energy's distance from the whole's.
-        let of = |(logits, &label): (&Vec<f32>, &usize)| {
+        // -ln p = -logit / t - energy / t.
+        let loss = |(logits, &label): (&Vec<f32>, &usize)| {
             -f64::from(logits[label]) / t - energy(logits, t) / t
         };
-        logits.iter().zip(labels).map(of).sum::<f64>()
+        logits.iter().zip(labels).map(loss).sum::<f64>()
     };
     let share = (5f64.sqrt() - 1.0) / 2.0;
     let [mut low, mut high] = TEMPERATURES.map(f64::ln);
@@ -37,7 +37,8 @@ pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
     low.midpoint(high).exp()
 }
 
-/// The least of `energies` that `share` of them do not exceed; `None` without any.
+/// The smallest of `energies` that `share` of them do not exceed. `None` if there are no
+/// energies.
 #[must_use]
 pub fn quantile(mut energies: Vec<f64>, share: f64) -> Option<f64> {
     energies.sort_by(f64::total_cmp);

@@ -1,5 +1,5 @@
-//! Checkpoint and resume: parameters, running statistics and Adam's moments, to
-//! the bit, in one safetensors file.
+//! Checkpoints: the exact parameters, running statistics and moments of Adam, in one
+//! safetensors file.
 
 use std::path::Path;
 
@@ -16,11 +16,11 @@ use crate::trainer::Trainer;
 const MEAN: &str = ".adam_mean";
 const SQUARE: &str = ".adam_square";
 
-/// Writes the state of `trainer`, which learns from the data of this `digest`, to `path`, atomically, with
-/// `notes`.
+/// Writes the state of `trainer`, the `digest` of its training data and `notes` to `path`,
+/// atomically.
 ///
 /// # Errors
-/// What the system reports.
+/// A file that cannot be written.
 pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> Result<(), Error> {
     let mut tensors = model_file::tensors(&mut trainer.model);
     for parameter in trainer.model.parameters() {
@@ -40,12 +40,12 @@ pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> R
     Ok(write_weights(path, &tensors, &metadata)?)
 }
 
-/// Sets `trainer`, which learns from the data of this `digest`, to the state in the checkpoint at `path`;
-/// returns its notes.
+/// Sets `trainer`, whose training data have this `digest`, to the state in the checkpoint at
+/// `path`. Returns the notes of the checkpoint.
 ///
 /// # Errors
-/// A file that is not a checkpoint, or a checkpoint of another recipe, of other data, or of more epochs
-/// than are wanted.
+/// A file that is not a checkpoint; a checkpoint of another recipe, of other data, or of more
+/// epochs than the recipe has.
 pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, Error> {
     let mut file = WeightsFile::open(path)?;
     let metadata = file.metadata();
@@ -59,7 +59,6 @@ pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, 
         text(key)?.parse().map_err(|_| bad(key, "expected a whole number"))
     };
     check_recipe(path, &text("recipe")?, &trainer.recipe)?;
-    // Checkpoints of earlier versions do not tell.
     if metadata.get("data").is_none_or(|data| data != digest) {
         return Err(other_run(path, "its training data differ"));
     }
@@ -81,13 +80,13 @@ pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, 
     Ok(text("notes")?)
 }
 
-/// Only the number of epochs may change, and only if the schedule does not
-/// depend on it.
+/// Checks that the recipe is that of the checkpoint. The number of epochs may differ if the
+/// schedule does not depend on it.
 fn check_recipe(path: &Path, before: &str, now: &Recipe) -> Result<(), Error> {
     let before: Recipe = toml::from_str(before)
         .map_err(|error| FormatError::malformed(path, "metadata `recipe`", error.to_string()))?;
-    let of_any_length = matches!(now.schedule, Schedule::Step { .. });
-    let epochs = if of_any_length { now.epochs } else { before.epochs };
+    let epochs_may_differ = matches!(now.schedule, Schedule::Step { .. });
+    let epochs = if epochs_may_differ { now.epochs } else { before.epochs };
     if (Recipe { epochs, ..before }) != *now {
         return Err(other_run(path, "its recipe differs"));
     }

@@ -1,4 +1,4 @@
-//! Labelled clouds, checked and perhaps normalised.
+//! Labelled clouds: reading, checking, normalising and splitting them.
 
 mod yanx27;
 
@@ -15,14 +15,14 @@ use crate::error::Error;
 /// Clouds with their classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clouds {
-    /// Coordinates: of the unit sphere, or metres from the sensor where a network
-    /// takes metres.
+    /// The clouds: in the unit sphere, or in metres from the sensor for networks that take
+    /// metres.
     pub set: LabelledSet,
     /// Class names in the order of the labels.
     pub classes: Vec<String>,
 }
 
-/// The packed NPZ file of `split` that `path` means.
+/// The packed NPZ file of `split` at `path`, if there is one.
 fn packed(path: &Path, split: Split) -> Option<PathBuf> {
     let mut beginning = path.as_os_str().to_owned();
     beginning.push(format!("-{split}.npz"));
@@ -42,7 +42,7 @@ fn read_hdf5(path: &Path, _: Split) -> Result<LabelledSet, Error> {
 }
 
 impl Clouds {
-    /// A digest of all points, labels and classes.
+    /// The digest of all points, labels and classes.
     #[must_use]
     pub fn digest(&self) -> String {
         let LabelledSet { points, labels, offsets, .. } = &self.set;
@@ -53,25 +53,27 @@ impl Clouds {
         formats::hash::of_parts::<Vec<u8>>(parts)
     }
 
-    /// Reads the `split` of the data at `path`, and normalises it. `path` is a
-    /// packed NPZ file; the common start of two names, as gen-dataset packs them
-    /// (`rotational-noisy` for `rotational-noisy-train.npz` and
-    /// `rotational-noisy-test.npz`); a folder with `train.npz` and `test.npz`; a
-    /// folder of ModelNet40's HDF5 files (`modelnet40_ply_hdf5_2048`), with
-    /// feature `hdf5`; or a folder of text files as in
-    /// yanx27/Pointnet_Pointnet2_pytorch, of which the first `most_points` points
-    /// of each cloud are read.
+    /// Reads the `split` of the data at `path` and normalises its clouds to the unit sphere.
+    /// `path` is one of:
+    ///
+    /// - a packed NPZ file;
+    /// - the common prefix of two packed files, as gen-dataset writes them:
+    ///   `rotational-noisy` for `rotational-noisy-train.npz` and `rotational-noisy-test.npz`;
+    /// - a folder with `train.npz` and `test.npz`;
+    /// - a folder of ModelNet40's HDF5 files (`modelnet40_ply_hdf5_2048`), with feature
+    ///   `hdf5`;
+    /// - a folder of text files as in yanx27/Pointnet_Pointnet2_pytorch. The first
+    ///   `most_points` points of each file are read.
     ///
     /// # Errors
-    /// Data that cannot be read, a set without clouds, a coordinate that is not
-    /// finite.
+    /// Data that cannot be read; a set without clouds; a coordinate that is not finite.
     pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
         Self::read_for(Normalization::UnitSphere, path, split, most_points)
     }
 
-    /// As [`Clouds::read`], for a network of this normalisation: clouds for one that
-    /// takes metres are left as they are, since training moves each of them by
-    /// itself, and infer-cpu does too.
+    /// Reads as [`Clouds::read`] does, for a network of this `normalization`. Clouds for a
+    /// network that takes metres stay unchanged, because training and infer-cpu move each of
+    /// them.
     ///
     /// # Errors
     /// As [`Clouds::read`].
@@ -85,7 +87,7 @@ impl Clouds {
             read_labelled(&packed)?
         } else if modelnet_h5_list::list(path, split).is_file() {
             read_hdf5(path, split)?
-        } else if yanx27::is_one(path) {
+        } else if yanx27::is_layout_of(path) {
             yanx27::read(path, split, most_points)?
         } else {
             let cause = format!(
@@ -108,8 +110,7 @@ impl Clouds {
         }
     }
 
-    /// Reads the `split` of the packed data at `path` as it is, neither moved
-    /// nor scaled.
+    /// Reads the `split` of the packed data at `path` and leaves its clouds unchanged.
     ///
     /// # Errors
     /// As [`Clouds::read`].
@@ -144,13 +145,13 @@ impl Clouds {
         Ok(Self { set, classes })
     }
 
-    /// How many clouds there are.
+    /// The number of clouds.
     #[must_use]
     pub fn len(&self) -> usize {
         self.set.len()
     }
 
-    /// Whether there is none.
+    /// Whether the set has no cloud.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.set.is_empty()
@@ -162,10 +163,10 @@ impl Clouds {
         Self { set: self.set.select(indices), classes: self.classes.clone() }
     }
 
-    /// These clouds followed by `others`, without remarks other than their names.
+    /// These clouds followed by `others`. Of the remarks, only the names are kept.
     ///
     /// # Errors
-    /// Clouds of other classes.
+    /// Clouds whose classes differ.
     pub fn concat(&self, others: &Self) -> Result<Self, String> {
         if self.classes != others.classes {
             return Err(format!(
@@ -193,9 +194,9 @@ impl Clouds {
         self.select(&(0..self.len()).filter(is_wanted).collect::<Vec<_>>())
     }
 
-    /// Splits the set by instance into training clouds and a `share` of
-    /// validation clouds; returns their indices. Views of one mesh stay together,
-    /// and every class has the share.
+    /// Splits the set into training clouds and a `share` of validation clouds, and returns
+    /// the indices of both. All views of a mesh are on the same side, and each class gives
+    /// the share.
     #[must_use]
     pub fn split_validation(&self, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
         let stream = StreamKey::new(seed, "validation", 0);
@@ -227,8 +228,8 @@ impl Clouds {
         (learnt, held)
     }
 
-    /// The mesh of cloud `i`: the cloud's name without the view's number, which
-    /// gen-dataset writes after the last `_v`.
+    /// The mesh of cloud `i`: the name of the cloud without the number of the view, which
+    /// gen-dataset appends after `_v`.
     fn instance(&self, i: usize) -> String {
         let Some(names) = &self.set.names else { return i.to_string() };
         match names[i].rsplit_once("_v") {

@@ -1,80 +1,22 @@
-//! Clusters in metres, varied as another scan of the same object would vary them,
-//! and centred as infer-cpu centres them.
+//! Varies clusters in metres as another scan of the same object would, and centres them as
+//! infer-cpu does.
 //!
-//! The sensor is at the origin, so that its error lies along the line from there to
-//! each point. Everything comes before the centring, because a network in use meets
-//! the mean and the lowest point of what a sensor saw, errors included. A turn about
-//! the up axis alone may follow: it and the centring can change places.
+//! The sensor is at the origin, so that its error is along the line from the origin to each
+//! point. All variations precede the centring, because in use the mean and the lowest point
+//! of a cluster include the sensor's errors. Only a rotation about the up axis may follow,
+//! since it commutes with the centring.
 
 use infer_cpu::sampler::OutlierFilter;
-use serde::{Deserialize, Serialize};
 
+use crate::cluster_variation::ClusterVariation;
 use crate::draws::Draws;
-use crate::recipe::{Augment, FINITE, Recipe, finite};
+use crate::recipe::{Augment, Recipe};
 
-/// How clusters in metres are varied, to be like those of other sensors, distances
-/// and segmentations. Its default varies nothing.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ClusterVariation {
-    /// A cluster keeps a random number of its points, log-uniform between these two,
-    /// before it is centred; all if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub density: Option<[usize; 2]>,
-    /// The largest height, metres, up to which a cluster's foot is cut off.
-    pub cut: f64,
-    /// Share of clusters that get points of other things.
-    pub stray_share: f64,
-    /// The largest number of such points.
-    pub strays: usize,
-    /// How far such points are from the cluster's box at most, metres.
-    pub stray_reach: f64,
-    /// Share of clusters with strips of the ground under them, which a segmentation
-    /// has left.
-    pub ground_share: f64,
-    /// How far such strips reach beyond the cluster's box at most, metres.
-    pub ground_reach: f64,
-    /// Share of clusters whose ground is taken to be unknown, as it may be in use.
-    pub ground_unknown: f64,
-}
-
-impl ClusterVariation {
-    /// Whether it varies nothing but what clouds of the unit sphere have, too.
-    pub(crate) fn suits_whole_objects(&self) -> bool {
-        let Self { cut, ground_share, ground_reach, ground_unknown, .. } = *self;
-        [cut, ground_share, ground_reach, ground_unknown] == [0.0; 4]
-    }
-
-    /// Whether each value is in its range, with the recipe's key and what is expected.
-    pub(crate) fn checks(&self) -> [(bool, &'static str, &'static str); 8] {
-        let Self { density, cut, stray_share, strays, stray_reach, .. } = *self;
-        let Self { ground_share, ground_reach, ground_unknown, .. } = *self;
-        [
-            (
-                density.is_none_or(|[least, most]| (1..=most).contains(&least)),
-                "clusters.density",
-                "expected two numbers of points, 1 or more and ascending",
-            ),
-            (finite(cut), "clusters.cut", FINITE),
-            ((0.0..=1.0).contains(&stray_share), "clusters.stray_share", "expected 0 to 1"),
-            (
-                stray_share <= 0.0 || strays > 0,
-                "clusters.strays",
-                "expected 1 or more with `stray_share`",
-            ),
-            (finite(stray_reach), "clusters.stray_reach", FINITE),
-            ((0.0..=1.0).contains(&ground_share), "clusters.ground_share", "expected 0 to 1"),
-            (finite(ground_reach), "clusters.ground_reach", FINITE),
-            ((0.0..=1.0).contains(&ground_unknown), "clusters.ground_unknown", "expected 0 to 1"),
-        ]
-    }
-}
-
-/// A cut that leaves less than this share of a cluster takes an object away, and not
-/// its foot.
+/// A cut must leave this share of a cluster; otherwise it would remove the object and not
+/// only its foot.
 const LEAST_LEFT: f64 = 0.5;
 
-/// `cluster`, varied and centred.
+/// Varies and centres `cluster`.
 pub(crate) fn varied(
     cluster: &[[f32; 3]],
     ground_z: Option<f32>,
@@ -83,8 +25,8 @@ pub(crate) fn varied(
 ) -> Vec<[f32; 3]> {
     let variation = &recipe.clusters;
     let cut = cut(cluster, variation.cut * draws.unit());
-    let seen = thinned(&cut, variation, draws);
-    let mut points = noisy(&seen, &recipe.augment, draws);
+    let thinned = thinned(&cut, variation, draws);
+    let mut points = noisy(&thinned, &recipe.augment, draws);
     add_strays(&mut points, variation, 0.0, draws);
     let ground_z = ground_z.map(f64::from).filter(|_| draws.unit() >= variation.ground_unknown);
     add_ground(&mut points, ground_z, variation, draws);
@@ -93,8 +35,8 @@ pub(crate) fn varied(
     centred
 }
 
-/// `cloud`, a whole object in the unit sphere: thinned, among strays, and then as
-/// infer-cpu makes it of that, without outliers and in the unit sphere again.
+/// Varies `cloud`, a whole object in the unit sphere: thins it and adds strays. Then drops
+/// outliers and normalises to the unit sphere, as infer-cpu does.
 pub(crate) fn varied_object(
     cloud: &[[f32; 3]],
     recipe: &Recipe,
@@ -113,8 +55,8 @@ pub(crate) fn varied_object(
     normalized
 }
 
-/// `cluster` without what is less than `height` above its lowest point: a
-/// segmentation removes the ground up to some height.
+/// `cluster` without the points that are less than `height` above its lowest point, because
+/// a segmentation removes the ground up to some height.
 fn cut(cluster: &[[f32; 3]], height: f64) -> Vec<[f32; 3]> {
     let lowest = cluster.iter().fold(f32::INFINITY, |lowest, point| lowest.min(point[2]));
     let stays = |point: &&[f32; 3]| f64::from(point[2]) >= f64::from(lowest) + height;
@@ -123,7 +65,7 @@ fn cut(cluster: &[[f32; 3]], height: f64) -> Vec<[f32; 3]> {
     if is_object { left } else { cluster.to_vec() }
 }
 
-/// As few of the points of `cluster` as another sensor or distance might leave.
+/// A random subset of the points of `cluster`, for another sensor or distance.
 fn thinned(cluster: &[[f32; 3]], variation: &ClusterVariation, draws: &mut Draws) -> Vec<[f32; 3]> {
     let Some([least, most]) = variation.density else { return cluster.to_vec() };
     let most = most.min(cluster.len());
@@ -155,17 +97,17 @@ fn noisy(points: &[[f32; 3]], augment: &Augment, draws: &mut Draws) -> Vec<[f64;
     points.iter().map(moved).collect()
 }
 
-/// The most strips of ground under a cluster.
+/// Largest number of strips of ground under a cluster.
 const STRIPS: usize = 3;
 
-/// Strips of ground hold at most this share of a cluster's points.
+/// Largest number of points of the strips of ground, as a share of the cluster's points.
 const GROUND_POINTS: f64 = 0.3;
 
-/// How far below a cluster's lowest point the ground may be, metres.
+/// Largest distance of the ground below a cluster's lowest point, metres.
 const GROUND_BELOW: f64 = 0.1;
 
-/// Adds strips of ground to a share of clusters: level, across the line of sight as
-/// a sensor's rings are.
+/// Adds strips of ground to a share of clusters. They are level and across the line of
+/// sight, like a sensor's rings.
 fn add_ground(
     points: &mut Vec<[f64; 3]>,
     ground_z: Option<f64>,
@@ -206,9 +148,9 @@ fn add_ground(
     }
 }
 
-/// Adds points of other things to a share of clusters: anywhere in the cluster's
-/// box, widened to its sides and upwards, and by `reach_below`: that is 0 where a
-/// segmentation has removed the ground.
+/// Adds points of other things to a share of clusters. They are uniform in the cluster's box,
+/// enlarged by `stray_reach` to the sides and upwards, and by `reach_below` downwards, which
+/// is 0 if a segmentation has removed the ground.
 fn add_strays(
     points: &mut Vec<[f64; 3]>,
     variation: &ClusterVariation,

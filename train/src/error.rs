@@ -11,20 +11,20 @@ pub enum Error {
     /// A file that cannot be read or written, or is malformed.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// Data that cannot be learnt from.
+    /// Data that cannot be used for training.
     #[error("{}: {cause}", path.display())]
     Data {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         cause: String,
     },
-    /// A value of a recipe that is out of range.
+    /// A value in a recipe that is out of its limits.
     #[error("recipe: `{key}`: {cause}")]
     Recipe {
         /// The key in the file.
         key: &'static str,
-        /// What is wrong with its value.
+        /// The cause.
         cause: String,
     },
     /// A loss that is not finite.
@@ -36,11 +36,11 @@ pub enum Error {
     NotFinite {
         /// The loss.
         loss: f64,
-        /// Counted from 1, within its epoch.
+        /// The step of the epoch, counted from 1.
         step: u64,
-        /// Counted from 1.
+        /// The epoch, counted from 1.
         epoch: u32,
-        /// The layer.
+        /// The first layer whose output is not finite.
         layer: String,
     },
     /// A checkpoint of another run.
@@ -48,10 +48,10 @@ pub enum Error {
     OtherRun {
         /// The checkpoint.
         path: PathBuf,
-        /// What differs.
+        /// The difference.
         cause: String,
     },
-    /// A network that infer-cpu refuses.
+    /// A model or a cloud that infer-cpu refuses.
     #[error(transparent)]
     Infer(#[from] infer_cpu::Error),
 }

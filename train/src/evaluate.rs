@@ -1,4 +1,4 @@
-//! Accuracy, measured with infer-cpu, which runs the models that are written.
+//! Classification of clouds by a model file, with infer-cpu.
 
 use std::ops::Range;
 use std::path::Path;
@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use crate::clouds::Clouds;
 use crate::error::Error;
 
-/// Clouds that one classifier takes at a time.
+/// Number of clouds that one task classifies.
 const CHUNK: usize = 128;
 
-/// Classifies all of `clouds` with the model at `path`.
+/// The confusion matrix of the model at `path` on `clouds`.
 ///
 /// # Errors
-/// A model that infer-cpu refuses, or that has other classes than the clouds.
+/// A model that infer-cpu refuses; a number of classes other than the clouds'.
 pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Evaluation, Error> {
     let n = clouds.classes.len();
     let parts = in_chunks(path, clouds, options, |classifier, some| {
@@ -31,8 +31,8 @@ pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Eval
     Ok(whole)
 }
 
-/// What the model at `path` says of each of `clouds`, whose classes may be others
-/// than the model's.
+/// The predictions of the model at `path` for `clouds`, whose classes may differ from the
+/// model's.
 ///
 /// # Errors
 /// A model or a cloud that infer-cpu refuses.
@@ -50,7 +50,7 @@ pub fn predictions(
     Ok(parts.into_iter().flatten().collect())
 }
 
-/// What `take` makes of each part of the clouds, on all threads, in order.
+/// The results of `take` for each chunk of the clouds, in order. The chunks run in parallel.
 fn in_chunks<T: Send>(
     path: &Path,
     clouds: &Clouds,

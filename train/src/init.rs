@@ -1,15 +1,15 @@
-//! Training that starts from a model's weights instead of random numbers.
+//! Starts training from a model's weights instead of random numbers.
 //!
-//! All layers but the last are the model's; the last is, too, if the model's classes are
-//! the first of the network's. Its other classes keep random numbers.
+//! All layers but the last take the model's weights. The last layer takes them, too, if the
+//! model's classes are the first classes of the network; the weights of the other classes
+//! stay random.
 //!
-//! A shipped model has no batch norms: they are folded into its linear layers. A batch
-//! norm of scale 1 and shift 0 would undo what was folded, since training normalises by
-//! each batch. Therefore each batch norm gets the mean and the standard deviation of
-//! what its layer computes of the training clouds, both as its running statistics and as
-//! its shift and scale. The network then computes what the model computes, with the
-//! running statistics exactly, and with those of a batch as nearly as the batch is like
-//! the others.
+//! A shipped model has no batch norms, since they are folded into its linear layers. A new
+//! batch norm with scale 1 and shift 0 would undo the folding, because training normalises
+//! each batch. Therefore the mean and the standard deviation of a layer's outputs on the
+//! training clouds become the running statistics of its batch norm, and also its shift and
+//! scale. The network then gives the model's outputs: exactly with the running statistics,
+//! and approximately with the statistics of a batch.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -29,14 +29,14 @@ use crate::point_encoder::TRAINING_ONLY;
 use crate::recipe::Recipe;
 use crate::trainer::Trainer;
 
-/// Clouds that the batch norms' statistics are computed of.
+/// Number of clouds from which the statistics of the batch norms are computed.
 const CLOUDS: usize = 256;
 
-/// Sets the network of `trainer` to the model at `path`. `card` is that of the network
-/// in training.
+/// Sets the network of `trainer` to the model at `path`. `card` is the card of the network in
+/// training.
 ///
 /// # Errors
-/// A file that is not a model, or a model that `card` or the layers do not fit.
+/// A file that is not a model; a model whose inputs or layers differ from the recipe's.
 pub fn start(
     trainer: &mut Trainer,
     path: &Path,
@@ -57,9 +57,9 @@ pub fn start(
     Ok(())
 }
 
-/// Whether both are of the same inputs, in the same layers.
+/// Checks that both models have the same inputs and layers.
 fn check_card(path: &Path, wanted: &ModelCard, found: &ModelCard) -> Result<(), FormatError> {
-    // A model that was imported may not say how many points it takes.
+    // The card of an imported model may lack the number of points.
     let found = ModelCard { points: found.points.or(wanted.points), ..found.clone() };
     for ((key, wanted), (_, found)) in facts(wanted).into_iter().zip(facts(&found)) {
         if wanted != found {
@@ -86,8 +86,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Reads all layers of `model`, of the last one the first `n_known` classes. Returns
-    /// whether some batch norms were folded.
+    /// Reads all layers of `model`. Of the last layer, only the first `n_known` classes are
+    /// read. Returns whether the file lacks batch norms, because they are folded.
     fn network(&mut self, model: &mut Model, n_known: Option<usize>) -> Result<bool, FormatError> {
         let layers: Vec<LayerMut<'_>> = model.layers();
         let (n, mut is_folded) = (layers.len(), false);
@@ -163,8 +163,8 @@ impl Reader<'_> {
     }
 }
 
-/// Sets all batch norms so that they change nothing on average, from the first layer to
-/// the last, each of which takes what those before it compute.
+/// Sets all batch norms so that they change nothing on average. The layers come in order,
+/// because the inputs of a layer depend on the batch norms before it.
 fn unfold(model: &mut Model, recipe: &Recipe, clouds: &Clouds) {
     let drawn = Recipe { batch: CLOUDS, clouds_per_epoch: Some(CLOUDS), ..recipe.clone() };
     let batch = std::thread::scope(|scope| batches::start(scope, clouds, &drawn, 0).recv());

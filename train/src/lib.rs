@@ -1,9 +1,8 @@
-//! Training of PointNet and its Critical Points Layer, on any CPU.
+//! Trains PointNet and its Critical Points Layer on any CPU.
 //!
-//! Layers compute their own gradients ([`layer`]). A step is a forward and
-//! backward pass of [`network::PointNet`] and a step of [`adam`]. A
-//! [`run::Job`] takes a [`recipe::Recipe`] and clouds to a model file that
-//! infer-cpu reads.
+//! [`run::Job`] trains a network on clouds by a [`recipe::Recipe`], and writes a model file that
+//! infer-cpu reads. A training step is a forward and backward pass of [`network::PointNet`],
+//! whose layers compute their own gradients ([`layer`]), and an update by [`adam::Adam`].
 
 #![deny(unsafe_code)]
 
@@ -15,7 +14,8 @@ pub mod batches;
 pub mod calibration;
 pub mod checkpoint;
 pub mod clouds;
-pub mod cluster;
+mod cluster;
+pub mod cluster_variation;
 pub mod cpl;
 mod draws;
 pub mod error;
@@ -25,6 +25,7 @@ pub mod gumbel;
 pub mod init;
 pub mod layer;
 pub mod lime;
+mod limits;
 pub mod loss;
 pub mod matrix;
 pub mod metrics;
@@ -38,14 +39,15 @@ pub mod parameter;
 pub mod point_encoder;
 pub mod random_baseline;
 pub mod recipe;
+pub mod rows;
 pub mod run;
 pub mod selector;
 pub mod shape;
-mod svg_text;
+mod svg;
 mod t_net;
 pub mod trainer;
 
-/// The README's example is compiled.
+/// Compiles the example of the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,8 +1,8 @@
 //! LIME-3D: which parts of a cloud determined a prediction (Tan and Kotthaus, arXiv
 //! 2107.13459; their code, commit of 2021-08-17).
 //!
-//! Parts are removed at random. A linear model of which parts remain estimates how
-//! much each part adds to the log-probability of the class.
+//! The method removes parts of the cloud at random. A linear model, whose inputs say which
+//! parts remain, then estimates how much each part adds to the log-probability of the class.
 
 use formats::rng::StreamKey;
 use infer_cpu::Classifier;
@@ -12,21 +12,21 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::error::Error;
 
-/// How a cloud is explained.
+/// The settings of an explanation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lime {
-    /// Parts of the cloud.
+    /// Number of parts of the cloud.
     pub clusters: usize,
-    /// Clouds with parts removed, including the whole cloud.
+    /// Number of clouds with parts removed, including the whole cloud.
     pub samples: usize,
-    /// Width of the kernel that weights them.
+    /// Width of the kernel that weights these clouds.
     pub sigma: f64,
     /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl Default for Lime {
-    /// The authors' (`lime_3d`): LIME's default number of samples.
+    /// The authors' settings (`lime_3d`), with LIME's default number of samples.
     fn default() -> Self {
         Self { clusters: 20, samples: 1000, sigma: 0.25, seed: 0 }
     }
@@ -38,32 +38,32 @@ const ROUNDS: usize = 10;
 /// Weight of the ridge.
 const ALPHA: f64 = 1.0;
 
-/// How much each part of a cloud adds to a prediction.
+/// The contribution of each part of a cloud to a prediction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
-    /// The class that is explained, the most probable of the whole cloud.
+    /// The explained class: the most probable class of the whole cloud.
     pub class: usize,
-    /// The part that each point belongs to.
+    /// The part of each point.
     pub cluster: Vec<usize>,
-    /// What each part adds to the class's log-probability.
+    /// The contribution of each part to the log-probability of the class.
     pub attribution: Vec<f64>,
     /// The weighted share of variance that the linear model explains.
     pub r_squared: f64,
 }
 
 impl Explanation {
-    /// The `n` points of the parts that add most, in descending order.
+    /// The `n` points in the parts with the largest contributions, in descending order.
     #[must_use]
     pub fn strongest(&self, n: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.cluster.len()).collect();
-        let of = |i: usize| self.attribution[self.cluster[i]];
-        order.sort_by(|&a, &b| of(b).total_cmp(&of(a)).then(a.cmp(&b)));
+        let worth = |i: usize| self.attribution[self.cluster[i]];
+        order.sort_by(|&a, &b| worth(b).total_cmp(&worth(a)).then(a.cmp(&b)));
         order.truncate(n);
         order
     }
 }
 
-/// Explains the class that `classifier` gives `points`.
+/// Explains the answer of `classifier` to `points`.
 ///
 /// # Errors
 /// A cloud that the classifier refuses.
@@ -87,8 +87,8 @@ pub fn explain(
     Ok(Explanation { class, cluster, attribution, r_squared })
 }
 
-/// k-means whose centres are points of the cloud: first the farthest points, then
-/// the point nearest to each cluster's mean.
+/// k-means whose centres are points of the cloud. The first centres are the farthest points;
+/// in each round a centre moves to the point nearest to its cluster's mean.
 fn clusters(points: &[[f32; 3]], k: usize) -> Vec<usize> {
     let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
     let mut centres = Vec::new();
@@ -112,19 +112,20 @@ fn clusters(points: &[[f32; 3]], k: usize) -> Vec<usize> {
 }
 
 fn nearest(points: &[[f32; 3]], centres: &[[f32; 3]]) -> Vec<usize> {
-    let of = |point: &[f32; 3]| {
+    let nearest_one = |point: &[f32; 3]| {
         let distance = |&c: &usize| squared(point, &centres[c]);
         (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
     };
-    points.iter().map(of).collect()
+    points.iter().map(nearest_one).collect()
 }
 
 fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// Which parts remain in each sample: all in the first, then each with a chance of
-/// one half. A sample without any part is drawn again.
+/// The parts that remain in each sample. All parts remain in the first sample, and each part
+/// remains in another sample with a probability of one half. A sample without parts is drawn
+/// again.
 fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
     let stream = StreamKey::new(lime.seed, "lime", 0);
     let mut n = 0;
@@ -143,15 +144,15 @@ fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
     masks
 }
 
-/// √exp(-d²/σ²) of the cosine distance d from the whole cloud.
+/// The weight √exp(-d²/σ²) of a sample at the cosine distance d from the whole cloud.
 fn weight(mask: &[bool], sigma: f64) -> f64 {
-    let there = mask.iter().filter(|there| **there).count() as f64;
-    let distance = 1.0 - (there / mask.len() as f64).sqrt();
+    let remaining = mask.iter().filter(|remains| **remains).count() as f64;
+    let distance = 1.0 - (remaining / mask.len() as f64).sqrt();
     (-(distance / sigma).powi(2)).exp().sqrt()
 }
 
-/// Weighted ridge regression with an intercept that is not penalised:
-/// coefficients, and R².
+/// Weighted ridge regression with an intercept that is not penalised. Returns the coefficients
+/// and R².
 fn ridge(masks: &[Vec<bool>], answers: &[f64], weights: &[f64]) -> (Vec<f64>, f64) {
     let k = masks[0].len();
     let total: f64 = weights.iter().sum();

@@ -1,4 +1,4 @@
-//! Cross entropy, with its gradient by the logits.
+//! Cross entropy and its gradient with respect to the logits.
 
 use ndarray::parallel::prelude::*;
 
@@ -7,16 +7,16 @@ use crate::matrix::Matrix;
 /// The loss of a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loss {
-    /// What is minimised.
+    /// The minimised sum.
     pub total: f64,
-    /// Mean of ‖T Tᵀ - 1‖ of feature transforms, before its weight.
+    /// The mean of ‖T Tᵀ - 1‖ over feature transforms, without its weight.
     pub orthogonality: f64,
-    /// Clouds whose most probable class has the largest share of the target.
+    /// The number of clouds whose most probable class has the largest share of the target.
     pub correct: usize,
 }
 
-/// The mean cross entropy of `logits` `[clouds, classes]` with `targets` (rows
-/// that sum to 1), and its gradient, which reuses the logits' memory.
+/// The mean cross entropy of `logits` `[clouds, classes]` and `targets`, whose rows sum to 1,
+/// with its gradient, which reuses the memory of the logits.
 #[must_use]
 pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
     let n = logits.nrows() as f64;
@@ -45,7 +45,7 @@ pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
     (Loss { total, correct, ..Loss::default() }, logits)
 }
 
-/// The place of the largest of `values`, the first among equals.
+/// The index of the largest of `values`; of equal values, the first.
 fn argmax(values: &[f32]) -> usize {
     let largest = |best: usize, i: usize| if values[i] > values[best] { i } else { best };
     (0..values.len()).fold(0, largest)

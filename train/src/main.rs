@@ -1,5 +1,5 @@
-//! The program `edgepuck-train`, which `cargo xtask train`, `eval`, `explain`
-//! and `compare-points` start.
+//! The program `edgepuck-train`. The commands `train`, `eval`, `explain` and `compare-points`
+//! of `edgepuck` and `cargo xtask` start it.
 
 mod cli;
 
@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand};
 use cli::{compare_points, eval, explain, serve, train};
 use formats::outcome::{Outcome, exit_code};
 
-/// Trains PointNets and measures them.
+/// Trains PointNets and evaluates them
 #[derive(Parser)]
 #[command(name = "edgepuck-train", version, max_term_width = 100)]
 struct Cli {
@@ -20,16 +20,16 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Train a network
-    Train(train::Args),
+    Train(train::TrainArgs),
     /// Measure a model's accuracy on labelled clouds
-    Eval(eval::Args),
+    Eval(eval::EvalArgs),
     /// Show which points determined a prediction
-    Explain(explain::Args),
+    Explain(explain::ExplainArgs),
     /// Compute the Chamfer distance of two clouds
-    ComparePoints(compare_points::Args),
+    ComparePoints(compare_points::ComparePointsArgs),
     /// Time training steps, for `cargo xtask bench train`
     #[command(hide = true)]
-    Serve(serve::Args),
+    Serve(serve::ServeArgs),
 }
 
 fn main() -> ExitCode {

@@ -1,5 +1,5 @@
-//! Products of matrices on several threads. The order of every sum is the same for
-//! any number of threads.
+//! Products of matrices on several threads. The order of each sum does not depend on the
+//! number of threads.
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::parallel::prelude::*;
@@ -9,10 +9,10 @@ use rayon::slice::ParallelSliceMut;
 /// A matrix, stored row by row.
 pub type Matrix = Array2<f32>;
 
-/// Rows that one thread takes at a time.
+/// Number of rows that one thread takes at a time.
 pub const ROWS: usize = 192;
 
-/// Outputs whose gradients one thread takes at a time.
+/// Number of outputs whose gradients one thread computes at a time.
 const COLUMNS: usize = 64;
 
 /// `x` times `right`.

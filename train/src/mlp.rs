@@ -1,22 +1,23 @@
-//! Stacks of layers: the shared MLP before a pooling, the dense head after it.
+//! Stacks of layers: the shared MLP before a pooling, and the dense head after it.
 
 use ndarray::ArrayView2;
 
-use crate::layer::{HiddenLayer, LayerMut, Linear, Module, PooledLayer, Rows};
+use crate::layer::{HiddenLayer, LayerMut, Linear, Module, PooledLayer};
 use crate::matrix::Matrix;
+use crate::rows::Rows;
 
-/// Hidden layers, each of which takes the output of the one before it.
+/// Hidden layers in sequence.
 #[derive(Clone, Debug)]
 struct Stack(Vec<HiddenLayer>);
 
 impl Stack {
-    /// The input of layer `i`, of which the first takes `x`.
+    /// The input of layer `i`; that of the first layer is `x`.
     fn input<'a>(&'a self, i: usize, x: ArrayView2<'a, f32>) -> ArrayView2<'a, f32> {
         if i == 0 { x } else { self.0[i - 1].base.output() }
     }
 
-    /// Takes `x` through all layers and returns the output of the last. `kept` is
-    /// the dropout mask of the last layer.
+    /// Applies all layers to `x` and returns the output of the last. `kept` is the dropout
+    /// mask of the last layer.
     fn forward<'a>(
         &'a mut self,
         x: ArrayView2<'a, f32>,
@@ -33,7 +34,7 @@ impl Stack {
         self.input(n, x)
     }
 
-    /// Takes the gradient of the output; returns that of `x`, if `wants_input`.
+    /// Propagates the gradient of the output. Returns the gradient of `x` if `wants_input`.
     fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
@@ -58,7 +59,7 @@ impl Stack {
     }
 }
 
-/// Point-wise layers, the last of which is pooled.
+/// Point-wise layers. The last layer is pooled.
 #[derive(Clone, Debug)]
 pub struct SharedMlp {
     hidden: Stack,
@@ -67,7 +68,7 @@ pub struct SharedMlp {
 }
 
 impl SharedMlp {
-    /// `widths` with the inputs first. Layers are named from number `first`.
+    /// Layers of these `widths`, beginning with the inputs. Their numbers begin with `first`.
     pub fn new(prefix: &str, widths: &[usize], first: usize, relu: bool, seed: u64) -> Self {
         let n = widths.len() - 1;
         let size = |i: usize| (widths[i], widths[i + 1]);
@@ -85,7 +86,7 @@ impl SharedMlp {
         self.pooled.forward(x, rows, momentum);
     }
 
-    /// Returns the gradient of `x`, if `wants_input`.
+    /// Propagates the gradient of the output. Returns the gradient of `x` if `wants_input`.
     pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
@@ -114,8 +115,8 @@ pub struct DenseHead {
 }
 
 impl DenseHead {
-    /// `widths` with inputs first and outputs last. Batch norms are numbered
-    /// after those of `n_points` point-wise layers.
+    /// Layers of these `widths`, from the inputs to the outputs. The numbers of the batch
+    /// norms follow those of `n_points` point-wise layers.
     pub fn new(prefix: &str, widths: &[usize], n_points: usize, seed: u64) -> Self {
         let n = widths.len() - 1;
         let hidden = widths.windows(2).take(n - 1).zip(1..).map(|(pair, i)| {
@@ -126,7 +127,7 @@ impl DenseHead {
         Self { hidden: Stack(hidden.collect()), last }
     }
 
-    /// `kept` is the dropout mask of the last layer but one.
+    /// Applies all layers to `x`. `kept` is the dropout mask of the last hidden layer.
     pub fn forward(
         &mut self,
         x: ArrayView2<'_, f32>,
@@ -141,10 +142,10 @@ impl DenseHead {
         let ones = vec![1.0; x.nrows()];
         let dy = self.last.backward(self.hidden.input(self.hidden.0.len(), x), dz);
         let dx = self.hidden.backward(x, dy, Rows::new(&ones, &[]), true);
-        dx.expect("invariant: it was asked for")
+        dx.expect("invariant: `wants_input` is true")
     }
 
-    /// How many features the last hidden layer has; none without such a layer.
+    /// The number of features of the last hidden layer, if there is one.
     pub fn hidden_width(&self) -> Option<usize> {
         self.hidden.0.last().map(|layer| layer.base.output.ncols())
     }

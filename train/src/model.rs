@@ -1,4 +1,4 @@
-//! A network, perhaps behind a Critical Points Layer.
+//! A network with its optional Critical Points Layer.
 
 use crate::batch::Batch;
 use crate::layer::{LayerMut, Module};
@@ -7,18 +7,18 @@ use crate::matrix::Matrix;
 use crate::network::{PointNet, Rates};
 use crate::point_encoder::PointEncoder;
 
-/// A network, perhaps behind a point encoder.
+/// A network with its optional point encoder.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// What chooses points.
+    /// Selects the points for the network.
     pub encoder: Option<PointEncoder>,
-    /// What classifies them.
+    /// Classifies the selected points.
     pub network: PointNet,
 }
 
 impl Model {
-    /// Takes a batch forward and backward: gradients are left in the
-    /// parameters.
+    /// Runs the forward and backward pass of a batch, which sets the gradients of the
+    /// parameters. `kept` is the dropout mask.
     pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
         let Some(encoder) = &mut self.encoder else {
             return self.network.learn(batch, kept, rates);

@@ -1,4 +1,4 @@
-//! Model files for infer-cpu, of networks in training.
+//! Writes networks in training to model files for infer-cpu, and reads them.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::layer::Module;
 use crate::point_encoder::TRAINING_ONLY;
 
-/// Parameters and running statistics by name.
+/// The parameters and running statistics of `network` by name.
 #[must_use]
 pub fn tensors(network: &mut dyn Module) -> BTreeMap<String, Tensor> {
     let mut tensors = BTreeMap::new();
@@ -25,21 +25,21 @@ pub fn tensors(network: &mut dyn Module) -> BTreeMap<String, Tensor> {
     tensors
 }
 
-/// Writes the weights of `network` to `path` as they are trained, atomically.
+/// Writes the weights and batch norms of `network` to `path` in f32, atomically.
 ///
 /// # Errors
-/// What the system reports.
+/// A file that cannot be written.
 pub fn write(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<(), Error> {
     let mut tensors = tensors(network);
     tensors.retain(|name, _| !name.starts_with(TRAINING_ONLY));
     Ok(write_weights(path, &tensors, &card.to_metadata())?)
 }
 
-/// Sets `network` to the weights that [`write()`] wrote to `path`. Parameters
-/// that the file leaves out keep their values.
+/// Sets `network` to the weights that [`write()`] wrote to `path`. Parameters that serve only
+/// training keep their values.
 ///
 /// # Errors
-/// A file that is not a model, or a model of another shape.
+/// A file that is not a model; a model of another shape.
 pub fn read(path: &Path, network: &mut dyn Module) -> Result<(), Error> {
     let mut file = WeightsFile::open(path)?;
     for parameter in network.parameters() {
@@ -54,7 +54,7 @@ pub fn read(path: &Path, network: &mut dyn Module) -> Result<(), Error> {
 /// Sets `values` to the tensor `name` of `file`.
 ///
 /// # Errors
-/// A tensor that is missing, cannot be read or has another number of elements.
+/// A tensor that is missing, that cannot be read or that has another number of elements.
 pub fn read_into(
     file: &mut WeightsFile,
     name: &str,
@@ -69,11 +69,11 @@ pub fn read_into(
     Ok(())
 }
 
-/// Writes `network` to `path` for release, atomically: in f16, with the batch
-/// norms folded into the linear layers.
+/// Writes `network` to `path` for release, in f16 and with the batch norms folded into the
+/// linear layers, atomically.
 ///
 /// # Errors
-/// A weight that f16 cannot hold; what the system reports.
+/// A weight that f16 cannot hold; a file that cannot be written.
 pub fn ship(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<(), Error> {
     let mut tensors = BTreeMap::new();
     for layer in network.folded() {

@@ -1,6 +1,6 @@
-//! Clouds of nothing in particular, for the class `unknown`. No score of a network that
-//! has met objects alone tells them: to it, flat ground is a keyboard for certain. They
-//! have to be learnt (outlier exposure: Hendrycks et al. 2019).
+//! Training clouds for the class `unknown` that show no object (outlier exposure: Hendrycks
+//! et al. 2019). No score of a network that was trained only on objects separates them from
+//! objects: such a network takes flat ground for a keyboard with high confidence.
 
 use formats::labelled::LabelledSet;
 use formats::rng::StreamKey;
@@ -9,17 +9,17 @@ use crate::clouds::Clouds;
 use crate::draws::Draws;
 use crate::recipe::Recipe;
 
-/// Points of a negative that is made of nothing else.
+/// Number of points of a negative that contains no object.
 const POINTS: usize = 1024;
 
 formats::named! {
     /// Kinds of negatives.
     pub enum Negative: "kind of negative" {
-        /// A patch of ground, rough or in a scanner's lines.
+        /// A patch of ground, perhaps in scan lines.
         Ground = "ground",
-        /// The same upright, in any direction.
+        /// Such a patch, upright, at a random azimuth.
         Wall = "wall",
-        /// One to three clouds without a surface.
+        /// One to three normal or uniform clouds.
         Blob = "blob",
         /// Two objects in one cloud.
         Pair = "pair",
@@ -28,8 +28,8 @@ formats::named! {
     }
 }
 
-/// `clouds`, followed by as many negatives as `recipe` asks for: the same for the same
-/// seed, `purpose` and `index`.
+/// `clouds`, followed by the number of negatives that `recipe` wants. The negatives depend only
+/// on the clouds, the seed, `purpose` and `index`.
 #[must_use]
 pub fn added(clouds: Clouds, recipe: &Recipe, purpose: &str, index: u32) -> Clouds {
     let n = (recipe.negatives * clouds.len() as f64) as usize;
@@ -37,7 +37,7 @@ pub fn added(clouds: Clouds, recipe: &Recipe, purpose: &str, index: u32) -> Clou
     if n == 0 {
         return Clouds { classes, ..clouds };
     }
-    // Remarks on each cloud would lack those on negatives.
+    // Negatives have no remarks.
     let LabelledSet { points, offsets, labels, .. } = clouds.set.clone();
     let mut set = LabelledSet { points, offsets, labels, ..LabelledSet::default() };
     for (number, kind) in Negative::ALL.into_iter().cycle().enumerate().take(n) {
@@ -47,8 +47,8 @@ pub fn added(clouds: Clouds, recipe: &Recipe, purpose: &str, index: u32) -> Clou
     Clouds { set, classes }
 }
 
-/// A negative in the unit sphere, z up, drawn from `stream`. `clouds` are objects of the
-/// unit sphere, some of which pairs and slivers are of.
+/// Draws a negative in the unit sphere, z up, from `stream`. Pairs and slivers are made of
+/// `clouds`, which are objects in the unit sphere.
 #[must_use]
 pub fn negative(kind: Negative, clouds: &Clouds, stream: StreamKey) -> Vec<[f32; 3]> {
     let draws = &mut Draws::new(stream);
@@ -64,8 +64,8 @@ pub fn negative(kind: Negative, clouds: &Clouds, stream: StreamKey) -> Vec<[f32;
     normalized
 }
 
-/// A rough, perhaps sloping rectangle or ellipse, any way round; half of them in lines,
-/// as a scanner sees the ground.
+/// A rough, perhaps sloping rectangle or ellipse at a random azimuth. The points of every
+/// second patch lie in lines, like a scan of the ground.
 fn patch(draws: &mut Draws) -> Vec<[f64; 3]> {
     let width = draws.between(0.3, 1.0);
     let is_round = draws.unit() < 0.5;
@@ -107,7 +107,7 @@ fn blob(draws: &mut Draws) -> Vec<[f64; 3]> {
     (0..POINTS).map(point).collect()
 }
 
-/// Two objects on one floor, side by side, of which one may be the smaller.
+/// Two objects side by side on one floor. The second is scaled by 0.5 to 1.
 fn pair(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
     let (apart, angle) = (draws.between(1.0, 2.2), draws.between(0.0, std::f64::consts::TAU));
     let scale = draws.between(0.5, 1.0);
@@ -137,7 +137,7 @@ fn object(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
     cloud.iter().map(|point| point.map(f64::from)).collect()
 }
 
-/// `points`, turned about z by any angle.
+/// Rotates `points` about z by a random angle.
 fn turned(points: impl Iterator<Item = [f64; 3]>, draws: &mut Draws) -> Vec<[f64; 3]> {
     let (sin, cos) = draws.between(0.0, std::f64::consts::TAU).sin_cos();
     points.map(|[x, y, z]| [cos * x - sin * y, sin * x + cos * y, z]).collect()

@@ -1,7 +1,7 @@
 //! PointNet for classification, forward and backward.
 //!
-//! Names of parameters are those of yanx27's `pointnet_cls`, which infer-cpu
-//! reads: `feat.stn.conv1.weight`, `feat.fstn.bn4.bias`, `fc3.weight`, ….
+//! The names of parameters are those of yanx27's `pointnet_cls`, which infer-cpu reads, such as
+//! `feat.stn.conv1.weight`, `feat.fstn.bn4.bias` and `fc3.weight`.
 
 use ndarray::{ArrayView2, Axis, s};
 
@@ -17,9 +17,9 @@ use crate::t_net::TNet;
 /// The settings of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// Share of a batch in the running statistics.
+    /// The share of a batch in the running statistics.
     pub momentum: f32,
-    /// Weight of the feature transform's regulariser.
+    /// The weight of the feature transform's regulariser.
     pub orthogonality: f32,
     /// The step's number, which keys the noise of a relaxed selection.
     pub step: u64,
@@ -29,7 +29,7 @@ pub struct Rates {
 #[derive(Clone, Debug)]
 pub struct PointNet {
     stn: Option<TNet>,
-    /// Selects points by the coordinates' T-Net, if `cpl.shared` is set.
+    /// Selects points by the input T-Net, if `cpl.shared` is set.
     selector: Option<CriticalPointSelector>,
     edges: Vec<EdgeLayer>,
     stem: HiddenLayer,
@@ -39,7 +39,7 @@ pub struct PointNet {
 }
 
 impl PointNet {
-    /// A network of random weights for `n_classes`.
+    /// A network with random weights for `n_classes` classes.
     ///
     /// # Panics
     /// If `shape` has fewer than two layers before a pooling.
@@ -68,20 +68,20 @@ impl PointNet {
         }
     }
 
-    /// Lets the coordinates' T-Net select the points that the other layers see.
+    /// Selects the points for the other layers by the input T-Net.
     pub fn select_by_t_net(&mut self, selector: CriticalPointSelector) {
         self.selector = Some(selector);
     }
 
-    /// Takes a batch forward and backward, and leaves the gradients in the
+    /// Runs the forward and backward pass of a batch, which sets the gradients of the
     /// parameters. `kept` is the dropout mask, `[clouds, last hidden width]`.
     pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
         self.learn_points(batch, kept, rates, false).0
     }
 
-    /// As [`PointNet::learn`]; also returns the gradient of the points'
-    /// coordinates, if `wants_points`: the part that flows through the trunk and
-    /// the T-Nets, without that of the neighborhoods.
+    /// Does the same as [`PointNet::learn`]. If `wants_points`, also returns the gradient of
+    /// the points' coordinates through the trunk and the T-Nets, without the part through the
+    /// neighborhoods.
     pub fn learn_points(
         &mut self,
         batch: &Batch,
@@ -112,7 +112,7 @@ impl PointNet {
         let (mut loss, dlogits) = loss::cross_entropy(logits, &batch.targets);
         let dpooled = self.head.backward(pooled.view(), dlogits.view());
         let dfeatures = self.trunk.backward(features, dpooled, rows, true);
-        let mut dstem = dfeatures.expect("invariant: it was asked for");
+        let mut dstem = dfeatures.expect("invariant: `wants_input` is true");
         if let Some(fstn) = &mut self.fstn {
             let (norm, own) = orthogonality(&fstn.transforms);
             loss.orthogonality = norm;
@@ -120,7 +120,7 @@ impl PointNet {
             let (mut elements, through) = fstn.transforms.backward(stem.view(), dstem.view(), rows);
             elements += &(own * rates.orthogonality);
             let predicted = fstn.backward(stem.view(), &elements, rows, true);
-            dstem = through + predicted.expect("invariant: it was asked for");
+            dstem = through + predicted.expect("invariant: `wants_input` is true");
         }
         let dz = self.stem.backward(entry, dstem, rows);
         if self.stn.is_none() && self.edges.is_empty() && !wants_points {
@@ -137,7 +137,8 @@ impl PointNet {
         let dpoints = match &mut self.stn {
             Some(stn) => {
                 let (elements, through) = stn.transforms.backward(x, dtransformed.view(), rows);
-                // A selection, which sees all points, has no gradient of theirs.
+                // The T-Net of a selection takes all points, so that its gradient is not that
+                // of the selected points.
                 let wanted = wants_points && selection.is_none();
                 let predicted = stn.backward(whole.points(), &elements, whole.rows(), wanted);
                 predicted.map(|predicted| through + predicted)
@@ -147,16 +148,16 @@ impl PointNet {
         (loss, dpoints.filter(|_| wants_points))
     }
 
-    /// Lets the coordinates' T-Net predict its transforms from all points; returns
-    /// those that it selects, if it does.
+    /// Predicts the transforms of the input T-Net from all points. Returns the points that it
+    /// selects, if it is the encoder of a Critical Points Layer.
     fn select(&mut self, whole: &Batch, rates: Rates) -> Option<Selection> {
         let stn = self.stn.as_mut()?;
         stn.predict(whole.points(), whole.rows(), rates.momentum);
         Some(self.selector?.select(&stn.points.pooled, whole, rates.step))
     }
 
-    /// The coordinates `[rows, 3]` followed by the EdgeConv features of each
-    /// point; none if the network has no EdgeConv layer.
+    /// The coordinates `[rows, 3]` followed by the EdgeConv features of each point. `None` if
+    /// the network has no EdgeConv layer.
     fn edge_features(
         &mut self,
         batch: &Batch,
@@ -172,8 +173,8 @@ impl PointNet {
         Some(ndarray::concatenate(Axis(1), &parts).expect("invariant: a row for each point"))
     }
 
-    /// The width of the dropout mask; none without a hidden layer after the
-    /// trunk's pooling.
+    /// The width of the dropout mask. `None` if there is no hidden layer after the trunk's
+    /// pooling.
     #[must_use]
     pub fn dropout_width(&self) -> Option<usize> {
         self.head.hidden_width()

@@ -1,21 +1,21 @@
-//! Learnt arrays.
+//! Arrays that are learnt.
 
 use ndarray::ArrayView2;
 
 /// An array that is learnt, with its gradient and the optimiser's moments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Its name in model files and checkpoints.
+    /// The name in model files and checkpoints.
     pub name: String,
-    /// Its shape there.
+    /// The shape in model files and checkpoints.
     pub shape: Vec<usize>,
-    /// Its elements in C order.
+    /// The elements in C order.
     pub value: Vec<f32>,
-    /// The loss's derivative by each.
+    /// The derivative of the loss with respect to each element.
     pub gradient: Vec<f32>,
-    /// Adam's running mean of gradients.
+    /// Adam's running mean of the gradients.
     pub mean: Vec<f32>,
-    /// Adam's running mean of their squares.
+    /// Adam's running mean of the squared gradients.
     pub square: Vec<f32>,
 }
 
@@ -28,7 +28,7 @@ impl Parameter {
         Self { name, shape, value, gradient, mean, square }
     }
 
-    /// A matrix of weights `[outputs, inputs]`.
+    /// The weights as a matrix, `[outputs, inputs]`.
     ///
     /// # Panics
     /// If the parameter is not a matrix.

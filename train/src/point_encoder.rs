@@ -1,13 +1,12 @@
-//! The point encoder of a Critical Points Layer, trained together with the
-//! network behind it.
+//! The point encoder of a Critical Points Layer, which is trained together with the network
+//! after it.
 //!
-//! The selection of points has no derivative: no gradient of the network's loss
-//! reaches the encoder, unless the selection is relaxed ([`crate::gumbel`]).
-//! Therefore the encoder has a loss of its own: its pooled features go through
-//! one linear layer to the classes. That layer is used in training only.
-//! Its gradient flows back through the maximum to the points that won channels,
-//! and these are the critical points. A trained encoder can be used alone, as a
-//! sampler. infer-cpu's own code ranks and resizes the selection.
+//! The selection of points has no derivative, so that the gradient of the network's loss does
+//! not reach the encoder, unless the selection is relaxed ([`crate::gumbel`]). Therefore the
+//! encoder has its own classification loss: in training, a linear layer classifies its pooled
+//! features. The gradient of this loss flows through the maximum to the points that won
+//! channels, which are the critical points. A trained encoder can also serve alone, as a
+//! sampler. The code of infer-cpu ranks and resizes the selection.
 
 use crate::batch::Batch;
 use crate::cpl::Cpl;
@@ -18,7 +17,7 @@ use crate::mlp::SharedMlp;
 use crate::network::Rates;
 use crate::selector::{CriticalPointSelector, Selection};
 
-/// The prefix of the parameters that model files leave out.
+/// The prefix of the parameters that only training needs. Model files leave them out.
 pub const TRAINING_ONLY: &str = "cpl.classes";
 
 /// A point encoder in training.
@@ -31,7 +30,7 @@ pub struct PointEncoder {
 }
 
 impl PointEncoder {
-    /// A point encoder of random weights.
+    /// A point encoder with random weights.
     ///
     /// # Errors
     /// An unknown rule of resizing.
@@ -52,8 +51,8 @@ impl PointEncoder {
         self.selector.select(&self.mlp.pooled, batch, rates.step)
     }
 
-    /// Takes the gradients of its own loss, which it returns, and of the selected
-    /// points' coordinates, where the selection has a gradient.
+    /// Runs the backward pass of the encoder's own loss, which it returns. `dpoints` is the
+    /// gradient of the selected points' coordinates, if the selection has a gradient.
     pub fn backward(
         &mut self,
         batch: &Batch,

@@ -1,4 +1,4 @@
-//! The distance of a choice of points to a reference, compared with that of random
+//! Compares the distance between chosen points and reference points with that of random
 //! choices of the same size.
 
 use formats::chamfer::{Chamfer, chamfer};
@@ -8,17 +8,17 @@ use infer_cpu::sampler::RandomSubset;
 /// Chamfer distances to the same reference points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RandomBaseline {
-    /// The distance of the choice.
+    /// The distance of the chosen points.
     pub ours: Chamfer,
     /// The distances of random subsets, ascending by squared distance.
     pub random: Vec<Chamfer>,
 }
 
 impl RandomBaseline {
-    /// Compares `chosen` with `reference`, both indices into `points`, and with
-    /// `draws` random subsets by `seed`.
+    /// Computes the distances to `reference` of `chosen`, and of `draws` random subsets. Both
+    /// arguments are indices into `points`.
     #[must_use]
-    pub fn of(
+    pub fn new(
         points: &[[f32; 3]],
         (chosen, reference): (&[usize], &[usize]),
         draws: u32,
@@ -40,7 +40,7 @@ impl RandomBaseline {
         Self { ours, random }
     }
 
-    /// How many random subsets are nearer.
+    /// The number of random subsets that are nearer than the choice.
     #[must_use]
     pub fn nearer(&self) -> usize {
         self.random.iter().filter(|one| one.squared < self.ours.squared).count()

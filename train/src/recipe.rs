@@ -1,6 +1,5 @@
-//! The recipe of a run, a TOML file. Every key has a default: the baseline's
-//! (yanx27/Pointnet_Pointnet2_pytorch, `train_classification.py`,
-//! `provider.py`).
+//! The recipe of a run: a TOML file. The default of every key is the baseline's setting
+//! (yanx27/Pointnet_Pointnet2_pytorch, `train_classification.py`, `provider.py`).
 
 use std::path::{Path, PathBuf};
 
@@ -10,80 +9,82 @@ use infer_cpu::UNKNOWN;
 use serde::{Deserialize, Serialize};
 
 use crate::adam::Adam;
-use crate::cluster::ClusterVariation;
+use crate::cluster_variation::ClusterVariation;
 use crate::cpl::Cpl;
 use crate::error::Error;
+use crate::limits::{Check, layers, non_negative, positive, share, share_below_1, widths};
 use crate::shape::{Edge, Shape};
 
-/// How a network is trained.
+/// The settings of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Recipe {
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Model file whose weights training starts from; random numbers if absent.
+    /// Model file from whose weights training starts. If absent, training starts from random
+    /// numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub init: Option<PathBuf>,
-    /// Passes over the training set.
+    /// Number of passes over the training set.
     pub epochs: u32,
-    /// Clouds of a batch; an incomplete batch at an epoch's end is left out.
+    /// Number of clouds of a batch. An incomplete batch at the end of an epoch is left out.
     pub batch: usize,
-    /// Points that the network sees.
+    /// Number of points of a cloud for the network.
     pub points: usize,
-    /// How those points are chosen from a cloud that has more.
+    /// The choice of these points from a cloud that has more.
     pub sampling: Sampling,
-    /// How clouds are moved and scaled: `unit-sphere`, or `metric` and
-    /// `metric-sight` for clusters in
-    /// metres, z up, with the sensor at the origin, of any number of points.
+    /// The normalisation of clouds: `unit-sphere`, or `metric` or `metric-sight` for clusters
+    /// of any number of points in metres, z up, with the sensor at the origin.
     #[serde(with = "by_name", skip_serializing_if = "is_default")]
     pub normalization: Normalization,
-    /// How evenly an epoch's clouds are drawn from the classes: 0 as they come, 1 as
-    /// many of each, and between these a class of n in proportion to n^(1 - balance).
+    /// The balance of the classes in an epoch. The share of a class of n clouds is in
+    /// proportion to n^(1 - balance): with 0 as in the data, with 1 equal for all classes.
     #[serde(skip_serializing_if = "is_default")]
     pub balance: f64,
-    /// Clouds that are drawn for an epoch; as many as the training set has if absent.
+    /// Number of clouds that are drawn for an epoch. If absent, it is the size of the training
+    /// set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clouds_per_epoch: Option<usize>,
-    /// The classes that the model answers as `unknown`. The temperature of its
-    /// confidences is then fitted to the validation set.
+    /// The classes that the model answers as `unknown`. If there are any, the temperature of
+    /// its confidences is fitted to the validation set.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unknown: Vec<String>,
-    /// The model answers `unknown`, too, to clouds whose energy is above that of this
-    /// share of the validation clouds that it finds to be of its other classes; to no
-    /// others if absent.
+    /// The model also answers `unknown` if a cloud's energy is above a limit. The limit keeps
+    /// this share of the validation clouds of known classes for which the model finds a known
+    /// class. If absent, there is no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep_known: Option<f64>,
-    /// Clouds of nothing in particular that are made for each epoch, over the clouds of
-    /// the data: patches of ground, walls, blobs, pairs and slivers of objects. Their
-    /// class, `unknown`, comes after those of the data.
+    /// Number of clouds without an object that are made for each epoch, as a ratio to the
+    /// number of clouds in the data. They are patches of ground, walls, blobs, pairs and
+    /// slivers of objects. Their class, `unknown`, follows the classes of the data.
     #[serde(skip_serializing_if = "is_default")]
     pub negatives: f64,
-    /// The model drops outliers before it samples (infer-cpu's `outliers`), and so does
-    /// its training, for clouds of the unit sphere.
+    /// Whether the model drops outliers before it samples a cloud in the unit sphere. Training
+    /// then drops them, too.
     #[serde(skip_serializing_if = "is_default")]
     pub outlier_filter: bool,
-    /// Share of the training set's instances that choose the checkpoint; with 0
-    /// the last checkpoint is taken.
+    /// Share of the training set's instances that are held out to choose the checkpoint. With
+    /// 0, the last checkpoint is chosen.
     pub validation: f64,
     /// The network's layers.
     pub network: Shape,
-    /// A Critical Points Layer before the network, which then sees `points`.
+    /// A Critical Points Layer before the network. The layer then takes `points` points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cpl: Option<Cpl>,
-    /// Share of the last hidden layer's features that are dropped.
+    /// Share of the features of the last hidden layer that are dropped.
     pub dropout: f64,
     /// Weight of the feature transform's regulariser.
     pub orthogonality: f64,
-    /// Share of the target that is spread over all classes.
+    /// Share of the target that is distributed over all classes.
     pub label_smoothing: f64,
     /// The optimiser.
     pub adam: Adam,
-    /// How the learning rate falls.
+    /// The schedule of the learning rate.
     pub schedule: Schedule,
-    /// How clouds are augmented.
+    /// The augmentation of clouds.
     pub augment: Augment,
-    /// How clusters in metres are varied before that. Clouds of the unit sphere may have
-    /// its density and strays, whose reach is then in radii.
+    /// The variation of clusters in metres before the augmentation. For clouds in the unit
+    /// sphere, only density and strays apply, with the reach in radii.
     #[serde(skip_serializing_if = "is_default")]
     pub clusters: ClusterVariation,
 }
@@ -122,12 +123,12 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
 fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
-/// Values that files call by their names.
+/// Values that files state by name.
 mod by_name {
     use std::fmt::Display;
     use std::str::FromStr;
@@ -148,36 +149,36 @@ mod by_name {
     }
 }
 
-/// Which points of a cloud are taken.
+/// The choice of points from a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
-    /// The first, as the baseline's loader.
+    /// The first points, like the baseline's loader.
     First,
-    /// Drawn without replacement, anew in each epoch.
+    /// Points drawn without replacement, anew in each epoch.
     Random,
     /// Farthest point sampling of a random half or more of the cloud, anew in
     /// each epoch.
     Fps,
 }
 
-/// How the learning rate falls.
+/// The schedule of the learning rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
 pub enum Schedule {
-    /// By a factor every so many epochs (PyTorch's `StepLR`).
+    /// Multiplies the rate by a factor at regular intervals (PyTorch's `StepLR`).
     Step {
-        /// Epochs between.
+        /// Epochs between two steps.
         every: u32,
         /// The factor.
         factor: f64,
     },
-    /// Along half a cosine to `last` of the first rate, after epochs of linear
-    /// growth (Loshchilov and Hutter 2017).
+    /// Raises the rate linearly, and then lowers it along half a cosine (Loshchilov and Hutter
+    /// 2017).
     Cosine {
-        /// Epochs of growth.
+        /// Epochs of linear growth.
         warm_up: f64,
-        /// The last rate over the first.
+        /// The ratio of the last rate to the first.
         last: f64,
     },
 }
@@ -189,13 +190,12 @@ impl Default for Schedule {
 }
 
 impl Schedule {
-    /// The rate divided by the first rate, `progress` epochs into a run of
-    /// `epochs`.
+    /// The ratio of the rate to the first rate, `progress` epochs into a run of `epochs`.
     #[must_use]
     pub fn factor(self, progress: f64, epochs: u32) -> f64 {
         match self {
-            // The baseline steps its scheduler before its first epoch, so that
-            // the rate falls a whole epoch early.
+            // The baseline steps its scheduler before the first epoch, so that the rate falls
+            // one epoch early.
             Self::Step { every, factor } => {
                 factor.powi(((progress.floor() as u32 + 1) / every.max(1)) as i32)
             }
@@ -209,44 +209,44 @@ impl Schedule {
     }
 }
 
-/// How clouds are augmented in training. A value of 0 switches its step off.
+/// The augmentation of clouds in training. A value of 0 disables its step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Augment {
-    /// The largest share of points that are dropped; each cloud's share is
-    /// uniform below it.
+    /// Largest share of points that are dropped. Each cloud's share is uniform from 0 to this
+    /// value.
     pub drop: f64,
-    /// The range of the scale, which is uniform.
+    /// Smallest and largest scale. The scale is uniform.
     pub scale: [f64; 2],
-    /// The largest shift along each axis.
+    /// Largest shift along each axis.
     pub shift: f64,
-    /// Standard deviation of a normal shift of each point.
+    /// Standard deviation of the normal shift of each point.
     pub jitter: f64,
-    /// Where jitter is clipped.
+    /// Limit to which jitter is clipped.
     pub jitter_clip: f64,
-    /// Standard deviation of a sensor's error, along the ray to each point, for
-    /// a sensor 3 radii away and 20 degrees above, from any side; for clusters in
-    /// metres, the sensor at the origin.
+    /// Standard deviation of the sensor's error along the ray to each point. The sensor is at
+    /// a distance of 3 radii, an elevation of 20 degrees and a random azimuth; for clusters in
+    /// metres, it is at the origin.
     pub sensor_noise: f64,
-    /// The largest angle about the up axis, degrees; 180 is any.
+    /// Largest angle of rotation about the up axis, degrees.
     pub rotate_degrees: f64,
-    /// Share of clouds that are turned; the others keep the direction that they have in
-    /// the data, which a network of aligned shapes does better with.
+    /// Share of clouds that are rotated. The others keep their direction in the data, with
+    /// which a network of aligned shapes is more accurate.
     #[serde(skip_serializing_if = "is_one")]
     pub rotate_share: f64,
     /// The up axis: x, y or z.
     pub up: Axis,
-    /// Each axis is stretched by a factor that is uniform in 1 ± this.
+    /// Largest difference from 1 of the uniform factor that stretches each axis.
     pub stretch: f64,
-    /// Share of clouds of which a part is replaced by another cloud's
-    /// (PointCutMix-R: Zhang et al. 2022).
+    /// Share of clouds in which a part is replaced by points of another cloud (PointCutMix-R:
+    /// Zhang et al. 2022).
     pub cut_mix: f64,
 }
 
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[allow(missing_docs, reason = "the names say all")]
+#[allow(missing_docs, reason = "the names suffice")]
 pub enum Axis {
     X,
     Y,
@@ -275,7 +275,7 @@ impl Recipe {
     /// Reads the recipe at `path`.
     ///
     /// # Errors
-    /// A file that is not TOML or has unknown keys; as [`Recipe::check`].
+    /// A file that is not TOML or has unknown keys; the errors of [`Recipe::check`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
         let recipe: Self = toml::from_str(&text)
@@ -284,63 +284,58 @@ impl Recipe {
         Ok(recipe)
     }
 
-    /// The recipe as TOML, every default spelled out.
+    /// The recipe as TOML, with all defaults.
     ///
     /// # Errors
-    /// [`Error::Recipe`] with what TOML cannot hold.
+    /// [`Error::Recipe`] for a value that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, Error> {
         toml::to_string(self)
             .map_err(|error| Error::Recipe { key: "recipe", cause: error.to_string() })
     }
 
-    /// Whether the model's card gets a temperature, and perhaps a largest energy,
-    /// that are fitted to the validation set.
+    /// Whether a temperature, and perhaps a largest energy, are fitted to the validation set.
     #[must_use]
     pub fn is_calibrated(&self) -> bool {
         !self.unknown.is_empty() || self.keep_known.is_some()
     }
 
-    /// Whether clouds of the unit sphere are varied before points are chosen.
+    /// Whether clouds in the unit sphere are varied before the choice of points.
     #[must_use]
     pub fn varies_objects(&self) -> bool {
         let is_unit = self.normalization == Normalization::UnitSphere;
         is_unit && (self.outlier_filter || !is_default(&self.clusters))
     }
 
-    /// The network's classes, for data of the classes `of_data`.
+    /// The network's classes for data with the classes `data_classes`.
     #[must_use]
-    pub fn classes(&self, of_data: &[String]) -> Vec<String> {
+    pub fn classes(&self, data_classes: &[String]) -> Vec<String> {
         let own = (self.negatives > 0.0).then(|| UNKNOWN.to_owned());
-        of_data.iter().cloned().chain(own).collect()
+        data_classes.iter().cloned().chain(own).collect()
     }
 
-    /// Checks that every value is in its range.
+    /// Checks that every value is within its limits.
     ///
     /// # Errors
     /// [`Error::Recipe`] with the key.
     pub fn check(&self) -> Result<(), Error> {
-        const SHARE: &str = "expected 0 or more, and less than 1";
-        const WIDTHS: &str = "expected widths of 1 to 8192";
-        let share = |x: f64| (0.0..1.0).contains(&x);
-        let width = |width: usize| (1..=WIDEST).contains(&width);
-        let Self { network, augment, adam, clusters, .. } = self;
+        let Self { network, augment, clusters, .. } = self;
         let is_metric = self.normalization.is_metric();
         let radius = |edge: &Edge| edge.radius.is_normal() && edge.radius > 0.0;
-        let mut checks = vec![
+        let mut checks: Vec<Check> = vec![
             (self.epochs > 0, "epochs", "expected 1 or more"),
             (self.batch > 1, "batch", "expected 2 or more clouds, for the batch norms"),
             (self.points > 0, "points", "expected 1 or more"),
-            (share(self.validation), "validation", SHARE),
-            (share(self.dropout), "dropout", SHARE),
-            (share(self.label_smoothing), "label_smoothing", SHARE),
-            ((0.0..=1.0).contains(&self.balance), "balance", "expected 0 to 1"),
-            (finite(self.orthogonality), "orthogonality", FINITE),
-            (finite(adam.rate) && adam.rate > 0.0, "adam.rate", "expected a finite number above 0"),
-            (network.trunk.len() > 1, "network.trunk", "expected 2 layers or more"),
-            (network.t_net.len() > 1, "network.t_net", "expected 2 layers or more"),
-            (!network.t_net_head.is_empty(), "network.t_net_head", "expected 1 layer or more"),
-            (!network.head.is_empty(), "network.head", "expected 1 layer or more"),
-            (network.widths().all(width), "network", WIDTHS),
+            share_below_1("validation", self.validation),
+            share_below_1("dropout", self.dropout),
+            share_below_1("label_smoothing", self.label_smoothing),
+            share("balance", self.balance),
+            non_negative("orthogonality", self.orthogonality),
+            positive("adam.rate", self.adam.rate),
+            layers("network.trunk", network.trunk.len(), 2),
+            layers("network.t_net", network.t_net.len(), 2),
+            layers("network.t_net_head", network.t_net_head.len(), 1),
+            layers("network.head", network.head.len(), 1),
+            widths("network", network.widths()),
             (
                 network.edges.iter().all(radius),
                 "network.edges.radius",
@@ -354,8 +349,8 @@ impl Recipe {
         ];
         if let Some(cpl) = &self.cpl {
             checks.extend([
-                (cpl.front.len() > 1, "cpl.front", "expected 2 layers or more"),
-                (cpl.front.iter().copied().all(width), "cpl.front", WIDTHS),
+                layers("cpl.front", cpl.front.len(), 2),
+                widths("cpl.front", cpl.front.iter().copied()),
                 ((1..=self.points).contains(&cpl.keep), "cpl.keep", "expected 1 to `points`"),
                 (
                     !cpl.shared || network.input_transform,
@@ -368,7 +363,7 @@ impl Recipe {
                     "cpl.gumbel",
                     "expected `cpl.resize` to be truncate, because each point is drawn once",
                 ),
-                (finite(cpl.weight), "cpl.weight", FINITE),
+                non_negative("cpl.weight", cpl.weight),
             ]);
         }
         checks.extend([
@@ -387,7 +382,7 @@ impl Recipe {
                 "outlier_filter",
                 "expected false with `normalization` metric, where it was not measured to help",
             ),
-            (finite(self.negatives), "negatives", FINITE),
+            non_negative("negatives", self.negatives),
             (
                 self.negatives <= 0.0 || !is_metric && self.unknown == [UNKNOWN],
                 "negatives",
@@ -405,26 +400,24 @@ impl Recipe {
             ),
         ]);
         checks.extend(clusters.checks());
-        let positive = |x: &f64| x.is_finite() && *x > 0.0;
-        let angle = augment.rotate_degrees;
         checks.extend([
-            (share(augment.drop), "augment.drop", SHARE),
+            share_below_1("augment.drop", augment.drop),
             (
-                augment.scale.iter().all(positive),
+                augment.scale.iter().all(|factor| factor.is_finite() && *factor > 0.0),
                 "augment.scale",
                 "expected two finite factors above 0",
             ),
-            (finite(augment.shift), "augment.shift", FINITE),
-            (finite(augment.jitter), "augment.jitter", FINITE),
-            (finite(augment.sensor_noise), "augment.sensor_noise", FINITE),
-            (share(augment.stretch), "augment.stretch", SHARE),
-            ((0.0..=1.0).contains(&augment.cut_mix), "augment.cut_mix", "expected 0 to 1"),
-            ((0.0..=180.0).contains(&angle), "augment.rotate_degrees", "expected 0 to 180"),
+            non_negative("augment.shift", augment.shift),
+            non_negative("augment.jitter", augment.jitter),
+            non_negative("augment.sensor_noise", augment.sensor_noise),
+            share_below_1("augment.stretch", augment.stretch),
+            share("augment.cut_mix", augment.cut_mix),
             (
-                (0.0..=1.0).contains(&augment.rotate_share),
-                "augment.rotate_share",
-                "expected 0 to 1",
+                (0.0..=180.0).contains(&augment.rotate_degrees),
+                "augment.rotate_degrees",
+                "expected 0 to 180",
             ),
+            share("augment.rotate_share", augment.rotate_share),
         ]);
         match checks.into_iter().find(|(holds, ..)| !holds) {
             Some((_, key, cause)) => Err(Error::Recipe { key, cause: cause.to_owned() }),
@@ -432,13 +425,3 @@ impl Recipe {
         }
     }
 }
-
-/// Whether `x` is a finite number of 0 or more.
-pub(crate) fn finite(x: f64) -> bool {
-    x.is_finite() && x >= 0.0
-}
-
-pub(crate) const FINITE: &str = "expected a finite number of 0 or more";
-
-/// Wider layers are refused as a mistake.
-const WIDEST: usize = 8192;

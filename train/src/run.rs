@@ -1,4 +1,4 @@
-//! A run from recipe to model, in a folder from which it can be resumed.
+//! A run from a recipe to a model. Its folder keeps a checkpoint that resumes it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use formats::model_card::ModelCard;
 use formats::split::Split;
 use formats::{FormatError, atomic};
-use indicatif::{ProgressBar, ProgressStyle};
 use infer_cpu::{Evaluation, Options, UNKNOWN, energy};
 
 use crate::augment::varied_too;
@@ -14,46 +13,77 @@ use crate::calibration::{quantile, temperature};
 use crate::clouds::Clouds;
 use crate::error::Error;
 use crate::evaluate::{confusion, predictions};
-use crate::metrics::{Metrics, Row};
+use crate::metrics::{Epoch, Metrics};
 use crate::recipe::{Recipe, Sampling};
 use crate::trainer::{EpochSummary, Trainer};
 use crate::{accuracy_report, batches, checkpoint, init, model_file, negatives};
 
-/// Points that are read from a text file at most: as many as the baseline's
-/// files have.
+/// Largest number of points that are read from a text file: the number in the baseline's
+/// files.
 pub const MOST_POINTS: usize = 10_000;
 
-/// How many points of a text file a run needs: the baseline's loader takes the
-/// first of them; other samplers and EdgeConv layers take all.
+/// The number of points of a text file that a run needs. The baseline's loader takes the
+/// first points; other samplers and EdgeConv layers need all of them.
 #[must_use]
 pub fn points_to_read(recipe: &Recipe) -> usize {
     let is_baseline = recipe.sampling == Sampling::First && recipe.network.edges.is_empty();
     if is_baseline { recipe.points } else { MOST_POINTS }
 }
 
-/// One training: a recipe, its data and where the model goes.
+/// Trains one model.
 pub struct Job<'a> {
-    /// How to train.
+    /// The settings of the training.
     pub recipe: Recipe,
-    /// What to learn from.
+    /// The training and validation clouds.
     pub clouds: &'a Clouds,
     /// Where the clouds come from, for errors.
     pub data: &'a str,
-    /// What the model's card calls the training set.
+    /// The name of the training set on the model's card.
     pub data_name: &'a str,
-    /// Where the model goes. The run's folder is beside it.
+    /// The model file. The run's folder is beside it.
     pub out: &'a Path,
 }
 
+/// What a run reports while it trains.
+#[derive(Clone, Copy, Debug)]
+pub enum Progress<'a> {
+    /// The run continues after the last epoch of its checkpoint.
+    Resumed {
+        /// The number of finished epochs.
+        epoch: u32,
+        /// The number of epochs of the whole run.
+        epochs: u32,
+    },
+    /// A step of an epoch is finished.
+    Step {
+        /// The epoch, counted from 1.
+        epoch: u32,
+        /// The number of epochs of the whole run.
+        epochs: u32,
+        /// The number of finished steps of the epoch.
+        step: usize,
+        /// The number of steps of the epoch.
+        steps: usize,
+        /// The epoch so far.
+        summary: &'a EpochSummary,
+    },
+    /// An epoch is finished and validated.
+    Epoch(&'a Epoch),
+}
+
 impl Job<'_> {
-    /// Trains, from wherever an earlier run was interrupted, and writes the
-    /// model. `test` is read once, at the end; returns the accuracy on it as a
-    /// line of text. Progress goes to standard error.
+    /// Trains, continuing an interrupted run, and writes the model. At the end, measures
+    /// the model on the clouds at `test` and returns the accuracy as a line of text. Calls
+    /// `report` as the run goes on.
     ///
     /// # Errors
-    /// Data, a recipe or a checkpoint that cannot be used, a loss that is not
-    /// finite, what the system reports.
-    pub fn run(self, test: Option<&Path>) -> Result<Option<String>, Error> {
+    /// Data, a recipe or a checkpoint that cannot be used; a loss that is not finite; a
+    /// file that cannot be read or written.
+    pub fn run(
+        self,
+        test: Option<&Path>,
+        report: &mut dyn FnMut(Progress<'_>),
+    ) -> Result<Option<String>, Error> {
         let Job { recipe, clouds: all, data, out, .. } = &self;
         recipe.check()?;
         check(all, recipe, data)?;
@@ -72,9 +102,9 @@ impl Job<'_> {
         let folder = out.with_extension("run");
         fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
         atomic::sweep_leftovers(&folder)?;
-        let mut run = Run::open(folder, &self, &clouds)?;
+        let mut run = Run::open(folder, &self, &clouds, report)?;
         while run.trainer.epoch < run.trainer.recipe.epochs {
-            run.epoch(&clouds, &held)?;
+            run.epoch(&clouds, &held, report)?;
         }
         run.finish(&self, test, &clouds, &held)
     }
@@ -116,14 +146,19 @@ struct Run {
     metrics: Metrics,
     classes: Vec<String>,
     training_set: String,
-    /// Of what it learns from.
+    /// Digest of the training clouds.
     digest: String,
 }
 
 impl Run {
-    /// The run in `folder` as its checkpoint has it, or a new one that learns from
+    /// Opens the run in `folder` at its checkpoint, or starts a new run that learns from
     /// `clouds`.
-    fn open(folder: PathBuf, job: &Job<'_>, clouds: &Clouds) -> Result<Self, Error> {
+    fn open(
+        folder: PathBuf,
+        job: &Job<'_>,
+        clouds: &Clouds,
+        report: &mut dyn FnMut(Progress<'_>),
+    ) -> Result<Self, Error> {
         let classes = job.recipe.classes(&job.clouds.classes);
         let trainer = Trainer::new(job.recipe.clone(), classes.len())?;
         let training_set = job.data_name.to_owned();
@@ -133,7 +168,8 @@ impl Run {
         let path = run.folder.join("checkpoint.safetensors");
         if path.is_file() {
             let notes = checkpoint::read(&path, &mut run.trainer, &run.digest)?;
-            eprintln!("resuming after epoch {} of {}", run.trainer.epoch, job.recipe.epochs);
+            let (epoch, epochs) = (run.trainer.epoch, job.recipe.epochs);
+            report(Progress::Resumed { epoch, epochs });
             run.metrics = Metrics::from_notes(&notes)
                 .map_err(|cause| FormatError::malformed(&path, "metadata `notes`", cause))?;
         } else if let Some(model) = &job.recipe.init {
@@ -146,9 +182,14 @@ impl Run {
         Ok(run)
     }
 
-    fn epoch(&mut self, clouds: &Clouds, held: &Clouds) -> Result<(), Error> {
+    fn epoch(
+        &mut self,
+        clouds: &Clouds,
+        held: &Clouds,
+        report: &mut dyn FnMut(Progress<'_>),
+    ) -> Result<(), Error> {
         let epoch = self.trainer.epoch + 1;
-        let learnt = self.learn(clouds)?;
+        let learnt = self.learn(clouds, report)?;
         let current = self.folder.join("current.safetensors");
         let card = self.card(None);
         model_file::write(&current, &mut self.trainer.model, &card)?;
@@ -157,7 +198,9 @@ impl Run {
         } else {
             Some(confusion(&current, held, &Options::default())?)
         };
-        self.note(epoch, &learnt, validated.as_ref());
+        let row = self.row(epoch, &learnt, validated.as_ref());
+        report(Progress::Epoch(&row));
+        self.metrics.epochs.push(row);
         // Without a validation set, the last epoch is taken.
         if validated.is_none() || self.metrics.is_best(epoch, self.trainer.recipe.balance > 0.0) {
             let best = self.folder.join("best.safetensors");
@@ -169,28 +212,25 @@ impl Run {
         checkpoint::write(&path, &mut self.trainer, &self.digest, &notes)
     }
 
-    /// Learns for one epoch, with a progress bar on standard error.
-    fn learn(&mut self, clouds: &Clouds) -> Result<EpochSummary, Error> {
-        let (epoch, epochs) = (self.trainer.epoch + 1, self.trainer.recipe.epochs);
-        let clouds = &negatives::added(clouds.clone(), &self.trainer.recipe, "learnt", epoch);
-        let batch = self.trainer.recipe.batch;
-        let bar = ProgressBar::new(batches::count(clouds.len(), &self.trainer.recipe) as u64);
-        let template = "epoch {prefix} {bar:30} {pos}/{len} {msg} {eta} left";
-        bar.set_style(ProgressStyle::with_template(template).expect("invariant: a valid template"));
-        bar.set_prefix(format!("{epoch}/{epochs}"));
-        let learnt = self.trainer.learn(clouds, |progress| {
-            bar.set_position((progress.clouds / batch) as u64);
-            let accuracy = 100.0 * progress.accuracy;
-            bar.set_message(format!("loss {:.3}, {accuracy:.1} %", progress.loss));
-        })?;
-        bar.finish_and_clear();
-        Ok(learnt)
+    fn learn(
+        &mut self,
+        clouds: &Clouds,
+        report: &mut dyn FnMut(Progress<'_>),
+    ) -> Result<EpochSummary, Error> {
+        let recipe = &self.trainer.recipe;
+        let (epoch, epochs, batch) = (self.trainer.epoch + 1, recipe.epochs, recipe.batch);
+        let clouds = &negatives::added(clouds.clone(), recipe, "learnt", epoch);
+        let steps = batches::count(clouds.len(), recipe);
+        self.trainer.learn(clouds, |summary| {
+            let step = summary.clouds / batch;
+            report(Progress::Step { epoch, epochs, step, steps, summary });
+        })
     }
 
-    fn note(&mut self, epoch: u32, learnt: &EpochSummary, validated: Option<&Evaluation>) {
+    fn row(&self, epoch: u32, learnt: &EpochSummary, validated: Option<&Evaluation>) -> Epoch {
         let recipe = &self.trainer.recipe;
         let factor = recipe.schedule.factor(f64::from(epoch - 1), recipe.epochs);
-        let row = Row {
+        Epoch {
             epoch,
             rate: recipe.adam.rate * factor,
             loss: learnt.loss,
@@ -199,9 +239,7 @@ impl Run {
             validation_class: validated.map(|found| found.class_accuracy().0),
             seconds: learnt.time.as_secs_f64(),
             clouds_per_second: learnt.clouds as f64 / learnt.time.as_secs_f64(),
-        };
-        eprintln!("{row}");
-        self.metrics.rows.push(row);
+        }
     }
 
     fn card(&self, accuracy: Option<String>) -> ModelCard {
@@ -230,8 +268,8 @@ impl Run {
         }
     }
 
-    /// Writes the best weights as they are shipped, and reads the test half
-    /// once, with those weights.
+    /// Writes the best weights in the form for release, and measures them once on the test
+    /// clouds.
     fn finish(
         &mut self,
         job: &Job<'_>,
@@ -248,14 +286,14 @@ impl Run {
         let activation_ranges = infer_cpu::activation_ranges_of_set(&shipped, &clouds.set)?;
         let card = ModelCard { activation_ranges, accuracy: accuracy.clone(), ..card };
         model_file::ship(&shipped, &mut self.trainer.model, &card)?;
-        // A kill before this line leaves files in the run's folder alone, which
-        // the next run sweeps.
+        // An interruption before this line leaves files in the run's folder only, and the
+        // next run removes them.
         fs::rename(&shipped, job.out).map_err(|source| FormatError::io(job.out, source))?;
         Ok(accuracy)
     }
 
-    /// Fits the temperature of `card`, and its largest energy if that is asked for,
-    /// to what `model` says of the validation clouds.
+    /// Fits the temperature of `card`, and its largest energy if the recipe wants one, to the
+    /// answers of `model` to the validation clouds.
     fn calibrate(&self, card: &mut ModelCard, model: &Path, held: &Clouds) -> Result<(), Error> {
         let recipe = &self.trainer.recipe;
         if !recipe.is_calibrated() {

@@ -1,5 +1,5 @@
-//! Selects the critical points of a batch's clouds, with infer-cpu's own ranking
-//! and resizing.
+//! Selects the critical points of the clouds in a batch. The code of infer-cpu ranks and
+//! resizes the selection.
 
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{CriticalPoints, Resize};
@@ -10,7 +10,7 @@ use crate::gumbel;
 use crate::layer::PooledLayer;
 use crate::matrix::Matrix;
 
-/// Selects the points that win a pooling.
+/// Selects the points that win channels of a pooling.
 #[derive(Clone, Copy, Debug)]
 pub struct CriticalPointSelector {
     keep: usize,
@@ -19,17 +19,17 @@ pub struct CriticalPointSelector {
     seed: u64,
 }
 
-/// The points that were selected from a batch.
+/// Points that were selected from a batch.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    /// The points.
+    /// The selected points.
     pub batch: Batch,
-    /// The row of the whole batch that each of them is.
+    /// The row of each selected point in the whole batch.
     pub rows: Vec<u32>,
 }
 
 impl CriticalPointSelector {
-    /// A selector as `cpl` states.
+    /// A selector with the settings of `cpl`.
     ///
     /// # Errors
     /// An unknown rule of resizing.
@@ -44,9 +44,9 @@ impl CriticalPointSelector {
         self.gumbel
     }
 
-    /// The points of `batch` that win a channel of `pooled`, which took all of
-    /// them. A point that is repeated counts as often. A relaxed selection draws
-    /// new noise in each `step`.
+    /// Selects the points of `batch` that win channels of `pooled`, the pooling of all points.
+    /// The weight of a point is the number of its copies in the selection. A relaxed selection
+    /// draws new noise in each `step`.
     #[must_use]
     pub fn select(self, pooled: &PooledLayer, batch: &Batch, step: u64) -> Selection {
         let mut chosen = Batch { starts: vec![0], ..Batch::default() };
@@ -78,9 +78,8 @@ impl CriticalPointSelector {
         Selection { batch: chosen, rows: origin }
     }
 
-    /// Adds to `dpooled`, the gradient of the output of `pooled`, what flows
-    /// through the relaxed selection: `dpoints` is the gradient of the selected
-    /// points' coordinates.
+    /// Adds the gradient through the relaxed selection to `dpooled`, the gradient of the output
+    /// of `pooled`. `dpoints` is the gradient of the selected points' coordinates.
     pub fn add_gradient(
         self,
         pooled: &PooledLayer,
@@ -112,8 +111,8 @@ impl CriticalPointSelector {
     }
 }
 
-/// Rows of the batch as rows of the cloud that begins at `first`, because a
-/// ranking without critical points falls back on row 0.
+/// Numbers the rows within the cloud that begins at row `first`, because a ranking without
+/// critical points falls back to row 0.
 fn within(winners: &[u32], first: u32) -> Vec<u32> {
     winners.iter().map(|winner| winner - first).collect()
 }
@@ -124,7 +123,7 @@ mod tests {
 
     #[test]
     fn a_cloud_without_critical_points_keeps_one_of_its_own() {
-        // A shift far below 0: past its ReLU nothing is left.
+        // With a shift far below 0, the output of the ReLU is 0.
         let mut pooled = PooledLayer::new("a", "b", (3, 4), true, 1);
         pooled.base.norm.shift.value.fill(-100.0);
         let coordinates = vec![[0.1, 0.2, 0.3], [0.5, 0.1, 0.0], [0.9, 0.8, 0.7], [0.2, 0.9, 0.4]];

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edge {
-    /// Radius of the neighborhood, in the unit of normalised clouds.
+    /// The radius of the neighborhood, in units of the normalised cloud.
     pub radius: f32,
-    /// Features that it computes for each point.
+    /// The number of features for each point.
     pub channels: usize,
 }
 
@@ -16,25 +16,25 @@ pub struct Edge {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shape {
-    /// The T-Net of the coordinates.
+    /// Whether the network has a T-Net of the coordinates.
     pub input_transform: bool,
-    /// The T-Net of the first layer's features.
+    /// Whether the network has a T-Net of the first layer's features.
     pub feature_transform: bool,
     /// The EdgeConv layers, whose features are appended to the coordinates.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub edges: Vec<Edge>,
-    /// Outputs of the trunk's point-wise layers, the last pooled.
+    /// Output widths of the trunk's point-wise layers. The last layer is pooled.
     pub trunk: Vec<usize>,
-    /// Outputs of a T-Net's point-wise layers, the last pooled.
+    /// Output widths of a T-Net's point-wise layers. The last layer is pooled.
     pub t_net: Vec<usize>,
-    /// Outputs of a T-Net's layers after the pooling.
+    /// Output widths of a T-Net's hidden layers after the pooling.
     pub t_net_head: Vec<usize>,
-    /// Outputs of the layers after the trunk's pooling, except the last.
+    /// Output widths of the hidden layers after the trunk's pooling.
     pub head: Vec<usize>,
 }
 
 impl Default for Shape {
-    /// The baseline's (yanx27/Pointnet_Pointnet2_pytorch, `pointnet_cls`).
+    /// The baseline's network (yanx27/Pointnet_Pointnet2_pytorch, `pointnet_cls`).
     fn default() -> Self {
         Self {
             input_transform: true,

@@ -2,18 +2,19 @@
 
 use ndarray::ArrayView2;
 
-use crate::layer::{LayerMut, Module, Rows, Transforms};
+use crate::layer::{LayerMut, Module, Transforms};
 use crate::matrix::Matrix;
 use crate::mlp::{DenseHead, SharedMlp};
+use crate::rows::Rows;
 use crate::shape::Shape;
 
 /// A T-Net in training.
 #[derive(Clone, Debug)]
 pub struct TNet {
-    /// Its point-wise layers and the pooling.
+    /// The point-wise layers and the pooling.
     pub points: SharedMlp,
     head: DenseHead,
-    /// The transforms that it predicted last.
+    /// The last predicted transforms.
     pub transforms: Transforms,
 }
 
@@ -36,8 +37,8 @@ impl TNet {
         self.transforms = Transforms::around_identity(elements, self.transforms.k);
     }
 
-    /// Takes the gradient of the transforms' elements; returns the part of the
-    /// gradient of `x` that flows through the prediction, if `wants_input`.
+    /// Propagates the gradient of the transforms' elements. If `wants_input`, returns the part
+    /// of the gradient of `x` that flows through the prediction.
     pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,

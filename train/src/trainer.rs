@@ -1,4 +1,4 @@
-//! A network, its optimiser, and an epoch of learning.
+//! A network in training, and one epoch of training.
 
 use std::time::{Duration, Instant};
 
@@ -15,37 +15,37 @@ use crate::point_encoder::PointEncoder;
 use crate::recipe::Recipe;
 use crate::selector::CriticalPointSelector;
 
-/// PyTorch's default share of a batch in running statistics.
+/// The share of a batch in running statistics: PyTorch's default.
 const MOMENTUM: f32 = 0.1;
 
-/// A training under way.
+/// A network in training.
 #[derive(Clone, Debug)]
 pub struct Trainer {
     /// The run's recipe.
     pub recipe: Recipe,
     /// The network, and its point encoder.
     pub model: Model,
-    /// Steps taken.
+    /// The number of finished steps.
     pub step: u64,
-    /// Epochs finished.
+    /// The number of finished epochs.
     pub epoch: u32,
 }
 
-/// The result of an epoch, or of its steps so far.
+/// The results of an epoch so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EpochSummary {
-    /// Mean loss of its batches.
+    /// The mean loss of the batches.
     pub loss: f64,
-    /// Share of its augmented clouds that were classified correctly.
+    /// The share of augmented clouds that were classified correctly.
     pub accuracy: f64,
-    /// Clouds learnt from.
+    /// The number of clouds.
     pub clouds: usize,
-    /// Wall-clock time.
+    /// The wall-clock time.
     pub time: Duration,
 }
 
 impl Trainer {
-    /// A network of random weights for `n_classes`.
+    /// A network with random weights for `n_classes` classes.
     ///
     /// # Errors
     /// [`Error::Recipe`] for an unknown rule of resizing.
@@ -64,8 +64,8 @@ impl Trainer {
         Ok(Self { recipe, model: Model { encoder, network }, step: 0, epoch: 0 })
     }
 
-    /// Learns from every cloud once, except those of an incomplete last batch.
-    /// `report` is called after each step.
+    /// Trains on the clouds of one epoch, except those of an incomplete last batch. Calls
+    /// `report` after each step.
     ///
     /// # Errors
     /// [`Error::NotFinite`].

@@ -10,7 +10,7 @@ use super::print;
 
 /// Flags of `compare-points`.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub struct ComparePointsArgs {
     /// One cloud file: PLY, NPZ, NPY, PCD, text, KITTI or LAS
     #[arg(value_name = "A")]
     a: PathBuf,
@@ -19,11 +19,11 @@ pub struct Args {
     b: PathBuf,
 }
 
-/// Compares the clouds that `args` name.
+/// Prints the Chamfer distance of two clouds.
 ///
 /// # Errors
-/// As [`read_finite`].
-pub fn run(args: &Args) -> anyhow::Result<()> {
+/// The errors of [`read_finite`].
+pub fn run(args: &ComparePointsArgs) -> anyhow::Result<()> {
     let (a, b) = (read_finite(&args.a)?, read_finite(&args.b)?);
     let found = chamfer(&a, &b);
     print(&format!("{} and {} points", a.len(), b.len()))?;
@@ -31,10 +31,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     print(&format!("Chamfer distance, plain, sum of both means:   {:.9}", found.plain))
 }
 
-/// Reads the cloud at `path`, which must have points, and finite ones.
+/// Reads the cloud at `path`.
 ///
 /// # Errors
-/// A cloud that cannot be read, has no points, or has some that are not finite.
+/// A cloud that cannot be read, that has no points, or that has points that are not finite.
 pub fn read_finite(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
     let cloud = read_cloud(path)?;
     ensure!(!cloud.is_empty(), "{}: expected points, found none", path.display());

@@ -19,12 +19,12 @@ use super::Usage;
 /// Flags of `eval`.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "\
-For clouds of one size, the accuracy is printed. For clusters with the remarks range_m,
-sensor or ids, for several files, and with --known, --map, --tracks or --min-points, a
-table is printed: the shares of right answers, with 95 % intervals, by class, label,
-range, number of points, sensor and file. A label that the model has no class for counts
-as a negative, whose right answer is `unknown`.")]
-pub struct Args {
+For clouds of one size, `eval` prints the accuracy. For clusters whose file holds range_m,
+sensor or ids, for several files, and with --known, --map, --tracks or --min-points, it
+prints a table: the shares of right answers, with 95 % intervals, by class, label, range,
+number of points, sensor and file. An object whose label is not a class of the model is a
+negative; the right answer to it is `unknown`.")]
+pub struct EvalArgs {
     /// The model file
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
@@ -35,11 +35,11 @@ pub struct Args {
     /// Precision of the inference: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
-    /// Drop outliers before the sampler, from clouds of the unit sphere [default: as in
-    /// training]
+    /// Whether outliers are dropped before sampling, from clouds in the unit sphere [default: as
+    /// in training]
     #[arg(long, value_name = "YES")]
     outlier_filter: Option<bool>,
-    /// Write the confusion matrix, or the table of clusters, to this CSV file
+    /// Write the confusion matrix, or the table for clusters, to this CSV file
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Draw the confusion matrix, or the clusters that are named wrongly, into this SVG file
@@ -49,31 +49,30 @@ pub struct Args {
     objects: ObjectArgs,
 }
 
-/// Flags about clusters.
+/// Flags of `eval` for clusters.
 #[derive(clap::Args, Debug)]
 struct ObjectArgs {
-    /// The classes that matter, separated by commas; any other answer counts as
-    /// `unknown` [default: all that the model does not answer as `unknown`]
+    /// Known classes, separated by commas; any other answer counts as `unknown` [default: all
+    /// classes that the model does not answer as `unknown`]
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     known: Vec<String>,
     /// TOML file that maps labels of the data to classes of the model, such as
     /// `pedestrian = "person"`; `rider = ""` leaves such objects out
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
-    /// Count an object that several frames show once, by the track in its id,
-    /// FRAME#TRACK
+    /// Count all views of an object as one, by the track in the id, FRAME#TRACK
     #[arg(long)]
     tracks: bool,
-    /// Leave out objects of fewer points
+    /// Leave out objects with fewer points
     #[arg(long, value_name = "N")]
     min_points: Option<usize>,
 }
 
-/// Measures the model that `args` name.
+/// Prints the accuracy of a model.
 ///
 /// # Errors
-/// A model or data that cannot be used, other numbers of classes.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+/// A model or data that cannot be used; numbers of classes that differ.
+pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
     let (card, names) = {
         let classifier = Classifier::load(&args.model, &options(args))?;
         let names: Vec<String> = classifier.classes().iter().map(ToString::to_string).collect();
@@ -95,24 +94,24 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-fn options(args: &Args) -> Options {
-    let Args { precision, outlier_filter, .. } = *args;
+fn options(args: &EvalArgs) -> Options {
+    let EvalArgs { precision, outlier_filter, .. } = *args;
     Options { precision, outlier_filter, ..Options::default() }
 }
 
-/// Reports on clouds of the model's own classes.
+/// Reports on clouds whose classes are the model's.
 fn report_clouds(
-    args: &Args,
+    args: &EvalArgs,
     data: &Path,
     clouds: &Clouds,
     names: &[String],
 ) -> anyhow::Result<()> {
-    // A model's classes after those of the data, such as `unknown`, have no cloud.
+    // The data have no clouds of the model's further classes, such as `unknown`.
     let mut clouds = clouds.clone();
     if names.starts_with(&clouds.classes) {
         clouds.classes = names.to_vec();
     }
-    // Also checks that model and data have equally many classes.
+    // `confusion` checks that the model and the data have the same number of classes.
     let found = confusion(&args.model, &clouds, &options(args))?;
     let mut pairs = names.iter().zip(&clouds.classes).enumerate();
     if let Some((class, (model, data))) = pairs.find(|(_, (model, data))| model != data) {
@@ -125,14 +124,14 @@ fn report_clouds(
         atomic::write_bytes(path, accuracy_report::to_csv(&found, names))?;
     }
     if let Some(path) = &args.svg {
-        atomic::write_bytes(path, accuracy_report::drawing(&found, names).to_string())?;
+        atomic::write_bytes(path, accuracy_report::drawing(&found, names))?;
     }
     Ok(())
 }
 
 /// Reports on objects that were cut out of scans.
 fn report_objects(
-    args: &Args,
+    args: &EvalArgs,
     card: &ModelCard,
     names: &[String],
     clouds: Vec<Clouds>,
@@ -159,13 +158,13 @@ fn report_objects(
         let clouds: Vec<_> =
             each_set.zip(&objects).map(|(set, object)| set.cloud(object.index)).collect();
         let drawing = object_report::drawing(&objects, &clouds, &labels);
-        atomic::write_bytes(path, drawing.to_string())?;
+        atomic::write_bytes(path, drawing)?;
     }
     Ok(())
 }
 
-/// The classes of the model, `names`, whose objects are negatives.
-fn unknown(args: &Args, card: &ModelCard, names: &[String]) -> Result<Vec<String>, Usage> {
+/// The classes of the model, among all its `names`, that count as `unknown`.
+fn unknown(args: &EvalArgs, card: &ModelCard, names: &[String]) -> Result<Vec<String>, Usage> {
     let known = &args.objects.known;
     if known.is_empty() {
         return Ok(card.unknown_classes.clone());
@@ -177,7 +176,7 @@ fn unknown(args: &Args, card: &ModelCard, names: &[String]) -> Result<Vec<String
     Ok(names.iter().filter(|class| !known.contains(class)).cloned().collect())
 }
 
-/// What is said of all objects together.
+/// The results for all objects together.
 fn summary(objects: &[Object], labels: &Labels, table: &Table) -> String {
     let mut lines = Vec::new();
     if let Some(balanced) = table.balanced() {
@@ -195,7 +194,7 @@ fn summary(objects: &[Object], labels: &Labels, table: &Table) -> String {
         if let Some(found) = found {
             let object_report::Detection { auroc, fpr_at_95 } = found;
             lines.push(format!(
-                "negatives told by {name}: AUROC {auroc:.3}, false alarms {:.1} % where 95 % of \
+                "negatives separated by {name}: AUROC {auroc:.3}, false alarms {:.1} % where 95 % of \
                  known objects stay known",
                 100.0 * fpr_at_95
             ));

@@ -15,7 +15,7 @@ use super::{Usage, print};
 
 /// Flags of `explain`.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub struct ExplainArgs {
     /// The model file
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
@@ -41,14 +41,14 @@ pub struct Args {
     svg: Option<PathBuf>,
 }
 
-/// Random subsets that the distance is compared with.
+/// Number of random subsets to compare the distance with.
 const DRAWS: u32 = 1000;
 
-/// Explains the prediction that `args` name.
+/// Explains the prediction of a model for a cloud.
 ///
 /// # Errors
 /// A model or a cloud that cannot be used.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     check(args)?;
     let cloud = read_finite(&args.cloud)?;
     let spec = SamplerSpec {
@@ -57,16 +57,16 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         resize: Resize::Truncate,
         ..SamplerSpec::default()
     };
-    // The network sees all points; the sampler only selects the critical ones.
+    // The network sees all points; the sampler only finds the critical points.
     let whole = SamplerSpec { kind: SamplerKind::All, ..SamplerSpec::default() };
-    // A cloud with parts removed is not normalised again.
+    // A cloud with parts removed must keep the normalisation of the whole cloud.
     let load = |sampler| {
         let (sampler, normalization) = (Some(sampler), Some(Normalization::None));
         Classifier::load(&args.model, &Options { sampler, normalization, ..Options::default() })
     };
     let mut points = Vec::new();
     let normalization = match ModelCard::read(&args.model)?.normalization {
-        // Clouds of any size are shown in the same frame.
+        // Clouds of any size are drawn in the same frame.
         Normalization::None => Normalization::UnitSphere,
         other => other,
     };
@@ -83,12 +83,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     print(&report(&points, &found, &critical, &strongest, args.seed))?;
     if let Some(path) = &args.svg {
         let drawing = explanation_drawing::draw(&points, &found, &critical);
-        atomic::write_bytes(path, drawing.to_string())?;
+        atomic::write_bytes(path, drawing)?;
     }
     Ok(())
 }
 
-fn check(args: &Args) -> Result<(), Usage> {
+fn check(args: &ExplainArgs) -> Result<(), Usage> {
     let least =
         [("points", args.points, 1), ("clusters", args.clusters, 2), ("samples", args.samples, 2)];
     match least.into_iter().find(|(_, found, least)| found < least) {
@@ -99,8 +99,8 @@ fn check(args: &Args) -> Result<(), Usage> {
     }
 }
 
-/// How near the critical points come to the points that LIME-3D finds
-/// strongest, as text.
+/// The distance between the critical points and the points that LIME-3D finds strongest, as
+/// text.
 fn report(
     points: &[[f32; 3]],
     found: &Explanation,
@@ -109,7 +109,7 @@ fn report(
     seed: u64,
 ) -> String {
     let n = critical.len();
-    let baseline = RandomBaseline::of(points, (critical, strongest), DRAWS, seed);
+    let baseline = RandomBaseline::new(points, (critical, strongest), DRAWS, seed);
     let RandomBaseline { ours, random } = &baseline;
     let [low, middle, high] =
         [DRAWS / 40, DRAWS / 2, DRAWS - 1 - DRAWS / 40].map(|i| random[i as usize]);

@@ -1,8 +1,9 @@
-//! The commands of `edgepuck-train`, what ends them, and the exit code it gives.
+//! The commands of `edgepuck-train`.
 
 pub mod compare_points;
 pub mod eval;
 pub mod explain;
+mod progress;
 pub mod serve;
 pub mod train;
 
@@ -12,7 +13,7 @@ use std::io::Write;
 /// Writes a line to standard output.
 ///
 /// # Errors
-/// What the system reports.
+/// Standard output cannot be written.
 fn print(line: &str) -> anyhow::Result<()> {
     Ok(writeln!(std::io::stdout(), "{line}")?)
 }

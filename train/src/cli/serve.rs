@@ -20,23 +20,23 @@ use train::shape::Shape;
 
 /// Flags of `serve`.
 #[derive(clap::Args, Debug)]
-pub struct Args {
-    /// The model file with the first weights
+pub struct ServeArgs {
+    /// Model file with the initial weights
     model: PathBuf,
-    /// The folder with cloud.safetensors
+    /// Folder of cloud.safetensors
     folder: PathBuf,
 }
 
-/// Steps before those that are timed.
+/// Number of steps before the timed ones.
 const WARM_UP: usize = 3;
 
 const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.001, step: 0 };
 
-/// Answers requests until its input ends.
+/// Answers requests until the input ends.
 ///
 /// # Errors
 /// Files that cannot be read.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub fn run(args: &ServeArgs) -> anyhow::Result<()> {
     let mut session = Session::open(args)?;
     respond(&json!({ "version": env!("CARGO_PKG_VERSION") }))?;
     for line in stdin().lock().lines() {
@@ -64,7 +64,7 @@ struct Session {
 }
 
 impl Session {
-    fn open(args: &Args) -> anyhow::Result<Self> {
+    fn open(args: &ServeArgs) -> anyhow::Result<Self> {
         let mut file = WeightsFile::open(&args.model)?;
         let mut values = BTreeMap::new();
         for name in file.shapes().into_keys() {

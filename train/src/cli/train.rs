@@ -8,10 +8,11 @@ use train::recipe::Recipe;
 use train::run::{Job, points_to_read};
 
 use super::Usage;
+use super::progress::shown;
 
 /// Flags of `train`.
 #[derive(clap::Args, Debug)]
-pub struct Args {
+pub struct TrainArgs {
     /// Training data: a packed NPZ file; the common prefix of two packed files,
     /// such as `rotational-noisy` for rotational-noisy-train.npz and
     /// rotational-noisy-test.npz; a folder with train.npz and test.npz; a
@@ -19,25 +20,23 @@ pub struct Args {
     /// yanx27/Pointnet_Pointnet2_pytorch
     #[arg(long, value_name = "PATH")]
     data: PathBuf,
-    /// Test data, on which the accuracy is measured once, at the end [default:
-    /// the test part of --data, if it has one]
+    /// Test data, on which the accuracy is measured once, after training [default: the test part
+    /// of --data, if there is one]
     #[arg(long, value_name = "PATH")]
     test: Option<PathBuf>,
-    /// Recipe, a TOML file; the flags below override it [default: the settings
-    /// of the baseline]
+    /// Recipe (TOML), which the flags below override [default: the settings of the baseline]
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
-    /// Model file whose weights training starts from. All layers but the last must be
-    /// those of the recipe; the last is taken, too, if the model's classes are the first
-    /// of the recipe's, and others get random numbers [default: random numbers]
+    /// Model file from whose weights training starts. Its layers must be those of the recipe. The
+    /// last layer is taken only if the model's classes are the first classes of the data; the
+    /// weights of further classes start from random numbers [default: random numbers]
     #[arg(long, value_name = "MODEL")]
     init: Option<PathBuf>,
     /// Network: pointnet, or cpl (pointnet after a Critical Points Layer)
     /// [default: the recipe's]
     #[arg(long, value_name = "NAME", value_parser = ["pointnet", "cpl"])]
     arch: Option<String>,
-    /// Number of points of each cloud that the network, or its Critical Points
-    /// Layer, sees
+    /// Number of points of each cloud for the network or its Critical Points Layer
     #[arg(long, value_name = "N")]
     points: Option<usize>,
     /// Widths of the layers of the Critical Points Layer's point encoder,
@@ -56,13 +55,12 @@ pub struct Args {
     /// Name of the training set on the model's card [default: the path]
     #[arg(long, value_name = "TEXT")]
     data_name: Option<String>,
-    /// Model file to write; the folder of the run is beside it, with the
-    /// extension `.run`
+    /// Model file to write. The folder of the run is beside it, with the extension `.run`
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
 
-/// Widths of a point encoder, without the coordinates'.
+/// Widths of a point encoder's layers, without the 3 coordinates.
 #[derive(Clone, Debug)]
 struct Widths(Vec<usize>);
 
@@ -74,27 +72,27 @@ fn parse_widths(word: &str) -> Result<Widths, String> {
     }
 }
 
-/// Trains what `args` describe, from wherever an earlier run was interrupted.
+/// Trains a network, continuing an interrupted run.
 ///
 /// # Errors
-/// As [`Job::run`]; flags that contradict each other.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+/// The errors of [`Job::run`]; flags that contradict each other.
+pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let recipe = recipe(args)?;
     let most_points = points_to_read(&recipe);
     let clouds = Clouds::read_for(recipe.normalization, &args.data, Split::Train, most_points)?;
-    // A single file has no test half.
-    let halves = (!args.data.is_file()).then(|| args.data.clone());
+    // A single file has no test part.
+    let test_part = (!args.data.is_file()).then(|| args.data.clone());
     let name = args.data.display().to_string();
     let data_name = args.data_name.as_ref().unwrap_or(&name);
-    let test = args.test.clone().or(halves);
+    let test = args.test.clone().or(test_part);
     let job = Job { recipe, clouds: &clouds, data: &name, data_name, out: &args.out };
-    if let Some(accuracy) = job.run(test.as_deref())? {
+    if let Some(accuracy) = job.run(test.as_deref(), &mut shown())? {
         super::print(&accuracy)?;
     }
     super::print(&args.out.display().to_string())
 }
 
-fn recipe(args: &Args) -> anyhow::Result<Recipe> {
+fn recipe(args: &TrainArgs) -> anyhow::Result<Recipe> {
     let mut recipe = match &args.recipe {
         Some(path) => Recipe::read(path)?,
         None => Recipe::default(),

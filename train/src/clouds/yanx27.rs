@@ -13,16 +13,14 @@ use crate::error::Error;
 const NAMES: &str = "modelnet40_shape_names.txt";
 
 /// Whether the folder at `path` has this layout.
-pub fn is_one(path: &Path) -> bool {
+pub fn is_layout_of(path: &Path) -> bool {
     path.join(NAMES).is_file()
 }
 
-/// Reads the first `n_points` of every cloud of `split`, as the baseline's
-/// loader does.
+/// Reads the first `n_points` points of every cloud of `split`, like the baseline's loader.
 ///
 /// # Errors
-/// A file that is missing or malformed, an id of an unknown class, a cloud of
-/// fewer points.
+/// A file that is missing or malformed; an id of an unknown class; a cloud of fewer points.
 pub fn read(root: &Path, split: Split, n_points: usize) -> Result<LabelledSet, Error> {
     let lines = |name: &str| -> Result<Vec<String>, FormatError> {
         let path = root.join(name);

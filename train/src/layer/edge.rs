@@ -1,18 +1,19 @@
-//! EdgeConv: a linear layer of the offsets from each point to its neighbors, batch
-//! norm, ReLU and the maximum over the neighbors. infer-cpu's `edge.rs` has the
-//! definition. It is a pooled layer whose clouds are neighborhoods.
+//! EdgeConv: a linear layer on the offsets from each point to its neighbors, a batch norm, a
+//! ReLU and the maximum over the neighbors, as infer-cpu's `edge_conv.rs` defines it. It is a
+//! pooled layer whose clouds are the neighborhoods.
 
 use ndarray::ArrayView2;
 use ndarray::parallel::prelude::*;
 
-use super::{PooledLayer, Rows};
+use super::PooledLayer;
 use crate::batch::Batch;
 use crate::matrix::Matrix;
+use crate::rows::Rows;
 
-/// An EdgeConv layer of one radius.
+/// An EdgeConv layer with one radius.
 #[derive(Clone, Debug)]
 pub struct EdgeLayer {
-    /// What it learns, and its last output, `[points, channels]`.
+    /// The parameters, and the last output, `[points, channels]`.
     pub pooled: PooledLayer,
     radius: f32,
     edges: Edges,
@@ -21,16 +22,16 @@ pub struct EdgeLayer {
 /// The edges from each point of a batch to its neighbors.
 #[derive(Clone, Debug, Default)]
 struct Edges {
-    /// Offsets over the radius, `[edges, 3]`.
+    /// The offsets divided by the radius, `[edges, 3]`.
     offsets: Matrix,
-    /// How often each edge counts in statistics: as often as its point.
+    /// The weight of each edge in statistics, which is that of its point.
     weights: Vec<f32>,
-    /// Where each point's edges begin, and where the last point's end.
+    /// The first edge of each point, and the end of the last point.
     starts: Vec<usize>,
 }
 
 impl EdgeLayer {
-    /// EdgeConv layer `number`, of neighbors within `radius`.
+    /// EdgeConv layer `number`, for neighbors within `radius`.
     #[must_use]
     pub fn new(number: usize, radius: f32, channels: usize, seed: u64) -> Self {
         let (linear, norm) = (format!("edge.conv{number}"), format!("edge.bn{number}"));
@@ -38,7 +39,7 @@ impl EdgeLayer {
         Self { pooled, radius, edges: Edges::default() }
     }
 
-    /// Features that it computes for each point.
+    /// The number of features for each point.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.pooled.base.linear.size().1
@@ -46,7 +47,7 @@ impl EdgeLayer {
 
     /// Computes the features of every point of `batch`.
     pub fn forward(&mut self, batch: &Batch, momentum: f32) {
-        self.edges = Edges::of(batch, self.radius);
+        self.edges = Edges::new(batch, self.radius);
         self.pooled.forward(self.edges.offsets.view(), self.edges.rows(), momentum);
     }
 
@@ -56,14 +57,14 @@ impl EdgeLayer {
         self.pooled.base.output()
     }
 
-    /// Sets the parameters' gradients from that of the output.
+    /// Sets the gradients of the parameters from the gradient `dy` of the output.
     pub fn backward(&mut self, dy: Matrix) {
         self.pooled.backward(dy, self.edges.offsets.view(), self.edges.rows(), false);
     }
 }
 
 impl Edges {
-    fn of(batch: &Batch, radius: f32) -> Self {
+    fn new(batch: &Batch, radius: f32) -> Self {
         let clouds: Vec<usize> = (0..batch.len()).collect();
         let offsets_of = |&cloud: &usize| {
             let centres = &batch.coordinates[batch.starts[cloud]..batch.starts[cloud + 1]];
@@ -88,8 +89,8 @@ impl Edges {
     }
 }
 
-/// The offsets, divided by `radius`, from `p` to its neighbors within `radius`: p
-/// itself first, and once, however often `others` hold it.
+/// The offsets from `p` to its neighbors within `radius`, divided by `radius`. The first
+/// neighbor is `p` itself; its copies in `others` are left out.
 fn neighbors(p: &[f32; 3], others: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
     let mut offsets = vec![[0.0; 3]];
     for q in others {

@@ -1,30 +1,31 @@
-//! A hidden layer: linear, perhaps dropout, batch norm, ReLU. It is applied to each
-//! point alone or, after a pooling, to one vector of each cloud.
+//! A hidden layer: linear, optional dropout, batch norm, ReLU. It takes each point separately
+//! or, after a pooling, one vector of each cloud.
 
 use ndarray::ArrayView2;
 
+use super::Normed;
 use super::norm::Saved;
-use super::{Normed, Rows};
 use crate::matrix::Matrix;
+use crate::rows::Rows;
 
-/// A layer that is applied to each row alone.
+/// A layer that takes each row separately.
 #[derive(Clone, Debug)]
 pub struct HiddenLayer {
-    /// Its parameters and its last output.
+    /// The parameters and the last output.
     pub base: Normed,
     saved: Saved,
     kept: Option<Matrix>,
 }
 
 impl HiddenLayer {
-    /// A layer whose parts are named `linear` and `norm`.
+    /// A layer with random weights, whose parts are named `linear` and `norm`.
     #[must_use]
     pub fn new(linear: &str, norm: &str, size: (usize, usize), seed: u64) -> Self {
         Self { base: Normed::new(linear, norm, size, seed), saved: Saved::default(), kept: None }
     }
 
-    /// Takes `x` `[rows, inputs]` through the layer. `kept` is the dropout mask
-    /// between product and batch norm, scaled by 1 / share kept.
+    /// Applies the layer to `x` `[rows, inputs]`. `kept` is the dropout mask before the batch
+    /// norm. Its elements are 0 or 1 / the share of kept features.
     pub fn forward(
         &mut self,
         x: ArrayView2<'_, f32>,
@@ -36,7 +37,7 @@ impl HiddenLayer {
         let mut bias = &self.base.linear.bias.value;
         let none = vec![0.0; bias.len()];
         if let Some(kept) = &kept {
-            // Dropped features lose their bias too, so that it has to be added here.
+            // Dropout also drops the bias, so that it must be added first.
             z += &ndarray::aview1(bias);
             z *= kept;
             bias = &none;
@@ -45,8 +46,8 @@ impl HiddenLayer {
         self.kept = kept;
     }
 
-    /// Sets the parameters' gradients from that of the output; returns that of the
-    /// product, for [`Linear::input_gradient`](super::Linear::input_gradient).
+    /// Sets the gradients of the parameters from the gradient `dy` of the output. Returns the
+    /// gradient of the product, for [`Linear::input_gradient`](super::Linear::input_gradient).
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dy: Matrix, rows: Rows<'_>) -> Matrix {
         let mut dz = self.base.norm.backward(dy, &self.base.output, &self.saved, rows);
         if let Some(kept) = &self.kept {

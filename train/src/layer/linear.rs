@@ -17,8 +17,8 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// A layer of random weights, named `name`. Weights and biases are uniform
-    /// in ±1/√inputs, as PyTorch's `Linear` and `Conv1d` draw them.
+    /// A layer with random weights, named `name`. Weights and biases are uniform in ±1/√inputs,
+    /// as in PyTorch's `Linear` and `Conv1d`.
     #[must_use]
     pub fn new(name: &str, inputs: usize, outputs: usize, seed: u64) -> Self {
         let limit = 1.0 / (inputs as f64).sqrt();
@@ -42,13 +42,13 @@ impl Linear {
         self.weight.name.trim_end_matches(".weight")
     }
 
-    /// How many inputs and outputs it has.
+    /// The numbers of inputs and outputs.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
         (self.weight.shape[1], self.weight.shape[0])
     }
 
-    /// `z` without the bias, for a batch norm, which would subtract it again.
+    /// `z` without the bias, for a batch norm, which would remove the bias.
     #[must_use]
     pub fn products(&self, x: ArrayView2<'_, f32>) -> Matrix {
         matrix::product(x, self.weight.matrix().t())
@@ -60,20 +60,20 @@ impl Linear {
         self.products(x) + ndarray::aview1(&self.bias.value)
     }
 
-    /// Sets the gradients, and returns that of `x`.
+    /// Sets the gradients of the parameters, and returns the gradient of `x`.
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) -> Matrix {
         self.backward_bias(dz);
         self.backward_products(x, dz);
         self.input_gradient(dz)
     }
 
-    /// Sets only the bias's gradient.
+    /// Sets only the gradient of the bias.
     pub fn backward_bias(&mut self, dz: ArrayView2<'_, f32>) {
         let bias = dz.sum_axis(ndarray::Axis(0));
         self.bias.gradient.copy_from_slice(bias.as_slice().expect("invariant: contiguous"));
     }
 
-    /// Sets only the weights' gradient. Before a batch norm, that of the bias is
+    /// Sets only the gradient of the weights. Before a batch norm, the gradient of the bias is
     /// 0.
     pub fn backward_products(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) {
         matrix::gradient(dz, x, &mut self.weight.gradient);
@@ -85,7 +85,7 @@ impl Linear {
         matrix::product(dz, self.weight.matrix())
     }
 
-    /// The layer itself, for a model file.
+    /// The layer without a batch norm, for a model file.
     #[must_use]
     pub fn folded(&self) -> Folded {
         Folded {
@@ -96,7 +96,7 @@ impl Linear {
         }
     }
 
-    /// The layer, without a batch norm.
+    /// The layer as a part of a network.
     pub fn layer(&mut self) -> LayerMut<'_> {
         LayerMut { linear: self, norm: None, output: None }
     }

@@ -4,11 +4,12 @@ use ndarray::Axis;
 use ndarray::parallel::prelude::*;
 use rayon::slice::ParallelSlice;
 
-use super::{Folded, Linear, Rows};
+use super::{Folded, Linear};
 use crate::matrix::{Matrix, ROWS};
 use crate::parameter::Parameter;
+use crate::rows::Rows;
 
-/// PyTorch's default, which the baseline keeps.
+/// PyTorch's default, which the baseline uses.
 pub const EPSILON: f32 = 1e-5;
 
 /// A batch norm with its running statistics.
@@ -29,14 +30,14 @@ pub struct Norm {
 /// The values of a forward pass that the backward pass needs.
 #[derive(Clone, Debug, Default)]
 pub struct Saved {
-    /// Values with mean 0 and variance 1.
+    /// The values, normalised to mean 0 and variance 1.
     pub normalised: Matrix,
-    /// 1 / standard deviation, of each channel.
+    /// 1 / standard deviation of each channel.
     pub inverse: Vec<f32>,
 }
 
 impl Norm {
-    /// A batch norm of `channels`.
+    /// A batch norm of `channels` channels.
     #[must_use]
     pub fn new(name: &str, channels: usize) -> Self {
         let parameter = |part: &str, value| {
@@ -51,8 +52,8 @@ impl Norm {
         }
     }
 
-    /// `linear` with this batch norm folded into its weights and biases, by the
-    /// running statistics and in f64.
+    /// `linear` with this batch norm folded into its weights and biases, computed in f64 from
+    /// the running statistics.
     #[must_use]
     pub fn folded_into(&self, linear: &Linear) -> Folded {
         let (inputs, outputs) = linear.size();
@@ -73,8 +74,8 @@ impl Norm {
         }
     }
 
-    /// Adds a batch's statistics to the running ones with the share `momentum`, as
-    /// PyTorch does: `mean` without `bias`, variance over `total` values.
+    /// Mixes the statistics of a batch into the running statistics with the share `momentum`,
+    /// as PyTorch does. `mean` does not include `bias`; the variance is over `total` values.
     pub fn update_statistics(
         &mut self,
         (mean, variance): (&[f32], &[f32]),
@@ -97,8 +98,8 @@ impl Norm {
         [(format!("{name}.running_mean"), mean), (format!("{name}.running_var"), variance)]
     }
 
-    /// Normalises, scales and shifts `z`, and makes negative results 0. `z` lacks
-    /// the bias, which changes nothing but the running mean.
+    /// Normalises, scales and shifts `z`, and sets negative results to 0. `z` does not include
+    /// the bias, which changes only the running mean.
     pub fn forward(
         &mut self,
         mut z: Matrix,
@@ -124,7 +125,7 @@ impl Norm {
                     for c in 0..z.len() {
                         z[c] = (z[c] - mean[c]) * inverse[c];
                         let y = z[c] * scale[c] + shift[c];
-                        // NaN is kept, so that the loss shows it.
+                        // Keeps NaN, so that the loss shows it.
                         out[c] = if y < 0.0 { 0.0 } else { y };
                     }
                 }
@@ -132,8 +133,8 @@ impl Norm {
         (out, Saved { normalised: z, inverse })
     }
 
-    /// Turns the gradient of the outputs into that of `z`, and sets those of
-    /// scale and shift. `y` are the outputs.
+    /// Sets the gradients of scale and shift from the gradient `dy` of the outputs `y`. Returns
+    /// the gradient of `z`.
     pub fn backward(
         &mut self,
         mut dy: Matrix,
@@ -169,7 +170,7 @@ impl Norm {
     }
 }
 
-/// Turns the gradient of the outputs `y` of a ReLU into that of its inputs.
+/// Changes the gradient of the outputs `y` of a ReLU to that of its inputs.
 pub fn relu_gradient(dy: &mut Matrix, y: &Matrix) {
     dy.zip_mut_with(y, |dy, &y| {
         if y <= 0.0 {
@@ -182,8 +183,8 @@ fn slice<'a>(row: &'a mut ndarray::ArrayViewMut1<'_, f32>) -> &'a mut [f32] {
     row.as_slice_mut().expect("invariant: rows are contiguous")
 }
 
-/// Sums `term(z, channel)` times its row's weight over rows, over `total`:
-/// chunks in f32, their sums in f64.
+/// Sums `term(z, channel)` times the weight of the row over all rows, and divides by `total`.
+/// The sums of chunks are in f32, and the sum over chunks is in f64.
 pub fn column_sums(
     z: &Matrix,
     weights: &[f32],
@@ -206,6 +207,6 @@ pub fn column_sums(
             sums
         })
         .collect();
-    let of = |c: usize| chunk_sums.iter().map(|sums| f64::from(sums[c])).sum::<f64>();
-    (0..channels).map(|c| (of(c) / f64::from(total)) as f32).collect()
+    let sum = |c: usize| chunk_sums.iter().map(|sums| f64::from(sums[c])).sum::<f64>();
+    (0..channels).map(|c| (sum(c) / f64::from(total)) as f32).collect()
 }

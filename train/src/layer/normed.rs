@@ -1,5 +1,4 @@
-//! A linear layer and its batch norm, the base of every layer that is followed by a
-//! ReLU or a pooling.
+//! A linear layer and its batch norm: the base of every layer before a ReLU or a pooling.
 
 use ndarray::ArrayView2;
 
@@ -18,7 +17,7 @@ pub struct Normed {
 }
 
 impl Normed {
-    /// Parts named `linear` and `norm`, of random weights.
+    /// A layer with random weights, whose parts are named `linear` and `norm`.
     #[must_use]
     pub fn new(linear: &str, norm: &str, (inputs, outputs): (usize, usize), seed: u64) -> Self {
         Self {
@@ -34,7 +33,7 @@ impl Normed {
         self.output.view()
     }
 
-    /// The linear layer and its batch norm.
+    /// The layer as a part of a network.
     pub fn layer(&mut self) -> LayerMut<'_> {
         let Self { linear, norm, output } = self;
         LayerMut { linear, norm: Some(norm), output: Some(output) }

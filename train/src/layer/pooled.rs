@@ -1,15 +1,15 @@
-//! Linear layer, batch norm and the maximum over each cloud's points, in one.
+//! A linear layer, a batch norm and the maximum over the points of each cloud, fused.
 //!
-//! The products z = W x, a thousand for each point, are never stored:
+//! The products z = W x, about a thousand for each point, are never stored:
 //!
-//! - The maximum needs one product of each channel and cloud, which infer-cpu's
-//!   fused kernel finds. A batch norm with a scale of at least 0 keeps the order of
-//!   its values; one below 0 reverses it, and then the weights change their sign.
+//! - The maximum needs one product for each channel and cloud, which infer-cpu's fused kernel
+//!   finds. A batch norm with a scale of 0 or more keeps the order of its values. A scale
+//!   below 0 reverses the order, so that the kernel takes weights of the opposite sign.
 //! - Mean and variance of z follow from those of x: mean(z) = W mean(x), and
 //!   var(z) = w cov(x) wᵀ for each channel's w.
-//! - In the backward pass, a channel's gradient G flows to one point of each cloud,
-//!   and through the batch norm's statistics to all points. With σ, γ of a
-//!   channel, n points in all, S = ΣG over clouds and P = ΣG ẑ:
+//! - In the backward pass, the gradient G of a channel flows to one point of each cloud and,
+//!   through the statistics of the batch norm, to all points. With the channel's σ and γ, the
+//!   number n of all points, S = ΣG and P = ΣG ẑ over clouds:
 //!
 //! ```text
 //! dW  =  γ/σ (Σ G x_winner  -  S mean(x)  -  P cov(x) w / σ)
@@ -17,21 +17,22 @@
 //! v   =  Σ_channels γ/σ S/n w,      A  =  Σ_channels γ P / (n σ²) w wᵀ
 //! ```
 //!
-//! so that all points together cost one product with a matrix of inputs by inputs.
+//! so that the gradient of all points takes one product with an inputs by inputs matrix.
 
 use infer_cpu::kernel::PooledProducts;
 use ndarray::parallel::prelude::*;
 use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
 
+use super::Normed;
 use super::norm::{EPSILON, column_sums, relu_gradient};
-use super::{Normed, Rows, by_cloud};
 use crate::matrix::{self, Matrix};
+use crate::rows::{Rows, by_cloud};
 
 /// The last point-wise layer before a pooling, and the pooling.
 #[derive(Clone, Debug)]
 pub struct PooledLayer {
-    /// Its parameters and its last output.
+    /// The parameters and the last output.
     pub base: Normed,
     relu: bool,
     saved: Saved,
@@ -40,42 +41,43 @@ pub struct PooledLayer {
 /// The values of a forward pass that the backward pass needs.
 #[derive(Clone, Debug, Default)]
 struct Saved {
-    /// The row that won, by cloud and channel.
+    /// The row with the maximum, by cloud and channel.
     winners: Vec<u32>,
-    /// Its product with mean 0 and variance 1.
+    /// The product of that row, normalised to mean 0 and variance 1.
     normalised: Matrix,
-    /// Mean of the inputs.
+    /// The mean of the inputs.
     mean: Vec<f32>,
-    /// Inputs less their mean.
+    /// The inputs minus their mean.
     centred: Matrix,
     /// W cov(x).
     covariant: Matrix,
+    /// 1 / standard deviation of each channel.
     inverse: Vec<f32>,
 }
 
 impl PooledLayer {
-    /// A layer whose parts are named `linear` and `norm`; with `relu` the output
-    /// is at least 0.
+    /// A layer with random weights, whose parts are named `linear` and `norm`. With `relu`, a
+    /// ReLU follows.
     #[must_use]
     pub fn new(linear: &str, norm: &str, size: (usize, usize), relu: bool, seed: u64) -> Self {
         Self { base: Normed::new(linear, norm, size, seed), relu, saved: Saved::default() }
     }
 
-    /// The row that won each channel of cloud `cloud`.
+    /// The row with the maximum of each channel of cloud `cloud`.
     #[must_use]
     pub fn winners(&self, cloud: usize) -> &[u32] {
         let n = self.base.output.ncols();
         &self.saved.winners[cloud * n..][..n]
     }
 
-    /// Takes `x` `[rows, inputs]` through the layer.
+    /// Applies the layer to `x` `[rows, inputs]`.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
         let x = x.to_owned();
         let mean = column_sums(&x, rows.weights, |x, _| x, rows.total);
         let centred = &x - &ndarray::aview1(&mean);
         let covariance = covariance(&centred, rows);
         let weights = self.base.linear.weight.matrix();
-        // [outputs, inputs]; a covariance is its own transpose.
+        // [outputs, inputs]. A covariance matrix is symmetric.
         let covariant = matrix::product(weights, covariance.t());
         let products = |row: usize| {
             let (a, w) = (covariant.row(row), weights.row(row));
@@ -101,7 +103,7 @@ impl PooledLayer {
         self.saved = Saved { winners, normalised, mean, centred, covariant, inverse };
     }
 
-    /// The products that the batch norm makes largest, and their rows.
+    /// The products that the batch norm maps to the maxima, and their rows.
     fn largest(&self, x: &Matrix, rows: Rows<'_>) -> (Matrix, Vec<u32>) {
         let (inputs, outputs) = self.base.linear.size();
         let scale = &self.base.norm.scale.value;
@@ -123,7 +125,7 @@ impl PooledLayer {
                 let points = x.slice(ndarray::s![first..last, ..]);
                 let points = points.to_slice().expect("invariant: rows are contiguous");
                 let mut maxima = vec![f32::NEG_INFINITY; outputs];
-                // NaN wins no channel. The first row is then the winner.
+                // If all products are NaN, none is a maximum: the first row stays.
                 winners.fill(first as u32);
                 pooled.argmax(points, first as u32, &mut maxima, winners);
                 for c in 0..outputs {
@@ -133,8 +135,8 @@ impl PooledLayer {
         (products, winners)
     }
 
-    /// Sets the parameters' gradients from that of the output; returns that of `x`,
-    /// if `wants_input`.
+    /// Sets the gradients of the parameters from the gradient `dy` of the output. Returns the
+    /// gradient of `x` if `wants_input`.
     pub fn backward(
         &mut self,
         mut dy: Matrix,

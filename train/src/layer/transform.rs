@@ -3,20 +3,20 @@
 use ndarray::parallel::prelude::*;
 use ndarray::{ArrayView2, Axis, s};
 
-use super::{Rows, by_cloud};
 use crate::matrix::Matrix;
+use crate::rows::{Rows, by_cloud};
 
-/// Square transforms `[clouds, k * k]`; a row vector p becomes p T.
+/// Square transforms T, `[clouds, k * k]`, which map a row vector p to p T.
 #[derive(Clone, Debug, Default)]
 pub struct Transforms {
     /// The elements of each cloud's transform, row by row.
     pub elements: Matrix,
-    /// Rows of each transform.
+    /// The number of rows of each transform.
     pub k: usize,
 }
 
 impl Transforms {
-    /// The transforms that differ from the identity by `elements`.
+    /// The transforms whose differences from the identity are `elements`.
     #[must_use]
     pub fn around_identity(mut elements: Matrix, k: usize) -> Self {
         for i in 0..k {
@@ -26,23 +26,23 @@ impl Transforms {
     }
 
     /// The transform of cloud `cloud`, `[k, k]`.
-    fn of(&self, cloud: usize) -> ArrayView2<'_, f32> {
+    fn matrix(&self, cloud: usize) -> ArrayView2<'_, f32> {
         let row = self.elements.row(cloud).to_slice().expect("invariant: rows are contiguous");
         ArrayView2::from_shape((self.k, self.k), row).expect("invariant: k by k")
     }
 
-    /// Each row of `x`, transformed by its cloud's transform.
+    /// Applies to each row of `x` the transform of its cloud.
     #[must_use]
     pub fn forward(&self, x: ArrayView2<'_, f32>, rows: Rows<'_>) -> Matrix {
         let mut out = Matrix::zeros(x.dim());
         by_cloud(&mut out, rows).into_par_iter().enumerate().for_each(|(cloud, mut out)| {
             let x = x.slice(s![rows.starts[cloud]..rows.starts[cloud + 1], ..]);
-            out.assign(&x.dot(&self.of(cloud)));
+            out.assign(&x.dot(&self.matrix(cloud)));
         });
         out
     }
 
-    /// The gradients of the transforms' elements and of `x`, from that of the
+    /// The gradients of the transforms' elements and of `x`, from the gradient `dy` of the
     /// transformed rows.
     #[must_use]
     pub fn backward(
@@ -60,7 +60,7 @@ impl Transforms {
             .for_each(|(cloud, (mut dx, mut elements))| {
                 let range = s![rows.starts[cloud]..rows.starts[cloud + 1], ..];
                 let (x, dy) = (x.slice(range), dy.slice(range));
-                dx.assign(&dy.dot(&self.of(cloud).t()));
+                dx.assign(&dy.dot(&self.matrix(cloud).t()));
                 let product = x.t().dot(&dy);
                 elements.iter_mut().zip(&product).for_each(|(out, x)| *out = *x);
             });
@@ -68,8 +68,8 @@ impl Transforms {
     }
 }
 
-/// The mean of ‖T Tᵀ - 1‖ (Frobenius) over clouds, and its derivative by the
-/// elements: 2 E T / ‖E‖ for E = T Tᵀ - 1, which is its own transpose.
+/// The mean of ‖T Tᵀ - 1‖ (Frobenius) over clouds, and its derivative with respect to the
+/// elements: 2 E T / ‖E‖ with the symmetric E = T Tᵀ - 1.
 #[must_use]
 pub fn orthogonality(transforms: &Transforms) -> (f64, Matrix) {
     let n = transforms.elements.nrows() as f32;
@@ -79,7 +79,7 @@ pub fn orthogonality(transforms: &Transforms) -> (f64, Matrix) {
         .into_par_iter()
         .enumerate()
         .map(|(cloud, mut gradient)| {
-            let t = transforms.of(cloud);
+            let t = transforms.matrix(cloud);
             let mut error = t.dot(&t.t());
             error.diag_mut().iter_mut().for_each(|x| *x -= 1.0);
             let norm = error.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt();

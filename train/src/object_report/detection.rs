@@ -1,18 +1,19 @@
-//! How well a score tells known objects from others, and how true confidences are.
+//! The separation of negatives from known objects by a score, and the calibration error of
+//! confidences.
 
-/// How well a score tells negatives, which should have larger scores, from known
-/// objects.
+/// The separation of negatives, which should have larger scores, from known objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// The chance that a negative's score is above that of a known object: the area
-    /// under the receiver operating characteristic.
+    /// The probability that a negative has a larger score than a known object: the area under
+    /// the receiver operating characteristic.
     pub auroc: f64,
-    /// The share of negatives that are taken for known where the threshold keeps 95 %
+    /// The share of negatives that are taken for known objects at the threshold that keeps 95 %
     /// of the known objects.
     pub fpr_at_95: f64,
 }
 
-/// Of the scores of `known` objects and of `negatives`; `None` if either has none.
+/// The separation by the scores of `known` objects and of `negatives`. `None` if there are no
+/// objects of either kind.
 #[must_use]
 pub fn detection(known: &[f64], negatives: &[f64]) -> Option<Detection> {
     let threshold = crate::calibration::quantile(known.to_vec(), 0.95)?;
@@ -35,12 +36,12 @@ pub fn detection(known: &[f64], negatives: &[f64]) -> Option<Detection> {
     })
 }
 
-/// Bins of the expected calibration error, as Guo et al. 2017 chose.
+/// Number of bins of the expected calibration error (Guo et al. 2017).
 const BINS: usize = 15;
 
-/// The expected calibration error of answers, each with its confidence and whether it
-/// is right: the mean distance of confidence from accuracy, over bins of confidence.
-/// 0 without answers.
+/// The expected calibration error of `answers`, each of which is a confidence and whether the
+/// answer is right. It is the mean difference between confidence and accuracy over bins of
+/// confidence, and 0 without answers.
 #[must_use]
 pub fn calibration_error(answers: &[(f64, bool)]) -> f64 {
     let mut bins = [(0.0, 0.0); BINS];

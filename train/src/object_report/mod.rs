@@ -1,18 +1,18 @@
-//! How a model answers to objects that were cut out of scans, some of which it is
-//! meant to know and some not.
+//! Scores the answers of a model to objects that were cut out of scans.
 //!
-//! Known objects are right if they are called by their class, and negatives, such as
-//! trees and walls, if they are answered as `unknown`. A negative that is called
-//! something known is a false alarm.
+//! An answer to a known object is right if it is the object's class. An answer to a negative,
+//! such as a tree or a wall, is right if it is `unknown`; any other answer is a false alarm.
 
 mod detection;
 mod failures;
+mod share;
 mod table;
 mod truth;
 
 pub use detection::{Detection, calibration_error, detection};
 pub use failures::drawing;
-pub use table::{Row, Table};
+pub use share::{Grouping, Share, bin, shares};
+pub use table::Table;
 pub use truth::{Labels, Truth};
 
 use std::path::Path;
@@ -23,26 +23,26 @@ use crate::clouds::Clouds;
 use crate::error::Error;
 use crate::evaluate::predictions;
 
-/// A labelled object, and what a model says of it.
+/// A labelled object with a model's answer.
 #[derive(Clone, Debug)]
 pub struct Object {
-    /// The file that it is from, without its extension.
+    /// The name of the file, without its extension.
     pub data: String,
-    /// Its place in that file.
+    /// The index of the object in the file.
     pub index: usize,
-    /// Its label in the file.
+    /// The label in the file.
     pub label: String,
-    /// What the answer should be.
+    /// The right answer.
     pub truth: Truth,
-    /// Points of its cluster.
+    /// The number of points.
     pub n_points: usize,
-    /// Distance from the sensor in metres, where the file lists it.
+    /// The distance from the sensor in metres, if the file states it.
     pub range_m: Option<f32>,
-    /// The sensor's name, where the file lists it.
+    /// The name of the sensor, if the file states it.
     pub sensor: Option<String>,
-    /// The track in its file: what follows the `#` of its id.
+    /// The track in the file: the part of the object's id after `#`.
     pub track: Option<String>,
-    /// The model's answer, with which of the classes count as known.
+    /// The model's answer.
     pub answer: Answer,
 }
 
@@ -51,14 +51,14 @@ pub struct Object {
 pub struct Answer {
     /// The class, an index into the model's; `None` for `unknown`.
     pub class: Option<usize>,
-    /// Whether the fine class is right, and its confidence: of a known object.
+    /// The probability of the most probable class.
     pub confidence: f64,
-    /// The most probable of all classes.
+    /// The most probable class, known or not.
     pub fine: usize,
     /// [`Prediction::energy`].
     pub energy: f64,
-    /// The largest logit of the classes that are not known, less the largest of
-    /// those that are; `None` if either has none.
+    /// The largest logit of the classes that are not known minus the largest logit of the
+    /// known classes. `None` if there are no classes of either kind.
     pub margin: Option<f64>,
 }
 
@@ -73,8 +73,8 @@ impl Object {
     }
 }
 
-/// Classifies `clouds`, which are of the file `data`, by the model at `path`: those
-/// of `least` points or more whose label is not left out.
+/// Classifies `clouds`, read from the file `data`, with the model at `path`. Leaves out clouds
+/// of fewer than `least` points, and those whose labels `labels` leaves out.
 ///
 /// # Errors
 /// A model or a cloud that infer-cpu refuses.

@@ -1,48 +1,32 @@
-//! The share of objects that are answered rightly: by class, and of each class by
-//! range, number of points, sensor and file.
+//! The share of right answers: by class, and within each class by label, range, number of
+//! points, sensor and file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use formats::interval::wilson;
-
+use super::share::{Grouping, Share, bin, shares};
 use super::{Labels, Object, Truth};
 
-/// Where ranges are divided, metres.
+/// Edges of the bins of range, metres.
 const RANGES: [usize; 7] = [0, 5, 10, 15, 20, 30, 40];
-/// Where numbers of points are divided.
+/// Edges of the bins of numbers of points.
 const POINTS: [usize; 7] = [0, 20, 30, 60, 100, 200, 500];
 
-/// What the objects are called that should be answered as unknown.
+/// The row of a class for all of its objects.
+const ALL: &str = "all";
+/// The name in the table of objects that the model should answer as `unknown`.
 const NEGATIVES: &str = "negatives";
 
-/// The group that an object is in, if it is in one: its name, after a number that
-/// orders the rows.
-type GroupOf<'a> = dyn Fn(&Object) -> Option<(usize, String)> + 'a;
-
-/// One share.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Row {
-    /// The class, or `negatives`.
-    pub class: String,
-    /// Which of its objects.
-    pub group: String,
-    /// How many of them are as the group says, or right.
-    pub hits: usize,
-    /// How many there are.
-    pub n: usize,
-}
-
-/// All shares.
+/// The shares of hits among all objects, by class and group.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
-    /// In order.
-    pub rows: Vec<Row>,
+    /// The name of a class, or `negatives`, with the share of one group of its objects.
+    pub rows: Vec<(String, Share)>,
 }
 
 impl Table {
-    /// Of `objects`, whose labels mean `labels`. With `tracks`, the views of a track
-    /// count once in each row: as right if more than half of them are.
+    /// Counts `objects`, whose labels `labels` explains. With `tracks`, all views of a
+    /// track count once in each row: as a hit if more than half of them are hits.
     #[must_use]
     pub fn new(objects: &[Object], labels: &Labels, tracks: bool) -> Self {
         let mut by_class: BTreeMap<(bool, String), Vec<&Object>> = BTreeMap::new();
@@ -53,55 +37,20 @@ impl Table {
             };
             by_class.entry(class).or_default().push(object);
         }
-        let mut table = Self::default();
-        for ((_, class), objects) in &by_class {
-            table.add(class, objects, labels, tracks);
-        }
-        table
+        let rows = by_class.into_iter().flat_map(|((_, class), objects)| {
+            let shares = class_shares(&class, &objects, labels, tracks);
+            shares.into_iter().map(move |share| (class.clone(), share))
+        });
+        Self { rows: rows.collect() }
     }
 
-    /// Adds the rows of `class`.
-    fn add(&mut self, class: &str, objects: &[&Object], labels: &Labels, tracks: bool) {
-        let mut add = |group: String, (hits, n): (usize, usize)| {
-            self.rows.push(Row { class: class.to_owned(), group, hits, n });
-        };
-        add("all".to_owned(), count(objects, tracks, Object::is_right));
-        for answer in objects.iter().map(|o| o.answer.class).collect::<BTreeSet<_>>() {
-            let name = answer.map_or(infer_cpu::UNKNOWN, |class| &labels.classes()[class]);
-            let wrong = |object: &Object| object.answer.class == answer && !object.is_right();
-            let found = count(objects, tracks, wrong);
-            if found.0 > 0 {
-                add(format!("called {name}"), found);
-            }
-        }
-        let has_aliases = objects.iter().any(|object| object.label != class);
-        let groups: [&GroupOf<'_>; 5] = [
-            &|o| has_aliases.then(|| (0, format!("labelled {}", o.label))),
-            &|o| Some(bin(f64::from(o.range_m.filter(|r| *r >= 0.0)?), &RANGES, "m")),
-            &|o| Some(bin(o.n_points as f64, &POINTS, "points")),
-            &|o| Some((0, o.sensor.clone()?)),
-            &|o| Some((0, format!("from {}", o.data))),
-        ];
-        for group_of in groups {
-            let mut groups: BTreeMap<(usize, String), Vec<&Object>> = BTreeMap::new();
-            for object in objects {
-                if let Some(group) = group_of(object) {
-                    groups.entry(group).or_default().push(object);
-                }
-            }
-            for ((_, group), objects) in groups {
-                add(group, count(&objects, tracks, Object::is_right));
-            }
-        }
-    }
-
-    /// The mean over all classes, negatives among them, of the share of right
-    /// answers; `None` without objects.
+    /// The mean share of right answers over all classes and the negatives. `None` without
+    /// objects.
     #[must_use]
     pub fn balanced(&self) -> Option<f64> {
-        let all = || self.rows.iter().filter(|row| row.group == "all");
+        let all = || self.rows.iter().filter(|(_, share)| share.group == ALL);
         let n = all().count();
-        (n > 0).then(|| all().map(|row| row.hits as f64 / row.n as f64).sum::<f64>() / n as f64)
+        (n > 0).then(|| all().map(|(_, share)| share.ratio()).sum::<f64>() / n as f64)
     }
 
     /// The rows as CSV.
@@ -112,12 +61,11 @@ impl Table {
             csv.write_record(record).expect("invariant: memory takes all, rows are equally long");
         };
         write(["class", "group", "hits", "of", "share", "low", "high"].map(str::to_owned));
-        for Row { class, group, hits, n } in &self.rows {
-            let (low, high) = wilson(*hits, *n);
-            let [share, low, high] =
-                [*hits as f64 / *n as f64, low, high].map(|share| format!("{share:.4}"));
-            let [hits, n] = [hits, n].map(usize::to_string);
-            write([class.clone(), group.clone(), hits, n, share, low, high]);
+        for (class, share) in &self.rows {
+            let (low, high) = share.interval();
+            let [ratio, low, high] = [share.ratio(), low, high].map(|ratio| format!("{ratio:.4}"));
+            let [hits, n] = [share.hits, share.n].map(|count| count.to_string());
+            write([class.clone(), share.group.clone(), hits, n, ratio, low, high]);
         }
         csv.into_inner().expect("invariant: memory takes all")
     }
@@ -125,15 +73,14 @@ impl Table {
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = |of: fn(&Row) -> &str| self.rows.iter().map(|row| of(row).len()).max();
-        let class_width = width(|row| row.class.as_str()).unwrap_or(0);
-        let group_width = width(|row| row.group.as_str()).unwrap_or(0);
-        for Row { class, group, hits, n } in &self.rows {
-            let (low, high) = wilson(*hits, *n);
-            let [share, low, high] = [*hits as f64 / *n as f64, low, high].map(|x| 100.0 * x);
+        let class_width = self.rows.iter().map(|(class, _)| class.len()).max().unwrap_or(0);
+        let group_width = self.rows.iter().map(|(_, share)| share.group.len()).max().unwrap_or(0);
+        for (class, share) in &self.rows {
+            let (Share { group, hits, n }, (low, high)) = (share, share.interval());
+            let [ratio, low, high] = [share.ratio(), low, high].map(|ratio| 100.0 * ratio);
             writeln!(
                 f,
-                "{class:class_width$}  {group:group_width$}  {hits:5} of {n:5}  {share:5.1} %  \
+                "{class:class_width$}  {group:group_width$}  {hits:5} of {n:5}  {ratio:5.1} %  \
                  ({low:.1} to {high:.1})"
             )?;
         }
@@ -141,8 +88,34 @@ impl fmt::Display for Table {
     }
 }
 
-/// How many of `objects` are hits, and how many there are; a track counts once if
-/// `tracks`.
+/// The rows of one class: right answers among all of its objects, each wrong answer, and
+/// right answers by label, range, number of points, sensor and file.
+fn class_shares(class: &str, objects: &[&Object], labels: &Labels, tracks: bool) -> Vec<Share> {
+    let right = |objects: &[&Object]| count(objects, tracks, Object::is_right);
+    let named = |group: String, (hits, n): (usize, usize)| Share { group, hits, n };
+    let mut found = vec![named(ALL.to_owned(), right(objects))];
+    for answer in objects.iter().map(|object| object.answer.class).collect::<BTreeSet<_>>() {
+        let name = answer.map_or(infer_cpu::UNKNOWN, |class| &labels.classes()[class]);
+        let wrong = |object: &Object| object.answer.class == answer && !object.is_right();
+        let counted = count(objects, tracks, wrong);
+        if counted.0 > 0 {
+            found.push(named(format!("called {name}"), counted));
+        }
+    }
+    let has_aliases = objects.iter().any(|object| object.label != class);
+    let groupings: [&Grouping<'_, Object>; 5] = [
+        &|object| has_aliases.then(|| (0, format!("labelled {}", object.label))),
+        &|object| Some(bin(f64::from(object.range_m.filter(|r| *r >= 0.0)?), &RANGES, "m")),
+        &|object| Some(bin(object.n_points as f64, &POINTS, "points")),
+        &|object| Some((0, object.sensor.clone()?)),
+        &|object| Some((0, format!("from {}", object.data))),
+    ];
+    found.extend(groupings.into_iter().flat_map(|grouping| shares(objects, grouping, right)));
+    found
+}
+
+/// The number of hits among `objects`, and the number of objects. With `tracks`, a track
+/// counts once.
 fn count(objects: &[&Object], tracks: bool, is_hit: impl Fn(&Object) -> bool) -> (usize, usize) {
     let mut things: BTreeMap<(&str, &str, usize), (usize, usize)> = BTreeMap::new();
     for (number, object) in objects.iter().enumerate() {
@@ -155,18 +128,6 @@ fn count(objects: &[&Object], tracks: bool, is_hit: impl Fn(&Object) -> bool) ->
         *n += 1;
     }
     (things.values().filter(|(hits, n)| 2 * hits > *n).count(), things.len())
-}
-
-/// The place and the name of the bin of `value` between `edges`, the last of which is
-/// open.
-fn bin(value: f64, edges: &[usize], unit: &str) -> (usize, String) {
-    let next = edges.partition_point(|&edge| edge as f64 <= value);
-    let low = edges[next - 1];
-    let name = match edges.get(next) {
-        Some(high) => format!("{low} to {high} {unit}"),
-        None => format!("{low} {unit} or more"),
-    };
-    (next, name)
 }
 
 #[cfg(test)]
@@ -195,8 +156,9 @@ mod tests {
     }
 
     fn found(table: &Table, class: &str, group: &str) -> Option<(usize, usize)> {
-        let row = table.rows.iter().find(|row| row.class == class && row.group == group);
-        row.map(|row| (row.hits, row.n))
+        let mut rows = table.rows.iter().filter(|(name, _)| name == class);
+        let (_, share) = rows.find(|(_, share)| share.group == group)?;
+        Some((share.hits, share.n))
     }
 
     #[test]
@@ -234,12 +196,5 @@ mod tests {
         let objects = [car(Some(0), "1"), car(None, "1"), car(Some(0), "2")];
         let table = Table::new(&objects, &labels(), true);
         assert_eq!(found(&table, "car", "all"), Some((1, 2)));
-    }
-
-    #[test]
-    fn bins_are_closed_below_and_the_last_is_open() {
-        assert_eq!(bin(0.0, &RANGES, "m").1, "0 to 5 m");
-        assert_eq!(bin(5.0, &RANGES, "m").1, "5 to 10 m");
-        assert_eq!(bin(1e9, &RANGES, "m").1, "40 m or more");
     }
 }

@@ -1,4 +1,4 @@
-//! What the answer to a label of data should be.
+//! The right answer to each label of a data set.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,8 +7,8 @@ use formats::FormatError;
 
 use crate::error::Error;
 
-/// What labelled sets call the things that networks call otherwise. A label that the
-/// model has a class for is never replaced.
+/// Labels of data sets, with the classes of networks for them. A label that is a class of the
+/// model is not replaced.
 const ALIASES: [(&str, &str); 6] = [
     ("pedestrian", "person"),
     ("4wd", "car"),
@@ -18,19 +18,19 @@ const ALIASES: [(&str, &str); 6] = [
     ("van", "car"),
 ];
 
-/// Stands in a file of aliases for a label whose objects are left out.
+/// The alias of a label whose objects are left out.
 const LEFT_OUT: &str = "";
 
-/// What the answer should be.
+/// The right answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Truth {
-    /// This class of the model.
+    /// This class, an index into the model's.
     Known(usize),
     /// `unknown`.
     Negative,
 }
 
-/// What each label of data means to a model.
+/// The right answer of a model to each label of a data set.
 #[derive(Clone, Debug)]
 pub struct Labels {
     classes: Vec<String>,
@@ -39,7 +39,7 @@ pub struct Labels {
 }
 
 impl Labels {
-    /// For a model of these `classes`, of which all but `unknown` are known.
+    /// For a model with these `classes`. All classes except those in `unknown` are known.
     #[must_use]
     pub fn new(classes: &[String], unknown: &[String]) -> Self {
         let aliases = ALIASES.map(|(label, class)| (label.to_owned(), class.to_owned()));
@@ -50,11 +50,11 @@ impl Labels {
         }
     }
 
-    /// The same with the aliases of the TOML file at `path` before the built-in ones:
-    /// `pedestrian = "person"`, or `rider = ""` for objects that are left out.
+    /// Adds the aliases in the TOML file at `path`, which replace built-in ones:
+    /// `pedestrian = "person"`, or `rider = ""` to leave objects out.
     ///
     /// # Errors
-    /// A file that is not such a table.
+    /// A file that is not a table of aliases.
     pub fn with_aliases(mut self, path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
         let aliases: BTreeMap<String, String> = toml::from_str(&text)
@@ -63,7 +63,7 @@ impl Labels {
         Ok(self)
     }
 
-    /// Whether the model is to tell this class, one of its own, from others.
+    /// Whether this class of the model is known.
     #[must_use]
     pub fn is_known(&self, class: usize) -> bool {
         self.is_known[class]
@@ -75,8 +75,8 @@ impl Labels {
         &self.classes
     }
 
-    /// What the answer to an object of `label` should be: its class, or that of its
-    /// alias, or `unknown` if the model has neither; `None` if it is left out.
+    /// The right answer to an object with this `label`: the class of that name, the class of its
+    /// alias, or `unknown` if the model has neither. `None` if the object is left out.
     #[must_use]
     pub fn truth(&self, label: &str) -> Option<Truth> {
         let alias = self.aliases.get(label).map(String::as_str);
@@ -88,8 +88,7 @@ impl Labels {
         Some(known.map_or(Truth::Negative, Truth::Known))
     }
 
-    /// Whether the model has neither this label nor its alias as a class, known or
-    /// not.
+    /// Whether neither this label nor its alias is a class of the model.
     #[must_use]
     pub fn lacks(&self, label: &str) -> bool {
         let alias = self.aliases.get(label);

@@ -9,7 +9,7 @@ use formats::rng::StreamKey;
 use infer_cpu::{Classifier, Options};
 use train::augment::{TrainingCloud, augment};
 use train::clouds::Clouds;
-use train::cluster::ClusterVariation;
+use train::cluster_variation::ClusterVariation;
 use train::recipe::{Augment, Recipe, Sampling};
 
 use crate::program::{stderr, train};

@@ -5,7 +5,7 @@ use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
 use infer_cpu::{Classifier, Options};
 use train::augment::{augment, varied_too};
-use train::cluster::ClusterVariation;
+use train::cluster_variation::ClusterVariation;
 use train::init;
 use train::model_file;
 use train::negatives::{Negative, added, negative};

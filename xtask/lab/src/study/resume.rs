@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use train::clouds::Clouds;
 use train::recipe::Recipe;
-use train::run::Job;
+use train::run::{Job, Progress};
 
 /// Trains the network called `name` by `recipe` on `clouds` and writes it to
 /// `out`, unless it is there.
@@ -26,7 +26,12 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
     }
     eprintln!("training {name}: {} clouds, {} points", clouds.len(), recipe.points);
     let job = Job { recipe, clouds, data: name, data_name: name, out };
-    job.run(None).map(|_| ()).with_context(|| format!("cannot train {name}"))
+    let mut report = |progress: Progress<'_>| {
+        if let Progress::Epoch(epoch) = progress {
+            eprintln!("{epoch}");
+        }
+    };
+    job.run(None, &mut report).map(|_| ()).with_context(|| format!("cannot train {name}"))
 }
 
 /// The result in the JSON file at `path`, or else the one that `make` gives, which

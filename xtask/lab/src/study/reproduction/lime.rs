@@ -49,7 +49,7 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
         let answer = &held.classes[found.class];
         let name = format!("cloud {cloud}, a {class} taken for a {answer}");
         let strongest = found.strongest(critical.len());
-        let beside = RandomBaseline::of(&points, (&critical, &strongest), context.plan.draws, 0);
+        let beside = RandomBaseline::new(&points, (&critical, &strongest), context.plan.draws, 0);
         all.push(Explained { name, points, critical, strongest, found, beside });
     }
     let shown = &all[..SHOWN.min(all.len())];
@@ -66,9 +66,7 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
             cpl_name(front, keep)
         ),
     ];
-    let draw = |one: &Explained| {
-        explanation_drawing::draw(&one.points, &one.found, &one.critical).to_string()
-    };
+    let draw = |one: &Explained| explanation_drawing::draw(&one.points, &one.found, &one.critical);
     Ok(Section {
         drawings: shown.iter().map(draw).collect(),
         clouds: shown.iter().map(coloured).collect(),
