@@ -1,24 +1,24 @@
-//! What can go wrong while rays are cast.
+//! Errors of casting.
 
 /// Casting failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CastError {
-    /// No adapter has the name that was asked for.
+    /// No adapter has the requested name.
     #[error("expected an adapter whose name holds {wanted:?}, found {}", present.join(", "))]
     NoSuchAdapter {
-        /// The name asked for.
+        /// The requested name.
         wanted: String,
-        /// The names there are.
+        /// The names of the adapters.
         present: Vec<String>,
     },
-    /// An adapter was asked for by a program that was built without GPUs.
+    /// An adapter was requested from a build without GPU support.
     #[error(
         "expected an adapter whose name holds {wanted:?}, but this program was built without GPU \
          support: build it with `--features gpu`, or take the adapter \"cpu\""
     )]
     NoGpuSupport {
-        /// The name asked for.
+        /// The requested name.
         wanted: String,
     },
     /// The adapter does not open.
@@ -26,7 +26,7 @@ pub enum CastError {
     Open {
         /// The adapter.
         name: String,
-        /// Why.
+        /// The cause.
         cause: String,
     },
     /// A mesh is too large for the adapter's bindings.

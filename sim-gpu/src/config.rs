@@ -1,8 +1,7 @@
 //! Reading TOML files that users write: sensors, poses and scenes.
 //!
-//! Every error names the file, the key and the cause. A `toml` error points at
-//! line and column; an [`InvalidValue`] carries the key's path as one would
-//! write it, `object[2].scale`.
+//! Every error names the file, the key and the cause. A `toml` error has a line and a column, an
+//! [`InvalidValue`] the path of the key, such as `object[2].scale`.
 
 use std::fmt;
 use std::io::Read;
@@ -11,11 +10,11 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-/// No file a person writes is longer; the limit keeps a wrong path (a mesh, a
-/// device) from filling the memory.
+/// The limit of files, beyond any that people write, so that a wrong path (a mesh, a device) does
+/// not fill the memory.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
-/// Why a TOML file could not be used.
+/// A TOML file could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// The file cannot be opened or read.
@@ -23,7 +22,7 @@ pub enum ConfigError {
     Read {
         /// The file as named by the user.
         file: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file is longer than any configuration is.
@@ -64,17 +63,17 @@ pub enum ConfigError {
 pub struct InvalidValue {
     /// The path of the key, such as `rotating.beam[3].elevation_deg`.
     pub key: String,
-    /// What is wrong with it.
+    /// The cause.
     pub cause: String,
 }
 
 impl InvalidValue {
-    /// The error that `key` is wrong because of `cause`.
+    /// The error that the value of `key` cannot be used because of `cause`.
     pub fn new(key: impl Into<String>, cause: impl Into<String>) -> Self {
         Self { key: key.into(), cause: cause.into() }
     }
 
-    /// The same error in the file it was found in.
+    /// The same error, with its file.
     #[must_use]
     pub fn in_file(self, file: &Path) -> ConfigError {
         ConfigError::Value { file: file.to_owned(), invalid: self }
@@ -96,7 +95,7 @@ pub fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
     parse(&text, file)
 }
 
-/// Parses `text`, which stands in `file`.
+/// Parses `text`, which is in `file`.
 ///
 /// # Errors
 /// Names the file and the cause.
@@ -107,13 +106,12 @@ pub fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ConfigEr
     })
 }
 
-/// That `value`, if there is one, is neither infinite nor NaN: TOML can write
-/// both.
+/// Checks that `value`, if there is one, is neither infinite nor NaN: TOML can express both.
 pub(crate) fn finite(key: &str, value: impl Into<Option<f64>>) -> Result<(), InvalidValue> {
     expect(key, value, format_args!("a finite number"), |_| true)
 }
 
-/// That `value`, if there is one, is finite and no less than `least`.
+/// Checks that `value`, if there is one, is finite and at least `least`.
 pub(crate) fn at_least(
     key: &str,
     value: impl Into<Option<f64>>,
@@ -122,7 +120,7 @@ pub(crate) fn at_least(
     expect(key, value, format_args!("a number of at least {least}"), |value| value >= least)
 }
 
-/// That `value`, if there is one, is finite and above 0.
+/// Checks that `value`, if there is one, is finite and above 0.
 pub(crate) fn positive(key: &str, value: impl Into<Option<f64>>) -> Result<(), InvalidValue> {
     expect(key, value, format_args!("a number above 0"), |value| value > 0.0)
 }
@@ -130,7 +128,7 @@ pub(crate) fn positive(key: &str, value: impl Into<Option<f64>>) -> Result<(), I
 /// Checks that `value`, if there is one, lies in `range`.
 ///
 /// # Errors
-/// Names the `key`, what it may be, and the value.
+/// Names the `key`, its range, and the value.
 pub fn within(
     key: &str,
     value: impl Into<Option<f64>>,

@@ -1,21 +1,20 @@
-//! What goes wrong with scans that a sensor has recorded: the corruptions of Robo3D (Kong et al.,
-//! ICCV 2023), each by the physics that it stands for.
+//! Corruptions of recorded scans: those of Robo3D (Kong et al., ICCV 2023), each by its physics.
 //!
-//! A recorded scan is taken to be of clear air and of a sensor at rest. Rain, snow and fog are
-//! [`crate::weather`]'s; the others are here.
+//! A recorded scan is assumed to be of clear air and of a sensor at rest. [`crate::weather`] has
+//! rain, snow and fog; this module has the others.
 //!
 //! # Wet ground
 //!
-//! A film of water lets through `t` of the light by Fresnel's formulas, in and again out, and
-//! keeps some between itself and the ground: of a ground of reflectivity rho it leaves
+//! A film of water transmits a part `t` of the light on the way in and out, by Fresnel's formulas,
+//! and reflects some back to the ground. A ground of reflectivity rho appears as
 //!
 //! ```text
 //! rho' = t t rho / (1 - r rho),    r = 1 - t
 //! ```
 //!
-//! of which the share `film / texture` is seen, where the film does not yet cover the ground's
-//! texture of 1.2 mm (Hahner et al., CVPR 2022, after Shin et al.). The rest of the light goes on
-//! as a mirror sends it.
+//! mixed with rho by the share `film / texture` while the film does not cover the ground's texture
+//! of 1.2 mm (Hahner et al., CVPR 2022, after Shin et al.). The rest of the light is reflected as by
+//! a mirror.
 
 use formats::Scan;
 use formats::rng::StreamKey;
@@ -30,71 +29,71 @@ use crate::weather::without_surface;
 /// Index of refraction of water over that of air.
 const WATER: f64 = 1.33 / 1.0003;
 
-/// How deep a film is that covers the texture of a road, metres (Hahner et al. 2022).
+/// The depth of a film that covers the texture of a road, metres (Hahner et al. 2022).
 const TEXTURE_M: f64 = 1.2e-3;
 
-/// What goes wrong with a recorded scan.
+/// A corruption of a recorded scan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Corruption {
     /// Rain, snow, fog or haze.
     Weather(Box<Weather>),
-    /// The ground is wet, under a film so deep.
+    /// The ground is wet.
     WetGround {
-        /// Metres.
+        /// The depth of the film of water, metres.
         film_m: f64,
     },
-    /// The sensor moves evenly while it turns, and nobody takes that out of its points.
+    /// The sensor moves uniformly during the scan, and its points are motion-distorted.
     Motion {
-        /// Along x of the points, metres a second.
+        /// Along x of the points, metres per second.
         speed_m_s: f64,
-        /// To the left, degrees a second.
+        /// To the left, degrees per second.
         yaw_rate_deg_s: f64,
     },
     /// Lasers are broken or covered.
     BeamsMissing {
-        /// Which part of them, 0 to 1.
+        /// The part of the lasers, 0 to 1.
         share: f64,
     },
-    /// Pulses of another sensor are taken for returns: at any time, and of any strength.
+    /// Pulses of another sensor are taken for returns, at any time and of any strength.
     Crosstalk {
-        /// Of so many points, 0 to 1.
+        /// The part of the points, 0 to 1.
         share: f64,
     },
-    /// A film of dirt on the window, which light crosses twice: what is dark or far is lost.
+    /// A film of dirt on the window, which light crosses twice: dark or distant points are lost.
     DirtyWindow {
-        /// The part of the light that gets through once, 0 to 1.
+        /// The part of the light that the film transmits once, 0 to 1.
         transmission: f64,
     },
     /// A sensor of fewer lasers and a slower pulse.
     FewerBeams {
-        /// The part of the lasers that it has, evenly spaced, 0 to 1.
+        /// The part of the lasers that remain, evenly spaced, 0 to 1.
         lasers: f64,
-        /// It fires at each so-manyth azimuth.
+        /// The sensor fires at every `keep_each`-th azimuth.
         keep_each: u32,
     },
 }
 
-/// What a corruption has to know of a scan.
+/// A recorded scan, with the inputs of corruptions.
 pub struct Recorded<'a> {
-    /// The points, as their file has them.
+    /// The points, in the frame of their file.
     pub scan: &'a Scan,
     /// Reflectivity times the cosine of the incidence, of each point.
     pub brightness: &'a [f32],
     /// Whether each point lies on the ground.
     pub is_ground: &'a [bool],
-    /// Where the sensor is.
+    /// The position of the sensor.
     pub sensor_m: DVec3,
-    /// The weakest return that it detects.
+    /// The sensor's detection limit.
     pub limit: DetectionLimit,
-    /// From where to where it measures, metres.
+    /// The nearest and the farthest range that the sensor measures, metres.
     pub range_m: [f64; 2],
-    /// Keys all random numbers.
+    /// The stream of all random numbers.
     pub stream: StreamKey,
 }
 
 impl Corruption {
-    /// Checks all numbers, which stand at `key`.
+    /// Checks all numbers, under names that begin with `key`.
     ///
     /// # Errors
     /// On the first that is not finite or out of its bounds.
@@ -120,22 +119,22 @@ impl Corruption {
     }
 }
 
-/// Of each scan that is returned, `intensity` is the brightness of its points.
+/// Every returned scan has the brightness of its points as `intensity`.
 impl Recorded<'_> {
-    /// How many points are too weak for the detection limit as they were recorded: whoever
-    /// recorded them has a lower one.
+    /// The number of points that are below the detection limit as recorded: the sensor that
+    /// recorded them has a lower limit.
     #[must_use]
     pub fn too_weak_before(&self) -> usize {
         let is_too_weak = |i: &usize| self.power(*i, 1.0) < self.limit.power();
         (0..self.scan.len()).filter(is_too_weak).count()
     }
 
-    /// The power of point `i` if this part of it is left.
+    /// The power of point `i`, times `left`.
     fn power(&self, i: usize, left: f64) -> f64 {
         f64::from(self.brightness[i]) * left / self.seen_from_sensor(i).length_squared()
     }
 
-    /// The scan on wet ground: the points whose returns are still detected, weaker.
+    /// The scan on wet ground, with the points that are still detected.
     #[must_use]
     pub fn wet_ground(&self, film_m: f64) -> Scan {
         let share = (film_m / TEXTURE_M).min(1.0);
@@ -149,20 +148,20 @@ impl Recorded<'_> {
         })
     }
 
-    /// The scan through a window that lets through this part of the light.
+    /// The scan through a window with this transmission.
     #[must_use]
     pub fn dirty_window(&self, transmission: f64) -> Scan {
         self.dimmed(|_, _| transmission * transmission)
     }
 
-    /// The points that are still detected if of point i, so far from the sensor, the part
-    /// `left` of the power is left; their brightness is the scan's intensity.
+    /// The points that are still detected if the power of point i, at this place relative to the
+    /// sensor, is multiplied by `left`.
     fn dimmed(&self, left: impl Fn(usize, DVec3) -> f64) -> Scan {
         let of_point = |i: usize| {
             let left = left(i, self.seen_from_sensor(i));
             let power = self.power(i, left);
-            // A point in the sensor itself, or one that is not finite, says nothing; and what
-            // loses nothing was detected.
+            // Points in the sensor or not finite have no power to compare, and points that lose no
+            // power were detected.
             let is_detected = left >= 1.0 || !power.is_finite() || power >= self.limit.power();
             is_detected.then(|| (i, (f64::from(self.brightness[i]) * left) as f32))
         };
@@ -173,8 +172,8 @@ impl Recorded<'_> {
         scan
     }
 
-    /// The scan of a sensor that goes along x and turns to the left; `None` if it has no times.
-    /// Normals and poses are left out, since they would be of the scan as it was.
+    /// The scan of a sensor that moves along x and turns to the left; `None` if the scan has no
+    /// times. Normals and poses are dropped, as they hold for the recorded scan only.
     #[must_use]
     pub fn motion(&self, speed_m_s: f64, yaw_rate_deg_s: f64) -> Option<Scan> {
         let times_s = self.scan.time_s.as_ref()?;
@@ -182,7 +181,7 @@ impl Recorded<'_> {
         let mut scan = self.scan.clone();
         for (i, point) in scan.positions.iter_mut().enumerate() {
             let time_s = f64::from(times_s[i]);
-            // Where it is by then on its arc, which bends to the left.
+            // The sensor's position on its arc, which bends to the left.
             let turned_rad = rate_rad_s * time_s;
             let gone_m = if rate_rad_s == 0.0 {
                 DVec3::new(speed_m_s * time_s, 0.0, 0.0)
@@ -214,8 +213,8 @@ impl Recorded<'_> {
         Some(self.where_point(|i| !is_missing[usize::from(rings[i])]))
     }
 
-    /// The scan in which this share of the points are another sensor's pulses: somewhere along
-    /// the beam, each place being as likely. `intensity` is the brightness of each.
+    /// The scan in which this share of the points are another sensor's pulses, uniformly
+    /// distributed along the beam.
     #[must_use]
     pub fn crosstalk(&self, share: f64) -> Scan {
         let mut scan = self.scan.clone();
@@ -237,9 +236,9 @@ impl Recorded<'_> {
         scan
     }
 
-    /// The scan of a sensor with this part of the rings, evenly spaced, that fires at each
-    /// `keep_each`-th azimuth; `None` if the scan has no rings. The shots of a ring are counted
-    /// as the file has them.
+    /// The scan of a sensor with this part of the rings, evenly spaced, that fires at every
+    /// `keep_each`-th azimuth; `None` if the scan has no rings. The shots of a ring are counted in
+    /// the order of the file.
     #[must_use]
     pub fn fewer_beams(&self, lasers: f64, keep_each: u32) -> Option<Scan> {
         let rings = self.scan.ring.as_ref()?;
@@ -249,7 +248,7 @@ impl Recorded<'_> {
             .map(|&ring| {
                 let shot = &mut shots[usize::from(ring)];
                 *shot += 1;
-                // Ring r is kept where the number of kept rings up to it grows.
+                // Ring r is kept if it raises the number of rings to keep.
                 let kept_below = |rings: f64| (rings * lasers + 1e-9).floor();
                 let stays = kept_below(f64::from(ring) + 1.0) > kept_below(f64::from(ring));
                 stays && (*shot - 1).is_multiple_of(keep_each)
@@ -265,33 +264,32 @@ impl Recorded<'_> {
         scan
     }
 
-    /// Where point `i` is, from the sensor.
+    /// Point `i` relative to the sensor.
     fn seen_from_sensor(&self, i: usize) -> DVec3 {
         let point = DVec3::from(self.scan.positions[i].map(f64::from));
         DVec3::from_array(self.scan.origin) + point - self.sensor_m
     }
 
-    /// A place seen from the sensor, as the file writes it.
+    /// A place relative to the sensor, in the frame of the file.
     fn in_file(&self, from_sensor: DVec3) -> [f32; 3] {
         let at = from_sensor + self.sensor_m - DVec3::from_array(self.scan.origin);
         at.as_vec3().to_array()
     }
 }
 
-/// Tells these brightnesses as the intensities of `scan`; what else it has of power would be of
-/// the scan as it was.
+/// Sets the intensities of `scan`, and drops its other attributes of power, which hold for the
+/// recorded scan only.
 fn set_brightness(scan: &mut Scan, brightness: Vec<f32>) {
     scan.intensity = Some(brightness);
     (scan.power, scan.reflectivity) = (None, None);
 }
 
-/// What a film of water leaves of the light that a ground of reflectivity `rho` returns to where
-/// it comes from, which meets it at this incidence.
+/// The reflectivity of a ground of reflectivity `rho` under a film of water, at this incidence.
 fn wet(rho: f64, cos_incidence: f64) -> f64 {
     let sin_inside = (1.0 - cos_incidence * cos_incidence).max(0.0).sqrt() / WATER;
     let cos_inside = (1.0 - sin_inside * sin_inside).sqrt();
     let reflected = |a: f64, b: f64| ((a - b) / (a + b)).powi(2);
-    // Unpolarised light: the mean of both planes.
+    // The light is unpolarised: the mean of both planes of polarisation.
     let across = reflected(cos_incidence, WATER * cos_inside);
     let along = reflected(WATER * cos_incidence, cos_inside);
     let r = (across + along) / 2.0;

@@ -1,5 +1,5 @@
-//! What a scan does to the ideal ranges: noise, dropout, the detection limit, wide beams and
-//! their returns, weather, quantisation, intensity. An effect that is `None` costs nothing.
+//! The effects that a scan applies to ideal ranges: noise, dropout, the detection limit, wide beams
+//! and their returns, weather, quantisation, intensity. An effect that is `None` costs nothing.
 //!
 //! In TOML and in the manifest:
 //!
@@ -31,7 +31,7 @@ mod footprint;
 mod motion;
 mod weather;
 
-/// The effects of one scene or run. The default is none: a clean scan.
+/// The effects of a scene or run. The default is a clean scan, without any.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "EffectsTable", into = "EffectsTable")]
 pub struct Effects {
@@ -43,11 +43,11 @@ pub struct Effects {
     pub detection: Option<Detection>,
     /// The width of beams.
     pub footprint: Option<Footprint>,
-    /// Which returns of a beam are told; `None` is the strongest.
+    /// The returns of a beam that the sensor reports; `None` is the strongest.
     pub returns: Option<ReturnMode>,
-    /// What is in the air; it takes returns below the detection limit, which it asks for.
+    /// Rain, snow, fog, haze, dust and spray. Weather needs a detection limit.
     pub weather: Option<Box<Weather>>,
-    /// How a sensor moves that has no trajectory.
+    /// The motion of a sensor without a trajectory.
     pub motion: Option<Box<EvenMotion>>,
     /// Rounding of the range.
     pub quantum: Option<Quantum>,
@@ -64,13 +64,13 @@ pub struct Noise {
     pub mean_m: f64,
     /// Standard deviation in metres, 0 or more.
     pub sigma_m: f64,
-    /// What the noise is added to; default [`NoiseModel::Range`].
+    /// The quantity that the noise is added to; default [`NoiseModel::Range`].
     #[serde(default)]
     pub model: NoiseModel,
 }
 
 formats::named! {
-    /// What Gaussian noise is added to.
+    /// The quantity that Gaussian noise is added to.
     #[derive(Default, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum NoiseModel: "noise model" {
@@ -82,7 +82,7 @@ formats::named! {
     }
 }
 
-/// Random loss of returns, each on its own.
+/// Independent random loss of returns.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Dropout {
@@ -101,12 +101,10 @@ pub struct Quantum {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Intensity;
 
-/// An effect that casters compute for each ray that hits, with its numbers.
+/// An effect that casters compute for each ray that hits, with its parameters.
 ///
-/// [`Effects::per_ray`] lists those that are wanted in the order in which their
-/// outputs stand side by side. Everything else follows that list: the shader is
-/// composed from it, the CPU appends its outputs by it, and a scan reads them
-/// by it.
+/// [`Effects::per_ray`] lists them in the order of their outputs. The composition of the shader,
+/// the outputs of the CPU and the scans that read them all follow that list.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RayEffect {
@@ -120,19 +118,19 @@ pub enum RayEffect {
     Intensity,
 }
 
-/// What an effect reads besides the ray and the triangle that it hits.
+/// The input of an effect besides the ray and the triangle that it hits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayInput {
-    /// The ray's random bits: the shader's `streams`.
+    /// The ray's random bits, `streams` in the shader.
     RandomBits,
-    /// Normal deviates made of the ray's random bits.
+    /// Normal deviates from the ray's random bits.
     NormalDeviates,
-    /// The object's reflectivity: that of the shader's view.
+    /// The object's reflectivity, which the shader's view holds.
     Reflectivity,
 }
 
 impl RayEffect {
-    /// The name of the effect's function, on the CPU and in its shader
+    /// The name of the effect's function on the CPU and in its shader,
     /// `shaders/effects/NAME.wgsl`.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -144,7 +142,7 @@ impl RayEffect {
         }
     }
 
-    /// How many numbers the effect gives for each ray, 1 to 4.
+    /// The number of outputs for each ray, 1 to 4.
     #[must_use]
     pub fn width(&self) -> usize {
         match self {
@@ -153,7 +151,7 @@ impl RayEffect {
         }
     }
 
-    /// What the effect reads.
+    /// The input of the effect.
     #[must_use]
     pub fn input(&self) -> RayInput {
         match self {
@@ -177,9 +175,8 @@ impl RayEffect {
 }
 
 impl Effects {
-    /// The effects that casters compute for each ray, in the order of their
-    /// outputs. The others are left out: they come after the range, which is solved once
-    /// all rays are cast.
+    /// The effects that casters compute for each ray, in the order of their outputs. The other
+    /// effects need the range, which is computed once all rays are cast.
     pub fn per_ray(&self) -> impl Iterator<Item = RayEffect> + use<> {
         let noise = self.noise.map(|noise| match noise.model {
             NoiseModel::Range => RayEffect::NoiseRange(noise),
@@ -190,31 +187,28 @@ impl Effects {
         [noise, dropout, intensity].into_iter().flatten()
     }
 
-    /// How many numbers all effects together give for each ray.
+    /// The number of outputs of all effects for each ray.
     #[must_use]
     pub fn outputs_per_ray(&self) -> usize {
         self.per_ray().map(|effect| effect.width()).sum()
     }
 
-    /// What is left of them in a clean scan: all that leaves its ranges exact.
+    /// The effects that remain in a clean scan: those that leave ranges exact.
     #[must_use]
     pub fn clean(&self) -> Self {
         Self { intensity: self.intensity, motion: self.motion.clone(), ..Self::default() }
     }
 
-    /// Whether no effect is wanted.
+    /// Whether there is no effect.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The same effects with each "the sensor's own" replaced by what
-    /// `sensor` states.
+    /// The same effects, with the values of `sensor` wherever they refer to the sensor's own.
     ///
     /// # Errors
-    ///
-    /// If quantisation is wanted and the sensor states no quantum, or likewise its own
-    /// detection limit or the shape of its beams.
+    /// If they refer to a quantum, a detection limit or a beam shape that the sensor does not state.
     pub fn for_sensor(&self, sensor: &Sensor) -> Result<Self, InvalidValue> {
         let mut resolved = self.clone();
         if let Some(quantum) = &mut resolved.quantum
@@ -246,12 +240,11 @@ impl Effects {
         Ok(resolved)
     }
 
-    /// `pattern`, which is of `sensor`, with as many rays for each beam as its footprint asks
-    /// for: the pattern to cast.
+    /// The `pattern` of `sensor` with the number of rays per beam that the footprint asks for.
     ///
     /// # Errors
-    /// If neither the footprint nor the sensor states how wide the beams are; if there are more
-    /// rays than [`MAX_RAYS`](crate::sensor::MAX_RAYS).
+    /// If neither the footprint nor the sensor states the width of beams; if there would be more
+    /// than [`MAX_RAYS`](crate::sensor::MAX_RAYS) rays.
     pub fn widen(
         &self,
         pattern: BeamPattern,

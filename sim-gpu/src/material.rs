@@ -1,9 +1,9 @@
-//! What surfaces are made of: how much light they return.
+//! Materials: how much light surfaces return.
 //!
-//! An OBJ file names a material for each face (`usemtl`), whose colour stands in an MTL file
-//! (`Kd`, `map_Kd`), or has colours at its vertices. A colour is what a screen shows, not what
-//! a sensor at 905 nm measures: black plastic may be bright there. So a name may be given a
-//! reflectivity of its own, or one of the table in `assets/materials.toml`.
+//! An OBJ file names a material for each face (`usemtl`), whose colour is in an MTL file (`Kd`,
+//! `map_Kd`), or gives its vertices colours. Colours describe visible light, and surfaces differ at
+//! 905 nm: black plastic may be bright there. A name may therefore get a reflectivity of its own, or
+//! one of the table in `assets/materials.toml`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,13 +18,13 @@ use texture::Texture;
 
 mod texture;
 
-/// How a surface returns light.
+/// The reflection of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// The part of the light that comes back at vertical incidence, 0 to 1.
     pub reflectivity: f64,
-    /// How well it reflects light back to where it came from, as road signs and licence
-    /// plates do: above 0, 1 being ideal. 0 is a surface that scatters.
+    /// The quality of a retro-reflector, such as a road sign or a licence plate: up to 1, which is
+    /// ideal. 0 is a surface that scatters.
     pub retroreflection: f64,
 }
 
@@ -56,7 +56,7 @@ fn table() -> BTreeMap<String, f64> {
 }
 
 formats::named! {
-    /// Where the colours of an OBJ file's faces come from.
+    /// The source of the colours of an OBJ file's faces.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum ColourSource: "source of colours" {
@@ -67,17 +67,17 @@ formats::named! {
     }
 }
 
-/// Which materials are wanted for a mesh.
+/// The choice of the materials of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MaterialChoice {
-    /// Where colours are taken from, if they are.
+    /// The source of colours, if they are used.
     pub colours: Option<ColourSource>,
-    /// Materials by name, which come before colours.
+    /// Materials by name, which take precedence over colours.
     pub by_name: BTreeMap<String, Material>,
 }
 
 impl MaterialChoice {
-    /// Whether all of a mesh is of one material.
+    /// Whether a mesh has a single material.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         *self == Self::default()
@@ -126,13 +126,13 @@ impl MaterialTable {
     }
 }
 
-/// Why a mesh's materials cannot be had.
+/// The materials of a mesh could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum MaterialError {
     /// The mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A material was named that the mesh does not use.
+    /// The choice names a material that the mesh does not use.
     #[error("{}: expected a material called \"{name}\", found {}", path.display(), known.join(", "))]
     UnknownName {
         /// The mesh's file.
@@ -142,7 +142,7 @@ pub enum MaterialError {
         /// The names that the mesh uses.
         known: Vec<String>,
     },
-    /// A material has no colour that can be used.
+    /// A material has no usable colour.
     #[error("{}: material {name}: {cause}", path.display())]
     Colour {
         /// The MTL file.
@@ -152,7 +152,7 @@ pub enum MaterialError {
         /// Why.
         cause: String,
     },
-    /// The colour of a vertex is none.
+    /// The colour of a vertex is not within 0 to 1.
     #[error(
         "{}: vertex {vertex}: expected three numbers within 0..=1 as its colour, found {found:?}",
         path.display()
@@ -176,24 +176,24 @@ pub struct Materials {
     of_triangle: Vec<Paint>,
 }
 
-/// What one triangle is made of.
+/// The material of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Paint {
-    /// One material, by its place.
+    /// One material, by its index in `even`.
     Even(u32),
-    /// Reflectivities of its corners.
+    /// The reflectivities of its corners.
     Corners([f32; 3]),
-    /// An image by its place, and where its corners lie there.
+    /// An image, by its index in `textures`, and the corners' places in it.
     Textured(u32, [[f32; 2]; 3]),
 }
 
 impl Materials {
-    /// The materials that `choice` gives the mesh in the OBJ file at `path`; what has none
-    /// is `otherwise`.
+    /// Loads the materials that `choice` selects for the mesh in the OBJ file at `path`. Faces
+    /// without one get `otherwise`.
     ///
     /// # Errors
-    /// A file that is not OBJ or cannot be read; a name that the mesh does not use; an MTL
-    /// file that is missing or malformed, a colour or an image that cannot be used.
+    /// If a file is not OBJ or cannot be read, a name is not used by the mesh, an MTL file is missing
+    /// or malformed, or a colour or an image cannot be used.
     pub fn load(
         path: &Path,
         choice: &MaterialChoice,
@@ -229,7 +229,7 @@ impl Materials {
         Ok(materials)
     }
 
-    /// Adds what a name stands for: its `own` material, or its `colour`.
+    /// Adds the material of a name: its `own`, or else its `colour`.
     fn add<'a>(
         &mut self,
         own: Option<&Material>,
@@ -256,8 +256,8 @@ impl Materials {
         Ok(Named::Even(self.even.len() as u32 - 1))
     }
 
-    /// The material of triangle `index` of the mesh, at a point whose barycentric
-    /// coordinates are made if they matter.
+    /// The material of triangle `index` of the mesh, at a point whose barycentric coordinates are
+    /// computed if they matter.
     #[must_use]
     pub fn at(&self, index: u32, barycentric: impl FnOnce() -> DVec3) -> Material {
         match self.of_triangle[index as usize] {
@@ -277,12 +277,12 @@ impl Materials {
     }
 }
 
-/// What a name of a material stands for.
+/// The material behind a name.
 enum Named<'a> {
     Nothing,
-    /// One material, by its place.
+    /// One material, by its index.
     Even(u32),
-    /// An image, by its place, of this colour.
+    /// An image, by its index, and its colour.
     Textured(u32, &'a Colour),
 }
 
@@ -297,7 +297,7 @@ fn unfit(colour: &Colour, cause: String) -> MaterialError {
     MaterialError::Colour { path: colour.library.clone(), name: colour.name.clone(), cause }
 }
 
-/// Where the corners of `face` lie in the image of `colour`.
+/// The texture coordinates of the corners of `face` in the image of `colour`.
 fn corners_in_image(
     appearance: &Appearance,
     face: &Face,
@@ -308,7 +308,7 @@ fn corners_in_image(
     Ok(corners.map(|i| appearance.texture_coordinates[i as usize].map(|x| x as f32)))
 }
 
-/// The colours of the vertices of `face`, if all have one.
+/// The reflectivities of the corners of `face` by their colours, if all have one.
 fn painted(path: &Path, appearance: &Appearance, face: &Face) -> Result<Paint, MaterialError> {
     let mut corners = [0.0; 3];
     for (corner, vertex) in corners.iter_mut().zip(face.vertices) {
@@ -326,7 +326,7 @@ fn luminance(srgb: [f64; 3]) -> f64 {
     tinted(srgb, [1.0; 3])
 }
 
-/// As [`luminance`], of light that another colour `tint` dims.
+/// As [`luminance`], multiplied by another colour, `tint`.
 fn tinted(srgb: [f64; 3], tint: [f64; 3]) -> f64 {
     let weights = [0.2126, 0.7152, 0.0722];
     let parts = srgb.iter().zip(tint).zip(weights);
@@ -373,7 +373,7 @@ mod tests {
 
     #[test]
     fn triangles_have_the_material_of_their_face() {
-        // Half of sRGB's range is 21.4 % of the light.
+        // An sRGB value of 0.5 is 21.4 % of the light.
         let grey = luminance([0.5; 3]);
         assert!((grey - 0.214_041).abs() < 1e-6, "{grey}");
         let mtl = from(ColourSource::Mtl);
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_is_named() {
+    fn errors_name_their_place() {
         let mtl = from(ColourSource::Mtl);
         let unread = if cfg!(feature = "textures") {
             "a.png: cannot be read: "

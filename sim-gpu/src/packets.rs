@@ -1,5 +1,5 @@
-//! Scans as a VLP-32C's packets: which sensors have them, and what they ask of
-//! a scan. [`formats::vlp32c`] writes them and says how they decode.
+//! Scans as packets of a VLP-32C: the sensors that have them, and the requirements for a scan.
+//! [`formats::vlp32c`] writes them and documents their decoding.
 
 use formats::scan::{Attribute, AttributeSet};
 use formats::vlp32c::{
@@ -10,8 +10,8 @@ use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, NoiseModel, ReturnMode};
 use crate::sensor::{Layout, Rotating, Sensor};
 
-/// What [`formats::vlp32c`] takes of each point, where these `effects` and attributes are
-/// `wanted`: their calibrated reflectivity or else their intensity, if there is either.
+/// The attributes that [`formats::vlp32c`] reads, with these `effects` and these `wanted` attributes:
+/// the calibrated reflectivity or else the intensity, if there is either.
 #[must_use]
 pub fn attributes(effects: &Effects, wanted: &AttributeSet) -> AttributeSet {
     let brightness = if wanted.contains(&Attribute::Reflectivity) {
@@ -22,11 +22,11 @@ pub fn attributes(effects: &Effects, wanted: &AttributeSet) -> AttributeSet {
     [Attribute::Beam, Attribute::Range].into_iter().chain(brightness).collect()
 }
 
-/// `sensor` with its beams cast as its packets tell them: from where they leave
-/// the axis, at azimuths that are whole units when a sequence starts.
+/// `sensor` with its beams as packets encode them: they start on the axis, and azimuths are
+/// whole units at the start of a sequence.
 ///
 /// # Errors
-/// A sensor that is not a VLP-32C, or whose scans its packets cannot tell.
+/// If the sensor is not a VLP-32C, or its packets cannot encode its scans.
 pub fn as_packets_tell(sensor: &Sensor) -> Result<Sensor, InvalidValue> {
     let mut sensor = sensor.clone();
     if let Layout::Rotating(rotating) = &mut sensor.layout {
@@ -37,10 +37,10 @@ pub fn as_packets_tell(sensor: &Sensor) -> Result<Sensor, InvalidValue> {
     Ok(sensor)
 }
 
-/// One turn of `sensor`, whose scans are what its packets tell.
+/// One revolution of `sensor`, as its packets encode it.
 ///
 /// # Errors
-/// As [`as_packets_tell`]; beams that are not cast as packets tell them.
+/// As [`as_packets_tell`]; if the beams are not as packets encode them.
 pub fn revolution(sensor: &Sensor) -> Result<Revolution, InvalidValue> {
     let Layout::Rotating(rotating) = &sensor.layout else {
         return Err(no_packets("rotating", "missing"));
@@ -60,15 +60,15 @@ pub fn revolution(sensor: &Sensor) -> Result<Revolution, InvalidValue> {
         return Err(no_packets("sample", "draws from the beams"));
     }
     within("range.max_m", sensor.range.max_m, 0.0..=FARTHEST_M)?;
-    // Fewer than the patterns' limit of 2^26.
+    // At most 2^26, the limit of patterns.
     Ok(Revolution { rpm: rotating.rpm, n_beams: rotating.rays_per_revolution() as u32 })
 }
 
-/// Which returns the packets of a scan with these `effects` hold, where `wanted` says so too.
+/// The returns in the packets of a scan with these `effects`, if they agree with `wanted`.
 ///
 /// # Errors
-/// Noise of another model than [`NoiseModel::Range`], which moves points off their beams;
-/// returns that packets do not hold, or other ones than are `wanted`.
+/// If the noise is not of the model [`NoiseModel::Range`] and so moves points off their beams; if
+/// packets cannot hold the returns, or they are not those `wanted`.
 pub fn returns(effects: &Effects, wanted: Option<Returns>) -> Result<Returns, InvalidValue> {
     if effects.noise.is_some_and(|noise| noise.model != NoiseModel::Range) {
         let cause = "moves points off their beams; take \"range\"";
@@ -92,8 +92,8 @@ pub fn returns(effects: &Effects, wanted: Option<Returns>) -> Result<Returns, In
     }
 }
 
-/// As [`returns`]; where beams have several returns, as in weather and with a width, and `effects`
-/// do not say which are told, they tell those that are `wanted` from here on.
+/// As [`returns`]; if beams may have several returns, in weather or with a width, and `effects` do
+/// not select any, sets those `wanted`.
 ///
 /// # Errors
 /// As [`returns`].
@@ -112,7 +112,7 @@ pub fn settle_returns(
     Ok(held)
 }
 
-/// That the head is a VLP-32C's: packets name lasers, drivers have the table.
+/// Checks that the head is a VLP-32C's: packets name lasers, whose angles are in drivers' tables.
 fn check_head(rotating: &Rotating) -> Result<(), InvalidValue> {
     let Some(Sensor { layout: Layout::Rotating(vlp32c), .. }) = Sensor::builtin("vlp32c") else {
         unreachable!("invariant: the built-in vlp32c rotates");
@@ -136,7 +136,7 @@ fn check_head(rotating: &Rotating) -> Result<(), InvalidValue> {
     within("rotating.rpm", rotating.rpm, 300.0..=1200.0)
 }
 
-/// That beams start and point as packets tell.
+/// Checks that beams start and point as packets encode them.
 fn check_aim(rotating: &Rotating) -> Result<(), InvalidValue> {
     let expect = |key: &str, found: Option<f64>, expected: Option<f64>| {
         if found == expected {

@@ -1,5 +1,5 @@
-//! Points spread evenly over a surface, as ModelNet40's clouds are, and which
-//! of them a sensor could see: what scans are compared with.
+//! Points distributed uniformly over a surface, as in ModelNet40's clouds, and the visibility of
+//! points from a sensor: the clouds that scans are compared with.
 
 use crate::cpu::oracle;
 use crate::ray::Ray;
@@ -7,15 +7,12 @@ use crate::target::{Surface, Target};
 use formats::rng::StreamKey;
 use glam::DVec3;
 
-/// A point counts as seen if nothing lies before it by more than this share of
-/// its distance: rounding is 1e-16 of it, times what a grazing triangle makes
-/// of that.
+/// A point is visible if nothing lies before this part of its distance. The margin allows for
+/// rounding, 1e-16, amplified by grazing triangles.
 const HIDDEN_BEFORE: f64 = 1.0 - 1e-7;
 
-/// `n` points of `surface`, in the world, uniform in area; `None` if it has no
-/// area. Point k is a function of `key` and k alone.
-///
-/// Within a triangle, the square root of Osada et al. 2002, section 3.3.
+/// `n` points on `surface`, in the world, uniform in area; `None` if it has no area. Point k is a
+/// function of `key` and k alone. Osada et al. 2002, section 3.3.
 #[must_use]
 pub fn area_uniform(surface: &Surface, n: usize, key: StreamKey) -> Option<Vec<DVec3>> {
     let mut total = 0.0;
@@ -42,15 +39,14 @@ pub fn area_uniform(surface: &Surface, n: usize, key: StreamKey) -> Option<Vec<D
     Some((0..n as u64).map(point).collect())
 }
 
-/// Which of `points`, on the surface of `target` in the world, lie open to a
-/// sensor at `sensor`.
+/// Whether each of `points`, on the surface of `target` in the world, is visible from `sensor`.
 #[must_use]
 pub fn seen_from(target: &Target, sensor: DVec3, points: &[DVec3]) -> Vec<bool> {
     let origin = target.surface.frame.to_unit(sensor);
     let is_seen = |&point: &DVec3| {
         let direction = target.surface.frame.to_unit(point) - origin;
         let nearest = oracle::nearest(target, &Ray { origin, direction });
-        // Its own triangle may be missed at an edge; nothing before it counts.
+        // The ray may miss the point's own triangle at an edge; then nothing hides the point.
         nearest.is_none_or(|crossing| crossing.range_m >= HIDDEN_BEFORE)
     };
     points.iter().map(is_seen).collect()

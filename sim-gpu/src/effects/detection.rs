@@ -1,24 +1,23 @@
-//! The weakest signal that a sensor detects.
+//! The detection of returns by their power.
 
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
 use crate::sensor::{DetectionLimit, LARGEST_M};
 
-/// Whether a sensor detects a return, by the power that it receives.
+/// The detection of returns by received power.
 ///
-/// A receiver reports a pulse where its signal crosses a threshold. Here the signal is
-/// the received power; the threshold is the power of the weakest surface that the sensor
-/// is stated to detect.
+/// A receiver reports a pulse where its signal crosses a threshold. Here the signal is the received
+/// power, and the threshold is the power of the weakest surface that the sensor is stated to detect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Detection {
-    /// What the sensor still detects; `None` is the sensor's own limit.
+    /// The weakest surface that the sensor detects; `None` is the sensor's own limit.
     pub limit: Option<DetectionLimit>,
     /// The threshold divided by the standard deviation of the receiver's noise: returns
     /// near the limit are then lost or kept at random. `None` is a receiver without noise.
     pub threshold_to_noise: Option<f64>,
-    /// Standard deviation that the receiver's noise gives the range of a return at the
-    /// limit, metres; it falls as the square root of the power grows. `None` is none.
+    /// The standard deviation of the range of a return at the limit due to the receiver's noise,
+    /// metres; it falls as the square root of the power grows. `None` is 0.
     pub range_sigma_m: Option<f64>,
 }
 

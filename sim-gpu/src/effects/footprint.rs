@@ -1,13 +1,13 @@
-//! Beams that are as wide as the sensor's: what one meets of several surfaces, and which of
-//! its returns the sensor tells.
+//! Beams with a width, which may meet several surfaces, and the returns that the sensor reports of
+//! them.
 
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
 use crate::sensor::{BeamShape, LARGEST_M, Sensor};
 
-/// Beams with a width: each is cast as several rays of equal power, and surfaces that the
-/// sensor cannot tell apart become one return between them.
+/// Beams with a width: each is cast as several rays of equal power, and surfaces that the receiver
+/// cannot resolve become one return between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     /// Rays of each beam: [`Footprint::SAMPLES`].
@@ -19,11 +19,11 @@ pub struct Footprint {
 }
 
 formats::named! {
-    /// Which returns of a beam a sensor tells. Where there is but one, it is that one.
+    /// The returns of a beam that a sensor reports. A single return is always reported.
     #[derive(Default, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum ReturnMode: "return mode" {
-        /// The strongest; of equals the nearest.
+        /// The strongest; the nearest of equals.
         #[default]
         Strongest = "strongest",
         /// The second strongest.
@@ -32,23 +32,23 @@ formats::named! {
         First = "first",
         /// The farthest.
         Last = "last",
-        /// The last and the strongest, or the second strongest where the strongest is the last:
+        /// The last and the strongest, or the second strongest if the strongest is the last:
         /// VLP-32C User Manual 63-9325, 9.3.2.
         Dual = "dual",
     }
 }
 
 impl Footprint {
-    /// How many rays a beam may be: a centre and up to three rings around it.
+    /// The possible numbers of rays per beam: a centre and up to three rings around it.
     pub const SAMPLES: [u32; 4] = [1, 7, 19, 37];
 
-    /// The rays of a beam where nobody says how many.
+    /// The default number of rays per beam.
     const USUAL_SAMPLES: u32 = 19;
 
-    /// The beam's shape as `sensor` has it, where this does not say otherwise.
+    /// The same footprint with missing values taken from `sensor`.
     ///
     /// # Errors
-    /// If neither states it.
+    /// If the sensor does not state them either.
     pub(super) fn for_sensor(&self, sensor: &Sensor) -> Result<Self, InvalidValue> {
         let own = sensor.footprint;
         let missing = |key: &str| {

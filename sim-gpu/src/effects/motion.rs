@@ -1,4 +1,4 @@
-//! A sensor that moves evenly while it scans.
+//! A sensor in uniform motion during a scan.
 
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
@@ -6,24 +6,25 @@ use serde::{Deserialize, Serialize};
 use crate::config::{InvalidValue, within};
 use crate::pose::{Pose, Trajectory};
 
-/// How a sensor that has no trajectory of its own moves while it scans. Points are where a driver
-/// puts them that takes it to stand where the scan began.
+/// The uniform motion of a sensor without a trajectory. Points are motion-distorted, as a driver
+/// that ignores ego-motion reports them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EvenMotion {
-    /// Its velocity, metres a second, along x, y and z of its frame as the scan begins.
+    /// The velocity along x, y and z of the sensor's frame at the start of the scan, metres per
+    /// second.
     #[serde(default)]
     pub velocity_m_s: [f64; 3],
-    /// How fast it turns to the left about its z axis, degrees a second.
+    /// The yaw rate about the sensor's z axis, to the left, degrees per second.
     #[serde(default)]
     pub yaw_rate_deg_s: f64,
 }
 
-/// A turn between two poses, degrees: the shortest way between them is then this one.
+/// The largest turn between two poses, degrees, so that interpolation turns the right way.
 const TURN_DEG: f64 = 45.0;
 
 impl EvenMotion {
-    /// The poses of a sensor that is at `pose` at the first of these times, up to the second.
+    /// The poses between two times of a sensor that is at `pose` at the first.
     #[must_use]
     pub fn trajectory(&self, pose: Pose, [from_s, to_s]: [f64; 2]) -> Trajectory {
         let velocity_m_s = pose.world_from_sensor * DVec3::from_array(self.velocity_m_s);

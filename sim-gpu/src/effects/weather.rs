@@ -1,52 +1,51 @@
-//! What is in the air between a sensor and what it looks at.
+//! Weather between a sensor and its surroundings.
 
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
 
-/// Rain, snow, fog, haze, dust and spray. What none of them is named for is clear air.
+/// Rain, snow, fog, haze, dust and spray. The default is clear air.
 ///
-/// [`crate::weather`] says what they do and by which laws.
+/// [`crate::weather`] documents the models.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Weather {
-    /// Rain, millimetres an hour.
+    /// The rate of rain, millimetres per hour.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rain_mm_h: Option<f64>,
-    /// Snow, millimetres of water an hour.
+    /// The rate of snow, millimetres of water per hour.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snow_mm_h: Option<f64>,
-    /// Fog in which a black object can be told from the sky up to so many metres: its
-    /// meteorological optical range.
+    /// The meteorological optical range of fog, metres: the distance up to which a black object
+    /// can be distinguished from the sky.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fog_visibility_m: Option<f64>,
-    /// How strong fog is compared with surfaces.
+    /// The model of the strength of fog's returns.
     #[serde(default, skip_serializing_if = "FogModel::is_default")]
     pub fog_model: FogModel,
-    /// Haze in which one can see so many metres by Koschmieder's law. It weakens returns and
-    /// gives none of its own.
+    /// The visibility in haze by Koschmieder's law, metres. Haze weakens returns and gives none
+    /// itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub haze_visibility_m: Option<f64>,
     /// Dust and spray.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub volumes: Vec<Volume>,
-    /// Whether beams that meet no surface return from the air; `None` is yes. `gen-dataset`
-    /// takes `None` for no: clouds of single objects are cut out of what a sensor sees, and are
-    /// without such returns.
+    /// Whether beams that meet no surface may return from the air; `None` is yes. For `gen-dataset`
+    /// `None` is no: clouds of single objects are cut out of scans, without such returns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub empty_beams: Option<bool>,
 }
 
 formats::named! {
-    /// How strong fog is compared with surfaces.
+    /// The model of the strength of fog's returns.
     #[derive(Default, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum FogModel: "fog model" {
-        /// By the power that it scatters back, whatever is behind it.
+        /// The power that the fog scatters back, whatever is behind it.
         #[default]
         Physical = "physical",
-        /// As the simulation of Hahner et al. (ICCV 2021) has it: in proportion to the surface
-        /// behind it, by a factor that its authors chose by eye.
+        /// The simulation of Hahner et al. (ICCV 2021): proportional to the surface behind the
+        /// fog, with a factor that its authors chose by eye.
         Hahner = "hahner",
     }
 }
@@ -61,22 +60,22 @@ impl FogModel {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Volume {
-    /// Its least coordinates, metres.
+    /// The lowest corner, metres.
     pub min_m: [f64; 3],
-    /// Its largest coordinates, metres.
+    /// The highest corner, metres.
     pub max_m: [f64; 3],
     /// The meteorological optical range inside, metres.
     pub visibility_m: f64,
 }
 
-/// More than the heaviest rain of a minute that was ever measured, 1872 mm/h, by far.
+/// Far more than the heaviest rain ever measured over a minute, 1872 mm/h.
 const MOST_MM_H: f64 = 1e6;
 
-/// From a wall in front of the sensor to beyond every horizon.
+/// From opaque to clear beyond every horizon.
 const VISIBILITIES_M: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 
 impl Weather {
-    /// Whether there is nothing in the air.
+    /// Whether the air is clear.
     #[must_use]
     pub fn is_clear(&self) -> bool {
         let is_dry = |rate: Option<f64>| rate.is_none_or(|rate| rate == 0.0);

@@ -4,16 +4,16 @@ use std::fmt;
 
 use crate::cast_error::CastError;
 
-/// What sort of device an adapter is, best first.
+/// The kinds of adapters, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AdapterKind {
-    /// A GPU with memory of its own.
+    /// A GPU with its own memory.
     Discrete,
     /// A GPU that shares the CPU's memory.
     Integrated,
-    /// A GPU lent by a virtual machine's host.
+    /// A GPU that the host of a virtual machine provides.
     Virtual,
-    /// A driver that says nothing of its device.
+    /// A device that its driver does not describe.
     Other,
     /// Vulkan in software, such as lavapipe.
     Software,
@@ -31,18 +31,18 @@ impl fmt::Display for AdapterKind {
     }
 }
 
-/// One adapter, for people to choose from.
+/// The description of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterSummary {
     /// The device's name.
     pub name: String,
-    /// What sort of device it is.
+    /// The kind of the device.
     pub kind: AdapterKind,
     /// The graphics interface, such as Vulkan.
     pub backend: String,
     /// The driver and its version.
     pub driver: String,
-    /// The largest buffer one binding can show, bytes.
+    /// The size limit of a binding, bytes.
     pub max_binding_bytes: u64,
 }
 
@@ -52,7 +52,7 @@ pub fn list_adapters() -> Vec<AdapterSummary> {
     adapters().iter().map(summary).collect()
 }
 
-/// The first adapter whose name holds `wanted`, best first.
+/// The best adapter whose name contains `wanted`.
 pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, CastError> {
     let mut adapters = adapters();
     let holds =
@@ -66,7 +66,7 @@ pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, CastError> {
     }
 }
 
-/// What there is to say of `adapter`.
+/// The description of `adapter`.
 pub(crate) fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
     let info = adapter.get_info();
     AdapterSummary {
@@ -92,7 +92,7 @@ pub(crate) fn adapters() -> Vec<wgpu::Adapter> {
     adapters
 }
 
-/// What sort of device `adapter` is.
+/// The kind of `adapter`.
 pub(crate) fn kind(adapter: &wgpu::Adapter) -> AdapterKind {
     match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,

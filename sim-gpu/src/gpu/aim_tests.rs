@@ -1,4 +1,4 @@
-//! The shader makes, to the bit, the rays that its twin makes.
+//! Tests that the shader makes the same rays as its twin, to the bit.
 
 use super::adapters;
 use super::batch::View;
@@ -10,7 +10,7 @@ use edgepuck_shaders as shaders;
 use test_support::need;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-/// Makes each ray from a view and a beam of its own.
+/// Makes each ray from its own view and beam.
 const MAIN: &str = "
 @group(0) @binding(0) var<storage, read> views: array<View>;
 @group(0) @binding(1) var<storage, read> beams: array<vec3i>;
@@ -24,7 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 ";
 
-/// What the shader makes on the best adapter.
+/// The rays that the shader makes on the best adapter.
 fn made(views: &[View], beams: &[[i32; 4]]) -> Result<Vec<TraceRay>, String> {
     let adapter = test_support::adapter(adapters().into_iter().next())?;
     let (device, queue) = pollster::block_on(adapter.request_device(&Default::default())).unwrap();
@@ -87,13 +87,13 @@ fn the_shader_makes_the_rays_of_its_twin() {
     let made = need!(made(&views, &beams));
     for (i, (ray, expected)) in made.iter().zip(&expected).enumerate() {
         let number = |x: i32, unit: f32| x as f32 * unit;
-        // All that matters is exact in f32: what is larger belongs to a ray that misses.
+        // Origins of rays that may hit are exact in f32.
         let is_exact = expected.origin.iter().all(|x| x.abs() <= 1 << 24);
         let origin = expected.origin.map(|x| number(x, 2.0f32.powi(-23)));
         assert!(!is_exact || ray.origin == origin, "ray {i}: {ray:?}, {expected:?}");
         assert_eq!(ray.direction, expected.direction.map(|x| number(x, 2.0f32.powi(-24))));
         let skipped = number(expected.skipped, 2.0f32.powi(-20));
-        // WGSL may round a whole number of more than 24 bits either way.
+        // WGSL may round an integer of more than 24 bits either way.
         assert!((ray.skipped - skipped).abs() <= skipped * f32::EPSILON, "ray {i}");
         assert_eq!(ray.root, i as u32);
     }

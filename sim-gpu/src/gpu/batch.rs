@@ -1,4 +1,4 @@
-//! Many meshes and views laid side by side for one dispatch.
+//! The meshes and views of one dispatch, in shared buffers.
 
 use super::compose::reads_random_bits;
 use crate::aim::{Aim, MOST_DIRECTIONS};
@@ -14,9 +14,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// How a sensor sees an object, and where its rays and beams begin in their buffers.
-/// `shaders/aim.wgsl` declares the same; a test compares size and offsets. What a
-/// [`FixedFrame`] holds is 0 where the rays are sent.
+/// The frame of a sensor and an object, and the places of its rays and beams in their buffers.
+/// `shaders/aim.wgsl` declares the same record; a test compares sizes and offsets. The fields of a
+/// [`FixedFrame`] are 0 if the rays are sent.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct View {
@@ -32,11 +32,11 @@ pub struct View {
     pub turn_z: [i32; 3],
     /// Where its word or words are.
     pub first_word: u32,
-    /// The sensor, the low halves.
+    /// The sensor's position, the low halves.
     pub origin_low: [u32; 3],
-    /// The pattern's first beam among all directions, or `u32::MAX` where the rays are sent.
+    /// The pattern's first direction among all directions, or `u32::MAX` if the rays are sent.
     pub first_direction: u32,
-    /// The sensor, the high halves.
+    /// The sensor's position, the high halves.
     pub origin_high: [u32; 3],
     /// The reach, its low half.
     pub reach_low: u32,
@@ -64,10 +64,10 @@ impl From<&FixedFrame> for View {
     }
 }
 
-/// What one dispatch can hold.
+/// The limits of one dispatch.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchLimits {
-    /// Bytes that one binding can show.
+    /// The size limit of a binding, bytes.
     pub binding_bytes: usize,
     /// Rays per dispatch.
     pub rays: usize,
@@ -89,23 +89,22 @@ pub struct Batch {
     pub nodes: Vec<Node>,
     /// Their triangles.
     pub triangles: Vec<LeafTriangle>,
-    /// The rays of all jobs, one job after another: eight words for each that is sent,
-    /// its beam for each that the shader makes.
+    /// The rays of all jobs, one job after another: eight words for each ray that is sent, and the
+    /// beam of each ray that the shader makes.
     pub rays: Vec<u32>,
-    /// How many rays these are.
+    /// The number of rays.
     pub n_rays: usize,
-    /// A view for each job, or part of one.
+    /// The view of each job, or part of a job.
     pub views: Vec<View>,
-    /// The directions of each pattern whose beams are among the rays.
+    /// The directions of the patterns of rays that the shader makes.
     pub directions: Vec<Directions>,
-    /// Key, key, beam and nothing per ray; empty unless an effect reads it.
+    /// The key in two words, the beam and padding, for each ray; empty unless an effect reads it.
     pub streams: Vec<[u32; 4]>,
     bases: HashMap<*const Bvh, u32>,
 }
 
 impl Batch {
-    /// Whether `rays` more rays of `job` fit beside what is here. What fits
-    /// no batch at all is for the caller to keep away.
+    /// Whether `rays` more rays of `job` fit. The caller checks that the target fits an empty batch.
     #[must_use]
     pub fn has_room(&self, job: &CastJob, rays: usize, limits: &BatchLimits) -> bool {
         let view_bytes = (self.views.len() + 1) * size_of::<View>();
@@ -124,7 +123,7 @@ impl Batch {
         }
     }
 
-    /// Whether the directions that the rays of `job` are made from fit, if they are not here.
+    /// Whether the directions of `job` fit, or are here already.
     fn has_room_for_directions(&self, job: &CastJob) -> bool {
         let Aim::ByCaster { directions, .. } = &job.aim else { return true };
         let is_here = self.directions.iter().any(|here| here.is_shared_with(directions));
@@ -155,7 +154,7 @@ impl Batch {
         }
     }
 
-    /// Where `directions` start among all; they are added once.
+    /// The index of the first of `directions` among all. They are added only once.
     fn first_direction(&mut self, directions: &Directions) -> u32 {
         let mut first = 0;
         for here in &self.directions {
@@ -168,7 +167,7 @@ impl Batch {
         first
     }
 
-    /// Where the tree of `target` starts; it is copied here once.
+    /// The root of the tree of `target`, which is copied only once.
     fn root_of(&mut self, target: &Target) -> u32 {
         let (nodes, triangles) = (&mut self.nodes, &mut self.triangles);
         *self.bases.entry(Arc::as_ptr(&target.bvh)).or_insert_with(|| {

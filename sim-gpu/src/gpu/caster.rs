@@ -1,4 +1,4 @@
-//! Sends batches through an adapter.
+//! Casts jobs in batches on an adapter.
 
 use super::adapter::{self, AdapterSummary};
 use super::batch::{Batch, BatchLimits};
@@ -10,8 +10,8 @@ use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Rays in one dispatch: enough to fill any adapter, few enough that a display
-/// driver's watchdog does not stop it.
+/// The most rays of a dispatch: enough to fill any adapter, and few enough that the watchdog of a
+/// display driver does not stop it.
 const RAYS_PER_DISPATCH: usize = 1 << 22;
 
 /// Casts on one adapter, for one set of effects.
@@ -19,7 +19,7 @@ pub struct GpuCaster {
     core: Arc<Core>,
 }
 
-/// What batches in flight share with their caster.
+/// The state that a caster shares with its batches in flight.
 struct Core {
     pipeline: Pipeline,
     summary: AdapterSummary,
@@ -28,13 +28,13 @@ struct Core {
     failure: Arc<Mutex<Option<String>>>,
 }
 
-/// A job's rays, as cut into dispatches.
+/// The rays of a job in one dispatch.
 struct Part {
     job: usize,
     rays: usize,
 }
 
-/// Jobs on their way through the adapter.
+/// Jobs in flight.
 pub struct Pending {
     core: Arc<Core>,
     dispatches: Vec<(Slot, Vec<Part>)>,
@@ -51,8 +51,8 @@ impl GpuCaster {
         let summary = adapter::summary(adapter);
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("edgepuck"),
-            // The numbers of rays and views come as immediate data, which wgpu's Vulkan,
-            // Metal and Direct3D 12 always have. A clock is taken where there is one.
+            // The numbers of rays and views are immediate data, which wgpu always supports on
+            // Vulkan, Metal and Direct3D 12. Timestamps are optional.
             required_features: wgpu::Features::IMMEDIATES
                 | adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: adapter.limits(),
@@ -75,26 +75,26 @@ impl GpuCaster {
         Ok(Self { core: Arc::new(core) })
     }
 
-    /// What there is to say of the adapter.
+    /// The description of the adapter.
     #[must_use]
     pub fn summary(&self) -> &AdapterSummary {
         &self.core.summary
     }
 
-    /// The effects that are modelled.
+    /// The effects that this caster models.
     #[must_use]
     pub fn effects(&self) -> &Effects {
         &self.core.pipeline.effects
     }
 
-    /// What one dispatch can hold.
+    /// The limits of one dispatch.
     #[must_use]
     pub fn limits(&self) -> &BatchLimits {
         &self.core.limits
     }
 
-    /// Bytes of memory that the device holds for this caster's buffers; `None` where the
-    /// graphics interface does not tell.
+    /// The bytes of device memory reserved for this caster's buffers; `None` if the graphics
+    /// interface does not report them.
     #[must_use]
     pub fn held_bytes(&self) -> Option<u64> {
         let report = self.core.pipeline.device.generate_allocator_report()?;
@@ -109,9 +109,8 @@ impl GpuCaster {
         self.start(jobs, false)
     }
 
-    /// Casts `jobs`, waits, and says how many seconds the adapter's own clock
-    /// counted while rays were traced, upload and read-back left out; `None`
-    /// where the adapter keeps no time.
+    /// Casts `jobs`, waits, and returns the seconds that tracing took by the adapter's own clock,
+    /// without upload and read-back; `None` if the adapter has no timestamps.
     ///
     /// # Errors
     /// As [`GpuCaster::submit`].
@@ -189,14 +188,14 @@ impl Pending {
         Ok(self.collect()?.0)
     }
 
-    /// The answers, and the seconds of all dispatches where each has them.
+    /// The answers, and the seconds of all dispatches if each has them.
     fn collect(self) -> Result<(Vec<Cast>, Option<f64>), CastError> {
         let per_ray = self.core.pipeline.effects.outputs_per_ray();
         let mut casts = vec![Cast::default(); self.jobs];
         let mut total = Some(0.0);
         for (slot, parts) in self.dispatches {
             let answer = slot.wait(&self.core.pipeline);
-            // What the device reported says more than that the wait failed.
+            // The error that the device reported is more specific than a failed wait.
             self.core.check()?;
             let Answer { codes, outputs, seconds } =
                 answer.map_err(|cause| self.core.lost(cause))?;
@@ -223,7 +222,7 @@ fn limits(limits: &wgpu::Limits, effects: &Effects) -> BatchLimits {
     let binding = usize::try_from(limits.max_storage_buffer_binding_size).unwrap_or(usize::MAX);
     let buffer = usize::try_from(limits.max_buffer_size).unwrap_or(usize::MAX);
     let binding_bytes = binding.min(buffer);
-    // A ray is the largest record per ray, unless effects give many numbers.
+    // The ray itself is the largest record per ray, unless effects have many outputs.
     let per_ray =
         (size_of::<f32>() * effects.outputs_per_ray()).max(size_of::<crate::ray::TraceRay>());
     let per_axis = limits.max_compute_workgroups_per_dimension as usize;

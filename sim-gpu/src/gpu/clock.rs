@@ -2,7 +2,7 @@
 
 use super::pipeline::Pipeline;
 
-/// Two times, before and after a pass, and where they are read back.
+/// The buffers of two timestamps, before and after a pass.
 pub(super) struct Clock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
@@ -13,7 +13,7 @@ pub(super) struct Clock {
 impl Clock {
     const BYTES: u64 = 2 * size_of::<u64>() as u64;
 
-    /// A clock on the device of `pipeline`; `None` if it keeps no time.
+    /// A clock on the device of `pipeline`; `None` if it has no timestamps.
     pub(super) fn new(pipeline: &Pipeline) -> Option<Self> {
         let Pipeline { device, queue, .. } = pipeline;
         if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
@@ -41,7 +41,7 @@ impl Clock {
         })
     }
 
-    /// What makes a pass note its beginning and its end.
+    /// Makes a pass write timestamps at its beginning and its end.
     pub(super) fn around_pass(&self) -> wgpu::ComputePassTimestampWrites<'_> {
         wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
@@ -50,13 +50,13 @@ impl Clock {
         }
     }
 
-    /// Copies both times to where they can be read.
+    /// Copies both timestamps to the readback buffer.
     pub(super) fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.queries, 0..2, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, Self::BYTES);
     }
 
-    /// The buffer that holds both times once the pass is done.
+    /// The buffer that holds both timestamps once the pass is done.
     pub(super) fn readback(&self) -> &wgpu::Buffer {
         &self.readback
     }

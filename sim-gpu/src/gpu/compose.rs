@@ -1,6 +1,5 @@
-//! Composes the WGSL of one shader variant from the sources of
-//! `edgepuck_shaders`. A variant holds the sources of the effects that it
-//! models and no others.
+//! Composes the WGSL of a shader variant from the sources of `edgepuck_shaders`. A variant contains
+//! only the sources of the effects that it models.
 
 use crate::bvh::MAX_DEPTH;
 use crate::cpu::aim::BEFORE;
@@ -10,10 +9,10 @@ use crate::effects::{Effects, RayEffect, RayInput};
 use crate::ray::{AMBIGUOUS, MISS, NO_HIT, SENT};
 use edgepuck_shaders as shaders;
 
-/// Rays of one workgroup. Lavapipe and GPUs trace alike from 32 to 256.
+/// The rays of a workgroup. From 32 to 256, the speed of Lavapipe and of GPUs is the same.
 pub(super) const WORKGROUP_SIZE: usize = 64;
 
-/// What every variant holds.
+/// The sources of every variant.
 const TRACE: [&str; 6] = [
     shaders::BVH,
     shaders::RAY,
@@ -53,14 +52,12 @@ fn reads(effects: &Effects, input: RayInput) -> bool {
     effects.per_ray().any(|effect| effect.input() == input)
 }
 
-/// Whether any of `effects` reads the rays' random bits, as they are or as
-/// normal deviates.
+/// Whether any of `effects` reads the rays' random bits, directly or as normal deviates.
 pub(super) fn reads_random_bits(effects: &Effects) -> bool {
     reads(effects, RayInput::RandomBits) || reads(effects, RayInput::NormalDeviates)
 }
 
-/// The constants that shaders share with their counterparts, which document
-/// them.
+/// The constants that shaders share with their counterparts, which document them.
 pub(super) fn constants() -> String {
     let floats = [
         ("ACCURACY", ACCURACY),

@@ -1,4 +1,4 @@
-//! A device with the shader variant of one set of effects compiled on it.
+//! A device with the compiled shader variant of one set of effects.
 
 use super::compose::{compose, reads_random_bits};
 use crate::effects::Effects;
@@ -8,9 +8,9 @@ pub(super) struct Pipeline {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) compute: wgpu::ComputePipeline,
-    /// The layout of group 0: what every variant reads and writes.
+    /// The layout of group 0: the buffers of every variant.
     pub(super) trace_layout: wgpu::BindGroupLayout,
-    /// The layout of group 1: what effects read and write, if there are any.
+    /// The layout of group 1: the buffers of effects, if there are any.
     pub(super) effects_layout: Option<wgpu::BindGroupLayout>,
     pub(super) effects: Effects,
 }
@@ -51,7 +51,7 @@ impl Pipeline {
             entry_point: Some("main"),
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &constants,
-                // No workgroup memory is used.
+                // The shader uses no workgroup memory.
                 zero_initialize_workgroup_memory: false,
             },
             cache: None,

@@ -1,5 +1,5 @@
-//! The buffers of one dispatch in flight. Slots are used again, so that a long
-//! run allocates as much as its largest batches need and no more.
+//! The buffers of one dispatch in flight. Slots are reused, so that a long run allocates only as much
+//! as its largest batches need.
 
 use super::batch::Batch;
 use super::clock::Clock;
@@ -14,7 +14,7 @@ const OUTPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::Buffe
 const READBACK: wgpu::BufferUsages =
     wgpu::BufferUsages::MAP_READ.union(wgpu::BufferUsages::COPY_DST);
 
-/// A buffer that is replaced by a larger one when it must hold more.
+/// A buffer that is replaced by a larger one when needed.
 struct Growing {
     label: &'static str,
     usage: wgpu::BufferUsages,
@@ -26,7 +26,7 @@ impl Growing {
         Self { label, usage, buffer: None }
     }
 
-    /// Makes room for `bytes`; whether the buffer is another one now.
+    /// Makes room for `bytes`, and returns whether the buffer was replaced.
     fn reserve(&mut self, device: &wgpu::Device, bytes: u64) -> bool {
         if self.buffer.as_ref().is_some_and(|buffer| buffer.size() >= bytes) {
             return false;
@@ -34,7 +34,7 @@ impl Growing {
         let limits = device.limits();
         let limit = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         let size = bytes.next_power_of_two().max(4096).min(limit).max(bytes);
-        // The old buffer goes first, so that both are never held together.
+        // The old buffer is dropped first, so that both never exist at the same time.
         self.buffer = None;
         self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(self.label),
@@ -56,13 +56,13 @@ impl Growing {
     }
 }
 
-/// Both groups of bindings, which stay as they are until a buffer grows.
+/// Both bind groups, which are reused until a buffer is replaced.
 struct BindGroups {
     trace: wgpu::BindGroup,
     effects: Option<wgpu::BindGroup>,
 }
 
-/// See the module.
+/// The buffers of one dispatch.
 pub(super) struct Slot {
     nodes: Growing,
     triangles: Growing,
@@ -74,7 +74,7 @@ pub(super) struct Slot {
     streams: Growing,
     codes_readback: Growing,
     outputs_readback: Growing,
-    /// What the buffer of directions holds.
+    /// The content of the buffer of directions.
     patterns: Vec<Directions>,
     bind_groups: Option<BindGroups>,
     clock: Option<Clock>,
@@ -91,17 +91,16 @@ struct AnswerBytes {
     clock: u64,
 }
 
-/// What the adapter found for one batch.
+/// The adapter's answer for one batch.
 pub(super) struct Answer {
     pub(super) codes: Vec<u32>,
     pub(super) outputs: Vec<f32>,
-    /// How long the pass took by the adapter's clock, where that was asked for.
+    /// The duration of the pass by the adapter's clock, if requested.
     pub(super) seconds: Option<f64>,
 }
 
 impl Slot {
-    /// A slot without buffers; with a clock if the passes are to be `timed` and
-    /// the device keeps time.
+    /// A slot without buffers; with a clock if passes are `timed` and the device has timestamps.
     pub(super) fn new(pipeline: &Pipeline, timed: bool) -> Self {
         Self {
             nodes: Growing::new("nodes", INPUT),
@@ -151,8 +150,7 @@ impl Slot {
         self.read_back(pipeline, encoder);
     }
 
-    /// Fills the buffers for `batch`; whether any of those that are bound is
-    /// another one now.
+    /// Fills the buffers for `batch`, and returns whether any bound buffer was replaced.
     fn upload(&mut self, pipeline: &Pipeline, batch: &Batch) -> bool {
         let Pipeline { device, effects, .. } = pipeline;
         let n_rays = batch.n_rays;
@@ -173,7 +171,7 @@ impl Slot {
         grown
     }
 
-    /// Uploads the directions of `patterns`, unless they are there since an earlier batch.
+    /// Uploads the directions of `patterns`, unless an earlier batch did.
     fn upload_directions(&mut self, pipeline: &Pipeline, patterns: &[Directions]) -> bool {
         let is_there = |(here, wanted): (&Directions, &Directions)| here.is_shared_with(wanted);
         let are_there = self.patterns.len() >= patterns.len()
@@ -235,15 +233,14 @@ impl Slot {
         self.mapped = Some(receive);
     }
 
-    /// What was found for the batch, once it is there.
+    /// Waits for the answer for the batch.
     pub(super) fn wait(&self, pipeline: &Pipeline) -> Result<Answer, String> {
         let mapped = self.mapped.as_ref().ok_or("nothing was dispatched")?;
-        // This batch alone: the next may be on its way already.
+        // Waits for this batch alone: the next may be in flight already.
         let submission_index = self.submission.clone();
         let poll = wgpu::PollType::Wait { submission_index, timeout: None };
         pipeline.device.poll(poll).map_err(|e| e.to_string())?;
-        // Another thread may be the one that runs the callbacks: this waits for
-        // it, until both ends of the channel were dropped.
+        // Another thread may run the callbacks: this waits until all senders are dropped.
         for result in mapped {
             result.map_err(|error| error.to_string())?;
         }
@@ -256,7 +253,7 @@ impl Slot {
     }
 }
 
-/// Asks for the first `bytes` of `buffer`; the result goes to `done`.
+/// Maps the first `bytes` of `buffer`, and sends the result to `done`.
 fn map(
     buffer: Option<&wgpu::Buffer>,
     bytes: u64,
@@ -265,7 +262,7 @@ fn map(
     let Some(buffer) = buffer.filter(|_| bytes > 0) else { return };
     let done = done.clone();
     buffer.slice(..bytes).map_async(wgpu::MapMode::Read, move |mapped| {
-        // The receiver is gone only if nobody waits any more.
+        // Sending fails only if the waiter is gone.
         let _ = done.send(mapped);
     });
 }

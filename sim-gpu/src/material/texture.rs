@@ -1,12 +1,12 @@
-//! Images that colour surfaces.
+//! Images of materials.
 
 use std::path::Path;
 
-/// An image, by the luminance of each pixel.
+/// The luminance of the pixels of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Texture {
     width: usize,
-    /// By row from the top.
+    /// By row, from the top.
     luminance: Vec<f32>,
 }
 
@@ -14,14 +14,14 @@ impl Texture {
     /// Reads the PNG or JPEG file at `path`; `luminance` is that of an sRGB colour.
     ///
     /// # Errors
-    /// Says why it cannot be read.
+    /// If the file cannot be read.
     #[cfg(feature = "textures")]
     pub fn load(path: &Path, luminance: impl Fn([f64; 3]) -> f64) -> Result<Self, String> {
         let failed = |error: &dyn std::error::Error| format!("cannot be read: {error}");
         let reader = image::ImageReader::open(path).map_err(|error| failed(&error))?;
         let reader = reader.with_guessed_format().map_err(|error| failed(&error))?;
         let pixels = reader.decode().map_err(|error| failed(&error))?.into_rgb8();
-        // 256 values a channel: what each weighs is worth a table.
+        // A table of the 256 values of each channel.
         let weight = |channel: usize| -> [f64; 256] {
             std::array::from_fn(|value| {
                 let mut colour = [0.0; 3];
@@ -36,14 +36,14 @@ impl Texture {
         Ok(Self { width: pixels.width() as usize, luminance: pixels.pixels().map(of).collect() })
     }
 
-    /// That this build reads no images.
+    /// An error: this build reads no images.
     #[cfg(not(feature = "textures"))]
     pub fn load(_: &Path, _: impl Fn([f64; 3]) -> f64) -> Result<Self, String> {
         Err("this build reads no images: build with `--features textures`".to_owned())
     }
 
-    /// The luminance at `u` to the right and `v` upwards, of an image whose sides are 1 and
-    /// that repeats; between the middles of pixels in proportion.
+    /// The luminance at `u` to the right and `v` upwards in the repeated image, whose sides are 1,
+    /// interpolated between the centres of pixels.
     pub fn at(&self, u: f64, v: f64) -> f64 {
         let (width, height) = (self.width, self.luminance.len() / self.width);
         let (column, right) = between(u, width);
@@ -56,11 +56,11 @@ impl Texture {
     }
 }
 
-/// Which of `n` pixels' middles lies before `at`, and how far on to the next it is.
+/// The last of `n` pixel centres before `at`, and the fraction of the way to the next.
 fn between(at: f64, n: usize) -> (usize, f64) {
     let from_first = (at - at.floor()) * n as f64 - 0.5;
     let before = from_first.floor();
-    // Before the first is the last, of the image beside it.
+    // The last pixel of the neighbouring image lies before the first.
     let pixel = if before < 0.0 { n - 1 } else { (before as usize).min(n - 1) };
     (pixel, from_first - before)
 }
@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn an_image_is_read_between_its_pixels_and_repeats() {
         let image = Texture { width: 2, luminance: vec![0.0, 1.0, 0.5, 0.25] };
-        // The middles of its pixels: the upper row is at v = 0.75.
+        // At the centres of pixels: the upper row is at v = 0.75.
         for ([u, v], expected) in [
             ([0.25, 0.75], 0.0),
             ([0.75, 0.75], 1.0),

@@ -1,7 +1,7 @@
-//! What an OBJ file and its MTL files say of colours.
+//! The colours of an OBJ file and its MTL files.
 //!
-//! The geometry is read without them ([`super::load()`]): this is a second pass, for those who
-//! ask. (tobj's own reader of MTL panics where a colour lacks a number.)
+//! The geometry is read without them ([`super::load()`]); this is a second pass, if materials are
+//! requested. (tobj's own reader of MTL panics if a colour lacks a number.)
 
 use std::path::{Path, PathBuf};
 
@@ -19,16 +19,16 @@ pub(crate) struct Appearance {
     pub names: Vec<String>,
     /// By triangle of the mesh.
     pub triangles: Vec<Face>,
-    /// By vertex of the file: red, green and blue, sRGB, where it has them.
+    /// The colour of each vertex of the file, if any: red, green and blue, sRGB.
     pub colours: Vec<Option<[f64; 3]>>,
-    /// `vt`: from the lower left corner of an image, whose sides are 1.
+    /// `vt`: coordinates from the lower left corner of an image, whose sides are 1.
     pub texture_coordinates: Vec<[f64; 2]>,
 }
 
-/// How one triangle is coloured.
+/// The colouring of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Face {
-    /// Its material's place among the names.
+    /// The index of its material's name.
     pub material: Option<u32>,
     /// Its vertices in the file.
     pub vertices: [u32; 3],
@@ -40,11 +40,11 @@ pub(crate) struct Face {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Colour {
     pub name: String,
-    /// The file that it stands in.
+    /// Its MTL file.
     pub library: PathBuf,
     /// `Kd`: red, green and blue, sRGB, 0 to 1.
     pub diffuse: Option<[f64; 3]>,
-    /// `map_Kd`: the image that colours it.
+    /// `map_Kd`: the image of its colours.
     pub image: Option<PathBuf>,
 }
 
@@ -52,7 +52,7 @@ impl Appearance {
     /// Reads the OBJ file at `path`.
     ///
     /// # Errors
-    /// A file that is no OBJ file or cannot be read; an index or a number that is none.
+    /// If the file is not OBJ or cannot be read, or has an invalid index or number.
     pub fn load(path: &Path) -> Result<Self, MeshError> {
         if MeshFormat::from_path(path) != Some(MeshFormat::Obj) {
             let cause = "expected an OBJ file, whose faces have colours, found another format";
@@ -90,7 +90,7 @@ impl Appearance {
         place as u32
     }
 
-    /// Appends a face as the geometry's reader does: a fan around its first corner.
+    /// Appends a face as the reader of the geometry does: as a fan around its first corner.
     fn add_face(&mut self, corners: &[u8], material: Option<u32>) -> Result<(), Malformed> {
         let (mut vertices, mut textures) = (Vec::new(), Vec::new());
         for corner in words(corners) {
@@ -114,7 +114,7 @@ impl Appearance {
 /// The materials in the MTL file at `path`.
 ///
 /// # Errors
-/// A file that cannot be read, or a colour that is none.
+/// If the file cannot be read, or has an invalid colour.
 pub(crate) fn colours(path: &Path) -> Result<Vec<Colour>, MeshError> {
     parse_colours(&read(path)?, path).map_err(malformed(path))
 }
@@ -155,7 +155,7 @@ fn malformed(path: &Path) -> impl Fn(ParseError) -> MeshError {
     |ParseError { line, cause }| MeshError::Malformed { path: path.into(), line, cause }
 }
 
-/// A line's first word, and what follows it.
+/// The first word and the rest of a line.
 fn keyed(line: &[u8]) -> (&[u8], &[u8]) {
     let data = data(line).trim_ascii();
     let end = data.iter().position(u8::is_ascii_whitespace).unwrap_or(data.len());
@@ -167,13 +167,13 @@ fn text(name: &[u8]) -> String {
     String::from_utf8_lossy(name).into_owned()
 }
 
-/// The numbers of a line, if all its words are finite numbers.
+/// The words of a line as numbers, if all are finite.
 fn numbers(value: &[u8]) -> Option<Vec<f64>> {
     let number = |word| std::str::from_utf8(word).ok()?.parse().ok();
     words(value).map(|word| number(word).filter(|x: &f64| x.is_finite())).collect()
 }
 
-/// A colour behind a position, as MeshLab and others write it.
+/// The colour after a position, as MeshLab and others write it.
 fn colour_of(position: &[u8]) -> Option<[f64; 3]> {
     match numbers(position)?[..] {
         [_, _, _, red, green, blue] => Some([red, green, blue]),
@@ -194,13 +194,13 @@ fn srgb(value: &[u8]) -> Result<[f64; 3], Malformed> {
     let is_fit = parts.iter().all(|part| (0.0..=1.0).contains(part));
     match parts[..] {
         [red, green, blue] if is_fit => Ok([red, green, blue]),
-        // Green and blue are those of red where they are left out.
+        // Green and blue default to red.
         [grey] if is_fit => Ok([grey; 3]),
         _ => Err(Malformed::expected("one or three numbers within 0..=1 as Kd", value)),
     }
 }
 
-/// An index of an OBJ file, from 1 or, if negative, from the last, as one from 0.
+/// Converts an index of an OBJ file, from 1 or, if negative, from the end, to one from 0.
 fn index(word: &[u8], n: usize) -> Result<u32, Malformed> {
     let number: Option<i64> = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
     let found = match number {

@@ -1,64 +1,64 @@
-//! What can be wrong with a mesh file.
+//! Errors of mesh files.
 
 use std::io;
 use std::path::PathBuf;
 
 use super::format::mesh_extensions;
 
-/// Why a mesh could not be had from a path.
+/// A mesh could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
-    /// The file system refused: no such file, no permission, a broken disk.
+    /// The file does not exist, or cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
     Read {
-        /// The file asked for.
+        /// The requested file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The path names a directory, a pipe or a device.
     #[error("{}: expected a mesh file, found {what}", path.display())]
     NotAFile {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
-        /// What it is, with its article.
+        /// The kind of the file, with its article.
         what: &'static str,
     },
-    /// The file name ends in no extension that stands for a mesh format.
+    /// The file name does not have the extension of a mesh format.
     #[error("{}: expected one of the extensions {}", path.display(), mesh_extensions().join(", "))]
     UnknownFormat {
-        /// The file asked for.
+        /// The requested file.
         path: PathBuf,
     },
     /// The file was read but is not a mesh.
     #[error("{}{}: {cause}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Malformed {
-        /// The file asked for.
+        /// The requested file.
         path: PathBuf,
-        /// The line at fault, counted from 1, where there is one.
+        /// The line of the fault, counted from 1, if known.
         line: Option<usize>,
-        /// What is wrong there.
+        /// The fault.
         cause: Malformed,
     },
 }
 
-/// What is wrong with a mesh file's content.
+/// A fault in the content of a mesh file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
-    /// The file holds no byte.
+    /// The file is empty.
     #[error("the file is empty")]
     Empty,
-    /// The file ends, or cannot but end, before all its header promises.
+    /// The file is too short for the counts of its header.
     #[error("truncated: expected {promised} {part}, found {held}")]
     Truncated {
         /// Vertices or faces.
         part: &'static str,
-        /// How many were read, or could be at most.
+        /// The number that the file holds, or could hold at most.
         held: u64,
-        /// How many the header promises.
+        /// The number in the header.
         promised: u64,
     },
-    /// A face names a vertex that is not there.
+    /// A face refers to a vertex that does not exist.
     #[error("index {found} is out of range: there are {n_vertices} vertices")]
     IndexOutOfRange {
         /// The index as written.
@@ -69,28 +69,28 @@ pub enum Malformed {
     /// The file is well formed but has no face of three or more corners.
     #[error("expected at least one triangle, found none")]
     NoTriangle,
-    /// Something else than the format has there.
+    /// The content does not follow the format.
     #[error("{0}")]
     Syntax(String),
 }
 
-/// A cause and the line where it lies, of a file whose path is not known.
+/// A fault and its line, in a file whose path is not known.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{cause}", line.map(|line| format!("line {line}: ")).unwrap_or_default())]
 pub struct ParseError {
-    /// The line at fault, counted from 1, where there is one.
+    /// The line of the fault, counted from 1, if known.
     pub line: Option<usize>,
-    /// What is wrong there.
+    /// The fault.
     pub cause: Malformed,
 }
 
 impl Malformed {
-    /// That `found` stands in a file where its format has `expected`.
+    /// The fault that a file has `found` instead of `expected`.
     pub(super) fn expected(expected: &str, found: &[u8]) -> Self {
         Self::Syntax(format!("expected {expected}, found {:?}", excerpt(found)))
     }
 
-    /// Checks that indices of 32 bits can name `n_vertices` vertices.
+    /// Checks that 32 bits can index `n_vertices` vertices.
     pub(super) fn check_vertex_count(n_vertices: u64) -> Result<(), Self> {
         if n_vertices <= u64::from(u32::MAX) {
             return Ok(());
@@ -98,7 +98,7 @@ impl Malformed {
         Err(Self::Syntax(format!("expected at most {} vertices, found {n_vertices}", u32::MAX)))
     }
 
-    /// The cause, found at `line`.
+    /// The fault, at `line`.
     pub(super) fn at(self, line: usize) -> ParseError {
         ParseError { line: Some(line), cause: self }
     }
@@ -110,7 +110,7 @@ impl From<Malformed> for ParseError {
     }
 }
 
-/// `bytes` as text for a message: at most 40 characters, none a control.
+/// `bytes` as text for a message: at most 40 characters, without control characters.
 pub(super) fn excerpt(bytes: &[u8]) -> String {
     const LONGEST: usize = 40;
     let head = &bytes[..bytes.len().min(4 * LONGEST)];

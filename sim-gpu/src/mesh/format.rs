@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::frame::Up;
 
 formats::named! {
-    /// The mesh formats read here; the name is the file name's extension.
+    /// The mesh formats. Their names are the extensions of files.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum MeshFormat: "mesh format" {
@@ -23,15 +23,15 @@ formats::named! {
 }
 
 impl MeshFormat {
-    /// The format that the extension of `path` stands for, in either case.
+    /// The format of the extension of `path`, in upper or lower case.
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?;
         Self::ALL.into_iter().find(|format| extension.eq_ignore_ascii_case(format.name()))
     }
 
-    /// The axis that points up in most files of this format: z in ModelNet's
-    /// OFF and in CAD's STL and PLY, y in OBJ.
+    /// The axis that points up in most files of this format: z in OFF (ModelNet), STL and PLY
+    /// (CAD), y in OBJ.
     #[must_use]
     pub fn default_up(self) -> Up {
         match self {

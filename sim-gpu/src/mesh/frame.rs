@@ -1,4 +1,4 @@
-//! From a file's axes and units to the world: z up, in metres.
+//! The transform from the axes and units of a file to the world: z up, in metres.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -20,43 +20,40 @@ formats::named! {
 }
 
 formats::named! {
-    /// How a mesh is moved and scaled.
+    /// The translation and the scale of a mesh.
     #[derive(Default, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Normalize: "normalization" {
-        /// The mean of the vertices to the origin and the farthest vertex to
-        /// radius 1, as point clouds of ModelNet are.
+        /// The mean of the vertices moves to the origin and the farthest vertex to radius 1, as in
+        /// the point clouds of ModelNet.
         #[default]
         UnitSphere = "unit-sphere",
-        /// The centre of the bounding box to the origin and its longest side to 2,
-        /// as in ModelNet40-C.
+        /// The centre of the bounding box moves to the origin, and its longest side becomes 2, as in
+        /// ModelNet40-C.
         Bbox = "bbox",
-        /// The centre of the bounding box to the origin; the scale stays, and the
-        /// file's unit is taken for a metre.
+        /// The centre of the bounding box moves to the origin; the unit of the file is a metre.
         None = "none",
     }
 }
 
-/// A mesh in the world, and how it came there:
-/// `world = (position - centre) * scale`, `position` being the file's, turned
-/// z up.
+/// A mesh in the world, and its transform: `world = (position - centre) * scale`, where `position`
+/// is that of the file, turned z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorldMesh {
     /// The mesh, z up, in metres.
     pub mesh: Mesh,
-    /// What became the origin, in the file's units.
+    /// The position of the origin, in the units of the file.
     pub centre: DVec3,
     /// Metres per unit of the file; at most the largest finite number.
     pub scale: f64,
 }
 
-/// Turns `mesh` z up, then moves and scales it as `normalize` says.
+/// Turns `mesh` z up, then moves and scales it by `normalize`.
 ///
-/// Centre and size are those of the vertices that triangles name: a stray
-/// vertex has no say, and is put at the origin, so that it does no harm
-/// either. (ModelNet's files have hardly any, so that the mean is ModelNet's.)
-/// A mesh without extent is moved only. Any finite coordinates will do: sums
-/// are formed relative to the box, and in units of its largest coordinate.
+/// Centre and size are those of the vertices that triangles refer to. Other vertices are ignored
+/// and moved to the origin. (ModelNet's files have hardly any, so that the mean is ModelNet's.) A
+/// mesh without extent is only moved. Every finite coordinate is allowed: sums are relative to the
+/// bounding box and in units of its largest coordinate.
 #[must_use]
 pub fn to_world(mesh: &Mesh, up: Up, normalize: Normalize) -> WorldMesh {
     let named = named_vertices(mesh);
@@ -93,7 +90,7 @@ pub fn to_world(mesh: &Mesh, up: Up, normalize: Normalize) -> WorldMesh {
     }
 }
 
-/// Which vertices a triangle names, `[n_vertices]`.
+/// Whether a triangle refers to each vertex, `[n_vertices]`.
 pub(super) fn named_vertices(mesh: &Mesh) -> Vec<bool> {
     let mut named = vec![false; mesh.vertices.len()];
     for &corner in mesh.triangles.iter().flatten() {
@@ -109,15 +106,15 @@ fn z_up(position: DVec3, up: Up) -> DVec3 {
     }
 }
 
-/// The power of two at or below `value` whose inverse is finite and normal
-/// too; 1 for 0. Multiplying by it rounds nothing.
+/// The largest power of two up to `value` whose inverse is finite and normal too; 1 for 0.
+/// Multiplication by it does not round.
 fn power_of_two_near(value: f64) -> f64 {
     const EXPONENT: u64 = 0x7FF << 52;
     let power = f64::from_bits(value.to_bits() & EXPONENT);
     if value == 0.0 { 1.0 } else { power.clamp(f64::MIN_POSITIVE, f64::MIN_POSITIVE.recip()) }
 }
 
-/// The length of `v`, which may be as short as squares underflow.
+/// The length of `v`, which may be so short that squares underflow.
 fn length(v: DVec3) -> f64 {
     let longest = v.abs().max_element();
     if longest == 0.0 { 0.0 } else { (v / longest).length() * longest }

@@ -1,4 +1,4 @@
-//! From a path to a mesh that the rest can rely on.
+//! Loads meshes from files, and checks them.
 
 use std::fs;
 use std::path::Path;
@@ -10,32 +10,30 @@ use super::format::MeshFormat;
 use super::triangle_mesh::{Mesh, Parsed};
 use super::{obj, off, ply, stl};
 
-/// A mesh as its file holds it, and what is to be known of the file.
+/// A mesh as in its file, with the properties of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedMesh {
-    /// The mesh, in the file's own axes and units. It has a triangle, fewer
-    /// than 2^32 vertices, all of them finite, and all indices in range.
+    /// The mesh, in the axes and units of the file. It has at least one triangle, fewer than 2^32
+    /// vertices, all finite, and all indices in range.
     pub mesh: Mesh,
     /// The format by the file's extension.
     pub format: MeshFormat,
-    /// Faces of fewer than three corners, which were left out.
+    /// The number of faces of fewer than three corners, which were dropped.
     pub dropped_faces: usize,
 }
 
-/// Reads the mesh at `path`; its extension says in which format.
+/// Reads the mesh at `path`, in the format of its extension.
 ///
 /// # Errors
 ///
-/// [`MeshError`], naming the path, the line where there is one, and the cause:
-/// a file that cannot be read, is no file, is empty, truncated, not of its
-/// format, or holds an index out of range, a coordinate that is not finite, or
-/// no triangle.
+/// [`MeshError`] names the path, the line if known, and the cause: the file cannot be read, is not a
+/// regular file, is empty, truncated or not of its format, has an index out of range or a coordinate
+/// that is not finite, or has no triangle.
 pub fn load(path: &Path) -> Result<LoadedMesh, MeshError> {
     Ok(load_hashed(path, Hashing::None)?.0)
 }
 
-/// As [`load`], and the hash of the file's bytes that `hashing` asks for: the file is
-/// read once.
+/// As [`load`], with the hash of the file's bytes that `hashing` asks for. The file is read once.
 ///
 /// # Errors
 ///
@@ -58,7 +56,7 @@ pub fn load_hashed(
 ///
 /// # Errors
 ///
-/// As [`load`]'s, without the path.
+/// As [`load`], without the path.
 pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
     let parsed = match format {
         _ if bytes.is_empty() => Err(Malformed::Empty.into()),
@@ -81,10 +79,10 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
     fs::read(path).map_err(failed)
 }
 
-/// What every mesh must satisfy, whatever its format and reader: as [`LoadedMesh::mesh`] has it.
+/// Checks that `mesh` has the properties of [`LoadedMesh::mesh`].
 ///
 /// # Errors
-/// A vertex that is not finite, an index out of range, or no triangle.
+/// If a vertex is not finite, an index is out of range, or there is no triangle.
 pub fn check(mesh: &Mesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
     Malformed::check_vertex_count(n_vertices)?;

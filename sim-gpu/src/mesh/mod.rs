@@ -1,8 +1,7 @@
 //! Triangle meshes in f64, as files hold them.
 //!
-//! [`tree`] finds the meshes of a dataset, [`load()`] reads one, [`frame`]
-//! turns and scales it into the world, [`validate`] says which of its triangles
-//! a ray can meet.
+//! [`tree`] finds the meshes of a dataset, [`load()`] reads one, [`frame`] transforms it into the
+//! world, and [`validate`] finds the triangles that a ray can meet.
 
 mod appearance;
 mod error;

@@ -1,9 +1,8 @@
 //! Wavefront OBJ, through the crate tobj.
 //!
-//! tobj sees positions and faces only: groups, materials, normals and texture
-//! coordinates have no part in where a beam ends, and yet would split the mesh
-//! into models of their own vertices, or fail it. The lines keep their numbers
-//! on the way, so that an error can name its line.
+//! tobj is given positions and faces only. Groups, materials, normals and texture coordinates do not
+//! matter to a beam, but would split the mesh into several models, or make it fail. Lines keep their
+//! numbers, so that errors can name them.
 
 use std::io::{BufRead, Cursor};
 
@@ -15,9 +14,9 @@ use super::triangle_mesh::{Mesh, Parsed};
 
 /// Reads an OBJ file from its bytes.
 ///
-/// All objects become one mesh; it has the vertices that faces name, in the
-/// order in which they are first named. Polygons become fans around their
-/// first corner; faces of fewer than three corners are dropped and counted.
+/// All objects become one mesh. It has the vertices that faces refer to, in the order of their first
+/// use. Polygons become fans around their first corner; faces of fewer than three corners are
+/// dropped and counted.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let geometry = Geometry::parse(bytes)?;
     let options = LoadOptions {
@@ -46,8 +45,8 @@ fn append(mesh: &mut Mesh, model: &tobj::Mesh) {
     mesh.triangles.extend(corners.iter().map(|corners| corners.map(|index| base + index)));
 }
 
-/// Passes on each line, with its number from 1 and how many lines of the file it stands on:
-/// a backslash at its end continues a line on the next one.
+/// Calls a function for each line, with its number from 1 and the number of lines of the file that
+/// it takes: a backslash at the end continues a line on the next one.
 pub(super) fn for_each_line(
     bytes: &[u8],
     mut take: impl FnMut(usize, &[u8], usize) -> Result<(), ParseError>,
@@ -72,7 +71,7 @@ pub(super) fn for_each_line(
     Ok(())
 }
 
-/// What stands in a line before a comment.
+/// The part of a line before a comment.
 pub(super) fn data(line: &[u8]) -> &[u8] {
     line.split(|&byte| byte == b'#').next().unwrap_or_default()
 }
@@ -81,7 +80,7 @@ pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     data(line).split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// The positions and faces of an OBJ file, each on the line it came from.
+/// The positions and faces of an OBJ file as text, on their lines in the file.
 struct Geometry {
     text: Vec<u8>,
     n_vertices: u64,
@@ -112,13 +111,13 @@ impl Geometry {
         }
     }
 
-    /// x, y, z and, if nothing but it follows, the weight; colours are left out.
+    /// Adds x, y, z and, if nothing else follows, the weight; not colours.
     fn add_position(&mut self, words: &[&[u8]]) -> Result<(), Malformed> {
         self.n_vertices += 1;
         let kept = if words.len() == 4 { words } else { &words[..words.len().min(3)] };
         self.text.push(b'v');
         for word in kept {
-            // tobj takes words such as "nan" for numbers.
+            // tobj parses words such as "nan" as numbers.
             if word.iter().any(|byte| matches!(byte, b'n' | b'N')) {
                 return Err(Malformed::expected("a finite coordinate", word));
             }
@@ -128,7 +127,7 @@ impl Geometry {
         Ok(())
     }
 
-    /// The indices into the positions: what stands before a slash.
+    /// Adds the indices of positions: the parts of the words before a slash.
     fn add_face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>) {
         let start = self.text.len();
         self.text.push(b'f');
@@ -136,7 +135,7 @@ impl Geometry {
         for word in words {
             self.text.push(b' ');
             let position = word.split(|&byte| byte == b'/').next().unwrap_or_default();
-            // Left out, it would change the number of corners in silence.
+            // Dropping it would silently change the number of corners.
             self.text.extend_from_slice(if position.is_empty() { b"?" } else { position });
             n_corners += 1;
         }
@@ -146,8 +145,8 @@ impl Geometry {
         }
     }
 
-    /// tobj's error in our words, with the line it is about: the last of the
-    /// `n_read` bytes that tobj took, unless it finds out only after the last line.
+    /// Converts tobj's error, and finds its line: that of the last of the `n_read` bytes, except
+    /// for errors that tobj detects after the last line.
     fn blame(&self, error: LoadError, n_read: usize) -> ParseError {
         match error {
             LoadError::FaceVertexOutOfBounds => self.first_out_of_range(),
@@ -160,9 +159,8 @@ impl Geometry {
         }
     }
 
-    /// The first face with an index that is 0, or beyond the positions (all of
-    /// the file for one counted from the start, those above it for one counted
-    /// backwards).
+    /// The error of the first face with an index that is 0 or out of range. Indices from the start
+    /// may refer to all positions of the file, indices from the end to those before the face.
     fn first_out_of_range(&self) -> ParseError {
         let mut above = 0;
         for (number, line) in self.text.lines().map_while(Result::ok).enumerate() {
@@ -195,7 +193,7 @@ mod tests {
         is_the_triangle(parse, format!("{CORNERS}f 1 2 3\n"));
         is_the_triangle(parse, format!("{CORNERS}f -3 -2 -1\n"));
         is_the_triangle(parse, format!("{CORNERS}vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\n"));
-        // Companions that point nowhere have no part in a beam's way.
+        // Invalid indices of texture coordinates and normals are ignored.
         is_the_triangle(parse, format!("{CORNERS}vt bad\nf 1/7/-9 2//8 3/-5\n"));
     }
 

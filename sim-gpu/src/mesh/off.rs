@@ -1,11 +1,10 @@
-//! ASCII OFF, as Geomview defines it and as ModelNet and others bend it.
+//! ASCII OFF, as Geomview defines it, with the deviations of ModelNet and others.
 //!
-//! Source: the Geomview manual, section "OFF: Object File Format". Read as
-//! ModelNet40 needs it: the keyword may be glued to the counts
-//! (`OFF490 518 0`, 2,862 of its 12,311 files); comments, blank lines and any
-//! of the three line ends occur anywhere; the number of edges may be missing;
-//! whatever stands on a line after what is needed (colours, normals, texture
-//! coordinates) is ignored, and so is all that follows the last face.
+//! Source: the Geomview manual, section "OFF: Object File Format". ModelNet40 needs deviations: the
+//! keyword may be glued to the counts (`OFF490 518 0`, 2,862 of its 12,311 files). Comments, blank
+//! lines and any of the three line ends may occur anywhere; the number of edges may be missing. The
+//! rest of each line (colours, normals, texture coordinates) is ignored, and so is everything after
+//! the last face.
 
 use glam::DVec3;
 
@@ -25,8 +24,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     read(&mut tokens).map_err(|cause| cause.at(tokens.line))
 }
 
-/// Reads the file from its keyword on. What is wrong is wrong in the line that
-/// `tokens` has come to.
+/// Reads the file from its keyword on. An error is in the current line of `tokens`.
 fn read(tokens: &mut Tokens<'_>) -> Result<Parsed, Malformed> {
     let [n_vertices, n_faces] = header(tokens)?;
     Malformed::check_vertex_count(n_vertices)?;
@@ -52,7 +50,7 @@ fn read(tokens: &mut Tokens<'_>) -> Result<Parsed, Malformed> {
     Ok(parsed)
 }
 
-/// Reads the corners of a face; none of a face that has fewer than three.
+/// Reads the corners of a face, unless it has fewer than three.
 fn read_corners(
     tokens: &mut Tokens<'_>,
     n_vertices: u64,
@@ -70,10 +68,10 @@ fn read_corners(
     Ok(())
 }
 
-/// The keyword, and the counts of vertices and faces.
+/// Reads the keyword, and returns the counts of vertices and faces.
 fn header(tokens: &mut Tokens<'_>) -> Result<[u64; 2], Malformed> {
     let keyword = tokens.next().unwrap_or_default();
-    // Before it at most the letters of every variant there is.
+    // The prefix has at most the letters of all variants together.
     let found = keyword.windows(3).position(|part| part == b"OFF" || part == b"off");
     let Some(at) = found.filter(|&at| at <= "STCN4n".len()) else {
         return Err(Malformed::expected("an OFF file", &keyword[..keyword.len().min(16)]));
@@ -97,7 +95,7 @@ fn header(tokens: &mut Tokens<'_>) -> Result<[u64; 2], Malformed> {
     Ok(counts)
 }
 
-/// Accepts the prefixes of `OFF` that leave x, y, z the first three numbers.
+/// Accepts the prefixes of `OFF` with which x, y, z remain the first three numbers.
 fn check_kind(kind: &[u8]) -> Result<(), Malformed> {
     let rest = kind.strip_prefix(b"ST").unwrap_or(kind);
     let rest = rest.strip_prefix(b"C").unwrap_or(rest);

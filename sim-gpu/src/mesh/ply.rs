@@ -1,5 +1,4 @@
-//! PLY, ASCII and binary of either byte order, through the reader of clouds and
-//! scans.
+//! PLY, ASCII and binary of either byte order, through the reader of clouds and scans.
 
 use std::path::Path;
 
@@ -10,17 +9,17 @@ use glam::DVec3;
 use super::error::{Malformed, ParseError};
 use super::triangle_mesh::Parsed;
 
-/// The names that the corners of a face go by.
+/// The names of the list of a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
-/// The kinds of elements that make a mesh, and the place of the faces.
+/// The elements of a mesh, and the index of the faces.
 const KINDS: [&str; 2] = ["vertex", "face"];
 const FACE: usize = 1;
 
 /// Reads a PLY file from its bytes.
 ///
-/// Of the element `vertex` it takes x, y and z, of `face` the list of vertex
-/// indices; all else is skipped. Polygons become fans around their first
-/// corner; faces of fewer than three corners are dropped and counted.
+/// It reads x, y and z of the element `vertex` and the list of vertex indices of `face`, and skips
+/// everything else. Polygons become fans around their first corner; faces of fewer than three corners
+/// are dropped and counted.
 ///
 /// A coordinate of type `float` is rounded to f32 in text too, so that both
 /// encodings of a mesh give the same positions.
@@ -59,7 +58,7 @@ pub(super) fn parse(mut bytes: &[u8]) -> Result<Parsed, ParseError> {
         }
     })
     .map_err(syntax)?;
-    // The reader gives every digit of a text, whatever the type.
+    // The reader parses text as f64, whatever the type.
     for vertex in &mut parsed.mesh.vertices {
         for axis in (0..3).filter(|&axis| is_single[axis]) {
             vertex[axis] = f64::from(vertex[axis] as f32);
@@ -74,7 +73,7 @@ pub(super) fn parse(mut bytes: &[u8]) -> Result<Parsed, ParseError> {
     }
 }
 
-/// The reader's error, with the line that it names, if it names one.
+/// The reader's error, with its line, if known.
 fn syntax(error: FormatError) -> ParseError {
     let FormatError::Malformed { part, cause, .. } = error else {
         return Malformed::Syntax(error.to_string()).into();
@@ -210,7 +209,7 @@ mod tests {
         ];
         let with = |face: &str| header.clone() + &BODY.replace("3 0 1 2", face);
         fails(parse, bad_faces.map(|(face, message)| (with(face), message)));
-        // The check that all formats share.
+        // The check of all formats.
         let parsed = parse_any(with("3 0 1 3").as_bytes(), MeshFormat::Ply);
         assert_eq!(
             parsed.unwrap_err().to_string(),

@@ -1,6 +1,6 @@
 //! STL, binary and ASCII.
 //!
-//! Its corners carry no indices; those of equal position become one vertex.
+//! Corners have no indices; corners at the same position become one vertex.
 
 use std::collections::HashMap;
 
@@ -9,14 +9,13 @@ use glam::DVec3;
 use super::error::{Malformed, ParseError};
 use super::triangle_mesh::Parsed;
 
-/// Binary STL: 80 bytes of any text, the number of triangles (u32), and for
-/// each triangle the normal and the corners as twelve f32, and a u16.
-/// Little-endian throughout.
+/// Binary STL, little-endian: 80 bytes of text, the number of triangles (u32), and for each triangle
+/// the normal and the corners as twelve f32, and a u16.
 const HEADER: usize = 80;
 const PREFIX: usize = HEADER + 4;
 const TRIANGLE: usize = 50;
 
-/// The lines of a facet in ASCII, and how many numbers end each of them.
+/// The lines of a facet in ASCII, and the number of numbers at the end of each.
 const FACET: [(&str, usize); 7] = [
     ("facet normal", 3),
     ("outer loop", 0),
@@ -58,10 +57,10 @@ fn binary_length(n_triangles: u32) -> u64 {
     PREFIX as u64 + TRIANGLE as u64 * u64::from(n_triangles)
 }
 
-/// Reads all solids of a text, whatever their names, in either case.
+/// Reads all solids of a text, whatever their names, in upper or lower case.
 fn parse_ascii(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let mut corners = Corners::default();
-    // How many lines of a facet were read, and whether a solid is open.
+    // The number of lines of the current facet, and whether a solid is open.
     let (mut n_read, mut is_open, mut last) = (0, false, 0);
     for (line, number) in bytes.split(|&byte| byte == b'\n').zip(1..) {
         let line = line.trim_ascii();
@@ -110,13 +109,13 @@ fn begins_with_word(line: &[u8], word: &str) -> bool {
         && line.get(word.len()).is_none_or(u8::is_ascii_whitespace)
 }
 
-/// The corners so far.
+/// The vertices and triangles read so far.
 #[derive(Default)]
 struct Corners {
     parsed: Parsed,
-    /// The vertex at each position, by its bits.
+    /// The vertex at each position, keyed by its bits.
     vertices: HashMap<[u32; 3], u32>,
-    /// Those of the triangle that is not whole yet.
+    /// The vertices of the incomplete triangle.
     open: Vec<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! What the tests of all readers share.
+//! Assertions for the tests of all readers.
 
 use glam::DVec3;
 
@@ -7,7 +7,7 @@ use super::triangle_mesh::{Mesh, Parsed};
 
 type Parse = fn(&[u8]) -> Result<Parsed, ParseError>;
 
-/// That `file` holds one triangle and nothing else.
+/// Asserts that `file` holds one triangle and nothing else.
 #[track_caller]
 pub fn is_the_triangle(parse: Parse, file: impl AsRef<[u8]>) {
     let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
@@ -16,7 +16,7 @@ pub fn is_the_triangle(parse: Parse, file: impl AsRef<[u8]>) {
     assert_eq!(found, Ok((expected, 0)), "{}", String::from_utf8_lossy(file.as_ref()));
 }
 
-/// That each file is refused with the message beside it.
+/// Asserts that each file is refused with its message.
 #[track_caller]
 pub fn fails<File: AsRef<[u8]>>(
     parse: Parse,

@@ -6,7 +6,7 @@ use super::error::Malformed;
 pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// The line that it has come to, counted from 1.
+    /// The current line, counted from 1.
     pub line: usize,
 }
 
@@ -24,19 +24,17 @@ impl<'a> Tokens<'a> {
         (length > 0).then(|| &rest[..length])
     }
 
-    /// The next token on this line, its `nth` of the `expected` tokens that are
-    /// `what`.
+    /// The next token on this line, which is the `nth` of the `expected` tokens of kind `what`.
     pub fn next_of(&mut self, what: &str, nth: u64, expected: u64) -> Result<&'a [u8], Malformed> {
         let short = || format!("expected {expected} {what} on the line, found {nth}");
         self.next().ok_or_else(|| Malformed::Syntax(short()))
     }
 
-    /// The coordinate that the next token on this line spells, the `nth` of three.
+    /// The next token on this line as a coordinate, the `nth` of three.
     pub fn next_coordinate(&mut self, nth: u64) -> Result<f64, Malformed> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
-        // Finds where the number ends while it reads it; whatever it reads otherwise than
-        // `coordinate` is left to that.
+        // Parsing finds the end of the token too; `coordinate` decides about unusual tokens.
         if let Ok((number, length)) = fast_float2::parse_partial::<f64, _>(rest)
             && number.is_finite()
             && rest.get(length).is_none_or(|&byte| !is_word(byte))
@@ -52,13 +50,13 @@ impl<'a> Tokens<'a> {
         self.at += rest.iter().take_while(|byte| is_blank(**byte)).count();
     }
 
-    /// Leaves this line for the next one that holds a token; false at the end.
+    /// Moves to the next line with a token; false at the end.
     pub fn next_data_line(&mut self) -> bool {
         self.skip_line();
         self.seek_data()
     }
 
-    /// Moves to the first token at or after here; false at the end.
+    /// Moves to the next token, which may be here; false at the end.
     pub fn seek_data(&mut self) -> bool {
         while let Some(&byte) = self.bytes.get(self.at) {
             match byte {
@@ -82,10 +80,10 @@ impl<'a> Tokens<'a> {
     }
 }
 
-/// The whole number that `token` spells.
+/// Parses `token` as an integer.
 pub(super) fn integer(token: &[u8], expected: &str) -> Result<i64, Malformed> {
     let number = match token {
-        // Nearly every token of a face: a few digits cannot overflow.
+        // Nearly every token of a face is short, and nine digits cannot overflow.
         [b'0'..=b'9', ..] if token.len() <= 9 => token.iter().try_fold(0, |sum, byte| {
             byte.is_ascii_digit().then(|| sum * 10 + i64::from(byte - b'0'))
         }),
@@ -94,14 +92,14 @@ pub(super) fn integer(token: &[u8], expected: &str) -> Result<i64, Malformed> {
     number.ok_or_else(|| Malformed::expected(expected, token))
 }
 
-/// The coordinate that `token` spells.
+/// Parses `token` as a coordinate.
 fn coordinate(token: &[u8]) -> Result<f64, Malformed> {
     let number = std::str::from_utf8(token).ok().and_then(|text| text.parse::<f64>().ok());
     let finite = number.filter(|number| number.is_finite());
     finite.ok_or_else(|| Malformed::expected("a finite coordinate", token))
 }
 
-/// A blank within a line; form feed and vertical tab occur in exports.
+/// Whether a byte is a blank within a line; form feeds and vertical tabs occur in exports.
 fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0B | 0x0C)
 }

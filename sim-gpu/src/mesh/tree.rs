@@ -1,4 +1,4 @@
-//! The meshes of a dataset: which there are, of which class, in which split.
+//! The meshes of a dataset, with their classes and splits.
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -11,53 +11,52 @@ use walkdir::WalkDir;
 
 use super::format::{MeshFormat, mesh_extensions};
 
-/// The share of meshes that a seeded split trains on.
+/// The share of meshes in the training set of a seeded split.
 const TRAIN_SHARE: f64 = 0.8;
 
-/// Longer names leave no room for what file names append to them: file systems
-/// allow 255 bytes.
+/// The longest name. File systems allow 255 bytes, and file names append to it.
 const LONGEST_NAME: usize = 180;
 
-/// Hexadecimal digits of a hash that set equal names apart.
+/// The hexadecimal digits of the hash that distinguishes equal names.
 const HASH_DIGITS: usize = 12;
 
 /// A mesh file of a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshEntry {
-    /// Where the file is.
+    /// The path of the file.
     pub path: PathBuf,
     /// Its path from the dataset's folder, with forward slashes.
     pub relative: String,
-    /// Its class: safe as the name of a folder on every platform.
+    /// Its class, which is a valid folder name on every platform.
     pub class: String,
     /// Its split.
     pub split: Split,
-    /// Its name: safe as part of a file name, and unique, upper case counting
-    /// as lower, among those of its class and split.
+    /// Its name, which is valid in file names on every platform, and unique within its class and
+    /// split, ignoring case.
     pub name: String,
 }
 
-/// Why a dataset could not be listed.
+/// A dataset could not be listed.
 #[derive(Debug, thiserror::Error)]
 pub enum TreeError {
-    /// A folder or its root cannot be read.
+    /// A folder cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
     Read {
         /// The folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A mesh whose path is not Unicode, and so cannot go into a manifest.
+    /// The path of a mesh is not Unicode, and so cannot be stored in a manifest.
     #[error("{}: the path is not Unicode; rename it", .0.display())]
     NotUnicode(PathBuf),
-    /// No mesh in the tree.
+    /// The folder has no mesh.
     #[error("{}: no mesh found; looked for {}", .0.display(), mesh_extensions().map(|e| format!("*.{e}")).join(", "))]
     NoMesh(PathBuf),
-    /// Two meshes whose names are equal even with a hash of their paths.
+    /// Two meshes have equal names even with a hash of their paths.
     #[error("{first} and {second}: both would be called {name}; rename one")]
     SameName {
-        /// The first mesh, from the dataset's folder.
+        /// The path of the first mesh from the dataset's folder.
         first: String,
         /// The second.
         second: String,
@@ -66,28 +65,23 @@ pub enum TreeError {
     },
 }
 
-/// Lists the meshes in the folder `root`, or the one file that it is, sorted by
-/// class, split and name.
+/// Lists the meshes in the folder `root`, or the single file `root`, sorted by class, split and name.
 ///
-/// A mesh `CLASS/{train,test}/NAME.ext` keeps its split. Any other takes the
-/// folder it lies in as its class, and 4 of 5 train: which ones is a function
-/// of `seed`, class and name alone, so that to add a mesh moves no other. What
-/// lies above `root` counts too, so that `root` may itself be one class, or
-/// one split of it.
+/// A mesh `CLASS/{train,test}/NAME.ext` keeps its split. The class of any other mesh is its folder,
+/// and 4 of 5 are in the training set. The split is a function of `seed`, class and name alone, so
+/// that a new mesh does not move others. Folders above `root` count too: `root` may itself be a
+/// class, or a split of one.
 ///
-/// Characters that some platform forbids in file names become `_`. Where
-/// several meshes have one class, split and name (`a.obj` beside `a.off`, or in
-/// folders at different depths), each of them gets `_` and a hash of its
-/// relative path appended.
+/// Characters that some platform forbids in file names become `_`. If several meshes have the same
+/// class, split and name (`a.obj` beside `a.off`, or in folders at different depths), `_` and a hash
+/// of the relative path is appended to each of their names.
 ///
-/// Links are followed, except back to a folder they lie in. Files of other
-/// extensions, files and folders whose name begins with a dot, and `__MACOSX`
-/// are passed over.
+/// Links are followed, except to a folder that contains them. Files with other extensions, files and
+/// folders whose name begins with a dot, and `__MACOSX` are ignored.
 ///
 /// # Errors
 ///
-/// [`TreeError`]: a folder that cannot be read, a mesh whose path is not
-/// Unicode, no mesh at all.
+/// [`TreeError`]: a folder cannot be read, the path of a mesh is not Unicode, or there is no mesh.
 pub fn discover(root: &Path, seed: u64) -> Result<Vec<MeshEntry>, TreeError> {
     let absolute =
         root.canonicalize().map_err(|source| TreeError::Read { path: root.into(), source })?;
@@ -98,7 +92,7 @@ pub fn discover(root: &Path, seed: u64) -> Result<Vec<MeshEntry>, TreeError> {
     if entries.is_empty() {
         return Err(TreeError::NoMesh(root.into()));
     }
-    tell_apart(&mut entries)?;
+    make_unique(&mut entries)?;
     entries.sort_by(|a, b| (&a.class, a.split, &a.name).cmp(&(&b.class, b.split, &b.name)));
     Ok(entries)
 }
@@ -120,7 +114,7 @@ fn mesh_files(root: &Path) -> Result<Vec<PathBuf>, TreeError> {
             Err(error) if error.loop_ancestor().is_some() => {}
             Err(error) => {
                 let path = error.path().unwrap_or(root).to_path_buf();
-                // A link to nowhere: if it should be a mesh, loading says so.
+                // A broken link to a mesh is listed, so that loading reports it.
                 if path.is_symlink() && path != root {
                     files.extend(MeshFormat::from_path(&path).is_some().then_some(path));
                 } else {
@@ -167,8 +161,8 @@ fn entry(root: &Path, absolute: &Path, path: PathBuf, seed: u64) -> Result<MeshE
     Ok(MeshEntry { path, relative, class, split, name })
 }
 
-/// Appends a hash of its path to each name that is not the only one.
-fn tell_apart(entries: &mut [MeshEntry]) -> Result<(), TreeError> {
+/// Appends a hash of its path to each name that is not unique.
+fn make_unique(entries: &mut [MeshEntry]) -> Result<(), TreeError> {
     let place =
         |entry: &MeshEntry| (entry.class.to_lowercase(), entry.split, entry.name.to_lowercase());
     let mut count = HashMap::new();
@@ -193,7 +187,7 @@ fn tell_apart(entries: &mut [MeshEntry]) -> Result<(), TreeError> {
     Ok(())
 }
 
-/// `text` with `_` for what Windows, macOS or Linux forbid in a file name.
+/// Replaces characters that Windows, macOS or Linux forbid in file names with `_`.
 /// Source: "Naming Files, Paths, and Namespaces", Microsoft.
 fn safe_name(text: &str) -> String {
     let safe = |c: char| if c.is_control() || r#"<>:"/\|?*"#.contains(c) { '_' } else { c };
@@ -208,7 +202,7 @@ fn safe_name(text: &str) -> String {
     name
 }
 
-/// Whether Windows keeps `name`, whatever follows its first dot, for a device.
+/// Whether Windows reserves the part of `name` before its first dot for a device.
 fn is_device(name: &str) -> bool {
     let stem = name.split('.').next().unwrap_or_default().trim_end().to_ascii_uppercase();
     let port = stem.strip_prefix("COM").or_else(|| stem.strip_prefix("LPT"));

@@ -1,4 +1,4 @@
-//! The mesh that all formats are read into.
+//! The mesh type of all formats.
 
 use glam::DVec3;
 
@@ -12,18 +12,18 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What a format's parser makes of a file's bytes.
+/// The result of parsing a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parsed {
     /// The mesh, with a triangle, finite vertices and indices in range once it was checked.
     pub mesh: Mesh,
-    /// Faces of fewer than three corners, which were left out.
+    /// The number of faces of fewer than three corners, which were dropped.
     pub dropped_faces: usize,
 }
 
 impl Parsed {
-    /// Appends a face as a fan around its first corner, or counts it as dropped
-    /// if it has fewer than three.
+    /// Appends a face as a fan around its first corner, or counts it as dropped if it has fewer than
+    /// three corners.
     pub(super) fn add_face(&mut self, corners: &[u32]) {
         self.dropped_faces += usize::from(corners.len() < 3);
         let sides = corners.windows(2).skip(1);

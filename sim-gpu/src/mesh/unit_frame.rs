@@ -1,14 +1,14 @@
-//! The frame in which casting and the validation of meshes see an object.
+//! The frame of casting and of the validation of meshes.
 
 use glam::DVec3;
 
-/// Maps an object to its unit frame: box centre to 0, half the longest side to
-/// (0.5, 1]. The scale is a power of two, so that it rounds nothing.
+/// Maps an object to its unit frame: the centre of its bounding box to 0, and half of its longest
+/// side to (0.5, 1]. The scale is a power of two, so that scaling does not round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitFrame {
     /// The centre of the bounding box, in the object's units.
     pub centre: DVec3,
-    /// Object units per unit length; a power of two.
+    /// The unit length in the object's units; a power of two.
     pub scale: f64,
 }
 
@@ -25,21 +25,20 @@ impl UnitFrame {
         Self { centre: low + half_size, scale: power_of_two_above(half_size.max_element()) }
     }
 
-    /// From the object's frame.
+    /// Maps from the object's frame to the unit frame.
     #[must_use]
     pub fn to_unit(&self, point: DVec3) -> DVec3 {
         (point - self.centre) / self.scale
     }
 
-    /// To the object's frame.
+    /// Maps from the unit frame to the object's frame.
     #[must_use]
     pub fn to_object(&self, point: DVec3) -> DVec3 {
         point * self.scale + self.centre
     }
 }
 
-/// The lowest and the highest coordinates of `points`; infinite, and the lowest
-/// above the highest, if there are none.
+/// The lowest and the highest coordinates of `points`; infinity and minus infinity if there are none.
 #[must_use]
 pub fn bounding_box(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| {
@@ -47,8 +46,7 @@ pub fn bounding_box(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     })
 }
 
-/// The least normal power of two that is not below `x`, or the largest that f64
-/// has; 1 for zero.
+/// The least normal power of two that is at least `x`, or the largest of f64; 1 for 0.
 fn power_of_two_above(x: f64) -> f64 {
     const LARGEST: f64 = f64::from_bits(0x7FE << 52);
     if x.is_nan() || x <= 0.0 {

@@ -1,4 +1,4 @@
-//! Which triangles of a mesh a beam can meet, and how many it cannot.
+//! The triangles of a mesh that a beam can meet, and the defects of the others.
 
 use glam::{DVec3, Vec3};
 use hashbrown::{DefaultHashBuilder, HashTable};
@@ -9,33 +9,32 @@ use super::frame::named_vertices;
 use super::triangle_mesh::Mesh;
 use super::unit_frame::UnitFrame;
 
-/// What a mesh has that no beam can meet, or can meet elsewhere as well.
+/// Counts of the redundant parts of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MeshDefects {
-    /// Triangles without area once their corners are f32.
+    /// Triangles without area in f32.
     pub degenerate: usize,
     /// Triangles with area whose three f32 corners are those of an earlier
     /// triangle, in any order.
     pub duplicate: usize,
-    /// Vertices that no triangle names.
+    /// Vertices that no triangle refers to.
     pub unreferenced: usize,
 }
 
 /// The defects of a mesh, and the triangles that remain.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TriangleStats {
-    /// What was left out, and why.
+    /// The defects.
     pub defects: MeshDefects,
-    /// Indices of the triangles that are neither degenerate nor duplicate,
-    /// ascending; of equal triangles the first is kept.
+    /// The indices of the triangles that are neither degenerate nor duplicates of an earlier one,
+    /// ascending.
     pub kept: Vec<u32>,
 }
 
-/// Sorts the triangles of `mesh` into those to cast at and the rest.
+/// Separates the triangles of `mesh` that rays can meet from the others.
 ///
-/// Corners are compared as the casting sees them: in f32 and in the
-/// [`UnitFrame`]. Vertices at one position are one corner, whatever their indices,
-/// since CAD files often repeat them for each face.
+/// Corners are compared as casters see them: in f32 and in the [`UnitFrame`]. Vertices at the same
+/// position are the same corner, because CAD files often repeat vertices for each face.
 #[must_use]
 pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
     let named = named_vertices(mesh);
@@ -66,8 +65,7 @@ pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
     TriangleStats { defects, kept }
 }
 
-/// The vertices in the unit frame of those that are named, in f32; those not
-/// named at the origin.
+/// The vertices in f32, in the unit frame of those that are `named`; the others at the origin.
 fn rounded_positions(mesh: &Mesh, named: &[bool]) -> Vec<Vec3> {
     let vertices = || mesh.vertices.iter().copied().zip(named);
     let frame =
@@ -76,20 +74,20 @@ fn rounded_positions(mesh: &Mesh, named: &[bool]) -> Vec<Vec3> {
     vertices().map(|(vertex, &named)| if named { rounded(vertex) } else { Vec3::ZERO }).collect()
 }
 
-/// Whether the cross product of two edges, in f64, is other than zero.
+/// Whether the cross product of two edges, in f64, is not zero.
 fn has_area(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
-/// Three words that are equal exactly for equal positions: -0 counts as 0.
+/// Three words that are equal if and only if positions are equal: -0 counts as 0.
 fn key(position: Vec3) -> [u32; 3] {
     position.to_array().map(|coordinate| (coordinate + 0.0).to_bits())
 }
 
-/// For each item the index of the first one that equals it.
+/// The index of the first equal item, for each item.
 fn lowest_equal(items: &[[u32; 3]]) -> Vec<u32> {
-    // Indices alone take a third of the memory that a map of the items would.
+    // A table of indices takes a third of the memory of a map of the items.
     let mut firsts = HashTable::with_capacity(items.len());
     let hasher = DefaultHashBuilder::default();
     let hash = |item: &[u32; 3]| hasher.hash_one(item);

@@ -7,14 +7,13 @@ use glam::DVec3;
 /// A square is cut into 2^BITS x 2^BITS cells: 0.01 degrees wide for a sensor
 /// that spans 40 degrees, finer than any beam spacing.
 const BITS: u32 = 12;
-/// At most so many squares lie side by side around the horizon.
+/// The most squares side by side around the horizon.
 const MAX_SQUARES: f64 = 256.0;
 
-/// All indices of `directions` along a chain of Hilbert curves: one curve for
-/// each square of the strip between the lowest and the highest elevation, from
-/// square to square around the horizon. Each curve ends where the next begins,
-/// so that each run of the chain is a compact patch whatever the spacing of
-/// the rings. Ties keep firing order.
+/// All indices of `directions`, sorted along a chain of Hilbert curves. The strip between the lowest
+/// and the highest elevation is cut into squares around the horizon, each with its own curve. Each
+/// curve ends where the next begins, so that every run of the chain is a compact patch, whatever
+/// the spacing of the rings. Ties keep firing order.
 pub(super) fn coherent_order(directions: &[DVec3]) -> Vec<u32> {
     let angles_rad: Vec<[f64; 2]> = directions.iter().map(azimuth_elevation_rad).collect();
     let lowest = |axis: usize| angles_rad.iter().map(|a| a[axis]).fold(f64::INFINITY, f64::min);
@@ -40,15 +39,15 @@ fn azimuth_elevation_rad(direction: &DVec3) -> [f64; 2] {
     [direction.y.atan2(direction.x), direction.z.clamp(-1.0, 1.0).asin()]
 }
 
-/// The cell along one side of a square, from a part of the side.
+/// The cell at this part, 0 to 1, of the side of a square.
 fn cell(part: f64) -> u32 {
     let cells = f64::from(1u32 << BITS);
     (part * cells).clamp(0.0, cells - 1.0) as u32
 }
 
-/// The index of cell (x, y) on the Hilbert curve of 2^BITS x 2^BITS cells,
-/// which begins at (0, 0) and ends at (2^BITS - 1, 0): one quadrant a bit,
-/// turned into place (Hilbert 1891; Warren, Hacker's Delight, chapter 16).
+/// The index of cell (x, y) on the Hilbert curve of 2^BITS x 2^BITS cells, which begins at (0, 0)
+/// and ends at (2^BITS - 1, 0). Each bit selects a quadrant and its orientation (Hilbert 1891;
+/// Warren, Hacker's Delight, chapter 16).
 fn hilbert_index(mut x: u32, mut y: u32) -> u32 {
     let mut index = 0;
     for bit in (0..BITS).rev() {
@@ -71,7 +70,7 @@ mod tests {
 
     #[test]
     fn the_curve_visits_each_cell_once_by_single_steps() {
-        // The lowest 4 of an even number of bits are a curve of their own.
+        // The lowest 4 bits, an even number, form a curve by themselves.
         let side = 1 << 4;
         let mut cells: Vec<(u32, u32, u32)> = (0..side * side)
             .map(|i| (i % side, i / side))

@@ -1,13 +1,13 @@
-//! Cones of directions: what an object can cover, what a block of rays covers.
+//! Cones of directions that bound an object or a block of rays.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// Added to a half angle, so that rounding in its computation loses no ray.
+/// The margin of half angles, so that rounding loses no ray.
 const ANGLE_MARGIN_RAD: f64 = 1e-9;
-/// Taken off a cosine. A dot product of two vectors whose lengths are within
-/// 1e-15 of 1 is off by less than 2e-15 + 3 ulp, below 3e-15.
+/// The margin of cosines. A dot product of two vectors whose lengths are within 1e-15 of 1 is off
+/// by less than 2e-15 + 3 ulp, which is below 3e-15.
 const COSINE_MARGIN: f64 = 4e-15;
 
 /// All directions within an angle of an axis.
@@ -57,7 +57,7 @@ impl WidenedCone {
     /// Whether no ray of the block can lie inside: the axes are farther apart
     /// than the two half angles together.
     pub(super) fn misses(&self, block: &BlockCone) -> bool {
-        // Together they reach around the sphere: cos(a) > cos(pi - b).
+        // cos(a) <= -cos(b) = cos(pi - b): together the half angles reach around the sphere.
         let reach_around = block.cos <= -self.cos;
         let cos_of_sum = block.cos * self.cos - block.sin * self.sin;
         !reach_around && self.axis.dot(block.axis) < cos_of_sum - COSINE_MARGIN

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
 
-/// The upper bound of every length that effects use: shaders hold lengths in f32 and multiply
-/// them.
+/// The largest length of a profile or an effect: farther than any sensor sees, and its square is
+/// finite in the f32 of shaders.
 pub(crate) const LARGEST_M: f64 = 1e9;
 
 /// A surface that a sensor just detects if it faces the sensor in clear air: what makers

@@ -1,4 +1,4 @@
-//! The width of a beam, and the rays that stand for it.
+//! The width of a beam, and the rays that sample it.
 
 use std::f64::consts::TAU;
 
@@ -7,18 +7,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
 
-/// How wide a sensor's beams are, and how far apart it tells two surfaces.
+/// The width of a sensor's beams, and its range resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamShape {
-    /// Full angles of divergence along the horizon and across it, degrees: where the power of
-    /// a Gaussian beam is 1/e^2 of that in its middle.
+    /// Full angles of divergence, horizontal and vertical, degrees: where the power density of a
+    /// Gaussian beam is 1/e^2 of that on its axis.
     pub divergence_deg: [f64; 2],
-    /// Surfaces that lie nearer than this behind one another give one return, metres.
+    /// Surfaces whose ranges differ by less than this give one return, metres.
     pub separation_m: f64,
 }
 
-/// No beam is wider: half a turn has no tangent.
+/// The widest beam: the tangent of half of it must exist.
 const WIDEST_DEG: f64 = 90.0;
 
 impl BeamShape {
@@ -42,7 +42,7 @@ impl BeamShape {
     }
 }
 
-/// Unit vectors of the rays that stand for a beam along `direction`, its centre first.
+/// Unit vectors of the rays that sample a beam along `direction`, its axis first.
 pub(super) fn rays_of(
     direction: DVec3,
     disc: &[[f64; 2]],
@@ -52,20 +52,20 @@ pub(super) fn rays_of(
     let up = direction.cross(across);
     let [wide, high] = divergence_deg.map(|full_deg| (full_deg.to_radians() / 2.0).tan());
     disc.iter().map(move |&[x, y]| match [x, y] {
-        // Not rounded, so that the centre is the beam that a sensor without width has.
+        // Not normalized again, so that the axis equals the beam of a sensor without width.
         [0.0, 0.0] => direction,
         _ => (direction + across * (x * wide) + up * (y * high)).normalize(),
     })
 }
 
-/// Points of equal power in a Gaussian beam, in units of the radius at which its power is 1/e^2
-/// of that in its middle: a centre, and `6 i` points on ring i around it.
+/// Points of equal power in a Gaussian beam, in units of the radius at which its power density is
+/// 1/e^2 of that on the axis: a centre, and `6 i` points on ring i around it.
 ///
-/// Each ring stands for the part of the beam that holds its share of the power. With
-/// `t = 2 r^2 / w^2` the power within r is `1 - exp(-t)`; a ring's radius is such that `r^2` is
-/// the mean of its part, and all radii are stretched by one factor for the part that the centre
-/// stands for. The mean of `r^2` over all points is thus the beam's, `w^2 / 2`, and a plane's
-/// mean range is right to the second order of its tilt.
+/// Each ring samples an annulus that holds its share of the power. With `t = 2 r^2 / w^2` the power
+/// within r is `1 - exp(-t)`. A ring's `r^2` is the mean over its annulus, and all radii are
+/// stretched by one factor to account for the disc that the centre samples. The mean of `r^2` over
+/// all points is thus the beam's, `w^2 / 2`, and the mean range of a plane is correct to the second
+/// order of its tilt.
 pub(super) fn disc(samples: u32) -> Vec<[f64; 2]> {
     let share = f64::from(samples).recip();
     let mut points = vec![[0.0, 0.0]];
@@ -78,8 +78,8 @@ pub(super) fn disc(samples: u32) -> Vec<[f64; 2]> {
         let mean_t = (moment(inner) - moment(outer)) / (outer - inner);
         sum += f64::from(count) * mean_t;
         let radius = (mean_t / 2.0).sqrt();
-        // Every second ring is turned by a quarter of a step: of the turns that were tried the
-        // one by which fewest points come to a straight edge together.
+        // Every second ring is turned by a quarter of a step, so that a straight edge meets few
+        // points at once.
         let turn = f64::from(ring % 2) / 4.0;
         points.extend((0..count).map(|i| {
             let angle_rad = TAU * (f64::from(i) + turn) / f64::from(count);
@@ -91,7 +91,7 @@ pub(super) fn disc(samples: u32) -> Vec<[f64; 2]> {
     points.iter().map(|point| point.map(|x| x * stretch)).collect()
 }
 
-/// The integral of `t exp(-t)` from where the power within is `power` to infinity.
+/// The integral of `t exp(-t)` to infinity from the radius that encloses `power`.
 fn moment(power: f64) -> f64 {
     let rest = 1.0 - power;
     if rest <= f64::EPSILON { 0.0 } else { rest * (1.0 - rest.ln()) }
@@ -130,8 +130,8 @@ mod tests {
     #[test]
     fn a_straight_edge_cuts_off_what_it_cuts_off_a_gaussian_beam() {
         // The beam's power on one side of an edge at u radii is (1 + erf(sqrt(2) u)) / 2.
-        // Points on a line parallel to the edge come to it together, so that the error is at
-        // least half of their number; the worst over all edges, measured.
+        // An edge meets the points on a line parallel to it at once: the error is at least half
+        // of their number. These are the measured maxima over all edges.
         for (samples, worst) in [(1, 0.5), (7, 0.215), (19, 0.107), (37, 0.06)] {
             let points = disc(samples);
             let mut largest: f64 = 0.0;

@@ -7,8 +7,8 @@ use super::uniform::linear_steps;
 use super::{MAX_RINGS, Rays, checked_ray_count};
 use crate::config::{InvalidValue, finite, positive, within};
 
-/// An image, row by row from the top left, taken at one time. It states either
-/// its fields of view or its focal lengths and principal point.
+/// An image, row by row from the top left, with a single exposure time. It states either its
+/// fields of view or its focal lengths and principal point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
@@ -16,11 +16,11 @@ pub struct Grid {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// From the centres of the leftmost pixels to those of the rightmost:
-    /// BLAINDER's static scanner puts pixel centres on the edges of the view.
+    /// The angle from the centres of the leftmost pixels to those of the rightmost: BLAINDER's
+    /// static scanner puts pixel centres on the edges of the view.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fov_x_deg: Option<f64>,
-    /// From the centres of the top pixels to those of the bottom pixels.
+    /// The angle from the centres of the top pixels to those of the bottom pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fov_y_deg: Option<f64>,
     /// Horizontal focal length in pixels.
@@ -37,7 +37,7 @@ pub struct Grid {
     pub cy: Option<f64>,
 }
 
-/// What a grid states about its optics.
+/// The optics of a grid, as its profile states them.
 enum Optics {
     FieldOfView { x_deg: f64, y_deg: f64 },
     Pinhole { fx: f64, fy: f64, cx: f64, cy: f64 },
@@ -94,7 +94,7 @@ impl Grid {
         rays
     }
 
-    /// Per column the tangent to the left, per row the tangent upwards.
+    /// The tangents to the left of each column, and upwards of each row.
     pub(super) fn tangents(&self) -> (Vec<f64>, Vec<f64>) {
         let optics = self.optics().expect("invariant: validated");
         match optics {
@@ -113,8 +113,8 @@ impl Grid {
     }
 }
 
-/// The direction of a pixel. Scaled before it is normalised, so that a tiny
-/// focal length does not overflow.
+/// The direction of a pixel, scaled before it is normalized, so that a tiny focal length does not
+/// overflow.
 fn unit(left: f64, up: f64) -> DVec3 {
     let largest = left.abs().max(up.abs()).max(1.0);
     (DVec3::new(1.0, left, up) / largest).normalize()

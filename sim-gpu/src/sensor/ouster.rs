@@ -1,4 +1,4 @@
-//! The profile of one Ouster, from the metadata that it tells of itself.
+//! The profile of an Ouster sensor, from its metadata.
 
 use std::num::NonZeroU32;
 use std::path::Path;

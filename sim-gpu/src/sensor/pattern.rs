@@ -1,4 +1,4 @@
-//! All beams of a sensor at once, and the few that can hit something.
+//! All beams of a sensor, and the selection of those that can hit an object.
 
 use crate::lanes::each;
 use glam::DVec3;
@@ -15,7 +15,7 @@ const BLOCK_RAYS: usize = 64;
 /// Blocks of one group share a bounding cone.
 const GROUP_BLOCKS: usize = 32;
 
-/// Unit vectors. A clone shares them, so that a caster knows them again.
+/// Unit vectors. A clone shares them, so that casters recognize them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Directions(Arc<[DVec3]>);
 
@@ -54,14 +54,14 @@ pub struct BeamPattern {
     pub ring: Vec<u16>,
     /// Time since the start of the revolution, `[n_rays]`.
     pub time_s: Vec<f64>,
-    /// Where each ray starts, in the sensor frame, metres, `[n_rays]`; empty where all start at
-    /// the sensor itself.
+    /// The start of each ray in the sensor frame, metres, `[n_rays]`; empty if all rays start at
+    /// the origin.
     pub starts_m: Vec<DVec3>,
-    /// Rays of each beam, which stand side by side, that of its centre first; 1 where beams
-    /// have no width.
+    /// The number of rays of each beam, which are neighbours, the axis first; 1 for beams without
+    /// width.
     pub rays_per_beam: u32,
-    /// All ray indices once, `[n_rays]`; neighbours in this list point in
-    /// neighbouring directions and so traverse a tree together.
+    /// A permutation of the rays, `[n_rays]`, in which neighbours point in similar directions, so
+    /// that they traverse a tree together.
     pub order: Vec<u32>,
     /// Bounding cones of each [`BLOCK_RAYS`] rays of `order`.
     blocks: Vec<BlockCone>,
@@ -70,16 +70,15 @@ pub struct BeamPattern {
 }
 
 impl BeamPattern {
-    /// A pattern of rays in firing order. All three lists must be of one
-    /// length, below 2^32, and all directions of unit length. All rays start at
-    /// the sensor itself.
+    /// A pattern of rays in firing order that start at the sensor's origin. The three lists must
+    /// have the same length, below 2^32, and directions unit length.
     #[must_use]
     pub fn new(directions: Vec<DVec3>, ring: Vec<u16>, time_s: Vec<f64>) -> Self {
         let order = coherent_order(&directions);
         Self::ordered(directions, ring, time_s, order)
     }
 
-    /// As [`BeamPattern::new`], of rays that are coherent in this `order`.
+    /// As [`BeamPattern::new`], for rays that are coherent in this `order`.
     fn ordered(directions: Vec<DVec3>, ring: Vec<u16>, time_s: Vec<f64>, order: Vec<u32>) -> Self {
         debug_assert!(directions.len() == ring.len() && directions.len() == time_s.len());
         let bound = |rays: &[u32]| BlockCone::around(rays.iter().map(|&i| directions[i as usize]));
@@ -90,11 +89,11 @@ impl BeamPattern {
         Self { directions, ring, time_s, starts_m, rays_per_beam, order, blocks, groups }
     }
 
-    /// The same beams with a width: each is `samples` rays of equal power, spread over a
-    /// Gaussian beam with these full angles of divergence along the horizon and across it.
+    /// The same beams with a width: each is sampled by `samples` rays of equal power in a Gaussian
+    /// beam with these full angles of divergence, horizontal and vertical.
     ///
     /// # Errors
-    /// If there are more rays than [`MAX_RAYS`], and how many.
+    /// If the pattern would have more than [`MAX_RAYS`] rays.
     pub(crate) fn widened(&self, samples: u32, divergence_deg: [f64; 2]) -> Result<Self, String> {
         let n_rays = self.len() as u64 * u64::from(samples);
         if n_rays > MAX_RAYS {
@@ -105,8 +104,7 @@ impl BeamPattern {
         }
         let disc = disc(samples);
         let directions = self.directions.iter().flat_map(|&d| rays_of(d, &disc, divergence_deg));
-        // The rays of a beam stay side by side, as they lie in memory: they are alike more than
-        // those of any two beams.
+        // The rays of a beam stay neighbours: they are more coherent than any two beams.
         let order = self.order.iter().flat_map(|&beam| beam * samples..(beam + 1) * samples);
         let mut widened = Self::ordered(
             directions.collect(),
@@ -119,26 +117,25 @@ impl BeamPattern {
         Ok(widened)
     }
 
-    /// The beam that a ray belongs to, as a number in firing order.
+    /// The number, in firing order, of the beam that a ray belongs to.
     #[must_use]
     pub fn beam_of(&self, ray: u32) -> u32 {
         ray / self.rays_per_beam
     }
 
-    /// Where ray `beam` starts, in the sensor frame, metres; `None` where that
-    /// is the sensor itself.
+    /// The start of ray number `beam` in the sensor frame, metres; `None` if it is the origin.
     #[must_use]
     pub fn start(&self, beam: u32) -> Option<DVec3> {
         starts(&self.starts_m, [beam]).map(|[start]| start)
     }
 
-    /// When the last ray is fired, seconds.
+    /// The time of the last ray, seconds.
     #[must_use]
     pub fn last_s(&self) -> f64 {
         self.time_s.iter().fold(0.0, |last, &time_s| time_s.max(last))
     }
 
-    /// How far from the sensor a ray starts at most, metres.
+    /// The largest distance of the start of a ray from the sensor, metres.
     #[must_use]
     pub fn farthest_start_m(&self) -> f64 {
         self.starts_m.iter().fold(0.0, |farthest, start| start.length().max(farthest))
@@ -156,12 +153,11 @@ impl BeamPattern {
         self.directions.is_empty()
     }
 
-    /// The rays within `cone`, as indices in the order of `order`.
+    /// The indices of the rays within `cone`, in the order of `order`.
     ///
-    /// No ray is lost whose angle to the axis is at most the half angle. Rays
-    /// up to 1e-9 rad outside, or up to 4e-15 in the cosine (1e-7 rad for a
-    /// cone thinner than that), may be among them. A half angle of pi or more,
-    /// or NaN, gives all rays.
+    /// Every ray whose angle to the axis is at most the half angle is among them. Rays up to 1e-9
+    /// rad outside, or up to 4e-15 in the cosine (1e-7 rad for a cone thinner than that), may be.
+    /// A half angle of pi or more, or NaN, gives all rays.
     #[must_use]
     pub fn within(&self, cone: &Cone) -> Vec<u32> {
         let Some(widened) = cone.widened() else { return self.order.clone() };
@@ -184,13 +180,13 @@ impl BeamPattern {
     }
 }
 
-/// What is known of each beam, for each of its rays.
+/// Repeats the value of each beam for each of its rays.
 fn for_each_ray<T: Copy>(of_beam: &[T], samples: u32) -> Vec<T> {
     of_beam.iter().flat_map(|&value| std::iter::repeat_n(value, samples as usize)).collect()
 }
 
-/// Where these rays start, by [`BeamPattern::starts_m`], in the sensor frame, metres; `None`
-/// where all rays start at the sensor itself.
+/// The starts of some rays, from [`BeamPattern::starts_m`]; `None` if all rays start at the sensor's
+/// origin.
 #[inline(always)]
 pub(crate) fn starts<const N: usize>(starts_m: &[DVec3], beams: [u32; N]) -> Option<[DVec3; N]> {
     (!starts_m.is_empty()).then(|| each(|lane: usize| starts_m[beams[lane] as usize]))

@@ -6,13 +6,10 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    BeamShape, DetectionLimit, Grid, Layout, RangeLimits, Rings, Risley, Rotating, Sample, Sensor,
-    Table, TypicalNoise, Uniform, Views,
+    BeamShape, DetectionLimit, Grid, LARGEST_M, Layout, RangeLimits, Rings, Risley, Rotating,
+    Sample, Sensor, Table, TypicalNoise, Uniform, Views,
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
-
-/// Farther than any sensor sees, and its square is still finite in f32.
-const MAX_RANGE_M: f64 = 1e9;
 
 /// The keys of a profile.
 #[derive(Deserialize)]
@@ -46,13 +43,13 @@ fn one() -> NonZeroU32 {
 }
 
 impl Profile {
-    /// Reads the table of directions that it names; it itself stands in `file`.
+    /// Reads the table of directions that the profile names, relative to its own `file`.
     pub(super) fn load_table(&mut self, file: &Path) -> Result<(), ConfigError> {
         self.table.as_mut().map_or(Ok(()), |table| table.load(file))
     }
 }
 
-/// Parses a profile that stands in `file`.
+/// Parses the profile `text`, which is in `file`.
 pub(super) fn parse(text: &str, file: &Path) -> Result<Sensor, ConfigError> {
     let profile: Profile = config::parse(text, file)?;
     Sensor::try_from(profile).map_err(|invalid| invalid.in_file(file))
@@ -94,7 +91,7 @@ impl TryFrom<Profile> for Sensor {
         if let (Layout::Rotating(rotating), Some(_)) = (&layout, &profile.rings)
             && (rotating.beam_crossing_m.is_some() || rotating.beam_start_m.is_some())
         {
-            // Rings are cones around one point, which such beams lack.
+            // Rings are cones around one point, and these beams start at different ones.
             let cause = "cannot stand beside [rings]";
             let key = match rotating.beam_crossing_m {
                 Some(_) => "rotating.beam_crossing_m",
@@ -122,7 +119,7 @@ impl TryFrom<Profile> for Sensor {
     }
 }
 
-/// The one layout that is there, checked.
+/// The layout, checked, if there is exactly one.
 fn only_layout(layouts: [Option<Layout>; 5]) -> Result<Layout, InvalidValue> {
     let mut found = layouts.into_iter().flatten();
     let expected = "expected one of [rotating], [uniform], [grid], [risley] and [table]";
@@ -145,7 +142,7 @@ fn only_layout(layouts: [Option<Layout>; 5]) -> Result<Layout, InvalidValue> {
 fn check_range(range: &RangeLimits) -> Result<(), InvalidValue> {
     within("range.min_m", range.min_m, 0.0..=f64::MAX)?;
     positive("range.max_m", range.max_m)?;
-    within("range.max_m", range.max_m, 0.0..=MAX_RANGE_M)?;
+    within("range.max_m", range.max_m, 0.0..=LARGEST_M)?;
     if range.min_m >= range.max_m {
         let (min_m, max_m) = (range.min_m, range.max_m);
         let cause = format!("expected a number above range.min_m = {min_m}, found {max_m}");

@@ -5,27 +5,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
 
-/// Rings of points: between a first polar angle and the last, each step of
-/// `step_deg` keeps a part of its points and moves them to its middle.
-/// Source: jiachens/ModelNet40-C, `data/generate_c.py`, `simulate_lidar`.
+/// Rings of points: each step of `step_deg` in polar angle keeps some of its points and moves them
+/// to its middle. Source: jiachens/ModelNet40-C, `data/generate_c.py`, `simulate_lidar`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rings {
-    /// Angle from ring to ring.
+    /// The angle between rings.
     pub step_deg: f64,
-    /// Start of the part of a step that is kept, in 0..1.
+    /// The start of the part of a step that is kept, in 0..1.
     pub keep_from: f64,
-    /// End of that part, which is not itself kept, in 0..=1.
+    /// The end of that part, exclusive, in 0..=1.
     pub keep_to: f64,
 }
 
 impl Rings {
     /// The direction snapped to its ring, `None` if it lies between two rings.
     ///
-    /// `direction` is of unit length in a frame at the sensor whose axes are
-    /// the world's. `first_polar_rad` is where the first ring begins: the
-    /// recipe takes the smallest [`polar_angle_rad`] of the scan. The azimuth
-    /// stays, as does the range, which is no matter of directions.
+    /// `direction` is a unit vector from the sensor in world axes. `first_polar_rad` is the polar
+    /// angle at which the first ring begins: the recipe takes the smallest [`polar_angle_rad`] of
+    /// the scan. The azimuth does not change.
     #[must_use]
     pub fn snap_to_ring(&self, direction: DVec3, first_polar_rad: f64) -> Option<DVec3> {
         let step_rad = self.step_deg.to_radians();

@@ -1,9 +1,9 @@
-//! Laser lines that turning wedge prisms deflect, as Livox's sensors with a rosette.
+//! Laser lines behind rotating wedge prisms, as in Livox's sensors with a rosette pattern.
 //!
-//! Each line points through all prisms in turn. A prism has a flat face and a tilted one, which
-//! turns about the forward axis; each face bends the ray by Snell's law (Li, Liu and Sun, Optics
-//! Express 25, 7677, 2017). The pattern does not repeat from scan to scan, unless the prisms'
-//! rates say so.
+//! Each line passes through all prisms in turn. A prism has a flat face and a tilted one, which
+//! turns about the forward axis; each face refracts the ray by Snell's law (Li, Liu and Sun, Optics
+//! Express 25, 7677, 2017). Whether the pattern repeats from scan to scan depends on the prisms'
+//! rates.
 
 use std::f64::consts::TAU;
 
@@ -17,16 +17,16 @@ use crate::config::{InvalidValue, positive, within};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Risley {
-    /// Pulses a second of each line; all lines fire at once.
+    /// Pulses per second of each line; all lines fire at the same time.
     pub pulse_hz: f64,
-    /// What one scan holds, seconds.
+    /// The duration of a scan, seconds.
     pub period_s: f64,
-    /// When the first scan begins, seconds since all tilted faces stood upright.
+    /// The start of the first scan, seconds after all tilted faces stood upright.
     #[serde(default)]
     pub start_s: f64,
     /// The prisms, in the order in which light leaves through them.
     pub prism: Vec<Prism>,
-    /// The lines; a point's ring is the place of its line.
+    /// The lines; a point's ring is the index of its line.
     pub line: Vec<Line>,
 }
 
@@ -34,15 +34,15 @@ pub struct Risley {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Prism {
-    /// Angle between its faces. Where it is negative, the second face is tilted and not the first.
+    /// The angle between its faces. If negative, the second face is tilted instead of the first.
     pub wedge_deg: f64,
-    /// Turns a second; where it is negative, the other way around.
+    /// Turns per second; negative in the opposite direction.
     pub rate_hz: f64,
     /// Index of refraction.
     pub index: f64,
 }
 
-/// Where a line points in front of the prisms.
+/// The direction of a line before the prisms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
@@ -53,14 +53,14 @@ pub struct Line {
 }
 
 impl Prism {
-    /// `ray` after both faces, `time_s` after the tilted face stood upright; `None` where it is
-    /// not let through.
+    /// `ray` behind both faces, `time_s` after the tilted face stood upright; `None` if it is
+    /// reflected.
     fn refract(&self, ray: DVec3, time_s: f64) -> Option<DVec3> {
         let (sin_tilt, cos_tilt) = self.wedge_deg.abs().to_radians().sin_cos();
-        // By whole turns first: the phase keeps its digits however late it is.
+        // The fraction is taken before the multiplication, so that late phases keep their digits.
         let turned_rad = TAU * (self.rate_hz * time_s).fract();
         let (sine, cosine) = turned_rad.sin_cos();
-        // Against the light.
+        // Normals point against the light.
         let flat = DVec3::NEG_X;
         let tilted = DVec3::new(-cos_tilt, -sin_tilt * sine, sin_tilt * cosine);
         if self.wedge_deg >= 0.0 {
@@ -72,12 +72,12 @@ impl Prism {
     }
 }
 
-/// Snell's law: the unit vector `ray` behind a face with this `normal` against it, where `ratio`
-/// is the index before the face over that behind it; `None` if it does not get there.
+/// Snell's law: the unit vector `ray` behind a face whose `normal` points against it. `ratio` is the
+/// index before the face over that behind it. `None` for total internal reflection.
 fn refract(ray: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
     let cos_in = -ray.dot(normal);
     let cos2_out = 1.0 - ratio * ratio * (1.0 - cos_in * cos_in);
-    // Light that comes from behind does not meet the face.
+    // Light from behind does not meet the face.
     (cos_in > 0.0 && cos2_out >= 0.0)
         .then(|| (ratio * ray + (ratio * cos_in - cos2_out.sqrt()) * normal).normalize())
 }
@@ -125,14 +125,14 @@ impl Risley {
         Ok(())
     }
 
-    /// Rays of so many scans.
+    /// The number of rays of consecutive scans.
     pub(super) fn rays_in(&self, scans: u32) -> u64 {
         self.pulses(scans).saturating_mul(self.line.len() as u64)
     }
 
-    /// Pulses of each line in so many scans.
+    /// The number of pulses of each line in consecutive scans.
     fn pulses(&self, scans: u32) -> u64 {
-        // A float converts to an integer by saturation.
+        // The conversion to an integer saturates.
         (self.pulse_hz * self.period_s * f64::from(scans)).round() as u64
     }
 
@@ -145,13 +145,13 @@ impl Risley {
     }
 
     pub(super) fn rays(&self, keep_each: u32, scans: u32) -> Rays {
-        // Checked: no pattern has more than 2^26 rays.
+        // At most 2^26, as `validate` checks.
         let pulses = self.pulses(scans) as u32;
         let mut rays = Rays::with_capacity(pulses.div_ceil(keep_each) as usize * self.line.len());
         for pulse in (0..pulses).step_by(keep_each as usize) {
             let time_s = f64::from(pulse) / self.pulse_hz;
             for (ray, number) in self.lines(pulse) {
-                // What is reflected totally inside does not leave the sensor.
+                // Rays that are totally reflected do not leave the sensor.
                 if let Some(ray) = ray {
                     rays.push(ray, number, time_s);
                 }

@@ -1,4 +1,4 @@
-//! A head of lasers that turns clockwise and fires in sequence, as Velodyne's.
+//! A head of lasers that turns clockwise and fires in sequence, such as Velodyne's.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -15,28 +15,26 @@ use crate::config::{InvalidValue, positive, within};
 pub struct Rotating {
     /// Revolutions per minute.
     pub rpm: f64,
-    /// From one firing sequence to the next, microseconds.
+    /// The period of firing sequences, microseconds.
     pub sequence_us: f64,
-    /// The encoder's azimuth is rounded to a multiple of this, degrees; exact
-    /// where absent.
+    /// The encoder's azimuth is rounded to a multiple of this, degrees; exact if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub azimuth_quantum_deg: Option<f64>,
-    /// The encoder is read when a sequence starts, as a multiple of this in
-    /// degrees, and the head turns on from what was read: how packets tell
-    /// azimuths. Excludes `azimuth_quantum_deg`.
+    /// The encoder's azimuth is rounded to a multiple of this, degrees, only when a sequence
+    /// starts, and grows from that value with the turning head, as packets encode azimuths.
+    /// Excludes `azimuth_quantum_deg`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequence_quantum_deg: Option<f64>,
-    /// All beams cross this far in front of the axis, metres, so that a beam
-    /// at elevation e leaves the axis `beam_crossing_m * tan(e)` below the
-    /// sensor, and its range counts from there. Beams start at the sensor
-    /// where this is absent.
+    /// All beams cross at this distance in front of the axis, metres: a beam of elevation e starts
+    /// on the axis `beam_crossing_m * tan(e)` below the sensor, and its range counts from there.
+    /// Beams start at the sensor if this is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam_crossing_m: Option<f64>,
-    /// Beams start this far from the axis, metres, in the direction that the encoder reads, and
-    /// ranges count from there: Ouster's sensors. Excludes `beam_crossing_m`.
+    /// Beams start at this distance from the axis, metres, in the direction that the encoder
+    /// reads, and ranges count from there, as in Ouster's sensors. Excludes `beam_crossing_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam_start_m: Option<f64>,
-    /// The beams, in any order; those that fire at one time keep theirs.
+    /// The beams, in any order. Beams that fire at the same time keep this order.
     pub beam: Vec<Beam>,
 }
 
@@ -44,7 +42,7 @@ pub struct Rotating {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Beam {
-    /// The beam points to the encoder's azimuth less this, clockwise.
+    /// The clockwise angle from the beam to the encoder's azimuth.
     pub azimuth_offset_deg: f64,
     /// Angle above the sensor's x-y plane.
     pub elevation_deg: f64,
@@ -53,27 +51,27 @@ pub struct Beam {
 }
 
 impl Rotating {
-    /// Rays in one revolution: beams x period / sequence, rounded down, so
-    /// that the last sequence may be cut short.
+    /// The number of rays in one revolution: beams x period / sequence, rounded down, so that the
+    /// last sequence may be incomplete.
     #[must_use]
     pub fn rays_per_revolution(&self) -> u64 {
         self.rays_in(1)
     }
 
-    /// Rays in so many revolutions of a head that keeps turning.
+    /// The number of rays in consecutive revolutions.
     pub(super) fn rays_in(&self, revolutions: u32) -> u64 {
         let turns = f64::from(revolutions);
-        // A float converts to an integer by saturation.
+        // The conversion to an integer saturates.
         (turns * self.beam.len() as f64 * 60e6 / (self.rpm * self.sequence_us)) as u64
     }
 
-    /// Seconds of one revolution.
+    /// The period of a revolution, seconds.
     #[must_use]
     pub fn period_s(&self) -> f64 {
         60.0 / self.rpm
     }
 
-    /// Places in `beam`, in the order in which the lasers fire.
+    /// Indices of `beam`, in the order in which the lasers fire.
     #[must_use]
     pub fn firing_order(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.beam.len()).collect();
@@ -103,7 +101,7 @@ impl Rotating {
         for (i, beam) in self.beam.iter().enumerate() {
             let key = |field: &str| format!("rotating.beam[{i}].{field}");
             within(&key("azimuth_offset_deg"), beam.azimuth_offset_deg, -360.0..=360.0)?;
-            // A beam along the axis would cross nothing in front of it.
+            // The tangent of a beam along the axis is not finite.
             let steepest_deg = if self.beam_crossing_m.is_some() { 89.0 } else { 90.0 };
             within(&key("elevation_deg"), beam.elevation_deg, -steepest_deg..=steepest_deg)?;
             if !(0.0..self.sequence_us).contains(&beam.firing_us) {
@@ -115,24 +113,22 @@ impl Rotating {
         checked_ray_count("rotating", self.rays_per_revolution())
     }
 
-    /// The rays of so many revolutions, of which only each `keep_each`-th firing
-    /// sequence is kept.
+    /// The rays of consecutive revolutions, with every `keep_each`-th firing sequence.
     pub(super) fn rays(&self, keep_each: u32, revolutions: u32) -> Rays {
         let n_rays = self.rays_in(revolutions);
-        // Checked: no pattern has more than 2^26 rays.
+        // At most 2^26, as `validate` checks.
         let sequences = 0..n_rays.div_ceil(self.beam.len() as u64) as u32;
         self.rays_of(sequences.step_by(keep_each as usize), n_rays)
     }
 
-    /// The beams of these firing `sequences` of a head that keeps turning: sequence n starts
-    /// n x `sequence_us` after the head read 0, and times count from there.
+    /// The beams of these firing `sequences`: sequence n starts n x `sequence_us` after the head
+    /// read azimuth 0, and times count from there.
     #[must_use]
     pub fn pattern_of(&self, sequences: Range<u32>) -> BeamPattern {
         self.rays_of(sequences, u64::MAX).into_pattern()
     }
 
-    /// The rays of `sequences`, of which the ray number `n_rays` and those after it are left
-    /// out.
+    /// The rays of `sequences` whose numbers are below `n_rays`.
     fn rays_of(&self, sequences: impl ExactSizeIterator<Item = u32>, n_rays: u64) -> Rays {
         let firing_order = self.firing_order();
         let rings = self.rings();
@@ -159,8 +155,7 @@ impl Rotating {
         rays
     }
 
-    /// How far the head has turned at `time_s`, in a sequence that started at
-    /// `start_s`.
+    /// The encoder's azimuth at `time_s`, in a sequence that started at `start_s`.
     fn encoder_rad(&self, start_s: f64, time_s: f64) -> f64 {
         let turned_rad = |time_s| TAU * time_s / self.period_s();
         let rounded_rad = |angle_rad: f64, quantum_deg: f64| {
@@ -176,7 +171,7 @@ impl Rotating {
         }
     }
 
-    /// For each beam its rank by elevation, from below.
+    /// The rank of each beam by elevation, from below.
     fn rings(&self) -> Vec<u16> {
         let mut by_elevation: Vec<usize> = (0..self.beam.len()).collect();
         by_elevation
@@ -189,7 +184,7 @@ impl Rotating {
     }
 }
 
-/// Where `laser` points while the encoder reads `encoder_rad`.
+/// The direction of `laser` while the encoder reads `encoder_rad`.
 fn direction(laser: &Beam, encoder_rad: f64) -> DVec3 {
     let clockwise_rad = encoder_rad - laser.azimuth_offset_deg.to_radians();
     let (sin_azimuth, cos_azimuth) = clockwise_rad.sin_cos();

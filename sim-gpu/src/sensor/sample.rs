@@ -1,28 +1,28 @@
-//! Drawing a fixed number of points from a scan.
+//! Samples of a fixed number of points of a scan.
 
 use formats::rng::StreamKey;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
 
-/// How many points of a scan are kept.
+/// The number of points to sample from a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     /// The number of points drawn.
     pub points: u32,
-    /// Whether a point may be drawn more than once. If not, a scan with fewer
-    /// points keeps them all.
+    /// Whether a point may be drawn more than once. If not, a scan with fewer points keeps them
+    /// all.
     pub with_replacement: bool,
-    /// So many points are drawn from the scan before its points are snapped to
-    /// rings: without replacement from a scan that has as many, with
-    /// replacement from a smaller one (ModelNet40-C, `occlusion_1`).
+    /// The number of points drawn before the points are snapped to rings: without replacement
+    /// from a scan that has as many, with replacement from a smaller one (ModelNet40-C,
+    /// `occlusion_1`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub before_rings: Option<u32>,
 }
 
 impl Sample {
-    /// The points to keep of `n_available`, as indices, in the order drawn.
+    /// The indices of the points to keep of `n_available`, in the order drawn.
     #[must_use]
     pub fn draw(&self, n_available: u32, key: StreamKey) -> Vec<u32> {
         if self.with_replacement {
@@ -32,8 +32,8 @@ impl Sample {
         }
     }
 
-    /// The points to keep of `n_available` before the rings, as indices; all
-    /// of them where the profile does not ask for this.
+    /// The indices of the points to keep of `n_available` before the rings: all of them unless
+    /// the profile asks for such a draw.
     #[must_use]
     pub fn draw_before_rings(&self, n_available: u32, key: StreamKey) -> Vec<u32> {
         match self.before_rings {
@@ -52,7 +52,7 @@ impl Sample {
     }
 }
 
-/// `n_drawn` indices below `n_available`, each independent; none from nothing.
+/// `n_drawn` independent indices below `n_available`; none if that is 0.
 fn draw_with_replacement(n_available: u32, n_drawn: u32, key: StreamKey) -> Vec<u32> {
     if n_available == 0 {
         return Vec::new();

@@ -6,17 +6,15 @@ use glam::DVec3;
 
 use super::{Layout, Sensor};
 
-/// Beams closer together than this are one beam that fires twice.
+/// Beams closer together than this count as one beam that fires twice.
 const SAME_BEAM_RAD: f64 = 1e-9;
 
 impl Sensor {
-    /// The least angle between neighbouring beams in radians, along a row or
-    /// along a column, whichever is less; `None` for a single beam.
+    /// The least angle between neighbouring beams along a row or a column, radians; `None` for a
+    /// single beam. For rosettes and tables, the least angle between any two beams of a scan.
     ///
-    /// Of rosettes and tables it is that between any two of a scan.
-    ///
-    /// Azimuths count as angles of the table, however high the beam: towards
-    /// the zenith real rays stand closer together.
+    /// Differences in azimuth count in full at every elevation, although rays stand closer together
+    /// towards the zenith.
     #[must_use]
     pub fn angular_step_rad(&self) -> Option<f64> {
         let keep_each = f64::from(self.decimation.get());
@@ -62,7 +60,7 @@ fn least_angle(directions: &[DVec3]) -> Option<f64> {
     let mut least = f64::INFINITY;
     for (i, &a) in sorted.iter().enumerate() {
         for &b in &sorted[i + 1..] {
-            // What is farther along z is farther away.
+            // Directions are sorted by z, whose difference bounds the distance from below.
             if b.z - a.z >= least {
                 break;
             }

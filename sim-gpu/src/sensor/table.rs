@@ -1,4 +1,4 @@
-//! Directions that a user brings in a table, as makers of scanners without a formula give them.
+//! Directions in a table, as makers of scanners without a formula publish them.
 
 use std::path::{Path, PathBuf};
 
@@ -8,26 +8,26 @@ use serde::{Deserialize, Serialize};
 use super::{MAX_RAYS, MAX_RINGS, Rays, checked_ray_count};
 use crate::config::{ConfigError, InvalidValue, positive, within};
 
-/// Where the beams point, one after the other, again and again.
+/// The directions of successive beams, repeated when the table ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    /// CSV file with the columns `azimuth_deg` and `elevation_deg`, or with `Azimuth/deg` and
-    /// `Zenith/deg` as Livox has them; other columns are passed over. Relative to the profile.
-    /// A sensor that is loaded has its rows in `directions_deg`.
+    /// A CSV file, relative to the profile, with the columns `azimuth_deg` and `elevation_deg`, or
+    /// with Livox's `Azimuth/deg` and `Zenith/deg`; other columns are ignored. Loading a sensor
+    /// moves the rows to `directions_deg`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// Rows a second.
+    /// Rows per second.
     pub pulse_hz: f64,
-    /// What one scan holds, seconds.
+    /// The duration of a scan, seconds.
     pub period_s: f64,
-    /// When the first scan begins, seconds since the first row.
+    /// The start of the first scan, seconds after the first row.
     #[serde(default)]
     pub start_s: f64,
-    /// How many lines of lasers take turns, row by row; a point's ring is the place of its line.
+    /// The number of laser lines that take turns row by row; a point's ring is the index of its line.
     #[serde(default = "one_line")]
     pub lines: u16,
-    /// Azimuth, counterclockwise from forward, and elevation of each row, in place of a file.
+    /// The azimuth, counterclockwise from forward, and the elevation of each row, instead of a file.
     #[serde(default)]
     pub directions_deg: Vec<[f64; 2]>,
 }
@@ -37,7 +37,7 @@ fn one_line() -> u16 {
 }
 
 impl Table {
-    /// Reads the file that it names, beside the `profile`, if it names one.
+    /// Reads the CSV file, if there is one, relative to the `profile`.
     pub(super) fn load(&mut self, profile: &Path) -> Result<(), ConfigError> {
         if let Some(file) = self.file.take() {
             if !self.directions_deg.is_empty() {
@@ -77,24 +77,24 @@ impl Table {
         checked_ray_count("table", self.rays_in(1))
     }
 
-    /// Rays of so many scans.
+    /// The number of rays of consecutive scans.
     pub(super) fn rays_in(&self, scans: u32) -> u64 {
         self.rows(scans)
     }
 
-    /// Rows of so many scans.
+    /// The number of rows of consecutive scans.
     fn rows(&self, scans: u32) -> u64 {
-        // A float converts to an integer by saturation.
+        // The conversion to an integer saturates.
         (self.pulse_hz * self.period_s * f64::from(scans)).round() as u64
     }
 
-    /// The row of the table that is number `row` of the scan.
+    /// The row of the table for row number `row` of the scan.
     fn place(&self, row: u64) -> usize {
         let start = (self.start_s * self.pulse_hz).round() as u64;
         ((start + row) % self.directions_deg.len() as u64) as usize
     }
 
-    /// Without the rows that so many scans do not need.
+    /// Removes the rows that consecutive scans of this number do not use.
     pub(super) fn trim(&mut self, scans: u32) {
         let needed = self.rows(scans);
         let in_turn = u64::from(self.lines);

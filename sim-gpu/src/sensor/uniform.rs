@@ -1,4 +1,4 @@
-//! A regular grid in azimuth and elevation, as BLAINDER's rotating scanner.
+//! A regular grid in azimuth and elevation, such as BLAINDER's rotating scanner.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{MAX_RINGS, Rays, checked_ray_count};
 use crate::config::{InvalidValue, positive, within};
 
-/// A regular grid of angles. Both ends of each axis belong to it; the azimuth
-/// is the outer loop.
+/// A regular grid of angles that includes both ends of each axis; the azimuth is the outer loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Uniform {
@@ -23,8 +22,8 @@ pub struct Uniform {
     pub elevation_to_deg: f64,
     /// Number of elevations.
     pub elevation_steps: u32,
-    /// Revolutions per minute, for the time of each column; where absent, all
-    /// rays are cast at time 0.
+    /// Revolutions per minute, for the time of each column; if absent, all rays are cast at time
+    /// 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rpm: Option<f64>,
 }

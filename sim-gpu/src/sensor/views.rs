@@ -1,4 +1,4 @@
-//! The places from which a sensor is meant to look at an object.
+//! The recommended poses of a sensor around an object.
 
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -12,24 +12,24 @@ use crate::pose::{Pose, azimuth_on_ring};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Views {
-    /// How many.
+    /// The number of views.
     pub count: u32,
-    /// From the object's origin, metres.
+    /// The distance from the object's origin, metres.
     pub distance_m: f64,
-    /// Each view's distance is drawn evenly from the one above to this.
+    /// If given, each view's distance is uniform between `distance_m` and this.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance_to_m: Option<f64>,
-    /// Above the world's x-y plane.
+    /// The elevation above the world's x-y plane.
     pub elevation_deg: f64,
-    /// Each view's elevation is drawn evenly from the one above to this.
+    /// If given, each view's elevation is uniform between `elevation_deg` and this.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elevation_to_deg: Option<f64>,
-    /// Of the first view, counterclockwise from world x.
+    /// The azimuth of the first view, counterclockwise from world x.
     pub azimuth_deg: f64,
     /// Each view's azimuth is moved by a uniform random angle of at most this.
     #[serde(default)]
     pub azimuth_jitter_deg: f64,
-    /// How the object should be normalised.
+    /// The recommended normalization of the object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normalize: Option<Normalize>,
 }
@@ -50,22 +50,21 @@ impl Views {
     /// One view from 45 degrees, 20 degrees above, 3 m away.
     pub const STATIC: Self = Self { count: 1, azimuth_deg: 45.0, ..Self::ROTATING };
 
-    /// The poses around `target_m`. The jitter of view k is number k of the
-    /// stream `key`, which nothing else depends on; its distance and its elevation, where they
-    /// are drawn, are numbers of that stream as well.
+    /// The poses around `target_m`. The jitter of view k is number k of the stream `key`; random
+    /// distances and elevations use other numbers of that stream.
     #[must_use]
     pub fn poses(&self, target_m: DVec3, key: StreamKey) -> Vec<Pose> {
         (0..self.count).map(|view| self.pose(view, target_m, key)).collect()
     }
 
-    /// Whether nothing is drawn, so that the poses around all objects are the same.
+    /// Whether no number is random, so that the poses around all objects are the same.
     #[must_use]
     pub fn is_regular(&self) -> bool {
         let Self { azimuth_jitter_deg, distance_to_m, elevation_to_deg, .. } = self;
         *azimuth_jitter_deg == 0.0 && distance_to_m.is_none() && elevation_to_deg.is_none()
     }
 
-    /// Number `view` of the poses.
+    /// Pose number `view`.
     #[must_use]
     pub fn pose(&self, view: u32, target_m: DVec3, key: StreamKey) -> Pose {
         if self.is_regular() {

@@ -1,4 +1,4 @@
-//! Decimation by edge collapse, believed only once it is proven.
+//! Decimation by edge collapse, followed by a proof of its error.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -12,22 +12,21 @@ use crate::bvh::Builder;
 use crate::mesh::Mesh;
 use crate::target::{Surface, Target, UnitFrame};
 
-/// The part of the bound that the decimation is told. Its errors are means over
-/// quadrics, not maxima: told all of the bound, it would go too far in a tenth
-/// of all places.
+/// The part of the bound that is given to the decimation. Its errors are means over quadrics, not
+/// maxima: with all of the bound it would exceed it in a tenth of all places.
 const SHARE: f64 = 0.5;
 
-/// How far around a triangle that outliers the mesh's own come back, in bounds.
-/// They then overlap with what is left: a beam at less than atan(4) = 76 degrees
-/// from the normal cannot slip through between two layers one bound apart.
+/// The distance around an outlier within which triangles of the mesh are restored, in bounds. They
+/// overlap with the simplified surface, so that a beam at less than atan(4) = 76 degrees from the
+/// normal cannot pass between two layers one bound apart.
 const OVERLAP: f64 = 4.0;
 
-/// A result with more than this part of the triangles is not worth it.
+/// A result with more than this part of the triangles is discarded.
 const WORTH_IT: f64 = 0.75;
 
-/// Decimates, and then puts right where that went too far. Triangles that are
-/// not proven to lie near the mesh are left out, and those of the mesh around
-/// them come back; so do those that are not proven to lie near what is left.
+/// Decimates `mesh`, and repairs the places where the error is too large. Triangles without a proof
+/// that they lie near the mesh are removed, and the mesh's own triangles around them restored; so
+/// are those without a proof that they lie near the simplified surface.
 pub(super) fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
     if kept.is_empty() || bound.is_nan() || bound <= 0.0 {
         return None;
@@ -35,7 +34,7 @@ pub(super) fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
     let surface = Surface::new(mesh.clone(), kept.to_vec());
     let welded = Welded::new(mesh, kept, &surface.frame);
     let most = (WORTH_IT * welded.corners.len() as f64) as usize;
-    // No error is larger than the whole mesh, which fits a box of side 2.
+    // The mesh fits a box of side 2, which limits the error.
     let error = SHARE * (bound / surface.frame.scale).min(2.0);
     let corners = welded.collapsed(error as f32);
     if corners.len() > most {
@@ -46,8 +45,7 @@ pub(super) fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
     (corners.len() <= most).then(|| welded.mesh_of(mesh, &corners))
 }
 
-/// `corners` without the triangles that stray from the `original`, and with what
-/// has to come back.
+/// `corners` without the triangles that stray from the `original`, and with the triangles to restore.
 fn repair(
     mesh: &Mesh,
     welded: &Welded,
@@ -59,7 +57,7 @@ fn repair(
     let outliers = beyond(&collapsed, original, bound);
     let corners_of = |&nth: &u32| triangle(&corners, nth as usize);
     let strayed: Vec<u32> = outliers.iter().flat_map(corners_of).collect();
-    // Only what the surface keeps was proven: of equal triangles the first.
+    // The proof covers the triangles that the surface keeps: the first of equal ones.
     let stays = |nth: &&u32| outliers.binary_search(nth).is_err();
     let mut left: Vec<u32> = collapsed.kept().iter().filter(stays).flat_map(corners_of).collect();
 
@@ -81,8 +79,7 @@ fn triangle(corners: &[u32], nth: usize) -> [u32; 3] {
     [0, 1, 2].map(|corner| corners[3 * nth + corner])
 }
 
-/// The triangles of `surface` of which some part may be within `distance` of
-/// `target`.
+/// The triangles of `surface` that may have a part within `distance` of `target`.
 fn around(surface: &Surface, target: &Target, distance: f64) -> Vec<u32> {
     let (from, to) = (surface.frame, target.surface.frame);
     let is_near = |&&t: &&u32| {
@@ -99,8 +96,8 @@ fn target(mesh: Mesh) -> Target {
     Target::new(Surface::of_mesh(mesh), Builder::Morton)
 }
 
-/// Triangles whose corners at one position are one vertex: files often repeat
-/// a vertex for each face, and nothing would collapse across such a seam.
+/// A mesh in which corners at the same position are the same vertex: files often repeat vertices for
+/// each face, and edges would not collapse across such seams.
 struct Welded {
     /// In the unit frame, `[n_welded]`.
     positions: Vec<[f32; 3]>,
@@ -123,7 +120,7 @@ impl Welded {
         for &vertex in kept.iter().flat_map(|&t| &mesh.triangles[t as usize]) {
             let welded_vertex = &mut by_vertex[vertex as usize];
             if *welded_vertex == NOT_SEEN {
-                // Adding 0 makes -0 and 0 one.
+                // Adding 0 turns -0 into 0.
                 let position = frame.to_unit(mesh.vertices[vertex as usize]).as_vec3() + 0.0;
                 *welded_vertex = match by_position.entry(position.to_array().map(f32::to_bits)) {
                     Entry::Occupied(known) => *known.get(),
@@ -139,8 +136,7 @@ impl Welded {
         welded
     }
 
-    /// The corners that are left when collapses may displace the surface by
-    /// about `error`.
+    /// The corners that remain after collapses that displace the surface by about `error` at most.
     fn collapsed(&self, error: f32) -> Vec<u32> {
         const AS_FAR_AS_THE_ERROR_ALLOWS: usize = 0;
         let absolute = SimplifyOptions::ErrorAbsolute;
@@ -154,17 +150,16 @@ impl Welded {
         )
     }
 
-    /// The mesh of triangles with these `corners`, at the f64 positions of
-    /// `mesh`, and of no other vertices.
+    /// The mesh of triangles with these `corners`, at the f64 positions of `mesh`, without unused
+    /// vertices.
     fn mesh_of(&self, mesh: &Mesh, corners: &[u32]) -> Mesh {
         let position = |corner: usize| mesh.vertices[self.sources[corner] as usize];
         of_named(corners.as_chunks().0.to_vec(), self.positions.len(), position)
     }
 }
 
-/// The mesh of `triangles`, whose corners are indices below `n` of vertices
-/// at `position`. It has those that are named, in the order in which they
-/// are first named.
+/// The mesh of `triangles`, whose corners are indices below `n` of vertices at `position`. It has
+/// the vertices that they use, in the order of their first use.
 fn of_named(
     mut triangles: Vec<[u32; 3]>,
     n: usize,

@@ -1,4 +1,4 @@
-//! How far a point is from a surface, in f64.
+//! The distance from a point to a surface, in f64.
 
 use glam::DVec3;
 use std::array;
@@ -36,8 +36,8 @@ fn to_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
     (point - (from + along * t)).length()
 }
 
-/// The distance from `point` to the surface of `target`, both in its unit
-/// frame; infinite for a surface of nothing.
+/// The distance from `point` to the surface of `target`, both in its unit frame; infinite for an empty
+/// surface.
 #[must_use]
 pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
     let mut search = NearestTo { point, surface: &target.surface, nearest: f64::INFINITY };

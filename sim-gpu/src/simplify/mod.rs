@@ -1,23 +1,19 @@
-//! Level of detail: fewer triangles, as far as a sensor cannot tell.
+//! Level of detail: fewer triangles, with a change below the resolution of sensors.
 //!
-//! A bound in metres, [`Simplify`], says how far the surface that is cast at
-//! may lie from the mesh's own. What holds of a simplified mesh was proven of
-//! it, whatever the decimation promised:
+//! A bound in metres, [`Simplify`], limits the distance between the simplified surface and the mesh's
+//! own. Its properties are proven for each mesh, independently of the decimation:
 //!
-//! - Every point of the simplified surface lies within the bound of the
-//!   original surface, and every point of the original within the bound of the
-//!   simplified one (their Hausdorff distance). So every point of a scan lies
-//!   within the bound of the mesh.
-//! - Hence a beam as wide as the bound on each side meets the original at a
-//!   range that differs from the simplified one by no more than the bound.
-//! - A beam without width, where both surfaces are one plane and its displaced
-//!   copy, finds a range that differs by up to bound / cos(incidence). Near
-//!   edges and silhouettes it may meet something else altogether; so it may
-//!   with a real sensor, whose beams have width.
+//! - Every point of the simplified surface lies within the bound of the original surface, and every
+//!   point of the original within the bound of the simplified one (their Hausdorff distance). So
+//!   every point of a scan lies within the bound of the mesh.
+//! - Hence a beam as wide as the bound on each side meets the original at a range that differs from
+//!   the simplified one by at most the bound.
+//! - For a beam without width, where one surface is a plane and the other a displaced copy, ranges
+//!   differ by up to bound / cos(incidence). Near edges and silhouettes it may meet another surface,
+//!   as may the wide beams of a real sensor.
 //!
-//! The choice of triangles is of the crate `meshopt`, whose C++ rounds as its
-//! compiler has it: the same program gives the same triangles, another
-//! platform's may give others.
+//! The crate `meshopt` chooses the triangles. Its C++ rounds as its compiler does: the same program
+//! gives the same triangles, but those of another platform may differ.
 
 #[cfg(feature = "simplify")]
 mod decimate;
@@ -37,29 +33,28 @@ pub use distance::{distance_to_surface, distance_to_triangle};
 pub use resolution::{FOOTPRINTS_PER_STEP, Viewpoint, resolved_m};
 pub use within::lies_within;
 
-/// How far a simplified surface may lie from the mesh's own.
+/// The bound of the distance between a simplified surface and the mesh's own.
 ///
 /// In TOML, JSON and on the command line `"auto"`, or a number of metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
 pub enum Simplify {
-    /// As far as no sensor can tell: see [`resolved_m`].
+    /// The resolution of the sensors: see [`resolved_m`].
     Auto,
-    /// So many metres, above 0.
+    /// A number of metres, above 0.
     Metres(f64),
 }
 
-/// What became of one mesh.
+/// The result of simplifying a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simplified {
-    /// No point lies farther than this from the other surface, metres; 0 where
-    /// a sensor may stand on the mesh.
+    /// The bound of the distance between the surfaces, metres; 0 if a sensor may stand on the mesh.
     pub bound_m: f64,
-    /// Triangles that were cast at.
+    /// The number of triangles of the simplified mesh.
     pub triangles: u64,
 }
 
-/// This build has no decimation.
+/// This build does not include decimation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "this program was built without simplification: build it with `--features simplify`, which \
@@ -68,7 +63,7 @@ pub struct Simplified {
 pub struct NotBuilt;
 
 impl Simplify {
-    /// The bound for a mesh of which its sensors resolve `resolved_m`.
+    /// The bound for a mesh whose sensors resolve `resolved_m`.
     #[must_use]
     pub fn bound_m(self, resolved_m: impl FnOnce() -> f64) -> f64 {
         match self {
@@ -78,21 +73,20 @@ impl Simplify {
     }
 }
 
-/// A mesh with fewer triangles than the `kept` ones of `mesh`, and all of the
-/// surface within `bound`, in the mesh's units; `None` where there is nothing
-/// to gain.
+/// Simplifies the `kept` triangles of `mesh` within `bound`, in the mesh's units; `None` if that saves
+/// too little.
 ///
-/// Its vertices are some of the mesh's own. Triangles that are degenerate or
-/// equal to another may be among its triangles, as in a file's.
+/// The vertices are some of the mesh's own. As in a file, some triangles may be degenerate or
+/// duplicates.
 ///
 /// # Errors
-/// If this build has no decimation.
+/// If this build does not include decimation.
 #[cfg(feature = "simplify")]
 pub fn simplified(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>, NotBuilt> {
     Ok(decimate::proven(mesh, kept, bound))
 }
 
-/// A build without decimation.
+/// Stands in for decimation, which this build does not include.
 ///
 /// # Errors
 /// Always.
@@ -101,11 +95,10 @@ pub fn simplified(_: &Mesh, _: &[u32], _: f64) -> Result<Option<Mesh>, NotBuilt>
     Err(NotBuilt)
 }
 
-/// The surface to cast at: that of [`simplified`], or of the `kept` triangles of
-/// `mesh` itself where there is nothing to gain.
+/// The surface of [`simplified`], or of the `kept` triangles of `mesh` if that saves too little.
 ///
 /// # Errors
-/// If this build has no decimation.
+/// If this build does not include decimation.
 pub fn simplified_surface(mesh: Mesh, kept: Vec<u32>, bound: f64) -> Result<Surface, NotBuilt> {
     Ok(match simplified(&mesh, &kept, bound)? {
         Some(fewer) => Surface::of_mesh(fewer),

@@ -1,4 +1,4 @@
-//! What a sensor can tell apart on an object.
+//! The resolution of a sensor on an object.
 
 use glam::DVec3;
 
@@ -6,28 +6,27 @@ use crate::mesh::Mesh;
 use crate::mesh::unit_frame::bounding_box;
 use crate::sensor::Sensor;
 
-/// A step between beams holds so many beams' footprints.
+/// The number of beam footprints per step between beams.
 ///
-/// The VLP-32C's beams diverge by 3.0 mrad across and 1.5 mrad upwards, and are
-/// 3.5 mrad apart: the narrow side of a footprint is 0.43 of a step. Profiles
-/// state steps but no divergence, so half a step stands for the footprint.
+/// The VLP-32C's beams diverge by 3.0 mrad horizontally and 1.5 mrad vertically, and are 3.5 mrad
+/// apart: the narrow side of a footprint is 0.43 of a step. Profiles always state steps, but not
+/// always a divergence, so half a step approximates the footprint.
 pub const FOOTPRINTS_PER_STEP: f64 = 2.0;
 
-/// A sensor and the places from which it looks, in the object's frame.
+/// A sensor and its positions in the object's frame.
 pub struct Viewpoint<'a> {
     /// The sensor.
     pub sensor: &'a Sensor,
-    /// Where it stands.
+    /// Its positions.
     pub positions: Vec<DVec3>,
 }
 
-/// The radius of a beam's footprint where an object is nearest to any of
-/// `viewpoints`: by that much a surface may be displaced without leaving the beam
-/// that sees it. In the units of `mesh`, of which a metre has `units_per_m`.
+/// The radius of a beam's footprint at the point of an object nearest to any of `viewpoints`, in the
+/// units of `mesh`, of which a metre has `units_per_m`. A surface displaced by less stays in its beam.
 ///
-/// The nearest distance is that to the mesh's bounding box, but not less than
-/// the nearest range that the sensor reports. 0 where a sensor without such a
-/// limit stands in the box; infinite where nothing is to be told apart.
+/// The nearest distance is that to the mesh's bounding box, but at least the nearest range that the
+/// sensor reports. The radius is 0 if a sensor without such a limit stands in the box, and infinite
+/// for a single beam.
 #[must_use]
 pub fn resolved_m(mesh: &Mesh, units_per_m: f64, viewpoints: &[Viewpoint<'_>]) -> f64 {
     let corners = mesh.triangles.iter().flatten().map(|&v| mesh.vertices[v as usize]);

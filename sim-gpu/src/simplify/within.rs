@@ -1,11 +1,9 @@
 //! The proof that one surface lies near another.
 //!
-//! The distance to a convex set is a convex function, and so largest at a
-//! corner of a triangle. So if all corners of a piece lie within the bound of
-//! one and the same triangle, all of the piece does. A piece for which there is
-//! no such triangle is halved across its longest edge and each half is proven
-//! by itself. Nothing is sampled: where the answer is yes, it holds of every
-//! point.
+//! The distance to a convex set is a convex function, so that its maximum over a triangle is at a
+//! corner. Hence if all corners of a piece lie within the bound of the same triangle, all of the
+//! piece does. A piece without such a triangle is halved across its longest edge, and each half is
+//! proven separately. Nothing is sampled: a proof holds for every point.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,22 +14,21 @@ use crate::bvh::{
 };
 use crate::target::{Surface, Target};
 
-/// Pieces shorter than this part of the bound are not halved any more: the
-/// surface is then so nearly out of bounds that the answer is no.
+/// Pieces shorter than this part of the bound are not halved further, and fail: the surface is at
+/// the very bound.
 const SHORTEST_PIECE: f64 = 1.0 / 16.0;
 
-/// Pieces that a proof may look at for each triangle of both surfaces: a proof
-/// that needs more is given up, and the answer is no.
+/// The limit of pieces in a proof, per triangle of both surfaces; a proof that needs more fails.
 const PIECES_PER_TRIANGLE: usize = 256;
 
-/// Whether it is proven that every point of `surface` lies within `bound` of
-/// the surface of `target`; both in metres, and so is the bound.
+/// Whether every point of `surface` is proven to lie within `bound` of the surface of `target`, all in
+/// the same units.
 #[must_use]
 pub fn lies_within(surface: &Surface, target: &Target, bound: f64) -> bool {
     beyond(surface, target, bound).is_empty()
 }
 
-/// The triangles of `surface` of which that is not proven, ascending.
+/// The triangles of `surface` without such a proof, ascending.
 #[must_use]
 pub fn beyond(surface: &Surface, target: &Target, bound: f64) -> Vec<u32> {
     const TRIANGLES_PER_TASK: usize = 64;
@@ -62,8 +59,8 @@ struct Proof<'a> {
 }
 
 impl Proof<'_> {
-    /// Whether all of `triangle` lies within the bound. `last` is the triangle
-    /// that held the piece before: neighbours often lie near the same.
+    /// Whether all of `triangle` lies within the bound. `last` is the triangle near the previous
+    /// piece: neighbouring pieces often lie near the same one.
     fn holds(&self, triangle: [DVec3; 3], last: &mut Option<u32>) -> bool {
         let mut pieces = vec![triangle];
         let mut looked_at = 0;
@@ -93,12 +90,12 @@ impl Proof<'_> {
         piece.iter().all(|&corner| distance_to_triangle(corner, corners) <= self.bound)
     }
 
-    /// A triangle that all of `piece` is near.
+    /// A triangle near all of `piece`.
     fn one_near(&self, piece: [DVec3; 3]) -> Option<u32> {
         self.search(piece, |index| self.is_near(piece, index))
     }
 
-    /// Whether any triangle is near `point`: where none is, no halving helps.
+    /// Whether any triangle is near `point`. If not, halving does not help.
     fn has_near(&self, point: DVec3) -> bool {
         self.search([point; 3], |index| {
             distance_to_triangle(point, self.target.surface.corners(index)) <= self.bound
@@ -106,8 +103,7 @@ impl Proof<'_> {
         .is_some()
     }
 
-    /// A triangle that is `fit`, of those in boxes that, grown by the bound, hold
-    /// all of `piece`.
+    /// A triangle that is `fit` among those in boxes that hold all of `piece` if grown by the bound.
     fn search(&self, [a, b, c]: [DVec3; 3], fit: impl Fn(u32) -> bool) -> Option<u32> {
         let (low, high) = (a.min(b).min(c) + self.bound, a.max(b).max(c) - self.bound);
         let Target { surface, bvh } = self.target;
@@ -119,7 +115,7 @@ impl Proof<'_> {
     }
 }
 
-/// The search for a triangle that is `fit`, in boxes that reach below `low` and above `high`.
+/// Searches for a triangle that is `fit`, in boxes that reach below `low` and above `high`.
 struct AnyFit<Fit> {
     low: DVec3,
     high: DVec3,
@@ -128,7 +124,7 @@ struct AnyFit<Fit> {
 }
 
 impl<Fit: Fn(u32) -> bool> Search for AnyFit<Fit> {
-    /// All are as near.
+    /// Distances do not matter.
     type Distance = ();
 
     fn enter(&self, node: &WideNode) -> Entered<()> {

@@ -2,48 +2,48 @@
 
 use crate::sensor::RangeLimits;
 
-/// A beam that drops fall through.
+/// A beam through drops.
 pub(super) struct Beam {
-    /// Of its angles of divergence the tangents' geometric mean.
+    /// The geometric mean of the tangents of its angles of divergence.
     pub width: f64,
-    /// Of the air, per metre.
+    /// The extinction of the air, per metre.
     pub extinction: f64,
     /// The least power that is detected.
     pub least_power: f64,
-    /// Where anything is.
+    /// The ranges that the sensor measures.
     pub range: RangeLimits,
 }
 
-/// The drops of one kind in a beam that are detected.
+/// The detectable drops of one kind in a beam.
 #[derive(Clone, Debug)]
 pub(super) struct Drops {
-    /// How diameters fall off: 1/mm.
+    /// The exponent of the distribution of diameters, 1/mm.
     slope: f64,
-    /// What a large drop reflects.
+    /// The reflectance of a large drop.
     reflectance: f64,
     width: f64,
     extinction: f64,
     least_power: f64,
-    /// From range to range, metres, at an even pace.
+    /// The start and the step of the ranges of `counts`, metres.
     from_m: f64,
     step_m: f64,
-    /// How many are detected up to each of these ranges in the mean.
+    /// The mean number of drops that are detected up to each range.
     counts: Vec<f64>,
-    /// The probability that a beam that meets no surface has none.
+    /// The probability that a beam of full length has no such drop.
     none: f64,
 }
 
-/// The smallest drop, millimetres: LISA.
+/// The smallest diameter, millimetres: LISA.
 const SMALLEST_MM: f64 = 0.05;
 
 /// Indices of refraction at 905 nm: LISA.
 const WATER: f64 = 1.328;
 const ICE: f64 = 1.3031;
 
-/// A beam has no more drops of a kind than this.
+/// The most drops of a kind in a beam.
 const MOST: u32 = 32;
 
-/// Steps of the integral along a beam. It is smooth; Simpson's rule errs by 1e-6 of it.
+/// Steps of the integral along a beam, which is smooth: the relative error of Simpson's rule is 1e-6.
 const STEPS: usize = 256;
 
 /// The extinction of rain at this rate, per metre.
@@ -67,7 +67,8 @@ impl Drops {
         Self::new(7600.0 * mm_h.powf(-0.87), 2.55 * mm_h.powf(-0.48), ICE, beam)
     }
 
-    /// Drops of `per_m3_mm * exp(-slope D)` for each cubic metre and millimetre of diameter.
+    /// Drops with a density of `per_m3_mm * exp(-slope D)` per cubic metre and millimetre of
+    /// diameter.
     fn new(per_m3_mm: f64, slope: f64, refraction: f64, beam: &Beam) -> Self {
         let from_m = beam.range.min_m.min(beam.range.max_m);
         let Beam { width, extinction, least_power, .. } = *beam;
@@ -85,7 +86,7 @@ impl Drops {
         let to_m = drops.last_m(beam.range.max_m);
         let per_m3 = per_m3_mm / slope * (-slope * SMALLEST_MM).exp();
         let density = |range_m: f64| {
-            // A circle as wide as the beam.
+            // The cross-section of the beam.
             let area = std::f64::consts::PI / 4.0 * (width * range_m).powi(2);
             per_m3 * area * drops.part_detected(range_m)
         };
@@ -101,7 +102,7 @@ impl Drops {
         drops
     }
 
-    /// The smallest drop that is detected at this range, millimetres; infinite if none is.
+    /// The smallest diameter that is detected at this range, millimetres; infinite if none is.
     fn least_mm(&self, range_m: f64) -> f64 {
         let through = (-2.0 * self.extinction * range_m).exp();
         let whole = self.reflectance * through / range_m.powi(2);
@@ -112,12 +113,13 @@ impl Drops {
         (1000.0 * self.width * range_m * part).max(SMALLEST_MM)
     }
 
-    /// The part of the drops at this range that are detected.
+    /// The part of the drops at this range that is detected.
     fn part_detected(&self, range_m: f64) -> f64 {
         (-self.slope * (self.least_mm(range_m) - SMALLEST_MM)).exp()
     }
 
-    /// Beyond this range up to `end_m`, metres, no drop is detected, or less than one of 10^17.
+    /// The range up to which drops are detected, at most `end_m`, metres: beyond it, less than one
+    /// in 10^17 is.
     fn last_m(&self, end_m: f64) -> f64 {
         let is_seen = |range_m: f64| self.part_detected(range_m) > 1e-17;
         if is_seen(end_m) {
@@ -132,7 +134,7 @@ impl Drops {
         unseen_m
     }
 
-    /// How many drops are detected up to this range in the mean.
+    /// The mean number of drops that are detected up to this range.
     pub fn mean(&self, range_m: f64) -> f64 {
         let place = (range_m - self.from_m) / self.step_m;
         let last = self.counts.len() - 1;
@@ -147,12 +149,12 @@ impl Drops {
         }
     }
 
-    /// Gives the range and the power of each drop up to `end_m` to `take`. `bits` are the
-    /// random bits of each draw.
+    /// Passes the range and the power of each detected drop up to `end_m` to `take`. `bits` gives
+    /// the random bits of each draw.
     pub fn draw(&self, end_m: f64, bits: impl Fn(u32) -> [u32; 4], mut take: impl FnMut(f64, f64)) {
         let first = bits(0);
         let uniform = super::unit(first[0]);
-        // A surface only takes drops away. Most beams have none.
+        // Most beams have no drop, and a surface only shortens a beam.
         if uniform < self.none {
             return;
         }
@@ -175,7 +177,7 @@ impl Drops {
         }
     }
 
-    /// Up to where there are so many drops in the mean.
+    /// The range up to which the mean number of drops is `count`.
     fn place(&self, count: f64) -> f64 {
         let above =
             self.counts.partition_point(|&sum| sum <= count).clamp(1, self.counts.len() - 1);
@@ -185,8 +187,7 @@ impl Drops {
     }
 }
 
-/// The number with this `mean` that a uniform number in [0, 1) stands for, by inversion; at most
-/// [`MOST`].
+/// A Poisson number of this `mean` from a uniform number in [0, 1), by inversion; at most [`MOST`].
 fn poisson(mean: f64, uniform: f64) -> u32 {
     let mut term = (-mean).exp();
     let (mut sum, mut count) = (term, 0);

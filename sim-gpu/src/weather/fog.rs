@@ -1,4 +1,4 @@
-//! Fog: the return of a pulse from all of it.
+//! The return of a pulse from fog.
 
 use std::f64::consts::PI;
 
@@ -6,42 +6,42 @@ use super::{AirBeam, Medium, Scattered};
 
 const LIGHT_M_S: f64 = 299_792_458.0;
 
-/// Half of the pulse's length: Hahner et al.
+/// Half of the pulse's duration: Hahner et al.
 const HALF_PULSE_S: f64 = 20e-9;
 
-/// Of how much of the way there and back light comes back at once, metres: the pulse's length.
+/// The length of fog from which light returns at the same time, metres: half of the pulse's length.
 const PULSE_M: f64 = LIGHT_M_S * HALF_PULSE_S;
 
-/// The receiver sees nothing up to here, and all of the beam from there: Hahner et al.
+/// The receiver sees nothing up to the first range, and all of the beam from the second: Hahner et
+/// al.
 const BLIND_M: f64 = 0.9;
 const WHOLE_M: f64 = 1.0;
 
 /// Backscatter per steradian times the visibility: Rasshofer et al. 2011.
 const BACKSCATTER: f64 = 0.046;
 
-/// What Hahner et al. hold fog against: 1e-6 / pi.
+/// The reference of Hahner et al. for fog: 1e-6 / pi.
 const HAHNERS_SURFACE: f64 = 1e-6 / PI;
 
 /// The return of fog.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fog {
-    /// Where I(R) has its maximum, metres.
+    /// The range of the maximum of I(R), metres.
     peak_m: f64,
-    /// Its power; where it is in proportion to the surface behind it, for one of brightness 1.
+    /// Its power; if proportional to the surface behind the fog, for a surface of brightness 1.
     power: f64,
-    /// The part of that power which the fog up to some ranges returns, of physical fog.
+    /// For physical fog, the part of that power from the fog before each border of cells.
     up_to: [f64; CELLS + 1],
     is_in_proportion: bool,
 }
 
-/// The extinction per metre in which one can see so far: ln 20 / V, where a contrast of 5 % is
-/// left.
+/// The extinction per metre for this visibility V: ln 20 / V, at which a contrast of 5 % remains.
 pub(super) fn extinction_of(visibility_m: f64) -> f64 {
     20f64.ln() / visibility_m
 }
 
-/// The brightness of so much fog of this visibility, metres, if nothing is before it: of no more
-/// of it than lies within a pulse's length.
+/// The brightness of this length of fog with this visibility, metres, with clear air before it. At
+/// most the length of a pulse counts.
 pub(super) fn of_one_pulse(visibility_m: f64, length_m: f64) -> f64 {
     let twice_extinction = 2.0 * extinction_of(visibility_m);
     let length_m = length_m.min(PULSE_M / 2.0);
@@ -49,7 +49,7 @@ pub(super) fn of_one_pulse(visibility_m: f64, length_m: f64) -> f64 {
 }
 
 impl Fog {
-    /// Fog of this visibility in air of this extinction, all in all.
+    /// Fog of this visibility, in air of this total extinction.
     pub fn new(visibility_m: f64, extinction: f64, is_in_proportion: bool) -> Self {
         let (peak_m, most) = strongest(extinction);
         let backscatter = BACKSCATTER / visibility_m;
@@ -62,20 +62,20 @@ impl Fog {
         Self { peak_m, power: factor * most, up_to, is_in_proportion }
     }
 
-    /// Whether it is in proportion to the surface behind it.
+    /// Whether its power is proportional to the brightness of the surface behind it.
     pub fn is_in_proportion(&self) -> bool {
         self.is_in_proportion
     }
 
-    /// What comes back along `beam`.
+    /// The return of the fog along `beam`.
     pub fn scattered(&self, beam: &AirBeam) -> Option<Scattered> {
         let (range_m, power, brightness) = if self.is_in_proportion {
             let power = self.power * beam.brightness;
-            // As that simulation reports it: as if it were as far as the surface.
+            // That simulation reports the brightness as if the fog were as far as the surface.
             (self.peak_m, power, (power * beam.end_m.powi(2)).min(1.0))
         } else {
-            // The pulse of a surface peaks half of its length after it begins to come back, and
-            // the sensor tells the surface to be where it is.
+            // The pulse of a surface peaks half of its length after it begins to return, for which
+            // sensors correct.
             let range_m = (self.peak_m - PULSE_M / 2.0).max(BLIND_M);
             let power = self.power * self.share_up_to(beam.end_m);
             (range_m, power, power * range_m.powi(2))
@@ -84,7 +84,7 @@ impl Fog {
         is_something.then_some(Scattered { range_m, power, brightness, medium: Medium::Fog })
     }
 
-    /// The part of its power that the fog before a surface at `end_m` returns.
+    /// The part of the power from the fog before a surface at `end_m`.
     fn share_up_to(&self, end_m: f64) -> f64 {
         let place = (end_m - BLIND_M) / (self.peak_m - BLIND_M) * CELLS as f64;
         if !(0.0..CELLS as f64).contains(&place) {
@@ -96,11 +96,11 @@ impl Fog {
     }
 }
 
-/// Cells of the table of shares: each is some 6 cm wide.
+/// The cells of the table of shares, each about 6 cm wide.
 const CELLS: usize = 64;
 
-/// The part of I(R) at its maximum that comes from before each border of cells from the blind
-/// part to the maximum.
+/// The part of the maximum of I(R) from the fog before each border of cells, between the blind range
+/// and the maximum.
 fn shares(peak_m: f64, extinction: f64) -> [f64; CELLS + 1] {
     let cell_m = (peak_m - BLIND_M) / CELLS as f64;
     let mut sums = [0.0; CELLS + 1];
@@ -111,13 +111,13 @@ fn shares(peak_m: f64, extinction: f64) -> [f64; CELLS + 1] {
         sums[cell + 1] = sums[cell] + at(0.0) + 4.0 * at(0.5) + at(1.0);
     }
     let all = sums[CELLS];
-    // Of fog so thick that nothing comes back, everything comes from anywhere.
+    // Fog so thick that nothing returns has no shares.
     sums.map(|sum| if all > 0.0 { sum / all } else { 1.0 })
 }
 
-/// Where I(R) is largest, metres, and how large it is there, s/m^2.
+/// The range of the maximum of I(R), metres, and the maximum, s/m^2.
 fn strongest(extinction: f64) -> (f64, f64) {
-    // It has one maximum, before the end of the pulse has come through the receiver's blind part.
+    // It has a single maximum, before the end of the pulse has passed the blind range.
     let (mut low_m, mut high_m) = (BLIND_M, WHOLE_M + PULSE_M);
     let golden = (5f64.sqrt() - 1.0) / 2.0;
     let at = |part: f64, low_m: f64, high_m: f64| {
@@ -125,7 +125,7 @@ fn strongest(extinction: f64) -> (f64, f64) {
         (range_m, returned(range_m, extinction))
     };
     let (mut a, mut b) = (at(1.0 - golden, low_m, high_m), at(golden, low_m, high_m));
-    // Each step leaves 0.62 of 6 m: 24 of them 0.06 mm.
+    // Golden section: each step leaves 0.62 of the interval, 24 steps leave 0.06 mm of 6 m.
     for _ in 0..24 {
         if a.1 < b.1 {
             low_m = a.0;
@@ -139,7 +139,8 @@ fn strongest(extinction: f64) -> (f64, f64) {
     (range_m, returned(range_m, extinction))
 }
 
-/// I(R), s/m^2, by Simpson's rule on each side of where the receiver sees all of the beam.
+/// I(R), s/m^2, by Simpson's rule on each side of the range from which the receiver sees all of the
+/// beam.
 fn returned(range_m: f64, extinction: f64) -> f64 {
     const STEPS: usize = 16;
     let between = |from_m: f64, to_m: f64| {
@@ -151,11 +152,11 @@ fn returned(range_m: f64, extinction: f64) -> f64 {
     };
     let nearest_m = BLIND_M.max(range_m - PULSE_M);
     let bend_m = WHOLE_M.clamp(nearest_m, range_m.max(nearest_m));
-    // dt is 2/c of dr.
+    // dt = 2/c dr.
     2.0 / LIGHT_M_S * (between(nearest_m, bend_m) + between(bend_m, range_m.max(bend_m)))
 }
 
-/// What I(R) integrates, of the fog at r.
+/// The integrand of I(R) for the fog at r.
 fn integrand(r: f64, range_m: f64, extinction: f64) -> f64 {
     let t = 2.0 * (range_m - r) / LIGHT_M_S;
     let seen = ((r - BLIND_M) / (WHOLE_M - BLIND_M)).clamp(0.0, 1.0);

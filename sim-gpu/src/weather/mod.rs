@@ -1,4 +1,4 @@
-//! What the air does to a beam: it takes power from what comes back, and scatters some itself.
+//! The effect of the air on a beam: it attenuates returns, and scatters light back itself.
 //!
 //! All powers are relative to that of a white surface that faces the sensor 1 m away in clear
 //! air. A surface of brightness b (its reflectivity times the cosine of the incidence) at range
@@ -8,9 +8,9 @@
 //! P = b exp(-2 a R) / R^2
 //! ```
 //!
-//! with a, the extinction per metre, the sum of all that is in the air. What is scattered by
-//! rain, snow, fog and dust is in the same units, so that one threshold decides what is
-//! detected and which return is the strongest.
+//! with a, the extinction per metre, the sum over everything in the air. Returns of rain, snow, fog
+//! and dust have the same units, so that one threshold decides which returns are detected, and
+//! which is the strongest.
 //!
 //! # Rain and snow
 //!
@@ -27,49 +27,49 @@
 //! what LISA integrates by Mie's theory, within 0.3 % (0.5 to 100 mm/h) and 0.5 % (0.5 to
 //! 10 mm/h).
 //!
-//! LISA draws all drops in a beam, some ten thousand, and looks for the strongest. Of these only
-//! a few near the sensor are strong enough to be detected. Their number has a Poisson
-//! distribution, whose mean is an integral along the beam, so that they alone are drawn here.
-//! LISA's surfaces have no cosine of the incidence; it belongs to their reflectivity.
+//! LISA draws all drops in a beam, some ten thousand, and takes the strongest. Only a few of them,
+//! near the sensor, are strong enough to be detected. Their number has a Poisson distribution whose
+//! mean is an integral along the beam, so that this module draws those alone. LISA includes the
+//! cosine of the incidence in the reflectivity of surfaces.
 //!
 //! # Fog
 //!
-//! A pulse `sin^2(pi t / 2 T)` of 0 to 2 T comes back from all of the fog that it has passed:
+//! A pulse `sin^2(pi t / 2 T)` of duration 2 T returns from all of the fog that it has passed:
 //!
 //! ```text
 //! I(R) = integral of sin^2(pi t / 2 T) exp(-2 a r) x(r) / r^2 dt,    r = R - c t / 2
 //! ```
 //!
 //! with x(r) the part of the beam that the receiver sees, 0 up to 0.9 m and 1 from 1 m (Rasshofer
-//! et al., Adv. Radio Sci. 9, 2011; Hahner et al., ICCV 2021). Its maximum, at some 4.6 m, is the
-//! return of the fog; its power is `pi (c / 2) beta I`, with `beta = 0.046 / visibility` the
-//! backscatter per metre and steradian. The return of a surface has its maximum `c T / 2 = 3 m`
-//! behind the surface by the same formula, and a sensor tells where the surface is, so that fog is
-//! told to be some 1.6 m away. A surface nearer than 4.6 m takes away the fog behind it.
+//! et al., Adv. Radio Sci. 9, 2011; Hahner et al., ICCV 2021). The maximum, at about 4.6 m, is the
+//! return of the fog. Its power is `pi (c / 2) beta I`, with `beta = 0.046 / visibility` the
+//! backscatter per metre and steradian. By the same formula the return of a surface peaks
+//! `c T / 2 = 3 m` behind it, and sensors correct for that: they report fog about 1.6 m away. A
+//! surface nearer than 4.6 m removes the fog behind it.
 //!
-//! [`FogModel::Hahner`] is for comparison with that simulation. There fog returns
-//! `b (beta / beta0) I` with `beta0 = 1e-6 / pi`: it is in proportion to the surface behind it,
-//! so that every beam longer than a certain range becomes fog, whatever it hits, 4.6 m away. The
-//! formula for surfaces lacks a factor 2/c there, and 1e-6 was chosen by eye. Both are kept.
+//! [`FogModel::Hahner`] reproduces the simulation of Hahner et al. There fog returns
+//! `b (beta / beta0) I` with `beta0 = 1e-6 / pi`. It is proportional to the surface behind it, so
+//! that every beam longer than a certain range returns from fog 4.6 m away, whatever it hits. Their
+//! formula for surfaces lacks a factor 2/c, and they chose 1e-6 by eye. Both are kept.
 //!
 //! # Haze
 //!
-//! Kruse's law: `a = 3.912 / V (wavelength / 550 nm)^-q` per kilometre, V the visibility in
-//! kilometres, q 1.6 above 50 km, 1.3 from 6 km, below that 0.585 times the cubic root of V. The
-//! wavelength is 905 nm.
+//! Kruse's law: `a = 3.912 / V (wavelength / 550 nm)^-q` per kilometre, with V the visibility in
+//! kilometres, and q 1.6 above 50 km, 1.3 from 6 km to 50 km, and 0.585 times the cube root of V
+//! below. The wavelength is 905 nm.
 //!
 //! # Dust and spray
 //!
-//! A box with the extinction of fog. With a probability of d / 0.7, d its optical depth along
-//! the beam, it returns from inside, as MAVS has it (Goodin et al.), at a depth that the
-//! extinction distributes, and with the power of as much of the box as lies within a pulse's
-//! length behind that:
+//! A box with the extinction of fog. As in MAVS (Goodin et al.), a beam returns from inside with
+//! probability d / 0.7, where d is the box's optical depth along the beam. The depth of the return
+//! follows from the extinction, and its power is that of the part of the box within a pulse's
+//! length L behind it:
 //!
 //! ```text
 //! brightness = pi beta (1 - exp(-2 a L)) / (2 a)
 //! ```
 //!
-//! times what comes through to it, at most pi beta / (2 a) = 0.024, that of endless fog.
+//! times the transmission up to it: at most pi beta / (2 a) = 0.024, that of endless fog.
 
 mod drops;
 mod fog;
@@ -87,7 +87,7 @@ use formats::rng::StreamKey;
 use glam::DVec3;
 
 formats::named! {
-    /// What a point is of.
+    /// The medium that returned a point.
     #[derive(Default)]
     pub enum Medium: "medium" {
         /// A surface.
@@ -107,57 +107,57 @@ formats::named! {
 /// The air of one scan.
 #[derive(Clone, Debug)]
 pub struct Air {
-    /// Of all but the volumes, per metre.
+    /// The extinction of everything but the volumes, per metre.
     extinction: f64,
     rain: Option<Drops>,
     snow: Option<Drops>,
     fog: Option<Fog>,
     volumes: Vec<Volume>,
-    /// Whether beams that meet no surface return from it.
+    /// Whether beams that meet no surface may return from the air.
     pub empty_beams: bool,
 }
 
-/// A beam in the air.
+/// A beam through the air.
 #[derive(Clone, Copy, Debug)]
 pub struct AirBeam {
-    /// Where it starts, in the world, metres.
+    /// Its start in the world, metres.
     pub origin: DVec3,
-    /// Its direction in the world, of unit length.
+    /// Its unit direction in the world.
     pub direction: DVec3,
-    /// Where it ends, metres: at the farthest surface that it meets, or at the sensor's limit.
+    /// Its length, metres: up to the farthest surface that it meets, or the sensor's limit.
     pub end_m: f64,
     /// The brightness of the surface at its end; 0 if there is none.
     pub brightness: f64,
-    /// Keys its random numbers.
+    /// The stream of its random numbers.
     pub stream: StreamKey,
-    /// And its number.
+    /// Its number, which keys its random numbers in the stream.
     pub number: u32,
 }
 
-/// What comes back from the air.
+/// A return of the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scattered {
-    /// From where, metres.
+    /// Its range, metres.
     pub range_m: f64,
-    /// How strong it is.
+    /// Its power.
     pub power: f64,
-    /// What a sensor takes for its brightness: its power at 1 m.
+    /// The brightness of a surface of the same power at this range.
     pub brightness: f64,
-    /// What it is of.
+    /// Its medium.
     pub medium: Medium,
 }
 
-/// Which random bits of a beam place drops, flakes and dust.
+/// Select the random bits of a beam that place drops, flakes and dust.
 const RAIN_PURPOSE: u32 = 32;
 const SNOW_PURPOSE: u32 = 64;
 const DUST_PURPOSE: u32 = 96;
 
-/// The wavelength of the sensors that the constants are for: 905 nm, in units of 550 nm.
+/// The wavelength that the constants are for, 905 nm, in units of 550 nm.
 const WAVELENGTH: f64 = 905.0 / 550.0;
 
 impl Air {
-    /// The air of this `weather` for beams of these angles of divergence, degrees, of a sensor
-    /// that detects no less than `limit` and nothing outside `range`.
+    /// The air of this `weather`, for beams with these angles of divergence, degrees, and a sensor
+    /// with this detection `limit` and `range`.
     #[must_use]
     pub fn new(
         weather: &Weather,
@@ -186,7 +186,7 @@ impl Air {
         }
     }
 
-    /// The part of the light that comes through to this range and back.
+    /// The part of the light that is transmitted to this range and back.
     #[must_use]
     pub fn transmission(&self, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
         let in_volumes = self.depth_in_volumes(origin, direction, range_m);
@@ -198,16 +198,16 @@ impl Air {
         self.volumes.iter().map(|volume| depth(volume, origin, direction, range_m)).sum()
     }
 
-    /// Whether what it returns depends on the brightness of what is behind it.
+    /// Whether the returns of the air depend on the brightness of the surface behind it.
     #[must_use]
     pub fn asks_for_brightness(&self) -> bool {
         self.fog.is_some_and(|fog| fog.is_in_proportion())
     }
 
-    /// Gives what comes back from the air along `beam` to `take`, in no order.
+    /// Passes the returns of the air along `beam` to `take`, unordered.
     pub fn scatter(&self, beam: &AirBeam, mut take: impl FnMut(Scattered)) {
         let AirBeam { origin, direction, end_m, stream, number, .. } = *beam;
-        // Drops and fog are drawn in the air between the volumes, which weaken them.
+        // Drops and fog are drawn without the volumes, which then attenuate them.
         let behind_volumes = |one: Scattered| {
             if self.volumes.is_empty() {
                 return one;
@@ -236,14 +236,14 @@ impl Air {
         }
     }
 
-    /// What comes back from inside `volume`.
+    /// The return of `volume`, if any.
     fn scattered_in(&self, volume: &Volume, beam: &AirBeam, purpose: u32) -> Option<Scattered> {
         let AirBeam { origin, direction, end_m, stream, number, .. } = *beam;
         let (enters_m, leaves_m) = inside(volume, origin, direction, end_m)?;
         let extinction = extinction_of(volume.visibility_m);
         let optical_depth = extinction * (leaves_m - enters_m);
         let [event, place, ..] = random_bits(stream, number, purpose);
-        // MAVS: a beam loses itself in dust of an optical depth of 0.7.
+        // MAVS: dust with an optical depth of 0.7 returns every beam.
         if optical_depth == 0.0 || unit(event) * 0.7 >= optical_depth {
             return None;
         }
@@ -257,25 +257,25 @@ impl Air {
     }
 }
 
-/// A number in [0, 1) of 32 bits.
+/// A number in [0, 1) from 32 bits.
 fn unit(bits: u32) -> f64 {
     f64::from(bits) * (1.0 / 4_294_967_296.0)
 }
 
-/// The optical depth of a beam in `volume` up to this range.
+/// The optical depth of `volume` along a beam up to this range.
 fn depth(volume: &Volume, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
     inside(volume, origin, direction, range_m).map_or(0.0, |(enters_m, leaves_m)| {
         (leaves_m - enters_m) * extinction_of(volume.visibility_m)
     })
 }
 
-/// Where a beam is inside `volume`, metres from its start, up to `end_m`.
+/// The distances at which a beam enters and leaves `volume`, up to `end_m`.
 fn inside(volume: &Volume, origin: DVec3, direction: DVec3, end_m: f64) -> Option<(f64, f64)> {
     let (mut enters_m, mut leaves_m) = (0.0f64, end_m);
     for axis in 0..3 {
         let faces = [volume.min_m[axis], volume.max_m[axis]];
         if direction[axis] == 0.0 {
-            // Along a face is inside.
+            // A beam along a face counts as inside.
             if !(faces[0]..=faces[1]).contains(&origin[axis]) {
                 return None;
             }

@@ -1,4 +1,4 @@
-//! Weather for points that a sensor measured in clear air.
+//! Weather applied to points that a sensor measured in clear air.
 
 use super::{Air, AirBeam, Medium, Scattered};
 use crate::sensor::DetectionLimit;
@@ -6,27 +6,27 @@ use formats::Scan;
 use formats::rng::StreamKey;
 use glam::DVec3;
 
-/// What became of the points of a scan in the weather.
+/// Counts of what became of the points of a scan in the weather.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fates {
-    /// Points that are where they were, weaker.
+    /// Points at the same place, weaker.
     pub kept: usize,
     /// Points whose beams returned from the air instead.
     pub scattered: usize,
-    /// Points that are gone, too weak to be detected.
+    /// Points that became too weak to be detected.
     pub lost: usize,
-    /// Those of them that are too weak for the detection limit in clear air, too: whoever
-    /// recorded them has a lower one.
+    /// Those of the lost points that are below the detection limit in clear air, too: the sensor
+    /// that recorded them has a lower limit.
     pub too_weak_before: usize,
-    /// Points that say nothing: they are not finite or lie in the sensor. They are kept.
+    /// Points that are not finite or lie in the sensor. They are kept unchanged.
     pub passed_over: usize,
 }
 
-/// `scan`, whose points were measured in clear air from `sensor_m`, as it had been in this `air`
-/// with a sensor that tells the strongest return and detects no less than `limit`.
+/// Applies this `air` to `scan`, whose points were measured in clear air from `sensor_m`, for a
+/// sensor that reports the strongest return and has this detection `limit`.
 ///
-/// `brightness` is that of each point: its reflectivity times the cosine of the incidence. It
-/// becomes the scan's intensity. The beam of point i has the random numbers i of `stream`.
+/// `brightness` holds each point's reflectivity times the cosine of the incidence. It becomes the
+/// scan's intensity. The beam of point i uses the random numbers i of `stream`.
 #[must_use]
 pub fn in_weather(
     scan: &Scan,
@@ -70,10 +70,11 @@ pub fn in_weather(
             }
         }
     }
-    (told(scan, sensor_m, &kept, &found), fates)
+    (moved(scan, sensor_m, &kept, &found), fates)
 }
 
-/// The strongest return of a beam that ends at a surface; `None` if none is as strong as `least`.
+/// The strongest return of the air along a beam that ends at a surface; `None` if all are weaker
+/// than `least`.
 fn strongest(air: &Air, beam: &AirBeam, least: f64) -> Option<Scattered> {
     let range_m = beam.end_m;
     let brightness = beam.brightness * air.transmission(beam.origin, beam.direction, range_m);
@@ -87,7 +88,7 @@ fn strongest(air: &Air, beam: &AirBeam, least: f64) -> Option<Scattered> {
     (best.power >= least).then_some(best)
 }
 
-/// Point `i` of `scan` is at this range and of no surface.
+/// Removes the attributes of a surface from point `i` of `scan`, and sets its range.
 pub(crate) fn without_surface(scan: &mut Scan, i: usize, range_m: f64) {
     if let Some(ranges_m) = &mut scan.range_m {
         ranges_m[i] = range_m as f32;
@@ -100,20 +101,20 @@ pub(crate) fn without_surface(scan: &mut Scan, i: usize, range_m: f64) {
     }
 }
 
-/// The points of `scan` of these numbers, as they were `found`.
-fn told(scan: &Scan, sensor_m: DVec3, kept: &[usize], found: &[Scattered]) -> Scan {
-    let mut told = scan.select(kept);
+/// The points of `scan` with these numbers, moved to where they were `found`.
+fn moved(scan: &Scan, sensor_m: DVec3, kept: &[usize], found: &[Scattered]) -> Scan {
+    let mut moved = scan.select(kept);
     let is_of_air = |one: &Scattered| one.medium != Medium::Surface;
     let from_origin = sensor_m - DVec3::from_array(scan.origin);
     for (i, one) in found.iter().enumerate().filter(|(_, one)| is_of_air(one)) {
-        let from_sensor = DVec3::from(told.positions[i].map(f64::from)) - from_origin;
-        let moved = from_sensor.normalize() * one.range_m + from_origin;
-        told.positions[i] = moved.as_vec3().to_array();
-        without_surface(&mut told, i, one.range_m);
+        let from_sensor = DVec3::from(moved.positions[i].map(f64::from)) - from_origin;
+        let position = from_sensor.normalize() * one.range_m + from_origin;
+        moved.positions[i] = position.as_vec3().to_array();
+        without_surface(&mut moved, i, one.range_m);
     }
-    told.intensity = Some(found.iter().map(|one| one.brightness as f32).collect());
-    told.medium = Some(found.iter().map(|one| one.medium as u8).collect());
-    // These would be of clear air.
-    (told.power, told.reflectivity) = (None, None);
-    told
+    moved.intensity = Some(found.iter().map(|one| one.brightness as f32).collect());
+    moved.medium = Some(found.iter().map(|one| one.medium as u8).collect());
+    // These hold for clear air only.
+    (moved.power, moved.reflectivity) = (None, None);
+    moved
 }

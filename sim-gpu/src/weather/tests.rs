@@ -1,4 +1,4 @@
-//! Against closed forms, and against figures that others published.
+//! Comparisons with closed forms and published figures.
 
 use super::*;
 

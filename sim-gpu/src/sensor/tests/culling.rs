@@ -21,7 +21,7 @@ fn angle_rad(a: DVec3, b: DVec3) -> f64 {
     2.0 * (a - b).length().atan2((a + b).length())
 }
 
-/// No ray inside is lost, none far outside is found, and the order is kept.
+/// Asserts that all rays inside are found, none far outside, and in order.
 fn assert_culls(pattern: &BeamPattern, cone: &Cone) {
     let found = pattern.within(cone);
     let mut next = found.iter().peekable();

@@ -1,4 +1,4 @@
-//! What the shipped sensors must be, and what no sensor may be.
+//! Checks of the built-in sensors, and of the profiles that are refused.
 
 use std::path::Path;
 
