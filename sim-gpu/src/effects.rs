@@ -130,8 +130,7 @@ pub enum RayInput {
 }
 
 impl RayEffect {
-    /// The name of the effect's function on the CPU and in its shader,
-    /// `shaders/effects/NAME.wgsl`.
+    /// The name of the effect's function on the CPU and in its shader, `shaders/effects/NAME.wgsl`.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {

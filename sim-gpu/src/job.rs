@@ -88,8 +88,7 @@ impl CastJob {
 /// A caster's answer for one job.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cast {
-    /// Per ray: triangle index, [`crate::ray::MISS`] or
-    /// [`crate::ray::AMBIGUOUS`]; `[n_rays]`.
+    /// Per ray: triangle index, [`crate::ray::MISS`] or [`crate::ray::AMBIGUOUS`]; `[n_rays]`.
     pub codes: Vec<u32>,
     /// The outputs of [`Effects::per_ray`](crate::effects::Effects::per_ray) side by side, not
     /// meaningful for a miss; `[n_rays, outputs_per_ray]`.

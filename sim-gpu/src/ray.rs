@@ -31,8 +31,7 @@ pub const MISS: u32 = u32::MAX;
 #[cfg(feature = "gpu")]
 pub(crate) const SENT: u32 = u32::MAX;
 
-/// The distance for a ray that hits nothing, unit lengths: finite, and beyond every other
-/// distance.
+/// The distance for a ray that hits nothing, unit lengths: finite, and beyond every other distance.
 pub const NO_HIT: f32 = 1e30;
 
 /// A bit of a caster's answer: another triangle may truly be nearer by more than the promised

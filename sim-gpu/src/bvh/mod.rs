@@ -30,8 +30,7 @@ const HALVING_DEPTH: usize = 32;
 /// The most triangles of a leaf.
 const MAX_LEAF: usize = 4;
 
-/// How far boxes reach beyond their triangles, in the unit frame, whose coordinates are at
-/// most 1.
+/// How far boxes reach beyond their triangles, in the unit frame, whose coordinates are at most 1.
 ///
 /// A box must not reject a ray that a triangle inside it accepts. By rounding, a triangle test
 /// may accept a ray that passes 48 units of 2^-24 outside the triangle (`cpu::intersect`), and a
@@ -41,11 +40,9 @@ const BOX_PADDING: f32 = 1.0 / (1 << 18) as f32;
 /// An algorithm that builds hierarchies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Builder {
-    /// Binned surface area heuristic (Wald 2007), in parallel: the fastest
-    /// tree to trace.
+    /// Binned surface area heuristic (Wald 2007), in parallel: the fastest tree to trace.
     Sah,
-    /// Midpoint splits along a Morton curve (Lauterbach et al. 2009): the
-    /// fastest tree to build.
+    /// Midpoint splits along a Morton curve (Lauterbach et al. 2009): the fastest tree to build.
     Morton,
 }
 

@@ -1,6 +1,5 @@
-//! Linear BVH: Lauterbach et al., "Fast BVH construction on GPUs", 2009.
-//! Triangles are sorted along a Morton curve; each node splits where the
-//! highest differing bit of its codes changes.
+//! Linear BVH: Lauterbach et al., "Fast BVH construction on GPUs", 2009. Triangles are sorted along
+//! a Morton curve; each node splits where the highest differing bit of its codes changes.
 
 use super::node::{Child, with_root};
 use super::sah::extent;

@@ -21,8 +21,7 @@ const _: () = assert!(MAX_LEAF <= LEAF);
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub struct WideNode {
-    /// The lowest corner of each child's box, x of all, y of all, z of all; then the
-    /// highest ones.
+    /// The lowest corner of each child's box, x of all, y of all, z of all; then the highest ones.
     pub boxes: [[[f32; WIDTH]; 3]; 2],
     /// The children.
     pub children: [WideChild; WIDTH],

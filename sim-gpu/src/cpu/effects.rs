@@ -45,8 +45,7 @@ pub fn noise_range(noise: &Noise, stream: StreamKey, beam: u32) -> f64 {
     noise.mean_m + noise.sigma_m * normal_deviate(random_bits(stream, beam, 1)[0])
 }
 
-/// The error of each coordinate of the point of `beam`, metres, in the world
-/// frame.
+/// The error of each coordinate of the point of `beam`, metres, in the world frame.
 #[must_use]
 pub fn noise_xyz(noise: &Noise, stream: StreamKey, beam: u32) -> DVec3 {
     let [x, y, z, _] = random_bits(stream, beam, 1).map(normal_deviate);

@@ -1,15 +1,13 @@
-//! Watertight ray-triangle test: Woop, Benthin, Wald, "Watertight
-//! ray/triangle intersection", JCGT 2(1), 2013. Twin of
-//! `shaders/intersect.wgsl`, for the four triangles of a leaf at once: each lane
-//! does to the bit what `reference` does for one triangle, as the shader does.
+//! Watertight ray-triangle test: Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT
+//! 2(1), 2013. Twin of `shaders/intersect.wgsl`, for the four triangles of a leaf at once: each
+//! lane does to the bit what `reference` does for one triangle, as the shader does.
 //!
-//! Subnormal numbers: WGSL lets an adapter flush them to 0 or not, as it likes, and
-//! the CPU does not. Promised is what does not depend on it. In the unit frame a
-//! flushed coordinate moves by less than 1.2e-38, nothing beside [`DISPLACEMENT`].
-//! Edge functions multiply two lengths: those of a triangle whose sides are below
-//! 1e-19 of the object's longest may vanish on one adapter and not on another, so
-//! that a beam hits it on the one and what lies behind it on the other. Such a
-//! triangle is smaller than the rounding of any vertex that is not next to 0.
+//! Subnormal numbers: WGSL allows adapters to flush them to 0, and the CPU does not flush. What this
+//! crate promises does not depend on it. In the unit frame, flushing moves a coordinate by less than
+//! 1.2e-38, which is negligible beside [`DISPLACEMENT`]. Edge functions are products of two lengths:
+//! those of a triangle whose sides are below 1e-19 of the object's longest may vanish on some
+//! adapters, whose beams then hit the surface behind it. Such a triangle is smaller than the rounding
+//! of any vertex that is not next to 0.
 
 #[cfg(test)]
 mod reference;
@@ -44,17 +42,16 @@ pub struct Candidates4 {
     pub rival: [f32; LEAF],
 }
 
-/// Rounding moves a triangle by at most this much against the ray, in unit
-/// lengths.
+/// The most that rounding displaces a triangle relative to the ray, in unit lengths.
 ///
-/// In units u = 2^-24, per component, coordinates of vertices at most 1 and of
-/// origins at most 2: vertex u, origin u, their difference 2u, direction 3.5u
-/// over a chord of 3.5; twice that through the shear (|Sx| <= 1): 15u. The
-/// shear's own arithmetic: 8u, the rounding of Sx: 5.5u, edge functions over
-/// edges of at most 2: 8u. Together 36.5u sideways; along the ray
-/// 1.74 * 7.5u and 4u * 3.5 of the division: 27u. Of a ray that is made in whole
-/// numbers ([`aim`](super::aim)), the origin counts 5.5u, and the direction 0.6u a unit
-/// length, 2.2u over 3.55: 10.7u where the others have 7.5u, so 43u sideways and 33u
+/// In units u = 2^-24, for each component, with coordinates of vertices at most 1 and of origins at
+/// most 2: u for the vertex, u for the origin, 2u for their difference, and 3.5u for the direction
+/// over a chord of 3.5, in sum 7.5u. The shear (|Sx| <= 1) doubles that to 15u. Its own arithmetic
+/// adds 8u, the rounding of Sx 5.5u, and edge functions over edges of at most 2 add 8u: 36.5u
+/// sideways. Along the ray it is 1.74 x 7.5u, and 3.5 x 4u for the division: 27u.
+///
+/// For a ray made in integers ([`aim`](super::aim)), the origin counts 5.5u, and the direction 0.6u
+/// over each unit length, 2.2u over 3.55. The sum is 10.7u instead of 7.5u: 43u sideways and 33u
 /// along the ray. All are below 48u.
 pub const DISPLACEMENT: f32 = 48.0 / 16_777_216.0;
 

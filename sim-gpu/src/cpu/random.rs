@@ -13,9 +13,8 @@ pub fn random_bits(stream: StreamKey, beam: u32, purpose: u32) -> [u32; 4] {
 /// A standard normal deviate from 32 random bits, by inversion: PPND7 of
 /// Wichura, "Algorithm AS 241", Applied Statistics 37(3), 1988, seven digits.
 ///
-/// The top bit is the sign, the others a tail probability in (0, 1/2), at
-/// least 2^-33: deviates reach 6.3 standard deviations, and the algorithm's
-/// third branch (beyond 7) is never needed.
+/// The top bit is the sign, the others a tail probability in (0, 1/2), at least 2^-33: deviates
+/// reach 6.3 standard deviations, and the algorithm's third branch (beyond 7) is never needed.
 #[must_use]
 pub fn normal_deviate(bits: u32) -> f64 {
     const PER_2_32: f64 = 1.0 / 4_294_967_296.0;

@@ -7,8 +7,7 @@ use glam::DVec3;
 pub struct Mesh {
     /// Vertex positions in the file's units, `[n_vertices]`, all finite.
     pub vertices: Vec<DVec3>,
-    /// Corners as indices into `vertices`, `[n_triangles, 3]`, in the file's
-    /// order; all in range.
+    /// Corners as indices into `vertices`, `[n_triangles, 3]`, in the file's order; all in range.
     pub triangles: Vec<[u32; 3]>,
 }
 

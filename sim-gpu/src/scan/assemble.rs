@@ -1,4 +1,4 @@
-//! From hits to the points of a scan: effects, clipping, attributes.
+//! Assembles a scan from hits: returns, their selection by the profile, and attributes.
 
 use super::echo::Source;
 use super::hit_effects::HitEffects;

@@ -83,8 +83,7 @@ impl Echo {
     }
 }
 
-/// Sorts echoes by range, and merges each with the next if they lie less than `separation_m`
-/// apart.
+/// Sorts echoes by range, and merges each with the next if they lie less than `separation_m` apart.
 ///
 /// A receding slope is thus one echo however long it is: its pulse has no gap.
 pub(super) fn merge(echoes: &mut Vec<Echo>, separation_m: f64) {

@@ -1,16 +1,14 @@
-//! The power of a return, and what follows from it, in f64.
+//! The power of a return, its detection and its calibrated reflectivity, in f64.
 //!
-//! Power is relative to what is received from a white surface that faces the sensor 1 m
-//! away, in clear air:
+//! Power is relative to that of a white surface that faces the sensor at 1 m in clear air:
 //!
 //! ```text
 //! P = rho cos(theta) / R^2
 //! ```
 //!
-//! for a surface that scatters by Lambert's law, wider than the beam: rho its
-//! reflectivity, theta the incidence, R the range. It stands here and in no shader: the
-//! range is known in f64 only once it is resolved, and a threshold must fall alike on
-//! every adapter.
+//! for a surface that scatters by Lambert's law and fills the beam, with reflectivity rho, incidence
+//! theta and range R. Shaders do not compute it: the range is known in f64 only after casting, and
+//! every adapter must detect the same returns.
 
 use crate::cpu::random::{normal_deviate, random_bits};
 use crate::effects::Detection;
@@ -18,20 +16,20 @@ use crate::material::Material;
 use crate::sensor::DetectionLimit;
 use formats::rng::StreamKey;
 
-/// Which random bits of a beam are the receiver's noise and the error of its timing.
+/// Selects the random bits of a beam for the receiver's noise and the error of its timing.
 const RECEIVER_PURPOSE: u32 = 3;
 
-/// Diffuse reflectivities in percent; retro-reflectors take the rest of a byte: VLP-32C
-/// User Manual 63-9325, 6.1.
+/// Calibrated reflectivities: percent for diffuse surfaces, the rest of a byte for retro-reflectors.
+/// VLP-32C User Manual 63-9325, 6.1.
 const WHITE: f64 = 100.0;
 const LEAST_RETRO: f64 = 101.0;
 const IDEAL_RETRO: f64 = 255.0;
 
-/// How bright a surface is whose normal has this `cosine` to the beam, 0 to 1: a white one that
-/// faces the sensor is 1.
+/// The brightness, 0 to 1, of a surface whose normal has this `cosine` to the beam. A white surface
+/// that faces the sensor has 1.
 ///
-/// So is a retro-reflector at any incidence. It returns far more than that; how much no
-/// maker states, so that this is a lower bound.
+/// A retro-reflector has 1 at any incidence. That is a lower bound: it returns far more, but makers do
+/// not state how much.
 pub(super) fn brightness(material: Material, cosine: impl FnOnce() -> f64) -> f64 {
     if material.retroreflection > 0.0 {
         return 1.0;
@@ -41,11 +39,11 @@ pub(super) fn brightness(material: Material, cosine: impl FnOnce() -> f64) -> f6
 
 /// The power received from a surface of this brightness at this range.
 pub(super) fn received(brightness: f64, range_m: f64) -> f64 {
-    // Nothing is received of black, even where the sensor touches it.
+    // A black surface returns nothing, even at range 0.
     if brightness == 0.0 { 0.0 } else { brightness / (range_m * range_m) }
 }
 
-/// The byte that a sensor with calibrated reflectivity reports.
+/// The calibrated reflectivity that a sensor reports.
 pub(super) fn calibrated(brightness: f64, retroreflection: f64) -> u8 {
     let byte = match retroreflection {
         retro if retro > 0.0 => LEAST_RETRO + (IDEAL_RETRO - LEAST_RETRO) * retro,
@@ -69,9 +67,9 @@ pub(super) fn is_detected(
     power + noise * limit.power() >= limit.power()
 }
 
-/// The error that the receiver's noise gives the range of a return that is detected with
-/// this power, metres. A pulse's time is known to 1/sqrt(2 SNR) of its length: the standard
-/// deviation falls as the square root of the power. The limit is the least power that counts.
+/// The error of the range of a detected return of this power due to the receiver's noise, metres. The
+/// time of a pulse is measured to 1/sqrt(2 SNR) of its length, so that the standard deviation falls
+/// as the square root of the power. Powers below the limit count as the limit.
 pub(super) fn range_error(
     sigma_at_limit_m: f64,
     limit: &DetectionLimit,

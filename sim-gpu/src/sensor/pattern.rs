@@ -49,8 +49,7 @@ impl<'a> IntoIterator for &'a Directions {
 pub struct BeamPattern {
     /// Unit vectors in the sensor frame, `[n_rays]`.
     pub directions: Directions,
-    /// Rank by elevation, 0 from below; for a camera the row from below,
-    /// `[n_rays]`.
+    /// Rank by elevation, 0 from below; for a camera the row from below, `[n_rays]`.
     pub ring: Vec<u16>,
     /// Time since the start of the revolution, `[n_rays]`.
     pub time_s: Vec<f64>,

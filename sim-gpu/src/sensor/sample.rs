@@ -14,9 +14,8 @@ pub struct Sample {
     /// Whether a point may be drawn more than once. If not, a scan with fewer points keeps them
     /// all.
     pub with_replacement: bool,
-    /// The number of points drawn before the points are snapped to rings: without replacement
-    /// from a scan that has as many, with replacement from a smaller one (ModelNet40-C,
-    /// `occlusion_1`).
+    /// The number of points drawn before the points are snapped to rings: without replacement from
+    /// a scan that has as many, with replacement from a smaller one (ModelNet40-C, `occlusion_1`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub before_rings: Option<u32>,
 }

@@ -22,8 +22,7 @@ pub struct Uniform {
     pub elevation_to_deg: f64,
     /// Number of elevations.
     pub elevation_steps: u32,
-    /// Revolutions per minute, for the time of each column; if absent, all rays are cast at time
-    /// 0.
+    /// Revolutions per minute, for the time of each column; if absent, all rays are cast at time 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rpm: Option<f64>,
 }
@@ -71,8 +70,7 @@ impl Uniform {
     }
 }
 
-/// `steps` numbers evenly spaced from `from` to `to`, both included; only
-/// `from` for one step.
+/// `steps` numbers evenly spaced from `from` to `to`, both included; only `from` for one step.
 pub(super) fn linear_steps(from: f64, to: f64, steps: u32) -> impl Iterator<Item = f64> {
     let last = steps.saturating_sub(1);
     let step = (to - from) / f64::from(last.max(1));
