@@ -33,6 +33,16 @@ use crate::sway::Sway;
 const FROM_KERB_M: f64 = 2.3;
 
 /// A sensor that drives along a street.
+///
+/// ```
+/// # fn drive(stage: &edgepuck_scenes::Stage) -> Result<(), edgepuck_scenes::SceneError> {
+/// let mut drive = edgepuck_scenes::Drive::new(stage, 5.0)?;
+/// for packet in drive.fire(0..150)? {
+///     println!("{} points", packet.scan.len());
+/// }
+/// # Ok(())
+/// # }
+/// ```
 pub struct Drive<'a> {
     pub(crate) street: Street<'a>,
     sensor: Sensor,

@@ -15,6 +15,11 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
+    /// A rectangle along x and y.
+    pub(crate) fn level(centre: DVec2, half: DVec2) -> Self {
+        Self { centre, half, yaw_rad: 0.0 }
+    }
+
     /// Whether the two rectangles overlap or nearly touch, by the separating axis theorem.
     pub(crate) fn meets(&self, other: &Self) -> bool {
         let between = other.centre - self.centre;

@@ -6,7 +6,7 @@ use edgepuck_shapes::Sampler;
 use glam::{DVec2, DVec3};
 
 use crate::footprint::Footprint;
-use crate::ground::{Ground, OWN_RADIUS_M, PAVEMENT_M};
+use crate::ground::{Ground, PAVEMENT_M};
 use crate::lanes::Lane;
 use crate::placed_object::PlacedObject;
 use crate::recipe::{Objects, Place, Span};
@@ -48,42 +48,15 @@ struct Unplaced {
 }
 
 impl<'a> Placer<'a> {
-    /// Starts a scene, in which the sensor's own vehicle has its place.
-    pub(crate) fn new(stage: &'a Stage, ground: &'a Ground, s: &'a mut Sampler) -> Self {
-        let half = DVec2::splat(OWN_RADIUS_M);
-        let taken = vec![Footprint { centre: DVec2::ZERO, half, yaw_rad: 0.0 }];
-        Self { stage, ground, s, taken, half_length_m: f64::INFINITY, objects: Vec::new() }
-    }
-
-    /// Starts a block of a street, `length_m` long, in which the sensor's way and the `lanes` stay
-    /// free.
-    pub(crate) fn in_block(
+    /// Starts without objects. The places in `taken` stay free.
+    pub(crate) fn new(
         stage: &'a Stage,
         ground: &'a Ground,
         s: &'a mut Sampler,
-        length_m: f64,
-        lanes: &[Lane],
+        half_length_m: f64,
+        taken: Vec<Footprint>,
     ) -> Self {
-        let half_length_m = length_m / 2.0;
-        let strip = |y_m: f64, half_m: f64| Footprint {
-            centre: DVec2::new(0.0, y_m),
-            half: DVec2::new(half_length_m, half_m),
-            yaw_rad: 0.0,
-        };
-        let mut taken = vec![strip(0.0, OWN_RADIUS_M)];
-        taken.extend(lanes.iter().map(|lane| strip(lane.y_m, lane.half_m)));
         Self { stage, ground, s, taken, half_length_m, objects: Vec::new() }
-    }
-
-    /// Starts a block of a lane, `length_m` long.
-    pub(crate) fn in_lane(
-        stage: &'a Stage,
-        ground: &'a Ground,
-        s: &'a mut Sampler,
-        length_m: f64,
-    ) -> Self {
-        let half_length_m = length_m / 2.0;
-        Self { stage, ground, s, taken: Vec::new(), half_length_m, objects: Vec::new() }
     }
 
     /// Places the objects of entry number `entry` of the recipe.

@@ -4,10 +4,11 @@ use std::f64::consts::TAU;
 
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use sim_gpu::pose::{Pose, Trajectory};
 
-use crate::ground::Ground;
+use crate::footprint::Footprint;
+use crate::ground::{Ground, OWN_RADIUS_M};
 use crate::place::Placer;
 use crate::placed_object::PlacedObject;
 use crate::stage::Stage;
@@ -52,7 +53,8 @@ impl Scene {
         // A key of its own, so that a moving sensor sees the same scene as one at rest.
         let speed_m_s = recipe.mount.speed_m_s.at(stream("speed").unit(0));
         let velocity_m_s = ground.along(speed_m_s);
-        let mut placer = Placer::new(stage, &ground, s);
+        let own = Footprint::level(DVec2::ZERO, DVec2::splat(OWN_RADIUS_M));
+        let mut placer = Placer::new(stage, &ground, s, f64::INFINITY, vec![own]);
         (0..recipe.object.len()).for_each(|entry| placer.place(entry));
         let objects = placer.objects;
         Self {

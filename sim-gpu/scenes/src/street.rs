@@ -5,11 +5,12 @@ use std::ops::RangeInclusive;
 
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use sim_gpu::bvh::Builder;
 use sim_gpu::target::Target;
 
-use crate::ground::Ground;
+use crate::footprint::Footprint;
+use crate::ground::{Ground, OWN_RADIUS_M};
 use crate::lanes::{Lane, lanes};
 use crate::model::target;
 use crate::place::Placer;
@@ -110,10 +111,16 @@ impl<'a> Street<'a> {
         let lane = layer.checked_sub(1).map(|i| &lanes[i]);
         let name = format!("drive/block/{layer}");
         let s = &mut Sampler::new(StreamKey::new(stage.seed(), &name, number as u32));
-        let mut placer = match lane {
-            None => Placer::in_block(stage, ground, s, *block_m, lanes),
-            Some(_) => Placer::in_lane(stage, ground, s, *block_m),
-        };
+        let half_m = block_m / 2.0;
+        let mut taken = Vec::new();
+        if lane.is_none() {
+            let strip = |y_m, half_y_m| {
+                Footprint::level(DVec2::new(0.0, y_m), DVec2::new(half_m, half_y_m))
+            };
+            taken.push(strip(0.0, OWN_RADIUS_M));
+            taken.extend(lanes.iter().map(|lane| strip(lane.y_m, lane.half_m)));
+        }
+        let mut placer = Placer::new(stage, ground, s, half_m, taken);
         for (entry, objects) in stage.recipe().object.iter().enumerate() {
             let has_entry = |lane: &&Lane| lane.entries.contains(&entry);
             match lane {

@@ -15,42 +15,19 @@ use crate::{Drive, OTHER, Packet, Recipe, Scene, Sightings, Stage, label_cluster
 const RECIPE: &str = r#"
 variants = 3
 glass_returned = [0, 0]
+mount = { height_m = [1.8, 1.8], tilt_deg = [1, 1], off_road_m = [0, 3] }
+sensor = [{ profile = "vlp16", noise_m = 0 }]
+object = [
+  { kind = "car", class = "car", count = [4, 6], place = "parked", distance_m = [3, 20] },
+  { kind = "person", class = "person", count = [4, 8], place = "pavement", distance_m = [2, 12] },
+  { kind = "hedge", class = "bush", count = [2, 4], place = "line", distance_m = [3, 20] },
+  { kind = "pole", class = "pole", count = [3, 5], place = "anywhere", distance_m = [3, 15] },
+]
 [ground]
 slope_deg = [2, 2]
 roughness_m = [0.01, 0.01]
 road_width_m = [8, 8]
 kerb_m = [0.12, 0.12]
-[mount]
-height_m = [1.8, 1.8]
-tilt_deg = [1, 1]
-off_road_m = [0, 3]
-[[sensor]]
-profile = "vlp16"
-noise_m = 0
-[[object]]
-kind = "car"
-class = "car"
-count = [4, 6]
-place = "parked"
-distance_m = [3, 20]
-[[object]]
-kind = "person"
-class = "person"
-count = [4, 8]
-place = "pavement"
-distance_m = [2, 12]
-[[object]]
-kind = "hedge"
-class = "bush"
-count = [2, 4]
-place = "line"
-distance_m = [3, 20]
-[[object]]
-kind = "pole"
-class = "pole"
-count = [3, 5]
-place = "anywhere"
-distance_m = [3, 15]
 "#;
 
 fn stage(recipe: &str) -> Stage {
@@ -72,7 +49,7 @@ fn a_scene_is_a_function_of_recipe_seed_and_number() {
 
 #[test]
 fn every_point_lies_on_its_surface() {
-    let moving = RECIPE.replace("off_road_m = [0, 3]", "off_road_m = [0, 3]\nspeed_m_s = [20, 20]");
+    let moving = RECIPE.replace("off_road_m = [0, 3]", "off_road_m = [0, 3], speed_m_s = [20, 20]");
     for (stage, number) in [(stage(RECIPE), 0), (stage(RECIPE), 1), (stage(&moving), 1)] {
         let scene = Scene::draw(&stage, number);
         let sweep = stage.sweep(&scene).unwrap();
@@ -162,8 +139,8 @@ fn glass_that_returns_nothing_leaves_holes_in_cars() {
 #[test]
 fn dark_objects_are_detected_at_shorter_ranges() {
     let with = |effects: &str, reflectivity: &str| {
-        let text = RECIPE.replacen("noise_m = 0", &format!("noise_m = 0\n{effects}"), 1);
-        let text = text.replace("kind = \"car\"", &format!("kind = \"car\"\n{reflectivity}"));
+        let text = RECIPE.replacen("noise_m = 0", &format!("noise_m = 0{effects}"), 1);
+        let text = text.replace("kind = \"car\"", &format!("kind = \"car\"{reflectivity}"));
         let stage = stage(&text);
         let scene = Scene::draw(&stage, 3);
         let scan = stage.sweep(&scene).unwrap().scan;
@@ -175,10 +152,10 @@ fn dark_objects_are_detected_at_shorter_ranges() {
         let of_cars = ranges_m.iter().zip(scan.object.unwrap()).filter(|(_, o)| is_car(*o));
         (ranges_m.len(), of_cars.map(|(range_m, _)| *range_m).fold(0.0, f32::max))
     };
-    let limit = "effects = { detection = { reflectivity = 1, range_m = 20 } }";
+    let limit = ", effects = { detection = { reflectivity = 1, range_m = 20 } }";
     let (all, farthest_m) = with("", "");
     let (near, white_m) = with(limit, "");
-    let (_, dark_m) = with(limit, "reflectivity = [0.09, 0.09]");
+    let (_, dark_m) = with(limit, ", reflectivity = [0.09, 0.09]");
     assert!(near < all && farthest_m >= white_m && white_m <= 20.0, "{near} of {all}");
     // 0.09 / 6^2 is 1 / 20^2.
     assert!(0.0 < dark_m && dark_m <= 6.0 && dark_m < white_m, "{dark_m} m, {white_m} m");
@@ -223,12 +200,12 @@ fn an_invalid_recipe_gives_an_error_with_the_key_and_the_cause() {
         ),
         (
             "distance_m = [2, 12]",
-            "distance_m = [2, 12]\nspeed_m_s = [-1, 1]",
+            "distance_m = [2, 12], speed_m_s = [-1, 1]",
             "object[1].speed_m_s: expected two ascending",
         ),
         (
             "place = \"parked\"",
-            "place = \"parked\"\nspeed_m_s = [1, 2]",
+            "place = \"parked\", speed_m_s = [1, 2]",
             "object[0].speed_m_s: expected with place = road or pavement, found \"parked\"",
         ),
         (
@@ -260,10 +237,10 @@ fn an_invalid_recipe_gives_an_error_with_the_key_and_the_cause() {
 /// The recipe with walking persons and moving cars.
 fn drive_recipe() -> String {
     let walking =
-        RECIPE.replace("distance_m = [2, 12]", "distance_m = [2, 12]\nspeed_m_s = [1, 2]");
-    let cars = "[[object]]\nkind = \"car\"\nclass = \"car\"\ncount = [3, 5]\nplace = \"road\"\n\
-                distance_m = [3, 20]\nspeed_m_s = [8, 10]\n";
-    walking.replace("vlp16", "vlp32c") + cars
+        RECIPE.replace("distance_m = [2, 12]", "distance_m = [2, 12], speed_m_s = [1, 2]");
+    let cars = "{ kind = \"car\", class = \"car\", count = [3, 5], place = \"road\", \
+                distance_m = [3, 20], speed_m_s = [8, 10] }\n]\n[ground]";
+    walking.replace("vlp16", "vlp32c").replace("]\n[ground]", cars)
 }
 
 /// The first `n` packets of a drive at 6 m/s, fired in batches of `batch`.

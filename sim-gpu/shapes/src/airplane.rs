@@ -5,9 +5,7 @@ mod fuselage;
 mod jet;
 mod wing;
 
-use glam::DVec3;
-
-use crate::primitives::{Builder, Makes, Sampler};
+use crate::primitives::{Builder, DVec3, Makes, Sampler};
 use details::{gear, jet_engine, propeller, struts};
 use fuselage::Fuselage;
 use jet::{delta, fighter};

@@ -1,16 +1,15 @@
 //! Bottles, flasks, jars, jugs and dispensers.
 
-use glam::{DAffine3, DVec3};
-
 use crate::primitives::{
-    Builder, Profile, Sampler, Section, Vessel, Wall, block, cylinder, frustum, smooth_tube,
+    Builder, DAffine3, DVec3, Profile, Sampler, Section, Vessel, Wall, block, cylinder, frustum,
+    smooth_tube,
 };
 
 /// Radii and heights of a bottle.
 struct Form {
     body_m: f64,
     neck_m: f64,
-    /// Where the shoulder begins, where the neck does, where the mouth is.
+    /// The heights where the shoulder begins and where the neck begins.
     shoulder_at_m: f64,
     neck_at_m: f64,
     height_m: f64,
@@ -75,7 +74,7 @@ fn outside(s: &mut Sampler, f: &Form) -> Profile {
     shoulder(s, profile, f)
 }
 
-/// A side with four ribs; `at` gives the height at a share of the side.
+/// A side with four ribs; `at` returns the height at a share of the side.
 fn ribs(mut profile: Profile, f: &Form, at: impl Fn(f64) -> f64) -> Profile {
     for rib in 0..4 {
         let at = |share: f64| at((rib as f64 + share) / 4.0);
@@ -88,7 +87,7 @@ fn ribs(mut profile: Profile, f: &Form, at: impl Fn(f64) -> f64) -> Profile {
     profile
 }
 
-/// The shoulder, round or sloping or stepped, and the neck with its lip.
+/// A round, sloping or stepped shoulder, and the neck with its lip.
 fn shoulder(s: &mut Sampler, profile: Profile, f: &Form) -> Profile {
     let between = |share: f64| f.shoulder_at_m + share * (f.neck_at_m - f.shoulder_at_m);
     let radius = |share: f64| f.neck_m + share * (f.body_m - f.neck_m);

@@ -1,10 +1,8 @@
 //! Bowls.
 
-use glam::DVec3;
+use crate::primitives::{Builder, DVec3, Profile, Sampler, Section, Vessel, Wall, smooth, tube};
 
-use crate::primitives::{Builder, Profile, Sampler, Section, Vessel, Wall, smooth, tube};
-
-/// Builds a bowl; deep ones have a cup's or a vase's proportions.
+/// Builds a bowl. Deep bowls have the proportions of cups or vases.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let rim_m = s.log_uniform(0.05, 0.2);
     let height_m = rim_m * s.log_uniform(0.3, 1.5);
@@ -27,8 +25,8 @@ fn section(s: &mut Sampler) -> Section {
     s.weighted(&[(6, Section::Round), (1, oval), (1, square), (1, polygon), (1, fluted)])
 }
 
-/// The outside, from radii at the rim and the foot, and the heights of the
-/// rim and of the ring it stands on.
+/// The outer profile from the radii of the rim and the foot, and the heights of the rim and of the
+/// ring that the bowl stands on.
 fn outside(s: &mut Sampler, [rim_m, foot_m]: [f64; 2], [height_m, ring_m]: [f64; 2]) -> Profile {
     let ring_foot_m = foot_m * s.uniform(0.9, 1.3);
     let depth_m = height_m - ring_m;
@@ -45,7 +43,7 @@ fn outside(s: &mut Sampler, [rim_m, foot_m]: [f64; 2], [height_m, ring_m]: [f64;
     let flared = curve([(between(0.45), at(0.25)), (between(0.6), at(0.75)), rim]);
     let closing = curve([(between(0.75), at(0.25)), (rim_m, at(0.6)), (0.85 * rim_m, height_m)]);
     let conical = profile.line(rim_m, height_m);
-    // The chance of a lip, and where it ends over the rim's radius and height.
+    // The probability of a lip, and its end over the radius and the height of the rim.
     let (profile, lip) = s.weighted(&[
         (3, (round, Some((0.3, 1.15, 1.01)))),
         (1, (conical, None)),

@@ -1,4 +1,4 @@
-//! Collects the surfaces of a shape at one fineness of tessellation.
+//! Collects the surfaces of a shape, tessellated at a given edge length.
 
 use std::ops::Range;
 
@@ -8,8 +8,8 @@ use sim_gpu::mesh::Mesh;
 
 /// A mesh under construction.
 ///
-/// Primitives ask it how finely to divide and hand it grids of points, which
-/// it places by the current placement.
+/// Primitives ask the builder for the number of segments and pass it grids of points, which it
+/// transforms by the current placement.
 #[derive(Clone, Debug)]
 pub struct Builder {
     mesh: Mesh,
@@ -21,8 +21,8 @@ pub struct Builder {
 }
 
 impl Builder {
-    /// Starts empty. Curved surfaces get edges of about `edge_m`, flat ones of
-    /// `edge_m * flat_ratio`; infinity gives the coarsest mesh there is.
+    /// Starts with an empty mesh. Curved surfaces get edges of about `edge_m`, flat ones of
+    /// `flat_ratio` times that; infinity gives the coarsest mesh.
     pub fn new(edge_m: f64, flat_ratio: f64) -> Self {
         Self {
             mesh: Mesh::default(),
@@ -34,12 +34,12 @@ impl Builder {
         }
     }
 
-    /// How many triangles there are so far.
+    /// The number of triangles so far.
     pub fn n_triangles(&self) -> usize {
         self.mesh.triangles.len()
     }
 
-    /// What was built so far.
+    /// The mesh so far.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
@@ -49,14 +49,14 @@ impl Builder {
         (self.mesh, self.parts)
     }
 
-    /// Builds panes of glass: what `build` adds is of this material.
+    /// Runs `build`, whose triangles are glass.
     pub fn glass(&mut self, build: impl FnOnce(&mut Self)) {
         let start = self.n_triangles();
         build(self);
         self.glass.push(start..self.n_triangles());
     }
 
-    /// The mesh with the triangles of glass moved to its end, and their place.
+    /// The mesh with the triangles of glass last, and their range.
     pub fn finish_with_glass(self) -> (Mesh, Range<u32>) {
         let Self { mut mesh, glass, .. } = self;
         let is_glass = |i: usize| glass.iter().any(|range| range.contains(&i));
@@ -70,7 +70,7 @@ impl Builder {
         (mesh, first..end)
     }
 
-    /// Runs `build` in the frame that `frame` places in the present one.
+    /// Runs `build` in `frame`, which is relative to the current frame.
     pub fn place(&mut self, frame: DAffine3, build: impl FnOnce(&mut Self)) {
         let outer = self.placement;
         self.placement = outer * frame;
@@ -78,7 +78,7 @@ impl Builder {
         self.placement = outer;
     }
 
-    /// Runs `build` in a frame whose origin is at `origin`.
+    /// Runs `build` in a frame at `origin`.
     pub fn shifted(&mut self, origin: DVec3, build: impl FnOnce(&mut Self)) {
         self.place(DAffine3::from_translation(origin), build);
     }
@@ -100,26 +100,26 @@ impl Builder {
         self.place(DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0)), build);
     }
 
-    /// Segments for a circle of `radius_m`, at least `least`.
+    /// The number of segments of a circle of `radius_m`, at least `least`.
     pub fn around(&self, radius_m: f64, least: usize) -> usize {
         self.curved(std::f64::consts::TAU * radius_m, least)
     }
 
-    /// Segments for a curve of `length_m`, at least `least`.
+    /// The number of segments of a curve of `length_m`, at least `least`.
     pub fn curved(&self, length_m: f64, least: usize) -> usize {
         ((length_m / self.edge_m).round() as usize).max(least)
     }
 
-    /// Segments for a straight edge of `length_m`, at least one.
+    /// The number of segments of a straight edge of `length_m`, at least one.
     pub fn straight(&self, length_m: f64) -> usize {
         ((length_m / self.flat_edge_m).round() as usize).max(1)
     }
 
-    /// Adds the surface through rows of points as a part of its own.
+    /// Adds the surface through rows of points, as a separate part.
     ///
-    /// Rows hold the same number of points, or one (a pole). `wrap` joins the
-    /// last point of each row to its first. Front faces look along
-    /// (direction in a row) x (direction from row to row).
+    /// All rows have the same number of points, or one point, which makes a fan. `wrap` joins the
+    /// last point of each row to its first. Front faces look along (direction in a row) x
+    /// (direction from row to row).
     pub fn grid(&mut self, rows: &[Vec<DVec3>], wrap: bool) {
         self.parts.push(self.mesh.triangles.len());
         let mut below: Option<(u32, u32)> = None;

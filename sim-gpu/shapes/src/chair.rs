@@ -1,15 +1,13 @@
-//! Chairs: a seat, what carries it, a back, perhaps arms.
+//! Chairs: a seat on a base, with a back and sometimes arms.
 
 mod back;
 mod base;
 
-use glam::{DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Sampler, bar, block_between, cushion, outline, prism, rod, smooth, tube,
+    Builder, DVec2, DVec3, Sampler, bar, block_between, cushion, outline, prism, rod, smooth, tube,
 };
 
-/// The seat, which everything else is fitted to. The chair faces -y.
+/// The seat of a chair that faces -y. All other parts are fitted to it.
 struct Seat {
     half: DVec2,
     /// Height of the seat's upper side.
@@ -18,7 +16,7 @@ struct Seat {
     shape: Shape,
 }
 
-/// The make of a seat.
+/// The form of a seat.
 #[derive(Clone, Copy, PartialEq)]
 enum Shape {
     Board,
@@ -27,12 +25,12 @@ enum Shape {
     Round,
 }
 
-/// The make of a pair of arms.
+/// The form of a pair of arms.
 #[derive(Clone, Copy, PartialEq)]
 enum Arms {
     /// A rest on two posts.
     Posts,
-    /// A tube up from the seat and down to it.
+    /// A tube that rises from the seat and returns to it.
     Loop,
     /// A tube from the seat's front to the back.
     Bent,
@@ -54,20 +52,20 @@ impl Seat {
         self.top_m - self.thick_m
     }
 
-    /// Where legs stand, as half the sides of a rectangle.
+    /// Half the size of the rectangle at whose corners the legs stand.
     fn legs_half(&self, inset_m: f64) -> DVec2 {
         let share = if self.shape == Shape::Round { 0.68 } else { 0.95 };
         share * self.half - inset_m
     }
 
-    /// Half the width of the seat where it is `y` behind its middle, a little
-    /// less so that what is fixed there has hold.
+    /// Half the width of the seat at `y` behind its middle, reduced a little so that parts fixed
+    /// there overlap the seat.
     fn side_m(&self, y: f64) -> f64 {
         let share = if self.shape == Shape::Round { y / self.half.y } else { 0.0 };
         0.96 * self.half.x * (1.0 - share * share).max(0.0).sqrt()
     }
 
-    /// How far behind the seat's middle its back stands.
+    /// The distance of the back behind the middle of the seat.
     fn rear_m(&self) -> f64 {
         self.half.y * if self.shape == Shape::Round { 0.68 } else { 0.9 }
     }
@@ -104,7 +102,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Arm rests on posts, as loops of tube, or bent down to the front.
+/// Arms on posts, as loops of tube, or bent down to the front.
 fn arms(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let z = seat.top_m + s.uniform(0.16, 0.26);
     let x = seat.half.x + s.uniform(0.0, 0.03);
@@ -136,7 +134,7 @@ fn arms(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     });
 }
 
-/// An upholstered block: base, cushion, two thick arms and a thick back.
+/// An upholstered armchair: a base, a cushion, two thick arms and a thick back.
 fn club_chair(b: &mut Builder, s: &mut Sampler) {
     let inner_m = s.uniform(0.22, 0.34);
     let arm_m = s.uniform(0.06, 0.18);

@@ -1,6 +1,6 @@
 //! The classes of shapes.
 
-use crate::primitives::{Builder, Makes, Sampler, build_one};
+use crate::primitives::Makes;
 use crate::{airplane, bottle, bowl, chair, cone, cup, lamp, monitor, table, vase};
 
 /// The makes of each class, and the fraction of its shapes that are rotated by a quarter or half
@@ -46,14 +46,9 @@ formats::named! {
 }
 
 impl ShapeClass {
-    /// Builds a shape that `s` draws, in the frame of the class.
-    pub(super) fn build(self, b: &mut Builder, s: &mut Sampler) {
-        build_one(FAMILIES[self as usize].0, b, s);
-    }
-
-    /// The probability that a shape of this class is rotated by a quarter or half turn.
-    pub(super) fn turn_chance(self) -> f64 {
-        FAMILIES[self as usize].1
+    /// The makes, and the probability that a shape is rotated by a quarter or half turn.
+    pub(super) fn family(self) -> (Makes, f64) {
+        FAMILIES[self as usize]
     }
 }
 

@@ -1,19 +1,17 @@
-//! Cones and what is called so: traffic cones, party hats, ice-cream cones.
+//! Cones: plain ones, traffic cones, party hats, ice-cream cones, funnels.
 
 use std::f64::consts::PI;
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Makes, Profile, Sampler, Section, Vessel, Wall, ellipsoid, outline, prism,
+    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, Vessel, Wall, ellipsoid,
+    outline, prism,
 };
 
 /// The makes, with their weights.
 pub const MAKES: Makes =
     &[(3, plain), (2, traffic_cone), (1, party_hat), (1, ice_cream), (1, funnel)];
 
-/// A cone or frustum, round or many-sided, closed or open below, upright or
-/// on its tip.
+/// A cone or frustum, round or many-sided, closed or open below, upright or on its tip.
 fn plain(b: &mut Builder, s: &mut Sampler) {
     let base_m = s.log_uniform(0.05, 1.0);
     let height_m = base_m * s.log_uniform(0.6, 5.0);
@@ -65,7 +63,7 @@ fn traffic_cone(b: &mut Builder, s: &mut Sampler) {
     profile.revolve(b, Section::Round);
 }
 
-/// A paper cone, open below, with or without a brim and a ball on top.
+/// A paper cone, open below, with or without a brim and a ball on its tip.
 fn party_hat(b: &mut Builder, s: &mut Sampler) {
     let base_m = s.uniform(0.05, 0.14);
     let height_m = base_m * s.uniform(1.3, 4.0);
@@ -96,7 +94,7 @@ fn ice_cream(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Two cones in one: a wide mouth above a narrow spout, open at both ends.
+/// A wide mouth above a narrow spout, open at both ends.
 fn funnel(b: &mut Builder, s: &mut Sampler) {
     let mouth_m = s.uniform(0.05, 0.2);
     let spout_m = mouth_m * s.uniform(0.08, 0.2);

@@ -1,17 +1,17 @@
 //! Cups, mugs, tumblers, goblets.
 
-use glam::{DVec2, DVec3};
-
-use crate::primitives::{Builder, Profile, Sampler, Section, Vessel, Wall, outline, smooth, sweep};
+use crate::primitives::{
+    Builder, DVec2, DVec3, Profile, Sampler, Section, Vessel, Wall, outline, smooth, sweep,
+};
 
 /// The body of a cup.
 struct Body {
     rim_m: f64,
     base_m: f64,
     height_m: f64,
-    /// How far the side bulges between base and rim, over the rim's radius.
+    /// The bulge of the side between base and rim, over the radius of the rim.
     bulge: f64,
-    /// Height of a stem under the body.
+    /// The height of a stem under the body; 0 without one.
     stem_m: f64,
 }
 
@@ -30,7 +30,7 @@ impl Body {
         }
     }
 
-    /// The outer radius and height at a share of the body's height.
+    /// The outer radius and the height at a share of the body's height.
     fn at(&self, share: f64) -> (f64, f64) {
         let bulge_m = 4.0 * share * (1.0 - share) * self.bulge * self.rim_m;
         let radius_m = self.base_m + share * (self.rim_m - self.base_m) + bulge_m;
@@ -54,7 +54,7 @@ impl Body {
     }
 }
 
-/// A foot disc and a thin stem that opens into the body's base.
+/// A foot and a thin stem that widens to the base of the body.
 fn stem(body: &Body) -> Profile {
     let thin_m = 0.12 * body.rim_m;
     Profile::from(0.0, 0.0)
@@ -87,7 +87,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     });
 }
 
-/// The dish under a cup; gives the height at which the cup stands.
+/// Builds the saucer under a cup and returns the height at which the cup stands.
 fn saucer(b: &mut Builder, s: &mut Sampler, body: &Body) -> f64 {
     let rim_m = body.rim_m * s.uniform(1.45, 2.0);
     let lift_m = 0.06 * rim_m;

@@ -1,4 +1,4 @@
-//! The last touches: budget, pose, and the disorder of real CAD.
+//! Finishes a shape: its number of triangles, its pose, and the defects of real CAD meshes.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -16,12 +16,12 @@ const MAX_TRIANGLES: usize = 50_000;
 /// Coordinates are multiples of this: a micrometre.
 const STEPS_PER_METRE: f64 = 1e6;
 
-/// What is decided about an instance besides its form.
+/// The properties of a shape apart from its form.
 #[derive(Clone, Debug)]
 pub struct Finish {
-    /// Triangles wanted before any are doubled.
+    /// The number of triangles before any are doubled.
     pub target_triangles: usize,
-    /// Edge length of flat surfaces over that of curved ones.
+    /// The edge length of flat surfaces over that of curved ones.
     pub flat_ratio: f64,
     yaw_rad: f64,
     winding: Winding,
@@ -29,7 +29,7 @@ pub struct Finish {
     vertices: Vertices,
 }
 
-/// Which way triangles look.
+/// The orientation of the triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Winding {
     AsBuilt,
@@ -38,7 +38,7 @@ enum Winding {
     SomeTrianglesInverted,
 }
 
-/// How corners share vertices.
+/// Which corners share a vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Vertices {
     SharedWithinParts,
@@ -47,15 +47,15 @@ enum Vertices {
 }
 
 impl Finish {
-    /// Draws a finish. The shares are near those counted in 21 ModelNet
-    /// meshes: two in three have some doubled faces, one in seven all; nearly
-    /// all have inconsistent winding.
+    /// Draws a finish. The frequencies are close to those in 21 meshes of ModelNet: two in three
+    /// have some doubled faces, one in seven only doubled faces; nearly all have inconsistent
+    /// winding.
     pub fn draw(class: ShapeClass, s: &mut Sampler) -> Self {
         use Vertices::{EachCornerItsOwn, Merged, SharedWithinParts};
         use Winding::{AsBuilt, Inverted, SomePartsInverted, SomeTrianglesInverted};
         let doubled_share = s.pick(&[0.0, 0.0, 0.0, 0.05, 0.2, 0.5, 1.0]);
         let wanted = s.log_uniform(1.1 * MIN_TRIANGLES as f64, MAX_TRIANGLES as f64);
-        let turned = s.chance(class.turn_chance());
+        let turned = s.chance(class.family().1);
         let turns = f64::from(if turned { s.pick(&[1, 2, 2, 3]) } else { 0 });
         Self {
             target_triangles: (wanted / (1.0 + doubled_share)).floor() as usize,
@@ -67,7 +67,7 @@ impl Finish {
         }
     }
 
-    /// Poses what was built and wears it.
+    /// Poses the mesh of `builder` and adds the defects.
     pub fn apply(&self, builder: Builder, s: &mut Sampler) -> Mesh {
         let (mut mesh, parts) = builder.finish();
         self.pose(&mut mesh);
@@ -82,13 +82,13 @@ impl Finish {
         mesh
     }
 
-    /// Turns the shape, stands it on z = 0 and rounds to the micrometre.
+    /// Rotates the shape, moves it to z = 0 and rounds it to micrometres.
     fn pose(&self, mesh: &mut Mesh) {
         let yaw = DQuat::from_rotation_z(self.yaw_rad);
         let lowest_m = mesh.vertices.iter().map(|v| v.z).fold(f64::INFINITY, f64::min);
         for vertex in &mut mesh.vertices {
             let stood = yaw * *vertex - lowest_m * DVec3::Z;
-            // Adding 0 turns -0 into 0, which text would tell apart.
+            // Adding 0 turns -0 into 0; text would show the sign.
             *vertex = (stood * STEPS_PER_METRE).round() / STEPS_PER_METRE + DVec3::ZERO;
         }
     }
@@ -107,7 +107,7 @@ impl Finish {
         }
     }
 
-    /// Adds the first triangles once more, looking the other way.
+    /// Adds a copy of the first triangles with the opposite winding.
     fn double(&self, mesh: &mut Mesh) {
         let n = (self.doubled_share * mesh.triangles.len() as f64).floor() as usize;
         let copies: Vec<_> = mesh.triangles[..n].iter().map(|&[a, b, c]| [a, c, b]).collect();
@@ -115,18 +115,18 @@ impl Finish {
     }
 }
 
-/// Leaves out triangles that rounding has made a line or a point.
+/// Removes triangles that rounding has reduced to a line or a point.
 fn drop_slivers(mesh: &mut Mesh) {
     let vertices = &mesh.vertices;
     mesh.triangles.retain(|t| {
         let [a, b, c] = t.map(|i| vertices[i as usize]);
-        // A triangle of a micrometre's height over a micrometre's base.
+        // Twice the area of a triangle with a base and a height of a micrometre.
         (b - a).cross(c - a).length() > STEPS_PER_METRE.powi(-2)
     });
 }
 
-/// Numbers vertices by first use. Corners whose `key` (of their number, their
-/// vertex, and their place in micrometres) is equal share a vertex.
+/// Numbers the vertices in the order of their first use. Corners with equal keys share a vertex;
+/// the arguments of `key` are the number of the corner, its vertex, and its place in micrometres.
 fn merge(mesh: &mut Mesh, key: impl Fn(i64, i64, [i64; 3]) -> [i64; 3]) {
     let mut numbers = BTreeMap::new();
     let mut vertices = Vec::new();

@@ -4,11 +4,9 @@ mod shade;
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Makes, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, frustum,
-    rod, smooth_tube,
+    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, Vessel, Wall, block,
+    cylinder, ellipsoid, frustum, rod, smooth_tube,
 };
 use shade::shade;
 
@@ -23,7 +21,7 @@ pub const MAKES: Makes = &[
     (1, pendant),
 ];
 
-/// A turned or plain body like a vase, with a shade above it.
+/// A body like that of a vase, with a shade above it.
 fn table_lamp(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(0.35, 0.75);
     let body_top_m = height_m * s.uniform(0.45, 0.65);
@@ -49,7 +47,7 @@ fn table_lamp(b: &mut Builder, s: &mut Sampler) {
     shade(b, s, height_m, radius_m, high_m);
 }
 
-/// A disc, a pole, and a shade below its end or a bowl of light above it.
+/// A foot, a pole, and a shade below its end or a bowl of light above it.
 fn floor_lamp(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(1.2, 1.9);
     let foot_m = height_m * s.uniform(0.07, 0.13);
@@ -89,7 +87,7 @@ fn tripod(b: &mut Builder, s: &mut Sampler) {
     shade(b, s, height_m, radius_m, 1.02 * (height_m - joint_m));
 }
 
-/// A tall curved arm with its shade far out.
+/// A tall curved arm with its shade at the end.
 fn arc_lamp(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(1.4, 2.1);
     let reach_m = height_m * s.uniform(0.35, 0.75);
@@ -104,7 +102,7 @@ fn arc_lamp(b: &mut Builder, s: &mut Sampler) {
     });
 }
 
-/// A lamp head: an open cone that looks along -z, its neck at the origin.
+/// A lamp head: an open cone that points to -z, with its neck at the origin.
 fn head(b: &mut Builder, s: &mut Sampler, size_m: f64) {
     let wide_m = size_m * s.uniform(0.6, 0.9);
     let neck_m = size_m * s.uniform(0.2, 0.3);

@@ -1,12 +1,11 @@
-//! Parametric shape families: ten classes named as in ModelNet40, so that a
-//! dataset can be made on a machine that has no CAD models.
+//! Procedural meshes of ten classes with ModelNet40's names, for datasets on machines without CAD
+//! models, and of [`objects`] of streets and rooms at real size.
 //!
-//! A shape is a pure function of (class, seed, instance). It is drawn in two
-//! steps: a class file puts primitives together after proportions of its own
-//! random stream, and `finish` wears the result the way CAD collections
-//! look: doubled faces, mixed winding, vertices merged or not. Proportions
-//! overlap between classes (a wide vase is a bowl), so that a classifier has
-//! to learn shapes and not sizes.
+//! A shape is a pure function of class, seed and number. [`generate`] makes it in two steps. The
+//! class draws proportions from the random stream of the shape and builds it from primitives. Then
+//! `finish` gives the mesh the defects of CAD collections: doubled faces, mixed winding, vertices
+//! that are shared or not. The proportions of the classes overlap (a wide vase is a bowl), so that
+//! a classifier must learn shapes instead of sizes.
 
 mod airplane;
 mod bottle;
@@ -33,28 +32,29 @@ mod write;
 mod tests;
 
 pub use class::ShapeClass;
+#[doc(hidden)]
 pub use sampler::Sampler;
-pub use tree::{TreeSummary, write_tree};
+pub use tree::write_tree;
 pub use write::{write_obj, write_off};
 
 use formats::rng::StreamKey;
 
 use finish::Finish;
+use primitives::build_one;
 use sim_gpu::mesh::Mesh;
 
-/// The shape that `seed` and `instance` give in `class`.
+/// Generates shape number `instance` of `class` under `seed`.
 ///
-/// Metres, z up, standing on z = 0 near the origin, azimuth as in ModelNet
-/// (chairs face -y, airplanes fly to -y, long tables lie along y) but for a
-/// yaw of up to 15 degrees and now and then a quarter or half turn. 200 to
-/// 50,000 triangles. Coordinates are whole micrometres, so that text holds
-/// them exactly.
+/// The mesh stands on z = 0 near the origin; lengths are metres, z is up. Directions follow
+/// ModelNet: chairs face -y, airplanes fly to -y, long tables lie along y; a yaw of up to 15
+/// degrees, and sometimes a quarter or half turn, is added. The mesh has 200 to 50,000 triangles.
+/// Coordinates are whole micrometres, so that text holds them exactly.
 #[must_use]
 pub fn generate(class: ShapeClass, seed: u64, instance: u32) -> Mesh {
     let stream = |part: &str| StreamKey::new(seed, &format!("shapes/{class}/{part}"), instance);
     let finish = Finish::draw(class, &mut Sampler::new(stream("finish")));
     let builder = tessellation::fit(&finish, |b| {
-        class.build(b, &mut Sampler::new(stream("form")));
+        build_one(class.family().0, b, &mut Sampler::new(stream("form")));
     });
     finish.apply(builder, &mut Sampler::new(stream("wear")))
 }

@@ -2,22 +2,20 @@
 
 mod screen;
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Makes, Sampler, bar, block, cap_start, cylinder, loft, outline, prism, rod, sheet,
-    skin,
+    Builder, DAffine3, DVec2, DVec3, Makes, Sampler, bar, block, cap_start, cylinder, loft,
+    outline, prism, rod, sheet, skin,
 };
 use screen::Screen;
 
-/// Builds what a flat screen stands on, up to the gap below the screen; the last
-/// argument is half the size of the foot.
+/// Builds the stand of a flat screen up to the gap below the screen. The last argument is half the
+/// size of the foot.
 type Stand = fn(&mut Builder, &mut Sampler, &Screen, f64, DVec2);
 
 /// The makes, with their weights.
 pub const MAKES: Makes = &[(4, flat), (2, tube_monitor), (1, pair)];
 
-/// One flat screen on a stand of some kind.
+/// A flat screen on a stand.
 fn flat(b: &mut Builder, s: &mut Sampler) {
     let screen = Screen::draw(s);
     let gap_m = screen.height_m * s.uniform(0.08, 0.4);
@@ -29,7 +27,7 @@ fn flat(b: &mut Builder, s: &mut Sampler) {
 }
 
 fn stand(b: &mut Builder, s: &mut Sampler, screen: &Screen, gap_m: f64) {
-    // The last are screens for the wall.
+    // The last one is for screens on a wall.
     let stand: Stand =
         s.pick(&[disc, disc, plate, plate, feet, bent_foot, wedge, |_, _, _, _, _| {}]);
     let foot = DVec2::new(0.35 * screen.height_m, screen.width_m * s.uniform(0.2, 0.35));
@@ -77,7 +75,7 @@ fn feet(b: &mut Builder, _: &mut Sampler, screen: &Screen, gap_m: f64, foot: DVe
     }
 }
 
-/// One bent sheet of metal: foot, bow and back support.
+/// A bent sheet of metal that is foot, bow and back support.
 fn bent_foot(b: &mut Builder, _: &mut Sampler, screen: &Screen, gap_m: f64, foot: DVec2) {
     let half_m = 0.6 * foot.y;
     let top_m = gap_m + 0.4 * screen.height_m;
@@ -107,12 +105,12 @@ fn tube_monitor(b: &mut Builder, s: &mut Sampler) {
     let back = s.uniform(0.45, 0.75);
     let foot_m = height_m * s.uniform(0.05, 0.15);
     cylinder(b, DVec3::ZERO, 0.3 * width_m, 0.5 * foot_m);
-    // The column ends inside the housing, wherever its underside is there.
+    // The column is long enough to end inside the housing.
     cylinder(b, 0.4 * foot_m * DVec3::Z, 0.15 * width_m, 0.6 * foot_m + 0.4 * height_m);
     let half = DVec2::new(0.5 * height_m, 0.5 * width_m);
     let section = |x: f64, scale: f64| -> Vec<DVec3> {
         let outline = outline::rounded_rectangle(half * scale, 0.08 * height_m * scale, 2);
-        // The outline's x runs down, so that it is counter-clockwise about +x.
+        // The x of the outline points down, so that the outline is counter-clockwise about +x.
         outline.iter().map(|p| DVec3::new(x, p.y, foot_m + half.x - p.x)).collect()
     };
     let waist = 0.5 * (1.0 + back);
@@ -141,7 +139,7 @@ fn picture(b: &mut Builder, centre: DVec3, size: DVec2, bulge_m: f64) {
     });
 }
 
-/// Two equal screens, turned to each other, on one pole or on a foot each.
+/// Two equal screens that face each other a little, on one pole.
 fn pair(b: &mut Builder, s: &mut Sampler) {
     let mut screen = Screen::draw(s);
     screen.width_m = s.uniform(0.4, 0.65);

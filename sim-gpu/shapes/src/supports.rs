@@ -1,27 +1,24 @@
-//! What furniture stands on: legs, pedestals, stars, crosses.
+//! Supports of furniture: legs, pedestals, stars, crosses.
 
 use std::f64::consts::TAU;
 
-use glam::{DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Profile, Sampler, Section, bar, block_between, cylinder, ellipsoid, loft, outline,
-    rod, smooth_tube, tube,
+    Builder, DVec2, DVec3, Profile, Sampler, Section, bar, block_between, cylinder, ellipsoid,
+    loft, outline, rod, smooth_tube, tube,
 };
 
-/// The make of a set of legs.
-#[derive(Clone, Copy, Debug)]
+/// The form of a set of legs.
 pub struct Legs {
     kind: LegKind,
-    /// Half the width of a leg where it meets the top.
+    /// Half the width of a leg at its top.
     half_width_m: f64,
-    /// Half the width at the floor over that at the top.
+    /// The width at the floor over that at the top.
     taper: f64,
-    /// How far the feet stand out beyond the tops, over the height.
+    /// The distance of the feet outwards from the tops, over the height.
     splay: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 enum LegKind {
     Square,
     Round,
@@ -31,7 +28,7 @@ enum LegKind {
 }
 
 impl Legs {
-    /// Draws the legs of a piece `height_m` high.
+    /// Draws the legs of a piece of furniture `height_m` high.
     pub fn draw(s: &mut Sampler, height_m: f64) -> Self {
         use LegKind::{Curved, Hairpin, Round, Square, Turned};
         let kind = s.weighted(&[(3, Square), (3, Round), (1, Turned), (1, Curved), (1, Hairpin)]);
@@ -46,12 +43,12 @@ impl Legs {
         }
     }
 
-    /// Half the width of a leg, by which tops stand in from an edge.
+    /// Half the width of a leg at its top, by which legs stand in from an edge.
     pub fn half_width_m(&self) -> f64 {
         self.half_width_m
     }
 
-    /// Where the leg under `top` meets the floor.
+    /// The point on the floor of the leg with this top.
     pub fn foot(&self, top: DVec3) -> DVec3 {
         let out = DVec2::new(top.x, top.y).normalize_or_zero() * self.splay * top.z;
         DVec3::new(top.x + out.x, top.y + out.y, 0.0)
@@ -90,7 +87,7 @@ fn turned_leg(b: &mut Builder, top: DVec3, r: f64) {
     b.shifted(top.with_z(0.0), |b| profile.revolve(b, Section::Round));
 }
 
-/// A leg that bows outwards at the knee and inwards above its foot.
+/// A leg that bends outwards at the knee and inwards above its foot.
 fn curved_leg(b: &mut Builder, top: DVec3, r: f64) {
     let out = top.with_z(0.0).normalize_or_zero() * top.z * 0.07;
     let at = |side: f64, height: f64| top.with_z(height * top.z) + side * out;
@@ -105,8 +102,8 @@ fn hairpin(b: &mut Builder, top: DVec3, foot: DVec3, r: f64) {
     }
 }
 
-/// Four legs under a rectangle of half size `half`, with stretchers between
-/// them at `stretcher` of the height if asked.
+/// Four legs under a rectangle of half size `half`, with stretchers between them at `stretcher` of
+/// the height, if given.
 pub fn four_legs(b: &mut Builder, legs: &Legs, half: DVec2, top_m: f64, stretcher: Option<f64>) {
     let tops = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
         .map(|(x, y)| DVec3::new(x * half.x, y * half.y, top_m));
@@ -121,7 +118,7 @@ pub fn four_legs(b: &mut Builder, legs: &Legs, half: DVec2, top_m: f64, stretche
     }
 }
 
-/// A foot disc, a column, and a plate under the top.
+/// A foot, a column, and a plate under the top.
 pub fn disc_pedestal(b: &mut Builder, s: &mut Sampler, foot_m: f64, height_m: f64) {
     let column_m = foot_m * s.uniform(0.07, 0.25);
     let thick_m = foot_m * s.uniform(0.03, 0.12);
@@ -141,7 +138,7 @@ pub fn disc_pedestal(b: &mut Builder, s: &mut Sampler, foot_m: f64, height_m: f6
     profile.line(0.0, height_m).revolve(b, Section::Round);
 }
 
-/// Arms from a hub to the floor, with castors or without, and a column.
+/// Arms from a hub to the floor, with or without castors, and a column.
 pub fn star_pedestal(b: &mut Builder, s: &mut Sampler, reach_m: f64, height_m: f64) {
     let n_arms = s.pick(&[3, 4, 4, 5, 5]);
     let castors = n_arms == 5 || s.chance(0.3);
@@ -162,8 +159,7 @@ pub fn star_pedestal(b: &mut Builder, s: &mut Sampler, reach_m: f64, height_m: f
     cylinder(b, hub_m * DVec3::Z, column_m, height_m - hub_m);
 }
 
-/// Two crossed pairs of boards, front and back or left and right, whose
-/// tops stand `half` from the middle.
+/// Two crossed pairs of boards, left and right, whose tops are `half` from the middle.
 pub fn crossed_legs(b: &mut Builder, half: DVec2, top_m: f64, width_m: f64) {
     for [side, lean] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
         let x = side * half.x + lean * 0.3 * width_m;
@@ -174,7 +170,7 @@ pub fn crossed_legs(b: &mut Builder, half: DVec2, top_m: f64, width_m: f64) {
     rod(b, end * DVec3::new(-1.0, 1.0, 1.0), end, [0.3 * width_m; 2]);
 }
 
-/// Two closed loops of tube, left and right, that lie on the floor.
+/// Two runners of tube, left and right, on the floor.
 pub fn sledge(b: &mut Builder, half: DVec2, top_m: f64, radius_m: f64) {
     let corners = [(1.0, top_m), (1.08, radius_m), (-1.08, radius_m), (-1.0, top_m)]
         .map(|(y, z)| DVec3::new(half.x, y * half.y, z));

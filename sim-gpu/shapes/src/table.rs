@@ -2,11 +2,11 @@
 
 mod desk;
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use desk::desk;
 
-use crate::primitives::{Builder, Sampler, bar, block, block_between, cap, outline, prism};
+use crate::primitives::{
+    Builder, DAffine3, DVec2, DVec3, Sampler, bar, block, block_between, cap, outline, prism,
+};
 use crate::supports::{
     Legs, crossed_legs, disc_pedestal, four_legs, side_panels, sledge, star_pedestal,
 };
@@ -15,7 +15,7 @@ use crate::supports::{
 struct Top {
     half: DVec2,
     height_m: f64,
-    /// 0 for glass, drawn as a single sheet.
+    /// The thickness; 0 for glass, which is a single sheet.
     thick_m: f64,
     shape: Shape,
 }
@@ -30,7 +30,7 @@ enum Shape {
     Oval,
 }
 
-/// What carries a top.
+/// The support of a top.
 #[derive(Clone, Copy)]
 enum Support {
     Legs,
@@ -44,7 +44,7 @@ enum Support {
 }
 
 impl Top {
-    /// From a stool's size to a banquet's; the long side lies along y.
+    /// Draws a top between the sizes of a stool and of a banquet table. The long side lies along y.
     fn draw(s: &mut Sampler) -> Self {
         use Shape::{Oval, Rectangle, Round, Rounded, Soft};
         let height_m = s.log_uniform(0.32, 1.05);
@@ -74,7 +74,7 @@ impl Top {
         matches!(self.shape, Shape::Rectangle | Shape::Rounded)
     }
 
-    /// The half size of the rectangle on whose corners legs stand.
+    /// Half the size of the rectangle at whose corners the legs stand.
     fn legs_half(&self, inset_m: f64) -> DVec2 {
         let share = if self.angular() { 0.96 } else { 0.66 };
         (share * self.half - inset_m).max(0.4 * self.half)
@@ -117,8 +117,8 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Builds with x and y exchanged by a quarter turn: supports are made for a
-/// piece that is wide along x.
+/// Builds with x and y exchanged by a quarter turn, because supports are made for furniture that is
+/// wide along x.
 fn turned(b: &mut Builder, build: impl FnOnce(&mut Builder)) {
     b.place(DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2), build);
 }

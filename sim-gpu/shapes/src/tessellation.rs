@@ -1,4 +1,4 @@
-//! Finds the fineness at which a shape has the triangles wanted.
+//! Finds the edge length at which a shape has the wanted number of triangles.
 
 use glam::DVec3;
 
@@ -7,15 +7,15 @@ use crate::primitives::Builder;
 use sim_gpu::mesh::Mesh;
 use sim_gpu::mesh::unit_frame::bounding_box;
 
-/// Trials before the best mesh so far is good enough.
+/// The greatest number of trials.
 const MAX_TRIALS: usize = 10;
-/// A mesh this close below its target is good enough.
+/// A mesh with this fraction of the wanted triangles is good enough.
 const CLOSE_ENOUGH: f64 = 0.93;
-/// Finer by this much each time while a mesh has too few triangles.
+/// The factor of the edge length after each mesh with too few triangles.
 const REFINEMENT: f64 = 0.85;
 
-/// Runs `build` at several finenesses; gives the mesh that comes nearest to
-/// the finish's target from below, or the coarsest if none is below.
+/// Runs `build` at several edge lengths. Returns the mesh with the most triangles up to the target
+/// of `finish`, or the coarsest mesh if all have more.
 pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
     let at = |edge_m: f64| {
         let mut builder = Builder::new(edge_m, finish.flat_ratio);
@@ -32,7 +32,8 @@ pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
         }
         let trial = at(edge_m);
         let n = trial.n_triangles() as f64;
-        // Triangles go with the square of the edge; overshoot a little less.
+        // The number of triangles grows with the inverse square of the edge. Aim a little below the
+        // target.
         let step = (n / (0.98 * target)).sqrt();
         edge_m *= step.clamp(0.25, 4.0);
         if n <= target && trial.n_triangles() > best.n_triangles() {
@@ -46,7 +47,7 @@ pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
     best
 }
 
-/// The box of the vertices: its lowest and highest corner.
+/// The lowest and the highest corner of the bounding box.
 pub fn bounds(mesh: &Mesh) -> [DVec3; 2] {
     bounding_box(mesh.vertices.iter().copied()).into()
 }

@@ -1,5 +1,5 @@
-//! What holds of every class: budgets, sizes, openness, variety, determinism,
-//! and classes that overlap and yet can be told apart.
+//! Properties of every class: numbers of triangles, sizes, open surfaces, variety, determinism, and
+//! separability.
 
 mod descriptors;
 mod separability;
@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use super::{ShapeClass, generate};
 use sim_gpu::mesh::Mesh;
 
-/// Instances looked at in each class.
+/// The number of tested shapes of each class.
 const INSTANCES: u32 = 200;
 const SEED: u64 = 11;
 
-/// Asserts `holds` of many instances of every class, on all cores.
+/// Runs the assertions `holds` on many shapes of every class, on all cores.
 fn for_all(holds: impl Fn(ShapeClass, u32, &Mesh) + Sync) {
     for class in ShapeClass::ALL {
         (0..INSTANCES).into_par_iter().for_each(|k| holds(class, k, &generate(class, SEED, k)));
@@ -35,9 +35,9 @@ fn triangle_counts_spread_evenly_over_their_decades() {
         ShapeClass::ALL.iter().flat_map(|class| (0..60).map(|k| (*class, k))).collect();
     let counts: Vec<usize> =
         all.into_par_iter().map(|(class, k)| generate(class, SEED, k).triangles.len()).collect();
-    // Log-uniform from 200 to 50,000: 29 % up to 1,000, 42 % up to 10,000, the
-    // rest above. Many parts cannot be drawn with few triangles, so the lowest
-    // share is smaller and the next larger; half of each must be there.
+    // A log-uniform distribution from 200 to 50,000 has 29 % up to 1,000, 42 % from there up to
+    // 10,000, and the rest above. Many parts need more triangles, so that the lowest share is
+    // smaller and the next one larger; half of each expected share is required.
     let share = |low: usize, high: usize| {
         counts.iter().filter(|&&n| (low..high).contains(&n)).count() as f64 / counts.len() as f64
     };

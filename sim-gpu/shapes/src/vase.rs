@@ -2,10 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Profile, Sampler, Section, Vessel, Wall, sheet, smooth, smooth_tube, tube,
+    Builder, DAffine3, DVec2, DVec3, Profile, Sampler, Section, Vessel, Wall, sheet, smooth,
+    smooth_tube, tube,
 };
 
 /// The outline of a vase.
@@ -17,20 +16,20 @@ enum Kind {
     Shouldered,
 }
 
-/// Radii at the heights that make a vase, and the height.
+/// The radii and heights of a vase.
 struct Form {
     height_m: f64,
     foot_m: f64,
     belly_m: f64,
     neck_m: f64,
     lip_m: f64,
-    /// Height of the belly over the whole.
+    /// The height of the belly, over the height of the vase.
     belly_at: f64,
     neck_at: f64,
 }
 
 impl Form {
-    /// Half of the vases are slender; the rest reach from bottle to bowl.
+    /// Half of the vases are slender; the others range from bottles to bowls.
     fn draw(s: &mut Sampler) -> Self {
         let height_m = s.log_uniform(0.12, 0.6);
         let belly_m = height_m * s.log_uniform(0.13, 0.75);

@@ -1,4 +1,4 @@
-//! Writes a mesh as OFF or OBJ.
+//! Writes meshes as OFF and OBJ.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -7,11 +7,11 @@ use formats::{FormatError, atomic};
 use glam::DVec3;
 use sim_gpu::mesh::Mesh;
 
-/// Writes `mesh` as ASCII OFF, coordinates as they are and with as few digits
-/// as tell them apart, whole or not at all.
+/// Writes `mesh` as ASCII OFF, with the shortest decimal numbers that give the same f64. The file
+/// is complete or absent.
 ///
 /// # Errors
-/// If the file cannot be written; an earlier file of this name then stays.
+/// The file cannot be written. An earlier file of this name then stays.
 pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
     let mut text = format!("OFF\n{} {} 0\n", mesh.vertices.len(), mesh.triangles.len());
     for DVec3 { x, y, z } in &mesh.vertices {
@@ -23,15 +23,15 @@ pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
     atomic::write_bytes(path, text)
 }
 
-/// Writes `mesh` as OBJ, which has y up: (x, y, z) becomes (x, z, -y), an
-/// exact turn. Else as [`write_off`].
+/// Writes `mesh` as OBJ, which has y up: (x, y, z) becomes (x, z, -y). Otherwise like
+/// [`write_off`].
 ///
 /// # Errors
-/// As [`write_off`].
+/// The file cannot be written. An earlier file of this name then stays.
 pub fn write_obj(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
     let mut text = String::new();
     for DVec3 { x, y, z } in &mesh.vertices {
-        // 0 - y and not -y: there is no need for a negative zero.
+        // 0 - y gives no negative zero.
         push_line(&mut text, format_args!("v {x} {z} {}", 0.0 - y));
     }
     for triangle in &mesh.triangles {
@@ -42,7 +42,7 @@ pub fn write_obj(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
 }
 
 fn push_line(text: &mut String, line: std::fmt::Arguments<'_>) {
-    // Writing to a String cannot fail.
+    // Writing to a `String` cannot fail.
     let _ = writeln!(text, "{line}");
 }
 

@@ -1,8 +1,8 @@
-//! Shapes keep their bytes: those under `assets/meshes` are what the
-//! generator gives, and hashes stand for larger ones.
+//! Shapes keep their bytes: those under `assets/meshes` are what the generator gives, and hashes
+//! stand for larger ones.
 //!
-//! `UPDATE_GOLDEN=1 cargo test -p edgepuck-shapes --test shapes_golden` rewrites both
-//! after a change that is meant.
+//! `UPDATE_GOLDEN=1 cargo test -p edgepuck-shapes --test shapes_golden` rewrites both after a
+//! change that is meant.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -15,8 +15,8 @@ use sha2::{Digest, Sha256};
 /// The seed of the committed meshes; `gen-shapes` with it gives the same.
 const SEED: u64 = 1;
 
-/// The committed meshes: path under `assets/meshes`, class, instance. Names
-/// count from 1, as in a tree of shapes.
+/// The committed meshes: path under `assets/meshes`, class, instance. Names count from 1, as in a
+/// tree of shapes.
 const COMMITTED: [(&str, ShapeClass, u32); 11] = [
     ("airplane/airplane_0019.off", ShapeClass::Airplane, 18),
     ("bottle/bottle_0052.off", ShapeClass::Bottle, 51),

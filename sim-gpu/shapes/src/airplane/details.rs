@@ -2,18 +2,18 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use glam::{DAffine3, DVec3};
-
 use super::fuselage::Fuselage;
 use super::wing::Wing;
-use crate::primitives::{Builder, Profile, Section, Vessel, Wall, cylinder, ellipsoid, rod, sheet};
+use crate::primitives::{
+    Builder, DAffine3, DVec3, Profile, Section, Vessel, Wall, cylinder, ellipsoid, rod, sheet,
+};
 
-/// A frame at `front` whose z axis looks to the rear (+y).
+/// A frame at `front` with its z axis to the rear (+y).
 fn rearwards(front: DVec3) -> DAffine3 {
     DAffine3::from_translation(front) * DAffine3::from_rotation_x(-FRAC_PI_2)
 }
 
-/// A jet engine: a ring open at both ends, a core, and a pylon above.
+/// A jet engine: a ring that is open at both ends, a core, and a pylon above.
 pub fn jet_engine(b: &mut Builder, front: DVec3, radius_m: f64, length_m: f64) {
     let ring = Profile::from(0.9 * radius_m, 0.0).curve(&[
         (radius_m, 0.2 * length_m),
@@ -44,7 +44,7 @@ pub fn nacelle(b: &mut Builder, front: DVec3, radius_m: f64, length_m: f64) {
     b.place(rearwards(front), |b| profile.revolve(b, Section::Round));
 }
 
-/// A spinner and twisted blades of no thickness.
+/// A spinner and twisted blades without thickness.
 pub fn propeller(b: &mut Builder, front: DVec3, radius_m: f64, n_blades: usize) {
     ellipsoid(b, front, DVec3::new(0.14, 0.25, 0.14) * radius_m);
     for blade in 0..n_blades {
@@ -60,12 +60,12 @@ pub fn propeller(b: &mut Builder, front: DVec3, radius_m: f64, n_blades: usize) 
     }
 }
 
-/// A cockpit's glass: half of it shows above the body.
+/// The glass of a cockpit. Half of it shows above the body.
 pub fn canopy(b: &mut Builder, centre: DVec3, radius_m: f64, half_length_m: f64) {
     ellipsoid(b, centre, DVec3::new(0.8 * radius_m, half_length_m, 0.9 * radius_m));
 }
 
-/// One strut a side from the body's underside to the middle of a high wing.
+/// One strut on each side, from the underside of the body to the middle of a high wing.
 pub fn struts(b: &mut Builder, wing: &Wing, foot_m: f64) {
     let chord = wing.chord_m(0.5);
     let top = wing.leading_edge(0.5) + 0.35 * chord * DVec3::Y;
@@ -74,7 +74,7 @@ pub fn struts(b: &mut Builder, wing: &Wing, foot_m: f64) {
     b.mirrored_x(|b| rod(b, foot, top, [r, r]));
 }
 
-/// Two struts a side between the wings of a biplane.
+/// Two struts on each side between the wings of a biplane.
 pub fn wing_struts(b: &mut Builder, lower: &Wing, upper: &Wing, station: f64) {
     let r = 0.02 * lower.root_chord_m;
     for chordwise in [0.15, 0.75] {

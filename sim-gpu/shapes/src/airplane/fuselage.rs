@@ -1,11 +1,8 @@
 //! An airplane's body.
 
-use glam::{DVec2, DVec3};
-
-use crate::primitives::{Builder, loft, outline};
+use crate::primitives::{Builder, DVec2, DVec3, loft, outline};
 
 /// A body from its nose at y = -length / 2 to its tail at y = length / 2.
-#[derive(Clone, Copy, Debug)]
 pub struct Fuselage {
     /// Length from nose to tail.
     pub length_m: f64,
@@ -15,7 +12,7 @@ pub struct Fuselage {
     pub nose: f64,
     /// Share of the length in which the tail narrows.
     pub tail: f64,
-    /// How far the tail's end is raised, over the radius.
+    /// The rise of the tail's end, over the radius.
     pub upsweep: f64,
 }
 
@@ -30,7 +27,7 @@ impl Fuselage {
         DVec3::new(0.0, -0.5 * self.length_m, 0.0)
     }
 
-    /// The middle of the section at this share of the length from the nose.
+    /// The middle of the section at a fraction of the length from the nose.
     pub fn spine(&self, share: f64) -> DVec3 {
         let rise = self.upsweep * self.radius_m() * self.along_tail(share).powi(2);
         DVec3::new(0.0, (share - 0.5) * self.length_m, rise)
@@ -41,8 +38,8 @@ impl Fuselage {
         ((share - 1.0 + self.tail) / self.tail).max(0.0)
     }
 
-    /// The radius at this share of the length: an ellipse's quarter at the
-    /// nose, then a cylinder, then a parabola to a quarter of it.
+    /// The radius at a fraction of the length: a quarter ellipse at the nose, a cylinder, and a
+    /// tail that narrows to a fifth.
     fn radius_at(&self, share: f64) -> f64 {
         let ahead = (1.0 - share / self.nose).max(0.0);
         let nose = (1.0 - ahead * ahead).max(0.0).sqrt().max(0.06);
@@ -56,7 +53,7 @@ impl Fuselage {
         let n_nose = b.curved(self.nose * self.length_m, 4);
         let n_middle = b.straight((1.0 - self.nose - self.tail) * self.length_m);
         let n_tail = b.curved(self.tail * self.length_m, 4);
-        // Squares crowd the nose's sections where it is blunt.
+        // Squares put more sections where the nose is blunt.
         let nose = (0..n_nose).map(|k| self.nose * (k as f64 / n_nose as f64).powi(2));
         let middle = spread(self.nose, 1.0 - self.tail, n_middle);
         let tail = spread(1.0 - self.tail, 1.0, n_tail).chain([1.0]);

@@ -1,11 +1,9 @@
 //! Fighters.
 
-use glam::DVec3;
-
 use super::details;
 use super::fuselage::Fuselage;
 use super::wing::{Wing, fin};
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler};
 
 /// A fighter with swept wings and a tail.
 pub fn fighter(b: &mut Builder, s: &mut Sampler) {
@@ -17,7 +15,7 @@ pub fn delta(b: &mut Builder, s: &mut Sampler) {
     jet(b, s, true);
 }
 
-/// A jet with thin wings, one fin or two, a canopy.
+/// A jet with thin wings, one or two fins and a canopy.
 fn jet(b: &mut Builder, s: &mut Sampler, delta: bool) {
     let length_m = s.uniform(11.0, 20.0);
     let body =

@@ -1,11 +1,9 @@
 //! Wings, stabilizers, fins.
 
-use glam::{DAffine3, DVec3};
-
-use crate::primitives::{Builder, cap, outline, skin};
+use crate::primitives::{Builder, DAffine3, DVec3, cap, outline, skin};
 
 /// A pair of wings. Slopes are per metre of span.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Wing {
     /// The leading edge at the plane of symmetry.
     pub root: DVec3,
@@ -15,22 +13,22 @@ pub struct Wing {
     pub root_chord_m: f64,
     /// Chord at the tip over that at the root.
     pub taper: f64,
-    /// How far the leading edge falls back.
+    /// The slope of the leading edge to the rear.
     pub sweep: f64,
-    /// How far the wing rises.
+    /// The slope of the wing upwards.
     pub dihedral: f64,
     /// Thickness over chord.
     pub thickness: f64,
 }
 
 impl Wing {
-    /// The leading edge of the right wing at this share of the half span.
+    /// The leading edge of the right wing at a fraction of the half span.
     pub fn leading_edge(&self, share: f64) -> DVec3 {
         let out_m = share * self.half_span_m;
         self.root + DVec3::new(1.0, self.sweep, self.dihedral) * out_m
     }
 
-    /// The chord at this share of the half span.
+    /// The chord at a fraction of the half span.
     pub fn chord_m(&self, share: f64) -> f64 {
         self.root_chord_m * (1.0 + share * (self.taper - 1.0))
     }
@@ -53,19 +51,18 @@ impl Wing {
     }
 }
 
-/// An upright fin whose leading edge starts at `root` and falls back by
-/// `sweep` a metre of height.
+/// An upright fin. Its leading edge starts at `root` and moves back by `sweep` per metre of height.
 pub fn fin(b: &mut Builder, root: DVec3, high_m: f64, chord_m: f64, sweep: f64) {
     let section = outline::airfoil(0.09, b.curved(chord_m, 4));
     let ends = [(0.0, chord_m), (high_m, 0.5 * chord_m)].map(|(up, chord)| {
         section.iter().map(|p| DVec3::new(chord * p.y, sweep * up + chord * p.x, up)).collect()
     });
-    // (y, x) as (x, y) runs clockwise; mirrored, it looks outwards.
+    // With x and y exchanged, the outline runs clockwise; mirrored, it looks outwards.
     let frame = DAffine3::from_translation(root) * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
     b.place(frame, |b| open_at_root(b, &ends));
 }
 
-/// The surface from the first section, at the root, to the last, which is closed.
+/// The surface from the first section, which stays open, to the last, which is closed.
 fn open_at_root(b: &mut Builder, ends: &[Vec<DVec3>; 2]) {
     skin(b, ends);
     cap(b, &ends[1]);

@@ -2,16 +2,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use super::Seat;
 use crate::primitives::{
-    Builder, Sampler, block, board, cushion, ellipsoid, outline, rod, sheet, smooth, smooth_tube,
-    sweep,
+    Builder, DAffine3, DVec2, DVec3, Sampler, block, board, cushion, ellipsoid, outline, rod,
+    sheet, smooth, smooth_tube, sweep,
 };
 
-/// A back's frame of reference: x across, y to the rear, z up along the back
-/// from the rear edge of the seat.
+/// The size of a back. In its frame x is across, y to the rear, and z up along the back from the
+/// rear edge of the seat.
 #[derive(Clone, Copy)]
 struct Back {
     half_m: f64,
@@ -24,7 +22,7 @@ const MAKES: [fn(&mut Builder, &mut Sampler, Back); 13] = [
     headrest,
 ];
 
-/// Adds a back, leaning to the rear.
+/// Adds a back that leans to the rear.
 pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let low = s.chance(0.15);
     let high_m = if low { s.uniform(0.16, 0.3) } else { s.uniform(0.34, 0.68) };
@@ -34,7 +32,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     b.turned(foot, DAffine3::from_rotation_x(-lean_rad), |b| s.pick(&MAKES)(b, s, back));
 }
 
-/// Two posts and the board or net between them.
+/// Two posts with a board or a net between them.
 fn panel(b: &mut Builder, s: &mut Sampler, back: Back) {
     let gap_m = back.high_m * s.pick(&[0.0, 0.25, 0.45]);
     let thick_m = s.uniform(0.012, 0.04);
@@ -48,7 +46,7 @@ fn posts(b: &mut Builder, back: Back, r: f64) {
     b.mirrored_x(|b| rod(b, x * DVec3::X, DVec3::new(x, 0.0, back.high_m), [r, r]));
 }
 
-/// A thick cushion before two short posts.
+/// A thick cushion in front of two short posts.
 fn padded(b: &mut Builder, s: &mut Sampler, back: Back) {
     let thick_m = s.uniform(0.05, 0.12);
     let gap_m = s.pick(&[0.0, 0.08]);
@@ -57,7 +55,7 @@ fn padded(b: &mut Builder, s: &mut Sampler, back: Back) {
     cushion(b, DVec3::new(0.0, 0.0, 0.5 * (back.high_m + gap_m)), size, 0.4 * thick_m);
 }
 
-/// A shell bent about the sitter, rounded above; a board or a mere sheet.
+/// A shell that curves around the sitter and is rounded above; a board or a sheet.
 fn shell(b: &mut Builder, s: &mut Sampler, back: Back) {
     let wrap_m = back.half_m * s.uniform(0.15, 0.7);
     let round = s.uniform(0.0, 0.5);
@@ -131,7 +129,7 @@ fn hooped(b: &mut Builder, s: &mut Sampler, back: Back) {
     smooth_tube(b, &arch, 2, 1.8 * r);
 }
 
-/// Rods in a fan, as high as `height` says of where they end across.
+/// Rods in a fan. `height` returns the height of a rod at its position across.
 fn spindles(b: &mut Builder, s: &mut Sampler, r: f64, back: Back, height: impl Fn(f64) -> f64) {
     let n = s.count(5, 9);
     for spindle in 0..n {

@@ -1,19 +1,17 @@
-//! What carries a chair's seat.
-
-use glam::{DVec2, DVec3};
+//! The base of a chair.
 
 use super::Seat;
-use crate::primitives::{Builder, Sampler, outline, smooth, sweep, tube};
+use crate::primitives::{Builder, DVec2, DVec3, Sampler, outline, smooth, sweep, tube};
 use crate::supports::{
     Legs, crossed_legs, disc_pedestal, four_legs, side_panels, sledge, star_pedestal,
 };
 
-/// Adds what carries the seat.
+/// Adds the base of `seat`.
 pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let under_m = seat.under_m();
     let tube_m = s.uniform(0.01, 0.016);
     let legs_half = seat.legs_half(0.0);
-    // Five of fourteen draws give legs, two a star, one a disc, and so on.
+    // Each base has some of the fourteen outcomes: legs five, a star two, and so on.
     match s.count(1, 14) {
         1..=5 => legged(b, s, seat),
         6..=7 => star_pedestal(b, s, seat.half.x * 1.15, under_m),
@@ -32,8 +30,8 @@ fn legged(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     four_legs(b, &legs, seat.legs_half(legs.half_width_m()), seat.under_m(), stretcher);
 }
 
-/// A tube that runs from the seat's rear along under it, down in front and
-/// back along the floor: nothing stands behind.
+/// A tube from the rear of the seat along its underside, down in front and back along the floor.
+/// The rear has no legs.
 fn cantilever(b: &mut Builder, seat: &Seat, radius_m: f64) {
     let (x, y) = (seat.legs_half(radius_m).x, seat.half.y);
     let under_m = seat.under_m() - radius_m;

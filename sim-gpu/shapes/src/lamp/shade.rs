@@ -1,11 +1,9 @@
 //! Lamp shades.
 
-use glam::DVec3;
+use crate::primitives::{Builder, DVec3, Profile, Sampler, Section, Vessel, Wall, ellipsoid, rod};
 
-use crate::primitives::{Builder, Profile, Sampler, Section, Vessel, Wall, ellipsoid, rod};
-
-/// A shade that hangs from `top_m`, `high_m` tall and `radius_m` wide below,
-/// with the bulb inside; most are open at both ends.
+/// A shade below `top_m`, `high_m` high and `radius_m` wide at its lower edge, with the bulb
+/// inside. Most shades are open at both ends.
 pub fn shade(b: &mut Builder, s: &mut Sampler, top_m: f64, radius_m: f64, high_m: f64) {
     let narrow_m = radius_m * s.uniform(0.35, 1.0);
     let low_m = top_m - high_m;
@@ -31,7 +29,7 @@ pub fn shade(b: &mut Builder, s: &mut Sampler, top_m: f64, radius_m: f64, high_m
     spider(b, bulb, top_m, 0.97 * neck_m);
 }
 
-/// Four wires at `top_m` that carry a shade, and the socket of its bulb.
+/// Four wires at `top_m` that hold a shade, and the socket of its bulb.
 fn spider(b: &mut Builder, bulb: DVec3, top_m: f64, reach_m: f64) {
     let r = 0.015 * reach_m;
     let hub = top_m * DVec3::Z;

@@ -1,26 +1,24 @@
 //! Flat screens in their housings.
 
-use glam::DVec3;
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between, board, cushion};
 
-use crate::primitives::{Builder, Sampler, block, block_between, board, cushion};
-
-/// A screen: it looks to +x, is as wide as y, its middle at the origin.
+/// A screen that faces +x, with its width along y and its middle at the origin.
 #[derive(Clone, Copy)]
 pub struct Screen {
     /// From side to side.
     pub width_m: f64,
-    /// From foot to top.
+    /// From the lower to the upper edge.
     pub height_m: f64,
     /// From front to back.
     pub depth_m: f64,
     housing: Housing,
 }
 
-/// Builds what a screen of this size sits in.
+/// Builds the housing of a screen of this size.
 type Housing = fn(&mut Builder, &mut Sampler, DVec3);
 
 impl Screen {
-    /// Draws a screen of some size and make.
+    /// Draws a screen.
     pub fn draw(s: &mut Sampler) -> Self {
         let width_m = s.log_uniform(0.35, 1.3);
         let ratio = s.pick(&[4.0 / 3.0, 1.25, 1.6, 16.0 / 9.0, 16.0 / 9.0, 21.0 / 9.0]);
@@ -49,7 +47,7 @@ fn rounded(b: &mut Builder, _: &mut Sampler, size: DVec3) {
     cushion(b, DVec3::ZERO, size, 0.4 * size.x);
 }
 
-/// A frame about a screen that lies a little behind it.
+/// A frame, and a screen that lies a little behind its front.
 fn framed(b: &mut Builder, s: &mut Sampler, size: DVec3) {
     let frame_m = size.z * s.uniform(0.02, 0.08);
     let chin_m = frame_m * s.uniform(1.0, 2.5);
@@ -68,14 +66,14 @@ fn framed(b: &mut Builder, s: &mut Sampler, size: DVec3) {
     block_between(b, DVec3::new(back, -inner_m, -half.z + chin_m), glass);
 }
 
-/// A framed screen and, behind it, the housing of its electronics.
+/// A framed screen with a housing for its electronics behind it.
 fn framed_with_box(b: &mut Builder, s: &mut Sampler, size: DVec3) {
     framed(b, s, size);
     let inner = size * DVec3::new(1.0, s.uniform(0.4, 0.75), s.uniform(0.4, 0.7));
     cushion(b, -0.8 * size.x * DVec3::X, inner, 0.2 * size.x);
 }
 
-/// A screen bent about an upright axis, its ends towards the viewer.
+/// A screen that is bent about an upright axis, with its ends towards the viewer.
 fn bent(b: &mut Builder, _: &mut Sampler, size: DVec3) {
     let sag_m = 0.12 * size.y;
     board(b, [size.y, size.z], -size.x * DVec3::X, |u, v| {

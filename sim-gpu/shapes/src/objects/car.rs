@@ -8,9 +8,7 @@ mod interior;
 pub(super) mod panel;
 pub(super) mod wheel;
 
-use glam::{DAffine3, DVec3};
-
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler};
 use body::Body;
 use cabin::Cabin;
 use form::Form;
@@ -29,7 +27,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     extras::build(b, s, &form, &body);
 }
 
-/// Four wheels; those in front are sometimes turned.
+/// Four wheels. The front wheels are sometimes turned.
 fn wheels(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     let width_m = s.uniform(0.165, 0.255);
     let steered_rad = if s.chance(0.3) { s.uniform(-25.0, 25.0).to_radians() } else { 0.0 };

@@ -1,4 +1,4 @@
-//! What stands in rooms, at its real size.
+//! Furniture at real size.
 
 pub mod cabinet;
 pub mod door;
@@ -7,28 +7,25 @@ pub mod sofa;
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::{DAffine3, DVec3};
-
 use sim_gpu::mesh::Mesh;
 
-use crate::primitives::{Builder, Make, Sampler};
+use crate::primitives::{Builder, DAffine3, DVec3, Make, Sampler};
 
-/// Builds a chair that looks to +x.
+/// Builds a chair that faces +x.
 ///
-/// The chairs of the ten classes have their real size: seats 0.34 to 0.52 m up,
-/// bar stools 0.6 to 0.8 m (EN 1729 and EN 16139 have most of them at 0.43 m).
+/// The chairs of the ten classes have real sizes: seats at 0.34 to 0.52 m, bar stools at 0.6 to 0.8
+/// m (EN 1729 and EN 16139: most at 0.43 m).
 pub fn chair(b: &mut Builder, s: &mut Sampler) {
     b.place(DAffine3::from_rotation_z(FRAC_PI_2), |b| {
-        // Few are so low or so high that they would be toys or ladders.
+        // The limits exclude toys and ladders.
         scaled(b, s, crate::chair::build, |drawn_m| drawn_m.clamp(0.65, 1.4));
     });
 }
 
 /// Builds a table.
 ///
-/// The tables of the ten classes are given a height in use: 0.70 to 0.76 m to
-/// sit at (EN 527-1, EN 1729), 0.4 to 0.5 m beside a sofa, 1.05 to 1.15 m to
-/// stand at.
+/// Tables of the ten classes are scaled to usual heights: 0.70 to 0.76 m for sitting (EN 527-1, EN
+/// 1729), 0.4 to 0.5 m beside a sofa, 1.05 to 1.15 m for standing.
 pub fn table(b: &mut Builder, s: &mut Sampler) {
     let ranges = [(6, [0.7, 0.76]), (2, [0.4, 0.5]), (1, [1.05, 1.15])];
     let [low_m, high_m] = s.weighted(&ranges);
@@ -36,10 +33,10 @@ pub fn table(b: &mut Builder, s: &mut Sampler) {
     scaled(b, s, crate::table::build, |_| height_m);
 }
 
-/// Builds what stands on height 0, stretched upwards to the height that
-/// `height_m` makes of the one drawn.
+/// Builds furniture on height 0 and stretches it upwards. `height_m` returns the new height for the
+/// drawn one.
 fn scaled(b: &mut Builder, s: &mut Sampler, build: Make, height_m: impl Fn(f64) -> f64) {
-    // It is built twice, the first time to learn its height.
+    // The first build gives the drawn height.
     let mut start = s.clone();
     let mut trial = b.clone();
     let mesh = loop {
@@ -47,7 +44,7 @@ fn scaled(b: &mut Builder, s: &mut Sampler, build: Make, height_m: impl Fn(f64) 
         if is_sound(trial.mesh()) {
             break trial.mesh();
         }
-        // The soft edges of thin arms leave triangles without area.
+        // Rounded edges of thin arms can have triangles without area; such a draw is rejected.
         start = s.clone();
         trial = b.clone();
     };

@@ -1,7 +1,7 @@
 //! Trees, bushes, hedges and trunks.
 //!
-//! Leaves are loose triangles, so that beams pass between them and return from
-//! different depths, as they do in real crowns.
+//! Leaves are loose triangles, so that beams pass between them and return from different depths, as
+//! they do in real crowns.
 
 pub mod bush;
 mod foliage;

@@ -1,14 +1,12 @@
-//! Poles and what they carry: lamps, signs, lights.
+//! Poles, lamp posts, traffic signs and traffic lights.
 
 pub mod lamp_post;
 pub mod traffic_light;
 pub mod traffic_sign;
 
-use glam::{DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Makes, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid, frustum,
-    outline, prism, rod,
+    Builder, DVec2, DVec3, Makes, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid,
+    frustum, outline, prism, rod,
 };
 
 /// The makes, with their weights.
@@ -23,7 +21,7 @@ fn shaft(b: &mut Builder, radii_m: [f64; 2], height_m: f64, section: Section) {
         .revolve(b, section);
 }
 
-/// A section that poles have: round, square or of eight sides.
+/// Draws the section of a pole: round, square or eight-sided.
 fn draw_section(s: &mut Sampler) -> Section {
     s.weighted(&[(5, Section::Round), (2, Section::Polygon(4)), (1, Section::Polygon(8))])
 }
@@ -58,8 +56,8 @@ fn post(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A utility pole: 0.2 to 0.4 m thick at its foot (ANSI O5.1, class 5 to 1),
-/// with cross-arms and perhaps a transformer.
+/// A utility pole: 0.2 to 0.4 m thick at its foot (ANSI O5.1, class 5 to 1), with cross-arms and
+/// perhaps a transformer.
 fn utility(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(6.0, 10.0);
     let radius_m = s.uniform(0.1, 0.2);
@@ -105,16 +103,15 @@ fn pillar(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A delineator at the side of a road: a hollow post with three sides, 1.05 m
-/// above the ground (Germany's HLB).
+/// A delineator beside a road: a hollow three-sided post, 1.05 m high (Germany's HLB).
 fn delineator(b: &mut Builder, s: &mut Sampler) {
     let half = DVec2::new(0.04, 0.06) * s.uniform(0.8, 1.3);
     let section = outline::ellipse(half, s.pick(&[3, 8]));
     prism(b, &section, 0.0, s.uniform(0.9, 1.1), s.uniform(0.8, 1.0));
 }
 
-/// A post that carries a small casing at the height of a hand or a head: a
-/// parking meter, a ticket machine, a letter box, a charging point.
+/// A post with a small casing at the height of a hand or a head: a parking meter, a ticket machine,
+/// a letter box, a charging point.
 fn meter(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(1.1, 1.9);
     let size = DVec3::new(s.uniform(0.12, 0.4), s.uniform(0.18, 0.5), s.uniform(0.2, 0.9));

@@ -1,4 +1,4 @@
-//! What stands on pavements and in yards.
+//! Objects on pavements and in yards.
 
 pub mod bench;
 pub mod bin;

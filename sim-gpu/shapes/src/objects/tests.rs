@@ -1,5 +1,5 @@
-//! What holds of every kind of object: sound meshes of real size on the ground,
-//! determinism, variety.
+//! Properties of every kind of object: valid meshes of real size on the ground, determinism,
+//! variety.
 
 use std::collections::BTreeSet;
 
@@ -10,8 +10,8 @@ use super::{Object, ObjectKind, object};
 const SEED: u64 = 5;
 const INSTANCES: u32 = 8;
 
-/// The smallest and the largest length, width and height of a kind in metres, mirrors,
-/// loads, leans and what is pushed included.
+/// The smallest and the largest length, width and height of a kind, metres, with mirrors, loads,
+/// leans and pushed things.
 fn sizes(kind: ObjectKind) -> [[f64; 2]; 3] {
     use ObjectKind as K;
     match kind {
@@ -49,7 +49,7 @@ fn sizes(kind: ObjectKind) -> [[f64; 2]; 3] {
     }
 }
 
-/// Runs `holds` on many instances of every kind, each with its name.
+/// Runs the assertions `holds` on many objects of every kind, each with its name.
 fn for_all(holds: impl Fn(ObjectKind, &str, &Object)) {
     for kind in ObjectKind::ALL {
         for k in 0..INSTANCES {
@@ -66,7 +66,7 @@ fn every_object_is_a_sound_mesh() {
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|i| mesh.vertices[i as usize]);
             let area = (b - a).cross(c - a).length() / 2.0;
-            // A square of 10 micrometres: what rounding leaves of a line.
+            // The area of a square of 10 micrometres; rounding leaves less of a line.
             assert!(area > 1e-10, "{what}: {a}, {b}, {c} have no area");
         }
         assert!(object.glass.start <= object.glass.end, "{what}");
@@ -81,7 +81,7 @@ fn every_object_stands_on_the_ground_about_the_origin_at_its_kind_s_size() {
         let low = vertices.clone().fold(DVec3::INFINITY, DVec3::min);
         let high = vertices.fold(DVec3::NEG_INFINITY, DVec3::max);
         assert_eq!(low.z, 0.0, "{what}");
-        // Two roundings of some metres.
+        // Two roundings of a few metres.
         assert!((low + high).truncate().length() < 1e-12, "{what}: {low} to {high}");
         for (size, [least, most]) in (high - low).to_array().into_iter().zip(sizes(kind)) {
             let size_m = high - low;
@@ -117,7 +117,7 @@ fn vehicles_have_panes_and_a_gap_to_the_ground_between_their_wheels() {
 #[test]
 fn objects_keep_to_their_budget_of_triangles() {
     use ObjectKind::{Bus, Car, Child, Person};
-    // A bus of 12 m has some 1,500, an articulated one has two bodies.
+    // A bus of 12 m has about 1,500 triangles; an articulated one has two bodies.
     for (kind, most) in [(Car, 3000), (Bus, 2400), (Person, 2500), (Child, 2500)] {
         for k in 0..INSTANCES {
             let n = object(kind, SEED, k).mesh.triangles.len();

@@ -5,14 +5,11 @@ mod motorcycle;
 mod parts;
 mod rider;
 
-use glam::{DAffine3, DVec3};
-
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler};
 use bicycle::Bicycle;
 use motorcycle::Motorcycle;
 
-/// Where a rider touches the vehicle, metres.
-#[derive(Clone, Copy, Debug)]
+/// The places where a rider touches the vehicle, metres.
 pub struct Contacts {
     /// The middle of the saddle's upper side.
     pub saddle: DVec3,
@@ -52,7 +49,7 @@ pub fn motorcyclist(b: &mut Builder, s: &mut Sampler) {
     });
 }
 
-/// Runs `build` in a frame that leans by `lean_deg` to the right.
+/// Runs `build` in a frame that leans to the right by `lean_deg`.
 fn leaning(b: &mut Builder, lean_deg: f64, build: impl FnOnce(&mut Builder)) {
     b.place(DAffine3::from_rotation_x(lean_deg.to_radians()), build);
 }

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::{Builder, loft, outline};
 
-/// The box of `size` about `centre`; each face has vertices of its own.
+/// The box of `size` about `centre`; no face shares vertices with another.
 pub fn block(b: &mut Builder, centre: DVec3, size: DVec3) {
     let half = size / 2.0;
     for axis in 0..3 {
@@ -21,7 +21,7 @@ pub fn block_between(b: &mut Builder, low: DVec3, high: DVec3) {
     block(b, (low + high) / 2.0, (high - low).abs());
 }
 
-/// The face of a box that looks along `axis` (0..3), to its `side`.
+/// The face of a box towards `side` of `axis` (0 to 2).
 fn face(b: &mut Builder, centre: DVec3, half: DVec3, axis: usize, side: f64) {
     let unit = |index: usize| DVec3::AXES[index % 3] * half[index % 3];
     let (normal, u, v) = (unit(axis) * side, unit(axis + 1) * side, unit(axis + 2));
@@ -30,8 +30,8 @@ fn face(b: &mut Builder, centre: DVec3, half: DVec3, axis: usize, side: f64) {
     b.surface(n, |share_u, share_v| centre + normal + at(share_u) * u + at(share_v) * v);
 }
 
-/// The box of `size` about `centre` with all edges rounded by `radius_m`, cut
-/// to what fits: a cushion, a casing.
+/// The box of `size` about `centre` with all edges rounded by `radius_m`, at most half the shortest
+/// side: a cushion, a casing.
 pub fn cushion(b: &mut Builder, centre: DVec3, size: DVec3, radius_m: f64) {
     let half = size / 2.0;
     let radius_m = radius_m.min(0.999 * half.min_element());

@@ -1,21 +1,20 @@
-//! Surfaces stretched over cross-sections.
+//! Surfaces through cross-sections.
 
 use glam::{DVec2, DVec3};
 
 use super::{Builder, outline};
 
-/// The surface through closed `sections` of equally many points, and the two
-/// ends that close it.
+/// The surface through closed `sections` of equally many points, with both ends closed.
 ///
-/// Sections counter-clockwise about the direction from the first to the last
-/// give front faces that look outwards.
+/// Sections counter-clockwise about the direction from the first to the last give front faces that
+/// look outwards.
 pub fn loft(b: &mut Builder, sections: &[Vec<DVec3>]) {
     skin(b, sections);
     cap_start(b, &sections[0]);
     cap(b, &sections[sections.len() - 1]);
 }
 
-/// As [`loft`], open at both ends.
+/// Like [`loft`], with open ends.
 pub fn skin(b: &mut Builder, sections: &[Vec<DVec3>]) {
     let mut rows = Vec::new();
     for (section, next) in sections.iter().zip(&sections[1..]) {
@@ -27,14 +26,14 @@ pub fn skin(b: &mut Builder, sections: &[Vec<DVec3>]) {
     b.grid(&rows, true);
 }
 
-/// Closes the first of a loft's sections, so that it looks outwards.
+/// Closes the first section of a loft, with the front face outwards.
 pub fn cap_start(b: &mut Builder, section: &[DVec3]) {
     let reversed: Vec<_> = section.iter().rev().copied().collect();
     cap(b, &reversed);
 }
 
-/// An upright prism over `outline` from `low` to `high`, whose top is `taper`
-/// times as wide as its bottom.
+/// An upright prism over `outline` from `low` to `high`. `taper` is the width of its top over that
+/// of its bottom.
 pub fn prism(b: &mut Builder, outline: &[DVec2], low: f64, high: f64, taper: f64) {
     let top: Vec<_> = outline.iter().map(|&p| p * taper).collect();
     loft(b, &[outline::at_height(outline, low), outline::at_height(&top, high)]);

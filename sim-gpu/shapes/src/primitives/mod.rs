@@ -1,5 +1,5 @@
-//! The surfaces that shapes are put together from. A class file imports all of
-//! its tools from here, the builder and the sampler among them.
+//! The surfaces from which shapes are built. Class files import all their tools from here,
+//! including the builder and the sampler.
 
 mod block;
 mod loft;
@@ -16,6 +16,7 @@ mod tests;
 pub use super::builder::Builder;
 pub use super::sampler::Sampler;
 pub use block::{block, block_between, cushion};
+pub use glam::{DAffine3, DVec2, DVec3};
 pub use loft::{cap, cap_start, loft, prism, skin};
 pub use revolve::{Profile, Section, cylinder, ellipsoid, frustum};
 pub use sheet::{board, sheet};

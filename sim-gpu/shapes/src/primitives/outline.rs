@@ -9,8 +9,7 @@ pub fn ellipse(half: DVec2, n: usize) -> Vec<DVec2> {
     superellipse(half, 2.0, n)
 }
 
-/// A superellipse |x/a|^e + |y/b|^e = 1: an ellipse at `exponent` 2, nearly a
-/// rectangle from 6 on.
+/// A superellipse |x/a|^e + |y/b|^e = 1: an ellipse at `exponent` 2, nearly a rectangle from 6 on.
 pub fn superellipse(half: DVec2, exponent: f64, n: usize) -> Vec<DVec2> {
     let power = |value: f64| value.signum() * value.abs().powf(2.0 / exponent);
     (0..n)
@@ -26,8 +25,8 @@ pub fn rectangle(half: DVec2) -> Vec<DVec2> {
         .to_vec()
 }
 
-/// A rectangle with corners of `radius` in `n_corner` segments each; the
-/// radius is cut to what fits.
+/// A rectangle with corners of `radius` in `n_corner` segments each; `radius` is at most half the
+/// shorter side.
 pub fn rounded_rectangle(half: DVec2, radius: f64, n_corner: usize) -> Vec<DVec2> {
     let radius = radius.min(half.min_element());
     let inner = half - DVec2::splat(radius);
@@ -42,22 +41,28 @@ pub fn rounded_rectangle(half: DVec2, radius: f64, n_corner: usize) -> Vec<DVec2
     outline
 }
 
-/// A symmetric wing section of chord 1 from the nose (x = 0) to the tail
-/// (x = 1) and back below, with `n` segments a side and a sharp tail.
+/// A symmetric wing section of chord 1 from the nose (x = 0) to the tail (x = 1) and back below,
+/// with `n` segments a side and a sharp tail.
 ///
-/// The NACA four-digit thickness law (Jacobs, Ward and Pinkerton, NACA report
-/// 460, 1933), its last coefficient changed from 0.1015 to 0.1036 as is usual
-/// to close the tail.
+/// The NACA four-digit thickness law (Jacobs, Ward and Pinkerton, NACA report 460, 1933). The last
+/// coefficient is 0.1036 instead of 0.1015, the usual value for a closed tail.
 pub fn airfoil(thickness: f64, n: usize) -> Vec<DVec2> {
     let half_thickness = |x: f64| {
         5.0 * thickness
             * (0.2969 * x.sqrt() + x * (-0.1260 + x * (-0.3516 + x * (0.2843 + x * -0.1036))))
     };
-    // Cosine spacing puts points where the nose bends.
+    // Cosine spacing puts more points where the nose bends.
     let station = |k: usize| 0.5 - 0.5 * (k as f64 / n as f64 * TAU / 2.0).cos();
     let lower = (0..n).map(|k| (station(k), -1.0));
     let upper = (1..=n).rev().map(|k| (station(k), 1.0));
     lower.chain(upper).map(|(x, side)| DVec2::new(x, side * half_thickness(x).max(0.0))).collect()
+}
+
+/// An upright rectangle across x, between the heights `low` and `high`.
+pub fn upright(x: f64, half_y: f64, [low, high]: [f64; 2]) -> Vec<DVec3> {
+    [(-half_y, low), (-half_y, high), (half_y, high), (half_y, low)]
+        .map(|(y, z)| DVec3::new(x, y, z))
+        .to_vec()
 }
 
 /// The outline in the plane z = `z`.
@@ -77,8 +82,7 @@ mod tests {
     #[test]
     fn outlines_run_counter_clockwise_and_enclose_their_areas() {
         let half = DVec2::new(2.0, 1.0);
-        // An inscribed polygon of n sides lacks (2 pi / n)^2 / 6 of the area:
-        // 1e-3 of it at n = 80.
+        // An inscribed polygon of n sides lacks (2 pi / n)^2 / 6 of the area: 1e-3 of it at n = 80.
         let pi = TAU / 2.0;
         assert!((area(&ellipse(half, 80)) / (2.0 * pi) - 1.0).abs() < 1.1e-3);
         assert_eq!(area(&rectangle(half)), 8.0);

@@ -1,4 +1,4 @@
-//! Surfaces of revolution, and their relatives with other cross-sections.
+//! Surfaces of revolution, also with cross-sections other than circles.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::{Builder, smooth};
 
-/// A curve in the half-plane (radius, height) that a surface is turned from.
+/// The profile of a surface of revolution: a curve in (radius, height).
 #[derive(Clone, Debug)]
 pub struct Profile {
     corners: Vec<DVec2>,
@@ -25,14 +25,14 @@ impl Profile {
         Self { corners: vec![DVec2::new(radius_m, height_m)], spans: Vec::new() }
     }
 
-    /// Goes on straight to (`radius_m`, `height_m`).
+    /// Continues with a straight line to (`radius_m`, `height_m`).
     pub fn line(mut self, radius_m: f64, height_m: f64) -> Self {
         self.corners.push(DVec2::new(radius_m, height_m));
         self.spans.push(Span::Line(DVec2::new(radius_m, height_m)));
         self
     }
 
-    /// Goes on smoothly through `points` of (radius, height).
+    /// Continues with a smooth curve through `points` of (radius, height).
     pub fn curve(mut self, points: &[(f64, f64)]) -> Self {
         let points: Vec<_> = points.iter().map(|&(r, z)| DVec2::new(r, z)).collect();
         self.corners.extend(points.last());
@@ -40,14 +40,14 @@ impl Profile {
         self
     }
 
-    /// Turns the profile about the z axis. One that runs upwards outside looks
-    /// outwards.
+    /// Revolves the profile about the z axis. A profile that rises on the outside gives front faces
+    /// that look outwards.
     pub fn revolve(&self, b: &mut Builder, section: Section) {
         let points = self.sample(b);
         revolve(b, &points, section, 0.0);
     }
 
-    /// The profile as a polyline of (radius, height), at `b`'s fineness.
+    /// The profile as a polyline of (radius, height), with the builder's edge length.
     pub fn sample(&self, b: &Builder) -> Vec<DVec2> {
         let mut path = vec![self.corners[0]];
         for (start, span) in self.corners.iter().zip(&self.spans) {
@@ -120,8 +120,8 @@ impl Section {
     }
 }
 
-/// Turns a polyline of (radius, height) about the z axis, while the section
-/// turns by `twist_rad` a metre of height. A point on the axis becomes a pole.
+/// Revolves a polyline of (radius, height) about the z axis and twists the section by `twist_rad`
+/// per metre of height. A point on the axis becomes a pole.
 pub fn revolve(b: &mut Builder, profile: &[DVec2], section: Section, twist_rad: f64) {
     let widest_m = profile.iter().map(|p| p.x).fold(0.0, f64::max);
     let n = section.segments(b, widest_m);
@@ -144,7 +144,7 @@ pub fn cylinder(b: &mut Builder, base: DVec3, radius_m: f64, height_m: f64) {
     frustum(b, base, [radius_m, radius_m], height_m);
 }
 
-/// An upright frustum of a cone, closed, `radii_m` at its foot and top.
+/// An upright closed frustum of a cone with these radii at its foot and its top.
 pub fn frustum(b: &mut Builder, base: DVec3, radii_m: [f64; 2], height_m: f64) {
     let profile = Profile::from(0.0, 0.0)
         .line(radii_m[0], 0.0)

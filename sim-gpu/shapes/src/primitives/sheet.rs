@@ -1,17 +1,16 @@
-//! Open surfaces given by a function, without thickness or with.
+//! Surfaces that a function defines, with or without thickness.
 
 use glam::DVec3;
 
 use super::Builder;
 
-/// The surface `at(u, v)`, u and v in 0..=1, without thickness; `size_m` are
-/// its rough lengths along u and v.
+/// The surface `at(u, v)`, with u and v in 0..=1, without thickness. `size_m` are its approximate
+/// lengths along u and v.
 pub fn sheet(b: &mut Builder, size_m: [f64; 2], at: impl Fn(f64, f64) -> DVec3) {
     b.surface(divisions(b, size_m), at);
 }
 
-/// The surface `at(u, v)` and its copy moved by `offset`, joined along the
-/// rim: a bent board.
+/// A bent board: the surface `at(u, v)` and its copy moved by `offset`, joined along the rim.
 pub fn board(b: &mut Builder, size_m: [f64; 2], offset: DVec3, at: impl Fn(f64, f64) -> DVec3) {
     sheet(b, size_m, &at);
     sheet(b, size_m, |u, v| at(1.0 - u, v) + offset);
@@ -23,7 +22,7 @@ pub fn board(b: &mut Builder, size_m: [f64; 2], offset: DVec3, at: impl Fn(f64, 
     sheet(b, [length_v, thickness_m], |v, t| at(1.0, 1.0 - v) + t * offset);
 }
 
-/// Bent sheets need a few segments to show their bend; rims need none.
+/// Bent sheets need a few segments; rims need only one.
 fn divisions(b: &Builder, size_m: [f64; 2]) -> [usize; 2] {
     let [short, long] = [size_m[0].min(size_m[1]), size_m[0].max(size_m[1])];
     let least = if short < 0.1 * long { [1, 6] } else { [3, 6] };

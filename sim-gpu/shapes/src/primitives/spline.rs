@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::Builder;
 
-/// Points along the Catmull-Rom spline through `points` (two or more), with at
-/// least `least` segments between neighbours.
+/// Points along the Catmull-Rom spline through `points` (two or more), with at least `least`
+/// segments between neighbours.
 pub fn smooth(b: &Builder, points: &[DVec3], least: usize) -> Vec<DVec3> {
     let last = points.len() - 1;
     let mut path = vec![points[0]];
@@ -20,8 +20,7 @@ pub fn smooth(b: &Builder, points: &[DVec3], least: usize) -> Vec<DVec3> {
     path
 }
 
-/// The uniform Catmull-Rom curve from the second point (t = 0) to the third
-/// (t = 1).
+/// The uniform Catmull-Rom curve from the second point (t = 0) to the third (t = 1).
 fn catmull_rom([p0, p1, p2, p3]: [DVec3; 4], t: f64) -> DVec3 {
     let linear = p2 - p0;
     let square = 2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3;

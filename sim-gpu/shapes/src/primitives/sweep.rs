@@ -1,23 +1,23 @@
-//! Sections carried along a path: rods, handles, rails, cords.
+//! Surfaces swept along a path: rods, handles, rails, cords.
 
 use glam::{DVec2, DVec3};
 
 use super::{Builder, loft, outline, smooth};
 
-/// A round tube of `radius_m` along `path`, closed at its ends.
+/// A round tube of `radius_m` along `path`, with closed ends.
 pub fn tube(b: &mut Builder, path: &[DVec3], radius_m: f64) {
     let section = outline::ellipse(DVec2::splat(radius_m), b.around(radius_m, 6));
     sweep(b, path, &section);
 }
 
-/// As [`tube`], along the smooth curve through `points` with at least `least`
-/// segments between neighbours.
+/// Like [`tube`], along the smooth curve through `points`, with at least `least` segments between
+/// neighbours.
 pub fn smooth_tube(b: &mut Builder, points: &[DVec3], least: usize, radius_m: f64) {
     let path = smooth(b, points, least);
     tube(b, &path, radius_m);
 }
 
-/// A round rod whose radius goes from `radii_m[0]` to `radii_m[1]`.
+/// A round rod with these radii at its two ends.
 pub fn rod(b: &mut Builder, from: DVec3, to: DVec3, radii_m: [f64; 2]) {
     let widest_m = radii_m[0].max(radii_m[1]);
     let unit = outline::ellipse(DVec2::ONE, b.around(widest_m, 6));
@@ -27,15 +27,15 @@ pub fn rod(b: &mut Builder, from: DVec3, to: DVec3, radii_m: [f64; 2]) {
     loft(b, &sections);
 }
 
-/// A bar of rectangular section: `width_m` across, level where it can be, and
-/// `height_m`.
+/// A bar of rectangular section. `width_m` is its level side where the direction allows it,
+/// `height_m` the other one.
 pub fn bar(b: &mut Builder, from: DVec3, to: DVec3, width_m: f64, height_m: f64) {
     let section = outline::rectangle(DVec2::new(width_m, height_m) / 2.0);
     sweep(b, &[from, to], &section);
 }
 
-/// Carries `section` (x level, y up, where the path allows) along `path`,
-/// without twisting it, and closes the ends.
+/// Sweeps `section` (x level, y up where the path allows it) along `path` without twisting it, and
+/// closes the ends.
 pub fn sweep(b: &mut Builder, path: &[DVec3], section: &[DVec2]) {
     let last = path.len() - 1;
     let mut frame = Frame::towards(path[1] - path[0]);
@@ -48,7 +48,7 @@ pub fn sweep(b: &mut Builder, path: &[DVec3], section: &[DVec2]) {
     loft(b, &sections);
 }
 
-/// The plane across a path: x and y of the section, z along the path.
+/// The plane across a path, with the axes of the section.
 #[derive(Clone, Copy)]
 struct Frame {
     x: DVec3,
@@ -64,7 +64,7 @@ impl Frame {
         Self { x, y: along.cross(x) }
     }
 
-    /// This frame turned the shortest way to a new direction.
+    /// The frame rotated by the smallest angle to a new direction.
     fn turned(self, direction: DVec3) -> Self {
         let along = direction.normalize_or(self.x.cross(self.y));
         let x = (self.x - self.x.dot(along) * along).normalize_or(Self::towards(along).x);

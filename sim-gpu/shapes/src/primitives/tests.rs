@@ -1,4 +1,4 @@
-//! Primitives, compared with geometry's formulas for volumes and areas.
+//! Compares primitives with formulas for volumes and areas.
 
 use std::f64::consts::PI;
 
@@ -7,8 +7,7 @@ use glam::{DVec2, DVec3};
 use super::revolve::revolve;
 use super::*;
 
-/// The sum of a measure over the triangles of what `build` makes with edges of
-/// `edge_m`.
+/// The sum of a measure over the triangles that `build` makes with edges of `edge_m`.
 fn sum(
     edge_m: f64,
     build: impl FnOnce(&mut Builder),
@@ -20,8 +19,8 @@ fn sum(
     mesh.triangles.iter().map(|t| of_triangle(t.map(|i| mesh.vertices[i as usize]))).sum()
 }
 
-/// Asserts that `build` encloses `expected` cubic metres to the share `tolerance`.
-/// A volume is positive only if front faces look outwards.
+/// Asserts that `build` encloses `expected` cubic metres, within the relative `tolerance`. The
+/// volume is positive only if front faces look outwards.
 fn encloses(
     what: &str,
     edge_m: f64,
@@ -33,13 +32,13 @@ fn encloses(
     assert!(error < tolerance, "{what}: expected a volume of {expected}, found {volume}");
 }
 
-/// Asserts that `build` has a surface of `expected` square metres.
+/// Asserts that the surface of `build` is `expected` square metres.
 fn covers(what: &str, edge_m: f64, expected: f64, build: impl FnOnce(&mut Builder)) {
     let area = sum(edge_m, build, |[a, b, c]| (b - a).cross(c - a).length() / 2.0);
     assert!((area - expected).abs() < 1e-9, "{what}: expected an area of {expected}, found {area}");
 }
 
-/// Sums of some hundred terms of about 1, rounded at 1e-16 each.
+/// Sums of a few hundred terms of about 1, rounded at 1e-16 each.
 const ROUNDING: f64 = 1e-12;
 
 #[test]
@@ -64,8 +63,8 @@ fn flat_solids_enclose_their_volumes_however_finely_divided() {
 
 #[test]
 fn solids_of_revolution_enclose_their_volumes() {
-    // Chords of length e on a circle of radius r lack e^2 / (6 r^2) of its
-    // area; a sphere lacks it in both directions: under 0.4 % at e = 0.1.
+    // Chords of length e on a circle of radius r lack e^2 / (6 r^2) of its area; a sphere lacks it
+    // in both directions: under 0.4 % at e = 0.1.
     encloses("cylinder", 0.1, (2.0 * PI, 4e-3), |b| cylinder(b, DVec3::ONE, 1.0, 2.0));
     let radii = DVec3::new(1.0, 2.0, 3.0) / 2.0;
     encloses("ellipsoid", 0.1, (PI, 4e-3), |b| ellipsoid(b, DVec3::X, radii));

@@ -5,17 +5,17 @@ use glam::DVec2;
 use super::revolve::revolve;
 use super::{Builder, Profile, Sampler, Section};
 
-/// What the side of a vessel is made of.
+/// The side of a vessel.
 #[derive(Clone, Copy, Debug)]
 pub enum Wall {
     /// One sheet without thickness.
     Sheet,
-    /// Two sheets this far apart, joined at the mouth.
+    /// Two sheets at this distance, joined at the mouth.
     Solid(f64),
 }
 
 impl Wall {
-    /// As CAD draws them: one in three a mere sheet, the rest 2 to 8 % of
+    /// Draws a wall as in CAD models: one in three is a sheet, the others are 2 to 8 % of
     /// `radius_m` thick.
     pub fn draw(s: &mut Sampler, radius_m: f64) -> Self {
         let thickness_m = radius_m * s.uniform(0.02, 0.08);
@@ -23,19 +23,16 @@ impl Wall {
     }
 }
 
-/// A vessel: its outer profile, from the foot to the mouth, and how it is
-/// carried around the axis.
+/// A vessel, described by its outer profile from the foot to the mouth.
 #[derive(Clone, Debug)]
 pub struct Vessel {
-    /// The outside; begins on the axis where the vessel has a bottom.
+    /// The outer profile. It begins on the axis if the vessel has a bottom.
     pub outside: Profile,
-    /// The side.
     pub wall: Wall,
-    /// The cross-section.
     pub section: Section,
-    /// Turn of the section in radians a metre of height.
+    /// Twist of the section, radians per metre of height.
     pub twist_rad: f64,
-    /// What lies below this height, a foot or a stem, is not hollow.
+    /// Below this height, a foot or a stem, the vessel is not hollow.
     pub hollow_from_m: f64,
 }
 
@@ -45,7 +42,7 @@ impl Vessel {
         Self { outside, wall, section, twist_rad: 0.0, hollow_from_m: f64::NEG_INFINITY }
     }
 
-    /// Adds the vessel, standing on the height its profile begins at.
+    /// Adds the vessel. It stands at the height where its profile begins.
     pub fn build(&self, b: &mut Builder) {
         let mut profile = self.outside.sample(b);
         if let Wall::Solid(thickness_m) = self.wall {
@@ -57,9 +54,8 @@ impl Vessel {
     }
 }
 
-/// The inner face of a wall: `outside` moved inwards, from the mouth down to
-/// the floor at `floor_m`, which is closed. A vessel without a bottom has no
-/// floor either.
+/// The inner face of a wall: `outside` moved inwards, from the mouth down to the closed floor at
+/// `floor_m`. A vessel without a bottom has no floor.
 fn inside(outside: &[DVec2], thickness_m: f64, floor_m: f64) -> Vec<DVec2> {
     let last = outside.len() - 1;
     let has_bottom = outside[0].x == 0.0;
@@ -77,7 +73,7 @@ fn inside(outside: &[DVec2], thickness_m: f64, floor_m: f64) -> Vec<DVec2> {
             }
             break;
         }
-        // Where the neck is narrower than its walls, there is no hollow.
+        // A neck that is narrower than its walls leaves no hollow.
         points.push(DVec2::new(point.x.max(0.25 * thickness_m), point.y));
     }
     if has_bottom {

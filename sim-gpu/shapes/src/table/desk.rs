@@ -1,11 +1,9 @@
 //! Desks with drawers.
 
-use glam::DVec3;
-
 use super::Top;
-use crate::primitives::{Builder, Sampler, block, block_between};
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between};
 
-/// A cabinet with drawers at one end or both, a panel at the other.
+/// A desk with a cabinet at one end and a panel or a second cabinet at the other.
 pub fn desk(b: &mut Builder, s: &mut Sampler, top: &Top) {
     let wide_m = (top.half.y * s.uniform(0.35, 0.6)).min(0.55);
     let both = s.chance(0.4) && top.half.y > 0.6;
@@ -24,7 +22,7 @@ pub fn desk(b: &mut Builder, s: &mut Sampler, top: &Top) {
     block(b, back, DVec3::new(0.02, 1.85 * top.half.y, 0.6 * top.height_m));
 }
 
-/// A box under the top with `n` drawers that look to -x.
+/// A box under the top with `n` drawers on the side of -x.
 fn cabinet(b: &mut Builder, top: &Top, y: f64, wide_m: f64, n: usize, handle_m: f64) {
     let low_m = 0.06 * top.height_m;
     let deep_m = 0.9 * top.half.x;

@@ -1,4 +1,4 @@
-//! Simple descriptors of a shape, for classifying by the nearest neighbour.
+//! Simple descriptors of a shape for a nearest-neighbour classifier.
 
 use glam::DVec3;
 
@@ -8,13 +8,13 @@ use crate::tessellation::bounds;
 use formats::rng::StreamKey;
 use sim_gpu::mesh::Mesh;
 
-/// Bins of the distance histogram.
+/// The number of bins of the distance histogram.
 const BINS: usize = 24;
-/// Pairs of points measured.
+/// The number of measured pairs of points.
 const PAIRS: usize = 4000;
 
-/// The sides of the box over its height and over each other, as logarithms;
-/// the longer level side first, so that a quarter turn changes nothing.
+/// The logarithms of the sides of the bounding box over its height, the longer side first, so that
+/// a quarter turn has no effect.
 pub fn aspect_ratios(mesh: &Mesh) -> Vec<f64> {
     let [low, high] = bounds(mesh);
     let size = high - low;
@@ -22,10 +22,9 @@ pub fn aspect_ratios(mesh: &Mesh) -> Vec<f64> {
     vec![(long / size.z).ln(), (short / size.z).ln()]
 }
 
-/// The D2 shape distribution (Osada et al., "Shape distributions", ACM
-/// Transactions on Graphics 2002): how often two random points of the surface
-/// lie how far apart, over the mean; as square roots, so that the Euclidean
-/// distance is Hellinger's.
+/// The D2 shape distribution (Osada et al., "Shape distributions", ACM Transactions on Graphics
+/// 2002): the histogram of the distances between two random points of the surface, over the mean.
+/// The values are square roots, so that the Euclidean distance is Hellinger's.
 pub fn shape_distribution(mesh: &Mesh) -> Vec<f64> {
     let points = surface_points(mesh, 2 * PAIRS);
     let distances: Vec<f64> = points.chunks(2).map(|pair| pair[0].distance(pair[1])).collect();
@@ -38,8 +37,8 @@ pub fn shape_distribution(mesh: &Mesh) -> Vec<f64> {
     histogram.into_iter().map(f64::sqrt).collect()
 }
 
-/// How the surface's area is spread over the height, in eighths, and its mean
-/// distance from the middle axis there, over the height.
+/// The distribution of the surface's area over the height, in eighths, and its mean distance from
+/// the vertical axis there, over the height.
 pub fn height_profile(mesh: &Mesh) -> Vec<f64> {
     let [low, high] = bounds(mesh);
     let height = high.z - low.z;
@@ -56,7 +55,7 @@ pub fn height_profile(mesh: &Mesh) -> Vec<f64> {
     shares.chain(radii).collect()
 }
 
-/// Points spread evenly over the surface's area.
+/// Random points, uniform on the surface.
 fn surface_points(mesh: &Mesh, n: usize) -> Vec<DVec3> {
     let mut sums = Vec::with_capacity(mesh.triangles.len());
     let mut sum = 0.0;

@@ -1,4 +1,4 @@
-//! Classes overlap in their proportions and differ in their shapes.
+//! The proportions of classes overlap, but their shapes differ.
 
 use rayon::prelude::*;
 
@@ -9,8 +9,8 @@ use sim_gpu::mesh::Mesh;
 const TRAIN: u32 = 40;
 const TEST: u32 = 20;
 
-/// The share of test shapes whose nearest training shape, by Euclidean
-/// distance of `describe`, is of their own class.
+/// The fraction of test shapes whose nearest training shape, by the Euclidean distance of
+/// `describe`, is of the same class.
 fn accuracy(describe: impl Fn(&Mesh) -> Vec<f64> + Sync) -> f64 {
     let described: Vec<Vec<(ShapeClass, Vec<f64>)>> = [0..TRAIN, TRAIN..TRAIN + TEST]
         .into_iter()
@@ -38,10 +38,9 @@ fn proportions_alone_do_not_tell_the_classes_apart_but_shapes_do() {
         [aspect_ratios(mesh), shape_distribution(mesh), height_profile(mesh)].concat()
     });
     println!("aspect ratios {ratios:.3}, D2 {distribution:.3}, with the height profile {all:.3}");
-    // Chance is 0.1, and the standard deviation of a share of 200 tests at
-    // most 0.035. Bounds lie some three of these from what was measured, so
-    // that new makes of a class do not upset them but a class that has become
-    // trivial, or like another, does.
+    // Guessing gives 0.1. The standard deviation of a fraction of 200 tests is at most 0.035. The
+    // bounds are about three of these from the measured values, so that new makes of a class do not
+    // fail the test, but a class that is trivial or like another one does.
     assert!(ratios < 0.75, "aspect ratios alone are right in {ratios}");
     assert!(distribution > 0.4, "D2 is right in only {distribution}");
     assert!(all > 0.6 && all < 0.97, "descriptors are right in {all}");
@@ -59,8 +58,8 @@ fn no_two_instances_of_a_class_are_alike() {
         for (i, a) in described.iter().enumerate() {
             for b in &described[..i] {
                 let largest = a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
-                // Two samplings of one shape differ by up to four standard
-                // deviations of a share's root, 0.5 / sqrt(8000): 0.02.
+                // The square root of a share deviates by up to four standard deviations, 0.5 /
+                // sqrt(8000), between two samples of one shape: 0.02.
                 assert!(largest > 0.02, "{class}: {i} is like another: {largest}");
             }
         }

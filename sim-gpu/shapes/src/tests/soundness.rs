@@ -1,4 +1,4 @@
-//! Numbers in range, sane boxes, open surfaces, parts that hang together.
+//! Finite numbers, plausible sizes, open surfaces, connected parts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -44,7 +44,7 @@ fn assert_stands_and_is_of_a_thing_s_size(mesh: &Mesh, what: &str) {
     let [low, high] = bounds(mesh);
     let size = high - low;
     assert_eq!(low.z, 0.0, "{what}");
-    // From an espresso cup to an airliner; the flattest are screens for the
+    // The range is from an espresso cup to an airliner. The flattest shapes are screens for the
     // wall, 1.5 % as deep as wide, and flying wings.
     let longest = size.max_element();
     assert!((0.03..90.0).contains(&longest), "{what}: {size}");
@@ -53,8 +53,8 @@ fn assert_stands_and_is_of_a_thing_s_size(mesh: &Mesh, what: &str) {
     assert!(middle.length() < longest, "{what}: far from the origin, {middle}");
 }
 
-/// Whether some edge belongs to one triangle only, vertices of equal place
-/// being one and doubled triangles too.
+/// Whether an edge belongs to only one triangle. Vertices at one place count as one, and so do
+/// doubled triangles.
 fn is_open(mesh: &Mesh) -> bool {
     let place = |v: DVec3| (v * 1e6).round().to_array().map(|c| c as i64);
     let mut triangles = BTreeSet::new();
@@ -79,20 +79,18 @@ fn many_vessels_and_shades_are_open_sheets() {
         let open =
             (0..looked_at).into_par_iter().filter(|&k| is_open(&generate(class, SEED, k))).count();
         println!("{class}: {open} of {looked_at} are open");
-        // A third of the walls at least are drawn as sheets: 17 expected,
-        // standard deviation 3.3.
+        // At least a third of the walls are sheets: 17 expected, standard deviation 3.3.
         assert!(open >= 8, "{class}: only {open} of {looked_at} are open");
     }
 }
 
-/// Cells to a diagonal in the grid of [`pieces`], and cells along its sides:
-/// a border of empty ones spares looking for the end.
+/// The number of cells along the diagonal and along a side of the grid in [`pieces`]. A border of
+/// empty cells makes checks for the end unnecessary.
 const CELLS: f64 = 64.0;
 const SIDE: i32 = 68;
 
-/// How many pieces the surface falls into when gaps of up to some 2 % of the
-/// diagonal are closed: the connected sets of the grid's occupied cells,
-/// corners touching.
+/// The number of connected pieces of the surface if gaps of up to about 2 % of the diagonal are
+/// closed: the connected sets of occupied cells, with neighbours at corners.
 fn pieces(mesh: &Mesh) -> usize {
     let [low, high] = bounds(mesh);
     let per_metre = CELLS / low.distance(high);
@@ -122,7 +120,7 @@ fn pieces(mesh: &Mesh) -> usize {
     pieces
 }
 
-/// Empties the cell `start` and all occupied ones that it leads to.
+/// Clears the cell `start` and all occupied cells that are connected to it.
 fn clear_connected(occupied: &mut [bool], start: usize) {
     let mut border = vec![start];
     while let Some(at) = border.pop() {

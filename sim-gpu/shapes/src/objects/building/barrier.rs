@@ -1,15 +1,14 @@
 //! Barriers beside and on roads.
 
-use glam::{DVec2, DVec3};
-
-use crate::primitives::{Builder, Makes, Sampler, block, cylinder, loft, outline, rod, skin};
+use crate::primitives::{
+    Builder, DVec2, DVec3, Makes, Sampler, block, cylinder, loft, outline, rod, skin,
+};
 
 /// The makes, with their weights.
 pub const MAKES: Makes = &[(4, guard_rail), (3, concrete), (2, boards), (2, crowd), (1, filled)];
 
-/// A steel beam with two waves, 0.31 m high and 0.08 m deep (AASHTO M 180),
-/// its top 0.75 m up (EN 1317 systems; 0.79 m in the USA), on posts 1.33 to
-/// 4 m apart.
+/// A steel beam with two waves, 0.31 m high and 0.08 m deep (AASHTO M 180), its top 0.75 m up (EN
+/// 1317 systems; 0.79 m in the USA), on posts 1.33 to 4 m apart.
 fn guard_rail(b: &mut Builder, s: &mut Sampler) {
     let long_m = s.uniform(4.0, 10.0);
     let top_m = s.uniform(0.7, 0.82);
@@ -38,8 +37,8 @@ fn guard_rail(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Concrete with sloping sides: New Jersey's profile, 0.81 m high, 0.61 m wide
-/// below and 0.15 m above (FHWA), or a plain block.
+/// A concrete barrier with sloping sides: the New Jersey profile, 0.81 m high, 0.61 m wide at its
+/// foot and 0.15 m at its top (FHWA), or a plain block.
 fn concrete(b: &mut Builder, s: &mut Sampler) {
     let long_m = s.uniform(1.5, 8.0);
     let scale = s.uniform(0.85, 1.3);
@@ -63,8 +62,8 @@ fn along_y(outline: &[DVec2], ends_m: [f64; 2], up_m: f64) -> [Vec<DVec3>; 2] {
     ends_m.map(|y| outline.iter().map(|p| DVec3::new(p.x, y, p.y + up_m)).collect())
 }
 
-/// Striped boards on a stand before a road work: one at 1 m (RSA), or three up
-/// to 1.5 m (MUTCD, type 3), with or without lamps.
+/// Striped boards on a stand at a road work: one at 1 m (RSA), or up to three at 0.5 to 1.5 m
+/// (MUTCD, type 3), with or without lamps.
 fn boards(b: &mut Builder, s: &mut Sampler) {
     let half_m = 0.5 * s.uniform(1.2, 3.0);
     let tops = s.pick(&[vec![1.0], vec![0.9, 0.45], vec![1.5, 1.0, 0.5]]);
@@ -100,7 +99,7 @@ fn crowd(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Shells of plastic filled with water, in a row.
+/// Plastic barriers filled with water, in a row.
 fn filled(b: &mut Builder, s: &mut Sampler) {
     let size = DVec3::new(s.uniform(0.4, 0.6), s.uniform(1.0, 2.0), s.uniform(0.55, 1.1));
     for piece in 0..s.count(1, 4) {

@@ -1,8 +1,6 @@
 //! Fences of boards, bars or wire between posts.
 
-use glam::DVec3;
-
-use crate::primitives::{Builder, Sampler, block, rod};
+use crate::primitives::{Builder, DVec3, Sampler, block, rod};
 
 /// A stretch of fence along y about the origin.
 struct Stretch {
@@ -54,7 +52,7 @@ impl Stretch {
         }
     }
 
-    /// Adds upright boards of `size` whose middles are `pitch_m` apart.
+    /// Adds upright boards of `size` at a distance of `pitch_m`, except where `missing` is true.
     fn uprights(&self, b: &mut Builder, pitch_m: f64, size: DVec3, missing: impl Fn(f64) -> bool) {
         let n = (self.long_m / pitch_m) as usize;
         for k in 0..n {
@@ -67,7 +65,7 @@ impl Stretch {
     }
 }
 
-/// Upright boards with or without gaps, on two rails; a few may be missing.
+/// Upright boards on two rails, with or without gaps; a few may be missing.
 fn pickets(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     let wide_m = s.uniform(0.07, 0.18);
     let pitch_m = wide_m * s.pick(&[1.02, 1.3, 1.8]);
@@ -85,7 +83,7 @@ fn bars(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     stretch.uprights(b, s.uniform(0.08, 0.14), size, |_| false);
 }
 
-/// Level planks: a ranch fence of few, or a screen of many.
+/// Level planks: a ranch fence with few of them, or a screen with many.
 fn planks(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     let n = s.pick(&[2, 3, 4, 9]);
     let pitch_m = stretch.high_m / n as f64;
@@ -96,11 +94,11 @@ fn planks(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     }
 }
 
-/// Wire: welded mats, or mesh whose wires are drawn thicker and further apart
-/// than they are, so that it stops as large a part of the beams.
+/// Wire: welded mats, or mesh. The wires of mesh are thicker and further apart than real ones, so
+/// that they stop the same fraction of the beams.
 fn wire(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     let [half_m, high_m] = [0.5 * stretch.long_m, stretch.high_m];
-    // Mesh of 50 mm with wires of 3 mm covers some 12 %: 10 mm wires at 0.16 m.
+    // Mesh of 50 mm with wires of 3 mm covers about 12 %, the same as 10 mm wires at 0.16 m.
     let pitch_m = s.uniform(0.1, 0.16);
     let r = s.uniform(0.003, 0.006);
     let slant_m = if s.chance(0.5) { high_m } else { 0.0 };
@@ -119,8 +117,8 @@ fn wire(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     rod(b, DVec3::new(0.0, -half_m, high_m), DVec3::new(0.0, half_m, high_m), [0.02, 0.02]);
 }
 
-/// A wire that rises from `foot` by `slant_m` along y, cut at the ends of the
-/// fence: two crossed strips.
+/// A wire that rises from `foot` by `slant_m` along y, cut at the ends of the fence: two crossed
+/// strips.
 fn strand(b: &mut Builder, foot: f64, slant_m: f64, [half_m, high_m]: [f64; 2], r: f64) {
     let share = |y: f64| if slant_m == 0.0 { 0.0 } else { (y - foot) / slant_m };
     let ends = [share(-half_m), share(half_m)];

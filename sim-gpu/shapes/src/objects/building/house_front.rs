@@ -1,14 +1,14 @@
-//! The front of a house with recessed windows, and what stands out of it.
+//! Fronts of houses with recessed windows, entrances, bays and balconies.
 //!
-//! Storeys are 2.6 to 3.6 m high, sills 0.8 to 1 m, doors 2 to 2.2 m (the
-//! usual measures of housing, as in Neufert's Architects' Data).
-
-use glam::{DAffine3, DVec2, DVec3};
+//! Storeys are 2.6 to 3.6 m high, sills 0.8 to 1 m, doors 2 to 2.2 m (usual measures of housing,
+//! for example in Neufert's Architects' Data).
 
 use super::opening::{Filling, Opening, Rect, blank};
-use crate::primitives::{Builder, Sampler, block, block_between, cylinder, rod};
+use crate::primitives::{
+    Builder, DAffine3, DVec2, DVec3, Sampler, block, block_between, cylinder, rod,
+};
 
-/// The plan of a front; it looks to +x and runs along y from 0.
+/// The measures of a front that faces +x and runs along y from 0.
 struct Front {
     n_bays: usize,
     bay_m: f64,
@@ -20,7 +20,8 @@ struct Front {
     window: DVec2,
     sill_m: f64,
     filling: Filling,
-    /// The ground floor's openings are a shop's or garages.
+    /// The filling of wide openings in the ground floor, of a shop or of garages; `None` for
+    /// windows.
     wide_below: Option<Filling>,
 }
 
@@ -90,7 +91,7 @@ impl Front {
             Some(filling) if storey == 0 => (hole(0.88 * self.bay_m, 0.1, 2.2), filling),
             _ if s.chance(0.1) => return blank(b, cell),
             _ => {
-                // A window in seven has its blind or shutter down.
+                // One window of seven has its blind or shutter down.
                 let filling = if s.chance(0.15) { Filling::Solid } else { self.filling };
                 (hole(self.window.x, self.sill_m, self.window.y), filling)
             }
@@ -104,7 +105,7 @@ impl Front {
     }
 }
 
-/// The steps to the door, a handrail, a roof above.
+/// The steps to the door, a handrail, and a canopy.
 fn entrance(b: &mut Builder, s: &mut Sampler, plinth_m: f64) {
     let half_m = s.uniform(0.6, 1.1);
     let n = (plinth_m / 0.17).round() as usize;
@@ -128,7 +129,7 @@ fn entrance(b: &mut Builder, s: &mut Sampler, plinth_m: f64) {
     }
 }
 
-/// The walls around the corners, of which one is longer.
+/// The two side walls, one of which is longer.
 fn side_walls(b: &mut Builder, s: &mut Sampler, front: &Front) {
     let deep_m = [s.uniform(0.3, 8.0), s.uniform(0.3, 1.0)];
     let turn_rad = std::f64::consts::FRAC_PI_2;
@@ -143,7 +144,7 @@ fn side_walls(b: &mut Builder, s: &mut Sampler, front: &Front) {
     }
 }
 
-/// A bay, a balcony and a downpipe.
+/// A bay or a balcony, and a downpipe.
 fn stand_out(b: &mut Builder, s: &mut Sampler, front: &Front, door: usize) {
     let free = (door + 1 + s.count(0, front.n_bays - 2)) % front.n_bays;
     let y = (free as f64 + 0.5) * front.bay_m;
@@ -179,7 +180,7 @@ fn balcony(b: &mut Builder, s: &mut Sampler, wide_m: f64) {
     }
 }
 
-/// A bay from the ground up, with a window in front.
+/// A bay that begins at the ground, with a window in front.
 fn bay(b: &mut Builder, s: &mut Sampler, front: &Front) {
     let out_m = s.uniform(0.5, 1.2);
     let half_m = 0.45 * front.bay_m;

@@ -1,8 +1,6 @@
-//! A piece of a wall with a window, a door or nothing in it.
+//! A part of a wall, with or without a window or a door.
 
-use glam::{DVec2, DVec3};
-
-use crate::primitives::{Builder, block};
+use crate::primitives::{Builder, DVec2, DVec3, block};
 
 /// An upright rectangle across x, in (y, z).
 #[derive(Clone, Copy)]
@@ -27,18 +25,16 @@ impl Rect {
         Self { low: self.low + by_m, high: self.high - by_m }
     }
 
-    /// The middle.
     pub fn middle(self) -> DVec2 {
         (self.low + self.high) / 2.0
     }
 
-    /// Width and height.
     pub fn size_m(self) -> DVec2 {
         self.high - self.low
     }
 }
 
-/// What an opening is closed by.
+/// The filling of an opening.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Filling {
     /// A pane of glass.
@@ -54,15 +50,14 @@ pub enum Filling {
 pub struct Opening {
     /// The hole in the wall.
     pub hole: Rect,
-    /// How far the filling lies behind the wall's face.
+    /// The distance of the filling behind the face of the wall.
     pub recess_m: f64,
     /// The width of the frame around the filling.
     pub frame_m: f64,
-    /// What closes it.
     pub filling: Filling,
 }
 
-/// Adds the wall of a rectangle, which looks to +x at x = 0.
+/// Adds a wall without an opening, which faces +x at x = 0.
 pub fn blank(b: &mut Builder, cell: Rect) {
     let [low, high] = [cell.low, cell.high];
     let row = |z: f64| vec![DVec3::new(0.0, low.x, z), DVec3::new(0.0, high.x, z)];
@@ -70,8 +65,7 @@ pub fn blank(b: &mut Builder, cell: Rect) {
 }
 
 impl Opening {
-    /// Adds the wall of `cell` about the hole, the reveals, the frame and the
-    /// filling.
+    /// Adds the wall of `cell` around the hole, the reveals, the frame and the filling.
     pub fn build(self, b: &mut Builder, cell: Rect) {
         let inner = self.hole.shrunk(self.frame_m);
         let [outside, inside] = [self.hole, inner].map(|rect| rect.corners(-self.recess_m));

@@ -1,18 +1,16 @@
 //! Free-standing walls.
 
-use glam::{DAffine3, DVec3};
-
 use crate::objects::plant::uneven::{Ripple, warped_box};
-use crate::primitives::{Builder, Sampler, block};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block};
 
-/// What a wall is made of.
+/// The form of a wall.
 struct Masonry {
     thick_m: f64,
     /// How far stones stand out; 0 for plaster and concrete.
     rough_m: f64,
-    /// How far the coping stands out; 0 for none.
+    /// How far the coping stands out; 0 without a coping.
     coping_m: f64,
-    /// The distance between piers; none for a plain wall.
+    /// The distance between piers; `None` without piers.
     piers_m: Option<f64>,
 }
 
@@ -26,7 +24,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
         coping_m: if s.chance(0.4) { s.uniform(0.02, 0.08) } else { 0.0 },
         piers_m: if s.chance(0.35) { Some(s.uniform(1.8, 4.0)) } else { None },
     };
-    // A wall on a slope goes down in steps.
+    // A wall on a slope descends in steps.
     let n_steps = if long_m > 3.0 { s.weighted(&[(4, 1), (1, 2), (1, 4)]) } else { 1 };
     let step_m = s.uniform(0.1, 0.4) * high_m / n_steps as f64;
     for step in 0..n_steps {
@@ -50,7 +48,7 @@ impl Masonry {
         if self.rough_m > 0.0 {
             let stones = Ripple::draw(s, 0.4, self.rough_m);
             let out = |p: DVec3| p + stones.at(p) * p.with_z(0.0).normalize_or(DVec3::X);
-            // No more faces than a wall needs at a distance.
+            // Larger faces suffice for a long wall, which is seen from afar.
             warped_box(b, size, 0.3_f64.max(long_m / 25.0), out);
         } else {
             block(b, 0.5 * size * DVec3::Z, size);

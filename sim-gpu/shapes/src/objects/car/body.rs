@@ -1,34 +1,30 @@
-//! The body below the windows: sides with wheel arches, nose, tail, bonnet, boot and
-//! underside.
-
-use glam::{DVec2, DVec3};
+//! The body below the windows: sides with wheel arches, nose, tail, bonnet, boot, underside.
 
 use super::form::{Form, Style};
 use super::panel::{Arch, in_order, lid, lower_edge_m};
-use crate::primitives::{Builder, Sampler, block_between};
+use crate::primitives::{Builder, DVec2, DVec3, Sampler, block_between};
 
-/// Rows of the shell, as shares of its height.
+/// The rows of points of the shell, as shares of its height.
 const ROWS: [f64; 6] = [0.0, 0.2, 0.42, 0.65, 0.88, 1.0];
 
-/// Shares of the half width where the nose and the tail have columns.
+/// The columns of points at the nose and the tail, as shares of the half width.
 const END_SHARES: [f64; 5] = [0.0, 0.3, 0.55, 0.75, 0.88];
 
-/// The body and what its shape depends on besides the form.
-#[derive(Clone, Debug)]
+/// The shape of the body.
 pub struct Body<'a> {
     form: &'a Form,
     arches: [Arch; 2],
-    /// The plan is a superellipse of this exponent.
+    /// The exponent of the superellipse that is the plan of the body.
     squareness: f64,
-    /// How far the tail and the nose lean in between the bumper and their top.
+    /// How far the tail and the nose lean in between the bumper and their upper edge.
     lean_m: [f64; 2],
-    /// How far the bumpers stand out before tail and nose.
+    /// How far the rear and the front bumper stand out.
     bumper_m: [f64; 2],
     /// How far the sides lean in at the sill and at the windows.
     inset_m: [f64; 2],
-    /// How much the bonnet is higher in its middle.
+    /// The rise of the bonnet in its middle.
     crown_m: f64,
-    /// A pick-up's bed without a cover.
+    /// Whether the car has a pick-up's bed without a cover.
     open_bed: bool,
 }
 
@@ -89,8 +85,8 @@ impl<'a> Body<'a> {
         self.underside(b);
     }
 
-    /// The outline on the right from the middle of the tail to that of the nose:
-    /// x, and half the width (negative).
+    /// The outline of the right side from the middle of the tail to the middle of the nose, as
+    /// points of x and half the width (negative).
     fn stations(&self) -> Vec<DVec2> {
         let half = self.form.half;
         let e = self.squareness;
@@ -106,12 +102,12 @@ impl<'a> Body<'a> {
         outline.map(|(x, y)| DVec2::new(x, -y)).collect()
     }
 
-    /// The point of the shell over the outline's point `plan`, at the share `t` of its
-    /// height there.
+    /// The point of the shell above the outline's point `plan`, at the share `t` of the height
+    /// there.
     fn point(&self, plan: DVec2, t: f64) -> DVec3 {
         let form = self.form;
         let end = (plan.x.abs() / form.half.x).min(1.0).powi(8);
-        // Nose and tail are cut off a little higher than the sills.
+        // The lower edges of nose and tail are a little higher than the sills.
         let sill_m = form.sill_m + 0.05 * end;
         let low_m = lower_edge_m(&self.arches, sill_m, plan.x);
         let high_m = form.top_m(plan.x).max(low_m + 0.05);
@@ -124,8 +120,8 @@ impl<'a> Body<'a> {
         DVec3::new(plan.x - plan.x.signum() * end * back_m, y, z)
     }
 
-    /// How far the side leans in at height `z`: it is widest at 0.55 m and rounded at
-    /// its upper edge.
+    /// How far the side leans in at height `z`. It is widest at 0.55 m, and its upper edge is
+    /// rounded.
     fn side_inset_m(&self, z: f64, t: f64) -> f64 {
         let [low_m, high_m] = self.inset_m;
         let below = ((0.55 - z) / 0.35).clamp(0.0, 1.0);
@@ -134,7 +130,7 @@ impl<'a> Body<'a> {
         low_m * below.powi(2) + 0.6 * high_m * above.powi(2) + 0.4 * high_m * shoulder
     }
 
-    /// The inside of an open bed: floor and walls.
+    /// The floor and the walls inside an open bed.
     fn bed(&self, b: &mut Builder) {
         let form = self.form;
         let [from, to] = [-form.half.x + 0.12 + self.lean_m[0] + self.bumper_m[0], form.rear[0]];
@@ -159,7 +155,7 @@ impl<'a> Body<'a> {
         });
     }
 
-    /// The floor, and what fills the space between the wheels: engine, tank, axles.
+    /// The floor, and blocks for the engine, the tank and the axles between the wheels.
     fn underside(&self, b: &mut Builder) {
         let form = self.form;
         let [rear, front] = form.axles;

@@ -1,15 +1,12 @@
-//! The cabin above the windows' lower edges: screens, side windows, pillars, roof.
-
-use glam::DVec3;
+//! The cabin above the lower edge of the windows: screens, side windows, pillars, roof.
 
 use super::body::Body;
 use super::form::{Form, Style};
 use super::panel::{Column, lid, wall};
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler};
 
-/// The cabin's right half, as columns from the middle of the rear window to that of
-/// the windscreen.
-#[derive(Clone, Debug)]
+/// The right half of the cabin, as columns from the middle of the rear window to the middle of the
+/// windscreen.
 pub struct Cabin {
     columns: Vec<Column>,
     crown_m: f64,
@@ -19,7 +16,7 @@ pub struct Cabin {
 struct Roof<'a> {
     form: &'a Form,
     half_y: f64,
-    /// How much lower the roof is at its sides, and at its two ends.
+    /// How much lower the roof is at its sides and at its ends.
     fall_m: [f64; 2],
 }
 

@@ -1,13 +1,11 @@
-//! What stands out from a car: mirrors, roof rails and boxes, ladders, spare wheels.
-
-use glam::{DAffine3, DVec3};
+//! Parts that stand out from a car: mirrors, roof rails and boxes, racks, spare wheels.
 
 use super::body::Body;
 use super::form::{Form, Style};
 use super::wheel;
-use crate::primitives::{Builder, Sampler, bar, block, cushion};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, bar, block, cushion};
 
-/// Builds the mirrors and what some cars carry.
+/// Builds the mirrors, and sometimes rails, a rack, a box or a spare wheel.
 pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     mirrors(b, s, form, body);
     let roof_y = 0.82 * form.roof_share * form.half.y;
@@ -35,7 +33,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     }
 }
 
-/// Outside mirrors are some 0.2 m wide and 0.13 m high; those of vans stand upright.
+/// Outside mirrors are about 0.2 m wide and 0.13 m high; those of vans are upright.
 fn mirrors(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     let boxy = form.style.is_boxy();
     let x = form.screen[0] - s.uniform(0.25, 0.5);

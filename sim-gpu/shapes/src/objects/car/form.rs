@@ -18,7 +18,7 @@ struct Styles {
 }
 
 /// A body style.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Style {
     Hatchback,
@@ -62,7 +62,6 @@ impl Style {
 }
 
 /// The measures of a car, metres. The car extends from -`half.x` to `half.x`.
-#[derive(Clone, Debug)]
 pub struct Form {
     pub style: Style,
     /// Half the length, and half the width without the mirrors.

@@ -1,17 +1,14 @@
-//! What a laser sees through the panes of a car.
-
-use glam::{DAffine3, DVec3};
+//! The interior of a car, which beams reach through the panes.
 
 use super::form::{Form, Style};
-use crate::primitives::{Builder, Sampler, block, block_between, ellipsoid};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block, block_between, ellipsoid};
 
-/// Builds the dashboard, seats with head rests, sometimes a driver, and the bulkhead
-/// of a van.
+/// Builds the dashboard, seats with head rests, sometimes a driver, and the bulkhead of a van.
 pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form) {
     let inner_y = 0.8 * form.half.y;
     let foot = form.screen[0];
     let belt_m = form.top_m(foot);
-    // The floor of a cabin is some 0.3 m above the road in cars and 0.6 m in vans.
+    // The floor of a cabin is about 0.3 m above the road in cars and 0.6 m in vans.
     let floor_m = if form.style.is_boxy() { 0.55 } else { form.sill_m + 0.14 };
     let dash = [foot - s.uniform(0.4, 0.6), foot - 0.15];
     let low = DVec3::new(dash[0], -inner_y, floor_m + 0.25);
@@ -36,7 +33,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form) {
     }
 }
 
-/// A seat to the left of the middle, and what it is fitted to.
+/// The measures of a seat on the left.
 struct Seat {
     y: f64,
     width_m: f64,
@@ -45,13 +42,13 @@ struct Seat {
 }
 
 impl Seat {
-    /// Adds the seat, the foot of whose back is at `x`.
+    /// Adds the seat, with the foot of its back at `x`.
     fn build(&self, b: &mut Builder, x: f64) {
         let cushion_m = self.floor_m + 0.28;
         let back_m = (self.belt_m + 0.12 - cushion_m).max(0.5);
         let middle = DVec3::new(x + 0.25, self.y, cushion_m - 0.1);
         block(b, middle, DVec3::new(0.5, self.width_m, 0.2));
-        // Backs are reclined by some 20 degrees.
+        // Backs are reclined by about 20 degrees.
         let reclined = DAffine3::from_rotation_y(-20f64.to_radians());
         b.turned(DVec3::new(x, self.y, cushion_m), reclined, |b| {
             block(b, 0.5 * back_m * DVec3::Z, DVec3::new(0.13, self.width_m, back_m));
@@ -60,7 +57,7 @@ impl Seat {
     }
 }
 
-/// The upper body and the head of a person who sits on a cushion at `at`.
+/// The upper body and the head of a person who sits at `at`.
 fn driver(b: &mut Builder, at: DVec3) {
     ellipsoid(b, at + DVec3::new(-0.05, 0.0, 0.28), DVec3::new(0.13, 0.2, 0.32));
     ellipsoid(b, at + DVec3::new(-0.1, 0.0, 0.7), DVec3::new(0.1, 0.08, 0.12));

@@ -1,22 +1,21 @@
-//! What the walls of vehicles are made of: panels with panes, and edges with wheel
-//! arches.
+//! Walls of vehicles: panels with panes, and edges with wheel arches.
 
 use glam::DVec3;
 
 use crate::primitives::Builder;
 
-/// An upright line of a wall, and what lies between it and the next one.
-#[derive(Clone, Copy, Debug)]
+/// An upright line of a wall, and the panel between it and the next one.
+#[derive(Clone, Copy)]
 pub struct Column {
     /// The lower end.
     pub foot: DVec3,
     /// The upper end.
     pub head: DVec3,
-    /// A pane from one share of the height to another, in a frame; or sheet metal.
+    /// The lower and the upper end of the pane, as shares of the height; `None` for sheet metal.
     pub pane: Option<[f64; 2]>,
 }
 
-/// The wall through `columns`, which go counter-clockwise seen from above.
+/// The wall through `columns`, which run counter-clockwise seen from above.
 pub fn wall(b: &mut Builder, columns: &[Column]) {
     for pair in columns.windows(2) {
         let strip = |b: &mut Builder, low: f64, high: f64| {
@@ -35,8 +34,8 @@ pub fn wall(b: &mut Builder, columns: &[Column]) {
     }
 }
 
-/// The lid over one side's `edge` (y below 0, from the rear to the front) and its
-/// mirror image, `crown_m` higher in the middle of its widest row.
+/// The lid over one side's `edge` (y below 0, from the rear to the front) and its mirror image. It
+/// is `crown_m` higher in the middle of its widest row.
 pub fn lid(b: &mut Builder, edge: &[DVec3], crown_m: f64) {
     let widest_m = edge.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
     let row = |p: &DVec3| {
@@ -55,18 +54,18 @@ pub fn lid(b: &mut Builder, edge: &[DVec3], crown_m: f64) {
 }
 
 /// The opening for a wheel in a vehicle's side.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Arch {
-    /// Where the axle is.
+    /// x of the axle.
     pub x: f64,
-    /// How high the axle is.
+    /// The height of the axle.
     pub z: f64,
     /// The radius of the opening.
     pub radius_m: f64,
 }
 
 impl Arch {
-    /// Where a side must have a column so that the opening is round.
+    /// The x at which a side needs columns for a round opening.
     pub fn stations(&self) -> impl Iterator<Item = f64> {
         let Self { x, radius_m, .. } = *self;
         let round = (0..=6).map(move |k| x - radius_m * (f64::from(k) * 30f64.to_radians()).cos());
@@ -74,19 +73,19 @@ impl Arch {
     }
 }
 
-/// The height of a side's lower edge at `x`: `sill_m` except above wheels.
+/// The height of a side's lower edge at `x`: `sill_m`, or the edge of a wheel arch.
 pub fn lower_edge_m(arches: &[Arch], sill_m: f64, x: f64) -> f64 {
     arches
         .iter()
         .map(|arch| (arch.z, arch.radius_m.powi(2) - (x - arch.x).powi(2)))
-        // Rounding must not close the opening at its two ends.
+        // The tolerance keeps rounding from closing the ends of the opening.
         .filter(|(_, square)| *square > -1e-9)
         .map(|(z, square)| z + square.max(0.0).sqrt())
         .fold(sill_m, f64::max)
 }
 
-/// `stations` in order, those left out that are nearer than a centimetre to
-/// another or outside `low..high`.
+/// `stations` within `low..high` in ascending order, without those less than a centimetre above
+/// another.
 pub fn in_order(stations: impl IntoIterator<Item = f64>, [low, high]: [f64; 2]) -> Vec<f64> {
     let mut xs: Vec<f64> = stations.into_iter().filter(|x| (low..high).contains(x)).collect();
     xs.sort_by(f64::total_cmp);

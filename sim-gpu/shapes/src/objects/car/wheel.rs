@@ -2,15 +2,13 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::DAffine3;
+use crate::primitives::{Builder, DAffine3, Profile, Section};
 
-use crate::primitives::{Builder, Profile, Section};
-
-/// A wheel on an axle along y. The middle of its outer face is at the origin, and
-/// looks to +y if `side` is 1, to -y if it is -1.
+/// A wheel on an axle along y. The middle of its outer face is at the origin and faces +y if `side`
+/// is 1, -y if it is -1.
 ///
-/// Its radius, its width and the depth of its dish are metres. The face towards the
-/// vehicle is open. Fourteen sides are round to 2.5 % of the radius.
+/// The measures are the radius, the width and the depth of the dish. The face towards the vehicle
+/// is open. The fourteen sides deviate by 2.5 % of the radius from a circle.
 pub fn wheel(b: &mut Builder, [radius_m, width_m, dish_m]: [f64; 3], side: f64) {
     let rim_m = 0.66 * radius_m;
     let profile = Profile::from(0.93 * radius_m, -width_m)

@@ -1,12 +1,9 @@
 //! Cabinets with doors or drawers.
 
-use glam::{DVec2, DVec3};
+use crate::primitives::{Builder, DVec2, DVec3, Sampler, block};
 
-use crate::primitives::{Builder, Sampler, block};
-
-/// The usual sizes of cabinets: ranges of depth, width and height, metres
-/// (Neufert's Architects' Data; base units of kitchens are 0.85 to 0.9 m high,
-/// EN 1116).
+/// The usual sizes of cabinets: ranges of depth, width and height, metres (Neufert's Architects'
+/// Data; base units of kitchens are 0.85 to 0.9 m high, EN 1116).
 const SIZES_M: [[[f64; 2]; 3]; 5] = [
     // Wardrobe.
     [[0.5, 0.65], [0.8, 2.2], [1.8, 2.3]],
@@ -20,7 +17,7 @@ const SIZES_M: [[[f64; 2]; 3]; 5] = [
     [[0.5, 0.7], [0.3, 0.75], [1.4, 1.9]],
 ];
 
-/// Builds a cabinet that looks to +x.
+/// Builds a cabinet that faces +x.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let [deep_m, wide_m, high_m] = s.pick(&SIZES_M).map(|[low, high]| s.uniform(low, high));
     let feet_m = s.pick(&[0.0, 0.05, 0.1, 0.15]);
@@ -29,7 +26,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     for (x, y) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
         let half = 0.5 * DVec2::new(deep_m, wide_m) - 0.04;
         let foot = DVec3::new(x * half.x, y * half.y, 0.5 * feet_m);
-        // Some stand on the floor without feet.
+        // Some cabinets have no feet.
         if feet_m > 0.0 {
             block(b, foot, DVec3::new(0.04, 0.04, feet_m));
         }
@@ -52,7 +49,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// The front of a door or a drawer that stands out a little, and its handle.
+/// The front of a door or a drawer, and its handle.
 fn panel(b: &mut Builder, middle: DVec3, cell: DVec2, door: bool) {
     let thick_m = 0.018;
     let front = middle + 0.5 * thick_m * DVec3::X;

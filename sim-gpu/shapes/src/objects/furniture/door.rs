@@ -1,12 +1,10 @@
 //! Doors in their frames.
 
-use glam::{DAffine3, DVec3};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block, block_between, rod};
 
-use crate::primitives::{Builder, Sampler, block, block_between, rod};
-
-/// Builds a door that looks to +x, shut or ajar: leaves of 0.735 to 0.985 m by
-/// 1.985 to 2.11 m, 0.04 m thick (DIN 18101), one or two; bare, or with a
-/// piece of the wall on either side.
+/// Builds a door that faces +x, shut or ajar, with one or two leaves of 0.735 to 0.985 m by 1.985
+/// to 2.11 m and 0.04 m thickness (DIN 18101), and sometimes with a part of the wall on either
+/// side.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let wide_m = s.pick(&[0.735, 0.86, 0.86, 0.985]);
     let high_m = s.pick(&[1.985, 1.985, 2.11]);
@@ -26,7 +24,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     for leaf in 0..n {
         let side = if leaf == 0 { 1.0 } else { -1.0 };
         let open_rad = if s.chance(0.5) { s.uniform(0.0, 1.9) } else { 0.0 };
-        // The second leaf is the first one's mirror image.
+        // The second leaf is the mirror image of the first.
         let frame = DAffine3::from_scale(DVec3::new(1.0, side, 1.0))
             * DAffine3::from_translation(-half_m * DVec3::Y)
             * DAffine3::from_rotation_z(-open_rad);
@@ -34,8 +32,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A leaf along y from its hinge, with a handle 1.05 m up and perhaps a pane
-/// of glass.
+/// A leaf along y from its hinge, with a handle at 1.05 m and perhaps a pane of glass.
 fn door_leaf(b: &mut Builder, [wide_m, high_m]: [f64; 2], pane: bool) {
     let half_m = 0.02;
     let mut panel = |low: [f64; 2], high: [f64; 2]| {

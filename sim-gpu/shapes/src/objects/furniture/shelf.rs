@@ -1,11 +1,8 @@
 //! Shelves with and without books.
 
-use glam::DVec3;
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between};
 
-use crate::primitives::{Builder, Sampler, block, block_between};
-
-/// The inside of a shelf: from the ground up along z, across along y, open to
-/// +x.
+/// The measures of a shelf that is open to +x, with its width along y.
 struct Frame {
     half_deep_m: f64,
     half_wide_m: f64,
@@ -13,8 +10,8 @@ struct Frame {
     board_m: f64,
 }
 
-/// Builds a shelf that looks to +x: 0.7 to 2.2 m high, 0.4 to 1.8 m wide, 0.25
-/// to 0.6 m deep, of boards, or of posts as in a store.
+/// Builds a shelf that faces +x: 0.7 to 2.2 m high, 0.4 to 1.8 m wide, 0.25 to 0.6 m deep, with
+/// side boards or, as in a store, with posts.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let frame = Frame {
         half_deep_m: s.uniform(0.125, 0.3),
@@ -61,7 +58,7 @@ impl Frame {
     fn fill(&self, b: &mut Builder, s: &mut Sampler, z: f64, room_m: f64) {
         let mut y = -self.half_wide_m + self.board_m;
         while y < 0.8 * self.half_wide_m {
-            // Books of one height are drawn as one block.
+            // Books of one height are one block.
             let wide_m = s.uniform(0.05, 0.35).min(self.half_wide_m - self.board_m - y);
             let size = DVec3::new(
                 self.half_deep_m * s.uniform(0.9, 1.7),

@@ -1,12 +1,10 @@
 //! Sofas and armchairs.
 
-use glam::DVec3;
+use crate::primitives::{Builder, DVec3, Sampler, block_between, cushion, cylinder};
 
-use crate::primitives::{Builder, Sampler, block_between, cushion, cylinder};
-
-/// Builds a sofa that looks to +x: one to four seats of 0.62 to 0.75 m, 0.38 to
-/// 0.48 m high, with a back up to 0.7 to 0.95 m (the usual measures of
-/// Neufert's Architects' Data), perhaps with a long seat at one end.
+/// Builds a sofa that faces +x: one to four seats of 0.62 to 0.75 m width at 0.38 to 0.48 m height,
+/// a back up to 0.7 to 0.95 m (usual measures in Neufert's Architects' Data), and perhaps a long
+/// seat at one end.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let n = s.weighted(&[(1, 1), (4, 2), (4, 3), (1, 4)]);
     let seat_m = s.uniform(0.62, 0.75);

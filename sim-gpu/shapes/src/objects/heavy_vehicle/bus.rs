@@ -1,17 +1,15 @@
-//! City buses, also articulated ones, coaches and minibuses.
+//! City buses, articulated buses, coaches and minibuses.
 
 use std::ops::Range;
-
-use glam::DVec3;
 
 use super::shell::Shell;
 use crate::objects::car::panel::Arch;
 use crate::objects::car::wheel;
-use crate::primitives::{Builder, Sampler, block, block_between};
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between, outline};
 
-/// What sets a bus apart. Lengths are metres.
+/// The measures of a bus, metres.
 ///
-/// After makers' data sheets: Mercedes Citaro, 12.14 or 18.13 x 2.55 x 3.12; MAN Lion's
+/// Sources are makers' data sheets: Mercedes Citaro, 12.14 or 18.13 x 2.55 x 3.12; MAN Lion's
 /// Coach, 12.1 to 13.9 x 2.55 x 3.87; midibuses of 7 to 9.5 m.
 struct Bus {
     length_m: f64,
@@ -21,7 +19,7 @@ struct Bus {
     waist_m: f64,
     lintel_m: f64,
     wheel_m: f64,
-    /// The length of a second section behind a joint, or 0.
+    /// The length of a second section behind a joint; 0 without one.
     trailer_m: f64,
     floor_m: f64,
     door_side: f64,
@@ -50,14 +48,14 @@ impl Bus {
             wheel_m: if is_midi { s.uniform(0.38, 0.45) } else { s.uniform(0.47, 0.51) },
             trailer_m: if is_articulated { s.uniform(6.3, 6.8) } else { 0.0 },
             floor_m: if is_coach { 1.25 } else { 0.4 },
-            // Two persons in three live where traffic keeps to the right.
+            // Two thirds of all people live where traffic keeps to the right.
             door_side: s.pick(&[-1.0, -1.0, 1.0]),
             is_coach,
         }
     }
 
-    /// Windows of about `pane_m` with pillars of 0.1 m between them, from `from` to `to`
-    /// except where `doors` are, which are given from the rear to the front.
+    /// Windows of about `pane_m` with pillars of 0.1 m between them, on the interval `from..to`
+    /// except at `doors`, which are ordered from the rear to the front.
     fn windows(doors: &[Range<f64>], [mut from, to]: [f64; 2], pane_m: f64) -> Vec<Range<f64>> {
         let mut windows = Vec::new();
         for (end, next) in doors.iter().map(|d| (d.start, d.end)).chain([(to, to)]) {
@@ -103,8 +101,8 @@ impl Bus {
     }
 }
 
-/// Builds a bus within Directive 96/53/EC's limits: 13.5 m with two axles, 18.75 m
-/// articulated, 2.55 m wide.
+/// Builds a bus within Directive 96/53/EC's limits: 13.5 m with two axles, 18.75 m articulated,
+/// 2.55 m wide.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let bus = Bus::draw(s);
     let rear_x = -bus.length_m;
@@ -133,8 +131,8 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Doors from the rear to the front: of 1.2 m before the front axle, in the middle and near the rear; coaches have
-/// the first and perhaps the second, 0.8 m wide.
+/// The doors from the rear to the front: 1.2 m wide ones before the front axle, in the middle and
+/// near the rear. Coaches have the first and perhaps the second, 0.8 m wide.
 fn doors(s: &mut Sampler, bus: &Bus, [rear_axle, front_axle]: [f64; 2]) -> Vec<Range<f64>> {
     let door = |middle: f64, width_m: f64| middle - 0.5 * width_m..middle + 0.5 * width_m;
     let first = 0.5 * (front_axle + bus.wheel_m - 0.35);
@@ -171,7 +169,7 @@ fn inside(b: &mut Builder, s: &mut Sampler, bus: &Bus, [rear_x, front_x]: [f64; 
         let x = rear_x + 0.5 + pitch_m * row as f64;
         for side in [-1.0, 1.0] {
             if s.chance(0.8) {
-                // A back and a cushion, thin as they are: sheets.
+                // The back and the cushion are thin, so that sheets represent them.
                 let y = side * 0.7 * bus.half_width_m - 0.42;
                 b.surface([1, 1], |u, v| {
                     DVec3::new(x - 0.12 * v, y + 0.84 * u, seat_m + 0.4 + 0.75 * v)
@@ -187,7 +185,7 @@ fn inside(b: &mut Builder, s: &mut Sampler, bus: &Bus, [rear_x, front_x]: [f64; 
     block(b, dash, DVec3::new(0.3, 1.8 * bus.half_width_m, 0.3 * bus.waist_m));
 }
 
-/// Mirrors that hang before the windscreen's upper corners, or stand out from the sides.
+/// Mirrors in front of the windscreen's upper corners, or at the sides.
 fn mirrors(b: &mut Builder, s: &mut Sampler, bus: &Bus) {
     let size = DVec3::new(0.12, 0.22, s.uniform(0.35, 0.6));
     let ahead_m = s.uniform(-0.2, 0.3);
@@ -199,7 +197,7 @@ fn mirrors(b: &mut Builder, s: &mut Sampler, bus: &Bus) {
     });
 }
 
-/// The rear section of an articulated bus, and the bellows before it.
+/// The rear section of an articulated bus, and the bellows in front of it.
 fn trailer(b: &mut Builder, s: &mut Sampler, bus: &Bus) {
     let front_x = -bus.length_m - 1.1;
     let rear_x = front_x - bus.trailer_m;
@@ -214,12 +212,7 @@ fn trailer(b: &mut Builder, s: &mut Sampler, bus: &Bus) {
         let inset_m = if k.is_multiple_of(2) { 0.0 } else { 0.08 };
         let x = front_x + 1.1 * k as f64 / folds as f64;
         let [y, top] = [half_y - inset_m, bus.height_m - 0.12 - inset_m];
-        vec![
-            DVec3::new(x, -y, 0.45),
-            DVec3::new(x, -y, top),
-            DVec3::new(x, y, top),
-            DVec3::new(x, y, 0.45),
-        ]
+        outline::upright(x, y, [0.45, top])
     };
     let rows: Vec<_> = (0..=folds).map(row).collect();
     b.grid(&rows, false);

@@ -1,13 +1,10 @@
 //! The cabs of lorries.
 
-use glam::DVec3;
-
 use super::shell::Shell;
 use crate::objects::car::panel::Arch;
-use crate::primitives::{Builder, Sampler, block, block_between, loft};
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between, loft, outline};
 
-/// What a cab is fitted to. The vehicle's front is at x = 0.
-#[derive(Clone, Copy, Debug)]
+/// The measures of a cab. The front of the vehicle is at x = 0.
 pub struct Cab {
     pub half_width_m: f64,
     pub wheel_m: f64,
@@ -17,8 +14,7 @@ pub struct Cab {
     pub rear_x: f64,
     /// The height of its roof.
     pub roof_m: f64,
-    /// The length of a bonnet before the windscreen, 0 if the driver sits above the
-    /// engine.
+    /// The length of a bonnet in front of the windscreen; 0 if the driver sits above the engine.
     pub bonnet_m: f64,
 }
 
@@ -99,16 +95,14 @@ impl Cab {
         let y = 0.55 * self.half_width_m;
         let top_m = waist_m - 0.05;
         let slope_m = 0.25;
-        let ring = |x: f64, half_y: f64, top: f64| {
-            let corner = |side: f64, z: f64| DVec3::new(x, side * half_y, z);
-            vec![corner(-1.0, 0.5), corner(-1.0, top), corner(1.0, top), corner(1.0, 0.5)]
-        };
-        let sections = [
-            ring(-self.bonnet_m, y + 0.12, top_m),
-            ring(-0.15, y, top_m - slope_m),
-            ring(0.0, 0.9 * y, top_m - slope_m - 0.1),
-        ];
-        loft(b, &sections);
+        loft(
+            b,
+            &[
+                outline::upright(-self.bonnet_m, y + 0.12, [0.5, top_m]),
+                outline::upright(-0.15, y, [0.5, top_m - slope_m]),
+                outline::upright(0.0, 0.9 * y, [0.5, top_m - slope_m - 0.1]),
+            ],
+        );
         let outer = self.half_width_m;
         block_between(b, DVec3::new(-0.25, -outer, 0.4), DVec3::new(0.0, outer, 0.75));
         b.mirrored_y(|b| {

@@ -1,14 +1,11 @@
-//! What stands on a lorry's frame.
-
-use glam::{DVec2, DVec3};
+//! Bodies on the frame of a lorry, and their loads.
 
 use crate::primitives::{
-    Builder, Sampler, bar, block, block_between, cap, cushion, loft, outline, rod,
+    Builder, DVec2, DVec3, Sampler, bar, block, block_between, cap, cushion, loft, outline, rod,
 };
 
-/// The space that a body fills: from `rear_x` to `front_x`, and up to `top_m` over the
-/// frame's upper side at `deck_m`.
-#[derive(Clone, Copy, Debug)]
+/// The space for a body, from `rear_x` to `front_x`, and from the upper side of the frame at
+/// `deck_m` up to `top_m`.
 pub struct Space {
     pub rear_x: f64,
     pub front_x: f64,
@@ -17,7 +14,7 @@ pub struct Space {
     pub top_m: f64,
 }
 
-/// A body, or a load, in a space.
+/// Builds a body or a load in a space.
 pub type Cargo = fn(&Space, &mut Builder, &mut Sampler);
 
 impl Space {
@@ -29,7 +26,7 @@ impl Space {
         DVec3::new(self.rear_x + along * self.length_m(), across * self.half_width_m, z)
     }
 
-    /// A closed box, smooth, with ribs like a container's, or with a lift at its tail.
+    /// A closed box with smooth sides or with ribs, and sometimes with a tail lift.
     pub fn closed(&self, b: &mut Builder, s: &mut Sampler) {
         block_between(b, self.at(0.0, -1.0, self.deck_m), self.at(1.0, 1.0, self.top_m));
         if s.chance(0.3) {
@@ -53,7 +50,7 @@ impl Space {
         }
     }
 
-    /// A dumper's skip, open above, empty or heaped.
+    /// A dumper's skip, open above, empty or filled.
     pub fn skip(&self, b: &mut Builder, s: &mut Sampler) {
         let top_m = (self.deck_m + s.uniform(0.8, 1.6)).min(self.top_m);
         let floor_m = self.deck_m + 0.12;
@@ -92,7 +89,7 @@ impl Space {
         }
     }
 
-    /// A platform with low side boards or none, empty or with a load.
+    /// A platform, with or without low side boards, with or without a load.
     pub fn platform(&self, b: &mut Builder, s: &mut Sampler) {
         let floor_m = self.deck_m + 0.15;
         block_between(b, self.at(0.0, -1.0, self.deck_m), self.at(1.0, 1.0, floor_m));
@@ -157,7 +154,7 @@ impl Space {
         );
     }
 
-    /// A concrete mixer's drum, lying towards the cab, with its chute.
+    /// The drum of a concrete mixer, with its mouth to the rear, and its chute.
     pub fn mixer(&self, b: &mut Builder, s: &mut Sampler) {
         let r = s.uniform(1.0, 1.1);
         let [low, high] = [self.deck_m + 0.15, self.deck_m + 0.7];
@@ -181,8 +178,7 @@ impl Space {
         let size = DVec3::new(0.74 * self.length_m(), 2.0 * self.half_width_m, top_m - self.deck_m);
         cushion(b, self.at(0.63, 0.0, 0.5 * (self.deck_m + top_m)), size, 0.12);
         let section = |along: f64, low: f64, high: f64| {
-            let corner = |side: f64, z: f64| self.at(along, side, z);
-            vec![corner(-1.0, low), corner(-1.0, high), corner(1.0, high), corner(1.0, low)]
+            outline::upright(self.at(along, 0.0, 0.0).x, self.half_width_m, [low, high])
         };
         let sections = [
             section(0.0, 0.7, self.deck_m + 0.6),

@@ -1,5 +1,5 @@
-//! The shell of a bus or of a lorry's cab: walls with wheel arches, panes and doors
-//! around a plan that is a rectangle with a bowed front, and a roof.
+//! The shell of a bus or of a lorry's cab: walls with wheel arches, panes and doors around a
+//! rectangular plan with a bowed front, and a roof.
 
 use std::ops::Range;
 
@@ -9,7 +9,6 @@ use crate::objects::car::panel::{Arch, Column, in_order, lid, lower_edge_m, wall
 use crate::primitives::Builder;
 
 /// A shell from `rear_x` to `front_x`. All lengths are metres.
-#[derive(Clone, Debug)]
 pub struct Shell {
     pub rear_x: f64,
     pub front_x: f64,
@@ -21,16 +20,16 @@ pub struct Shell {
     /// The height of the windows' upper edge.
     pub lintel_m: f64,
     pub arches: Vec<Arch>,
-    /// How far the windscreen's upper edge is behind its lower one.
+    /// The distance of the windscreen's upper edge behind its lower edge.
     pub rake_m: f64,
     /// How far the middle of the front stands out.
     pub bow_m: f64,
     /// How far the walls lean in.
     pub inset_m: f64,
-    /// Where the windows of both sides begin and end.
+    /// The intervals of x that have windows, on both sides.
     pub windows: Vec<Range<f64>>,
-    /// Where the doors of one side (-1 right, 1 left) begin and end: panes from near
-    /// the ground.
+    /// The side with doors (-1 right, 1 left) and the intervals of x that have doors. Doors are
+    /// panes that begin near the ground.
     pub doors: (f64, Vec<Range<f64>>),
     pub has_rear_window: bool,
     pub has_windscreen: bool,
@@ -47,8 +46,8 @@ impl Shell {
         lid(b, &edge, 0.06);
     }
 
-    /// The right half from the middle of the rear to that of the front, with what is
-    /// particular to `side`.
+    /// The right half from the middle of the rear to the middle of the front, with the doors of
+    /// `side`.
     fn half(&self, b: &mut Builder, side: f64) {
         let plan = self.plan();
         let lower: Vec<_> = plan.iter().map(|&p| self.lower(p, side)).collect();
@@ -57,7 +56,7 @@ impl Shell {
         wall(b, &upper);
     }
 
-    /// The outline on the right: x, and y (negative or 0).
+    /// The outline of the right half: x, and y (negative or 0).
     fn plan(&self) -> Vec<DVec2> {
         let y = self.half_width_m;
         let doors = self.doors.1.iter();
@@ -110,7 +109,7 @@ impl Shell {
 
     /// The upper end of the wall over `p`.
     fn head(&self, p: DVec2) -> DVec3 {
-        // The rake grows from nothing behind the front corners.
+        // The rake begins behind the front corners and increases to the front.
         let reach_m = 3.0 * self.rake_m + 0.2;
         let forward = ((p.x - self.front_x + reach_m) / reach_m).clamp(0.0, 1.0);
         let y = p.y * (1.0 - self.inset_m / self.half_width_m);
@@ -118,7 +117,7 @@ impl Shell {
     }
 }
 
-/// Whether a pane begins or goes on at `x`.
+/// Whether a pane begins at `x` or contains it.
 fn within(ranges: &[Range<f64>], x: f64) -> bool {
     ranges.iter().any(|range| (range.start - 0.005..range.end - 0.011).contains(&x))
 }

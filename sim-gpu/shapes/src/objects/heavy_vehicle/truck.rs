@@ -1,17 +1,15 @@
 //! Lorries: rigid ones, tractors with semi-trailers, and delivery trucks.
 
-use glam::DVec3;
-
 use super::cab::Cab;
 use super::cargo::{Cargo, Space};
 use crate::objects::car::wheel;
-use crate::primitives::{Builder, Makes, Sampler, block_between, cylinder, rod};
+use crate::primitives::{Builder, DVec3, Makes, Sampler, block_between, cylinder, rod};
 
-/// The makes, with their weights. They keep to the limits of Directive 96/53/EC: 12 m long, or
-/// 16.5 m with a semi-trailer; 2.55 m wide and 4 m high.
+/// The makes, with their weights. They keep to the limits of Directive 96/53/EC: 12 m long, or 16.5
+/// m with a semi-trailer; 2.55 m wide and 4 m high.
 pub const MAKES: Makes = &[(4, delivery), (5, rigid), (3, articulated)];
 
-/// The frame under a body: two rails, axles, and what hangs between them.
+/// The frame under a body: two rails, axles, and parts between the axles.
 struct Frame {
     wheel_m: f64,
     half_width_m: f64,
@@ -21,6 +19,22 @@ struct Frame {
 }
 
 impl Frame {
+    /// Builds `cab` and its axle, and draws the frame behind it, whose top is in the range `top_m`.
+    fn behind(
+        cab: &Cab,
+        b: &mut Builder,
+        s: &mut Sampler,
+        half_width_m: f64,
+        [rear_x, front_x]: [f64; 2],
+        top_m: [f64; 2],
+    ) -> Self {
+        cab.build(b, s);
+        let top_m = s.within(top_m);
+        let frame = Self { wheel_m: cab.wheel_m, half_width_m, top_m, rear_x, front_x };
+        frame.axle(b, cab.axle_x, 1.0);
+        frame
+    }
+
     fn build(&self, b: &mut Builder, s: &mut Sampler, rear_axles: &[f64]) {
         let [low, high] = [self.top_m - 0.26, self.top_m];
         b.mirrored_y(|b| {
@@ -30,7 +44,7 @@ impl Frame {
         for &x in rear_axles {
             self.axle(b, x, 2.0);
         }
-        // The bar that keeps cars from driving under.
+        // The underrun protection.
         let y = 0.92 * self.half_width_m;
         block_between(b, DVec3::new(self.rear_x, -y, 0.42), DVec3::new(self.rear_x + 0.1, y, 0.56));
         if s.chance(0.7) {
@@ -44,7 +58,7 @@ impl Frame {
         }
     }
 
-    /// An axle with a wheel on each side, or two (`twin` of 2).
+    /// An axle with one wheel on each side, or with two (`twin` of 2).
     fn axle(&self, b: &mut Builder, x: f64, twin: f64) {
         let width_m = 0.62 * self.wheel_m * 0.5 * (1.0 + twin);
         let dish_m = if twin > 1.0 { 0.3 * self.wheel_m } else { 0.06 };
@@ -78,7 +92,7 @@ impl Frame {
     }
 }
 
-/// A delivery truck of 3.5 to 7.5 t with a box: 5.5 to 8 m long.
+/// A delivery truck of 3.5 to 7.5 t with a box, 5.5 to 8 m long.
 fn delivery(b: &mut Builder, s: &mut Sampler) {
     let length_m = s.uniform(5.5, 8.0);
     let wheel_m = s.uniform(0.35, 0.42);
@@ -93,15 +107,7 @@ fn delivery(b: &mut Builder, s: &mut Sampler) {
         roof_m: s.uniform(2.1, 2.5),
         bonnet_m: 0.0,
     };
-    cab.build(b, s);
-    let frame = Frame {
-        wheel_m,
-        half_width_m,
-        top_m: s.uniform(0.75, 0.95),
-        rear_x: -length_m,
-        front_x: -0.6,
-    };
-    frame.axle(b, cab.axle_x, 1.0);
+    let frame = Frame::behind(&cab, b, s, half_width_m, [-length_m, -0.6], [0.75, 0.95]);
     let rear_axle = -length_m + s.uniform(1.1, 1.9);
     frame.build(b, s, &[rear_axle]);
     frame.flanks(b, s, [rear_axle + 0.5, -cab_m - 0.1]);
@@ -116,22 +122,14 @@ fn delivery(b: &mut Builder, s: &mut Sampler) {
     cargo(&space, b, s);
 }
 
-/// A rigid lorry of 12 to 32 t: 7 to 12 m long.
+/// A rigid lorry of 12 to 32 t, 7 to 12 m long.
 fn rigid(b: &mut Builder, s: &mut Sampler) {
     let length_m = s.uniform(7.0, 12.0);
     let wheel_m = s.uniform(0.46, 0.53);
     let half_width_m = s.uniform(1.2, 1.275);
     let bonnet_m = if s.chance(0.15) { s.uniform(1.0, 1.5) } else { 0.0 };
     let cab = heavy_cab(s, half_width_m, wheel_m, bonnet_m);
-    cab.build(b, s);
-    let frame = Frame {
-        wheel_m,
-        half_width_m,
-        top_m: s.uniform(0.95, 1.1),
-        rear_x: -length_m,
-        front_x: -0.8,
-    };
-    frame.axle(b, cab.axle_x, 1.0);
+    let frame = Frame::behind(&cab, b, s, half_width_m, [-length_m, -0.8], [0.95, 1.1]);
     let last = -length_m + s.uniform(1.3, 2.3);
     let step_m = 2.0 * wheel_m + 0.32;
     let n_axles = if length_m > 8.5 && s.chance(0.6) { 2 } else { 1 };
@@ -157,7 +155,7 @@ fn rigid(b: &mut Builder, s: &mut Sampler) {
     cargo(&space, b, s);
 }
 
-/// A cab of a lorry above 12 t.
+/// The cab of a lorry above 12 t.
 fn heavy_cab(s: &mut Sampler, half_width_m: f64, wheel_m: f64, bonnet_m: f64) -> Cab {
     Cab {
         half_width_m: half_width_m - s.uniform(0.0, 0.03),

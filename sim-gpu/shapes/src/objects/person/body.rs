@@ -1,32 +1,25 @@
-//! The parts of a body, after its stature and girth.
+//! The parts of a body of a given stature and girth.
 
-use glam::{DVec2, DVec3};
+use crate::primitives::{Builder, DVec2, DVec3, Sampler, ellipsoid, loft, outline, rod};
 
-use crate::primitives::{Builder, Sampler, ellipsoid, loft, outline, rod};
-
-/// A body's measures in metres. Lengths of segments are shares of the stature
-/// (Drillis and Contini 1966, as given by Winter, Biomechanics and Motor Control of
-/// Human Movement).
-#[derive(Clone, Copy, Debug)]
+/// The measures of a body, metres. Lengths of segments are shares of the stature (Drillis and
+/// Contini 1966, as given by Winter, Biomechanics and Motor Control of Human Movement).
 pub struct Measures {
-    /// The stature.
     pub stature_m: f64,
-    /// Breadths and depths over those of a slim grown-up of this stature.
+    /// Breadths and depths over those of a slim adult of this stature.
     pub girth: f64,
-    /// How much clothes add to the radius of the trunk, of arms and of legs.
+    /// The thickness of the clothes on the trunk, the arms and the legs.
     pub cloth_m: [f64; 3],
-    /// The height of the head over the stature: 0.13 in grown-ups, more in children.
+    /// The height of the head over the stature: 0.13 in adults, more in children.
     head_share: f64,
 }
 
 /// A leg's joints.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Leg {
-    /// The knee.
     pub knee: DVec3,
-    /// The ankle.
     pub ankle: DVec3,
-    /// Where the foot points.
+    /// The direction of the foot.
     pub toes: DVec3,
 }
 
@@ -53,7 +46,7 @@ impl Measures {
         self.stature_m * (0.47 - self.head_share - 0.03)
     }
 
-    /// The joint of the right (-1) or left (1) arm, seen from the pelvis.
+    /// The right (-1) or left (1) shoulder joint, relative to the pelvis.
     pub fn shoulder(&self, side: f64) -> DVec3 {
         let y = self.stature_m * 0.108 * (0.5 + 0.5 * self.girth);
         DVec3::new(0.0, side * y, self.neck_m() - 0.052 * self.stature_m)
@@ -64,12 +57,12 @@ impl Measures {
         0.05 * self.stature_m
     }
 
-    /// The trunk from the crotch to the neck, upright over the hip joints' middle.
+    /// The trunk from the crotch to the neck, upright above the middle of the hip joints.
     pub fn trunk(&self, b: &mut Builder) {
         let h = self.stature_m;
         let neck_m = self.neck_m();
-        // Share of the height between hip joints and neck; half depth, half
-        // breadth and forward shift over the stature.
+        // Share of the height between hip joints and neck; half depth, half breadth and forward
+        // shift over the stature.
         let stout = (self.girth - 1.0).max(0.0);
         let sections = [
             (-0.17, 0.045, 0.07, -0.004),
@@ -95,14 +88,14 @@ impl Measures {
         0.5 * self.head_share * self.stature_m
     }
 
-    /// The middle of the head, seen from the foot of the neck.
+    /// The middle of the head, relative to the foot of the neck.
     pub fn head_middle(&self) -> DVec3 {
         let up_m = self.head_m() + 0.03 * self.stature_m;
         DVec3::new(0.012 * self.stature_m, 0.0, up_m)
     }
 
-    /// Neck and head over the neck's foot. A head is some 0.23 m high, 0.195 m long
-    /// and 0.155 m broad (DIN 33402).
+    /// Neck and head above the foot of the neck. A head is about 0.23 m high, 0.195 m long and
+    /// 0.155 m broad (DIN 33402).
     pub fn head(&self, b: &mut Builder) {
         let half_m = self.head_m();
         let middle = self.head_middle();
@@ -146,7 +139,7 @@ impl Measures {
         loft(b, &sections);
     }
 
-    /// An arm from the shoulder to the fist at `hand`, or as near as it reaches; the
+    /// An arm from the shoulder to the fist at `hand`, or as close to it as the arm reaches. The
     /// elbow points to `elbow_side`.
     pub fn arm(&self, b: &mut Builder, shoulder: DVec3, hand: DVec3, elbow_side: DVec3) {
         let h = self.stature_m;
@@ -165,8 +158,8 @@ impl Measures {
     }
 }
 
-/// The joint between two segments of `lengths_m` that lead from `root` to `tip`, bent
-/// to `side`, and the tip, drawn nearer where the segments do not reach it.
+/// The joint between two segments of `lengths_m` from `root` to `tip`, bent towards `side`, and the
+/// tip. If the segments do not reach the tip, it is moved closer.
 pub fn bent(root: DVec3, tip: DVec3, lengths_m: [f64; 2], side: DVec3) -> [DVec3; 2] {
     let [first, second] = lengths_m;
     let along = (tip - root).normalize_or(DVec3::NEG_Z);

@@ -1,31 +1,30 @@
-//! What persons carry and push.
-
-use glam::{DAffine3, DVec3};
+//! Things that persons carry and push.
 
 use super::body::Measures;
 use super::pose::Pose;
 use crate::objects::car::wheel;
-use crate::primitives::{Builder, Profile, Sampler, Section, block, cushion, ellipsoid, rod, skin};
+use crate::primitives::{
+    Builder, DAffine3, DVec3, Profile, Sampler, Section, block, cushion, ellipsoid, outline, rod,
+    skin,
+};
 
-/// A thing that is carried, and where the hand that holds it is.
-#[derive(Clone, Copy, Debug)]
+/// A thing that a person carries, and the place of the hand that holds it.
 pub enum Carried {
     Nothing,
     Backpack,
     ShoulderBag,
-    /// A bag that hangs from the hand at this place.
+    /// A bag that hangs from the hand.
     HandBag(DVec3),
-    /// A box that both arms hold before the chest at this place.
+    /// A box that both arms hold in front of the chest.
     Box(DVec3),
-    /// An umbrella whose stick is at this place.
     Umbrella(DVec3),
-    /// A suitcase on wheels, drawn by the hand at this place.
+    /// A suitcase on wheels that the hand pulls.
     Suitcase(DVec3),
-    /// A pram whose handle is at this place.
+    /// A pram with its handle.
     Pram(DVec3),
 }
 
-/// Draws what a person carries, and puts the hands to it.
+/// Draws the thing that a person carries, and moves the hands of `pose` to it.
 pub fn draw(s: &mut Sampler, measures: &Measures, pose: &mut Pose) -> Carried {
     let h = measures.stature_m;
     let grown_up = h > 1.45;
@@ -59,7 +58,7 @@ pub fn draw(s: &mut Sampler, measures: &Measures, pose: &mut Pose) -> Carried {
     }
 }
 
-/// Builds the thing. `trunk` places what is worn on the trunk.
+/// Builds the thing. `trunk` is the frame of the trunk.
 pub fn build(b: &mut Builder, s: &mut Sampler, it: &Carried, measures: &Measures, trunk: DAffine3) {
     let h = measures.stature_m;
     match *it {
@@ -116,7 +115,7 @@ fn umbrella(b: &mut Builder, s: &mut Sampler, hand: DVec3, h: f64) {
     b.shifted(hand + top_m * DVec3::Z, |b| canopy.revolve(b, Section::Polygon(8)));
 }
 
-/// A pram or a push-chair: some 0.6 m wide, a handle at 1 m.
+/// A pram or a push-chair, about 0.6 m wide with a handle at 1 m.
 fn pram(b: &mut Builder, s: &mut Sampler, handle: DVec3) {
     let half_y = s.uniform(0.22, 0.29);
     let wheel_m = s.uniform(0.09, 0.15);
@@ -133,11 +132,7 @@ fn pram(b: &mut Builder, s: &mut Sampler, handle: DVec3) {
         }
     });
     // The tub, and a hood over its rear end.
-    let section = |x: f64, low: f64, high: f64| {
-        let corner =
-            |side: f64, z: f64| DVec3::new(middle.x + x, middle.y + side * half_y * 0.85, z);
-        vec![corner(-1.0, low), corner(-1.0, high), corner(1.0, high), corner(1.0, low)]
-    };
+    let section = |x, low, high| outline::upright(middle.x + x, half_y * 0.85, [low, high]);
     skin(b, &[section(-0.32, 0.55, 0.8), section(-0.1, 0.42, 0.8), section(0.4, 0.5, 0.78)]);
     if s.chance(0.7) {
         let at = DVec3::new(middle.x - 0.12, middle.y, 0.82);

@@ -1,12 +1,10 @@
 //! Coats, skirts, hair, hats and hoods.
 
-use glam::{DVec2, DVec3};
-
 use super::body::{Leg, Measures};
 use super::pose::Pose;
-use crate::primitives::{Builder, Sampler, ellipsoid, frustum, outline, skin};
+use crate::primitives::{Builder, DVec2, DVec3, Sampler, ellipsoid, frustum, outline, skin};
 
-/// A jacket's hem or hood on a trunk upright over the hip joints' middle.
+/// A hood on a trunk that is upright above the middle of the hip joints.
 pub fn above_waist(b: &mut Builder, s: &mut Sampler, measures: &Measures) {
     let h = measures.stature_m;
     if s.chance(0.15) {
@@ -19,7 +17,7 @@ pub fn above_waist(b: &mut Builder, s: &mut Sampler, measures: &Measures) {
 /// A skirt or the lower part of a coat around the thighs.
 pub fn below_waist(b: &mut Builder, s: &mut Sampler, measures: &Measures, pose: &Pose) {
     let h = measures.stature_m;
-    // Who sits or runs is left in trousers.
+    // Persons who sit or run wear trousers.
     let [right, left] = pose.legs;
     let upright = right.knee.z.max(left.knee.z) < pose.pelvis.z - 0.15 * h;
     if !s.chance(0.3) || !upright {
@@ -51,7 +49,7 @@ pub fn below_waist(b: &mut Builder, s: &mut Sampler, measures: &Measures, pose: 
     );
 }
 
-/// Hair, a hat, a cap or a hood on the head, over the neck's foot.
+/// Hair, a hat, a cap or a hood on the head, above the foot of the neck.
 pub fn on_head(b: &mut Builder, s: &mut Sampler, measures: &Measures) {
     let half_m = measures.head_m();
     let middle = measures.head_middle();
@@ -75,7 +73,7 @@ pub fn on_head(b: &mut Builder, s: &mut Sampler, measures: &Measures) {
     } else if worn < 0.55 {
         ellipsoid(b, middle - 0.15 * half_m * DVec3::X, half_m * DVec3::new(1.05, 0.95, 1.2));
     } else if worn < 0.75 {
-        // Hair that adds to the head's volume.
+        // Hair that adds to the volume of the head.
         let radii = half_m * DVec3::new(0.9, s.uniform(0.74, 0.95), 0.9);
         ellipsoid(b, middle + half_m * DVec3::new(-0.15, 0.0, 0.2), radii);
     }

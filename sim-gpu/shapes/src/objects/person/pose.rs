@@ -1,4 +1,4 @@
-//! Postures: walking at any phase of the stride, standing, sitting.
+//! Poses: walking at any phase of the stride, standing, sitting.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,16 +7,15 @@ use glam::DVec3;
 use super::body::{Leg, Measures, bent};
 use crate::primitives::Sampler;
 
-/// Where the joints of a person are, metres, and angles in radians.
-#[derive(Clone, Debug)]
+/// The places of a person's joints, metres, and angles, radians.
 pub struct Pose {
     /// The middle between the hip joints.
     pub pelvis: DVec3,
-    /// How far the trunk leans forward.
+    /// The lean of the trunk, forward.
     pub lean_rad: f64,
-    /// How far the shoulders are turned to the left.
+    /// The rotation of the shoulders to the left.
     pub twist_rad: f64,
-    /// How far the head is turned to the left, and bowed.
+    /// The rotation of the head to the left, and downwards.
     pub look_rad: [f64; 2],
     /// The right and the left leg.
     pub legs: [Leg; 2],
@@ -25,7 +24,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Six in ten walk, some sit.
+    /// Draws a pose: six of ten persons walk, a few sit.
     pub fn draw(s: &mut Sampler, measures: &Measures) -> Self {
         let stretched_m = measures.stature_m * (Measures::THIGH + Measures::SHANK + 0.039);
         let mut pose = Self {
@@ -50,11 +49,11 @@ impl Pose {
         pose
     }
 
-    /// A step of ordinary or quick walking, or now and then of running.
+    /// A step in walking, or sometimes in running.
     ///
-    /// Hip and knee follow the curves of level walking (Winter 1991): the hip from some
-    /// 20 degrees backwards to 30 forwards, the knee bent by 15 degrees when loaded and
-    /// by 60 in the swing.
+    /// Hip and knee follow the curves of level walking (Winter 1991): the hip moves from about 20
+    /// degrees backwards to 30 forwards, the knee bends by 15 degrees under load and by 60 in the
+    /// swing.
     fn walk(&mut self, s: &mut Sampler, measures: &Measures) {
         let phase = s.uniform(0.0, 1.0);
         let running = s.chance(0.05);
@@ -81,7 +80,7 @@ impl Pose {
         self.twist_rad += 0.1 * vigour * (TAU * phase).cos();
     }
 
-    /// Feet side by side or one ahead, weight on one leg or both.
+    /// The feet are side by side or one ahead of the other.
     fn stand(&mut self, s: &mut Sampler, measures: &Measures) {
         let h = measures.stature_m;
         let lower_m = s.uniform(0.001, 0.008) * h;
@@ -97,7 +96,7 @@ impl Pose {
         }
     }
 
-    /// Thighs level, on a seat that is not there.
+    /// The thighs are level, as on a seat, which is not built.
     fn sit(&mut self, s: &mut Sampler, measures: &Measures) {
         let h = measures.stature_m;
         self.pelvis.z = s.uniform(0.26, 0.3) * h;
@@ -110,8 +109,7 @@ impl Pose {
         }
     }
 
-    /// The leg whose hip, knee and sole are bent by `angles_rad` in the plane of
-    /// walking.
+    /// The leg with these angles of hip, knee and sole in the plane of walking.
     fn leg(&self, measures: &Measures, side: f64, angles_rad: [f64; 3]) -> Leg {
         let [hip_rad, knee_rad, sole_rad] = angles_rad;
         let down = |angle: f64| DVec3::new(angle.sin(), 0.0, -angle.cos());
@@ -124,7 +122,7 @@ impl Pose {
         Leg { knee, ankle, toes }
     }
 
-    /// The leg whose ankle is at `ankle`.
+    /// The leg with its ankle at `ankle`.
     fn leg_to(&self, measures: &Measures, side: f64, ankle: DVec3, toes: DVec3) -> Leg {
         let hip = self.pelvis + side * measures.hip_joint_m() * DVec3::Y;
         let lengths = [Measures::THIGH, Measures::SHANK].map(|share| share * measures.stature_m);
@@ -132,7 +130,7 @@ impl Pose {
         Leg { knee, ankle, toes }
     }
 
-    /// The wrist of an arm that hangs, swung forward by `arm_rad` and bent by `elbow_rad`.
+    /// The wrist of a hanging arm that is swung forward by `arm_rad` and bent by `elbow_rad`.
     fn hanging(&self, measures: &Measures, side: f64, arm_rad: f64, elbow_rad: f64) -> DVec3 {
         let h = measures.stature_m;
         let down = |angle: f64| DVec3::new(angle.sin(), 0.0, -angle.cos());
@@ -142,8 +140,8 @@ impl Pose {
         shoulder + out + 0.186 * h * down(arm_rad) + 0.19 * h * down(arm_rad + elbow_rad)
     }
 
-    /// Hands in the pockets, at the ear with a telephone, before the chest with one,
-    /// folded, behind the back, or reached out.
+    /// Puts the hands into the pockets, to the ear or before the chest with a telephone, folded,
+    /// behind the back, or reached out.
     fn occupy_hands(&mut self, s: &mut Sampler, measures: &Measures) {
         let h = measures.stature_m;
         let ahead_m = measures.neck_m() * self.lean_rad.sin();

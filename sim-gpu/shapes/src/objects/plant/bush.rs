@@ -2,12 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use super::foliage::{Clump, blade, fill, leaf, leaf_length_m};
 use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem};
-use crate::primitives::{Builder, Makes, Sampler};
+use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Makes, Sampler};
 
 /// The makes, with their weights.
 pub const MAKES: Makes =
@@ -28,8 +26,8 @@ fn thicket(b: &mut Builder, s: &mut Sampler) {
     clumps(b, s, half_m.extend(height_m));
 }
 
-/// Fills half of an ellipsoid on the ground, of half width, half depth and
-/// height `size_m`, with clumps, and joins them to the ground by twigs.
+/// Fills half of an ellipsoid on the ground with clumps, and joins the clumps to the ground by
+/// twigs. `size_m` is the half width, the half depth and the height.
 fn clumps(b: &mut Builder, s: &mut Sampler, size_m: DVec3) {
     let n = s.count(5, 16);
     let clump_m = size_m.element_product().cbrt() * s.uniform(1.0, 1.5) / (n as f64).cbrt();
@@ -53,11 +51,11 @@ fn clumps(b: &mut Builder, s: &mut Sampler, size_m: DVec3) {
 
 /// A body cut round: a ball, a dome or a cushion, with short leaves.
 fn trimmed(b: &mut Builder, s: &mut Sampler) {
-    // As high as a gardener reaches with shears.
+    // The height that a gardener reaches with shears.
     let height_m = s.uniform(0.4, 2.6);
     let half_m = (height_m * s.uniform(0.4, 1.1)).clamp(0.22, 1.9);
     let depth_m = half_m * s.uniform(0.75, 1.0);
-    // A dome's middle is near the ground, a ball's at half its height.
+    // The middle of a dome is near the ground, that of a ball at half its height.
     let middle_m = height_m * s.uniform(0.1, 0.6);
     let rough_m = s.uniform(0.005, 0.05) * half_m;
     let body = Lump {
@@ -67,7 +65,7 @@ fn trimmed(b: &mut Builder, s: &mut Sampler) {
         ripple: Ripple::draw(s, half_m * 0.7, rough_m),
     };
     if s.chance(0.4) {
-        // Of fine leaves to the middle, so that beams reach into it.
+        // Fine leaves fill the whole body, so that beams enter it.
         let clump = Clump { centre: body.centre, radii_m: body.radii_m };
         let layers = s.uniform(1.0, 3.0);
         return fill(b, s, &[clump], 1800, layers);
@@ -75,8 +73,7 @@ fn trimmed(b: &mut Builder, s: &mut Sampler) {
     coated(b, s, &body);
 }
 
-/// Adds `body`, or a smaller heart of it, and leaves in its surface above the
-/// ground.
+/// Adds `body`, or a smaller core of it, and leaves in its surface above the ground.
 fn coated(b: &mut Builder, s: &mut Sampler, body: &Lump) {
     let heart = s.pick(&[1.0, 0.9, 0.75]);
     b.place(DAffine3::from_scale(DVec3::new(heart, heart, 1.0)), |b| body.build(b));

@@ -2,25 +2,21 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
-
 use super::uneven::direction;
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler};
 
-/// The area of a leaf over the square of its length: half its width over its
-/// length.
+/// The area of a leaf over the square of its length, which is half the width over the length.
 const LEAF_AREA: f64 = 0.45;
 
 /// An ellipsoid that leaves fill.
 pub struct Clump {
-    /// The middle.
     pub centre: DVec3,
     /// Half the sizes.
     pub radii_m: DVec3,
 }
 
 impl Clump {
-    /// The mean area of the clump's silhouettes, near enough.
+    /// The approximate mean area of the clump's silhouettes.
     fn silhouette_m2(&self) -> f64 {
         PI * self.radii_m.element_product().powf(2.0 / 3.0)
     }
@@ -37,18 +33,18 @@ pub fn leaf(b: &mut Builder, s: &mut Sampler, at: DVec3, length_m: f64) {
     b.grid(&[vec![above(base - half), above(base + half)], vec![above(base + long)]], false);
 }
 
-/// The length of `n` leaves of which a beam through `area_m2` meets `layers`
-/// on average. A leaf in any position shows half of its area.
+/// The length of `n` leaves if a beam through `area_m2` meets `layers` of them on average. A leaf
+/// in a random orientation shows half of its area.
 pub fn leaf_length_m(n: usize, area_m2: f64, layers: f64) -> f64 {
     (2.0 * layers * area_m2 / (LEAF_AREA * n as f64)).sqrt()
 }
 
-/// Fills `clumps` with `n` leaves, of which a beam through the middle of a
-/// clump meets some `layers`.
+/// Fills `clumps` with `n` leaves. A beam through the middle of a clump meets about `layers` of
+/// them.
 ///
-/// More leaves are near the surface of a clump, where the light is. The
-/// fraction of beams that pass is about exp(-layers), the law of Beer and
-/// Lambert that Monsi and Saeki applied to foliage (1953).
+/// Most leaves are near the surface of a clump, where the light is. The fraction of beams that pass
+/// is about exp(-layers), the law of Beer and Lambert that Monsi and Saeki applied to foliage
+/// (1953).
 pub fn fill(b: &mut Builder, s: &mut Sampler, clumps: &[Clump], n: usize, layers: f64) {
     let area_m2: f64 = clumps.iter().map(Clump::silhouette_m2).sum();
     let length_m = leaf_length_m(n, area_m2, layers);
@@ -62,11 +58,10 @@ pub fn fill(b: &mut Builder, s: &mut Sampler, clumps: &[Clump], n: usize, layers
     }
 }
 
-/// Adds a twig or a blade of grass: two crossed triangles, `width_m` wide at
-/// their foot.
+/// Adds a twig or a blade of grass: two crossed triangles, `width_m` wide at their foot.
 ///
-/// A beam is some 3 mrad wide and so finds twigs that a line would miss: at
-/// 10 m, twigs look 3 cm thicker than they are.
+/// A beam is about 3 mrad wide and therefore hits twigs that a line would miss: at 10 m, twigs are
+/// built 3 cm thicker than real ones.
 pub fn blade(b: &mut Builder, from: DVec3, to: DVec3, width_m: f64) {
     let along = (to - from).normalize_or(DVec3::Z);
     let across = along.any_orthonormal_vector();

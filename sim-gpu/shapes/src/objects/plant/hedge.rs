@@ -1,17 +1,15 @@
-//! Hedges: trimmed to a box, dense or loose, whole or with gaps.
-
-use glam::DVec3;
+//! Hedges: trimmed to a box, dense or loose, with or without gaps.
 
 use super::foliage::{blade, leaf, leaf_length_m};
 use super::uneven::{BoxFace, Ripple, warped_box};
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler};
 
 /// A piece of hedge without a gap, which stands on the ground along x.
 struct Piece {
     size_m: DVec3,
-    /// The top's width over the foot's.
+    /// The width at the top over that at the ground.
     taper: f64,
-    /// How far the top's edges lie below its middle, over the height.
+    /// How far the edges of the top are below its middle, over the height.
     round: f64,
     ripple: Ripple,
 }
@@ -38,7 +36,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
 }
 
 impl Piece {
-    /// Moves a point of the plain box to where it is in the hedge.
+    /// Moves a point of the box to its place in the hedge.
     fn warp(&self, p: DVec3) -> DVec3 {
         let across = 2.0 * p.y / self.size_m.y;
         let narrow = 1.0 - (1.0 - self.taper) * p.z / self.size_m.z;
@@ -49,8 +47,8 @@ impl Piece {
         moved.with_z(moved.z.max(0.0))
     }
 
-    /// Adds `n` leaves in the faces, `deep_m` deep at most and `layers` thick,
-    /// where `grows` allows.
+    /// Adds leaves to the faces, up to `deep_m` deep and `layers` thick, at the places where
+    /// `grows` is true.
     fn leaves(
         &self,
         b: &mut Builder,
@@ -76,19 +74,19 @@ impl Piece {
     }
 }
 
-/// Leaves upon a body that nothing passes.
+/// Leaves on an opaque body.
 fn dense(b: &mut Builder, s: &mut Sampler, piece: &Piece) {
     warped_box(b, piece.size_m, 0.3, |p| piece.warp(p * DVec3::new(0.97, 0.85, 0.95)));
     let layers = s.uniform(0.3, 0.7);
     piece.leaves(b, s, [0.1, layers], |_| true);
 }
 
-/// Fine leaves cut to a plane: box or yew.
+/// A smooth opaque body: box or yew.
 fn smooth(b: &mut Builder, _: &mut Sampler, piece: &Piece) {
     warped_box(b, piece.size_m, 0.25, |p| piece.warp(p));
 }
 
-/// Leaves that let beams through, with holes, on stems that are seen below.
+/// Leaves with holes that beams pass, above visible stems.
 fn loose(b: &mut Builder, s: &mut Sampler, piece: &Piece) {
     let holes = Ripple::draw(s, 0.7, 1.0);
     let most = s.uniform(0.6, 2.0);

@@ -1,16 +1,14 @@
 //! Trees with their crowns.
 //!
-//! Street trees keep 2 to 4.5 m of clear stem over ways (Germany's FLL advice,
-//! the British BS 8545); garden trees branch from the ground.
+//! Street trees have 2 to 4.5 m of clear stem over ways (Germany's FLL advice, the British BS
+//! 8545); garden trees branch from the ground.
 
 use std::f64::consts::TAU;
-
-use glam::{DVec2, DVec3};
 
 use super::foliage::{Clump, fill, leaf, leaf_length_m};
 use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem, bough};
-use crate::primitives::{Builder, Makes, Sampler};
+use crate::primitives::{Builder, DVec2, DVec3, Makes, Sampler};
 
 /// The makes, with their weights.
 pub const MAKES: Makes = &[(6, broadleaved), (2, conifer), (2, bare), (1, column), (1, palm)];
@@ -18,7 +16,7 @@ pub const MAKES: Makes = &[(6, broadleaved), (2, conifer), (2, bare), (1, column
 /// The sizes of a tree with a crown.
 struct Form {
     height_m: f64,
-    /// Where the crown begins.
+    /// The height of the crown's lower end.
     crown_m: f64,
     /// Half the crown's width.
     reach_m: f64,
@@ -42,7 +40,7 @@ impl Form {
         ((self.crown_m + half_m) * DVec3::Z, radii_m)
     }
 
-    /// One stem or several, each up into the crown.
+    /// Builds one or several stems that reach into the crown.
     fn stems(&self, b: &mut Builder, s: &mut Sampler) -> Vec<Stem> {
         let n = s.weighted(&[(6, 1), (1, 2), (1, 3)]);
         let thick_m = self.stem_m.max(0.03) / (n as f64).sqrt();
@@ -121,7 +119,7 @@ fn bare(b: &mut Builder, s: &mut Sampler) {
         let stem = &stems[limb % stems.len()];
         let share = s.uniform(0.45, 1.0);
         let from = stem.at(share);
-        // Near the golden angle, at which shoots follow each other.
+        // The golden angle, about 2.4 rad, separates successive shoots.
         let turn_rad = (limb as f64 + s.uniform(0.0, 0.7)) * 2.4;
         let out = DVec2::from_angle(turn_rad).extend(s.uniform(0.2, 1.2)).normalize();
         let length_m = 0.55 * form.reach_m.max(0.3 * (form.height_m - from.z));
@@ -142,14 +140,14 @@ fn column(b: &mut Builder, s: &mut Sampler) {
     let length_m = leaf_length_m(1500, TAU * half_m * height_m, s.uniform(0.2, 0.5));
     for _ in 0..1500 {
         let out = direction(s);
-        // More points on the long side than at the ends.
+        // The cube puts more points on the long side than at the ends.
         let out = DVec3::new(out.x, out.y, out.z.powi(3)).normalize_or(DVec3::X);
         let at = body.at(out) * DVec3::new(1.03, 1.03, 1.0);
         leaf(b, s, at, length_m);
     }
 }
 
-/// A bare stem with a head of fronds.
+/// A bare stem with fronds at its top.
 fn palm(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(2.0, 9.0);
     let radius_m = s.uniform(0.1, 0.25);

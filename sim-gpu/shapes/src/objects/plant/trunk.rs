@@ -1,13 +1,11 @@
-//! Trunks, cut off where the crown begins or the sensor's view ends.
+//! Trunks, cut off where the crown begins.
 
 use std::f64::consts::TAU;
-
-use glam::DVec3;
 
 use super::foliage::{blade, leaf};
 use super::uneven::direction;
 use super::wood::{Stem, bough};
-use crate::primitives::{Builder, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler};
 
 /// Builds a trunk.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
@@ -36,7 +34,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Two or three limbs that part.
+/// Two or three limbs at a fork.
 fn fork(b: &mut Builder, s: &mut Sampler, from: DVec3, radius_m: f64, rise_m: f64) {
     let n = s.count(2, 3);
     let turn_rad = s.uniform(0.0, TAU);
@@ -50,7 +48,7 @@ fn fork(b: &mut Builder, s: &mut Sampler, from: DVec3, radius_m: f64, rise_m: f6
     }
 }
 
-/// Ivy that has climbed part of the way.
+/// Ivy on the lower part of a stem.
 fn ivy(b: &mut Builder, s: &mut Sampler, stem: &Stem) {
     let reach = s.uniform(0.3, 1.0);
     for _ in 0..500 {
@@ -62,7 +60,7 @@ fn ivy(b: &mut Builder, s: &mut Sampler, stem: &Stem) {
     }
 }
 
-/// Thin shoots and tall grass about the foot, where no mower comes.
+/// Thin shoots and tall grass around the foot.
 fn shoots(b: &mut Builder, s: &mut Sampler, radius_m: f64) {
     for _ in 0..80 {
         let (sin, cos) = s.uniform(0.0, TAU).sin_cos();

@@ -1,18 +1,16 @@
-//! Surfaces that are uneven: foliage, stones, bark, old walls.
+//! Uneven surfaces: foliage, stones, bark, old walls.
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec3;
+use crate::primitives::{Builder, DVec3, Sampler};
 
-use crate::primitives::{Builder, Sampler};
-
-/// Waves that a ripple is the sum of: enough to show no pattern.
+/// The number of waves in a ripple, enough to show no pattern.
 const N_WAVES: usize = 12;
-/// Segments around a lump: chords lie within 1.3 % of the radius of the round
-/// surface.
+/// The number of segments around a lump. Its chords deviate by up to 1.3 % of the radius from the
+/// round surface.
 const N_AROUND: usize = 20;
 
-/// A direction, all of them equally likely.
+/// A random direction, uniform on the sphere.
 pub fn direction(s: &mut Sampler) -> DVec3 {
     let z = s.uniform(-1.0, 1.0);
     let (sin, cos) = s.uniform(0.0, TAU).sin_cos();
@@ -20,7 +18,7 @@ pub fn direction(s: &mut Sampler) -> DVec3 {
     DVec3::new(across * cos, across * sin, z)
 }
 
-/// A height that varies smoothly and irregularly from place to place.
+/// A height that varies smoothly and irregularly with the place.
 pub struct Ripple {
     /// The wave vectors, radians a metre, and the phases.
     waves: Vec<(DVec3, f64)>,
@@ -28,15 +26,14 @@ pub struct Ripple {
 }
 
 impl Ripple {
-    /// Heights of standard deviation `deviation_m`, in waves of half to twice
-    /// `length_m`.
+    /// Heights of standard deviation `deviation_m`, in waves of half to twice `length_m`.
     pub fn draw(s: &mut Sampler, length_m: f64, deviation_m: f64) -> Self {
         let mut wave = || {
             let length_m = length_m * s.log_uniform(0.5, 2.0);
             (TAU / length_m * direction(s), s.uniform(0.0, TAU))
         };
         let waves = (0..N_WAVES).map(|_| wave()).collect();
-        // A sine's variance is a half, and the waves are independent.
+        // The variance of a sine is 1/2, and the waves are independent.
         Self { waves, amplitude_m: deviation_m * (2.0 / N_WAVES as f64).sqrt() }
     }
 
@@ -47,16 +44,14 @@ impl Ripple {
     }
 }
 
-/// A round body, an ellipsoid or a box with soft edges, which is flat where it
-/// would reach below the ground at height 0.
+/// An ellipsoid or a box with soft edges. The part below height 0 is moved up to the ground.
 pub struct Lump {
-    /// The middle.
     pub centre: DVec3,
     /// Half the sizes.
     pub radii_m: DVec3,
-    /// 2 for an ellipsoid, 4 and more towards a box.
+    /// 2 for an ellipsoid; 4 and more approach a box.
     pub exponent: f64,
-    /// How far the surface lies outside.
+    /// The offset of the surface outwards.
     pub ripple: Ripple,
 }
 
@@ -71,7 +66,7 @@ impl Lump {
         point.with_z(point.z.max(0.0))
     }
 
-    /// Adds the surface, which nothing passes.
+    /// Adds the surface, which is opaque.
     pub fn build(&self, b: &mut Builder) {
         let row = |j: usize| {
             let (sin, cos) = (j as f64 / (N_AROUND / 2) as f64 * PI).sin_cos();
@@ -87,8 +82,8 @@ impl Lump {
     }
 }
 
-/// The five faces of the box of `size_m` on the ground that are seen, each
-/// point moved by `warp`, with edges of about `edge_m`.
+/// The faces of the box of `size_m` on the ground, except the lower one. `warp` moves each point;
+/// edges have about the length `edge_m`.
 pub fn warped_box(b: &mut Builder, size_m: DVec3, edge_m: f64, warp: impl Fn(DVec3) -> DVec3) {
     for face in BoxFace::SEEN {
         let [across_m, up_m] = face.size_m(size_m);
@@ -122,7 +117,7 @@ impl BoxFace {
         }
     }
 
-    /// The point of the face at `u` and `v` in 0..=1; faces look outwards.
+    /// The point of the face at `u` and `v` in 0..=1. Front faces look outwards.
     pub fn at(self, size_m: DVec3, u: f64, v: f64) -> DVec3 {
         let [across, up] = [u - 0.5, v - 0.5];
         let unit = match self {

@@ -2,30 +2,27 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DVec2, DVec3};
-
 use super::foliage::blade;
 use super::uneven::{Ripple, direction};
-use crate::primitives::{Builder, Sampler, cap, rod, skin};
+use crate::primitives::{Builder, DVec2, DVec3, Sampler, cap, rod, skin};
 
-/// Branches thinner than this are drawn as blades.
+/// The radius below which a branch is two crossed triangles.
 const THIN_M: f64 = 0.03;
 
 /// A stem that stands upright or leans.
 pub struct Stem {
     foot: DVec3,
     rise: DVec3,
-    /// How far the middle stands aside.
+    /// The offset of the middle.
     bow: DVec3,
     radii_m: [f64; 2],
-    /// How much wider the foot is than the stem above it, over the radius.
+    /// The additional radius at the foot, over the radius above it.
     flare: f64,
     bark: Ripple,
 }
 
 impl Stem {
-    /// Draws a stem from `foot` to `top`; `radii_m` are those above the roots
-    /// and at the top.
+    /// Draws a stem from `foot` to `top`, with its radii above the roots and at the top.
     pub fn draw(s: &mut Sampler, foot: DVec3, top: DVec3, radii_m: [f64; 2]) -> Self {
         let rise = top - foot;
         let bow = s.uniform(0.0, 0.04) * rise.length() * direction(s).with_z(0.0);
@@ -46,8 +43,8 @@ impl Stem {
         ((z - self.foot.z) / self.rise.z).clamp(0.0, 1.0)
     }
 
-    /// The radius at this share of the length. Roots spread within about one
-    /// and a half radii of the ground.
+    /// The radius at a share of the length. The roots widen the stem up to about one and a half
+    /// radii above the ground.
     pub fn radius_m(&self, share: f64) -> f64 {
         let [low_m, high_m] = self.radii_m;
         let height = share * self.rise.z / (0.8 * low_m);
@@ -86,7 +83,7 @@ pub fn bough(b: &mut Builder, from: DVec3, to: DVec3, radius_m: f64, sag: f64) {
 
 /// A branch of a bare tree.
 pub struct Branch {
-    /// Where it leaves its parent.
+    /// The place where it leaves its parent.
     pub from: DVec3,
     /// Its direction times its length.
     pub along: DVec3,
@@ -95,7 +92,7 @@ pub struct Branch {
 }
 
 impl Branch {
-    /// Adds the branch and `orders` of ever smaller ones along it.
+    /// Adds the branch and `orders` generations of smaller branches along it.
     pub fn grow(&self, b: &mut Builder, s: &mut Sampler, orders: usize) {
         let end = self.from + self.along;
         if self.radius_m > THIN_M {
@@ -108,7 +105,7 @@ impl Branch {
         }
         let length_m = self.along.length();
         for child in 0..4 {
-            // The last child goes on from the end.
+            // The last child continues from the end.
             let share = if child == 3 { 1.0 } else { s.uniform(0.3, 1.0) };
             let turned = self.along / length_m + s.uniform(0.4, 0.9) * direction(s);
             let upwards = (turned + 0.15 * DVec3::Z).normalize_or(DVec3::Z);

@@ -1,17 +1,15 @@
 //! Lamp posts: columns of 3 to 10 m (EN 40-2) with one or two luminaires.
 
-use glam::{DAffine3, DVec3};
-
 use super::shaft;
 use crate::primitives::{
-    Builder, Makes, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid, frustum, rod,
-    smooth_tube,
+    Builder, DAffine3, DVec3, Makes, Profile, Sampler, Section, block, cushion, cylinder,
+    ellipsoid, frustum, rod, smooth_tube,
 };
 
 /// The makes, with their weights.
 pub const MAKES: Makes = &[(4, arm), (3, post_top), (2, lantern)];
 
-/// A column that tapers upwards from a wider foot with a door in it.
+/// A column that tapers upwards, sometimes with a wider foot.
 fn column(b: &mut Builder, s: &mut Sampler, height_m: f64) {
     let radius_m = 0.03 + height_m * s.uniform(0.005, 0.01);
     let section = s.pick(&[Section::Round, Section::Round, Section::Polygon(8)]);
@@ -22,7 +20,7 @@ fn column(b: &mut Builder, s: &mut Sampler, height_m: f64) {
     shaft(b, [radius_m, 0.6 * radius_m], height_m, section);
 }
 
-/// A flat luminaire at the end of an arm, or of two.
+/// One or two flat luminaires, each at the end of an arm.
 fn arm(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(5.0, 10.0);
     let reach_m = s.uniform(0.3, 2.0);

@@ -1,20 +1,19 @@
 //! Traffic lights for vehicles, bicycles and persons.
 //!
-//! Lenses are 0.2 or 0.3 m wide (EN 12368), so that a head of three is 0.7 to
-//! 1.1 m high; heads beside the road hang 2.1 m up or more, those over it
-//! 4.5 m or more.
+//! Lenses are 0.2 or 0.3 m wide (EN 12368), so that a head with three lenses is 0.7 to 1.1 m high.
+//! Heads are at least 2.1 m up beside the road and at least 4.5 m up over it.
 
 use std::f64::consts::PI;
 
-use glam::{DAffine3, DVec3};
-
 use super::shaft;
-use crate::primitives::{Builder, Makes, Sampler, Section, block, cushion, rod, sheet};
+use crate::primitives::{
+    Builder, DAffine3, DVec3, Makes, Sampler, Section, block, cushion, rod, sheet,
+};
 
 /// The makes, with their weights.
 pub const MAKES: Makes = &[(4, mast), (2, gantry), (2, pedestrian)];
 
-/// A head of `n` lenses which looks to +x, its middle at `centre`.
+/// A head with `n` lenses that faces +x, with its middle at `centre`.
 fn head(b: &mut Builder, s: &mut Sampler, centre: DVec3, n: usize, lens_m: f64) {
     let pitch_m = 1.12 * lens_m;
     let size = DVec3::new(s.uniform(0.12, 0.25), 1.25 * lens_m, pitch_m * n as f64 + 0.03);
@@ -38,13 +37,13 @@ fn visor(b: &mut Builder, lens: DVec3, radius_m: f64) {
     });
 }
 
-/// A mast beside the road with one head or two.
+/// A mast beside the road with one or two heads.
 fn mast(b: &mut Builder, s: &mut Sampler) {
     let lens_m = s.pick(&[0.2, 0.2, 0.3]);
     let radius_m = s.uniform(0.05, 0.1);
     let middle_m = s.uniform(2.1, 2.7) + 1.7 * lens_m;
     shaft(b, [radius_m, radius_m], middle_m + 2.2 * lens_m, Section::Round);
-    // Heads before the mast, or at the ends of brackets on either side.
+    // The heads are in front of the mast or at the ends of brackets on either side.
     let wide_m = s.uniform(0.25, 0.5);
     let places = [vec![0.0], vec![wide_m], vec![-wide_m, wide_m], vec![0.0, wide_m]];
     for y in s.pick(&places) {
@@ -67,7 +66,7 @@ fn mast(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// The box with the button for persons, at the height of a hand.
+/// The push button for pedestrians, at the height of a hand.
 fn push_button(b: &mut Builder, radius_m: f64) {
     block(b, DVec3::new(radius_m + 0.05, 0.0, 1.0), DVec3::new(0.1, 0.12, 0.25));
 }
@@ -87,7 +86,7 @@ fn gantry(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A light for persons, with two lenses.
+/// A light for pedestrians, with two lenses.
 fn pedestrian(b: &mut Builder, s: &mut Sampler) {
     let radius_m = s.uniform(0.04, 0.08);
     let z = s.uniform(2.2, 2.6);

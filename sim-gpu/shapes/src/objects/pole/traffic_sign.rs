@@ -1,23 +1,22 @@
 //! Traffic signs on one or two posts.
 //!
-//! Sizes are those of Germany's VwV-StVO (circles 0.42, 0.6 and 0.75 m,
-//! triangles 0.63, 0.9 and 1.26 m, squares 0.42, 0.6 and 0.84 m) and of the
-//! MUTCD of 2009 (octagons 0.75 and 0.9 m, speed limits 0.6 by 0.75 m). The
-//! lower edge is 1.5 m (MUTCD, rural) to 2.3 m up (over footways); panels that
-//! mark obstacles hang lower.
+//! Sizes are those of Germany's VwV-StVO (circles 0.42, 0.6 and 0.75 m, triangles 0.63, 0.9 and
+//! 1.26 m, squares 0.42, 0.6 and 0.84 m) and of the MUTCD of 2009 (octagons 0.75 and 0.9 m, speed
+//! limits 0.6 by 0.75 m). The lower edge is 1.5 m (MUTCD, rural) to 2.3 m up (over footways);
+//! panels that mark obstacles hang lower.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use super::{draw_section, shaft};
-use crate::primitives::{Builder, Makes, Sampler, Section, block, outline, prism};
+use crate::primitives::{
+    Builder, DAffine3, DVec2, DVec3, Makes, Sampler, Section, block, outline, prism,
+};
 
 /// The makes, with their weights.
 pub const MAKES: Makes = &[(6, single), (3, board), (2, low_panel), (1, street_name), (2, stele)];
 
-/// Adds a plate across x whose middle is at `centre`; `outline` is up and to
-/// the left.
+/// Adds a plate across x with its middle at `centre`. The axes of `outline` point up and to the
+/// left.
 fn plate(b: &mut Builder, outline: &[DVec2], centre: DVec3, thick_m: f64) {
     let upright = DAffine3::from_rotation_y(-FRAC_PI_2);
     b.turned(centre, upright, |b| {
@@ -25,7 +24,7 @@ fn plate(b: &mut Builder, outline: &[DVec2], centre: DVec3, thick_m: f64) {
     });
 }
 
-/// The outline of a sign, up and to the left.
+/// Draws the outline of a sign. Its axes point up and to the left.
 fn draw_outline(s: &mut Sampler) -> Vec<DVec2> {
     let corners = |n: usize, radius_m: f64, turn_rad: f64| {
         let at = |k: usize| DVec2::from_angle(turn_rad + k as f64 / n as f64 * TAU);
@@ -35,7 +34,7 @@ fn draw_outline(s: &mut Sampler) -> Vec<DVec2> {
     let side_m = s.pick(&[0.63, 0.9, 0.9, 1.26]);
     let square_m = s.pick(&[0.42, 0.6, 0.6, 0.75, 0.84]);
     let octagon_m = s.pick(&[0.75, 0.9]);
-    // The radius of a triangle's corners is its side over the root of 3.
+    // The distance of a triangle's corners from its middle is its side over the root of 3.
     let apex_m = side_m / 3_f64.sqrt();
     match s.count(0, 6) {
         0 | 1 => corners(20, 0.5 * circle_m, 0.0),
@@ -46,17 +45,17 @@ fn draw_outline(s: &mut Sampler) -> Vec<DVec2> {
     }
 }
 
-/// One post with one sign or several above each other, perhaps on both sides.
+/// A post with one sign or several signs above each other, sometimes on both sides.
 fn single(b: &mut Builder, s: &mut Sampler) {
     let low_m = s.uniform(1.5, 2.3);
     let radius_m = s.uniform(0.025, 0.045);
     let section = draw_section(s);
     let back_to_back = s.chance(0.15);
-    // Some stand out to one side of their post like flags.
+    // Some signs are mounted to one side of their post, like flags.
     let flag = if s.chance(0.25) { s.pick(&[-0.9, 0.9]) } else { 0.0 };
     let mut z = low_m;
     for number in 0..s.weighted(&[(6, 1), (3, 2), (1, 3)]) {
-        // The signs under the first are often plain tablets.
+        // Signs below the first are often plain rectangles.
         let tablet = number > 0 && s.chance(0.6);
         let high_m = s.uniform(0.2, 0.42);
         let outline = if tablet {
@@ -77,7 +76,7 @@ fn single(b: &mut Builder, s: &mut Sampler) {
     shaft(b, [radius_m, radius_m], z + s.uniform(-0.03, 0.3), section);
 }
 
-/// A large board with the ways to places, on two posts or more.
+/// A large direction board on two posts.
 fn board(b: &mut Builder, s: &mut Sampler) {
     let wide_m = s.log_uniform(1.0, 4.5);
     let high_m = wide_m * s.uniform(0.25, 0.8);
@@ -93,8 +92,8 @@ fn board(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A panel at the height of a car: a chevron, an obstacle marker, the beacon
-/// of a road work on its foot.
+/// A panel at the height of a car: a chevron, an obstacle marker, or the beacon of a road work on
+/// its foot.
 fn low_panel(b: &mut Builder, s: &mut Sampler) {
     let size = DVec3::new(0.03, s.uniform(0.25, 0.6), s.uniform(0.5, 1.0));
     let top_m = s.uniform(1.25, 1.9);
@@ -105,7 +104,7 @@ fn low_panel(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Narrow blades with the names of streets, at right angles.
+/// One or two street name signs, at right angles.
 fn street_name(b: &mut Builder, s: &mut Sampler) {
     let z = s.uniform(2.2, 3.0);
     let size = DVec3::new(0.02, s.uniform(0.6, 1.1), s.uniform(0.15, 0.25));
@@ -116,8 +115,8 @@ fn street_name(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A narrow board that stands on the ground or a low foot, about as tall as a
-/// person: a town's map, a price board, the board of a shop.
+/// A narrow board on the ground or on a low foot, about as high as a person: a town map, a price
+/// board, a shop board.
 fn stele(b: &mut Builder, s: &mut Sampler) {
     let size = DVec3::new(s.log_uniform(0.03, 0.3), s.log_uniform(0.3, 1.2), s.uniform(1.25, 2.4));
     let low_m = s.pick(&[0.0, 0.0, 0.3, 0.7]);

@@ -1,11 +1,8 @@
-//! Benches, whose seats are 0.42 to 0.48 m high.
+//! Benches with seats at 0.42 to 0.48 m.
 
-use glam::{DAffine3, DVec3};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block, rod};
 
-use crate::primitives::{Builder, Sampler, block, rod};
-
-/// Builds a bench that looks to +x, with or without a back and arms, or with a
-/// table.
+/// Builds a bench that faces +x, with or without a back and arms, or with a table.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let long_m = s.uniform(1.2, 2.4);
     let seat_m = s.uniform(0.42, 0.48);
@@ -22,7 +19,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     let lean_rad = s.uniform(0.1, 0.35);
     let foot = DVec3::new(-0.5 * deep_m, 0.0, seat_m);
     let back_m = s.uniform(0.35, 0.5);
-    // The back is a seat set upright.
+    // The back is built as an upright seat.
     let upright = DAffine3::from_rotation_y(-lean_rad - std::f64::consts::FRAC_PI_2);
     if backed {
         let panel = DVec3::new(back_m - 0.08, long_m, 0.03);
@@ -49,7 +46,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// The legs of one side, or the block that bears it.
+/// The legs or the solid support of one side.
 fn side(b: &mut Builder, [deep_m, y, seat_m]: [f64; 3], solid: bool) {
     if solid {
         let size = DVec3::new(0.8 * deep_m, 0.12, seat_m - 0.02);
@@ -60,7 +57,7 @@ fn side(b: &mut Builder, [deep_m, y, seat_m]: [f64; 3], solid: bool) {
     }
 }
 
-/// Laths along y which fill the board of `size` about `centre`, or one board.
+/// Laths along y that fill the board of `size` about `centre`, or one board.
 fn slats(b: &mut Builder, s: &mut Sampler, size: DVec3, centre: DVec3) {
     let n = s.pick(&[1, 2, 3, 5, 8]);
     let pitch_m = size.x / n as f64;
@@ -71,7 +68,7 @@ fn slats(b: &mut Builder, s: &mut Sampler, size: DVec3, centre: DVec3) {
     }
 }
 
-/// A table with a bench on either side, as one piece.
+/// A table with a bench on each side, in one piece.
 fn picnic(b: &mut Builder, s: &mut Sampler, long_m: f64) {
     slats(b, s, DVec3::new(0.75, long_m, 0.04), 0.74 * DVec3::Z);
     for side in [-1.0, 1.0] {

@@ -1,29 +1,25 @@
 //! Bins for litter and waste.
 
-use glam::{DAffine3, DVec2, DVec3};
-
 use crate::primitives::{
-    Builder, Makes, Profile, Sampler, Section, Vessel, Wall, block, cylinder, ellipsoid, loft,
-    outline, prism, rod,
+    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, Vessel, Wall, block,
+    cylinder, ellipsoid, loft, outline, prism, rod,
 };
 
 /// The makes, with their weights.
 pub const MAKES: Makes =
     &[(3, litter), (4, two_wheels), (3, four_wheels), (1, skip), (1, bottle_bank), (2, group)];
 
-/// The two-wheeled bins of EN 840-1 of 120, 240 and 360 litres: depth, width and
-/// height, metres.
+/// The two-wheeled bins of EN 840-1 of 120, 240 and 360 litres: depth, width and height, metres.
 const TWO_WHEELS_M: [[f64; 3]; 3] = [[0.55, 0.48, 0.93], [0.74, 0.58, 1.07], [0.86, 0.62, 1.10]];
 /// The four-wheeled bins of EN 840-2 and EN 840-3 of 660, 770 and 1,100 litres.
 const FOUR_WHEELS_M: [[f64; 3]; 3] = [[0.78, 1.26, 1.22], [0.78, 1.37, 1.32], [1.08, 1.37, 1.46]];
 
-/// One of the sizes, as makers differ a little.
+/// Draws one of the sizes, with the small differences between makers.
 fn sized(s: &mut Sampler, sizes_m: &[[f64; 3]]) -> [f64; 3] {
     s.pick(sizes_m).map(|size_m| size_m * s.uniform(0.96, 1.02))
 }
 
-/// A body that widens upwards: `size` at its upper rim, from `low_m` to
-/// `high_m`.
+/// A body that widens upwards from `low_m` to `high_m`, with `size` at its upper rim.
 fn body(b: &mut Builder, size: DVec2, taper: f64, low_m: f64, high_m: f64) {
     let section = |share: f64, z: f64| {
         let outline = outline::rounded_rectangle(0.5 * share * size, 0.05, 2);
@@ -32,7 +28,7 @@ fn body(b: &mut Builder, size: DVec2, taper: f64, low_m: f64, high_m: f64) {
     loft(b, &[section(taper, low_m), section(1.0, high_m)]);
 }
 
-/// A litter bin on the ground or on a post, open or under a hood.
+/// A litter bin on the ground or on a post, open or with a hood.
 fn litter(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(0.5, 1.0);
     let radius_m = s.uniform(0.15, 0.3);
@@ -60,14 +56,14 @@ fn litter(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A bin on two wheels, which opens to the front; its lid may stand open.
+/// A bin on two wheels that opens to the front. Its lid may be open.
 fn two_wheels(b: &mut Builder, s: &mut Sampler) {
     let [deep_m, wide_m, high_m] = sized(s, &TWO_WHEELS_M);
     let rim_m = 0.92 * high_m;
     let size = DVec2::new(0.88 * deep_m, wide_m);
     body(b, size, s.uniform(0.72, 0.85), 0.05, rim_m);
     lid(b, s, DVec3::new(deep_m, wide_m, high_m - rim_m), rim_m);
-    // The handle and the wheels are behind.
+    // The handle and the wheels are at the rear.
     let handle = DVec3::new(-0.5 * deep_m, 0.0, rim_m - 0.03);
     rod(b, handle - 0.4 * wide_m * DVec3::Y, handle + 0.4 * wide_m * DVec3::Y, [0.015, 0.015]);
     for side in [-1.0, 1.0] {
@@ -75,7 +71,7 @@ fn two_wheels(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A lid of `size` on hinges behind, shut or thrown back.
+/// A lid of `size` with its hinges at the rear, shut or open.
 fn lid(b: &mut Builder, s: &mut Sampler, size: DVec3, rim_m: f64) {
     let open = s.chance(0.08);
     let turn_rad = if open { -s.uniform(1.7, 4.3) } else { -s.uniform(-0.03, 0.06) };
@@ -108,7 +104,7 @@ fn four_wheels(b: &mut Builder, s: &mut Sampler) {
         wheel(b, DVec3::new(0.33 * x * deep_m, 0.38 * y * wide_m, 0.1), 0.1);
     }
     for side in [-1.0, 1.0] {
-        // The trunnions by which lorries lift the bin.
+        // The trunnions, where lorries lift the bin.
         let at = DVec3::new(0.0, side * 0.5 * wide_m, 0.8 * high_m);
         rod(b, at, at + 0.06 * side * DVec3::Y, [0.025, 0.025]);
     }
@@ -120,7 +116,7 @@ fn arch(half: DVec3, side: f64) -> Vec<DVec3> {
     (0..=6).map(at).map(|(sin, cos)| half * DVec3::new(cos, side, sin)).collect()
 }
 
-/// An open container that a lorry sets down, with sloping ends.
+/// An open container with sloping ends.
 fn skip(b: &mut Builder, s: &mut Sampler) {
     let half = DVec2::new(s.uniform(1.4, 1.95), s.uniform(0.8, 0.95));
     let high_m = s.uniform(1.0, 1.6);
@@ -154,7 +150,7 @@ fn bottle_bank(b: &mut Builder, s: &mut Sampler) {
     block(b, DVec3::new(0.9 * half_m, 0.0, 0.75 * high_m), DVec3::new(0.1, 0.8 * half_m, 0.25));
 }
 
-/// Bins that stand beside each other, as on the day of their collection.
+/// Bins beside each other, as on the day of their collection.
 fn group(b: &mut Builder, s: &mut Sampler) {
     let mut y = 0.0;
     for _ in 0..s.count(2, 4) {

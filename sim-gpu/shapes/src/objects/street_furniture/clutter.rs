@@ -1,11 +1,10 @@
-//! Things of no kind of their own, which lie and stand about.
-
-use glam::{DAffine3, DVec2, DVec3};
+//! Things that belong to no other kind.
 
 use crate::objects::plant::bush;
 use crate::objects::plant::uneven::{Lump, Ripple, direction};
 use crate::primitives::{
-    Builder, Makes, Profile, Sampler, Section, block, build_one, outline, rod,
+    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, block, build_one, outline,
+    rod,
 };
 
 /// The makes, with their weights.
@@ -21,7 +20,7 @@ pub const MAKES: Makes = &[
     (2, drum),
 ];
 
-/// Cardboard boxes beside and upon each other, none quite straight.
+/// Cardboard boxes beside and on top of each other.
 fn boxes(b: &mut Builder, s: &mut Sampler) {
     let mut top = DVec3::ZERO;
     for _ in 0..s.count(1, 7) {
@@ -77,8 +76,7 @@ fn hydrant(b: &mut Builder, s: &mut Sampler) {
     rod(b, cap, cap + out * DVec3::X, [0.06, 0.06]);
 }
 
-/// A cabinet beside the road with electric or telephone gear: 0.8 to 1.8 m
-/// high, as network operators set them up.
+/// A roadside cabinet for electricity or telephone, 0.8 to 1.8 m high.
 fn cabinet(b: &mut Builder, s: &mut Sampler) {
     let size = DVec3::new(s.uniform(0.25, 0.6), s.uniform(0.4, 1.8), s.uniform(0.75, 1.8));
     let foot_m = s.uniform(0.05, 0.2);
@@ -131,7 +129,7 @@ fn trolley(b: &mut Builder, s: &mut Sampler) {
     rod(b, handle - 0.5 * wide_m * DVec3::Y, handle + 0.5 * wide_m * DVec3::Y, [0.015, 0.015]);
 }
 
-/// Two boards that lean against each other, before a shop.
+/// Two boards that lean against each other, in front of a shop.
 fn a_board(b: &mut Builder, s: &mut Sampler) {
     let high_m = s.uniform(0.8, 1.3);
     let size = DVec3::new(0.025, s.uniform(0.5, 0.8), high_m);
@@ -143,8 +141,7 @@ fn a_board(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// Pallets of 0.8 by 1.2 m and 0.144 m high (EN 13698-1), empty or with a
-/// load.
+/// A stack of pallets of 0.8 by 1.2 m and 0.144 m height (EN 13698-1), with or without a load.
 fn pallets(b: &mut Builder, s: &mut Sampler) {
     let n = s.count(2, 10);
     for pallet in 0..n {
@@ -165,7 +162,7 @@ fn pallets(b: &mut Builder, s: &mut Sampler) {
     }
 }
 
-/// A barrel, or the drum that guides traffic (MUTCD: 0.9 m high, 0.45 m wide).
+/// A barrel, or a traffic drum (MUTCD: 0.9 m high, 0.45 m wide).
 fn drum(b: &mut Builder, s: &mut Sampler) {
     let radius_m = s.uniform(0.2, 0.32);
     let high_m = s.uniform(0.7, 1.0);

@@ -1,11 +1,9 @@
 //! Traffic cones.
 
-use glam::DVec2;
+use crate::primitives::{Builder, DVec2, Profile, Sampler, Section, outline, prism};
 
-use crate::primitives::{Builder, Profile, Sampler, Section, outline, prism};
-
-/// Builds a traffic cone: 0.3, 0.5, 0.75 or 1 m high (EN 13422) or 0.45, 0.7
-/// or 0.9 m (MUTCD: 18, 28 and 36 inches).
+/// Builds a traffic cone: 0.3, 0.5, 0.75 or 1 m high (EN 13422) or 0.45, 0.7 or 0.9 m (MUTCD: 18,
+/// 28 and 36 inches).
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.pick(&[0.3, 0.45, 0.5, 0.5, 0.7, 0.75, 0.75, 0.9, 1.0]);
     let slim = height_m > 0.6 && s.chance(0.2);

@@ -1,16 +1,13 @@
 //! Bicycles: city, touring, mountain, racing and children's.
 
-use glam::DVec3;
-
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
-use crate::primitives::{Builder, Sampler, block, cushion, ellipsoid, rod, tube};
+use crate::primitives::{Builder, DVec3, Sampler, block, cushion, ellipsoid, rod, tube};
 
 /// The measures of a bicycle, metres. The middle between its axles is at x = 0.
 ///
-/// Wheels are ISO 5775's 559 (26 inch) to 622 (28 inch) with tyres of 23 to 57 mm;
-/// wheelbases, saddles and bars span the makers' geometry tables of such bicycles.
-#[derive(Clone, Debug)]
+/// Wheels are ISO 5775's 559 (26 inch) to 622 (28 inch) with tyres of 23 to 57 mm. The ranges of
+/// wheelbases, saddles and bars are those of makers' geometry tables.
 pub struct Bicycle {
     wheel_m: f64,
     tyre_m: f64,
@@ -18,9 +15,9 @@ pub struct Bicycle {
     saddle: DVec3,
     grip: DVec3,
     crank: DVec3,
-    /// Where the right crank points: 0 is forward, a quarter turn up.
+    /// The angle of the right crank: 0 is forward, a quarter turn is up.
     crank_rad: f64,
-    /// A frame without a top tube at the height of the saddle.
+    /// Whether the frame has no top tube at the height of the saddle.
     low_entry: bool,
     tube_m: f64,
     racing: bool,
@@ -51,7 +48,7 @@ impl Bicycle {
         }
     }
 
-    /// Where a rider touches it.
+    /// The places where a rider touches it.
     pub fn contacts(&self) -> Contacts {
         let soles = [-1.0, 1.0].map(|side| self.pedal(side) + 0.01 * DVec3::Z);
         Contacts { saddle: self.saddle + 0.02 * DVec3::Z, grip: self.grip, soles }
@@ -66,8 +63,8 @@ impl Bicycle {
     pub fn build(&self, b: &mut Builder, s: &mut Sampler) {
         let half_m = 0.5 * self.wheelbase_m;
         let [rear, front] = [-half_m, half_m].map(|x| DVec3::new(x, 0.0, self.wheel_m));
-        // Spokes are 2 mm thick; a beam is some centimetres wide and is returned by
-        // those it grazes, which a thin ray would miss.
+        // Spokes are 2 mm thick. A beam is a few centimetres wide and returns from spokes that a
+        // thin ray would miss.
         let filling = Filling::Spokes(s.pick(&[12, 14, 16, 18]), s.uniform(0.004, 0.009));
         wheel(b, rear, self.tyre_m, filling);
         wheel(b, front, self.tyre_m, filling);
@@ -109,7 +106,7 @@ impl Bicycle {
             rod(b, rear + side, clamp, [0.5 * r, 0.6 * r]);
             rod(b, front + 0.8 * side, crown + 0.6 * side, [0.6 * r, 0.9 * r]);
             if self.racing {
-                // The bar's drop.
+                // The drop of the bar.
                 let down = [
                     self.grip,
                     self.grip + DVec3::new(0.09, 0.0, -0.02),
@@ -121,7 +118,7 @@ impl Bicycle {
         });
     }
 
-    /// Mudguards, a rack with bags, a basket, a child's seat, a lamp.
+    /// Mudguards, a rack with bags or a child's seat, a basket, a lamp.
     fn additions(&self, b: &mut Builder, s: &mut Sampler, rear: DVec3, front: DVec3) {
         let mudguard_m = self.tyre_m + 0.015;
         if s.chance(0.7) {

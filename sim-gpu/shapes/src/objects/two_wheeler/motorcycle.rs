@@ -1,17 +1,16 @@
 //! Motorcycles (naked, sports, touring, cruisers) and scooters.
 
-use glam::{DVec2, DVec3};
-
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
-use crate::primitives::{Builder, Sampler, block, cushion, ellipsoid, loft, outline, rod, sheet};
+use crate::primitives::{
+    Builder, DVec2, DVec3, Sampler, block, cushion, ellipsoid, loft, outline, rod, sheet,
+};
 
 /// The measures of a motorcycle, metres. The middle between its axles is at x = 0.
 ///
-/// They span the makers' data sheets: a scooter (Vespa Primavera: wheelbase 1.34, length
-/// 1.86, saddle 0.79) to a cruiser (Harley-Davidson Softail: wheelbase 1.63, length 2.36,
+/// The ranges are those of makers' data sheets, from a scooter (Vespa Primavera: wheelbase 1.34,
+/// length 1.86, saddle 0.79) to a cruiser (Harley-Davidson Softail: wheelbase 1.63, length 2.36,
 /// saddle 0.68) and an adventure tourer (BMW R 1250 GS: 1.51, 2.2, 0.85).
-#[derive(Clone, Debug)]
 pub struct Motorcycle {
     scooter: bool,
     wheel_m: [f64; 2],
@@ -19,7 +18,7 @@ pub struct Motorcycle {
     wheelbase_m: f64,
     saddle: DVec3,
     grip: DVec3,
-    /// Half the breadth of the fairing, the engine, the tank.
+    /// Half the width of the fairing, the engine and the tank.
     half_m: f64,
     fairing: bool,
 }
@@ -46,7 +45,7 @@ impl Motorcycle {
         }
     }
 
-    /// Where a rider touches it.
+    /// The places where a rider touches it.
     pub fn contacts(&self) -> Contacts {
         let sole = if self.scooter {
             DVec3::new(0.22, 0.12, 0.31)

@@ -2,20 +2,18 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use glam::{DAffine3, DVec2, DVec3};
+use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Profile, Section, smooth_tube};
 
-use crate::primitives::{Builder, Profile, Section, smooth_tube};
-
-/// What fills a wheel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The inside of a wheel.
+#[derive(Clone, Copy, PartialEq)]
 pub enum Filling {
-    /// This many spokes, each of this width in metres.
+    /// The number of spokes, and their width in metres.
     Spokes(usize, f64),
     Disc,
 }
 
-/// A wheel about the axle at `axle`, along y: a tyre `width_m` wide that stands on
-/// the ground, and its filling.
+/// A wheel that stands on the ground, with its axle at `axle` along y: a tyre of `width_m`, and its
+/// filling.
 pub fn wheel(b: &mut Builder, axle: DVec3, width_m: f64, filling: Filling) {
     let [outer_m, half_m] = [axle.z, 0.5 * width_m];
     let rim_m = outer_m - 1.1 * width_m.max(0.035);
@@ -53,8 +51,7 @@ pub fn wheel(b: &mut Builder, axle: DVec3, width_m: f64, filling: Filling) {
     });
 }
 
-/// A mudguard around the upper part of a wheel, from one angle to another (0 is
-/// forward, 90 up).
+/// A mudguard around the upper part of a wheel, between two angles (0 is forward, 90 up).
 pub fn mudguard(b: &mut Builder, axle: DVec3, width_m: f64, [from_deg, to_deg]: [f64; 2]) {
     let radius_m = axle.z + 0.02;
     b.surface([6, 1], |u, v| {
@@ -64,7 +61,7 @@ pub fn mudguard(b: &mut Builder, axle: DVec3, width_m: f64, [from_deg, to_deg]: 
     });
 }
 
-/// A handlebar through the left `grip` and its mirror image, held at `stem`.
+/// A handlebar through the left `grip` and its mirror image, fixed at `stem`.
 pub fn handlebar(b: &mut Builder, stem: DVec3, grip: DVec3, radius_m: f64) {
     let mirror = DVec3::new(1.0, -1.0, 1.0);
     let bend = DVec3::new(0.5 * (stem.x + grip.x) + 0.03, 0.55 * grip.y, grip.z);

@@ -1,15 +1,13 @@
 //! Riders of bicycles and motorcycles.
 
-use glam::{DAffine3, DVec3};
-
 use super::Contacts;
 use crate::objects::person::body::{Leg, Measures, bent};
-use crate::primitives::{Builder, Sampler, cushion, ellipsoid};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, cushion, ellipsoid};
 
-/// Builds a rider who sits on the saddle with hands on the grips and feet on the
-/// pedals or rests; one of a motorcycle wears a full helmet.
+/// Builds a rider on the saddle, with hands on the grips and feet on the pedals or rests. The rider
+/// of a motorcycle wears a full helmet.
 pub fn build(b: &mut Builder, s: &mut Sampler, contacts: Contacts, motorised: bool) {
-    // The legs that fit a saddle are as long as it is above the lower pedal.
+    // The stature at which stretched legs reach from the saddle to the lower pedal.
     let reach_m = contacts.saddle.z - contacts.soles.map(|p| p.z).into_iter().fold(1.0, f64::min);
     let fitting_m = (reach_m / (Measures::THIGH + Measures::SHANK + 0.02)).clamp(1.5, 1.92);
     let stature_m = if motorised { s.uniform(1.6, 1.9) } else { fitting_m };
@@ -51,7 +49,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, contacts: Contacts, motorised: bo
     }
 }
 
-/// How far the trunk leans so that slightly bent arms reach the grips.
+/// The lean of the trunk at which slightly bent arms reach the grips.
 fn lean_rad(s: &mut Sampler, measures: &Measures, pelvis: DVec3, grip: DVec3) -> f64 {
     let arm_m = s.uniform(0.82, 0.96) * 0.376 * measures.stature_m;
     let shoulder = measures.shoulder(1.0);
