@@ -2,13 +2,10 @@
 
 use edgepuck_segment::Segmentation;
 
+use crate::recipe::OTHER;
 use crate::scene::Scene;
 use crate::stage::Stage;
 use crate::sweep::Sweep;
-
-/// The class of clusters that do not show one whole object: ground, two objects in one cluster, or
-/// a small part of an object.
-pub const OTHER: &str = "other";
 
 /// The least fraction of a cluster's points that lie on the object that it shows. Clusters below
 /// mix objects.

@@ -37,12 +37,12 @@ mod tests;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub use clusters::{LabelledCluster, OTHER, label_clusters};
+pub use clusters::{LabelledCluster, label_clusters};
 pub use drive::{Drive, Packet};
 pub use error::SceneError;
 pub use generate::{ClusterCounts, LabelledScene, generate};
 pub use placed_object::PlacedObject;
-pub use recipe::{Ground, Mount, Objects, Place, Recipe, SensorChoice, Span};
+pub use recipe::{Ground, Mount, OTHER, Objects, Place, Recipe, SensorChoice, Span};
 pub use scene::Scene;
 pub use sightings::{Sighting, Sightings};
 pub use stage::Stage;

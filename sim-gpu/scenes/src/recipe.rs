@@ -8,6 +8,10 @@ use sim_gpu::config::{self, ConfigError, InvalidValue, within};
 use sim_gpu::effects::Effects;
 use sim_gpu::sensor::Sensor;
 
+/// The class of clusters that do not show one whole object: ground, two objects in one cluster, or
+/// a small part of an object.
+pub const OTHER: &str = "other";
+
 /// A distribution of scenes.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -262,13 +266,11 @@ impl Recipe {
     }
 
     /// The classes of the objects and [`OTHER`], sorted by name.
-    ///
-    /// [`OTHER`]: crate::OTHER
     #[must_use]
     pub fn classes(&self) -> Vec<String> {
         let mut classes: Vec<String> =
             self.object.iter().map(|objects| objects.class.clone()).collect();
-        classes.push(crate::OTHER.to_owned());
+        classes.push(OTHER.to_owned());
         classes.sort();
         classes.dedup();
         classes
