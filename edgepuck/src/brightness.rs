@@ -1,11 +1,11 @@
-//! How bright the points of a recorded scan are.
+//! The brightness of the points of a recorded scan.
 
 use crate::Usage;
 use formats::Scan;
 use sim_gpu::config::within;
 use std::path::Path;
 
-/// Flags that say what a file's intensities mean.
+/// Flags about the meaning of a file's intensities.
 #[derive(clap::Args)]
 pub struct BrightnessArgs {
     /// Intensity of a white surface that faces the sensor [default: 1]
@@ -18,7 +18,7 @@ pub struct BrightnessArgs {
 }
 
 impl BrightnessArgs {
-    /// That the numbers make sense.
+    /// Checks the values.
     ///
     /// # Errors
     /// A usage error that names the flag.
@@ -27,8 +27,8 @@ impl BrightnessArgs {
             .map_err(|error| Usage(error.to_string()))
     }
 
-    /// What part of the light each point returns in clear air.
-    pub fn of(&self, scan: &Scan, sweep: &Path) -> anyhow::Result<Vec<f32>> {
+    /// The brightness of each point of `scan`: the share of the light that it returns in clear air.
+    pub fn brightness_of(&self, scan: &Scan, sweep: &Path) -> anyhow::Result<Vec<f32>> {
         if let Some(reflectivity) = self.reflectivity {
             return Ok(vec![reflectivity as f32; scan.len()]);
         }
@@ -58,7 +58,7 @@ impl BrightnessArgs {
         Ok(intensities.iter().map(|intensity| intensity / white).collect())
     }
 
-    /// Turns the intensities of `scan`, which are brightnesses, back to the numbers of the file.
+    /// Converts the intensities of `scan`, which are brightnesses, back to the file's units.
     pub fn restore(&self, scan: &mut Scan) {
         let white = self.white.unwrap_or(1.0) as f32;
         scan.intensity.iter_mut().flatten().for_each(|intensity| *intensity *= white);

@@ -1,4 +1,4 @@
-//! `edgepuck card`: what a finished dataset is published with.
+//! `edgepuck card`: writes the card and the metadata for publishing a finished dataset.
 
 use crate::Outcome;
 use anyhow::Context;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// Flags of `card`.
 #[derive(Clone, clap::Args)]
-pub struct Args {
+pub struct CardArgs {
     /// Folder of a finished dataset
     #[arg(value_name = "DIR")]
     folder: PathBuf,
@@ -16,31 +16,31 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 
-    /// Licence of the dataset, as an identifier of SPDX, such as CC-BY-4.0. It is yours to know: the
-    /// scans derive from your meshes
+    /// Licence of the dataset, an SPDX identifier such as CC-BY-4.0. It depends on the licence of your
+    /// meshes, from which the scans derive
     #[arg(long, value_name = "SPDX", value_parser = license)]
     license: Option<String>,
 
-    /// Address where the dataset will be found
+    /// Address at which the dataset will be published
     #[arg(long, value_name = "URL")]
     url: Option<String>,
 
-    /// Who made the dataset
+    /// Creator of the dataset
     #[arg(long, value_name = "NAME")]
     creator: Option<String>,
 
-    /// Day of publication
+    /// Date of publication
     #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
     published: Option<String>,
 
-    /// Replace a card and metadata that are there
+    /// Replace an existing card and metadata
     #[arg(long)]
     overwrite: bool,
 }
 
 /// Writes the card and the metadata.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let Args { folder, name, license, url, creator, published, overwrite } = args.clone();
+pub fn run(args: &CardArgs) -> anyhow::Result<Outcome> {
+    let CardArgs { folder, name, license, url, creator, published, overwrite } = args.clone();
     let full = folder.canonicalize().with_context(|| folder.display().to_string())?;
     let own_name = || full.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let name = name.unwrap_or_else(own_name);
@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// An identifier of SPDX, <https://spdx.org/licenses/>.
+/// Parses an SPDX identifier, <https://spdx.org/licenses/>.
 fn license(text: &str) -> Result<String, String> {
     let is_id = |c: char| c.is_ascii_alphanumeric() || "-.+".contains(c);
     match !text.is_empty() && text.chars().all(is_id) {
@@ -60,7 +60,7 @@ fn license(text: &str) -> Result<String, String> {
     }
 }
 
-/// A day, as ISO 8601 writes it.
+/// Parses a date in the form of ISO 8601.
 fn day(text: &str) -> Result<String, String> {
     let numbers: Vec<u32> = text.split('-').filter_map(|part| part.parse().ok()).collect();
     let is_written = |year: u32, month: u32, day: u32| {

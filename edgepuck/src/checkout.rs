@@ -1,10 +1,10 @@
-//! Finds the source checkout that this program was built in, if it still runs
-//! from there. An installed program has none, and needs none.
+//! Finds the source checkout of a program that runs from its `target` folder. An installed program
+//! has no checkout.
 
 use std::path::{Path, PathBuf};
 
-/// The checkout's root: the folder above `target`, if the program lies in there
-/// and the sources of the training program are beside it.
+/// The root of the checkout: the nearest folder above the program that holds the sources of the
+/// training program.
 pub fn root() -> Option<PathBuf> {
     let program = std::env::current_exe().ok()?;
     let is_checkout = |folder: &&Path| folder.join("train/Cargo.toml").is_file();

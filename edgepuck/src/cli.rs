@@ -1,4 +1,4 @@
-//! The command line of the program `edgepuck`, which its binary and its Python package start.
+//! The command line of `edgepuck`, for the program and for the Python package.
 
 use crate::{
     Outcome, adapters, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes,
@@ -23,62 +23,62 @@ enum Command {
     /// Scan a folder of meshes into a LiDAR dataset (default: built-in procedural shapes)
     #[command(alias = "gen")]
     GenDataset(Box<gen_dataset::Args>),
-    /// Scan street scenes and cut them into labelled clusters (default: built-in objects)
+    /// Scan street scenes and segment them into labelled clusters (default: built-in objects)
     GenScenes(gen_scenes::Args),
-    /// Simulate a drive through a street, as one capture of a VLP-32C's packets with its truth
+    /// Simulate a drive through a street: a capture of VLP-32C packets, with ground truth
     GenDrive(gen_drive::Args),
     /// Write the procedural shapes that gen-dataset uses by default as OFF files
     GenShapes(gen_shapes::Args),
     /// Sample points uniformly from the surfaces of meshes, as in ModelNet40's point clouds
-    SampleSurfaces(sample_surfaces::Args),
+    SampleSurfaces(sample_surfaces::SampleSurfacesArgs),
     /// Scan one scene
     Scan(scan::Args),
-    /// Cut a sweep of a sensor into ground and clusters
+    /// Segment a sensor's sweep into ground and clusters
     Segment(segment::Args),
     /// Add rain, snow, fog or haze to a recorded scan, and label each point
-    Weather(weather::Args),
-    /// Make what goes wrong with a sweep, or with scans of meshes, as test sets of robustness
-    Corrupt(Box<corrupt::Args>),
-    /// Find and name the objects of a sweep
+    Weather(weather::WeatherArgs),
+    /// Apply sensor corruptions to a sweep or to mesh scans, to make robustness test sets
+    Corrupt(Box<corrupt::CorruptArgs>),
+    /// Find and classify the objects in a sweep
     #[cfg(feature = "models")]
     Detect(detect::Args),
     /// Draw a picture of a scan from the side, from above and from the front
     Preview(preview_scan::Args),
     /// List the built-in sensors, or check and describe a sensor profile
-    Profile(profile::Args),
+    Profile(profile::ProfileArgs),
     /// List the adapters (GPUs and CPU) that can cast rays
     Adapters,
     /// Merge the shards of a dataset into one dataset
     MergeDataset(merge_dataset::Args),
-    /// Describe a finished dataset for publishing: a card (README.md) and Croissant metadata
-    Card(card::Args),
-    /// Print the job file of a dataset that many machines make: Slurm, Kubernetes or HyperQueue
-    Cluster(cluster::Args),
+    /// Write a card (README.md) and Croissant metadata for publishing a finished dataset
+    Card(card::CardArgs),
+    /// Print a job file for making a dataset on many machines: Slurm, Kubernetes or HyperQueue
+    Cluster(cluster::ClusterArgs),
     /// Convert a PyTorch checkpoint into a model file for infer-cpu
     #[cfg(feature = "models")]
-    ImportWeights(import_weights::Args),
+    ImportWeights(import_weights::ImportWeightsArgs),
     /// Convert a model file to ONNX, for other inference engines
     #[cfg(feature = "models")]
-    ExportOnnx(export_onnx::Args),
+    ExportOnnx(export_onnx::ExportOnnxArgs),
     /// Train a network: `edgepuck train --help`
     #[command(disable_help_flag = true)]
-    Train(trainer::Args),
+    Train(trainer::TrainerArgs),
     /// Measure a model's accuracy on labelled clouds: `edgepuck eval --help`
     #[command(disable_help_flag = true)]
-    Eval(trainer::Args),
+    Eval(trainer::TrainerArgs),
     /// Show which points determined a prediction: `edgepuck explain --help`
     #[command(disable_help_flag = true)]
-    Explain(trainer::Args),
+    Explain(trainer::TrainerArgs),
     /// Compute the Chamfer distance of two clouds: `edgepuck compare-points A B`
     #[command(disable_help_flag = true)]
-    ComparePoints(trainer::Args),
+    ComparePoints(trainer::TrainerArgs),
     /// Recommend one configuration of the classifier for a device, based on measurements
     #[cfg(feature = "models")]
     Advise(advise::Args),
 }
 
-/// Does what the command line `words` asks for, of which the first is the program's name, and
-/// gives the exit code. Errors and help are printed.
+/// Runs the command line `words`, which begins with the name of the program. Prints errors and
+/// help, and returns the exit code.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     match Cli::try_parse_from(words) {
         Ok(cli) => outcome::exit_code(run(&cli.command)),
@@ -90,10 +90,11 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// As [`main`], but the error is the caller's to tell, and help is none.
+/// Runs the command line `words` like [`main`], but returns errors to the caller instead of
+/// printing them. `--help` is an error.
 ///
 /// # Errors
-/// What the command reports.
+/// The errors of the command; words that are not a command line.
 pub fn run_words(words: impl IntoIterator<Item = OsString>) -> anyhow::Result<Outcome> {
     run(&Cli::try_parse_from(words)?.command)
 }

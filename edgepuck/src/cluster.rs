@@ -1,12 +1,12 @@
-//! `edgepuck cluster`: the job file of a dataset that many machines make, to be read and submitted by
-//! the user.
+//! `edgepuck cluster`: prints a job file for making a dataset on many machines. The user reads and
+//! submits it.
 
 use crate::shell::posix_quoted;
 use crate::{Outcome, Usage, gen_dataset};
 use std::fmt::Write;
 
 formats::named! {
-    /// What runs the tasks.
+    /// A program that runs tasks on a cluster.
     pub enum Scheduler: "scheduler" {
         /// A job array of Slurm.
         Slurm = "slurm",
@@ -19,8 +19,8 @@ formats::named! {
 
 /// Flags of `cluster`.
 #[derive(clap::Args)]
-pub struct Args {
-    /// What runs the tasks: slurm, kubernetes or hyperqueue
+pub struct ClusterArgs {
+    /// Scheduler of the tasks: slurm, kubernetes or hyperqueue
     #[arg(value_name = "SCHEDULER")]
     scheduler: Scheduler,
 
@@ -47,22 +47,22 @@ pub struct Args {
     #[arg(long, default_value = "edgepuck:latest", value_name = "IMAGE")]
     image: String,
 
-    /// Words of gen-dataset behind `--`: the meshes, the output folder, which all tasks share, and what
-    /// the dataset holds
+    /// After `--`, the arguments of gen-dataset: the meshes, the output folder, which all tasks share,
+    /// and the contents of the dataset
     #[arg(last = true, required = true, value_name = "WORDS")]
     words: Vec<String>,
 }
 
 /// Prints the job file.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &ClusterArgs) -> anyhow::Result<Outcome> {
     print!("{}", job_file(args)?);
     Ok(Outcome::Success)
 }
 
-fn job_file(args: &Args) -> anyhow::Result<String> {
+fn job_file(args: &ClusterArgs) -> anyhow::Result<String> {
     let own = ["--shard", "--resume", "--overwrite", "--verify"];
     if let Some(word) = args.words.iter().find(|word| own.iter().any(|own| word.starts_with(own))) {
-        return Err(Usage(format!("{word}: each task is told that by the job file")).into());
+        return Err(Usage(format!("{word}: the job file sets this flag for each task")).into());
     }
     gen_dataset::check_words_of_tasks(&args.words)?;
     let words: Vec<String> = args.words.iter().map(|word| quoted(word)).collect();
@@ -75,11 +75,11 @@ fn job_file(args: &Args) -> anyhow::Result<String> {
     })
 }
 
-fn slurm(Args { parts, cpus, memory, hours, .. }: &Args, command: &str) -> String {
+fn slurm(ClusterArgs { parts, cpus, memory, hours, .. }: &ClusterArgs, command: &str) -> String {
     let last = parts - 1;
     format!(
         "#!/bin/bash
-# A job array of Slurm: sbatch THIS_FILE. Tasks that end early are queued again, and go on.
+# A job array of Slurm: sbatch THIS_FILE. Interrupted tasks are queued again and resume.
 #SBATCH --job-name=edgepuck
 #SBATCH --array=0-{last}
 #SBATCH --cpus-per-task={cpus}
@@ -88,7 +88,7 @@ fn slurm(Args { parts, cpus, memory, hours, .. }: &Args, command: &str) -> Strin
 #SBATCH --requeue
 #SBATCH --open-mode=append
 #SBATCH --output=edgepuck-%a.log
-# A minute before the time is up, the program is told to end, and leaves out the tar that it is at.
+# A minute before the time limit, Slurm sends SIGTERM; the program ends and drops its unfinished tar.
 #SBATCH --signal=TERM@60
 
 export RAYON_NUM_THREADS=\"$SLURM_CPUS_PER_TASK\"
@@ -96,7 +96,7 @@ srun {command}
 code=$?
 case $code in
     0) ;;
-    3) echo 'Done, but for the meshes above.' ;;
+    3) echo 'Done, except for the meshes above.' ;;
     75 | 143) scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID\" ;;
     *) exit $code ;;
 esac
@@ -104,18 +104,21 @@ esac
     )
 }
 
-fn hyperqueue(Args { parts, cpus, .. }: &Args, command: &str) -> String {
+fn hyperqueue(ClusterArgs { parts, cpus, .. }: &ClusterArgs, command: &str) -> String {
     let (last, task) = (parts - 1, quoted(&script(command)));
     format!(
         "#!/bin/sh
 # A task array of HyperQueue: sh THIS_FILE, where a server runs and workers wait (`hq worker start`).
-# A task that was told to end has failed: submit this again, and what is there is kept.
+# A task that was terminated counts as failed. Submit this file again to resume; finished tars stay.
 exec hq submit --name edgepuck --array 0-{last} --cpus {cpus} --crash-limit 20 -- sh -c {task}
 "
     )
 }
 
-fn kubernetes(Args { parts, cpus, memory, image, .. }: &Args, command: &str) -> String {
+fn kubernetes(
+    ClusterArgs { parts, cpus, memory, image, .. }: &ClusterArgs,
+    command: &str,
+) -> String {
     let mut lines = String::new();
     for line in script(command).lines() {
         writeln!(lines, "              {line}").expect("invariant: a string takes all");
@@ -135,11 +138,11 @@ spec:
   backoffLimitPerIndex: 6
   podFailurePolicy:
     rules:
-      # A pod that is moved elsewhere has not failed.
+      # The eviction of a pod is not a failure.
       - action: Ignore
         onPodConditions:
           - type: DisruptionTarget
-      # Wrong words stay wrong.
+      # A wrong command line fails on every try.
       - action: FailJob
         onExitCodes:
           containerName: edgepuck
@@ -170,15 +173,14 @@ spec:
     )
 }
 
-/// A script that runs `command`, to which it hands on the signal to end, and for which refused meshes
-/// are no failure.
+/// A script that runs `command` and forwards SIGTERM to it. Refused meshes do not make it fail.
 fn script(command: &str) -> String {
     format!(
         "{command} &
 p=$!
 trap 'kill -TERM \"$p\"' TERM
 wait \"$p\"; code=$?
-# The signal ends the first wait.
+# A signal ends the first wait.
 [ \"$code\" -le 128 ] || {{ wait \"$p\"; code=$?; }}
 [ \"$code\" -ne 3 ] || code=0
 exit \"$code\"
@@ -186,7 +188,7 @@ exit \"$code\"
     )
 }
 
-/// A word of a POSIX shell, in quotes if it needs them.
+/// `word` for a POSIX shell, quoted if necessary.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=:@+".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

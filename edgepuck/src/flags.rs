@@ -1,12 +1,12 @@
-//! What flags of several commands have in common.
+//! Checks and parsers for flags of several commands.
 
 use crate::Usage;
 use std::path::Path;
 
-/// Fails if meshes are to be simplified and this program was built without that.
+/// Checks that this program can simplify meshes, if that is `wanted`.
 ///
 /// # Errors
-/// A usage error that says how to get a program that simplifies.
+/// A usage error that explains how to get a program that can.
 pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
     if !wanted || cfg!(feature = "simplify") {
         return Ok(());
@@ -19,7 +19,7 @@ pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
     ))
 }
 
-/// Fails unless `--meshes`, where it is given, names a folder.
+/// Checks that `--meshes`, if present, names a folder.
 ///
 /// # Errors
 /// A usage error that names the path.
@@ -30,7 +30,7 @@ pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
     }
 }
 
-/// A finite number above 0.
+/// Parses a finite number above 0.
 pub fn positive(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(x),

@@ -1,4 +1,4 @@
-//! The commands of the program `edgepuck`, a module each.
+//! The commands of the program `edgepuck`, each in its own module.
 
 pub mod adapters;
 #[cfg(feature = "models")]

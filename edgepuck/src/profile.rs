@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Flags of `profile`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ProfileArgs {
     /// Sensor to check and describe: a built-in name, a TOML file, or the metadata (JSON) of an
     /// Ouster [default: list the built-in sensors]
     #[arg(value_name = "SENSOR")]
@@ -23,8 +23,9 @@ pub struct Args {
     beams: Option<PathBuf>,
 }
 
-/// Lists or describes; says on the error stream what of a valid profile looks odd.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// Lists the built-in sensors, or describes one sensor. Prints warnings about unusual values of a
+/// valid profile to standard error.
+pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     let Some(name) = &args.sensor else {
         for name in builtin_names() {
             let sensor = Sensor::builtin(name).expect("invariant: a built-in name");
@@ -50,11 +51,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// What a scan of the sensor is, a line for each fact.
+/// A description of the sensor's scans, with a line for each property.
 fn described(sensor: &Sensor, pattern: &BeamPattern) -> String {
     let mut text = format!("{}: {}\n", sensor.name, sensor.description);
-    let mut line = |what: &str, says: String| {
-        writeln!(text, "{what:<18} {says}").expect("invariant: a string takes all");
+    let mut line = |name: &str, value: String| {
+        writeln!(text, "{name:<18} {value}").expect("invariant: a string takes all");
     };
     let kind = match &sensor.layout {
         Layout::Rotating(head) => format!("{} beams on a head that turns", head.beam.len()),
@@ -100,16 +101,16 @@ fn described(sensor: &Sensor, pattern: &BeamPattern) -> String {
     text
 }
 
-/// What of a valid profile is seldom meant.
+/// Warnings about values of a valid profile that are probably mistakes.
 fn oddities(sensor: &Sensor, pattern: &BeamPattern) -> Vec<String> {
     let mut found = Vec::new();
     if sensor.sources.is_empty() {
-        found.push("sources: expected where the numbers are from, found none".to_owned());
+        found.push("sources: expected the sources of the numbers, found none".to_owned());
     }
     let [lowest, highest] = ends(pattern.directions.iter().map(elevation_deg));
-    // Of those that are in radians, none is beyond a quarter turn.
-    let most = std::f64::consts::FRAC_PI_2;
-    if pattern.ring.iter().any(|&ring| ring > 0) && lowest >= -most && highest <= most {
+    // No elevation in radians exceeds a quarter turn.
+    let largest = std::f64::consts::FRAC_PI_2;
+    if pattern.ring.iter().any(|&ring| ring > 0) && lowest >= -largest && highest <= largest {
         found.push(format!(
             "all elevations lie within {lowest:.3} to {highest:.3} degrees: are they in radians?"
         ));
@@ -142,7 +143,7 @@ fn beams(pattern: &BeamPattern) -> String {
     for (ray, direction) in (0..).zip(&pattern.directions) {
         let [time_s, ring] = [pattern.time_s[ray as usize], pattern.ring[ray as usize].into()];
         let azimuth_deg = direction.y.atan2(direction.x).to_degrees();
-        // Without minus zero.
+        // Adding zero turns minus zero into zero.
         let [x, y, z] = (pattern.start(ray).unwrap_or_default() + DVec3::ZERO).to_array();
         let elevation_deg = elevation_deg(direction);
         writeln!(text, "{time_s},{ring},{azimuth_deg},{elevation_deg},{x},{y},{z}")

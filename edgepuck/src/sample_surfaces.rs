@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 /// Flags of `sample-surfaces`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct SampleSurfacesArgs {
     /// Folder of meshes, as for gen-dataset
     #[arg(value_name = "MESHES")]
     meshes: PathBuf,
@@ -25,7 +25,7 @@ pub struct Args {
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     points: u32,
 
-    /// Number of visible points that a viewpoint must have, out of six times --points samples
+    /// Smallest number of visible points for a viewpoint, out of six times --points samples
     #[arg(long, default_value_t = 64, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,
@@ -40,7 +40,7 @@ pub struct Args {
 }
 
 /// Samples the meshes.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &SampleSurfacesArgs) -> anyhow::Result<Outcome> {
     let meshes = discover(&args.meshes, args.seed)?;
     let config = SurfaceConfig {
         seed: args.seed,

@@ -1,33 +1,33 @@
-//! The samplers that `cargo xtask trade` measures, by the names that its record has.
+//! The samplers that `cargo xtask trade` measures, by their names in its record.
 
 use infer_cpu::sampler::{FrontChoice, SamplerKind};
 
-/// A way to choose points, as `infer-cpu bench --sampler` names it.
+/// A sampler, by its name in `infer-cpu bench --sampler`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SamplerConfig {
-    /// Its name.
+    /// The name.
     pub name: &'static str,
-    /// What infer-cpu is asked for.
+    /// The kind of sampler.
     pub kind: SamplerKind,
-    /// Which layers find critical points.
+    /// The layers that find critical points.
     pub front: FrontChoice,
 }
 
 impl SamplerConfig {
-    /// Points drawn at random.
+    /// Random points.
     pub const RANDOM: Self = Self::by("random", SamplerKind::Random, FrontChoice::Auto);
     /// Farthest point sampling.
     pub const FPS: Self = Self::by("fps", SamplerKind::Fps, FrontChoice::Auto);
-    /// One point a cell of a grid.
+    /// One point in each cell of a grid.
     pub const VOXEL: Self = Self::by("voxel", SamplerKind::Voxel, FrontChoice::Auto);
-    /// Critical points by a front end of the model's own.
+    /// Critical points of the model's own front end.
     pub const CPL: Self = Self::by("cpl:own", SamplerKind::Cpl, FrontChoice::Own);
-    /// Critical points of the trunk of the coordinates' T-Net.
+    /// Critical points of the trunk of the input T-Net.
     pub const CPL_STN: Self = Self::by("cpl:stn", SamplerKind::Cpl, FrontChoice::Stn);
     /// Critical points of the network's own trunk.
     pub const CPL_TRUNK: Self = Self::by("cpl:trunk", SamplerKind::Cpl, FrontChoice::Trunk);
 
-    /// All of them.
+    /// All samplers.
     pub const ALL: [Self; 6] =
         [Self::RANDOM, Self::FPS, Self::VOXEL, Self::CPL, Self::CPL_STN, Self::CPL_TRUNK];
 
@@ -35,13 +35,13 @@ impl SamplerConfig {
         Self { name, kind, front }
     }
 
-    /// The one that a row names so.
+    /// The sampler with this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|config| config.name == name)
     }
 
-    /// The first of its kind.
-    pub fn of(kind: SamplerKind) -> Self {
+    /// The first sampler of this kind.
+    pub fn of_kind(kind: SamplerKind) -> Self {
         Self::ALL.into_iter().find(|config| config.kind == kind).unwrap_or(Self::RANDOM)
     }
 }

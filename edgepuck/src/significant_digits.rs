@@ -1,4 +1,4 @@
-//! Numbers as people read them.
+//! Numbers rounded to significant digits.
 
 /// `x` with three significant digits.
 pub fn digits(x: f64) -> String {

@@ -1,4 +1,4 @@
-//! One measured setting: what it is, what it costs, how right it is.
+//! The record of `cargo xtask trade`: measured settings with their costs and accuracies.
 
 use anyhow::{Context, Result, ensure};
 use formats::atomic;
@@ -7,16 +7,16 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::Path;
 
-/// Which stretch of the chain a row is about.
+/// The part of the pipeline that a row measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Part {
-    /// From mesh to scan, by sensor, place and noise; the classifier stays.
+    /// From mesh to scan, with different sensors, distances and noise and the same classifier.
     #[default]
     Scan,
-    /// The same by what casts.
+    /// From mesh to scan, with different casters.
     Caster,
-    /// From cloud to class.
+    /// From cloud to class, with different classifiers.
     Classifier,
 }
 
@@ -31,98 +31,99 @@ formats::named! {
     }
 }
 
-/// One setting of all knobs. A field that a part does not have is empty.
+/// A measured setting of all parameters. Fields that do not apply to its part are empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// The stretch of the chain.
+    /// The part of the pipeline.
     pub part: Part,
-    /// The clouds on which it was measured.
+    /// The clouds of the measurement.
     pub test_set: String,
-    /// The knob that is turned, away from the reference.
+    /// The parameter that differs from the reference.
     pub knob: String,
 
-    /// Name of the sensor's profile, or what was made of it.
+    /// Name of the sensor's profile, or of a variant of it.
     pub sensor: String,
-    /// Beams, one above the other.
+    /// Number of beams, one above another.
     pub beams: Option<usize>,
-    /// From one firing to the next.
+    /// Angle from one firing to the next.
     pub azimuth_step_deg: Option<f64>,
-    /// Ranges are multiples of this; 0: they are not rounded.
+    /// Unit to which ranges are rounded. 0 if they are not rounded.
     pub range_quantum_m: Option<f64>,
-    /// From the sensor to the object's centre; the object's radius is 1 m.
+    /// Distance from the sensor to the centre of the object, whose radius is 1 m.
     pub distance_m: Option<f64>,
     /// Standard deviation of the noise along the ray.
     pub noise_m: Option<f64>,
-    /// What finds the hits and their ranges.
+    /// The caster.
     pub caster: String,
-    /// Whether beams that cannot hit are left out: on or off.
+    /// Whether beams that cannot hit the object are left out: on or off.
     pub culling: String,
-    /// The model's name.
+    /// Name of the model.
     pub model: String,
-    /// Its file.
+    /// File of the model.
     pub model_file: String,
-    /// How points are chosen.
+    /// The sampler.
     pub sampler: String,
-    /// Points that the network sees.
+    /// Number of points for the network.
     pub points: Option<usize>,
-    /// What the network computes in.
+    /// Precision of the network.
     pub precision: String,
-    /// T-Nets that are run; empty where the model has none.
+    /// The T-Nets that run. Empty if the model has no T-Net.
     pub t_nets: String,
-    /// Threads of the classifier.
+    /// Number of threads of the classifier.
     pub threads: Option<usize>,
 
-    /// Rays that the sensor fires, those that cannot hit among them, a second of CPU time.
+    /// Rays that the sensor fires per second of CPU time, including those that cannot hit.
     pub rays_per_cpu_s: Option<f64>,
-    /// Scans a second of CPU time, from aiming to points.
+    /// Scans per second of CPU time, from aiming to points.
     pub scans_per_cpu_s: Option<f64>,
-    /// CPU time of a scan (on a GPU wall time), or the median wall time of a classification, on
-    /// this machine.
+    /// On this machine, the CPU time of a scan (wall time on a GPU), or the median wall time of a
+    /// classification.
     pub ms_here: Option<f64>,
     /// Modelled time of a classification on a Raspberry Pi 5.
     pub ms_pi5: Option<f64>,
-    /// Of a scan or a classification, where this machine's counters tell.
+    /// Energy of a scan or a classification, if this machine can measure it.
     pub joules: Option<f64>,
-    /// File of a scan on average, or weights as the precision holds them.
+    /// Mean size of a scan's file, or size of the weights in the precision.
     pub megabytes: Option<f64>,
 
-    /// Points of a scan on average.
+    /// Mean number of points of a scan.
     pub points_per_scan: Option<f64>,
-    /// Root of the mean square of ranges less those in f64 without any effect.
+    /// Root mean square difference between ranges and those in f64 without effects.
     pub range_rms_m: Option<f64>,
-    /// The largest of these differences.
+    /// Largest of these differences.
     pub range_worst_m: Option<f64>,
-    /// Rays that hit where f64 does not, or miss where it hits, in a million that are fired.
+    /// Rays per million for which a hit in f64 is a miss here, or the reverse.
     pub wrong_rays_per_million: Option<f64>,
-    /// Mean distance to the clean VLP-32C scan (ranges in f64) from the same place, both ways
-    /// added, of some of those scans that have points.
+    /// Mean Chamfer distance (the sum of both directions) to the clean VLP-32C scan in f64 from the
+    /// same place, over a sample of the scans that have points.
     pub chamfer_m: Option<f64>,
-    /// Largest difference of a logit from f32's by the same sampler and number of points; a CPL
-    /// chooses its points in the row's own precision, so they need not be the same ones.
+    /// Largest difference of a logit from that in f32 with the same sampler and number of points.
+    /// A CPL chooses points in the row's precision, so that the points may differ.
     pub logit_error: Option<f64>,
-    /// Share of clouds with the same answer as the reference's: the reference scan's, the f64
-    /// caster's, or that of fp32 and all T-Nets by the same sampler and number of points.
+    /// Share of clouds with the same answer as the reference: the reference scan, the f64 caster,
+    /// or the network in f32 with all T-Nets, the same sampler and the same number of points.
     pub agreement: Option<f64>,
-    /// Clouds classified as labelled.
+    /// Number of clouds that are classified correctly.
     pub right: usize,
-    /// Clouds.
+    /// Number of clouds.
     pub clouds: usize,
-    /// Their share.
+    /// Share of clouds that are classified correctly.
     pub accuracy: f64,
-    /// Lower end of its 95 % interval (Wilson 1927).
+    /// Lower end of the accuracy's 95 % interval (Wilson 1927).
     pub accuracy_low: f64,
-    /// Upper end.
+    /// Upper end of that interval.
     pub accuracy_high: f64,
-    /// What measured it.
+    /// The machine of the measurement.
     pub machine: String,
-    /// Whether no other row of its kind costs less here and is better.
+    /// Whether no other row of the same kind is both faster on this machine and more accurate.
     pub front_here: bool,
-    /// The same on a Raspberry Pi 5, modelled.
+    /// Whether no other row of the same kind is both faster on a Raspberry Pi 5, by the model, and
+    /// more accurate.
     pub front_pi5: bool,
 }
 
 impl Row {
-    /// The row with `right` of `clouds` classified as labelled.
+    /// The row with the accuracy of `right` correct answers for `clouds` clouds.
     #[must_use]
     pub fn with_accuracy(mut self, right: usize, clouds: usize) -> Self {
         (self.right, self.clouds) = (right, clouds);
@@ -131,7 +132,7 @@ impl Row {
         self
     }
 
-    /// The row with the CPU time of a scan of so many `rays`.
+    /// The row with the times of a scan that fires `rays` rays in `seconds` seconds of CPU time.
     #[must_use]
     pub fn with_time(mut self, rays: usize, seconds: f64) -> Self {
         self.rays_per_cpu_s = Some(rays as f64 / seconds);
@@ -140,7 +141,7 @@ impl Row {
         self
     }
 
-    /// Milliseconds on `device`.
+    /// Time in milliseconds on `device`.
     #[must_use]
     pub fn ms(&self, device: Device) -> Option<f64> {
         match device {
@@ -149,7 +150,7 @@ impl Row {
         }
     }
 
-    /// Whether it is on the front of `device`.
+    /// Whether the row is on the Pareto front of `device`.
     #[must_use]
     pub fn on_front(&self, device: Device) -> bool {
         match device {
@@ -189,10 +190,10 @@ impl fmt::Display for Row {
     }
 }
 
-/// Writes `rows` as CSV.
+/// Writes `rows` to `path` as CSV.
 ///
 /// # Errors
-/// What the system reports.
+/// A file that cannot be written.
 pub fn write(rows: &[Row], path: &Path) -> Result<()> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     for row in rows {
@@ -201,18 +202,18 @@ pub fn write(rows: &[Row], path: &Path) -> Result<()> {
     Ok(atomic::write_bytes(path, &csv.into_inner()?)?)
 }
 
-/// The record that ships with this program.
+/// The record that is part of this program.
 ///
 /// # Errors
-/// The record does not hold a row of these columns.
+/// A record whose columns differ.
 pub fn bundled() -> Result<Vec<Row>> {
-    parse(edgepuck_assets::TRADE_RECORD.as_bytes()).context("the record that ships")
+    parse(edgepuck_assets::TRADE_RECORD.as_bytes()).context("the built-in record")
 }
 
-/// Reads what [`write()`] wrote.
+/// Reads the record that [`write()`] wrote to `path`.
 ///
 /// # Errors
-/// Names the file, and the line that is not as it should be.
+/// A file that cannot be read; a malformed line.
 pub fn read(path: &Path) -> Result<Vec<Row>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&bytes).with_context(|| path.display().to_string())

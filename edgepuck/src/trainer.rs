@@ -1,6 +1,5 @@
-//! `train`, `eval`, `explain` and `compare-points`: commands of the program
-//! `edgepuck-train`, which is a program of its own so that nobody who trains
-//! nothing has to build it.
+//! `train`, `eval`, `explain` and `compare-points`: these commands start the program
+//! `edgepuck-train`. It is a separate program, so that users who do not train need not build it.
 
 use crate::{Outcome, checkout};
 use anyhow::Context;
@@ -12,21 +11,21 @@ use std::process::{Command, ExitStatus};
 /// The program's file name, without the system's suffix.
 const PROGRAM: &str = "edgepuck-train";
 
-/// Names a training program to start instead of the one that would be found.
+/// The environment variable that names another training program.
 const OVERRIDE: &str = "EDGEPUCK_TRAIN";
 
-/// Flags of the command, which the training program itself reads.
+/// Flags of the command, which the training program reads.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct TrainerArgs {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
     flags: Vec<OsString>,
 }
 
-/// Runs `command` of the training program in the caller's folder.
+/// Runs `command` of the training program in the current folder.
 ///
 /// # Errors
-/// The training program is missing or cannot be started.
-pub fn run(command: &str, args: &Args) -> anyhow::Result<Outcome> {
+/// A training program that is missing or cannot be started.
+pub fn run(command: &str, args: &TrainerArgs) -> anyhow::Result<Outcome> {
     let mut program = find(&args.flags);
     program.arg(command).args(&args.flags);
     let status = program.status().with_context(|| {
@@ -39,8 +38,8 @@ pub fn run(command: &str, args: &Args) -> anyhow::Result<Outcome> {
     })
 }
 
-/// The code to end with for a training program that ended with `status`: its own,
-/// or as shells have it 128 more than the signal that ended it, which is named.
+/// The exit code for a training program that ended with `status`: its exit code or, as in shells,
+/// 128 plus the signal that ended it.
 fn exit_code(status: ExitStatus) -> u8 {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
@@ -50,8 +49,8 @@ fn exit_code(status: ExitStatus) -> u8 {
     status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
 }
 
-/// The training program: the one that the environment names, the one that a
-/// checkout builds, the one beside this program, or the one on PATH.
+/// The training program: the one that the environment names, else the one that the checkout
+/// builds, the one beside this program, or the one on PATH.
 fn find(flags: &[OsString]) -> Command {
     if let Some(program) = std::env::var_os(OVERRIDE) {
         return Command::new(program);
@@ -68,12 +67,12 @@ fn beside_this_program() -> Option<PathBuf> {
     program.is_file().then_some(program)
 }
 
-/// Cargo, which builds the program if need be and then runs it.
+/// Cargo, which builds the program if necessary and runs it.
 fn built_by_cargo(root: &Path, flags: &[OsString]) -> Command {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.args(["run", "--release", "--package", "train", "--bin", PROGRAM, "--manifest-path"]);
     cargo.arg(root.join("Cargo.toml"));
-    // The HDF5 reader takes long to build, so only such data asks for it.
+    // The HDF5 reader takes long to build: only runs on HDF5 files need it.
     if is_among(flags) {
         cargo.args(["--features", "hdf5"]);
     }

@@ -1,4 +1,4 @@
-//! `edgepuck weather`: rain, snow, fog and haze for a scan that was recorded in clear air.
+//! `edgepuck weather`: adds rain, snow, fog and haze to a scan that was recorded in clear air.
 
 use crate::brightness::BrightnessArgs;
 use crate::segment::SweepArgs;
@@ -16,39 +16,39 @@ use std::path::PathBuf;
 
 /// Flags of `weather`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct WeatherArgs {
     #[command(flatten)]
     input: SweepArgs,
 
-    /// File to write: .npz, .ply or .csv. It has the points that are left, the strongest return of
-    /// each beam; `intensity` is what the weather leaves of theirs, and `medium` says what each is
-    /// of: 0 a surface, 1 rain, 2 snow, 3 fog
+    /// File to write: .npz, .ply or .csv. It holds the strongest return of each beam that still has
+    /// one. `intensity` is the intensity in the weather, and `medium` is the source of the return: 0 a
+    /// surface, 1 rain, 2 snow, 3 fog
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// Rain, millimetres an hour
+    /// Rain, millimetres per hour
     #[arg(long, value_name = "MM/H", allow_negative_numbers = true)]
     rain: Option<f64>,
 
-    /// Snow, millimetres of water an hour
+    /// Snow, millimetres of water per hour
     #[arg(long, value_name = "MM/H", allow_negative_numbers = true)]
     snow: Option<f64>,
 
-    /// Fog of this visibility, metres
+    /// Fog with this visibility, metres
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     fog: Option<f64>,
 
-    /// How strong fog is: `physical`, by the power that it scatters, or `hahner`, in proportion to
-    /// the surface behind it, as in the simulation of Hahner et al. (ICCV 2021)
+    /// Model of the fog's returns: `physical`, by the scattered power, or `hahner`, in proportion to
+    /// the return of the surface behind the fog, as in the simulation of Hahner et al. (ICCV 2021)
     #[arg(long, value_name = "MODEL", default_value = "physical")]
     fog_model: FogModel,
 
-    /// Haze of this visibility, metres
+    /// Haze with this visibility, metres
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     haze: Option<f64>,
 
-    /// Sensor that recorded the scan: a built-in name or a TOML file. Its detection limit, beam
-    /// width and least range decide what is seen
+    /// Sensor that recorded the scan: a built-in name or a TOML file. Its detection limit, beam width
+    /// and minimum range determine which returns are detected
     #[arg(long, default_value = "vlp32c", value_name = "NAME")]
     profile: String,
 
@@ -60,8 +60,8 @@ pub struct Args {
     seed: u64,
 }
 
-/// Reads the scan, and writes it as it is in the weather.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// Reads a scan, and writes it with the weather.
+pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     let usage = |error: &dyn std::fmt::Display| Usage(error.to_string());
     let format = ScanFormat::of(&args.out)?;
     if format == ScanFormat::Pcap {
@@ -78,23 +78,22 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let asked = Effects { weather: Some(Box::new(weather.clone())), ..Effects::default() };
     let effects = asked.for_sensor(&sensor).map_err(|error| usage(&error))?;
     let limit = effects.detection.and_then(|detection| detection.limit);
-    let limit = limit.expect("invariant: weather takes returns below a limit");
+    let limit = limit.expect("invariant: weather needs a detection limit");
 
     let scan = args.input.read_whole()?;
-    let brightness = args.brightness.of(&scan, &args.input.sweep)?;
+    let brightness = args.brightness.brightness_of(&scan, &args.input.sweep)?;
     let air = Air::new(&weather, sensor.beam_divergence_deg(), &limit, &sensor.range);
     let stream = StreamKey::new(args.seed, "weather", 0);
     let sensor_m = DVec3::from_array(args.input.sensor_m());
-    let (mut told, fates) = in_weather(&scan, &brightness, sensor_m, &air, &limit, stream);
-    // Back to the numbers of the file.
-    args.brightness.restore(&mut told);
-    write_scan(&args.out, format, Hashing::None, &told)?;
-    report(&fates, &told);
-    eprintln!("{} points: {}", told.len(), args.out.display());
+    let (mut changed, fates) = in_weather(&scan, &brightness, sensor_m, &air, &limit, stream);
+    args.brightness.restore(&mut changed);
+    write_scan(&args.out, format, Hashing::None, &changed)?;
+    report(&fates, &changed);
+    eprintln!("{} points: {}", changed.len(), args.out.display());
     Ok(Outcome::Success)
 }
 
-impl Args {
+impl WeatherArgs {
     fn weather(&self) -> Weather {
         Weather {
             rain_mm_h: self.rain,
@@ -107,16 +106,16 @@ impl Args {
     }
 }
 
-/// Says what became of the points.
-fn report(fates: &Fates, told: &Scan) {
+/// Prints the numbers of kept, added and lost points.
+fn report(fates: &Fates, changed: &Scan) {
     let all = fates.kept + fates.scattered + fates.lost + fates.passed_over;
     let line = |what: &str, count: usize| {
         eprintln!("{what:<12}{count:>10}  {:5.1} %", 100.0 * count as f64 / all.max(1) as f64);
     };
     line("kept", fates.kept);
     for medium in Medium::ALL.into_iter().filter(|medium| *medium != Medium::Surface) {
-        let is_of = |of: &&u8| **of == medium as u8;
-        let count = told.medium.iter().flatten().filter(is_of).count();
+        let is_this = |found: &&u8| **found == medium as u8;
+        let count = changed.medium.iter().flatten().filter(is_this).count();
         if count > 0 {
             line(medium.name(), count);
         }

@@ -1,4 +1,4 @@
-"""LiDAR scans of triangle meshes as NumPy arrays, and a classifier of what a sensor sees.
+"""LiDAR scans of triangle meshes as NumPy arrays, and a classifier of point clouds.
 
 >>> import edgepuck as ep
 >>> lidar = ep.Sensor("vlp32c")
@@ -7,8 +7,9 @@
 >>> scan.positions.shape[1], scan.positions.dtype, len(scan.ring) == len(scan)
 (3, dtype('float32'), True)
 
-`Dataset` and `Scenes` cast as they are read, in the workers of a `DataLoader` too. Lengths are
-metres, angles degrees, times seconds. World and sensor have z up; sensors look along x.
+`Dataset` and `Scenes` cast on demand, also in the workers of a `DataLoader`. Lengths are in metres,
+angles in degrees and times in seconds. In the frames of the world and of sensors, z points up, and
+sensors look along x.
 """
 
 from importlib.metadata import version as _version

@@ -1,4 +1,4 @@
-"""Checks of what callers give, and what keeps it."""
+"""Checks of arguments, and objects that are pickled by their arguments."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ._edgepuck import Error
 
 
 class Remade:
-    """Something that is pickled by what it was made of, and made again from that."""
+    """An object that is pickled by its arguments, and made again from them."""
 
     _made_of: tuple[tuple[Any, ...], dict[str, Any]]
 
@@ -21,7 +21,7 @@ class Remade:
 
 
 def whole(name: str, value: Any, least: int, most: int) -> int:
-    """`value` as a whole number within these bounds."""
+    """`value` as a whole number from `least` to `most`."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -37,14 +37,14 @@ def seed(value: Any) -> int:
 
 
 def place(name_or_path: str | os.PathLike[str]) -> str:
-    """A name as it is, though a folder may be called so; a file's path so that it stays right in
-    another folder."""
+    """The absolute path of a file, which stays valid in another folder. Other names stay unchanged,
+    even if a folder has that name."""
     text = os.fspath(name_or_path)
     return os.path.abspath(text) if os.path.isfile(text) else text
 
 
 def number(name: str, index: Any, length: int) -> int:
-    """The number of one of `length` items, counted from the end if it is below 0."""
+    """The index of one of `length` items; a negative `index` counts from the end."""
     found = operator.index(index)
     if not -length <= found < length:
         raise IndexError(f"expected the number of one of {length} {name}, found {found}")

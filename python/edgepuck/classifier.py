@@ -1,4 +1,4 @@
-"""The classifier."""
+"""Classification of clouds."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from .scan import Scan
 
 @dataclass(eq=False)
 class Prediction:
-    """What a network says of a cloud."""
+    """The answer of a network to a cloud."""
 
     label: str
-    """The class's name; of an object that the model is not to tell apart, its nearest class."""
+    """The name of the most probable class, known or not."""
     index: int
-    """The class's place among `Classifier.classes`."""
+    """The index of the class in `Classifier.classes`."""
     is_unknown: bool
-    """Whether the object is none that the model is to tell apart."""
+    """Whether the object belongs to no known class."""
     confidence: float
-    """The probability that the network gives the class."""
+    """The probability of the class."""
     logits: NDArray[np.float32]
     """The outputs of the network, [n_classes]."""
 
 
 class Classifier(Remade):
-    """A PointNet behind a sampler, on one thread of the CPU.
+    """A PointNet with a sampler, on one thread of the CPU.
 
     Args:
         model: A bundled model, `edge-64` (the classes of ModelNet40) or `street-128` (cars and
             persons among other things), or the path of a model file.
-        precision: What it computes in: f32, f32-fc16, f16 or i8.
-        sampler: How points are chosen: all, random, fps, voxel or cpl. By default, as in training.
-        points: How many are chosen.
+        precision: The precision: f32, f32-fc16, f16 or i8.
+        sampler: The sampler of points: all, random, fps, voxel or cpl. By default, as in training.
+        points: The number of points that the sampler chooses.
 
     Raises:
-        Error: The model cannot be read, or a setting does not fit it.
+        Error: The model cannot be read, or a setting does not suit it.
 
     >>> Classifier("edge-64").classes[:3]
     ['airplane', 'bathtub', 'bed']
@@ -61,16 +61,16 @@ class Classifier(Remade):
 
     @property
     def classes(self) -> list[str]:
-        """The classes' names."""
+        """The names of the classes."""
         return self._classifier.classes
 
     def __call__(self, cloud: Scan | ArrayLike, *, ground_z: float | None = None) -> Prediction:
         """Classify a cloud, [n, 3], z up.
 
         Args:
-            cloud: The points. Those that are not finite are an error.
+            cloud: The points, which must be finite.
             ground_z: The height of the ground below the object, metres, for models such as
-                `street-128` that have learnt with it.
+                `street-128` that were trained with it.
         """
         points = cloud.positions if isinstance(cloud, Scan) else cloud
         return Prediction(**self._classifier.classify(points_of(points), ground_z))

@@ -1,4 +1,4 @@
-"""Clouds of many meshes, cast as they are read."""
+"""Clouds of many meshes, cast on demand."""
 
 from __future__ import annotations
 
@@ -18,39 +18,40 @@ Range = float | tuple[float, float]
 
 
 class Dataset:
-    """A folder of meshes as clouds of points, each cast when it is read.
+    """The meshes of a folder as point clouds, cast on demand.
 
-    It is a map-style dataset of PyTorch, but needs no PyTorch: `dataset[i]` is a cloud of shape
-    [points, 3] in the unit sphere, and its class. What it is depends on the seed, the epoch and `i`
-    alone, not on batches or workers, and on one adapter not on the machine. In epoch 0, the clouds are
-    those that `edgepuck gen-dataset` packs with the same settings; a view of too few points, which that
-    leaves out, is replaced by another.
+    It is a map-style dataset for PyTorch, but needs no PyTorch: `dataset[i]` is a cloud of shape
+    [points, 3] in the unit sphere, and its class. A cloud depends only on the seed, the epoch and `i`,
+    not on batches or workers; on the same adapter, it does not depend on the machine. In epoch 0, the
+    clouds are those that `edgepuck gen-dataset` packs with the same settings; a view of too few points,
+    which `gen-dataset` leaves out, is replaced by another view.
 
     Args:
-        meshes: The folder: `CLASS/{train,test}/NAME.off`, or any other layout, in which a hash
-            of the seed, the class and the name puts about one mesh in five into the test set: there, the
-            sets to train and to test with must have one seed.
-        sensor: As of `Sensor`.
+        meshes: The folder, with the layout `CLASS/{train,test}/NAME.off`. In any other layout, a hash
+            of the seed, the class and the name puts about one mesh in five into the test set, so that
+            the training and test sets must have the same seed.
+        sensor: The name or path of a sensor, as in `Sensor`.
         split: `train`, `test`, or None for both.
-        points: Points of each cloud.
-        views: Clouds of each mesh in an epoch, from as many sides.
-        distance: From the mesh to the sensor, metres; of two, a random one between them.
-        elevation: Of the sensor above the mesh, degrees; of two, a random one between them.
-        azimuth_jitter: Each view is turned around the mesh by a random angle of at most this,
-            degrees: 180 is any side.
-        noise: Standard deviation of the noise of the ranges, metres; 0.01 if there are no effects.
+        points: The number of points of each cloud.
+        views: The number of clouds of each mesh in an epoch, evenly around the mesh.
+        distance: The distance of the sensor from the mesh, metres, or the limits of a random distance.
+        elevation: The elevation of the sensor, degrees, or the limits of a random elevation.
+        azimuth_jitter: The largest random rotation of each view around the mesh, degrees. 180 allows
+            all sides.
+        noise: Standard deviation of the noise of the ranges, metres. The default is 0.01 without
+            `effects`.
         dropout: Probability that a return is missing.
-        effects: The path of a TOML file with a table `[effects]`, in place of noise and dropout.
-        seed: Of all random numbers.
-        normalize: As of `Mesh`.
-        up: As of `Mesh`.
-        min_points: A view that sees fewer points is replaced by another.
-        cache_mb: Meshes stay in the memory of each process up to this, MiB.
-        adapter: As of `Sensor`.
+        effects: The path of a TOML file with a table `[effects]`, instead of noise and dropout.
+        seed: The seed of all random numbers.
+        normalize: The normalisation of meshes, as in `Mesh`.
+        up: The upward axis of meshes, as in `Mesh`.
+        min_points: A view with fewer points is replaced by another view.
+        cache_mb: The size of the cache of meshes in each process, MiB.
+        adapter: The adapter, as in `Sensor`.
 
     Raises:
-        Error: The folder has no mesh, or a setting is wrong. A mesh that cannot be read is named
-            when it is drawn.
+        Error: The folder has no mesh, or a setting is wrong. A mesh that cannot be read raises an
+            error when one of its clouds is drawn.
     """
 
     def __init__(
@@ -94,39 +95,39 @@ class Dataset:
         cache = whole("cache_mb", cache_mb, 0, 2**30) << 20
         self._arguments = (os.path.abspath(meshes), split, words, cache, adapter)
         self._clouds = _edgepuck.Clouds(*self._arguments)
-        # Shared, so that workers that outlive an epoch see the next one.
+        # Shared memory, so that workers that persist over epochs see the current epoch.
         self._epoch = multiprocessing.RawValue("Q", 0)
 
     def __len__(self) -> int:
-        """The number of clouds of an epoch."""
+        """The number of clouds in an epoch."""
         return len(self._clouds)
 
     @property
     def classes(self) -> list[str]:
-        """The classes' names; labels are indices into them."""
+        """The names of the classes, in the order of the labels."""
         return self._clouds.classes
 
     @property
     def labels(self) -> NDArray[np.int64]:
-        """The label of each cloud, without casting any, [len]."""
+        """The labels of all clouds, [len]. Nothing is cast."""
         return self._clouds.labels
 
     @property
     def epoch(self) -> int:
-        """The epoch that is drawn."""
+        """The current epoch."""
         return int(self._epoch.value)
 
     def set_epoch(self, epoch: int) -> None:
-        """Draw other views from now on, of epoch number `epoch`. Workers of a `DataLoader` follow
-        at once, so call it between two iterations."""
+        """Draw the views of epoch number `epoch` from now on. It takes effect in the workers of a
+        `DataLoader` at once, so call it between two iterations."""
         self._epoch.value = whole("epoch", epoch, 0, 2**32 - 1)
 
     def source(self, index: int) -> str:
-        """The mesh file that cloud `index` is of, from the folder of meshes."""
+        """The mesh file of cloud `index`, relative to the folder of meshes."""
         return self._clouds.source(self._number(index))
 
     def batch(self, indices: Sequence[int]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-        """Some clouds, [n, points, 3], and their labels, [n]."""
+        """The clouds at `indices`, [n, points, 3], and their labels, [n]."""
         seed = _edgepuck.seed_of_epoch(self._seed, self.epoch)
         return self._clouds.draw(seed, [self._number(index) for index in indices])
 
@@ -142,7 +143,7 @@ class Dataset:
         return number("clouds", index, len(self))
 
     def __getstate__(self) -> dict[str, Any]:
-        # The shared epoch goes to the children of this process alone.
+        # Only children of this process can share its memory.
         shared = None if get_spawning_popen() is None else self._epoch
         return {"arguments": self._arguments, "seed": self._seed, "epoch": self.epoch, "shared": shared}
 

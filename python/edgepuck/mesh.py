@@ -16,7 +16,7 @@ Normalize = Literal["unit-sphere", "bbox", "none"]
 
 
 class Mesh(Remade):
-    """A triangle mesh where sensors find it: at the origin, z up.
+    """A triangle mesh, placed at the origin with z up.
 
     Args:
         source: The path of an OBJ, OFF, PLY or STL file; vertices, of shape [n, 3]; or anything
@@ -24,8 +24,9 @@ class Mesh(Remade):
         faces: The indices of each triangle's vertices, of shape [m, 3], if `source` is vertices.
         normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the
             farthest of them to 1 m. `bbox` moves the middle of the bounding box there and scales its
-            longest side to 2 m. `none` moves only, and takes the unit of length for a metre.
-        up: The upward axis of `source`: y or z. By default, y of OBJ files and z of all else.
+            longest side to 2 m. `none` only moves the middle there, and takes the unit of length as a
+            metre.
+        up: The upward axis of `source`: y or z. By default, y for OBJ files and z for all others.
 
     Raises:
         Error: The file cannot be read, a number is not finite, an index is out of range, or there
@@ -57,7 +58,7 @@ class Mesh(Remade):
                 "expected a path, a mesh with vertices and faces, or vertices and faces, found "
                 f"{type(source).__name__} alone"
             )
-        # A copy, which stays as it is.
+        # A copy, so that later changes of the arrays do not change the mesh.
         vertices = np.array(source, dtype=np.float64, order="C")
         indices = _indices(faces)
         for name, array in [("vertices", vertices), ("faces", indices)]:
@@ -73,7 +74,7 @@ class Mesh(Remade):
 
     @property
     def vertices(self) -> NDArray[np.float64]:
-        """The vertices where sensors find them, as scans have their positions, metres, [n, 3]."""
+        """The vertices in the frame of scans, metres, [n, 3]."""
         return self._mesh.vertices
 
     @property
@@ -83,12 +84,12 @@ class Mesh(Remade):
 
     @property
     def scale(self) -> float:
-        """Metres for each unit of length of the source."""
+        """The length of the source's unit in metres."""
         return self._mesh.scale
 
     @property
     def centre(self) -> NDArray[np.float64]:
-        """What became the origin, in the source's units, z up."""
+        """The point of the source that became the origin, in the source's units, z up."""
         return np.array(self._mesh.centre)
 
 
@@ -100,7 +101,7 @@ def _indices(faces: ArrayLike) -> NDArray[np.int64]:
 
 
 def box(size: tuple[float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """The vertices and faces of a box of this length, width and height around the origin.
+    """The vertices and faces of a box with this length, width and height around the origin.
 
     >>> vertices, faces = box((2.0, 1.0, 1.0))
     >>> vertices.max(axis=0).tolist(), faces.shape

@@ -1,4 +1,4 @@
-"""What a sensor saw."""
+"""Scans."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from numpy.typing import NDArray
 
 from ._edgepuck import Error
 
-# The names of columns in files that are no names in Python, or say too little there.
+# The columns in files whose names are keywords of Python, or too short there.
 _NAMES = {"return": "return_number", "sensor": "sensor_position"}
 
 
 @dataclass(eq=False, repr=False)
 class Scan:
-    """The points of one scan, and what is known of each. What was not asked for is None.
+    """The points of one scan with their attributes. Attributes that were not requested are None.
 
-    The arrays are those that the scan was cast into: nothing is copied. `np.asarray(scan)` is
+    The arrays are the memory into which the scan was cast: nothing is copied. `np.asarray(scan)` is
     `positions`, and `torch.from_dlpack(scan.positions)` shares its memory.
     """
 
     positions: NDArray[np.float32]
-    """Where the beams ended, metres, from `origin`, [n, 3]."""
+    """The points that the beams hit, metres, relative to `origin`, [n, 3]."""
     origin: NDArray[np.float64]
-    """What to add to each position, metres, [3]; zero but for sensors far from the origin."""
+    """The offset to add to each position, metres, [3]. It is zero unless the sensor is far from the
+    origin."""
     range: NDArray[np.float32] | None = None
-    """Distance from where the beam starts, metres, [n]."""
+    """Distance from the start of the beam, metres, [n]."""
     beam: NDArray[np.uint32] | None = None
     """Number of the beam in firing order, [n]."""
     ring: NDArray[np.uint16] | None = None
@@ -49,15 +50,16 @@ class Scan:
     return_number: NDArray[np.uint8] | None = None
     """Number of the return among those of its beam, from 1, [n]."""
     medium: NDArray[np.uint8] | None = None
-    """0 of a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray, [n]."""
+    """The source of the return: 0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray, [n]."""
     sensor_position: NDArray[np.float32] | None = None
-    """Where the sensor was when the beam was fired, metres, [n, 3]."""
+    """Position of the sensor when it fired the beam, metres, [n, 3]."""
     attitude: NDArray[np.float32] | None = None
-    """How the sensor was turned then, a rotation vector, radians, [n, 3]."""
+    """Orientation of the sensor at that time, a rotation vector, radians, [n, 3]."""
     normal: NDArray[np.float32] | None = None
     """Unit normal of the surface, towards the sensor, [n, 3]."""
     pose: NDArray[np.float64] | None = None
-    """From the sensor's frame to that of the positions, [4, 4]; None if that is the sensor's own."""
+    """Transform from the frame of the sensor to that of the positions, [4, 4]. None if the positions
+    are in the frame of the sensor."""
 
     def __len__(self) -> int:
         """The number of points."""
@@ -73,14 +75,14 @@ class Scan:
         return array.copy() if copy else array
 
     def in_sensor_frame(self) -> NDArray[np.float32]:
-        """The positions from the sensor, x forward and z up, metres, [n, 3]."""
+        """The positions in the frame of the sensor, x forward and z up, metres, [n, 3]."""
         if self.pose is None:
             return self.positions
         from_sensor = self.positions + (self.origin - self.pose[:3, 3])
         return np.ascontiguousarray(from_sensor @ self.pose[:3, :3], dtype=np.float32)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file in NPZ that `edgepuck preview` and `edgepuck segment` read.
+        """Write an NPZ file, which `edgepuck preview` and `edgepuck segment` read.
 
         Raises:
             Error: The file's name does not end in `.npz`.
@@ -98,7 +100,7 @@ class Scan:
 
 
 def scan_of(columns: Mapping[str, Any]) -> Scan:
-    """The scan of columns by their names in files."""
+    """A scan with these columns, by their names in files."""
     named = {_NAMES.get(column, column): of for column, of in columns.items()}
     pose = named.get("pose")
     pose = None if pose is None else np.array(pose).reshape(4, 4)

@@ -17,17 +17,18 @@ from .scan import Scan, scan_of
 
 @dataclass(eq=False, repr=False)
 class Scene:
-    """A scene, what its sensor saw, and what segmentation made of that."""
+    """A scene with its scan and the clusters of the scan."""
 
     sensor: str
     """The sensor's name."""
     scan: Scan
-    """The points, in the sensor's frame; `object` 0 is the ground, and `i` is `objects[i - 1]`."""
+    """The points in the frame of the sensor. `object` 0 is the ground, and `i` is `objects[i - 1]`."""
     objects: list[dict[str, Any]]
-    """`class`, `position` (the middle of its footprint), `size` and `yaw_deg` of each object, x along
-    the road, from the ground below the sensor."""
+    """`class`, `position` (the middle of the footprint), `size` and `yaw_deg` of each object. The
+    origin is on the ground below the sensor, and x is along the road."""
     cluster: NDArray[np.int32]
-    """The cluster of each point, as `segment` numbers them, for ground as low as the recipe draws, [n]."""
+    """The cluster of each point, numbered as by `segment`. The segmentation allows for the lowest
+    ground that the recipe can draw. [n]."""
     cluster_class: NDArray[np.int64]
     """The class of each cluster, an index into `Scenes.classes`, [n_clusters]."""
     cluster_truth_share: NDArray[np.float32]
@@ -41,14 +42,14 @@ class Scene:
 
 
 class Scenes(Remade):
-    """Scenes that a recipe draws, each cast when it is read: a map-style dataset.
+    """Scenes that a recipe draws, cast on demand: a map-style dataset.
 
     Args:
         recipe: `street`, `yard`, `room`, or the path of a recipe in TOML.
-        length: How many scenes there are.
-        sensors: Sensors to use in place of the recipe's.
-        meshes: The folder of a user's own meshes, if the recipe has objects of kind "mesh".
-        seed: Of all random numbers.
+        length: The number of scenes.
+        sensors: Sensors that replace those of the recipe.
+        meshes: The folder of your own meshes, if the recipe has objects of kind "mesh".
+        seed: The seed of all random numbers.
 
     Raises:
         Error: The recipe or a mesh cannot be read.
@@ -83,14 +84,14 @@ class Scenes(Remade):
 
     @property
     def classes(self) -> list[str]:
-        """The classes' names, `other` among them."""
+        """The names of the classes, including `other`."""
         return self._scenes.classes
 
     def __getitem__(self, index: int) -> Scene:
-        told = self._scenes.draw(number("scenes", index, self._length))
-        return Scene(**{**told, "scan": scan_of(told["scan"])})
+        drawn = self._scenes.draw(number("scenes", index, self._length))
+        return Scene(**{**drawn, "scan": scan_of(drawn["scan"])})
 
 
 def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:
-    """Scan the scene in a TOML file, as `edgepuck scan` does: the scan of each sensor by its name."""
-    return {name: scan_of(told) for name, told in _edgepuck.scan_scene(os.fspath(file), adapter)}
+    """Scan the scene in a TOML file, like `edgepuck scan`. Return the scans by the names of sensors."""
+    return {name: scan_of(columns) for name, columns in _edgepuck.scan_scene(os.fspath(file), adapter)}

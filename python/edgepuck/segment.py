@@ -17,15 +17,15 @@ def segment(
     radius: float | None = None,
     min_points: int | None = None,
 ) -> NDArray[np.int32]:
-    """The cluster of each point of a sweep, from 0; -1 is ground, -2 what is in no cluster, and -3 a
-    point that is not finite.
+    """The cluster of each point of a sweep, counted from 0. -1 is ground, -2 is a point in no cluster,
+    and -3 is a point that is not finite.
 
     Args:
-        sweep: A scan, or points of shape [n, 3], metres, from the sensor, z up.
-        rings: The ring of each point, from below, [n]; a scan has its own.
-        radius: Take the connected components of points within this many metres instead, for clouds
-            that are not sweeps of a sensor. There is no ground then.
-        min_points: The fewest points of a cluster.
+        sweep: A scan, or points of shape [n, 3] in the frame of the sensor, metres, z up.
+        rings: The ring of each point, from below, [n]. A scan has its own.
+        radius: If given, clusters are the connected components of points within this distance,
+            metres, and there is no ground. This suits clouds that are not sweeps of a sensor.
+        min_points: The smallest number of points of a cluster.
 
     >>> post = [[5.0, 0.0, 0.05 * i - 1.0] for i in range(30)]
     >>> int(segment(post)[20])

@@ -18,13 +18,13 @@ from .scan import Scan, scan_of
 
 
 class Sensor(Remade):
-    """A LiDAR with its beams.
+    """A LiDAR with its beam pattern.
 
     Args:
         name: A built-in sensor, such as `vlp32c` (`edgepuck profile` lists them), or the path of a
             profile in TOML or of an Ouster's metadata in JSON.
-        adapter: What casts: `cpu`, `auto` (a GPU if there is one), or a part of a GPU's name. Each
-            process opens it when it first casts.
+        adapter: The adapter that casts: `cpu`, `auto` (a GPU if there is one), or a part of a GPU's
+            name. Each process opens it when it first casts.
 
     Raises:
         Error: There is no such sensor, or its profile is wrong.
@@ -72,25 +72,25 @@ class Sensor(Remade):
         attributes: Iterable[str] = ("range", "beam", "ring", "time"),
         seed: int = 0,
     ) -> Scan:
-        """Scan a mesh from a place around it.
+        """Scan a mesh from a position around it.
 
         Args:
             mesh: The mesh, at the origin.
-            distance: From the origin to the sensor, metres.
-            elevation: Of the sensor above the horizon, degrees.
-            azimuth: Of the sensor, counterclockwise from x, degrees.
-            pose: Where the sensor stands, in place of these three: a matrix of shape [4, 4] from the
-                sensor's frame (x forward, z up) to the world.
+            distance: The distance of the sensor from the origin, metres.
+            elevation: The elevation of the sensor above the horizon, degrees.
+            azimuth: The azimuth of the sensor, counterclockwise from x, degrees.
+            pose: The pose of the sensor, instead of these three: a matrix of shape [4, 4] from the
+                frame of the sensor (x forward, z up) to the world.
             noise: Standard deviation of the noise of the ranges, metres.
             dropout: Probability that a return is missing.
-            effects: More effects, as the table `[effects]` of a scene has them:
+            effects: Further effects, with the keys of the table `[effects]` of a scene:
                 `{"footprint": {"samples": 7}, "returns": "last"}`.
-            attributes: What is wanted of each point besides its position: range, beam, ring, time,
+            attributes: The attributes of each point besides its position: range, beam, ring, time,
                 triangle, object, intensity, power, reflectivity, return, medium, normal.
-            seed: Of all random numbers.
+            seed: The seed of all random numbers.
 
         Raises:
-            Error: A value is out of its bounds or there is no such attribute or effect.
+            Error: A value is out of its limits, or an attribute or effect is unknown.
         """
         if not isinstance(mesh, Mesh):
             raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
@@ -111,16 +111,16 @@ class Sensor(Remade):
                 found = list(matrix.shape)
                 raise _edgepuck.Error(f"pose: expected a matrix of shape [4, 4], found {found}")
             at = matrix.ravel().tolist()
-        told = json.dumps(_plain(wanted, "effects"))
+        encoded = json.dumps(_plain(wanted, "effects"))
         key = _arguments.seed(seed)
-        return scan_of(self._sensor.scan(mesh._mesh, at, told, list(attributes), key))
+        return scan_of(self._sensor.scan(mesh._mesh, at, encoded, list(attributes), key))
 
     def __repr__(self) -> str:
         return f"Sensor({self.name!r})"
 
 
 def _plain(value: Any, key: str) -> Any:
-    """`value`, which stands at `key`, in what JSON has."""
+    """`value`, found at `key`, as types of JSON."""
     if isinstance(value, Mapping):
         return {str(name): _plain(of, f"{key}.{name}") for name, of in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -1,4 +1,4 @@
-"""A PointNet to train in PyTorch, and its way to `infer-cpu`. This module alone imports PyTorch."""
+"""A PointNet to train in PyTorch, and its export to `infer-cpu`. Only this module imports PyTorch."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from . import _edgepuck
 class PointNet(nn.Module):
     """PointNet without T-Nets (Qi et al., CVPR 2017), for clouds of shape [batch, n, 3].
 
-    Layers are named as yanx27's `pointnet_cls` names them, which `edgepuck import-weights` reads.
+    The names of layers are those of yanx27's `pointnet_cls`, which `edgepuck import-weights` reads.
 
     Args:
-        n_classes: Logits.
-        widths: Channels of the layers that all points share; the last are pooled by their maximum.
-        head: Channels of the dense layers between the pooled ones and the logits.
-        dropout: Probability that one of the last of these channels is dropped in training.
+        n_classes: The number of classes.
+        widths: The widths of the layers that all points share. The last layer is max-pooled.
+        head: The widths of the dense layers between the pooling and the logits.
+        dropout: The probability of dropout after the last hidden layer.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class PointNet(nn.Module):
         self.dropout = nn.Dropout(dropout)
 
     def forward(self, clouds: Tensor) -> Tensor:
-        """Logits, [batch, n_classes], of clouds, [batch, n, 3]."""
+        """The logits, [batch, n_classes], of `clouds`, [batch, n, 3]."""
         x = clouds.transpose(1, 2)
         for i in range(1, self.n_layers + 1):
             x = self.feat.get_submodule(f"bn{i}")(self.feat.get_submodule(f"conv{i}")(x))
@@ -64,18 +64,18 @@ def export(
     points: int = 64,
     training_set: str | None = None,
 ) -> None:
-    """Write a model file for `edgepuck.Classifier` and `infer-cpu`, as `edgepuck import-weights` does.
+    """Write a model file for `edgepuck.Classifier` and `infer-cpu`.
 
     Args:
         model: The network.
         path: The file, `.safetensors`.
-        classes: The classes' names, in the order of the logits.
-        sampler: How the points of a cloud are chosen: all, random, fps, voxel or cpl.
-        points: How many are chosen.
-        training_set: What it learnt from, in words.
+        classes: The names of the classes in the order of the logits.
+        sampler: The sampler of points: all, random, fps, voxel or cpl.
+        points: The number of points that the sampler chooses.
+        training_set: The name of the training set.
 
     Raises:
-        Error: The file cannot be written, or the classes are not as many as the logits.
+        Error: The file cannot be written, or the numbers of classes and logits differ.
     """
     with tempfile.TemporaryDirectory() as folder:
         checkpoint, names = Path(folder, "model.pth"), Path(folder, "classes.txt")

@@ -1,5 +1,5 @@
-//! `edgepuck corrupt`: the corruptions of Robo3D and ModelNet-C that a sensor can suffer, by
-//! physics.
+//! `edgepuck corrupt`: applies the corruptions of Robo3D and ModelNet-C that have a physical cause in
+//! a sensor.
 
 mod objects;
 mod plan;
@@ -15,11 +15,12 @@ use std::path::PathBuf;
 /// Flags of `corrupt`.
 #[derive(clap::Args)]
 #[command(after_help = "\
-SWEEP may also be a folder of meshes, as for gen-dataset: OUT then has one packed set of clouds
-for each corruption and severity of ModelNet-C, jitter-1-test.npz and so on, and clean-test.npz,
-of the same views of its test meshes. Of a sweep, OUT has fog-1.npz and so on, by Robo3D.
-`edgepuck corrupt --list` says what each is, and what is left out.")]
-pub struct Args {
+For a sweep, --out gets a scan for each corruption and severity of Robo3D, such as fog-1.npz.
+SWEEP may also be a folder of meshes, as for gen-dataset. --out then gets a packed set of clouds
+for each corruption and severity of ModelNet-C, such as jitter-1-test.npz, and clean-test.npz, all
+of the same views of the test meshes. `edgepuck corrupt --list` describes the corruptions, and
+names those that are left out.")]
+pub struct CorruptArgs {
     #[command(flatten)]
     input: Option<SweepArgs>,
 
@@ -39,11 +40,11 @@ pub struct Args {
     #[arg(long, value_name = "TOML")]
     plan: Option<PathBuf>,
 
-    /// Say what each corruption is and what is left out, and make nothing
+    /// Describe the corruptions and those that are left out, and write nothing
     #[arg(long, exclusive = true)]
     list: bool,
 
-    /// Sensor that recorded the sweep, or that scans the meshes: a built-in name or a file
+    /// Sensor that recorded the sweep, or that scans the meshes: a built-in name or a TOML file
     #[arg(long, default_value = "vlp32c", value_name = "NAME")]
     profile: String,
 
@@ -58,14 +59,14 @@ pub struct Args {
     seed: u64,
 }
 
-/// Makes the corruptions that are asked for.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// Writes the chosen corruptions of a sweep or of meshes.
+pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
     let plan = Plan::read(args.plan.as_deref())?;
     if args.list {
         print!("{}", listed(&plan));
         return Ok(Outcome::Success);
     }
-    let input = args.input.as_ref().expect("invariant: without --list it is asked for");
+    let input = args.input.as_ref().expect("invariant: required without --list");
     let sensor = Sensor::resolve(&args.profile)?;
     if input.sweep.is_dir() {
         return objects::run(args, &input.sweep, &plan, &sensor);
@@ -75,8 +76,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 
 fn listed(plan: &Plan) -> String {
     let mut text = String::new();
-    let mut line = |of: &str, name: &str, severities: usize, by: &str| {
-        text += &format!("{of:<8} {name:<16} {severities}  {by}\n");
+    let mut line = |kind: &str, name: &str, severities: usize, by: &str| {
+        text += &format!("{kind:<8} {name:<16} {severities}  {by}\n");
     };
     for Entry { name, by, severity } in &plan.sweep {
         line("sweep", name, severity.len(), by);
@@ -92,25 +93,25 @@ fn listed(plan: &Plan) -> String {
 
 /// A line of `corruptions.csv`.
 #[derive(serde::Serialize)]
-struct Made<'a> {
+struct Written<'a> {
     file: String,
     corruption: &'a str,
     severity: u32,
-    /// Points of the scan, or clouds of the set.
+    /// Number of points of the scan, or of clouds of the set.
     count: usize,
-    /// Points of the sweep, or clouds of which a point may be seen.
+    /// Number of points of the sweep, or of clouds before the corruption.
     of: usize,
     by: &'a str,
 }
 
-/// Writes what was made, as CSV.
-fn write_list(made: &[Made<'_>], out: &std::path::Path) -> anyhow::Result<()> {
+/// Writes `corruptions.csv`.
+fn write_list(written: &[Written<'_>], out: &std::path::Path) -> anyhow::Result<()> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    made.iter().try_for_each(|line| csv.serialize(line))?;
+    written.iter().try_for_each(|line| csv.serialize(line))?;
     Ok(formats::atomic::write_bytes(&out.join("corruptions.csv"), csv.into_inner()?)?)
 }
 
-/// A usage error of this cause.
+/// A usage error with this cause.
 fn usage(error: impl std::fmt::Display) -> Usage {
     Usage(error.to_string())
 }

@@ -1,7 +1,7 @@
-//! Corruptions of scans of meshes.
+//! Corruptions of mesh scans.
 
 use super::plan::{Plan, chosen};
-use super::{Args, Made, usage, write_list};
+use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
 use anyhow::Context;
@@ -13,31 +13,31 @@ use sim_gpu::mesh::tree::discover;
 use sim_gpu::sensor::{Sensor, Views};
 use std::path::Path;
 
-/// Flags about meshes.
+/// Flags for meshes.
 #[derive(clap::Args)]
 pub(super) struct ObjectArgs {
-    /// Of meshes: views of each, evenly around it
+    /// For meshes: number of views of each mesh, evenly around it
     #[arg(long, default_value_t = 4, value_name = "N")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
     views: u32,
 
-    /// Of meshes: distance of the sensor, metres; a mesh has a radius of 1 m
+    /// For meshes: distance of the sensor, metres; a mesh has a radius of 1 m
     #[arg(long, default_value_t = 3.0, value_name = "M", value_parser = crate::flags::positive)]
     distance: f64,
 
-    /// Of meshes: points of each cloud
+    /// For meshes: number of points of each cloud
     #[arg(long, default_value_t = 1024, value_name = "N")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     points: u32,
 
-    /// Of meshes: the upward axis [default: y of OBJ, z of all others]
+    /// For meshes: the upward axis [default: y for OBJ, z for others]
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 }
 
-/// Writes one packed set for each corruption and severity, and one of clean scans.
+/// Writes a packed set for each corruption and severity, and one of clean scans.
 pub(super) fn run(
-    args: &Args,
+    args: &CorruptArgs,
     folder: &Path,
     plan: &Plan,
     sensor: &Sensor,
@@ -68,16 +68,16 @@ pub(super) fn run(
     let named = chosen.iter().map(|(entry, severity, _)| (&*entry.name, *severity, &*entry.by));
     let named = std::iter::once(clean).chain(named).zip(&sets).zip(&written.clouds);
     let of = written.of;
-    let made: Vec<Made<'_>> = named
+    let lines: Vec<Written<'_>> = named
         .map(|(((corruption, severity, by), set), &count)| {
             if count < of {
-                eprintln!("{}: of {} of {of} views nothing is seen", set.name, of - count);
+                eprintln!("{}: {} of {of} views have no point", set.name, of - count);
             }
             let file = format!("{}-test.npz", set.name);
-            Made { file, corruption, severity, count, of, by }
+            Written { file, corruption, severity, count, of, by }
         })
         .collect();
-    write_list(&made, out)?;
-    eprintln!("{} sets of {tested} meshes: {}", made.len(), out.display());
+    write_list(&lines, out)?;
+    eprintln!("{} sets of {tested} meshes: {}", lines.len(), out.display());
     Ok(if written.failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }

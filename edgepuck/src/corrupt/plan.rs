@@ -1,4 +1,4 @@
-//! Which corruptions there are.
+//! The plan of corruptions: their names, severities and sources.
 
 use anyhow::{Context, bail, ensure};
 use edgepuck_assets::CORRUPTIONS;
@@ -10,17 +10,17 @@ use std::path::Path;
 
 use crate::Usage;
 
-/// Corruptions of sweeps and of objects, and those that are left out.
+/// The corruptions of sweeps and of objects, and those that are left out.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    /// Of recorded sweeps.
+    /// Corruptions of recorded sweeps.
     #[serde(default)]
     pub sweep: Vec<Entry<Corruption>>,
-    /// Of scans of meshes.
+    /// Corruptions of mesh scans.
     #[serde(default)]
     pub object: Vec<Entry<ObjectCorruption>>,
-    /// Of those that others have.
+    /// Corruptions of other benchmarks that are left out.
     #[serde(default)]
     pub left_out: Vec<LeftOut>,
 }
@@ -29,23 +29,23 @@ pub struct Plan {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry<T> {
-    /// What it is called.
+    /// The name.
     pub name: String,
-    /// By what physics.
+    /// The physical cause.
     pub by: String,
-    /// Its numbers, from the mildest on; severity 1 is the first.
+    /// The parameters of each severity, beginning with severity 1, the mildest.
     pub severity: Vec<T>,
 }
 
-/// A corruption that others have and this program has not.
+/// A corruption of another benchmark that is left out.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LeftOut {
-    /// What it is called.
+    /// The name.
     pub name: String,
-    /// Who has it.
+    /// The benchmark.
     pub of: String,
-    /// Why it is not here.
+    /// The reason.
     pub because: String,
 }
 
@@ -53,7 +53,7 @@ impl Plan {
     /// The plan in `file`, or the built-in one.
     ///
     /// # Errors
-    /// A file that is not a plan, with the key and the cause.
+    /// A file that is not a plan; the error names the key and the cause.
     pub fn read(file: Option<&Path>) -> anyhow::Result<Self> {
         let plan: Self = match file {
             Some(file) => config::read(file)?,
@@ -70,16 +70,16 @@ impl Plan {
     }
 }
 
-/// That all entries of a kind have a name of their own, and numbers that make sense.
+/// Checks that the names of `entries` are valid and unique, and that their parameters are valid.
 fn check_all<T>(
     kind: &str,
     entries: &[Entry<T>],
     validate: impl Fn(&T, &str) -> Result<(), InvalidValue>,
 ) -> anyhow::Result<()> {
     for (i, Entry { name, severity, .. }) in entries.iter().enumerate() {
-        let is_fine = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         ensure!(
-            !name.is_empty() && name.chars().all(is_fine),
+            !name.is_empty() && name.chars().all(is_allowed),
             "{kind}[{i}].name: expected letters, digits and -, found \"{name}\""
         );
         if let Some(first) = entries[..i].iter().position(|other| other.name == *name) {
@@ -93,21 +93,21 @@ fn check_all<T>(
     Ok(())
 }
 
-/// A corruption, its severity and its numbers.
+/// A corruption, one of its severities, and the parameters of that severity.
 pub type Chosen<'a, T> = (&'a Entry<T>, u32, &'a T);
 
-/// Each of `entries` that is among `names`, or all if that is empty, at each of its severities
-/// that is among `severities`.
+/// Chooses the `entries` with these `names`, at these `severities`. An empty list stands for all
+/// names or all severities.
 ///
 /// # Errors
-/// A name or a severity that none has.
+/// A name or a severity that no entry has.
 pub fn chosen<'a, T>(
     entries: &'a [Entry<T>],
     names: &[String],
     severities: &[u32],
 ) -> Result<Vec<Chosen<'a, T>>, Usage> {
     if entries.is_empty() {
-        return Err(Usage("--plan: expected a corruption of what is given, found none".to_owned()));
+        return Err(Usage("--plan: expected a corruption for this input, found none".to_owned()));
     }
     let known = || entries.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>().join(", ");
     if let Some(name) = names.iter().find(|name| entries.iter().all(|e| e.name != **name)) {

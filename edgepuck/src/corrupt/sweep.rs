@@ -1,7 +1,7 @@
 //! Corruptions of a recorded sweep.
 
 use super::plan::{Plan, chosen};
-use super::{Args, Made, usage, write_list};
+use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
 use crate::segment::SweepArgs;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
@@ -16,9 +16,9 @@ use sim_gpu::glam;
 use sim_gpu::sensor::{DetectionLimit, Sensor};
 use sim_gpu::weather::{Air, in_weather};
 
-/// Writes the sweep once for each corruption and severity.
+/// Writes a scan for each corruption and severity.
 pub(super) fn run(
-    args: &Args,
+    args: &CorruptArgs,
     input: &SweepArgs,
     plan: &Plan,
     sensor: &Sensor,
@@ -27,7 +27,7 @@ pub(super) fn run(
     args.brightness.check()?;
     let any = |is: fn(&Corruption) -> bool| chosen.iter().any(|(_, _, corruption)| is(corruption));
     let scan = input.read_whole()?;
-    let brightness = match args.brightness.of(&scan, &input.sweep) {
+    let brightness = match args.brightness.brightness_of(&scan, &input.sweep) {
         Ok(brightness) => Some(brightness),
         Err(error) if any(takes_light) => return Err(error),
         Err(_) => None,
@@ -41,7 +41,7 @@ pub(super) fn run(
     };
 
     let is_dark = brightness.is_none();
-    let (mut made, mut too_weak_before) = (Vec::new(), 0);
+    let (mut written, mut too_weak_before) = (Vec::new(), 0);
     for (entry, severity, corruption) in chosen {
         let stream = StreamKey::new(args.seed, &format!("corrupt/{}", entry.name), severity);
         let dark = vec![0.0; scan.len()];
@@ -69,20 +69,20 @@ pub(super) fn run(
             too_weak_before = too_weak_before.max(recorded.too_weak_before());
         }
         let (corruption, by, count, of) = (&*entry.name, &*entry.by, found.len(), scan.len());
-        made.push(Made { file, corruption, severity, count, of, by });
+        written.push(Written { file, corruption, severity, count, of, by });
     }
-    write_list(&made, &args.out)?;
+    write_list(&written, &args.out)?;
     if too_weak_before > 0 {
         eprintln!(
             "warning: {too_weak_before} of the points are below the profile's detection limit as \
              they were recorded: see --profile, --white and --reflectivity"
         );
     }
-    eprintln!("{} scans: {}", made.len(), args.out.display());
+    eprintln!("{} scans: {}", written.len(), args.out.display());
     Ok(Outcome::Success)
 }
 
-/// Whether it depends on how much light comes back.
+/// Whether the corruption depends on the power of returns.
 fn takes_light(corruption: &Corruption) -> bool {
     use Corruption::{DirtyWindow, Weather, WetGround};
     matches!(corruption, Weather(_) | WetGround { .. } | DirtyWindow { .. })
@@ -93,10 +93,10 @@ fn limit_of(sensor: &Sensor) -> anyhow::Result<DetectionLimit> {
     let asked = Effects { detection: Some(Detection::default()), ..Effects::default() };
     let effects = asked.for_sensor(sensor).map_err(usage)?;
     let limit = effects.detection.and_then(|detection| detection.limit);
-    Ok(limit.expect("invariant: a sensor's own limit was asked for"))
+    Ok(limit.expect("invariant: the default of `detection` is the sensor's limit"))
 }
 
-/// The scan with this corruption; `None` if it lacks what that takes.
+/// The scan with this corruption. `None` if it lacks the times or rings that the corruption needs.
 fn corrupted(recorded: &Recorded, corruption: &Corruption, sensor: &Sensor) -> Option<Scan> {
     match corruption {
         Corruption::Weather(weather) => {
@@ -115,7 +115,7 @@ fn corrupted(recorded: &Recorded, corruption: &Corruption, sensor: &Sensor) -> O
     }
 }
 
-/// Whether each point lies on the ground, by the segmentation that a robot runs.
+/// Whether each point is on the ground, by the segmentation that a robot runs.
 fn ground(scan: &Scan, sensor_m: DVec3) -> anyhow::Result<Vec<bool>> {
     let origin = DVec3::from_array(scan.origin) - sensor_m;
     let from_sensor = |point: &[f32; 3]| (origin + DVec3::from(point.map(f64::from))).as_vec3();

@@ -1,35 +1,40 @@
-//! A Critical Points Layer before the network: from all points of a cloud to
-//! the M that win most of a max-pooling, as `infer-cpu --sampler cpl` chooses.
+//! A Critical Points Layer before the network: it selects the M points of a cloud with the largest
+//! scores in a max-pooling, like `infer-cpu --sampler cpl`.
 //!
-//! Scores are summed in f32 where infer-cpu has f64, and ties are broken by a
-//! point's index where it has geometry. Clouds whose points all differ, sorted
-//! by x, y, z, have the same ties.
+//! Scores are summed in f32, and in f64 in infer-cpu. Ties are broken by the index of a point, and
+//! by geometry in infer-cpu. For clouds of distinct points that are sorted by x, y, z, both break
+//! ties the same way.
 
 use anyhow::bail;
 
 use super::graph::{Graph, int, word};
-use super::pointnet::{Net, Seen, convolutions, pool, transposed, trunk};
+use super::pointnet::{Net, NetInputs, convolutions, pool, transposed, trunk};
 
-/// The points of a cloud's input that were chosen, an output.
+/// The output with the indices of the selected points.
 pub const KEPT: &str = "kept";
 
-/// Adds the choice of `n_points` points of `cloud` `[batch, all, 3]`; what the
-/// network sees then. Value [`KEPT`] holds their indices.
+/// Adds the selection of `n_points` points of `cloud` `[batch, all, 3]`, and returns the inputs of
+/// the network. Value [`KEPT`] holds the indices of the points.
 ///
 /// # Errors
 /// A network without a front end.
-pub fn add(graph: &mut Graph, net: &Net, cloud: &str, n_points: usize) -> anyhow::Result<Seen> {
+pub fn add(
+    graph: &mut Graph,
+    net: &Net,
+    cloud: &str,
+    n_points: usize,
+) -> anyhow::Result<NetInputs> {
     let (features, is_stn) = front(graph, net, cloud)?;
     let pooled = pool(graph, "cpl.pool", &features);
     let score = scores(graph, cloud, &features, &pooled);
     best(graph, cloud, &score, n_points);
     let points = gathered(graph, cloud);
-    // The coordinates' T-Net pools all points where it is the front end.
-    Ok(Seen { points, cloud: Some(cloud.to_owned()), pooled_stn: is_stn.then_some(pooled) })
+    // If the input T-Net is the front end, it pools all points.
+    Ok(NetInputs { points, cloud: Some(cloud.to_owned()), pooled_stn: is_stn.then_some(pooled) })
 }
 
-/// The features that are pooled `[batch, features, all]`, as infer-cpu chooses
-/// a front end, and whether they are those of the coordinates' T-Net.
+/// The features to pool, `[batch, features, all]`, by infer-cpu's choice of a front end, and whether
+/// they are those of the input T-Net.
 fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, bool)> {
     let mut entry = || transposed(graph, "cpl.entry", cloud);
     match (&net.front, &net.stn, &net.fstn) {
@@ -42,8 +47,11 @@ fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, b
             Ok((convolutions(graph, &stn.convs, &entry, "feat.stn"), true))
         }
         (None, None, None) => {
-            let all =
-                Seen { points: cloud.to_owned(), cloud: Some(cloud.to_owned()), pooled_stn: None };
+            let all = NetInputs {
+                points: cloud.to_owned(),
+                cloud: Some(cloud.to_owned()),
+                pooled_stn: None,
+            };
             Ok((trunk(graph, net, &all, "cpl"), false))
         }
         (None, None, Some(_)) => {
@@ -52,7 +60,7 @@ fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, b
     }
 }
 
-/// What each point wins, `[batch, all]`: the sum of the maxima above 0.
+/// The score of each point, `[batch, all]`: the sum of the maxima above 0 that it wins.
 fn scores(graph: &mut Graph, cloud: &str, features: &str, pooled: &str) -> String {
     let winners = vec![int("axis", 2), int("keepdims", 0)];
     let winners = graph.add("ArgMax", "cpl.winners", &[features], winners);
@@ -64,8 +72,8 @@ fn scores(graph: &mut Graph, cloud: &str, features: &str, pooled: &str) -> Strin
     graph.add("ScatterElements", "cpl.score", &[&none, &winners, &worth], sum)
 }
 
-/// The indices of the `n_points` best, `[batch, M]`; where fewer points have a
-/// score, the best one takes the places left, which changes no maximum.
+/// The indices of the `n_points` best points, `[batch, M]`. If fewer points have a score, copies of
+/// the best point fill the rest, which changes no maximum.
 fn best(graph: &mut Graph, cloud: &str, score: &str, n_points: usize) {
     let all = vec![int("start", 1), int("end", 2)];
     let all = graph.add("Shape", "cpl.all", &[cloud], all);

@@ -1,10 +1,9 @@
-//! What surrounds a point, as `infer-cpu/src/edge_conv.rs` defines it: for each
-//! radius and channel the largest of `relu(w (q - p) / r + b)` over the points q
-//! of the cloud that are no farther than the radius r from the point p.
+//! EdgeConv features, as `infer-cpu/src/edge_conv.rs` defines them: for each radius and channel the
+//! maximum of `relu(w (q - p) / r + b)` over the points q of the cloud within the radius r of the
+//! point p.
 //!
-//! Who is a neighbour is decided by the same roundings as there: differences,
-//! squares, and their sum in the order x, y, z. A point that is none takes part
-//! as an offset of 0, as p itself does.
+//! The graph rounds as that code does: differences, squares, and their sum in the order x, y, z. A
+//! point that is not a neighbor contributes an offset of 0, as p itself does.
 
 use infer_cpu::model_file::Dense;
 
@@ -57,7 +56,7 @@ fn squared_lengths(graph: &mut Graph, offset: &str, name: &impl Fn(&str) -> Stri
     graph.add("Add", &name("squared"), &[&sum, &z], vec![])
 }
 
-/// All offsets, of which those within a radius count.
+/// The offsets within a radius.
 struct Near<'a> {
     offset: &'a str,
     squared: &'a str,
@@ -83,7 +82,7 @@ impl Near<'_> {
         let is_near = graph.add("LessOrEqual", &part("is_near"), &[self.squared, &limit], vec![]);
         let near = graph.add("Where", &part("near"), &[&is_near, self.offset, &zero], vec![]);
         let product = graph.add("MatMul", &part("product"), &[&near, &weight], vec![]);
-        // ReLU and bias keep order: once, for the largest.
+        // Bias and ReLU are monotonic, so that they can follow the maximum.
         let all = graph.whole(&[ALL]);
         let keep = vec![int("keepdims", 0)];
         let largest = graph.add("ReduceMax", &part("largest"), &[&product, &all], keep);

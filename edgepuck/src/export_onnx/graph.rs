@@ -1,4 +1,4 @@
-//! A graph as it grows: each node bears the name of its first output.
+//! A graph under construction. A node has the name of its first output.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use super::proto::{
     TensorTypeProto, TypeProto, ValueInfoProto, attribute_type, data_type,
 };
 
-/// Nodes in the order in which they were added, and their constants by name.
+/// Nodes in the order of their addition, and constants by name.
 #[derive(Default)]
 pub struct Graph {
     nodes: Vec<NodeProto>,
@@ -21,7 +21,7 @@ pub struct Graph {
 pub enum Size<'a> {
     /// Known now.
     Fixed(usize),
-    /// Known when the model runs.
+    /// Known only when the model runs.
     Named(&'a str),
 }
 
@@ -32,12 +32,12 @@ impl Graph {
         name.to_owned()
     }
 
-    /// Declares value `name` an output, of this kind of elements.
+    /// Declares value `name` an output with this kind of elements.
     pub fn output(&mut self, name: &str, elements: i32, shape: &[Size<'_>]) {
         self.outputs.push(value(name, elements, shape));
     }
 
-    /// Adds a node of one output, `name`, and returns that.
+    /// Adds a node with one output, `name`, and returns the name.
     pub fn add(
         &mut self,
         operator: &str,
@@ -49,7 +49,7 @@ impl Graph {
         name.to_owned()
     }
 
-    /// Adds a node of several outputs.
+    /// Adds a node with several outputs.
     pub fn add_of_many(
         &mut self,
         operator: &str,
@@ -66,13 +66,13 @@ impl Graph {
         });
     }
 
-    /// A constant of f32 and the name that it was given.
+    /// Adds a constant of f32 and returns its name.
     pub fn reals(&mut self, name: &str, shape: &[usize], values: &[f32]) -> String {
         let raw_data = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.constant(name, data_type::FLOAT, shape, raw_data)
     }
 
-    /// A list of whole numbers; equal lists are one constant.
+    /// Adds a constant of whole numbers and returns its name. Equal lists are one constant.
     pub fn whole(&mut self, values: &[i64]) -> String {
         let words: Vec<String> = values.iter().map(ToString::to_string).collect();
         let raw_data = values.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -114,12 +114,12 @@ fn value(name: &str, elem_type: i32, shape: &[Size<'_>]) -> ValueInfoProto {
     }
 }
 
-/// An attribute that is one whole number.
+/// An attribute with one whole number.
 pub fn int(name: &str, i: i64) -> AttributeProto {
     AttributeProto { name: name.to_owned(), i, r#type: attribute_type::INT, ..Default::default() }
 }
 
-/// An attribute that is a list of whole numbers.
+/// An attribute with a list of whole numbers.
 pub fn ints(name: &str, ints: &[i64]) -> AttributeProto {
     AttributeProto {
         name: name.to_owned(),
@@ -129,7 +129,7 @@ pub fn ints(name: &str, ints: &[i64]) -> AttributeProto {
     }
 }
 
-/// An attribute that is a word.
+/// An attribute with a string.
 pub fn word(name: &str, word: &str) -> AttributeProto {
     AttributeProto {
         name: name.to_owned(),

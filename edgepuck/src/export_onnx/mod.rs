@@ -1,4 +1,4 @@
-//! `edgepuck export-onnx`: a model file as ONNX, for other engines.
+//! `edgepuck export-onnx`: converts a model file to ONNX, for other engines.
 
 mod critical_points;
 mod edges;
@@ -18,17 +18,17 @@ use prost::Message;
 
 use crate::{Outcome, Usage, checkout};
 use graph::{Graph, Size};
-use pointnet::{Net, Seen};
+use pointnet::{Net, NetInputs};
 use proto::{ModelProto, OperatorSetIdProto, StringStringEntryProto, data_type};
 
-/// The operators that are used are those of ONNX 1.13, the first whose
-/// ReduceMax takes its axes as an input: ONNX Runtime 1.14 and later run them.
+/// The operators are those of ONNX 1.13, the first version in which ReduceMax takes its axes as an
+/// input. ONNX Runtime 1.14 and later run them.
 const OPSET: i64 = 18;
 
 /// The version of the messages that came with [`OPSET`].
 const IR_VERSION: i64 = 8;
 
-/// What no message of protobuf exceeds, in bytes.
+/// The largest message of protobuf, in bytes.
 const LARGEST: usize = i32::MAX as usize;
 
 /// Flags of `export-onnx`.
@@ -53,7 +53,7 @@ Outputs:
   kept   [batch, M], int64   with --critical-points: indices of the chosen points
 
 The card (classes, normalization, sampler, ...) is in the file's metadata_props.")]
-pub struct Args {
+pub struct ExportOnnxArgs {
     /// Model file, or the name of a bundled model: edge-64, or in a checkout any in assets/weights
     #[arg(value_name = "MODEL")]
     model: PathBuf,
@@ -62,7 +62,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// Include the model's Critical Points Layer in the graph, like --sampler cpl of infer-cpu
+    /// Include the model's Critical Points Layer in the graph, like infer-cpu's --sampler cpl
     #[arg(long)]
     critical_points: bool,
 
@@ -73,7 +73,7 @@ pub struct Args {
 }
 
 /// Exports the model.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
     let path = find(&args.model);
     let (card, net) = read(&path)?;
     let n_points = args.critical_points.then(|| kept_points(args, &path, &card)).transpose()?;
@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// A file, or else the bundled model of this name that lies in a checkout.
+/// The file `model` or, if there is none, the bundled model of this name in the checkout.
 fn find(model: &Path) -> PathBuf {
     let bundled = |root: PathBuf| {
         let file = root.join("assets/weights").join(model).with_extension("safetensors");
@@ -103,7 +103,7 @@ fn find(model: &Path) -> PathBuf {
     found.unwrap_or_else(|| model.to_path_buf())
 }
 
-/// The name under which the default model is built in.
+/// The name of the built-in model.
 const BUILTIN: &str = "edge-64";
 
 /// Reads the model file, or the model that is built into this program.
@@ -114,25 +114,24 @@ fn read(path: &Path) -> Result<(ModelCard, Net), FormatError> {
     model_file::read(path)
 }
 
-fn kept_points(args: &Args, path: &Path, card: &ModelCard) -> anyhow::Result<usize> {
+fn kept_points(args: &ExportOnnxArgs, path: &Path, card: &ModelCard) -> anyhow::Result<usize> {
     let trained = card.points.and_then(|points| u32::try_from(points).ok());
     match args.points.or(trained) {
         Some(points) if points > 0 => Ok(points as usize),
         _ => Err(Usage(format!(
-            "{} does not say how many points it was trained on: name a number by --points",
+            "{} does not state its number of points: give --points",
             path.display()
         ))
         .into()),
     }
 }
 
-/// The model of `net`, behind a Critical Points Layer of `n_points` if that is
-/// asked for.
+/// The ONNX model of `net`, with a Critical Points Layer of `n_points` points before it if given.
 fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Result<ModelProto> {
     const BATCH: Size<'_> = Size::Named("batch");
     let mut graph = Graph::default();
     let mut input = |name, n| graph.input(name, &[BATCH, Size::Named(n), Size::Fixed(3)]);
-    let seen = match n_points {
+    let inputs = match n_points {
         Some(n_points) => {
             let cloud = input("cloud", "all");
             critical_points::add(&mut graph, net, &cloud, n_points)?
@@ -140,10 +139,10 @@ fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Resul
         None => {
             let points = input("points", "points");
             let cloud = (!net.edges.is_empty()).then(|| input("cloud", "all"));
-            Seen { points, cloud, pooled_stn: None }
+            NetInputs { points, cloud, pooled_stn: None }
         }
     };
-    pointnet::add(&mut graph, net, &seen);
+    pointnet::add(&mut graph, net, &inputs);
     let n_classes = net.head.last().map_or(0, |layer| layer.outputs);
     graph.output("logits", data_type::FLOAT, &[BATCH, Size::Fixed(n_classes)]);
     if n_points.is_some() {

@@ -1,32 +1,30 @@
-//! PointNet, with either T-Net or without: from points to logits.
+//! PointNet from points to logits, with or without T-Nets.
 //!
-//! Weights keep the names and shapes that PyTorch gives them: a layer that all
-//! points share is a convolution `[outputs, inputs, 1]`, one behind a pooling a
-//! `Gemm` `[outputs, inputs]`. Batch norms are folded in, and so is the
-//! identity that a T-Net adds to its matrix.
+//! Weights have PyTorch's names and shapes: a layer that all points share is a convolution
+//! `[outputs, inputs, 1]`, and a layer after a pooling is a `Gemm` `[outputs, inputs]`. Batch norms
+//! are folded into the weights, and so is the identity that a T-Net adds to its matrix.
 
 use infer_cpu::model_file::{Dense, Network, TNet};
 
 use super::edges;
 use super::graph::{Graph, int, ints};
 
-/// A model file's network, in f32, batch norms folded in.
+/// The network of a model file, in f32, with batch norms folded in.
 pub type Net = Network<Dense, Dense>;
 
-/// What a network sees, as values of the graph.
-pub struct Seen {
+/// The inputs of a network, as values of the graph.
+pub struct NetInputs {
     /// The points, `[batch, points, 3]`.
     pub points: String,
-    /// All points of the cloud, `[batch, all, 3]`, for networks that look around.
+    /// All points of the cloud, `[batch, all, 3]`, for networks with EdgeConv layers.
     pub cloud: Option<String>,
-    /// The pooled vector of the coordinates' T-Net, `[batch, features]`, where
-    /// it is known already.
+    /// The pooled vector of the input T-Net, `[batch, features]`, if it is in the graph already.
     pub pooled_stn: Option<String>,
 }
 
-/// Adds `net` on what it sees; the logits are value `logits`.
-pub fn add(graph: &mut Graph, net: &Net, seen: &Seen) {
-    let features = trunk(graph, net, seen, "feat");
+/// Adds `net`. The logits are value `logits`.
+pub fn add(graph: &mut Graph, net: &Net, inputs: &NetInputs) {
+    let features = trunk(graph, net, inputs, "feat");
     let mut x = pool(graph, "feat.pool", &features);
     for (i, dense) in net.head.iter().enumerate() {
         x = match i + 1 == net.head.len() {
@@ -36,10 +34,10 @@ pub fn add(graph: &mut Graph, net: &Net, seen: &Seen) {
     }
 }
 
-/// The features that the trunk gives each point, `[batch, features, points]`;
-/// values besides those of layers are named after `prefix`.
-pub fn trunk(graph: &mut Graph, net: &Net, seen: &Seen, prefix: &str) -> String {
-    let mut x = entry(graph, net, seen, prefix);
+/// The features of each point after the trunk, `[batch, features, points]`. The names of values that
+/// are not outputs of layers begin with `prefix`.
+pub fn trunk(graph: &mut Graph, net: &Net, inputs: &NetInputs, prefix: &str) -> String {
+    let mut x = entry(graph, net, inputs, prefix);
     for (i, dense) in net.trunk.iter().enumerate() {
         if let Some(fstn) = net.fstn.as_ref().filter(|_| i == net.transform_after) {
             let matrix = t_net(graph, fstn, "feat.fstn", &x, None);
@@ -52,17 +50,17 @@ pub fn trunk(graph: &mut Graph, net: &Net, seen: &Seen, prefix: &str) -> String 
     x
 }
 
-/// What the trunk's first layer takes, channels first: turned coordinates, and
-/// features of what surrounds the points as they come.
-fn entry(graph: &mut Graph, net: &Net, seen: &Seen, prefix: &str) -> String {
-    let mut points = seen.points.clone();
+/// The input of the trunk's first layer, channels first: the transformed coordinates, and the
+/// EdgeConv features of the points before the transform.
+fn entry(graph: &mut Graph, net: &Net, inputs: &NetInputs, prefix: &str) -> String {
+    let mut points = inputs.points.clone();
     if let Some(stn) = &net.stn {
         let x = transposed(graph, "feat.stn.points", &points);
-        let matrix = t_net(graph, stn, "feat.stn", &x, seen.pooled_stn.as_deref());
+        let matrix = t_net(graph, stn, "feat.stn", &x, inputs.pooled_stn.as_deref());
         points = graph.add("MatMul", "feat.stn.turned", &[&points, &matrix], vec![]);
     }
-    if let Some(cloud) = seen.cloud.as_ref().filter(|_| !net.edges.is_empty()) {
-        let around = edges::add(graph, &net.edges, &seen.points, cloud, prefix);
+    if let Some(cloud) = inputs.cloud.as_ref().filter(|_| !net.edges.is_empty()) {
+        let around = edges::add(graph, &net.edges, &inputs.points, cloud, prefix);
         let values: Vec<&str> =
             std::iter::once(&points).chain(&around).map(String::as_str).collect();
         points = graph.add("Concat", &format!("{prefix}.edged"), &values, vec![int("axis", 2)]);
@@ -70,7 +68,7 @@ fn entry(graph: &mut Graph, net: &Net, seen: &Seen, prefix: &str) -> String {
     transposed(graph, &format!("{prefix}.entry"), &points)
 }
 
-/// The matrix that a T-Net predicts of `x` `[batch, channels, points]`.
+/// The matrix that a T-Net predicts from `x` `[batch, channels, points]`.
 fn t_net(
     graph: &mut Graph,
     net: &TNet<Dense, Dense>,
@@ -89,23 +87,23 @@ fn t_net(
         x = fully_connected(graph, dense, &x);
     }
     let k = net.k as i64;
-    // 0 keeps the batch's size.
+    // In a reshape, 0 keeps the size of the batch.
     let shape = graph.whole(&[0, k, k]);
     graph.add("Reshape", &format!("{name}.matrix"), &[&x, &shape], vec![])
 }
 
-/// Layers that all points share, one after the other.
+/// Layers that all points share, in sequence.
 pub fn convolutions(graph: &mut Graph, layers: &[Dense], x: &str, prefix: &str) -> String {
     layers.iter().fold(x.to_owned(), |x, dense| convolution(graph, dense, &x, prefix))
 }
 
-/// One layer that all points share. A trunk that runs twice, before and behind
-/// a Critical Points Layer, has one set of weights and two sets of `prefix`es.
+/// One layer that all points share. If a trunk runs twice, before and after a Critical Points Layer,
+/// both runs share the weights, and differ in `prefix`.
 fn convolution(graph: &mut Graph, dense: &Dense, x: &str, prefix: &str) -> String {
     let Dense { name, inputs, outputs, .. } = dense;
     let kernel = graph.reals(&format!("{name}.weight"), &[*outputs, *inputs, 1], &dense.weight);
     let bias = graph.reals(&format!("{name}.bias"), &[*outputs], &dense.bias);
-    // Converters of other engines ask for all that ONNX would assume.
+    // Converters of other engines require the attributes that have defaults in ONNX.
     let attributes = vec![
         ints("kernel_shape", &[1]),
         ints("strides", &[1]),
@@ -135,7 +133,7 @@ fn relu(graph: &mut Graph, dense: &Dense, y: String) -> String {
     if dense.relu { graph.add("Relu", &format!("{y}.relu"), &[&y], vec![]) } else { y }
 }
 
-/// The largest of each feature `[batch, features]`.
+/// The maximum of each feature, `[batch, features]`.
 pub fn pool(graph: &mut Graph, name: &str, x: &str) -> String {
     let axes = graph.whole(&[2]);
     graph.add("ReduceMax", name, &[x, &axes], vec![int("keepdims", 0)])

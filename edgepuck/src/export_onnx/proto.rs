@@ -1,12 +1,12 @@
-//! The few of ONNX's messages that an inference model needs, field by field as
-//! onnx/onnx.proto numbers them (<https://github.com/onnx/onnx>, ONNX 1.13).
+//! The messages of ONNX that an inference model needs, with the field numbers of onnx/onnx.proto
+//! (<https://github.com/onnx/onnx>, ONNX 1.13).
 
 use prost::Message;
 
 /// A whole file.
 #[derive(Clone, PartialEq, Message)]
 pub struct ModelProto {
-    /// Version of the messages themselves.
+    /// Version of the messages.
     #[prost(int64, tag = "1")]
     pub ir_version: i64,
     #[prost(string, tag = "2")]
@@ -23,7 +23,7 @@ pub struct ModelProto {
     pub metadata_props: Vec<StringStringEntryProto>,
 }
 
-/// A version of a set of operators; the empty domain is ONNX's own.
+/// A version of a set of operators. The empty domain is ONNX's own.
 #[derive(Clone, PartialEq, Message)]
 pub struct OperatorSetIdProto {
     #[prost(string, tag = "1")]
@@ -32,7 +32,7 @@ pub struct OperatorSetIdProto {
     pub version: i64,
 }
 
-/// A remark.
+/// An entry of the metadata.
 #[derive(Clone, PartialEq, Message)]
 pub struct StringStringEntryProto {
     #[prost(string, tag = "1")]
@@ -41,7 +41,7 @@ pub struct StringStringEntryProto {
     pub value: String,
 }
 
-/// Nodes in an order in which they can run, and what they start from.
+/// Nodes in an order in which they can run, with their constants, inputs and outputs.
 #[derive(Clone, PartialEq, Message)]
 pub struct GraphProto {
     #[prost(message, repeated, tag = "1")]
@@ -56,7 +56,7 @@ pub struct GraphProto {
     pub output: Vec<ValueInfoProto>,
 }
 
-/// One operator at work.
+/// One use of an operator.
 #[derive(Clone, PartialEq, Message)]
 pub struct NodeProto {
     #[prost(string, repeated, tag = "1")]
@@ -82,7 +82,7 @@ pub struct AttributeProto {
     pub s: Vec<u8>,
     #[prost(int64, repeated, packed = "false", tag = "8")]
     pub ints: Vec<i64>,
-    /// Which of the fields counts, see [`attribute_type`].
+    /// The field that holds the value, see [`attribute_type`].
     #[prost(int32, tag = "20")]
     pub r#type: i32,
 }
@@ -124,7 +124,7 @@ pub struct ValueInfoProto {
     pub r#type: Option<TypeProto>,
 }
 
-/// Tensors are the only type in use here.
+/// A type; tensors are the only one here.
 #[derive(Clone, PartialEq, Message)]
 pub struct TypeProto {
     #[prost(message, optional, tag = "1")]

@@ -1,4 +1,4 @@
-//! What an imported model says about itself.
+//! The card of an imported model.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use formats::weights::Tensor;
 use super::checkpoint::{Accuracy, Checkpoint};
 use super::table::Table;
 
-/// Flags that say what neither the checkpoint nor the table does, or correct
+/// Flags for the facts on the card that neither the checkpoint nor the table states, or that correct
 /// the table.
 #[derive(clap::Args)]
 pub struct CardArgs {
@@ -20,11 +20,11 @@ pub struct CardArgs {
     #[arg(long, value_name = "FILE")]
     classes: Option<PathBuf>,
 
-    /// Sampler that was used in training, by its name in infer-cpu [default: the table's]
+    /// Sampler in training, by its name in infer-cpu [default: the table's]
     #[arg(long, value_name = "NAME")]
     sampler: Option<String>,
 
-    /// Number of points that the sampler keeps [default: the table's]
+    /// Number of points that the sampler selects [default: the table's]
     #[arg(long, value_name = "N")]
     points: Option<usize>,
 
@@ -36,18 +36,17 @@ pub struct CardArgs {
     #[arg(long, value_name = "TEXT")]
     training_set: Option<String>,
 
-    /// Accuracy of the model, and the data on which it was measured [default: what the checkpoint
-    /// states]
+    /// Accuracy of the model, and the data of the measurement [default: as the checkpoint states]
     #[arg(long, value_name = "TEXT")]
     accuracy: Option<String>,
 
-    /// Where the weights come from [default: the checkpoint's name and SHA-256]
+    /// Source of the weights [default: the checkpoint's name and SHA-256]
     #[arg(long, value_name = "TEXT")]
     provenance: Option<String>,
 }
 
 impl CardArgs {
-    /// The card of the model in the checkpoint at `path` that became `tensors`.
+    /// The card of the model with these `tensors`, read from the checkpoint at `path`.
     pub fn card(
         &self,
         path: &Path,
@@ -105,14 +104,14 @@ impl CardArgs {
     }
 }
 
-/// The widths of trunk and head, such as `3-64-128-1024 | 1024-512-256-40`.
+/// The widths of the trunk and the head, such as `3-64-128-1024 | 1024-512-256-40`.
 pub fn all_widths(tensors: &BTreeMap<String, Tensor>) -> String {
     let joined =
         |stem| widths(tensors, stem).iter().map(ToString::to_string).collect::<Vec<_>>().join("-");
     format!("{} | {}", joined("feat.conv"), joined("fc"))
 }
 
-/// What the layers `stem1`, `stem2`, … take and give.
+/// The number of inputs of layer `stem1`, and the numbers of outputs of `stem1`, `stem2`, ….
 fn widths(tensors: &BTreeMap<String, Tensor>, stem: &str) -> Vec<usize> {
     let shape = |i: usize| Some(&tensors.get(&format!("{stem}{i}.weight"))?.shape[..]);
     let inputs = shape(1).and_then(|shape| shape.get(1)).copied();

@@ -1,7 +1,7 @@
-//! What a model needs of a PyTorch checkpoint.
+//! Reads a model from a PyTorch checkpoint.
 //!
-//! The file is read by the `pytorch-reader` crate, which executes nothing and
-//! takes every container that `torch.save` has written.
+//! The `pytorch-reader` crate reads the file. It executes no code, and reads all containers that
+//! versions of `torch.save` write.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,31 +11,31 @@ use formats::weights::{Tensor, tensor_part};
 use half::{bf16, f16};
 use pytorch_reader::{DType, PickleValue, PytorchReader};
 
-/// Where training scripts keep the model, beside the optimiser's state.
+/// The prefixes of the model's tensors in checkpoints that also hold the optimiser's state.
 const STATES: [&str; 2] = ["model_state_dict.", "state_dict."];
 
-/// What `torch.nn.DataParallel` puts before every name.
+/// The prefix that `torch.nn.DataParallel` adds to all names.
 const PARALLEL: &str = "module.";
 
-/// More elements than any PointNet has, by far: a view that repeats one element
-/// can claim any number of them in a file of any size.
+/// Largest number of elements of a model, far above that of any PointNet. Without this limit, a small
+/// file could fill the memory by a view that repeats one element.
 const MOST_ELEMENTS: usize = 1 << 27;
 
-/// A checkpoint, whose tensors are read when asked for.
+/// A checkpoint whose tensors are read on demand.
 pub struct Checkpoint {
     path: PathBuf,
     tensors: BTreeMap<String, pytorch_reader::Tensor>,
     accuracy: Accuracy,
 }
 
-/// What a checkpoint says that its model reached.
+/// The accuracy of the model according to the checkpoint.
 #[derive(Debug, PartialEq)]
 pub enum Accuracy {
-    /// Nothing.
+    /// Not stated.
     Silent,
-    /// This, as text.
+    /// Stated, as text.
     Stated(String),
-    /// Something of this Python type, which is not read.
+    /// Stated by an object of this Python type, which is not read.
     Unread(String),
 }
 
@@ -57,12 +57,12 @@ impl Checkpoint {
         self.tensors.keys().map(String::as_str)
     }
 
-    /// What it says that the model reached.
+    /// The accuracy of the model according to the checkpoint.
     pub fn accuracy(&self) -> &Accuracy {
         &self.accuracy
     }
 
-    /// Reads tensors, given as pairs of a new name and the name here.
+    /// Reads the tensors in `names`, which maps new names to names in the checkpoint.
     pub fn read(
         &self,
         names: &BTreeMap<String, String>,
@@ -83,7 +83,7 @@ impl Checkpoint {
     }
 }
 
-/// Of all tensors in a file the model's, under the names that the model has.
+/// The tensors of the model among `all` tensors of a file, without the prefixes of their names.
 fn model_tensors<T>(all: BTreeMap<String, T>) -> BTreeMap<String, T> {
     let state = STATES.into_iter().find(|state| all.keys().any(|name| name.starts_with(state)));
     let model = within(all, state.unwrap_or_default());
@@ -91,7 +91,7 @@ fn model_tensors<T>(all: BTreeMap<String, T>) -> BTreeMap<String, T> {
     within(model, if is_parallel { PARALLEL } else { "" })
 }
 
-/// The tensors whose names begin with `prefix`, without it.
+/// The tensors whose names begin with `prefix`, under their names without the prefix.
 fn within<T>(tensors: BTreeMap<String, T>, prefix: &str) -> BTreeMap<String, T> {
     let stripped = |name: String| name.strip_prefix(prefix).map(str::to_owned);
     tensors.into_iter().filter_map(|(name, tensor)| Some((stripped(name)?, tensor))).collect()
@@ -116,7 +116,7 @@ fn elements<const N: usize>(bytes: &[u8], decode: impl Fn([u8; N]) -> f32) -> Ve
     bytes.as_chunks::<N>().0.iter().map(|element| decode(*element)).collect()
 }
 
-/// What yanx27's training script notes beside the weights.
+/// The accuracy that yanx27's training script stores with the weights.
 fn accuracy(root: &PickleValue) -> Accuracy {
     let PickleValue::Dict(entries) = root else { return Accuracy::Silent };
     let mut stated = Vec::new();

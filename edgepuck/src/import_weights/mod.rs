@@ -1,4 +1,4 @@
-//! `edgepuck import-weights`: a PyTorch checkpoint into a model file.
+//! `edgepuck import-weights`: converts a PyTorch checkpoint to a model file.
 
 mod card;
 mod checkpoint;
@@ -20,7 +20,7 @@ use table::{Names, Table};
 
 /// Flags of `import-weights`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ImportWeightsArgs {
     /// Checkpoint file that torch.save wrote
     #[arg(value_name = "CHECKPOINT")]
     checkpoint: PathBuf,
@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
-    /// Importer table (TOML) for a model whose layers have other names
+    /// Importer table (TOML), for a model whose layers have other names
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
 
@@ -42,7 +42,7 @@ pub struct Args {
 }
 
 /// Imports the checkpoint.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &ImportWeightsArgs) -> anyhow::Result<Outcome> {
     let checkpoint = Checkpoint::open(&args.checkpoint)?;
     let tables = match &args.table {
         Some(path) => vec![Table::read(path)?],
@@ -62,14 +62,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Metadata that only the loaded network can give: the ranges of `--calibrate`.
+/// The metadata of `--calibrate`, which need the loaded network.
 type Ranges = Option<(String, String)>;
 
-/// That infer-cpu loads a model file of these tensors, and what calibration
-/// finds then. Errors name the checkpoint, and tensors by their names there
-/// too.
+/// Checks that infer-cpu loads a model file with these tensors, and calibrates the model. Errors name
+/// the checkpoint, and also give a tensor's name in the checkpoint.
 fn check(
-    args: &Args,
+    args: &ImportWeightsArgs,
     names: &Names,
     tensors: &BTreeMap<String, Tensor>,
     metadata: &BTreeMap<String, String>,
@@ -91,7 +90,7 @@ fn check(
     }
 }
 
-/// The largest activations of the model on clouds spread over the set.
+/// The largest activations of the model on a sample of the clouds.
 fn calibrate(model: &Path, clouds: &Path) -> anyhow::Result<(String, String)> {
     let set = read_labelled(clouds)?;
     let activation_ranges = infer_cpu::activation_ranges_of_set(model, &set)?;

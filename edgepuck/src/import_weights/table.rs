@@ -1,5 +1,5 @@
-//! Importer tables: how others name a PointNet's layers, and what they leave
-//! unsaid about it.
+//! Importer tables: the names of a PointNet's layers in another repository, and the facts that its
+//! checkpoints do not state.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,32 +8,31 @@ use anyhow::{Context, bail};
 use formats::model_card::ModelCard;
 use serde::Deserialize;
 
-/// The built-in tables, in the order in which they are tried.
+/// The built-in tables in the order of trial.
 const BUILTIN: [(&str, &str); 2] = edgepuck_assets::IMPORTERS;
 
-/// What PyTorch calls the tensors of a layer that a model needs.
+/// PyTorch's names of the tensors of a layer that a model needs.
 const PARTS: [&str; 4] = ["weight", "bias", "running_mean", "running_var"];
 
-/// A tensor of batch norms that counts training steps.
+/// The tensor of a batch norm that counts training steps.
 const COUNTER: &str = "num_batches_tracked";
 
 /// Stands for any number in a layer's name.
 const NUMBER: &str = "{i}";
 
-/// How many unknown names an error lists.
+/// Largest number of unknown names in an error.
 const LISTED: usize = 5;
 
-/// A table, checked.
+/// An importer table.
 #[derive(Debug)]
 pub struct Table {
-    /// A short name.
+    /// A short name of the repository.
     pub name: String,
-    /// What a model says about itself, but for classes, accuracy and
-    /// provenance.
+    /// The card of a model, without classes, accuracy and provenance.
     pub card: ModelCard,
-    /// Class names of models that have as many logits.
+    /// The class names of a model with this number of logits.
     pub default_classes: Vec<String>,
-    /// Their layer to ours; either may hold one [`NUMBER`].
+    /// Maps their layers to ours. Both names may hold one [`NUMBER`].
     layers: BTreeMap<String, String>,
 }
 
@@ -48,11 +47,11 @@ struct TableFile {
     card: BTreeMap<String, toml::Value>,
 }
 
-/// A model's tensors: our name to theirs.
+/// Maps our names of a model's tensors to theirs.
 pub type Names = BTreeMap<String, String>;
 
 impl Table {
-    /// The tables that are part of the program.
+    /// The built-in tables.
     pub fn builtin() -> anyhow::Result<Vec<Self>> {
         BUILTIN.into_iter().map(|(path, text)| Self::parse(Path::new(path), text)).collect()
     }
@@ -74,8 +73,7 @@ impl Table {
         Ok(Self { name, card, default_classes, layers })
     }
 
-    /// Our names of the tensors `keys`, and the keys that no layer of the
-    /// table has.
+    /// Our names of the tensors `keys`, and the keys that are unknown to the table.
     fn names<'k>(
         &self,
         keys: impl Iterator<Item = &'k str>,
@@ -112,8 +110,7 @@ impl Table {
     }
 }
 
-/// The first of `tables` that knows every tensor of `keys`, and what it makes
-/// of them.
+/// The first of `tables` that knows all tensors in `keys`, and its names for them.
 pub fn choose<'t, 'k>(
     tables: &'t [Table],
     keys: impl Iterator<Item = &'k str> + Clone,
@@ -151,7 +148,7 @@ fn check_numbers(theirs: &str, ours: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A card from the keys and values of a model file's metadata.
+/// Parses a card from keys and values as in the metadata of a model file.
 fn parse_card(path: &Path, entries: &BTreeMap<String, toml::Value>) -> anyhow::Result<ModelCard> {
     let text =
         |value: &toml::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);

@@ -128,7 +128,7 @@ impl Classifying {
         let sampler = card.sampler.as_deref().and_then(|name| name.split(':').next());
         Ok(Self {
             model: model.to_owned(),
-            sampler: SamplerConfig::of(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
+            sampler: SamplerConfig::of_kind(sampler.map_or(Ok(SamplerKind::Random), str::parse)?),
             points: card.points.unwrap_or(AS_THE_BASELINE),
             precision: Precision::F32,
             t_nets: TNets::Both,
