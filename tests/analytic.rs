@@ -2,9 +2,9 @@
 
 use glam::{DQuat, DVec3};
 use sim_gpu::effects::Effects;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::sensor::BeamPattern;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::sensor::BeamPattern;
 use tests::adapter::casters;
 use tests::casting::{beams, builtin, hits, job, ranges, target};
 use tests::meshes::{cuboid, icosphere, mapped};
@@ -24,7 +24,7 @@ fn patterns() -> [BeamPattern; 3] {
 /// Compares every beam of every pattern and caster with `truth`, which tells
 /// the range of a beam in the world, or that it is too near a silhouette or
 /// too grazing to tell.
-fn check(mesh: &Mesh, poses: &[Pose], truth: impl Fn(DVec3, DVec3) -> Truth) {
+fn check(mesh: &TriangleMesh, poses: &[Pose], truth: impl Fn(DVec3, DVec3) -> Truth) {
     let target = target(mesh);
     for pattern in &patterns() {
         for pose in poses {
@@ -34,7 +34,7 @@ fn check(mesh: &Mesh, poses: &[Pose], truth: impl Fn(DVec3, DVec3) -> Truth) {
                 let mut told = 0;
                 for (beam, (&direction, range)) in pattern.directions.iter().zip(found).enumerate()
                 {
-                    match (truth(pose.position_m, pose.world_from_sensor * direction), range) {
+                    match (truth(pose.position_m, pose.rotation * direction), range) {
                         (Truth::Untold, _) => continue,
                         (Truth::Miss, None) => {}
                         (Truth::Within(low, high), Some(range)) => {
@@ -159,14 +159,14 @@ fn a_box_wherever_it_stands_is_met_where_its_planes_are() {
 fn a_plane_is_met_at_its_distance_over_the_cosine() {
     let half = 20.0;
     let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
-    let mesh = Mesh {
+    let mesh = TriangleMesh {
         vertices: corners.iter().map(|&(x, y)| DVec3::new(x, y, 0.0)).collect(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
     };
     let heights = [0.5, 1.7, -3.0, 30.0];
     let poses: Vec<Pose> = heights
         .iter()
-        .map(|&z| Pose { position_m: DVec3::new(0.3, -0.2, z), world_from_sensor: DQuat::IDENTITY })
+        .map(|&z| Pose { position_m: DVec3::new(0.3, -0.2, z), rotation: DQuat::IDENTITY })
         .collect();
     check(&mesh, &poses, |origin, direction| {
         let range = -origin.z / direction.z;

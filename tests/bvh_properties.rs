@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
-use sim_gpu::bvh::{Builder, Bvh, LeafTriangle, assert_well_formed};
-use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::target::Target;
+use sim_gpu::internals::bvh::{Builder, Bvh, LeafTriangle, assert_well_formed};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::target::Target;
 use tests::casting::{at, beams, hits, job, target_by, tree_bytes};
 use tests::judge::judge;
 use tests::meshes::unconnected;
@@ -76,7 +76,7 @@ proptest! {
         let mut expected: Vec<_> = corners
             .iter()
             .zip(&indices)
-            .map(|(&t, &i)| (i, bits(sim_gpu::bvh::canonical_corners(t))))
+            .map(|(&t, &i)| (i, bits(sim_gpu::internals::bvh::canonical_corners(t))))
             .collect();
         expected.sort_unstable();
         for builder in BUILDERS {
@@ -92,7 +92,7 @@ proptest! {
         let mut random = Random::new(&format!("brute force {seed}"));
         let sensor = random.in_cube() * 2.0;
         let pattern = beams((0..64).map(|_| random.in_cube() * 0.7 - sensor));
-        let cpu = Caster::Cpu(Effects::default());
+        let cpu = OpenCaster::Cpu(Effects::default());
         for builder in BUILDERS {
             let target = target_by(builder, &mesh);
             let job = job(&target, &at(sensor), &pattern);

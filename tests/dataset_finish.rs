@@ -13,10 +13,10 @@ use edgepuck_dataset::{DatasetError, MeshFailure, check_layouts, layout};
 use formats::Split::{Test, Train};
 use formats::hash::Hashing;
 use formats::labelled::read_labelled;
-use sim_gpu::caster::Caster;
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::tree::discover;
-use sim_gpu::sensor::{Sensor, builtin_names};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::tree::discover;
+use sim_gpu::internals::sensor::{SensorProfile, builtin_names};
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -178,7 +178,7 @@ fn clouds_that_a_run_keeps_are_those_that_its_files_give() {
     }
     let terms = terms(config(), None);
     let config = &terms.config;
-    let caster = Caster::Cpu(config.cast_effects());
+    let caster = OpenCaster::Cpu(config.cast_effects());
     let (culling, progress) = (Culling::On, &Progress::default());
     let is_over = &AtomicBool::new(false);
     let run = Run { out: &out, config, caster: &caster, culling, progress, is_over };
@@ -304,7 +304,7 @@ fn every_builtin_sensor_comes_back_from_a_manifest() {
     let folder = tempfile::tempdir().unwrap();
     for name in builtin_names() {
         let mut config = config();
-        config.sets[0].sensor = Sensor::builtin(name).unwrap();
+        config.sets[0].sensor = SensorProfile::builtin(name).unwrap();
         let terms = terms(config, None);
         let manifest = finish(folder.path(), &terms, Vec::new(), Vec::new()).unwrap();
         let read = Manifest::read(&layout::manifest(folder.path())).unwrap();

@@ -10,11 +10,11 @@ use edgepuck_dataset::start::{Begin, begin};
 use edgepuck_dataset::{DatasetConfig, DatasetError, SetConfig, Variant, Viewpoints, layout};
 use formats::Split;
 use formats::labelled::read_labelled;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::tree::{MeshEntry, discover};
-use sim_gpu::sensor::{Sensor, Views};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
+use sim_gpu::internals::sensor::{SensorProfile, Views};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use tests::written_dataset::config;
@@ -38,7 +38,7 @@ fn asked(seed: u64) -> DatasetConfig {
         variants: vec![Variant::Noisy],
         sets: vec![SetConfig {
             name: "rotational".to_owned(),
-            sensor: Sensor::builtin("vlp32c").expect("a built-in sensor"),
+            sensor: SensorProfile::builtin("vlp32c").expect("a built-in sensor"),
             viewpoints: Viewpoints::Views(views),
         }],
         layouts: vec![],
@@ -57,8 +57,8 @@ fn clouds(meshes: &[MeshEntry], config: DatasetConfig, cache_bytes: usize) -> Cl
     Clouds::new(config, meshes, Some(Split::Train), cache_bytes).expect("a dataset")
 }
 
-fn cpu(clouds: &Clouds) -> Caster {
-    Caster::Cpu(clouds.cast_effects())
+fn cpu(clouds: &Clouds) -> OpenCaster {
+    OpenCaster::Cpu(clouds.cast_effects())
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn clouds_on_demand_are_those_of_the_packed_set() {
     let folder = tempfile::tempdir().unwrap();
     let (out, meshes) = (folder.path().join("out"), meshes(&folder.path().join("meshes")));
     let config = asked(seed_of_epoch(7, 2));
-    let caster = Caster::Cpu(config.cast_effects());
+    let caster = OpenCaster::Cpu(config.cast_effects());
     let terms = Terms::new(config.clone(), &caster, &meshes, None);
     begin(&out, &terms, Begin::Fresh).unwrap();
     let (progress, culling) = (Progress::default(), Culling::On);

@@ -4,14 +4,14 @@
 
 use formats::rng::StreamKey;
 use glam::DVec3;
-use sim_gpu::caster::Caster;
-use sim_gpu::cpu::effects::dropout;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
-use sim_gpu::job::{Cast, CastJob};
-use sim_gpu::pose::Pose;
-use sim_gpu::ray::MISS;
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::Target;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::cpu::effects::dropout;
+use sim_gpu::internals::job::{Cast, CastJob};
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::ray::MISS;
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::Target;
 use test_support::need;
 use tests::adapter::{adapter, casters};
 use tests::casting::{at, beams, builtin, cast, hits, job, target};
@@ -33,7 +33,7 @@ fn all_hit(stream: StreamKey, pattern: &BeamPattern) -> CastJob {
 }
 
 /// What `caster` answers for jobs of several streams, in all of which every ray hits.
-fn cast_all_hit(caster: &Caster, pattern: &BeamPattern) -> Vec<(CastJob, Cast)> {
+fn cast_all_hit(caster: &OpenCaster, pattern: &BeamPattern) -> Vec<(CastJob, Cast)> {
     let names = ["", "chair_0001", "chair_0002"];
     let answer = |(i, name)| {
         let job = all_hit(StreamKey::new(u64::from(i) * 0x1_0000_0001, name, i), pattern);

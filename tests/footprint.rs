@@ -6,12 +6,12 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::DVec3;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Dropout, Effects, Footprint, Noise, NoiseModel, ReturnMode};
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
-use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
+use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
 use tests::{adapter, casting, meshes};
 
 /// The beams' full angles along the horizon and across it, degrees.
@@ -37,19 +37,19 @@ fn fan() -> BeamPattern {
 }
 
 /// What a sensor at the origin measures of `mesh` with the effects of `caster`.
-fn scan(caster: &Caster, pattern: &BeamPattern, mesh: &Mesh) -> (Scan, Tally) {
-    let sensor = Sensor::builtin("vlp32c").unwrap();
+fn scan(caster: &OpenCaster, pattern: &BeamPattern, mesh: &TriangleMesh) -> (Scan, Tally) {
+    let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let pattern = caster.effects().widen(pattern.clone(), &sensor).unwrap();
     scan_as_is(caster, &pattern, mesh, None)
 }
 
 fn scan_as_is(
-    caster: &Caster,
+    caster: &OpenCaster,
     pattern: &BeamPattern,
-    mesh: &Mesh,
+    mesh: &TriangleMesh,
     effects: Option<Effects>,
 ) -> (Scan, Tally) {
-    let sensor = Sensor::builtin("vlp32c").unwrap();
+    let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let target = casting::target(mesh);
     let pose = Pose::look_at(DVec3::ZERO, DVec3::X).unwrap();
     let mut request = ScanRequest::new(&sensor, pattern, pose);
@@ -61,8 +61,8 @@ fn scan_as_is(
     (scanned.scan, scanned.tally)
 }
 
-fn on_cpu(effects: &Effects, mesh: &Mesh) -> Scan {
-    scan(&Caster::Cpu(effects.clone()), &fan(), mesh).0
+fn on_cpu(effects: &Effects, mesh: &TriangleMesh) -> Scan {
+    scan(&OpenCaster::Cpu(effects.clone()), &fan(), mesh).0
 }
 
 fn ranges(scan: &Scan) -> Vec<f64> {
@@ -74,17 +74,17 @@ fn beams(scan: &Scan) -> &[u32] {
 }
 
 /// A plate across the x axis, `at_m` away, from y = `from_m` on to the left.
-fn plate(at_m: f64, from_m: f64) -> Mesh {
+fn plate(at_m: f64, from_m: f64) -> TriangleMesh {
     let corner = |y, z| DVec3::new(at_m, y, z);
     let vertices =
         vec![corner(from_m, -9.0), corner(9.0, -9.0), corner(9.0, 9.0), corner(from_m, 9.0)];
-    Mesh { vertices, triangles: vec![[0, 2, 1], [0, 3, 2]] }
+    TriangleMesh { vertices, triangles: vec![[0, 2, 1], [0, 3, 2]] }
 }
 
-fn together(a: &Mesh, b: &Mesh) -> Mesh {
+fn together(a: &TriangleMesh, b: &TriangleMesh) -> TriangleMesh {
     let n = a.vertices.len() as u32;
     let shifted = b.triangles.iter().map(|corners| corners.map(|corner| corner + n));
-    Mesh {
+    TriangleMesh {
         vertices: [&a.vertices[..], &b.vertices].concat(),
         triangles: a.triangles.iter().copied().chain(shifted).collect(),
     }
@@ -96,7 +96,7 @@ fn one_ray_is_the_beam_without_width_to_the_bit() {
     let dropout = Some(Dropout { probability: 0.1 });
     let plain = Effects { noise, dropout, ..Effects::default() };
     let one = Effects { noise, dropout, ..dual(1) };
-    let pattern = Sensor::builtin("vlp32c").unwrap().pattern();
+    let pattern = SensorProfile::builtin("vlp32c").unwrap().pattern();
     let mesh = meshes::mapped(&meshes::icosphere(3), |p| p * 5.0);
     for (plain, one) in adapter::casters(&plain).into_iter().zip(adapter::casters(&one)) {
         let (expected, found) = (scan(plain, &pattern, &mesh), scan(one, &pattern, &mesh));
@@ -107,18 +107,19 @@ fn one_ray_is_the_beam_without_width_to_the_bit() {
 
 #[test]
 fn the_clean_scan_of_wide_beams_is_that_of_their_centres() {
-    let sensor = Sensor::builtin("vlp32c").unwrap();
+    let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let mesh = meshes::mapped(&meshes::icosphere(3), |p| p * 5.0);
-    let expected = scan(&Caster::Cpu(Effects::default()), &sensor.pattern(), &mesh);
+    let expected = scan(&OpenCaster::Cpu(Effects::default()), &sensor.pattern(), &mesh);
     let wide = wide(7);
     let pattern = wide.widen(sensor.pattern(), &sensor).unwrap();
     let clean = Some(wide.clean());
-    assert_eq!(scan_as_is(&Caster::Cpu(wide), &pattern, &mesh, clean), expected);
+    assert_eq!(scan_as_is(&OpenCaster::Cpu(wide), &pattern, &mesh, clean), expected);
 }
 
 #[test]
 fn all_casters_agree() {
-    let pattern = Sensor::builtin("vlp32c").unwrap().decimated(7.try_into().unwrap()).pattern();
+    let pattern =
+        SensorProfile::builtin("vlp32c").unwrap().decimated(7.try_into().unwrap()).pattern();
     let mesh = together(&plate(10.0, 0.0), &plate(12.0, -9.0));
     let effects = dual(19);
     let scans = adapter::casters(&effects).into_iter().map(|caster| scan(caster, &pattern, &mesh));
@@ -236,13 +237,13 @@ fn thirty_seven_rays_measure_what_a_hundred_thousand_do() {
         let (sine, cosine) = (std::f64::consts::TAU * stream.unit(2 * i + 1)).sin_cos();
         beam + across * (radius * cosine * half_wide / 2.0) + up * (radius * sine * half_high / 2.0)
     });
-    let many = scan(&Caster::Cpu(Effects::default()), &casting::beams(rays), &columns).0;
+    let many = scan(&OpenCaster::Cpu(Effects::default()), &casting::beams(rays), &columns).0;
     let powers: Vec<f64> = many.power.as_ref().unwrap().iter().map(|&p| p.into()).collect();
     let power = powers.iter().sum::<f64>() / 1e5;
     let range_m = powers.iter().zip(ranges(&many)).map(|(p, r)| p * r).sum::<f64>()
         / powers.iter().sum::<f64>();
 
-    let one = scan(&Caster::Cpu(wide(37)), &casting::beams([beam]), &columns).0;
+    let one = scan(&OpenCaster::Cpu(wide(37)), &casting::beams([beam]), &columns).0;
     assert_eq!(one.len(), 1);
     // Each edge may move 0.06 of the power (see above) from one surface to the other, which
     // lies 6 % farther away; two edges lie within the beam's radius of 17 mm.

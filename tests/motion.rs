@@ -6,13 +6,13 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DQuat, DVec3};
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Weather};
-use sim_gpu::job::Culling;
-use sim_gpu::pose::{Pose, Trajectory};
-use sim_gpu::scan::{PlacedTarget, ScanRequest, scan_objects};
-use sim_gpu::sensor::{BeamPattern, Layout, Sensor};
-use sim_gpu::target::Target;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::pose::{Pose, Trajectory};
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
+use sim_gpu::internals::sensor::{BeamPattern, Layout, SensorProfile};
+use sim_gpu::internals::target::Target;
 use std::num::NonZeroU32;
 use std::sync::Arc;
 use tests::{adapter, casting, meshes};
@@ -22,8 +22,8 @@ use tests::{adapter, casting, meshes};
 const START_S: f64 = 1.7e9;
 
 fn pose(position_m: [f64; 3], axis: DVec3, angle_rad: f64) -> Pose {
-    let world_from_sensor = DQuat::from_axis_angle(axis.normalize(), angle_rad);
-    Pose { position_m: position_m.into(), world_from_sensor }
+    let rotation = DQuat::from_axis_angle(axis.normalize(), angle_rad);
+    Pose { position_m: position_m.into(), rotation }
 }
 
 fn moving(poses: &[(f64, Pose)]) -> Option<Arc<Trajectory>> {
@@ -50,8 +50,8 @@ fn passing() -> Option<Arc<Trajectory>> {
     ])
 }
 
-fn sensor() -> Sensor {
-    Sensor::builtin("vlp32c").unwrap().decimated(NonZeroU32::new(12).unwrap())
+fn sensor() -> SensorProfile {
+    SensorProfile::builtin("vlp32c").unwrap().decimated(NonZeroU32::new(12).unwrap())
 }
 
 fn everything() -> std::collections::BTreeSet<Attribute> {
@@ -64,7 +64,7 @@ fn targets() -> [Target; 2] {
     [meshes::cuboid(DVec3::splat(-9.0), DVec3::splat(9.0)), lump].map(|mesh| casting::target(&mesh))
 }
 
-fn request<'a>(sensor: &'a Sensor, pattern: &'a BeamPattern) -> ScanRequest<'a> {
+fn request<'a>(sensor: &'a SensorProfile, pattern: &'a BeamPattern) -> ScanRequest<'a> {
     let mut request = ScanRequest::new(sensor, pattern, pose([0.0; 3], DVec3::Z, 0.0));
     request.attributes = everything();
     (request.stream, request.start_s) = (StreamKey([3, 5]), START_S);
@@ -104,8 +104,7 @@ fn a_scan_in_motion_is_a_loop_of_scans_of_a_world_that_stands_still() {
             still.pose = swerving().unwrap().at(START_S + time_s);
             let body = passing().unwrap().at(START_S + time_s);
             frozen[1].world_from_object =
-                DAffine3::from_rotation_translation(body.world_from_sensor, body.position_m)
-                    * stretched;
+                DAffine3::from_rotation_translation(body.rotation, body.position_m) * stretched;
             let mut expected = scan_objects(caster, &frozen, &still).unwrap().scan;
             expected
                 .beam
@@ -127,7 +126,7 @@ fn culling_loses_nothing_of_what_moves() {
         (request.motion, request.culling) = (swerving(), culling);
         let mut placed = PlacedTarget::new(&targets[1]);
         placed.motion = passing();
-        scan_objects(&Caster::Cpu(Effects::default()), &[placed], &request).unwrap().scan
+        scan_objects(&OpenCaster::Cpu(Effects::default()), &[placed], &request).unwrap().scan
     };
     assert!(with(Culling::On).len() > 30);
     assert_eq!(with(Culling::On), with(Culling::Off));
@@ -145,7 +144,7 @@ fn culling_loses_nothing_of_beams_that_start_beside_the_axis_at_rest_and_in_moti
         let [culled, all] = [Culling::On, Culling::Off].map(|culling| {
             let mut request = request(&sensor, &pattern);
             (request.motion, request.culling) = (motion.clone(), culling);
-            let cpu = Caster::Cpu(Effects::default());
+            let cpu = OpenCaster::Cpu(Effects::default());
             scan_objects(&cpu, &[PlacedTarget::new(&near)], &request).unwrap().scan
         });
         assert!(culled.len() > 5, "{}", culled.len());
@@ -165,7 +164,7 @@ fn a_wall_that_is_approached_comes_nearer_as_the_sensor_goes() {
         (1.0, pose([SPEED_M_S, 0.0, 0.0], DVec3::Z, 0.0)),
     ]);
     let scan =
-        scan_objects(&Caster::Cpu(Effects::default()), &[PlacedTarget::new(&wall)], &request);
+        scan_objects(&OpenCaster::Cpu(Effects::default()), &[PlacedTarget::new(&wall)], &request);
     let scan = scan.unwrap().scan;
     assert!(scan.len() > 500);
     let beams = scan.beam.as_ref().unwrap();
@@ -192,7 +191,7 @@ fn what_stands_still_is_where_it_is_once_deskewed() {
     let pattern = sensor.pattern();
     let mut request = request(&sensor, &pattern);
     (request.motion, request.deskew) = (swerving(), true);
-    let cpu = Caster::Cpu(Effects::default());
+    let cpu = OpenCaster::Cpu(Effects::default());
     let scan = scan_objects(&cpu, &[PlacedTarget::new(&targets[0])], &request).unwrap().scan;
     let off_m = |p: &[f32; 3]| (DVec3::from(p.map(f64::from)).abs().max_element() - 9.0).abs();
     assert!(scan.positions.iter().all(|p| off_m(p) < 1e-5));
@@ -216,7 +215,7 @@ fn what_does_not_move_is_as_it_ever_was() {
     let (sensor, targets) = (sensor(), targets());
     let pattern = sensor.pattern();
     let weather = Some(Box::new(Weather { rain_mm_h: Some(50.0), ..Weather::default() }));
-    let caster = Caster::Cpu(Effects { weather, ..Effects::default() });
+    let caster = OpenCaster::Cpu(Effects { weather, ..Effects::default() });
     let placed = || [PlacedTarget::new(&targets[0]), PlacedTarget::new(&targets[1])];
     let still = request(&sensor, &pattern);
     let mut resting = still.clone();

@@ -1,7 +1,7 @@
 //! Property tests of the hand-written OFF parser.
 
 use proptest::prelude::*;
-use sim_gpu::mesh::{MeshFormat, parse};
+use sim_gpu::internals::mesh::{MeshFormat, parse};
 
 /// What ModelNet's and others' files do besides the plain form.
 #[derive(Clone, Debug)]

@@ -26,7 +26,7 @@ use sim_gpu::effects::{
     Detection, Dropout, Effects, EvenMotion, Footprint, Intensity, Noise, NoiseModel, Quantum,
     ReturnMode, Weather,
 };
-use sim_gpu::sensor::DetectionLimit;
+use sim_gpu::internals::sensor::DetectionLimit;
 
 /// What a scan costs, by what it costs: instructions, bindings, bytes.
 type Rows = BTreeMap<String, u64>;

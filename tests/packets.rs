@@ -10,29 +10,29 @@ use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use formats::vlp32c::{BEAM_CROSSING_M, Returns, Revolution, write};
 use glam::{DQuat, DVec3};
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel, ReturnMode};
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::packets::{as_packets_tell, returns, revolution};
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::ScanRequest;
-use sim_gpu::sensor::{Layout, Rotating, Sensor};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::packets::{as_packets_tell, returns, revolution};
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::ScanRequest;
+use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile};
 use tests::{adapter, casting, judge, meshes};
 
 const STREAM: StreamKey = StreamKey([3, 5]);
 
-fn vlp32c() -> Sensor {
-    Sensor::builtin("vlp32c").unwrap()
+fn vlp32c() -> SensorProfile {
+    SensorProfile::builtin("vlp32c").unwrap()
 }
 
-fn head_of(sensor: &mut Sensor) -> &mut Rotating {
+fn head_of(sensor: &mut SensorProfile) -> &mut Rotating {
     let Layout::Rotating(rotating) = &mut sensor.layout else { panic!("it turns") };
     rotating
 }
 
 /// A VLP-32C of packets, at this many revolutions a minute.
-fn turning(rpm: f64) -> Sensor {
+fn turning(rpm: f64) -> SensorProfile {
     let mut sensor = vlp32c();
     head_of(&mut sensor).rpm = rpm;
     as_packets_tell(&sensor).unwrap()
@@ -43,17 +43,23 @@ fn turning(rpm: f64) -> Sensor {
 fn pose(distance_m: f64) -> Pose {
     let looking = Pose::look_at(DVec3::new(distance_m, 0.3, 0.2), DVec3::ZERO).unwrap();
     let tilted = DQuat::from_rotation_y(-0.3) * DQuat::from_rotation_x(0.2);
-    Pose { world_from_sensor: looking.world_from_sensor * tilted, ..looking }
+    Pose { rotation: looking.rotation * tilted, ..looking }
 }
 
 /// What `sensor` sees of `mesh`, with all that packets and this test need.
-fn scan(caster: &Caster, sensor: &Sensor, mesh: &Mesh, pose: &Pose, culling: Culling) -> Scan {
+fn scan(
+    caster: &OpenCaster,
+    sensor: &SensorProfile,
+    mesh: &TriangleMesh,
+    pose: &Pose,
+    culling: Culling,
+) -> Scan {
     let pattern = sensor.pattern();
     let target = casting::target(mesh);
     let mut request = ScanRequest::new(sensor, &pattern, *pose);
     request.attributes = [Attribute::Range, Attribute::Beam].into();
     (request.stream, request.culling) = (STREAM, culling);
-    sim_gpu::scan(caster, &target, &request).unwrap()
+    sim_gpu::internals::scan::scan(caster, &target, &request).unwrap()
 }
 
 /// A point from a packet: azimuth clockwise and elevation in degrees, range in
@@ -98,7 +104,7 @@ fn decode(capture: &[u8], returns: Returns, head: &Rotating) -> Vec<Decoded> {
     decoded
 }
 
-fn packets_of(sensor: &Sensor, returns: Returns, scan: &Scan) -> Vec<Decoded> {
+fn packets_of(sensor: &SensorProfile, returns: Returns, scan: &Scan) -> Vec<Decoded> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.pcap");
     write(&path, Hashing::None, &revolution(sensor).unwrap(), returns, scan).unwrap();
@@ -107,7 +113,7 @@ fn packets_of(sensor: &Sensor, returns: Returns, scan: &Scan) -> Vec<Decoded> {
 
 /// The scan's points in the sensor's frame.
 fn in_sensor<'a>(scan: &'a Scan, pose: &'a Pose) -> impl Iterator<Item = DVec3> + 'a {
-    let sensor_from_world = pose.world_from_sensor.inverse();
+    let sensor_from_world = pose.rotation.inverse();
     scan.positions
         .iter()
         .map(move |p| sensor_from_world * (DVec3::from_array(p.map(f64::from)) - pose.position_m))
@@ -153,7 +159,7 @@ fn packets_decode_to_the_points_of_the_scan() {
 fn around_a_sensor_inside_a_box_every_beam_comes_back() {
     let mesh = meshes::cuboid(DVec3::splat(-6.0), DVec3::splat(6.0));
     let (sensor, pose) = (turning(600.0), pose(1.5));
-    let scan = scan(&Caster::Cpu(Effects::default()), &sensor, &mesh, &pose, Culling::On);
+    let scan = scan(&OpenCaster::Cpu(Effects::default()), &sensor, &mesh, &pose, Culling::On);
     assert_eq!(scan.len(), 57_870);
     let decoded = packets_of(&sensor, Returns::Strongest, &scan);
     assert_eq!(decoded.len(), 57_870);
@@ -173,7 +179,7 @@ fn culling_loses_no_beam_that_starts_beside_the_sensor() {
         // Near, 12 mm are a tenth of it.
         let mesh = meshes::mapped(&meshes::icosphere(2), |v| v * 0.1 * distance_m);
         let [culled, all] = [Culling::On, Culling::Off].map(|culling| {
-            scan(&Caster::Cpu(Effects::default()), &sensor, &mesh, &pose(distance_m), culling)
+            scan(&OpenCaster::Cpu(Effects::default()), &sensor, &mesh, &pose(distance_m), culling)
         });
         assert!(culled.len() > 20, "{}", culled.len());
         assert_eq!(culled, all, "{distance_m} m");
@@ -195,10 +201,11 @@ fn the_oracle_agrees_on_beams_that_start_beside_the_sensor() {
 #[test]
 fn a_sensor_that_packets_cannot_tell_is_refused() {
     for name in ["kinect-v2", "generic-static", "blainder-ultrapuck", "vlp16", "hdl64e"] {
-        let error = as_packets_tell(&Sensor::builtin(name).unwrap()).unwrap_err().to_string();
+        let error =
+            as_packets_tell(&SensorProfile::builtin(name).unwrap()).unwrap_err().to_string();
         assert!(error.contains("VLP-32C only"), "{name}: {error}");
     }
-    type Change = fn(&mut Sensor);
+    type Change = fn(&mut SensorProfile);
     let changes: [(Change, &str); 11] = [
         (|s| head_of(s).beam[7].elevation_deg += 0.001, "rotating.beam[7]: expected laser 7"),
         (|s| head_of(s).beam[7].azimuth_offset_deg = 0.0, "rotating.beam[7]: expected laser 7"),

@@ -3,15 +3,15 @@
 //! `sim-gpu/src/cpu`.
 
 use glam::DVec3;
-use sim_gpu::bvh::Builder;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::ray::{AMBIGUOUS, MISS};
-use sim_gpu::resolve::resolve;
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::Target;
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::ray::{AMBIGUOUS, MISS};
+use sim_gpu::internals::resolve::resolve;
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::Target;
 use test_support::need;
 use tests::adapter::{adapter, casters};
 use tests::casting::{at, beams, builtin, cast, hits, job, job_with, target, target_by};
@@ -22,7 +22,7 @@ use tests::meshes::{cube, icosphere, soup, together, torus};
 use tests::random::Random;
 
 /// Surfaces of many kinds: smooth, edged, open, overlapping, enclosing.
-fn surfaces() -> Vec<(&'static str, Mesh)> {
+fn surfaces() -> Vec<(&'static str, TriangleMesh)> {
     let room = tests::meshes::cuboid(DVec3::splat(-8.0), DVec3::splat(8.0));
     vec![
         ("sphere", icosphere(4)),

@@ -6,11 +6,11 @@ use std::path::Path;
 
 use glam::DVec3;
 use sim_gpu::effects::Effects;
-use sim_gpu::mesh::frame::{Normalize, to_world};
-use sim_gpu::mesh::tree::{MeshEntry, discover};
-use sim_gpu::mesh::validate::triangle_stats;
-use sim_gpu::mesh::{LoadedMesh, Mesh, load};
-use sim_gpu::pose::Pose;
+use sim_gpu::internals::mesh::frame::{Normalize, to_world};
+use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
+use sim_gpu::internals::mesh::validate::triangle_stats;
+use sim_gpu::internals::mesh::{LoadedMesh, TriangleMesh, load};
+use sim_gpu::internals::pose::Pose;
 use test_support::{need, shared_data};
 use tests::adapter::casters;
 use tests::casting::{builtin, job, target};
@@ -29,7 +29,7 @@ const MOST_AMBIGUOUS_OF_ALL: f64 = 0.02;
 
 /// Reads the meshes under `root` and checks what is true of each once it stands
 /// in the world.
-fn read_in_full(root: &Path, n_meshes: usize) -> Vec<(MeshEntry, Mesh, LoadedMesh)> {
+fn read_in_full(root: &Path, n_meshes: usize) -> Vec<(MeshEntry, TriangleMesh, LoadedMesh)> {
     let read = |entry: MeshEntry| {
         let name = &entry.relative;
         let loaded = load(&entry.path).unwrap_or_else(|error| panic!("{error}"));
@@ -52,7 +52,7 @@ fn read_in_full(root: &Path, n_meshes: usize) -> Vec<(MeshEntry, Mesh, LoadedMes
 
 /// Casts at every `every`-th mesh from the default view of the paper's set, 3 m
 /// away and 20 degrees above.
-fn assert_agreement(meshes: &[(MeshEntry, Mesh, LoadedMesh)], every: usize) {
+fn assert_agreement(meshes: &[(MeshEntry, TriangleMesh, LoadedMesh)], every: usize) {
     let pattern = builtin("vlp32c");
     let view = Pose::view(3.0, 20f64.to_radians(), 0.0, DVec3::ZERO);
     let casters = casters(&Effects::default());
@@ -83,7 +83,7 @@ fn modelnet_is_read_in_full_keeps_its_splits_and_agrees_with_the_oracle() {
         [("bathtub_0002", 700, 664), ("airplane_0002", 23322, 64290), ("guitar_0001", 8654, 11325)]
     {
         let (.., loaded) = meshes.iter().find(|(entry, ..)| entry.name == name).unwrap();
-        let Mesh { vertices, triangles } = &loaded.mesh;
+        let TriangleMesh { vertices, triangles } = &loaded.mesh;
         assert_eq!((vertices.len(), triangles.len()), (n_vertices, n_triangles), "{name}");
     }
     assert_agreement(&meshes, 1);

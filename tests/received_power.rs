@@ -6,14 +6,14 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Detection, Effects};
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
-use sim_gpu::scene::{Scene, cast};
-use sim_gpu::sensor::{DetectionLimit, Sensor};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
+use sim_gpu::internals::scene::{Scene, cast};
+use sim_gpu::internals::sensor::{DetectionLimit, SensorProfile};
 use std::fs;
 use tests::{adapter, casting, meshes};
 
@@ -22,14 +22,14 @@ const WALL_M: f64 = 10.0;
 
 /// A surface, from a sensor at the origin.
 struct Seen {
-    mesh: Mesh,
+    mesh: TriangleMesh,
     world_from_object: DAffine3,
     reflectivity: f32,
     retroreflection: f64,
 }
 
 impl Seen {
-    fn new(mesh: Mesh) -> Self {
+    fn new(mesh: TriangleMesh) -> Self {
         let world_from_object = DAffine3::IDENTITY;
         Self { mesh, world_from_object, reflectivity: 1.0, retroreflection: 0.0 }
     }
@@ -46,12 +46,12 @@ impl Seen {
         Self::new(meshes::mapped(&meshes::icosphere(5), |p| p * WALL_M))
     }
 
-    fn scan(&self, caster: &Caster) -> (Scan, Tally) {
+    fn scan(&self, caster: &OpenCaster) -> (Scan, Tally) {
         let target = casting::target(&self.mesh);
         let mut placed = PlacedTarget::new(&target);
         placed.world_from_object = self.world_from_object;
         (placed.reflectivity, placed.retroreflection) = (self.reflectivity, self.retroreflection);
-        let sensor = Sensor::builtin("vlp32c").unwrap();
+        let sensor = SensorProfile::builtin("vlp32c").unwrap();
         let pattern = sensor.pattern();
         let pose = Pose::look_at(DVec3::ZERO, DVec3::X).unwrap();
         let mut request = ScanRequest::new(&sensor, &pattern, pose);
@@ -69,7 +69,7 @@ impl Seen {
     }
 
     fn on_cpu(&self, detection: Option<Detection>) -> (Scan, Tally) {
-        self.scan(&Caster::Cpu(Effects { detection, ..Effects::default() }))
+        self.scan(&OpenCaster::Cpu(Effects { detection, ..Effects::default() }))
     }
 }
 
@@ -103,7 +103,7 @@ fn incidence_is_that_in_the_world_however_an_object_is_scaled() {
     // A plane through the x axis' point WALL_M, tilted by 45 degrees before it is stretched.
     let corners = [[1.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [-1.0, 1.0]];
     let vertices = corners.map(|[up, side]| DVec3::new(up, 20.0 * side, up)).to_vec();
-    let mesh = Mesh { vertices, triangles: vec![[0, 1, 2], [1, 3, 2]] };
+    let mesh = TriangleMesh { vertices, triangles: vec![[0, 1, 2], [1, 3, 2]] };
     let placed = DAffine3::from_translation(DVec3::X * WALL_M);
     let stretched = placed * DAffine3::from_scale(DVec3::new(1.0, 1.0, 4.0));
     let (scan, _) = Seen { world_from_object: stretched, ..Seen::new(mesh) }.on_cpu(None);
@@ -225,7 +225,7 @@ fn faces_return_light_as_their_materials_do() {
          [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n",
     );
     let scene = Scene::load(&folder.path().join("scene.toml")).unwrap();
-    let scan = &cast(&scene, &Caster::Cpu(scene.effects.clone()), Culling::On).unwrap()[0].scan;
+    let scan = &cast(&scene, &OpenCaster::Cpu(scene.effects.clone()), Culling::On).unwrap()[0].scan;
     let (intensities, bytes) =
         (scan.intensity.as_ref().unwrap(), scan.reflectivity.as_ref().unwrap());
     // Half of sRGB's range in linear light: ((0.5 + 0.055) / 1.055)^2.4.

@@ -6,11 +6,11 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::DVec3;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
+use sim_gpu::internals::sensor::SensorProfile;
 use tests::{adapter, casting, meshes};
 
 const STREAM: StreamKey = StreamKey([7, 11]);
@@ -19,7 +19,7 @@ const STREAM: StreamKey = StreamKey([7, 11]);
 const SENSOR: DVec3 = DVec3::new(3.0, 0.0, 0.0);
 
 /// What `sensor` measures of a unit sphere with all effects of `caster`.
-fn scan(caster: &Caster, sensor: &Sensor) -> (Scan, Tally) {
+fn scan(caster: &OpenCaster, sensor: &SensorProfile) -> (Scan, Tally) {
     let pattern = sensor.pattern();
     let target = casting::target(&meshes::icosphere(4));
     let mut placed = PlacedTarget::new(&target);
@@ -33,13 +33,13 @@ fn scan(caster: &Caster, sensor: &Sensor) -> (Scan, Tally) {
     (scanned.scan, scanned.tally)
 }
 
-fn vlp32c() -> Sensor {
-    Sensor::builtin("vlp32c").unwrap()
+fn vlp32c() -> SensorProfile {
+    SensorProfile::builtin("vlp32c").unwrap()
 }
 
 /// What a VLP-32C measures with `effects` by the CPU.
 fn on_cpu(effects: &Effects) -> (Scan, Tally) {
-    scan(&Caster::Cpu(effects.clone()), &vlp32c())
+    scan(&OpenCaster::Cpu(effects.clone()), &vlp32c())
 }
 
 /// A point from the sensor.
@@ -65,7 +65,7 @@ fn ranges(scan: &Scan) -> Vec<f64> {
 
 #[test]
 fn a_sensor_sees_nothing_outside_its_range() {
-    let caster = Caster::Cpu(Effects::default());
+    let caster = OpenCaster::Cpu(Effects::default());
     let everything = scan(&caster, &vlp32c()).1.points;
     let mut near = vlp32c();
     near.range.min_m = 2.2;
@@ -177,8 +177,8 @@ fn intensity_is_the_cosine_of_incidence_times_reflectivity() {
 
 #[test]
 fn modelnet40c_gives_768_points_on_rings_a_degree_apart() {
-    let sensor = Sensor::builtin("modelnet40c-lidar").unwrap();
-    let (scan, _) = scan(&Caster::Cpu(Effects::default()), &sensor);
+    let sensor = SensorProfile::builtin("modelnet40c-lidar").unwrap();
+    let (scan, _) = scan(&OpenCaster::Cpu(Effects::default()), &sensor);
     assert_eq!(scan.len(), 768);
     let mut polar_deg: Vec<f64> = scan
         .positions

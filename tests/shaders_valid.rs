@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use naga::TypeInner;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use sim_gpu::bvh::{LeafTriangle, Node};
-use sim_gpu::cpu::effects::append_outputs;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
-use sim_gpu::gpu::{View, compose};
-use sim_gpu::ray::TraceRay;
+use sim_gpu::internals::bvh::{LeafTriangle, Node};
+use sim_gpu::internals::cpu::effects::append_outputs;
+use sim_gpu::internals::gpu::{View, compose};
+use sim_gpu::internals::ray::TraceRay;
 
 /// What every variant is made of.
 const TRACE: [&str; 6] = [

@@ -8,20 +8,20 @@ use std::path::Path;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::frame::{Normalize, to_world};
-use sim_gpu::mesh::tree::discover;
-use sim_gpu::mesh::validate::triangle_stats;
-use sim_gpu::mesh::{Mesh, load};
-use sim_gpu::pose::Pose;
-use sim_gpu::scene::{Scene, cast};
-use sim_gpu::sensor::{Sensor, Views};
-use sim_gpu::simplify::{Viewpoint, distance_to_surface, resolved_m, simplified};
-use sim_gpu::surface_points::area_uniform;
-use sim_gpu::target::Target;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::frame::{Normalize, to_world};
+use sim_gpu::internals::mesh::tree::discover;
+use sim_gpu::internals::mesh::validate::triangle_stats;
+use sim_gpu::internals::mesh::{TriangleMesh, load};
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scene::{Scene, cast};
+use sim_gpu::internals::sensor::{SensorProfile, Views};
+use sim_gpu::internals::simplify::{Viewpoint, distance_to_surface, resolved_m, simplified};
+use sim_gpu::internals::surface_points::area_uniform;
+use sim_gpu::internals::target::Target;
 use test_support::{need, shared_data};
 use tests::casting::{builtin, job, target};
 use tests::meshes;
@@ -36,13 +36,13 @@ fn views() -> Vec<Pose> {
 }
 
 /// What `--simplify auto` allows for a mesh that the VLP-32C sees from there.
-fn auto_m(mesh: &Mesh) -> f64 {
-    let sensor = Sensor::builtin("vlp32c").unwrap();
+fn auto_m(mesh: &TriangleMesh) -> f64 {
+    let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let positions = views().iter().map(|view| view.position_m).collect();
     resolved_m(mesh, 1.0, &[Viewpoint { sensor: &sensor, positions }])
 }
 
-fn simplify(mesh: &Mesh, bound_m: f64) -> Option<Mesh> {
+fn simplify(mesh: &TriangleMesh, bound_m: f64) -> Option<TriangleMesh> {
     simplified(mesh, &triangle_stats(mesh).kept, bound_m).unwrap()
 }
 
@@ -59,7 +59,12 @@ fn drawn(target: &Target, n: usize) -> Vec<DVec3> {
 }
 
 /// Both surfaces lie within `bound_m` of each other, by points drawn of both.
-fn assert_near(mesh: &Mesh, fewer: &Mesh, bound_m: f64, what: &str) -> (Target, Target) {
+fn assert_near(
+    mesh: &TriangleMesh,
+    fewer: &TriangleMesh,
+    bound_m: f64,
+    what: &str,
+) -> (Target, Target) {
     let (whole, fewer) = (target(mesh), target(fewer));
     for (name, from, to) in [("added", &fewer, &whole), ("lost", &whole, &fewer)] {
         let farthest = farthest_m(&drawn(from, 20_000), to);
@@ -72,8 +77,8 @@ fn assert_near(mesh: &Mesh, fewer: &Mesh, bound_m: f64, what: &str) -> (Target, 
 fn scanned(target: &Target, pose: &Pose) -> Vec<DVec3> {
     let pattern = builtin("vlp32c");
     let job = job(target, pose, &pattern);
-    let hits = tests::casting::hits(&Caster::Cpu(Effects::default()), &job, &pattern);
-    let beam = |beam: u32| pose.world_from_sensor * pattern.directions[beam as usize];
+    let hits = tests::casting::hits(&OpenCaster::Cpu(Effects::default()), &job, &pattern);
+    let beam = |beam: u32| pose.rotation * pattern.directions[beam as usize];
     hits.hits.iter().map(|hit| pose.position_m + beam(hit.beam) * hit.range_m).collect()
 }
 
@@ -212,10 +217,10 @@ fn a_soup_of_triangles_is_left_or_kept_within_the_bound() {
 #[test]
 fn what_has_nothing_to_lose_is_left_as_it_is() {
     let triangle =
-        Mesh { vertices: vec![DVec3::X, DVec3::Y, DVec3::Z], triangles: vec![[0, 1, 2]] };
+        TriangleMesh { vertices: vec![DVec3::X, DVec3::Y, DVec3::Z], triangles: vec![[0, 1, 2]] };
     assert_eq!(simplify(&triangle, 1e-3), None);
     assert_eq!(simplify(&triangle, f64::INFINITY), None, "it would vanish");
-    assert_eq!(simplify(&Mesh::default(), 1e-3), None);
+    assert_eq!(simplify(&TriangleMesh::default(), 1e-3), None);
     for bound in [0.0, -1.0, f64::NAN] {
         assert_eq!(simplify(&meshes::icosphere(4), bound), None);
     }
@@ -241,7 +246,7 @@ const SCENE: &str = "[[object]]\nmesh = \"fine.off\"\nup = \"z\"\nscale = [1, 1,
 fn a_scene_says_which_objects_are_simplified() {
     let folder = tempfile::tempdir().unwrap();
     edgepuck_shapes::write_off(&meshes::icosphere(5), &folder.path().join("fine.off")).unwrap();
-    let caster = Caster::Cpu(Effects::default());
+    let caster = OpenCaster::Cpu(Effects::default());
     let scan = |scene_key: &str, object_key: &str| {
         let object = format!("{object_key}\nup =");
         let text = format!("{scene_key}\n{}", SCENE.replacen("up =", &object, 1));

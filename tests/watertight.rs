@@ -3,9 +3,9 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::mesh::TriangleMesh;
 use tests::adapter::casters;
 use tests::adversarial::{
     SENSORS, aimed, corners_and_midpoints, from_inside, missed, moved_sphere,
@@ -16,7 +16,7 @@ use tests::meshes::{cube, tiled_cube, unmerged};
 use tests::random::Random;
 
 /// Casts from `SENSORS` places inside at all corners and edges; how many rays.
-fn cast_from_inside(mesh: &Mesh, expected: usize) {
+fn cast_from_inside(mesh: &TriangleMesh, expected: usize) {
     let target = &target(mesh);
     assert_eq!(corners_and_midpoints(target).len() * SENSORS, expected);
     let mut lost: Vec<(&str, [usize; 2])> = Vec::new();

@@ -5,23 +5,23 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::DVec3;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{
     Detection, Dropout, Effects, FogModel, Footprint, Noise, NoiseModel, ReturnMode, Volume,
     Weather,
 };
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
-use sim_gpu::sensor::{DetectionLimit, Sensor};
-use sim_gpu::weather::Medium;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
+use sim_gpu::internals::sensor::{DetectionLimit, SensorProfile};
+use sim_gpu::internals::weather::Medium;
 use tests::{adapter, casting, meshes};
 
 const WALL_M: f64 = 30.0;
 
 /// The inside of a ball around the sensor: every beam meets it at one range, squarely.
-fn ball() -> Mesh {
+fn ball() -> TriangleMesh {
     meshes::mapped(&meshes::icosphere(5), |p| p * WALL_M)
 }
 
@@ -36,19 +36,24 @@ fn rain(mm_h: f64) -> Weather {
     Weather { rain_mm_h: Some(mm_h), ..Weather::default() }
 }
 
-fn scan(caster: &Caster, mesh: &Mesh, reflectivity: f32, culling: Culling) -> (Scan, Tally) {
+fn scan(
+    caster: &OpenCaster,
+    mesh: &TriangleMesh,
+    reflectivity: f32,
+    culling: Culling,
+) -> (Scan, Tally) {
     scan_with(caster, mesh, reflectivity, culling, None)
 }
 
 /// A scan with these `effects` of the caster's, or all of them.
 fn scan_with(
-    caster: &Caster,
-    mesh: &Mesh,
+    caster: &OpenCaster,
+    mesh: &TriangleMesh,
     reflectivity: f32,
     culling: Culling,
     effects: Option<Effects>,
 ) -> (Scan, Tally) {
-    let sensor = Sensor::builtin("vlp32c").unwrap();
+    let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let pattern = caster.effects().widen(sensor.pattern(), &sensor).unwrap();
     let target = casting::target(mesh);
     let mut placed = PlacedTarget::new(&target);
@@ -64,7 +69,7 @@ fn scan_with(
 }
 
 fn on_cpu(effects: &Effects, reflectivity: f32) -> (Scan, Tally) {
-    scan(&Caster::Cpu(effects.clone()), &ball(), reflectivity, Culling::On)
+    scan(&OpenCaster::Cpu(effects.clone()), &ball(), reflectivity, Culling::On)
 }
 
 fn count(scan: &Scan, medium: Medium) -> usize {
@@ -183,8 +188,8 @@ fn by_hahners_model_beams_beyond_a_range_become_fog_whatever_they_meet() {
         || meshes::mapped(&meshes::icosphere(0), |p| DVec3::new(WALL_M, 20.0 * p.y, 9.0 * p.z));
     for footprint in [None, Some(SEVEN_RAYS)] {
         for reflectivity in [0.2, 1.0] {
-            let of = |visibility_m, mesh: &Mesh| {
-                let caster = Caster::Cpu(in_hahners_fog(visibility_m, footprint));
+            let of = |visibility_m, mesh: &TriangleMesh| {
+                let caster = OpenCaster::Cpu(in_hahners_fog(visibility_m, footprint));
                 scan(&caster, mesh, reflectivity, Culling::On).0
             };
             let thin = of(80.0, &ball());
@@ -208,8 +213,8 @@ fn rays_for_scans_of_wide_beams_are_none_of_narrow_ones_in_weather() {
         for weather in [weather, hahner] {
             let narrow = in_weather(weather);
             let wide = Effects { footprint: Some(SEVEN_RAYS), ..narrow.clone() };
-            let alone = scan(&Caster::Cpu(narrow.clone()), &mesh, 0.5, Culling::On);
-            let among = scan_with(&Caster::Cpu(wide), &mesh, 0.5, Culling::On, Some(narrow));
+            let alone = scan(&OpenCaster::Cpu(narrow.clone()), &mesh, 0.5, Culling::On);
+            let among = scan_with(&OpenCaster::Cpu(wide), &mesh, 0.5, Culling::On, Some(narrow));
             assert!(alone.0 == among.0 && alone.1 == among.1, "{:?}, {:?}", alone.1, among.1);
         }
     }
@@ -252,7 +257,7 @@ fn fog_and_a_surface_are_one_return_where_the_sensor_cannot_tell_them_apart() {
     let effects = Effects { returns: Some(ReturnMode::Dual), ..in_weather(weather) };
     let of = |range_m: f64| {
         let mesh = meshes::mapped(&meshes::icosphere(5), |p| p * range_m);
-        scan(&Caster::Cpu(effects.clone()), &mesh, 0.5, Culling::On).0
+        scan(&OpenCaster::Cpu(effects.clone()), &mesh, 0.5, Culling::On).0
     };
     let (near, far) = (of(2.0), of(4.0));
     assert!(near.len() > 50_000 && pairs(&near).is_empty(), "the sensor's own metre");
@@ -265,7 +270,7 @@ fn beams_that_meet_nothing_return_from_the_air_unless_they_are_told_not_to() {
     let mesh = meshes::mapped(&meshes::icosphere(3), |p| p * 2.0 + DVec3::X * 15.0);
     let with = |empty_beams| {
         let weather = Weather { empty_beams, ..rain(100.0) };
-        scan(&Caster::Cpu(in_weather(weather)), &mesh, 0.5, Culling::On)
+        scan(&OpenCaster::Cpu(in_weather(weather)), &mesh, 0.5, Culling::On)
     };
     let (all, some) = (with(None), with(Some(false)));
     assert_eq!(with(Some(true)), all);

@@ -2,7 +2,7 @@
 
 use crate::Outcome;
 use crate::caster::HOW_TO_GET_VULKAN;
-use sim_gpu::gpu::{AdapterKind, list_adapters};
+use sim_gpu::internals::gpu::{AdapterKind, list_adapters};
 use std::io::Write;
 
 /// Lists every adapter, best first, and the CPU caster.

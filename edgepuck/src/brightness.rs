@@ -2,7 +2,7 @@
 
 use crate::Usage;
 use formats::Scan;
-use sim_gpu::config::within;
+use sim_gpu::internals::config::within;
 use std::path::Path;
 
 /// Flags about the meaning of a file's intensities.

@@ -1,10 +1,10 @@
 //! Opens the adapter that a command line asks for.
 
 use anyhow::Context;
-use sim_gpu::caster::AdapterRequest;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::Culling;
+use sim_gpu::internals::caster::AdapterRequest;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
 
 /// What a GPU may lack.
 pub const HOW_TO_GET_VULKAN: &str = "a GPU needs a Vulkan driver, which on Debian or Ubuntu \
@@ -25,17 +25,18 @@ pub struct CasterArgs {
 
 impl CasterArgs {
     /// Opens the adapter for `effects` and says which it is.
-    pub fn open(&self, effects: &Effects) -> anyhow::Result<Caster> {
+    pub fn open(&self, effects: &Effects) -> anyhow::Result<OpenCaster> {
         if self.adapter != AdapterRequest::Auto {
-            let caster = Caster::open(&self.adapter, effects).context("cannot open the adapter")?;
+            let caster =
+                OpenCaster::open(&self.adapter, effects).context("cannot open the adapter")?;
             eprintln!("Casting on {}.", caster.name());
             return Ok(caster);
         }
-        let (caster, passed_over) = Caster::open_best(effects);
+        let (caster, passed_over) = OpenCaster::open_best(effects);
         for error in &passed_over {
             eprintln!("Skipped an adapter: {error}.");
         }
-        if matches!(caster, Caster::Cpu(_)) {
+        if matches!(caster, OpenCaster::Cpu(_)) {
             eprintln!("No GPU was found, so the CPU casts.");
         } else {
             eprintln!("Casting on {}.", caster.name());

@@ -5,7 +5,7 @@ use crate::{Outcome, Usage};
 use formats::atomic;
 use glam::DVec3;
 use sim_gpu::glam;
-use sim_gpu::sensor::{BeamPattern, Layout, Sensor, builtin_names};
+use sim_gpu::internals::sensor::{BeamPattern, Layout, SensorProfile, builtin_names};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub struct ProfileArgs {
 pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     let Some(name) = &args.sensor else {
         for name in builtin_names() {
-            let sensor = Sensor::builtin(name).expect("invariant: a built-in name");
+            let sensor = SensorProfile::builtin(name).expect("invariant: a built-in name");
             println!("{name:<20} {}", sensor.description);
         }
         return Ok(Outcome::Success);
@@ -39,7 +39,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
         let found = file.display();
         return Err(Usage(format!("--beams: expected a name with .csv, found {found}")).into());
     }
-    let sensor = Sensor::resolve(name)?;
+    let sensor = SensorProfile::resolve(name)?;
     let pattern = sensor.pattern();
     print!("{}", described(&sensor, &pattern));
     for oddity in oddities(&sensor, &pattern) {
@@ -52,7 +52,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
 }
 
 /// A description of the sensor's scans, with a line for each property.
-fn described(sensor: &Sensor, pattern: &BeamPattern) -> String {
+fn described(sensor: &SensorProfile, pattern: &BeamPattern) -> String {
     let mut text = format!("{}: {}\n", sensor.name, sensor.description);
     let mut line = |name: &str, value: String| {
         writeln!(text, "{name:<18} {value}").expect("invariant: a string takes all");
@@ -102,7 +102,7 @@ fn described(sensor: &Sensor, pattern: &BeamPattern) -> String {
 }
 
 /// Warnings about values of a valid profile that are probably mistakes.
-fn oddities(sensor: &Sensor, pattern: &BeamPattern) -> Vec<String> {
+fn oddities(sensor: &SensorProfile, pattern: &BeamPattern) -> Vec<String> {
     let mut found = Vec::new();
     if sensor.sources.is_empty() {
         found.push("sources: expected the sources of the numbers, found none".to_owned());
@@ -126,7 +126,7 @@ fn oddities(sensor: &Sensor, pattern: &BeamPattern) -> Vec<String> {
     }
     if let Layout::Rotating(head) = &sensor.layout {
         for (i, beam) in head.beam.iter().enumerate() {
-            let same = |other: &&sim_gpu::sensor::Beam| {
+            let same = |other: &&sim_gpu::internals::sensor::Beam| {
                 other.elevation_deg == beam.elevation_deg
                     && other.azimuth_offset_deg == beam.azimuth_offset_deg
             };

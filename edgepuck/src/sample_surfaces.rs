@@ -3,9 +3,9 @@
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
 use edgepuck_dataset::surfaces::{SurfaceConfig, write_surfaces};
-use sim_gpu::mesh::frame::{Normalize, Up};
-use sim_gpu::mesh::tree::discover;
-use sim_gpu::sensor::Views;
+use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::tree::discover;
+use sim_gpu::internals::sensor::Views;
 use std::path::PathBuf;
 
 /// Flags of `sample-surfaces`.

@@ -7,9 +7,9 @@ use formats::atomic;
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::{self, Returns};
-use sim_gpu::packets;
-use sim_gpu::scene::{Scene, SceneScan, cast};
-use sim_gpu::simplify::Simplify;
+use sim_gpu::internals::packets;
+use sim_gpu::internals::scene::{Scene, SceneScan, cast};
+use sim_gpu::internals::simplify::Simplify;
 use std::path::{Path, PathBuf};
 
 /// Flags of `scan`.

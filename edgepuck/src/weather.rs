@@ -10,8 +10,8 @@ use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
 use sim_gpu::effects::{Effects, FogModel, Weather};
 use sim_gpu::glam;
-use sim_gpu::sensor::Sensor;
-use sim_gpu::weather::{Air, Fates, Medium, in_weather};
+use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::internals::weather::{Air, Fates, Medium, in_weather};
 use std::path::PathBuf;
 
 /// Flags of `weather`.
@@ -74,7 +74,7 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
         return Err(Usage("expected one of --rain, --snow, --fog and --haze".to_owned()).into());
     }
     args.brightness.check()?;
-    let sensor = Sensor::resolve(&args.profile)?;
+    let sensor = SensorProfile::resolve(&args.profile)?;
     let asked = Effects { weather: Some(Box::new(weather.clone())), ..Effects::default() };
     let effects = asked.for_sensor(&sensor).map_err(|error| usage(&error))?;
     let limit = effects.detection.and_then(|detection| detection.limit);

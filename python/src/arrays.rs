@@ -8,7 +8,7 @@ use numpy::ndarray::Array2;
 use numpy::{Element, IntoPyArray, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_gpu::pose::Pose;
+use sim_gpu::internals::pose::Pose;
 
 /// `[n, 3]`.
 pub fn vectors(py: Python<'_>, vectors: Vec<[f32; 3]>) -> PyResult<Bound<'_, PyAny>> {

@@ -7,7 +7,7 @@ use formats::Split;
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray1, PyArray3};
 use pyo3::prelude::*;
-use sim_gpu::mesh::tree::discover;
+use sim_gpu::internals::mesh::tree::discover;
 use std::path::PathBuf;
 
 /// Clouds, `[n, points, 3]`, and their classes, `[n]`.

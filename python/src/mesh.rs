@@ -5,10 +5,10 @@ use crate::process;
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use sim_gpu::bvh::Builder;
-use sim_gpu::mesh::frame::{Normalize, Up, to_world};
-use sim_gpu::mesh::{self, LoadedMesh};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
+use sim_gpu::internals::mesh::{self, LoadedMesh};
+use sim_gpu::internals::target::{Surface, Target};
 use std::path::PathBuf;
 
 /// A mesh in the world's frame, with its tree.

@@ -8,8 +8,8 @@ use crate::error::{raised, raised_with_causes};
 use edgepuck_program::Outcome;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use sim_gpu::caster::{AdapterRequest, Caster};
 use sim_gpu::effects::Effects;
+use sim_gpu::internals::caster::{AdapterRequest, Caster};
 use std::ffi::OsString;
 use std::mem;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -132,7 +132,7 @@ impl LazyCaster {
 /// The names of the adapters that can cast, the CPU last.
 #[pyfunction]
 pub fn adapters(py: Python<'_>) -> Vec<String> {
-    let found = py.detach(sim_gpu::gpu::list_adapters);
+    let found = py.detach(sim_gpu::internals::gpu::list_adapters);
     let names = found.into_iter().map(|adapter| adapter.name);
     names.chain(["cpu".to_owned()]).collect()
 }

@@ -8,8 +8,8 @@ use edgepuck_segment::Settings;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sim_gpu::job::Culling;
-use sim_gpu::scene::{Scene, cast};
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::scene::{Scene, cast};
 use std::path::PathBuf;
 
 /// The scenes of a recipe.

@@ -12,15 +12,15 @@ use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::effects::{Effects, Footprint, Intensity};
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{ScanRequest, scan};
-use sim_gpu::sensor::BeamPattern;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{ScanRequest, scan};
+use sim_gpu::internals::sensor::BeamPattern;
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// A sensor and its beams.
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
 pub struct Sensor {
-    sensor: sim_gpu::sensor::Sensor,
+    sensor: sim_gpu::internals::sensor::Sensor,
     pattern: OnceLock<Arc<BeamPattern>>,
     /// The rays of its beams for the footprint that was asked for last.
     widened: Mutex<Option<(Footprint, Arc<BeamPattern>)>>,
@@ -32,7 +32,7 @@ impl Sensor {
     /// A built-in sensor by its name, or the profile in a file.
     #[new]
     fn new(name: &str, adapter: &str) -> PyResult<Self> {
-        let sensor = sim_gpu::sensor::Sensor::resolve(name).map_err(raised)?;
+        let sensor = sim_gpu::internals::sensor::Sensor::resolve(name).map_err(raised)?;
         let (pattern, widened) = (OnceLock::new(), Mutex::new(None));
         Ok(Self { sensor, pattern, widened, caster: LazyCaster::new(adapter) })
     }
@@ -170,6 +170,6 @@ fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
     if !is_rotation {
         return Err(raised("pose: expected a rotation in the first three rows and columns"));
     }
-    let world_from_sensor = DQuat::from_mat3(&rotation).normalize();
-    Ok(Pose { position_m: DVec3::new(x, y, z), world_from_sensor })
+    let rotation = DQuat::from_mat3(&rotation).normalize();
+    Ok(Pose { position_m: DVec3::new(x, y, z), rotation })
 }

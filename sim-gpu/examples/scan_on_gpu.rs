@@ -5,16 +5,16 @@
 use std::error::Error;
 use std::path::Path;
 
-use sim_gpu::caster::{AdapterRequest, Caster};
 use sim_gpu::effects::{Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::formats::rng::StreamKey;
 use sim_gpu::formats::scan::Attribute;
 use sim_gpu::glam::DVec3;
-use sim_gpu::mesh::frame::Normalize;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{ScanRequest, scan_many};
-use sim_gpu::sensor::Sensor;
-use sim_gpu::target::Target;
+use sim_gpu::internals::caster::{AdapterRequest, Caster};
+use sim_gpu::internals::mesh::frame::Normalize;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{ScanRequest, scan_many};
+use sim_gpu::internals::sensor::Sensor;
+use sim_gpu::internals::target::Target;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("usage: scan_on_gpu MESH")?;

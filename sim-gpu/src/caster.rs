@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::str::FromStr;
 
 /// A way of casting.
-pub enum Caster {
+pub enum OpenCaster {
     /// The CPU, with these effects.
     Cpu(Effects),
     /// A GPU, or software Vulkan.
@@ -53,7 +53,7 @@ impl FromStr for AdapterRequest {
     }
 }
 
-impl Caster {
+impl OpenCaster {
     /// The caster that answers `request` and models `effects`.
     ///
     /// # Errors
@@ -154,7 +154,7 @@ impl Caster {
     /// Casts `jobs` and waits.
     ///
     /// # Errors
-    /// As [`Caster::submit`].
+    /// As [`OpenCaster::submit`].
     pub fn cast(&self, jobs: &[CastJob]) -> Result<Vec<Cast>, CastError> {
         self.submit(jobs)?.wait()
     }

@@ -19,7 +19,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive, within};
-use crate::sensor::{BeamPattern, LARGEST_M, Sensor};
+use crate::sensor::{BeamPattern, LARGEST_M, SensorProfile};
 
 pub use detection::Detection;
 pub use footprint::{Footprint, ReturnMode};
@@ -208,7 +208,7 @@ impl Effects {
     ///
     /// # Errors
     /// If they refer to a quantum, a detection limit or a beam shape that the sensor does not state.
-    pub fn for_sensor(&self, sensor: &Sensor) -> Result<Self, InvalidValue> {
+    pub fn for_sensor(&self, sensor: &SensorProfile) -> Result<Self, InvalidValue> {
         let mut resolved = self.clone();
         if let Some(quantum) = &mut resolved.quantum
             && quantum.step_m.is_none()
@@ -247,7 +247,7 @@ impl Effects {
     pub fn widen(
         &self,
         pattern: BeamPattern,
-        sensor: &Sensor,
+        sensor: &SensorProfile,
     ) -> Result<BeamPattern, InvalidValue> {
         let Some(footprint) = self.footprint else { return Ok(pattern) };
         let own = footprint.for_sensor(sensor)?;

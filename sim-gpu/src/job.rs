@@ -99,18 +99,18 @@ pub struct Cast {
 mod tests {
     use super::*;
     use crate::bvh::Builder;
-    use crate::mesh::Mesh;
+    use crate::mesh::TriangleMesh;
     use crate::pose::Pose;
-    use crate::sensor::Sensor;
+    use crate::sensor::SensorProfile;
     use crate::target::Surface;
     use glam::{DAffine3, DVec3};
 
     #[test]
     fn casters_make_the_rays_where_integers_are_exact_enough() {
         let vertices = vec![DVec3::X, DVec3::Y, DVec3::Z];
-        let surface = Surface::new(Mesh { vertices, triangles: vec![[0, 1, 2]] }, vec![0]);
+        let surface = Surface::new(TriangleMesh { vertices, triangles: vec![[0, 1, 2]] }, vec![0]);
         let target = Target::new(surface, Builder::Sah);
-        let pattern = Sensor::builtin("generic-static").unwrap().pattern();
+        let pattern = SensorProfile::builtin("generic-static").unwrap().pattern();
         let mut beside = pattern.clone();
         beside.starts_m = vec![DVec3::Z * 0.01; beside.len()];
         let stretched = DAffine3::from_scale(DVec3::new(1.0, 1.0, 2.0));

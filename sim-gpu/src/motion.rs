@@ -41,9 +41,8 @@ impl Motion {
     #[must_use]
     pub fn world_from_object_at(&self, time_s: f64) -> DAffine3 {
         self.object.as_ref().map_or(self.world_from_object, |object| {
-            let Pose { position_m, world_from_sensor } = object.at(self.start_s + time_s);
-            DAffine3::from_rotation_translation(world_from_sensor, position_m)
-                * self.world_from_object
+            let Pose { position_m, rotation } = object.at(self.start_s + time_s);
+            DAffine3::from_rotation_translation(rotation, position_m) * self.world_from_object
         })
     }
 
@@ -108,7 +107,7 @@ impl Motion {
         let from_sensor = self.world_from_object_at(0.0).transform_point3(centre) - pose.position_m;
         let reach_m = radius_m + sensor_m + object_m + around_m + pattern.farthest_start_m();
         let sine = reach_m / from_sensor.length();
-        let Some(axis) = (pose.world_from_sensor.inverse() * from_sensor).try_normalize() else {
+        let Some(axis) = (pose.rotation.inverse() * from_sensor).try_normalize() else {
             return everything;
         };
         if sine.is_nan() || sine >= 1.0 {

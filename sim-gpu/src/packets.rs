@@ -8,7 +8,7 @@ use formats::vlp32c::{
 
 use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, NoiseModel, ReturnMode};
-use crate::sensor::{Layout, Rotating, Sensor};
+use crate::sensor::{Layout, Rotating, SensorProfile};
 
 /// The attributes that [`formats::vlp32c`] reads, with these `effects` and these `wanted` attributes:
 /// the calibrated reflectivity or else the intensity, if there is either.
@@ -27,7 +27,7 @@ pub fn attributes(effects: &Effects, wanted: &AttributeSet) -> AttributeSet {
 ///
 /// # Errors
 /// If the sensor is not a VLP-32C, or its packets cannot encode its scans.
-pub fn as_packets_tell(sensor: &Sensor) -> Result<Sensor, InvalidValue> {
+pub fn as_packets_tell(sensor: &SensorProfile) -> Result<SensorProfile, InvalidValue> {
     let mut sensor = sensor.clone();
     if let Layout::Rotating(rotating) = &mut sensor.layout {
         rotating.beam_crossing_m.get_or_insert(BEAM_CROSSING_M);
@@ -41,7 +41,7 @@ pub fn as_packets_tell(sensor: &Sensor) -> Result<Sensor, InvalidValue> {
 ///
 /// # Errors
 /// As [`as_packets_tell`]; if the beams are not as packets encode them.
-pub fn revolution(sensor: &Sensor) -> Result<Revolution, InvalidValue> {
+pub fn revolution(sensor: &SensorProfile) -> Result<Revolution, InvalidValue> {
     let Layout::Rotating(rotating) = &sensor.layout else {
         return Err(no_packets("rotating", "missing"));
     };
@@ -114,7 +114,9 @@ pub fn settle_returns(
 
 /// Checks that the head is a VLP-32C's: packets name lasers, whose angles are in drivers' tables.
 fn check_head(rotating: &Rotating) -> Result<(), InvalidValue> {
-    let Some(Sensor { layout: Layout::Rotating(vlp32c), .. }) = Sensor::builtin("vlp32c") else {
+    let Some(SensorProfile { layout: Layout::Rotating(vlp32c), .. }) =
+        SensorProfile::builtin("vlp32c")
+    else {
         unreachable!("invariant: the built-in vlp32c rotates");
     };
     if rotating.sequence_us != SEQUENCE_US {

@@ -25,7 +25,7 @@ pub struct Pose {
     /// Turns vectors of the sensor frame into the world frame; of unit length,
     /// written `[x, y, z, w]`.
     #[serde(rename = "quaternion_xyzw")]
-    pub world_from_sensor: DQuat,
+    pub rotation: DQuat,
 }
 
 impl Pose {
@@ -56,7 +56,7 @@ impl Pose {
         let level = to_target.x.hypot(to_target.y);
         let azimuth_rad = if level == 0.0 { 0.0 } else { (-to_target.y).atan2(-to_target.x) };
         let elevation_rad = (-to_target.z).atan2(level);
-        Ok(Self { position_m, world_from_sensor: facing_inwards(elevation_rad, azimuth_rad) })
+        Ok(Self { position_m, rotation: facing_inwards(elevation_rad, azimuth_rad) })
     }
 
     /// The sensor that stands `distance_m` from `target_m` at this elevation
@@ -66,7 +66,7 @@ impl Pose {
     pub fn view(distance_m: f64, elevation_rad: f64, azimuth_rad: f64, target_m: DVec3) -> Self {
         Self {
             position_m: target_m + distance_m * outwards(elevation_rad, azimuth_rad),
-            world_from_sensor: facing_inwards(elevation_rad, azimuth_rad),
+            rotation: facing_inwards(elevation_rad, azimuth_rad),
         }
     }
 }

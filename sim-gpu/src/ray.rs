@@ -65,10 +65,10 @@ impl RayFrame {
     pub fn new(surface: &Surface, world_from_object: &DAffine3, pose: &Pose) -> Self {
         let object_from_world = world_from_object.matrix3.inverse();
         let in_object = object_from_world * (pose.position_m - world_from_object.translation);
-        let world_from_sensor = DMat3::from_quat(pose.world_from_sensor);
+        let rotation = DMat3::from_quat(pose.rotation);
         Self {
             origin: surface.frame.to_unit(in_object),
-            unit_from_sensor: object_from_world * world_from_sensor * surface.frame.scale.recip(),
+            unit_from_sensor: object_from_world * rotation * surface.frame.scale.recip(),
             radius: surface.radius,
         }
     }

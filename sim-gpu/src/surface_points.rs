@@ -56,7 +56,7 @@ pub fn seen_from(target: &Target, sensor: DVec3, points: &[DVec3]) -> Vec<bool> 
 mod tests {
     use super::*;
     use crate::bvh::Builder;
-    use crate::mesh::Mesh;
+    use crate::mesh::TriangleMesh;
 
     /// A unit square at x = 0, and one of half its side at x = 1, both in y, z.
     fn squares() -> Surface {
@@ -66,7 +66,7 @@ mod tests {
         };
         let vertices = [square(0.0, 1.0), square(1.0, 0.5)].concat();
         let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
-        Surface::new(Mesh { vertices, triangles }, vec![0, 1, 2, 3])
+        Surface::new(TriangleMesh { vertices, triangles }, vec![0, 1, 2, 3])
     }
 
     #[test]
@@ -100,9 +100,9 @@ mod tests {
     #[test]
     fn a_surface_without_area_has_no_points() {
         let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::X * 2.0];
-        let surface = Surface::new(Mesh { vertices, triangles: vec![[0, 1, 2]] }, vec![0]);
+        let surface = Surface::new(TriangleMesh { vertices, triangles: vec![[0, 1, 2]] }, vec![0]);
         assert_eq!(area_uniform(&surface, 5, StreamKey::new(0, "test", 0)), None);
-        let empty = Surface::new(Mesh::default(), Vec::new());
+        let empty = Surface::new(TriangleMesh::default(), Vec::new());
         assert_eq!(area_uniform(&empty, 5, StreamKey::new(0, "test", 0)), None);
     }
 }

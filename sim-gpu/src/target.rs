@@ -3,7 +3,7 @@
 use crate::bvh::{Builder, Bvh};
 use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::validate::triangle_stats;
-use crate::mesh::{Mesh, MeshError, load};
+use crate::mesh::{MeshError, TriangleMesh, load};
 use glam::DVec3;
 use std::path::Path;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ impl Surface {
     /// The triangles of `mesh` that a ray can meet: all that are neither
     /// degenerate nor duplicates.
     #[must_use]
-    pub fn of_mesh(mesh: Mesh) -> Self {
+    pub fn of_mesh(mesh: TriangleMesh) -> Self {
         let kept = triangle_stats(&mesh).kept;
         Self::new(mesh, kept)
     }
@@ -60,7 +60,7 @@ impl Surface {
     /// `mesh::validate::triangle_stats` lists those that are neither degenerate nor
     /// duplicates.
     #[must_use]
-    pub fn new(mesh: Mesh, kept: Vec<u32>) -> Self {
+    pub fn new(mesh: TriangleMesh, kept: Vec<u32>) -> Self {
         let used = kept
             .iter()
             .flat_map(|&t| mesh.triangles[t as usize])

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, dvec3};
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, Precision};
-use sim_gpu::caster::Caster;
-use sim_gpu::job::Culling;
-use sim_gpu::scene::{Scene, cast};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::scene::{Scene, cast};
 use tests::adapter::casters;
 
 /// How far a point may be from where it is at the origin, from the sensor, metres.
@@ -77,7 +77,7 @@ fn assets() -> PathBuf {
 }
 
 /// The points in the world.
-fn scan(scene: &Scene, caster: &Caster) -> Vec<DVec3> {
+fn scan(scene: &Scene, caster: &OpenCaster) -> Vec<DVec3> {
     let scan = &cast(scene, caster, Culling::On).unwrap()[0].scan;
     let origin = DVec3::from_array(scan.origin);
     let in_world = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from)) + origin;

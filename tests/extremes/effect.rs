@@ -4,9 +4,9 @@ use formats::scan::{Attribute, Column};
 use glam::DVec3;
 use serde::Deserialize;
 use sim_gpu::effects::Effects;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{PlacedTarget, ScanRequest, scan_objects};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
+use sim_gpu::internals::sensor::SensorProfile;
 use tests::adapter::casters;
 use tests::{casting, meshes};
 
@@ -54,7 +54,7 @@ impl InCube {
     }
 
     fn judge(&self, effects: &Effects, points: [usize; 2], range_m: [f32; 2]) {
-        let sensor = Sensor::builtin("vlp32c").expect("it is built in");
+        let sensor = SensorProfile::builtin("vlp32c").expect("it is built in");
         let pattern = effects.widen(sensor.pattern(), &sensor).expect("a pattern");
         let half = DVec3::splat(self.half_m);
         let target = casting::target(&meshes::cuboid(-half, half));

@@ -2,18 +2,18 @@
 
 use glam::{DAffine3, DMat3, DVec3, dvec3};
 use libtest_mimic::Trial;
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::mesh::validate::triangle_stats;
-use sim_gpu::pose::Pose;
-use sim_gpu::ray::MISS;
-use sim_gpu::resolve::Hits;
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::mesh::validate::triangle_stats;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::ray::MISS;
+use sim_gpu::internals::resolve::Hits;
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::{Surface, Target};
 use tests::adapter::casters;
 use tests::casting::{at, beams, builtin, hits, job, job_with, placed_job, ranges, target};
 use tests::judge::judge;
@@ -47,7 +47,7 @@ pub fn trials() -> Vec<Trial> {
 /// Casts on all casters, holds each to the oracle, and returns what all found.
 fn scan(name: &str, target: &Target, pose: &Pose, pattern: &BeamPattern) -> Vec<Hits> {
     let job = job(target, pose, pattern);
-    let cast = |caster: &&Caster| {
+    let cast = |caster: &&OpenCaster| {
         let hits = hits(caster, &job, pattern);
         judge(&job, pattern, &hits).assert_kept(&format!("{name} on {}", caster.name()));
         hits
@@ -101,7 +101,7 @@ fn a_sensor_on_a_surface_is_blind_or_looks_past_it() {
 /// be tried at no cost, and cast it must not borrow its neighbours' triangles.
 fn an_empty_object_in_a_batch_has_no_hits() {
     let pattern = builtin("generic-static");
-    let [empty, full] = [Mesh::default(), torus(20)].map(|mesh| target(&mesh));
+    let [empty, full] = [TriangleMesh::default(), torus(20)].map(|mesh| target(&mesh));
     let pose = view(DVec3::ZERO);
     let cast = |target| job_with(target, &pose, &pattern, Culling::Off);
     let jobs = [cast(&empty), cast(&full), cast(&empty)];
@@ -116,7 +116,7 @@ fn an_empty_object_in_a_batch_has_no_hits() {
 }
 
 /// Every triangle of `mesh` is kept, whatever a survey says.
-fn unsurveyed(mesh: Mesh) -> Target {
+fn unsurveyed(mesh: TriangleMesh) -> Target {
     let kept = (0..mesh.triangles.len() as u32).collect();
     Target::new(Surface::new(mesh, kept), Builder::Sah)
 }
@@ -128,7 +128,7 @@ fn of_coincident_triangles_the_lowest_index_is_hit() {
     let copies = |order: [[usize; 3]; 3]| {
         let turn = |p: [usize; 3]| {
             let triangles = single.triangles.iter().map(|t| p.map(|i| t[i])).collect();
-            Mesh { vertices: single.vertices.clone(), triangles }
+            TriangleMesh { vertices: single.vertices.clone(), triangles }
         };
         together(&order.map(turn))
     };

@@ -3,16 +3,16 @@
 
 use glam::{DQuat, DVec3};
 use serde::Deserialize;
-use sim_gpu::bvh::{Builder, assert_well_formed};
-use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::resolve::{Hits, resolve};
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::Target;
+use sim_gpu::internals::bvh::{Builder, assert_well_formed};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::job::{CastJob, Culling};
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::resolve::{Hits, resolve};
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::Target;
 use tests::adapter::casters;
 use tests::casting::{beams, builtin, job_with, ranges, target_by};
 use tests::judge::{judge, near_silhouette};
@@ -164,7 +164,7 @@ impl Scan {
     /// What every caster finds, once it was checked.
     fn cast_all(&self, setting: Setting) -> (Scene, Vec<Hits>) {
         let scene = self.scene(setting);
-        let check = |caster: &&Caster| {
+        let check = |caster: &&OpenCaster| {
             let what = format!("{setting:?} on {}", caster.name());
             let [hits, unculled] = [Culling::On, Culling::Off].map(|c| scene.cast(caster, c));
             assert_eq!(hits, unculled, "{what}: culling");
@@ -201,7 +201,7 @@ impl Scan {
 
 impl Scene {
     /// As a scan does: a target too large for the adapter goes to the CPU.
-    fn cast(&self, caster: &Caster, culling: Culling) -> Hits {
+    fn cast(&self, caster: &OpenCaster, culling: Culling) -> Hits {
         let job = self.job(culling);
         let jobs = std::slice::from_ref(&job);
         let casts = match caster.fits(&self.target) {
@@ -224,7 +224,7 @@ impl Place {
                 let back = |distance| at_m.normalize() * distance;
                 Pose {
                     position_m: distance.map_or(*at_m, back),
-                    world_from_sensor: quaternion_xyzw.unwrap_or(DQuat::IDENTITY),
+                    rotation: quaternion_xyzw.unwrap_or(DQuat::IDENTITY),
                 }
             }
             Self::View { distance_m, elevation_deg, azimuth_deg } => {
@@ -240,7 +240,7 @@ impl Beams {
     /// The pattern, and the points that its beams are aimed at, if any.
     fn pattern(
         &self,
-        mesh: &Mesh,
+        mesh: &TriangleMesh,
         sensor: DVec3,
         random: &mut Random,
     ) -> (BeamPattern, Option<Vec<DVec3>>) {
@@ -263,7 +263,7 @@ impl Beams {
     }
 }
 
-fn corners_and_edges(mesh: &Mesh) -> Vec<DVec3> {
+fn corners_and_edges(mesh: &TriangleMesh) -> Vec<DVec3> {
     let of = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
         [a, b, c, a.midpoint(b), b.midpoint(c), c.midpoint(a)]

@@ -6,8 +6,8 @@ use formats::scan::Attribute;
 use glam::DVec3;
 use serde::Deserialize;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::Culling;
-use sim_gpu::scene::{Scene, SceneScan, cast};
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::scene::{Scene, SceneScan, cast};
 use tests::adapter::casters;
 use tests::meshes::cuboid;
 

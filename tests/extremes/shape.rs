@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3, dvec3};
 use serde::Deserialize;
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 use tests::meshes;
 
 /// A mesh by its rule.
@@ -37,9 +37,9 @@ pub enum Shape {
 
 impl Shape {
     /// The mesh.
-    pub fn mesh(&self) -> Mesh {
+    pub fn mesh(&self) -> TriangleMesh {
         match self {
-            Self::Empty {} => Mesh::default(),
+            Self::Empty {} => TriangleMesh::default(),
             Self::Cube {} => meshes::cube(),
             Self::Square {} => square(),
             Self::TiledCube { n } => meshes::tiled_cube(*n),
@@ -47,7 +47,7 @@ impl Shape {
             Self::Icosphere { level } => meshes::icosphere(*level),
             Self::Soup { n, size } => meshes::soup(*n, *size),
             Self::Triangles { vertices, triangles } => {
-                Mesh { vertices: vertices.clone(), triangles: triangles.clone() }
+                TriangleMesh { vertices: vertices.clone(), triangles: triangles.clone() }
             }
             Self::Fan { slivers, apart } => fan(*slivers, *apart),
             Self::Layers {} => layers(),
@@ -60,21 +60,21 @@ impl Shape {
 }
 
 /// Two triangles in the plane z = 0.
-fn square() -> Mesh {
+fn square() -> TriangleMesh {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let vertices = corners.map(|(x, y)| dvec3(x, y, 0.0)).to_vec();
-    Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] }
+    TriangleMesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] }
 }
 
-fn fan(slivers: u32, apart: f64) -> Mesh {
+fn fan(slivers: u32, apart: f64) -> TriangleMesh {
     let tip = |i: u32| dvec3(1.0, (f64::from(i) - f64::from(slivers) / 2.0) * apart, 0.0);
-    Mesh {
+    TriangleMesh {
         vertices: (0..=slivers).map(tip).chain([-DVec3::X]).collect(),
         triangles: (0..slivers).map(|i| [slivers + 1, i, i + 1]).collect(),
     }
 }
 
-fn layers() -> Mesh {
+fn layers() -> TriangleMesh {
     let turned = |angle: f64, size: f64| {
         meshes::mapped(&square(), |v| DQuat::from_rotation_z(angle) * v * size)
     };

@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec3};
-use sim_gpu::cast_error::CastError;
-use sim_gpu::caster::Caster;
-use sim_gpu::job::CastJob;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::ray::MISS;
-use sim_gpu::resolve::resolve;
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::Target;
+use sim_gpu::internals::cast_error::CastError;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::CastJob;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::ray::MISS;
+use sim_gpu::internals::resolve::resolve;
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::Target;
 
 use crate::casting::{at, beams, job};
 use crate::meshes::{icosphere, mapped};
@@ -21,7 +21,7 @@ pub const SENSORS: usize = 20;
 
 /// A sphere of `20 * 4^level` triangles, moved and rotated. From [`SENSORS`] sensors within
 /// that of level 5, 819,240 rays are aimed at its vertices and edges.
-pub fn moved_sphere(level: u32) -> Mesh {
+pub fn moved_sphere(level: u32) -> TriangleMesh {
     let rotation = Random::new("watertight").rotation();
     mapped(&icosphere(level), |v| rotation * v * 1.7 + DVec3::new(12.3, -4.5, 6.7))
 }
@@ -68,9 +68,9 @@ pub fn from_inside(target: &Target) -> impl Iterator<Item = (CastJob, BeamPatter
 /// ray, and after.
 ///
 /// # Errors
-/// As [`Caster::cast`].
+/// As [`OpenCaster::cast`].
 pub fn missed(
-    caster: &Caster,
+    caster: &OpenCaster,
     job: &CastJob,
     pattern: &BeamPattern,
 ) -> Result<[usize; 2], CastError> {

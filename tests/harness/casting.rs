@@ -2,24 +2,24 @@
 
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3};
-use sim_gpu::bvh::{Builder, Bvh};
-use sim_gpu::caster::Caster;
-use sim_gpu::job::{Cast, CastJob, Culling};
-use sim_gpu::mesh::Mesh;
-use sim_gpu::mesh::validate::triangle_stats;
-use sim_gpu::pose::Pose;
-use sim_gpu::ray::RayFrame;
-use sim_gpu::resolve::{Hits, resolve};
-use sim_gpu::sensor::{BeamPattern, Sensor};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::{Builder, Bvh};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::{Cast, CastJob, Culling};
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::mesh::validate::triangle_stats;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::ray::RayFrame;
+use sim_gpu::internals::resolve::{Hits, resolve};
+use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
+use sim_gpu::internals::target::{Surface, Target};
 
 /// `mesh` without its degenerate and duplicate triangles, ready for casting.
-pub fn target(mesh: &Mesh) -> Target {
+pub fn target(mesh: &TriangleMesh) -> Target {
     target_by(Builder::Sah, mesh)
 }
 
 /// As [`target`], by this builder.
-pub fn target_by(builder: Builder, mesh: &Mesh) -> Target {
+pub fn target_by(builder: Builder, mesh: &TriangleMesh) -> Target {
     let kept = triangle_stats(mesh).kept;
     Target::new(Surface::new(mesh.clone(), kept), builder)
 }
@@ -32,7 +32,7 @@ pub fn tree_bytes(bvh: &Bvh) -> Vec<u8> {
 
 /// The beams of a sensor that comes with the program.
 pub fn builtin(name: &str) -> BeamPattern {
-    Sensor::builtin(name).unwrap_or_else(|| panic!("no sensor {name}")).pattern()
+    SensorProfile::builtin(name).unwrap_or_else(|| panic!("no sensor {name}")).pattern()
 }
 
 /// Beams in these directions, which are brought to unit length.
@@ -44,7 +44,7 @@ pub fn beams(directions: impl IntoIterator<Item = DVec3>) -> BeamPattern {
 
 /// A sensor at `position_m` whose axes are the world's.
 pub fn at(position_m: DVec3) -> Pose {
-    Pose { position_m, world_from_sensor: DQuat::IDENTITY }
+    Pose { position_m, rotation: DQuat::IDENTITY }
 }
 
 /// `pattern` from `pose` at a target whose frame is the world's.
@@ -71,13 +71,13 @@ pub fn placed_job(
 }
 
 /// What `caster` answers for `job` alone.
-pub fn cast(caster: &Caster, job: &CastJob) -> Cast {
+pub fn cast(caster: &OpenCaster, job: &CastJob) -> Cast {
     let casts = caster.cast(std::slice::from_ref(job)).unwrap_or_else(|error| panic!("{error}"));
     casts.into_iter().next().expect("invariant: one job has one answer")
 }
 
 /// What `caster` finds for `job`.
-pub fn hits(caster: &Caster, job: &CastJob, pattern: &BeamPattern) -> Hits {
+pub fn hits(caster: &OpenCaster, job: &CastJob, pattern: &BeamPattern) -> Hits {
     resolve(job, &cast(caster, job), pattern, caster.effects())
 }
 

@@ -1,11 +1,11 @@
 //! Holds the outputs of the effects' shaders to their f64 counterparts.
 
-use sim_gpu::cpu::effects::append_outputs;
 use sim_gpu::effects::{Effects, Noise, RayEffect};
-use sim_gpu::job::{Cast, CastJob};
-use sim_gpu::ray::{AMBIGUOUS, MISS};
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::Target;
+use sim_gpu::internals::cpu::effects::append_outputs;
+use sim_gpu::internals::job::{Cast, CastJob};
+use sim_gpu::internals::ray::{AMBIGUOUS, MISS};
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::Target;
 
 /// How far the shader's standard normal deviate may lie from the f64 twin's,
 /// by the accuracy that WGSL promises, with u = 2^-24.

@@ -8,13 +8,13 @@ use std::fmt;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle::{self, Crossing};
-use sim_gpu::job::CastJob;
-use sim_gpu::ray::Ray;
-use sim_gpu::resolve::{Hit, Hits};
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::Target;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::cpu::oracle::{self, Crossing};
+use sim_gpu::internals::job::CastJob;
+use sim_gpu::internals::ray::Ray;
+use sim_gpu::internals::resolve::{Hit, Hits};
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::Target;
 
 use crate::casting::hits;
 
@@ -81,7 +81,7 @@ pub fn judge(job: &CastJob, pattern: &BeamPattern, hits: &Hits) -> Verdict {
 /// Asserts that `caster` keeps the promise on `job`, and leaves at most the share
 /// `most_ambiguous` of its hits to f64.
 pub fn assert_promise(
-    caster: &Caster,
+    caster: &OpenCaster,
     job: &CastJob,
     pattern: &BeamPattern,
     most_ambiguous: f64,

@@ -4,19 +4,19 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use glam::{DVec3, dvec3};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 use crate::random::Random;
 
 /// A unit sphere of `20 * 4^level` triangles, all vertices on the sphere.
-pub fn icosphere(level: u32) -> Mesh {
+pub fn icosphere(level: u32) -> TriangleMesh {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     let mut vertices = Vec::new();
     for (i, j) in [(-1.0, golden), (1.0, golden), (-1.0, -golden), (1.0, -golden)] {
         vertices.extend([dvec3(i, j, 0.0), dvec3(0.0, i, j), dvec3(j, 0.0, i)]);
     }
     vertices.iter_mut().for_each(|v| *v = v.normalize());
-    let mut mesh = Mesh { triangles: hull_triangles(&vertices), vertices };
+    let mut mesh = TriangleMesh { triangles: hull_triangles(&vertices), vertices };
     for _ in 0..level {
         mesh = subdivided(&mesh);
     }
@@ -41,7 +41,7 @@ fn hull_triangles(vertices: &[DVec3]) -> Vec<[u32; 3]> {
     faces
 }
 
-fn subdivided(mesh: &Mesh) -> Mesh {
+fn subdivided(mesh: &TriangleMesh) -> TriangleMesh {
     let mut vertices = mesh.vertices.clone();
     let mut middles = HashMap::new();
     let mut triangles = Vec::with_capacity(mesh.triangles.len() * 4);
@@ -55,11 +55,11 @@ fn subdivided(mesh: &Mesh) -> Mesh {
         let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
         triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
     }
-    Mesh { vertices, triangles }
+    TriangleMesh { vertices, triangles }
 }
 
 /// A box of twelve triangles between two corners.
-pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
+pub fn cuboid(low: DVec3, high: DVec3) -> TriangleMesh {
     let vertices = (0..8)
         .map(|i| {
             let pick =
@@ -70,19 +70,19 @@ pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
     let quads =
         [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    Mesh { vertices, triangles }
+    TriangleMesh { vertices, triangles }
 }
 
 /// The cube from -1 to 1.
-pub fn cube() -> Mesh {
+pub fn cube() -> TriangleMesh {
     cuboid(DVec3::NEG_ONE, DVec3::ONE)
 }
 
 /// The cube from -1 to 1, each face of `n` x `n` squares: boxes of its triangles
 /// are flat and touch without overlap.
-pub fn tiled_cube(n: u32) -> Mesh {
+pub fn tiled_cube(n: u32) -> TriangleMesh {
     let at = |i: u32| f64::from(i) / f64::from(n) * 2.0 - 1.0;
-    let mut mesh = Mesh::default();
+    let mut mesh = TriangleMesh::default();
     for face in 0..6usize {
         let base = mesh.vertices.len() as u32;
         let side = if face < 3 { -1.0 } else { 1.0 };
@@ -103,8 +103,8 @@ pub fn tiled_cube(n: u32) -> Mesh {
 }
 
 /// A wavy torus about z, within 1.1 of the origin, of `2 n^2` triangles.
-pub fn torus(n: u32) -> Mesh {
-    let mut mesh = Mesh::default();
+pub fn torus(n: u32) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
     for i in 0..n {
         for j in 0..n {
             let (u, v) = (TAU * f64::from(i) / f64::from(n), TAU * f64::from(j) / f64::from(n));
@@ -121,7 +121,7 @@ pub fn torus(n: u32) -> Mesh {
 
 /// `n` triangles anywhere in the cube from -1 to 1, their corners within
 /// `size` of each other.
-pub fn soup(n: u32, size: f64) -> Mesh {
+pub fn soup(n: u32, size: f64) -> TriangleMesh {
     let mut random = Random::new("soup");
     let mut corners = |_| {
         let place = random.in_cube();
@@ -131,14 +131,14 @@ pub fn soup(n: u32, size: f64) -> Mesh {
 }
 
 /// Triangles of three vertices each, in their order.
-pub fn unconnected(vertices: Vec<DVec3>) -> Mesh {
+pub fn unconnected(vertices: Vec<DVec3>) -> TriangleMesh {
     let n = vertices.len() as u32 / 3;
-    Mesh { vertices, triangles: (0..n).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect() }
+    TriangleMesh { vertices, triangles: (0..n).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect() }
 }
 
 /// The meshes side by side in one.
-pub fn together(meshes: &[Mesh]) -> Mesh {
-    let mut all = Mesh::default();
+pub fn together(meshes: &[TriangleMesh]) -> TriangleMesh {
+    let mut all = TriangleMesh::default();
     for mesh in meshes {
         let base = all.vertices.len() as u32;
         all.vertices.extend(&mesh.vertices);
@@ -148,13 +148,13 @@ pub fn together(meshes: &[Mesh]) -> Mesh {
 }
 
 /// The same surface with three vertices of its own for each triangle.
-pub fn unmerged(mesh: &Mesh) -> Mesh {
+pub fn unmerged(mesh: &TriangleMesh) -> TriangleMesh {
     let corners = mesh.triangles.iter().flatten();
     unconnected(corners.map(|&v| mesh.vertices[v as usize]).collect())
 }
 
 /// The mesh with each vertex mapped.
-pub fn mapped(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
+pub fn mapped(mesh: &TriangleMesh, map: impl Fn(DVec3) -> DVec3) -> TriangleMesh {
     let vertices = mesh.vertices.iter().map(|&v| map(v)).collect();
-    Mesh { vertices, triangles: mesh.triangles.clone() }
+    TriangleMesh { vertices, triangles: mesh.triangles.clone() }
 }

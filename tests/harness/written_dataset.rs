@@ -15,10 +15,10 @@ use formats::scan::{Attribute, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c::Returns;
 use sim_gpu::effects::Effects;
-use sim_gpu::mesh::frame::{Normalize, Up};
-use sim_gpu::mesh::validate::MeshDefects;
-use sim_gpu::scan::Tally;
-use sim_gpu::sensor::{Sensor, Views};
+use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::validate::MeshDefects;
+use sim_gpu::internals::scan::Tally;
+use sim_gpu::internals::sensor::{SensorProfile, Views};
 use std::path::Path;
 
 /// Points of each packed cloud.
@@ -31,7 +31,7 @@ pub const MIN_POINTS: u32 = 16;
 pub fn config() -> DatasetConfig {
     let set = |name: &str, sensor: &str, views: Views| SetConfig {
         name: name.to_owned(),
-        sensor: Sensor::builtin(sensor).expect("a built-in sensor"),
+        sensor: SensorProfile::builtin(sensor).expect("a built-in sensor"),
         viewpoints: Viewpoints::Views(views),
     };
     DatasetConfig {

@@ -5,11 +5,11 @@ use formats::hash::Hashing;
 use formats::scan::AttributeSet;
 use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::ScanRequest;
-use sim_gpu::sensor::Sensor;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::ScanRequest;
+use sim_gpu::internals::sensor::SensorProfile;
 use tests::{casting, meshes};
 
 use super::Rows;
@@ -38,13 +38,13 @@ pub fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
 
 /// The scan of a unit sphere from this far.
 fn scan(distance_m: f64, effects: &Effects, attributes: &AttributeSet) -> Scan {
-    let sensor = Sensor::builtin("vlp32c").unwrap();
+    let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let pattern = effects.widen(sensor.pattern(), &sensor).unwrap();
     let pose = Pose::look_at(DVec3::X * distance_m, DVec3::ZERO).unwrap();
     let mut request = ScanRequest::new(&sensor, &pattern, pose);
     request.attributes = attributes.clone();
     let target = casting::target(&meshes::icosphere(4));
-    sim_gpu::scan(&Caster::Cpu(effects.clone()), &target, &request).unwrap()
+    sim_gpu::internals::scan::scan(&OpenCaster::Cpu(effects.clone()), &target, &request).unwrap()
 }
 
 fn bytes(scan: &Scan, format: ScanFormat) -> Vec<u8> {

@@ -2,7 +2,7 @@
 
 use naga::{Block, Function, Statement};
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::compose;
+use sim_gpu::internals::gpu::compose;
 use std::collections::BTreeSet;
 
 use super::Rows;

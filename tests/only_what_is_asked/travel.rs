@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::Batch;
+use sim_gpu::internals::gpu::Batch;
 use tests::{adapter, casting, meshes};
 
 use super::Rows;

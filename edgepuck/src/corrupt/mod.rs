@@ -9,7 +9,7 @@ use crate::brightness::BrightnessArgs;
 use crate::segment::SweepArgs;
 use crate::{Outcome, Usage};
 use plan::{Entry, Plan};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::internals::sensor::SensorProfile;
 use std::path::PathBuf;
 
 /// Flags of `corrupt`.
@@ -67,7 +67,7 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Success);
     }
     let input = args.input.as_ref().expect("invariant: required without --list");
-    let sensor = Sensor::resolve(&args.profile)?;
+    let sensor = SensorProfile::resolve(&args.profile)?;
     if input.sweep.is_dir() {
         return objects::run(args, &input.sweep, &plan, &sensor);
     }

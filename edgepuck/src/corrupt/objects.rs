@@ -8,9 +8,9 @@ use anyhow::Context;
 use edgepuck_dataset::corrupted::{Corrupted, CorruptedSet, ObjectCorruption};
 use formats::Split;
 use indicatif::{ProgressBar, ProgressStyle};
-use sim_gpu::mesh::frame::Up;
-use sim_gpu::mesh::tree::discover;
-use sim_gpu::sensor::{Sensor, Views};
+use sim_gpu::internals::mesh::frame::Up;
+use sim_gpu::internals::mesh::tree::discover;
+use sim_gpu::internals::sensor::{SensorProfile, Views};
 use std::path::Path;
 
 /// Flags for meshes.
@@ -40,7 +40,7 @@ pub(super) fn run(
     args: &CorruptArgs,
     folder: &Path,
     plan: &Plan,
-    sensor: &Sensor,
+    sensor: &SensorProfile,
 ) -> anyhow::Result<Outcome> {
     let chosen = chosen(&plan.object, &args.only, &args.severity)?;
     let ObjectArgs { views: count, distance: distance_m, points, up } = args.objects;

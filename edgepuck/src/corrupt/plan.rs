@@ -4,8 +4,8 @@ use anyhow::{Context, bail, ensure};
 use edgepuck_assets::CORRUPTIONS;
 use edgepuck_dataset::corrupted::ObjectCorruption;
 use serde::Deserialize;
-use sim_gpu::config::{self, InvalidValue};
-use sim_gpu::corruption::Corruption;
+use sim_gpu::internals::config::{self, InvalidValue};
+use sim_gpu::internals::corruption::Corruption;
 use std::path::Path;
 
 use crate::Usage;

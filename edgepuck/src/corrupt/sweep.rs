@@ -10,18 +10,18 @@ use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
-use sim_gpu::corruption::{Corruption, Recorded};
 use sim_gpu::effects::{Detection, Effects};
 use sim_gpu::glam;
-use sim_gpu::sensor::{DetectionLimit, Sensor};
-use sim_gpu::weather::{Air, in_weather};
+use sim_gpu::internals::corruption::{Corruption, Recorded};
+use sim_gpu::internals::sensor::{DetectionLimit, SensorProfile};
+use sim_gpu::internals::weather::{Air, in_weather};
 
 /// Writes a scan for each corruption and severity.
 pub(super) fn run(
     args: &CorruptArgs,
     input: &SweepArgs,
     plan: &Plan,
-    sensor: &Sensor,
+    sensor: &SensorProfile,
 ) -> anyhow::Result<Outcome> {
     let chosen = chosen(&plan.sweep, &args.only, &args.severity)?;
     args.brightness.check()?;
@@ -89,7 +89,7 @@ fn takes_light(corruption: &Corruption) -> bool {
 }
 
 /// The weakest return that `sensor` detects.
-fn limit_of(sensor: &Sensor) -> anyhow::Result<DetectionLimit> {
+fn limit_of(sensor: &SensorProfile) -> anyhow::Result<DetectionLimit> {
     let asked = Effects { detection: Some(Detection::default()), ..Effects::default() };
     let effects = asked.for_sensor(sensor).map_err(usage)?;
     let limit = effects.detection.and_then(|detection| detection.limit);
@@ -97,7 +97,7 @@ fn limit_of(sensor: &Sensor) -> anyhow::Result<DetectionLimit> {
 }
 
 /// The scan with this corruption. `None` if it lacks the times or rings that the corruption needs.
-fn corrupted(recorded: &Recorded, corruption: &Corruption, sensor: &Sensor) -> Option<Scan> {
+fn corrupted(recorded: &Recorded, corruption: &Corruption, sensor: &SensorProfile) -> Option<Scan> {
     match corruption {
         Corruption::Weather(weather) => {
             let Recorded { scan, brightness, sensor_m, limit, stream, .. } = *recorded;

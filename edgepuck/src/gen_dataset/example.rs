@@ -9,7 +9,7 @@ use edgepuck_dataset::record::MeshRecord;
 use formats::Scan;
 use formats::scan_file::{ScanFormat, read_scan};
 use glam::DVec3;
-use sim_gpu::pose::Pose;
+use sim_gpu::internals::pose::Pose;
 use std::path::{Path, PathBuf};
 
 /// Draws a mesh from the middle of the list that fills a packed cloud, or else

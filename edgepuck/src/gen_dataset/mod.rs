@@ -27,7 +27,7 @@ use formats::hash::Hashing;
 use settings::Settings;
 use shard::Shard;
 use signal_hook::consts::SIGTERM;
-use sim_gpu::mesh::tree::{MeshEntry, discover};
+use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
 use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::io::Write;

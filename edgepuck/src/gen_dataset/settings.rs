@@ -7,14 +7,14 @@ use formats::hash::Hashing;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
-use sim_gpu::config::{self, within};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
-use sim_gpu::material::ColourSource;
-use sim_gpu::mesh::frame::{Normalize, Up};
-use sim_gpu::packets;
-use sim_gpu::pose::load_poses;
-use sim_gpu::sensor::{Layout as BeamLayout, Sensor, Views};
-use sim_gpu::simplify::Simplify;
+use sim_gpu::internals::config::{self, within};
+use sim_gpu::internals::material::ColourSource;
+use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::packets;
+use sim_gpu::internals::pose::load_poses;
+use sim_gpu::internals::sensor::{Layout as BeamLayout, SensorProfile, Views};
+use sim_gpu::internals::simplify::Simplify;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -234,7 +234,7 @@ impl Settings {
     fn sets(&self) -> anyhow::Result<Vec<SetConfig>> {
         match &self.sensor {
             Some(name) => {
-                let sensor = Sensor::resolve(name)?.trimmed();
+                let sensor = SensorProfile::resolve(name)?.trimmed();
                 let set = match sensor.layout {
                     BeamLayout::Rotating(_) | BeamLayout::Uniform(_) => "rotational",
                     BeamLayout::Grid(_) => "static",
@@ -250,7 +250,12 @@ impl Settings {
         }
     }
 
-    fn set(&self, name: &str, sensor: Sensor, views: Option<u32>) -> anyhow::Result<SetConfig> {
+    fn set(
+        &self,
+        name: &str,
+        sensor: SensorProfile,
+        views: Option<u32>,
+    ) -> anyhow::Result<SetConfig> {
         let viewpoints = match &self.poses {
             Some(file) => Viewpoints::Poses(load_poses(file)?),
             None => {
@@ -320,6 +325,6 @@ fn cast_as_packets_tell(
     Ok(returns)
 }
 
-fn builtin(name: &str) -> anyhow::Result<Sensor> {
-    Sensor::builtin(name).with_context(|| format!("no built-in sensor {name}"))
+fn builtin(name: &str) -> anyhow::Result<SensorProfile> {
+    SensorProfile::builtin(name).with_context(|| format!("no built-in sensor {name}"))
 }

@@ -7,7 +7,7 @@ use edgepuck_dataset::publish::retract;
 use edgepuck_dataset::tars::{self, Cut, HandOver, PartManifest, Run, Sample};
 use edgepuck_dataset::{DatasetError, check_layouts};
 use signal_hook::consts::{SIGINT, SIGTERM};
-use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};

@@ -7,13 +7,13 @@ use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use sim_gpu::config::InvalidValue;
 use sim_gpu::effects::Effects;
-use sim_gpu::material::ColourSource;
-use sim_gpu::mesh::frame::{Normalize, Up};
-use sim_gpu::pose::Pose;
-use sim_gpu::sensor::{Sensor, Views};
-use sim_gpu::simplify::Simplify;
+use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::internals::material::ColourSource;
+use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::sensor::{SensorProfile, Views};
+use sim_gpu::internals::simplify::Simplify;
 
 /// What a dataset is to hold: with the meshes and the adapter, this decides
 /// every byte of it.
@@ -77,7 +77,7 @@ pub struct SetConfig {
     /// The set's folder, such as `rotational`.
     pub name: String,
     /// The sensor, in full.
-    pub sensor: Sensor,
+    pub sensor: SensorProfile,
     /// Where it stands.
     pub viewpoints: Viewpoints,
 }

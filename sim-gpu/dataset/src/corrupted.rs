@@ -12,16 +12,16 @@ use formats::rng::StreamKey;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
-use sim_gpu::config::{InvalidValue, within};
 use sim_gpu::effects::Effects;
-use sim_gpu::mesh::frame::{Normalize, Up};
-use sim_gpu::mesh::tree::MeshEntry;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{ScanError, ScanRequest, scan};
-use sim_gpu::sensor::{BeamPattern, Sensor, Views};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::config::{InvalidValue, within};
+use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{ScanError, ScanRequest, scan};
+use sim_gpu::internals::sensor::{BeamPattern, SensorProfile, Views};
+use sim_gpu::internals::target::{Surface, Target};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -44,7 +44,7 @@ pub struct CorruptedSet {
     /// What goes wrong with it.
     pub corruption: ObjectCorruption,
     /// Casts its rays: on the CPU, since test sets are small and have many effects.
-    caster: Caster,
+    caster: OpenCaster,
     /// The beams that it casts.
     pattern: BeamPattern,
 }
@@ -64,7 +64,7 @@ pub struct Corrupted<'a> {
     /// The folder to write to.
     pub out: &'a Path,
     /// The sensor.
-    pub sensor: &'a Sensor,
+    pub sensor: &'a SensorProfile,
     /// Where it stands around each mesh.
     pub views: Views,
     /// The meshes' upward axis; `None` is each format's default.
@@ -112,11 +112,11 @@ impl CorruptedSet {
     pub fn new(
         name: String,
         corruption: ObjectCorruption,
-        sensor: &Sensor,
+        sensor: &SensorProfile,
     ) -> Result<Self, InvalidValue> {
         corruption.effects.for_sensor(sensor)?;
         let pattern = corruption.effects.widen(sensor.pattern(), sensor)?;
-        let caster = Caster::Cpu(corruption.effects.clone());
+        let caster = OpenCaster::Cpu(corruption.effects.clone());
         Ok(Self { name, corruption, caster, pattern })
     }
 }

@@ -2,9 +2,9 @@
 
 use super::record::MeshFailure;
 use formats::FormatError;
-use sim_gpu::cast_error::CastError;
-use sim_gpu::config::InvalidValue;
-use sim_gpu::scan::ScanError;
+use sim_gpu::internals::cast_error::CastError;
+use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::internals::scan::ScanError;
 use std::path::{Path, PathBuf};
 
 /// Why a dataset cannot be made, merged or verified. A bad mesh is no such

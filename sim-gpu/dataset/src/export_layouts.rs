@@ -9,7 +9,7 @@ use super::record::{Entry, MeshRecord};
 use formats::scan_file::ScanFormat;
 use formats::yanx27::Yanx27Writer;
 use formats::{Split, hash};
-use sim_gpu::config::InvalidValue;
+use sim_gpu::internals::config::InvalidValue;
 use std::collections::BTreeMap;
 use std::path::Path;
 

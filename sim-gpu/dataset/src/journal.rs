@@ -8,8 +8,8 @@ use super::record::{Entry, MeshRecord};
 use formats::atomic;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sim_gpu::caster::Caster;
-use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ impl Terms {
     #[must_use]
     pub fn new(
         config: DatasetConfig,
-        caster: &Caster,
+        caster: &OpenCaster,
         meshes: &[MeshEntry],
         shard: Option<(u32, u32)>,
     ) -> Self {

@@ -10,7 +10,7 @@ use super::layout;
 use super::record::{Entry, FileRecord, MeshFailure, MeshRecord, VariantRecord};
 use formats::hash::{FileHash, Hashing};
 use serde::{Deserialize, Serialize};
-use sim_gpu::pose::Pose;
+use sim_gpu::internals::pose::Pose;
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 

@@ -11,22 +11,22 @@ use formats::hash::{FileHash, Hashing};
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use glam::DAffine3;
-use sim_gpu::bvh::Builder;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{Cast, CastJob, Culling};
-use sim_gpu::material::{Material, MaterialChoice, MaterialError, Materials};
-use sim_gpu::mesh::frame::{Normalize, Up, to_world};
-use sim_gpu::mesh::tree::MeshEntry;
-use sim_gpu::mesh::validate::triangle_stats;
-use sim_gpu::mesh::{LoadedMesh, Mesh, MeshError, load_hashed};
-use sim_gpu::packets;
-use sim_gpu::pose::{Pose, Trajectory};
-use sim_gpu::ray::RayFrame;
-use sim_gpu::resolve::{Hits, resolve};
-use sim_gpu::scan::{ObjectHits, PlacedTarget, ScanRequest, assemble};
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::job::{Cast, CastJob, Culling};
+use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Materials};
+use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
+use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::mesh::validate::triangle_stats;
+use sim_gpu::internals::mesh::{LoadedMesh, MeshError, TriangleMesh, load_hashed};
+use sim_gpu::internals::packets;
+use sim_gpu::internals::pose::{Pose, Trajectory};
+use sim_gpu::internals::ray::RayFrame;
+use sim_gpu::internals::resolve::{Hits, resolve};
+use sim_gpu::internals::scan::{ObjectHits, PlacedTarget, ScanRequest, assemble};
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
+use sim_gpu::internals::target::{Surface, Target};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -184,7 +184,7 @@ pub(super) fn read(
     up: Option<Up>,
     normalize: Normalize,
     hashing: Hashing,
-) -> Result<(MeshRecord, Mesh, Vec<u32>), MeshError> {
+) -> Result<(MeshRecord, TriangleMesh, Vec<u32>), MeshError> {
     let (LoadedMesh { mesh, format, dropped_faces }, hash) = load_hashed(&entry.path, hashing)?;
     let up = up.unwrap_or(format.default_up());
     let world = to_world(&mesh, up, normalize);

@@ -13,17 +13,17 @@ use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::{Scan, Split};
 use rayon::prelude::*;
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
-use sim_gpu::config::InvalidValue;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{Cast, CastJob};
-use sim_gpu::material::Materials;
-use sim_gpu::mesh::tree::MeshEntry;
-use sim_gpu::resolve::resolve;
-use sim_gpu::scan::{ObjectHits, assemble};
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::internals::job::{Cast, CastJob};
+use sim_gpu::internals::material::Materials;
+use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::resolve::resolve;
+use sim_gpu::internals::scan::{ObjectHits, assemble};
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::{Surface, Target};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -149,7 +149,7 @@ impl Clouds {
     /// A mesh that cannot be read, or of which no view has enough points; a failing adapter.
     pub fn draw(
         &self,
-        caster: &Caster,
+        caster: &OpenCaster,
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Labelled>, DatasetError> {
@@ -162,7 +162,7 @@ impl Clouds {
     /// A failing adapter.
     pub fn draw_each(
         &self,
-        caster: &Caster,
+        caster: &OpenCaster,
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Result<Labelled, DatasetError>>, DatasetError> {
@@ -181,7 +181,7 @@ impl Clouds {
     /// A failing adapter.
     pub fn scan_each(
         &self,
-        caster: &Caster,
+        caster: &OpenCaster,
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Result<Scan, DatasetError>>, DatasetError> {
@@ -194,7 +194,7 @@ impl Clouds {
     /// nothing of it.
     fn make_each<T: Send>(
         &self,
-        caster: &Caster,
+        caster: &OpenCaster,
         seed: u64,
         indices: &[usize],
         make: impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync,
@@ -243,7 +243,7 @@ impl Clouds {
     #[expect(clippy::type_complexity, reason = "what may fail for each view, and what for all")]
     fn cast<T: Send>(
         &self,
-        caster: &Caster,
+        caster: &OpenCaster,
         config: &DatasetConfig,
         indices: &[usize],
         make: &(impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync),

@@ -11,11 +11,11 @@ use super::progress::{Progress, Stage};
 use super::record::{Entry, MeshFailure, MeshRecord};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use formats::hash::Hashing;
-use sim_gpu::cast_error::CastError;
-use sim_gpu::caster::{Caster, Casting};
-use sim_gpu::job::{Cast, CastJob, Culling};
-use sim_gpu::mesh::tree::MeshEntry;
-use sim_gpu::sensor::BeamPattern;
+use sim_gpu::internals::cast_error::CastError;
+use sim_gpu::internals::caster::{Casting, OpenCaster};
+use sim_gpu::internals::job::{Cast, CastJob, Culling};
+use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::sensor::BeamPattern;
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
@@ -46,7 +46,7 @@ pub struct Run<'a> {
     /// What it is to hold.
     pub config: &'a DatasetConfig,
     /// Casts the rays; opened for the configuration's cast effects.
-    pub caster: &'a Caster,
+    pub caster: &'a OpenCaster,
     /// Whether beams that cannot hit are cast.
     pub culling: Culling,
     /// Counters.
@@ -271,7 +271,7 @@ impl<'b> Batch<'b> {
     /// large for the adapter, and a note says so.
     fn submit(
         meshes: Vec<Held<'b>>,
-        caster: &Caster,
+        caster: &OpenCaster,
         progress: &Progress,
     ) -> Result<Self, CastError> {
         let mut jobs = Vec::new();

@@ -5,11 +5,11 @@ use formats::Split;
 use formats::hash::FileHash;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
-use sim_gpu::mesh::frame::Up;
-use sim_gpu::mesh::tree::MeshEntry;
-use sim_gpu::mesh::validate::MeshDefects;
-use sim_gpu::scan::Tally;
-use sim_gpu::simplify::Simplified;
+use sim_gpu::internals::mesh::frame::Up;
+use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::mesh::validate::MeshDefects;
+use sim_gpu::internals::scan::Tally;
+use sim_gpu::internals::simplify::Simplified;
 use std::fmt;
 
 /// Which mesh of a dataset: orders everything that is listed.

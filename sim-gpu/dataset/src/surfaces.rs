@@ -11,12 +11,12 @@ use formats::packed::PackedWriter;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::bvh::Builder;
-use sim_gpu::mesh::frame::{Normalize, Up};
-use sim_gpu::mesh::tree::MeshEntry;
-use sim_gpu::sensor::Views;
-use sim_gpu::surface_points::{area_uniform, seen_from};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::sensor::Views;
+use sim_gpu::internals::surface_points::{area_uniform, seen_from};
+use sim_gpu::internals::target::{Surface, Target};
 use std::collections::BTreeSet;
 use std::path::Path;
 

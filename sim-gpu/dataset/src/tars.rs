@@ -16,9 +16,9 @@ use super::record::MeshFailure;
 use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
 use formats::{Split, atomic};
 use serde::{Deserialize, Serialize};
-use sim_gpu::caster::Caster;
-use sim_gpu::config::InvalidValue;
-use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -82,7 +82,7 @@ pub struct Run<'a> {
     /// Part (number from 0, of N): every N-th tar.
     pub part: (u32, u32),
     /// Casts the rays.
-    pub caster: &'a Caster,
+    pub caster: &'a OpenCaster,
     /// Set by whoever wants the run to end; the tar that is being made is left out.
     pub is_over: &'a AtomicBool,
     /// Given each tar once it is complete, if anybody takes them; says why it could not be handed over.

@@ -14,11 +14,11 @@ use formats::scan::Attribute;
 use formats::vlp32c::{Returns, Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET};
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
-use sim_gpu::config::InvalidValue;
-use sim_gpu::packets;
-use sim_gpu::pose::{Pose, Trajectory};
-use sim_gpu::scan::{ScanRequest, scan_objects};
-use sim_gpu::sensor::{BeamPattern, Layout, Rotating, Sensor};
+use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::internals::packets;
+use sim_gpu::internals::pose::{Pose, Trajectory};
+use sim_gpu::internals::scan::{ScanRequest, scan_objects};
+use sim_gpu::internals::sensor::{BeamPattern, Layout, Rotating, SensorProfile};
 
 use crate::error::SceneError;
 use crate::ground::{Ground, OWN_RADIUS_M};
@@ -45,7 +45,7 @@ const FROM_KERB_M: f64 = 2.3;
 /// ```
 pub struct Drive<'a> {
     pub(crate) street: Street<'a>,
-    sensor: Sensor,
+    sensor: SensorProfile,
     revolution: Revolution,
     /// The pose of the sensor at time 0.
     start: Pose,
@@ -122,8 +122,8 @@ impl<'a> Drive<'a> {
     #[must_use]
     pub fn pose(&self, time_s: f64) -> Pose {
         let position_m = self.start.position_m + self.velocity_m_s * time_s;
-        let world_from_sensor = self.start.world_from_sensor * self.sway.at(time_s);
-        Pose { position_m, world_from_sensor }
+        let rotation = self.start.rotation * self.sway.at(time_s);
+        Pose { position_m, rotation }
     }
 
     /// The object with this number in scans and sightings; `None` for 0, the ground.
@@ -172,11 +172,11 @@ impl<'a> Drive<'a> {
         let [from_s, to_s] = [pattern.time_s[0], pattern.time_s[pattern.len() - 1]];
         let time_s = (from_s + to_s) / 2.0;
         let pose = self.pose(time_s);
-        let turned_rad = [from_s, to_s]
-            .map(|end_s| pose.world_from_sensor.angle_between(self.pose(end_s).world_from_sensor));
+        let turned_rad =
+            [from_s, to_s].map(|end_s| pose.rotation.angle_between(self.pose(end_s).rotation));
         let turned_rad = turned_rad[0].max(turned_rad[1]);
         let sector = Sector::of_beams(&pattern);
-        let sensor_from_world = pose.world_from_sensor.inverse();
+        let sensor_from_world = pose.rotation.inverse();
         let in_sight = near.iter().filter(|(_, object)| {
             let from_sensor = object.centre_m(time_s) - pose.position_m;
             // The greatest shift of the object in the sensor's frame between the middle and an end
@@ -194,7 +194,7 @@ impl<'a> Drive<'a> {
             let mut target = stage.place_object(&object.placed, self.glass_returned);
             target.motion = trajectory([from_s, to_s].map(|time_s| {
                 let position_m = object.velocity_m_s * time_s;
-                (time_s, Pose { position_m, world_from_sensor: DQuat::IDENTITY })
+                (time_s, Pose { position_m, rotation: DQuat::IDENTITY })
             }));
             target
         }));

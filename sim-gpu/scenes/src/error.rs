@@ -1,9 +1,9 @@
 //! The errors of this crate.
 
 use formats::FormatError;
-use sim_gpu::config::{ConfigError, InvalidValue};
-use sim_gpu::mesh::MeshError;
-use sim_gpu::scan::ScanError;
+use sim_gpu::internals::config::{ConfigError, InvalidValue};
+use sim_gpu::internals::mesh::MeshError;
+use sim_gpu::internals::scan::ScanError;
 use std::path::PathBuf;
 
 /// An error in drawing, scanning or packing scenes.

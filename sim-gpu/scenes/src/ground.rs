@@ -3,7 +3,7 @@
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
 use glam::{DVec2, DVec3};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 use crate::recipe;
 
@@ -67,14 +67,14 @@ impl Ground {
     }
 
     /// The ground of a scene as triangles.
-    pub(crate) fn mesh(&self) -> Mesh {
+    pub(crate) fn mesh(&self) -> TriangleMesh {
         let xs = self.lines(&[]);
         self.surface(&xs, |row, column| (row * xs.len() + column) as u64)
     }
 
     /// Tile `number` of an endless ground: it begins at x = `number` * `length_m` and is
     /// `length_m` long. Neighbouring tiles share the vertices on their border.
-    pub(crate) fn tile(&self, number: i32, length_m: f64) -> Mesh {
+    pub(crate) fn tile(&self, number: i32, length_m: f64) -> TriangleMesh {
         let n_steps = if self.roughness_m > 0.0 { (length_m / STEP_M).ceil() as i32 } else { 1 };
         let line = |column: i32| number * n_steps + column;
         let step_m = length_m / f64::from(n_steps);
@@ -84,12 +84,12 @@ impl Ground {
 
     /// The surface above the grid lines `xs`. `vertex` numbers the vertex at a row and a column;
     /// the number keys its roughness.
-    fn surface(&self, xs: &[f64], vertex: impl Fn(usize, usize) -> u64) -> Mesh {
+    fn surface(&self, xs: &[f64], vertex: impl Fn(usize, usize) -> u64) -> TriangleMesh {
         let kerbs = [-1.0, 1.0].map(|side| self.road_y_m + side * self.road_half_m);
         let faces = [kerbs[0] - KERB_FACE_M, kerbs[0], kerbs[1], kerbs[1] + KERB_FACE_M];
         let ys = self.lines(&faces);
         let n = xs.len();
-        let mut mesh = Mesh::default();
+        let mut mesh = TriangleMesh::default();
         for (row, &y) in ys.iter().enumerate() {
             mesh.vertices.extend(xs.iter().enumerate().map(|(column, &x)| {
                 let rough_m = self.roughness_m * self.bump(vertex(row, column));

@@ -7,11 +7,11 @@ use std::sync::OnceLock;
 use edgepuck_shapes::objects::{Object, ObjectKind, object, stand};
 use formats::rng::StreamKey;
 use glam::DVec3;
-use sim_gpu::bvh::Builder;
-use sim_gpu::mesh::frame::{Normalize, to_world};
-use sim_gpu::mesh::unit_frame::bounding_box;
-use sim_gpu::mesh::{self, Mesh, MeshFormat};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::mesh::frame::{Normalize, to_world};
+use sim_gpu::internals::mesh::unit_frame::bounding_box;
+use sim_gpu::internals::mesh::{self, MeshFormat, TriangleMesh};
+use sim_gpu::internals::target::{Surface, Target};
 
 use crate::error::SceneError;
 use crate::recipe::Objects;
@@ -31,13 +31,13 @@ impl Model {
         Self::new(mesh, glass)
     }
 
-    fn new(mesh: Mesh, glass: Range<u32>) -> Self {
+    fn new(mesh: TriangleMesh, glass: Range<u32>) -> Self {
         let (low, high) = bounding_box(mesh.vertices.iter().copied());
         Self { target: target(mesh, Builder::Sah), glass, size_m: high - low }
     }
 
     /// A user's mesh, scaled to `height_m`; `None` if the mesh is flat.
-    fn scaled(mut mesh: Mesh, height_m: f64) -> Option<Self> {
+    fn scaled(mut mesh: TriangleMesh, height_m: f64) -> Option<Self> {
         let (low, high) = bounding_box(mesh.vertices.iter().copied());
         let scale = height_m / (high.z - low.z);
         if !(scale.is_normal() && scale > 0.0) {
@@ -50,7 +50,7 @@ impl Model {
 }
 
 /// A target of all triangles of `mesh`.
-pub(crate) fn target(mesh: Mesh, builder: Builder) -> Target {
+pub(crate) fn target(mesh: TriangleMesh, builder: Builder) -> Target {
     let kept = (0..mesh.triangles.len() as u32).collect();
     Target::new(Surface::new(mesh, kept), builder)
 }

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use edgepuck_shapes::objects::ObjectKind;
 use serde::Deserialize;
-use sim_gpu::config::{self, ConfigError, InvalidValue, within};
 use sim_gpu::effects::Effects;
-use sim_gpu::sensor::Sensor;
+use sim_gpu::internals::config::{self, ConfigError, InvalidValue, within};
+use sim_gpu::internals::sensor::SensorProfile;
 
 /// The class of clusters that do not show one whole object: ground, two objects in one cluster, or
 /// a small part of an object.
@@ -280,9 +280,12 @@ impl Recipe {
     ///
     /// # Errors
     /// A profile is missing or invalid.
-    pub fn sensors(&self, file: &Path) -> Result<Vec<Sensor>, ConfigError> {
+    pub fn sensors(&self, file: &Path) -> Result<Vec<SensorProfile>, ConfigError> {
         let folder = file.parent().unwrap_or(Path::new(""));
-        self.sensor.iter().map(|sensor| Sensor::resolve_in(folder, &sensor.profile)).collect()
+        self.sensor
+            .iter()
+            .map(|sensor| SensorProfile::resolve_in(folder, &sensor.profile))
+            .collect()
     }
 
     fn check(&self) -> Result<(), InvalidValue> {

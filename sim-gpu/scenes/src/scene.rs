@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
 use glam::{DQuat, DVec2, DVec3};
-use sim_gpu::pose::{Pose, Trajectory};
+use sim_gpu::internals::pose::{Pose, Trajectory};
 
 use crate::footprint::Footprint;
 use crate::ground::{Ground, OWN_RADIUS_M};
@@ -46,7 +46,7 @@ impl Scene {
         let ground = Ground::draw(&recipe.ground, road_y_m, s, stream("ground"));
         let sensor = s.count(0, recipe.sensor.len() - 1);
         let mut pose = draw_mount(stage, s);
-        pose.world_from_sensor *= DQuat::from_rotation_z(s.uniform(0.0, TAU));
+        pose.rotation *= DQuat::from_rotation_z(s.uniform(0.0, TAU));
         let glass_returned = recipe.glass_returned.at(s.uniform(0.0, 1.0));
         let share = s.uniform(0.0, 1.0);
         let ground_clearance_m = recipe.ground_clearance_m.map(|span| span.at(share));
@@ -91,5 +91,5 @@ pub(crate) fn draw_mount(stage: &Stage, s: &mut Sampler) -> Pose {
     let towards_rad = s.uniform(0.0, TAU);
     let tilt_axis = DVec3::new(towards_rad.cos(), towards_rad.sin(), 0.0);
     let tilt = DQuat::from_axis_angle(tilt_axis, tilt_rad);
-    Pose { position_m: DVec3::new(0.0, 0.0, height_m), world_from_sensor: tilt }
+    Pose { position_m: DVec3::new(0.0, 0.0, height_m), rotation: tilt }
 }

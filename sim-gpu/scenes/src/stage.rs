@@ -5,13 +5,13 @@ use std::sync::OnceLock;
 
 use formats::rng::StreamKey;
 use glam::DVec3;
-use sim_gpu::caster::Caster;
-use sim_gpu::config::InvalidValue;
 use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
-use sim_gpu::job::Culling;
-use sim_gpu::scan::{Glass, PlacedTarget};
-use sim_gpu::sensor::{BeamPattern, Sensor};
-use sim_gpu::target::Target;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::scan::{Glass, PlacedTarget};
+use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
+use sim_gpu::internals::target::Target;
 
 use crate::error::SceneError;
 use crate::model::{Model, user_models};
@@ -31,9 +31,9 @@ pub struct Stage {
 
 /// A sensor, its beams as its effects widen them, and the caster of these effects.
 pub(crate) struct StageSensor {
-    pub(crate) sensor: Sensor,
+    pub(crate) sensor: SensorProfile,
     pub(crate) pattern: BeamPattern,
-    pub(crate) caster: Caster,
+    pub(crate) caster: OpenCaster,
 }
 
 impl Stage {
@@ -47,7 +47,9 @@ impl Stage {
         meshes: Option<&Path>,
         seed: u64,
     ) -> Result<Self, SceneError> {
-        Self::with_casters(recipe, file, meshes, seed, |effects| Ok(Caster::Cpu(effects.clone())))
+        Self::with_casters(recipe, file, meshes, seed, |effects| {
+            Ok(OpenCaster::Cpu(effects.clone()))
+        })
     }
 
     /// Prepares `recipe`, which was read from `file`. `meshes` is the folder with the user's
@@ -61,7 +63,7 @@ impl Stage {
         file: &Path,
         meshes: Option<&Path>,
         seed: u64,
-        open: impl Fn(&Effects) -> Result<Caster, E>,
+        open: impl Fn(&Effects) -> Result<OpenCaster, E>,
     ) -> Result<Self, E> {
         let profiles = recipe.sensors(file).map_err(SceneError::from)?;
         let mut sensors = Vec::with_capacity(profiles.len());

@@ -6,8 +6,8 @@ use std::ops::RangeInclusive;
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
 use glam::{DVec2, DVec3};
-use sim_gpu::bvh::Builder;
-use sim_gpu::target::Target;
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::target::Target;
 
 use crate::footprint::Footprint;
 use crate::ground::{Ground, OWN_RADIUS_M};

@@ -6,10 +6,10 @@ use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use glam::DVec3;
-use sim_gpu::bvh::Builder;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::scan::{PlacedTarget, ScanRequest, scan_objects};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
+use sim_gpu::internals::sensor::SensorProfile;
 
 use crate::error::SceneError;
 use crate::model::target;
@@ -27,7 +27,7 @@ pub struct Sweep {
 impl Stage {
     /// The sensor of `scene`.
     #[must_use]
-    pub fn sensor(&self, scene: &Scene) -> &Sensor {
+    pub fn sensor(&self, scene: &Scene) -> &SensorProfile {
         &self.sensors[scene.sensor].sensor
     }
 
@@ -84,7 +84,7 @@ impl Stage {
     /// The ground and the objects of `scene` as one mesh, in which the objects lose their numbers
     /// and materials.
     #[must_use]
-    pub fn mesh(&self, scene: &Scene) -> Mesh {
+    pub fn mesh(&self, scene: &Scene) -> TriangleMesh {
         let mut whole = scene.ground.mesh();
         for object in &scene.objects {
             let world_from_object = object.world_from_object();
@@ -103,7 +103,7 @@ impl Stage {
 impl Sweep {
     /// Moves the points of `scan` from the scene's frame to the sensor's.
     fn new(mut scan: Scan, scene: &Scene) -> Self {
-        let sensor_from_world = scene.pose.world_from_sensor.inverse();
+        let sensor_from_world = scene.pose.rotation.inverse();
         let origin = DVec3::from_array(std::mem::take(&mut scan.origin)) - scene.pose.position_m;
         for point in &mut scan.positions {
             let from_sensor = DVec3::from_array(point.map(f64::from)) + origin;

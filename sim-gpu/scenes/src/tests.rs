@@ -6,9 +6,9 @@ use std::path::Path;
 use edgepuck_segment::{Segmenter, Settings, Sweep as Points};
 use formats::Scan;
 use glam::{DVec2, DVec3};
-use sim_gpu::bvh::Builder;
-use sim_gpu::scan::PlacedTarget;
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::scan::PlacedTarget;
+use sim_gpu::internals::target::{Surface, Target};
 
 use crate::{Drive, OTHER, Packet, Recipe, Scene, Sightings, Stage, label_clusters};
 
@@ -60,7 +60,7 @@ fn every_point_lies_on_its_surface() {
             let in_sensor = DVec3::from_array(point.map(f64::from));
             // Where the sensor was when the beam fired.
             let position_m = scene.pose.position_m + scene.velocity_m_s * f64::from(time_s);
-            let point = position_m + scene.pose.world_from_sensor * in_sensor;
+            let point = position_m + scene.pose.rotation * in_sensor;
             let Some(i) = (surface as usize).checked_sub(1) else {
                 // Roughness is 1 cm, uniform, so at most 1.8 cm; a kerb's face is
                 // as high as the kerb.

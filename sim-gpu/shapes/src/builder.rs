@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DAffine3, DVec3};
 
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 /// A mesh under construction.
 ///
@@ -12,7 +12,7 @@ use sim_gpu::mesh::Mesh;
 /// transforms by the current placement.
 #[derive(Clone, Debug)]
 pub struct Builder {
-    mesh: Mesh,
+    mesh: TriangleMesh,
     parts: Vec<usize>,
     glass: Vec<Range<usize>>,
     edge_m: f64,
@@ -25,7 +25,7 @@ impl Builder {
     /// `flat_ratio` times that; infinity gives the coarsest mesh.
     pub fn new(edge_m: f64, flat_ratio: f64) -> Self {
         Self {
-            mesh: Mesh::default(),
+            mesh: TriangleMesh::default(),
             parts: Vec::new(),
             glass: Vec::new(),
             edge_m,
@@ -40,12 +40,12 @@ impl Builder {
     }
 
     /// The mesh so far.
-    pub fn mesh(&self) -> &Mesh {
+    pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
     /// The mesh, and the index of the first triangle of each of its parts.
-    pub fn finish(self) -> (Mesh, Vec<usize>) {
+    pub fn finish(self) -> (TriangleMesh, Vec<usize>) {
         (self.mesh, self.parts)
     }
 
@@ -57,7 +57,7 @@ impl Builder {
     }
 
     /// The mesh with the triangles of glass last, and their range.
-    pub fn finish_with_glass(self) -> (Mesh, Range<u32>) {
+    pub fn finish_with_glass(self) -> (TriangleMesh, Range<u32>) {
         let Self { mut mesh, glass, .. } = self;
         let is_glass = |i: usize| glass.iter().any(|range| range.contains(&i));
         let (panes, mut opaque): (Vec<_>, Vec<_>) =

@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 
 use super::class::ShapeClass;
 use crate::primitives::{Builder, Sampler};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 /// The fewest triangles of a shape.
 pub const MIN_TRIANGLES: usize = 200;
@@ -68,7 +68,7 @@ impl Finish {
     }
 
     /// Poses the mesh of `builder` and adds the defects.
-    pub fn apply(&self, builder: Builder, s: &mut Sampler) -> Mesh {
+    pub fn apply(&self, builder: Builder, s: &mut Sampler) -> TriangleMesh {
         let (mut mesh, parts) = builder.finish();
         self.pose(&mut mesh);
         self.invert(&mut mesh, &parts, s);
@@ -83,7 +83,7 @@ impl Finish {
     }
 
     /// Rotates the shape, moves it to z = 0 and rounds it to micrometres.
-    fn pose(&self, mesh: &mut Mesh) {
+    fn pose(&self, mesh: &mut TriangleMesh) {
         let yaw = DQuat::from_rotation_z(self.yaw_rad);
         let lowest_m = mesh.vertices.iter().map(|v| v.z).fold(f64::INFINITY, f64::min);
         for vertex in &mut mesh.vertices {
@@ -93,7 +93,7 @@ impl Finish {
         }
     }
 
-    fn invert(&self, mesh: &mut Mesh, parts: &[usize], s: &mut Sampler) {
+    fn invert(&self, mesh: &mut TriangleMesh, parts: &[usize], s: &mut Sampler) {
         let ends = parts.iter().skip(1).copied().chain([mesh.triangles.len()]);
         let ranges: Vec<_> = parts.iter().copied().zip(ends).collect();
         for (start, end) in ranges {
@@ -108,7 +108,7 @@ impl Finish {
     }
 
     /// Adds a copy of the first triangles with the opposite winding.
-    fn double(&self, mesh: &mut Mesh) {
+    fn double(&self, mesh: &mut TriangleMesh) {
         let n = (self.doubled_share * mesh.triangles.len() as f64).floor() as usize;
         let copies: Vec<_> = mesh.triangles[..n].iter().map(|&[a, b, c]| [a, c, b]).collect();
         mesh.triangles.extend(copies);
@@ -116,7 +116,7 @@ impl Finish {
 }
 
 /// Removes triangles that rounding has reduced to a line or a point.
-fn drop_slivers(mesh: &mut Mesh) {
+fn drop_slivers(mesh: &mut TriangleMesh) {
     let vertices = &mesh.vertices;
     mesh.triangles.retain(|t| {
         let [a, b, c] = t.map(|i| vertices[i as usize]);
@@ -127,7 +127,7 @@ fn drop_slivers(mesh: &mut Mesh) {
 
 /// Numbers the vertices in the order of their first use. Corners with equal keys share a vertex;
 /// the arguments of `key` are the number of the corner, its vertex, and its place in micrometres.
-fn merge(mesh: &mut Mesh, key: impl Fn(i64, i64, [i64; 3]) -> [i64; 3]) {
+fn merge(mesh: &mut TriangleMesh, key: impl Fn(i64, i64, [i64; 3]) -> [i64; 3]) {
     let mut numbers = BTreeMap::new();
     let mut vertices = Vec::new();
     for (corner, number_of_corner) in mesh.triangles.as_flattened_mut().iter_mut().zip(0..) {

@@ -41,7 +41,7 @@ use formats::rng::StreamKey;
 
 use finish::Finish;
 use primitives::build_one;
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 /// Generates shape number `instance` of `class` under `seed`.
 ///
@@ -50,7 +50,7 @@ use sim_gpu::mesh::Mesh;
 /// degrees, and sometimes a quarter or half turn, is added. The mesh has 200 to 50,000 triangles.
 /// Coordinates are whole micrometres, so that text holds them exactly.
 #[must_use]
-pub fn generate(class: ShapeClass, seed: u64, instance: u32) -> Mesh {
+pub fn generate(class: ShapeClass, seed: u64, instance: u32) -> TriangleMesh {
     let stream = |part: &str| StreamKey::new(seed, &format!("shapes/{class}/{part}"), instance);
     let finish = Finish::draw(class, &mut Sampler::new(stream("finish")));
     let builder = tessellation::fit(&finish, |b| {

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::finish::{Finish, MIN_TRIANGLES};
 use crate::primitives::Builder;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::mesh::unit_frame::bounding_box;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::mesh::unit_frame::bounding_box;
 
 /// The greatest number of trials.
 const MAX_TRIALS: usize = 10;
@@ -48,6 +48,6 @@ pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
 }
 
 /// The lowest and the highest corner of the bounding box.
-pub fn bounds(mesh: &Mesh) -> [DVec3; 2] {
+pub fn bounds(mesh: &TriangleMesh) -> [DVec3; 2] {
     bounding_box(mesh.vertices.iter().copied()).into()
 }

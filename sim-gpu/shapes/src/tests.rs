@@ -8,14 +8,14 @@ mod soundness;
 use rayon::prelude::*;
 
 use super::{ShapeClass, generate};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 /// The number of tested shapes of each class.
 const INSTANCES: u32 = 200;
 const SEED: u64 = 11;
 
 /// Runs the assertions `holds` on many shapes of every class, on all cores.
-fn for_all(holds: impl Fn(ShapeClass, u32, &Mesh) + Sync) {
+fn for_all(holds: impl Fn(ShapeClass, u32, &TriangleMesh) + Sync) {
     for class in ShapeClass::ALL {
         (0..INSTANCES).into_par_iter().for_each(|k| holds(class, k, &generate(class, SEED, k)));
     }

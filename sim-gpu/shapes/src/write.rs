@@ -5,14 +5,14 @@ use std::path::Path;
 
 use formats::{FormatError, atomic};
 use glam::DVec3;
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 /// Writes `mesh` as ASCII OFF, with the shortest decimal numbers that give the same f64. The file
 /// is complete or absent.
 ///
 /// # Errors
 /// The file cannot be written. An earlier file of this name then stays.
-pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
+pub fn write_off(mesh: &TriangleMesh, path: &Path) -> Result<(), FormatError> {
     let mut text = format!("OFF\n{} {} 0\n", mesh.vertices.len(), mesh.triangles.len());
     for DVec3 { x, y, z } in &mesh.vertices {
         push_line(&mut text, format_args!("{x} {y} {z}"));
@@ -28,7 +28,7 @@ pub fn write_off(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
 ///
 /// # Errors
 /// The file cannot be written. An earlier file of this name then stays.
-pub fn write_obj(mesh: &Mesh, path: &Path) -> Result<(), FormatError> {
+pub fn write_obj(mesh: &TriangleMesh, path: &Path) -> Result<(), FormatError> {
     let mut text = String::new();
     for DVec3 { x, y, z } in &mesh.vertices {
         // 0 - y gives no negative zero.
@@ -51,8 +51,8 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn tetrahedron() -> Mesh {
-        Mesh {
+    fn tetrahedron() -> TriangleMesh {
+        TriangleMesh {
             vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y * 0.1, DVec3::new(0.0, 0.0, 1e-6)],
             triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
         }

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
-use crate::sensor::{BeamShape, LARGEST_M, Sensor};
+use crate::sensor::{BeamShape, LARGEST_M, SensorProfile};
 
 /// Beams with a width: each is cast as several rays of equal power, and surfaces that the receiver
 /// cannot resolve become one return between them.
@@ -49,7 +49,7 @@ impl Footprint {
     ///
     /// # Errors
     /// If the sensor does not state them either.
-    pub(super) fn for_sensor(&self, sensor: &Sensor) -> Result<Self, InvalidValue> {
+    pub(super) fn for_sensor(&self, sensor: &SensorProfile) -> Result<Self, InvalidValue> {
         let own = sensor.footprint;
         let missing = |key: &str| {
             let key = format!("effects.footprint.{key}");

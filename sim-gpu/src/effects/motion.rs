@@ -27,15 +27,15 @@ impl EvenMotion {
     /// The poses between two times of a sensor that is at `pose` at the first.
     #[must_use]
     pub fn trajectory(&self, pose: Pose, [from_s, to_s]: [f64; 2]) -> Trajectory {
-        let velocity_m_s = pose.world_from_sensor * DVec3::from_array(self.velocity_m_s);
+        let velocity_m_s = pose.rotation * DVec3::from_array(self.velocity_m_s);
         let seconds = (to_s - from_s).max(1e-3);
         let turns = (self.yaw_rate_deg_s.abs() * seconds / TURN_DEG).ceil().max(1.0) as u32;
         let at = |i: u32| {
             let after_s = seconds * f64::from(i) / f64::from(turns);
             let turned = DQuat::from_rotation_z(self.yaw_rate_deg_s.to_radians() * after_s);
             let position_m = pose.position_m + velocity_m_s * after_s;
-            let world_from_sensor = (pose.world_from_sensor * turned).normalize();
-            (from_s + after_s, Pose { position_m, world_from_sensor })
+            let rotation = (pose.rotation * turned).normalize();
+            (from_s + after_s, Pose { position_m, rotation })
         };
         let poses = (0..=turns).map(at).collect();
         Trajectory::new(poses).expect("invariant: checked numbers are finite")
@@ -62,9 +62,9 @@ mod tests {
         let at = trajectory.at(5.05);
         // Forward is along y, and half a turn is 0.05 s.
         assert!(at.position_m.distance(DVec3::new(1.0, 2.5, 3.05)) < 1e-12);
-        let forward = at.world_from_sensor * DVec3::X;
+        let forward = at.rotation * DVec3::X;
         assert!(forward.distance(DVec3::NEG_Y) < 1e-9, "{forward}");
-        let quarter = trajectory.at(5.025).world_from_sensor * DVec3::X;
+        let quarter = trajectory.at(5.025).rotation * DVec3::X;
         assert!(quarter.distance(DVec3::NEG_X) < 1e-9, "to the left: {quarter}");
     }
 }

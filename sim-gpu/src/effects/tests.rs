@@ -61,10 +61,10 @@ fn bad_numbers_are_named() {
 #[test]
 fn the_sensors_own_quantum_is_filled_in() {
     let effects: Effects = toml::from_str("quantise_m = true").unwrap();
-    let vlp32c = Sensor::builtin("vlp32c").unwrap();
+    let vlp32c = SensorProfile::builtin("vlp32c").unwrap();
     let resolved = effects.for_sensor(&vlp32c).unwrap();
     assert_eq!(resolved.quantum, Some(Quantum { step_m: Some(0.004) }));
-    let kinect = Sensor::builtin("kinect-v2").unwrap();
+    let kinect = SensorProfile::builtin("kinect-v2").unwrap();
     let error = effects.for_sensor(&kinect).unwrap_err();
     assert!(error.to_string().contains("kinect-v2"), "{error}");
 }
@@ -72,10 +72,10 @@ fn the_sensors_own_quantum_is_filled_in() {
 #[test]
 fn the_sensors_own_detection_limit_is_filled_in() {
     let effects: Effects = toml::from_str("detection = true").unwrap();
-    let vlp32c = Sensor::builtin("vlp32c").unwrap();
+    let vlp32c = SensorProfile::builtin("vlp32c").unwrap();
     let limit = effects.for_sensor(&vlp32c).unwrap().detection.unwrap().limit;
     assert_eq!(limit, Some(DetectionLimit { reflectivity: 0.8, range_m: 200.0 }));
-    let kinect = Sensor::builtin("kinect-v2").unwrap();
+    let kinect = SensorProfile::builtin("kinect-v2").unwrap();
     let error = effects.for_sensor(&kinect).unwrap_err();
     assert!(error.to_string().contains("as sensor \"kinect-v2\" has no [detection]"), "{error}");
 }

@@ -238,10 +238,10 @@ mod tests {
     use crate::cpu;
     use crate::effects::{Dropout, Intensity, Noise, NoiseModel};
     use crate::job::{Aim, Culling};
-    use crate::mesh::Mesh;
+    use crate::mesh::TriangleMesh;
     use crate::pose::Pose;
     use crate::ray::{AMBIGUOUS, RayFrame};
-    use crate::sensor::Sensor;
+    use crate::sensor::SensorProfile;
     use crate::target::{Surface, Target};
     use formats::rng::StreamKey;
     use glam::{DAffine3, DVec3};
@@ -262,12 +262,12 @@ mod tests {
     /// Pyramids of different sizes, each from its own side. The rays of every other one are
     /// sent, the others are made on the adapter.
     fn jobs() -> Vec<CastJob> {
-        let pattern = Sensor::builtin("generic-static").unwrap().pattern();
+        let pattern = SensorProfile::builtin("generic-static").unwrap().pattern();
         (1..6u32)
             .map(|i| {
                 let vertices = vec![DVec3::X, DVec3::Y, DVec3::Z, -DVec3::ONE * f64::from(i)];
                 let triangles = vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]];
-                let surface = Surface::new(Mesh { vertices, triangles }, vec![0, 1, 2, 3]);
+                let surface = Surface::new(TriangleMesh { vertices, triangles }, vec![0, 1, 2, 3]);
                 let position_m = DVec3::new(4.0, f64::from(i) - 3.0, 1.0) * f64::from(i);
                 let pose = Pose::look_at(position_m, DVec3::ZERO).unwrap();
                 let frame = RayFrame::new(&surface, &DAffine3::IDENTITY, &pose);

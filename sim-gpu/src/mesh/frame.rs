@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::triangle_mesh::Mesh;
+use super::triangle_mesh::TriangleMesh;
 use super::unit_frame::bounding_box;
 
 formats::named! {
@@ -41,7 +41,7 @@ formats::named! {
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorldMesh {
     /// The mesh, z up, in metres.
-    pub mesh: Mesh,
+    pub mesh: TriangleMesh,
     /// The position of the origin, in the units of the file.
     pub centre: DVec3,
     /// Metres per unit of the file; at most the largest finite number.
@@ -55,7 +55,7 @@ pub struct WorldMesh {
 /// mesh without extent is only moved. Every finite coordinate is allowed: sums are relative to the
 /// bounding box and in units of its largest coordinate.
 #[must_use]
-pub fn to_world(mesh: &Mesh, up: Up, normalize: Normalize) -> WorldMesh {
+pub fn to_world(mesh: &TriangleMesh, up: Up, normalize: Normalize) -> WorldMesh {
     let named = named_vertices(mesh);
     let named_positions =
         || mesh.vertices.iter().zip(&named).filter(|(_, named)| **named).map(|(vertex, _)| vertex);
@@ -81,7 +81,7 @@ pub fn to_world(mesh: &Mesh, up: Up, normalize: Normalize) -> WorldMesh {
         if *named { (from_box(*vertex) - shift) / size } else { DVec3::ZERO }
     };
     WorldMesh {
-        mesh: Mesh {
+        mesh: TriangleMesh {
             vertices: mesh.vertices.iter().zip(&named).map(moved).collect(),
             triangles: mesh.triangles.clone(),
         },
@@ -91,7 +91,7 @@ pub fn to_world(mesh: &Mesh, up: Up, normalize: Normalize) -> WorldMesh {
 }
 
 /// Whether a triangle refers to each vertex, `[n_vertices]`.
-pub(super) fn named_vertices(mesh: &Mesh) -> Vec<bool> {
+pub(super) fn named_vertices(mesh: &TriangleMesh) -> Vec<bool> {
     let mut named = vec![false; mesh.vertices.len()];
     for &corner in mesh.triangles.iter().flatten() {
         named[corner as usize] = true;
@@ -125,11 +125,11 @@ mod tests {
     use super::*;
 
     /// A tetrahedron of size `size` at `centre`, and a stray vertex.
-    fn tetrahedron(size: f64, centre: DVec3) -> Mesh {
+    fn tetrahedron(size: f64, centre: DVec3) -> TriangleMesh {
         let corners = [DVec3::ZERO, DVec3::X, 2.0 * DVec3::Y, DVec3::Z];
         let mut vertices: Vec<_> = corners.iter().map(|c| centre + size * *c).collect();
         vertices.push(DVec3::splat(-9e99));
-        Mesh { vertices, triangles: vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] }
+        TriangleMesh { vertices, triangles: vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] }
     }
 
     /// A few roundings of coordinates of the order of 1.
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn a_mesh_without_extent_has_scale_1() {
         for position in [DVec3::ZERO, DVec3::splat(1e300), DVec3::splat(5e-324)] {
-            let mesh = Mesh { vertices: vec![position; 3], triangles: vec![[0, 1, 2]] };
+            let mesh = TriangleMesh { vertices: vec![position; 3], triangles: vec![[0, 1, 2]] };
             for normalize in [Normalize::UnitSphere, Normalize::Bbox, Normalize::None] {
                 let world = to_world(&mesh, Up::Z, normalize);
                 assert_eq!((world.scale, world.centre), (1.0, position));

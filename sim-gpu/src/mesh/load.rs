@@ -7,7 +7,7 @@ use formats::hash::{FileHash, Hashing};
 
 use super::error::{Malformed, MeshError, ParseError};
 use super::format::MeshFormat;
-use super::triangle_mesh::{Mesh, Parsed};
+use super::triangle_mesh::{Parsed, TriangleMesh};
 use super::{obj, off, ply, stl};
 
 /// A mesh as in its file, with the properties of the file.
@@ -15,7 +15,7 @@ use super::{obj, off, ply, stl};
 pub struct LoadedMesh {
     /// The mesh, in the axes and units of the file. It has at least one triangle, fewer than 2^32
     /// vertices, all finite, and all indices in range.
-    pub mesh: Mesh,
+    pub mesh: TriangleMesh,
     /// The format by the file's extension.
     pub format: MeshFormat,
     /// The number of faces of fewer than three corners, which were dropped.
@@ -83,7 +83,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
 ///
 /// # Errors
 /// If a vertex is not finite, an index is out of range, or there is no triangle.
-pub fn check(mesh: &Mesh) -> Result<(), ParseError> {
+pub fn check(mesh: &TriangleMesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
     Malformed::check_vertex_count(n_vertices)?;
     if let Some(vertex) = mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {

@@ -24,4 +24,4 @@ pub(crate) use appearance::{Appearance, Colour, Face, colours};
 pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
 pub use load::{LoadedMesh, check, load, load_hashed, parse};
-pub use triangle_mesh::{Mesh, Parsed};
+pub use triangle_mesh::{Parsed, TriangleMesh};

@@ -10,7 +10,7 @@ use glam::DVec3;
 use tobj::{LoadError, LoadOptions};
 
 use super::error::{Malformed, ParseError, excerpt};
-use super::triangle_mesh::{Mesh, Parsed};
+use super::triangle_mesh::{Parsed, TriangleMesh};
 
 /// Reads an OBJ file from its bytes.
 ///
@@ -38,7 +38,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     Ok(parsed)
 }
 
-fn append(mesh: &mut Mesh, model: &tobj::Mesh) {
+fn append(mesh: &mut TriangleMesh, model: &tobj::Mesh) {
     let base = mesh.vertices.len() as u32;
     mesh.vertices.extend(model.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
     let corners = model.indices.as_chunks::<3>().0;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::error::ParseError;
-use super::triangle_mesh::{Mesh, Parsed};
+use super::triangle_mesh::{Parsed, TriangleMesh};
 
 type Parse = fn(&[u8]) -> Result<Parsed, ParseError>;
 
@@ -11,7 +11,7 @@ type Parse = fn(&[u8]) -> Result<Parsed, ParseError>;
 #[track_caller]
 pub fn is_the_triangle(parse: Parse, file: impl AsRef<[u8]>) {
     let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
-    let expected = Mesh { vertices, triangles: vec![[0, 1, 2]] };
+    let expected = TriangleMesh { vertices, triangles: vec![[0, 1, 2]] };
     let found = parse(file.as_ref()).map(|parsed| (parsed.mesh, parsed.dropped_faces));
     assert_eq!(found, Ok((expected, 0)), "{}", String::from_utf8_lossy(file.as_ref()));
 }

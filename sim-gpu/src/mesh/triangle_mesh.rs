@@ -4,7 +4,7 @@ use glam::DVec3;
 
 /// A triangle mesh in f64.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
+pub struct TriangleMesh {
     /// Vertex positions in the file's units, `[n_vertices]`, all finite.
     pub vertices: Vec<DVec3>,
     /// Corners as indices into `vertices`, `[n_triangles, 3]`, in the file's order; all in range.
@@ -15,7 +15,7 @@ pub struct Mesh {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parsed {
     /// The mesh, with a triangle, finite vertices and indices in range once it was checked.
-    pub mesh: Mesh,
+    pub mesh: TriangleMesh,
     /// The number of faces of fewer than three corners, which were dropped.
     pub dropped_faces: usize,
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::hash::BuildHasher;
 
 use super::frame::named_vertices;
-use super::triangle_mesh::Mesh;
+use super::triangle_mesh::TriangleMesh;
 use super::unit_frame::UnitFrame;
 
 /// Counts of the redundant parts of a mesh.
@@ -35,7 +35,7 @@ pub struct TriangleStats {
 /// Corners are compared as casters see them: in f32 and in the [`UnitFrame`]. Vertices at the same
 /// position are the same corner, because CAD files often repeat vertices for each face.
 #[must_use]
-pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
+pub fn triangle_stats(mesh: &TriangleMesh) -> TriangleStats {
     let named = named_vertices(mesh);
     let positions = rounded_positions(mesh, &named);
     let keys: Vec<[u32; 3]> = positions.iter().map(|position| key(*position)).collect();
@@ -65,7 +65,7 @@ pub fn triangle_stats(mesh: &Mesh) -> TriangleStats {
 }
 
 /// The vertices in f32, in the unit frame of those that are `named`; the others at the origin.
-fn rounded_positions(mesh: &Mesh, named: &[bool]) -> Vec<Vec3> {
+fn rounded_positions(mesh: &TriangleMesh, named: &[bool]) -> Vec<Vec3> {
     let vertices = || mesh.vertices.iter().copied().zip(named);
     let frame =
         UnitFrame::around(vertices().filter(|(_, named)| **named).map(|(vertex, _)| vertex));
@@ -102,9 +102,9 @@ fn lowest_equal(items: &[[u32; 3]]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    fn mesh(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Mesh {
+    fn mesh(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> TriangleMesh {
         let vertices = vertices.iter().copied().map(DVec3::from_array).collect();
-        Mesh { vertices, triangles: triangles.to_vec() }
+        TriangleMesh { vertices, triangles: triangles.to_vec() }
     }
 
     const SQUARE: [[f64; 3]; 4] =

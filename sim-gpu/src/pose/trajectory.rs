@@ -25,7 +25,7 @@ impl Trajectory {
         }
         for (i, (time_s, pose)) in poses.iter().enumerate() {
             let key = || format!("trajectory[{i}]");
-            let is_finite = pose.position_m.is_finite() && pose.world_from_sensor.is_finite();
+            let is_finite = pose.position_m.is_finite() && pose.rotation.is_finite();
             if !(time_s.is_finite() && is_finite) {
                 return Err(InvalidValue::new(key(), "expected finite numbers"));
             }
@@ -43,8 +43,8 @@ impl Trajectory {
     /// As [`read_trajectory`].
     pub fn load(path: &Path, period_s: f64) -> Result<Self, FormatError> {
         let pose = |keyed: KeyedPose| {
-            let world_from_sensor = DQuat::from_array(keyed.quaternion_xyzw);
-            (keyed.time_s, Pose { position_m: keyed.position_m.into(), world_from_sensor })
+            let rotation = DQuat::from_array(keyed.quaternion_xyzw);
+            (keyed.time_s, Pose { position_m: keyed.position_m.into(), rotation })
         };
         Ok(Self(read_trajectory(path, period_s)?.into_iter().map(pose).collect()))
     }
@@ -61,11 +61,7 @@ impl Trajectory {
         let share = (time_s - a.0) / (b.0 - a.0);
         Pose {
             position_m: a.1.position_m.lerp(b.1.position_m, share),
-            world_from_sensor: a
-                .1
-                .world_from_sensor
-                .slerp(b.1.world_from_sensor, share)
-                .normalize(),
+            rotation: a.1.rotation.slerp(b.1.rotation, share).normalize(),
         }
     }
 
@@ -82,7 +78,7 @@ impl Trajectory {
             // A straight way between two poses is nowhere farther than at its ends; a turn is
             // no more than the sum of its parts.
             far_m = far_m.max(pose.position_m.distance(start.position_m));
-            turned_rad += before.world_from_sensor.angle_between(pose.world_from_sensor);
+            turned_rad += before.rotation.angle_between(pose.rotation);
             before = pose;
         }
         (far_m, turned_rad)

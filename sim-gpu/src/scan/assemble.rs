@@ -10,7 +10,7 @@ use super::request::ScanRequest;
 use crate::config::InvalidValue;
 use crate::effects::Effects;
 use crate::pose::Pose;
-use crate::sensor::{Sensor, polar_angle_rad};
+use crate::sensor::{SensorProfile, polar_angle_rad};
 use crate::weather::Medium;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
@@ -66,8 +66,8 @@ fn position(receiver: &Receiver, start: &Pose, r: &Return, origin: DVec3) -> DVe
     if request.deskew {
         return r.from_sensor + (pose.position_m - origin);
     }
-    let in_sensor = pose.world_from_sensor.inverse() * r.from_sensor;
-    start.world_from_sensor * in_sensor + (start.position_m - origin)
+    let in_sensor = pose.rotation.inverse() * r.from_sensor;
+    start.rotation * in_sensor + (start.position_m - origin)
 }
 
 fn f32x3(v: DVec3) -> [f32; 3] {
@@ -95,7 +95,7 @@ fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<HitId> {
 
 /// Applies the rings and the sampling of points that a sensor's profile may ask for.
 fn post_process(request: &ScanRequest, returns: &mut Vec<Return>) {
-    let Sensor { rings, sample, .. } = request.sensor;
+    let SensorProfile { rings, sample, .. } = request.sensor;
     if let (Some(sample), Some(_)) = (sample, rings) {
         let drawn = sample.draw_before_rings(returns.len() as u32, request.stream);
         *returns = drawn.iter().map(|&i| returns[i as usize]).collect();
@@ -161,7 +161,7 @@ fn with_attributes(mut scan: Scan, receiver: &Receiver, returns: &[Return]) -> S
                 scan.sensor_m = column(returns, |r| f32x3(at(r) - origin));
             }
             Attribute::Attitude => {
-                let at = |r: &Return| request.pose_at(ray(r)).world_from_sensor;
+                let at = |r: &Return| request.pose_at(ray(r)).rotation;
                 // The quaternion of the two that turns by at most half a turn.
                 let shorter = |q: DQuat| if q.w < 0.0 { -q } else { q };
                 scan.attitude_rad = column(returns, |r| f32x3(shorter(at(r)).to_scaled_axis()));

@@ -3,7 +3,7 @@
 //! [`scan()`] is the whole way in one call; [`scan_many`] casts many scans
 //! together, which keeps a GPU busy; [`scan_objects`] looks at several objects
 //! at once. All three aim the sensor's beams ([`ScanRequest::aim`]), cast them
-//! ([`Caster::cast`]), solve the ranges ([`resolve`]) and make points of them
+//! ([`OpenCaster::cast`]), solve the ranges ([`resolve`]) and make points of them
 //! ([`assemble`]).
 
 mod assemble;
@@ -21,7 +21,7 @@ pub use object_hits::{ObjectHits, Tally};
 pub use request::{Glass, PlacedTarget, ScanRequest};
 
 use crate::cast_error::CastError;
-use crate::caster::Caster;
+use crate::caster::OpenCaster;
 use crate::config::InvalidValue;
 use crate::cpu;
 use crate::effects::Effects;
@@ -65,7 +65,11 @@ pub struct Scanned {
 /// # Errors
 /// [`ScanError`]: the adapter failed, or the request asks for what its sensor
 /// or `caster` does not have.
-pub fn scan(caster: &Caster, target: &Target, request: &ScanRequest) -> Result<Scan, ScanError> {
+pub fn scan(
+    caster: &OpenCaster,
+    target: &Target,
+    request: &ScanRequest,
+) -> Result<Scan, ScanError> {
     Ok(scan_objects(caster, &[PlacedTarget::new(target)], request)?.scan)
 }
 
@@ -75,7 +79,7 @@ pub fn scan(caster: &Caster, target: &Target, request: &ScanRequest) -> Result<S
 /// # Errors
 /// As [`scan()`].
 pub fn scan_many(
-    caster: &Caster,
+    caster: &OpenCaster,
     requests: &[(&Target, ScanRequest)],
 ) -> Result<Vec<Scanned>, ScanError> {
     let placed: Vec<_> = requests.iter().map(|(target, _)| [PlacedTarget::new(target)]).collect();
@@ -90,7 +94,7 @@ pub fn scan_many(
 /// # Errors
 /// As [`scan()`].
 pub fn scan_objects(
-    caster: &Caster,
+    caster: &OpenCaster,
     objects: &[PlacedTarget],
     request: &ScanRequest,
 ) -> Result<Scanned, ScanError> {
@@ -99,7 +103,7 @@ pub fn scan_objects(
 }
 
 fn scan_all(
-    caster: &Caster,
+    caster: &OpenCaster,
     requests: &[(&[PlacedTarget], &ScanRequest)],
 ) -> Result<Vec<Scanned>, ScanError> {
     let moves = |(_, request): &(&[PlacedTarget], &ScanRequest)| {
@@ -116,12 +120,12 @@ fn scan_all(
 
 /// The scans of requests that have the poses of their sensors.
 fn scan_as_asked(
-    caster: &Caster,
+    caster: &OpenCaster,
     requests: &[(&[PlacedTarget], &ScanRequest)],
 ) -> Result<Vec<Scanned>, ScanError> {
     let targets = requests.iter().flat_map(|(objects, _)| *objects).map(|object| object.target);
     let fits = targets.into_iter().all(|target| caster.fits(target));
-    if !fits || matches!(caster, Caster::Cpu(_)) {
+    if !fits || matches!(caster, OpenCaster::Cpu(_)) {
         let scan = |(objects, request): &(&[PlacedTarget], &ScanRequest)| {
             let (jobs, hits) = cast_nearest_first(objects, request);
             finish(caster, objects, request, &jobs, hits, !fits)
@@ -183,7 +187,7 @@ fn cast_nearest_first(
 
 /// From what was cast for one request to its scan.
 fn finish(
-    caster: &Caster,
+    caster: &OpenCaster,
     objects: &[PlacedTarget],
     request: &ScanRequest,
     jobs: &[CastJob],

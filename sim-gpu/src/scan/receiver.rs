@@ -94,7 +94,7 @@ impl<'a> Receiver<'a> {
 
     /// The unit vector along a ray, in world axes.
     fn direction(&self, ray: u32) -> DVec3 {
-        self.request.pose_at(ray).world_from_sensor * self.pattern().directions[ray as usize]
+        self.request.pose_at(ray).rotation * self.pattern().directions[ray as usize]
     }
 
     /// The axis of the beam that a ray belongs to, in world axes.
@@ -116,7 +116,7 @@ impl<'a> Receiver<'a> {
     /// The start of a ray relative to the sensor, in world axes; `None` if it is the sensor.
     pub fn start(&self, ray: u32) -> Option<DVec3> {
         let start = self.pattern().start(ray)?;
-        Some(self.request.pose_at(ray).world_from_sensor * start)
+        Some(self.request.pose_at(ray).rotation * start)
     }
 
     /// The start of a ray in the world.

@@ -8,7 +8,7 @@ use crate::material::Materials;
 use crate::motion::Motion;
 use crate::pose::{Pose, Trajectory};
 use crate::ray::RayFrame;
-use crate::sensor::{BeamPattern, Sensor};
+use crate::sensor::{BeamPattern, SensorProfile};
 use crate::target::Target;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
@@ -35,8 +35,8 @@ use std::sync::Arc;
 #[non_exhaustive]
 pub struct ScanRequest<'a> {
     /// The sensor.
-    pub sensor: &'a Sensor,
-    /// The beams of the sensor, [`Sensor::pattern`], which many requests share.
+    pub sensor: &'a SensorProfile,
+    /// The beams of the sensor, [`SensorProfile::pattern`], which many requests share.
     pub pattern: &'a BeamPattern,
     /// Where the sensor stands, if it does not move.
     pub pose: Pose,
@@ -100,7 +100,7 @@ impl<'a> ScanRequest<'a> {
     /// A scan of `sensor`, whose beams are `pattern`, from `pose`: positions
     /// alone, with all effects of the caster, and random numbers of seed 0.
     #[must_use]
-    pub fn new(sensor: &'a Sensor, pattern: &'a BeamPattern, pose: Pose) -> Self {
+    pub fn new(sensor: &'a SensorProfile, pattern: &'a BeamPattern, pose: Pose) -> Self {
         Self {
             sensor,
             pattern,

@@ -2,12 +2,12 @@
 
 use super::{Scene, SceneObject, SceneSensor};
 use crate::bvh::Builder;
-use crate::caster::Caster;
+use crate::caster::OpenCaster;
 use crate::job::Culling;
 use crate::material::{Material, MaterialError, Materials};
 use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::validate::triangle_stats;
-use crate::mesh::{LoadedMesh, Mesh, MeshError, load};
+use crate::mesh::{LoadedMesh, MeshError, TriangleMesh, load};
 use crate::scan::{PlacedTarget, ScanError, ScanRequest, Scanned, Tally, scan_objects};
 use crate::simplify::{NotBuilt, Simplified, Viewpoint, resolved_m, simplified_surface};
 use crate::target::{Surface, Target};
@@ -63,7 +63,7 @@ struct Placed {
 /// fails.
 pub fn cast(
     scene: &Scene,
-    caster: &Caster,
+    caster: &OpenCaster,
     culling: Culling,
 ) -> Result<Vec<SceneScan>, SceneError> {
     let objects =
@@ -103,7 +103,7 @@ fn place(scene: &Scene, object: &SceneObject) -> Result<Placed, SceneError> {
 fn resolved_by(
     scene: &Scene,
     object: &SceneObject,
-    mesh: &Mesh,
+    mesh: &TriangleMesh,
     world_from_object: &DAffine3,
 ) -> f64 {
     let object_from_world = world_from_object.inverse();
@@ -122,7 +122,7 @@ fn cast_sensor(
     sensor: &SceneSensor,
     number: u32,
     objects: &[Placed],
-    caster: &Caster,
+    caster: &OpenCaster,
     culling: Culling,
 ) -> Result<SceneScan, SceneError> {
     let pattern = scene.effects.widen(sensor.sensor.pattern(), &sensor.sensor);

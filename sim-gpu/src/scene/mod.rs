@@ -12,7 +12,7 @@ use crate::effects::Effects;
 use crate::material::MaterialChoice;
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::{Pose, Trajectory};
-use crate::sensor::Sensor;
+use crate::sensor::SensorProfile;
 use crate::simplify::Simplify;
 
 mod cast;
@@ -79,7 +79,7 @@ pub struct SceneObject {
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneSensor {
     /// The sensor, from its profile.
-    pub sensor: Sensor,
+    pub sensor: SensorProfile,
     /// Default: the sensor's name.
     pub name: String,
     /// Where it stands; if it moves, when the scan begins.
@@ -129,13 +129,15 @@ impl Scene {
         let mut sensors = Vec::new();
         for (i, sensor) in table.sensor.into_iter().enumerate() {
             let profile =
-                Sensor::resolve_in(folder, &sensor.profile).map_err(|error| match error {
-                    ConfigError::UnknownSensor { .. } => {
-                        let key = format!("sensor[{i}].profile");
-                        in_file(InvalidValue::new(key, error.to_string()))
-                    }
-                    in_profile => in_profile,
-                })?;
+                SensorProfile::resolve_in(folder, &sensor.profile).map_err(
+                    |error| match error {
+                        ConfigError::UnknownSensor { .. } => {
+                            let key = format!("sensor[{i}].profile");
+                            in_file(InvalidValue::new(key, error.to_string()))
+                        }
+                        in_profile => in_profile,
+                    },
+                )?;
             effects.for_sensor(&profile).map_err(in_file)?;
             sensors.push(sensor.validate(i, folder, profile).map_err(in_file)?);
         }

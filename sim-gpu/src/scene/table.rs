@@ -15,7 +15,7 @@ use crate::effects::Effects;
 use crate::material::{ColourSource, MaterialChoice, MaterialTable};
 use crate::mesh::frame::{Normalize, Up};
 use crate::pose::{PoseKeys, Trajectory};
-use crate::sensor::Sensor;
+use crate::sensor::SensorProfile;
 use crate::simplify::Simplify;
 
 /// The keys of a scene.
@@ -262,7 +262,7 @@ impl SensorTable {
         self,
         index: usize,
         folder: &Path,
-        sensor: Sensor,
+        sensor: SensorProfile,
     ) -> Result<SceneSensor, InvalidValue> {
         let table = format!("sensor[{index}]");
         let key = |field: &str| format!("{table}.{field}");

@@ -1,7 +1,7 @@
 //! Sensors: which way each beam points, when it fires, how far it measures.
 //!
 //! A sensor is a TOML profile, built in (`assets/sensors`) or given by path.
-//! Angles are in degrees as in the profile; [`Sensor::pattern`] turns them
+//! Angles are in degrees as in the profile; [`SensorProfile::pattern`] turns them
 //! into unit vectors of the sensor frame (x forward, y left, z up).
 
 use std::num::NonZeroU32;
@@ -62,7 +62,7 @@ const MAX_RINGS: f64 = u16::MAX as f64;
 /// A sensor, checked: its pattern can be built without error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "profile::Profile")]
-pub struct Sensor {
+pub struct SensorProfile {
     /// A short name, as in `--sensor`.
     pub name: String,
     /// One line for people.
@@ -142,7 +142,7 @@ pub enum Layout {
     Table(Table),
 }
 
-impl Sensor {
+impl SensorProfile {
     /// The built-in sensor of this name, if there is one.
     #[must_use]
     pub fn builtin(name: &str) -> Option<Self> {
@@ -170,17 +170,17 @@ impl Sensor {
     ///
     /// # Errors
     ///
-    /// As [`Sensor::load`]; where there is neither such a name nor such a
+    /// As [`SensorProfile::load`]; where there is neither such a name nor such a
     /// file, the error lists the known names.
     pub fn resolve(name_or_path: &str) -> Result<Self, ConfigError> {
         Self::resolve_in(Path::new(""), name_or_path)
     }
 
-    /// As [`Sensor::resolve`], with relative paths taken from `folder`.
+    /// As [`SensorProfile::resolve`], with relative paths taken from `folder`.
     ///
     /// # Errors
     ///
-    /// As [`Sensor::resolve`].
+    /// As [`SensorProfile::resolve`].
     pub fn resolve_in(folder: &Path, name_or_path: &str) -> Result<Self, ConfigError> {
         if let Some(sensor) = Self::builtin(name_or_path) {
             return Ok(sensor);

@@ -5,14 +5,14 @@ use std::path::Path;
 
 use formats::ouster::Metadata;
 
-use super::{Beam, Layout, RangeLimits, Rotating, Sensor};
+use super::{Beam, Layout, RangeLimits, Rotating, SensorProfile};
 use crate::config::{ConfigError, InvalidValue};
 
 /// The farthest range that 19 bits of millimetres hold, metres.
 const FARTHEST_M: f64 = 524.0;
 
 /// Reads the metadata in `file`. The sensor's frame is Ouster's lidar frame.
-pub(super) fn load(file: &Path) -> Result<Sensor, ConfigError> {
+pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
     let metadata = Metadata::read(file).map_err(|error| ConfigError::Syntax {
         file: file.to_owned(),
         message: error.to_string(),
@@ -48,7 +48,7 @@ pub(super) fn load(file: &Path) -> Result<Sensor, ConfigError> {
         InvalidValue::new(format!("as a profile, {key}"), cause).in_file(file)
     })?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Sensor {
+    Ok(SensorProfile {
         name,
         description: format!("Ouster of {} beams", metadata.beams_deg().len()),
         sources: vec![file.display().to_string()],

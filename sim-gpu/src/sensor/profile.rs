@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::{
     BeamShape, DetectionLimit, Grid, LARGEST_M, Layout, RangeLimits, Rings, Risley, Rotating,
-    Sample, Sensor, Table, TypicalNoise, Uniform, Views,
+    Sample, SensorProfile, Table, TypicalNoise, Uniform, Views,
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
 
@@ -50,12 +50,12 @@ impl Profile {
 }
 
 /// Parses the profile `text`, which is in `file`.
-pub(super) fn parse(text: &str, file: &Path) -> Result<Sensor, ConfigError> {
+pub(super) fn parse(text: &str, file: &Path) -> Result<SensorProfile, ConfigError> {
     let profile: Profile = config::parse(text, file)?;
-    Sensor::try_from(profile).map_err(|invalid| invalid.in_file(file))
+    SensorProfile::try_from(profile).map_err(|invalid| invalid.in_file(file))
 }
 
-impl TryFrom<Profile> for Sensor {
+impl TryFrom<Profile> for SensorProfile {
     type Error = InvalidValue;
 
     fn try_from(profile: Profile) -> Result<Self, InvalidValue> {

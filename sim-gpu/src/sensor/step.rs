@@ -4,12 +4,12 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::{Layout, Sensor};
+use super::{Layout, SensorProfile};
 
 /// Beams closer together than this count as one beam that fires twice.
 const SAME_BEAM_RAD: f64 = 1e-9;
 
-impl Sensor {
+impl SensorProfile {
     /// The least angle between neighbouring beams along a row or a column, radians; `None` for a
     /// single beam. For rosettes and tables, the least angle between any two beams of a scan.
     ///
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use std::num::NonZeroU32;
 
-    fn step_deg(sensor: &Sensor) -> f64 {
+    fn step_deg(sensor: &SensorProfile) -> f64 {
         sensor.angular_step_rad().unwrap().to_degrees()
     }
 
@@ -98,12 +98,12 @@ mod tests {
         assert!((opposite.to_degrees() - 180.0).abs() < 1e-6);
         assert_eq!(least_angle(&[at(3.0), at(3.0)]), None);
         // A rosette crosses itself: less than from one shot of a line to its next.
-        assert!(step_deg(&Sensor::builtin("mid70").unwrap()) < 0.1);
+        assert!(step_deg(&SensorProfile::builtin("mid70").unwrap()) < 0.1);
     }
 
     #[test]
     fn a_real_head_steps_by_its_firing_sequence() {
-        let vlp32c = Sensor::builtin("vlp32c").unwrap();
+        let vlp32c = SensorProfile::builtin("vlp32c").unwrap();
         // 55.296 us of a revolution of 0.1 s; its rows are 0.333 degrees apart.
         assert!((step_deg(&vlp32c) - 0.199_065_6).abs() < 1e-9);
         let halved = vlp32c.decimated(NonZeroU32::new(2).unwrap());
@@ -112,9 +112,9 @@ mod tests {
 
     #[test]
     fn a_grid_steps_by_its_pitch() {
-        let ultrapuck = Sensor::builtin("blainder-ultrapuck").unwrap();
+        let ultrapuck = SensorProfile::builtin("blainder-ultrapuck").unwrap();
         assert!((step_deg(&ultrapuck) - 360.0 / 1799.0).abs() < 1e-9);
-        let camera = Sensor::builtin("generic-static").unwrap();
+        let camera = SensorProfile::builtin("generic-static").unwrap();
         // 100 pixels over 60 degrees, uniform in the tangent: least at the edge.
         let edge = 30f64.to_radians().tan();
         let expected = (edge.atan() - (edge - 2.0 * edge / 99.0).atan()).to_degrees();
@@ -125,7 +125,7 @@ mod tests {
     fn a_single_beam_has_no_neighbour() {
         let text = "name = \"one\"\nrange = { max_m = 10 }\n[grid]\nwidth = 1\nheight = 1\n\
                     fov_x_deg = 10\nfov_y_deg = 10";
-        let one: Sensor = toml::from_str(text).unwrap();
+        let one: SensorProfile = toml::from_str(text).unwrap();
         assert_eq!(one.angular_step_rad(), None);
     }
 }

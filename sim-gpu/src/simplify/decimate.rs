@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::distance::distance_to_surface;
 use super::within::beyond;
 use crate::bvh::Builder;
-use crate::mesh::Mesh;
+use crate::mesh::TriangleMesh;
 use crate::target::{Surface, Target, UnitFrame};
 
 /// The part of the bound that is given to the decimation. Its errors are means over quadrics, not
@@ -27,7 +27,7 @@ const WORTH_IT: f64 = 0.75;
 /// Decimates `mesh`, and repairs the places where the error is too large. Triangles without a proof
 /// that they lie near the mesh are removed, and the mesh's own triangles around them restored; so
 /// are those without a proof that they lie near the simplified surface.
-pub(super) fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
+pub(super) fn proven(mesh: &TriangleMesh, kept: &[u32], bound: f64) -> Option<TriangleMesh> {
     if kept.is_empty() || bound.is_nan() || bound <= 0.0 {
         return None;
     }
@@ -47,7 +47,7 @@ pub(super) fn proven(mesh: &Mesh, kept: &[u32], bound: f64) -> Option<Mesh> {
 
 /// `corners` without the triangles that stray from the `original`, and with the triangles to restore.
 fn repair(
-    mesh: &Mesh,
+    mesh: &TriangleMesh,
     welded: &Welded,
     original: &Target,
     corners: Vec<u32>,
@@ -92,7 +92,7 @@ fn around(surface: &Surface, target: &Target, distance: f64) -> Vec<u32> {
     surface.kept().par_iter().filter(is_near).copied().collect()
 }
 
-fn target(mesh: Mesh) -> Target {
+fn target(mesh: TriangleMesh) -> Target {
     Target::new(Surface::of_mesh(mesh), Builder::Morton)
 }
 
@@ -108,7 +108,7 @@ struct Welded {
 }
 
 impl Welded {
-    fn new(mesh: &Mesh, kept: &[u32], frame: &UnitFrame) -> Self {
+    fn new(mesh: &TriangleMesh, kept: &[u32], frame: &UnitFrame) -> Self {
         const NOT_SEEN: u32 = u32::MAX;
         let mut welded = Self {
             positions: Vec::new(),
@@ -152,7 +152,7 @@ impl Welded {
 
     /// The mesh of triangles with these `corners`, at the f64 positions of `mesh`, without unused
     /// vertices.
-    fn mesh_of(&self, mesh: &Mesh, corners: &[u32]) -> Mesh {
+    fn mesh_of(&self, mesh: &TriangleMesh, corners: &[u32]) -> TriangleMesh {
         let position = |corner: usize| mesh.vertices[self.sources[corner] as usize];
         of_named(corners.as_chunks().0.to_vec(), self.positions.len(), position)
     }
@@ -164,7 +164,7 @@ fn of_named(
     mut triangles: Vec<[u32; 3]>,
     n: usize,
     position: impl Fn(usize) -> glam::DVec3,
-) -> Mesh {
+) -> TriangleMesh {
     const NOT_NAMED: u32 = u32::MAX;
     let mut numbers = vec![NOT_NAMED; n];
     let mut vertices = Vec::new();
@@ -176,7 +176,7 @@ fn of_named(
         }
         *corner = *number;
     }
-    Mesh { vertices, triangles }
+    TriangleMesh { vertices, triangles }
 }
 
 #[cfg(test)]
@@ -192,7 +192,7 @@ mod tests {
         let mut vertices: Vec<DVec3> = corners.map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec();
         vertices.push(DVec3::Z);
         let triangles = (0..4).map(|i| [i, (i + 1) % 4, 4]).collect();
-        let mesh = Mesh { vertices, triangles };
+        let mesh = TriangleMesh { vertices, triangles };
         let kept = triangle_stats(&mesh).kept;
         let surface = Surface::new(mesh.clone(), kept.clone());
         let welded = Welded::new(&mesh, &kept, &surface.frame);

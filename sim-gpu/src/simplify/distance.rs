@@ -82,7 +82,7 @@ fn to_box(point: DVec3, bounds: Bounds) -> f64 {
 mod tests {
     use super::*;
     use crate::bvh::Builder;
-    use crate::mesh::Mesh;
+    use crate::mesh::TriangleMesh;
 
     const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
 
@@ -114,7 +114,7 @@ mod tests {
         let vertices = (0..3 * n_triangles).map(vertex).collect();
         let triangles = (0..n_triangles as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let kept = (0..n_triangles as u32).collect();
-        let surface = Surface::new(Mesh { vertices, triangles }, kept);
+        let surface = Surface::new(TriangleMesh { vertices, triangles }, kept);
         let target = Target::new(surface, Builder::Morton);
         for i in 0..200 {
             let point =

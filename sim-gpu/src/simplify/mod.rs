@@ -26,7 +26,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, positive};
-use crate::mesh::Mesh;
+use crate::mesh::TriangleMesh;
 use crate::target::Surface;
 
 pub use distance::{distance_to_surface, distance_to_triangle};
@@ -82,7 +82,11 @@ impl Simplify {
 /// # Errors
 /// If this build does not include decimation.
 #[cfg(feature = "simplify")]
-pub fn simplified(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>, NotBuilt> {
+pub fn simplified(
+    mesh: &TriangleMesh,
+    kept: &[u32],
+    bound: f64,
+) -> Result<Option<TriangleMesh>, NotBuilt> {
     Ok(decimate::proven(mesh, kept, bound))
 }
 
@@ -91,7 +95,7 @@ pub fn simplified(mesh: &Mesh, kept: &[u32], bound: f64) -> Result<Option<Mesh>,
 /// # Errors
 /// Always.
 #[cfg(not(feature = "simplify"))]
-pub fn simplified(_: &Mesh, _: &[u32], _: f64) -> Result<Option<Mesh>, NotBuilt> {
+pub fn simplified(_: &TriangleMesh, _: &[u32], _: f64) -> Result<Option<TriangleMesh>, NotBuilt> {
     Err(NotBuilt)
 }
 
@@ -99,7 +103,11 @@ pub fn simplified(_: &Mesh, _: &[u32], _: f64) -> Result<Option<Mesh>, NotBuilt>
 ///
 /// # Errors
 /// If this build does not include decimation.
-pub fn simplified_surface(mesh: Mesh, kept: Vec<u32>, bound: f64) -> Result<Surface, NotBuilt> {
+pub fn simplified_surface(
+    mesh: TriangleMesh,
+    kept: Vec<u32>,
+    bound: f64,
+) -> Result<Surface, NotBuilt> {
     Ok(match simplified(&mesh, &kept, bound)? {
         Some(fewer) => Surface::of_mesh(fewer),
         None => Surface::new(mesh, kept),

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use crate::mesh::Mesh;
+use crate::mesh::TriangleMesh;
 use crate::mesh::unit_frame::bounding_box;
-use crate::sensor::Sensor;
+use crate::sensor::SensorProfile;
 
 /// The number of beam footprints per step between beams.
 ///
@@ -16,7 +16,7 @@ pub const FOOTPRINTS_PER_STEP: f64 = 2.0;
 /// A sensor and its positions in the object's frame.
 pub struct Viewpoint<'a> {
     /// The sensor.
-    pub sensor: &'a Sensor,
+    pub sensor: &'a SensorProfile,
     /// Its positions.
     pub positions: Vec<DVec3>,
 }
@@ -28,7 +28,7 @@ pub struct Viewpoint<'a> {
 /// sensor reports. The radius is 0 if a sensor without such a limit stands in the box, and infinite
 /// for a single beam.
 #[must_use]
-pub fn resolved_m(mesh: &Mesh, units_per_m: f64, viewpoints: &[Viewpoint<'_>]) -> f64 {
+pub fn resolved_m(mesh: &TriangleMesh, units_per_m: f64, viewpoints: &[Viewpoint<'_>]) -> f64 {
     let corners = mesh.triangles.iter().flatten().map(|&v| mesh.vertices[v as usize]);
     let (low, high) = bounding_box(corners);
     let radius = |viewpoint: &Viewpoint<'_>| {
@@ -50,13 +50,13 @@ pub fn resolved_m(mesh: &Mesh, units_per_m: f64, viewpoints: &[Viewpoint<'_>]) -
 mod tests {
     use super::*;
 
-    fn unit_square() -> Mesh {
+    fn unit_square() -> TriangleMesh {
         let vertices = vec![DVec3::ZERO, DVec3::Y, DVec3::Z, DVec3::splat(1e9)];
-        Mesh { vertices, triangles: vec![[0, 1, 2]] }
+        TriangleMesh { vertices, triangles: vec![[0, 1, 2]] }
     }
 
     fn seen_from(sensor: &str, positions: Vec<DVec3>) -> f64 {
-        let sensor = Sensor::builtin(sensor).unwrap();
+        let sensor = SensorProfile::builtin(sensor).unwrap();
         resolved_m(&unit_square(), 1.0, &[Viewpoint { sensor: &sensor, positions }])
     }
 

@@ -153,11 +153,11 @@ fn with_longest_edge_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
 mod tests {
     use super::*;
     use crate::bvh::Builder;
-    use crate::mesh::Mesh;
+    use crate::mesh::TriangleMesh;
 
     /// A square of 2 m by 2 m in `n` by `n` cells, at the height `z(x, y)`.
     fn plate(n: u32, z: impl Fn(f64, f64) -> f64) -> Surface {
-        let mut mesh = Mesh::default();
+        let mut mesh = TriangleMesh::default();
         for i in 0..=n {
             for j in 0..=n {
                 let at = |k: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
@@ -198,7 +198,7 @@ mod tests {
     fn what_reaches_beyond_an_open_border_is_found() {
         let narrow = || {
             Surface::new(
-                Mesh {
+                TriangleMesh {
                     vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
                     triangles: vec![[0, 1, 2]],
                 },
@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn nothing_is_near_nothing() {
-        let nothing = || Surface::new(Mesh::default(), vec![]);
+        let nothing = || Surface::new(TriangleMesh::default(), vec![]);
         assert!(proven(&nothing(), plate(1, |_, _| 0.0), 1.0));
         assert!(!proven(&plate(1, |_, _| 0.0), nothing(), 1e9));
     }

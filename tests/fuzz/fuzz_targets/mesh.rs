@@ -3,9 +3,9 @@
 
 #![no_main]
 
-use sim_gpu::mesh::validate::triangle_stats;
-use sim_gpu::mesh::frame::{Normalize, Up, to_world};
-use sim_gpu::mesh::{MeshFormat, parse};
+use sim_gpu::internals::mesh::validate::triangle_stats;
+use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
+use sim_gpu::internals::mesh::{MeshFormat, parse};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

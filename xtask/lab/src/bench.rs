@@ -22,7 +22,7 @@ use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
 use formats::atomic;
 use serde::Serialize;
-use sim_gpu::caster::AdapterRequest;
+use sim_gpu::internals::caster::AdapterRequest;
 use std::path::PathBuf;
 
 /// What to measure.

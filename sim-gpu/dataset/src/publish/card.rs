@@ -5,7 +5,7 @@ use super::{Facts, Form, Publication};
 use crate::config::{SetConfig, Viewpoints};
 use crate::tars::Sample;
 use formats::hash::Hashing;
-use sim_gpu::sensor::Views;
+use sim_gpu::internals::sensor::Views;
 use std::fmt::Write;
 
 /// What such datasets are found by.

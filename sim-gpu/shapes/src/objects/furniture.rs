@@ -7,7 +7,7 @@ pub mod sofa;
 
 use std::f64::consts::FRAC_PI_2;
 
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 use crate::primitives::{Builder, DAffine3, DVec3, Make, Sampler};
 
@@ -54,7 +54,7 @@ fn scaled(b: &mut Builder, s: &mut Sampler, build: Make, height_m: impl Fn(f64) 
 }
 
 /// Whether all triangles have an area.
-fn is_sound(mesh: &Mesh) -> bool {
+fn is_sound(mesh: &TriangleMesh) -> bool {
     mesh.triangles.iter().all(|triangle| {
         let [p, q, r] = triangle.map(|vertex| mesh.vertices[vertex as usize]);
         (q - p).cross(r - p).length() > 1e-9

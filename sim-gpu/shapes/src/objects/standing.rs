@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 use crate::tessellation::bounds;
 
@@ -11,7 +11,7 @@ use crate::tessellation::bounds;
 #[derive(Clone, Debug)]
 pub struct Object {
     /// The mesh, in metres; x points forward, z up.
-    pub mesh: Mesh,
+    pub mesh: TriangleMesh,
     /// The triangles of glass, which are the last ones; empty without glass. Glass transmits or
     /// mirrors most of a beam and returns little.
     pub glass: Range<u32>,
@@ -20,7 +20,7 @@ pub struct Object {
 /// Moves `mesh` so that its lowest vertex is at height 0 and the middle of its footprint at the
 /// origin.
 #[doc(hidden)]
-pub fn stand(mesh: &mut Mesh) {
+pub fn stand(mesh: &mut TriangleMesh) {
     let [low, high] = bounds(mesh);
     let origin = ((low + high) / 2.0).truncate().extend(low.z);
     mesh.vertices.iter_mut().for_each(|vertex| *vertex -= origin);

@@ -6,7 +6,7 @@ use super::soundness::corners;
 use crate::sampler::Sampler;
 use crate::tessellation::bounds;
 use formats::rng::StreamKey;
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 /// The number of bins of the distance histogram.
 const BINS: usize = 24;
@@ -15,7 +15,7 @@ const PAIRS: usize = 4000;
 
 /// The logarithms of the sides of the bounding box over its height, the longer side first, so that
 /// a quarter turn has no effect.
-pub fn aspect_ratios(mesh: &Mesh) -> Vec<f64> {
+pub fn aspect_ratios(mesh: &TriangleMesh) -> Vec<f64> {
     let [low, high] = bounds(mesh);
     let size = high - low;
     let [long, short] = [size.x.max(size.y), size.x.min(size.y)];
@@ -25,7 +25,7 @@ pub fn aspect_ratios(mesh: &Mesh) -> Vec<f64> {
 /// The D2 shape distribution (Osada et al., "Shape distributions", ACM Transactions on Graphics
 /// 2002): the histogram of the distances between two random points of the surface, over the mean.
 /// The values are square roots, so that the Euclidean distance is Hellinger's.
-pub fn shape_distribution(mesh: &Mesh) -> Vec<f64> {
+pub fn shape_distribution(mesh: &TriangleMesh) -> Vec<f64> {
     let points = surface_points(mesh, 2 * PAIRS);
     let distances: Vec<f64> = points.chunks(2).map(|pair| pair[0].distance(pair[1])).collect();
     let mean = distances.iter().sum::<f64>() / PAIRS as f64;
@@ -39,7 +39,7 @@ pub fn shape_distribution(mesh: &Mesh) -> Vec<f64> {
 
 /// The distribution of the surface's area over the height, in eighths, and its mean distance from
 /// the vertical axis there, over the height.
-pub fn height_profile(mesh: &Mesh) -> Vec<f64> {
+pub fn height_profile(mesh: &TriangleMesh) -> Vec<f64> {
     let [low, high] = bounds(mesh);
     let height = high.z - low.z;
     let middle = (low + high) / 2.0;
@@ -56,7 +56,7 @@ pub fn height_profile(mesh: &Mesh) -> Vec<f64> {
 }
 
 /// Random points, uniform on the surface.
-fn surface_points(mesh: &Mesh, n: usize) -> Vec<DVec3> {
+fn surface_points(mesh: &TriangleMesh, n: usize) -> Vec<DVec3> {
     let mut sums = Vec::with_capacity(mesh.triangles.len());
     let mut sum = 0.0;
     for &triangle in &mesh.triangles {

@@ -4,14 +4,14 @@ use rayon::prelude::*;
 
 use super::descriptors::{aspect_ratios, height_profile, shape_distribution};
 use super::{SEED, ShapeClass, generate};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
 const TRAIN: u32 = 40;
 const TEST: u32 = 20;
 
 /// The fraction of test shapes whose nearest training shape, by the Euclidean distance of
 /// `describe`, is of the same class.
-fn accuracy(describe: impl Fn(&Mesh) -> Vec<f64> + Sync) -> f64 {
+fn accuracy(describe: impl Fn(&TriangleMesh) -> Vec<f64> + Sync) -> f64 {
     let described: Vec<Vec<(ShapeClass, Vec<f64>)>> = [0..TRAIN, TRAIN..TRAIN + TEST]
         .into_iter()
         .map(|instances| {

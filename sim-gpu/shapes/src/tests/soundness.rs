@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::{SEED, ShapeClass, for_all, generate};
 use crate::tessellation::bounds;
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 
-pub fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 3] {
+pub fn corners(mesh: &TriangleMesh, triangle: [u32; 3]) -> [DVec3; 3] {
     triangle.map(|i| mesh.vertices[i as usize])
 }
 
@@ -24,7 +24,7 @@ fn every_mesh_is_sound() {
     });
 }
 
-fn assert_well_formed(mesh: &Mesh, what: &str) {
+fn assert_well_formed(mesh: &TriangleMesh, what: &str) {
     let n = mesh.triangles.len();
     assert!((200..=50_000).contains(&n), "{what}: {n} triangles");
     assert!(mesh.vertices.iter().all(|v| v.is_finite()), "{what}");
@@ -34,13 +34,13 @@ fn assert_well_formed(mesh: &Mesh, what: &str) {
     }
 }
 
-fn assert_every_vertex_used(mesh: &Mesh, what: &str) {
+fn assert_every_vertex_used(mesh: &TriangleMesh, what: &str) {
     let mut used = vec![false; mesh.vertices.len()];
     mesh.triangles.as_flattened().iter().for_each(|&corner| used[corner as usize] = true);
     assert!(used.iter().all(|&used| used), "{what}");
 }
 
-fn assert_stands_and_is_of_a_thing_s_size(mesh: &Mesh, what: &str) {
+fn assert_stands_and_is_of_a_thing_s_size(mesh: &TriangleMesh, what: &str) {
     let [low, high] = bounds(mesh);
     let size = high - low;
     assert_eq!(low.z, 0.0, "{what}");
@@ -55,7 +55,7 @@ fn assert_stands_and_is_of_a_thing_s_size(mesh: &Mesh, what: &str) {
 
 /// Whether an edge belongs to only one triangle. Vertices at one place count as one, and so do
 /// doubled triangles.
-fn is_open(mesh: &Mesh) -> bool {
+fn is_open(mesh: &TriangleMesh) -> bool {
     let place = |v: DVec3| (v * 1e6).round().to_array().map(|c| c as i64);
     let mut triangles = BTreeSet::new();
     let mut edges: BTreeMap<_, u32> = BTreeMap::new();
@@ -91,7 +91,7 @@ const SIDE: i32 = 68;
 
 /// The number of connected pieces of the surface if gaps of up to about 2 % of the diagonal are
 /// closed: the connected sets of occupied cells, with neighbours at corners.
-fn pieces(mesh: &Mesh) -> usize {
+fn pieces(mesh: &TriangleMesh) -> usize {
     let [low, high] = bounds(mesh);
     let per_metre = CELLS / low.distance(high);
     let index = |p: DVec3| {

@@ -5,17 +5,17 @@ use crate::bvh::{Builder, Stack};
 use crate::cpu::traverse::traverse;
 use crate::job::Culling;
 use crate::lanes::ways;
-use crate::mesh::Mesh;
+use crate::mesh::TriangleMesh;
 use crate::pose::Pose;
 use crate::ray::RayFrame;
-use crate::sensor::Sensor;
+use crate::sensor::SensorProfile;
 use crate::target::{Surface, Target};
 use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
 
 /// A torus of `2 * side * side` triangles.
 fn torus(side: u32) -> Target {
-    let mut mesh = Mesh::default();
+    let mut mesh = TriangleMesh::default();
     let turn = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(side);
     for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
         let r = 1.0 + 0.4 * turn(j).cos();
@@ -30,7 +30,7 @@ fn torus(side: u32) -> Target {
 
 /// A revolution around `target`, from beside it and from within.
 fn revolutions(target: &Target) -> Vec<TraceRay> {
-    let pattern = Sensor::builtin("vlp16").unwrap().pattern();
+    let pattern = SensorProfile::builtin("vlp16").unwrap().pattern();
     let places = [DVec3::new(3.0, 0.4, 0.5), DVec3::new(1.0, 0.0, 0.1)];
     let aim = |place: DVec3| {
         let pose = Pose::look_at(place, DVec3::new(0.1, 0.2, 0.0)).unwrap();
@@ -104,7 +104,7 @@ fn a_handful_of_rays_is_traced_too() {
 
 #[test]
 fn no_ray_hits_a_tree_of_nothing() {
-    let nothing = Target::new(Surface::of_mesh(Mesh::default()), Builder::Sah);
+    let nothing = Target::new(Surface::of_mesh(TriangleMesh::default()), Builder::Sah);
     let rays = revolutions(&torus(4));
     assert!(trace(&nothing.bvh.wide, &rays).iter().all(|&code| code == MISS));
 }

@@ -10,11 +10,11 @@ mod profiles;
 mod recipe;
 mod sphere;
 
-fn sensor(name: &str) -> Sensor {
-    Sensor::builtin(name).unwrap()
+fn sensor(name: &str) -> SensorProfile {
+    SensorProfile::builtin(name).unwrap()
 }
 
-fn parse(text: &str) -> Result<Sensor, ConfigError> {
+fn parse(text: &str) -> Result<SensorProfile, ConfigError> {
     profile::parse(text, Path::new("my_sensor.toml"))
 }
 

@@ -321,7 +321,7 @@ fn a_table_is_fired_row_by_row_again_and_again() {
         "Time/s,Azimuth/deg,Zenith/deg\n1,0,90\n2,90,45\n3,180,90\n4,270,120\n5,30,90\n6,60,90\n";
     std::fs::write(in_folder("rows.csv"), csv).unwrap();
     std::fs::write(in_folder("own.toml"), TABLE.to_owned() + "file = \"rows.csv\"\n").unwrap();
-    let own = Sensor::load(&in_folder("own.toml")).unwrap();
+    let own = SensorProfile::load(&in_folder("own.toml")).unwrap();
     let pattern = own.pattern();
     assert_eq!(pattern.ring, [0, 1, 0, 1]);
     for (ray, (elevation_deg, azimuth_deg)) in
@@ -338,7 +338,7 @@ fn a_table_is_fired_row_by_row_again_and_again() {
     assert!(matches!(&trimmed.layout, Layout::Table(table) if table.directions_deg.len() == 4));
     assert_eq!(trimmed.pattern(), pattern);
     let json = serde_json::to_string(&trimmed).unwrap();
-    assert_eq!(serde_json::from_str::<Sensor>(&json).unwrap(), trimmed);
+    assert_eq!(serde_json::from_str::<SensorProfile>(&json).unwrap(), trimmed);
 }
 
 #[test]
@@ -356,10 +356,10 @@ fn a_table_that_cannot_be_used_is_named_with_its_line() {
         ("azimuth_deg,elevation_deg\n", "own.toml: table.directions_deg: expected a row"),
     ] {
         std::fs::write(folder.path().join("rows.csv"), rows).unwrap();
-        let error = Sensor::load(&profile).unwrap_err().to_string();
+        let error = SensorProfile::load(&profile).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
     std::fs::remove_file(folder.path().join("rows.csv")).unwrap();
-    let error = Sensor::load(&profile).unwrap_err().to_string();
+    let error = SensorProfile::load(&profile).unwrap_err().to_string();
     assert!(error.contains("rows.csv: No such file"), "{error}");
 }

@@ -6,7 +6,7 @@ fn every_builtin_profile_is_sound_named_and_sourced() {
         let sensor = parse(text).unwrap();
         assert_eq!(sensor.name, name);
         assert!(!sensor.description.is_empty() && !sensor.sources.is_empty(), "{name}");
-        assert_eq!(Sensor::builtin(name), Some(sensor));
+        assert_eq!(SensorProfile::builtin(name), Some(sensor));
     }
 }
 
@@ -14,23 +14,23 @@ fn every_builtin_profile_is_sound_named_and_sourced() {
 fn every_sensor_survives_a_round_trip_through_json() {
     for name in builtin_names() {
         let json = serde_json::to_string(&sensor(name)).unwrap();
-        assert_eq!(serde_json::from_str::<Sensor>(&json).unwrap(), sensor(name), "{json}");
+        assert_eq!(serde_json::from_str::<SensorProfile>(&json).unwrap(), sensor(name), "{json}");
     }
 }
 
 #[test]
 fn a_name_a_path_and_neither() {
-    assert_eq!(Sensor::resolve("vlp16").unwrap().name, "vlp16");
+    assert_eq!(SensorProfile::resolve("vlp16").unwrap().name, "vlp16");
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("own.toml");
     std::fs::write(&file, TINY).unwrap();
-    assert_eq!(Sensor::resolve(file.to_str().unwrap()).unwrap().name, "tiny");
-    assert_eq!(Sensor::resolve_in(folder.path(), "own.toml").unwrap().name, "tiny");
-    let unknown = Sensor::resolve("vlp33").unwrap_err().to_string();
+    assert_eq!(SensorProfile::resolve(file.to_str().unwrap()).unwrap().name, "tiny");
+    assert_eq!(SensorProfile::resolve_in(folder.path(), "own.toml").unwrap().name, "tiny");
+    let unknown = SensorProfile::resolve("vlp33").unwrap_err().to_string();
     assert!(unknown.contains("vlp33") && unknown.contains("blainder-ultrapuck"), "{unknown}");
-    let missing = Sensor::resolve("no/such.toml").unwrap_err().to_string();
+    let missing = SensorProfile::resolve("no/such.toml").unwrap_err().to_string();
     assert!(missing.contains("no/such.toml"), "{missing}");
-    let folder_error = Sensor::load(folder.path()).unwrap_err().to_string();
+    let folder_error = SensorProfile::load(folder.path()).unwrap_err().to_string();
     assert!(folder_error.contains(folder.path().to_str().unwrap()), "{folder_error}");
 }
 
@@ -39,9 +39,9 @@ fn a_file_too_long_or_not_text_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("mesh.toml");
     std::fs::write(&file, vec![b' '; (16 << 20) + 1]).unwrap();
-    assert!(matches!(Sensor::load(&file), Err(ConfigError::TooLong { .. })));
+    assert!(matches!(SensorProfile::load(&file), Err(ConfigError::TooLong { .. })));
     std::fs::write(&file, [0xff, 0xfe]).unwrap();
-    assert!(matches!(Sensor::load(&file), Err(ConfigError::Read { .. })));
+    assert!(matches!(SensorProfile::load(&file), Err(ConfigError::Read { .. })));
 }
 
 /// What SENSORS.md tells people to write can be read.

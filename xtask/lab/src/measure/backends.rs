@@ -1,10 +1,10 @@
 //! The casters that a run compares.
 
 use anyhow::{Context, Result, bail};
-use sim_gpu::caster::AdapterRequest;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::{AdapterKind, AdapterSummary, list_adapters};
+use sim_gpu::internals::caster::AdapterRequest;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::gpu::{AdapterKind, AdapterSummary, list_adapters};
 
 /// Rays that fill a GPU, so that what is measured is not its idling.
 const RAYS_TO_FILL_A_GPU: usize = 1 << 22;
@@ -15,7 +15,7 @@ const RAYS_TO_FILL_THE_CORES: usize = 1 << 19;
 /// A caster.
 pub struct Backend {
     /// What casts.
-    pub caster: Caster,
+    pub caster: OpenCaster,
     /// Rays that one repeat should cast at least.
     pub rays: usize,
     /// Whether it casts beside the CPU, whose time then tells nothing.
@@ -31,8 +31,8 @@ impl Backend {
     /// What opens another caster on the same adapter.
     pub fn request(&self) -> AdapterRequest {
         match &self.caster {
-            Caster::Cpu(_) => AdapterRequest::Cpu,
-            Caster::Gpu(_) => AdapterRequest::Named(self.name().to_owned()),
+            OpenCaster::Cpu(_) => AdapterRequest::Cpu,
+            OpenCaster::Gpu(_) => AdapterRequest::Named(self.name().to_owned()),
         }
     }
 }
@@ -65,14 +65,14 @@ pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
 
 /// The CPU.
 pub fn cpu() -> Backend {
-    let caster = Caster::Cpu(Effects::default());
+    let caster = OpenCaster::Cpu(Effects::default());
     Backend { caster, rays: RAYS_TO_FILL_THE_CORES, is_gpu: false }
 }
 
 /// The first adapter that has the name of `adapter`.
 pub fn of_adapter(adapter: &AdapterSummary) -> Result<Backend> {
     let named = AdapterRequest::Named(adapter.name.clone());
-    let caster = Caster::open(&named, &Effects::default())
+    let caster = OpenCaster::open(&named, &Effects::default())
         .with_context(|| format!("opening {}", adapter.name))?;
     let is_gpu = adapter.kind != AdapterKind::Software;
     let rays = if is_gpu { RAYS_TO_FILL_A_GPU } else { RAYS_TO_FILL_THE_CORES };

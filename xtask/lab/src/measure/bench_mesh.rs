@@ -2,10 +2,10 @@
 
 use super::scenes;
 use anyhow::{Result, bail};
-use sim_gpu::bvh::Builder;
-use sim_gpu::mesh::frame::{Normalize, to_world};
-use sim_gpu::mesh::{Mesh, load, tree};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::mesh::frame::{Normalize, to_world};
+use sim_gpu::internals::mesh::{TriangleMesh, load, tree};
+use sim_gpu::internals::target::{Surface, Target};
 use std::path::Path;
 
 /// A mesh in the world, in metres.
@@ -13,7 +13,7 @@ pub struct BenchMesh {
     /// Its name in tables.
     pub name: String,
     /// The mesh, about as large as the unit sphere.
-    pub mesh: Mesh,
+    pub mesh: TriangleMesh,
 }
 
 /// Tori of each of these sizes.
@@ -51,6 +51,6 @@ pub fn real(root: &Path, limit: usize) -> Result<Vec<BenchMesh>> {
 }
 
 /// The target of casters for `mesh`.
-pub fn target(mesh: Mesh, builder: Builder) -> Target {
+pub fn target(mesh: TriangleMesh, builder: Builder) -> Target {
     Target::new(Surface::of_mesh(mesh), builder)
 }

@@ -1,7 +1,7 @@
 //! What a benchmark record must say of the machine and the program.
 
 use serde::Serialize;
-use sim_gpu::gpu::list_adapters;
+use sim_gpu::internals::gpu::list_adapters;
 use std::fs;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};

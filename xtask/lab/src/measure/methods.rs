@@ -3,12 +3,12 @@
 use super::ray_set::RaySet;
 use glam::Vec3;
 use rayon::prelude::*;
-use sim_gpu::bvh::{
+use sim_gpu::internals::bvh::{
     self, Entered, LEAF, Leaf4, Search, Stack, WIDTH, WideBvh, WideChild, WideNode, boxes_that,
 };
-use sim_gpu::cpu::oracle;
-use sim_gpu::cpu::traverse::traverse;
-use sim_gpu::ray::{MISS, TraceRay};
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::cpu::traverse::traverse;
+use sim_gpu::internals::ray::{MISS, TraceRay};
 
 /// The f64 oracle; `[n_rays]`, metres.
 pub fn in_f64(ray_set: &RaySet) -> Vec<Option<f64>> {

@@ -2,12 +2,12 @@
 
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3, dvec3};
-use sim_gpu::cpu::oracle;
-use sim_gpu::job::{Aim, Cast, CastJob, Culling};
-use sim_gpu::pose::Pose;
-use sim_gpu::ray::{AMBIGUOUS, MISS, Ray, RayFrame};
-use sim_gpu::sensor::{BeamPattern, Sensor};
-use sim_gpu::target::Target;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::job::{Aim, Cast, CastJob, Culling};
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::ray::{AMBIGUOUS, MISS, Ray, RayFrame};
+use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
+use sim_gpu::internals::target::Target;
 
 /// Numbers the benchmark's own random streams.
 const SEED: u64 = 0x000E_D6E9;
@@ -61,7 +61,7 @@ impl RaySet {
 
     fn of(target: &Target, pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Self {
         let surface = &target.surface;
-        let anywhere = Pose { position_m: DVec3::ZERO, world_from_sensor: DQuat::IDENTITY };
+        let anywhere = Pose { position_m: DVec3::ZERO, rotation: DQuat::IDENTITY };
         let frame = RayFrame::new(surface, &DAffine3::IDENTITY, &anywhere);
         let rays: Vec<Ray> = pairs
             .map(|(origin, point)| Ray {
@@ -115,8 +115,8 @@ impl RaySet {
 }
 
 /// The VLP-32C at 600 rpm.
-pub fn vlp32c() -> Sensor {
-    Sensor::builtin("vlp32c").expect("invariant: this profile is built in")
+pub fn vlp32c() -> SensorProfile {
+    SensorProfile::builtin("vlp32c").expect("invariant: this profile is built in")
 }
 
 /// The pose of the sensor for sweeps.

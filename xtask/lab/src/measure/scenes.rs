@@ -2,13 +2,13 @@
 
 use glam::{DQuat, DVec3, dvec3};
 use harness::meshes::{icosphere, mapped};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 use std::f64::consts::TAU;
 
 /// A bumpy torus of about `triangles` triangles that fits the unit sphere.
-pub fn torus(triangles: usize) -> Mesh {
+pub fn torus(triangles: usize) -> TriangleMesh {
     let n = ((triangles as f64 / 2.0).sqrt().round() as usize).max(3);
-    let mut mesh = Mesh::default();
+    let mut mesh = TriangleMesh::default();
     for i in 0..n {
         for j in 0..n {
             let (u, v) = (i as f64 / n as f64 * TAU, j as f64 / n as f64 * TAU);
@@ -23,7 +23,7 @@ pub fn torus(triangles: usize) -> Mesh {
 }
 
 /// `mesh` inside a closed cube of 16 m, so that every ray hits.
-pub fn in_a_room(mut mesh: Mesh) -> Mesh {
+pub fn in_a_room(mut mesh: TriangleMesh) -> TriangleMesh {
     const HALF_SIDE_M: f64 = 8.0;
     let first = mesh.vertices.len() as u32;
     for corner in 0..8 {
@@ -37,14 +37,14 @@ pub fn in_a_room(mut mesh: Mesh) -> Mesh {
 }
 
 /// A closed sphere of 20 * 4^`levels` triangles, neither centred nor aligned.
-pub fn closed_sphere(levels: u32) -> Mesh {
+pub fn closed_sphere(levels: u32) -> TriangleMesh {
     let turn = DQuat::from_axis_angle(dvec3(0.3, -0.5, 0.8).normalize(), 0.7);
     let shift = dvec3(0.137, -0.291, 0.053);
     mapped(&icosphere(levels), |v| turn * v + shift)
 }
 
 /// The points halfway along each edge of `mesh`, once each.
-pub fn edge_midpoints(mesh: &Mesh) -> Vec<DVec3> {
+pub fn edge_midpoints(mesh: &TriangleMesh) -> Vec<DVec3> {
     let mut edges: Vec<[u32; 2]> = mesh
         .triangles
         .iter()
@@ -56,7 +56,7 @@ pub fn edge_midpoints(mesh: &Mesh) -> Vec<DVec3> {
     edges.iter().map(|e| e.map(|v| mesh.vertices[v as usize])).map(|[p, q]| 0.5 * (p + q)).collect()
 }
 
-fn push_quad(mesh: &mut Mesh, [a, b, c, d]: [u32; 4]) {
+fn push_quad(mesh: &mut TriangleMesh, [a, b, c, d]: [u32; 4]) {
     mesh.triangles.extend([[a, b, c], [a, c, d]]);
 }
 

@@ -10,7 +10,7 @@ use formats::Scan;
 use formats::vlp32c::{SEQUENCE_US, SEQUENCES_PER_PACKET};
 use infer_cpu::Options;
 use maud::{Markup, html};
-use sim_gpu::sensor::Sensor;
+use sim_gpu::internals::sensor::SensorProfile;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -88,7 +88,7 @@ fn turn() -> Result<(Scan, Vec<String>)> {
     let stage = Stage::new(recipe, Path::new(RECIPE), None, 0)?;
     let mut drive = Drive::new(&stage, SPEED_M_S)?;
     let (mut scan, mut objects, mut rings) = (Scan::default(), Vec::new(), Vec::new());
-    let pattern = Sensor::builtin(SENSOR).expect("invariant: it is built in").pattern();
+    let pattern = SensorProfile::builtin(SENSOR).expect("invariant: it is built in").pattern();
     let packet_s = SEQUENCE_US * 1e-6 * f64::from(SEQUENCES_PER_PACKET);
     for (packet, number) in drive.fire(0..PACKETS)?.into_iter().zip(0u32..) {
         let pose = drive.pose((f64::from(number) + 0.5) * packet_s);

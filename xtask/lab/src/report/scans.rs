@@ -5,14 +5,14 @@ use anyhow::{Context, Result};
 use formats::rng::StreamKey;
 use glam::DVec3;
 use maud::{Markup, html};
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
-use sim_gpu::mesh::frame::Normalize;
-use sim_gpu::mesh::tree::discover;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::ScanRequest;
-use sim_gpu::sensor::Sensor;
-use sim_gpu::target::Target;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::mesh::frame::Normalize;
+use sim_gpu::internals::mesh::tree::discover;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::ScanRequest;
+use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::internals::target::Target;
 use std::path::Path;
 use xtask::workspace::file_name;
 
@@ -59,7 +59,7 @@ pub fn body(assets: &Path) -> Result<Markup> {
 }
 
 fn scan(target: &Target, sensor: &str, sigma_m: f64) -> Result<Vec<[f32; 3]>> {
-    let sensor = Sensor::builtin(sensor).expect("invariant: these profiles are built in");
+    let sensor = SensorProfile::builtin(sensor).expect("invariant: these profiles are built in");
     let noise = Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range };
     let effects = Effects { noise: (sigma_m > 0.0).then_some(noise), ..Effects::default() };
     let (elevation, azimuth) = (ELEVATION_DEG.to_radians(), AZIMUTH_DEG.to_radians());
@@ -67,7 +67,7 @@ fn scan(target: &Target, sensor: &str, sigma_m: f64) -> Result<Vec<[f32; 3]>> {
     let pattern = sensor.pattern();
     let mut request = ScanRequest::new(&sensor, &pattern, pose);
     request.stream = StreamKey::new(0, "report", 0);
-    Ok(sim_gpu::scan(&Caster::Cpu(effects), target, &request)?.positions)
+    Ok(sim_gpu::internals::scan::scan(&OpenCaster::Cpu(effects), target, &request)?.positions)
 }
 
 /// Some of the points, spread over all.

@@ -13,13 +13,13 @@ use glam::{DAffine3, DVec3};
 use harness::judge::{RANGE_TOLERANCE, SILHOUETTE_RAD, near_edge};
 use infer_cpu::{Classifier, Options};
 use serde::Serialize;
-use sim_gpu::bvh::Builder;
-use sim_gpu::mesh::frame::{Normalize, Up, to_world};
-use sim_gpu::pose::Pose;
-use sim_gpu::ray::RayFrame;
-use sim_gpu::resolve::{Hit, Hits};
-use sim_gpu::scan::{ScanRequest, scan_many};
-use sim_gpu::target::Target;
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::ray::RayFrame;
+use sim_gpu::internals::resolve::{Hit, Hits};
+use sim_gpu::internals::scan::{ScanRequest, scan_many};
+use sim_gpu::internals::target::Target;
 
 use crate::measure::backends::{self, Backend};
 use crate::measure::bench_mesh::{self, BenchMesh, target};
@@ -187,7 +187,7 @@ impl View<'_> {
 
     fn position(&self, hit: &Hit) -> [f64; 3] {
         let ScanRequest { pose, pattern, .. } = &self.request;
-        let direction = pose.world_from_sensor * pattern.directions[hit.beam as usize];
+        let direction = pose.rotation * pattern.directions[hit.beam as usize];
         (pose.position_m + direction * hit.range_m).to_array()
     }
 

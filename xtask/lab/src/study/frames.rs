@@ -12,7 +12,7 @@ use formats::labelled_sweep::{LabelledBox, LabelledSweep, read_labelled_sweep};
 use formats::{Scan, atomic};
 use glam::DVec3;
 use infer_cpu::Options;
-use sim_gpu::sensor::{Layout, Sensor};
+use sim_gpu::internals::sensor::{Layout, SensorProfile};
 use std::fmt::{self, Display, Write};
 use std::path::{Path, PathBuf};
 
@@ -268,7 +268,7 @@ impl Judged {
 
 /// Where the sensors of a sweep stand: the mean of their origins, fitted to their beams.
 fn origin_m(sweep: &LabelledSweep) -> Result<DVec3> {
-    let Layout::Rotating(table) = Sensor::resolve("vlp32c")?.layout else {
+    let Layout::Rotating(table) = SensorProfile::resolve("vlp32c")?.layout else {
         bail!("vlp32c: expected a table of rotating beams, found another layout");
     };
     let sensors = sweep::by_sensor(sweep, table.beam.len())?;

@@ -25,11 +25,11 @@ use harness::meshes::{cube, icosphere, soup};
 use infer_cpu::{Classifier, Options};
 use serde::Serialize;
 use serde_json::{Value, json};
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
-use sim_gpu::gpu::{AdapterKind, list_adapters};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::gpu::{AdapterKind, list_adapters};
+use sim_gpu::internals::mesh::TriangleMesh;
 use std::path::PathBuf;
 use std::time::Instant;
 use xtask::workspace::root;
@@ -129,7 +129,7 @@ pub fn run(args: &GpuArgs) -> Result<Outcome> {
 
 /// Surfaces that are smooth, edged and crossing, shapes, and real meshes.
 fn meshes(args: &GpuArgs, size: &Size) -> Result<Vec<BenchMesh>> {
-    let named = |(name, mesh): (&str, Mesh)| BenchMesh { name: name.to_owned(), mesh };
+    let named = |(name, mesh): (&str, TriangleMesh)| BenchMesh { name: name.to_owned(), mesh };
     let made = [("soup", soup(2000, 0.2)), ("sphere", icosphere(4)), ("cube", cube())];
     let mut all: Vec<BenchMesh> = made.into_iter().map(named).collect();
     all.extend(ShapeClass::ALL.into_iter().take(size.meshes).map(devices::shape));
@@ -208,7 +208,7 @@ fn effect_verdicts(meshes: &[BenchMesh], backend: &Backend) -> Result<Vec<Effect
             intensity: Some(Intensity),
             ..Effects::default()
         };
-        let caster = Caster::open(&backend.request(), &effects)?;
+        let caster = OpenCaster::open(&backend.request(), &effects)?;
         for bench_mesh in meshes {
             let target = target(bench_mesh.mesh.clone(), Builder::Sah);
             let job = job(&target, &sweep_pose(), &pattern);
@@ -294,8 +294,8 @@ impl Report {
         tables.iter().for_each(|table| print!("{table}"));
         self.checks.extend(checks);
         let held = |backend: &Backend| match &backend.caster {
-            Caster::Cpu(_) => None,
-            Caster::Gpu(gpu) => Some((backend.name().to_owned(), gpu.held_bytes())),
+            OpenCaster::Cpu(_) => None,
+            OpenCaster::Gpu(gpu) => Some((backend.name().to_owned(), gpu.held_bytes())),
         };
         self.parts.push(Part {
             name,

@@ -3,7 +3,7 @@
 use anyhow::Context;
 use edgepuck_shapes as shapes;
 use formats::split::Split;
-use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -1,17 +1,17 @@
 //! What simulators without a table of beams cast in its place.
 
 use anyhow::bail;
-use sim_gpu::sensor::{Layout, Rotating, Sensor, Uniform};
+use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile, Uniform};
 
 /// The same sensor with as many rows and columns, evenly spread between its
 /// lowest and its highest beam and all around.
-pub fn as_even_grid(sensor: Sensor) -> anyhow::Result<Sensor> {
+pub fn as_even_grid(sensor: SensorProfile) -> anyhow::Result<SensorProfile> {
     let Layout::Rotating(table) = &sensor.layout else {
         bail!("{}: has no table of beams", sensor.name);
     };
     let name = format!("{}-grid", sensor.name);
     let layout = Layout::Uniform(grid(table));
-    Ok(Sensor { name, layout, ..sensor })
+    Ok(SensorProfile { name, layout, ..sensor })
 }
 
 fn grid(table: &Rotating) -> Uniform {
@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn the_grid_spans_what_the_beams_do_with_as_many_rays() {
-        let sensor = Sensor::builtin("vlp32c").unwrap();
+        let sensor = SensorProfile::builtin("vlp32c").unwrap();
         let Layout::Rotating(table) = &sensor.layout else { panic!("no table") };
         let rays = table.rays_per_revolution();
         let Layout::Uniform(grid) = as_even_grid(sensor.clone()).unwrap().layout else {

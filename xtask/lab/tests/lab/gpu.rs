@@ -3,7 +3,7 @@
 use crate::{LAB, exits, succeeds};
 use serde_json::Value;
 use sim_gpu::effects::Effects;
-use sim_gpu::gpu::{AdapterKind, list_adapters};
+use sim_gpu::internals::gpu::{AdapterKind, list_adapters};
 use std::path::Path;
 use test_support::need;
 

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 use ndarray::{Array1, Array2};
 use serde_json::{Value, json};
-use sim_gpu::mesh::Mesh;
+use sim_gpu::internals::mesh::TriangleMesh;
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
@@ -34,7 +34,7 @@ impl Embree {
     }
 
     /// Builds a scene of `mesh`; what the build cost.
-    pub fn load(&mut self, mesh: &Mesh) -> Result<Cost> {
+    pub fn load(&mut self, mesh: &TriangleMesh) -> Result<Cost> {
         let vertices = mesh.vertices.iter().flat_map(in_f32).collect();
         let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
         let files = ["vertices.npy", "corners.npy"].map(|name| self.files.path().join(name));

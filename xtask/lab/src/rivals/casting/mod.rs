@@ -15,14 +15,14 @@ use anyhow::Result;
 use embree::{Embree, RIVALS};
 use rayon::prelude::*;
 use serde::Serialize;
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{Cast, CastJob, Culling};
-use sim_gpu::mesh::Mesh;
-use sim_gpu::resolve::{Hits, resolve};
-use sim_gpu::scan::{PlacedTarget, ScanRequest};
-use sim_gpu::target::Target;
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::{Cast, CastJob, Culling};
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::resolve::{Hits, resolve};
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest};
+use sim_gpu::internals::target::Target;
 use std::cell::RefCell;
 use std::iter::{repeat, zip};
 use std::slice::from_ref;
@@ -103,7 +103,7 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn load(&self, mesh: &Mesh) -> Result<Target> {
+    fn load(&self, mesh: &TriangleMesh) -> Result<Target> {
         self.embree.borrow_mut().load(mesh)?;
         Ok(target(mesh.clone(), Builder::Sah))
     }
@@ -115,7 +115,7 @@ impl Bench<'_> {
         self.embree.borrow_mut().aim(ray_set, copies)?;
         let jobs = vec![ray_set.job.clone(); copies];
         let ours = self.backends.iter().map(|backend| casting(backend, jobs.clone())).collect();
-        let ranges = |caster: &Caster| -> Result<_> {
+        let ranges = |caster: &OpenCaster| -> Result<_> {
             Ok(ray_set.ranges(&caster.cast(from_ref(&ray_set.job))?.swap_remove(0)))
         };
         self.entries(rays_from, (ray_set, copies), ours, ranges)
@@ -130,12 +130,12 @@ impl Bench<'_> {
         request: &ScanRequest<'_>,
     ) -> Result<Vec<Entry>> {
         let pattern = request.pattern;
-        let solve = |caster: &Caster, revolutions: usize| -> Result<Vec<Hits>> {
+        let solve = |caster: &OpenCaster, revolutions: usize| -> Result<Vec<Hits>> {
             let aim = || request.aim(&PlacedTarget::new(target));
             let resolve =
                 |job: &CastJob, cast: &Cast| resolve(job, cast, pattern, &Effects::default());
             // As `scan_many`: a CPU takes one scan after another, a GPU all at once.
-            if matches!(caster, Caster::Cpu(_)) {
+            if matches!(caster, OpenCaster::Cpu(_)) {
                 let scan = |_| -> Result<Hits> {
                     let job = aim();
                     Ok(resolve(&job, &caster.cast(from_ref(&job))?[0]))
@@ -150,7 +150,7 @@ impl Bench<'_> {
         self.embree.borrow_mut().aim(&all, REVOLUTIONS)?;
         let ours = self.backends.iter();
         let ours = ours.map(|ours| workload(move || solve(&ours.caster, REVOLUTIONS))).collect();
-        let ranges = |caster: &Caster| -> Result<_> {
+        let ranges = |caster: &OpenCaster| -> Result<_> {
             let mut by_beam = vec![None; pattern.len()];
             for hit in &solve(caster, 1)?[0].hits {
                 by_beam[hit.beam as usize] = Some(hit.range_m);
@@ -167,7 +167,7 @@ impl Bench<'_> {
         rays_from: &'static str,
         (ray_set, copies): (&RaySet, usize),
         ours: Vec<Workload<'_>>,
-        ranges: impl Fn(&Caster) -> Result<Vec<Option<f64>>>,
+        ranges: impl Fn(&OpenCaster) -> Result<Vec<Option<f64>>>,
     ) -> Result<Vec<Entry>> {
         let mut workloads: Vec<Workload<'_>> = ours;
         for rival in RIVALS {

@@ -7,7 +7,7 @@ use super::plan::Plan;
 use crate::measure::clock::{Spread, Workload, interleave, measured};
 use crate::study::resume;
 use anyhow::Context;
-use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::collections::BTreeMap;
 use std::path::Path;
 

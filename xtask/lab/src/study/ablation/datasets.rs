@@ -17,9 +17,9 @@ use formats::atomic;
 use formats::labelled::read_labelled;
 use formats::scan_file::ScanFormat;
 use formats::split::Split;
-use sim_gpu::caster::{AdapterRequest, Caster};
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::internals::caster::{AdapterRequest, OpenCaster};
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -46,7 +46,7 @@ pub fn make(
     let (scans, failures) = match source {
         Source::Scans(switches) => {
             let config = effects::scans(plan, switches)?;
-            let caster = Caster::open(&AdapterRequest::Cpu, &config.cast_effects())?;
+            let caster = OpenCaster::open(&AdapterRequest::Cpu, &config.cast_effects())?;
             let terms = Terms::new(config, &caster, meshes, None);
             let manifest = match begin(out, &terms, Begin::Resume)? {
                 Start::Complete(manifest) => *manifest,

@@ -10,8 +10,8 @@ use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::Returns;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
-use sim_gpu::mesh::frame::Normalize;
-use sim_gpu::sensor::{Sensor, Views};
+use sim_gpu::internals::mesh::frame::Normalize;
+use sim_gpu::internals::sensor::{SensorProfile, Views};
 
 /// What is switched on and off.
 pub struct Effect {
@@ -117,7 +117,7 @@ const SEED: u64 = 0;
 
 /// A dataset of scans with `switches`.
 pub fn scans(plan: &Plan, switches: Switches) -> anyhow::Result<DatasetConfig> {
-    let sensor = Sensor::builtin("vlp32c").context("no built-in sensor vlp32c")?;
+    let sensor = SensorProfile::builtin("vlp32c").context("no built-in sensor vlp32c")?;
     let stated = sensor.noise.map(|noise| noise.typical_sigma_m);
     let sigma_m = plan
         .noise_m

@@ -26,7 +26,7 @@ use effects::{DATASETS, EFFECTS, Effect, Judge};
 use formats::atomic;
 use plan::Plan;
 use serde::Serialize;
-use sim_gpu::mesh::tree::{MeshEntry, discover};
+use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

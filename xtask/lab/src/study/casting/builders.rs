@@ -1,6 +1,6 @@
 //! Which builder is faster for how many rays.
 //!
-//! [`sim_gpu::bvh::Builder::for_rays`] rests on these figures.
+//! [`sim_gpu::internals::bvh::Builder::for_rays`] rests on these figures.
 
 use super::speed::building;
 use crate::measure::bench_mesh::BenchMesh;
@@ -10,12 +10,12 @@ use crate::render::table::{Column, Table, digits, milliseconds};
 use anyhow::Result;
 use glam::DVec3;
 use serde::Serialize;
-use sim_gpu::bvh::Builder;
-use sim_gpu::cpu::trace;
-use sim_gpu::job::{Cast, Culling};
-use sim_gpu::pose::ring_of_views;
-use sim_gpu::sensor::BeamPattern;
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::cpu::trace;
+use sim_gpu::internals::job::{Cast, Culling};
+use sim_gpu::internals::pose::ring_of_views;
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::{Surface, Target};
 
 /// Rays cast at each mesh, in turn.
 const RAYS: [usize; 5] = [1_000, 10_000, 30_000, 100_000, 1_000_000];

@@ -6,9 +6,9 @@ use anyhow::{Context, Result};
 use clap::Args;
 use edgepuck_scenes::{Recipe, Scene, Stage};
 use edgepuck_segment::{Segmenter, Settings, Sweep};
-use sim_gpu::bvh::Builder;
-use sim_gpu::scan::PlacedTarget;
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::scan::PlacedTarget;
+use sim_gpu::internals::target::{Surface, Target};
 use std::path::PathBuf;
 
 /// Flags of `bench scenes`.

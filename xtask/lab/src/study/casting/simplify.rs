@@ -12,11 +12,11 @@ use anyhow::Result;
 use glam::DVec3;
 use moved::Moved;
 use serde::Serialize;
-use sim_gpu::bvh::Builder;
-use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::sensor::Views;
-use sim_gpu::simplify::{Viewpoint, resolved_m, simplified, simplified_surface};
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::job::{CastJob, Culling};
+use sim_gpu::internals::sensor::Views;
+use sim_gpu::internals::simplify::{Viewpoint, resolved_m, simplified, simplified_surface};
+use sim_gpu::internals::target::{Surface, Target};
 
 /// One mesh as it is and as `--simplify auto` has it.
 #[derive(Serialize)]

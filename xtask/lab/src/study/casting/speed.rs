@@ -8,12 +8,12 @@ use crate::measure::scenes::in_a_room;
 use crate::render::table::{Column, Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use serde::Serialize;
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
-use sim_gpu::ray::MISS;
-use sim_gpu::target::{Surface, Target};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::{CastJob, Culling};
+use sim_gpu::internals::ray::MISS;
+use sim_gpu::internals::target::{Surface, Target};
 use std::hint::black_box;
 
 /// One builder on one mesh.
@@ -101,7 +101,7 @@ fn traces(
     rounds: usize,
 ) -> Result<Vec<Trace>> {
     let job = &ray_set.job;
-    let cast = sim_gpu::cpu::trace::cast(job, &Effects::default());
+    let cast = sim_gpu::internals::cpu::trace::cast(job, &Effects::default());
     let hits = cast.codes.iter().filter(|&&code| code != MISS).count();
     let fitting = |backend: &&Backend| {
         let fits = backend.caster.fits(&job.target);
@@ -135,7 +135,7 @@ fn traces(
 /// Seconds of the kernel alone in each of `repeats` casts of `jobs`, by the adapter's own
 /// clock; `None` if the adapter does not have one.
 fn kernel_seconds(backend: &Backend, jobs: &[CastJob], repeats: usize) -> Result<Option<Vec<f64>>> {
-    let Caster::Gpu(gpu) = &backend.caster else { return Ok(None) };
+    let OpenCaster::Gpu(gpu) = &backend.caster else { return Ok(None) };
     // The first cast warms up and is left out.
     gpu.cast_timed(jobs)?;
     (0..repeats).map(|_| Ok(gpu.cast_timed(jobs)?.1)).collect()

@@ -12,9 +12,9 @@ use edgepuck_dataset::pipeline::{Run, scan_all};
 use edgepuck_dataset::progress::{Progress, Stage};
 use edgepuck_program::gen_dataset;
 use serde::Serialize;
-use sim_gpu::caster::Caster;
-use sim_gpu::job::Culling;
-use sim_gpu::mesh::tree::MeshEntry;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
@@ -46,7 +46,7 @@ pub fn measure(
     let config = gen_dataset::config(&[])?;
     let mut datasets = Vec::new();
     for backend in backends {
-        let caster = Caster::open(&backend.request(), &config.cast_effects())?;
+        let caster = OpenCaster::open(&backend.request(), &config.cast_effects())?;
         let once = |_| once(&config, &caster, &meshes);
         let mut repeats = (0..rounds).map(once).collect::<Result<Vec<_>>>()?;
         repeats.sort_by(|a, b| a.cost.cpu_s.total_cmp(&b.cost.cpu_s));
@@ -55,7 +55,7 @@ pub fn measure(
     Ok(datasets)
 }
 
-fn once(config: &DatasetConfig, caster: &Caster, meshes: &[MeshEntry]) -> Result<Dataset> {
+fn once(config: &DatasetConfig, caster: &OpenCaster, meshes: &[MeshEntry]) -> Result<Dataset> {
     let folder = tempfile::tempdir()?;
     let terms = Terms::new(config.clone(), caster, meshes, None);
     Journal::of(folder.path()).begin(&terms)?;

@@ -12,7 +12,7 @@ use anyhow::Result;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use serde::Serialize;
-use sim_gpu::bvh::Builder;
+use sim_gpu::internals::bvh::Builder;
 
 /// How rays become ranges.
 type Method = fn(&RaySet) -> Vec<Option<f64>>;

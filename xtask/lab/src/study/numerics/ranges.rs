@@ -1,17 +1,17 @@
 //! Ranges: what f32 finds by itself, and what is delivered once f64 has solved it.
 
 use glam::DVec3;
-use sim_gpu::bvh::{Builder, Stack};
-use sim_gpu::caster::Caster;
-use sim_gpu::cpu::oracle;
-use sim_gpu::cpu::traverse::traverse;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::CastJob;
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::resolve::resolve;
-use sim_gpu::scan::{PlacedTarget, ScanRequest};
-use sim_gpu::sensor::{BeamPattern, Sensor};
+use sim_gpu::internals::bvh::{Builder, Stack};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::cpu::traverse::traverse;
+use sim_gpu::internals::job::CastJob;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::resolve::resolve;
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest};
+use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
 
 use super::{Row, Setting, U64, settings};
 use crate::measure::bench_mesh::target;
@@ -39,7 +39,7 @@ pub fn measure() -> Vec<Row> {
 }
 
 /// Errors of f32 alone, and of what is delivered, in metres.
-fn measure_at(setting: Setting, sensor: &Sensor, pattern: &BeamPattern) -> [Row; 2] {
+fn measure_at(setting: Setting, sensor: &SensorProfile, pattern: &BeamPattern) -> [Row; 2] {
     let [scale, offset] = [setting.of("scale", 1.0), setting.of("offset", 0.0)];
     let distance = setting.of("distance", 3.0);
     let mesh = torus(setting.of("N", 10_000.0) as usize);
@@ -48,7 +48,7 @@ fn measure_at(setting: Setting, sensor: &Sensor, pattern: &BeamPattern) -> [Row;
     let moved = Pose { position_m: pose.position_m * scale + shift, ..pose };
     let job = |pose, map: &dyn Fn(DVec3) -> DVec3| -> CastJob {
         let vertices = mesh.vertices.iter().map(|&v| map(v)).collect();
-        let mesh = Mesh { vertices, triangles: mesh.triangles.clone() };
+        let mesh = TriangleMesh { vertices, triangles: mesh.triangles.clone() };
         let target = target(mesh, Builder::Sah);
         ScanRequest::new(sensor, pattern, pose).aim(&PlacedTarget::new(&target))
     };
@@ -63,7 +63,7 @@ fn measure_at(setting: Setting, sensor: &Sensor, pattern: &BeamPattern) -> [Row;
     let (mut in_f32, mut delivered) = (Vec::new(), Vec::new());
     let (mut f32_bound, mut magnitude) = (0.0f64, 0.0f64);
     let effects = Effects::default();
-    let casts = Caster::Cpu(effects.clone()).cast_on_cpu(std::slice::from_ref(&there));
+    let casts = OpenCaster::Cpu(effects.clone()).cast_on_cpu(std::slice::from_ref(&there));
     for hit in resolve(&there, &casts[0], pattern, &effects).hits {
         let ray = at_home.frame.ray(pattern.directions[hit.beam as usize]);
         let Some(truth) = oracle::nearest(&at_home.target, &ray) else { continue };

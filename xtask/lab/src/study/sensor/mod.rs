@@ -14,7 +14,7 @@ use formats::atomic;
 use formats::labelled_sweep::read_labelled_sweep;
 use mounting::Mounting;
 use patches::{Patch, Shown, typical_mm};
-use sim_gpu::sensor::{Layout, Rotating, Sensor};
+use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile};
 use std::fmt::Write;
 use std::path::PathBuf;
 use sweep::Return;
@@ -58,7 +58,7 @@ impl Sweep {
 
 /// Measures the frames and a simulated sweep, prints the tables and writes the report.
 pub fn run(args: &SensorArgs) -> Result<()> {
-    let sensor = Sensor::resolve(&args.sensor)?;
+    let sensor = SensorProfile::resolve(&args.sensor)?;
     let Layout::Rotating(table) = &sensor.layout else {
         bail!("{}: expected a table of rotating beams, found another layout", sensor.name);
     };

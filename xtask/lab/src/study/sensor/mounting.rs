@@ -7,7 +7,7 @@
 use super::sweep::Return;
 use glam::{DVec3, dvec3};
 use nalgebra::{DMatrix, DVector};
-use sim_gpu::sensor::Rotating;
+use sim_gpu::internals::sensor::Rotating;
 use std::f64::consts::TAU;
 
 use super::quantile;
@@ -281,11 +281,11 @@ fn wrapped(degrees: f64) -> f64 {
 mod tests {
     use super::super::sweep;
     use super::*;
-    use sim_gpu::sensor::{Layout, Sensor};
+    use sim_gpu::internals::sensor::{Layout, SensorProfile};
 
     #[test]
     fn a_simulated_sweep_gives_the_profile_back() {
-        let sensor = Sensor::builtin("vlp32c").unwrap();
+        let sensor = SensorProfile::builtin("vlp32c").unwrap();
         let Layout::Rotating(table) = &sensor.layout else { panic!("it rotates") };
         let returns = sweep::simulated(&sensor, table).unwrap();
         let found = Mounting::fit(&returns, table);

@@ -5,7 +5,7 @@ use super::quantile;
 use super::sweep::Return;
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen};
-use sim_gpu::sensor::Rotating;
+use sim_gpu::internals::sensor::Rotating;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 

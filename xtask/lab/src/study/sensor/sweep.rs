@@ -7,13 +7,13 @@ use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use glam::{DQuat, DVec3, dvec3};
 use half::f16;
-use sim_gpu::bvh::Builder;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::{Effects, Noise, NoiseModel, Quantum};
-use sim_gpu::mesh::Mesh;
-use sim_gpu::pose::Pose;
-use sim_gpu::scan::{ScanRequest, scan};
-use sim_gpu::sensor::{Rotating, Sensor};
+use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::scan::{ScanRequest, scan};
+use sim_gpu::internals::sensor::{Rotating, SensorProfile};
 
 /// Height of the simulated sensor above the ground, metres: on a car's roof.
 const HEIGHT_M: f64 = 1.65;
@@ -53,7 +53,7 @@ pub fn by_sensor(sweep: &LabelledSweep, n_lasers: usize) -> Result<Vec<Vec<Retur
 
 /// What `sensor` measures in a street of even ground between walls, with the noise
 /// and the quantum of its profile, in the precision of Argoverse 2's files.
-pub fn simulated(sensor: &Sensor, table: &Rotating) -> Result<Vec<Return>> {
+pub fn simulated(sensor: &SensorProfile, table: &Rotating) -> Result<Vec<Return>> {
     let pattern = sensor.pattern();
     let sigma_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);
     let effects = Effects {
@@ -61,12 +61,12 @@ pub fn simulated(sensor: &Sensor, table: &Rotating) -> Result<Vec<Return>> {
         quantum: sensor.range.quantum_m.map(|_| Quantum { step_m: None }),
         ..Effects::default()
     };
-    let pose = Pose { position_m: dvec3(0.0, 0.0, HEIGHT_M), world_from_sensor: DQuat::IDENTITY };
+    let pose = Pose { position_m: dvec3(0.0, 0.0, HEIGHT_M), rotation: DQuat::IDENTITY };
     let mut request = ScanRequest::new(sensor, &pattern, pose);
     request.attributes = [Attribute::Beam, Attribute::Time].into();
     request.stream = StreamKey::new(0, "sensor", 0);
     let street = target(street(), Builder::Sah);
-    let scan = scan(&Caster::Cpu(effects), &street, &request)?;
+    let scan = scan(&OpenCaster::Cpu(effects), &street, &request)?;
     let (beams, times) = (scan.beam.context("no beams")?, scan.time_s.context("no times")?);
     let order = table.firing_order();
     let returns =
@@ -79,8 +79,8 @@ pub fn simulated(sensor: &Sensor, table: &Rotating) -> Result<Vec<Return>> {
 }
 
 /// Ground of 240 m by 240 m, and walls 15 m high: a street 24 m wide and 120 m long.
-fn street() -> Mesh {
-    let mut mesh = Mesh::default();
+fn street() -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
     let mut quad = |corner: DVec3, a: DVec3, b: DVec3| {
         let first = mesh.vertices.len() as u32;
         mesh.vertices.extend([corner, corner + a, corner + a + b, corner + b]);

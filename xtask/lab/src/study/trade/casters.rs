@@ -12,9 +12,9 @@ use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::caster::Caster;
 use sim_gpu::effects::Effects;
-use sim_gpu::job::{CastJob, Culling};
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::{CastJob, Culling};
 use std::collections::HashMap;
 use std::hint::black_box;
 
@@ -30,7 +30,7 @@ enum Method<'a> {
     /// The watertight test, and ranges in f32.
     F32,
     /// The product: the watertight test in f32, ranges in f64.
-    Product(&'a Caster),
+    Product(&'a OpenCaster),
 }
 
 /// The rays of every scan.
@@ -48,7 +48,7 @@ pub fn cast_all(
     rounds: usize,
     test_set: &str,
 ) -> Result<Vec<Scanned>> {
-    let cpu = Caster::Cpu(Effects::default());
+    let cpu = OpenCaster::Cpu(Effects::default());
     let mut methods = vec![
         ("cpu f64".to_owned(), Method::Oracle, false),
         ("cpu f32 Möller-Trumbore, f32 range".to_owned(), Method::MollerTrumbore, false),

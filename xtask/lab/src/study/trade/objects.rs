@@ -4,11 +4,11 @@ use crate::study::meshes;
 use anyhow::{Context, Result, ensure};
 use formats::rng::StreamKey;
 use glam::DVec3;
-use sim_gpu::mesh::frame::Normalize;
-use sim_gpu::mesh::tree::{MeshEntry, discover};
-use sim_gpu::pose::Pose;
-use sim_gpu::sensor::Views;
-use sim_gpu::target::Target;
+use sim_gpu::internals::mesh::frame::Normalize;
+use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::sensor::Views;
+use sim_gpu::internals::target::Target;
 use std::collections::BTreeSet;
 use std::path::Path;
 

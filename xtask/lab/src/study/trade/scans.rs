@@ -11,9 +11,9 @@ use formats::hash::Hashing;
 use formats::scan::{Attribute, AttributeSet, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use rayon::prelude::*;
-use sim_gpu::caster::Caster;
-use sim_gpu::scan::{ScanRequest, scan_many};
-use sim_gpu::sensor::BeamPattern;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::scan::{ScanRequest, scan_many};
+use sim_gpu::internals::sensor::BeamPattern;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::hint::black_box;
@@ -147,7 +147,7 @@ fn scan<'a>(
         (request.attributes, request.stream) = (attributes.clone(), place.stream);
         (&place.object.target, request)
     };
-    let made = |sim_gpu::scan::Scanned { scan, hits, .. }| {
+    let made = |sim_gpu::internals::scan::Scanned { scan, hits, .. }| {
         let hits = &hits[0].hits;
         let exact = |beam: &u32| {
             // That in the middle of a wide beam.
@@ -159,7 +159,7 @@ fn scan<'a>(
         Made { scan, exact_m }
     };
     let requests: Vec<_> = places.iter().map(request).collect();
-    let scans = scan_many(&Caster::Cpu(setting.effects()), &requests)?;
+    let scans = scan_many(&OpenCaster::Cpu(setting.effects()), &requests)?;
     Ok(scans.into_iter().map(made).collect())
 }
 

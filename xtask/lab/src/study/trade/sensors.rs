@@ -3,7 +3,7 @@
 use crate::study::uniform_raster::as_even_grid;
 use sim_gpu::effects::{Detection, Effects, Footprint, Noise, NoiseModel, Quantum};
 use sim_gpu::effects::{ReturnMode, Weather};
-use sim_gpu::sensor::{DetectionLimit, Layout, Sensor};
+use sim_gpu::internals::sensor::{DetectionLimit, Layout, SensorProfile};
 use std::num::NonZeroU32;
 
 /// The settings of a scan.
@@ -14,7 +14,7 @@ pub struct Scanning {
     /// The sensor's name, and how it differs from its profile.
     pub name: String,
     /// The sensor.
-    pub sensor: Sensor,
+    pub sensor: SensorProfile,
     /// To the object's centre.
     pub distance_m: f64,
     /// Along the ray.
@@ -123,7 +123,7 @@ pub fn one_at_a_time() -> Vec<Scanning> {
     let name = "even grid of 32 rows".to_owned();
     all.push(Scanning { name, sensor: grid, ..reference().varying("beam table") });
     for name in ["blainder-ultrapuck", "os1-128", "vls128", "xt32", "avia"] {
-        let sensor = Sensor::builtin(name).expect("invariant: it is built in");
+        let sensor = SensorProfile::builtin(name).expect("invariant: it is built in");
         let name = name.to_owned();
         all.push(Scanning { name, sensor, ..reference().varying("beam table") });
     }
@@ -192,8 +192,8 @@ pub fn combinations() -> Vec<Scanning> {
     all
 }
 
-fn vlp32c() -> Sensor {
-    Sensor::builtin("vlp32c").expect("invariant: this profile is built in")
+fn vlp32c() -> SensorProfile {
+    SensorProfile::builtin("vlp32c").expect("invariant: this profile is built in")
 }
 
 #[cfg(test)]

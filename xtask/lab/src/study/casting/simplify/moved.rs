@@ -3,9 +3,9 @@
 use crate::measure::ray_set::RaySet;
 use rayon::prelude::*;
 use serde::Serialize;
-use sim_gpu::cpu::oracle;
-use sim_gpu::ray::Ray;
-use sim_gpu::simplify::distance_to_surface;
+use sim_gpu::internals::cpu::oracle;
+use sim_gpu::internals::ray::Ray;
+use sim_gpu::internals::simplify::distance_to_surface;
 
 /// Errors over all rays of some ray_sets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
