@@ -6,13 +6,12 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
+use sim_gpu::Scene;
 use sim_gpu::effects::{Detection, Effects};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
-use sim_gpu::internals::scene::{Scene, cast};
 use sim_gpu::internals::sensor::{DetectionLimit, SensorProfile};
 use std::fs;
 use tests::{adapter, casting, meshes};
@@ -224,8 +223,8 @@ fn faces_return_light_as_their_materials_do() {
          materials = { sign = { retroreflection = 1 } }\n\
          [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n",
     );
-    let scene = Scene::load(&folder.path().join("scene.toml")).unwrap();
-    let scan = &cast(&scene, &OpenCaster::Cpu(scene.effects.clone()), Culling::On).unwrap()[0].scan;
+    let scene = Scene::read(folder.path().join("scene.toml")).unwrap();
+    let scan = scene.scan_mounted(0).run().unwrap();
     let (intensities, bytes) =
         (scan.intensity.as_ref().unwrap(), scan.reflectivity.as_ref().unwrap());
     // Half of sRGB's range in linear light: ((0.5 + 0.055) / 1.055)^2.4.

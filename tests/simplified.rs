@@ -17,11 +17,12 @@ use sim_gpu::internals::mesh::tree::discover;
 use sim_gpu::internals::mesh::validate::triangle_stats;
 use sim_gpu::internals::mesh::{TriangleMesh, load};
 use sim_gpu::internals::pose::Pose;
-use sim_gpu::internals::scene::{Scene, cast};
+use sim_gpu::internals::scene::SceneFile;
 use sim_gpu::internals::sensor::{SensorProfile, Views};
 use sim_gpu::internals::simplify::{Viewpoint, distance_to_surface, resolved_m, simplified};
 use sim_gpu::internals::surface_points::area_uniform;
 use sim_gpu::internals::target::Target;
+use sim_gpu::{Scan, Scene};
 use test_support::{need, shared_data};
 use tests::casting::{builtin, job, target};
 use tests::meshes;
@@ -250,16 +251,17 @@ fn a_scene_says_which_objects_are_simplified() {
     let scan = |scene_key: &str, object_key: &str| {
         let object = format!("{object_key}\nup =");
         let text = format!("{scene_key}\n{}", SCENE.replacen("up =", &object, 1));
-        let scene = Scene::parse(&text, &folder.path().join("scene.toml")).unwrap();
-        cast(&scene, &caster, Culling::On).unwrap().remove(0)
+        let scene = SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap();
+        let scene = Scene::try_from(&scene).unwrap();
+        (scene.scan_mounted(0).run().unwrap(), scene.instances()[0].simplified)
     };
     let plain = scan("", "");
-    assert_eq!(plain.simplified, [None]);
-    assert_eq!(scan("simplify = \"auto\"", "simplify = false").scan, plain.scan);
+    assert_eq!(plain.1, None);
+    assert_eq!(scan("simplify = \"auto\"", "simplify = false").0.points, plain.0.points);
     let auto = scan("simplify = \"auto\"", "");
     let own = scan("", "simplify = \"auto\"");
-    assert_eq!(auto.scan, own.scan);
-    let made = auto.simplified[0].unwrap();
+    assert_eq!(auto.0.points, own.0.points);
+    let made = auto.1.unwrap();
     assert!(made.triangles < 20_480 / 4, "{made:?}");
     // A quarter of 0.199 degrees at the box's nearest side, 9 m away; the
     // object's least factor, 0.5, halves what is promised of it.

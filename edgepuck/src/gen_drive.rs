@@ -140,7 +140,7 @@ fn write_poses(file: &mut Unfinished, drive: &Drive, seconds: f64) -> anyhow::Re
         let time_s = f64::from(n) / f64::from(POSES_HZ);
         let pose = drive.pose(time_s);
         let [x, y, z] = pose.position_m.to_array();
-        let [qx, qy, qz, qw] = pose.world_from_sensor.to_array();
+        let [qx, qy, qz, qw] = pose.rotation.to_array();
         let time_s = f64::from(START_S) + time_s;
         file.append(|writer| {
             writeln!(writer, "{time_s:.2} {x:.6} {y:.6} {z:.6} {qx:.9} {qy:.9} {qz:.9} {qw:.9}")

@@ -57,9 +57,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
-    let stage = Stage::with_casters(recipe, &args.recipe, meshes, args.seed, |effects| {
-        args.caster.open(effects)
-    })?;
+    let caster = args.caster.caster()?;
+    let stage = Stage::with_caster(recipe, &args.recipe, meshes, args.seed, &caster)?;
     let stage = stage.with_culling(args.caster.culling());
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;

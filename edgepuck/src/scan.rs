@@ -5,11 +5,12 @@ use crate::{Outcome, Usage, flags};
 use anyhow::Context;
 use formats::atomic;
 use formats::hash::Hashing;
-use formats::scan_file::{ScanFormat, write_scan};
+use formats::scan_file::ScanFormat;
 use formats::vlp32c::{self, Returns};
 use sim_gpu::internals::packets;
-use sim_gpu::internals::scene::{Scene, SceneScan, cast};
+use sim_gpu::internals::scene::SceneFile;
 use sim_gpu::internals::simplify::Simplify;
+use sim_gpu::{Scan, Scene};
 use std::path::{Path, PathBuf};
 
 /// Flags of `scan`.
@@ -45,68 +46,75 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         Some(file) => file.clone(),
         None => write_default_scene()?,
     };
-    let mut scene = Scene::load(&scene_file)?;
-    scene.simplify = args.simplify.or(scene.simplify);
-    scene.check_triangles().map_err(|error| Usage(error.to_string()))?;
-    flags::need_simplification(scene.simplifies())?;
+    let mut file = SceneFile::load(&scene_file)?;
+    file.simplify = args.simplify.or(file.simplify);
+    file.check_triangles().map_err(|error| Usage(error.to_string()))?;
+    flags::need_simplification(file.simplifies())?;
     let mut returns = Returns::default();
     if format == ScanFormat::Pcap {
-        returns = cast_as_packets_tell(&mut scene, args.returns)
+        returns = cast_as_packets_tell(&mut file, args.returns)
             .with_context(|| format!("{}", scene_file.display()))?;
     } else if args.returns.is_some() {
         let cause = "--returns applies to packets only: expected --out with the extension .pcap; \
                      the returns of other files are the scene's: `effects.returns`";
         return Err(Usage(cause.to_owned()).into());
     }
-    let caster = args.caster.open(&scene.effects)?;
-    let scans = cast(&scene, &caster, args.caster.culling())
-        .with_context(|| format!("{}", scene_file.display()))?;
-    for (number, object) in scene.objects.iter().enumerate() {
-        let label = object.label.as_ref().map(|label| format!(", a {label}")).unwrap_or_default();
-        let simplified = scans.first().and_then(|scan| scan.simplified[number]);
-        let simplified = simplified
-            .map(|s| format!(", {} triangles left, within {:.2e} m", s.triangles, s.bound_m))
-            .unwrap_or_default();
-        eprintln!("object {number}: {}{label}{simplified}", object.name);
-    }
-    let several = scans.len() > 1;
-    for (SceneScan { sensor, scan, tally, too_large_for_adapter, .. }, asked) in
-        scans.iter().zip(&scene.sensors)
-    {
-        if *too_large_for_adapter {
+    let caster = args.caster.caster()?;
+    let in_scene = || scene_file.display().to_string();
+    let scene = Scene::try_from(&file).with_context(in_scene)?;
+    let scan =
+        |number| scene.scan_mounted(number).with(&caster).culling(args.caster.culling()).run();
+    let scans: Vec<Scan> =
+        (0..scene.sensors.len()).map(scan).collect::<Result<_, _>>().with_context(in_scene)?;
+    tell_objects(&scene);
+    for (scan, mounted) in scans.iter().zip(&scene.sensors) {
+        let sensor = &mounted.name;
+        if scan.cast_on_cpu {
             eprintln!(
                 "{sensor}: one mesh exceeds the adapter's largest binding, so the CPU cast it"
             );
         }
-        let file = if several { beside(&args.out, sensor) } else { args.out.clone() };
+        let file = if scans.len() > 1 { beside(&args.out, sensor) } else { args.out.clone() };
         match format {
             ScanFormat::Pcap => {
-                let revolution = packets::revolution(&asked.sensor)?;
+                let revolution = packets::revolution(mounted.sensor.profile())?;
                 vlp32c::write(&file, Hashing::None, &revolution, returns, scan)?;
             }
-            _ => {
-                write_scan(&file, format, Hashing::None, scan)?;
-            }
+            _ => scan.save(&file)?,
         }
-        eprintln!(
-            "{sensor}: {} points ({}{} out of range, {}{} dropped, {} with a negative range): {}",
-            tally.points,
-            scene
-                .effects
-                .weather
-                .as_ref()
-                .map_or(String::new(), |_| format!("{} of the air, ", tally.scattered)),
-            tally.out_of_range,
-            match (&scene.effects.detection, &scene.effects.weather) {
-                (None, None) => String::new(),
-                _ => format!("{} undetected, ", tally.undetected),
-            },
-            tally.dropped,
-            tally.negative,
-            file.display()
-        );
+        eprintln!("{sensor}: {}: {}", told(&scene, scan), file.display());
     }
     Ok(Outcome::Success)
+}
+
+/// Lists the objects of `scene`, and what simplification made of them.
+fn tell_objects(scene: &Scene) {
+    for (number, object) in scene.instances().iter().enumerate() {
+        let name = object.name.as_deref().unwrap_or_default();
+        let label = object.label.as_ref().map(|label| format!(", a {label}")).unwrap_or_default();
+        let simplified = object
+            .simplified
+            .map(|s| format!(", {} triangles left, within {:.2e} m", s.triangles, s.bound_m))
+            .unwrap_or_default();
+        eprintln!("object {number}: {name}{label}{simplified}");
+    }
+}
+
+/// The number of points of `scan`, and what became of the other returns.
+fn told(scene: &Scene, scan: &Scan) -> String {
+    let (tally, effects) = (&scan.tally, &scene.effects);
+    let of_the_air = effects.weather.as_ref().map(|_| format!("{} of the air, ", tally.scattered));
+    let can_be_missed = effects.detection.is_some() || effects.weather.is_some();
+    let undetected = can_be_missed.then(|| format!("{} undetected, ", tally.undetected));
+    format!(
+        "{} points ({}{} out of range, {}{} dropped, {} with a negative range)",
+        tally.points,
+        of_the_air.unwrap_or_default(),
+        tally.out_of_range,
+        undetected.unwrap_or_default(),
+        tally.dropped,
+        tally.negative,
+    )
 }
 
 /// The folder of the scene that is scanned by default.
@@ -129,7 +137,7 @@ fn write_default_scene() -> anyhow::Result<PathBuf> {
 /// Gives the sensors the beam geometry that their packets describe, and the scans
 /// the attributes that packets are made of. Says which returns they hold, where `wanted` does
 /// not say otherwise.
-fn cast_as_packets_tell(scene: &mut Scene, wanted: Option<Returns>) -> anyhow::Result<Returns> {
+fn cast_as_packets_tell(scene: &mut SceneFile, wanted: Option<Returns>) -> anyhow::Result<Returns> {
     let returns = packets::settle_returns(&mut scene.effects, wanted)?;
     for (i, sensor) in scene.sensors.iter_mut().enumerate() {
         sensor.sensor = packets::as_packets_tell(&sensor.sensor)

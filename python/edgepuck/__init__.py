@@ -19,7 +19,8 @@ from .classifier import Classifier, Prediction
 from .dataset import Dataset
 from .mesh import Mesh, box
 from .scan import Scan
-from .scenes import Scene, Scenes, scan_scene
+from .scene import Scene, scan_scene
+from .scenes import DrawnScene, Scenes
 from .segment import segment
 from .sensor import Sensor
 
@@ -28,6 +29,7 @@ __version__ = _version("edgepuck")
 __all__ = [
     "Classifier",
     "Dataset",
+    "DrawnScene",
     "Error",
     "Mesh",
     "Prediction",

@@ -9,12 +9,12 @@ __all__ = [
     "Clouds",
     "Error",
     "Mesh",
+    "Scene",
     "Scenes",
     "Sensor",
     "adapters",
     "main",
     "run",
-    "scan_scene",
     "seed_of_epoch",
     "segment",
     "set_num_threads",
@@ -51,9 +51,33 @@ class Sensor:
     def rings(self) -> NDArray[np.uint16]: ...
     @property
     def times(self) -> NDArray[np.float64]: ...
+
+@final
+class Scene:
+    def __new__(cls) -> Scene: ...
+    @staticmethod
+    def read(file: str) -> Scene: ...
+    def __len__(self) -> int: ...
+    def add(
+        self,
+        mesh: Mesh,
+        pose: Sequence[float],
+        scale: Sequence[float],
+        name: str | None,
+        label: str | None,
+        reflectivity: float,
+        retroreflection: float,
+    ) -> int: ...
+    def move(self, number: int, pose: Sequence[float]) -> None: ...
     def scan(
-        self, mesh: Mesh, place: Sequence[float], effects: str, attributes: Sequence[str], seed: int
+        self,
+        sensor: Sensor,
+        place: Sequence[float],
+        effects: str,
+        attributes: Sequence[str],
+        seed: int,
     ) -> dict[str, Any]: ...
+    def scan_all(self, adapter: str) -> list[tuple[str, dict[str, Any]]]: ...
 
 @final
 class Clouds:
@@ -96,7 +120,6 @@ class Scenes:
 def adapters() -> list[str]: ...
 def main(words: Sequence[str]) -> int: ...
 def run(words: Sequence[str]) -> None: ...
-def scan_scene(file: str, adapter: str) -> list[tuple[str, dict[str, Any]]]: ...
 def seed_of_epoch(seed: int, epoch: int) -> int: ...
 def segment(
     cloud: NDArray[np.float32],

@@ -16,7 +16,7 @@ Normalize = Literal["unit-sphere", "bbox", "none"]
 
 
 class Mesh(Remade):
-    """A triangle mesh, placed at the origin with z up.
+    """A triangle mesh, z up.
 
     Args:
         source: The path of an OBJ, OFF, PLY or STL file; vertices, of shape [n, 3]; or anything
@@ -24,9 +24,9 @@ class Mesh(Remade):
         faces: The indices of each triangle's vertices, of shape [m, 3], if `source` is vertices.
         normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the
             farthest of them to 1 m. `bbox` moves the middle of the bounding box there and scales its
-            longest side to 2 m. `none` only moves the middle there, and takes the unit of length as a
-            metre.
-        up: The upward axis of `source`: y or z. By default, y for OBJ files and z for all others.
+            longest side to 2 m. `none` leaves the mesh where it is, and takes the unit of length for
+            a metre.
+        up: The upward axis of `source`: y or z. By default, y of OBJ files and z of all else.
 
     Raises:
         Error: The file cannot be read, a number is not finite, an index is out of range, or there
@@ -74,7 +74,7 @@ class Mesh(Remade):
 
     @property
     def vertices(self) -> NDArray[np.float64]:
-        """The vertices in the frame of scans, metres, [n, 3]."""
+        """The vertices in the mesh's frame, metres, [n, 3]."""
         return self._mesh.vertices
 
     @property

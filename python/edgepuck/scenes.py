@@ -1,4 +1,4 @@
-"""Streets, yards and rooms, and scenes in files."""
+"""Streets, yards and rooms that recipes draw."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .scan import Scan, scan_of
 
 
 @dataclass(eq=False, repr=False)
-class Scene:
-    """A scene with its scan and the clusters of the scan."""
+class DrawnScene:
+    """A scene that a recipe drew, what its sensor saw, and what segmentation made of that."""
 
     sensor: str
     """The sensor's name."""
@@ -38,7 +38,7 @@ class Scene:
 
     def __repr__(self) -> str:
         clusters = len(self.cluster_class)
-        return f"<Scene of {self.sensor}: {self.scan!r}, {len(self.objects)} objects, {clusters} clusters>"
+        return f"<DrawnScene of {self.sensor}: {self.scan!r}, {len(self.objects)} objects, {clusters} clusters>"
 
 
 class Scenes(Remade):
@@ -87,11 +87,6 @@ class Scenes(Remade):
         """The names of the classes, including `other`."""
         return self._scenes.classes
 
-    def __getitem__(self, index: int) -> Scene:
-        drawn = self._scenes.draw(number("scenes", index, self._length))
-        return Scene(**{**drawn, "scan": scan_of(drawn["scan"])})
-
-
-def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:
-    """Scan the scene in a TOML file, like `edgepuck scan`. Return the scans by the names of sensors."""
-    return {name: scan_of(columns) for name, columns in _edgepuck.scan_scene(os.fspath(file), adapter)}
+    def __getitem__(self, index: int) -> DrawnScene:
+        told = self._scenes.draw(number("scenes", index, self._length))
+        return DrawnScene(**{**told, "scan": scan_of(told["scan"])})

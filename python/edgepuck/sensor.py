@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -11,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _arguments, _edgepuck
+from . import _edgepuck
 from ._arguments import Remade, place
 from .mesh import Mesh
-from .scan import Scan, scan_of
+from .scan import Scan
+from .scene import Scene
 
 
 class Sensor(Remade):
@@ -72,10 +71,10 @@ class Sensor(Remade):
         attributes: Iterable[str] = ("range", "beam", "ring", "time"),
         seed: int = 0,
     ) -> Scan:
-        """Scan a mesh from a position around it.
+        """Scan one mesh from a place around the origin: `Scene.scan` of a scene with this mesh alone.
 
         Args:
-            mesh: The mesh, at the origin.
+            mesh: The mesh.
             distance: The distance of the sensor from the origin, metres.
             elevation: The elevation of the sensor above the horizon, degrees.
             azimuth: The azimuth of the sensor, counterclockwise from x, degrees.
@@ -92,40 +91,20 @@ class Sensor(Remade):
         Raises:
             Error: A value is out of its limits, or an attribute or effect is unknown.
         """
-        if not isinstance(mesh, Mesh):
-            raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
-        if isinstance(attributes, str):
-            raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
-        wanted: dict[str, Any] = dict(effects or {})
-        for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
-            if given and name in wanted:
-                raise _edgepuck.Error(f"{name}: expected it once, found it in effects as well")
-        if noise != 0:
-            wanted["noise"] = {"sigma_m": noise, "mean_m": 0.0, "model": "range"}
-        if dropout != 0:
-            wanted["dropout"] = {"probability": dropout}
-        at = [float(distance), float(elevation), float(azimuth)]
-        if pose is not None:
-            matrix = np.asarray(pose, dtype=np.float64)
-            if matrix.shape != (4, 4):
-                found = list(matrix.shape)
-                raise _edgepuck.Error(f"pose: expected a matrix of shape [4, 4], found {found}")
-            at = matrix.ravel().tolist()
-        encoded = json.dumps(_plain(wanted, "effects"))
-        key = _arguments.seed(seed)
-        return scan_of(self._sensor.scan(mesh._mesh, at, encoded, list(attributes), key))
+        scene = Scene()
+        scene.add(mesh)
+        return scene.scan(
+            self,
+            distance=distance,
+            elevation=elevation,
+            azimuth=azimuth,
+            pose=pose,
+            noise=noise,
+            dropout=dropout,
+            effects=effects,
+            attributes=attributes,
+            seed=seed,
+        )
 
     def __repr__(self) -> str:
         return f"Sensor({self.name!r})"
-
-
-def _plain(value: Any, key: str) -> Any:
-    """`value`, found at `key`, as types of JSON."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(of, f"{key}.{name}") for name, of in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(of, f"{key}[{i}]") for i, of in enumerate(value)]
-    plain = value.item() if isinstance(value, np.generic) else value
-    if isinstance(plain, float) and not math.isfinite(plain):
-        raise _edgepuck.Error(f"{key}: expected a finite number, found {plain}")
-    return plain

@@ -27,8 +27,7 @@ pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
 
 /// From the sensor's frame to the world's, row by row.
 pub fn matrix(pose: &Pose) -> Vec<f64> {
-    let world_from_sensor =
-        DMat4::from_rotation_translation(pose.world_from_sensor, pose.position_m);
+    let world_from_sensor = DMat4::from_rotation_translation(pose.rotation, pose.position_m);
     world_from_sensor.transpose().to_cols_array().to_vec()
 }
 

@@ -72,7 +72,8 @@ impl Clouds {
     /// The clouds of these numbers, `[n, points, 3]`, and their classes, `[n]`.
     fn draw<'py>(&self, py: Python<'py>, seed: u64, indices: Vec<usize>) -> PyResult<Batch<'py>> {
         indices.iter().try_for_each(|&index| self.check(index))?;
-        let caster = self.caster.open(&self.clouds.cast_effects())?;
+        let caster =
+            self.caster.open()?.for_effects(&self.clouds.cast_effects()).map_err(raised)?;
         let drawn = process::run(py, || self.clouds.draw(&caster, seed, &indices))?;
         let drawn = drawn.map_err(raised)?;
         let labels: Vec<i64> = drawn.iter().map(|cloud| cloud.label as i64).collect();

@@ -10,6 +10,7 @@ mod clouds;
 mod error;
 mod mesh;
 mod process;
+mod scene;
 mod scenes;
 mod segment;
 mod sensor;
@@ -28,7 +29,9 @@ mod _edgepuck {
     #[pymodule_export]
     use super::process::{adapters, main, run_command, set_num_threads};
     #[pymodule_export]
-    use super::scenes::{Scenes, scan_scene};
+    use super::scene::Scene;
+    #[pymodule_export]
+    use super::scenes::Scenes;
     #[pymodule_export]
     use super::segment::segment;
     #[pymodule_export]

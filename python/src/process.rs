@@ -8,8 +8,7 @@ use crate::error::{raised, raised_with_causes};
 use edgepuck_program::Outcome;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use sim_gpu::effects::Effects;
-use sim_gpu::internals::caster::{AdapterRequest, Caster};
+use sim_gpu::Caster;
 use std::ffi::OsString;
 use std::mem;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -104,26 +103,24 @@ pub fn set_num_threads(threads: usize) {
     drop(old);
 }
 
-/// An adapter and its effects, opened by each process that casts.
+/// An adapter, opened by each process that casts.
 pub struct LazyCaster {
-    request: AdapterRequest,
+    adapter: String,
     opened: Mutex<Option<Own<Arc<Caster>>>>,
 }
 
 impl LazyCaster {
     pub fn new(adapter: &str) -> Self {
-        let Ok(request) = adapter.parse();
-        Self { request, opened: Mutex::new(None) }
+        Self { adapter: adapter.to_owned(), opened: Mutex::new(None) }
     }
 
-    /// The caster of this process for `effects`.
-    pub fn open(&self, effects: &Effects) -> PyResult<Arc<Caster>> {
+    /// The caster of this process.
+    pub fn open(&self) -> PyResult<Arc<Caster>> {
         let mut opened = lock(&self.opened);
-        match Own::of_this_process(&opened) {
-            Some(caster) if caster.effects() == effects => return Ok(Arc::clone(caster)),
-            _ => {}
+        if let Some(caster) = Own::of_this_process(&opened) {
+            return Ok(Arc::clone(caster));
         }
-        let caster = Arc::new(Caster::open(&self.request, effects).map_err(raised)?);
+        let caster = Arc::new(Caster::named(&self.adapter).map_err(raised)?);
         *opened = Some(Own::new(Arc::clone(&caster)));
         Ok(caster)
     }

@@ -1,15 +1,13 @@
-//! Scenes: those that recipes draw, and those that files describe.
+//! Scenes that recipes draw.
 
 use crate::error::{raised, raised_with_causes};
-use crate::process::{self, LazyCaster};
+use crate::process;
 use crate::{arrays, segment};
 use edgepuck_scenes::{LabelledScene, Stage};
 use edgepuck_segment::Settings;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sim_gpu::internals::job::Culling;
-use sim_gpu::internals::scene::{Scene, cast};
 use std::path::PathBuf;
 
 /// The scenes of a recipe.
@@ -72,22 +70,4 @@ impl Scenes {
         told.set_item("scan", arrays::scan(py, sweep.scan)?)?;
         Ok(told)
     }
-}
-
-/// Scan the scene in a TOML file: for each of its sensors the name and the scan.
-#[pyfunction]
-pub fn scan_scene<'py>(
-    py: Python<'py>,
-    file: PathBuf,
-    adapter: &str,
-) -> PyResult<Vec<(String, Bound<'py, PyDict>)>> {
-    let scene = process::run(py, || Scene::load(&file))?.map_err(raised)?;
-    let caster = LazyCaster::new(adapter).open(&scene.effects)?;
-    let scans = process::run(py, || cast(&scene, &caster, Culling::On))?.map_err(raised)?;
-    let told = scans.into_iter().zip(&scene.sensors).map(|(of, asked)| {
-        let told = arrays::scan(py, of.scan)?;
-        told.set_item("pose", arrays::matrix(&asked.pose))?;
-        Ok((of.sensor, told))
-    });
-    told.collect()
 }

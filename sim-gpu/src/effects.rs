@@ -69,6 +69,14 @@ pub struct Noise {
     pub model: NoiseModel,
 }
 
+impl Noise {
+    /// Noise of the range with this standard deviation, metres, and mean 0.
+    #[must_use]
+    pub fn along_range(sigma_m: f64) -> Self {
+        Self { mean_m: 0.0, sigma_m, model: NoiseModel::Range }
+    }
+}
+
 formats::named! {
     /// The quantity that Gaussian noise is added to.
     #[derive(Default, Serialize, Deserialize)]

@@ -1,66 +1,137 @@
 //! Casts LiDAR beams against triangle meshes.
 //!
 //! ```no_run
-//! use sim_gpu::caster::{AdapterRequest, Caster};
-//! use sim_gpu::effects::Effects;
-//! use sim_gpu::formats::hash::Hashing;
-//! use sim_gpu::formats::scan_file::{ScanFormat, write_scan};
-//! use sim_gpu::glam::DVec3;
-//! use sim_gpu::mesh::frame::Normalize;
-//! use sim_gpu::pose::Pose;
-//! use sim_gpu::scan::ScanRequest;
-//! use sim_gpu::sensor::Sensor;
-//! use sim_gpu::target::Target;
-//! use std::path::Path;
+//! use sim_gpu::{Caster, Mesh, Pose, Scene, Sensor};
 //!
+//! let mut scene = Scene::new();
 //! // A mesh (OBJ, OFF, PLY or STL), scaled to the unit sphere around the origin.
-//! let target = Target::load(Path::new("chair.obj"), Normalize::UnitSphere)?;
-//! // A sensor by name, or by the path of a TOML profile, and its beams.
-//! let sensor = Sensor::resolve("vlp32c")?;
-//! let pattern = sensor.pattern();
-//! // The sensor stands at (3, 0, 1) metres and looks at the origin.
-//! let pose = Pose::look_at(DVec3::new(3.0, 0.0, 1.0), DVec3::ZERO)?;
-//! // The best GPU there is, or else the CPU; `Caster::Cpu` needs no driver.
-//! let caster = Caster::open(&AdapterRequest::Auto, &Effects::default())?;
-//!
-//! let scan = sim_gpu::scan(&caster, &target, &ScanRequest::new(&sensor, &pattern, pose))?;
-//! println!("{} points", scan.positions.len());
-//! write_scan(Path::new("scan.npz"), ScanFormat::Npz, Hashing::None, &scan)?;
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! scene.add(Mesh::read("chair.obj")?.unit_sphere(), Pose::IDENTITY);
+//! // A sensor 3 m away, 20 degrees above the horizon, that looks at the origin.
+//! let sensor = Sensor::named("vlp32c")?;
+//! let pose = Pose::looking_at_origin_deg(3.0, 20.0, 0.0);
+//! // The best GPU that there is, or else the CPU.
+//! let scan = scene.scan(&sensor, pose).with(&Caster::auto()).run()?;
+//! println!("{} points", scan.len());
+//! scan.save("scan.npz")?;
+//! # Ok::<(), sim_gpu::Error>(())
 //! ```
 //!
-//! The modules stand in the order in which data flows through them: mesh,
-//! BVH, target, sensor and scene, casting (on a GPU or on the CPU), scan,
-//! packets.
+//! [`Mesh`] and [`Sensor`] go into a [`Scene`], a [`Caster`] makes a [`Scan`] of it, and
+//! [`Effects`] say what the scan models beyond ideal ranges.
+//!
+//! # Features
+//! `gpu` casts on GPUs and software Vulkan, through wgpu. `simplify` simplifies meshes, which takes
+//! a C++ compiler. `textures` reads reflectivities from images.
 
 mod aim;
-pub mod bvh;
-pub mod cast_error;
-pub mod caster;
-pub mod config;
-pub mod corruption;
-pub mod cpu;
+mod api;
+mod bvh;
+mod cast_error;
+mod caster;
+mod config;
+mod corruption;
+mod cpu;
 pub mod effects;
 mod fixed_frame;
 #[cfg(feature = "gpu")]
-pub mod gpu;
-pub mod job;
+mod gpu;
+mod job;
 mod lanes;
-pub mod material;
-pub mod mesh;
-pub mod motion;
-pub mod packets;
-pub mod pose;
-pub mod ray;
-pub mod resolve;
-pub mod scan;
-pub mod scene;
-pub mod sensor;
-pub mod simplify;
-pub mod surface_points;
-pub mod target;
-pub mod weather;
+mod material;
+mod mesh;
+mod motion;
+mod packets;
+mod pose;
+mod ray;
+mod resolve;
+mod scan;
+mod scene;
+mod sensor;
+mod simplify;
+mod surface_points;
+mod target;
+mod weather;
 
+pub use api::{
+    Caster, Error, Instance, InstanceId, Mesh, MountedSensor, Scan, ScanBuilder, Scene, Sensor,
+};
+pub use effects::Effects;
 pub use formats;
+pub use formats::scan::Attribute;
 pub use glam;
-pub use scan::{scan, scan_many};
+pub use material::Materials;
+pub use pose::{Pose, Trajectory};
+pub use scan::{Glass, Tally};
+
+/// What Edgepuck's own crates, tests and measurements use beyond the types at the root. It is no
+/// promise: any release may change it.
+#[doc(hidden)]
+pub mod internals {
+    pub mod bvh {
+        pub use crate::bvh::*;
+    }
+    pub mod cast_error {
+        pub use crate::cast_error::*;
+    }
+    pub mod caster {
+        pub use crate::caster::*;
+    }
+    pub mod config {
+        pub use crate::config::*;
+    }
+    pub mod corruption {
+        pub use crate::corruption::*;
+    }
+    pub mod cpu {
+        pub use crate::cpu::*;
+    }
+    #[cfg(feature = "gpu")]
+    pub mod gpu {
+        pub use crate::gpu::*;
+    }
+    pub mod job {
+        pub use crate::job::*;
+    }
+    pub mod material {
+        pub use crate::material::*;
+    }
+    pub mod mesh {
+        pub use crate::mesh::*;
+    }
+    pub mod motion {
+        pub use crate::motion::*;
+    }
+    pub mod packets {
+        pub use crate::packets::*;
+    }
+    pub mod pose {
+        pub use crate::pose::*;
+    }
+    pub mod ray {
+        pub use crate::ray::*;
+    }
+    pub mod resolve {
+        pub use crate::resolve::*;
+    }
+    pub mod scan {
+        pub use crate::scan::*;
+    }
+    pub mod scene {
+        pub use crate::scene::*;
+    }
+    pub mod sensor {
+        pub use crate::sensor::*;
+    }
+    pub mod simplify {
+        pub use crate::simplify::*;
+    }
+    pub mod surface_points {
+        pub use crate::surface_points::*;
+    }
+    pub mod target {
+        pub use crate::target::*;
+    }
+    pub mod weather {
+        pub use crate::weather::*;
+    }
+}

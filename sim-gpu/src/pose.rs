@@ -17,18 +17,45 @@ pub use trajectory::Trajectory;
 mod orientation;
 mod trajectory;
 
-/// A rigid placement of a sensor in the world.
+/// Where a sensor or an instance of a mesh is in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Origin of the sensor in the world, metres.
+    /// The origin of its frame in the world, metres.
     pub position_m: DVec3,
-    /// Turns vectors of the sensor frame into the world frame; of unit length,
-    /// written `[x, y, z, w]`.
+    /// Turns vectors of its frame into the world frame; of unit length, written
+    /// `[x, y, z, w]`.
     #[serde(rename = "quaternion_xyzw")]
     pub rotation: DQuat,
 }
 
 impl Pose {
+    /// At the origin, not turned: a sensor looks along x.
+    pub const IDENTITY: Self = Self { position_m: DVec3::ZERO, rotation: DQuat::IDENTITY };
+
+    /// At this position, metres, not turned.
+    #[must_use]
+    pub fn at(position_m: impl Into<DVec3>) -> Self {
+        Self { position_m: position_m.into(), ..Self::IDENTITY }
+    }
+
+    /// At the same position, turned by `yaw_deg` about z, then by `pitch_deg` about its own y axis
+    /// (a positive angle looks down), then by `roll_deg` about its own x axis.
+    #[must_use]
+    pub fn turned_deg(self, yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> Self {
+        let turn = DQuat::from_rotation_z(yaw_deg.to_radians())
+            * DQuat::from_rotation_y(pitch_deg.to_radians())
+            * DQuat::from_rotation_x(roll_deg.to_radians());
+        Self { rotation: self.rotation * turn, ..self }
+    }
+
+    /// `distance_m` from the origin at this elevation and azimuth (counterclockwise from x), looking
+    /// at the origin.
+    #[must_use]
+    pub fn looking_at_origin_deg(distance_m: f64, elevation_deg: f64, azimuth_deg: f64) -> Self {
+        let (elevation_rad, azimuth_rad) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
+        Self::view(distance_m, elevation_rad, azimuth_rad, DVec3::ZERO)
+    }
+
     /// The sensor at `position_m` that looks at `target_m`, upright: its left
     /// axis is level. Straight above or below the target, where upright means
     /// nothing, it is turned as a sensor that came there along azimuth 0.

@@ -8,8 +8,8 @@ use glam::{DVec3, dvec3};
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, Precision};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::job::Culling;
-use sim_gpu::internals::scene::{Scene, cast};
+use sim_gpu::internals::scene::SceneFile;
+use sim_gpu::{Caster, Scene};
 use tests::adapter::casters;
 
 /// How far a point may be from where it is at the origin, from the sensor, metres.
@@ -60,7 +60,7 @@ fn assert_same_class(precision: Precision, what: &str, there: &[DVec3], here: &[
     }
 }
 
-fn scene(at: DVec3) -> Scene {
+fn scene(at: DVec3) -> SceneFile {
     let mesh = assets().join("meshes/chair/chair_0046.obj").display().to_string();
     let [at_m, from_m] = [at, at + 200.0 * DVec3::X].map(|place| place.to_array());
     let text = format!(
@@ -69,7 +69,7 @@ fn scene(at: DVec3) -> Scene {
          [[sensor]]\nprofile = \"vlp32c\"\nposition_m = {from_m:?}\nlook_at_m = {at_m:?}\n\
          [effects]\nnoise = {{ sigma_m = 0.1 }}\nquantise_m = true\n",
     );
-    Scene::parse(&text, Path::new("chain.toml")).unwrap()
+    SceneFile::parse(&text, Path::new("chain.toml")).unwrap()
 }
 
 fn assets() -> PathBuf {
@@ -77,8 +77,9 @@ fn assets() -> PathBuf {
 }
 
 /// The points in the world.
-fn scan(scene: &Scene, caster: &OpenCaster) -> Vec<DVec3> {
-    let scan = &cast(scene, caster, Culling::On).unwrap()[0].scan;
+fn scan(scene: &SceneFile, caster: &OpenCaster) -> Vec<DVec3> {
+    let caster = Caster::named(caster.name()).unwrap();
+    let scan = Scene::try_from(scene).unwrap().scan_mounted(0).with(&caster).run().unwrap();
     let origin = DVec3::from_array(scan.origin);
     let in_world = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from)) + origin;
     scan.positions.iter().map(in_world).collect()

@@ -6,8 +6,8 @@ use formats::scan::Attribute;
 use glam::DVec3;
 use serde::Deserialize;
 use sim_gpu::effects::Effects;
-use sim_gpu::internals::job::Culling;
-use sim_gpu::internals::scene::{Scene, SceneScan, cast};
+use sim_gpu::internals::scene::SceneFile;
+use sim_gpu::{Caster, Scan, Scene};
 use tests::adapter::casters;
 use tests::meshes::cuboid;
 
@@ -45,11 +45,13 @@ impl ManyObjects {
         let cube = cuboid(DVec3::splat(-0.5), DVec3::splat(0.5));
         edgepuck_shapes::write_off(&cube, &folder.path().join("cube.off")).expect("a mesh");
         let file = folder.path().join("scene.toml");
-        let scene = Scene::parse(&self.text(), &file).unwrap_or_else(|error| panic!("{error}"));
+        let scene = SceneFile::parse(&self.text(), &file).unwrap_or_else(|error| panic!("{error}"));
+        let scene = Scene::try_from(&scene).expect("the mesh is there");
         for caster in casters(&Effects::default()) {
-            let scans = cast(&scene, caster, Culling::On);
-            let scans = scans.unwrap_or_else(|error| panic!("{}: {error}", caster.name()));
-            self.judge(&scene, &scans[0], caster.name());
+            let caster = Caster::named(caster.name()).expect("the adapter that was listed opens");
+            let scan = scene.scan_mounted(0).with(&caster).run();
+            let scan = scan.unwrap_or_else(|error| panic!("{}: {error}", caster.name()));
+            self.judge(&scene, &scan, caster.name());
         }
     }
 
@@ -76,11 +78,11 @@ impl ManyObjects {
         DVec3::new(along(i % side), along(i / side), 0.0)
     }
 
-    fn judge(&self, scene: &Scene, found: &SceneScan, caster: &str) {
+    fn judge(&self, scene: &Scene, found: &Scan, caster: &str) {
         let Expect { points_at_least, seen_at_least, within_m } = self.expect;
-        let points = &found.scan.positions;
+        let points = &found.positions;
         assert!(points.len() >= points_at_least, "{caster}: {} points", points.len());
-        let objects = found.scan.object.as_ref().expect("the attribute was asked for");
+        let objects = found.object.as_ref().expect("the attribute was asked for");
         assert!(scene.attributes.contains(&Attribute::Object));
         let mut seen = objects.clone();
         seen.sort_unstable();

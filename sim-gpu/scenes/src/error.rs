@@ -1,6 +1,7 @@
 //! The errors of this crate.
 
 use formats::FormatError;
+use sim_gpu::internals::cast_error::CastError;
 use sim_gpu::internals::config::{ConfigError, InvalidValue};
 use sim_gpu::internals::mesh::MeshError;
 use sim_gpu::internals::scan::ScanError;
@@ -36,6 +37,9 @@ pub enum SceneError {
     /// The caster failed.
     #[error(transparent)]
     Scan(#[from] ScanError),
+    /// The adapter does not open.
+    #[error(transparent)]
+    Caster(#[from] CastError),
     /// The sweep cannot be segmented.
     #[error("the sweep cannot be segmented: {0}")]
     Segment(String),

@@ -1,10 +1,11 @@
 //! What all scenes of a recipe share: sensors with their casters, and models of objects.
 
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use formats::rng::StreamKey;
 use glam::DVec3;
+use sim_gpu::Caster;
 use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
@@ -33,11 +34,11 @@ pub struct Stage {
 pub(crate) struct StageSensor {
     pub(crate) sensor: SensorProfile,
     pub(crate) pattern: BeamPattern,
-    pub(crate) caster: OpenCaster,
+    pub(crate) caster: Arc<OpenCaster>,
 }
 
 impl Stage {
-    /// Prepares `recipe` with casters on the CPU; see [`Stage::with_casters`].
+    /// Prepares `recipe` with casters on the CPU; see [`Stage::with_caster`].
     ///
     /// # Errors
     /// A sensor profile or a mesh is missing or invalid.
@@ -47,25 +48,22 @@ impl Stage {
         meshes: Option<&Path>,
         seed: u64,
     ) -> Result<Self, SceneError> {
-        Self::with_casters(recipe, file, meshes, seed, |effects| {
-            Ok(OpenCaster::Cpu(effects.clone()))
-        })
+        Self::with_caster(recipe, file, meshes, seed, &Caster::cpu())
     }
 
     /// Prepares `recipe`, which was read from `file`. `meshes` is the folder with the user's
-    /// meshes, `seed` the seed of all random numbers. `open` opens a caster for the effects of
-    /// each sensor.
+    /// meshes, `seed` the seed of all random numbers.
     ///
     /// # Errors
-    /// A sensor profile or a mesh is missing or invalid, or `open` fails.
-    pub fn with_casters<E: From<SceneError>>(
+    /// A sensor profile or a mesh is missing or invalid, or the adapter does not open.
+    pub fn with_caster(
         recipe: Recipe,
         file: &Path,
         meshes: Option<&Path>,
         seed: u64,
-        open: impl Fn(&Effects) -> Result<OpenCaster, E>,
-    ) -> Result<Self, E> {
-        let profiles = recipe.sensors(file).map_err(SceneError::from)?;
+        caster: &Caster,
+    ) -> Result<Self, SceneError> {
+        let profiles = recipe.sensors(file)?;
         let mut sensors = Vec::with_capacity(profiles.len());
         for (choice, sensor) in recipe.sensor.iter().zip(profiles) {
             let typical_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);
@@ -78,7 +76,7 @@ impl Stage {
             let in_file = |invalid: InvalidValue| SceneError::from(invalid.in_file(file));
             effects.for_sensor(&sensor).map_err(in_file)?;
             let pattern = effects.widen(sensor.pattern(), &sensor).map_err(in_file)?;
-            sensors.push(StageSensor { sensor, pattern, caster: open(&effects)? });
+            sensors.push(StageSensor { sensor, pattern, caster: caster.for_effects(&effects)? });
         }
         let models = recipe.object.iter().map(|objects| match objects.built_in() {
             Some(_) => Ok((0..recipe.variants).map(|_| OnceLock::new()).collect()),

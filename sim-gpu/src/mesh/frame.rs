@@ -99,7 +99,8 @@ pub(super) fn named_vertices(mesh: &TriangleMesh) -> Vec<bool> {
     named
 }
 
-fn z_up(position: DVec3, up: Up) -> DVec3 {
+/// `position`, turned z up.
+pub(crate) fn z_up(position: DVec3, up: Up) -> DVec3 {
     match up {
         Up::Y => DVec3::new(position.x, -position.z, position.y),
         Up::Z => position,

@@ -1,5 +1,5 @@
-//! Scenes: which objects stand where, which sensors look at them, and which
-//! effects and attributes are wanted. [`cast`] loads the meshes and scans them.
+//! Scenes in TOML: which objects stand where, which sensors look at them, and which
+//! effects and attributes are wanted.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,17 +15,14 @@ use crate::pose::{Pose, Trajectory};
 use crate::sensor::SensorProfile;
 use crate::simplify::Simplify;
 
-mod cast;
 mod table;
-
-pub use cast::{SceneError, SceneScan, cast};
 
 #[cfg(test)]
 mod tests;
 
-/// A scene, checked.
+/// What a scene's file says, checked; the meshes are not read yet.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scene {
+pub struct SceneFile {
     /// Seed of all random effects; default 0.
     pub seed: u64,
     /// The objects, at least one, with different names.
@@ -93,7 +90,7 @@ pub struct SceneSensor {
     pub deskew: bool,
 }
 
-impl Scene {
+impl SceneFile {
     /// Reads a scene and the sensor profiles it names.
     ///
     /// # Errors
@@ -109,7 +106,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// As [`Scene::load`].
+    /// As [`SceneFile::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, ConfigError> {
         Self::from_table(config::parse(text, file)?, file)
     }
@@ -162,7 +159,7 @@ impl Scene {
     }
 }
 
-impl Scene {
+impl SceneFile {
     /// Whether and how far the mesh of `object` is simplified.
     #[must_use]
     pub fn simplify_of(&self, object: &SceneObject) -> Option<Simplify> {

@@ -1,16 +1,16 @@
 use super::*;
 use crate::effects::{Intensity, Noise, NoiseModel, Quantum};
 
-fn shipped(name: &str) -> Scene {
+fn shipped(name: &str) -> SceneFile {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes");
-    Scene::load(&folder.join(name)).unwrap()
+    SceneFile::load(&folder.join(name)).unwrap()
 }
 
 const OBJECT: &str = "[[object]]\nmesh = \"a.obj\"\n";
 const SENSOR: &str = "[[sensor]]\nprofile = \"vlp16\"\nposition_m = [1, 0, 0]\nyaw_deg = 0\n";
 
-fn parse(text: &str) -> Result<Scene, ConfigError> {
-    Scene::parse(text, Path::new("scenes/my.toml"))
+fn parse(text: &str) -> Result<SceneFile, ConfigError> {
+    SceneFile::parse(text, Path::new("scenes/my.toml"))
 }
 
 #[test]

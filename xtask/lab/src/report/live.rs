@@ -94,7 +94,7 @@ fn turn() -> Result<(Scan, Vec<String>)> {
         let pose = drive.pose((f64::from(number) + 0.5) * packet_s);
         let to_sensor = |point: &[f32; 3]| {
             let at = glam::DVec3::from(point.map(f64::from)) - pose.position_m;
-            (pose.world_from_sensor.inverse() * at).as_vec3().to_array()
+            (pose.rotation.inverse() * at).as_vec3().to_array()
         };
         scan.positions.extend(packet.scan.positions.iter().map(to_sensor));
         // The lasers of each sequence fire in the same order.

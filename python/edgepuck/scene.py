@@ -1,0 +1,194 @@
+"""Scenes that are filled, moved and scanned, and those of files."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _arguments, _edgepuck
+from .mesh import Mesh
+from .scan import Scan, scan_of
+
+if TYPE_CHECKING:
+    from .sensor import Sensor
+
+
+class Scene:
+    """Meshes in the world, for sensors to scan.
+
+    A mesh is added once for each place where it stands; its instances share it, and moving one
+    rebuilds nothing.
+
+    >>> import edgepuck as ep
+    >>> scene, cube = ep.Scene(), ep.Mesh(*ep.box((1.0, 1.0, 1.0)), normalize="none")
+    >>> near = scene.add(cube, position=(3, 0, 0))
+    >>> far = scene.add(cube, position=(6, 1, 0), scale=2.0, reflectivity=0.3)
+    >>> scan = scene.scan(ep.Sensor("vlp32c"), pose=np.eye(4), noise=0.01, seed=7)
+    >>> sorted(set(scan.object.tolist())) == [near, far]
+    True
+    >>> scene.move(near, position=(3, 20, 0))
+    """
+
+    def __init__(self) -> None:
+        self._scene = _edgepuck.Scene()
+
+    @classmethod
+    def read(cls, file: str | os.PathLike[str]) -> Scene:
+        """Read a scene's TOML file, as `edgepuck scan` does, and the meshes that it names.
+
+        Raises:
+            Error: The file, or a mesh or sensor that it names, cannot be read.
+        """
+        scene = cls.__new__(cls)
+        scene._scene = _edgepuck.Scene.read(os.fspath(file))
+        return scene
+
+    def __len__(self) -> int:
+        """The number of instances."""
+        return len(self._scene)
+
+    def add(
+        self,
+        mesh: Mesh,
+        pose: ArrayLike | None = None,
+        *,
+        position: ArrayLike | None = None,
+        scale: float | ArrayLike = 1.0,
+        name: str | None = None,
+        label: str | None = None,
+        reflectivity: float = 1.0,
+        retroreflection: float = 0.0,
+    ) -> int:
+        """Add an instance of a mesh, and return its number, which the attribute `object` of scans has.
+
+        Args:
+            mesh: The mesh.
+            pose: From the mesh's frame to the world's, a matrix of shape [4, 4] without scale.
+            position: Where its origin is, metres, in place of `pose`; at the origin by default.
+            scale: A factor, or one for each axis of the mesh.
+            name: A name, which keys the random numbers of its returns.
+            label: The name of its class.
+            reflectivity: The part of the light that comes back at vertical incidence, 0 to 1.
+            retroreflection: How well it returns light to where it came from, 0 to 1.
+
+        Raises:
+            Error: A value is out of its bounds.
+        """
+        if not isinstance(mesh, Mesh):
+            raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
+        factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,)).tolist()
+        at = _pose(pose, position)
+        return self._scene.add(
+            mesh._mesh, at, factors, name, label, float(reflectivity), float(retroreflection)
+        )
+
+    def move(
+        self, instance: int, pose: ArrayLike | None = None, *, position: ArrayLike | None = None
+    ) -> None:
+        """Move the instance of this number to a pose or a position, as `add` takes them.
+
+        Raises:
+            Error: There is no such instance, or the pose has a wrong shape or is no rotation.
+        """
+        self._scene.move(instance, _pose(pose, position))
+
+    def scan(
+        self,
+        sensor: Sensor,
+        *,
+        distance: float = 3.0,
+        elevation: float = 20.0,
+        azimuth: float = 0.0,
+        pose: ArrayLike | None = None,
+        noise: float = 0.0,
+        dropout: float = 0.0,
+        effects: Mapping[str, Any] | None = None,
+        attributes: Iterable[str] = ("range", "beam", "ring", "time", "object"),
+        seed: int = 0,
+    ) -> Scan:
+        """Scan the scene.
+
+        Args:
+            sensor: The sensor.
+            distance: The distance of the sensor from the origin, at which it looks, metres.
+            elevation: The elevation of the sensor above the horizon, degrees.
+            azimuth: The azimuth of the sensor, counterclockwise from x, degrees.
+            pose: The pose of the sensor, instead of these three: a matrix of shape [4, 4] from the
+                frame of the sensor (x forward, z up) to the world.
+            noise: Standard deviation of the noise of the ranges, metres.
+            dropout: Probability that a return is missing.
+            effects: Further effects, with the keys of the table `[effects]` of a scene:
+                `{"footprint": {"samples": 7}, "returns": "last"}`.
+            attributes: The attributes of each point besides its position: range, beam, ring, time,
+                triangle, object, intensity, power, reflectivity, return, medium, normal.
+            seed: The seed of all random numbers.
+
+        Raises:
+            Error: A value is out of its limits, or an attribute or effect is unknown.
+        """
+        if isinstance(attributes, str):
+            raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
+        wanted: dict[str, Any] = dict(effects or {})
+        for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
+            if given and name in wanted:
+                raise _edgepuck.Error(f"{name}: expected it once, found it in effects as well")
+        if noise != 0:
+            wanted["noise"] = {"sigma_m": noise, "mean_m": 0.0, "model": "range"}
+        if dropout != 0:
+            wanted["dropout"] = {"probability": dropout}
+        at = [float(distance), float(elevation), float(azimuth)] if pose is None else _matrix(pose)
+        told = json.dumps(_plain(wanted, "effects"))
+        key = _arguments.seed(seed)
+        return scan_of(self._scene.scan(sensor._sensor, at, told, list(attributes), key))
+
+    def __repr__(self) -> str:
+        return f"<Scene of {len(self)} instances>"
+
+
+def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:
+    """Scan the scene in a TOML file, as `edgepuck scan` does: the scan of each sensor by its name."""
+    scans = Scene.read(file)._scene.scan_all(adapter)
+    return {name: scan_of(columns) for name, columns in scans}
+
+
+def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:
+    """The rows of a pose, or of a position alone, or of the origin."""
+    if pose is not None and position is not None:
+        raise _edgepuck.Error("expected a pose or a position, found both")
+    if pose is not None:
+        return _matrix(pose)
+    matrix = np.eye(4)
+    if position is not None:
+        at = np.asarray(position, dtype=np.float64)
+        if at.shape != (3,):
+            raise _edgepuck.Error(f"position: expected shape [3], found {list(at.shape)}")
+        matrix[:3, 3] = at
+    return matrix.ravel().tolist()
+
+
+def _matrix(pose: ArrayLike) -> list[float]:
+    """The rows of a matrix of shape [4, 4]."""
+    matrix = np.asarray(pose, dtype=np.float64)
+    if matrix.shape != (4, 4):
+        raise _edgepuck.Error(
+            f"pose: expected a matrix of shape [4, 4], found {list(matrix.shape)}"
+        )
+    return matrix.ravel().tolist()
+
+
+def _plain(value: Any, key: str) -> Any:
+    """`value`, which stands at `key`, in what JSON has."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(of, f"{key}.{name}") for name, of in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(of, f"{key}[{i}]") for i, of in enumerate(value)]
+    plain = value.item() if isinstance(value, np.generic) else value
+    if isinstance(plain, float) and not math.isfinite(plain):
+        raise _edgepuck.Error(f"{key}: expected a finite number, found {plain}")
+    return plain

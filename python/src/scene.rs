@@ -1,0 +1,171 @@
+//! Scenes that Python fills, and those that files describe.
+
+use crate::arrays;
+use crate::error::raised;
+use crate::mesh::Mesh;
+use crate::process::{self, LazyCaster, lock};
+use crate::sensor::Sensor;
+use formats::scan::Attribute;
+use glam::{DMat3, DQuat, DVec3};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sim_gpu::{Effects, Pose};
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+/// A scan's columns and the name of its sensor.
+type NamedScan<'py> = (String, Bound<'py, PyDict>);
+
+/// Meshes in the world, and the sensors of a scene's file.
+#[pyclass(module = "edgepuck._edgepuck", frozen)]
+pub struct Scene {
+    /// A scan takes a copy, which shares the meshes: the lock is held for a moment, under Python's.
+    scene: Mutex<sim_gpu::Scene>,
+}
+
+#[pymethods]
+impl Scene {
+    /// An empty scene.
+    #[new]
+    fn new() -> Self {
+        Self { scene: Mutex::default() }
+    }
+
+    /// Read a scene's TOML file.
+    #[staticmethod]
+    fn read(py: Python<'_>, file: PathBuf) -> PyResult<Self> {
+        let scene = process::run(py, || {
+            let scene = sim_gpu::Scene::read(&file)?;
+            for instance in scene.instances() {
+                let _ = instance.mesh.target();
+            }
+            Ok::<_, sim_gpu::Error>(scene)
+        })?;
+        Ok(Self { scene: Mutex::new(scene.map_err(raised)?) })
+    }
+
+    /// How many instances there are.
+    fn __len__(&self) -> usize {
+        lock(&self.scene).instances().len()
+    }
+
+    /// Add a mesh at this pose, and give its number.
+    #[expect(clippy::too_many_arguments, reason = "Python's side has names for them")]
+    fn add(
+        &self,
+        mesh: &Mesh,
+        pose: [f64; 16],
+        scale: [f64; 3],
+        name: Option<String>,
+        label: Option<String>,
+        reflectivity: f64,
+        retroreflection: f64,
+    ) -> PyResult<u32> {
+        let (pose, mut scene) = (pose_of(&pose)?, lock(&self.scene));
+        let id = scene.add(&mesh.mesh, pose);
+        let instance = &mut scene[id];
+        (instance.scale, instance.name, instance.label) = (scale.into(), name, label);
+        (instance.reflectivity, instance.retroreflection) = (reflectivity, retroreflection);
+        Ok(id.number())
+    }
+
+    /// Move the instance of this number.
+    #[pyo3(name = "move")]
+    fn move_to(&self, number: usize, pose: [f64; 16]) -> PyResult<()> {
+        let (pose, mut scene) = (pose_of(&pose)?, lock(&self.scene));
+        let n = scene.instances().len();
+        let missing =
+            || raised(format!("expected the number of one of {n} instances, found {number}"));
+        let id = scene.ids().nth(number).ok_or_else(missing)?;
+        scene[id].pose = pose;
+        Ok(())
+    }
+
+    /// Scan it from this place.
+    fn scan<'py>(
+        &self,
+        py: Python<'py>,
+        sensor: &Sensor,
+        place: Place,
+        effects: &str,
+        attributes: Vec<String>,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let pose = place.pose()?;
+        let effects: Effects =
+            serde_json::from_str(effects).map_err(|error| raised(format!("effects: {error}")))?;
+        let attributes = attributes.iter().map(|name| name.parse::<Attribute>());
+        let attributes: Vec<_> = attributes.collect::<Result<_, _>>().map_err(raised)?;
+        sensor.sensor.rays(&effects).map_err(raised)?;
+        let (caster, scene) = (sensor.caster.open()?, lock(&self.scene).clone());
+        let scan = process::run(py, || {
+            let scan = scene.scan(&sensor.sensor, pose).with(&caster).effects(effects);
+            scan.attributes(attributes).seed(seed).run()
+        })?;
+        let columns = arrays::scan(py, scan.map_err(raised)?.points)?;
+        columns.set_item("pose", arrays::matrix(&pose))?;
+        Ok(columns)
+    }
+
+    /// Scan it by each of the sensors of its file.
+    fn scan_all<'py>(&self, py: Python<'py>, adapter: &str) -> PyResult<Vec<NamedScan<'py>>> {
+        let (caster, scene) = (LazyCaster::new(adapter).open()?, lock(&self.scene).clone());
+        let scans = process::run(py, || scene.scan_all(&caster))?.map_err(raised)?;
+        let columns = scans.into_iter().zip(&scene.sensors).map(|(scan, mounted)| {
+            let columns = arrays::scan(py, scan.points)?;
+            columns.set_item("pose", arrays::matrix(&mounted.pose))?;
+            Ok((mounted.name.clone(), columns))
+        });
+        columns.collect()
+    }
+}
+
+/// Where a sensor stands.
+#[derive(FromPyObject)]
+enum Place {
+    /// Around the origin: distance in metres, elevation and azimuth in degrees.
+    Around([f64; 3]),
+    /// From the sensor's frame to the world's, row by row.
+    Matrix([f64; 16]),
+}
+
+impl Place {
+    fn pose(&self) -> PyResult<Pose> {
+        let numbers = match self {
+            Self::Around(numbers) => &numbers[..],
+            Self::Matrix(numbers) => numbers,
+        };
+        if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
+            return Err(raised(format!(
+                "expected finite numbers as the sensor's place, found {number}"
+            )));
+        }
+        match *self {
+            Self::Around(around) => view(around),
+            Self::Matrix(rows) => pose_of(&rows),
+        }
+    }
+}
+
+fn view([distance_m, elevation_deg, azimuth_deg]: [f64; 3]) -> PyResult<Pose> {
+    if distance_m <= 0.0 {
+        return Err(raised(format!("expected a distance above 0, found {distance_m}")));
+    }
+    Ok(Pose::looking_at_origin_deg(distance_m, elevation_deg, azimuth_deg))
+}
+
+/// The pose that a matrix of four rows tells.
+fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
+    let [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] = *rows else {
+        let cause = "pose: expected a matrix of shape [4, 4] whose last row is 0, 0, 0, 1";
+        return Err(raised(cause));
+    };
+    let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
+    let is_rotation = (rotation * rotation.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-6)
+        && rotation.determinant() > 0.0;
+    if !is_rotation {
+        return Err(raised("pose: expected a rotation in the first three rows and columns"));
+    }
+    let rotation = DQuat::from_mat3(&rotation).normalize();
+    Ok(Pose { position_m: DVec3::new(x, y, z), rotation })
+}

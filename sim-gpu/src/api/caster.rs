@@ -1,0 +1,99 @@
+//! The processor that casts.
+
+use crate::cast_error::CastError;
+use crate::caster::{AdapterRequest, OpenCaster};
+use crate::effects::Effects;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Pipelines of a GPU that are kept, each with its buffers.
+const MOST_OPEN: usize = 4;
+
+/// What casts the beams: a GPU, software Vulkan, or the CPU. All give the same points.
+///
+/// It casts for any [`Effects`]: a GPU's pipeline for them is built once and kept.
+///
+/// ```
+/// # use sim_gpu::Caster;
+/// let caster = Caster::auto();
+/// match caster.why_no_gpu() {
+///     None => println!("casting on {}", caster.name()),
+///     Some(reason) => println!("casting on the CPU: {reason}"),
+/// }
+/// ```
+pub struct Caster {
+    name: String,
+    why_no_gpu: Option<String>,
+    opened: Mutex<Vec<Arc<OpenCaster>>>,
+}
+
+impl Caster {
+    /// The CPU, on all its cores; it needs no graphics driver.
+    #[must_use]
+    pub fn cpu() -> Self {
+        let cpu = OpenCaster::Cpu(Effects::default());
+        Self { why_no_gpu: Some("the CPU was asked for".to_owned()), ..Self::of(cpu) }
+    }
+
+    /// The best GPU that opens, or else the CPU. [`Caster::why_no_gpu`] says why it is the CPU.
+    #[must_use]
+    pub fn auto() -> Self {
+        let (best, errors) = OpenCaster::open_best(&Effects::default());
+        let why = if errors.is_empty() {
+            "no GPU was found; software Vulkan is taken by its name alone".to_owned()
+        } else {
+            errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+        };
+        let why_no_gpu = matches!(best, OpenCaster::Cpu(_)).then_some(why);
+        Self { why_no_gpu, ..Self::of(best) }
+    }
+
+    /// The first adapter whose name holds this text, letter case ignored; `auto` and `cpu` are
+    /// [`Caster::auto`] and [`Caster::cpu`].
+    ///
+    /// # Errors
+    /// No adapter has such a name (the message lists those that there are), or it does not open.
+    pub fn named(name: &str) -> Result<Self, CastError> {
+        match name.parse() {
+            Ok(AdapterRequest::Auto) => Ok(Self::auto()),
+            Ok(AdapterRequest::Cpu) => Ok(Self::cpu()),
+            Ok(request) => Ok(Self::of(OpenCaster::open(&request, &Effects::default())?)),
+        }
+    }
+
+    /// The adapter's name, or `cpu`.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Why the CPU casts and not a GPU; `None` where a GPU does.
+    #[must_use]
+    pub fn why_no_gpu(&self) -> Option<&str> {
+        self.why_no_gpu.as_deref()
+    }
+
+    /// The caster of this adapter that models `effects`, which it opens unless it is open.
+    ///
+    /// # Errors
+    /// The adapter does not open.
+    #[doc(hidden)]
+    pub fn for_effects(&self, effects: &Effects) -> Result<Arc<OpenCaster>, CastError> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(caster) = opened.iter().find(|caster| caster.effects() == effects) {
+            return Ok(Arc::clone(caster));
+        }
+        if self.name == "cpu" {
+            return Ok(Arc::new(OpenCaster::Cpu(effects.clone())));
+        }
+        let request = AdapterRequest::Named(self.name.clone());
+        let caster = Arc::new(OpenCaster::open(&request, effects)?);
+        opened.insert(0, Arc::clone(&caster));
+        opened.truncate(MOST_OPEN);
+        Ok(caster)
+    }
+
+    fn of(caster: OpenCaster) -> Self {
+        let name = caster.name().to_owned();
+        Self { name, why_no_gpu: None, opened: Mutex::new(vec![Arc::new(caster)]) }
+    }
+}

@@ -1,0 +1,231 @@
+//! A mesh that instances share, with the BVH over it.
+
+use super::Error;
+use crate::bvh::Builder;
+use crate::mesh::frame::{Normalize, Up, WorldMesh, to_world, z_up};
+use crate::mesh::unit_frame::bounding_box;
+use crate::mesh::{LoadedMesh, TriangleMesh, check, load};
+use crate::target::{Surface, Target};
+use glam::{DAffine3, DVec3};
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+/// A triangle mesh, z up, in metres.
+///
+/// A clone shares the vertices and the BVH, which the first scan builds: one mesh may stand at many
+/// places of a [`Scene`](crate::Scene).
+///
+/// ```
+/// # use sim_gpu::Mesh;
+/// let tetrahedron = Mesh::from_triangles(
+///     vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 2.0]],
+///     vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]],
+/// )?;
+/// assert_eq!(tetrahedron.bounds_m(), [[0.0, 0.0, 0.0], [4.0, 3.0, 2.0]]);
+/// let largest = |mesh: &Mesh| {
+///     let radii = mesh.vertices().iter().map(|vertex| vertex.length());
+///     radii.fold(0.0, f64::max)
+/// };
+/// assert!((largest(&tetrahedron.unit_sphere()) - 1.0).abs() < 1e-12);
+/// # Ok::<(), sim_gpu::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// This or `ready` is there from the start; the other is made of it.
+    triangles: Arc<OnceLock<TriangleMesh>>,
+    /// Whether the middle of its bounding box is to become the origin of what is cast, so that a
+    /// mesh far from its origin keeps its digits in f32.
+    recentres: bool,
+    ready: Arc<OnceLock<Ready>>,
+    centre: DVec3,
+    scale: f64,
+}
+
+/// A mesh that can be cast at.
+#[derive(Debug)]
+struct Ready {
+    target: Target,
+    mesh_from_target: DAffine3,
+}
+
+impl Mesh {
+    /// Reads an OBJ, OFF, PLY or STL file. An OBJ file's y axis points up, the z axis of all
+    /// others. The file's unit is taken for a metre, and the mesh stays where the file has it.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is not what its extension says: with the file and the line.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::read_turned(path.as_ref(), None)
+    }
+
+    /// As [`Mesh::read`], of a file whose upward axis may be another than its format's.
+    #[doc(hidden)]
+    pub fn read_turned(path: &Path, up: Option<Up>) -> Result<Self, Error> {
+        let LoadedMesh { mesh, format, .. } = load(path)?;
+        Ok(Self::upright(&mesh, up.unwrap_or(format.default_up())))
+    }
+
+    /// A mesh of these vertices, `[n][3]` in metres, z up, and these triangles, `[m][3]` indices of
+    /// vertices.
+    ///
+    /// # Errors
+    /// There is no triangle; a coordinate is not finite; an index has no vertex.
+    pub fn from_triangles(
+        vertices: Vec<[f64; 3]>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self, Error> {
+        let vertices = vertices.into_iter().map(DVec3::from_array).collect();
+        Self::try_from(TriangleMesh { vertices, triangles })
+    }
+
+    /// The same mesh of a file whose y axis points up: (x, y, z) becomes (x, -z, y).
+    #[must_use]
+    pub fn y_up(&self) -> Self {
+        Self::upright(self.triangle_mesh(), Up::Y)
+    }
+
+    /// The same mesh, scaled about its origin: 0.001 for a file in millimetres.
+    ///
+    /// # Errors
+    /// The factor is not a finite number above 0, or a coordinate becomes too large.
+    pub fn scaled(&self, factor: f64) -> Result<Self, Error> {
+        crate::config::positive("factor", factor)?;
+        let vertices = self.vertices().iter().map(|vertex| *vertex * factor).collect();
+        let triangles = self.triangles().to_vec();
+        Self::try_from(TriangleMesh { vertices, triangles })
+    }
+
+    /// The same mesh with the mean of its vertices at the origin and its farthest vertex at radius
+    /// 1, as point clouds of ModelNet are.
+    #[must_use]
+    pub fn unit_sphere(&self) -> Self {
+        self.normalized(Normalize::UnitSphere)
+    }
+
+    /// The same mesh with the centre of its bounding box at the origin and its longest side 2
+    /// long, as in ModelNet40-C.
+    #[must_use]
+    pub fn unit_box(&self) -> Self {
+        self.normalized(Normalize::Bbox)
+    }
+
+    /// The vertices, metres, `[n]`.
+    #[must_use]
+    pub fn vertices(&self) -> &[DVec3] {
+        &self.triangle_mesh().vertices
+    }
+
+    /// The triangles as indices of vertices, `[m][3]`.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangle_mesh().triangles
+    }
+
+    /// The least and the largest coordinates of the vertices, metres.
+    #[must_use]
+    pub fn bounds_m(&self) -> [[f64; 3]; 2] {
+        let (low, high) = bounding_box(self.vertices().iter().copied());
+        [low.to_array(), high.to_array()]
+    }
+
+    /// What became the origin when the mesh was scaled to a unit sphere or box, in the units that
+    /// it had before; 0 for all other meshes.
+    #[must_use]
+    pub fn centre(&self) -> [f64; 3] {
+        self.centre.to_array()
+    }
+
+    /// The factor by which it was scaled to a unit sphere or box; 1 for all other meshes.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// The mesh as `normalize` has it; [`Normalize::None`] leaves it as it is.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn normalized(&self, normalize: Normalize) -> Self {
+        if normalize == Normalize::None {
+            return self.clone();
+        }
+        let WorldMesh { mesh, centre, scale } = to_world(self.triangle_mesh(), Up::Z, normalize);
+        Self { centre, scale, recentres: false, ..Self::of(mesh) }
+    }
+
+    /// A mesh that is cast at as `target`, which stands `centre` away from where the mesh does.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn from_target(target: Target, centre: DVec3) -> Self {
+        let ready = Ready { target, mesh_from_target: DAffine3::from_translation(centre) };
+        Self::with(OnceLock::new(), OnceLock::from(ready))
+    }
+
+    /// What casters take, built by the first who asks.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn target(&self) -> &Target {
+        &self.ready().target
+    }
+
+    pub(super) fn mesh_from_target(&self) -> &DAffine3 {
+        &self.ready().mesh_from_target
+    }
+
+    fn ready(&self) -> &Ready {
+        self.ready.get_or_init(|| {
+            let mesh = self.triangle_mesh();
+            let (mesh, centre) = if self.recentres {
+                let world = to_world(mesh, Up::Z, Normalize::None);
+                (world.mesh, world.centre)
+            } else {
+                (mesh.clone(), DVec3::ZERO)
+            };
+            let target = Target::new(Surface::of_mesh(mesh), Builder::Sah);
+            Ready { target, mesh_from_target: DAffine3::from_translation(centre) }
+        })
+    }
+
+    fn triangle_mesh(&self) -> &TriangleMesh {
+        self.triangles.get_or_init(|| {
+            let Ready { target, mesh_from_target } = self.ready();
+            let surface = &target.surface;
+            let in_mesh = |vertex: &DVec3| {
+                mesh_from_target.transform_point3(surface.frame.to_object(*vertex))
+            };
+            let vertices = surface.vertices().iter().map(in_mesh).collect();
+            TriangleMesh { vertices, triangles: surface.triangles().to_vec() }
+        })
+    }
+
+    fn with(triangles: OnceLock<TriangleMesh>, ready: OnceLock<Ready>) -> Self {
+        let (triangles, ready) = (Arc::new(triangles), Arc::new(ready));
+        Self { triangles, recentres: true, ready, centre: DVec3::ZERO, scale: 1.0 }
+    }
+
+    fn of(triangles: TriangleMesh) -> Self {
+        Self::with(OnceLock::from(triangles), OnceLock::new())
+    }
+
+    pub(super) fn upright(mesh: &TriangleMesh, up: Up) -> Self {
+        let vertices = mesh.vertices.iter().map(|vertex| z_up(*vertex, up)).collect();
+        Self::of(TriangleMesh { vertices, triangles: mesh.triangles.clone() })
+    }
+}
+
+impl TryFrom<TriangleMesh> for Mesh {
+    type Error = Error;
+
+    fn try_from(mesh: TriangleMesh) -> Result<Self, Error> {
+        let wrong = |error: crate::mesh::ParseError| {
+            crate::config::InvalidValue::new("mesh", error.to_string())
+        };
+        check(&mesh).map_err(wrong)?;
+        Ok(Self::of(mesh))
+    }
+}
+
+impl From<&Mesh> for Mesh {
+    fn from(mesh: &Mesh) -> Self {
+        mesh.clone()
+    }
+}

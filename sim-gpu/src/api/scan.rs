@@ -1,0 +1,68 @@
+//! A scan of a scene.
+
+use super::{Error, Sensor};
+use crate::effects::Effects;
+use crate::packets;
+use crate::scan::Tally;
+use formats::hash::Hashing;
+use formats::scan_file::{ScanFormat, write_scan};
+use formats::vlp32c;
+use std::ops::Deref;
+use std::path::Path;
+
+/// What a sensor measured of a scene: the points of [`formats::Scan`], which it dereferences to,
+/// and what became of its beams.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Scan {
+    /// The points, with a column for each attribute that was asked for.
+    pub points: formats::Scan,
+    /// What became of the returns.
+    pub tally: Tally,
+    /// Whether the CPU cast because a mesh exceeds the adapter's largest binding.
+    pub cast_on_cpu: bool,
+    sensor: Sensor,
+    effects: Effects,
+}
+
+impl Scan {
+    pub(super) fn new(
+        points: formats::Scan,
+        tally: Tally,
+        cast_on_cpu: bool,
+        sensor: Sensor,
+        effects: Effects,
+    ) -> Self {
+        Self { points, tally, cast_on_cpu, sensor, effects }
+    }
+
+    /// Writes the scan in the format that the extension names: `.npz` (NumPy, Open3D), `.ply`,
+    /// `.csv`, or `.pcap`, the packets of a VLP-32C.
+    ///
+    /// # Errors
+    /// The extension names no format, or the file cannot be written. For `.pcap`: the sensor is
+    /// not what [`Sensor::as_packets_tell`] gives; the scan lacks the attributes `beam` and
+    /// `range`; an effect moves points off their beams.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        match ScanFormat::of(path)? {
+            ScanFormat::Pcap => {
+                let returns = packets::returns(&self.effects, None)?;
+                let revolution = packets::revolution(self.sensor.profile())?;
+                vlp32c::write(path, Hashing::None, &revolution, returns, &self.points)?;
+            }
+            format => {
+                write_scan(path, format, Hashing::None, &self.points)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Deref for Scan {
+    type Target = formats::Scan;
+
+    fn deref(&self) -> &formats::Scan {
+        &self.points
+    }
+}

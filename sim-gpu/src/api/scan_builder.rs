@@ -1,0 +1,145 @@
+//! What is wanted of a scan.
+
+use super::{Caster, Error, Scan, Scene, Sensor};
+use crate::config::{positive, within};
+use crate::effects::{Effects, Intensity};
+use crate::job::Culling;
+use crate::pose::{Pose, Trajectory};
+use crate::scan::{ScanRequest, Scanned, scan_objects};
+use formats::rng::StreamKey;
+use formats::scan::{Attribute, AttributeSet};
+use std::sync::Arc;
+
+/// A scan that [`ScanBuilder::run`] makes. What is not set is as the [`Scene`] has it.
+#[derive(Clone)]
+#[must_use = "`run` makes the scan"]
+pub struct ScanBuilder<'a> {
+    scene: &'a Scene,
+    sensor: &'a Sensor,
+    pose: Pose,
+    key: Key<'a>,
+    caster: Option<&'a Caster>,
+    motion: Option<Arc<Trajectory>>,
+    start_s: f64,
+    deskew: bool,
+    effects: Effects,
+    attributes: AttributeSet,
+    seed: u64,
+    culling: Culling,
+}
+
+/// What the random numbers of a scan belong to, besides its seed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Key<'a> {
+    pub name: &'a str,
+    pub number: u32,
+}
+
+impl<'a> ScanBuilder<'a> {
+    pub(super) fn new(scene: &'a Scene, sensor: &'a Sensor, pose: Pose, key: Key<'a>) -> Self {
+        Self {
+            scene,
+            sensor,
+            pose,
+            key,
+            caster: None,
+            motion: None,
+            start_s: 0.0,
+            deskew: false,
+            effects: scene.effects.clone(),
+            attributes: scene.attributes.clone(),
+            seed: scene.seed,
+            culling: Culling::On,
+        }
+    }
+
+    /// Casts on `caster`; by default the CPU casts.
+    pub fn with(self, caster: &'a Caster) -> Self {
+        Self { caster: Some(caster), ..self }
+    }
+
+    /// Applies these effects in place of the scene's.
+    pub fn effects(self, effects: Effects) -> Self {
+        Self { effects, ..self }
+    }
+
+    /// Gives points these attributes in place of the scene's. [`Attribute::Intensity`] asks for the
+    /// effect of that name, too.
+    pub fn attributes(self, attributes: impl IntoIterator<Item = Attribute>) -> Self {
+        Self { attributes: attributes.into_iter().collect(), ..self }
+    }
+
+    /// Draws random numbers from this seed. Scans of one seed have the same noise: give each scan
+    /// of a sequence a seed of its own.
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// Moves the sensor along these poses while it scans.
+    pub fn along(self, motion: impl Into<Arc<Trajectory>>) -> Self {
+        Self { motion: Some(motion.into()), ..self }
+    }
+
+    /// Begins the scan at this time of all trajectories, seconds; 0 by default.
+    pub fn start_s(self, start_s: f64) -> Self {
+        Self { start_s, ..self }
+    }
+
+    /// Puts the points of a moving sensor where its beams met the surfaces. By default they are
+    /// motion-distorted, as a driver that ignores ego-motion reports them.
+    pub fn deskewed(self, deskew: bool) -> Self {
+        Self { deskew, ..self }
+    }
+
+    /// Whether beams that cannot hit are cast; the scan is the same.
+    #[doc(hidden)]
+    pub fn culling(self, culling: Culling) -> Self {
+        Self { culling, ..self }
+    }
+
+    /// Makes the scan.
+    ///
+    /// # Errors
+    /// An effect or an instance has a number that is out of its bounds; the sensor lacks what an
+    /// effect takes from its profile; the adapter failed.
+    pub fn run(self) -> Result<Scan, Error> {
+        let mut effects = self.effects.clone();
+        if self.attributes.contains(&Attribute::Intensity) {
+            effects.intensity.get_or_insert(Intensity);
+        }
+        effects.validate()?;
+        effects.for_sensor(self.sensor.profile())?;
+        self.check_instances()?;
+        let cpu = Caster::cpu();
+        let caster = self.caster.unwrap_or(&cpu).for_effects(&effects)?;
+        let rays = self.sensor.rays(&effects)?;
+        let mut request = ScanRequest::new(self.sensor.profile(), &rays, self.pose);
+        (request.motion, request.start_s) = (self.motion.clone(), self.start_s);
+        request.deskew = self.deskew;
+        request.attributes.clone_from(&self.attributes);
+        request.stream = self.stream(self.key.name);
+        request.culling = self.culling;
+        let placed = self.scene.placed(|name| self.stream(name));
+        let Scanned { scan, tally, cast_on_cpu, .. } = scan_objects(&caster, &placed, &request)?;
+        Ok(Scan::new(scan, tally, cast_on_cpu, self.sensor.clone(), effects))
+    }
+
+    /// The key of a name's random numbers. Scans of other times have other noise, other drops and
+    /// other losses.
+    fn stream(&self, name: &str) -> StreamKey {
+        let at = if self.start_s == 0.0 { String::new() } else { format!("@{}", self.start_s) };
+        StreamKey::new(self.seed, &format!("{name}{at}"), self.key.number)
+    }
+
+    fn check_instances(&self) -> Result<(), Error> {
+        for (i, instance) in self.scene.instances().iter().enumerate() {
+            let key = |field: &str| format!("instance[{i}].{field}");
+            within(&key("reflectivity"), instance.reflectivity, 0.0..=1.0)?;
+            within(&key("retroreflection"), instance.retroreflection, 0.0..=1.0)?;
+            for factor in instance.scale.to_array() {
+                positive(&key("scale"), factor)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,271 @@
+//! Scenes: what stands where, and which sensors look at it.
+
+use super::scan_builder::Key;
+use super::{Caster, Error, Mesh, Scan, ScanBuilder, Sensor};
+use crate::effects::Effects;
+use crate::material::Materials;
+use crate::pose::{Pose, Trajectory};
+use crate::scan::{Glass, PlacedTarget};
+use crate::scene::SceneFile;
+use crate::simplify::Simplified;
+use formats::rng::StreamKey;
+use formats::scan::{Attribute, AttributeSet};
+use glam::{DAffine3, DVec3};
+use std::ops::{Index, IndexMut};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Instances of meshes in the world, and the sensors that look at them.
+///
+/// A mesh is added once for each place where it stands; the instances share its vertices and its
+/// BVH, and moving one rebuilds nothing.
+///
+/// ```
+/// use sim_gpu::{Mesh, Pose, Scene, Sensor};
+///
+/// # let corners = vec![[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.0, 1.0]];
+/// # let wall = Mesh::from_triangles(corners, vec![[0, 1, 2]])?;
+/// let mut scene = Scene::new();
+/// let near = scene.add(&wall, Pose::at([2.0, 0.0, 0.0]));
+/// let far = scene.add(&wall, Pose::at([4.0, 0.0, 0.0]));
+/// scene[far].scale = [3.0; 3].into();
+/// scene[near].reflectivity = 0.4;
+///
+/// let sensor = Sensor::named("vlp16")?;
+/// let both = scene.scan(&sensor, Pose::IDENTITY).run()?;
+/// scene[near].pose.position_m.y = 10.0; // it moves aside
+/// let after = scene.scan(&sensor, Pose::IDENTITY).run()?;
+/// assert!(both.object.as_ref().is_some_and(|objects| objects.contains(&near.number())));
+/// assert!(after.object.as_ref().is_some_and(|objects| objects.contains(&far.number())));
+/// # Ok::<(), sim_gpu::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Scene {
+    /// The sensors that [`Scene::scan_all`] scans with.
+    pub sensors: Vec<MountedSensor>,
+    /// The effects of all scans that do not name their own; none by default.
+    pub effects: Effects,
+    /// What points carry besides their positions; by default range, beam, ring, time and object.
+    pub attributes: AttributeSet,
+    /// Seed of all random numbers; 0 by default.
+    pub seed: u64,
+    instances: Vec<Instance>,
+}
+
+/// The handle of an [`Instance`] of a [`Scene`], which the scene is indexed by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct InstanceId(u32);
+
+/// A mesh at a place in a scene.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Instance {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Where it stands, metres.
+    pub pose: Pose,
+    /// Factors along the axes of the mesh, all above 0; 1 by default.
+    pub scale: DVec3,
+    /// If it moves: the poses over time of the frame in which it stands at `pose`.
+    pub motion: Option<Arc<Trajectory>>,
+    /// A name. It keys the random numbers of the instance's returns.
+    pub name: Option<String>,
+    /// The name of its class.
+    pub label: Option<String>,
+    /// The part of the light that comes back at vertical incidence, 0 to 1; 1 by default.
+    pub reflectivity: f64,
+    /// How well it returns light to where it came from, 0 to 1, 1 being an ideal retro-reflector;
+    /// 0 by default.
+    pub retroreflection: f64,
+    /// Which of its triangles are glass; nothing by default.
+    pub glass: Option<Glass>,
+    /// The materials of its faces, in place of its reflectivity; one for all by default.
+    pub materials: Option<Arc<Materials>>,
+    /// What simplification made of the mesh, where a scene's file asks for it.
+    #[doc(hidden)]
+    pub simplified: Option<Simplified>,
+    /// The key of its random numbers, in place of the one that its name and the scan give.
+    #[doc(hidden)]
+    pub stream: Option<StreamKey>,
+}
+
+/// A sensor at a place in a scene.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct MountedSensor {
+    /// Its name, which keys the random numbers of its scans.
+    pub name: String,
+    /// The sensor.
+    pub sensor: Sensor,
+    /// Where it stands; if it moves, when the scan begins.
+    pub pose: Pose,
+    /// Its poses over time, if it moves.
+    pub motion: Option<Arc<Trajectory>>,
+    /// The time of all trajectories at which its scan begins, seconds; 0 by default.
+    pub start_s: f64,
+    /// Whether the points of a moving sensor are where its beams met the surfaces. By default they
+    /// are motion-distorted, as a driver that ignores ego-motion reports them.
+    pub deskew: bool,
+}
+
+impl Scene {
+    /// A scene without instances and sensors.
+    #[must_use]
+    pub fn new() -> Self {
+        let attributes = [
+            Attribute::Range,
+            Attribute::Beam,
+            Attribute::Ring,
+            Attribute::Time,
+            Attribute::Object,
+        ];
+        Self {
+            sensors: Vec::new(),
+            effects: Effects::default(),
+            attributes: attributes.into(),
+            seed: 0,
+            instances: Vec::new(),
+        }
+    }
+
+    /// Reads a scene's TOML file, and the meshes and sensor profiles that it names.
+    ///
+    /// # Errors
+    /// With the file, the key or line, and the cause.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::try_from(&SceneFile::load(path.as_ref())?)
+    }
+
+    /// Adds an instance of `mesh` at `pose`. What else is to be known of it is set by its handle:
+    /// `scene[id].reflectivity = 0.3`.
+    pub fn add(&mut self, mesh: impl Into<Mesh>, pose: Pose) -> InstanceId {
+        let id = InstanceId(self.instances.len() as u32);
+        self.instances.push(Instance::new(mesh.into(), pose));
+        id
+    }
+
+    /// Adds a sensor of this name at `pose`.
+    pub fn mount(&mut self, name: &str, sensor: &Sensor, pose: Pose) {
+        let (name, sensor) = (name.to_owned(), sensor.clone());
+        let (motion, start_s, deskew) = (None, 0.0, false);
+        self.sensors.push(MountedSensor { name, sensor, pose, motion, start_s, deskew });
+    }
+
+    /// The instances, each at the number that its [`InstanceId`] and the scans' attribute `object`
+    /// have.
+    #[must_use]
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// The handles of the instances, in their order.
+    pub fn ids(&self) -> impl Iterator<Item = InstanceId> + use<> {
+        (0..self.instances.len() as u32).map(InstanceId)
+    }
+
+    /// A scan of the scene by `sensor` at `pose`: [`ScanBuilder::run`] makes it.
+    pub fn scan<'a>(&'a self, sensor: &'a Sensor, pose: Pose) -> ScanBuilder<'a> {
+        ScanBuilder::new(self, sensor, pose, Key { name: "scan", number: 0 })
+    }
+
+    /// A scan by each of the [`sensors`](Scene::sensors), in their order.
+    ///
+    /// # Errors
+    /// As [`ScanBuilder::run`].
+    pub fn scan_all(&self, caster: &Caster) -> Result<Vec<Scan>, Error> {
+        (0..self.sensors.len()).map(|number| self.scan_mounted(number).with(caster).run()).collect()
+    }
+
+    /// The scan by sensor number `number` of [`sensors`](Scene::sensors).
+    ///
+    /// # Panics
+    /// There is no such sensor.
+    pub fn scan_mounted(&self, number: usize) -> ScanBuilder<'_> {
+        let mounted = &self.sensors[number];
+        let key = Key { name: &mounted.name, number: number as u32 };
+        let scan = ScanBuilder::new(self, &mounted.sensor, mounted.pose, key);
+        let scan = scan.start_s(mounted.start_s).deskewed(mounted.deskew);
+        match &mounted.motion {
+            Some(motion) => scan.along(Arc::clone(motion)),
+            None => scan,
+        }
+    }
+
+    /// All instances as a caster takes them. `stream` keys the random numbers of a name.
+    #[doc(hidden)]
+    pub fn placed(&self, stream: impl Fn(&str) -> StreamKey) -> Vec<PlacedTarget<'_>> {
+        let mut placed: Vec<_> = self.instances.iter().map(Instance::placed).collect();
+        for ((placed, instance), number) in placed.iter_mut().zip(&self.instances).zip(0..) {
+            placed.stream = instance.stream.or_else(|| match (&instance.name, number) {
+                (Some(name), _) => Some(stream(name)),
+                // A scene of one mesh has the random numbers of the scan.
+                (None, 0) => None,
+                (None, _) => Some(stream(&format!("instance/{number}"))),
+            });
+        }
+        placed
+    }
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl InstanceId {
+    /// Its number, which the attribute `object` of scans holds.
+    #[must_use]
+    pub fn number(self) -> u32 {
+        self.0
+    }
+}
+
+impl Index<InstanceId> for Scene {
+    type Output = Instance;
+
+    fn index(&self, id: InstanceId) -> &Instance {
+        &self.instances[id.0 as usize]
+    }
+}
+
+impl IndexMut<InstanceId> for Scene {
+    fn index_mut(&mut self, id: InstanceId) -> &mut Instance {
+        &mut self.instances[id.0 as usize]
+    }
+}
+
+impl Instance {
+    fn new(mesh: Mesh, pose: Pose) -> Self {
+        Self {
+            mesh,
+            pose,
+            scale: DVec3::ONE,
+            motion: None,
+            name: None,
+            label: None,
+            reflectivity: 1.0,
+            retroreflection: 0.0,
+            glass: None,
+            materials: None,
+            simplified: None,
+            stream: None,
+        }
+    }
+
+    /// As a caster takes it.
+    fn placed(&self) -> PlacedTarget<'_> {
+        let Pose { position_m, rotation } = self.pose;
+        let world_from_mesh =
+            DAffine3::from_scale_rotation_translation(self.scale, rotation, position_m);
+        let mut placed = PlacedTarget::new(self.mesh.target());
+        placed.world_from_object = world_from_mesh * *self.mesh.mesh_from_target();
+        placed.motion.clone_from(&self.motion);
+        placed.reflectivity = self.reflectivity as f32;
+        placed.retroreflection = self.retroreflection;
+        placed.glass.clone_from(&self.glass);
+        placed.materials = self.materials.as_deref();
+        placed
+    }
+}
