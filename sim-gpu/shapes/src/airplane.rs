@@ -8,7 +8,7 @@ mod wing;
 use crate::primitives::{Builder, DVec3, Makes, Sampler};
 use details::{gear, jet_engine, propeller, struts};
 use fuselage::Fuselage;
-use jet::{delta, fighter};
+use jet::fighter;
 use wing::{Wing, fin};
 
 /// The makes, with their weights. Airplanes have the size of real ones and fly to -y.
@@ -16,8 +16,8 @@ pub const MAKES: Makes = &[
     (3, liner),
     (2, light),
     (1, biplane),
-    (2, fighter),
-    (1, delta),
+    (2, |b, s| fighter(b, s, false)),
+    (1, |b, s| fighter(b, s, true)),
     (1, glider),
     (1, flying_wing),
 ];

@@ -100,7 +100,8 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     let inner = top.legs_half(thick_m);
     match support {
         Panels => {
-            side_panels_across(b, &top, thick_m);
+            let half = DVec2::new(0.96 * top.half.y, 0.95 * top.half.x);
+            turned(b, |b| side_panels(b, half, top.under_m(), thick_m));
             back_panel(b, s, &top, inner.y);
         }
         Trestle => trestle(b, s, &top),
@@ -156,12 +157,6 @@ fn apron(b: &mut Builder, s: &mut Sampler, top: &Top, half: DVec2) {
         block(b, DVec3::new(side * half.x, 0.0, z), DVec3::new(thin_m, 2.0 * half.y, high_m));
         block(b, DVec3::new(0.0, side * half.y, z), DVec3::new(2.0 * half.x, thin_m, high_m));
     }
-}
-
-fn side_panels_across(b: &mut Builder, top: &Top, thick_m: f64) {
-    turned(b, |b| {
-        side_panels(b, DVec2::new(0.96 * top.half.y, 0.95 * top.half.x), top.under_m(), thick_m);
-    });
 }
 
 fn back_panel(b: &mut Builder, s: &mut Sampler, top: &Top, half_y_m: f64) {

@@ -1,8 +1,7 @@
-//! Shapes keep their bytes: those under `assets/meshes` are what the generator gives, and hashes
-//! stand for larger ones.
+//! The bytes of shapes stay the same: the meshes under `assets/meshes`, and hashes of larger ones.
 //!
-//! `UPDATE_GOLDEN=1 cargo test -p edgepuck-shapes --test shapes_golden` rewrites both after a
-//! change that is meant.
+//! After an intended change, `UPDATE_GOLDEN=1 cargo test -p edgepuck-shapes --test shapes_golden`
+//! rewrites both.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,11 +11,11 @@ use std::path::{Path, PathBuf};
 use edgepuck_shapes::{ShapeClass, generate, write_obj, write_off};
 use sha2::{Digest, Sha256};
 
-/// The seed of the committed meshes; `gen-shapes` with it gives the same.
+/// The seed of the committed meshes; `gen-shapes` gives the same meshes with it.
 const SEED: u64 = 1;
 
-/// The committed meshes: path under `assets/meshes`, class, instance. Names count from 1, as in a
-/// tree of shapes.
+/// The committed meshes: path under `assets/meshes`, class, instance. The numbers in names start at
+/// 1, as those of `write_tree`.
 const COMMITTED: [(&str, ShapeClass, u32); 11] = [
     ("airplane/airplane_0019.off", ShapeClass::Airplane, 18),
     ("bottle/bottle_0052.off", ShapeClass::Bottle, 51),
@@ -33,14 +32,14 @@ const COMMITTED: [(&str, ShapeClass, u32); 11] = [
 
 const HOW_TO_UPDATE: &str = "if that is meant, UPDATE_GOLDEN=1 rewrites it";
 
-/// All of them together, in bytes.
+/// The largest total size of the committed meshes, bytes.
 const MAX_COMMITTED_BYTES: usize = 300 * 1024;
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// Whether the golden file holds `bytes`; writes it first if so asked.
+/// Whether the golden file holds `bytes`. With `UPDATE_GOLDEN`, writes it first.
 fn is_golden(path: &Path, bytes: &[u8]) -> io::Result<bool> {
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         path.parent().map_or(Ok(()), fs::create_dir_all)?;

@@ -5,18 +5,8 @@ use super::fuselage::Fuselage;
 use super::wing::{Wing, fin};
 use crate::primitives::{Builder, DVec3, Sampler};
 
-/// A fighter with swept wings and a tail.
-pub fn fighter(b: &mut Builder, s: &mut Sampler) {
-    jet(b, s, false);
-}
-
-/// A fighter with delta wings and no tail.
-pub fn delta(b: &mut Builder, s: &mut Sampler) {
-    jet(b, s, true);
-}
-
-/// A jet with thin wings, one or two fins and a canopy.
-fn jet(b: &mut Builder, s: &mut Sampler, delta: bool) {
+/// A fighter with thin wings, one or two fins and a canopy. One with `delta` wings has no tail.
+pub fn fighter(b: &mut Builder, s: &mut Sampler, delta: bool) {
     let length_m = s.uniform(11.0, 20.0);
     let body =
         Fuselage { slender: s.uniform(8.0, 12.0), nose: 0.3, tail: 0.12, length_m, upsweep: 0.0 };
