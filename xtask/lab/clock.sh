@@ -25,6 +25,7 @@ git clone --quiet "$root" "$clone"
 cd "$clone"
 unset CARGO_TARGET_DIR
 cargo fetch --quiet
+cargo fetch --quiet --manifest-path xtask/lab/Cargo.toml
 echo "clone: $clone, commit $(git rev-parse --short HEAD), load $(cut -d' ' -f1-3 /proc/loadavg)"
 
 # Runs a command and prints its CPU-seconds and its seconds on the clock.

@@ -44,13 +44,14 @@ fn become_process(command: &mut Command) -> std::io::Result<u8> {
 /// The features that a command line needs beyond the default ones: what takes long to build.
 fn features(package: &str, words: &[OsString]) -> Vec<&'static str> {
     let any = |is: fn(&str) -> bool| words.iter().any(|word| is(&word.to_string_lossy()));
-    let is_in_scene = |key| package == EDGEPUCK && words.iter().any(|word| has_key(word, key));
+    let is_in_scene = |key| words.iter().any(|word| has_key(word, key));
+    if package == LAB {
+        return if modelnet_h5_list::is_among(words) { vec!["hdf5"] } else { Vec::new() };
+    }
     let simplifies = any(|word| word.starts_with("--simplify")) || is_in_scene("simplify");
     let is_coloured = any(|word| word.starts_with("--colours")) || is_in_scene("colours");
-    let needs_hdf5 = match package {
-        LAB => modelnet_h5_list::is_among(words),
-        _ => any(|word| word.starts_with("--layout")) && any(|word| word.contains("modelnet-h5")),
-    };
+    let needs_hdf5 =
+        any(|word| word.starts_with("--layout")) && any(|word| word.contains("modelnet-h5"));
     let features = [(simplifies, "simplify"), (needs_hdf5, "hdf5"), (is_coloured, "textures")];
     features.into_iter().filter(|(is_needed, _)| *is_needed).map(|(_, name)| name).collect()
 }

@@ -37,7 +37,7 @@ enum Command {
     Bench(Forwarded),
     /// Sweep every parameter from the mesh to the class, and record time and accuracy
     Trade(Forwarded),
-    /// Measure how much each effect of a scan matters to a classifier, and what it costs
+    /// Measure how much each effect of a scan matters to a classifier, and its cost
     Ablate(Forwarded),
     /// Reproduce the paper's experiments, and write one report
     Reproduce(Forwarded),

@@ -105,7 +105,7 @@ fn cargo_on_all(words: &[&str]) -> Command {
 /// A command of Cargo on the laboratory's workspace.
 fn cargo_on_lab(words: &[&str]) -> Command {
     let mut command = cargo_in_lab(words);
-    command.args(["--features", if has_cpp_compiler() { "hdf5,simplify" } else { "hdf5" }]);
+    command.args(["--features", "hdf5"]);
     command
 }
 

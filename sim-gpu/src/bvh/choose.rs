@@ -3,7 +3,7 @@
 use super::Builder;
 
 /// The rays per triangle above which a better tree saves more time than it takes longer to build,
-/// as measured by `cargo xtask bench sim MESHES --builders`.
+/// as measured in `assets/bench/2026-11-21-xeon-2vcpu/builders.txt`.
 const RAYS_PER_TRIANGLE_TO_BREAK_EVEN: usize = 4;
 
 impl Builder {

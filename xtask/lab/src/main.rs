@@ -24,15 +24,17 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Measure speed and accuracy
-    Bench(bench::BenchArgs),
+    #[command(subcommand)]
+    Bench(bench::Benchmark),
     /// Sweep every parameter from the mesh to the class, and record time and accuracy
-    Trade(trade::Args),
-    /// Measure how much each effect of a scan matters to a classifier, and what it costs
-    Ablate(ablation::Args),
+    Trade(trade::TradeArgs),
+    /// Measure how much each effect of a scan matters to a classifier, and its cost
+    #[command(subcommand)]
+    Ablate(ablation::Ablation),
     /// Reproduce the paper's experiments, and write one report
-    Reproduce(reproduction::Args),
+    Reproduce(reproduction::ReproduceArgs),
     /// Show the results of all measurements on one HTML page
-    Report(report::Args),
+    Report(report::ReportArgs),
 }
 
 fn main() -> ExitCode {
@@ -41,9 +43,9 @@ fn main() -> ExitCode {
 
 fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Bench(args) => bench::run(args),
+        Command::Bench(benchmark) => bench::run(benchmark),
         Command::Trade(args) => trade::run(args),
-        Command::Ablate(args) => ablation::run(args),
+        Command::Ablate(ablation) => ablation::run(ablation),
         Command::Reproduce(args) => reproduction::run(args),
         Command::Report(args) => report::run(args),
     }

@@ -2,33 +2,29 @@
 
 use anyhow::{Context, Result, bail};
 use sim_gpu::effects::Effects;
-use sim_gpu::internals::caster::AdapterRequest;
-use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::caster::{AdapterRequest, OpenCaster};
 use sim_gpu::internals::gpu::{AdapterKind, AdapterSummary, list_adapters};
 
-/// Rays that fill a GPU, so that what is measured is not its idling.
+/// Rays that fill a GPU, so that no idle time is measured.
 const RAYS_TO_FILL_A_GPU: usize = 1 << 22;
 
 /// Rays that keep the cores busy for some tenths of a second.
 const RAYS_TO_FILL_THE_CORES: usize = 1 << 19;
 
-/// A caster.
 pub struct Backend {
-    /// What casts.
     pub caster: OpenCaster,
     /// Rays that one repeat should cast at least.
     pub rays: usize,
-    /// Whether it casts beside the CPU, whose time then tells nothing.
+    /// Whether it casts beside the CPU, so that CPU time is no measure.
     pub is_gpu: bool,
 }
 
 impl Backend {
-    /// The adapter's name, or `cpu`.
     pub fn name(&self) -> &str {
         self.caster.name()
     }
 
-    /// What opens another caster on the same adapter.
+    /// The request that opens another caster on the same adapter.
     pub fn request(&self) -> AdapterRequest {
         match &self.caster {
             OpenCaster::Cpu(_) => AdapterRequest::Cpu,
@@ -63,7 +59,6 @@ pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
     Ok(backends)
 }
 
-/// The CPU.
 pub fn cpu() -> Backend {
     let caster = OpenCaster::Cpu(Effects::default());
     Backend { caster, rays: RAYS_TO_FILL_THE_CORES, is_gpu: false }

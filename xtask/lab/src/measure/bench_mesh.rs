@@ -1,7 +1,8 @@
 //! The meshes that a run casts at.
 
-use super::scenes;
 use anyhow::{Result, bail};
+use glam::DVec3;
+use harness::meshes::{cuboid, together};
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::frame::{Normalize, to_world};
 use sim_gpu::internals::mesh::{TriangleMesh, load, tree};
@@ -10,16 +11,24 @@ use std::path::Path;
 
 /// A mesh in the world, in metres.
 pub struct BenchMesh {
-    /// Its name in tables.
     pub name: String,
     /// The mesh, about as large as the unit sphere.
     pub mesh: TriangleMesh,
 }
 
-/// Tori of each of these sizes.
 pub fn tori(sizes: &[usize]) -> Vec<BenchMesh> {
-    let torus = |&n: &usize| BenchMesh { name: format!("torus {n}"), mesh: scenes::torus(n) };
+    let torus = |&n: &usize| BenchMesh { name: format!("torus {n}"), mesh: torus(n) };
     sizes.iter().map(torus).collect()
+}
+
+/// A bumpy torus of about `triangles` triangles.
+pub fn torus(triangles: usize) -> TriangleMesh {
+    harness::meshes::torus(((triangles as f64 / 2.0).sqrt().round() as u32).max(3))
+}
+
+/// `mesh` inside a closed cube of 16 m, so that every ray hits.
+pub fn in_a_room(mesh: TriangleMesh) -> TriangleMesh {
+    together(&[mesh, cuboid(DVec3::splat(-8.0), DVec3::splat(8.0))])
 }
 
 /// At least one and at most `limit` of the mesh files under `root`, spread evenly over
@@ -50,7 +59,6 @@ pub fn real(root: &Path, limit: usize) -> Result<Vec<BenchMesh>> {
     Ok(bench_meshes)
 }
 
-/// The target of casters for `mesh`.
 pub fn target(mesh: TriangleMesh, builder: Builder) -> Target {
     Target::new(Surface::of_mesh(mesh), builder)
 }

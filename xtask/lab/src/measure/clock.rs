@@ -9,31 +9,25 @@ use serde::{Deserialize, Serialize};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// What one repeat cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Seconds on the wall clock.
     pub wall_s: f64,
     /// Seconds of CPU time, all threads together.
     pub cpu_s: f64,
 }
 
-/// What each repeat cost, in the order in which they ran.
+/// The costs of all repeats, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Costs(pub Vec<Cost>);
 
-/// The middle and the ends of some figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// The upper median.
     pub median: f64,
-    /// The least.
     pub min: f64,
-    /// The greatest.
     pub max: f64,
 }
 
-/// Does `work` once.
 pub fn measured<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     let (cpu, wall) = (ProcessTime::now(), Instant::now());
     let answer = work();
@@ -41,10 +35,10 @@ pub fn measured<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     (answer, cost)
 }
 
-/// One of several that do comparable work; each call is one repeat.
+/// Work to compare with other work; each call is one repeat.
 pub type Workload<'a> = Box<dyn FnMut() -> anyhow::Result<Cost> + 'a>;
 
-/// All of `work` is timed, and its answers are thrown away.
+/// A workload of all of `work`, whose results are dropped.
 pub fn workload<'a, T>(mut work: impl FnMut() -> anyhow::Result<T> + 'a) -> Workload<'a> {
     Box::new(move || {
         let (answer, cost) = measured(&mut work);
@@ -53,8 +47,8 @@ pub fn workload<'a, T>(mut work: impl FnMut() -> anyhow::Result<T> + 'a) -> Work
     })
 }
 
-/// Lets all `workloads` have one repeat uncounted, then `rounds` rounds of
-/// one repeat each: what disturbs the machine for a while disturbs them all.
+/// Runs all `workloads` once uncounted, then in `rounds` rounds of one repeat each, so that a
+/// disturbance of the machine affects all of them.
 pub fn interleave(rounds: usize, workloads: &mut [Workload<'_>]) -> anyhow::Result<Vec<Costs>> {
     let mut costs = vec![Costs::default(); workloads.len()];
     for round in 0..=rounds {
@@ -69,19 +63,17 @@ pub fn interleave(rounds: usize, workloads: &mut [Workload<'_>]) -> anyhow::Resu
 }
 
 impl Costs {
-    /// Of the wall times.
     pub fn wall_s(&self) -> Spread {
         Spread::of(self.0.iter().map(|cost| cost.wall_s))
     }
 
-    /// Of the CPU times.
     pub fn cpu_s(&self) -> Spread {
         Spread::of(self.0.iter().map(|cost| cost.cpu_s))
     }
 }
 
 impl Spread {
-    /// Of `figures`; zeros if there are none.
+    /// The spread of `figures`; zeros without figures.
     pub fn of(figures: impl IntoIterator<Item = f64>) -> Self {
         let mut figures: Vec<f64> = figures.into_iter().collect();
         figures.sort_unstable_by(f64::total_cmp);
@@ -103,10 +95,5 @@ mod tests {
         });
         let costs = interleave(3, &mut [workload]).unwrap();
         assert_eq!(costs[0].wall_s(), Spread { median: 3.0, min: 2.0, max: 4.0 });
-    }
-
-    #[test]
-    fn nothing_has_a_spread_of_zeros() {
-        assert_eq!(Spread::of([]), Spread { median: 0.0, min: 0.0, max: 0.0 });
     }
 }

@@ -6,45 +6,34 @@ use std::fs;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Where and when figures were measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct Machine {
     /// Seconds since 1970 at the start of the run.
     pub unix_time_s: u64,
     /// The arguments of the command, absolute paths without their folders.
     pub command: Vec<String>,
-    /// Version of this program.
     pub version: &'static str,
     /// The commit of the working tree, `+` behind it if it has changes; `None`
     /// outside a clone.
     pub commit: Option<String>,
     /// The processor's name; `None` where the system does not tell.
     pub cpu: Option<String>,
-    /// Hardware threads that this process may use.
     pub threads: usize,
-    /// The operating system and the processor's architecture.
     pub system: String,
     /// Mean number of runnable threads over 1, 5 and 15 minutes, on Linux.
     pub load_average: Option<String>,
-    /// All adapters there are, measured or not.
     pub adapters: Vec<Adapter>,
 }
 
-/// One adapter.
 #[derive(Clone, Debug, Serialize)]
 pub struct Adapter {
-    /// The device's name.
     pub name: String,
-    /// What sort of device it is.
     pub kind: String,
-    /// The graphics interface.
     pub backend: String,
-    /// The driver and its version.
     pub driver: String,
 }
 
 impl Machine {
-    /// This machine, now.
     pub fn here() -> Self {
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {

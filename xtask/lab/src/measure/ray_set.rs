@@ -18,27 +18,20 @@ const SENSOR_M: DVec3 = dvec3(5.0, 0.0, 0.5);
 /// Rays against one target. Ray `i` of both lists is the same.
 #[derive(Clone)]
 pub struct RaySet {
-    /// The rays as casters read them; beam `i` is number `i` of a sensor's
-    /// pattern, or simply of this list.
+    /// The rays as casters read them; beam `i` is number `i` of a sensor's pattern, or of this
+    /// list.
     pub job: CastJob,
     /// The rays in f64, in the target's unit frame.
     pub rays: Vec<Ray>,
 }
 
 impl RaySet {
-    /// One revolution or image of a sensor at `pose`.
     pub fn sweep(target: &Target, pose: &Pose, pattern: &BeamPattern, culling: Culling) -> Self {
         let frame = RayFrame::new(&target.surface, &DAffine3::IDENTITY, pose);
         let stream = StreamKey::new(SEED, "sweep", 0);
         let job = CastJob::aim(target.clone(), frame, pattern, culling, stream, 1.0);
         let rays = job.beams.iter().map(|&beam| frame.beam(pattern, beam)).collect();
         Self { job, rays }
-    }
-
-    /// Rays from each of `origins` through each of `points`, all in the world.
-    pub fn through(target: &Target, origins: &[DVec3], points: &[DVec3]) -> Self {
-        let pairs = origins.iter().flat_map(|&o| points.iter().map(move |&p| (o, p)));
-        Self::of(target, pairs)
     }
 
     /// `n` rays from random places 5 m away through random points of the unit
@@ -81,15 +74,6 @@ impl RaySet {
         Self { job, rays }
     }
 
-    /// The rays of these numbers, in this order.
-    pub fn only(&self, numbers: &[usize]) -> Self {
-        let mut ray_set = self.clone();
-        ray_set.rays = numbers.iter().map(|&i| self.rays[i]).collect();
-        ray_set.job.aim = Aim::Rays(numbers.iter().map(|&i| self.job.rays()[i]).collect());
-        ray_set.job.beams = numbers.iter().map(|&i| self.job.beams[i]).collect();
-        ray_set
-    }
-
     /// Each ray's origin and unit direction in the world, metres.
     pub fn in_world(&self) -> impl Iterator<Item = (DVec3, DVec3)> {
         let frame = self.job.target.surface.frame;
@@ -99,7 +83,7 @@ impl RaySet {
     }
 
     /// The ranges that follow from a caster's codes, in metres, as
-    /// `sim_gpu::resolve` finds them; `[n_rays]`.
+    /// `sim_gpu::internals::resolve` finds them; `[n_rays]`.
     pub fn ranges(&self, cast: &Cast) -> Vec<Option<f64>> {
         let target = &self.job.target;
         let range = |(ray, &code): (&Ray, &u32)| match code {
@@ -114,12 +98,10 @@ impl RaySet {
     }
 }
 
-/// The VLP-32C at 600 rpm.
 pub fn vlp32c() -> SensorProfile {
     SensorProfile::builtin("vlp32c").expect("invariant: this profile is built in")
 }
 
-/// The pose of the sensor for sweeps.
 pub fn sweep_pose() -> Pose {
     Pose::look_at(SENSOR_M, DVec3::ZERO).expect("invariant: the sensor is not at the origin")
 }

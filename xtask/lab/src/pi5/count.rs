@@ -1,9 +1,7 @@
 //! Instructions of one classification, counted by function under QEMU.
 
-use super::kernels::{Kernels, demangled};
-use super::load::{load, tile_instructions};
-use super::model::Other;
-use super::number::Number;
+use super::kernels::{Kernels, Number, demangled};
+use super::model::{Other, load, tile_instructions};
 use super::plan::{Setting, Stage};
 use anyhow::{Context, ensure};
 use std::collections::BTreeMap;
@@ -14,7 +12,6 @@ use xtask::{pi_target, workspace};
 /// The plugin's source, from the workspace's root.
 const SOURCE: &str = "xtask/lab/peers/insn_count.c";
 
-/// Counts under QEMU.
 pub struct Counter {
     plugin: PathBuf,
     folder: PathBuf,
@@ -22,7 +19,6 @@ pub struct Counter {
     model: PathBuf,
 }
 
-/// Instructions by function.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counts(BTreeMap<String, f64>);
 
@@ -40,7 +36,6 @@ impl Counter {
         Ok(counter)
     }
 
-    /// Counts one classification.
     pub fn classification(&self, setting: Setting) -> anyhow::Result<Counts> {
         let Setting { sampler, from, points, precision } = setting;
         let sampler = sampler.word();
@@ -55,7 +50,6 @@ impl Counter {
         Ok(repeated(2)?.less(&repeated(1)?))
     }
 
-    /// Counts `live` on a capture; also gives its lines.
     pub fn live(&self, capture: &Path) -> anyhow::Result<(Counts, String)> {
         let model = self.model.as_path();
         self.run("live --threads 1", &["--model".as_ref(), model, "--pcap".as_ref(), capture])
@@ -76,7 +70,6 @@ impl Counter {
 }
 
 impl Counts {
-    /// Reads lines `COUNT SYMBOL`.
     pub fn parse(log: &str) -> Self {
         let mut counts = BTreeMap::new();
         for (count, symbol) in log.lines().filter_map(|line| line.split_once(' ')) {
@@ -91,27 +84,17 @@ impl Counts {
         Self(self.0.iter().map(|(name, count)| (name.clone(), count - before(name))).collect())
     }
 
-    /// Instructions of functions whose name contains `part`.
     fn of(&self, part: &str) -> f64 {
         self.0.iter().filter(|(name, _)| name.contains(part)).map(|(_, count)| count).sum()
     }
 
-    /// Every function and its instructions.
     pub fn all(&self) -> impl Iterator<Item = (&str, f64)> {
         self.0.iter().map(|(name, count)| (name.as_str(), *count))
     }
 
-    /// The functions that most instructions are spent in.
-    pub fn largest(&self, n: usize) -> Vec<(String, f64)> {
-        let mut all: Vec<_> = self.0.iter().map(|(name, count)| (name.clone(), *count)).collect();
-        all.sort_by(|a, b| b.1.total_cmp(&a.1));
-        all.truncate(n);
-        all
-    }
-
-    /// What is outside the inner loops of `stages`, and the share of the
-    /// vector layers' columns that were read, the others' inputs being 0. Fails if a kernel has
-    /// fewer instructions than the plan has in its loops: the binary did something else.
+    /// The instructions outside the inner loops of `stages`, and the share of the vector layers'
+    /// columns that were read, the others' inputs being 0. Fails if a kernel has fewer instructions
+    /// than the plan has in its loops: the binary did something else.
     pub fn outside_loops(
         &self,
         stages: &[Stage],
@@ -121,7 +104,7 @@ impl Counts {
         for number in Number::ALL {
             let counted = self.of(number.tile_prefix());
             let planned = tile_instructions(stages, kernels, number);
-            // A first layer's tiles are mostly what is outside their loop.
+            // Most instructions of a first layer's tiles are outside their loop.
             ensure!(
                 planned <= counted && counted <= 10.0 * planned,
                 "{counted} instructions were counted in {}…, {planned} are planned for its loop",
@@ -174,7 +157,7 @@ mod tests {
         let found = Counts::parse(log);
         assert_eq!(found, counts(&[("?", 5.0), ("a::b", 120.0)]));
         let less = found.less(&counts(&[("a::b", 20.0)]));
-        assert_eq!(less.largest(1), [("a::b".to_owned(), 100.0)]);
+        assert_eq!(less.of("a::b"), 100.0);
     }
 
     /// One tile row of 8 x 64 channels and 4 inputs has 8 x 4 rounds of two

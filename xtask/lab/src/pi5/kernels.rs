@@ -2,22 +2,17 @@
 
 use super::assembly::{Function, Loop, functions};
 use super::mca::{Cost, Mca};
-use super::number::Number;
 use anyhow::{Context, ensure};
-use serde::Serialize;
 
 /// FMA and dot-product pipes of a Cortex-A76.
 const PIPES: usize = 2;
 
 /// One round of a kernel's inner loop.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Kernel {
-    /// The function's name.
     pub name: String,
     /// Products of a round; of farthest point sampling, points.
     pub work: usize,
-    /// What a round costs, by llvm-mca.
-    #[serde(flatten)]
     pub cost: Cost,
     /// The core's most products a cycle in the format computed in.
     pub peak: Option<usize>,
@@ -30,14 +25,11 @@ impl Kernel {
     }
 }
 
-/// A register tile.
 #[derive(Clone, Debug)]
 pub struct Tile {
     /// Its loop over inputs.
     pub kernel: Kernel,
-    /// Rows of the tile.
     pub rows: usize,
-    /// Output channels of the tile.
     pub channels: usize,
     /// Inputs of a round.
     pub inputs: usize,
@@ -49,7 +41,6 @@ pub struct Kernels {
     tiles: Vec<Tile>,
     /// In the order of [`Number::ALL`]; a round is one input of one block.
     gemv: Vec<Kernel>,
-    /// A step of farthest point sampling.
     pub farthest: Kernel,
 }
 
@@ -81,7 +72,6 @@ impl Kernels {
         })
     }
 
-    /// The tile that multiplies in a format.
     pub fn tile(&self, number: Number) -> &Tile {
         &self.tiles[number as usize]
     }
@@ -91,7 +81,6 @@ impl Kernels {
         &self.gemv[number as usize]
     }
 
-    /// Every loop.
     pub fn all(&self) -> impl Iterator<Item = &Kernel> {
         let tiles = self.tiles.iter().map(|tile| &tile.kernel);
         tiles.chain(&self.gemv).chain([&self.farthest])
@@ -129,8 +118,8 @@ fn shape(name: &str, prefix: &str) -> Option<(usize, usize)> {
     Some((rows.parse().ok()?, channels[..end].parse().ok()?))
 }
 
-/// Of the loops in functions whose name contains `part`, those of most `work`;
-/// of these, which differ in what follows the loop, the slowest.
+/// The slowest of the loops with the most `work` in functions whose name contains `part`; their
+/// code differs in what follows the loop.
 fn slowest(
     functions: &[(String, Function<'_>)],
     part: &str,
@@ -151,6 +140,55 @@ fn slowest(
         }
     }
     slowest.context("invariant: one loop has most work")
+}
+
+/// A format that kernels multiply in, or that weights are stored in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Number {
+    F32,
+    F16,
+    I8,
+}
+
+impl Number {
+    pub const ALL: [Self; 3] = [Self::F32, Self::F16, Self::I8];
+
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::F32 => 4,
+            Self::F16 => 2,
+            Self::I8 => 1,
+        }
+    }
+
+    /// The names of the tile functions of this format, up to their shape.
+    pub fn tile_prefix(self) -> &'static str {
+        match self {
+            Self::F32 => "tile_f32_",
+            Self::F16 => "tile_f16_",
+            Self::I8 => "tile_i8_",
+        }
+    }
+
+    /// The instruction that tiles of this format multiply by, the arrangement
+    /// of its result, and its products.
+    pub fn multiplier(self) -> (&'static str, &'static str, usize) {
+        match self {
+            Self::F32 => ("fmla", "4s", 4),
+            Self::F16 => ("fmla", "8h", 8),
+            Self::I8 => ("sdot", "4s", 16),
+        }
+    }
+
+    /// Whether a loop of matrix-vector products widens weights of this format.
+    pub fn widens(self, inner: &Loop<'_>) -> bool {
+        let (f16, i8) = (inner.has("fcvtl"), inner.has("scvtf"));
+        match self {
+            Self::F32 => !f16 && !i8,
+            Self::F16 => f16,
+            Self::I8 => i8,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -177,19 +215,5 @@ pub mod tests {
         assert_eq!(shape("tile_f32_12x8::<Max, 8>", "tile_f32_"), Some((12, 8)));
         assert_eq!(shape("tile_f32_8", "tile_f32_"), None);
         assert_eq!(shape("gemv", "tile_f32_"), None);
-    }
-
-    #[test]
-    fn symbols_lose_their_hashes() {
-        let symbol = "_ZN9infer_cpu6kernel4neon12tile_f32_8x817h8fbc176e95428d3bE";
-        assert_eq!(demangled(symbol), "infer_cpu::kernel::neon::tile_f32_8x8");
-        assert_eq!(demangled("memcpy"), "memcpy");
-    }
-
-    #[test]
-    fn shares_of_peak_are_of_products_a_cycle() {
-        let cost = Cost { cycles: 40.0, instructions: 80.0 };
-        let kernel = Kernel { name: String::new(), work: 256, cost, peak: Some(8) };
-        assert_eq!(kernel.share_of_peak(), Some(0.8));
     }
 }

@@ -7,11 +7,10 @@ use crate::render::table::Table;
 use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// The clusters of a turn that the modelled time is asked for.
+/// Clusters of the turn whose time is modelled.
 const CLUSTERS: f64 = 20.0;
-/// Turns a second.
 const TURNS_HZ: f64 = 10.0;
 
 /// A stage, and what the names of its functions contain. The first stage that fits has a function;
@@ -38,14 +37,14 @@ const STAGES: [(&str, &[&str]); 5] = [
 const TRACKS: usize = 1;
 const CLASSIFY: usize = 3;
 
-/// What a line tells of a cluster.
+/// A line of `infer-cpu live`.
 #[derive(Deserialize)]
 struct Line {
     turn: u64,
     confidence: Option<f64>,
 }
 
-/// What was done between the ends of two captures of one drive.
+/// The work between the ends of two captures of one drive.
 #[derive(Debug, Default)]
 struct Work {
     instructions: [f64; STAGES.len()],
@@ -54,15 +53,15 @@ struct Work {
     classified: f64,
 }
 
-/// Counts both captures of a drive, of which one is longer, and tells of what is between their
-/// ends, in which no model is loaded.
-pub fn table(counter: &Counter, captures: &[impl AsRef<Path>], machine: Machine) -> Result<String> {
-    let [short, long] = captures else { anyhow::bail!("--live: expected two captures") };
-    let (short, long) = (Work::of(counter, short.as_ref())?, Work::of(counter, long.as_ref())?);
+/// Counts two captures of a drive, the second longer than the first, and reports on the difference,
+/// in which no model is loaded.
+pub fn table(counter: &Counter, captures: [&PathBuf; 2], machine: Machine) -> Result<String> {
+    let [short, long] = captures.map(|capture| Work::of(counter, capture));
+    let (short, long) = (short?, long?);
     let work = long.less(&short);
     ensure!(
         work.turns > 0.0 && work.classified > 0.0,
-        "--live: expected a second capture of more turns than the first, with clusters, found {} \
+        "expected a second capture of more turns than the first, with clusters, found {} \
          turns and {} clusters more",
         work.turns,
         work.classified
@@ -96,7 +95,7 @@ impl Work {
         }
     }
 
-    /// Instructions of a turn in which all of so many clusters are classified.
+    /// Instructions of a turn in which `clusters` clusters are all classified.
     fn of_turn(&self, clusters: f64) -> [f64; STAGES.len()] {
         let mut turn = self.instructions.map(|count| count / self.turns);
         turn[CLASSIFY] = self.instructions[CLASSIFY] / self.classified * clusters;

@@ -1,21 +1,16 @@
 //! What infer-cpu does to classify one cloud, stage by stage.
 
+use super::kernels::Number;
 use super::network::{Layer, Net, Network};
-use super::number::Number;
 use infer_cpu::Precision;
 use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays, prefilter_pays};
-use serde::{Serialize, Serializer};
 use std::slice::from_ref;
 
 /// Where the points that a network sees come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampler {
-    /// All points of the cloud.
     All,
-    /// Points drawn at random.
     Random,
-    /// Farthest point sampling.
     Fps,
     /// A Critical Points Layer with a front end of its own.
     Cpl,
@@ -24,8 +19,8 @@ pub enum Sampler {
 }
 
 impl Sampler {
-    /// As `infer-cpu bench --sampler` takes it. No point twice: the network
-    /// would see it once in any case.
+    /// The value of `infer-cpu bench --sampler`. No point is repeated, because the network would
+    /// see it once in any case.
     pub fn word(self) -> &'static str {
         match self {
             Self::All => "all",
@@ -37,35 +32,27 @@ impl Sampler {
     }
 }
 
-/// What is modelled: `points` of a cloud of `from` points to a class.
-#[derive(Clone, Copy, Debug, Serialize)]
+/// A classification: `points` are chosen from a cloud of `from` points.
+#[derive(Clone, Copy, Debug)]
 pub struct Setting {
-    /// Where the points come from.
     pub sampler: Sampler,
     /// Points of the cloud.
     pub from: usize,
     /// Points that the network sees.
     pub points: usize,
-    /// What it computes in.
-    #[serde(serialize_with = "by_name")]
     pub precision: Precision,
 }
 
-fn by_name<S: Serializer>(precision: &Precision, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(precision.name())
-}
-
 impl Setting {
-    /// What infer-cpu does; `None` if the network lacks what the sampler pools.
+    /// The stages of infer-cpu; `None` if the network lacks the layers that the sampler pools.
     pub fn stages(self, network: &Network) -> Option<Vec<Stage>> {
         stages(network, self.sampler, (self.from, self.points), self.precision)
     }
 }
 
-/// A layer as it is multiplied: point-wise, in a format.
+/// A point-wise layer in a format.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Product {
-    /// The layer.
     pub layer: Layer,
     /// The format of its activations and weights.
     pub number: Number,
@@ -129,7 +116,7 @@ pub fn stages(
         }
     }
     if !network.stn.convs.is_empty() {
-        // A point that is critical for the cloud is so for what is kept of it.
+        // A critical point of the cloud is critical for the points that are kept.
         if sampler != Sampler::CplStn {
             formats.pass(&mut stages, points, &[], &network.stn.convs)?;
         }
@@ -158,7 +145,7 @@ pub fn stages(
     Some(stages)
 }
 
-/// What a precision computes and stores in.
+/// The formats of a precision.
 struct Formats {
     /// Point-wise layers but for the first.
     points: Number,
@@ -255,28 +242,5 @@ mod tests {
         use Number::{F32, I8};
         assert_eq!(numbers, [vec![F32, I8], vec![F32, I8, I8], vec![F32, I8]]);
         assert!(stages.iter().any(|stage| matches!(stage, Stage::Alone { rows: 64, .. })));
-    }
-
-    /// The poolings over all of `points`.
-    fn pools(points: usize, precision: Precision) -> Vec<(usize, Number, bool)> {
-        let stages = stages(&baseline(), Sampler::All, (points, points), precision).unwrap();
-        let pools = stages.into_iter().filter_map(|stage| match stage {
-            Stage::Pool { rows, product, screened } => Some((rows, product.number, screened)),
-            _ => None,
-        });
-        pools.collect()
-    }
-
-    #[test]
-    fn poolings_of_fp32_are_screened_by_int8() {
-        assert_eq!(pools(64, Precision::F32), [(64, Number::I8, true); 3]);
-        assert_eq!(pools(64, Precision::F16), [(64, Number::F16, false); 3]);
-        assert_eq!(pools(64, Precision::I8), [(64, Number::I8, false); 3]);
-    }
-
-    #[test]
-    fn long_clouds_go_in_runs() {
-        let rows: Vec<usize> = pools(2048, Precision::F32).iter().map(|pool| pool.0).collect();
-        assert_eq!(rows, [1056, 992, 1056, 992, 1056, 992]);
     }
 }

@@ -1,86 +1,64 @@
-//! One row for each sampler, number of points and precision.
+//! Modelled times: a row for each sampler, number of points and precision.
 
 use super::PiModelArgs;
 use super::count::Counter;
-use super::kernels::Kernels;
-use super::model::{Other, Time, time};
+use super::kernels::{Kernel, Kernels};
+use super::model::{Machine, Other, Time, time};
 use super::network::Network;
 use super::plan::{Sampler, Setting, Stage};
+use crate::render::table::{Column, Table, digits};
 use anyhow::Result;
-use serde::Serialize;
 
 /// Clouds of more points are not run under QEMU: what is counted grows by the
 /// same amount with every run of blocks.
 const MOST_COUNTED: usize = 1024;
 
-/// Functions of a row that are named.
-const NAMED_FUNCTIONS: usize = 12;
+/// Points of the clouds that samplers choose from, and that a Critical Points Layer keeps.
+const FROM: usize = 1024;
+const CRITICAL: usize = 64;
 
-/// One modelled classification.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    /// What is modelled.
-    #[serde(flatten)]
+pub struct PiRow {
     pub setting: Setting,
     /// Multiplications with an addition, of sampler and network.
     pub macs: usize,
-    /// Modelled time.
     pub time: Time,
-    /// Share of the vector layers' columns that were read.
-    pub columns_read: Option<f64>,
-    /// Instructions outside the inner loops.
-    pub other: Option<Other>,
-    /// Where most instructions were counted, the inner loops among them.
-    pub functions: Vec<(String, f64)>,
 }
 
-/// All rows that `args` ask for.
 pub fn rows(
     args: &PiModelArgs,
     network: &Network,
     kernels: &Kernels,
     counter: Option<&Counter>,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<PiRow>> {
     let mut rows = Vec::new();
     for setting in settings(args) {
         let Some(stages) = setting.stages(network) else { continue };
         let count = |counter| count(counter, network, kernels, setting);
         let counted = counter.map(count).transpose()?;
-        let columns_read = counted.as_ref().map(|counted| counted.columns_read);
-        let other = counted.as_ref().map(|counted| counted.other);
-        let share = columns_read.unwrap_or(1.0);
-        rows.push(Row {
-            setting,
-            macs: stages.iter().map(Stage::macs).sum(),
-            time: time(&args.machine(), kernels, &stages, share, other),
-            columns_read,
-            other,
-            functions: counted.map(|counted| counted.functions).unwrap_or_default(),
-        });
+        let share = counted.as_ref().map_or(1.0, |counted| counted.columns_read);
+        let time =
+            time(&Machine::PI_5, kernels, &stages, share, counted.map(|counted| counted.other));
+        rows.push(PiRow { setting, macs: stages.iter().map(Stage::macs).sum(), time });
     }
     Ok(rows)
 }
 
 fn settings(args: &PiModelArgs) -> impl Iterator<Item = Setting> {
-    let from = args.from;
     let all = args.points.iter().map(|&n| (Sampler::All, n, n));
-    let fewer = args.points.iter().filter(move |&&points| points < from);
-    let fps = fewer.map(move |&points| (Sampler::Fps, from, points));
-    let critical = args.critical.min(from);
-    let cpl = [Sampler::Cpl, Sampler::CplStn].map(|kind| (kind, from, critical));
+    let fewer = args.points.iter().filter(|&&points| points < FROM);
+    let fps = fewer.map(|&points| (Sampler::Fps, FROM, points));
+    let cpl = [Sampler::Cpl, Sampler::CplStn].map(|kind| (kind, FROM, CRITICAL));
     all.chain(fps).chain(cpl).flat_map(|(sampler, from, points)| {
         let precisions = args.precision.iter();
         precisions.map(move |&precision| Setting { sampler, from, points, precision })
     })
 }
 
-/// What counting gave.
 pub struct Counted {
     /// Instructions outside the inner loops.
     pub other: Other,
     /// Share of the vector layers' columns that were read.
     pub columns_read: f64,
-    functions: Vec<(String, f64)>,
 }
 
 /// Counts one setting; one that is too large for QEMU is extrapolated from two
@@ -96,7 +74,7 @@ pub fn count(
         let counts = counter.classification(setting)?;
         let stages = setting.stages(network).unwrap_or_default();
         let (other, columns_read) = counts.outside_loops(&stages, kernels)?;
-        Ok(Counted { other, columns_read, functions: counts.largest(NAMED_FUNCTIONS) })
+        Ok(Counted { other, columns_read })
     };
     if from <= MOST_COUNTED || sampler != Sampler::All {
         return measure(setting);
@@ -109,5 +87,61 @@ pub fn count(
         shared: beyond(half.other.shared, whole.other.shared),
         alone: beyond(half.other.alone, whole.other.alone),
     };
-    Ok(Counted { other, functions: Vec::new(), ..whole })
+    Ok(Counted { other, ..whole })
+}
+
+pub const LEFT_OUT: &str = "\
+What the model leaves out. llvm-mca knows pipes and latencies, but no caches:
+activations and the weights at hand are taken to be in the first-level cache
+whenever a loop wants them. Every layer's weights come from main memory once a
+classification, at the bandwidth given, behind or before its arithmetic,
+whichever is longer; a real board's memory is slower for one core, and slower
+when its refresh or a screen is busy. Work outside inner loops runs at a flat
+number of instructions a cycle, and overlaps with nothing. Threads wake, meet
+and share out in no time, the clock never drops, and nothing else runs. Page
+and TLB misses, mispredicted branches and the first classification after
+loading are not there. Cycles are those of inner loops: a whole tile, with the
+start and the end of its sums, takes some 5 to 10 % more, of which the
+instructions are counted among the others. What depends on the data is that of
+the model file and of the clouds of `infer-cpu bench`: inputs of vector layers
+that are 0, and skipped, and products in fp32 that int8 could not rule out.
+Measure a real board with `infer-cpu bench --json`.";
+
+/// The modelled times; what was not counted is empty.
+pub fn times(rows: &[PiRow]) -> Table {
+    let columns: [Column<'_, PiRow>; 10] = [
+        ("sampler", &|row| row.setting.sampler.word().to_owned()),
+        ("from", &|row| row.setting.from.to_string()),
+        ("points", &|row| row.setting.points.to_string()),
+        ("precision", &|row| row.setting.precision.to_string()),
+        ("macs", &|row| row.macs.to_string()),
+        ("points_ms", &|row| digits(row.time.points_ms)),
+        ("vectors_ms", &|row| digits(row.time.vectors_ms)),
+        ("choosing_ms", &|row| digits(row.time.choosing_ms)),
+        ("other_ms", &|row| row.time.other_ms.map(digits).unwrap_or_default()),
+        ("total_ms", &|row| digits(row.time.total_ms)),
+    ];
+    let Machine { threads, hertz, bytes_per_s, instructions_per_cycle } = Machine::PI_5;
+    let title = format!(
+        "Modelled ms: {threads} threads at {} GHz, {} GB/s, {instructions_per_cycle} instructions a \
+         cycle outside inner loops",
+        hertz / 1e9,
+        bytes_per_s / 1e9
+    );
+    Table::of(title, rows, &columns)
+}
+
+/// The inner loops and what llvm-mca makes of them.
+pub fn kernels(kernels: &Kernels, version: &str) -> Table {
+    let share = |kernel: &Kernel| Some(format!("{:.1}", kernel.share_of_peak()? * 100.0));
+    let columns: [Column<'_, &Kernel>; 6] = [
+        ("inner loop", &|kernel| kernel.name.clone()),
+        ("products", &|kernel| kernel.work.to_string()),
+        ("instructions", &|kernel| format!("{:.0}", kernel.cost.instructions)),
+        ("cycles", &|kernel| format!("{:.2}", kernel.cost.cycles)),
+        ("products/cycle", &|kernel| format!("{:.2}", kernel.work as f64 / kernel.cost.cycles)),
+        ("% of peak", &|kernel| share(kernel).unwrap_or_default()),
+    ];
+    let title = format!("Inner loops as compiled, one round, by {version} as Neoverse N1");
+    Table::of(title, &kernels.all().collect::<Vec<_>>(), &columns)
 }

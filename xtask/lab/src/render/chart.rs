@@ -6,7 +6,6 @@ use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// An axis and what it shows, with its unit.
 pub enum Axis<'a> {
     /// Equal steps are equal factors.
     Logarithmic(&'a str),
@@ -14,32 +13,23 @@ pub enum Axis<'a> {
     Percent(&'a str),
 }
 
-/// One measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dot {
-    /// Horizontal position.
     pub x: f64,
-    /// Vertical position.
     pub y: f64,
-    /// What it is.
     pub tip: String,
-    /// Whether it is filled.
     pub filled: bool,
 }
 
-/// Dots of one colour.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
-    /// Its name in the legend.
     pub name: String,
-    /// The dots.
     pub dots: Vec<Dot>,
     /// Whether a line joins the filled ones.
     pub joined: bool,
 }
 
 impl Series {
-    /// A series of each name.
     pub fn by_name(dots: BTreeMap<&str, Vec<Dot>>, joined: bool) -> Vec<Self> {
         let series = |(name, dots): (&str, _)| Self { name: name.to_owned(), dots, joined };
         dots.into_iter().map(series).collect()
@@ -57,13 +47,11 @@ const PLOT_Y: Range<f64> = 40.0..344.0;
 /// From one series of a file's legend to the next.
 const LEGEND_LINE: f64 = 20.0;
 
-/// What a page's style sheet says of charts, for a file of its own.
+/// The part of a page's style sheet for charts, for a separate file.
 const FILE_STYLE: &str = ".grid line{stroke:#ddd}.hollow{opacity:.35}[data-tip]{display:none}";
 
-/// Most steps between two ticks.
 const MOST_STEPS: f64 = 6.0;
 
-/// An axis with the range of values that it shows.
 struct Scale<'a> {
     axis: &'a Axis<'a>,
     /// In values, or in powers of ten if the axis is logarithmic.
@@ -74,13 +62,10 @@ struct Scale<'a> {
 
 /// A chart with one message.
 pub struct Chart<'a> {
-    /// The message, in words.
     pub message: String,
     /// How to read the dots; may be empty.
     pub caption: &'a str,
-    /// The horizontal axis.
     pub x: Axis<'a>,
-    /// The vertical axis.
     pub y: Axis<'a>,
     /// The dots. Those without a place on an axis (such as 0 on a logarithmic one) are
     /// left out.
@@ -88,7 +73,6 @@ pub struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// The chart as part of a page.
     pub fn figure(&self) -> Markup {
         html! {
             figure class="chart" {
@@ -197,7 +181,7 @@ impl Axis<'_> {
         label
     }
 
-    /// What is drawn in proportion: powers of ten, or the value itself.
+    /// The number that is drawn in proportion: a power of ten, or the value itself.
     fn unit(&self, value: f64) -> f64 {
         if matches!(self, Self::Logarithmic(_)) { value.log10() } else { value }
     }
@@ -251,7 +235,7 @@ fn linear_ticks(range: &Range<f64>) -> Vec<f64> {
     (first..=last).map(|i| i as f64 * step).collect()
 }
 
-/// Of a range of exponents: 1, 2, 5, 10 over a short one, 1, 3, 10 over a longer one, and
+/// Ticks of a range of exponents: 1, 2, 5, 10 over a short one, 1, 3, 10 over a longer one, and
 /// powers of ten alone over a long one.
 fn logarithmic_ticks(range: &Range<f64>) -> Vec<f64> {
     let decades = range.end - range.start;
@@ -308,13 +292,6 @@ mod tests {
         assert_eq!(figure.matches("data-tip").count(), 2);
         assert!(figure.contains(r#"data-tip="a &lt; b""#), "{figure}");
         assert!(figure.contains("<h3>message</h3>") && figure.contains("polyline"), "{figure}");
-    }
-
-    #[test]
-    fn dots_without_a_place_are_left_out() {
-        let figure = drawn(vec![dot(0.0, 1.0, "0"), dot(f64::NAN, 1.0, "NaN"), dot(1.0, 1.0, "1")]);
-        assert_eq!(figure.matches("data-tip").count(), 1);
-        assert!(drawn(Vec::new()).contains("</svg>"));
     }
 
     #[test]

@@ -7,20 +7,16 @@ const STYLE: &str = include_str!("../../../../assets/page/page.css");
 const TABS: &str = include_str!("../../../../assets/page/page.js");
 const CLOUDS: &str = include_str!("../../../../assets/page/cloud.js");
 
-/// One chapter of a page.
 pub struct Chapter {
     /// Its anchor: letters and hyphens.
     pub id: String,
-    /// A few words for its tab.
     pub tab: String,
     /// Its heading: what a reader wants to know.
     pub title: String,
-    /// What it shows.
     pub body: Markup,
 }
 
 impl Chapter {
-    /// A chapter with the anchor `id`.
     pub fn new(id: &str, tab: &str, title: &str, body: Markup) -> Self {
         Self { id: id.to_owned(), tab: tab.to_owned(), title: title.to_owned(), body }
     }
@@ -57,44 +53,15 @@ pub fn of(title: &str, lead: &Markup, chapters: &[Chapter]) -> String {
     page.into_string()
 }
 
-/// A cloud that a reader can rotate.
-pub struct Cloud<'a> {
-    /// Coordinates in thousandths.
-    pub points: &'a str,
-    /// A digit for the colour of each point.
-    pub colours: &'a str,
-    /// The colours that the digits mean.
-    pub palette: &'a str,
-    /// Width and height.
-    pub pixels: [u32; 2],
-    /// Of the points of the first colour and of all others, pixels.
-    pub radii: [f32; 2],
-    /// How high above the cloud the viewer is at first.
-    pub elevation_rad: f32,
-}
-
-impl Cloud<'_> {
-    /// What most clouds have; they have no points yet.
-    pub const EMPTY: Self = Self {
-        points: "",
-        colours: "",
-        palette: "",
-        pixels: [480, 360],
-        radii: [1.6, 3.4],
-        elevation_rad: 0.35,
-    };
-
-    /// The cloud above its caption.
-    pub fn figure(&self, caption: &Markup) -> Markup {
-        let Self { points, colours, palette, pixels: [width, height], radii, elevation_rad } = self;
-        html! {
-            figure {
-                canvas class="cloud" width=(width) height=(height) data-points=(points)
-                    data-colours=(colours) data-palette=(palette)
-                    data-radii=(format!("{} {}", radii[0], radii[1]))
-                    data-elevation=(elevation_rad) {}
-                figcaption { (caption) }
-            }
+/// A cloud that a reader can rotate, above its caption: coordinates in thousandths, a digit for the
+/// colour of each point, and the colours that the digits mean.
+pub fn cloud(points: &str, colours: &str, palette: &str, caption: &Markup) -> Markup {
+    html! {
+        figure {
+            canvas class="cloud" width="480" height="360" data-points=(points)
+                data-colours=(colours) data-palette=(palette) data-radii="1.6 3.4"
+                data-elevation="0.35" {}
+            figcaption { (caption) }
         }
     }
 }

@@ -1,54 +1,103 @@
-//! Tables: the same rows as text for a terminal and as HTML for a page.
+//! Tables: the same rows as text for a terminal, as Markdown, CSV and HTML.
 
 pub use edgepuck_program::significant_digits::digits;
+use formats::atomic;
+use formats::interval::wilson;
+use infer_cpu::Evaluation;
 use maud::{Markup, html};
+use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::path::Path;
 
-/// Rows of words under a heading.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Table {
-    title: String,
-    heading: Vec<String>,
-    rows: Vec<Row>,
+    pub title: String,
+    pub heading: Vec<String>,
+    pub rows: Vec<Vec<Cell>>,
+    /// Numbers of the rows that a page sets in bold.
+    marked: Vec<usize>,
 }
 
-struct Row {
-    is_marked: bool,
-    cells: Vec<Cell>,
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Cell {
+    Text(String),
+    /// A number and its decimals.
+    Number(f64, usize),
+    /// A count and the count of all.
+    Share(usize, usize),
+    /// A mean of shares, and half the width of its 95 % interval.
+    Mean(f64, f64),
 }
 
-/// A cell of a table.
-#[derive(Default)]
-pub struct Cell {
-    /// Its value.
-    pub text: String,
-    /// A remark, such as the value's interval; may be empty.
-    pub note: String,
-    /// A share that shades the cell on a page.
-    pub share: Option<f64>,
-}
-
-/// A column of a table: its heading, and what it says of an item.
+/// A column of a table: its heading, and its words for an item.
 pub type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> String);
 
 impl From<String> for Cell {
     fn from(text: String) -> Self {
-        Self { text, ..Self::default() }
+        Self::Text(text)
     }
 }
 
 impl Cell {
+    pub const EMPTY: Self = Self::Text(String::new());
+
+    /// A number; empty if it is not finite.
+    pub fn number(value: f64, digits: usize) -> Self {
+        if value.is_finite() { Self::Number(value, digits) } else { Self::EMPTY }
+    }
+
+    pub fn instance(found: &Evaluation) -> Self {
+        Self::Share(found.correct(), found.total())
+    }
+
+    pub fn class(found: &Evaluation) -> Self {
+        let (mean, half) = found.class_accuracy();
+        Self::Mean(mean, half)
+    }
+
+    /// Value and 95 % interval.
+    pub fn numbers(&self) -> (Option<f64>, Option<[f64; 2]>) {
+        match *self {
+            Self::Text(_) => (None, None),
+            Self::Number(value, _) => (Some(value), None),
+            Self::Share(correct, n) => {
+                let (low, high) = wilson(correct, n);
+                (Some(correct as f64 / n.max(1) as f64), Some([low, high]))
+            }
+            Self::Mean(mean, half) => (Some(mean), Some([mean - half, mean + half])),
+        }
+    }
+
+    pub fn text(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Number(value, digits) => format!("{value:.digits$}"),
+            Self::Share(..) | Self::Mean(..) => {
+                self.numbers().0.map_or(String::new(), |share| format!("{} %", percent(share)))
+            }
+        }
+    }
+
+    /// The interval in words; may be empty.
+    fn interval(&self) -> String {
+        let words = |[low, high]: [f64; 2]| format!("{} to {}", percent(low), percent(high));
+        self.numbers().1.map_or(String::new(), words)
+    }
+
+    /// A cell shaded by its share, if it is one.
     fn html(&self) -> Markup {
-        let opacity = self.share.map(|share| 0.45 * share);
+        let share = self.numbers().0.filter(|_| !matches!(self, Self::Number(..)));
+        let opacity = share.map(|share| 0.45 * share);
         let shade = opacity.map(|opacity| format!("background:rgba(23,99,199,{opacity:.2})"));
-        html! { td style=[shade] { (self.text) @if !self.note.is_empty() { small { (self.note) } } } }
+        let interval = self.interval();
+        html! { td style=[shade] { (self.text()) @if !interval.is_empty() { small { (interval) } } } }
     }
 }
 
 impl Table {
-    /// A table without rows.
     pub fn new(title: impl Into<String>, heading: &[&str]) -> Self {
         let heading = heading.iter().map(|&word| word.to_owned()).collect();
-        Self { title: title.into(), heading, rows: Vec::new() }
+        Self { title: title.into(), heading, ..Self::default() }
     }
 
     /// A table with a row for each of `items`.
@@ -61,7 +110,6 @@ impl Table {
         table
     }
 
-    /// The rows of a CSV file.
     pub fn from_csv(title: &str, bytes: &[u8]) -> anyhow::Result<Self> {
         let mut csv = csv::Reader::from_reader(bytes);
         let mut table = Self::new(title, &csv.headers()?.iter().collect::<Vec<_>>());
@@ -73,19 +121,24 @@ impl Table {
 
     /// Adds a row, as long as the heading.
     pub fn push<C: Into<Cell>>(&mut self, cells: Vec<C>) {
-        self.push_marked(false, cells);
-    }
-
-    /// Adds a row, which is set in bold on a page if it `is_marked`.
-    pub fn push_marked<C: Into<Cell>>(&mut self, is_marked: bool, cells: Vec<C>) {
-        let cells: Vec<Cell> = cells.into_iter().map(Into::into).collect();
         debug_assert_eq!(cells.len(), self.heading.len());
-        self.rows.push(Row { is_marked, cells });
+        self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// How many rows there are.
-    pub fn len(&self) -> usize {
-        self.rows.len()
+    /// Adds a row of cells that are measured one after another, behind its name.
+    pub fn measure(
+        &mut self,
+        name: impl Into<String>,
+        cells: impl IntoIterator<Item = anyhow::Result<Cell>>,
+    ) -> anyhow::Result<()> {
+        let name = std::iter::once(Ok(Cell::Text(name.into())));
+        let cells = name.chain(cells).collect::<anyhow::Result<Vec<Cell>>>()?;
+        self.push(cells);
+        Ok(())
+    }
+
+    pub fn mark(&mut self) {
+        self.marked.push(self.rows.len() - 1);
     }
 
     /// The heading and the rows as a CSV file.
@@ -93,37 +146,30 @@ impl Table {
         let mut csv = csv::Writer::from_writer(Vec::new());
         csv.write_record(&self.heading)?;
         for row in &self.rows {
-            csv.write_record(row.cells.iter().map(|cell| &cell.text))?;
+            csv.write_record(row.iter().map(Cell::text))?;
         }
         Ok(csv.into_inner()?)
     }
 
     /// The table as Markdown, under its title.
     pub fn markdown(&self) -> String {
-        let line = |words: Vec<&str>| format!("| {} |\n", words.join(" | "));
-        let heading = self.heading.iter().map(String::as_str).collect();
-        let rows =
-            self.rows.iter().map(|row| row.cells.iter().map(|cell| cell.text.as_str()).collect());
+        let line = |words: Vec<String>| format!("| {} |\n", words.join(" | "));
+        let rows = self.rows.iter().map(|row| row.iter().map(Cell::text).collect());
         let body: String = rows.map(line).collect();
-        format!(
-            "## {}\n\n{}{}{body}",
-            self.title,
-            line(heading),
-            line(vec!["---"; self.heading.len()])
-        )
+        let rule = vec!["---".to_owned(); self.heading.len()];
+        format!("## {}\n\n{}{}{body}", self.title, line(self.heading.clone()), line(rule))
     }
 
-    /// The table as HTML.
     pub fn html(&self) -> Markup {
         html! {
             div class="scroll" {
                 table {
                     @if !self.title.is_empty() { caption { (self.title) } }
                     thead { tr { @for word in &self.heading { th scope="col" { (word) } } } }
-                    tbody { @for row in &self.rows {
-                        tr class=[row.is_marked.then_some("marked")] {
-                            @for (i, cell) in row.cells.iter().enumerate() {
-                                @if i == 0 { th scope="row" { (cell.text) } } @else { (cell.html()) }
+                    tbody { @for (number, row) in self.rows.iter().enumerate() {
+                        tr class=[self.marked.contains(&number).then_some("marked")] {
+                            @for (i, cell) in row.iter().enumerate() {
+                                @if i == 0 { th scope="row" { (cell.text()) } } @else { (cell.html()) }
                             }
                         }
                     } }
@@ -133,11 +179,28 @@ impl Table {
     }
 }
 
+/// Prints `tables`, and writes them to the Markdown file `report`, if one is asked for.
+pub fn publish(tables: &[Table], report: Option<&Path>) -> anyhow::Result<()> {
+    tables.iter().for_each(|table| print!("{table}"));
+    if let Some(file) = report {
+        let text: Vec<String> = tables.iter().map(|table| table.markdown() + "\n").collect();
+        atomic::write_bytes(file, text.concat())?;
+    }
+    Ok(())
+}
+
+/// Writes `record` to the JSON file `file`, if one is asked for.
+pub fn write_json(record: &impl Serialize, file: Option<&Path>) -> anyhow::Result<()> {
+    if let Some(file) = file {
+        atomic::write_bytes(file, serde_json::to_string_pretty(record)? + "\n")?;
+    }
+    Ok(())
+}
+
 /// As text: the first column is flush left, the others are flush right.
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let words = |row: &Row| row.cells.iter().map(|cell| cell.text.clone()).collect();
-        let body = self.rows.iter().map(words);
+        let body = self.rows.iter().map(|row| row.iter().map(Cell::text).collect());
         let rows: Vec<Vec<String>> = std::iter::once(self.heading.clone()).chain(body).collect();
         let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.heading.len()).map(width).collect();
@@ -161,12 +224,10 @@ pub fn millions_per_s(count: usize, seconds: f64) -> String {
     if seconds > 0.0 { digits(count as f64 / seconds / 1e6) } else { "-".to_owned() }
 }
 
-/// `seconds` in milliseconds.
 pub fn milliseconds(seconds: f64) -> String {
     digits(seconds * 1e3)
 }
 
-/// A share in percent with one decimal.
 pub fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share)
 }
@@ -180,7 +241,8 @@ mod tests {
         let columns: [Column<'_, u8>; 2] =
             [("name", &|_| "a < b".to_owned()), ("ms", &|ms| ms.to_string())];
         let mut table = Table::of("title", &[1], &columns);
-        table.push_marked(true, vec!["c".to_owned(), "10".to_owned()]);
+        table.push(vec!["c".to_owned(), "10".to_owned()]);
+        table.mark();
         assert_eq!(table.to_string(), "\ntitle\n  name   ms\n  a < b   1\n  c      10\n");
         assert_eq!(
             table.markdown(),
@@ -189,16 +251,17 @@ mod tests {
         let html = table.html().into_string();
         assert!(html.contains("<th scope=\"row\">a &lt; b</th><td>1</td>"), "{html}");
         assert!(html.contains("<tr class=\"marked\">"), "{html}");
+        let csv = table.to_csv().unwrap();
+        assert_eq!(Table::from_csv("", &csv).unwrap().to_csv().unwrap(), csv);
+        assert!(Table::from_csv("caption", b"a,b\n1\n").is_err());
     }
 
     #[test]
-    fn a_csv_file_becomes_rows() {
-        let csv = b"a,b\n1,\"x, y\"\n";
-        let table = Table::from_csv("caption", csv).unwrap();
-        assert_eq!(table.to_csv().unwrap(), csv);
-        let found = table.html().into_string();
-        assert!(found.contains("<th scope=\"col\">a</th>"));
-        assert!(found.contains("<th scope=\"row\">1</th>") && found.contains("<td>x, y</td>"));
-        assert!(Table::from_csv("caption", b"a,b\n1\n").is_err());
+    fn a_share_has_its_interval() {
+        assert_eq!(Cell::Share(9, 10).text(), "90.0 %");
+        // Wilson 1927 for 9 of 10.
+        assert_eq!(Cell::Share(9, 10).interval(), "59.6 to 98.2");
+        assert_eq!(Cell::Number(1.234, 1).text(), "1.2");
+        assert_eq!(Cell::number(f64::NAN, 1), Cell::EMPTY);
     }
 }

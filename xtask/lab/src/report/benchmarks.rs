@@ -11,13 +11,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use xtask::workspace::file_name;
 
-/// What is read of `bench infer --json`.
+/// The fields of `bench infer --json` that are needed.
 #[derive(Deserialize)]
 struct Comparison {
     classifying: Vec<Measured>,
 }
 
-/// One engine on clouds of one size.
 #[derive(Deserialize)]
 struct Measured {
     engine: String,
@@ -28,7 +27,6 @@ struct Measured {
     wall_ns: Vec<f64>,
 }
 
-/// Every record in `bench`.
 pub fn body(bench: &Path) -> Result<Markup> {
     let records: Vec<_> = entries(bench)?.into_iter().filter(|path| path.is_dir()).collect();
     if records.is_empty() {
@@ -60,7 +58,6 @@ fn one(folder: &Path) -> Result<Markup> {
     })
 }
 
-/// Milliseconds by points, one thread.
 fn by_points(comparison: &Comparison) -> Chart<'static> {
     let mut series: BTreeMap<&str, Vec<Dot>> = BTreeMap::new();
     for measured in comparison.on_one_thread() {

@@ -25,7 +25,6 @@ struct Growth {
     unit: String,
 }
 
-/// Drawings of the record in `folder`, and what else lies beside it.
 pub fn body(folder: &Path) -> Result<Markup> {
     let path = folder.join("growth.csv");
     let Some(rows) = lines::<Growth>(&path)? else {
@@ -68,7 +67,6 @@ impl Growth {
     }
 }
 
-/// Errors of one quantity by one parameter; a colour a precision.
 fn chart<'a>(parameter: &'a str, rows: &[&'a Growth]) -> Chart<'a> {
     let mut series: BTreeMap<&str, Vec<Dot>> = BTreeMap::new();
     for row in rows {

@@ -1,21 +1,18 @@
 //! `cargo xtask report`: every record on one self-contained page.
 //!
-//! Each file makes a chapter: [`scans`] shows clouds that can be rotated, [`live`] a turn of
-//! a drive whose clusters are named, [`records`] the tables under `assets/reports`, [`growth`] errors beside their bounds,
-//! [`benchmarks`] the records under `assets/bench`. For a missing record the page names
-//! the command that makes it.
+//! Each file makes a chapter: [`scans`] shows clouds that can be rotated, [`records`] the tables
+//! under `assets/reports`, [`growth`] errors beside their bounds, [`benchmarks`] the records under
+//! `assets/bench`. For a missing record the page names the command that makes it.
 
 mod benchmarks;
 mod growth;
-mod live;
 mod records;
 mod scans;
 
 use crate::render::page::{self, Chapter};
 use crate::study::trade;
 use anyhow::{Context, Result, ensure};
-use edgepuck_program::Outcome;
-use edgepuck_program::trade_record;
+use edgepuck_program::{Outcome, trade_record};
 use formats::atomic;
 use maud::{Markup, html};
 use serde::de::DeserializeOwned;
@@ -23,9 +20,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use xtask::workspace;
 
-/// Flags of `report`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ReportArgs {
     /// Folder that holds the folders reports, bench and meshes [default: this repository's assets]
     #[arg(long, value_name = "DIR")]
     assets: Option<PathBuf>,
@@ -35,29 +31,27 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// Writes the page.
-pub fn run(args: &Args) -> Result<Outcome> {
+pub fn run(args: &ReportArgs) -> Result<Outcome> {
     let assets = args.assets.clone().unwrap_or_else(|| workspace::root().join("assets"));
     ensure!(assets.is_dir(), "--assets: expected a folder, found {}", assets.display());
     let reports = assets.join("reports");
     let scans = scans::body(&assets)?;
     let mut chapters = vec![Chapter::new("scans", "Scans", "What does a scan look like?", scans)];
-    let question = "What does it see in a street?";
-    chapters.push(Chapter::new("live", "Live", question, live::body()?));
     chapters.extend(trade_chapters(&reports.join("trade/trade.csv"))?);
     let reality = records::reality(&reports.join("reality"))?;
-    let question = "What do networks make of real sensors' scans?";
-    chapters.push(Chapter::new("reality", "Reality", question, reality));
     let effects = records::ablations(&reports.join("ablations"))?;
-    let question = "Which effects of a scan matter to a classifier?";
-    chapters.push(Chapter::new("effects", "Effects", question, effects));
     let errors = growth::body(&reports.join("extremes"))?;
-    chapters.push(Chapter::new("extremes", "Errors", "How large can errors get?", errors));
     let paper = records::reproduction(&reports)?;
-    chapters.push(Chapter::new("paper", "Paper", "Do the paper's experiments hold?", paper));
     let speed = benchmarks::body(&assets.join("bench"))?;
-    let question = "How fast is it beside other engines?";
-    chapters.push(Chapter::new("benchmarks", "Speed", question, speed));
+    for (id, tab, question, body) in [
+        ("reality", "Reality", "What do networks make of real sensors' scans?", reality),
+        ("effects", "Effects", "Which effects of a scan matter to a classifier?", effects),
+        ("extremes", "Errors", "How large can errors get?", errors),
+        ("paper", "Paper", "Do the paper's experiments hold?", paper),
+        ("benchmarks", "Speed", "How fast is it beside other engines?", speed),
+    ] {
+        chapters.push(Chapter::new(id, tab, question, body));
+    }
     let lead = html! {
         p { "LiDAR scans of meshes and the networks that classify them: every measurement of edgepuck "
             (env!("CARGO_PKG_VERSION")) " in one file that works offline. Touch or point at a dot for its "
@@ -80,12 +74,12 @@ fn trade_chapters(record: &Path) -> Result<Vec<Chapter>> {
     Ok(trade::page::chapters(&trade_record::read(record)?))
 }
 
-/// Says that there is no record, and which command makes it.
+/// A remark that there is no record, with the command that makes it.
 fn missing(record: &Path, command: &str) -> Markup {
     html! { p { "There is no " (record.display()) " yet: " code { (command) } " makes it." } }
 }
 
-/// The file's text; nothing where there is no file.
+/// The file's text; `None` if there is no file.
 fn text(path: &Path) -> Result<Option<String>> {
     match fs::read_to_string(path) {
         Ok(text) => Ok(Some(text)),
@@ -94,7 +88,7 @@ fn text(path: &Path) -> Result<Option<String>> {
     }
 }
 
-/// The lines of a record; nothing where there is no file.
+/// The lines of a record; `None` if there is no file.
 fn lines<T: DeserializeOwned>(csv: &Path) -> Result<Option<Vec<T>>> {
     let Some(text) = text(csv)? else { return Ok(None) };
     let lines: Result<Vec<T>, csv::Error> =
@@ -102,7 +96,7 @@ fn lines<T: DeserializeOwned>(csv: &Path) -> Result<Option<Vec<T>>> {
     lines.map(Some).with_context(|| format!("reading {}", csv.display()))
 }
 
-/// What stands in `folder`, sorted; nothing where there is no such folder.
+/// The sorted entries of `folder`; empty if there is no such folder.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.exists() {
         return Ok(Vec::new());
@@ -115,7 +109,6 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// The README of a record.
 fn remarks(folder: &Path) -> Result<Markup> {
     let text = text(&folder.join("README.md"))?;
     Ok(

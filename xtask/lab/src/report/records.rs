@@ -2,7 +2,7 @@
 
 use super::{entries, lines, missing, remarks, text};
 use crate::render::page;
-use crate::render::table::{Table, percent};
+use crate::render::table::Table;
 use anyhow::Result;
 use maud::{Markup, html};
 use serde::Deserialize;
@@ -25,7 +25,6 @@ pub fn reality(folder: &Path) -> Result<Markup> {
     })
 }
 
-/// The heading of a Markdown file.
 fn title(text: &str) -> &str {
     text.lines().next().unwrap_or_default().trim_start_matches('#').trim()
 }
@@ -33,58 +32,14 @@ fn title(text: &str) -> &str {
 /// How much each effect matters, of the record in `folder`.
 pub fn ablations(folder: &Path) -> Result<Markup> {
     let path = folder.join("ablations.csv");
-    let (Some(rows), Some(csv)) = (lines(&path)?, text(&path)?) else {
+    let (Some(main), Some(csv)) = (text(&folder.join("README.md"))?, text(&path)?) else {
         return Ok(missing(&path, "cargo xtask ablate"));
     };
-    let (message, gains) = gains(&rows);
     let every_row = Table::from_csv("", csv.as_bytes())?;
     Ok(html! {
-        h3 { (message) }
-        p { "Networks are trained with and without each effect of a scan, all else equal, and tested on "
-            "scans that have it: " code { "cargo xtask ablate" } "." }
-        (gains.html())
-        (remarks(folder)?)
-        details { summary { "All " (every_row.len()) " rows" } (every_row.html()) }
+        (page::markdown(&main))
+        details { summary { "All " (every_row.rows.len()) " rows" } (every_row.html()) }
     })
-}
-
-/// A line of `cargo xtask ablate`'s CSV.
-#[derive(Deserialize)]
-struct Ablation {
-    effect: String,
-    trained_on: String,
-    tested_on: String,
-    accuracy: Option<f64>,
-}
-
-/// The largest gain in words, and the gain of training with each effect.
-fn gains(rows: &[Ablation]) -> (String, Table) {
-    let mean = |effect: &str, trained_on: &str| {
-        let of = rows.iter().filter(|row| {
-            (row.effect.as_str(), row.trained_on.as_str(), row.tested_on.as_str())
-                == (effect, trained_on, "with")
-        });
-        let accuracies: Vec<f64> = of.filter_map(|row| row.accuracy).collect();
-        (!accuracies.is_empty()).then(|| accuracies.iter().sum::<f64>() / accuracies.len() as f64)
-    };
-    let mut effects: Vec<&str> = rows.iter().map(|row| row.effect.as_str()).collect();
-    effects.dedup();
-    let mut gains: Vec<(&str, f64, f64)> = effects
-        .into_iter()
-        .filter_map(|effect| Some((effect, mean(effect, "with")?, mean(effect, "without")?)))
-        .collect();
-    gains.sort_by(|a, b| (b.1 - b.2).total_cmp(&(a.1 - a.2)));
-    let points = |with: f64, without: f64| format!("{:+.1}", 100.0 * (with - without));
-    let message = gains.first().map_or_else(String::new, |&(effect, with, without)| {
-        format!("Training with {effect} gains most: {} points.", points(with, without))
-    });
-    let heading = ["effect", "trained with it, %", "trained without it, %", "gain, points"];
-    let mut table = Table::new("Correct on scans that have the effect, means over seeds", &heading);
-    for (effect, with, without) in gains {
-        let figures = [percent(with), percent(without), points(with, without)];
-        table.push(std::iter::once(effect.to_owned()).chain(figures).collect());
-    }
-    (message, table)
 }
 
 /// A cell of `cargo xtask reproduce`'s CSV.

@@ -1,6 +1,6 @@
 //! Clouds that can be rotated: one mesh as several sensors see it.
 
-use crate::render::page::Cloud;
+use crate::render::page;
 use anyhow::{Context, Result};
 use formats::rng::StreamKey;
 use glam::DVec3;
@@ -20,7 +20,7 @@ use xtask::workspace::file_name;
 const SENSORS: [(&str, f64); 4] =
     [("vlp32c", 0.0), ("vlp32c", 0.02), ("vlp16", 0.0), ("generic-static", 0.0)];
 
-/// As gen-dataset's rotating set has it, from one of its sides.
+/// As in gen-dataset's rotating set, from one side.
 const DISTANCE_M: f64 = 3.0;
 const ELEVATION_DEG: f64 = 20.0;
 const AZIMUTH_DEG: f64 = 45.0;
@@ -28,7 +28,6 @@ const AZIMUTH_DEG: f64 = 45.0;
 /// Points that a canvas draws at most, so that a phone turns them.
 const MOST_POINTS: usize = 6000;
 
-/// One mesh of `assets`, as each of the sensors sees it.
 pub fn body(assets: &Path) -> Result<Markup> {
     let folder = assets.join("meshes");
     let entries = if folder.exists() { discover(&folder, 0)? } else { Vec::new() };
@@ -45,12 +44,7 @@ pub fn body(assets: &Path) -> Result<Markup> {
         p { (file_name(&entry.path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "
             (ELEVATION_DEG) "° below it. Made now, on the CPU." }
         div class="clouds" { @for (sensor, noise_m, cloud) in &clouds {
-            (Cloud {
-                points: &thousandths(cloud),
-                colours: &"0".repeat(shown(cloud).count()),
-                palette: "#1763c7",
-                ..Cloud::EMPTY
-            }.figure(&html! {
+            (page::cloud(&thousandths(cloud), &"0".repeat(shown(cloud).count()), "#1763c7", &html! {
                 (sensor) @if *noise_m > 0.0 { ", noise " (noise_m) " m" } ": " (cloud.len()) " points. "
                 "Drag to rotate."
             }))
@@ -70,7 +64,6 @@ fn scan(target: &Target, sensor: &str, sigma_m: f64) -> Result<Vec<[f32; 3]>> {
     Ok(sim_gpu::internals::scan::scan(&OpenCaster::Cpu(effects), target, &request)?.positions)
 }
 
-/// Some of the points, spread over all.
 fn shown(cloud: &[[f32; 3]]) -> impl Iterator<Item = &[f32; 3]> {
     cloud.iter().step_by(cloud.len().div_ceil(MOST_POINTS).max(1))
 }

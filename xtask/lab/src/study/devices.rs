@@ -1,17 +1,17 @@
-//! `cargo xtask bench devices`: the same meshes on every adapter and on the CPU.
+//! The same meshes on every adapter and on the CPU.
 //!
 //! Positions must be equal within the promised bound, classes must be equal, and so must
 //! the number of points but for beams at silhouettes, which are listed.
 
-use std::path::PathBuf;
-
-use anyhow::{Result, bail};
-use clap::Args;
+use crate::measure::backends::Backend;
+use crate::measure::bench_mesh::{BenchMesh, target};
+use crate::measure::ray_set::vlp32c;
+use crate::render::table::{Column, Table, digits};
+use anyhow::Result;
 use edgepuck_shapes::{ShapeClass, generate};
-use formats::atomic;
 use glam::{DAffine3, DVec3};
 use harness::judge::{RANGE_TOLERANCE, SILHOUETTE_RAD, near_edge};
-use infer_cpu::{Classifier, Options};
+use infer_cpu::Classifier;
 use serde::Serialize;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
@@ -21,77 +21,24 @@ use sim_gpu::internals::resolve::{Hit, Hits};
 use sim_gpu::internals::scan::{ScanRequest, scan_many};
 use sim_gpu::internals::target::Target;
 
-use crate::measure::backends::{self, Backend};
-use crate::measure::bench_mesh::{self, BenchMesh, target};
-use crate::measure::ray_set::vlp32c;
-use crate::render::table::{Column, Table, digits};
-use xtask::workspace::root;
-
 /// From the middle of a mesh of the unit sphere, metres.
 const DISTANCE_M: f64 = 3.0;
-
-/// Flags of `bench devices`.
-#[derive(Args, Debug)]
-pub struct DevicesArgs {
-    /// CSV file to write, with one row for each mesh, view and adapter.
-    #[arg(long, value_name = "FILE")]
-    csv: PathBuf,
-    /// Meshes to measure in addition to the procedural shapes [default: assets/meshes].
-    meshes: Option<PathBuf>,
-    /// Model that classifies, in f32 [default: edge-64 of assets/weights].
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// Number of views of each mesh, spread around it.
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
-    views: u32,
-}
 
 /// One mesh from one side, on one adapter beside the CPU.
 #[derive(Serialize)]
 pub struct Comparison {
-    /// The name of the mesh.
     pub mesh: String,
     view: u32,
-    /// The name of the adapter.
     pub adapter: String,
     points: [usize; 2],
     /// Beams that see another surface, or none.
     silhouettes: Vec<u32>,
-    /// Of them, those that have no silhouette near.
+    /// Of them, those without a silhouette nearby.
     unexplained: usize,
     /// Between positions where both see one.
     apart_m: f64,
     bound_m: f64,
     classes: [String; 2],
-}
-
-/// Compares all adapters with the CPU. Fails if something is unequal.
-pub fn run(args: &DevicesArgs) -> Result<()> {
-    let weights = || root().join("assets/weights/edge-64.safetensors");
-    let model = args.model.clone().unwrap_or_else(weights);
-    let mut classifier = Classifier::load(&model, &Options::default())?;
-    let meshes = args.meshes.clone().unwrap_or_else(|| root().join("assets/meshes"));
-    let mut bench_meshes = bench_mesh::real(&meshes, usize::MAX)?;
-    bench_meshes.extend(ShapeClass::ALL.into_iter().map(shape));
-    let backends = backends::open(None)?;
-    let [cpu, others @ ..] = &backends[..] else { bail!("the CPU is always there") };
-    if others.is_empty() {
-        bail!(
-            "expected an adapter to compare with the CPU, found none; `cargo xtask adapters` lists them"
-        );
-    }
-    let all = compare(&bench_meshes, args.views, (cpu, others), &mut classifier)?;
-    atomic::write_bytes(&args.csv, &csv(&all)?)?;
-    print!("{}", summary(&all, others));
-    match all.iter().find(|comparison| !comparison.is_equal()) {
-        None => Ok(()),
-        Some(c) => bail!(
-            "{}, view {} on {}: expected the points and classes of the CPU",
-            c.mesh,
-            c.view,
-            c.adapter
-        ),
-    }
 }
 
 /// Compares each of `others` with the CPU, on `views` of each mesh.
@@ -122,13 +69,11 @@ pub fn compare(
     Ok(all)
 }
 
-/// The first of the parametric shapes of `class`.
 pub fn shape(class: ShapeClass) -> BenchMesh {
     let mesh = to_world(&generate(class, 0, 0), Up::Z, Normalize::UnitSphere).mesh;
     BenchMesh { name: format!("shape {class}"), mesh }
 }
 
-/// A sensor's look at a mesh.
 struct View<'a> {
     target: &'a Target,
     request: ScanRequest<'a>,
@@ -191,7 +136,7 @@ impl View<'_> {
         (pose.position_m + direction * hit.range_m).to_array()
     }
 
-    /// Whether an edge is as near to `beam` as a silhouette may be.
+    /// Whether an edge is near enough to `beam` to be a silhouette.
     fn is_near_edge(&self, beam: u32) -> bool {
         let frame = RayFrame::new(&self.target.surface, &DAffine3::IDENTITY, &self.request.pose);
         let ray = frame.ray(self.request.pattern.directions[beam as usize]);
@@ -206,7 +151,7 @@ impl Comparison {
     }
 }
 
-fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
+pub fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
     let beams = |all: &[u32]| all.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
     let columns: [Column<'_, Comparison>; 11] = [
         ("mesh", &|c| c.mesh.clone()),
@@ -224,7 +169,6 @@ fn csv(all: &[Comparison]) -> Result<Vec<u8>> {
     Table::of("", all, &columns).to_csv()
 }
 
-/// One row for each of `others`.
 pub fn summary(all: &[Comparison], others: &[Backend]) -> Table {
     let scans = |backend: &Backend| {
         all.iter().filter(|c| c.adapter == backend.name()).collect::<Vec<&Comparison>>()

@@ -1,22 +1,20 @@
 //! `cargo xtask bench frames`: what `edgepuck detect` finds in whole sweeps of real
 //! sensors whose objects are labelled.
 
-use crate::render::table::{Table, percent};
+use crate::render::table::{Table, percent, publish};
 use crate::study::sensor::{mounting::Mounting, sweep};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use edgepuck_program::detect::{Detections, Detector, Object};
 use edgepuck_segment::Label;
+use formats::Scan;
 use formats::interval::wilson;
 use formats::labelled_sweep::{LabelledBox, LabelledSweep, read_labelled_sweep};
-use formats::{Scan, atomic};
 use glam::DVec3;
 use infer_cpu::Options;
 use sim_gpu::internals::sensor::{Layout, SensorProfile};
-use std::fmt::{self, Display, Write};
 use std::path::{Path, PathBuf};
 
-/// Flags of `bench frames`.
 #[derive(Args, Debug)]
 pub struct FramesArgs {
     /// Labelled sweeps as NPZ files with `xyz_mm`, `boxes` and `classes`. Those with `laser` are of
@@ -34,9 +32,9 @@ pub struct FramesArgs {
 
 /// Fewest points of a cluster that is named, as `detect` has it.
 const MIN_CLUSTER: usize = 20;
-/// Objects of fewer points are not asked for.
+/// Objects of fewer points are not evaluated.
 const MIN_POINTS: usize = 30;
-/// Nor are objects farther away, metres.
+/// Farther objects are not evaluated, metres.
 const MAX_RANGE_M: f64 = 40.0;
 /// KITTI's camera sees 1,242 pixels at a focal length of 721.5 pixels: 40.7 degrees to
 /// either side of x.
@@ -49,7 +47,7 @@ const SHARE: f64 = 0.5;
 /// Borders of the bins of range, metres.
 const RANGES_M: [f64; 5] = [0.0, 10.0, 20.0, 30.0, MAX_RANGE_M];
 
-/// What labels call the classes of a network for streets.
+/// Labels of datasets, and the classes of a network for streets.
 const CLASSES: [(&str, &str); 16] = [
     ("car", "car"),
     ("van", "car"),
@@ -75,47 +73,31 @@ fn class(label: &str) -> Option<&'static str> {
     CLASSES.iter().find(|(name, _)| *name == label).map(|(_, class)| *class)
 }
 
-/// What became of a labelled car or person.
-enum Outcome {
-    Named,
-    Misnamed(String),
-    Unknown,
-    /// No cluster is mostly it.
-    NotCut,
-}
+/// The outcome of a labelled object that is found and named; others are a few words.
+const NAMED: &str = "named";
+/// No cluster holds most of it.
+const NOT_CUT: &str = "not cut out";
 
-impl Display for Outcome {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Named => f.write_str("named"),
-            Self::Misnamed(class) => write!(f, "called {class}"),
-            Self::Unknown => f.write_str("unknown"),
-            Self::NotCut => f.write_str("not cut out"),
-        }
-    }
-}
-
-/// A labelled car or person, and what became of it.
 struct Asked {
     frame: String,
     source: &'static str,
     class: &'static str,
     range_m: f64,
     n_points: usize,
-    outcome: Outcome,
+    outcome: String,
 }
 
-/// A named cluster that is nothing of its name.
+/// A named cluster without a label of its name.
 struct FalseAlarm {
     frame: String,
     source: &'static str,
     class: String,
-    /// What it is, as far as that is labelled.
+    /// Its label, if it has one.
     truth: String,
     object: String,
 }
 
-/// A sweep, its labels in the sensor's frame, and what was found in it.
+/// A sweep, its labels in the sensor's frame, and the detections.
 struct Judged {
     name: String,
     source: &'static str,
@@ -125,7 +107,6 @@ struct Judged {
     found: Detections,
 }
 
-/// Detects in each frame, prints the tables and writes the report.
 pub fn run(args: &FramesArgs) -> Result<()> {
     let mut detector = Detector::open(&args.model, &Options::default(), MIN_CLUSTER)?;
     let (mut asked, mut alarms, mut sources) = (Vec::new(), Vec::new(), Vec::new());
@@ -135,15 +116,8 @@ pub fn run(args: &FramesArgs) -> Result<()> {
         alarms.extend(judged.false_alarms());
         sources.push(judged.source);
     }
-    let mut report = String::new();
-    for table in [summary(&asked, &alarms, &sources), misses(&asked), alarm_table(&alarms)] {
-        print!("{table}");
-        writeln!(report, "{}", table.markdown())?;
-    }
-    if let Some(file) = &args.report {
-        atomic::write_bytes(file, report)?;
-    }
-    Ok(())
+    let tables = [summary(&asked, &alarms, &sources), misses(&asked), alarm_table(&alarms)];
+    publish(&tables, args.report.as_deref())
 }
 
 impl Judged {
@@ -170,12 +144,11 @@ impl Judged {
         })
     }
 
-    /// Whether objects at `centre_m` are labelled and near enough to be asked for.
+    /// Whether objects at `centre_m` are labelled and near enough to be evaluated.
     fn is_judged(&self, [x, y]: [f64; 2]) -> bool {
         x.hypot(y) <= MAX_RANGE_M && (self.is_all_round || y.atan2(x).abs() <= HALF_VIEW_RAD)
     }
 
-    /// The labelled cars and persons that are asked for.
     fn asked(&self) -> Vec<Asked> {
         let mut asked = Vec::new();
         for one in &self.boxes {
@@ -198,8 +171,8 @@ impl Judged {
         (0..self.points.len()).filter(|&i| one.contains(self.points[i], margin_m)).collect()
     }
 
-    /// What became of the object in `one`, which has the points `inside` that are not ground.
-    fn outcome(&self, one: &LabelledBox, class: &str, inside: &[usize]) -> Outcome {
+    /// The outcome of the object in `one`, with the points `inside`.
+    fn outcome(&self, one: &LabelledBox, class: &str, inside: &[usize]) -> String {
         let labels = &self.found.labels;
         let standing: Vec<_> =
             inside.iter().map(|&i| labels[i]).filter(|label| *label != Label::Ground).collect();
@@ -211,16 +184,16 @@ impl Judged {
             .collect();
         clusters.sort_unstable();
         let largest = clusters.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len());
-        let Some(largest) = largest else { return Outcome::NotCut };
+        let Some(largest) = largest else { return NOT_CUT.to_owned() };
         let (within, all) = self.shared(largest[0], one);
         let holds = largest.len() as f64 >= SHARE * standing.len() as f64;
         if !holds || (within as f64) < SHARE * all as f64 {
-            return Outcome::NotCut;
+            return NOT_CUT.to_owned();
         }
         match self.found.objects.iter().find(|object| object.cluster == largest[0]) {
-            None => Outcome::Unknown,
-            Some(object) if object.class == class => Outcome::Named,
-            Some(object) => Outcome::Misnamed(object.class.clone()),
+            None => "unknown".to_owned(),
+            Some(object) if object.class == class => NAMED.to_owned(),
+            Some(object) => format!("called {}", object.class),
         }
     }
 
@@ -233,7 +206,7 @@ impl Judged {
         })
     }
 
-    /// The named clusters that no box of their class holds mostly.
+    /// The named clusters of which no box of their class holds the larger part.
     fn false_alarms(&self) -> Vec<FalseAlarm> {
         let is_judged = |object: &&Object| {
             let [x, y, _] = object.place.centre_m.map(f64::from);
@@ -276,7 +249,6 @@ fn origin_m(sweep: &LabelledSweep) -> Result<DVec3> {
     Ok(origins.sum::<DVec3>() / sensors.len() as f64)
 }
 
-/// Shares of found and named objects by source, class and range, and false alarms.
 fn summary(asked: &[Asked], alarms: &[FalseAlarm], sources: &[&'static str]) -> Table {
     let mut table = Table::new(
         "Cars and persons of 30 points or more within 40 m",
@@ -287,7 +259,7 @@ fn summary(asked: &[Asked], alarms: &[FalseAlarm], sources: &[&'static str]) -> 
     names.dedup();
     let mut push = |name: String, of: &dyn Fn(&&Asked) -> bool| {
         let of: Vec<_> = asked.iter().filter(of).collect();
-        let named = of.iter().filter(|one| matches!(one.outcome, Outcome::Named)).count();
+        let named = of.iter().filter(|one| one.outcome == NAMED).count();
         if of.is_empty() {
             return;
         }
@@ -327,8 +299,7 @@ fn summary(asked: &[Asked], alarms: &[FalseAlarm], sources: &[&'static str]) -> 
 }
 
 fn misses(asked: &[Asked]) -> Table {
-    let missed: Vec<_> =
-        asked.iter().filter(|one| !matches!(one.outcome, Outcome::Named)).collect();
+    let missed: Vec<_> = asked.iter().filter(|one| one.outcome != NAMED).collect();
     Table::of(
         "What was missed",
         &missed,
@@ -337,7 +308,7 @@ fn misses(asked: &[Asked]) -> Table {
             ("object", &|one| one.class.to_owned()),
             ("range, m", &|one| format!("{:.1}", one.range_m)),
             ("points", &|one| one.n_points.to_string()),
-            ("outcome", &|one| one.outcome.to_string()),
+            ("outcome", &|one| one.outcome.clone()),
         ],
     )
 }

@@ -2,10 +2,10 @@
 
 pub mod ablation;
 pub mod casting;
+mod datasets;
 pub mod devices;
 pub mod frames;
 pub mod gpu;
-mod meshes;
 pub mod numerics;
 mod plan;
 pub mod reproduction;
@@ -14,7 +14,4 @@ pub mod robustness;
 pub mod scale;
 pub mod sensor;
 pub mod sydney;
-#[cfg(test)]
-mod test_clouds;
 pub mod trade;
-pub mod uniform_raster;

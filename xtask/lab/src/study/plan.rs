@@ -4,14 +4,10 @@ use anyhow::Context;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// The sizes of a study.
 pub trait Plan: DeserializeOwned {
-    /// The bundled plan, as TOML.
     const FULL: &'static str;
-    /// The bundled plan of a quick look.
     const QUICK: &'static str;
 
-    /// Checks that every value is in its range.
     fn check(&self) -> anyhow::Result<()>;
 }
 
@@ -29,18 +25,4 @@ pub fn read<P: Plan>(path: Option<&Path>, quick: bool) -> anyhow::Result<P> {
     let plan: P = toml::from_str(&text).with_context(|| format!("{name}: not a valid plan"))?;
     plan.check().with_context(|| name)?;
     Ok(plan)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::{ablation, reproduction};
-    use super::*;
-
-    #[test]
-    fn bundled_plans_are_valid() {
-        for quick in [false, true] {
-            read::<ablation::plan::Plan>(None, quick).unwrap();
-            read::<reproduction::plan::Plan>(None, quick).unwrap();
-        }
-    }
 }

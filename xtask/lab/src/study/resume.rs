@@ -34,6 +34,12 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
     job.run(None, &mut report).map(|_| ()).with_context(|| format!("cannot train {name}"))
 }
 
+/// `recipe` with the fewest epochs that have at least `steps` steps on `clouds` clouds.
+pub fn of_steps(recipe: Recipe, steps: u32, clouds: usize) -> Recipe {
+    let each = (clouds / recipe.batch).max(1) as u32;
+    Recipe { epochs: steps.div_ceil(each).max(1), ..recipe }
+}
+
 /// The result in the JSON file at `path`, or else the one that `make` gives, which
 /// is then written there.
 pub fn result<T: Serialize + DeserializeOwned>(

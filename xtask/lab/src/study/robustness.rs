@@ -1,24 +1,20 @@
-//! `cargo xtask bench robustness`: networks for whole objects, given what is not quite
-//! one: strays, turns, few points, and no object at all; each with and without the
-//! outlier filter, and what the filter costs.
+//! `cargo xtask bench robustness`: networks for whole objects on strays, turns, few points and
+//! negatives, each with and without the outlier filter, and the cost of the filter.
 
 use crate::measure::clock::{Workload, interleave, workload};
-use crate::render::table::{Table, percent};
+use crate::render::table::{Table, percent, publish};
 use anyhow::{Result, bail};
 use clap::Args;
-use formats::atomic;
 use formats::labelled::LabelledSet;
 use formats::rng::StreamKey;
 use formats::split::Split;
 use infer_cpu::sampler::OutlierFilter;
 use infer_cpu::{Classifier, ModelCard, Normalization, Options};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use train::clouds::Clouds;
 use train::evaluate::predictions;
 use train::negatives::{Negative, negative};
 
-/// Flags of `bench robustness`.
 #[derive(Args, Debug)]
 pub struct RobustnessArgs {
     /// Models for whole objects, in the unit sphere (repeat the flag).
@@ -34,7 +30,6 @@ pub struct RobustnessArgs {
 
 /// Seed of all that is drawn here; no training uses its streams' names.
 const SEED: u64 = 0;
-/// Negatives of each kind.
 const NEGATIVES: usize = 300;
 /// Strays lie in the cube of this half edge around the unit sphere's centre.
 const STRAY_REACH: f64 = 1.5;
@@ -43,10 +38,8 @@ const FEW: usize = 100;
 /// Repeats of each timing, and clouds that one repeat classifies.
 const ROUNDS: usize = 9;
 const TIMED: usize = 50;
-/// Sizes of the clouds that the filter alone is timed on.
 const SIZES: [usize; 4] = [100, 1024, 32_768, 1_000_000];
 
-/// Measures the models, prints the tables and writes the report.
 pub fn run(args: &RobustnessArgs) -> Result<()> {
     let clouds = Clouds::read(&args.data, Split::Test, usize::MAX)?;
     let inputs = inputs(&clouds);
@@ -56,18 +49,10 @@ pub fn run(args: &RobustnessArgs) -> Result<()> {
     }
     tables.push(cost_in_classifier(&args.model, &clouds)?);
     tables.push(cost_alone(&clouds)?);
-    let mut report = String::new();
-    for table in tables {
-        print!("{table}");
-        writeln!(report, "{}", table.markdown())?;
-    }
-    if let Some(file) = &args.report {
-        atomic::write_bytes(file, report)?;
-    }
-    Ok(())
+    publish(&tables, args.report.as_deref())
 }
 
-/// A set of clouds that something was done to.
+/// A set of changed clouds, or of negatives.
 struct Input {
     name: String,
     set: LabelledSet,
@@ -144,7 +129,6 @@ fn filter(is_on: bool) -> Options {
     Options { outlier_filter: Some(is_on), ..Options::default() }
 }
 
-/// The shares of right answers of the model at `path`.
 fn answers(path: &Path, clouds: &Clouds, inputs: &[Input]) -> Result<Table> {
     let card = ModelCard::read(path)?;
     if card.normalization != Normalization::UnitSphere || !card.classes.starts_with(&clouds.classes)
@@ -170,11 +154,7 @@ fn answers(path: &Path, clouds: &Clouds, inputs: &[Input]) -> Result<Table> {
         let right = |found: &[infer_cpu::Prediction]| {
             let labelled = found.iter().zip(&set.labels);
             let is_right = |(found, label): &(&infer_cpu::Prediction, &usize)| {
-                if *is_negative {
-                    found.is_unknown
-                } else {
-                    !found.is_unknown && found.class == **label
-                }
+                found.is_unknown == *is_negative && (*is_negative || found.class == **label)
             };
             percent(labelled.filter(is_right).count() as f64 / set.len() as f64)
         };
@@ -189,7 +169,6 @@ fn answers(path: &Path, clouds: &Clouds, inputs: &[Input]) -> Result<Table> {
     Ok(table)
 }
 
-/// The time of whole classifications, filter off and on.
 fn cost_in_classifier(models: &[PathBuf], clouds: &Clouds) -> Result<Table> {
     let heading = ["model", "filter off, µs", "filter on, µs"];
     let mut table = Table::new("CPU time of a classification, f32, one thread", &heading);
@@ -210,7 +189,6 @@ fn cost_in_classifier(models: &[PathBuf], clouds: &Clouds) -> Result<Table> {
     Ok(table)
 }
 
-/// The time of the filter alone, in clouds of several sizes.
 fn cost_alone(clouds: &Clouds) -> Result<Table> {
     let mut table = Table::new("CPU time of the filter alone", &["points", "µs"]);
     for size in SIZES {

@@ -1,17 +1,13 @@
-//! `ablate`: what each effect is worth, on shapes that take no time.
+//! `ablate`, on shapes that take no time.
 
-use crate::{LAB, exits, run, said};
+use crate::{LAB, exits, said, succeeds};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Output;
 
 const PLAN: &str = r#"
 about = "a test"
 most_per_class = [2, 1]
-views = 2
-dropout = 0.1
-packed_points = 64
-min_points = 8
+flags = "--sensor vlp32c --views 2 --points 64 --min-points 8 --attributes intensity"
 seeds = [0, 1]
 steps = 4
 cost_rounds = 1
@@ -25,11 +21,21 @@ input_transform = false
 feature_transform = false
 trunk = [8, 16]
 head = [12]
+[[row]]
+name = "reference"
+flags = "--noise 0.03 --quantise"
+[[row]]
+name = "grid"
+flags = "--noise 0"
+source = "even-grid"
+[[row]]
+name = "seen"
+source = "seen"
+[[row]]
+name = "surface"
+source = "surface"
+beside = "seen"
 "#;
-
-fn ablate(folder: &Path) -> Output {
-    run(Path::new(LAB), folder, "ablate --plan plan.toml --out out")
-}
 
 /// The lines of a CSV file by heading.
 fn lines(file: &Path) -> Vec<BTreeMap<String, String>> {
@@ -40,67 +46,45 @@ fn lines(file: &Path) -> Vec<BTreeMap<String, String>> {
     lines.map(|line| heading.iter().cloned().zip(line).collect()).collect()
 }
 
-/// All but what the clock says.
-fn timeless(file: &Path) -> Vec<BTreeMap<String, String>> {
-    let mut lines = lines(file);
-    lines.iter_mut().for_each(|line| line.retain(|key, _| !key.starts_with("scan_seconds")));
-    lines
-}
-
 #[test]
-fn every_effect_has_its_lines_and_an_interrupted_run_goes_on() {
+fn rows_are_compared_and_an_interrupted_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     std::fs::write(at.join("plan.toml"), PLAN).unwrap();
-    let ran = ablate(at);
-    assert!(ran.status.success(), "{}", said(&ran));
+    let ablate = || succeeds(Path::new(LAB), at, "ablate objects --plan plan.toml --out out");
+    let ran = ablate();
+    assert!(said(&ran).contains("gain"), "{}", said(&ran));
     let csv = at.join("out/ablations.csv");
     let found = lines(&csv);
-    for (effect, expected) in [
-        ("noise", 8),
-        ("noise-model", 8),
-        ("dropout", 8),
-        ("quantum", 8),
-        ("beams", 8),
-        ("all-of-these", 8),
-        // Tested on the reference's scans besides.
-        ("occlusion", 12),
-        ("intensity", 2),
-        ("time", 2),
-    ] {
-        let n = found.iter().filter(|line| line["effect"] == effect).count();
-        assert_eq!(n, expected, "{effect}");
-    }
-    let number = |line: &BTreeMap<String, String>, key: &str| line[key].parse::<f64>().unwrap();
-    for line in &found {
-        assert!(number(line, "scan_seconds_cpu") > 0.0 && number(line, "n") > 0.0, "{line:?}");
-        if line["judged_by"] == "networks" {
-            let [low, high] = ["accuracy_low", "accuracy_high"].map(|key| number(line, key));
-            let accuracy = number(line, "accuracy");
-            assert!(0.0 <= low && low <= accuracy && accuracy <= high && high <= 1.0, "{line:?}");
-        } else {
-            // 10 classes of 3 meshes, from 2 sides: no position differs.
-            assert_eq!((line["n"].as_str(), line["accuracy"].as_str()), ("60", ""), "{line:?}");
-        }
-    }
-    // An attribute of 4 bytes a point is paid for, and nothing else.
-    let bytes = |effect: &str, trained_on: &str| {
-        let is_it = |l: &&BTreeMap<_, _>| l["effect"] == effect && l["trained_on"] == trained_on;
-        number(found.iter().find(is_it).unwrap(), "bytes_per_cloud")
+    let of = |trained: &str, tested: &str| {
+        let is_it = |line: &&BTreeMap<String, String>| {
+            line["trained_on"] == trained && line["tested_on"] == tested
+        };
+        let found: Vec<_> = found.iter().filter(is_it).map(|line| line["of"].as_str()).collect();
+        found
     };
-    assert!(bytes("intensity", "with") > bytes("intensity", "without"));
-    assert_eq!(bytes("noise", "with"), bytes("noise", "without"));
-    assert!(said(&ran).contains("gain"), "{}", said(&ran));
+    // 10 classes of a mesh from 2 sides, and 2 seeds.
+    for (trained, tested) in [
+        ("reference", "reference"),
+        ("grid", "reference"),
+        ("grid", "grid"),
+        ("reference", "grid"),
+        ("surface", "seen"),
+        ("seen", "surface"),
+        ("surface", "reference"),
+    ] {
+        let n = if tested == "surface" { "10" } else { "20" };
+        assert_eq!(of(trained, tested), [n, n], "{trained}, {tested}");
+    }
+    assert!(of("surface", "grid").is_empty());
 
-    // As if it had been killed before the end, in a dataset and in a training.
-    let networks = at.join("out/work/trained/networks");
-    std::fs::remove_file(networks.join("reference-seed-1.safetensors")).unwrap();
+    // As if it had been killed in a dataset, in a training and in its tests.
+    std::fs::remove_file(at.join("out/networks/reference-1.safetensors")).unwrap();
+    std::fs::remove_file(at.join("out/answers/reference-1.json")).unwrap();
     std::fs::remove_dir_all(at.join("out/work/data/grid")).unwrap();
-    let first = timeless(&csv);
     std::fs::remove_file(&csv).unwrap();
-    let again = ablate(at);
-    assert!(again.status.success(), "{}", said(&again));
-    assert_eq!(timeless(&csv), first);
+    ablate();
+    assert_eq!(lines(&csv), found);
 }
 
 #[test]
@@ -108,20 +92,24 @@ fn what_cannot_be_run_is_refused_before_anything_is_made() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let plan = |name: &str, text: String| std::fs::write(at.join(name), text).unwrap();
-    plan("typo.toml", PLAN.replace("views", "sides"));
-    plan("certain.toml", PLAN.replace("dropout = 0.1", "dropout = 1.0"));
+    plan("typo.toml", PLAN.replace("steps", "strides"));
+    plan("certain.toml", PLAN.replace("--quantise", "--dropout 1.5"));
     let refused = |code, words: &str, expected: &str| {
         let said = exits(code, Path::new(LAB), at, words);
         assert!(said.contains(expected), "{words}: {said}");
         assert!(!at.join("out").exists() && !at.join("data").exists(), "{words}");
     };
-    refused(1, "ablate --plan typo.toml --out out", "unknown field `sides`");
-    refused(1, "ablate --plan certain.toml --out out", "certain.toml: dropout");
-    refused(1, "ablate --plan nowhere.toml --out out", "cannot read nowhere.toml");
-    refused(2, "ablate --meshes nowhere --out out", "--meshes: expected a folder, found nowhere");
+    refused(1, "ablate objects --plan typo.toml --out out", "unknown field `strides`");
+    refused(2, "ablate objects --plan certain.toml --out out", "certain.toml: row \"reference\"");
+    refused(1, "ablate objects --plan nowhere.toml --out out", "cannot read nowhere.toml");
+    refused(
+        2,
+        "ablate objects --meshes nowhere --out out",
+        "--meshes: expected a folder, found nowhere",
+    );
     std::fs::create_dir(at.join("other")).unwrap();
     std::fs::write(at.join("other/terms.toml"), "version = \"another\"").unwrap();
-    let said = exits(1, Path::new(LAB), at, "ablate --quick --out other");
+    let said = exits(1, Path::new(LAB), at, "ablate objects --quick --out other");
     assert!(said.contains("an earlier run had another plan or other data"), "{said}");
 }
 
@@ -145,16 +133,15 @@ fn effects_of_streets_are_compared_on_simulated_and_on_real_objects() {
         ),
     );
     std::fs::write(at.join("plan.toml"), plan).unwrap();
-    let words = "ablate --street --plan plan.toml --out out";
-    let ran = run(Path::new(LAB), at, words);
-    assert!(ran.status.success(), "{}", said(&ran));
+    let words = "ablate streets --plan plan.toml --out out";
+    succeeds(Path::new(LAB), at, words);
     // Simulated clusters stand in for real ones.
     let real = "out/street/scenes/none-0/test.npz";
     std::fs::copy(at.join(real), at.join("real.npz")).unwrap();
     std::fs::remove_dir_all(at.join("out")).unwrap();
     let words = format!("{words} --real real.npz");
-    let ran = run(Path::new(LAB), at, &words);
-    assert!(ran.status.success() && said(&ran).contains("driving"), "{}", said(&ran));
+    let ran = succeeds(Path::new(LAB), at, &words);
+    assert!(said(&ran).contains("driving"), "{}", said(&ran));
     let found = lines(&at.join("out/street/street.csv"));
     let of = |trained: &str, tested: &str| -> Vec<String> {
         let is_it = |line: &&BTreeMap<String, String>| {
@@ -171,6 +158,6 @@ fn effects_of_streets_are_compared_on_simulated_and_on_real_objects() {
     assert!(!at.join("out/street/scenes/unturned-0").exists(), "the same scenes are made once");
     let table = std::fs::read_to_string(at.join("out/street/street.md")).unwrap();
     assert!(table.contains("| driving |"), "{table}");
-    let again = run(Path::new(LAB), at, "ablate --street --plan plan.toml --out out");
-    assert!(said(&again).contains("an earlier run had another plan or other data"));
+    let refused = exits(1, Path::new(LAB), at, "ablate streets --plan plan.toml --out out");
+    assert!(refused.contains("an earlier run had another plan or other data"));
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 /// Half a unit in the last place of f32, relative.
 pub const U32: f64 = 1.0 / (1 << 24) as f64;
-/// Of f16.
+/// The same of f16.
 const U16: f64 = 1.0 / (1 << 11) as f64;
 /// Half the least number of f16.
 const TINY16: f64 = 1.0 / (1 << 25) as f64;
@@ -19,7 +19,6 @@ const TINY16: f64 = 1.0 / (1 << 25) as f64;
 /// each step rounded to f16 (`kernel/scalar.rs`).
 const F16_ROUNDINGS: f64 = 32.0 + 4.0 - 1.0;
 const F16_BLOCK: f64 = 128.0;
-/// Levels of int8.
 const LEVELS: f64 = 127.0;
 
 /// The cost of `n` roundings of f32 in a row.
@@ -48,25 +47,24 @@ pub struct Affine {
     pub relu: bool,
 }
 
-/// What is rounded in a layer.
+/// The kind of a layer, which decides what is rounded.
 #[derive(Clone, Copy)]
 pub enum Kind {
-    /// It takes coordinates: f32, whatever the precision.
+    /// Takes coordinates: f32 in all precisions.
     First,
-    /// It takes features, of which int8 is calibrated to the largest.
+    /// Takes features; int8 is calibrated to the largest.
     Point { range: f64 },
-    /// It takes a pooled vector.
+    /// Takes a pooled vector.
     Vector,
 }
 
 impl Rows {
-    /// How many rows.
     pub fn n(&self) -> usize {
         self.value.len() / self.width.max(1)
     }
 
-    /// The largest of each column. Of two maxima the difference is at most the
-    /// largest difference of what they are of.
+    /// The maximum of each column. Two maxima differ by at most the largest difference of their
+    /// operands.
     pub fn pooled(&self) -> Self {
         let over = |of: &[f64]| {
             let mut most = vec![f64::NEG_INFINITY; self.width];
@@ -78,13 +76,13 @@ impl Rows {
         Self { width: self.width, value: over(&self.value), bound: over(&self.bound) }
     }
 
-    /// Cuts what is negative, which brings nothing apart.
+    /// Sets negative values to 0, which increases no difference.
     pub fn relu(mut self) -> Self {
         self.value.iter_mut().for_each(|x| *x = x.max(0.0));
         self
     }
 
-    /// As a layer of `kind` takes them in `precision`.
+    /// The rows rounded as inputs of a layer of `kind` in `precision`.
     fn taken(mut self, precision: Precision, kind: Kind) -> Self {
         let Kind::Point { range } = kind else { return self };
         for (x, e) in self.value.iter().zip(&mut self.bound) {
@@ -100,7 +98,6 @@ impl Rows {
 }
 
 impl Affine {
-    /// The identity.
     pub fn identity(width: usize) -> Self {
         let mut w = vec![0.0; width * width];
         (0..width).for_each(|i| w[i * width + i] = 1.0);
@@ -127,7 +124,7 @@ impl Affine {
             Precision::F32Fc16 | Precision::F16 => {
                 for (w, dw) in self.w.iter().zip(&mut self.dw) {
                     let exact = (w - f64::from(f16::from_f64(*w))).abs();
-                    // What is off may round the other way.
+                    // An inexact weight may round the other way.
                     *dw += if *dw == 0.0 { exact } else { U16 * (w.abs() + *dw) + TINY16 };
                 }
             }
@@ -170,8 +167,8 @@ impl Affine {
         (sum, off + part * magnitude + least)
     }
 
-    /// Of a sum of products: how large a part of its magnitudes is lost at most,
-    /// and what is lost where products underflow.
+    /// Bounds of the rounding error of a sum of products: relative to the sum of magnitudes, and
+    /// absolute where products underflow.
     fn roundings(&self, precision: Precision, kind: Kind) -> (f64, f64) {
         let k = self.inputs as f64;
         match (precision, kind) {

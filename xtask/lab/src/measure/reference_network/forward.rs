@@ -63,19 +63,17 @@ pub fn outputs(
     Ok(all)
 }
 
-/// That layer `name` takes as many inputs as there are.
 fn check(name: &str, layer: &Affine, rows: &Rows) -> Result<()> {
     let (expected, found) = (layer.inputs, rows.width);
     ensure!(expected == found, "{name}: expected {expected} inputs, found {found}");
     Ok(())
 }
 
-/// The first layer as the second takes it: through an identity, as it is measured.
+/// The first layer's outputs as the second takes them: through an identity, as they are measured.
 fn as_taken(network: &Network, chain: &Chain, rows: Rows, precision: Precision) -> Rows {
     Affine::identity(rows.width).through(rows, precision, kind(network, chain, 1))
 }
 
-/// What layer `i` of a chain takes.
 fn kind(network: &Network, chain: &Chain, i: usize) -> Kind {
     match i {
         0 => Kind::First,
@@ -83,7 +81,6 @@ fn kind(network: &Network, chain: &Chain, i: usize) -> Kind {
     }
 }
 
-/// The matrix of a T-Net, the identity added.
 fn transform(
     network: &Network,
     prefix: &str,

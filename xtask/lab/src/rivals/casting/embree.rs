@@ -20,7 +20,6 @@ pub const RIVALS: [&str; 2] = ["embreex", "open3d"];
 pub struct Embree {
     process: Subprocess,
     files: TempDir,
-    /// Versions of the packages.
     pub versions: Value,
 }
 
@@ -33,7 +32,7 @@ impl Embree {
         Ok(Self { process, files: tempfile::tempdir()?, versions })
     }
 
-    /// Builds a scene of `mesh`; what the build cost.
+    /// Builds a scene of `mesh`; returns the cost.
     pub fn load(&mut self, mesh: &TriangleMesh) -> Result<Cost> {
         let vertices = mesh.vertices.iter().flat_map(in_f32).collect();
         let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
@@ -52,7 +51,7 @@ impl Embree {
         Ok(())
     }
 
-    /// Casts all rays once by `rival`, one of [`RIVALS`]; what it cost.
+    /// Casts all rays once by `rival`, one of [`RIVALS`]; returns the cost.
     pub fn cast(&mut self, rival: &str) -> Result<Cost> {
         self.process.ask(json!({ "cast": rival }))
     }

@@ -1,14 +1,12 @@
-//! How others do on the same meshes and rays, in the same run.
+//! Embree on the same meshes and rays, in the same run.
 
 mod embree;
 
-use crate::measure::accuracy::Accuracy;
 use crate::measure::backends::{Backend, short};
-use crate::measure::bench_mesh::{BenchMesh, target};
+use crate::measure::bench_mesh::{BenchMesh, in_a_room, target};
 use crate::measure::clock::{Costs, Workload, interleave, workload};
-use crate::measure::methods;
+use crate::measure::methods::{self, Accuracy};
 use crate::measure::ray_set::{RaySet, sweep_pose, vlp32c};
-use crate::measure::scenes::in_a_room;
 use crate::render::table::{Column, Table, digits, millions_per_s, milliseconds};
 use crate::study::casting::speed::casting;
 use anyhow::Result;
@@ -34,10 +32,9 @@ const OPEN3D: Environment<'_> = Environment {
     size: "some 700 MB",
 };
 
-/// How often the rays of a revolution are aimed, cast and solved in one repeat.
+/// Revolutions that are aimed, cast and solved in one repeat.
 const REVOLUTIONS: usize = 10;
 
-/// One caster on one set of rays.
 #[derive(Serialize)]
 struct Entry {
     mesh: String,
@@ -94,7 +91,6 @@ pub fn measure(
     Ok(Some(Comparison { versions, entries }))
 }
 
-/// One mesh and who casts at it.
 struct Bench<'a> {
     mesh: &'a str,
     backends: &'a [Backend],
@@ -121,8 +117,8 @@ impl Bench<'_> {
         self.entries(rays_from, (ray_set, copies), ours, ranges)
     }
 
-    /// From beams to ranges: we aim, cast and solve in f64; Embree is handed
-    /// all rays of the revolution and answers in f32.
+    /// From beams to ranges: Edgepuck aims, casts and solves in f64; Embree casts all rays of the
+    /// revolution in f32.
     fn whole(
         &self,
         rays_from: &'static str,
@@ -161,7 +157,7 @@ impl Bench<'_> {
     }
 
     /// Times `ours`, one workload for each backend, and Embree's rays, `copies` copies of
-    /// `ray_set`; `ranges` is what a backend finds for one.
+    /// `ray_set`; `ranges` are a backend's ranges of one copy.
     fn entries(
         &self,
         rays_from: &'static str,
@@ -198,7 +194,6 @@ impl Bench<'_> {
 }
 
 impl Comparison {
-    /// The figures for people.
     pub fn table(&self) -> Table {
         let same_rays = |a: &Entry, b: &Entry| a.mesh == b.mesh && a.rays_from == b.rays_from;
         let groups = self.entries.chunk_by(same_rays);

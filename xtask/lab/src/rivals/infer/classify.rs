@@ -1,25 +1,24 @@
-//! Classifying: by points, at each number of threads.
+//! The jobs: classifying, by points and threads, and farthest point sampling.
 
 use super::candidate::{Arithmetic, Candidate, Job};
 use super::comparison::{Entry, compare};
-use super::reference::worst;
+use super::model::{shortfall, worst};
 use super::speed_tables::show;
 use crate::measure::clock::Spread;
 use crate::measure::reference_network::Network;
 use anyhow::Result;
 
-/// How far log-probabilities in f32 may be from the reference's. Engines sum in
-/// different orders; over this model's layers that gives some 1e-6.
+/// Tolerance of log-probabilities in f32. Engines sum in different orders; over this model's layers
+/// that gives some 1e-6.
 const F32_TOLERANCE: f64 = 1e-4;
 
-/// How far others may be, over the range of the reference's log-probabilities: not
-/// a verdict on their accuracy, which the tables show, but on whether they ran
-/// this model at all.
+/// Tolerance of others, over the range of the reference's log-probabilities: not a verdict on their
+/// accuracy, which the tables show, but on whether they ran this model at all.
 const REDUCED_TOLERANCE: f64 = 0.25;
 
 /// Lets `candidates` classify parts of `cloud` of all sizes in `points` with each
 /// number of `threads`, and shows how they did.
-pub fn compare_all(
+pub fn classify_all(
     candidates: &mut [Candidate],
     points: &[usize],
     threads: &[usize],
@@ -48,4 +47,31 @@ pub fn compare_all(
 
 fn in_words(threads: usize) -> String {
     format!("{threads} thread{}", if threads == 1 { "" } else { "s" })
+}
+
+/// Numbers of points before and after sampling.
+const JOBS: [Job; 3] = [
+    Job { points: 1024, setting: 128 },
+    Job { points: 1024, setting: 64 },
+    Job { points: 4096, setting: 128 },
+];
+
+pub const MOST_POINTS: usize = 4096;
+
+/// Tolerance of squared distances: those of f32 coordinates in the unit sphere, subtracted and
+/// summed in f32, are off by some 1e-7 of the squared diameter, and the least distance kept here is
+/// a hundredth of that.
+const TOLERANCE: f64 = 1e-4;
+
+/// Lets `candidates` sample parts of `cloud`, and shows how they did.
+pub fn sample_all(candidates: &mut [Candidate], rounds: usize, cloud: &[[f32; 3]]) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    for job in JOBS {
+        eprintln!("sampling {} of {} points", job.setting, job.points);
+        let error_of = |kept: &[f64]| shortfall(&cloud[..job.points], kept, job.setting);
+        entries.extend(compare(candidates, job, rounds, error_of, |_| TOLERANCE));
+    }
+    let heading = |job: &Job| format!("{}->{}", job.points, job.setting);
+    show("Farthest point sampling", &entries, &JOBS, heading);
+    entries
 }

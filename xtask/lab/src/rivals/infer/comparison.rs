@@ -12,24 +12,21 @@ use std::time::Duration;
 /// against what disturbs a machine for a while.
 const TURN_S: f64 = 0.04;
 
-/// Repeats in a turn.
 const REPEATS: [usize; 2] = [3, 40];
 
 /// Threads of the pool that ran last may still spin; ncnn's do for 20 ms.
 const PAUSE: Duration = Duration::from_millis(30);
 
-/// What a candidate did on one job.
+/// The result of a candidate on one job.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
-    /// Who it is.
     #[serde(flatten)]
     pub engine: Label,
-    /// The job.
     #[serde(flatten)]
     pub job: Job,
-    /// How far its answer was from the reference's.
+    /// The difference of its answer from the reference's.
     pub error: f64,
-    /// Of every repeat of every turn.
+    /// The costs of every repeat of every turn.
     #[serde(flatten, serialize_with = "in_ns")]
     pub costs: Costs,
 }
@@ -79,8 +76,7 @@ fn refuse(name: &str, job: Job, cause: &anyhow::Error) {
     println!("left out {name} at {} points, {}: {cause:#}", job.points, job.setting);
 }
 
-/// Lets `candidate` try `job`: repeats that fill a turn, and an entry without
-/// costs.
+/// Tries `job` with `candidate`: the repeats that fill a turn, and an entry without costs.
 fn enter(
     candidate: &mut Candidate,
     job: Job,
@@ -161,33 +157,15 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_answer_is_not_timed() {
+    fn a_wrong_answer_is_not_timed_and_a_failing_candidate_is_left_out() {
         let (notes, entries) = play(2, &[('a', 1.2, 99), ('b', 1.05, 99), ('c', f64::NAN, 99)]);
         assert_eq!(notes, "bbb");
         assert!((entries[0].error - 0.05).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_failing_candidate_is_left_out_and_the_others_go_on() {
+        let record = serde_json::to_value(&entries[0]).unwrap();
+        assert_eq!((&record["wall_ns"][0], &record["points"]), (&20_000_000.into(), &16.into()));
         let (notes, entries) = play(2, &[('a', 1.0, 99), ('b', 1.0, 2)]);
         assert_eq!(notes, "ababa");
         assert_eq!(entries.iter().map(|e| &e.engine.name[..]).collect::<String>(), "a");
-    }
-
-    #[test]
-    fn a_record_holds_every_repeat_in_nanoseconds() {
-        let (_, entries) = play(1, &[('a', 1.0, 99)]);
-        let record = serde_json::to_value(&entries[0]).unwrap();
-        assert_eq!(record["wall_ns"], serde_json::json!([20_000_000, 20_000_000, 20_000_000]));
-        assert_eq!(record["cpu_ns"][2], 10_000_000);
-        assert_eq!(record["points"], 16);
-    }
-
-    #[test]
-    fn a_turn_is_filled_within_limits() {
-        assert_eq!(repeats(0.004), 10);
-        assert_eq!(repeats(1.0), 3);
-        assert_eq!(repeats(1e-9), 40);
-        assert_eq!(repeats(0.0), 40);
+        assert_eq!([0.004, 1.0, 0.0].map(repeats), [10, 3, 40]);
     }
 }

@@ -2,12 +2,9 @@
 //! and with PyTorch, in turns.
 
 use super::candidate::{Arithmetic, Candidate, Job, Label};
-use super::cloud;
 use super::comparison::{Entry, compare};
-use super::hosts::Material;
-use super::model;
-use super::reference::worst;
-use super::roster::{TRAINERS, served, start};
+use super::model::{self, worst};
+use super::roster::{Material, TRAINERS, served, start};
 use super::speed_tables::show;
 use crate::measure::machine::Machine;
 use anyhow::Result;
@@ -18,7 +15,6 @@ use std::path::PathBuf;
 use xtask::venv::cache_dir;
 use xtask::workspace;
 
-/// Flags of `bench train`.
 #[derive(Args, Debug)]
 pub struct TrainArgs {
     /// Sizes of the clouds, in points.
@@ -40,8 +36,8 @@ pub struct TrainArgs {
     json: Option<PathBuf>,
 }
 
-/// By how much losses may differ, relatively: two steps of some 30 layers in
-/// fp32, batch norms of 24 clouds among them, summed in different orders.
+/// Tolerance of losses, relative: two steps of some 30 layers in fp32, batch norms of 24 clouds
+/// among them, summed in different orders.
 const TOLERANCE: f64 = 1e-2;
 
 #[derive(Serialize)]
@@ -50,13 +46,12 @@ struct Report {
     steps: Vec<Entry>,
 }
 
-/// Runs the benchmark that `args` ask for.
 pub fn run(args: &TrainArgs) -> Result<()> {
     let folder = cache_dir().join("train");
     let material = Material { model: folder.join("random.safetensors"), folder };
     model::write_random(&material.model)?;
     let most = args.points.iter().max().copied().unwrap_or(0) * args.batch;
-    cloud::write(&cloud::cloud(most), &material.cloud())?;
+    model::write_cloud(&model::cloud(most), &material.cloud())?;
 
     let mut candidates = vec![ours(&material)?];
     candidates.extend(start(&TRAINERS, |_| true, !args.no_torch, &material));
@@ -80,7 +75,6 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     Ok(())
 }
 
-/// Our own program, built if need be.
 fn ours(material: &Material) -> Result<Candidate> {
     let mut command = workspace::cargo(&["run", "--quiet", "--release", "--package", "train"]);
     command.args(["--", "serve"]).args([&material.model, &material.folder]);

@@ -3,16 +3,11 @@
 
 mod candidate;
 mod classify;
-mod cloud;
 mod comparison;
-mod hosts;
 pub mod learn;
 mod model;
 mod ours;
-mod reference;
 mod roster;
-mod sample;
-mod server;
 mod speed_tables;
 
 use crate::measure::machine::Machine;
@@ -23,15 +18,13 @@ use clap::Args;
 use comparison::Entry;
 use edgepuck_program::Usage;
 use formats::atomic;
-use hosts::Material;
-use roster::{CLASSIFIERS, SAMPLERS};
+use roster::{CLASSIFIERS, Material, SAMPLERS};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use xtask::venv::cache_dir;
 use xtask::workspace::recorded;
 
-/// Flags of `bench infer`.
 #[derive(Args, Debug)]
 pub struct InferArgs {
     /// Weights for all engines: a safetensors file with the key names of yanx27's `pointnet_cls`
@@ -62,18 +55,15 @@ pub struct InferArgs {
     torch: bool,
 }
 
-/// All figures of a run.
 #[derive(Serialize)]
 struct Report {
     machine: Machine,
     model: String,
-    /// Of each engine.
     versions: BTreeMap<String, String>,
     classifying: Vec<Entry>,
     sampling: Vec<Entry>,
 }
 
-/// Runs the benchmark that `args` ask for.
 pub fn run(args: &InferArgs) -> Result<()> {
     check(&args.engines)?;
     let is_wanted = |name: &str| {
@@ -87,8 +77,8 @@ pub fn run(args: &InferArgs) -> Result<()> {
     }
     let material = Material { model: args.model.clone().unwrap_or(random), folder };
     let reference = Network::read(&material.model)?;
-    let cloud = cloud::cloud(args.points.iter().copied().fold(sample::MOST_POINTS, usize::max));
-    cloud::write(&cloud, &material.cloud())?;
+    let cloud = model::cloud(args.points.iter().copied().fold(classify::MOST_POINTS, usize::max));
+    model::write_cloud(&cloud, &material.cloud())?;
 
     let mut classifiers = ours::classifiers(&material.model, &cloud, is_wanted);
     classifiers.extend(roster::start(&CLASSIFIERS, is_wanted, args.torch, &material));
@@ -106,10 +96,10 @@ pub fn run(args: &InferArgs) -> Result<()> {
         let (points, threads) = (&args.points, &args.threads);
         let reference = (&reference, &cloud[..]);
         report.classifying =
-            classify::compare_all(&mut classifiers, points, threads, args.rounds, reference)?;
+            classify::classify_all(&mut classifiers, points, threads, args.rounds, reference)?;
     }
     if !samplers.is_empty() {
-        report.sampling = sample::compare_all(&mut samplers, args.rounds, &cloud);
+        report.sampling = classify::sample_all(&mut samplers, args.rounds, &cloud);
     }
     if let Some(file) = &args.json {
         atomic::write_bytes(file, serde_json::to_string(&report)? + "\n")?;
@@ -117,7 +107,6 @@ pub fn run(args: &InferArgs) -> Result<()> {
     Ok(())
 }
 
-/// Whether `word` names `engine`.
 fn is_named(engine: &str, word: &str) -> bool {
     engine.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
 }

@@ -12,15 +12,12 @@ use std::path::{Path, PathBuf};
 /// Runs before those that count, as the rivals' programs have.
 const UNCOUNTED: usize = 3;
 
-/// Our sampler's name.
 const SAMPLER: &str = "ours";
 
-/// The name of our classifier in `precision`.
 fn name(precision: Precision) -> String {
     format!("ours-{precision}")
 }
 
-/// What `--engines` can call us.
 pub fn names() -> Vec<String> {
     Precision::ALL.map(name).into_iter().chain([SAMPLER.to_owned()]).collect()
 }

@@ -1,23 +1,20 @@
-//! The engines of other projects.
+//! The engines of other projects, the programs that run them, and the files that they need.
 
-use super::candidate::{Arithmetic, Candidate, Label};
-use super::hosts::{Host, Material, command};
-use super::server::Server;
+use super::candidate::{Arithmetic, Candidate, Label, Server};
 use Arithmetic::{F32, Half, I8};
 use std::cell::LazyCell;
+use std::path::PathBuf;
 use std::process::Command;
+use xtask::venv::{Environment, programs, succeeds};
 
-/// Another engine, or another arithmetic of one: its name in tables, for `--engines` and
-/// for its program, what it computes with, and what runs it.
+/// Another engine, or another arithmetic of one: its name in tables, for `--engines` and for its
+/// program, its arithmetic, and its program.
 pub type Rival = (&'static str, Arithmetic, Host);
 
-/// Engines that classify.
-pub const CLASSIFIERS: [Rival; 13] = [
+pub const CLASSIFIERS: [Rival; 11] = [
     ("onnxruntime", F32, Host::Python),
     ("openvino", F32, Host::Python),
     ("ncnn", F32, Host::Python),
-    ("tract", F32, Host::Rust),
-    ("rten", F32, Host::Rust),
     ("torch", F32, Host::Torch),
     ("torchscript", F32, Host::Torch),
     ("openvino-bf16", Half, Host::Python),
@@ -28,14 +25,12 @@ pub const CLASSIFIERS: [Rival; 13] = [
     ("ncnn-i8", I8, Host::Python),
 ];
 
-/// Engines that sample farthest points.
 pub const SAMPLERS: [Rival; 3] = [
     ("numpy", F32, Host::Sampling),
     ("fpsample", F32, Host::Sampling),
     ("fpsample-tree", F32, Host::Sampling),
 ];
 
-/// Engines that train.
 pub const TRAINERS: [Rival; 1] = [("torch", F32, Host::Training)];
 
 /// Starts those of `rivals` whose names are wanted, those in PyTorch only if `torch`. A
@@ -76,4 +71,85 @@ pub fn start(
 pub fn served(label: Label, command: &mut Command) -> anyhow::Result<Candidate> {
     let (server, version) = Server::start(command)?;
     Ok(Candidate { label, version, engine: Box::new(server) })
+}
+
+const GENERAL: Environment<'_> = Environment {
+    name: "infer-venv",
+    requirements: "xtask/lab/peers/infer/requirements.txt",
+    size: "about 150 MB",
+};
+
+const TORCH: Environment<'_> = Environment {
+    name: "torch-venv",
+    requirements: "xtask/lab/peers/infer/torch-requirements.txt",
+    size: "about 5 GB",
+};
+
+/// The program that runs a rival.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Host {
+    /// `peers/infer/infer.py`.
+    Python,
+    /// The same, in the environment that holds PyTorch.
+    Torch,
+    /// `peers/train/train.py`, in that environment.
+    Training,
+    /// `peers/infer/fps.py`.
+    Sampling,
+}
+
+/// The input of all rivals.
+pub struct Material {
+    pub model: PathBuf,
+    /// The folder with the cloud, and the model in every form.
+    pub folder: PathBuf,
+}
+
+/// The words before an engine's name on a command line, and the words after it.
+pub type Program = [Vec<PathBuf>; 2];
+
+impl Material {
+    pub fn cloud(&self) -> PathBuf {
+        self.folder.join("cloud.safetensors")
+    }
+
+    /// Writes the model in every form. An error is the cause, for the user.
+    pub fn prepare(&self) -> Result<(), String> {
+        let mut command = command(&python(&GENERAL, "infer/prepare.py")?);
+        succeeds(command.arg(&self.model).arg(self.cloud()).arg(&self.folder))
+    }
+}
+
+impl Host {
+    /// Whether it runs what [`Material::prepare`] writes.
+    pub fn needs_preparing(self) -> bool {
+        self == Self::Python
+    }
+
+    pub fn is_torch(self) -> bool {
+        matches!(self, Self::Torch | Self::Training)
+    }
+
+    /// Its program, installed or built if need be. An error is the cause, for the user.
+    pub fn program(self, material: &Material) -> Result<Program, String> {
+        let Material { model, folder } = material;
+        let (model, folder) = (model.clone(), folder.clone());
+        Ok(match self {
+            Self::Python => [python(&GENERAL, "infer/infer.py")?, vec![model, folder]],
+            Self::Torch => [python(&TORCH, "infer/infer.py")?, vec![model, folder]],
+            Self::Training => [python(&TORCH, "train/train.py")?, vec![model, folder]],
+            Self::Sampling => [python(&GENERAL, "infer/fps.py")?, vec![folder]],
+        })
+    }
+}
+
+/// The interpreter, which writes no compiled files beside its programs, and the script.
+fn python(environment: &Environment<'_>, script: &str) -> Result<Vec<PathBuf>, String> {
+    Ok(vec![environment.interpreter()?, "-B".into(), programs().join(script)])
+}
+
+pub fn command(words: &[PathBuf]) -> Command {
+    let mut command = Command::new(&words[0]);
+    command.args(&words[1..]);
+    command
 }

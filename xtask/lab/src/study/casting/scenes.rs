@@ -11,7 +11,6 @@ use sim_gpu::internals::scan::PlacedTarget;
 use sim_gpu::internals::target::{Surface, Target};
 use std::path::PathBuf;
 
-/// Flags of `bench scenes`.
 #[derive(Args, Debug)]
 pub struct ScenesArgs {
     /// Scene recipe.
@@ -28,21 +27,19 @@ pub struct ScenesArgs {
     rounds: u16,
 }
 
-/// What one scene takes, seconds.
 struct Measured {
     n_objects: usize,
     n_triangles: usize,
     n_points: usize,
-    /// Ground and objects, each with a hierarchy of its own.
+    /// Ground and objects, each with its own hierarchy.
     sweep_s: f64,
-    /// All of it as one mesh, whose hierarchy is there.
+    /// The same as one mesh, whose hierarchy exists.
     one_mesh_s: f64,
-    /// To check that mesh and to make its hierarchy.
+    /// To check that mesh and build its hierarchy.
     build_s: f64,
     segment_s: f64,
 }
 
-/// Casts each scene object by object and as one mesh, on the CPU.
 pub fn run(args: &ScenesArgs) -> Result<()> {
     let mut recipe = Recipe::load(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));

@@ -1,10 +1,9 @@
 //! How fast hierarchies are built and rays are traced.
 
 use crate::measure::backends::{Backend, short};
-use crate::measure::bench_mesh::{BenchMesh, target};
+use crate::measure::bench_mesh::{BenchMesh, in_a_room, target};
 use crate::measure::clock::{Costs, Spread, Workload, interleave, measured, workload};
 use crate::measure::ray_set::{RaySet, sweep_pose, vlp32c};
-use crate::measure::scenes::in_a_room;
 use crate::render::table::{Column, Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use serde::Serialize;
@@ -16,7 +15,6 @@ use sim_gpu::internals::ray::MISS;
 use sim_gpu::internals::target::{Surface, Target};
 use std::hint::black_box;
 
-/// One builder on one mesh.
 #[derive(Serialize)]
 pub struct Build {
     mesh: String,
@@ -25,7 +23,6 @@ pub struct Build {
     costs: Costs,
 }
 
-/// One caster on one set of rays.
 #[derive(Serialize)]
 pub struct Trace {
     mesh: String,
@@ -36,7 +33,6 @@ pub struct Trace {
     rays: usize,
     /// Rays that the repeat stands for: more where culling spared some.
     beams: usize,
-    /// Rays that hit.
     hits: usize,
     costs: Costs,
     /// Seconds of the kernel alone in each repeat, by the adapter's clock.
@@ -44,14 +40,12 @@ pub struct Trace {
     kernel_s: Option<Vec<f64>>,
 }
 
-/// All speeds of a run.
 #[derive(Serialize, Default)]
 pub struct Speed {
     builds: Vec<Build>,
     traces: Vec<Trace>,
 }
 
-/// Measures `bench_meshes` on `backends` in `rounds` rounds each.
 pub fn measure(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
     let mut speed = tracing(bench_meshes, backends, rounds)?;
     for bench_mesh in bench_meshes {
@@ -60,7 +54,6 @@ pub fn measure(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) 
     Ok(speed)
 }
 
-/// The same without the building of hierarchies.
 pub fn tracing(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
     let mut speed = Speed::default();
     let pattern = vlp32c().pattern();
@@ -141,7 +134,6 @@ fn kernel_seconds(backend: &Backend, jobs: &[CastJob], repeats: usize) -> Result
     (0..repeats).map(|_| Ok(gpu.cast_timed(jobs)?.1)).collect()
 }
 
-/// Builds the hierarchy over `surface`.
 pub fn building(surface: &Surface, builder: Builder) -> Workload<'_> {
     Box::new(move || {
         let surface = surface.clone();
@@ -151,13 +143,11 @@ pub fn building(surface: &Surface, builder: Builder) -> Workload<'_> {
     })
 }
 
-/// Casts `jobs` on `backend`, all together.
 pub fn casting(backend: &Backend, jobs: Vec<CastJob>) -> Workload<'_> {
     workload(move || Ok(backend.caster.cast(&jobs)?))
 }
 
 impl Speed {
-    /// The figures for people.
     pub fn tables(&self) -> Vec<Table> {
         let of_build: [Column<Build>; 8] = [
             ("mesh", &|build| build.mesh.clone()),
@@ -190,6 +180,6 @@ impl Speed {
                        count those that culling spared)";
         let builds = Table::of("Building the hierarchy", &self.builds, &of_build);
         let traces = Table::of(tracing, &self.traces, &of_trace);
-        [builds, traces].into_iter().filter(|table| table.len() > 0).collect()
+        [builds, traces].into_iter().filter(|table| !table.rows.is_empty()).collect()
     }
 }

@@ -19,7 +19,6 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// One dataset on one adapter.
 #[derive(Serialize)]
 pub struct Dataset {
     adapter: String,
@@ -76,7 +75,6 @@ fn once(config: &DatasetConfig, caster: &OpenCaster, meshes: &[MeshEntry]) -> Re
     })
 }
 
-/// The figures for people.
 pub fn table(datasets: &[Dataset]) -> Table {
     let mut heading = vec!["adapter", "meshes", "scans", "points", "wall s", "CPU s"];
     heading.extend(Stage::ALL.map(Stage::name));

@@ -1,16 +1,15 @@
-//! Errors of each layer's activations and of the logits, by parameter, in every precision.
+//! Errors of each layer's activations and of the logits, by parameter and by the number of products
+//! in a sum, in every precision.
 
-use std::collections::BTreeSet;
-use std::path::Path;
-
-use anyhow::{Context, Result, bail};
-use infer_cpu::{Classifier, Options, Precision, to_unit_sphere};
-
-use super::clouds::cloud;
-use super::probe;
-use super::{Row, Setting, U64, settings};
+use super::{Row, Setting, U64, probe, settings};
 use crate::measure::reference_network::affine::{Rows, U32, gamma};
-use crate::measure::reference_network::{Chain, Network, Points, outputs};
+use crate::measure::reference_network::{Chain, Network, Points, drawn, outputs};
+use anyhow::{Context, Result};
+use formats::model_card::ModelCard;
+use formats::rng::StreamKey;
+use infer_cpu::{Classifier, Options, Precision, to_unit_sphere};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 /// Points of a cloud where their number is not the parameter.
 const N: f64 = 64.0;
@@ -22,12 +21,9 @@ const SETTINGS: [(&str, &[f64]); 3] = [
     ("offset", &[1e2, 1e4, 1e6, 1e8]),
 ];
 
-/// Measures every chain of the model at `path` on so many clouds a setting.
+/// Measures every chain of the model at `path` on `n_clouds` clouds of each setting.
 pub fn measure(path: &Path, n_clouds: u32) -> Result<Vec<Row>> {
     let network = Network::read(path)?;
-    if let Some(norm) = network.tensors.keys().find(|name| name.ends_with(".running_var")) {
-        bail!("{}: {norm}: expected batch norms that are folded in", path.display());
-    }
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut rows = Vec::new();
     let chains = network.chains();
@@ -43,7 +39,7 @@ pub fn measure(path: &Path, n_clouds: u32) -> Result<Vec<Row>> {
 }
 
 /// The layers of one chain.
-pub(super) fn measure_chain(
+fn measure_chain(
     network: &Network,
     name: &str,
     chain: &Chain,
@@ -111,7 +107,7 @@ fn compare(row: &mut Row, found: impl Iterator<Item = f64>, truth: &Rows, is_poi
     }
 }
 
-/// What a classifier is given, and what it would be given in exact arithmetic.
+/// The input of a classifier, and the same in exact arithmetic.
 fn clouds(setting: &Setting, number: u32) -> (Vec<[f64; 3]>, Points) {
     let (scale, offset) = (setting.of("scale", 1.0), setting.of("offset", 0.0));
     let plain = cloud(number, setting.of("N", N) as usize);
@@ -136,4 +132,67 @@ fn normalized(points: &[[f64; 3]]) -> (Vec<f64>, f64) {
     let radius = centred.iter().map(|p| p.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
     let radius = radius.sqrt();
     (centred.as_flattened().iter().map(|x| x / radius).collect(), radius)
+}
+
+/// Cloud `number` of `n` points: on an ellipsoid, a box, a cone or a rod, stretched
+/// at random.
+fn cloud(number: u32, n: usize) -> Vec<[f64; 3]> {
+    let key = StreamKey::new(0, "growth", number);
+    let stretch = [0, 1, 2].map(|axis| 0.3 + key.unit(axis));
+    let point = |i: usize| {
+        let unit = |k: usize| 2.0 * key.unit((3 + 3 * i + k) as u64) - 1.0;
+        let p = [unit(0), unit(1), unit(2)];
+        let on_surface = match number % 4 {
+            0 => {
+                let radius = p.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+                p.map(|x| x / radius)
+            }
+            1 => {
+                let mut p = p;
+                p[i % 3] = p[i % 3].signum();
+                p
+            }
+            2 => [p[0] * (1.0 - p[2]) / 2.0, p[1] * (1.0 - p[2]) / 2.0, p[2]],
+            _ => [0.1 * p[0], 0.1 * p[1], p[2]],
+        };
+        [0, 1, 2].map(|axis| on_surface[axis] * stretch[axis])
+    };
+    (0..n).map(point).collect()
+}
+
+const WIDTHS: [usize; 5] = [16, 64, 256, 1024, 4096];
+const OUTPUTS: usize = 64;
+
+/// Measures a layer of each width behind one of coordinates.
+pub fn by_width() -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for k in WIDTHS {
+        let network = random(k);
+        let convs = vec!["feat.conv1".to_owned(), "feat.conv2".to_owned()];
+        let chain = Chain { convs, ..Chain::default() };
+        let setting = Setting { parameter: "K", value: k as f64 };
+        let measured = measure_chain(&network, "random", &chain, false, &[setting], 2)?;
+        // The first layer has three inputs whatever the width.
+        rows.extend(measured.into_iter().filter(|row| row.layer.ends_with("conv2")));
+    }
+    Ok(rows)
+}
+
+/// A network of coordinates, K features and some outputs, uniform as He et al. 2015
+/// have it, so that activations keep their magnitude.
+fn random(k: usize) -> Network {
+    let mut tensors = BTreeMap::new();
+    for (name, inputs, outputs) in [("feat.conv1", 3, k), ("feat.conv2", k, OUTPUTS)] {
+        let mut add = |part: &str, shape: &[usize], largest: f64| {
+            let name = format!("{name}.{part}");
+            let key = StreamKey::new(0, &name, k as u32);
+            tensors.insert(name, drawn(key, shape, |unit| largest * (2.0 * unit - 1.0)));
+        };
+        add("weight", &[outputs, inputs], (6.0 / inputs as f64).sqrt());
+        add("bias", &[outputs], 0.1);
+    }
+    // Of weights of at most 1.42 and coordinates of a unit sphere.
+    let largest = (1.42 * 3f64.sqrt() + 0.1) as f32;
+    let ranges = BTreeMap::from([("feat.conv1".to_owned(), largest)]);
+    Network { card: ModelCard { activation_ranges: ranges, ..ModelCard::default() }, tensors }
 }

@@ -1,15 +1,12 @@
 //! `cargo xtask bench growth`: how errors grow, measured against f64, with the
 //! derived bound of each.
 //!
-//! [`ranges`] is about the ranges that casters find, [`layers`] about a network's
-//! layers and logits, [`widths`] about the number of products in a sum. A row is one
-//! value of one parameter.
+//! [`ranges`] is about the ranges that casters find, [`layers`] about a network's layers and logits
+//! and about the number of products in a sum. A row is one value of one parameter.
 
-mod clouds;
 mod layers;
 mod probe;
 mod ranges;
-mod widths;
 
 use std::path::PathBuf;
 
@@ -21,21 +18,19 @@ use crate::measure::clock::Spread;
 use crate::render::table::{Column, Table};
 use xtask::workspace::root;
 
-/// Flags of `bench growth`.
 #[derive(Args, Debug)]
 pub struct GrowthArgs {
     /// CSV file to write, with one row for each quantity, layer, precision and value of a
     /// parameter.
     #[arg(long, value_name = "FILE")]
     csv: PathBuf,
-    /// Models whose layers are measured; batch norms must be folded in [default:
-    /// edge-64, pointnet-64 and pointnet-1024 of assets/weights].
-    #[arg(long, value_name = "FILE,...", value_delimiter = ',')]
-    models: Vec<PathBuf>,
     /// Number of clouds for each value of a parameter.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     clouds: u32,
 }
+
+/// Models whose layers are measured; their batch norms are folded in.
+const MODELS: [&str; 3] = ["edge-64", "pointnet-64", "pointnet-1024"];
 
 /// Half a unit in the last place of f64, relative.
 const U64: f64 = 1.0 / (1u64 << 53) as f64;
@@ -45,11 +40,9 @@ const U64: f64 = 1.0 / (1u64 << 53) as f64;
 pub struct Setting {
     /// The parameter: scale, offset, distance, N (points or triangles), K (inputs).
     pub parameter: &'static str,
-    /// Its value.
     pub value: f64,
 }
 
-/// Every value of some parameters.
 fn settings(all: &[(&'static str, &[f64])]) -> Vec<Setting> {
     let values = all.iter().flat_map(|&(name, values)| values.iter().map(move |&v| (name, v)));
     values.map(|(parameter, value)| Setting { parameter, value }).collect()
@@ -68,17 +61,14 @@ pub struct Row {
     pub quantity: &'static str,
     /// The layer, behind its model's name; empty for ranges.
     pub layer: String,
-    /// What it was computed in.
     pub precision: String,
-    /// What it was measured at.
     pub setting: Setting,
-    /// The errors found.
     pub errors: Vec<f64>,
     /// No error may be above this.
     pub bound: f64,
     /// The largest magnitude of what the errors are of.
     pub magnitude: f64,
-    /// Of error and bound.
+    /// Unit of error and bound.
     pub unit: &'static str,
 }
 
@@ -88,8 +78,7 @@ impl Row {
         Spread::of(self.errors.iter().copied())
     }
 
-    /// Whether there are errors, and none is above the bound; NaN, the last of
-    /// all, is.
+    /// Whether there are errors, all within the bound; NaN sorts last and is not.
     fn holds(&self) -> bool {
         !self.errors.is_empty() && self.spread().max <= self.bound
     }
@@ -99,10 +88,11 @@ impl Row {
 /// an error is above its bound.
 pub fn run(args: &GrowthArgs) -> Result<()> {
     let mut rows = ranges::measure();
-    rows.extend(widths::measure()?);
-    for model in args.models() {
-        eprintln!("{}", model.display());
-        rows.extend(layers::measure(&model, args.clouds)?);
+    rows.extend(layers::by_width()?);
+    for model in MODELS {
+        eprintln!("{model}");
+        let file = root().join("assets/weights").join(format!("{model}.safetensors"));
+        rows.extend(layers::measure(&file, args.clouds)?);
     }
     atomic::write_bytes(&args.csv, &csv(&rows)?)?;
     println!("{} rows: {}", rows.len(), args.csv.display());
@@ -120,17 +110,6 @@ pub fn run(args: &GrowthArgs) -> Result<()> {
             row.bound,
             row.spread().max
         ),
-    }
-}
-
-impl GrowthArgs {
-    fn models(&self) -> Vec<PathBuf> {
-        if !self.models.is_empty() {
-            return self.models.clone();
-        }
-        let weights = root().join("assets/weights");
-        let bundled = ["edge-64", "pointnet-64", "pointnet-1024"];
-        bundled.map(|name| weights.join(format!("{name}.safetensors"))).to_vec()
     }
 }
 

@@ -10,7 +10,7 @@ use formats::weights::{Tensor, write_weights};
 
 use crate::measure::reference_network::{Chain, Network};
 
-/// Writes the model that gives what the first `n_layers` of `chain` do.
+/// Writes the model of the first `n_layers` of `chain`.
 pub fn write(network: &Network, chain: &Chain, n_layers: usize, path: &Path) -> Result<()> {
     let n_convs = n_layers.min(chain.convs.len());
     let n_fcs = n_layers - n_convs;
@@ -59,7 +59,6 @@ struct Model<'a> {
 }
 
 impl Model<'_> {
-    /// Takes layer `from` as layer `to`.
     fn copy(&mut self, from: &str, to: &str) {
         for part in ["weight", "bias"] {
             let mut tensor = self.network.tensors[&format!("{from}.{part}")].clone();
@@ -70,7 +69,7 @@ impl Model<'_> {
         self.ranges.insert(to.to_owned(), self.network.range(from) as f32);
     }
 
-    /// Takes every layer whose name begins with `prefix` as it is.
+    /// Copies every layer whose name begins with `prefix`.
     fn copy_all(&mut self, prefix: &str) {
         let named = |name: &&String| name.starts_with(prefix);
         for name in self.network.tensors.keys().filter(named) {
@@ -90,7 +89,6 @@ impl Model<'_> {
         self.tensors.insert(format!("{to}.bias"), bias);
     }
 
-    /// Outputs of layer `name` of the network.
     fn width(&self, name: &str) -> usize {
         self.network.tensors[&format!("{name}.bias")].values.len()
     }

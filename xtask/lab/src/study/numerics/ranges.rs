@@ -1,4 +1,4 @@
-//! Ranges: what f32 finds by itself, and what is delivered once f64 has solved it.
+//! Ranges in f32 alone, and as delivered after solving in f64.
 
 use glam::DVec3;
 use sim_gpu::effects::Effects;
@@ -14,9 +14,8 @@ use sim_gpu::internals::scan::{PlacedTarget, ScanRequest};
 use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
 
 use super::{Row, Setting, U64, settings};
-use crate::measure::bench_mesh::target;
+use crate::measure::bench_mesh::{target, torus};
 use crate::measure::ray_set::vlp32c;
-use crate::measure::scenes::torus;
 
 /// Beams this close to a surface's plane are promised less: 0.1 degree.
 const GRAZING_TANGENT: f64 = 573.0;
@@ -38,7 +37,7 @@ pub fn measure() -> Vec<Row> {
     settings(&SETTINGS).into_iter().flat_map(rows).collect()
 }
 
-/// Errors of f32 alone, and of what is delivered, in metres.
+/// Errors of f32 alone, and of the delivered ranges, in metres.
 fn measure_at(setting: Setting, sensor: &SensorProfile, pattern: &BeamPattern) -> [Row; 2] {
     let [scale, offset] = [setting.of("scale", 1.0), setting.of("offset", 0.0)];
     let distance = setting.of("distance", 3.0);
@@ -56,7 +55,7 @@ fn measure_at(setting: Setting, sensor: &SensorProfile, pattern: &BeamPattern) -
     let there = job(moved, &|v| v * scale + shift);
     let unit = there.target.surface.frame.scale;
 
-    // What is lost before anything is computed: vertices and the sensor round to
+    // Lost before any computation: vertices and the sensor round to
     // f64 of their own place; then some ten roundings of the range itself.
     let kept = U64 * (2.0 * 3f64.sqrt() * offset + 10.0 * (distance + 2.0) * scale);
     let delivered_bound = 2.0 * kept * (1.0 + GRAZING_TANGENT);
@@ -82,7 +81,7 @@ fn measure_at(setting: Setting, sensor: &SensorProfile, pattern: &BeamPattern) -
         if nearest.index == hit.triangle {
             let found = f64::from(trace.skipped) + f64::from(nearest.t);
             in_f32.push((found * unit - truth_m).abs());
-            // The caster's own account, and the rounding of what was skipped.
+            // The caster's own bound, and the rounding of the skipped distance.
             let skipped = f64::from(trace.skipped) / f64::from(1u32 << 24);
             f32_bound = f32_bound.max((f64::from(nearest.error) + skipped) * unit);
         }

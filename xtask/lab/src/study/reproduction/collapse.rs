@@ -1,21 +1,20 @@
 //! Where the collapse from one dataset to another comes from: one step at a
 //! time from uniform samples to noisy scans.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::rc::Rc;
-
+use super::context::ExperimentContext;
+use super::page::Section;
+use super::sets;
+use crate::render::table::{Cell, Table};
 use anyhow::ensure;
 use formats::labelled::read_labelled;
 use formats::rng::StreamKey;
 use formats::split::Split;
 use infer_cpu::{Normalization, Options};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::rc::Rc;
 use train::clouds::Clouds;
 use train::evaluate::confusion;
-
-use super::context::ExperimentContext;
-use super::matrix;
-use super::section::{Cell, Section, Table};
 
 /// Test clouds of one step, and whether they are used where they lie.
 struct Step {
@@ -27,12 +26,9 @@ struct Step {
 pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     let steps = steps(context)?;
     let networks = networks(context)?;
-    let mut table = Table::new(
-        "3 steps",
-        "Instance accuracy after each step, of networks by what they were trained on",
-        "tested on",
-        networks.iter().map(|(name, _)| *name),
-    );
+    let title = "Instance accuracy after each step, of networks by what they were trained on";
+    let mut table = Table::new(title, &["tested on"]);
+    table.heading.extend(networks.iter().map(|(name, _)| (*name).to_owned()));
     for step in &steps {
         let normalization = step.unmoved.then_some(Normalization::None);
         let options = Options { normalization, ..Options::default() };
@@ -51,7 +47,7 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
          decided by casting a ray at each sample from where the sensor stands."
             .to_owned(),
     ];
-    Ok(Section::new("Where the collapse comes from", about, vec![table]))
+    Ok(Section::new("Where the collapse comes from", about, vec![("3 steps", table)]))
 }
 
 /// Networks by the mix that they were trained on.
@@ -63,19 +59,19 @@ fn networks(context: &ExperimentContext) -> anyhow::Result<Vec<(&'static str, Pa
         let joined = surface.concat(other);
         let clouds = joined
             .map_err(|cause| anyhow::anyhow!("surfaces and scans cannot be joined: {cause}"))?;
-        context.network(name, matrix::recipe(context, clouds.len()), &clouds)
+        context.network(name, sets::recipe(context, clouds.len()), &clouds)
     };
     let turned = {
-        let mut recipe = matrix::recipe(context, surface.len());
+        let mut recipe = sets::recipe(context, surface.len());
         recipe.augment.rotate_degrees = 180.0;
         context.network("on-surface-turned", recipe, &surface)?
     };
     Ok(vec![
-        ("uniform samples", matrix::network(context, "surfaces/surface")?),
+        ("uniform samples", sets::network(context, "surfaces/surface")?),
         ("the same, turned about z in training", turned),
-        ("what each view sees of them", matrix::network(context, "surfaces/seen")?),
+        ("what each view sees of them", sets::network(context, "surfaces/seen")?),
         ("uniform and seen", mixed("on-surface-and-seen", &seen)?),
-        ("rotational noisy", matrix::network(context, "lidar/packed/rotational-noisy")?),
+        ("rotational noisy", sets::network(context, "lidar/packed/rotational-noisy")?),
         ("uniform and rotational noisy", mixed("on-surface-and-noisy", &noisy)?),
     ])
 }
@@ -121,8 +117,8 @@ fn turned(clouds: &Clouds, y_up: bool) -> Clouds {
     clouds
 }
 
-/// Of each cloud of `seen` as many points as the scan of the same view has;
-/// the others are repetitions. Views that have no scan are left out.
+/// The clouds of `seen` with as many distinct points as the scan of the same view; the others are
+/// repetitions. Views that have no scan are left out.
 fn thinned(context: &ExperimentContext, seen: &Clouds) -> anyhow::Result<Clouds> {
     let scans = read_labelled(&context.scans.join("lidar/packed/rotational-clean-test.npz"))?;
     let names = scans.names.iter().flatten().map(String::as_str);
@@ -143,24 +139,4 @@ fn thinned(context: &ExperimentContext, seen: &Clouds) -> anyhow::Result<Clouds>
     }
     clouds.normalize();
     Ok(clouds)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use formats::labelled::LabelledSet;
-
-    #[test]
-    fn turning_keeps_heights_or_lays_them_along_y() {
-        let points = vec![0.6, 0.0, 0.8, 0.0, 0.0, 1.0];
-        let offsets = vec![0, 2];
-        let set = LabelledSet { points, offsets, labels: vec![0], ..LabelledSet::default() };
-        let clouds = Clouds { set, classes: vec!["cup".to_owned()] };
-        let about_z = turned(&clouds, false);
-        assert_eq!(about_z.set.points[2], 0.8);
-        assert_eq!(about_z.set.points[3..], [0.0, 0.0, 1.0]);
-        let y_up = turned(&clouds, true);
-        assert_eq!(y_up.set.points[1], 0.8);
-        assert_eq!(y_up.set.points[3..], [0.0, 1.0, 0.0]);
-    }
 }

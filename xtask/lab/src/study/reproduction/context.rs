@@ -1,39 +1,29 @@
-//! Data and networks that experiments share. A network is trained once and kept
-//! for resumed runs.
+//! The plan, the data and the networks that experiments share. A network is trained once and kept for
+//! resumed runs.
 
+use crate::study::{plan, resume};
+use anyhow::ensure;
+use formats::split::Split;
+use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
+use infer_cpu::{Evaluation, Options};
+use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-
-use anyhow::ensure;
-use formats::hash;
-use formats::split::Split;
-use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
-use infer_cpu::{Evaluation, Options};
-use serde::Serialize;
 use train::clouds::Clouds;
 use train::evaluate::confusion;
 use train::recipe::Recipe;
 
-use super::plan::Plan;
-use crate::study::resume;
-
-/// The data, networks and sizes of all experiments.
 pub struct ExperimentContext {
-    /// How large they are.
     pub plan: Plan,
     /// ModelNet40's clouds, or those that replace them.
     pub clouds: PathBuf,
-    /// What the report calls those clouds.
     pub clouds_are: String,
-    /// Scans and surfaces of meshes, as `cargo xtask reproduce` makes them.
+    /// The folder of the scans and surfaces of meshes.
     pub scans: PathBuf,
-    /// What the report calls the meshes.
     pub meshes_are: String,
-    /// The folder of the report and of the networks.
     pub out: PathBuf,
-    /// What has been read so far, by name and split.
     pub read: RefCell<BTreeMap<String, Rc<Clouds>>>,
 }
 
@@ -70,18 +60,15 @@ impl ExperimentContext {
             meshes_sha256: [String; 2],
             plan: &'a Plan,
         }
-        let digest = |clouds: Rc<Clouds>| {
-            let bytes: Vec<u8> = clouds.set.points.iter().flat_map(|x| x.to_le_bytes()).collect();
-            hash::of_bytes(&bytes)
-        };
         let surface = self.scans("surfaces/surface", Split::Train)?;
         let noisy = self.scans("lidar/packed/rotational-noisy", Split::Test)?;
         let terms = Terms {
             version: env!("CARGO_PKG_VERSION"),
             clouds: &self.clouds_are,
-            clouds_sha256: [self.clouds(Split::Train)?, self.clouds(Split::Test)?].map(digest),
+            clouds_sha256: [self.clouds(Split::Train)?, self.clouds(Split::Test)?]
+                .map(|clouds| clouds.digest()),
             meshes: &self.meshes_are,
-            meshes_sha256: [surface, noisy].map(digest),
+            meshes_sha256: [surface, noisy].map(|clouds| clouds.digest()),
             plan: &self.plan,
         };
         Ok(toml::to_string(&terms)?)
@@ -122,14 +109,8 @@ impl ExperimentContext {
         Ok(clouds)
     }
 
-    /// The folder of all networks.
-    pub fn models(&self) -> PathBuf {
-        self.out.join("models")
-    }
-
-    /// Where the network called `name` lies.
     pub fn model(&self, name: &str) -> PathBuf {
-        self.models().join(format!("{name}.safetensors"))
+        self.out.join("models").join(format!("{name}.safetensors"))
     }
 
     /// The network called `name`, trained by `recipe` on `clouds` unless it is
@@ -160,4 +141,75 @@ pub fn test(
 ) -> anyhow::Result<Evaluation> {
     let options = Options { sampler, ..Options::default() };
     Ok(confusion(model, clouds, &options)?)
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    pub about: String,
+    /// Clouds of each class that are learnt from at most, and tested on.
+    pub most_per_class: Option<[usize; 2]>,
+    /// Steps of every training on scans and surfaces of meshes, which differ in
+    /// size; `recipe.epochs` counts for clouds.
+    pub mesh_steps: u32,
+    /// Points that networks are trained at, of ModelNet40's clouds.
+    pub points: Vec<usize>,
+    /// Points that one network is tested at.
+    pub tested_points: Vec<usize>,
+    pub kept: Vec<usize>,
+    /// Front ends of Critical Points Layers; the first is the paper's.
+    pub fronts: Vec<Vec<usize>>,
+    /// Points that networks are trained at, of scans and surfaces of meshes.
+    pub mesh_points: usize,
+    /// Clouds that LIME-3D explains.
+    pub explained: usize,
+    /// Clouds with parts taken away, of each.
+    pub lime_samples: usize,
+    /// Random subsets that critical points are compared with.
+    pub draws: u32,
+    /// How all networks are trained, but for what an experiment is about.
+    pub recipe: Recipe,
+}
+
+impl plan::Plan for Plan {
+    const FULL: &'static str = include_str!("../../../../../assets/reproduce/full.toml");
+    const QUICK: &'static str = include_str!("../../../../../assets/reproduce/quick.toml");
+
+    fn check(&self) -> anyhow::Result<()> {
+        self.recipe.check()?;
+        let need = |is_valid: bool, what: &str| {
+            ensure!(is_valid, "{what}");
+            Ok(())
+        };
+        let mut counts = self.points.iter().chain(&self.kept).chain(&self.tested_points);
+        let are_counts = counts.all(|&n| n > 0) && self.mesh_points > 0;
+        need(are_counts, "points, kept, tested_points, mesh_points: expected 1 or more")?;
+        let are_some = !self.points.is_empty() && !self.kept.is_empty();
+        need(are_some, "points, kept: expected one count or more")?;
+        let is_plain = self.recipe.cpl.is_none();
+        need(is_plain, "recipe.cpl: expected none, because `fronts` lists the encoders")?;
+        let has_clouds = self.most_per_class.is_none_or(|most| !most.contains(&0));
+        need(has_clouds, "most_per_class: expected 1 or more")?;
+        need(self.mesh_steps > 0 && self.draws > 0, "mesh_steps, draws: expected 1 or more")?;
+        need(!self.fronts.is_empty(), "fronts: expected one encoder or more")?;
+        let are_deep = self.fronts.iter().all(|front| front.len() > 1);
+        need(are_deep, "fronts: expected two layers or more")?;
+        let are_wide = self.fronts.iter().flatten().all(|width| (1..=8192).contains(width));
+        need(are_wide, "fronts: expected widths of 1 to 8192")?;
+        need(self.explained > 0, "explained: expected 1 or more")?;
+        need(self.lime_samples > 1, "lime_samples: expected 2 or more")
+    }
+}
+
+impl Plan {
+    /// Points of a cloud that experiments ask for at most.
+    pub fn most_points(&self) -> usize {
+        let counts = self.points.iter().chain(&self.tested_points).chain(&self.kept);
+        counts.copied().chain([self.mesh_points]).max().unwrap_or(1)
+    }
+
+    /// The recipe at `points` points.
+    pub fn at(&self, points: usize) -> Recipe {
+        Recipe { points, ..self.recipe.clone() }
+    }
 }

@@ -1,21 +1,19 @@
 //! What an answer rests on: LIME-3D's strongest points, critical points, and
 //! random subsets, by Chamfer distance.
 
+use super::context::{ExperimentContext, sampler};
+use super::page::{Cloud, Section};
+use super::samplers::{cpl_name, wide};
+use crate::render::table::{Cell, Table};
 use formats::split::Split;
 use infer_cpu::sampler::SamplerKind;
 use infer_cpu::{Classifier, Normalization, Options};
+use train::explanation_drawing;
 use train::lime::{Explanation, Lime, explain};
 use train::random_baseline::RandomBaseline;
 
-use super::context::{ExperimentContext, sampler};
-use super::samplers::{cpl_name, wide};
-use super::section::{Cell, Cloud, Section, Table};
-use train::explanation_drawing;
-
-/// Clouds that are shown.
 const SHOWN: usize = 3;
 
-/// One cloud, explained.
 struct Explained {
     name: String,
     points: Vec<[f32; 3]>,
@@ -70,19 +68,22 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
     Ok(Section {
         drawings: shown.iter().map(draw).collect(),
         clouds: shown.iter().map(coloured).collect(),
-        ..Section::new("LIME-3D and critical points", about, vec![table(&all, context.plan.draws)])
+        ..Section::new(
+            "LIME-3D and critical points",
+            about,
+            vec![("5 chamfer", table(&all, context.plan.draws)?)],
+        )
     })
 }
 
-fn table(all: &[Explained], draws: u32) -> Table {
+fn table(all: &[Explained], draws: u32) -> anyhow::Result<Table> {
     let mut table = Table::new(
-        "5 chamfer",
         format!(
             "Chamfer distance to the points that LIME-3D finds strongest, of critical points and \
              of {draws} random subsets"
         ),
-        "cloud",
-        [
+        &[
+            "cloud",
             "critical points, squared",
             "random, squared, median",
             "2.5 %",
@@ -108,9 +109,9 @@ fn table(all: &[Explained], draws: u32) -> Table {
             Cell::Text(format!("{} of {}", one.beside.nearer(), random.len())),
             Cell::number(one.found.r_squared, 2),
         ];
-        table.push(&one.name, cells);
+        table.measure(&one.name, cells.map(Ok))?;
     }
-    table
+    Ok(table)
 }
 
 fn coloured(one: &Explained) -> Cloud {

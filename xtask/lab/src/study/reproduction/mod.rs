@@ -1,37 +1,34 @@
-//! `cargo xtask reproduce`: repeats the paper's experiments (Meyer and Reitmann
-//! 2026, arXiv 2608.07106). Datasets are made by `edgepuck`, networks trained and
-//! measured by the library `train`. The result of each experiment is kept, so that
-//! an interrupted run can be resumed.
+//! `cargo xtask reproduce`: repeats the paper's experiments (Meyer and Reitmann 2026, arXiv
+//! 2608.07106).
+//!
+//! The result of each experiment is kept, so that an interrupted run can be resumed.
 
 mod collapse;
 mod context;
-mod datasets;
 mod lime;
-mod matrix;
-mod noise;
 mod page;
-pub mod plan;
-mod points;
 mod samplers;
-mod section;
+mod sets;
 #[cfg(test)]
 mod tests;
 
-use super::{meshes, plan as plans, resume};
+use super::{datasets, plan as plans, resume};
 use anyhow::Context;
 use context::ExperimentContext;
 use edgepuck_program::flags::need_folder_of_meshes;
+use edgepuck_program::gen_dataset::report_failures;
 use edgepuck_program::{Outcome, gen_shapes};
 use formats::atomic;
-use section::{Section, write_csv};
+use page::{Section, write_csv};
+use sim_gpu::internals::caster::AdapterRequest;
+use sim_gpu::internals::mesh::tree::discover;
 use std::cell::RefCell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Flags of `reproduce`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ReproduceArgs {
     /// ModelNet40's clouds, in any form that `train --data` accepts [default: points sampled from
     /// the meshes' surfaces]
     #[arg(long, value_name = "PATH")]
@@ -62,41 +59,55 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// Makes the datasets, runs the experiments that are not done yet, and writes
-/// `report.html` and `report.csv`.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// The datasets of scans: a folder, and flags of `gen-dataset`.
+const DATASETS: [(&str, &str); 4] = [
+    ("lidar", "--min-points 16"),
+    ("noise-0.02", "--min-points 16 --sensor vlp32c --noise 0.02"),
+    ("noise-0.05", "--min-points 16 --sensor vlp32c --noise 0.05"),
+    ("noise-0.1", "--min-points 16 --sensor vlp32c --noise 0.1"),
+];
+
+/// Makes the datasets, runs the experiments that are not done yet, and writes `report.html` and
+/// `report.csv`.
+pub fn run(args: &ReproduceArgs) -> anyhow::Result<Outcome> {
     need_folder_of_meshes(args.meshes.as_deref())?;
     let plan = plans::read(args.plan.as_deref(), args.quick)?;
     let scans = args.out.join("data");
     let per_class = [gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS];
-    let meshes = meshes::folder(args.meshes.as_deref(), &scans.join("shapes"), per_class)?;
-    datasets::make(&meshes, &scans)?;
+    let meshes = datasets::meshes(args.meshes.as_deref(), &scans.join("shapes"), per_class)?;
+    make_datasets(&meshes, &scans)?;
+    let named = |name: &Option<String>, what: &str, path: &Path| {
+        name.clone().unwrap_or_else(|| format!("{what} {}", path.display()))
+    };
     let meshes_are = match &args.meshes {
-        Some(folder) => named(args.meshes_name.as_ref(), "meshes of", folder),
-        None => "shapes of our own".to_owned(),
+        Some(folder) => named(&args.meshes_name, "meshes of", folder),
+        None => "built-in shapes".to_owned(),
     };
     let (clouds, clouds_are) = match &args.clouds {
-        Some(path) => (path.clone(), named(args.clouds_name.as_ref(), "clouds of", path)),
+        Some(path) => (path.clone(), named(&args.clouds_name, "clouds of", path)),
         None => (
             scans.join("surfaces/surface"),
             format!("surface points of {meshes_are}, in place of ModelNet40's"),
         ),
     };
-    let out = args.out.clone();
-    experiments(&ExperimentContext {
-        plan,
-        clouds,
-        clouds_are,
-        scans,
-        meshes_are,
-        out,
-        read: RefCell::default(),
-    })?;
+    let (out, read) = (args.out.clone(), RefCell::default());
+    experiments(&ExperimentContext { plan, clouds, clouds_are, scans, meshes_are, out, read })?;
     Ok(Outcome::Success)
 }
 
-fn named(name: Option<&String>, what: &str, path: &Path) -> String {
-    name.cloned().unwrap_or_else(|| format!("{what} {}", path.display()))
+/// Makes those datasets of `folder`, a folder of meshes, that `scans` lacks.
+fn make_datasets(folder: &Path, scans: &Path) -> anyhow::Result<()> {
+    let source = folder.canonicalize()?.display().to_string();
+    resume::keep_terms(&source, &scans.join("meshes.txt"))?;
+    let meshes = discover(folder, 0)?;
+    datasets::surfaces(&datasets::config("")?, true, &meshes, &scans.join("surfaces"))?;
+    for (name, flags) in DATASETS {
+        eprintln!("dataset {name}: gen-dataset {flags}");
+        let config = datasets::config(flags)?;
+        let made = datasets::scans(config, &AdapterRequest::Auto, &meshes, &scans.join(name))?;
+        report_failures(&made.failures);
+    }
+    Ok(())
 }
 
 /// Runs the experiments on data that are there, and writes the report.
@@ -104,7 +115,7 @@ fn experiments(context: &ExperimentContext) -> anyhow::Result<()> {
     let out = &context.out;
     context.check()?;
     resume::keep_terms(&context.terms()?, &out.join("terms.toml"))?;
-    fs::create_dir_all(context.models())?;
+    fs::create_dir_all(out.join("models"))?;
     let mut sections: Vec<Section> = Vec::new();
     for (name, experiment) in EXPERIMENTS {
         let path = out.join("items").join(format!("{name}.json"));
@@ -126,10 +137,10 @@ type Experiment = fn(&ExperimentContext) -> anyhow::Result<Section>;
 
 /// In this order each finds the networks that it shares with those before it.
 const EXPERIMENTS: [(&str, Experiment); 6] = [
-    ("1-points", points::run),
-    ("2-matrix", matrix::run),
+    ("1-points", samplers::by_count),
+    ("2-matrix", sets::matrix),
     ("3-collapse", collapse::run),
     ("4-samplers", samplers::run),
     ("5-lime", lime::run),
-    ("6-noise", noise::run),
+    ("6-noise", sets::noise),
 ];

@@ -1,22 +1,57 @@
-//! The report: a self-contained page with a chapter for each experiment.
+//! The report: a self-contained page with a chapter for each experiment, and its numbers as CSV.
 
-use super::plan::Plan;
-use super::section::{COLOURS, Cell, Cloud, Section, Table};
+use super::context::Plan;
 use crate::measure::machine::field;
 use crate::render::page::{self, Chapter};
-use crate::render::table;
+use crate::render::table::{Cell, Table};
 use maud::{Markup, PreEscaped, html};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
 use xtask::workspace::command_line;
 
 const TITLE: &str = "The paper's experiments, repeated";
 
-/// All sections as a page.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Section {
+    pub title: String,
+    /// The data, and remarks.
+    pub about: Vec<String>,
+    /// Tables and their names in the CSV file; the first cell of a row is its name.
+    pub tables: Vec<(String, Table)>,
+    pub drawings: Vec<String>,
+    /// Clouds that can be rotated.
+    pub clouds: Vec<Cloud>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cloud {
+    pub caption: String,
+    /// Thousandths of the unit sphere's radius.
+    pub points: Vec<[i16; 3]>,
+    /// An index into [`COLOURS`] for each.
+    pub colours: Vec<u8>,
+}
+
+/// Colours of points: plain, critical, LIME's, and both.
+const COLOURS: [&str; 4] = ["#a8a8a8", "#d33b12", "#1763c7", "#8a2fc0"];
+
+impl Section {
+    /// A section without drawings and clouds.
+    pub fn new(title: &str, about: [String; 2], tables: Vec<(&str, Table)>) -> Self {
+        let tables = tables.into_iter().map(|(name, table)| (name.to_owned(), table)).collect();
+        Self { title: title.to_owned(), about: about.into(), tables, ..Self::default() }
+    }
+}
+
 pub fn of(sections: &[Section], plan: &Plan) -> anyhow::Result<String> {
     let plan_text = toml::to_string(plan)?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let cpu = field("/proc/cpuinfo", "model name");
     let lead = html! {
         p {
             "Meyer and Reitmann 2026, arXiv 2608.07106, by edgepuck "
-            (env!("CARGO_PKG_VERSION")) "; " (machine()) "."
+            (env!("CARGO_PKG_VERSION")) "; " (cores) " cores of "
+            (cpu.as_deref().unwrap_or(std::env::consts::ARCH)) "."
         }
         p { strong { (plan.about) } }
         pre { (command_line()) }
@@ -26,17 +61,10 @@ pub fn of(sections: &[Section], plan: &Plan) -> anyhow::Result<String> {
     Ok(page::of(TITLE, &lead, &chapters))
 }
 
-/// What this ran on.
-fn machine() -> String {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let cpu = field("/proc/cpuinfo", "model name");
-    format!("{cores} cores of {}", cpu.as_deref().unwrap_or(std::env::consts::ARCH))
-}
-
 fn chapter(number: usize, section: &Section) -> Chapter {
     let body = html! {
         @for paragraph in &section.about { p { (paragraph) } }
-        @for table in &section.tables { (numbers(table).html()) }
+        @for (_, table) in &section.tables { (table.html()) }
         @for drawing in &section.drawings { (PreEscaped(drawing)) }
         @for cloud in &section.clouds { (canvas(cloud)) }
     };
@@ -52,32 +80,27 @@ fn canvas(cloud: &Cloud) -> Markup {
         span style={ "color:" (COLOURS[2]) } { "LIME's strongest" } ", "
         span style={ "color:" (COLOURS[3]) } { "both" }
     };
-    let (points, palette) = (joined(&cloud.points), COLOURS.join(" "));
-    page::Cloud { points: &points, colours: &colours, palette: &palette, ..page::Cloud::EMPTY }
-        .figure(&caption)
+    let points: Vec<String> = cloud.points.as_flattened().iter().map(i16::to_string).collect();
+    let (points, palette) = (points.join(" "), COLOURS.join(" "));
+    page::cloud(&points, &colours, &palette, &caption)
 }
 
-fn joined(points: &[[i16; 3]]) -> String {
-    let words: Vec<String> = points.as_flattened().iter().map(ToString::to_string).collect();
-    words.join(" ")
-}
-
-fn numbers(table: &Table) -> table::Table {
-    let columns = table.columns.iter().map(String::as_str);
-    let heading: Vec<&str> = std::iter::once(table.rows_are.as_str()).chain(columns).collect();
-    let mut shown = table::Table::new(table.caption.clone(), &heading);
-    for (row, cells) in &table.rows {
-        let first = table::Cell::from(row.clone());
-        shown.push(std::iter::once(first).chain(cells.iter().map(one)).collect());
+pub fn write_csv(sections: &[Section], path: &Path) -> anyhow::Result<()> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(["table", "row", "column", "value", "low", "high", "text"])?;
+    for (name, table) in sections.iter().flat_map(|section| &section.tables) {
+        for cells in &table.rows {
+            let row = cells[0].text();
+            for (column, cell) in table.heading.iter().zip(cells).skip(1) {
+                let (value, range) = cell.numbers();
+                let text = if let Cell::Text(text) = cell { text } else { "" };
+                let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x}"));
+                let [low, high] = [0, 1].map(|i| number(range.map(|range| range[i])));
+                csv.write_record([name, &row, column, &number(value), &low, &high, text])?;
+            }
+        }
     }
-    shown
-}
-
-/// A cell; shares are shaded by their size.
-fn one(cell: &Cell) -> table::Cell {
-    let (text, note) = cell.words();
-    let is_share = matches!(cell, Cell::Share(..) | Cell::Mean(..));
-    table::Cell { text, note, share: cell.numbers().0.filter(|_| is_share) }
+    Ok(formats::atomic::write_bytes(path, csv.into_inner()?)?)
 }
 
 #[cfg(test)]
@@ -86,10 +109,11 @@ mod tests {
 
     #[test]
     fn a_page_shows_tables_and_clouds_and_escapes_names() {
-        let mut table = Table::new("id", "a < b", "rows", ["x"]);
-        table.push("row", [Cell::Share(1, 2)]);
+        let mut table = Table::new("a < b", &["rows", "x"]);
+        table.measure("row", [Ok(Cell::Share(1, 2))]).unwrap();
         let cloud = Cloud { points: vec![[1, 2, 3]], colours: vec![2], ..Cloud::default() };
-        let section = Section { tables: vec![table], clouds: vec![cloud], ..Section::default() };
+        let tables = vec![("id".to_owned(), table)];
+        let section = Section { tables, clouds: vec![cloud], ..Section::default() };
         let plan = crate::study::plan::read(None, true).unwrap();
         let page = of(&[section], &plan).unwrap();
         assert!(page.contains("a &lt; b") && page.contains("50.0 %"));

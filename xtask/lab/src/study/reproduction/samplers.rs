@@ -1,21 +1,18 @@
-//! Random, farthest and critical points: what they cost and what they are
-//! worth, each behind a network trained at the same count.
+//! Accuracy by the number of points; random, farthest and critical points, what they cost and how
+//! accurate the networks behind them are.
 
-use std::time::Instant;
-
+use super::context::{ExperimentContext, Plan, sampler, test};
+use super::page::Section;
+use crate::render::chart::{Axis, Chart, Dot, Series};
+use crate::render::table::{Cell, Table};
 use formats::split::Split;
 use infer_cpu::sampler::{Resize, Sampler, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, kernel};
+use std::time::Instant;
 use train::clouds::Clouds;
 use train::cpl::Cpl;
 use train::recipe::{Recipe, Sampling};
 
-use super::context::{ExperimentContext, sampler, test};
-use super::plan::Plan;
-use super::points;
-use super::section::{Cell, Section, Table};
-
-/// Clouds whose sampling is timed.
 const TIMED: usize = 64;
 
 /// The name of the network behind front end `front` at `keep` points.
@@ -47,10 +44,10 @@ pub fn run(context: &ExperimentContext) -> anyhow::Result<Section> {
             .to_owned(),
     ];
     let tables = vec![
-        accuracy(context, &held)?,
-        latency(context, &held)?,
-        unique(context, &held)?,
-        resized(context, &held)?,
+        ("4 accuracy", accuracy(context, &held)?),
+        ("4 latency", latency(context, &held)?),
+        ("4 unique", unique(context, &held)?),
+        ("4 resize", resized(context, &held)?),
     ];
     Ok(Section::new("Samplers", about, tables))
 }
@@ -68,7 +65,7 @@ fn rivals(plan: &Plan, n_points: usize) -> Vec<Rival> {
         recipe.cpl.iter_mut().for_each(change);
         recipe
     };
-    let random = at_each_count(&|keep| (points::name(keep), points::recipe(plan, keep)));
+    let random = at_each_count(&|keep| (random_name(keep), random_recipe(plan, keep)));
     let farthest = at_each_count(&|keep| {
         (format!("farthest-{keep}"), Recipe { sampling: Sampling::Fps, ..plan.at(keep) })
     });
@@ -93,15 +90,12 @@ fn rivals(plan: &Plan, n_points: usize) -> Vec<Rival> {
 fn accuracy(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let train = context.clouds(Split::Train)?;
     let kept = &context.plan.kept;
-    let mut table = Table::new(
-        "4 accuracy",
-        "Instance accuracy, each network trained behind its sampler at that count",
-        "sampler",
-        kept.iter().map(|n| format!("{n} points")),
-    );
+    let title = "Instance accuracy, each network trained behind its sampler at that count";
+    let mut table = Table::new(title, &["sampler"]);
+    table.heading.extend(kept.iter().map(|n| format!("{n} points")));
     for (rival, networks) in rivals(&context.plan, train.set.smallest_cloud()) {
         let trained = |i: usize| {
-            let Some((name, recipe)) = networks.get(i) else { return Ok(Cell::None) };
+            let Some((name, recipe)) = networks.get(i) else { return Ok(Cell::EMPTY) };
             let model = context.network(name, recipe.clone(), &train)?;
             Ok(Cell::instance(&test(&model, held, None)?))
         };
@@ -112,20 +106,21 @@ fn accuracy(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table>
 
 fn latency(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let keep = context.plan.kept[0];
-    let caption = format!("Choosing {keep} of {} points, ms", held.set.smallest_cloud());
-    let mut table = Table::new("4 latency", caption, "sampler", ["ms", "paper (1024 to 128)"]);
+    let title = format!("Choosing {keep} of {} points, ms", held.set.smallest_cloud());
+    let mut table = Table::new(title, &["sampler", "ms", "paper (1024 to 128)"]);
     let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
-    for (name, kind, paper) in
-        [("random", SamplerKind::Random, Cell::None), ("farthest", SamplerKind::Fps, paper("5.73"))]
-    {
+    for (name, kind, paper) in [
+        ("random", SamplerKind::Random, Cell::EMPTY),
+        ("farthest", SamplerKind::Fps, paper("5.73")),
+    ] {
         let mut chosen = Sampler::new(sampler(kind, keep))?;
         let ms = median(held, |cloud| Ok(chosen.select(cloud, kernels)?.len()))?;
-        table.push(name, [Cell::Number(ms, 4), paper]);
+        table.measure(name, [Cell::Number(ms, 4), paper].map(Ok))?;
     }
     for front in &context.plan.fronts {
         let (name, mut classifier) = with_cpl(context, front, keep)?;
         let ms = median(held, |cloud| Ok(classifier.sample(&wide(cloud))?.len()))?;
-        table.push(name, [Cell::Number(ms, 4), paper("1.96")]);
+        table.measure(name, [Cell::Number(ms, 4), paper("1.96")].map(Ok))?;
     }
     Ok(table)
 }
@@ -147,7 +142,6 @@ fn paper(ms: &str) -> Cell {
     Cell::Text(format!("{ms}, Raspberry Pi 5"))
 }
 
-/// The median time of `choose` over some clouds, ms.
 fn median(
     clouds: &Clouds,
     mut choose: impl FnMut(&[[f32; 3]]) -> anyhow::Result<usize>,
@@ -170,9 +164,8 @@ pub fn wide(cloud: &[[f32; 3]]) -> Vec<[f64; 3]> {
 }
 
 fn unique(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
-    let caption = "Distinct critical points of a cloud";
-    let columns = ["least", "median", "most", "paper"];
-    let mut table = Table::new("4 unique", caption, "front end", columns);
+    let title = "Distinct critical points of a cloud";
+    let mut table = Table::new(title, &["front end", "least", "median", "most", "paper"]);
     for front in &context.plan.fronts {
         let (name, mut classifier) = with_cpl(context, front, held.set.smallest_cloud())?;
         let mut counts = Vec::new();
@@ -183,18 +176,18 @@ fn unique(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
         let at = |i: usize| Cell::Number(counts[i], 0);
         let last = counts.len() - 1;
         let paper = Cell::Text("40 to 60".to_owned());
-        table.push(name, [at(0), at(last / 2), at(last), paper]);
+        table.measure(name, [at(0), at(last / 2), at(last), paper].map(Ok))?;
     }
     Ok(table)
 }
 
-/// Accuracy by how critical points are made as many as are wanted.
+/// Accuracy by the rule that resizes the critical points.
 fn resized(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> {
     let keep = context.plan.kept[0];
     let rules = [Resize::Truncate, Resize::Cyclic, Resize::Nearest, Resize::Weighted];
-    let caption = format!("Instance accuracy by the rule that makes {keep} points of the ranking");
-    let columns = rules.map(|rule| rule.to_string());
-    let mut table = Table::new("4 resize", caption, "front end", columns);
+    let title = format!("Instance accuracy by the rule that makes {keep} points of the ranking");
+    let mut table = Table::new(title, &["front end"]);
+    table.heading.extend(rules.map(|rule| rule.to_string()));
     for front in &context.plan.fronts {
         let name = cpl_name(front, keep);
         let model = context.model(&name);
@@ -205,4 +198,77 @@ fn resized(context: &ExperimentContext, held: &Clouds) -> anyhow::Result<Table> 
         table.measure(name, rules.map(tested))?;
     }
     Ok(table)
+}
+
+fn random_name(n: usize) -> String {
+    format!("random-{n}")
+}
+
+fn random_recipe(plan: &Plan, n: usize) -> Recipe {
+    Recipe { sampling: Sampling::Random, ..plan.at(n) }
+}
+
+pub fn by_count(context: &ExperimentContext) -> anyhow::Result<Section> {
+    let (train, held) = (context.clouds(Split::Train)?, context.clouds(Split::Test)?);
+    let title = "Networks trained and tested at N points, drawn at random";
+    let heading = ["points", "instance accuracy", "class accuracy", "paper"];
+    let mut trained = Table::new(title, &heading);
+    for &n in &context.plan.points {
+        let model = context.network(&random_name(n), random_recipe(&context.plan, n), &train)?;
+        let found = test(&model, &held, None)?;
+        let cells = [Cell::instance(&found), Cell::class(&found), paper_accuracy(n)];
+        trained.measure(n.to_string(), cells.map(Ok))?;
+    }
+    let most = context.plan.points.iter().copied().max().unwrap_or(1);
+    let model = context.network(&random_name(most), random_recipe(&context.plan, most), &train)?;
+    let title = format!("The network of {most} points, tested at others");
+    let mut tested = Table::new(title, &["points", "random points", "farthest points"]);
+    for &n in &context.plan.tested_points {
+        let at = |kind| {
+            if n > held.set.smallest_cloud() {
+                return Ok(Cell::Text(format!("clouds have {} points", held.set.smallest_cloud())));
+            }
+            Ok(Cell::instance(&test(&model, &held, Some(sampler(kind, n)))?))
+        };
+        tested.measure(n.to_string(), [SamplerKind::Random, SamplerKind::Fps].map(at))?;
+    }
+    let chart = Chart {
+        message: "Instance accuracy by the number of points".to_owned(),
+        caption: "",
+        x: Axis::Logarithmic("points"),
+        y: Axis::Percent("instance accuracy"),
+        series: vec![
+            line("trained at N", &trained, 1),
+            line(&format!("trained at {most}, random"), &tested, 1),
+            line(&format!("trained at {most}, farthest"), &tested, 2),
+        ],
+    };
+    let about = [
+        format!("Data: {}.", context.clouds_are),
+        "The first table has a network for each count; the second one network for all.".to_owned(),
+    ];
+    let title = "Accuracy by the number of points (table 1)";
+    Ok(Section {
+        drawings: vec![chart.figure().into_string()],
+        ..Section::new(title, about, vec![("1 trained at N", trained), ("1 tested at N", tested)])
+    })
+}
+
+/// The numbers of column `column` of `table`, whose rows are counts of points.
+fn line(name: &str, table: &Table, column: usize) -> Series {
+    let dot = |cells: &Vec<Cell>| {
+        let (points, cell) = (cells[0].text(), &cells[column]);
+        let (x, y) = (points.parse().ok()?, cell.numbers().0?);
+        let tip = format!("{name}: {} of {points} points", cell.text());
+        Some(Dot { x, y, tip, filled: true })
+    };
+    let dots = table.rows.iter().filter_map(dot).collect();
+    Series { name: name.to_owned(), dots, joined: true }
+}
+
+fn paper_accuracy(n: usize) -> Cell {
+    match n {
+        64 => Cell::Text("89.01 % (random), 88.36 % (CPL)".to_owned()),
+        _ => Cell::EMPTY,
+    }
 }

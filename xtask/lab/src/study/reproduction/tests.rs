@@ -1,10 +1,11 @@
 //! The paper's experiments on shapes that take no time.
 
-use super::context::ExperimentContext;
+use super::context::{ExperimentContext, Plan};
 use super::experiments;
-use super::plan::Plan;
 use crate::study::plan::Plan as _;
-use crate::study::test_clouds;
+use formats::hash::Hashing;
+use formats::packed::PackedWriter;
+use formats::rng::StreamKey;
 use std::cell::RefCell;
 use std::path::Path;
 
@@ -47,7 +48,7 @@ fn folder() -> tempfile::TempDir {
     for set in SETS {
         for (split, seed, n) in [("train", 5, 60), ("test", 6, 30)] {
             let path = folder.path().join(format!("{set}-{split}.npz"));
-            test_clouds::write(&path, seed, 0, n);
+            write_clouds(&path, seed, 0, n);
         }
     }
     folder
@@ -138,4 +139,27 @@ fn another_plan_or_a_bad_one_is_refused() {
     std::fs::create_dir(folder.join("out")).unwrap();
     std::fs::write(folder.join("out/terms.toml"), "version = \"another\"").unwrap();
     refused(PLAN, "an earlier run had another plan or other data");
+}
+
+/// Points of a cloud.
+const POINTS: usize = 32;
+
+/// Writes a packed set to `path`: clouds `first` to `n` of a ball, a disc and a
+/// rod in turns, called `m0_v0`, `m1_v0` and so on. Another seed gives other
+/// clouds of the same classes.
+fn write_clouds(path: &Path, seed: u64, first: usize, n: usize) {
+    let classes = ["ball", "disc", "rod"].map(str::to_owned).to_vec();
+    let mut packed = PackedWriter::create(path, POINTS, classes).unwrap();
+    for i in first..n {
+        let n_raw = 10 + 5 * i as u32;
+        packed.push(&cloud(seed, i), i % 3, &format!("m{i}_v0"), n_raw).unwrap();
+    }
+    packed.finish(Hashing::None).unwrap();
+}
+
+fn cloud(seed: u64, i: usize) -> Vec<[f32; 3]> {
+    let key = StreamKey::new(seed, "clouds", i as u32);
+    let flat = [[1.0, 1.0, 1.0], [1.0, 1.0, 0.05], [1.0, 0.05, 0.05]][i % 3];
+    let unit = |n: usize| (2.0 * key.unit(n as u64) - 1.0) as f32;
+    (0..POINTS).map(|point| [0, 1, 2].map(|axis| unit(3 * point + axis) * flat[axis])).collect()
 }

@@ -1,25 +1,18 @@
-//! `cargo xtask bench scale`: what a million, a billion and a trillion scans cost as tars, and what is
-//! the first to keep more machines from making them sooner.
-//!
-//! Tasks of each plan are run and measured. What all tasks of a plan cost, and the link over which they
-//! upload, are modelled from what one tar costs.
+//! `cargo xtask bench scale`: the cost of tasks of a million, a billion and a trillion scans as tars.
 
-mod link;
-mod model;
-mod runs;
-
-use crate::measure::clock::Spread;
+use crate::measure::clock::{Cost, Costs, Spread};
 use crate::measure::machine::Machine;
-use crate::render::table::{Column, Table, digits, percent};
-use anyhow::Result;
+use crate::render::table::{Column, Table, digits};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
+use edgepuck_dataset::tars::PartManifest;
 use formats::atomic;
-use model::{CORES, PerCloud, costs};
-use runs::{Plan, Program, Task};
-use std::path::PathBuf;
-use xtask::workspace::command_line;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+use tempfile::TempDir;
+use xtask::workspace::{command_line, output, words};
 
-/// Flags of `bench scale`.
 #[derive(Args, Debug)]
 pub struct ScaleArgs {
     /// Program to measure, which `cargo build --release -p edgepuck` builds.
@@ -37,13 +30,9 @@ const PLANS: [Plan; 3] = [
     Plan { scans: 1_000_000_000_000, tar_clouds: 1 << 20 },
 ];
 
-/// Gbit/s of the link that is simulated.
-const LINK: f64 = 10.0;
-
 /// Words about the tables.
 const NOTES: &str = include_str!("notes.md");
 
-/// Measures, prints the tables and writes the report.
 pub fn run(args: &ScaleArgs) -> Result<()> {
     let (machine, program) = (Machine::here(), Program::new(&args.program)?);
     let mut start_ups = PLANS.map(Plan::no_tar);
@@ -54,25 +43,16 @@ pub fn run(args: &ScaleArgs) -> Result<()> {
     let mut samples = [PLANS[0].one_tar("clouds"), scans.one_tar("scan")];
     program.run(&mut samples, 1)?;
     let cast_cpu_s = program.cast_cpu_s(20)?;
-    let [clouds, scans] = samples.each_ref().map(|task| PerCloud {
-        cpu_s: task.costs.cpu_s().median / task.clouds as f64,
-        cast_cpu_s,
-        bytes: task.bytes as f64 / task.clouds as f64,
-    });
     let [small, large] = equal.each_ref().map(|task| task.costs.cpu_s().median);
     let tasks: Vec<Task> = start_ups.into_iter().chain(equal).chain(samples).collect();
-    let tables = [
-        measured(&tasks),
-        modelled("clouds", &clouds),
-        modelled("scan", &scans),
-        links(&clouds, &scans),
-        shares(&clouds),
-    ];
     let mut text = heading(&machine, cast_cpu_s, small / large);
-    tables.iter().for_each(|table| text += &(table.markdown() + "\n"));
+    text += &(measured(&tasks).markdown() + "\n");
     text += NOTES;
     print!("{text}");
-    args.report.as_ref().map_or(Ok(()), |file| Ok(atomic::write_bytes(file, &text)?))
+    if let Some(file) = &args.report {
+        atomic::write_bytes(file, &text)?;
+    }
+    Ok(())
 }
 
 fn heading(machine: &Machine, cast_cpu_s: f64, ratio: f64) -> String {
@@ -80,8 +60,8 @@ fn heading(machine: &Machine, cast_cpu_s: f64, ratio: f64) -> String {
     let [commit, cpu, load] = [commit, cpu, load_average].map(|x| x.as_deref().unwrap_or("?"));
     format!(
         "# Tars of a million to a trillion scans\n\n    {}\n\nCommit {commit}; {cpu}, {threads} \
-         threads, {system}, load {load}. Measured: a CPU-second makes {} times as many clouds of the \
-         plan of 1e9 scans as of that of 1e6; aiming and casting take {} CPU-ms a scan.\n\n",
+         threads, {system}, load {load}. A CPU-second makes {} times as many clouds of the plan \
+         of 1e9 scans as of that of 1e6; aiming and casting take {} CPU-ms a scan.\n\n",
         command_line(),
         digits(ratio),
         digits(1e3 * cast_cpu_s),
@@ -106,46 +86,167 @@ fn measured(tasks: &[Task]) -> Table {
         ("bytes/cloud", &|t| per(t.bytes, t.clouds as f64)),
         ("peak MB", &|t| digits(t.peak_bytes as f64 / 1e6)),
     ];
-    Table::of("Measured: tasks without a tar, and with one", tasks, &columns)
+    Table::of("Tasks without a tar, and with one", tasks, &columns)
 }
 
-fn modelled(sample: &str, cloud: &PerCloud) -> Table {
-    let title = format!("Modelled: all of a plan, `--sample {sample}`, machines of {CORES} cores");
-    let mut table = Table::new(title, &["", "1e6 scans", "1e9 scans", "1e12 scans"]);
-    let [small, medium, large] = PLANS.map(|plan| costs(plan, cloud));
-    for ((small, medium), large) in small.into_iter().zip(medium).zip(large) {
-        table.push(vec![small.0, small.1, medium.1, large.1]);
+/// Built-in shapes to train and to test with, of 10 classes.
+const SHAPES: [u64; 2] = [400, 100];
+const VIEWS: &str = "--sensor vlp32c --distance 2,10 --elevation -10,40 --azimuth-jitter 180 \
+                     --adapter cpu";
+
+#[derive(Clone, Copy)]
+struct Plan {
+    scans: u64,
+    tar_clouds: u64,
+}
+
+/// A part of a plan, and its costs in each round.
+struct Task {
+    plan: Plan,
+    sample: &'static str,
+    /// Its number from 1 in the first round, and the number of parts.
+    shard: [u64; 2],
+    costs: Costs,
+    peak_bytes: u64,
+    clouds: u64,
+    bytes: u64,
+}
+
+/// The program, and the shapes that it scans.
+struct Program {
+    path: PathBuf,
+    shapes: TempDir,
+}
+
+impl Plan {
+    fn views(self) -> u64 {
+        self.scans / SHAPES.iter().sum::<u64>()
     }
-    table
+
+    /// Scans to train and to test with.
+    fn splits(self) -> [u64; 2] {
+        SHAPES.map(|shapes| shapes * self.views())
+    }
+
+    fn tars(self) -> [u64; 2] {
+        self.splits().map(|scans| scans.div_ceil(self.tar_clouds))
+    }
+
+    fn task(self, sample: &'static str, shard: [u64; 2]) -> Task {
+        let (plan, costs) = (self, Costs::default());
+        Task { plan, sample, shard, costs, peak_bytes: 0, clouds: 0, bytes: 0 }
+    }
+
+    /// The task of the last but one tar to train with, which is whole: there are fewer to test with.
+    fn one_tar(self, sample: &'static str) -> Task {
+        let [train, _] = self.tars();
+        self.task(sample, [train - 1, train])
+    }
+
+    /// A task without tars, since a split has fewer than a million.
+    fn no_tar(self) -> Task {
+        self.task("clouds", [1_000_000; 2])
+    }
 }
 
-fn links(clouds: &PerCloud, scans: &PerCloud) -> Table {
-    let cores = |cloud: &PerCloud, link: f64| digits(cloud.cores_to_fill(link));
-    let columns: [Column<f64>; 3] = [
-        ("Gbit/s", &|link| digits(*link)),
-        ("cores, clouds", &|link| cores(clouds, *link)),
-        ("cores, scan", &|link| cores(scans, *link)),
-    ];
-    Table::of("Modelled: cores that fill a link", &[1.0, 10.0, 100.0], &columns)
+impl Task {
+    /// Tars differ in what they cost: each round takes another, a sixteenth of all tars before the last.
+    fn shard_in(&self, round: u64) -> [u64; 2] {
+        let [number, of] = self.shard;
+        [number - round * (of / 16), of]
+    }
 }
 
-fn shares(cloud: &PerCloud) -> Table {
-    let clouds = PLANS[0].tar_clouds as f64;
-    let cast_s = cloud.cpu_s * clouds / CORES as f64;
-    let upload_s = cloud.bytes * clouds * 8.0 / (LINK * 1e9);
-    let title = format!(
-        "Modelled: share of the rate without a link, %, of tasks of {CORES} cores that share {LINK} \
-         Gbit/s ({} s to cast a tar of clouds, {} s to upload it alone: {} tasks fill the link)",
-        digits(cast_s),
-        digits(upload_s),
-        digits((cast_s + upload_s) / upload_s),
-    );
-    let share =
-        |tasks: usize, stagger_s| percent(link::share_of_rate(tasks, cast_s, upload_s, stagger_s));
-    let columns: [Column<usize>; 3] = [
-        ("tasks", &usize::to_string),
-        ("started evenly over a tar's time", &|n| share(*n, (cast_s + upload_s) / *n as f64)),
-        ("started together", &|n| share(*n, 0.0)),
-    ];
-    Table::of(title, &[1, 4, 16, 64, 256], &columns)
+impl Program {
+    fn new(path: &Path) -> Result<Self> {
+        let path = path.canonicalize().with_context(|| path.display().to_string())?;
+        let shapes = tempfile::tempdir()?;
+        let [train, test] = SHAPES.map(|shapes| (shapes / 10).to_string());
+        let mut command = Command::new(&path);
+        command.args(["gen-shapes", "--train", &train, "--test", &test, "--out"]);
+        output(command.arg(shapes.path()))?;
+        Ok(Self { path, shapes })
+    }
+
+    fn run(&self, tasks: &mut [Task], rounds: u64) -> Result<()> {
+        let in_turns = |round| tasks.iter_mut().try_for_each(|task| self.run_once(task, round));
+        (0..rounds).try_for_each(in_turns)
+    }
+
+    fn run_once(&self, task: &mut Task, round: u64) -> Result<()> {
+        let (Task { plan, sample, .. }, [number, of]) = (&*task, task.shard_in(round));
+        let (views, clouds) = (plan.views(), plan.tar_clouds);
+        let out = tempfile::tempdir()?;
+        let flags = format!(
+            "--layout webdataset --views {views} --sample {sample} --tar-clouds {clouds} --shard {number}/{of}"
+        );
+        let (cost, peak_bytes, _) = self.gen_dataset(&flags, out.path())?;
+        let part = format!("data/part-{:04}-of-{of:04}.json", number - 1);
+        let part: PartManifest = serde_json::from_slice(&std::fs::read(out.path().join(part))?)?;
+        task.costs.0.push(cost);
+        task.peak_bytes = task.peak_bytes.max(peak_bytes);
+        task.clouds = part.tars.iter().map(|tar| tar.clouds).sum();
+        task.bytes = part.tars.iter().map(|tar| tar.bytes).sum();
+        Ok(())
+    }
+
+    /// CPU-seconds that aiming and casting take of each scan of a dataset without tars, if threads
+    /// wait as often in all of its stages.
+    fn cast_cpu_s(&self, views: u64) -> Result<f64> {
+        let out = tempfile::tempdir()?;
+        let (cost, _, said) = self.gen_dataset(&format!("--views {views}"), out.path())?;
+        let share = cast_share(&said).context("expected the seconds of each stage, found none")?;
+        Ok(share * cost.cpu_s / (views * SHAPES.iter().sum::<u64>()) as f64)
+    }
+
+    /// Makes a dataset in `out`/data; returns the cost, the peak memory in bytes, and the program's
+    /// messages.
+    fn gen_dataset(&self, flags: &str, out: &Path) -> Result<(Cost, u64, String)> {
+        let usage = out.join("usage");
+        let mut command = Command::new("time");
+        command.args(["--quiet", "--format", "%U %S %M", "--output"]).arg(&usage).arg(&self.path);
+        command.arg("gen-dataset").arg(self.shapes.path()).args(VIEWS.split_whitespace());
+        command.args(flags.split_whitespace()).arg("--out").arg(out.join("data"));
+        let start = Instant::now();
+        let output = command.output().context("running GNU time, of the Debian package time")?;
+        let wall_s = start.elapsed().as_secs_f64();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        // 3: all is done, but for shapes that too few beams hit from afar.
+        let is_done = matches!(output.status.code(), Some(0 | 3));
+        ensure!(is_done, "{} failed ({}): {said}", words(&command), output.status);
+        let usage = std::fs::read_to_string(usage)?;
+        let figures: Vec<f64> = usage.split_whitespace().flat_map(str::parse).collect();
+        ensure!(figures.len() == 3, "expected three figures of GNU time, found {usage}");
+        let cost = Cost { wall_s, cpu_s: figures[0] + figures[1] };
+        Ok((cost, figures[2] as u64 * 1024, said))
+    }
+}
+
+/// The share of aiming, which GPUs do too, and casting in the seconds of a summary.
+fn cast_share(said: &str) -> Option<f64> {
+    let stages = said.lines().find_map(|line| line.strip_prefix("seconds over all threads: "))?;
+    let (mut cast, mut all) = (0.0, 0.0);
+    for stage in stages.split(", ") {
+        let (name, seconds) = stage.split_once(' ')?;
+        let seconds: f64 = seconds.parse().ok()?;
+        all += seconds;
+        cast += if ["aim", "cast"].contains(&name) { seconds } else { 0.0 };
+    }
+    Some(cast / all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_task_has_one_whole_tar_and_a_plan_fewer_than_a_million() {
+        let plan = Plan { scans: 1_000_000, tar_clouds: 65_536 };
+        assert_eq!((plan.splits(), plan.tars()), ([800_000, 200_000], [13, 4]));
+        assert_eq!(plan.one_tar("scan").shard_in(0), [12, 13]);
+        let (small, large) =
+            (Plan { tar_clouds: 8192, ..plan }, Plan { scans: 1 << 40, tar_clouds: 1 << 20 });
+        assert_eq!((small.tars(), small.one_tar("scan").shard_in(4)), ([98, 25], [73, 98]));
+        assert!(large.no_tar().shard_in(2)[0] > large.tars()[0]);
+    }
 }

@@ -7,19 +7,16 @@ pub mod mounting;
 mod patches;
 pub mod sweep;
 
-use crate::render::table::{Table, percent};
+use crate::render::table::{Table, percent, publish};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use formats::atomic;
 use formats::labelled_sweep::read_labelled_sweep;
 use mounting::Mounting;
 use patches::{Patch, Shown, typical_mm};
 use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile};
-use std::fmt::Write;
 use std::path::PathBuf;
 use sweep::Return;
 
-/// Flags of `bench sensor`.
 #[derive(Args, Debug)]
 pub struct SensorArgs {
     /// Frames of Argoverse 2 as NPZ files with `xyz_mm`, `laser` and `offset_ns`. Files without
@@ -38,10 +35,9 @@ pub struct SensorArgs {
 const RANGES_M: [f64; 6] = [0.0, 10.0, 15.0, 20.0, 30.0, 50.0];
 /// Borders of the bins of incidence, degrees.
 const INCIDENCES_DEG: [f64; 4] = [0.0, 40.0, 70.0, 85.0];
-/// A bin of fewer patches says nothing.
+/// Fewer patches are no figure of a bin.
 const MIN_PATCHES: usize = 5;
 
-/// One sensor's sweep, taken apart.
 struct Sweep {
     name: String,
     mounting: Mounting,
@@ -56,7 +52,6 @@ impl Sweep {
     }
 }
 
-/// Measures the frames and a simulated sweep, prints the tables and writes the report.
 pub fn run(args: &SensorArgs) -> Result<()> {
     let sensor = SensorProfile::resolve(&args.sensor)?;
     let Layout::Rotating(table) = &sensor.layout else {
@@ -79,22 +74,14 @@ pub fn run(args: &SensorArgs) -> Result<()> {
     }
     let returns = sweep::simulated(&sensor, table).context("simulating a sweep")?;
     let simulated = [Sweep::of("simulated".to_owned(), &returns, table)];
-    let mut report = String::new();
-    for table in [
+    let tables = [
         mountings(real.iter().chain(&simulated)),
         beams(&real, &simulated, table),
         figures(&real, &simulated, table),
-    ] {
-        print!("{table}");
-        writeln!(report, "{}", table.markdown())?;
-    }
-    if let Some(file) = &args.report {
-        atomic::write_bytes(file, report)?;
-    }
-    Ok(())
+    ];
+    publish(&tables, args.report.as_deref())
 }
 
-/// Where each sensor stands, and how well it is known.
 fn mountings<'a>(sweeps: impl Iterator<Item = &'a Sweep>) -> Table {
     let heading = [
         "sweep",
@@ -160,7 +147,6 @@ fn mean_and_error(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// What a sweep looks like, real and simulated.
 fn figures(real: &[Sweep], simulated: &[Sweep], profile: &Rotating) -> Table {
     let mut table = Table::new("Real and simulated", &["figure", "real", "simulated"]);
     let mut push = |name: String, of: &dyn Fn(&[Sweep]) -> Option<String>| {

@@ -16,7 +16,7 @@ use super::quantile;
 /// tilt (2), deviation of the rate of turning, and the head's uneven turning: sine and
 /// cosine of one, two and three times its angle.
 const N: usize = 17;
-/// Those that elevations depend on.
+/// The number of values that elevations depend on.
 const N_OF_ELEVATION: usize = 10;
 /// Steps of Gauss and Newton in each stage; they end at rest well before.
 const STEPS: usize = 40;
@@ -77,7 +77,6 @@ impl Mounting {
         found
     }
 
-    /// Whether the sensor hangs upside down.
     pub fn is_upside_down(&self) -> bool {
         self.upright < 0.0
     }
@@ -178,8 +177,8 @@ impl Mounting {
         [0, 1].map(|kind| level(&now[kind], returns, n_lasers))
     }
 
-    /// Elevations in the car's frame, and what azimuths are ahead of the encoder, which
-    /// reads `zero` in the middle of the sweep; both in degrees.
+    /// Elevations in the car's frame, and the lead of azimuths over the encoder, which reads `zero`
+    /// in the middle of the sweep; both in degrees.
     fn angles(
         &self,
         values: &[f64; N],
@@ -211,7 +210,7 @@ impl Mounting {
         [elevations, ahead]
     }
 
-    /// What the encoder reads in the middle of a sweep, degrees: the mean direction.
+    /// The encoder's reading in the middle of a sweep, degrees: the mean direction.
     fn encoder_zero(&self, returns: &[Return], table: &Rotating) -> f64 {
         let [_, ahead] = self.angles(&self.values, returns, table, 0.0);
         let sines: f64 = ahead.iter().map(|a| a.to_radians().sin()).sum();
@@ -259,8 +258,8 @@ fn weighted_means(
     sums.into_iter().map(|(sum, total)| if total > 0.0 { sum / total } else { 0.0 }).collect()
 }
 
-/// `values` less their laser's mean: what is left of a slope where each laser's own
-/// angle is free.
+/// `values` less the mean of their laser: the slope when each laser's own angle is a free
+/// parameter.
 fn less_means(
     mut values: Vec<f64>,
     weights: &[f64],

@@ -9,7 +9,7 @@ use sim_gpu::internals::sensor::Rotating;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// A patch is of so many rings and so many firing sequences: some 4 degrees wide.
+/// Rings and firing sequences of a patch: some 4 degrees.
 const PATCH: [usize; 2] = [3, 12];
 /// A patch of fewer returns is an edge's.
 const MIN_RETURNS: usize = 20;
@@ -18,7 +18,7 @@ const MIN_RETURNS: usize = 20;
 const FLAT_M: f64 = 0.05;
 /// Neighbours whose ranges differ by less than this share see one surface.
 const SAME_SURFACE: f64 = 0.03;
-/// Ranges below this are written so finely that steps of 4 mm can be told, metres.
+/// Ranges below this are written finely enough to distinguish steps of 4 mm, metres.
 const NEAR_M: f64 = 8.0;
 /// Firing sequences of one direction: 5 degrees.
 const DIRECTION: usize = 25;
@@ -34,7 +34,6 @@ struct Placed {
     rounding_m2: f64,
 }
 
-/// A flat patch.
 pub struct Patch {
     /// Mean range, metres.
     pub range_m: f64,
@@ -46,11 +45,10 @@ pub struct Patch {
     pub plane_m2: f64,
 }
 
-/// What one sensor's sweep shows besides its directions.
+/// The noise, gaps and ranges of one sensor's sweep.
 pub struct Shown {
-    /// The flat patches.
     pub patches: Vec<Patch>,
-    /// Of each two neighbours on one surface: the range, and how many firings lie between
+    /// For each pair of neighbours on one surface: the range, and the number of firings between
     /// them without a return.
     pub gaps: Vec<(f64, usize)>,
     /// The ranges of all returns, metres.
@@ -64,7 +62,7 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// Takes the sweep apart, which the sensor at `mounting` took.
+    /// Measures the sweep of the sensor at `mounting`.
     pub fn of(returns: &[Return], mounting: &Mounting, table: &Rotating) -> Self {
         let placed = place(returns, mounting, table);
         let mut counts = vec![0; table.beam.len()];

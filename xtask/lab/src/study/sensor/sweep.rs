@@ -18,7 +18,6 @@ use sim_gpu::internals::sensor::{Rotating, SensorProfile};
 /// Height of the simulated sensor above the ground, metres: on a car's roof.
 const HEIGHT_M: f64 = 1.65;
 
-/// A return.
 #[derive(Clone, Copy)]
 pub struct Return {
     /// Where, in the car's frame, metres.
@@ -51,8 +50,8 @@ pub fn by_sensor(sweep: &LabelledSweep, n_lasers: usize) -> Result<Vec<Vec<Retur
     Ok(sensors)
 }
 
-/// What `sensor` measures in a street of even ground between walls, with the noise
-/// and the quantum of its profile, in the precision of Argoverse 2's files.
+/// A sweep of `sensor` in a street of even ground between walls, with the noise and the quantum of
+/// its profile, in the precision of Argoverse 2's files.
 pub fn simulated(sensor: &SensorProfile, table: &Rotating) -> Result<Vec<Return>> {
     let pattern = sensor.pattern();
     let sigma_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);

@@ -6,29 +6,26 @@
 //! with such that start from random numbers, by the same recipe. Each answer is the mean
 //! of several, to random draws of the object's points that are turned about the up axis.
 
-mod folds;
-mod score;
-#[cfg(test)]
-mod tests;
-
 use super::resume;
-use crate::render::table::{Table, percent};
-use anyhow::Result;
+use crate::render::table::{Table, percent, publish};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
-use folds::Folds;
-use formats::{atomic, hash};
+use formats::hash;
+use formats::labelled::LabelledSet;
+use formats::model_card::Normalization;
+use formats::rng::StreamKey;
+use formats::split::Split;
 use infer_cpu::Options;
-use score::{Answer, f1, interval, mean, weighted_f1};
 use serde::Serialize;
-use std::fmt::Write;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use train::clouds::Clouds;
 use train::evaluate::predictions;
 use train::recipe::Recipe;
+use train::run::MOST_POINTS;
 use xtask::workspace::root;
 
-/// Flags of `bench sydney`.
 #[derive(Args, Debug)]
 pub struct SydneyArgs {
     /// NPZ files of clusters in metres with `raw_labels` and `fold`, the fold of each; all
@@ -55,7 +52,7 @@ pub struct SydneyArgs {
     report: Option<PathBuf>,
 }
 
-/// The networks that begin in one way.
+/// The networks of one starting point.
 struct Start {
     name: &'static str,
     /// `[seed][fold]`, by votes.
@@ -64,7 +61,6 @@ struct Start {
     single: Vec<Vec<Vec<Answer>>>,
 }
 
-/// Trains and tests the networks, prints the tables and writes the report.
 pub fn run(args: &SydneyArgs) -> Result<()> {
     let folds = Folds::read(&args.folds)?;
     let path = args.recipe.clone();
@@ -77,15 +73,8 @@ pub fn run(args: &SydneyArgs) -> Result<()> {
         start("pre-trained", &trained, &folds, args)?,
         start("from scratch", &scratch, &folds, args)?,
     ];
-    let mut report = String::new();
-    for table in [by_fold(&starts, &folds), summary(&starts), by_class(&starts, &folds)] {
-        print!("{table}");
-        writeln!(report, "{}", table.markdown())?;
-    }
-    if let Some(file) = &args.report {
-        atomic::write_bytes(file, report)?;
-    }
-    Ok(())
+    let tables = [by_fold(&starts, &folds), summary(&starts), by_class(&starts, &folds)];
+    publish(&tables, args.report.as_deref())
 }
 
 /// Writes all that the networks depend on beside them, or compares it with an earlier
@@ -125,20 +114,17 @@ fn start(name: &'static str, recipe: &Recipe, folds: &Folds, args: &SydneyArgs) 
     Ok(start)
 }
 
-/// What `model` makes of `clouds`, by the mean log-probabilities of `votes` draws.
+/// The answers of `model` to `clouds`, by the mean log-probabilities of `votes` draws.
 fn answers_of(model: &Path, clouds: &Clouds, votes: u32) -> Result<Vec<Answer>> {
     let options = Options { votes, vote_rotations: votes > 1, ..Options::default() };
     let found = predictions(model, clouds, &options)?;
     Ok(clouds.set.labels.iter().zip(found).map(|(&label, found)| (label, found.class)).collect())
 }
 
-/// The weighted F1 of each network.
 fn by_fold(starts: &[Start], folds: &Folds) -> Table {
-    let numbers = folds.numbers().into_iter().map(|fold| format!("fold {fold}"));
-    let heading = ["start".to_owned(), "seed".to_owned()].into_iter().chain(numbers);
-    let heading: Vec<String> = heading.chain(["mean".to_owned()]).collect();
-    let heading: Vec<&str> = heading.iter().map(String::as_str).collect();
-    let mut table = Table::new("Weighted F1 of each network, %", &heading);
+    let mut table = Table::new("Weighted F1 of each network, %", &["start", "seed"]);
+    table.heading.extend(folds.numbers().into_iter().map(|fold| format!("fold {fold}")));
+    table.heading.push("mean".to_owned());
     for Start { name, answers, .. } in starts {
         for (seed, answers) in answers.iter().enumerate() {
             let found: Vec<f64> = answers.iter().map(|answers| weighted_f1(answers)).collect();
@@ -150,7 +136,7 @@ fn by_fold(starts: &[Start], folds: &Folds) -> Table {
     table
 }
 
-/// The means over folds and seeds, and how sure they are.
+/// The means over folds and seeds, with intervals.
 fn summary(starts: &[Start; 2]) -> Table {
     let heading = ["start", "mean", "95 % interval", "seeds from", "to", "mean without votes"];
     let mut table = Table::new("Weighted F1, mean over folds and seeds, %", &heading);
@@ -180,7 +166,6 @@ fn summary(starts: &[Start; 2]) -> Table {
     table
 }
 
-/// F1 of each class, of all folds and seeds together.
 fn by_class(starts: &[Start; 2], folds: &Folds) -> Table {
     let heading = ["class", "objects", starts[0].name, starts[1].name];
     let mut table = Table::new("F1 of each class, all folds and seeds together, %", &heading);
@@ -191,4 +176,145 @@ fn by_class(starts: &[Start; 2], folds: &Folds) -> Table {
         table.push(vec![name.clone(), n.to_string(), a, b]);
     }
     table
+}
+
+/// Objects, and the fold that each is in.
+pub struct Folds {
+    pub clouds: Clouds,
+    pub fold: Vec<u32>,
+}
+
+impl Folds {
+    /// Reads all `files`. The classes are the sorted labels of the data's source.
+    pub fn read(files: &[PathBuf]) -> Result<Self> {
+        let mut sets = Vec::new();
+        for path in files {
+            let clouds = Clouds::read_for(Normalization::Metric, path, Split::Train, MOST_POINTS)?;
+            let set = clouds.set;
+            let lacks =
+                |key| format!("{}: {key}: expected one for each cloud, found none", path.display());
+            let fold = set.fold.clone().with_context(|| lacks("fold"))?;
+            let labels = set.raw_labels.clone().with_context(|| lacks("raw_labels"))?;
+            sets.push((set, labels, fold));
+        }
+        let classes: BTreeSet<&String> = sets.iter().flat_map(|(_, labels, _)| labels).collect();
+        let classes: Vec<String> = classes.into_iter().cloned().collect();
+        let (mut all, mut fold) = (LabelledSet::default(), Vec::new());
+        for (set, labels, folds) in &sets {
+            for (i, label) in labels.iter().enumerate() {
+                let class = classes.binary_search(label).expect("invariant: all are listed");
+                all.push(set.cloud(i), class);
+            }
+            fold.extend(folds);
+        }
+        let folds = Self { clouds: Clouds { set: all, classes }, fold };
+        let n = folds.numbers().len();
+        ensure!(n > 1, "fold: expected two folds or more in all files together, found {n}");
+        Ok(folds)
+    }
+
+    pub fn numbers(&self) -> Vec<u32> {
+        self.fold.iter().copied().collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// The clouds to learn from where `fold` is tested, and those to test with.
+    pub fn split(&self, fold: u32) -> [Clouds; 2] {
+        [false, true].map(|is_tested| {
+            let is_in = |&i: &usize| (self.fold[i] == fold) == is_tested;
+            self.clouds.select(&(0..self.fold.len()).filter(is_in).collect::<Vec<_>>())
+        })
+    }
+}
+
+/// An object's class, and the class that it was given.
+pub type Answer = (usize, usize);
+
+/// F1 of `class`, and how many objects it has.
+pub fn f1(answers: &[Answer], class: usize) -> (f64, usize) {
+    let count = |is: &dyn Fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
+    let right = count(&|answer| *answer == (class, class));
+    let (support, given) = (count(&|answer| answer.0 == class), count(&|answer| answer.1 == class));
+    (2.0 * right as f64 / (support + given).max(1) as f64, support)
+}
+
+/// The mean of F1 over classes, each weighted by its objects.
+pub fn weighted_f1(answers: &[Answer]) -> f64 {
+    let most = answers.iter().map(|answer| answer.0).max().unwrap_or(0);
+    let weighted = (0..=most).map(|class| f1(answers, class));
+    weighted.map(|(f1, n)| f1 * n as f64).sum::<f64>() / answers.len().max(1) as f64
+}
+
+/// The mean over folds of the mean over seeds of the weighted F1: `[seed][fold]`.
+pub fn mean(answers: &[Vec<Vec<Answer>>]) -> f64 {
+    let all: Vec<f64> = answers.iter().flatten().map(|answers| weighted_f1(answers)).collect();
+    all.iter().sum::<f64>() / all.len().max(1) as f64
+}
+
+/// How often objects are drawn anew for an interval.
+const DRAWS: u32 = 1000;
+
+/// The 95 % interval of `statistic` over objects that are drawn anew from each fold, the
+/// same ones for all networks (Efron's bootstrap, percentiles).
+pub fn interval<const N: usize>(
+    networks: [&[Vec<Vec<Answer>>]; N],
+    statistic: impl Fn([f64; N]) -> f64,
+) -> [f64; 2] {
+    let draw = |number| {
+        statistic(networks.map(|answers| {
+            let seeds = answers.iter().map(|folds| {
+                let drawn = folds.iter().enumerate().map(|(fold, answers)| {
+                    let key = StreamKey::new(0, &format!("fold {fold}"), number);
+                    let n = answers.len() as u64;
+                    (0..n).map(|i| answers[key.below(n, i) as usize]).collect()
+                });
+                drawn.collect()
+            });
+            mean(&seeds.collect::<Vec<Vec<Vec<Answer>>>>())
+        }))
+    };
+    let mut found: Vec<f64> = (0..DRAWS).map(draw).collect();
+    found.sort_by(f64::total_cmp);
+    [0.025, 0.975].map(|share| found[(share * f64::from(DRAWS)) as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use test_support::{need, shared_data};
+
+    #[test]
+    fn a_fold_is_tested_by_networks_of_the_others() {
+        let mut set = LabelledSet::default();
+        (0..6).for_each(|i| set.push(&[[i as f32; 3]], 0));
+        let clouds = Clouds { set, classes: vec!["car".to_owned()] };
+        let folds = Folds { clouds, fold: vec![0, 1, 2, 0, 1, 2] };
+        let [learnt, tested] = folds.split(2);
+        assert_eq!(
+            (learnt.len(), tested.set.points.as_slice()),
+            (4, &[2.0f32, 2.0, 2.0, 5.0, 5.0, 5.0][..])
+        );
+        assert_eq!(folds.numbers(), [0, 1, 2]);
+    }
+
+    #[test]
+    fn the_benchmark_s_own_folds_are_read() {
+        let file = need!(shared_data("real_objects/sydney_folds01.npz"));
+        let folds = Folds::read(&[file]).unwrap();
+        assert_eq!((folds.clouds.len(), folds.clouds.classes.len()), (297, 14));
+        assert_eq!(folds.numbers(), [0, 1]);
+    }
+
+    /// Class 0: precision 2/3, recall 2/2, F1 4/5; class 1: 1/1, 1/2, 2/3.
+    #[test]
+    fn f1_is_weighted_by_the_objects_of_a_class() {
+        let answers = [(0, 0), (0, 0), (1, 0), (1, 1)];
+        let (found, n) = f1(&answers, 1);
+        assert_eq!(n, 2);
+        assert!((found - 2.0 / 3.0).abs() < 1e-12);
+        let expected = (2.0 * 0.8 + 2.0 * 2.0 / 3.0) / 4.0;
+        assert!((weighted_f1(&answers) - expected).abs() < 1e-12);
+        assert_eq!(f1(&answers, 2), (0.0, 0));
+        let [low, high] = interval([&[vec![answers.to_vec()]]], |[mean]| mean);
+        assert!(low < expected && high > expected && high <= 1.0, "{low} {high}");
+    }
 }

@@ -1,12 +1,10 @@
 //! The casters, with and without culling of beams that cannot hit.
 
-use super::objects::{Object, Place, places};
-use super::scans::{Cloud, Scanned};
+use super::scans::{Cloud, Object, Place, Scanned, places};
 use super::sensors::Scanning;
-use crate::measure::accuracy::Accuracy;
 use crate::measure::backends::{Backend, short};
 use crate::measure::clock::{Workload, interleave, measured};
-use crate::measure::methods;
+use crate::measure::methods::{self, Accuracy};
 use crate::measure::ray_set::RaySet;
 use anyhow::Result;
 use edgepuck_program::trade_record::{Part, Row};
@@ -21,11 +19,8 @@ use std::hint::black_box;
 /// The ranges of one ray_set's rays, metres.
 type Ranges = Vec<Option<f64>>;
 
-/// How rays become ranges.
 enum Method<'a> {
-    /// Everything in f64: the oracle.
     Oracle,
-    /// Möller and Trumbore's test in f32.
     MollerTrumbore,
     /// The watertight test, and ranges in f32.
     F32,
@@ -33,15 +28,13 @@ enum Method<'a> {
     Product(&'a OpenCaster),
 }
 
-/// The rays of every scan.
 struct Aimed {
     culling: Culling,
     ray_sets: Vec<RaySet>,
-    /// Those of the ray_sets, as casters take them.
+    /// The jobs of the ray sets.
     jobs: Vec<CastJob>,
 }
 
-/// Casts the clean reference scans by every method, in turns.
 pub fn cast_all(
     objects: &[Object],
     backends: &[Backend],
@@ -123,7 +116,6 @@ impl Method<'_> {
     }
 }
 
-/// The errors of `method` on the rays aimed, against the truth of all that are `fired`.
 fn assess(
     method: &Method<'_>,
     aimed: &Aimed,

@@ -1,7 +1,6 @@
 //! The classes that a classifier finds for clouds, and the time it takes.
 
 use super::scans::Cloud;
-use crate::measure::energy::Energy;
 use anyhow::{Context, Result, ensure};
 use edgepuck_program::sampler_config::SamplerConfig;
 use edgepuck_program::trade_record::{Part, Row};
@@ -19,62 +18,41 @@ const TIMED: usize = 100;
 /// Points of the baseline's clouds.
 const AS_THE_BASELINE: usize = 1024;
 
-/// Labelled clouds.
 pub struct TestSet {
-    /// Its name in the rows.
     pub name: String,
-    /// The clouds.
     pub clouds: Vec<Cloud>,
     /// Each one's class, by name.
     pub labels: Vec<String>,
 }
 
-/// The settings of a classifier.
 #[derive(Clone, Debug)]
 pub struct Classifying {
-    /// The model file.
     pub model: PathBuf,
-    /// How points are chosen.
     pub sampler: SamplerConfig,
-    /// How many.
     pub points: usize,
-    /// What to compute in.
     pub precision: Precision,
-    /// The T-Nets to run.
     pub t_nets: TNets,
-    /// Threads.
     pub threads: usize,
 }
 
-/// What a classifier answers to each cloud; `None` for a cloud without points.
+/// The answers to each cloud; `None` for a cloud without points.
 pub type Answers = Vec<Option<Prediction>>;
 
-/// The name of each answer's class.
 fn labels(answers: &Answers) -> impl Iterator<Item = Option<&str>> {
     answers.iter().map(|answer| answer.as_ref().map(|prediction| &*prediction.label))
 }
 
-/// The share of clouds of which both say the same.
+/// The share of clouds with the same answer.
 pub fn agreement(a: &Answers, b: &Answers) -> f64 {
     labels(a).zip(labels(b)).filter(|(a, b)| a == b).count() as f64 / a.len().max(1) as f64
 }
 
-/// The largest difference of two logits.
 fn largest_error(a: &Answers, b: &Answers) -> f64 {
     let logits = |answers: &Answers| -> Vec<f32> {
         answers.iter().flatten().flat_map(|answer| answer.logits.clone()).collect()
     };
     let pairs = logits(a).into_iter().zip(logits(b));
     pairs.map(|(a, b)| (f64::from(a) - f64::from(b)).abs()).fold(0.0, f64::max)
-}
-
-/// What classifications cost.
-#[derive(Clone, Debug, Default)]
-pub struct Costs {
-    /// Wall time of each, milliseconds.
-    pub ms: Vec<f64>,
-    /// Of all together; 0 where the machine does not measure it.
-    pub joules: f64,
 }
 
 impl TestSet {
@@ -93,12 +71,10 @@ impl TestSet {
         })
     }
 
-    /// Points of its largest cloud.
     pub fn most_points(&self) -> usize {
         most_points(&self.clouds)
     }
 
-    /// How many are answered as labelled.
     pub fn right(&self, answers: &Answers) -> usize {
         let pairs = self.labels.iter().zip(labels(answers));
         pairs.filter(|(label, answer)| *answer == Some(label.as_str())).count()
@@ -136,7 +112,6 @@ impl Classifying {
         })
     }
 
-    /// Whether both choose the same points of a cloud.
     pub fn chooses_as(&self, other: &Self) -> bool {
         (self.sampler, self.points) == (other.sampler, other.points)
     }
@@ -156,7 +131,6 @@ impl Classifying {
         Ok(Classifier::load(&self.model, &options)?)
     }
 
-    /// Classifies `clouds`.
     pub fn answers(&self, clouds: &[Cloud]) -> Result<Answers> {
         let capacity = most_points(clouds);
         // Answers do not depend on the number of threads.
@@ -175,20 +149,18 @@ impl Classifying {
     }
 
     /// Times some of `clouds`, spread over all, one after another, and adds them to
-    /// `costs`.
-    pub fn time(&self, clouds: &[Cloud], energy: Option<&Energy>, costs: &mut Costs) -> Result<()> {
+    /// `ms`.
+    pub fn time(&self, clouds: &[Cloud], ms: &mut Vec<f64>) -> Result<()> {
         let mut classifier = self.load(most_points(clouds))?;
         let each = clouds.len().div_ceil(TIMED).max(1);
         let timed: Vec<_> = clouds.iter().step_by(each).filter(|cloud| !cloud.is_empty()).collect();
         let Some(first) = timed.first() else { return Ok(()) };
         classifier.classify(first)?;
-        let before = energy.map(Energy::now);
         for cloud in timed {
             let start = Instant::now();
             classifier.classify(cloud)?;
-            costs.ms.push(start.elapsed().as_secs_f64() * 1e3);
+            ms.push(start.elapsed().as_secs_f64() * 1e3);
         }
-        costs.joules += energy.zip(before).map_or(0.0, |(energy, then)| energy.joules_since(&then));
         Ok(())
     }
 
@@ -228,7 +200,6 @@ impl Classifying {
     }
 }
 
-/// Points of the largest of `clouds`.
 fn most_points(clouds: &[Cloud]) -> usize {
     clouds.iter().map(Vec::len).max().unwrap_or_default()
 }

@@ -1,8 +1,7 @@
 //! Models, samplers, points, precisions, T-Nets and threads on one test set.
 
-use super::classes::{Answers, Classifying, Costs, TestSet};
+use super::classes::{Answers, Classifying, TestSet};
 use crate::measure::clock::Spread;
-use crate::measure::energy::Energy;
 use crate::pi5::{Modelled, Sampler};
 use anyhow::{Context, Result};
 use edgepuck_program::sampler_config::SamplerConfig;
@@ -14,20 +13,16 @@ use std::path::{Path, PathBuf};
 /// Threads whose times on a Raspberry Pi 5 are modelled: it has four cores.
 const PI_THREADS: [usize; 3] = [1, 2, 4];
 
-/// The values that are swept.
 struct Sweep {
-    /// Points that networks see.
     points: Vec<usize>,
-    /// How they are chosen.
     samplers: Vec<SamplerConfig>,
-    /// What to compute in besides fp32.
+    /// Precisions besides fp32.
     precisions: Vec<Precision>,
     /// Threads of the network as its card has it, besides one.
     threads: Vec<usize>,
 }
 
 impl Sweep {
-    /// Everything that a user can choose.
     fn whole() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Self {
@@ -38,7 +33,6 @@ impl Sweep {
         }
     }
 
-    /// A few of them.
     fn quick() -> Self {
         Self {
             points: vec![16, 64],
@@ -94,19 +88,14 @@ struct Measured {
 
 /// Times all settings in turns, so that a slow minute affects them all.
 fn time(all: &mut [Measured], set: &TestSet, rounds: usize) -> Result<()> {
-    let energy = Energy::here();
-    let mut costs = vec![Costs::default(); all.len()];
+    let mut times = vec![Vec::new(); all.len()];
     for _ in 0..rounds {
-        for (measured, costs) in all.iter().zip(&mut costs) {
-            measured.setting.time(&set.clouds, energy.as_ref(), costs)?;
+        for (measured, ms) in all.iter().zip(&mut times) {
+            measured.setting.time(&set.clouds, ms)?;
         }
     }
-    for (Measured { row, .. }, costs) in all.iter_mut().zip(costs) {
-        let n = costs.ms.len();
-        if n > 0 {
-            row.joules = energy.as_ref().map(|_| costs.joules / n as f64);
-            row.ms_here = Some(Spread::of(costs.ms).median);
-        }
+    for (Measured { row, .. }, ms) in all.iter_mut().zip(times) {
+        row.ms_here = (!ms.is_empty()).then(|| Spread::of(ms).median);
     }
     Ok(())
 }
@@ -140,7 +129,6 @@ fn with_pi(row: Row, setting: &Classifying, from: usize, pi: Option<&Modelled>) 
         Row {
             threads: Some(threads),
             ms_here: row.ms_here.filter(|_| here),
-            joules: row.joules.filter(|_| here),
             ms_pi5: Some(ms),
             ..row.clone()
         }
@@ -156,7 +144,7 @@ fn sampled(trained: &Classifying, set: &TestSet, sweep: &Sweep) -> Vec<Classifyi
         let points = sweep.points.iter().copied().filter(|&points| points <= most);
         all.extend(points.map(|points| Classifying { sampler, points, ..trained.clone() }));
     }
-    // All points of a cloud are the same whoever chooses them.
+    // All samplers keep the same points if they keep all.
     all.retain(|setting| setting.points < most || setting.sampler == SamplerConfig::RANDOM);
     if trained.points < most && !all.iter().any(|setting| setting.chooses_as(trained)) {
         all.insert(0, trained.clone());

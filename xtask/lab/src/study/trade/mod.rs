@@ -1,22 +1,20 @@
 //! `cargo xtask trade`: sweeps every parameter from mesh to class and records time and
 //! accuracy.
 //!
-//! [`objects`] are scanned with the settings of [`sensors`] ([`scans`]) and by all
-//! [`casters`]; [`classifiers`] sweep models, samplers, points and precisions. Each
-//! setting becomes a [`Row`] of one CSV file, in which [`pareto`] marks the
-//! Pareto-optimal rows and of which [`page`] makes a page. `cargo xtask advise` reads
-//! the same file.
+//! Objects are scanned with the settings of [`sensors`] ([`scans`]) and by all [`casters`];
+//! [`classifiers`] sweep models, samplers, points and precisions. Each setting becomes a [`Row`] of
+//! one CSV file, in which [`pareto`] marks the Pareto-optimal rows. [`page`] shows the rows on a
+//! page, and `cargo xtask advise` reads them.
 
 mod casters;
 mod classes;
 mod classifiers;
-mod objects;
 pub mod page;
 mod pareto;
 mod scans;
 mod sensors;
 
-use super::meshes;
+use super::datasets;
 use crate::measure::backends;
 use crate::measure::machine::Machine;
 use anyhow::{Context, Result, ensure};
@@ -28,14 +26,12 @@ use edgepuck_program::{Outcome, gen_shapes};
 use formats::cloud::resample;
 use formats::rng::StreamKey;
 use infer_cpu::inspect;
-use objects::Object;
-use scans::{Cloud, Scanned};
+use scans::{Cloud, Object, Scanned};
 use std::path::{Path, PathBuf};
 use xtask::workspace::file_name;
 
-/// Flags of `trade`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct TradeArgs {
     /// Folder of meshes, as for gen-dataset; only the test meshes are scanned [default: built-in
     /// procedural shapes]
     #[arg(long, value_name = "DIR")]
@@ -75,21 +71,18 @@ pub struct Args {
 /// Meshes of a class that a whole run scans at most.
 const MOST_PER_CLASS: u32 = 5;
 
-/// The same of a quick run.
 const FEW_PER_CLASS: u32 = 2;
 
-/// Clouds of a quick run.
 const FEW_CLOUDS: usize = 100;
 
-/// Measures and writes the record.
-pub fn run(args: &Args) -> Result<Outcome> {
+pub fn run(args: &TradeArgs) -> Result<Outcome> {
     need_folder_of_meshes(args.meshes.as_deref())?;
     let clouds = clouds(args)?;
     let of_clouds = clouds.as_ref().map(|set| models_for(args, set)).transpose()?;
     let per_class = if args.quick { FEW_PER_CLASS } else { MOST_PER_CLASS };
     let shapes = [gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS];
-    let meshes = meshes::folder(args.meshes.as_deref(), &args.out.join("shapes"), shapes)?;
-    let objects = objects::read(&meshes, per_class)?;
+    let meshes = datasets::meshes(args.meshes.as_deref(), &args.out.join("shapes"), shapes)?;
+    let objects = scans::read(&meshes, per_class)?;
     let unseen = vec![Cloud::new(); objects.len()];
     let of_scans = models_for(args, &scan_set(&objects, &name_of_meshes(args), &unseen))?;
     std::fs::create_dir_all(&args.out)
@@ -112,14 +105,14 @@ pub fn run(args: &Args) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-fn name_of_meshes(args: &Args) -> String {
+fn name_of_meshes(args: &TradeArgs) -> String {
     let of_folder = || args.meshes.as_deref().map(file_name);
     let named = args.meshes_name.clone().or_else(of_folder);
     format!("scans of {}", named.as_deref().unwrap_or("shapes of our own"))
 }
 
 /// The models that know the classes of `set`: the one asked for, or bundled ones.
-fn models_for(args: &Args, set: &TestSet) -> Result<Vec<PathBuf>> {
+fn models_for(args: &TradeArgs, set: &TestSet) -> Result<Vec<PathBuf>> {
     if let Some(model) = &args.model {
         set.fits(model)?;
         return Ok(vec![model.clone()]);
@@ -133,16 +126,14 @@ fn models_for(args: &Args, set: &TestSet) -> Result<Vec<PathBuf>> {
     Ok(known)
 }
 
-/// The clouds asked for.
-fn clouds(args: &Args) -> Result<Option<TestSet>> {
+fn clouds(args: &TradeArgs) -> Result<Option<TestSet>> {
     let Some(path) = &args.clouds else { return Ok(None) };
     let mut set = TestSet::read(path, if args.quick { FEW_CLOUDS } else { usize::MAX })?;
     set.name = args.clouds_name.clone().unwrap_or(set.name);
     Ok(Some(set))
 }
 
-/// Rows of sensors and of casters, and the reference scans.
-fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>, TestSet)> {
+fn scan_rows(args: &TradeArgs, objects: &[Object], model: &Path) -> Result<(Vec<Row>, TestSet)> {
     let (name, rounds) = (name_of_meshes(args), usize::from(args.rounds));
     let mut settings = sensors::one_at_a_time();
     if !args.quick {
@@ -168,7 +159,6 @@ fn scan_rows(args: &Args, objects: &[Object], model: &Path) -> Result<(Vec<Row>,
     Ok((rows?, reference))
 }
 
-/// Clouds of [`objects::places`], labelled.
 fn scan_set(objects: &[Object], name: &str, clouds: &[Cloud]) -> TestSet {
     let views = clouds.len() / objects.len().max(1);
     let label = |object: &Object| vec![object.class.clone(); views];
@@ -176,9 +166,8 @@ fn scan_set(objects: &[Object], name: &str, clouds: &[Cloud]) -> TestSet {
     TestSet { name: name.to_owned(), clouds: clouds.to_vec(), labels }
 }
 
-/// Rows of classifiers, on the clouds given or else on the reference scans.
 fn classifier_rows(
-    args: &Args,
+    args: &TradeArgs,
     models: &[PathBuf],
     clouds: Option<TestSet>,
     reference: TestSet,
@@ -192,8 +181,8 @@ fn classifier_rows(
     Ok(rows.collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// As many points as gen-dataset packs: the Raspberry Pi's model wants one size.
+/// As many points as gen-dataset packs, because the Raspberry Pi's model needs one size.
 fn packed(cloud: &[[f32; 3]]) -> Cloud {
     const POINTS: usize = 1024;
-    resample(cloud, POINTS, StreamKey::new(objects::SEED, "trade", 0)).unwrap_or_default()
+    resample(cloud, POINTS, StreamKey::new(scans::SEED, "trade", 0)).unwrap_or_default()
 }

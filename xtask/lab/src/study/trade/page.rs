@@ -16,7 +16,6 @@ use xtask::workspace::command_line;
 const CAPTION: &str = "Filled dots are Pareto-optimal: no other setting is as fast and as accurate. \
      Touch or point at a dot for its figures.";
 
-/// Writes `trade.html` and the two charts to `folder`.
 pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     for (part, name) in [(Part::Classifier, "classifier"), (Part::Scan, "scan")] {
         let svg = chart(rows, part).file();
@@ -30,7 +29,6 @@ pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     Ok(atomic::write_bytes(&folder.join("trade.html"), html.as_bytes())?)
 }
 
-/// A chapter for each part of the chain.
 pub fn chapters(rows: &[Row]) -> Vec<Chapter> {
     let classifier = html! {
         (chart(rows, Part::Classifier).figure())
@@ -56,17 +54,16 @@ pub fn chapters(rows: &[Row]) -> Vec<Chapter> {
     ]
 }
 
-/// The chapter on classifiers, which tells even where there is no record.
+/// The chapter on classifiers, which the page has even without a record.
 pub fn classifier_chapter(body: Markup) -> Chapter {
     Chapter::new("classifier", "Settings", "Which setting fits my time budget?", body)
 }
 
 fn every_setting(rows: &[Row], part: Part, columns: &[Column]) -> Markup {
     let table = table_of(rows, part, columns);
-    html! { details { summary { "All " (table.len()) " settings" } (table.html()) } }
+    html! { details { summary { "All " (table.rows.len()) " settings" } (table.html()) } }
 }
 
-/// Time against accuracy of one part's rows.
 fn chart(rows: &[Row], part: Part) -> Chart<'static> {
     let device = device_of(rows, part);
     let of_part = || rows.iter().filter(|row| row.part == part);
@@ -94,7 +91,7 @@ fn chart(rows: &[Row], part: Part) -> Chart<'static> {
     }
 }
 
-/// What the chart of `part` shows, in words.
+/// The message of the chart of `part`.
 fn message(rows: &[Row], part: Part, device: Device) -> String {
     let optimal = || rows.iter().filter(|row| row.part == part && row.on_front(device));
     let by_accuracy = |a: &&Row, b: &&Row| a.accuracy.total_cmp(&b.accuracy);
@@ -177,7 +174,6 @@ fn millions_of_rays(row: &Row) -> String {
     number(row.rays_per_cpu_s.map(|rays| rays * 1e-6))
 }
 
-/// The Pareto-optimal rows of `part`, the fastest first.
 pub fn pareto_table(rows: &[Row], part: Part) -> Table {
     let device = device_of(rows, part);
     let mut optimal: Vec<&Row> =
@@ -206,10 +202,8 @@ pub fn dominated_table(rows: &[Row]) -> Table {
     table
 }
 
-/// A column's heading, and what it shows of a row.
 type Column = (&'static str, fn(&Row) -> String);
 
-/// All rows of `part`, the Pareto-optimal ones marked.
 fn table_of(rows: &[Row], part: Part, columns: &[Column]) -> Table {
     let of_part = || rows.iter().filter(|row| row.part == part);
     let caption = of_part().next().map_or_else(String::new, |row| {
@@ -219,7 +213,10 @@ fn table_of(rows: &[Row], part: Part, columns: &[Column]) -> Table {
     let mut table = Table::new(caption, &heading);
     for row in of_part() {
         let words = columns.iter().map(|(_, words)| words(row)).collect();
-        table.push_marked(is_optimal(row), words);
+        table.push::<String>(words);
+        if is_optimal(row) {
+            table.mark();
+        }
     }
     table
 }
@@ -233,7 +230,6 @@ const CLASSIFIER_COLUMNS: &[Column] = &[
     ("threads", |row| count(row.threads)),
     ("ms here", |row| number(row.ms_here)),
     ("ms on a Pi 5", |row| number(row.ms_pi5)),
-    ("J", |row| number(row.joules)),
     ("MB", |row| number(row.megabytes)),
     ("accuracy %", accuracy),
     ("same class as fp32 %", agreement),
@@ -250,7 +246,6 @@ const SCAN_COLUMNS: &[Column] = &[
     ("quantum m", |row| number(row.range_quantum_m)),
     ("CPU ms a scan", |row| number(row.ms_here)),
     ("M rays/CPU-s", millions_of_rays),
-    ("J", |row| number(row.joules)),
     ("kB", |row| number(row.megabytes.map(|mb| mb * 1e3))),
     ("points", |row| row.points_per_scan.map(|n| format!("{n:.0}")).unwrap_or_default()),
     ("range error m, RMS", |row| number(row.range_rms_m)),

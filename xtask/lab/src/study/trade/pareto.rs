@@ -21,9 +21,8 @@ pub fn mark(rows: &mut [Row]) {
     for (i, row) in rows.iter().enumerate() {
         groups.entry(group_key(row)).or_default().push(i);
     }
-    for (device, group) in
-        Device::ALL.into_iter().flat_map(|d| groups.values().map(move |g| (d, g)))
-    {
+    let each = Device::ALL.into_iter().flat_map(|d| groups.values().map(move |g| (d, g)));
+    for (device, group) in each {
         let (members, points): (Vec<usize>, Vec<[f64; 3]>) =
             group.iter().filter_map(|&i| Some((i, costs(&rows[i], device)?))).unzip();
         for (i, is_optimal) in members.into_iter().zip(optimal(&points)) {
@@ -54,7 +53,6 @@ fn costs(row: &Row, device: Device) -> Option<[f64; 3]> {
     costs.iter().all(|cost| cost.is_finite()).then_some(costs)
 }
 
-/// Whether the row is Pareto-optimal on any device.
 pub fn is_optimal(row: &Row) -> bool {
     row.front_here || row.front_pi5
 }
@@ -119,29 +117,11 @@ mod tests {
     }
 
     #[test]
-    fn equal_rows_are_both_optimal_and_a_row_without_a_cost_is_not() {
-        let mut rows = [row("a", 1.0, 80), row("b", 1.0, 80), row("c", f64::NAN, 99)];
-        mark(&mut rows);
-        assert_eq!(rows.each_ref().map(|row| row.front_pi5), [true, true, false]);
-    }
-
-    #[test]
     fn times_on_different_devices_are_not_compared() {
         let here = Row { ms_here: Some(0.1), ms_pi5: None, ..row("x86", 0.0, 99) };
         let mut rows = [row("board", 1.0, 80), here];
         mark(&mut rows);
         assert_eq!(rows.each_ref().map(|row| row.front_pi5), [true, false]);
         assert_eq!(rows.each_ref().map(|row| row.front_here), [false, true]);
-    }
-
-    #[test]
-    fn scans_are_compared_at_the_same_distance() {
-        let scan = |distance_m, right| {
-            let row = Row { distance_m: Some(distance_m), ms_here: Some(1.0), ..Row::default() };
-            row.with_accuracy(right, 100)
-        };
-        let mut rows = [scan(3.0, 90), scan(20.0, 50), scan(20.0, 40)];
-        mark(&mut rows);
-        assert_eq!(rows.each_ref().map(|row| row.front_here), [true, true, false]);
     }
 }

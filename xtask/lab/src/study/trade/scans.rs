@@ -1,41 +1,44 @@
-//! Scans of all objects with one setting: their cost and their errors.
+//! The objects that are scanned, from which places, and the cost and errors of each setting.
 
-use super::objects::{Object, Place, places};
 use super::sensors::Scanning;
-use crate::measure::clock::{Workload, interleave, measured};
-use crate::measure::energy::Energy;
-use anyhow::Result;
+use crate::measure::clock::{Workload, interleave, workload};
+use crate::study::datasets::keep_at_most;
+use anyhow::{Context, Result, ensure};
 use edgepuck_program::trade_record::{Part, Row};
 use formats::chamfer::chamfer;
 use formats::hash::Hashing;
+use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
+use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::mesh::frame::Normalize;
+use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
+use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{ScanRequest, scan_many};
-use sim_gpu::internals::sensor::BeamPattern;
-use std::collections::BTreeMap;
+use sim_gpu::internals::sensor::{BeamPattern, Views};
+use sim_gpu::internals::target::Target;
 use std::collections::btree_map::Entry;
-use std::hint::black_box;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 /// A cloud as the classifier takes it.
 pub type Cloud = Vec<[f32; 3]>;
 
-/// The Chamfer distance is taken of one in so many scans, of all four sides in turn.
+/// The Chamfer distance is measured on every `CHAMFER_EACH`-th scan, of all four sides in turn.
 const CHAMFER_EACH: usize = 7;
 
 /// A scan and its ranges without any effect.
 struct Made {
     scan: Scan,
-    /// Of each point of the scan.
+    /// The exact range of each point of the scan.
     exact_m: Vec<f64>,
 }
 
-/// The scans of one setting.
 pub struct Scanned {
     /// Costs and geometric errors, without the accuracy of classes.
     pub row: Row,
-    /// One cloud a place.
     pub clouds: Vec<Cloud>,
 }
 
@@ -48,20 +51,10 @@ pub fn scan_all(
 ) -> Result<Vec<Scanned>> {
     let patterns = settings.iter().map(|s| s.effects().widen(s.sensor.pattern(), &s.sensor));
     let patterns: Vec<BeamPattern> = patterns.collect::<Result<_, _>>()?;
-    let energy = Energy::here();
-    let mut joules: Vec<f64> = vec![0.0; settings.len()];
     let mut workloads: Vec<Workload<'_>> = Vec::new();
-    for ((setting, pattern), joules) in settings.iter().zip(&patterns).zip(&mut joules) {
-        let (energy, places) = (energy.as_ref(), places(objects, setting.distance_m));
-        workloads.push(Box::new(move || {
-            let before = energy.map(Energy::now);
-            let (scans, cost) =
-                measured(|| scan(&places, setting, pattern, &AttributeSet::default()));
-            let spent = energy.zip(before).map_or(0.0, |(energy, then)| energy.joules_since(&then));
-            *joules += spent / places.len() as f64;
-            black_box(scans?);
-            Ok(cost)
-        }));
+    for (setting, pattern) in settings.iter().zip(&patterns) {
+        let places = places(objects, setting.distance_m);
+        workloads.push(workload(move || scan(&places, setting, pattern, &AttributeSet::default())));
     }
     let costs = interleave(rounds, &mut workloads)?;
     drop(workloads);
@@ -83,8 +76,6 @@ pub fn scan_all(
         let cpu_s = costs[i].cpu_s().median / clouds.len() as f64;
         let mut row = row.with_time(pattern.len(), cpu_s);
         row.test_set = test_set.to_owned();
-        // The repeat that is not counted has its joules in the sum, too.
-        row.joules = energy.is_some().then(|| joules[i] / (rounds + 1) as f64);
         all.push(Scanned { row, clouds });
     }
     Ok(all)
@@ -135,7 +126,6 @@ fn assess(
     Ok(Scanned { row, clouds })
 }
 
-/// One scan a place, on the CPU, without files.
 fn scan<'a>(
     places: &[Place<'a>],
     setting: &Scanning,
@@ -163,7 +153,6 @@ fn scan<'a>(
     Ok(scans.into_iter().map(made).collect())
 }
 
-/// Mean bytes of an NPZ file of a scan.
 fn file_bytes(clouds: &[Cloud]) -> Result<f64> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("scan.npz");
@@ -196,4 +185,56 @@ fn mean_chamfer(truth: &[Made], clouds: &[Cloud]) -> Option<f64> {
     let distances: Vec<f64> = pairs.par_iter().map(distance).collect();
     let known: Vec<f64> = distances.into_iter().filter(|distance| distance.is_finite()).collect();
     (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+}
+
+/// Keys all random numbers of the chain.
+pub const SEED: u64 = 0;
+
+/// A mesh in the unit sphere, and its class.
+pub struct Object {
+    pub class: String,
+    /// Class and name.
+    id: String,
+    pub target: Target,
+}
+
+/// One scan to be made: an object from one of its sides.
+pub struct Place<'a> {
+    pub object: &'a Object,
+    pub pose: Pose,
+    /// Keys its noise.
+    pub stream: StreamKey,
+}
+
+/// The test objects of the tree at `folder`, at most `per_class` of each class.
+pub fn read(folder: &Path, per_class: u32) -> Result<Vec<Object>> {
+    let mut entries = discover(folder, SEED)?;
+    keep_at_most([0, per_class], &mut entries);
+    let classes: BTreeSet<&str> = entries.iter().map(|entry| entry.class.as_str()).collect();
+    ensure!(
+        classes.len() > 1,
+        "{}: expected test meshes of at least two classes",
+        folder.display()
+    );
+    let object = |entry: &MeshEntry| {
+        let target = Target::load(&entry.path, Normalize::default())
+            .with_context(|| format!("cannot scan {}", entry.relative))?;
+        let id = format!("{}/{}", entry.class, entry.name);
+        Ok(Object { class: entry.class.clone(), id, target })
+    };
+    entries.iter().map(object).collect()
+}
+
+/// The four sides of gen-dataset's rotating set, from `distance_m`.
+pub fn places(objects: &[Object], distance_m: f64) -> Vec<Place<'_>> {
+    let views = Views { distance_m, ..Views::ROTATING };
+    let of_object = objects.iter().flat_map(|object| {
+        let poses = views.poses(DVec3::ZERO, StreamKey::new(SEED, "trade", 0));
+        poses.into_iter().zip(0..).map(move |(pose, view)| {
+            // As gen-dataset keys its set `rotational`.
+            let stream = StreamKey::new(SEED, &format!("rotational/{}", object.id), view);
+            Place { object, pose, stream }
+        })
+    });
+    of_object.collect()
 }
