@@ -142,7 +142,7 @@ fn description(stage: &Stage, done: &LabelledScene) -> Value {
     json!({
         "sweep_frame": "the sensor's: metres, x forward, z up",
         "objects_frame": "x along the road, z up, origin on the ground below the sensor; metres",
-        "sensor": stage.sensor(scene).name,
+        "sensor": stage.sensor(scene).name(),
         "sensor_pose": scene.pose,
         "object_0": "the ground",
         "objects": objects.collect::<Vec<_>>(),

@@ -48,7 +48,7 @@ impl Scenes {
         let drawn = process::run(py, || LabelledScene::new(&self.stage, number, &settings))?;
         let LabelledScene { scene, sweep, labels, clusters } = drawn.map_err(raised)?;
         let told = PyDict::new(py);
-        told.set_item("sensor", &self.stage.sensor(&scene).name)?;
+        told.set_item("sensor", self.stage.sensor(&scene).name())?;
         told.set_item("cluster", segment::numbers(&labels).into_pyarray(py))?;
         let of_clusters = |of: &dyn Fn(&edgepuck_scenes::LabelledCluster) -> f32| {
             clusters.iter().map(of).collect::<Vec<_>>().into_pyarray(py)

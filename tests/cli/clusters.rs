@@ -41,7 +41,10 @@ fn each_scheduler_is_told_the_tasks_and_their_needs() {
 fn words_that_the_job_file_settles_are_refused() {
     let folder = Folder::new();
     let cases = [
-        ("cluster slurm --parts 3 -- meshes --layout webdataset --shard 1/3", "--shard: the job file sets"),
+        (
+            "cluster slurm --parts 3 -- meshes --layout webdataset --shard 1/3",
+            "--shard: the job file sets",
+        ),
         ("cluster slurm --parts 3 -- meshes --out o", "expected --layout webdataset"),
         ("cluster slurm --parts 3 -- --layout webdataset --out o", "expected the folder"),
         ("cluster slurm --parts 3 -- meshes --layout webdataset", "expected --out"),

@@ -12,13 +12,13 @@ use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use formats::vlp32c::{Returns, Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::packets;
-use sim_gpu::internals::pose::{Pose, Trajectory};
 use sim_gpu::internals::scan::{ScanRequest, scan_objects};
 use sim_gpu::internals::sensor::{BeamPattern, Layout, Rotating, SensorProfile};
+use sim_gpu::{Pose, Scene as World, Trajectory};
 
 use crate::error::SceneError;
 use crate::ground::{Ground, OWN_RADIUS_M};
@@ -81,7 +81,7 @@ impl<'a> Drive<'a> {
     /// # Errors
     /// The sensor is not a VLP-32C, or it has effects that its packets cannot represent.
     pub fn new(stage: &'a Stage, speed_m_s: f64) -> Result<Self, SceneError> {
-        let sensor = packets::as_packets_tell(&stage.sensors[0].sensor)?;
+        let sensor = packets::as_packets_tell(stage.sensors[0].sensor.profile())?;
         let effects = stage.sensors[0].caster.effects();
         packets::returns(effects, None)?;
         if effects.motion.is_some() {
@@ -187,24 +187,26 @@ impl<'a> Drive<'a> {
                 && sector.meets(sensor_from_world * from_sensor, object.radius_m() + moves_m)
         });
         let (numbers, objects): (Vec<u32>, Vec<&StreetObject>) = in_sight.copied().unzip();
-        let tiles = tiles.range(self.street.tiles_in_sight(pose.position_m.x));
-        let mut targets: Vec<_> = tiles.map(|(_, tile)| stage.place_ground(tile, 0)).collect();
-        let n_tiles = targets.len();
-        targets.extend(objects.iter().map(|object| {
-            let mut target = stage.place_object(&object.placed, self.glass_returned);
-            target.motion = trajectory([from_s, to_s].map(|time_s| {
-                let position_m = object.velocity_m_s * time_s;
-                (time_s, Pose { position_m, rotation: DQuat::IDENTITY })
-            }));
-            target
-        }));
+        let stream = StreamKey::new(stage.seed(), "drive/beams", number);
+        let mut world = World::new();
+        for (_, tile) in tiles.range(self.street.tiles_in_sight(pose.position_m.x)) {
+            stage.add_ground(&mut world, tile, 0, stream);
+        }
+        let n_tiles = world.instances().len();
+        for object in &objects {
+            let id = stage.add_object(&mut world, &object.placed, self.glass_returned, stream);
+            world[id].motion = trajectory(
+                [from_s, to_s].map(|time_s| (time_s, Pose::at(object.velocity_m_s * time_s))),
+            );
+        }
 
         let mut request = ScanRequest::new(&self.sensor, &pattern, pose);
         request.motion = trajectory([from_s, to_s].map(|time_s| (time_s, self.pose(time_s))));
         request.deskew = true;
         request.attributes = [Attribute::Beam, Attribute::Range, Attribute::Object].into();
-        request.stream = StreamKey::new(stage.seed(), "drive/beams", number);
-        let mut scan = scan_objects(caster, &targets, &request)?.scan;
+        request.stream = stream;
+        let placed = world.placed(|_| stream);
+        let mut scan = scan_objects(caster, &placed, &request)?.scan;
         for object in scan.object.iter_mut().flatten() {
             // Points in the air belong to no target; like those on the ground, they get 0.
             let in_sight = (*object as usize).checked_sub(n_tiles);

@@ -109,7 +109,7 @@ fn pack(
     counts: &mut [usize],
 ) -> Result<(), SceneError> {
     let LabelledScene { scene, sweep, clusters, .. } = done;
-    let sensor = &stage.sensor(scene).name;
+    let sensor = stage.sensor(scene).name();
     let mut points = Vec::new();
     for (cluster, n) in clusters.iter().zip(0..) {
         points.clear();

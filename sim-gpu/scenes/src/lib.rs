@@ -1,7 +1,8 @@
 //! Streets, yards and rooms as the LiDAR of a robot sees them.
 //!
 //! A [`Recipe`] is a distribution of scenes, read from TOML. [`Scene::draw`] draws one scene by
-//! its number. [`Stage::sweep`] scans the whole scene, ground and objects together.
+//! its number. [`Stage::sweep`] scans the whole scene, ground and objects together;
+//! [`Stage::build`] returns it as a [`sim_gpu::Scene`] for other scans.
 //! [`label_clusters`] takes the clusters that the robot's segmentation found in the sweep, and
 //! labels each with the class of the object that most of its points lie on. [`generate`] does all
 //! of this for many scenes and packs the clusters as a training set. A [`Drive`] moves a sensor

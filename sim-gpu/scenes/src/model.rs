@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 use edgepuck_shapes::objects::{Object, ObjectKind, object, stand};
 use formats::rng::StreamKey;
 use glam::DVec3;
+use sim_gpu::Mesh;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::frame::{Normalize, to_world};
 use sim_gpu::internals::mesh::unit_frame::bounding_box;
@@ -16,9 +17,9 @@ use sim_gpu::internals::target::{Surface, Target};
 use crate::error::SceneError;
 use crate::recipe::Objects;
 
-/// An object with its hierarchy, ready to be cast.
+/// The mesh of an object, which all instances of the object share.
 pub(crate) struct Model {
-    pub(crate) target: Target,
+    pub(crate) mesh: Mesh,
     /// The triangles of glass.
     pub(crate) glass: Range<u32>,
     /// Length, width and height.
@@ -33,7 +34,7 @@ impl Model {
 
     fn new(mesh: TriangleMesh, glass: Range<u32>) -> Self {
         let (low, high) = bounding_box(mesh.vertices.iter().copied());
-        Self { target: target(mesh, Builder::Sah), glass, size_m: high - low }
+        Self { mesh: shared(mesh, Builder::Sah), glass, size_m: high - low }
     }
 
     /// A user's mesh, scaled to `height_m`; `None` if the mesh is flat.
@@ -49,10 +50,10 @@ impl Model {
     }
 }
 
-/// A target of all triangles of `mesh`.
-pub(crate) fn target(mesh: TriangleMesh, builder: Builder) -> Target {
+/// A mesh that instances share, with a hierarchy over all its triangles.
+pub(crate) fn shared(mesh: TriangleMesh, builder: Builder) -> Mesh {
     let kept = (0..mesh.triangles.len() as u32).collect();
-    Target::new(Surface::new(mesh, kept), builder)
+    Mesh::from_target(Target::new(Surface::new(mesh, kept), builder), DVec3::ZERO)
 }
 
 /// Reads the user's meshes for the entry `objects`, from a folder in `meshes`.

@@ -4,15 +4,12 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use formats::rng::StreamKey;
-use glam::DVec3;
-use sim_gpu::Caster;
+use glam::{DQuat, DVec3};
 use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::Culling;
-use sim_gpu::internals::scan::{Glass, PlacedTarget};
-use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
-use sim_gpu::internals::target::Target;
+use sim_gpu::{Caster, Glass, InstanceId, Mesh, Pose, Scene as World, Sensor};
 
 use crate::error::SceneError;
 use crate::model::{Model, user_models};
@@ -30,10 +27,9 @@ pub struct Stage {
     models: Vec<Vec<OnceLock<Model>>>,
 }
 
-/// A sensor, its beams as its effects widen them, and the caster of these effects.
+/// A sensor, and the caster of its effects.
 pub(crate) struct StageSensor {
-    pub(crate) sensor: SensorProfile,
-    pub(crate) pattern: BeamPattern,
+    pub(crate) sensor: Sensor,
     pub(crate) caster: Arc<OpenCaster>,
 }
 
@@ -65,8 +61,8 @@ impl Stage {
     ) -> Result<Self, SceneError> {
         let profiles = recipe.sensors(file)?;
         let mut sensors = Vec::with_capacity(profiles.len());
-        for (choice, sensor) in recipe.sensor.iter().zip(profiles) {
-            let typical_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);
+        for (choice, profile) in recipe.sensor.iter().zip(profiles) {
+            let typical_m = profile.noise.map_or(0.0, |noise| noise.typical_sigma_m);
             let sigma_m = choice.noise_m.unwrap_or(typical_m);
             let effects = Effects {
                 noise: Some(Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range }),
@@ -74,9 +70,10 @@ impl Stage {
                 ..choice.effects.clone()
             };
             let in_file = |invalid: InvalidValue| SceneError::from(invalid.in_file(file));
-            effects.for_sensor(&sensor).map_err(in_file)?;
-            let pattern = effects.widen(sensor.pattern(), &sensor).map_err(in_file)?;
-            sensors.push(StageSensor { sensor, pattern, caster: caster.for_effects(&effects)? });
+            effects.for_sensor(&profile).map_err(in_file)?;
+            let sensor = Sensor::from(profile);
+            sensor.rays(&effects).map_err(in_file)?;
+            sensors.push(StageSensor { sensor, caster: caster.for_effects(&effects)? });
         }
         let models = recipe.object.iter().map(|objects| match objects.built_in() {
             Some(_) => Ok((0..recipe.variants).map(|_| OnceLock::new()).collect()),
@@ -87,6 +84,7 @@ impl Stage {
     }
 
     /// The same stage with another `culling`, which changes the time of a sweep, not its points.
+    #[doc(hidden)]
     #[must_use]
     pub fn with_culling(self, culling: Culling) -> Self {
         Self { culling, ..self }
@@ -129,29 +127,42 @@ impl Stage {
         self.model(object.entry, object.variant).size_m * object.scale
     }
 
-    /// The ground of the scene or drive number `number`, or a tile of it, with its reflectivity.
-    pub(crate) fn place_ground<'a>(&self, ground: &'a Target, number: u32) -> PlacedTarget<'a> {
+    /// Adds the ground of the scene or drive number `number`, or a tile of it, to `world`. `stream`
+    /// keys the random numbers of its returns.
+    pub(crate) fn add_ground(
+        &self,
+        world: &mut World,
+        mesh: &Mesh,
+        number: u32,
+        stream: StreamKey,
+    ) {
+        let id = world.add(mesh, Pose::IDENTITY);
         let drawn = StreamKey::new(self.seed, "reflectivity/ground", number).unit(0);
-        let mut placed = PlacedTarget::new(ground);
-        placed.reflectivity = self.recipe.ground.reflectivity.at(drawn) as f32;
-        placed
+        world[id].reflectivity = self.recipe.ground.reflectivity.at(drawn);
+        world[id].stream = Some(stream);
     }
 
-    /// The model of `object` at its place, with its reflectivity and its glass, which returns the
-    /// fraction `glass_returned` of the beams.
-    pub(crate) fn place_object(
+    /// Adds `object` to `world`, with its class, its reflectivity and its glass, which returns the
+    /// fraction `glass_returned` of the beams. `stream` keys the random numbers of its returns.
+    pub(crate) fn add_object(
         &self,
+        world: &mut World,
         object: &PlacedObject,
         glass_returned: f64,
-    ) -> PlacedTarget<'_> {
-        let model = self.model(object.entry, object.variant);
-        let mut placed = PlacedTarget::new(&model.target);
-        placed.world_from_object = object.world_from_object();
+        stream: StreamKey,
+    ) -> InstanceId {
+        let (model, entry) =
+            (self.model(object.entry, object.variant), &self.recipe.object[object.entry]);
+        let rotation = DQuat::from_rotation_z(object.yaw_rad);
+        let id = world.add(&model.mesh, Pose { position_m: object.position, rotation });
+        let instance = &mut world[id];
+        instance.scale = object.scale;
+        instance.label = Some(entry.class.clone());
         let drawn = StreamKey::new(self.seed, "reflectivity/object", object.entry as u32);
-        let reflectivity = self.recipe.object[object.entry].reflectivity;
-        placed.reflectivity = reflectivity.at(drawn.unit(object.variant.into())) as f32;
-        placed.glass = (!model.glass.is_empty())
+        instance.reflectivity = entry.reflectivity.at(drawn.unit(object.variant.into()));
+        instance.glass = (!model.glass.is_empty())
             .then(|| Glass { triangles: model.glass.clone(), returned: glass_returned });
-        placed
+        instance.stream = Some(stream);
+        id
     }
 }

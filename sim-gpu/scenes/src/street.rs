@@ -6,13 +6,13 @@ use std::ops::RangeInclusive;
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
 use glam::{DVec2, DVec3};
+use sim_gpu::Mesh;
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::target::Target;
 
 use crate::footprint::Footprint;
 use crate::ground::{Ground, OWN_RADIUS_M};
 use crate::lanes::{Lane, lanes};
-use crate::model::target;
+use crate::model::shared;
 use crate::place::Placer;
 use crate::placed_object::PlacedObject;
 use crate::stage::Stage;
@@ -55,7 +55,7 @@ pub(crate) struct Street<'a> {
     /// The objects drawn so far. New ones are appended, so that an index stays valid.
     pub(crate) objects: Vec<StreetObject>,
     /// The tiles of the ground in sight, by number.
-    pub(crate) tiles: BTreeMap<i32, Target>,
+    pub(crate) tiles: BTreeMap<i32, Mesh>,
 }
 
 impl<'a> Street<'a> {
@@ -95,7 +95,7 @@ impl<'a> Street<'a> {
         self.tiles.retain(|number, _| in_sight.iter().any(|tiles| tiles.contains(number)));
         for number in in_sight.into_iter().flatten() {
             let mesh = || self.ground.tile(number, self.block_m);
-            self.tiles.entry(number).or_insert_with(|| target(mesh(), Builder::Morton));
+            self.tiles.entry(number).or_insert_with(|| shared(mesh(), Builder::Morton));
         }
     }
 

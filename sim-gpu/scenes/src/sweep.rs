@@ -4,15 +4,14 @@ use std::sync::Arc;
 
 use formats::Scan;
 use formats::rng::StreamKey;
-use formats::scan::Attribute;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::TriangleMesh;
-use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
-use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::internals::scan::{ScanRequest, scan_objects};
+use sim_gpu::{Effects, Scene as World, Sensor};
 
 use crate::error::SceneError;
-use crate::model::target;
+use crate::model::shared;
 use crate::scene::Scene;
 use crate::stage::{Stage, StageSensor};
 
@@ -27,7 +26,7 @@ pub struct Sweep {
 impl Stage {
     /// The sensor of `scene`.
     #[must_use]
-    pub fn sensor(&self, scene: &Scene) -> &SensorProfile {
+    pub fn sensor(&self, scene: &Scene) -> &Sensor {
         &self.sensors[scene.sensor].sensor
     }
 
@@ -37,58 +36,64 @@ impl Stage {
         self.size_of(&scene.objects[i])
     }
 
+    /// The ground and the objects of `scene` as instances: instance 0 is the ground, and instance
+    /// `i` is object `i - 1` of `scene`, labelled with its class.
+    #[must_use]
+    pub fn build(&self, scene: &Scene) -> World {
+        let mut world = World::new();
+        (world.seed, world.effects) = (self.seed(), self.effects(scene).clone());
+        let ground = shared(scene.ground.mesh(), Builder::Morton);
+        self.add_ground(&mut world, &ground, scene.number, self.stream(scene, 0));
+        for (object, number) in scene.objects.iter().zip(1..) {
+            self.add_object(&mut world, object, scene.glass_returned, self.stream(scene, number));
+        }
+        world
+    }
+
     /// Scans the ground and all objects of `scene`.
     ///
     /// # Errors
     /// The caster fails.
     pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
-        let ground = target(scene.ground.mesh(), Builder::Morton);
-        let mut targets = vec![self.place_ground(&ground, scene.number)];
-        let objects = scene.objects.iter();
-        targets.extend(objects.map(|object| self.place_object(object, scene.glass_returned)));
-        self.sweep_targets(scene, &mut targets)
+        self.sweep_in(&self.build(scene), scene)
     }
 
-    /// Scans `targets` with the sensor of `scene`, in place of its ground and objects.
+    /// Scans `world` with the sensor of `scene`.
     ///
     /// # Errors
     /// The caster fails.
     #[doc(hidden)]
-    pub fn sweep_targets(
-        &self,
-        scene: &Scene,
-        targets: &mut [PlacedTarget<'_>],
-    ) -> Result<Sweep, SceneError> {
-        let StageSensor { sensor, pattern, caster } = &self.sensors[scene.sensor];
-        let stream =
-            |part: u32| StreamKey::new(self.seed(), &format!("scene/{}/beams", scene.number), part);
-        for (target, part) in targets.iter_mut().zip(0..) {
-            target.stream = Some(stream(part));
-        }
-        let mut request = ScanRequest::new(sensor, pattern, scene.pose);
-        request.attributes = [
-            Attribute::Range,
-            Attribute::Beam,
-            Attribute::Ring,
-            Attribute::Time,
-            Attribute::Object,
-        ]
-        .into();
+    pub fn sweep_in(&self, world: &World, scene: &Scene) -> Result<Sweep, SceneError> {
+        let StageSensor { sensor, caster } = &self.sensors[scene.sensor];
+        let pattern = sensor.rays(caster.effects())?;
+        let mut request = ScanRequest::new(sensor.profile(), &pattern, scene.pose);
+        request.attributes.clone_from(&world.attributes);
         request.culling = self.culling;
         request.motion = scene.motion(pattern.last_s()).map(Arc::new);
-        request.stream = stream(u32::MAX);
-        let scan = scan_objects(caster, targets, &request)?.scan;
+        request.stream = self.stream(scene, u32::MAX);
+        let placed = world.placed(|_| request.stream);
+        let scan = scan_objects(caster, &placed, &request)?.scan;
         Ok(Sweep::new(scan, scene))
+    }
+
+    fn effects(&self, scene: &Scene) -> &Effects {
+        self.sensors[scene.sensor].caster.effects()
+    }
+
+    /// The key of the random numbers of instance number `part` in scans of `scene`.
+    fn stream(&self, scene: &Scene, part: u32) -> StreamKey {
+        StreamKey::new(self.seed(), &format!("scene/{}/beams", scene.number), part)
     }
 
     /// The ground and the objects of `scene` as one mesh, in which the objects lose their numbers
     /// and materials.
+    #[doc(hidden)]
     #[must_use]
     pub fn mesh(&self, scene: &Scene) -> TriangleMesh {
         let mut whole = scene.ground.mesh();
         for object in &scene.objects {
             let world_from_object = object.world_from_object();
-            let surface = &self.model(object.entry, object.variant).target.surface;
+            let surface = &self.model(object.entry, object.variant).mesh.target().surface;
             for &index in surface.kept() {
                 let first = whole.vertices.len() as u32;
                 let corners = surface.corners(index).map(|corner| surface.frame.to_object(corner));

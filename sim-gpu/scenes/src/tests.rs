@@ -6,9 +6,7 @@ use std::path::Path;
 use edgepuck_segment::{Segmenter, Settings, Sweep as Points};
 use formats::Scan;
 use glam::{DVec2, DVec3};
-use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::scan::PlacedTarget;
-use sim_gpu::internals::target::{Surface, Target};
+use sim_gpu::{Mesh, Pose, Scene as World};
 
 use crate::{Drive, OTHER, Packet, Recipe, Scene, Sightings, Stage, label_clusters};
 
@@ -85,8 +83,9 @@ fn a_sweep_of_the_objects_equals_a_sweep_of_one_mesh_of_all() {
     let stage = stage(&opaque);
     for number in 0..3 {
         let scene = Scene::draw(&stage, number);
-        let whole = Target::new(Surface::of_mesh(stage.mesh(&scene)), Builder::Sah);
-        let of_mesh = stage.sweep_targets(&scene, &mut [PlacedTarget::new(&whole)]).unwrap().scan;
+        let mut whole = World::new();
+        whole.add(Mesh::try_from(stage.mesh(&scene)).unwrap(), Pose::IDENTITY);
+        let of_mesh = stage.sweep_in(&whole, &scene).unwrap().scan;
         let of_parts = stage.sweep(&scene).unwrap().scan;
         let ranges = |scan: &Scan| -> BTreeMap<u32, f32> {
             let beams = scan.beam.as_ref().unwrap().iter().copied();

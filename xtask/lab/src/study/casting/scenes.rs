@@ -7,8 +7,8 @@ use clap::Args;
 use edgepuck_scenes::{Recipe, Scene, Stage};
 use edgepuck_segment::{Segmenter, Settings, Sweep};
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::scan::PlacedTarget;
 use sim_gpu::internals::target::{Surface, Target};
+use sim_gpu::{Mesh, Pose};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
@@ -55,12 +55,14 @@ fn measure(stage: &Stage, number: u32, rounds: usize) -> Result<Measured> {
     let mesh = stage.mesh(&scene);
     let n_triangles = mesh.triangles.len();
     let (whole, build) = measured(|| Target::new(Surface::of_mesh(mesh), Builder::Sah));
+    let mut one_mesh = sim_gpu::Scene::new();
+    one_mesh.add(Mesh::from_target(whole, glam::DVec3::ZERO), Pose::IDENTITY);
     let sweep = stage.sweep(&scene)?;
     let as_sweep = Sweep { points: sweep.points(), rings: Some(sweep.rings()) };
     let mut segmenter = Segmenter::new(Settings::default()).context("the default settings")?;
     let workloads: &mut [Workload<'_>] = &mut [
         workload(|| Ok(stage.sweep(&scene)?)),
-        workload(|| Ok(stage.sweep_targets(&scene, &mut [PlacedTarget::new(&whole)])?)),
+        workload(|| Ok(stage.sweep_in(&one_mesh, &scene)?)),
         workload(|| Ok(segmenter.segment(&as_sweep)?.clusters().len())),
     ];
     let costs = interleave(rounds, workloads)?;
