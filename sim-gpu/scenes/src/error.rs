@@ -11,15 +11,10 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// The recipe, or a sensor profile that it names, is missing or invalid.
+    /// The recipe, a sensor profile or a mesh is missing or invalid, the adapter fails, or a file
+    /// cannot be written.
     #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// A value of the recipe does not fit a sensor.
-    #[error(transparent)]
-    Value(#[from] InvalidValue),
-    /// A user's mesh cannot be read.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
+    Sim(#[from] sim_gpu::Error),
     /// A user's mesh cannot be scaled to a height, because it is flat.
     #[error("{}: expected a mesh with a height, found all of it at one height", file.display())]
     FlatMesh {
@@ -31,19 +26,22 @@ pub enum SceneError {
     NoMeshes {
         /// The folder.
         folder: PathBuf,
-        /// What was found instead.
+        /// The files or the error that were found instead.
         cause: String,
     },
-    /// The caster failed.
-    #[error(transparent)]
-    Scan(#[from] ScanError),
-    /// The adapter does not open.
-    #[error(transparent)]
-    Caster(#[from] CastError),
     /// The sweep cannot be segmented.
     #[error("the sweep cannot be segmented: {0}")]
     Segment(String),
-    /// A file cannot be written.
-    #[error(transparent)]
-    Format(#[from] FormatError),
 }
+
+/// Makes `?` turn these errors into [`SceneError::Sim`].
+macro_rules! convert {
+    ($($error:ty),+) => {
+        $(impl From<$error> for SceneError {
+            fn from(error: $error) -> Self {
+                Self::Sim(error.into())
+            }
+        })+
+    };
+}
+convert!(CastError, ConfigError, FormatError, InvalidValue, MeshError, ScanError);

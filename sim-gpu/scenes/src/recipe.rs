@@ -8,6 +8,8 @@ use sim_gpu::effects::Effects;
 use sim_gpu::internals::config::{self, ConfigError, InvalidValue, within};
 use sim_gpu::internals::sensor::SensorProfile;
 
+use crate::error::SceneError;
+
 /// The class of clusters that do not show one whole object: ground, two objects in one cluster, or
 /// a small part of an object.
 pub const OTHER: &str = "other";
@@ -231,20 +233,21 @@ impl Recipe {
     ///
     /// # Errors
     /// The file is missing or invalid; the error names the key and the cause.
-    pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        let recipe: Self = config::read(file)?;
-        recipe.check().map_err(|invalid| invalid.in_file(file))?;
-        Ok(recipe)
+    pub fn load(file: &Path) -> Result<Self, SceneError> {
+        config::read::<Self>(file)?.checked(file)
     }
 
     /// Parses the recipe `text`. Errors name `file`, which need not exist.
     ///
     /// # Errors
     /// The recipe is invalid; the error names the key and the cause.
-    pub fn parse(text: &str, file: &Path) -> Result<Self, ConfigError> {
-        let recipe: Self = config::parse(text, file)?;
-        recipe.check().map_err(|invalid| invalid.in_file(file))?;
-        Ok(recipe)
+    pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
+        config::parse::<Self>(text, file)?.checked(file)
+    }
+
+    fn checked(self, file: &Path) -> Result<Self, SceneError> {
+        self.check().map_err(|invalid| invalid.in_file(file))?;
+        Ok(self)
     }
 
     /// Replaces the sensors by those with these `names`, unless `names` is empty. Sensors of the
@@ -277,10 +280,7 @@ impl Recipe {
     }
 
     /// Reads the sensor profiles, relative to the folder of `file`.
-    ///
-    /// # Errors
-    /// A profile is missing or invalid.
-    pub fn sensors(&self, file: &Path) -> Result<Vec<SensorProfile>, ConfigError> {
+    pub(crate) fn sensors(&self, file: &Path) -> Result<Vec<SensorProfile>, ConfigError> {
         let folder = file.parent().unwrap_or(Path::new(""));
         self.sensor
             .iter()
