@@ -76,9 +76,7 @@ pub fn label_clusters(
 /// The mean horizontal distance and the lowest height of the `chosen` points.
 fn range_and_lowest(points: &[[f32; 3]], chosen: &[u32]) -> (f32, f32) {
     let chosen = chosen.iter().map(|&i| points[i as usize]);
-    let (sum, lowest, n) = chosen
-        .fold((0.0, f32::INFINITY, 0u32), |(sum, lowest, n), [x, y, z]| {
-            (sum + f64::from(x.hypot(y)), lowest.min(z), n + 1)
-        });
-    ((sum / f64::from(n.max(1))) as f32, lowest)
+    let sum_m: f64 = chosen.clone().map(|[x, y, _]| f64::from(x.hypot(y))).sum();
+    let lowest_m = chosen.clone().map(|[.., z]| z).fold(f32::INFINITY, f32::min);
+    ((sum_m / chosen.len().max(1) as f64) as f32, lowest_m)
 }

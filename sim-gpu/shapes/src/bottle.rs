@@ -31,7 +31,6 @@ impl Form {
     }
 }
 
-/// Builds a bottle.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let form = Form::draw(s);
     let section = section(s);

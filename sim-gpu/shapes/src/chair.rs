@@ -88,7 +88,6 @@ impl Seat {
     }
 }
 
-/// Builds a chair.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     if s.chance(0.14) {
         return club_chair(b, s);

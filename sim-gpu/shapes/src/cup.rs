@@ -68,7 +68,6 @@ fn stem(body: &Body) -> Profile {
         ])
 }
 
-/// Builds a cup.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let body = Body::draw(s);
     let wall = Wall::draw(s, body.rim_m);

@@ -85,7 +85,6 @@ impl Top {
     }
 }
 
-/// Builds a table.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     use Support::{Crossed, Desk, Disc, Legs, Panels, Sledge, Star, Trestle};
     let top = Top::draw(s);

@@ -50,7 +50,6 @@ impl Form {
     }
 }
 
-/// Builds a vase.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     use Kind::{Bellied, Cylinder, Shouldered, Trumpet};
     let form = Form::draw(s);

@@ -47,7 +47,6 @@ impl Fuselage {
         self.radius_m() * nose * tail
     }
 
-    /// Adds the body.
     pub fn build(&self, b: &mut Builder) {
         let n_around = b.around(self.radius_m(), 10);
         let n_nose = b.curved(self.nose * self.length_m, 4);

@@ -33,7 +33,6 @@ impl Wing {
         self.root_chord_m * (1.0 + share * (self.taper - 1.0))
     }
 
-    /// Adds both wings.
     pub fn build(&self, b: &mut Builder) {
         let section = outline::airfoil(self.thickness, b.curved(self.root_chord_m, 4));
         let ends = [0.0, 1.0].map(|share| {

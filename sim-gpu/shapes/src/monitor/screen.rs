@@ -18,7 +18,6 @@ pub struct Screen {
 type Housing = fn(&mut Builder, &mut Sampler, DVec3);
 
 impl Screen {
-    /// Draws a screen.
     pub fn draw(s: &mut Sampler) -> Self {
         let width_m = s.log_uniform(0.35, 1.3);
         let ratio = s.pick(&[4.0 / 3.0, 1.25, 1.6, 16.0 / 9.0, 16.0 / 9.0, 21.0 / 9.0]);
@@ -33,7 +32,6 @@ impl Screen {
         }
     }
 
-    /// Adds the screen.
     pub fn build(self, b: &mut Builder, s: &mut Sampler) {
         (self.housing)(b, s, DVec3::new(self.depth_m, self.width_m, self.height_m));
     }

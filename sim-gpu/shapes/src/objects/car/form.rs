@@ -87,7 +87,6 @@ pub struct Form {
 }
 
 impl Form {
-    /// Draws a style and the measures of a car of this style.
     pub fn draw(s: &mut Sampler) -> Self {
         let weighted: Vec<_> = STYLES.style.iter().map(|ranges| (ranges.weight, ranges)).collect();
         let ranges = s.weighted(&weighted);

@@ -14,7 +14,6 @@ struct Piece {
     ripple: Ripple,
 }
 
-/// Builds a hedge.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.log_uniform(0.8, 2.5);
     let wide_m = s.uniform(0.35, 1.4);

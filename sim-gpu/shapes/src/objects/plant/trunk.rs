@@ -7,7 +7,6 @@ use super::uneven::direction;
 use super::wood::{Stem, bough};
 use crate::primitives::{Builder, DVec3, Sampler};
 
-/// Builds a trunk.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let radius_m = s.log_uniform(0.05, 0.5);
     let height_m = s.uniform(2.0, 4.0);

@@ -58,7 +58,6 @@ impl Stem {
         point + self.bark.at(point) * out
     }
 
-    /// Adds the stem.
     pub fn build(&self, b: &mut Builder) {
         let n_around = b.around(self.radii_m[0], 7);
         let n_along = (self.rise.z / 0.25).clamp(4.0, 14.0) as usize;
