@@ -1,25 +1,16 @@
-//! A finished dataset is complete, the same however often it was finished, and
-//! says what was done to it since.
+//! Finishing a dataset gives the same bytes after any interruption, and verifying it finds every
+//! change.
 
-use edgepuck_dataset::config::{DatasetConfig, Layout};
-use edgepuck_dataset::finish::finish;
-use edgepuck_dataset::journal::{Journal, Terms};
-use edgepuck_dataset::manifest::{Manifest, Poses};
-use edgepuck_dataset::pipeline::{Run, scan_all};
-use edgepuck_dataset::progress::Progress;
-use edgepuck_dataset::record::Entry;
-use edgepuck_dataset::verify::verify;
-use edgepuck_dataset::{DatasetError, MeshFailure, check_layouts, layout};
+use edgepuck_dataset::internals::{Journal, Terms, finish, layout};
+use edgepuck_dataset::{
+    DatasetConfig, DatasetError, Entry, Layout, Manifest, MeshFailure, Poses, check_layouts, verify,
+};
 use formats::Split::{Test, Train};
 use formats::hash::Hashing;
 use formats::labelled::read_labelled;
-use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::job::Culling;
-use sim_gpu::internals::mesh::tree::discover;
 use sim_gpu::internals::sensor::{SensorProfile, builtin_names};
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use tests::tree::files;
 use tests::written_dataset::{MIN_POINTS, PACKED_POINTS, config, entry, failure, terms, write};
 
@@ -34,7 +25,7 @@ fn entries() -> Vec<Entry> {
     entries
 }
 
-/// A mesh of a class of its own that failed: its class keeps its label.
+/// The failures are of a class without scanned meshes, which has a label all the same.
 fn failures() -> Vec<MeshFailure> {
     vec![failure("bowl", Train, "bowl_2"), failure("bowl", Test, "bowl_1")]
 }
@@ -132,7 +123,7 @@ fn finishing_again_gives_the_same_bytes_wherever_it_was_stopped() {
     let whole = files(out);
 
     // Stopped while it packed: no manifest yet, parts of files, a stale file.
-    Journal::of(out).begin(&terms).unwrap();
+    Journal::at(out).begin(&terms).unwrap();
     fs::remove_file(layout::manifest(out)).unwrap();
     fs::write(out.join("packed/.edgepuck-abc.tmp"), "part").unwrap();
     fs::write(out.join("rotational/clean/cup/.edgepuck-abc.tmp"), "part").unwrap();
@@ -142,60 +133,31 @@ fn finishing_again_gives_the_same_bytes_wherever_it_was_stopped() {
     assert!(files(out) == whole);
 
     // Stopped before the journal was removed.
-    Journal::of(out).begin(&terms).unwrap();
+    Journal::at(out).begin(&terms).unwrap();
     assert!(matches!(verify(out), Err(DatasetError::Unfinished { .. })));
     again().unwrap();
     assert!(files(out) == whole);
 
     // A scan is lost: an error, and no manifest of what is not there.
-    Journal::of(out).begin(&terms).unwrap();
+    Journal::at(out).begin(&terms).unwrap();
     let lost = out.join("static/clean/chair/train/chair_0_v0.npz");
     let bytes = fs::read(&lost).unwrap();
     fs::remove_file(&lost).unwrap();
     let message = again().map(|_| ()).unwrap_err().to_string();
     assert!(message.contains("chair_0_v0.npz"), "{message}");
-    assert!(!layout::manifest(out).exists() && Journal::of(out).exists());
+    assert!(!layout::manifest(out).exists() && Journal::at(out).exists());
     fs::write(&lost, bytes).unwrap();
     again().unwrap();
     assert!(files(out) == whole);
 
-    // Nothing failed the second time.
+    // The second time no mesh failed.
     finish(out, &terms, records.clone(), Vec::new()).unwrap();
     assert!(!layout::failures(out).exists());
     assert!(verify(out).unwrap().is_sound());
 }
 
 #[test]
-fn clouds_that_a_run_keeps_are_those_that_its_files_give() {
-    let folder = tempfile::tempdir().unwrap();
-    let (meshes, out) = (folder.path().join("meshes"), folder.path().join("out"));
-    let tetrahedron =
-        "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
-    for name in ["cup/train/cup_1.off", "cup/test/cup_2.off", "bowl/train/bowl_1.off"] {
-        let file = meshes.join(name);
-        fs::create_dir_all(file.parent().unwrap()).unwrap();
-        fs::write(file, tetrahedron).unwrap();
-    }
-    let terms = terms(config(), None);
-    let config = &terms.config;
-    let caster = OpenCaster::Cpu(config.cast_effects());
-    let (culling, progress) = (Culling::On, &Progress::default());
-    let is_over = &AtomicBool::new(false);
-    let run = Run { out: &out, config, caster: &caster, culling, progress, is_over };
-    let records = scan_all(&run, &discover(&meshes, config.seed).unwrap()).unwrap().records;
-    let mut read_again = records.clone();
-    let scans = read_again.iter_mut().flat_map(|mesh| &mut mesh.scans);
-    for written in scans.flat_map(|scan| &mut scan.variants) {
-        assert!(written.cloud.take().is_some(), "{} points", written.tally.points);
-    }
-    finish(&out, &terms, records, Vec::new()).unwrap();
-    let kept = files(&out);
-    finish(&out, &terms, read_again, Vec::new()).unwrap();
-    assert!(files(&out) == kept);
-}
-
-#[test]
-fn what_was_done_to_a_dataset_is_named() {
+fn every_change_of_a_file_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     make(out);
@@ -240,7 +202,7 @@ fn what_was_done_to_a_dataset_is_named() {
 }
 
 #[test]
-fn files_are_hashed_as_was_asked() {
+fn files_have_the_hash_of_the_settings() {
     for (hash, keys, said) in [
         (Hashing::Sha256, ["sha256"].as_slice(), Some("was changed: its SHA-256 is ")),
         (Hashing::Blake3, &["hash", "blake3"], Some("was changed: its BLAKE3 is ")),
@@ -253,7 +215,7 @@ fn files_are_hashed_as_was_asked() {
         for key in ["sha256", "blake3", "hash"] {
             assert_eq!(manifest.contains(&format!("\"{key}\": ")), keys.contains(&key), "{key}");
         }
-        // Text stays readable, and keeps its lines: a hash alone tells.
+        // The text keeps its lines: only a hash finds the change.
         let path = out.join("rotational/clean/chair/train/chair_0_v1.csv");
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen('x', "y", 1)).unwrap();
@@ -265,7 +227,7 @@ fn files_are_hashed_as_was_asked() {
 }
 
 #[test]
-fn what_is_no_finished_dataset_is_found_out() {
+fn manifests_that_are_missing_or_invalid_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     assert!(matches!(verify(out), Err(DatasetError::NoManifest { .. })));
@@ -286,7 +248,10 @@ fn what_is_no_finished_dataset_is_found_out() {
         verify(out).unwrap_err().to_string()
     };
     let message = refused(&|manifest| manifest.tool = "other".to_owned());
-    assert!(message.ends_with("made by `other`, not by `edgepuck`"), "{message}");
+    assert!(
+        message.ends_with("expected a dataset of `edgepuck`, found one of `other`"),
+        "{message}"
+    );
     let message = refused(&|manifest| manifest.packed[0].hash = None);
     assert!(message.ends_with("expected the hash sha256 of every file, found none"), "{message}");
     for name in ["..", "a/b", "/etc", r"a\b", ""] {
@@ -310,7 +275,7 @@ fn every_builtin_sensor_comes_back_from_a_manifest() {
         let read = Manifest::read(&layout::manifest(folder.path())).unwrap();
         assert_eq!(read, manifest, "{name}");
     }
-    // No mesh at all: sets are empty, but there.
+    // Without meshes, the packed sets exist but are empty.
     assert!(verify(folder.path()).unwrap().is_sound());
     let set = read_labelled(&folder.path().join("packed/static-noisy-test.npz")).unwrap();
     assert!(set.is_empty());

@@ -1,11 +1,7 @@
-//! Shards that are merged are one run, byte for byte.
+//! Merged shards have the bytes of one run.
 
-use edgepuck_dataset::finish::finish;
-use edgepuck_dataset::journal::{Journal, Terms};
-use edgepuck_dataset::merge::merge;
-use edgepuck_dataset::record::Entry;
-use edgepuck_dataset::verify::verify;
-use edgepuck_dataset::{DatasetError, MeshFailure, layout};
+use edgepuck_dataset::internals::{Journal, Terms, finish, layout};
+use edgepuck_dataset::{DatasetError, Entry, MeshFailure, merge, verify};
 use formats::Split::{Test, Train};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +14,7 @@ fn entries() -> Vec<Entry> {
     (0..12_usize).map(|i| entry(class(i), split(i), &format!("{}_{i}", class(i)))).collect()
 }
 
-/// One is of a class that no mesh that was scanned has.
+/// One is of a class without scanned meshes.
 fn failures() -> Vec<MeshFailure> {
     vec![failure("airplane", Train, "airplane_1"), failure("cup", Test, "cup_99")]
 }
@@ -72,7 +68,7 @@ fn adapters_are_listed_once_each() {
 }
 
 #[test]
-fn shards_that_make_no_dataset_are_refused() {
+fn shards_that_do_not_make_a_dataset_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let shards = make_shards(folder.path());
     let [first, second, third] = &shards[..] else { panic!("three shards") };
@@ -112,7 +108,7 @@ fn shards_that_make_no_dataset_are_refused() {
     let all = &shards[..];
     let occupied = merge(all, first).unwrap_err().to_string();
     assert!(occupied.ends_with("holds files already; merge into an empty folder"), "{occupied}");
-    Journal::of(second).begin(&terms(config(), Some((1, 3)))).unwrap();
+    Journal::at(second).begin(&terms(config(), Some((1, 3)))).unwrap();
     assert!(matches!(merge(all, &out), Err(DatasetError::Unfinished { .. })));
 }
 

@@ -1,28 +1,21 @@
-//! Clouds that are cast as they are asked for are those that a dataset of the same settings
-//! holds.
+//! Clouds cast on demand equal the packed clouds of a dataset with the same settings.
 
-use edgepuck_dataset::finish::finish;
-use edgepuck_dataset::journal::Terms;
-use edgepuck_dataset::on_demand::{Clouds, seed_of_epoch};
-use edgepuck_dataset::pipeline::{Run, scan_all};
-use edgepuck_dataset::progress::Progress;
-use edgepuck_dataset::start::{Begin, begin};
-use edgepuck_dataset::{DatasetConfig, DatasetError, SetConfig, Variant, Viewpoints, layout};
+use edgepuck_dataset::{
+    Clouds, DatasetConfig, DatasetError, Plan, Progress, SetConfig, Variant, Viewpoints, make,
+    seed_of_epoch,
+};
 use formats::Split;
 use formats::labelled::read_labelled;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
 use sim_gpu::internals::sensor::{SensorProfile, Views};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
-use tests::written_dataset::config;
 
 const CACHE_BYTES: usize = 1 << 20;
 
 /// Two noisy views of each mesh, from random places.
-fn asked(seed: u64) -> DatasetConfig {
+fn settings(seed: u64) -> DatasetConfig {
     let noise = Noise { mean_m: 0.0, sigma_m: 0.02, model: NoiseModel::Range };
     let views = Views {
         count: 2,
@@ -32,18 +25,18 @@ fn asked(seed: u64) -> DatasetConfig {
         azimuth_jitter_deg: 180.0,
         ..Views::ROTATING
     };
+    let set = SetConfig {
+        name: "rotational".to_owned(),
+        sensor: SensorProfile::builtin("vlp32c").expect("a built-in sensor"),
+        viewpoints: Viewpoints::Views(views),
+    };
     DatasetConfig {
         seed,
         effects: Effects { noise: Some(noise), ..Effects::default() },
         variants: vec![Variant::Noisy],
-        sets: vec![SetConfig {
-            name: "rotational".to_owned(),
-            sensor: SensorProfile::builtin("vlp32c").expect("a built-in sensor"),
-            viewpoints: Viewpoints::Views(views),
-        }],
-        layouts: vec![],
-        formats: vec![formats::scan_file::ScanFormat::Npz],
-        ..config()
+        packed_points: 32,
+        min_points: 16,
+        ..DatasetConfig::new(vec![set])
     }
 }
 
@@ -65,19 +58,13 @@ fn cpu(clouds: &Clouds) -> OpenCaster {
 fn clouds_on_demand_are_those_of_the_packed_set() {
     let folder = tempfile::tempdir().unwrap();
     let (out, meshes) = (folder.path().join("out"), meshes(&folder.path().join("meshes")));
-    let config = asked(seed_of_epoch(7, 2));
+    let config = settings(seed_of_epoch(7, 2));
     let caster = OpenCaster::Cpu(config.cast_effects());
-    let terms = Terms::new(config.clone(), &caster, &meshes, None);
-    begin(&out, &terms, Begin::Fresh).unwrap();
-    let (progress, culling) = (Progress::default(), Culling::On);
-    let (config, progress, is_over) = (&config, &progress, &AtomicBool::new(false));
-    let run = Run { out: &out, config, caster: &caster, culling, progress, is_over };
-    let scanned = scan_all(&run, &meshes).unwrap();
-    finish(&out, &terms, scanned.records, scanned.failures).unwrap();
-    let packed = layout::packed(&out, &config.sets[0], Variant::Noisy, Split::Train);
-    let expected = read_labelled(&packed).unwrap();
+    let plan = Plan::new(&out, &config, &meshes);
+    make(&plan, &caster, &Progress::default()).unwrap();
+    let expected = read_labelled(&out.join("packed/rotational-noisy-train.npz")).unwrap();
 
-    let clouds = clouds(&meshes, asked(7), CACHE_BYTES);
+    let clouds = clouds(&meshes, settings(7), CACHE_BYTES);
     assert_eq!(clouds.len(), expected.len(), "no view of this seed has too few points");
     let all: Vec<usize> = (0..clouds.len()).collect();
     let drawn = clouds.draw(&cpu(&clouds), seed_of_epoch(7, 2), &all).unwrap();
@@ -91,8 +78,8 @@ fn clouds_on_demand_are_those_of_the_packed_set() {
 fn a_cloud_depends_on_its_number_and_the_seed_alone() {
     let folder = tempfile::tempdir().unwrap();
     let meshes = meshes(folder.path());
-    let whole = clouds(&meshes, asked(7), usize::MAX);
-    let uncached = clouds(&meshes, asked(7), 0);
+    let whole = clouds(&meshes, settings(7), usize::MAX);
+    let uncached = clouds(&meshes, settings(7), 0);
     let numbers = [5, 0, 11, 5, 38];
     let together = whole.draw(&cpu(&whole), 7, &numbers).unwrap();
     for (number, together) in numbers.into_iter().zip(together) {
@@ -106,10 +93,10 @@ fn a_cloud_depends_on_its_number_and_the_seed_alone() {
 }
 
 #[test]
-fn a_mesh_that_no_view_sees_well_enough_is_named() {
+fn a_mesh_whose_views_all_have_too_few_points_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let meshes = meshes(folder.path());
-    let config = DatasetConfig { min_points: 1 << 20, ..asked(7) };
+    let config = DatasetConfig { min_points: 1 << 20, ..settings(7) };
     let clouds = clouds(&meshes, config, CACHE_BYTES);
     match clouds.draw(&cpu(&clouds), 7, &[3]) {
         Err(error @ DatasetError::Sparse { .. }) => {

@@ -2,7 +2,7 @@
 
 use crate::Outcome;
 use anyhow::Context;
-use edgepuck_dataset::publish::{Publication, publish};
+use edgepuck_dataset::{Publication, publish};
 use std::path::PathBuf;
 
 /// Flags of `card`.

@@ -1,7 +1,7 @@
-//! `edgepuck merge-dataset`: merges shards into one dataset.
+//! `edgepuck merge-dataset`: merges the shards of a dataset.
 
 use crate::{Outcome, gen_dataset};
-use edgepuck_dataset::merge::merge;
+use edgepuck_dataset::merge;
 use std::path::PathBuf;
 
 /// Flags of `merge-dataset`.
@@ -22,8 +22,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     eprintln!("{} meshes: {}", manifest.meshes.len(), args.out.display());
     if manifest.adapters.len() > 1 {
         eprintln!(
-            "The shards were cast on different adapters ({}): clean scans are the same as from \
-             one run, noise differs in its last digits.",
+            "The shards were cast on different adapters ({}): the clean scans equal those of one \
+             run, but the noise differs in its last digits.",
             manifest.adapters.join(", ")
         );
     }

@@ -2,7 +2,7 @@
 
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
-use edgepuck_dataset::surfaces::{SurfaceConfig, write_surfaces};
+use edgepuck_dataset::{SurfaceConfig, write_surfaces};
 use sim_gpu::internals::mesh::frame::{Normalize, Up};
 use sim_gpu::internals::mesh::tree::discover;
 use sim_gpu::internals::sensor::Views;

@@ -41,7 +41,7 @@ pub struct Args {
 
 /// Scans the scene.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let format = ScanFormat::of(&args.out)?;
+    let format = ScanFormat::of_path(&args.out)?;
     let scene_file = match &args.scene {
         Some(file) => file.clone(),
         None => write_default_scene()?,

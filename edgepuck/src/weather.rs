@@ -63,7 +63,7 @@ pub struct WeatherArgs {
 /// Reads a scan, and writes it with the weather.
 pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     let usage = |error: &dyn std::fmt::Display| Usage(error.to_string());
-    let format = ScanFormat::of(&args.out)?;
+    let format = ScanFormat::of_path(&args.out)?;
     if format == ScanFormat::Pcap {
         let cause = "--out: expected .npz, .ply or .csv, as packets hold a sensor's ranges";
         return Err(Usage(cause.to_owned()).into());

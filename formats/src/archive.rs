@@ -1,4 +1,4 @@
-//! NPZ archives: NumPy arrays under names, in a zip file.
+//! NPZ archives: named NumPy arrays in a zip file.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
@@ -17,8 +17,7 @@ use crate::hash::{FileHash, Hashing};
 use crate::npy::{self, Header};
 use crate::number::Number;
 
-/// An archive that is being written: uncompressed, and with the same bytes
-/// whenever and wherever it is written.
+/// Writes an uncompressed archive. The same arrays give the same bytes.
 pub(crate) struct NpzWriter<W: Write + Seek> {
     zip: ZipWriter<W>,
 }
@@ -28,8 +27,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     pub fn write(writer: W, fill: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
         let mut npz = Self { zip: ZipWriter::new(writer) };
         if let Err(error) = fill(&mut npz) {
-            // When it is dropped it tries to end the archive and prints to stderr
-            // that it cannot. The caller reports the error already.
+            // Dropping it would try to end the archive and print a second error to stderr.
             std::mem::forget(npz.zip);
             return Err(error);
         }
@@ -58,14 +56,14 @@ impl<W: Write + Seek> NpzWriter<W> {
     ) -> io::Result<()> {
         // A header that this crate writes takes at most 128 bytes.
         let n_bytes = (size_of::<A>() * elements.len()) as u64 + 128;
-        // Elements are written one by one; zip sums up each write.
+        // Buffered, because zip computes a checksum for each write and elements come one by one.
         let mut writer = BufWriter::new(self.begin(key, n_bytes)?);
         npy::write_array(&mut writer, shape, elements)?;
         writer.flush()
     }
 
-    /// Writes the array `key` of NumPy's fixed-width text (`<U`), which
-    /// `np.load` takes without pickle.
+    /// Writes the array `key` of NumPy's fixed-width text (`<U`), which `np.load` reads without
+    /// pickle.
     pub fn text(&mut self, key: &str, lines: &[String]) -> io::Result<()> {
         // NumPy has no text of width 0.
         let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0).max(1);
@@ -82,12 +80,11 @@ impl<W: Write + Seek> NpzWriter<W> {
     }
 }
 
-/// Bytes of an archive that wait in memory; a longer one waits in a file.
+/// Bytes of an archive that are kept in memory; a longer one goes to a file.
 const IN_MEMORY: usize = 32 << 20;
 
-/// Memory for a file that is made before it can be written, which goes over into a
-/// file without a name in `folder` when it grows beyond [`IN_MEMORY`]. The system
-/// removes that file however the process ends.
+/// A buffer for a file that must be complete before it is written. Beyond [`IN_MEMORY`] it becomes an
+/// unnamed file in `folder`, which the system removes however the process ends.
 pub(crate) fn waiting_room(folder: &Path) -> SpooledTempFile {
     tempfile::spooled_tempfile_in(IN_MEMORY, folder)
 }
@@ -95,9 +92,8 @@ pub(crate) fn waiting_room(folder: &Path) -> SpooledTempFile {
 /// Writes the archive whose arrays `fill` writes to `path`, atomically, and returns
 /// the hash of the file that `hashing` asks for.
 ///
-/// The head of an entry is patched once the entry is complete, while a file that is
-/// hashed as it is written takes its bytes in order: the archive waits till it is
-/// whole.
+/// The archive is completed in a buffer first, because the header of an entry is patched after the
+/// entry, while hashing takes the bytes of the file in order.
 #[cfg(feature = "dataset")]
 pub(crate) fn write_archive(
     path: &Path,
@@ -111,7 +107,7 @@ pub(crate) fn write_archive(
     atomic::write_hashed(path, hashing, |writer| io::copy(&mut archive, writer).map(drop))
 }
 
-/// An archive that is being read. Its errors name the file and the key.
+/// Reads an archive. Errors name the file and the key.
 pub(crate) struct NpzReader<R: Read + Seek = BufReader<File>> {
     path: PathBuf,
     file_size: u64,
@@ -132,7 +128,7 @@ impl NpzReader {
 }
 
 impl<R: Read + Seek> NpzReader<R> {
-    /// Reads an archive that its errors call `path`.
+    /// Opens an archive, which errors call `path`.
     pub fn new(mut reader: R, path: &Path) -> Result<Self, FormatError> {
         let file_size =
             reader.seek(SeekFrom::End(0)).map_err(|source| FormatError::io(path, source))?;
@@ -166,8 +162,7 @@ impl<R: Read + Seek> NpzReader<R> {
         })
     }
 
-    /// The array `key` of text, of either kind that NumPy keeps without pickle:
-    /// letters (`<U`) or bytes (`S`).
+    /// The array `key` of text, which is letters (`<U`) or bytes (`S`).
     pub fn text(&mut self, key: &str) -> Result<Vec<String>, FormatError> {
         self.entry(key, |header, size, entry| {
             let not_text = || {
@@ -196,8 +191,8 @@ impl<R: Read + Seek> NpzReader<R> {
         })
     }
 
-    /// Hands the array `key` to `read`: its header, the bytes of its elements,
-    /// and a reader of these.
+    /// Passes the array `key` to `read`: its header, the number of bytes of its elements, and a
+    /// reader of these.
     pub fn entry<T>(
         &mut self,
         key: &str,
@@ -209,7 +204,7 @@ impl<R: Read + Seek> NpzReader<R> {
             zip::result::ZipError::FileNotFound => here("missing".to_owned()),
             other => here(other.to_string()),
         })?;
-        // A deflated byte unfolds to at most 1032 bytes (zlib's technical notes).
+        // A deflated byte expands to at most 1032 bytes (zlib's technical notes).
         if entry.size() / 1032 > *file_size {
             return Err(here(format!(
                 "the entry states {} bytes in a file of {file_size}",
@@ -221,7 +216,7 @@ impl<R: Read + Seek> NpzReader<R> {
         let size = size.saturating_sub(header.n_bytes as u64);
         let value = read(header, size, &mut entry.by_ref().take(size));
         let value = value.map_err(|error| here(error.to_string()))?;
-        // The checksum is compared when the entry's end is read.
+        // Reading to the end of the entry compares the checksum.
         match io::copy(&mut entry, &mut io::sink()) {
             Ok(_) => Ok(value),
             Err(error) => Err(here(error.to_string())),

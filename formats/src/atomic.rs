@@ -1,9 +1,8 @@
-//! Files that are there whole or not at all.
+//! Atomic writes: a file is complete or absent.
 //!
-//! A file is filled under a temporary name in its own folder and renamed when
-//! it is complete, so that a process killed at any moment leaves no part of a
-//! file under its final name. Nothing is synced to the disk: that guards
-//! against a power cut, and would cost more than writing a small scan.
+//! A file is written under a temporary name in its own folder and renamed when it is complete, so
+//! that a process killed at any moment leaves no part of a file under its final name. Nothing is
+//! synced to the disk, which would guard against power cuts but cost more than writing a small scan.
 
 #[cfg(feature = "dataset")]
 use std::fmt::Display;
@@ -20,15 +19,15 @@ use crate::hash::{FileHash, HashedFile, Hasher, Hashing};
 const PREFIX: &str = ".edgepuck-";
 const SUFFIX: &str = ".tmp";
 
-/// Bytes that are written at once: most scans.
+/// Bytes of the buffer, which holds most scans.
 const BUFFER: usize = 64 << 10;
 
-/// Writes the file at `path` by `fill`, atomically, replacing what was there.
-/// Folders that are missing are made.
+/// Writes the file at `path` with `fill`, atomically, and replaces an existing file. Missing folders
+/// are created.
 ///
 /// # Errors
-/// Whatever the system or `fill` reports, with the file's name; a full disk as
-/// [`FormatError::DiskFull`]. Nothing is left behind in that case.
+/// Errors of the system or of `fill`, with the name of the file; a full disk is
+/// [`FormatError::DiskFull`]. No temporary file remains.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
@@ -36,8 +35,8 @@ pub fn write(
     write_through(path, |file| file, fill, drop)
 }
 
-/// As [`write()`], and returns the hash of the file that `hashing` asks for.
-/// Bytes are hashed while they are written, in order: nothing is read back.
+/// As [`write()`]; returns the hash of the file that `hashing` asks for. Bytes are hashed while they
+/// are written.
 ///
 /// # Errors
 /// As [`write()`].
@@ -51,7 +50,7 @@ pub fn write_hashed(
     write_through(path, open, fill, |written| written.hash.finish())
 }
 
-/// A file that is hashed while it is written.
+/// A file whose bytes are hashed while they are written.
 #[cfg(feature = "dataset")]
 pub struct HashingFile {
     file: File,
@@ -71,8 +70,8 @@ impl Write for HashingFile {
     }
 }
 
-/// Fills a temporary file through the writer that `open` makes of it, renames
-/// it to `path`, and returns what `close` makes of the writer.
+/// Writes a temporary file through the writer that `open` makes of it, renames it to `path`, and
+/// returns the result of `close` for the writer.
 fn write_through<W: Write, T>(
     path: &Path,
     open: impl FnOnce(File) -> W,
@@ -84,8 +83,8 @@ fn write_through<W: Write, T>(
     file.close(close)
 }
 
-/// A file that is written piece by piece: it lies under its name once it is finished, and
-/// nothing is left of one that is dropped before.
+/// A file that is written piece by piece. It gets its name when it is finished; one that is dropped
+/// before is removed.
 pub struct Unfinished<W: Write = File> {
     path: PathBuf,
     writer: BufWriter<W>,
@@ -93,10 +92,10 @@ pub struct Unfinished<W: Write = File> {
 }
 
 impl Unfinished {
-    /// Begins the file at `path`. Folders that are missing are made.
+    /// Begins the file at `path`. Missing folders are created.
     ///
     /// # Errors
-    /// What the system reports; a folder that has the file's name.
+    /// Errors of the system; a folder of that name.
     pub fn create(path: &Path) -> Result<Self, FormatError> {
         if path.is_dir() {
             return Err(FormatError::io(path, io::ErrorKind::IsADirectory.into()));
@@ -104,10 +103,10 @@ impl Unfinished {
         Self::open(path, |file| file)
     }
 
-    /// Gives the file its name, replacing what was there.
+    /// Gives the file its name, and replaces an existing file.
     ///
     /// # Errors
-    /// What the system reports.
+    /// Errors of the system.
     pub fn finish(self) -> Result<(), FormatError> {
         self.close(drop)
     }
@@ -122,10 +121,10 @@ impl<W: Write> Unfinished<W> {
         Ok(Self { path: path.to_path_buf(), writer, temporary })
     }
 
-    /// Appends what `fill` writes.
+    /// Appends the output of `fill`.
     ///
     /// # Errors
-    /// What the system or `fill` reports, with the file's name.
+    /// Errors of the system or of `fill`, with the name of the file.
     pub fn append(
         &mut self,
         fill: impl FnOnce(&mut BufWriter<W>) -> io::Result<()>,
@@ -143,7 +142,7 @@ impl<W: Write> Unfinished<W> {
     }
 }
 
-/// [`write()`] of bytes that are at hand.
+/// As [`write()`], for bytes in memory.
 ///
 /// # Errors
 /// As [`write()`].
@@ -164,13 +163,13 @@ pub(crate) fn write_lines(
     Ok(HashedFile { path, hash })
 }
 
-/// The folder that holds `path`, made if it is missing.
+/// The folder of `path`, which is created if it is missing.
 pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    // To look takes less than to make: most often it is there.
+    // Usually the folder exists, and looking is cheaper than trying to create it.
     if !folder.is_dir() {
         fs::create_dir_all(folder).map_err(|source| FormatError::io(folder, source))?;
     }
@@ -183,18 +182,16 @@ fn named_temporary(folder: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // What `File::create` asks for; the umask takes its share.
+        // The permissions of `File::create`, from which the umask is subtracted.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(folder)
 }
 
-/// Removes the temporary files that killed runs left in `folder` and below,
-/// and returns how many there were. Links are not followed. A folder that is
-/// not there holds none.
+/// Removes the temporary files that killed runs left in `folder` and below, and returns their
+/// number. Links are not followed. The folder need not exist.
 ///
-/// Call it only where nothing else is writing: a live temporary file cannot be
-/// told from a dead one.
+/// Nothing else may write there meanwhile, since temporary files in use look the same.
 ///
 /// # Errors
 /// A folder that cannot be listed, a file that cannot be removed.

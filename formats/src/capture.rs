@@ -1,4 +1,4 @@
-//! Captures of a sensor's packets, packet by packet, and the points in them as a scan.
+//! Reads captures of a sensor's packets and collects their returns in a scan.
 
 use std::fmt::Display;
 use std::ops::ControlFlow;
@@ -9,7 +9,7 @@ use crate::pcap;
 use crate::returns::Return;
 use crate::scan::Scan;
 
-/// Gives each UDP packet of a capture to `take`, until that breaks; the number of packets.
+/// Passes each UDP packet of a capture to `take` until it breaks; returns the number of packets.
 pub(crate) fn each_packet<E: Display>(
     path: &Path,
     mut take: impl FnMut(&[u8]) -> Result<ControlFlow<()>, E>,
@@ -30,7 +30,7 @@ pub(crate) fn each_packet<E: Display>(
     }
 }
 
-/// Returns on their way to a scan.
+/// The returns of a scan that is being read.
 #[derive(Default)]
 pub(crate) struct Points {
     positions: Vec<[f32; 3]>,
@@ -41,8 +41,8 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// Adds a return of the packet that was sent at `packet_us`, whose reflectivity is `white` for
-    /// an intensity of 1.
+    /// Adds a return of the packet that was sent at `packet_us`. Its reflectivity `white` is an
+    /// intensity of 1.
     pub fn push(&mut self, found: &Return, packet_us: f64, white: f32) {
         self.positions.push(found.point_m);
         self.ranges_m.push(found.range_m);

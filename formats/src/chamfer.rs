@@ -1,14 +1,14 @@
-//! How far two clouds are apart.
+//! The Chamfer distance of two clouds.
 
 use kiddo::{ImmutableKdTree as Tree, SquaredEuclidean};
 
-/// Chamfer distances of clouds A and B: means over the points of one of the
-/// distance to the nearest of the other, both ways added.
+/// Chamfer distances of two clouds: the mean distance from the points of each to the nearest
+/// point of the other, summed over both directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Chamfer {
-    /// Of squared distances, as PyTorch3D's `chamfer_distance` has it.
+    /// Of squared distances, as in PyTorch3D's `chamfer_distance`.
     pub squared: f64,
-    /// Of distances, as some papers have it.
+    /// Of distances, as in some papers.
     pub plain: f64,
 }
 
@@ -52,7 +52,7 @@ mod tests {
         let a: Vec<[f64; 3]> =
             (0..100).map(|i| [f64::from(i % 7), f64::from(i % 3), f64::from(i)]).collect();
         assert_eq!(chamfer(&a, &a), Chamfer::default());
-        // Many points alike are no case of their own.
+        // Equal points need no special case.
         let same = vec![[0.5; 3]; 5000];
         assert_eq!(chamfer(&same, &same[..1]), Chamfer::default());
         assert!(chamfer(&a, &[]).squared.is_nan());

@@ -1,7 +1,7 @@
-//! Clouds as networks take them: one size, one scale.
+//! Clouds of one size and one scale, as networks take them.
 //!
-//! Resample first and normalise then: the cloud that is stored, not the scan
-//! it was drawn from, fills the unit sphere exactly.
+//! Resample a scan before normalising it, so that the resulting cloud fills the unit sphere
+//! exactly.
 
 use std::collections::HashMap;
 
@@ -9,9 +9,9 @@ use crate::rng::StreamKey;
 
 /// Moves the mean of `points` to 0 and scales the largest radius to 1.
 ///
-/// Computed in f64 and summed in the order of the points, so that the same
-/// points give the same bits. Points that all coincide go to 0; no point is no
-/// work. A point that is not finite makes all of them so.
+/// It computes in f64 and sums in the order of the points, so that the same points give the same
+/// bits. Points that all coincide are moved to 0. If one point is not finite, none of the results
+/// is.
 pub fn normalize_unit_sphere(points: &mut [[f32; 3]]) {
     if points.is_empty() {
         return;
@@ -38,11 +38,10 @@ pub fn normalize_unit_sphere(points: &mut [[f32; 3]]) {
 
 /// Draws `n` of `points`.
 ///
-/// Of more than `n` points each subset is as likely as any other, and the
-/// order is drawn too, so that any first part of the result is a fair sample
-/// as well. Up to `n` points are all kept, in their order, and followed by
-/// repetitions of points picked uniformly. `None` if there is no point to
-/// repeat and `n` is not 0.
+/// From more than `n` points it draws a uniformly distributed subset in random order, so that
+/// every prefix of the result is a fair sample as well. It keeps up to `n` points in their order
+/// and appends uniformly drawn repetitions. It returns `None` if there are no points and `n` is not
+/// 0.
 #[must_use]
 pub fn resample(points: &[[f32; 3]], n: usize, key: StreamKey) -> Option<Vec<[f32; 3]>> {
     if points.len() > n {
@@ -58,8 +57,8 @@ pub fn resample(points: &[[f32; 3]], n: usize, key: StreamKey) -> Option<Vec<[f3
     Some(cloud)
 }
 
-/// The first `n` steps of a Fisher-Yates shuffle. Only the places that were
-/// swapped are remembered: at most `n`, however many points there are.
+/// The first `n` steps of a Fisher-Yates shuffle. It stores only the indices that were swapped, at
+/// most `n`.
 fn draw_without_replacement(points: &[[f32; 3]], n: usize, key: StreamKey) -> Vec<[f32; 3]> {
     let mut moved = HashMap::with_capacity(n);
     (0..n)

@@ -1,4 +1,4 @@
-//! Scans as CSV, for spreadsheets and eyes.
+//! Writes scans as CSV.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -8,15 +8,15 @@ use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::scan::{Column, Scan};
 
-/// Writes `scan` to `path`, atomically: the header `x,y,z` and the attributes'
-/// names (`nx,ny,nz` for normals), then one point a line. Returns the hash of
-/// the file that `hashing` asks for.
+/// Writes `scan` to `path`, atomically: the header `x,y,z` and the names of the attributes
+/// (`nx,ny,nz` for normals), then one point in each line. Returns the hash of the file that
+/// `hashing` asks for.
 ///
-/// Numbers are the shortest that read back as the same f32, and need no quotes. Text
-/// has room for any coordinate, so that the origin is added to the positions.
+/// Numbers have the fewest digits that read back as the same f32. The origin is added to the
+/// positions, since text can represent any coordinate.
 ///
 /// # Errors
-/// An attribute of another length than the positions; what the system reports.
+/// An attribute of another length than the positions; errors of the system.
 pub fn write_scan(
     path: &Path,
     hashing: Hashing,

@@ -1,20 +1,20 @@
-//! What goes wrong while bytes are made sense of.
+//! Errors of decoders.
 //!
-//! Decoders report it as [`io::Error`], because that is what their readers
-//! report too; [`error_in`] tells the two apart once the file is known.
+//! Decoders return [`io::Error`], as their readers do; [`error_in`] tells the two apart when the
+//! file is known.
 
 use std::io;
 use std::path::Path;
 
 use crate::error::FormatError;
 
-/// The error of bytes that make no sense.
+/// The error of invalid bytes.
 pub(crate) fn invalid(cause: impl ToString) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, cause.to_string())
 }
 
-/// The error of `part` of the file at `path`: bytes that end too early or make
-/// no sense are the file's fault, everything else is the system's.
+/// The error of `part` of the file at `path`. Bytes that are invalid or end too early are an error
+/// of the file, and all others are errors of the system.
 pub(crate) fn error_in(path: &Path, part: &str, error: io::Error) -> FormatError {
     match error.kind() {
         io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput => {
@@ -24,7 +24,7 @@ pub(crate) fn error_in(path: &Path, part: &str, error: io::Error) -> FormatError
     }
 }
 
-/// The start of `text`, fit for one line of an error.
+/// The start of `text` for one line of an error.
 pub(crate) fn excerpt(text: &str) -> String {
     const LONGEST: usize = 60;
     let mut letters = text.trim().chars();

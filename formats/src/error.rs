@@ -1,4 +1,4 @@
-//! What can go wrong with a file or with what should go into it.
+//! The errors of this crate.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,26 +12,26 @@ pub enum FormatError {
     Io {
         /// The file that was read or written.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
-    /// No room (or no quota) is left for the file.
+    /// The disk or the quota is full.
     #[error("{}: the disk is full", path.display())]
     DiskFull {
-        /// The file that was to be written; nothing lies under its name.
+        /// The file, which was not written.
         path: PathBuf,
     },
-    /// The file's content is not what its name or its header says.
+    /// The content of the file is not valid.
     #[error("{}: {part}: {cause}", path.display())]
     Malformed {
         /// The file that was read.
         path: PathBuf,
         /// The key, element or line at fault.
         part: String,
-        /// What is wrong with it.
+        /// The cause.
         cause: String,
     },
-    /// A scan's attribute is not as long as its positions.
+    /// An attribute of a scan has another length than its positions.
     #[error("attribute {attribute}: expected {expected} values, one for each point, found {found}")]
     Length {
         /// The name of the attribute at fault.
@@ -46,15 +46,15 @@ pub enum FormatError {
     Instance {
         /// The instance's name.
         name: String,
-        /// Why it cannot be held.
+        /// The cause.
         cause: String,
     },
     /// A word that is not one of the known names.
     #[error("unknown {what} `{word}`, expected one of {choices}")]
     UnknownName {
-        /// The word as given.
+        /// The word.
         word: String,
-        /// What it should name.
+        /// The kind of the names.
         what: &'static str,
         /// The known names, separated by commas.
         choices: String,
@@ -62,8 +62,8 @@ pub enum FormatError {
 }
 
 impl FormatError {
-    /// The error of a failed read or write of `path`. A full disk or quota is
-    /// an error of its own, because it ends a run and other errors need not.
+    /// The error `source` of reading or writing `path`. A full disk or quota is
+    /// [`FormatError::DiskFull`], since it ends a run and other errors need not.
     #[must_use]
     pub fn io(path: &Path, source: io::Error) -> Self {
         let path = path.to_path_buf();

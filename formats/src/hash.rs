@@ -1,4 +1,4 @@
-//! Hashes of files, so that datasets can be checked with common tools.
+//! Hashes of files, which common tools can check.
 
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
@@ -11,23 +11,23 @@ use std::path::Path;
 use std::path::PathBuf;
 
 crate::named! {
-    /// How the files of a dataset are hashed.
+    /// The hash of the files of a dataset.
     #[derive(Default, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Hashing: "hash" {
-        /// SHA-256, which `sha256sum` checks. It takes little where the processor has
-        /// instructions for it: most of x86-64 since 2019, and of AArch64.
+        /// SHA-256, which `sha256sum` checks. It is fast on processors with instructions for it:
+        /// most of x86-64 since 2019, and of AArch64.
         #[default]
         Sha256 = "sha256",
-        /// BLAKE3, which `b3sum` checks: with AVX2 as fast as SHA-256 with instructions.
+        /// BLAKE3, which `b3sum` checks. With AVX2 it is as fast as SHA-256 with instructions.
         Blake3 = "blake3",
-        /// None: a later change of a file may go unnoticed.
+        /// No hash: later changes of files may go unnoticed.
         None = "none",
     }
 }
 
-/// The hash of a file's bytes, in hexadecimal digits. Serialised it is one field, named
-/// after the hash.
+/// The hash of a file's bytes, in hexadecimal digits. It is serialised as one field with the name
+/// of the hash.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FileHash {
@@ -38,7 +38,7 @@ pub enum FileHash {
 }
 
 impl FileHash {
-    /// Which hash it is.
+    /// The kind of hash.
     #[must_use]
     pub const fn hashing(&self) -> Hashing {
         match self {
@@ -65,17 +65,17 @@ impl Display for FileHash {
     }
 }
 
-/// A file as it was written.
+/// A file that was written.
 #[cfg(feature = "dataset")]
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct HashedFile {
-    /// Where the file is.
+    /// The path of the file.
     pub path: PathBuf,
     /// Its hash, if one was asked for.
     pub hash: Option<FileHash>,
 }
 
-/// Bytes that are being hashed.
+/// A hash in progress.
 #[cfg(feature = "dataset")]
 pub(crate) enum Hasher {
     Sha256(Sha256),
@@ -162,7 +162,7 @@ pub fn of_bytes(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
-/// The SHA-256 of all `parts`, one behind the other, in hexadecimal digits.
+/// The SHA-256 of the concatenated `parts`, in hexadecimal digits.
 #[must_use]
 pub fn of_parts<T: AsRef<[u8]>>(parts: impl IntoIterator<Item = T>) -> String {
     let mut hash = Sha256::new();
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hashes_are_those_that_were_published() {
+    fn hashes_equal_published_ones() {
         // FIPS 180-2, appendix B.1, and BLAKE3's test_vectors.json: no input.
         let sha256 = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         let blake3 = "af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262";
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hash_is_a_field_that_bears_its_name() {
+    fn a_hash_is_serialised_as_a_field_of_its_name() {
         #[derive(Debug, PartialEq, Serialize, Deserialize)]
         struct Record {
             file: u8,

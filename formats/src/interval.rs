@@ -1,4 +1,4 @@
-//! How sure a share of some trials is.
+//! Confidence intervals of shares.
 
 /// The 97.5 % quantile of the normal distribution.
 pub const Z: f64 = 1.959_963_984_540_054;
@@ -23,7 +23,7 @@ mod tests {
     /// Brown, Cai and DasGupta 2001, table of Wilson intervals: 0 of 10 gives
     /// (0, 0.2775), 5 of 10 (0.2366, 0.7634).
     #[test]
-    fn intervals_are_wilson_s() {
+    fn intervals_equal_published_ones() {
         let near = |(low, high): (f64, f64), expected: (f64, f64)| {
             (low - expected.0).abs() < 5e-5 && (high - expected.1).abs() < 5e-5
         };

@@ -22,8 +22,7 @@
 //! | `fold`, with `offsets` | whole numbers | `[m]` | part of a cross-validation; may be absent |
 //!
 //! Where labels are text and no classes are listed, the classes are the sorted
-//! distinct labels. [`crate::packed`] writes clouds of one size, and
-//! [`crate::clusters`] clusters of any size. Other keys are ignored.
+//! distinct labels. `packed` writes both kinds. Other keys are ignored.
 
 mod read;
 
@@ -87,13 +86,13 @@ pub fn equal_offsets(m: usize, n_points: usize) -> Vec<usize> {
 }
 
 impl LabelledSet {
-    /// How many clouds there are.
+    /// The number of clouds.
     #[must_use]
     pub fn len(&self) -> usize {
         self.labels.len()
     }
 
-    /// Whether there is none.
+    /// Whether the set has no clouds.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.labels.is_empty()
@@ -105,7 +104,7 @@ impl LabelledSet {
         self.points[3 * self.offsets[i]..3 * self.offsets[i + 1]].as_chunks::<3>().0
     }
 
-    /// As [`LabelledSet::cloud`], to be changed.
+    /// The points of cloud `i`, mutable.
     #[must_use]
     pub fn cloud_mut(&mut self, i: usize) -> &mut [[f32; 3]] {
         self.points[3 * self.offsets[i]..3 * self.offsets[i + 1]].as_chunks_mut::<3>().0
@@ -117,8 +116,7 @@ impl LabelledSet {
         self.offsets.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(0)
     }
 
-    /// Height of the ground under cloud `i`, in the cloud's frame, metres, where the
-    /// set tells it.
+    /// Height of the ground under cloud `i` in the cloud's frame, metres, if the set has it.
     #[must_use]
     pub fn ground_z(&self, i: usize) -> Option<f32> {
         let height_m = self.height_m.as_ref()?[i];
@@ -126,8 +124,7 @@ impl LabelledSet {
         height_m.is_finite().then_some(lowest - height_m)
     }
 
-    /// Appends a cloud of class `label`. The columns of remarks, such as names, are
-    /// left to the caller.
+    /// Appends a cloud of class `label`. The caller extends the optional columns, such as names.
     pub fn push(&mut self, points: &[[f32; 3]], label: usize) {
         self.points.extend_from_slice(points.as_flattened());
         self.offsets.push(self.points.len() / 3);

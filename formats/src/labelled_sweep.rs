@@ -3,10 +3,10 @@
 //! | key | type | shape | what |
 //! | --- | --- | --- | --- |
 //! | `xyz_mm` | whole numbers | `[n, 3]` | points, millimetres, z up |
-//! | `laser`, may be absent | whole numbers | `[n]` | which laser each point is from |
+//! | `laser`, may be absent | whole numbers | `[n]` | the laser of each point |
 //! | `offset_ns`, may be absent | whole numbers | `[n]` | time of each point since the sweep's reference |
 //! | `boxes` | floating | `[b, 7]` | centre, length, width, height (metres), yaw (radians) |
-//! | `classes` | text | `[b]` | what is in each box |
+//! | `classes` | text | `[b]` | the class of each box |
 //!
 //! Other keys are ignored.
 
@@ -17,7 +17,7 @@ use crate::decoding::invalid;
 use crate::error::FormatError;
 use crate::npy;
 
-/// A sweep and what was labelled in it.
+/// A sweep with labelled boxes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LabelledSweep {
     /// The points, metres.
@@ -30,12 +30,12 @@ pub struct LabelledSweep {
     pub boxes: Vec<LabelledBox>,
 }
 
-/// A labelled object: a box that stands upright.
+/// A labelled object in an upright box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelledBox {
-    /// What it is.
+    /// Its class.
     pub class: String,
-    /// Its middle, metres.
+    /// Its centre, metres.
     pub centre_m: [f64; 3],
     /// Its length, width and height, metres.
     pub size_m: [f64; 3],
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_shape_and_a_missing_name_are_told() {
+    fn wrong_shapes_and_missing_names_are_refused() {
         let (_folder, path) = written(&[7], &["Car"]);
         let error = read_labelled_sweep(&path).unwrap_err().to_string();
         assert!(error.ends_with("boxes: expected shape [n, 7], found [7]"), "{error}");

@@ -7,13 +7,13 @@ use std::path::Path;
 use crate::decoding::excerpt;
 use crate::error::FormatError;
 
-/// The longest line that is read. A point takes some hundred bytes; the limit
-/// keeps a file without line ends from filling the memory.
+/// The longest line that is read, so that a file without line ends does not fill the memory. The
+/// line of a point takes some hundred bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// The lines of a text, one by one.
 pub(crate) struct Lines<'a, R> {
-    /// What follows the last line that was read.
+    /// The rest of the file after the last line that was read.
     pub reader: &'a mut R,
     name: &'a Path,
     number: u64,
@@ -22,7 +22,7 @@ pub(crate) struct Lines<'a, R> {
 
 /// One line, without blanks at its ends.
 pub(crate) struct Line<'a> {
-    /// The line itself; bytes that are not UTF-8 are replaced.
+    /// The text of the line; bytes that are not UTF-8 are replaced.
     pub text: Cow<'a, str>,
     name: &'a Path,
     number: u64,
@@ -34,12 +34,12 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Self { reader, name, number: 0, bytes: Vec::new() }
     }
 
-    /// The next line, or none at the end.
+    /// The next line, or `None` at the end.
     pub fn next(&mut self) -> Result<Option<Line<'_>>, FormatError> {
         Ok(if self.advance()? { Some(self.line()) } else { None })
     }
 
-    /// The next line that is not blank, of `n` of which `found` came so far.
+    /// The next line that is not blank. Errors say that `found` of `n` lines were found.
     pub fn next_of(&mut self, found: u64, n: u64) -> Result<Line<'_>, FormatError> {
         loop {
             if !self.advance()? {
@@ -75,13 +75,13 @@ impl Line<'_> {
         FormatError::malformed(self.name, format!("line {}", self.number), cause)
     }
 
-    /// The number that `word` spells: NaN and infinities too.
+    /// The number `word`, which may be NaN or infinite.
     pub fn number(&self, word: &str) -> Result<f64, FormatError> {
         word.parse()
             .map_err(|_| self.error(format!("expected a number, found `{}`", excerpt(word))))
     }
 
-    /// The whole number that `word` spells.
+    /// The whole number `word`.
     pub fn count(&self, word: &str) -> Result<u64, FormatError> {
         word.parse().map_err(|_| self.error(format!("expected a count, found `{}`", excerpt(word))))
     }

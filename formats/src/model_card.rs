@@ -1,23 +1,23 @@
-//! What a model file says about itself, in safetensors' metadata.
+//! The card of a model: what it states about itself in safetensors' metadata.
 //!
 //! | key | value | if absent |
 //! | --- | --- | --- |
 //! | `classes` | JSON list of names, in the order of the logits | `class 0`, `class 1`, … |
 //! | `normalization` | `unit-sphere`, `metric` or `none` | `unit-sphere` |
-//! | `sampler` | sampler that the model was trained behind, as `infer-cpu --sampler` names it | `all` |
+//! | `sampler` | sampler in training, as `infer-cpu --sampler` names it | `all` |
 //! | `points` | points that the sampler keeps | none |
 //! | `fps_start` | `farthest` or `first` | `farthest` |
-//! | `outlier_filter` | `true` if outliers are dropped before the sampler | `false` |
-//! | `transform_after` | layer of the trunk whose features the feature transform turns | `1` |
+//! | `outlier_filter` | `true` if outliers are removed before the sampler | `false` |
+//! | `transform_after` | number of layers of the trunk before the feature transform | `1` |
 //! | `pooled` | `relu` if the trunk's last layer has a ReLU, else `linear` | `linear` |
-//! | `edge_radii` | JSON list: how far each layer `edge.conv1…` looks around a point | none |
+//! | `edge_radii` | JSON list: the radius of the neighbourhoods of each layer `edge.conv1…` | none |
 //! | `activation_ranges` | JSON object: layer to its largest activation, for int8 | calibrated at load |
-//! | `unknown_classes` | JSON list of those of the classes that are answered as `unknown` | none |
-//! | `unknown_energy` | a cloud of a larger energy is answered as `unknown` | no cloud is |
-//! | `temperature` | what logits are divided by before the softmax and the energy | `1` |
+//! | `unknown_classes` | JSON list of the classes that are answered as `unknown` | none |
+//! | `unknown_energy` | energy above which a cloud is answered as `unknown` | infinity |
+//! | `temperature` | divisor of the logits before the softmax and the energy | `1` |
 //! | `trained` | `false` for a model of random weights | `true` |
 //! | `training_set`, `accuracy`, `provenance` | free text | |
-//! | `widths` | for the reader; the tensors decide | |
+//! | `widths` | for people only; the tensors decide | |
 //!
 //! The energy of logits f at temperature T is -T ln Σ exp(f / T) (Liu et al. 2020,
 //! "Energy-based out-of-distribution detection").
@@ -32,60 +32,60 @@ use serde_json::json;
 use crate::error::FormatError;
 use crate::weights::WeightsFile;
 
-/// A model's remarks about itself. See the module for the keys.
+/// The card of a model. See the module for the keys.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelCard {
-    /// Class names in the order of the logits; empty if the file names none.
+    /// Class names in the order of the logits; empty if the file has no names.
     pub classes: Vec<String>,
     /// How clouds were normalised in training.
     pub normalization: Normalization,
-    /// The sampler that the model was trained behind.
+    /// The sampler in training.
     pub sampler: Option<String>,
-    /// How many points that sampler keeps.
+    /// The number of points that the sampler keeps.
     pub points: Option<usize>,
-    /// Where farthest point sampling began in training.
+    /// The first point of farthest point sampling in training.
     pub fps_start: Option<String>,
-    /// Whether outliers were dropped before the sampler in training.
+    /// Whether outliers were removed before the sampler in training.
     pub outlier_filter: bool,
-    /// How many layers of the trunk come before the feature transform.
+    /// The number of layers of the trunk before the feature transform.
     pub transform_after: usize,
     /// Whether the trunk's last layer has a ReLU.
     pub pooled_relu: bool,
-    /// How far each layer of surroundings looks, in the normalised cloud's unit.
+    /// The radius of the neighbourhoods of each EdgeConv layer, in units of the normalised cloud.
     pub edge_radii: Vec<f32>,
     /// The largest activation of each layer, by the layer's name.
     pub activation_ranges: BTreeMap<String, f32>,
-    /// Those of `classes` that are no object of interest, such as a tree or a wall:
-    /// the answer to them is `unknown`.
+    /// The classes that are not objects of interest, such as trees or walls, and are answered as
+    /// `unknown`.
     pub unknown_classes: Vec<String>,
-    /// The answer to a cloud of a larger energy is `unknown`, whatever its class.
+    /// The energy above which a cloud is answered as `unknown`.
     pub unknown_energy: Option<f64>,
-    /// What logits are divided by before the softmax and the energy.
+    /// The divisor of the logits before the softmax and the energy.
     pub temperature: f64,
-    /// Whether the weights were trained at all.
+    /// Whether the weights were trained.
     pub trained: bool,
-    /// What it was trained on.
+    /// The training set.
     pub training_set: Option<String>,
-    /// What it reached, and on what.
+    /// The accuracy and the test set.
     pub accuracy: Option<String>,
-    /// Where the weights come from.
+    /// The source of the weights.
     pub provenance: Option<String>,
 }
 
 crate::named! {
-    /// How a cloud is moved and scaled before a network sees it.
+    /// The normalisation of a cloud before it enters a network.
     #[derive(Default)]
     pub enum Normalization: "normalization" {
         /// Mean to 0, largest radius to 1.
         #[default]
         UnitSphere = "unit-sphere",
-        /// Metres: the mean of x and of y to 0, the ground, or the lowest z where it is
-        /// unknown, to 0, and no scale.
+        /// Mean of x and of y to 0, and the ground, or the lowest z if it is unknown, to 0; in
+        /// metres, without scaling.
         Metric = "metric",
-        /// The same, turned about z so that the line of sight, from the sensor to the mean,
-        /// is along x: a network sees which side of an object faced the sensor.
+        /// As [`Normalization::Metric`], turned about z so that the line of sight from the sensor
+        /// to the mean is along x. The network can tell the side of an object that faced the sensor.
         MetricSight = "metric-sight",
-        /// As it comes.
+        /// No normalisation.
         None = "none",
     }
 }
@@ -99,7 +99,7 @@ impl Normalization {
 }
 
 impl Default for ModelCard {
-    /// What the baseline's own checkpoints mean, which say nothing.
+    /// The card of the baseline's checkpoints, which have no metadata.
     fn default() -> Self {
         Self {
             classes: Vec::new(),
@@ -124,7 +124,7 @@ impl Default for ModelCard {
 }
 
 impl ModelCard {
-    /// Reads the card of the model file at `path`, and none of its weights.
+    /// Reads the card of the model file at `path`, without its weights.
     ///
     /// # Errors
     /// A file that is not safetensors; as [`ModelCard::from_metadata`].
@@ -132,11 +132,10 @@ impl ModelCard {
         Self::from_metadata(path, &WeightsFile::open(path)?.metadata())
     }
 
-    /// Interprets `metadata` of the model file at `path`. Keys of other names
-    /// are passed over.
+    /// Parses `metadata` of the model file at `path`. Other keys are ignored.
     ///
     /// # Errors
-    /// A value that makes no sense: [`FormatError::Malformed`] with the key.
+    /// An invalid value: [`FormatError::Malformed`] with the key.
     pub fn from_metadata(
         path: &Path,
         metadata: &BTreeMap<String, String>,
@@ -173,7 +172,7 @@ impl ModelCard {
         })
     }
 
-    /// The card as metadata; what is unknown is left out.
+    /// The card as metadata, without unknown values.
     #[must_use]
     pub fn to_metadata(&self) -> BTreeMap<String, String> {
         let ranges = self.activation_ranges.iter();
@@ -212,7 +211,7 @@ struct Entries<'a> {
 }
 
 impl Entries<'_> {
-    /// What `parse` makes of the value of `key`; `if_absent` where there is none.
+    /// The value of `key`, which `parse` parses, or `if_absent`.
     fn get<T, E: Display>(
         &self,
         key: &str,
@@ -287,12 +286,12 @@ mod tests {
         };
         let back = ModelCard::from_metadata(Path::new("m"), &card.to_metadata());
         assert_eq!(back.unwrap(), card);
-        let silent = ModelCard::from_metadata(Path::new("m"), &BTreeMap::new());
-        assert_eq!(silent.unwrap(), ModelCard::default());
+        let empty = ModelCard::from_metadata(Path::new("m"), &BTreeMap::new());
+        assert_eq!(empty.unwrap(), ModelCard::default());
     }
 
     #[test]
-    fn a_value_that_makes_no_sense_is_an_error_that_names_the_key() {
+    fn an_invalid_value_is_an_error_that_names_the_key() {
         let keys = [
             "classes",
             "normalization",
@@ -318,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_says_nothing_of_unknown_objects_unless_it_knows_something() {
+    fn defaults_of_unknown_objects_are_left_out_of_the_metadata() {
         let metadata = ModelCard::default().to_metadata();
         let keys = ["unknown_classes", "unknown_energy", "temperature"];
         assert!(keys.iter().all(|&key| !metadata.contains_key(key)), "{metadata:?}");

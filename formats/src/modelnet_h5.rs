@@ -18,15 +18,14 @@ use crate::hash::{HashedFile, Hashing};
 use crate::labelled::{LabelledSet, equal_offsets};
 pub use crate::modelnet_h5_list::is_one;
 use crate::modelnet_h5_list::list;
-use crate::packed::check_cloud;
+use crate::packed::{check_label, check_size};
 use crate::split::Split;
 
 /// Clouds in a file, as in the original.
 pub const CLOUDS_PER_FILE: usize = 2048;
 const LISTED_FOLDER: &str = "data/modelnet40_ply_hdf5_2048";
 
-/// One half of a dataset that is being written. It holds at most
-/// [`CLOUDS_PER_FILE`] clouds in memory.
+/// Writes one split of a dataset. It holds at most [`CLOUDS_PER_FILE`] clouds in memory.
 pub struct ModelNetH5Writer {
     folder: PathBuf,
     split: Split,
@@ -67,7 +66,7 @@ impl ModelNetH5Writer {
     ///
     /// # Errors
     /// [`FormatError::Instance`] for a cloud of another size than the set's, a
-    /// label without a class or above 255; what the system reports.
+    /// label without a class or above 255; errors of the system.
     pub fn push(
         &mut self,
         points: &[[f32; 3]],
@@ -76,18 +75,18 @@ impl ModelNetH5Writer {
     ) -> Result<(), FormatError> {
         // A label is one byte.
         let classes = self.classes.len().min(256);
-        check_cloud(name, points.len(), self.n_points, label, classes)?;
+        check_size(name, points.len(), self.n_points)?;
+        check_label(name, label, classes)?;
         self.data.extend_from_slice(points.as_flattened());
         self.labels.push(label as u8);
         if self.labels.len() == CLOUDS_PER_FILE { self.write_file() } else { Ok(()) }
     }
 
-    /// Writes the clouds that are left, and the lists. A set without clouds has one file
-    /// that is empty, since readers join what they find. Returns all files of
-    /// the split.
+    /// Writes the remaining clouds and the lists. A set without clouds has one empty file, since
+    /// readers concatenate the listed files. Returns all files of the split.
     ///
     /// # Errors
-    /// What the system reports.
+    /// Errors of the system.
     pub fn finish(mut self) -> Result<Vec<HashedFile>, FormatError> {
         if !self.labels.is_empty() || self.n_files == 0 {
             self.write_file()?;
@@ -125,8 +124,8 @@ fn file_name(split: Split, k: usize) -> String {
     format!("ply_data_{split}{k}.h5")
 }
 
-/// Reads one half of the dataset in `folder`. Files are looked for there,
-/// whatever folder the list names.
+/// Reads one split of the dataset in `folder`. The files must be in that folder, whatever folder
+/// the list names.
 ///
 /// # Errors
 /// A list, a file or a dataset that is missing or of another type or shape,

@@ -1,9 +1,9 @@
 //! Enums whose variants have names on command lines and in files.
 
-/// Declares an enum of plain variants, each with its name: `ALL`, `name`,
+/// Declares an enum whose variants have names, with `ALL`, `name`,
 /// [`Display`](std::fmt::Display) and [`FromStr`](std::str::FromStr), whose error
-/// lists the names. The literal behind the enum says in that error what the names
-/// are of.
+/// lists the names. In that error, the literal after the enum is the kind of the
+/// names.
 #[macro_export]
 macro_rules! named {
     (
@@ -19,7 +19,7 @@ macro_rules! named {
         }
 
         impl $name {
-            /// All of them, in order.
+            /// All variants, in order.
             pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
 
             /// Its name on command lines and in files.

@@ -1,4 +1,4 @@
-//! NumPy's array files: a header, and elements behind it.
+//! NumPy's array files: a header, followed by the elements.
 //!
 //! Format: NumPy enhancement proposal 1, `numpy.lib.format`. The crate
 //! `ndarray-npy` is not used: its parser of Python literals (`py_literal`, over
@@ -14,13 +14,13 @@ use crate::records;
 
 /// The first bytes of every array file.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
-/// Data begins at a multiple of this.
+/// The data begin at a multiple of this.
 const ALIGNMENT: usize = 64;
 /// The longest header that is read. NumPy itself refuses to parse more than
 /// 10,000 bytes.
 const LONGEST_HEADER: u64 = 1 << 20;
 
-/// What an array's header says.
+/// The header of an array.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Header {
     /// The type of an element, as in `<f4`; empty for a record.
@@ -34,16 +34,16 @@ pub(crate) struct Header {
 }
 
 impl Header {
-    /// How many elements the header promises, if that many can be counted.
+    /// The number of elements by the header, unless it overflows.
     pub fn n_elements(&self) -> Option<usize> {
-        // A zero makes the product 0 whatever the others are.
+        // With a zero the product is 0, even if the other sizes overflow.
         if self.shape.contains(&0) {
             return Some(0);
         }
         self.shape.iter().try_fold(1usize, |product, &size| product.checked_mul(size))
     }
 
-    /// What an element is, if it is a number.
+    /// The type of an element, if it is a number.
     pub fn number(&self) -> Option<(NumberType, ByteOrder)> {
         let order = match self.descr.get(..1)? {
             ">" => ByteOrder::Big,
@@ -53,7 +53,7 @@ impl Header {
         Some((NumberType::of_numpy(&self.descr[1..])?, order))
     }
 
-    /// As [`Header::number`]; anything else is an error.
+    /// As [`Header::number`], with an error for other types.
     pub fn number_or_error(&self) -> io::Result<(NumberType, ByteOrder)> {
         let not_numbers = || match self.descr.as_str() {
             "|O" => invalid("expected numbers, found pickled Python objects"),
@@ -156,8 +156,8 @@ pub(crate) fn write_array<A: Number>(
         .try_for_each(|element| writer.write_all(element.to_little_endian().as_ref()))
 }
 
-/// Reads the elements of a whole array in C order, whichever order the file
-/// has. They must be of the type `A`.
+/// Reads the elements of a whole array and returns them in C order. They must be
+/// of the type `A`.
 pub(crate) fn read_elements<A: Number>(
     reader: &mut (impl Read + ?Sized),
     header: &Header,
@@ -175,8 +175,8 @@ pub(crate) fn read_elements<A: Number>(
     read_in_c_order(reader, header, size_of::<A>(), |bytes| A::from_bytes(bytes, order))
 }
 
-/// Reads the elements of a whole array in C order, numbers of any type, each
-/// through `convert`.
+/// Reads the elements of a whole array of numbers and returns them in C order,
+/// each converted by `convert`.
 pub(crate) fn read_numbers<T: Copy>(
     reader: &mut (impl Read + ?Sized),
     header: &Header,

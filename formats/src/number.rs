@@ -1,28 +1,28 @@
-//! Numbers as binary files hold them.
+//! Numbers in binary files.
 
 use half::f16;
 
-/// Which of a number's bytes comes first.
+/// The order of a number's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ByteOrder {
-    /// The lowest.
+    /// Lowest byte first.
     Little,
-    /// The highest.
+    /// Highest byte first.
     Big,
 }
 
-/// A number of Rust's that files hold as it is.
+/// A number of Rust that files hold without conversion.
 pub(crate) trait Number: Copy {
     /// Its type in files.
     const TYPE: NumberType;
     /// Its bytes, lowest first.
     fn to_little_endian(self) -> impl AsRef<[u8]>;
-    /// The number at the start of `bytes`, which hold at least one.
+    /// The number at the start of `bytes`, which must hold at least one.
     fn from_bytes(bytes: &[u8], order: ByteOrder) -> Self;
 }
 
-/// Declares the types of numbers: in Rust, here, in NumPy (without the byte
-/// order), and how one becomes an f64.
+/// Declares the types of numbers: in Rust, here, in NumPy (without the byte order), and the
+/// conversion to f64.
 macro_rules! numbers {
     ($($number:ty: $kind:ident, $numpy:literal, $x:ident => $f64:expr;)*) => {
         /// The type of a number in a file.
@@ -39,7 +39,7 @@ macro_rules! numbers {
                 }
             }
 
-            /// The number at the start of `bytes`, which hold at least one. Whole
+            /// The number at the start of `bytes`, which must hold at least one. Whole
             /// numbers beyond 2^53 are rounded.
             pub fn decode(self, bytes: &[u8], order: ByteOrder) -> f64 {
                 match self {

@@ -1,4 +1,4 @@
-//! How a program ends: its exit code, and what it says of an error.
+//! The exit codes and error messages of programs.
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
@@ -6,27 +6,27 @@ use std::io::{self, ErrorKind, Write};
 /// The exit status of a completed command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Every input was fine.
+    /// All inputs were processed.
     Success,
-    /// Some inputs failed, and were named.
+    /// Some inputs failed and were named.
     SomeFailed,
-    /// All is done, but for some inputs that were refused and named: to try again is no use. A
-    /// scheduler tells it from a failure by its code.
+    /// Some inputs were refused and named, and all others were processed. Trying again is
+    /// useless; the exit code tells schedulers so.
     SomeRefused,
-    /// The work was stopped by SIGTERM, and may go on from where it was.
+    /// SIGTERM stopped the work, which can be resumed.
     Interrupted,
-    /// The work was done by a child process, which ended with this code.
+    /// A child process did the work and ended with this code.
     ChildExit(u8),
 }
 
-/// A command line that asks for something impossible.
+/// An error in the command line.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Usage(pub String);
 
-/// Prints the error, if there is one, and gives the program's exit code: 0 for
-/// success, 1 for a failure, 2 for a [`Usage`], 3 where inputs were refused, and 75 for an
-/// interruption. When the reader of the output has gone, the command succeeds.
+/// Prints the error, if there is one, and returns the program's exit code: 0 for success, 1 for
+/// a failure, 2 for a [`Usage`], 3 if inputs were refused, and 75 for an interruption. A broken
+/// pipe is success.
 pub fn exit_code(result: anyhow::Result<Outcome>) -> u8 {
     match result {
         Ok(Outcome::Success) => 0,
@@ -43,7 +43,7 @@ pub fn exit_code(result: anyhow::Result<Outcome>) -> u8 {
     }
 }
 
-/// The error and its causes, without those that an outer one already spells out.
+/// The error and its causes, without causes that an outer error already contains.
 #[must_use]
 pub fn joined_causes(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |message, cause| {
@@ -57,7 +57,7 @@ pub fn joined_causes(error: &anyhow::Error) -> String {
     })
 }
 
-/// Writes a line to standard error. A closed one does not stop the program.
+/// Writes a line to standard error, and ignores errors of a closed one.
 pub fn say(line: impl Display) {
     let _ = writeln!(io::stderr(), "{line}");
 }

@@ -1,11 +1,10 @@
-//! Captures of UDP packets, as tcpdump and Wireshark keep them.
+//! Captures of UDP packets in the formats of tcpdump and Wireshark.
 //!
 //! The classic libpcap format: a header of 24 bytes, then each frame after one
 //! of 16 (<https://ietf-opsawg-wg.github.io/draft-ietf-opsawg-pcap/draft-ietf-opsawg-pcap.html>).
-//! These two are a few words each, so no crate writes them; the headers and
-//! checksums inside the frames are `etherparse`'s. Captures of both formats, the classic one
-//! and pcapng, are read with `pcap-parser`. Packets that are longer than a frame come in fragments
-//! (RFC 791), which are joined.
+//! This module writes these two headers itself, and those of the frames with `etherparse`. It reads
+//! the classic format and pcapng with `pcap-parser`. Packets that are longer than a frame come in
+//! fragments (RFC 791), which are joined.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -21,21 +20,21 @@ use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
 
 use crate::error::FormatError;
 
-/// A file in this byte order whose times are in microseconds.
+/// The magic number of a file in this byte order with times in microseconds.
 const MAGIC: u32 = 0xa1b2_c3d4;
 const VERSION: [u16; 2] = [2, 4];
-/// No frame was cut: longer ones than this do not exist.
+/// The longest frame, so that no frame is cut.
 const SNAP_LENGTH: u32 = 65535;
 const ETHERNET: u32 = 1;
 
-/// Routers that a broadcast may pass: what systems set by default.
+/// Routers that a broadcast may pass: the default of operating systems.
 const TIME_TO_LIVE: u8 = 64;
 
-/// Who sends packets to everyone in a network.
+/// The sender of broadcast packets.
 pub(crate) struct Sender {
     pub mac: [u8; 6],
     pub ip: [u8; 4],
-    /// Sent from and to.
+    /// The source and destination port.
     pub port: u16,
 }
 
@@ -45,14 +44,14 @@ pub(crate) fn write_header(writer: &mut impl Write) -> io::Result<()> {
     for number in VERSION {
         writer.write_all(&number.to_le_bytes())?;
     }
-    // Two fields that nobody uses, zero by the format's specification.
+    // Two unused fields, which are zero by the specification.
     writer.write_all(&[0; 8])?;
     writer.write_all(&SNAP_LENGTH.to_le_bytes())?;
     writer.write_all(&ETHERNET.to_le_bytes())
 }
 
-/// Writes a UDP packet that was sent to everyone at `seconds` and
-/// `microseconds` of Unix time.
+/// Writes a UDP broadcast packet that was sent at `seconds` and `microseconds` of
+/// Unix time.
 pub(crate) fn write_packet(
     writer: &mut impl Write,
     sender: &Sender,
@@ -72,28 +71,28 @@ pub(crate) fn write_packet(
     writer.write_all(&frame)
 }
 
-/// Bytes that are held at once; no frame is longer than 64 KiB.
+/// Bytes of the reader's buffer. No frame is longer than 64 KiB.
 const CAPACITY: usize = 256 * 1024;
 
 /// A UDP packet of a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UdpPacket<'a> {
-    /// When it was captured, seconds of Unix time; `None` where the capture does not tell.
+    /// The time of capture, seconds of Unix time, if the capture has it.
     pub time_s: Option<f64>,
-    /// Who sent it.
+    /// The sender.
     pub source: IpAddr,
-    /// The port that it was sent to.
+    /// The destination port.
     pub port: u16,
-    /// What it carries.
+    /// The payload.
     pub payload: Cow<'a, [u8]>,
 }
 
-/// Gives each UDP packet in the capture at `path`, pcap or pcapng, to `each`, until that breaks.
-/// Other packets, and those that make no sense, are passed over.
+/// Passes each UDP packet of the capture at `path`, pcap or pcapng, to `each` until it breaks.
+/// Other packets and invalid ones are skipped.
 ///
 /// # Errors
-/// A file that cannot be read, is no capture of Ethernet frames, or ends within a frame; if it is
-/// read to its end, a packet some of whose fragments are missing.
+/// A file that cannot be read, is not a capture of Ethernet frames, or ends within a frame. At the
+/// end of the file, a packet with missing fragments.
 pub fn read(
     path: &Path,
     mut each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
@@ -107,7 +106,7 @@ pub fn read(
         let part = || format!("frame {number}");
         match reader.next() {
             Ok((size, block)) => {
-                if let Some(frame) = Frame::of(&block, &mut interfaces) {
+                if let Some(frame) = Frame::in_block(&block, &mut interfaces) {
                     let packet = frame.udp_packet(number, &mut fragments);
                     let packet = packet.map_err(|cause| flaw(part(), cause))?;
                     if packet.is_some_and(|packet| each(&packet).is_break()) {
@@ -129,11 +128,11 @@ pub fn read(
     }
 }
 
-/// What a capture says of a network interface.
+/// A network interface of a capture.
 #[derive(Clone, Copy)]
 struct Interface {
     link: Linktype,
-    /// Seconds of Unix time at which its clock begins, and ticks of that clock each second.
+    /// The start of its clock in seconds of Unix time, and ticks of that clock in a second.
     clock: (u64, u64),
 }
 
@@ -145,8 +144,8 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// The frame in a block, if it holds one. `interfaces` are those so far.
-    fn of(block: &'a PcapBlockOwned<'_>, interfaces: &mut Vec<Interface>) -> Option<Self> {
+    /// The frame in a block, if it holds one. `interfaces` are those of the blocks before.
+    fn in_block(block: &'a PcapBlockOwned<'_>, interfaces: &mut Vec<Interface>) -> Option<Self> {
         match block {
             PcapBlockOwned::LegacyHeader(header) => {
                 let ticks =
@@ -180,7 +179,7 @@ impl<'a> Frame<'a> {
         None
     }
 
-    /// What the frame carries by UDP, if it does or is the last fragment of what does.
+    /// The UDP packet that the frame holds or, as its last fragment, completes.
     fn udp_packet(
         &self,
         number: usize,
@@ -196,7 +195,7 @@ impl<'a> Frame<'a> {
             Some(NetSlice::Ipv6(ip)) => ip.header().source_addr().into(),
             _ => return Ok(None),
         };
-        let of = |udp: &UdpSlice<'_>, payload| UdpPacket {
+        let packet_with = |udp: &UdpSlice<'_>, payload| UdpPacket {
             time_s: self.time_s,
             source,
             port: udp.destination_port(),
@@ -208,43 +207,45 @@ impl<'a> Frame<'a> {
             };
             let joined = fragments.join(fragment, number);
             let udp = joined.as_deref().and_then(|joined| UdpSlice::from_slice(joined).ok());
-            return Ok(udp.map(|udp| of(&udp, Cow::Owned(udp.payload().to_vec()))));
+            return Ok(udp.map(|udp| packet_with(&udp, Cow::Owned(udp.payload().to_vec()))));
         }
         match packet.transport {
-            Some(TransportSlice::Udp(udp)) => Ok(Some(of(&udp, Cow::Borrowed(udp.payload())))),
+            Some(TransportSlice::Udp(udp)) => {
+                Ok(Some(packet_with(&udp, Cow::Borrowed(udp.payload()))))
+            }
             _ => Ok(None),
         }
     }
 }
 
-/// What is wrong with a packet that cannot be joined.
+/// The error of a packet whose fragments cannot be joined.
 const FRAGMENT: &str = "expected whole UDP packets, found a fragment of one";
 
-/// Packets that are joined at once: a few senders' at most, of 64 KiB each.
+/// Packets that are joined at the same time: those of a few senders, of up to 64 KiB each.
 const AT_ONCE: usize = 16;
 
-/// Frames within which a sender does not use an identification, of 16 bits, twice.
+/// Frames within which a sender does not repeat an identification of 16 bits.
 const REPEATS: usize = 60_000;
 
-/// UDP packets of which some fragments have come, the oldest first.
+/// Incomplete UDP packets, oldest first.
 #[derive(Default)]
 struct Fragments {
     unfinished: Vec<Unfinished>,
-    /// The frame in which the first packet began that was given up.
+    /// The first frame of the first packet that was discarded.
     given_up: Option<usize>,
 }
 
 struct Unfinished {
     /// Source, destination and identification.
     key: ([u8; 4], [u8; 4], u16),
-    /// Where its first fragment was found.
+    /// The frame of its first fragment.
     number: usize,
     joined: IpDefragBuf,
 }
 
 impl Fragments {
-    /// The packet that `fragment`, in frame `number`, makes whole. Fragments of other protocols
-    /// than UDP, and those that contradict each other, are passed over.
+    /// The packet that `fragment` in frame `number` completes. Fragments of other protocols and
+    /// contradictory ones are skipped.
     fn join(&mut self, fragment: &Ipv4Slice<'_>, number: usize) -> Option<Vec<u8>> {
         let (header, payload) = (fragment.header(), fragment.payload());
         if payload.ip_number != etherparse::IpNumber::UDP {
@@ -266,7 +267,7 @@ impl Fragments {
         joined.is_complete().then(|| self.unfinished.remove(at).joined.take_bufs().0)
     }
 
-    /// The frame in which the first packet began that never became whole.
+    /// The first frame of the first packet that was never completed.
     fn first_unfinished(&self) -> Option<usize> {
         self.given_up.or_else(|| self.unfinished.first().map(|one| one.number))
     }
@@ -277,8 +278,8 @@ fn words(error: &PcapError<&[u8]>) -> String {
         PcapError::HeaderNotRecognized | PcapError::Eof | PcapError::Incomplete(_) => {
             "expected a capture, pcap or pcapng".to_owned()
         }
-        PcapError::UnexpectedEof => "the file ends within it".to_owned(),
-        PcapError::ReadError => "it cannot be read".to_owned(),
-        _ => "its headers make no sense".to_owned(),
+        PcapError::UnexpectedEof => "the file ends within the frame".to_owned(),
+        PcapError::ReadError => "the file cannot be read".to_owned(),
+        _ => "expected a valid header, found an invalid one".to_owned(),
     }
 }

@@ -1,6 +1,6 @@
-//! What little of Python's literals a NumPy header is written in.
+//! Parses the Python literals of NumPy headers.
 
-/// The keys of a Python dictionary and its values as they are written.
+/// The keys of a Python dictionary, with the text of their values.
 pub(crate) fn dictionary(text: &str) -> Option<Vec<(&str, &str)>> {
     let mut rest = text.trim().strip_prefix('{')?.strip_suffix('}')?.trim();
     let mut entries = Vec::new();
@@ -14,14 +14,14 @@ pub(crate) fn dictionary(text: &str) -> Option<Vec<(&str, &str)>> {
     Some(entries)
 }
 
-/// What stands between the quotes that `text` begins with, and what follows.
+/// The text between the quotes at the start of `text`, and the rest.
 pub(crate) fn string(text: &str) -> Option<(&str, &str)> {
     let quote = text.chars().next().filter(|quote| matches!(quote, '\'' | '"'))?;
     text[1..].split_once(quote)
 }
 
-/// Where the comma after a value is, or the text's end: outside of brackets and
-/// quotes, which must pair.
+/// The position of the comma after a value, outside of brackets and quotes, or the end of the
+/// text. Brackets and quotes must pair.
 fn end_of_value(text: &str) -> Option<usize> {
     let mut depth = 0usize;
     let mut quote = None;

@@ -1,5 +1,4 @@
-//! Records of one size that lie one after the other, as binary files hold
-//! points.
+//! Reads records of equal size, as binary files hold points.
 
 use std::io::{self, Read};
 
@@ -10,12 +9,11 @@ const BLOCK_SIZE: usize = 1 << 16;
 /// The largest record that is read. No sensor has points of this size.
 const LARGEST_RECORD: usize = 1 << 24;
 
-/// Hands `n` records of `size` bytes to `each`. Memory does not grow with `n`,
-/// which comes from a header and may be wrong.
+/// Passes `n` records of `size` bytes to `each`. Memory does not grow with `n`, which comes from a
+/// header and may be wrong.
 ///
 /// # Errors
-/// [`io::ErrorKind::UnexpectedEof`] for fewer than `n` records, and what the
-/// reader reports.
+/// [`io::ErrorKind::UnexpectedEof`] for fewer than `n` records; errors of the reader.
 pub(crate) fn read(
     reader: &mut (impl Read + ?Sized),
     size: usize,
@@ -26,8 +24,8 @@ pub(crate) fn read(
     if found < n { Err(truncated(found, n)) } else { Ok(()) }
 }
 
-/// Hands every record of `size` bytes up to the end of the file to `each`, and
-/// returns how many bytes are left over.
+/// Passes every record of `size` bytes up to the end of the file to `each`, and returns the
+/// number of bytes that are left over.
 pub(crate) fn read_to_end(
     reader: &mut (impl Read + ?Sized),
     size: usize,
@@ -47,7 +45,7 @@ pub(crate) fn skip(reader: &mut (impl Read + ?Sized), n: u64) -> io::Result<()> 
     if skipped < n { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
 }
 
-/// Fills `buffer` as far as the reader goes, and returns how far that was.
+/// Fills `buffer` as far as the reader has bytes, and returns their number.
 pub(crate) fn fill(reader: &mut (impl Read + ?Sized), buffer: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
     while filled < buffer.len() {
@@ -61,8 +59,7 @@ pub(crate) fn fill(reader: &mut (impl Read + ?Sized), buffer: &mut [u8]) -> io::
     Ok(filled)
 }
 
-/// Reads up to `n` records; returns how many there were, and how many bytes of
-/// an unfinished one.
+/// Reads up to `n` records; returns their number and the bytes of an incomplete one.
 fn read_at_most(
     reader: &mut (impl Read + ?Sized),
     size: usize,
@@ -94,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn records_come_whole_whatever_their_size() {
+    fn records_of_any_size_are_whole() {
         let bytes: Vec<u8> = (0..200_003u32).map(|i| i as u8).collect();
         for size in [1, 3, 16, 1000, BLOCK_SIZE + 1] {
             let mut seen = Vec::new();
@@ -108,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_promise_that_is_not_kept_is_an_error() {
+    fn fewer_records_than_stated_are_an_error() {
         let mut n = 0;
         let error = read(&mut &[0; 10][..], 4, u64::MAX, |_| n += 1).unwrap_err();
         assert_eq!(error.to_string(), format!("the file ends after 2 of {}", u64::MAX));

@@ -1,32 +1,32 @@
-//! What decoders of packets give: one return of one beam.
+//! A return of a beam, as decoders of packets give it.
 
 /// One return of one beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Return {
-    /// In the sensor's frame, metres: x forward, y left, z up.
+    /// The point in the sensor's frame, metres: x forward, y left, z up.
     pub point_m: [f32; 3],
-    /// As the sensor measured it, metres.
+    /// The measured range, metres.
     pub range_m: f32,
     /// The laser's row, from the lowest elevation.
     pub ring: u16,
-    /// The larger, the more light came back for the distance; the scale is the sensor's.
+    /// The reflectivity, on the scale of the sensor.
     pub reflectivity: u8,
     /// Microseconds after the packet's time.
     pub after_us: f64,
-    /// Which of the beam's returns it is.
+    /// Its place among the returns of the beam.
     pub kind: Kind,
 }
 
-/// Which of the returns of one beam.
+/// The place of a return among those of its beam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The strongest; of an Ouster the first that its packet lists, which is the strongest unless
-    /// the sensor is told another order.
+    /// The strongest. For an Ouster, the first return in the packet, which is the strongest unless
+    /// the sensor is configured otherwise.
     Strongest,
     /// The last.
     Last,
-    /// The last, which is the strongest as well.
+    /// The last and the strongest.
     Both,
-    /// The second that the packet of an Ouster lists.
+    /// The second return in the packet of an Ouster.
     Second,
 }

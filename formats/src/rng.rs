@@ -1,9 +1,8 @@
 //! Counter-based random numbers: Philox4x32-10 of Salmon et al., "Parallel
 //! random numbers: as easy as 1, 2, 3", SC 2011.
 //!
-//! A number is a pure function of (key, counter), so it is the same whatever
-//! the batch, the thread count, the shard or the order of evaluation. The key
-//! says what the number belongs to; the counter says which number it is.
+//! A number is a pure function of (key, counter) and therefore independent of batches, threads,
+//! shards and the order of evaluation. The key names the stream, and the counter the number in it.
 
 use sha2::{Digest, Sha256};
 
@@ -11,15 +10,15 @@ const MULTIPLIER: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: usize = 10;
 
-/// The key of one random stream: all numbers that belong to one thing.
+/// The key of a stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct StreamKey(pub [u32; 2]);
 
 impl StreamKey {
-    /// The key of what `name` calls number `index`, under `seed`.
+    /// The key of number `index` of the streams called `name` under `seed`.
     ///
-    /// The first eight bytes of SHA-256 over (seed, index, name), so that
-    /// neighbouring seeds and names share nothing.
+    /// It is the first eight bytes of SHA-256 over (seed, index, name), so that similar seeds and
+    /// names have unrelated keys.
     #[must_use]
     pub fn new(seed: u64, name: &str, index: u32) -> Self {
         let mut hash = Sha256::new();

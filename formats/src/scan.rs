@@ -1,4 +1,4 @@
-//! What one sensor saw from one place.
+//! Scans: the points that one sensor measures in one revolution or frame.
 
 use std::collections::BTreeSet;
 
@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::FormatError;
 
-/// The points one sensor saw from one place, and what is known of each.
+/// The points of one scan, with attributes.
 ///
-/// Every attribute that is there has one value for each position; a scan may
-/// hold no point at all.
+/// Every attribute that is present has one value for each position. A scan may
+/// have no points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scan {
-    /// What to add to every position, in metres. Almost always zero; it lets a
-    /// scene that lies 1e7 m from the world's origin keep its micrometres.
+    /// An offset to add to every position, metres. It is zero in most scans; a scene
+    /// 1e7 m from the world's origin keeps its micrometres by it.
     pub origin: [f64; 3],
-    /// Where the beams ended: metres, in the world's frame, from `origin`.
+    /// The end points of the beams in the world's frame, metres from `origin`.
     pub positions: Vec<[f32; 3]>,
-    /// Distance from where the beam starts, which is the sensor or near it, in
+    /// Distance from the start of the beam, which is at the sensor or near it,
     /// metres.
     pub range_m: Option<Vec<f32>>,
     /// Number of the beam in the sensor's firing order.
@@ -36,26 +36,26 @@ pub struct Scan {
     /// Received power, relative to that of a white surface that faces the sensor 1 m away:
     /// it falls with the square of the range.
     pub power: Option<Vec<f32>>,
-    /// Calibrated reflectivity as Velodyne's sensors report it, whatever the range: 0 to 100
-    /// are percent of a white surface that faces the sensor, 101 to 255 retro-reflectors.
+    /// Calibrated reflectivity, independent of the range, as Velodyne's sensors report it: 0 to
+    /// 100 are percent of a white surface that faces the sensor, 101 to 255 retro-reflectors.
     pub reflectivity: Option<Vec<u8>>,
-    /// Number of the return among those of its beam that the sensor detected, 1 the nearest.
+    /// Number of the return among the detected returns of its beam, from 1, the nearest.
     pub return_number: Option<Vec<u8>>,
-    /// What the point is of: 0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray. What is no
-    /// surface has triangle and object 2^32 - 1 and normal 0.
+    /// What reflected the beam: 0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray. Points of
+    /// the air have triangle and object 2^32 - 1 and normal 0.
     pub medium: Option<Vec<u8>>,
-    /// Where the sensor was when the beam was fired, metres, as positions are.
+    /// Position of the sensor when the beam was fired, metres from `origin`.
     pub sensor_m: Option<Vec<[f32; 3]>>,
-    /// How the sensor was turned then: the rotation from its frame to the world's, as a vector
-    /// along its axis of as many radians.
+    /// Attitude of the sensor at that time: the rotation from its frame to the world's, as a
+    /// vector along the axis whose length is the angle in radians.
     pub attitude_rad: Option<Vec<[f32; 3]>>,
     /// Unit normal of the surface, towards the sensor, in the world's frame.
     pub normal: Option<Vec<[f32; 3]>>,
 }
 
 crate::named! {
-    /// Something that may be known of each point besides its position, in the
-    /// order in which files hold it.
+    /// An attribute of points besides their position, in the order of columns in
+    /// files.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Attribute: "attribute" {
@@ -90,10 +90,10 @@ crate::named! {
     }
 }
 
-/// The attributes that are wanted, in the order in which files hold them.
+/// Attributes, in the order of columns in files.
 pub type AttributeSet = BTreeSet<Attribute>;
 
-/// One attribute's values, one for each point.
+/// The values of one attribute, one for each point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Column<'a> {
     /// Real numbers.
@@ -120,7 +120,7 @@ impl Column<'_> {
     }
 }
 
-/// Where a reader puts one attribute's values.
+/// The place where a reader stores the values of one attribute.
 pub enum ColumnSlot<'a> {
     /// Real numbers.
     F32(&'a mut Option<Vec<f32>>),
@@ -135,43 +135,45 @@ pub enum ColumnSlot<'a> {
 }
 
 impl Scan {
-    /// How many points there are.
+    /// The number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Whether the sensor saw nothing.
+    /// Whether the scan has no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// The points of these numbers, in their order, with all that is known of each.
+    /// The points at these indices, in their order, with all attributes.
     ///
     /// # Panics
-    /// If there is no point of one of these numbers.
+    /// If an index is not below the number of points.
     #[must_use]
     pub fn select(&self, numbers: &[usize]) -> Self {
-        fn of<T: Copy>(values: &[T], numbers: &[usize]) -> Vec<T> {
+        fn picked<T: Copy>(values: &[T], numbers: &[usize]) -> Vec<T> {
             numbers.iter().map(|&i| values[i]).collect()
         }
-        let positions = of(&self.positions, numbers);
+        let positions = picked(&self.positions, numbers);
         let mut selected = Self { origin: self.origin, positions, ..Self::default() };
         for (attribute, column) in self.columns() {
             match (selected.slot(attribute), column) {
-                (ColumnSlot::F32(slot), Column::F32(all)) => *slot = Some(of(all, numbers)),
-                (ColumnSlot::U8(slot), Column::U8(all)) => *slot = Some(of(all, numbers)),
-                (ColumnSlot::U16(slot), Column::U16(all)) => *slot = Some(of(all, numbers)),
-                (ColumnSlot::U32(slot), Column::U32(all)) => *slot = Some(of(all, numbers)),
-                (ColumnSlot::Vector(slot), Column::Vector(all)) => *slot = Some(of(all, numbers)),
+                (ColumnSlot::F32(slot), Column::F32(all)) => *slot = Some(picked(all, numbers)),
+                (ColumnSlot::U8(slot), Column::U8(all)) => *slot = Some(picked(all, numbers)),
+                (ColumnSlot::U16(slot), Column::U16(all)) => *slot = Some(picked(all, numbers)),
+                (ColumnSlot::U32(slot), Column::U32(all)) => *slot = Some(picked(all, numbers)),
+                (ColumnSlot::Vector(slot), Column::Vector(all)) => {
+                    *slot = Some(picked(all, numbers))
+                }
                 _ => unreachable!("invariant: a column and its slot are of one type"),
             }
         }
         selected
     }
 
-    /// One attribute's values, if they are known.
+    /// The values of one attribute, if the scan has them.
     #[must_use]
     pub fn column(&self, attribute: Attribute) -> Option<Column<'_>> {
         match attribute {
@@ -192,7 +194,7 @@ impl Scan {
         }
     }
 
-    /// The place of one attribute's values.
+    /// The place of the values of one attribute.
     pub fn slot(&mut self, attribute: Attribute) -> ColumnSlot<'_> {
         match attribute {
             Attribute::Range => ColumnSlot::F32(&mut self.range_m),
@@ -212,7 +214,7 @@ impl Scan {
         }
     }
 
-    /// The attributes that are known, in the order in which files hold them.
+    /// The attributes that the scan has, in the order of columns in files.
     pub fn columns(&self) -> impl Iterator<Item = (Attribute, Column<'_>)> {
         Attribute::ALL
             .into_iter()
@@ -222,7 +224,7 @@ impl Scan {
     /// Checks that every attribute has one value for each point.
     ///
     /// # Errors
-    /// [`FormatError::Length`] for the first that has not.
+    /// [`FormatError::Length`] for the first attribute of another length.
     pub fn check_lengths(&self) -> Result<(), FormatError> {
         let expected = self.len();
         match self.columns().find(|(_, column)| column.len() != expected) {

@@ -1,5 +1,5 @@
-//! Scans on disk: as PLY ([`ply`]), as CSV ([`csv`]), or as NPZ files that NumPy
-//! and Open3D load as they are:
+//! Scans on disk: as binary PLY, as CSV, or as NPZ files that NumPy and Open3D load
+//! without conversion:
 //!
 //! | key | type | shape |
 //! | --- | --- | --- |
@@ -28,18 +28,18 @@ use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 use crate::{csv, ply};
 
 crate::named! {
-    /// A format in which scans are written; its name is the file's extension.
+    /// A file format of scans; its name is the extension.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum ScanFormat: "scan format" {
         /// NumPy archive: see the module.
         Npz = "npz",
-        /// Binary PLY: see [`ply`].
+        /// Binary PLY.
         Ply = "ply",
-        /// Text: see [`csv`]. It is written, not read.
+        /// Text with a header, which is written but not read.
         Csv = "csv",
-        /// A sensor's packets: see `vlp32c`. They hold ranges along beams, not
-        /// points, so that writing them takes the sensor, too.
+        /// A sensor's packets: see `vlp32c`. They hold ranges along beams instead of points, so
+        /// that writing them requires the sensor.
         Pcap = "pcap",
     }
 }
@@ -48,25 +48,25 @@ impl ScanFormat {
     /// The formats of points, which [`write_scan`] writes.
     pub const POINTS: [Self; 3] = [Self::Npz, Self::Ply, Self::Csv];
 
-    /// The format that `path`'s extension names, in whichever case.
+    /// The format of the extension of `path`, in upper or lower case.
     ///
     /// # Errors
-    /// [`FormatError::Malformed`] if it names none.
-    pub fn of(path: &Path) -> Result<Self, FormatError> {
+    /// [`FormatError::Malformed`] for an unknown extension.
+    pub fn of_path(path: &Path) -> Result<Self, FormatError> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         extension.parse().map_err(|error| FormatError::malformed(path, "extension", error))
     }
 }
 
-/// What is said to whoever takes packets for points.
+/// The error of reading or writing packets as points.
 const PACKETS: &str = "packets hold a sensor's ranges, not points";
 
-/// Writes `scan` to `path`, atomically, and returns the hash of the file that `hashing`
-/// asks for; the same scan gives the same bytes. The name is taken as it is.
+/// Writes `scan` to `path`, atomically, and returns the hash of the file that `hashing` asks for.
+/// The same scan gives the same bytes. The name is not changed.
 ///
 /// # Errors
 /// An attribute of another length than the positions; [`ScanFormat::Pcap`], whose
-/// packets hold no points; what the system reports.
+/// packets hold no points; errors of the system.
 pub fn write_scan(
     path: &Path,
     format: ScanFormat,
@@ -91,7 +91,7 @@ pub fn write_scan(
 /// [`FormatError::Malformed`] with the file and the key, element or line at fault.
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     let refuse = |cause: &str| Err(FormatError::malformed(path, "extension", cause));
-    match ScanFormat::of(path)? {
+    match ScanFormat::of_path(path)? {
         ScanFormat::Npz => read_npz(path),
         ScanFormat::Ply => ply::read_scan(path),
         ScanFormat::Csv => refuse("CSV is written but not read"),
@@ -126,8 +126,7 @@ fn write_columns<W: Write + Seek, A: Number>(
     npz.array(key, &[values.len() / width, width], values.iter().copied())
 }
 
-/// Attributes may be columns or vectors, compressed or not; keys of other names are
-/// passed over.
+/// Attributes may be columns or vectors, compressed or not. Other keys are ignored.
 fn read_npz(path: &Path) -> Result<Scan, FormatError> {
     let mut npz = NpzReader::open(path)?;
     let positions = read_columns::<f32>(&mut npz, "positions", 3, None)?;

@@ -1,11 +1,11 @@
-//! Trajectories: where something is at which time.
+//! Trajectories: poses over time, read from text.
 //!
 //! | format | a line |
 //! | --- | --- |
 //! | TUM | time in seconds, x y z in metres, quaternion qx qy qz qw (<https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats>) |
 //! | KITTI | twelve numbers, a 3 x 4 matrix row by row, without a time |
 //!
-//! Blanks separate numbers; empty lines and lines that begin with `#` say nothing.
+//! Blanks separate numbers. Empty lines and lines that begin with `#` are skipped.
 
 use std::path::Path;
 
@@ -14,20 +14,20 @@ use crate::error::FormatError;
 /// A pose at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyedPose {
-    /// When, seconds.
+    /// The time, seconds.
     pub time_s: f64,
-    /// Where, metres.
+    /// The position, metres.
     pub position_m: [f64; 3],
-    /// How it is turned: a quaternion of length 1, x y z w.
+    /// The attitude: a quaternion of length 1, x y z w.
     pub quaternion_xyzw: [f64; 4],
 }
 
-/// Reads a trajectory in TUM's or KITTI's format, whichever its lines have the numbers of. The
-/// poses of KITTI's are `period_s` apart and begin at 0.
+/// Reads a trajectory in TUM's or KITTI's format, which the count of numbers in a line tells apart.
+/// The poses of KITTI's format are `period_s` apart and begin at 0.
 ///
 /// # Errors
-/// A file that cannot be read; a line that is no pose, or not later than the one before; no pose
-/// at all.
+/// A file that cannot be read or has no pose; a line that is not a pose, or not later than the line
+/// before.
 pub fn read_trajectory(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
     let io = |source| FormatError::io(path, source);
     let text = std::fs::read_to_string(path).map_err(io)?;
@@ -73,14 +73,15 @@ fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
         }
     };
     let length = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
-    // Files have six digits at times.
+    // Some files have only six digits.
     if (length - 1.0).abs() > 1e-3 {
         return Err(format!("expected a quaternion of length 1, found length {length}"));
     }
     Ok(KeyedPose { time_s, position_m, quaternion_xyzw: quaternion.map(|q| q / length) })
 }
 
-/// The rotation that these rows are, by the largest of the quaternion's numbers (Shepperd 1978).
+/// The rotation of the matrix with these rows, from the largest component of the quaternion
+/// (Shepperd 1978).
 fn quaternion_of(rows: [[f64; 3]; 3]) -> Result<[f64; 4], String> {
     let dot = |i: usize, j: usize| (0..3).map(|k| rows[i][k] * rows[j][k]).sum::<f64>();
     let [a, b, c] = rows;
@@ -92,7 +93,7 @@ fn quaternion_of(rows: [[f64; 3]; 3]) -> Result<[f64; 4], String> {
         return Err("expected a rotation in the matrix, found another map".to_owned());
     }
     let [xx, yy, zz] = [a[0], b[1], c[2]];
-    // Four times each number squared.
+    // Four times the square of each component.
     let squares = [1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz, 1.0 + xx + yy + zz];
     let largest = (0..4).max_by(|&i, &j| squares[i].total_cmp(&squares[j])).unwrap_or(3);
     let sums = [a[1] + b[0], a[2] + c[0], b[2] + c[1]];

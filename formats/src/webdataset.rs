@@ -1,5 +1,5 @@
-//! Samples in tars, as WebDataset and Hugging Face's `datasets` read them: files of one stem, side by
-//! side, are one sample. The same samples give the same bytes.
+//! Writes samples in tars, as WebDataset and Hugging Face's `datasets` read them: adjacent files of one
+//! stem are one sample. The same samples give the same bytes.
 
 use std::io::{self, Cursor, Write};
 
@@ -7,19 +7,19 @@ use crate::archive::NpzWriter;
 use crate::scan::Scan;
 use crate::scan_file::write_npz;
 
-/// What tars are made of, bytes.
+/// The size of a block of a tar, bytes.
 const BLOCK: usize = 512;
 
 /// Appends a file called `name`, of at most 100 bytes, to `tar`.
 ///
 /// # Errors
-/// A name that is too long; what the system reports.
+/// A name that is too long; errors of the system.
 pub fn append_file(tar: &mut impl Write, name: &str, bytes: &[u8]) -> io::Result<()> {
     let mut header = tar::Header::new_ustar();
     header.set_path(name)?;
     header.set_size(bytes.len() as u64);
     header.set_entry_type(tar::EntryType::Regular);
-    // Whoever makes it and whenever, it is the same.
+    // Nothing depends on the user or the time.
     header.set_mode(0o644);
     header.set_uid(0);
     header.set_gid(0);
@@ -33,7 +33,7 @@ pub fn append_file(tar: &mut impl Write, name: &str, bytes: &[u8]) -> io::Result
 /// Ends `tar`.
 ///
 /// # Errors
-/// What the system reports.
+/// Errors of the system.
 pub fn end(tar: &mut impl Write) -> io::Result<()> {
     tar.write_all(&[0; 2 * BLOCK])
 }
@@ -42,7 +42,7 @@ pub fn end(tar: &mut impl Write) -> io::Result<()> {
 /// `[m, n, 3]`, `labels` i64 `[m]`.
 ///
 /// # Errors
-/// None but those of memory.
+/// Errors of the archive in memory.
 pub fn npz_of_clouds(clouds: &[(Vec<[f32; 3]>, usize)], n_points: usize) -> io::Result<Vec<u8>> {
     npz(|npz| {
         let numbers: Vec<f32> =
@@ -55,7 +55,7 @@ pub fn npz_of_clouds(clouds: &[(Vec<[f32; 3]>, usize)], n_points: usize) -> io::
 /// The NPZ file of a scan, as [`write_scan`](crate::scan_file::write_scan) writes it.
 ///
 /// # Errors
-/// None but those of memory.
+/// Errors of the archive in memory.
 pub fn npz_of_scan(scan: &Scan) -> io::Result<Vec<u8>> {
     npz(|npz| write_npz(npz, scan))
 }
@@ -74,7 +74,7 @@ mod tests {
     use std::io::Read;
 
     #[test]
-    fn a_tar_holds_its_files_and_nothing_of_who_made_it() {
+    fn a_tar_holds_its_files_without_owner_and_time() {
         let files = [("a.txt", vec![]), ("b.npz", vec![7; 511]), ("c.cls", vec![1; 1025])];
         let mut tar = Vec::new();
         for (name, bytes) in &files {
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_without_room_is_refused() {
+    fn a_name_that_is_too_long_is_refused() {
         assert!(append_file(&mut Vec::new(), &"n".repeat(101), &[]).is_err());
     }
 }

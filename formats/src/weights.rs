@@ -1,7 +1,7 @@
 //! Weights on disk: safetensors, opened once, read tensor by tensor.
 //!
-//! A model of 13 MiB need not be in memory twice: [`WeightsFile`] holds the
-//! header, and a tensor is read when it is asked for.
+//! [`WeightsFile`] holds only the header and reads tensors on demand, so that a model
+//! is not in memory twice.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -17,7 +17,7 @@ use crate::error::FormatError;
 
 /// The header's length comes first, as u64.
 const LENGTH_SIZE: u64 = 8;
-/// What the safetensors crate itself accepts at most.
+/// The longest header that the crate `safetensors` accepts.
 const LONGEST_HEADER: u64 = 100_000_000;
 
 /// A tensor of f32 and its shape.
@@ -33,7 +33,7 @@ pub struct Tensor {
 pub struct WeightsFile {
     path: PathBuf,
     file: Box<dyn Source>,
-    /// Where the tensors' bytes begin.
+    /// The offset of the tensors' bytes.
     data_offset: u64,
     header: Metadata,
 }
@@ -62,8 +62,8 @@ impl WeightsFile {
         Self::new(path, Box::new(file), file_size)
     }
 
-    /// Takes a file's `bytes` from memory and checks its header against their
-    /// number; errors call it `name`.
+    /// Takes the `bytes` of a file from memory and checks its header against their number. Errors
+    /// call the file `name`.
     ///
     /// # Errors
     /// Bytes that are not safetensors, or cut short.
@@ -80,8 +80,8 @@ impl WeightsFile {
         let start = length;
         let length = u64::from_le_bytes(length);
         if length > LONGEST_HEADER || length > file_size - LENGTH_SIZE {
-            // Zip archives, and pickles of protocol 2 from before PyTorch 1.6. Only of
-            // what is no length: a header of 640 bytes begins with 80 02, too.
+            // Zip archives, and pickles of protocol 2 from before PyTorch 1.6. A valid length is
+            // tested first, since a header of 640 bytes begins with 80 02 as well.
             if start.starts_with(b"PK\x03\x04") || start.starts_with(b"\x80\x02") {
                 let cause = "expected safetensors, found a PyTorch checkpoint: import its weights";
                 return Err(bad(cause.to_owned()));
@@ -115,7 +115,7 @@ impl WeightsFile {
         tensors.map(|(name, info)| (name, info.shape.clone())).collect()
     }
 
-    /// The file's own remarks, sorted by key.
+    /// The metadata of the file, sorted by key.
     #[must_use]
     pub fn metadata(&self) -> BTreeMap<String, String> {
         let metadata = self.header.metadata().iter().flatten();
@@ -131,7 +131,7 @@ impl WeightsFile {
     /// Reads tensor `name`.
     ///
     /// # Errors
-    /// None of that name, neither f32 nor f16, or a value that is not finite.
+    /// A tensor that is missing, is neither f32 nor f16, or has a value that is not finite.
     pub fn read(&mut self, name: &str) -> Result<Tensor, FormatError> {
         let bad = |cause: String| FormatError::malformed(&self.path, tensor_part(name), cause);
         let info: &TensorInfo = self.header.info(name).ok_or_else(|| bad("missing".to_owned()))?;
@@ -156,7 +156,7 @@ impl WeightsFile {
     }
 }
 
-/// How an error names tensor `name`.
+/// The name of tensor `name` in errors.
 #[must_use]
 pub fn tensor_part(name: &str) -> String {
     format!("tensor `{name}`")
@@ -166,7 +166,7 @@ pub fn tensor_part(name: &str) -> String {
 /// content gives the same bytes.
 ///
 /// # Errors
-/// A tensor whose shape does not fit its values; what the system reports.
+/// A tensor whose shape does not fit its values; errors of the system.
 pub fn write_weights(
     path: &Path,
     tensors: &BTreeMap<String, Tensor>,
@@ -175,7 +175,7 @@ pub fn write_weights(
     write(path, tensors, metadata, Dtype::F32)
 }
 
-/// The same, rounded to f16.
+/// As [`write_weights`], rounded to f16.
 ///
 /// # Errors
 /// As [`write_weights`]; a value that f16 cannot hold.
@@ -227,9 +227,9 @@ fn write(
     })
 }
 
-/// The header, its keys sorted: safetensors' own writer keeps metadata in a
-/// hash map, whose order changes from run to run. Padded by blanks so that the
-/// tensors begin at a multiple of eight bytes.
+/// The header with sorted keys: the crate `safetensors` keeps metadata in a hash map, whose
+/// order changes from run to run. Blanks pad it, so that the tensors begin at a multiple of
+/// eight bytes.
 fn header_json(
     infos: Vec<(String, TensorInfo)>,
     metadata: &BTreeMap<String, String>,

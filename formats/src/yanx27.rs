@@ -19,7 +19,7 @@ use crate::error::FormatError;
 use crate::hash::{HashedFile, Hashing};
 use crate::split::Split;
 
-/// A dataset in yanx27's layout that is being written.
+/// Writes a dataset in yanx27's layout.
 pub struct Yanx27Writer {
     root: PathBuf,
     classes: Vec<String>,
@@ -50,14 +50,13 @@ impl Yanx27Writer {
         Ok(Self { root, classes, ids: Default::default(), hashing, files: Vec::new() })
     }
 
-    /// Writes one cloud: the `view` of the mesh `name` of `class`. Normals that
-    /// are not known are written as 0.
+    /// Writes the cloud of view `view` of the mesh `name` of `class`. Unknown normals are written as
+    /// 0.
     ///
     /// # Errors
-    /// [`FormatError::Instance`] for fewer than two points (NumPy reads a lone
-    /// line as a vector, and the loader fails), for another number of normals
-    /// than of points, for a class that the set lacks, for a name that
-    /// cannot be a file's or that was written before; what the system reports.
+    /// [`FormatError::Instance`] for fewer than two points (NumPy reads a single line as a vector,
+    /// and the loader fails), for another number of normals than of points, for an unknown class, or
+    /// for a name that cannot be a file's or was written before; errors of the system.
     pub fn push(
         &mut self,
         class: &str,
@@ -107,7 +106,7 @@ impl Yanx27Writer {
     /// the labels and of the ids. Returns all files of the dataset.
     ///
     /// # Errors
-    /// What the system reports.
+    /// Errors of the system.
     pub fn finish(mut self) -> Result<Vec<HashedFile>, FormatError> {
         self.write_lists("modelnet40")?;
         if self.classes.len() == 10 {
@@ -130,9 +129,8 @@ impl Yanx27Writer {
 /// The id of one view: the class, `_`, and the rest without any `_`, as in
 /// `night_stand_0007v2` for view 2 of `night_stand_0007`.
 ///
-/// `_` becomes `-` and what was `-` becomes `~-`, so that two names of the same
-/// class differ in their ids as well; but a name that begins with its class and
-/// the same name without it are one.
+/// `_` becomes `-` and `-` becomes `~-`, so that different names of a class have different ids,
+/// except that a name that begins with its class has the same id as the name without it.
 fn instance_id(class: &str, name: &str, view: u32) -> String {
     let prefix = format!("{class}_");
     let number = name.strip_prefix(&prefix).unwrap_or(name);
@@ -140,8 +138,7 @@ fn instance_id(class: &str, name: &str, view: u32) -> String {
     format!("{prefix}{number}v{view}")
 }
 
-/// Whether `name` can stand in a list of lines that the loader strips, and as a
-/// folder of its own.
+/// Whether `name` can be a line of a list, which the loader strips, and the name of a folder.
 fn is_folder_name(name: &str) -> bool {
     let bad = |letter: char| letter.is_control() || matches!(letter, '/' | '\\' | ':');
     !name.is_empty() && name.trim() == name && !name.starts_with('.') && !name.contains(bad)
@@ -158,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn an_id_gives_its_class_back() {
+    fn the_loader_finds_the_class_in_an_id() {
         assert_eq!(instance_id("airplane", "airplane_0001", 0), "airplane_0001v0");
         for (class, name) in [("night_stand", "night_stand_7"), ("cup", "my_cup-3"), ("a_b", "c_")]
         {

@@ -261,7 +261,7 @@ fn metadata_that_make_no_sense_are_named() {
         ),
         (
             said("/lidar_mode", json!("1024x10")),
-            "lidar_mode: expected 32x10 or alike, found \"1024x10\"",
+            "lidar_mode: expected a mode such as 32x10, found \"1024x10\"",
         ),
         (
             said("/beam_azimuth_angles", json!([0, "x", 0])),
@@ -273,7 +273,7 @@ fn metadata_that_make_no_sense_are_named() {
         ),
         (
             said("/lidar_to_sensor_transform", json!(vec![0; 16])),
-            "lidar_to_sensor_transform: expected a rotation and a shift, found [0,0",
+            "lidar_to_sensor_transform: expected a rotation and a translation, found [0,0",
         ),
     ] {
         assert!(found.starts_with("m.json: ") && found.contains(expected), "{found}");

@@ -1,11 +1,20 @@
-//! Packed sets survive their files and grow no memory on their way.
+//! Packed sets and sets of clusters survive their files.
 
 use std::fs;
 use std::path::Path;
 
 use formats::hash::{FileHash, Hashing};
 use formats::labelled::{LabelledSet, read_labelled};
-use formats::packed::PackedWriter;
+use formats::packed::{ClusterWriter, PackedWriter, Remarks};
+
+const REMARKS: Remarks<'_> = Remarks {
+    name: "car_v3",
+    id: "000012#7",
+    sensor: "vlp32c",
+    range_m: 12.5,
+    truth_share: 0.9,
+    height_m: f32::NAN,
+};
 
 fn classes() -> Vec<String> {
     ["bowl", "chaise longue", "étagère"].map(str::to_owned).to_vec()
@@ -92,17 +101,56 @@ fn what_does_not_fit_is_refused_by_name() {
 }
 
 #[test]
-fn no_damaged_byte_makes_the_reader_panic() {
+fn clusters_come_back_from_their_file_with_their_remarks() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("street/train.npz");
+    let mut writer = ClusterWriter::create(&path, classes()).unwrap();
+    writer.push(&[[1.0, 2.0, 3.0]], 1, &REMARKS).unwrap();
+    writer.push(&[[4.0; 3], [5.0; 3]], 0, &Remarks { range_m: 3.0, ..REMARKS }).unwrap();
+    assert_eq!(writer.n_clusters(), 2);
+    writer.finish().unwrap();
+    let set = read_labelled(&path).unwrap();
+    assert_eq!(set.cloud(0), [[1.0, 2.0, 3.0]]);
+    assert_eq!(set.cloud(1), [[4.0; 3], [5.0; 3]]);
+    assert_eq!((set.labels, set.classes), (vec![1, 0], Some(classes())));
+    assert_eq!(set.names.unwrap(), ["car_v3", "car_v3"]);
+    assert_eq!(set.ids.unwrap(), ["000012#7", "000012#7"]);
+    assert_eq!(set.sensor.unwrap(), ["vlp32c", "vlp32c"]);
+    assert_eq!(set.range_m.unwrap(), [12.5, 3.0]);
+}
+
+#[test]
+fn a_set_of_clusters_may_be_empty_and_an_unfinished_one_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("set.npz");
-    write(&path, 2, 2);
-    let whole = fs::read(&path).unwrap();
-    for at in (0..whole.len()).step_by(5) {
-        let mut bytes = whole.clone();
-        bytes[at] ^= 0x15;
-        fs::write(&path, &bytes).unwrap();
-        let _ = read_labelled(&path);
-        fs::write(&path, &whole[..at]).unwrap();
-        assert!(read_labelled(&path).is_err(), "cut at {at}");
+    let mut writer = ClusterWriter::create(&path, classes()).unwrap();
+    let none = writer.push(&[], 0, &REMARKS).unwrap_err().to_string();
+    assert_eq!(none, "instance `car_v3`: expected points, found none");
+    writer.push(&[[0.0; 3]], 0, &REMARKS).unwrap();
+    drop(writer);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    ClusterWriter::create(&path, classes()).unwrap().finish().unwrap();
+    let set = read_labelled(&path).unwrap();
+    assert_eq!((set.len(), set.offsets.as_slice()), (0, &[0][..]));
+}
+
+#[test]
+fn no_damaged_byte_makes_the_reader_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let [packed, clusters] = ["packed.npz", "clusters.npz"].map(|name| folder.path().join(name));
+    write(&packed, 2, 2);
+    let mut writer = ClusterWriter::create(&clusters, classes()).unwrap();
+    writer.push(&[[1.0, 2.0, 3.0]], 1, &REMARKS).unwrap();
+    writer.finish().unwrap();
+    for path in [packed, clusters] {
+        let whole = fs::read(&path).unwrap();
+        for at in (0..whole.len()).step_by(5) {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 0x15;
+            fs::write(&path, &bytes).unwrap();
+            let _ = read_labelled(&path);
+            fs::write(&path, &whole[..at]).unwrap();
+            assert!(read_labelled(&path).is_err(), "cut at {at}");
+        }
     }
 }

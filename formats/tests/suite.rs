@@ -3,8 +3,6 @@
 
 #[cfg(feature = "cloud-files")]
 mod clouds;
-#[cfg(feature = "dataset")]
-mod clusters;
 #[cfg(all(feature = "npz", feature = "dataset"))]
 mod labelled_sets;
 #[cfg(feature = "hdf5")]

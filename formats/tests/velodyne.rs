@@ -104,7 +104,7 @@ fn what_is_no_turn_is_named() {
         error(b"no capture, but long enough"),
         ": header: expected a capture, pcap or pcapng"
     );
-    assert_eq!(error(&whole[..whole.len() - 1]), ": frame 150: the file ends within it");
+    assert_eq!(error(&whole[..whole.len() - 1]), ": frame 150: the file ends within the frame");
     let found = error(&whole[..FILE + 70 * (FRAME + PROTOCOLS + 1206)]);
     let expected = ": packets: expected a turn of a VLP-16 or VLP-32C, found 167.2 degrees of one";
     assert_eq!(found, expected);

@@ -1,8 +1,8 @@
-//! The clouds of a dataset, cast as they are asked for.
+//! The clouds of a dataset, cast on demand.
 
 use crate::error::{raised, raised_with_causes};
 use crate::process::{self, LazyCaster};
-use edgepuck_dataset::on_demand;
+use edgepuck_dataset as dataset;
 use formats::Split;
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray1, PyArray3};
@@ -13,18 +13,18 @@ use std::path::PathBuf;
 /// Clouds, `[n, points, 3]`, and their classes, `[n]`.
 type Batch<'py> = (Bound<'py, PyArray3<f32>>, Bound<'py, PyArray1<i64>>);
 
-/// A folder of meshes, seen from places around them.
+/// The clouds of a folder of meshes, scanned from viewpoints around each.
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
 pub struct Clouds {
-    clouds: on_demand::Clouds,
+    clouds: dataset::Clouds,
     n_points: usize,
     caster: LazyCaster,
 }
 
 #[pymethods]
 impl Clouds {
-    /// The clouds of the meshes in a folder, of one split or of both, as `gen-dataset` makes them
-    /// with `flags`.
+    /// The clouds that `gen-dataset` makes with `flags` of the meshes in a folder, of one split or
+    /// of both.
     #[new]
     fn new(
         py: Python<'_>,
@@ -36,11 +36,11 @@ impl Clouds {
     ) -> PyResult<Self> {
         let split: Option<Split> = split.map(str::parse).transpose().map_err(raised)?;
         let config = edgepuck_program::gen_dataset::config(&flags);
-        let config = config.map_err(|error| raised(of_flags(&error)))?;
+        let config = config.map_err(|error| raised(argument_error(&error)))?;
         let n_points = config.packed_points as usize;
         let clouds = process::run(py, || {
             let meshes = discover(&meshes, config.seed)?;
-            Ok(on_demand::Clouds::new(config, &meshes, split, cache_bytes)?)
+            Ok(dataset::Clouds::new(config, &meshes, split, cache_bytes)?)
         })?;
         let clouds = clouds.map_err(raised_with_causes)?;
         Ok(Self { clouds, n_points, caster: LazyCaster::new(adapter) })
@@ -63,13 +63,13 @@ impl Clouds {
         labels.collect::<Vec<_>>().into_pyarray(py)
     }
 
-    /// The file of the mesh that cloud `index` is of, from the folder of meshes.
+    /// The mesh file of cloud `index`, from the folder of meshes.
     fn source(&self, index: usize) -> PyResult<&str> {
         self.check(index)?;
         Ok(&self.clouds.mesh(index).relative)
     }
 
-    /// The clouds of these numbers, `[n, points, 3]`, and their classes, `[n]`.
+    /// The clouds at `indices`, `[n, points, 3]`, and their classes, `[n]`.
     fn draw<'py>(&self, py: Python<'py>, seed: u64, indices: Vec<usize>) -> PyResult<Batch<'py>> {
         indices.iter().try_for_each(|&index| self.check(index))?;
         let caster =
@@ -85,8 +85,8 @@ impl Clouds {
     }
 }
 
-/// What is wrong with flags, in the words of one who gave arguments.
-fn of_flags(error: &anyhow::Error) -> String {
+/// The message of an error in flags, without their dashes: in Python they are arguments.
+fn argument_error(error: &anyhow::Error) -> String {
     let text = formats::outcome::joined_causes(error);
     let cause = text.split("\n\n").next().unwrap_or_default();
     cause.trim_start_matches("error: ").trim_end().replace("'--", "'")
@@ -103,8 +103,8 @@ impl Clouds {
     }
 }
 
-/// The seed of an epoch, in which the dataset that has `seed` shows other views.
+/// The seed of an epoch of a dataset with `seed`; each epoch has other views.
 #[pyfunction]
 pub fn seed_of_epoch(seed: u64, epoch: u32) -> u64 {
-    on_demand::seed_of_epoch(seed, epoch)
+    dataset::seed_of_epoch(seed, epoch)
 }

@@ -41,7 +41,7 @@ fn what_cannot_be_described_is_refused_and_nothing_is_replaced() {
     folder.refuses(
         1,
         &[
-            ("card out", "out/croissant.json: is there already; replace it with --overwrite"),
+            ("card out", "out/croissant.json: exists already; replace it with --overwrite"),
             ("card meshes", "meshes/manifest.json: expected a finished dataset's manifest"),
             ("card part", "expected a whole dataset, found part 1 of 2"),
             ("card tars", "tars: is not finished; continue it with --resume"),

@@ -53,10 +53,12 @@ fn one_thread_gives_the_bytes_of_many_and_a_mesh_added_moves_no_other() {
 fn merged_shards_are_the_whole() {
     let folder = Folder::with_meshes();
     folder.write("meshes/ring/train/broken.off", "OFF\n1 1 0\n");
-    folder.exits(3, "gen-dataset meshes --out whole");
+    // Merging reads the clouds from files that a single run keeps in memory.
+    const LAYOUT: &str = "--layout yanx27 --attributes normal";
+    folder.exits(3, &format!("gen-dataset meshes --out whole {LAYOUT}"));
     for shard in 1..=3 {
         // The broken mesh falls into one of the shards, which fails.
-        let words = format!("gen-dataset meshes --out part{shard} --shard {shard}/3");
+        let words = format!("gen-dataset meshes --out part{shard} --shard {shard}/3 {LAYOUT}");
         folder.edgepuck(&words).output().unwrap();
     }
     // What failed in a part failed in the whole.

@@ -40,7 +40,7 @@ fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
     let (mut n, mut n_inside, mut n_inside_as_seen) = (0u32, 0u32, 0u32);
     let mut packets = 0;
     formats::pcap::read(&folder.at("drives/a.pcap"), |packet| {
-        let header = Header::of(&packet.payload).unwrap();
+        let header = Header::parse(&packet.payload).unwrap();
         let start_s = packet.time_s.unwrap();
         assert_eq!(f64::from(header.time_us), ((start_s - 946_684_800.0) * 1e6).round());
         packets += 1;

@@ -1,21 +1,16 @@
-//! Datasets whose scans were never cast: finishing, checking and merging only
-//! need files and records that agree.
+//! Datasets whose scans were never cast: finishing, verifying and merging need only files and
+//! records that agree.
 
-use edgepuck_dataset::config::Layout;
-use edgepuck_dataset::journal::{Journal, Terms};
-use edgepuck_dataset::record::{Entry, FileRecord};
+use edgepuck_dataset::internals::{Journal, Terms, layout};
 use edgepuck_dataset::{
-    DatasetConfig, MeshFailure, MeshRecord, ScanRecord, SetConfig, Variant, VariantRecord,
-    Viewpoints, layout,
+    DatasetConfig, Entry, FileRecord, Layout, MeshFailure, MeshRecord, ScanRecord, SetConfig,
+    Variant, VariantRecord, Viewpoints,
 };
 use formats::Split;
-use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
-use formats::vlp32c::Returns;
-use sim_gpu::effects::Effects;
-use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::frame::Up;
 use sim_gpu::internals::mesh::validate::MeshDefects;
 use sim_gpu::internals::scan::Tally;
 use sim_gpu::internals::sensor::{SensorProfile, Views};
@@ -23,11 +18,11 @@ use std::path::Path;
 
 /// Points of each packed cloud.
 pub const PACKED_POINTS: u32 = 32;
-/// Fewer points are not packed.
+/// Points that a scan must have to be packed.
 pub const MIN_POINTS: u32 = 16;
 
-/// What the datasets hold: a rotating sensor with two views and a camera whose
-/// one view is jittered, clean and noisy, in all formats.
+/// A rotating sensor with two views and a camera whose one view is jittered, clean and noisy, in
+/// all formats of points.
 pub fn config() -> DatasetConfig {
     let set = |name: &str, sensor: &str, views: Views| SetConfig {
         name: name.to_owned(),
@@ -36,24 +31,16 @@ pub fn config() -> DatasetConfig {
     };
     DatasetConfig {
         seed: 7,
-        normalize: Normalize::UnitSphere,
-        up: None,
-        simplify: None,
         attributes: [Attribute::Normal].into(),
         formats: ScanFormat::POINTS.to_vec(),
-        effects: Effects::default(),
         variants: vec![Variant::Clean, Variant::Noisy],
-        sets: vec![
-            set("rotational", "vlp32c", Views { count: 2, ..Views::ROTATING }),
-            set("static", "kinect-v2", Views { azimuth_jitter_deg: 10.0, ..Views::STATIC }),
-        ],
         packed_points: PACKED_POINTS,
         min_points: MIN_POINTS,
         layouts: vec![Layout::Yanx27],
-        returns: Returns::default(),
-        hash: Hashing::default(),
-        reflectivity: 1.0,
-        colours: None,
+        ..DatasetConfig::new(vec![
+            set("rotational", "vlp32c", Views { count: 2, ..Views::ROTATING }),
+            set("static", "kinect-v2", Views { azimuth_jitter_deg: 10.0, ..Views::STATIC }),
+        ])
     }
 }
 
@@ -78,10 +65,10 @@ pub fn failure(class: &str, split: Split, name: &str) -> MeshFailure {
     }
 }
 
-/// Begins a dataset in `out` and writes the scans of `entries`, as a run would
-/// that was killed before it could finish.
+/// Begins a dataset in `out` and writes the scans of `entries`, as a run that was killed before
+/// the end leaves it.
 pub fn write(out: &Path, terms: &Terms, entries: &[Entry]) -> Vec<MeshRecord> {
-    Journal::of(out).begin(terms).expect("a journal");
+    Journal::at(out).begin(terms).expect("a journal");
     entries.iter().map(|entry| write_mesh(out, &terms.config, entry)).collect()
 }
 
@@ -132,8 +119,8 @@ fn write_variant(
     }
 }
 
-/// None to 99 points on the x axis, in order, with their x for a normal too:
-/// a cloud that keeps points and normals together rises where they rise.
+/// 0 to 99 points on the x axis, in ascending order, with normals equal to the positions: in a
+/// cloud that keeps points and normals together, both ascend together.
 fn scan(key: StreamKey) -> Scan {
     let n = key.below(100, 0);
     let positions: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, 0.0, 0.0]).collect();

@@ -5,7 +5,7 @@ use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
 use anyhow::Context;
-use edgepuck_dataset::corrupted::{Corrupted, CorruptedSet, ObjectCorruption};
+use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption};
 use formats::Split;
 use indicatif::{ProgressBar, ProgressStyle};
 use sim_gpu::internals::mesh::frame::Up;

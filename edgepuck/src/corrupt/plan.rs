@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail, ensure};
 use edgepuck_assets::CORRUPTIONS;
-use edgepuck_dataset::corrupted::ObjectCorruption;
+use edgepuck_dataset::ObjectCorruption;
 use serde::Deserialize;
 use sim_gpu::internals::config::{self, InvalidValue};
 use sim_gpu::internals::corruption::Corruption;

@@ -1,19 +1,16 @@
-//! The picture that a run ends with: one mesh from all its views, clean above
-//! noisy.
+//! The example picture of a dataset: one mesh from all its viewpoints, clean above noisy.
 
 use crate::preview;
-use edgepuck_dataset::config::Variant;
-use edgepuck_dataset::layout;
-use edgepuck_dataset::manifest::Manifest;
-use edgepuck_dataset::record::MeshRecord;
+use edgepuck_dataset::internals::layout;
+use edgepuck_dataset::{Manifest, MeshRecord, Variant};
 use formats::Scan;
 use formats::scan_file::{ScanFormat, read_scan};
 use glam::DVec3;
 use sim_gpu::internals::pose::Pose;
 use std::path::{Path, PathBuf};
 
-/// Draws a mesh from the middle of the list that fills a packed cloud, or else
-/// the one with the most points; `None` if no scan holds a point.
+/// Draws a mesh from the middle of the list that fills a packed cloud, or else the mesh with the
+/// most points. Returns `None` if no scan holds a point.
 pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> {
     let Some(set) = manifest.config.sets.first() else { return Ok(None) };
     let points = |record: &&MeshRecord| -> u64 {
@@ -37,7 +34,7 @@ pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> 
     Ok(Some(picture))
 }
 
-/// The scans of all views as one cloud, each point with its range.
+/// The scans of all views as one cloud with ranges.
 fn all_views(
     out: &Path,
     record: &MeshRecord,

@@ -12,34 +12,27 @@ use crate::{Outcome, Usage, flags, gen_shapes};
 use anyhow::Context;
 use clap::Parser;
 use clap::error::ErrorKind;
-use edgepuck_dataset::check_layouts;
-use edgepuck_dataset::config::{DatasetConfig, Layout};
-use edgepuck_dataset::finish::finish;
-use edgepuck_dataset::journal::Terms;
-use edgepuck_dataset::manifest::Manifest;
-use edgepuck_dataset::pipeline::{Run, scan_all};
-use edgepuck_dataset::progress::Progress;
-use edgepuck_dataset::start::{Begin, Start, begin};
-use edgepuck_dataset::verify::verify;
-use edgepuck_dataset::{DatasetError, MeshFailure};
+use edgepuck_dataset::{
+    Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshFailure, Plan, Progress,
+    check_layouts, make, verify,
+};
 use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
 use settings::Settings;
 use shard::Shard;
 use signal_hook::consts::SIGTERM;
-use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
-use std::collections::BTreeSet;
-use std::fmt::Display;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::mesh::tree::discover;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+use std::sync::atomic::Ordering::SeqCst;
 use std::time::Instant;
 
-/// Where the meshes of a run without meshes are written, a seed behind it.
+/// Folder of the built-in shapes, to which the seed is appended.
 const DEFAULT_SHAPES: &str = "data/default-shapes";
 
-/// Where the dataset of a run without meshes is written.
+/// Folder of the dataset of the built-in shapes.
 const DEFAULT_OUT: &str = "data/lidar-shapes";
 
 /// Flags of `gen-dataset`.
@@ -82,25 +75,24 @@ pub struct Args {
     caster: CasterArgs,
 }
 
-/// The configuration of a dataset that is made with these `flags`, such as `--distance=2,10`.
+/// The settings of a dataset that these `flags` ask for, such as `--distance=2,10`.
 ///
 /// # Errors
-/// A flag that is none or has no such value; a sensor that is missing or does not go with the
-/// others.
+/// An unknown flag or value; a sensor that is missing or does not fit the other flags.
 pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
     Settings::try_parse_from(behind_name(flags))?.config()
 }
 
-/// A command line of these `words`, which begins with the program's name.
+/// A command line: the program's name and these `words`.
 fn behind_name(words: &[String]) -> impl Iterator<Item = &str> {
     std::iter::once("gen-dataset").chain(words.iter().map(String::as_str))
 }
 
-/// Checks words that are to be given to the tasks of a cluster, which read and write the same folders.
-/// These need not be here.
+/// Checks the words of a command line for the tasks of a cluster, which share their folders. The
+/// folders need not exist on this machine.
 ///
 /// # Errors
-/// As [`config`]; no meshes, no output folder, or no tars.
+/// As [`config`]; words without a folder of meshes, an output folder or tars.
 pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
     #[derive(Parser)]
     struct Words {
@@ -122,7 +114,7 @@ pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
         let cause = format!("expected {word} among the words: tasks share folders and make tars");
         return Err(Usage(cause).into());
     }
-    tars::check(&config)
+    Ok(check_layouts(&config, &[])?)
 }
 
 /// Makes or verifies a dataset.
@@ -138,58 +130,56 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let out = args.out.clone().unwrap_or(default_out);
     let meshes = discover(&meshes_folder, config.seed)?;
-    if config.layouts.contains(&Layout::Webdataset) {
-        return tars::run(args, &out, &config, &meshes);
-    }
-    let meshes = shard(meshes, args.shard);
-    let classes: BTreeSet<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
-    check_layouts(&config, &Vec::from_iter(classes))?;
     let caster = args.caster.open(&config.cast_effects())?;
-    let part = args.shard.map(|shard| (shard.number, shard.of));
-    let terms = Terms::new(config, &caster, &meshes, part);
-    let how = match (args.resume, args.overwrite) {
-        (true, _) => Begin::Resume,
-        (_, true) => Begin::Overwrite,
-        _ => Begin::Fresh,
+    let plan = Plan {
+        part: args.shard.map(|shard| (shard.number, shard.of)),
+        begin: match (args.resume, args.overwrite) {
+            (true, _) => Begin::Resume,
+            (_, true) => Begin::Overwrite,
+            _ => Begin::Fresh,
+        },
+        culling: args.caster.culling(),
+        ..Plan::new(&out, &config, &meshes)
     };
-    if let Start::Complete(manifest) = begin(&out, &terms, how)? {
-        eprintln!("{}: the dataset is already complete.", out.display());
-        return end(&out, &manifest);
-    }
-
-    let started = Instant::now();
-    let progress = Progress::default();
-    let (config, culling) = (&terms.config, args.caster.culling());
-    let is_over = Arc::new(AtomicBool::new(false));
-    // Once all is scanned, SIGTERM ends the program as it ends any.
-    let is_scanned = Arc::new(AtomicBool::new(false));
-    signal_hook::flag::register_conditional_default(SIGTERM, Arc::clone(&is_scanned))?;
-    signal_hook::flag::register(SIGTERM, Arc::clone(&is_over))?;
-    let (caster, progress) = (&caster, &progress);
-    let run = Run { out: &out, config, caster, culling, progress, is_over: &is_over };
-    let scanned = match bar::beside(progress, meshes.len(), || scan_all(&run, &meshes)) {
-        Err(stopped @ DatasetError::Interrupted { .. }) => {
-            eprintln!("{}: {stopped}", out.display());
-            return Ok(Outcome::Interrupted);
+    let made = if config.layouts.contains(&Layout::Webdataset) {
+        tars::run(&args.tars, &plan, &caster)
+    } else {
+        make_files(&plan, &caster)
+    };
+    made.or_else(|error| match error.downcast_ref() {
+        Some(DatasetError::Interrupted { .. }) => {
+            eprintln!("{}: {error}", out.display());
+            Ok(Outcome::Interrupted)
         }
-        scanned => scanned?,
-    };
-    is_scanned.store(true, SeqCst);
-    report_failures(&scanned.failures);
-    let packing = Instant::now();
-    let manifest = finish(&out, &terms, scanned.records, scanned.failures)?;
-    summary::print(&out, &manifest, progress, started.elapsed(), packing.elapsed());
-    end(&out, &manifest)
+        _ => Err(error),
+    })
 }
 
-/// Prints which meshes failed, and why.
+fn make_files(plan: &Plan, caster: &OpenCaster) -> anyhow::Result<Outcome> {
+    let started = Instant::now();
+    let progress = Progress::default();
+    // Once all meshes are scanned, SIGTERM ends the program immediately.
+    let is_scanned = Arc::clone(&progress.is_scanned);
+    signal_hook::flag::register_conditional_default(SIGTERM, is_scanned)?;
+    signal_hook::flag::register(SIGTERM, Arc::clone(&progress.stop))?;
+    let manifest = bar::beside(&progress, || make(plan, caster, &progress))?;
+    if progress.is_scanned.load(SeqCst) {
+        report_failures(&manifest.failures);
+        summary::print(plan.out, &manifest, &progress, started.elapsed());
+    } else {
+        eprintln!("{}: the dataset is already complete.", plan.out.display());
+    }
+    end(plan.out, &manifest)
+}
+
+/// Prints the meshes that failed, with the causes.
 pub fn report_failures(failures: &[MeshFailure]) {
     for failure in failures {
         eprintln!("failed: {failure}");
     }
 }
 
-/// Draws the example picture, which an interrupted run may lack, and prints its name.
+/// Draws the example picture, which is missing after an interruption, and prints its path.
 pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
     match example::draw(out, manifest).context("cannot draw the example")? {
         Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
@@ -198,31 +188,24 @@ pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
     Ok(if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }
 
+/// Verifies the dataset in `folder` and prints its problems, one a line.
 fn check(folder: &Path) -> anyhow::Result<Outcome> {
-    if edgepuck_dataset::tars::root_file(folder).exists() {
-        let problems = edgepuck_dataset::tars::verify(folder)?;
-        return tell_problems(&problems, &format!("{}: ", folder.display()));
-    }
     let report = verify(folder)?;
     let by = match report.hash {
         Hashing::None => "read, without hashes to compare",
         Hashing::Sha256 | Hashing::Blake3 => "checked",
     };
-    tell_problems(&report.problems, &format!("{}: {} files {by}, ", folder.display(), report.files))
-}
-
-/// Prints what is wrong with a dataset, a line each, and how much that is behind `introduction`.
-fn tell_problems(problems: &[impl Display], introduction: &str) -> anyhow::Result<Outcome> {
     let mut out = std::io::stdout().lock();
-    for problem in problems {
+    for problem in &report.problems {
         writeln!(out, "{problem}")?;
     }
-    eprintln!("{introduction}{} problems.", problems.len());
-    Ok(if problems.is_empty() { Outcome::Success } else { Outcome::SomeFailed })
+    let (files, problems) = (report.files, report.problems.len());
+    eprintln!("{}: {files} files {by}, {problems} problems.", folder.display());
+    Ok(if report.is_sound() { Outcome::Success } else { Outcome::SomeFailed })
 }
 
 fn write_default_shapes(seed: u64) -> anyhow::Result<PathBuf> {
-    // A folder of its own for each seed: meshes of another run must not mix in.
+    // Each seed has its own folder, so that meshes of different runs do not mix.
     let folder = PathBuf::from(format!("{DEFAULT_SHAPES}-{seed}"));
     eprintln!("No meshes were named: writing built-in procedural shapes to {}.", folder.display());
     shapes::write_tree(&folder, seed, gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS)
@@ -235,12 +218,6 @@ fn default_out(meshes: &Path) -> PathBuf {
     let absolute = std::path::absolute(meshes).unwrap_or_else(|_| meshes.to_owned());
     let name = absolute.file_stem().map_or("meshes".into(), |name| name.to_string_lossy());
     Path::new("data").join(format!("lidar-{name}"))
-}
-
-/// Every N-th mesh, from the I-th.
-fn shard(meshes: Vec<MeshEntry>, shard: Option<Shard>) -> Vec<MeshEntry> {
-    let Some(Shard { number, of }) = shard else { return meshes };
-    meshes.into_iter().skip(number as usize).step_by(of as usize).collect()
 }
 
 /// A usage error.

@@ -1,8 +1,8 @@
-//! From flags to a dataset's configuration.
+//! The flags that decide what a dataset holds.
 
 use super::usage;
 use anyhow::Context;
-use edgepuck_dataset::config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
+use edgepuck_dataset::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
 use formats::hash::Hashing;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
@@ -143,7 +143,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The configuration that the flags ask for.
+    /// The settings that the flags ask for.
     pub fn config(&self) -> anyhow::Result<DatasetConfig> {
         let mut sets = self.sets()?;
         let recommended = sets.iter().find_map(|set| match &set.viewpoints {
@@ -159,10 +159,15 @@ impl Settings {
                 "--simplify renumbers the triangles of a mesh: leave `triangle` out of --attributes",
             ));
         }
+        if self.simplify.is_some() && self.layout.contains(&Layout::Webdataset) {
+            let cause = "--simplify cannot be used with --layout webdataset, which reads a mesh \
+                         again for each tar";
+            return Err(usage(cause));
+        }
         let mut effects = self.effects()?;
         if self.simplify.is_some() && effects.motion.is_some() {
-            let cause = "--simplify: what a sensor resolves of a mesh changes as it moves \
-                         (effects.motion)";
+            let cause = "--simplify cannot be used with effects.motion: the resolution of a moving \
+                         sensor changes";
             return Err(usage(cause));
         }
         within("--reflectivity", self.reflectivity, 0.0..=1.0)
@@ -278,7 +283,7 @@ impl Settings {
     }
 }
 
-/// A number, or two between which one is drawn.
+/// A number, or the bounds between which one is drawn.
 #[derive(Clone, Copy, Debug)]
 struct FromTo {
     from: f64,
@@ -301,15 +306,15 @@ impl FromStr for FromTo {
     }
 }
 
-/// A file of effects.
+/// The contents of a file of effects.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EffectsFile {
     effects: Effects,
 }
 
-/// Gives the sensors the beam geometry that their packets describe.
-/// Says which returns they hold, where `wanted` does not say otherwise, and lets the scans tell them.
+/// Gives the sensors the beam geometry of their packets, and the effects the returns that packets
+/// hold: `wanted`, or those of the effects.
 fn cast_as_packets_tell(
     sets: &mut [SetConfig],
     effects: &mut Effects,

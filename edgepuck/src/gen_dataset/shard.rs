@@ -1,9 +1,9 @@
-//! Which part of a dataset one task of a job array makes.
+//! The part of a dataset that a task of a job array makes.
 
 use std::str::FromStr;
 
-/// The variables that tell a task of an array its number: of Slurm, of Kubernetes' Indexed Jobs and
-/// of HyperQueue.
+/// The environment variables that hold the number of a task: of Slurm, of Kubernetes' Indexed Jobs
+/// and of HyperQueue.
 const NUMBERS: [&str; 3] = ["SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX", "HQ_TASK_ID"];
 
 /// Part `number` (from 0) of `of` parts.
@@ -22,7 +22,7 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// The part that `text` names, in an environment of these variables.
+    /// The part that `text` names. `variable` looks up an environment variable.
     fn parse(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         match text.split_once('/') {
             Some(("auto", of)) => {
@@ -43,8 +43,8 @@ impl Shard {
 
     /// The part of this task of an array of `of` tasks.
     fn of_array(of: u32, variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
-        let told = NUMBERS.iter().find_map(|name| Some((name, variable(name)?)));
-        let (name, number) = told.ok_or_else(|| {
+        let found = NUMBERS.iter().find_map(|name| Some((name, variable(name)?)));
+        let (name, number) = found.ok_or_else(|| {
             format!(
                 "auto: expected one of the variables {}, found none; outside a job array, give the \
                  part, such as 1/{of}",
@@ -58,7 +58,7 @@ impl Shard {
     }
 }
 
-/// How many tasks the array of Slurm has that this is a task of.
+/// The number of tasks of the array of Slurm to which this task belongs.
 fn tasks_of_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<u32, String> {
     let number = |name: &str| variable(name).and_then(|value| value.parse::<u32>().ok());
     let [first, last, count] =
@@ -66,13 +66,13 @@ fn tasks_of_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<u32, Stri
     match (first, last, count) {
         (Some(0), Some(last), Some(count)) if last.checked_add(1) == Some(count) => Ok(count),
         (None, None, None) => {
-            let cause = "auto: expected an array of Slurm, found none of its variables; elsewhere, \
-                         auto/N says of how many tasks";
+            let cause = "auto: expected a job array of Slurm, found none of its variables; \
+                         elsewhere, give the number of tasks with auto/N";
             Err(cause.to_owned())
         }
-        // A part of the array that is run again says nothing of the whole.
-        _ => Err("auto: expected a whole array from 0, as `sbatch --array=0-7` makes it; auto/N \
-                  says of how many tasks the whole is"
+        // A part of the array that is run again does not have the number of all tasks.
+        _ => Err("auto: expected a whole array from 0, as `sbatch --array=0-7` makes it; \
+                  otherwise give the number of tasks with auto/N"
             .to_owned()),
     }
 }
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn each_scheduler_tells_a_task_its_part() {
+    fn the_part_comes_from_the_variables_of_each_scheduler() {
         assert_eq!(parsed("2/4", &[]), Ok((1, 4)));
         for name in NUMBERS {
             assert_eq!(parsed("auto/8", &[(name, "7")]), Ok((7, 8)), "{name}");
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_part_of_a_whole_is_refused() {
+    fn invalid_parts_are_refused() {
         for text in ["0/4", "5/4", "1/0", "auto/0", "auto/x", "auto/8", "auto", "4", "1/4/2"] {
             assert!(parsed(text, &[]).is_err(), "{text}");
         }

@@ -1,20 +1,13 @@
-//! What a run did, in a few lines.
+//! The closing summary of a run.
 
-use edgepuck_dataset::manifest::Manifest;
-use edgepuck_dataset::progress::{Progress, Stage};
+use edgepuck_dataset::internals::layout;
+use edgepuck_dataset::{Manifest, Progress, Stage};
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
-/// Prints the closing summary of a run that took `total`, the last `packing`
-/// of it after all scans were there.
-pub fn print(
-    out: &Path,
-    manifest: &Manifest,
-    progress: &Progress,
-    total: Duration,
-    packing: Duration,
-) {
+/// Prints the closing summary of a run that took `total`.
+pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Duration) {
     progress.notes().iter().for_each(|note| eprintln!("{note}"));
     let count = |counter: &std::sync::atomic::AtomicU64| counter.load(Relaxed);
     let seconds = total.as_secs_f64();
@@ -35,7 +28,7 @@ pub fn print(
         .iter()
         .map(|&stage| format!("{} {:.1}", stage.name(), progress.spent(stage).as_secs_f64()))
         .collect();
-    eprintln!("seconds over all threads: {}, pack {:.1}", stages.join(", "), packing.as_secs_f64());
+    eprintln!("seconds over all threads: {}", stages.join(", "));
     let simplified = manifest.meshes.iter().filter_map(|mesh| Some((mesh, mesh.simplified?)));
     let (before, after) = simplified.fold((0, 0), |(before, after), (mesh, simplified)| {
         (before + mesh.triangles, after + simplified.triangles)
@@ -47,8 +40,7 @@ pub fn print(
         eprintln!("{}: {} clouds, {} left out", packed.file, packed.clouds, packed.left_out.len());
     }
     if !manifest.failures.is_empty() {
-        let file = edgepuck_dataset::layout::failures(out);
-        eprintln!("Meshes that failed are listed in {}", file.display());
+        eprintln!("Meshes that failed are listed in {}", layout::failures(out).display());
     }
     eprintln!("Dataset: {}", out.display());
 }

@@ -1,19 +1,16 @@
-//! `gen-dataset --layout webdataset`: tars, each of which is handed over when it is complete.
+//! `gen-dataset --layout webdataset`: makes tars and hands each over when it is complete.
 
-use crate::{Outcome, Usage, shell};
-use edgepuck_dataset::config::DatasetConfig;
-use edgepuck_dataset::layout;
-use edgepuck_dataset::publish::retract;
-use edgepuck_dataset::tars::{self, Cut, HandOver, PartManifest, Run, Sample};
-use edgepuck_dataset::{DatasetError, check_layouts};
+use super::report_failures;
+use crate::{Outcome, shell};
+use edgepuck_dataset::{Cut, HandOver, Plan, Progress, Sample, TarRecord, Tars, make_tars};
 use signal_hook::consts::{SIGINT, SIGTERM};
-use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::caster::OpenCaster;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::Duration;
 
-/// How often a command is tried, with a pause of this many seconds before it is tried again.
+/// Pauses before a command is tried again, seconds.
 const PAUSES_S: [u64; 3] = [1, 4, 16];
 
 /// Flags of tars.
@@ -37,100 +34,38 @@ pub struct TarArgs {
     on_shard: Option<String>,
 }
 
-/// Makes the tars of one part of the dataset.
-pub fn run(
-    args: &super::Args,
-    out: &Path,
-    config: &DatasetConfig,
-    meshes: &[MeshEntry],
-) -> anyhow::Result<Outcome> {
-    check(config)?;
-    let part = args.shard.map_or((0, 1), |shard| (shard.number, shard.of));
-    let caster = args.caster.open(&config.cast_effects())?;
-    refuse_what_is_there(args, out, part)?;
-    let is_over = Arc::new(AtomicBool::new(false));
-    // A second Ctrl-C ends the program at once; schedulers may repeat SIGTERM.
-    signal_hook::flag::register_conditional_default(SIGINT, Arc::clone(&is_over))?;
+/// Makes the tars of `plan`.
+pub fn run(args: &TarArgs, plan: &Plan, caster: &OpenCaster) -> anyhow::Result<Outcome> {
+    let progress = Progress::default();
+    // A second Ctrl-C ends the program immediately; schedulers may repeat SIGTERM.
+    signal_hook::flag::register_conditional_default(SIGINT, Arc::clone(&progress.stop))?;
     for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&is_over))?;
+        signal_hook::flag::register(signal, Arc::clone(&progress.stop))?;
     }
-    let TarArgs { sample, tar_clouds, on_shard } = &args.tars;
-    let hands_over = on_shard.as_ref().map(|command| {
-        let is_over = Arc::clone(&is_over);
-        move |tar: &Path| hand_over(command, tar, &is_over)
-    });
-    let run = Run {
-        out,
-        config,
-        cut: Cut { sample: *sample, clouds_per_tar: *tar_clouds },
-        part,
-        caster: &caster,
-        is_over: &is_over,
-        hand_over: hands_over.as_ref().map(|hand_over| hand_over as HandOver),
-        say: &|line| eprintln!("{line}"),
+    let command = args.on_shard.as_ref();
+    let hand_over = command.map(|command| |tar: &Path| hand_over(command, tar, &progress.stop));
+    let tars = Tars {
+        cut: Cut { sample: args.sample, clouds_per_tar: args.tar_clouds },
+        on_made: &|TarRecord { file, clouds, bytes, .. }| {
+            eprintln!("{file}: {clouds} clouds, {} MiB", bytes >> 20);
+        },
+        hand_over: hand_over.as_ref().map(|hand_over| hand_over as HandOver),
     };
-    match tars::make(&run, meshes) {
-        Ok(made) => Ok(end(out, &made)),
-        Err(stopped @ DatasetError::Interrupted { .. }) => {
-            eprintln!("{}: {stopped}", out.display());
-            Ok(Outcome::Interrupted)
-        }
-        Err(error) => Err(error.into()),
-    }
-}
+    let made = make_tars(plan, &tars, caster, &progress)?;
 
-/// Checks that tars can hold what is asked for.
-pub fn check(config: &DatasetConfig) -> anyhow::Result<()> {
-    check_layouts(config, &[])?;
-    if config.simplify.is_some() {
-        let cause = "--simplify does not go with --layout webdataset, which reads a mesh again for \
-                     each tar";
-        return Err(Usage(cause.to_owned()).into());
-    }
-    Ok(())
-}
-
-/// Tars of this part that are there are gone on with or made anew only if that is asked for. What is not
-/// ours, or another part's, stays.
-fn refuse_what_is_there(args: &super::Args, out: &Path, part: (u32, u32)) -> anyhow::Result<()> {
-    let occupied = |what| DatasetError::Occupied { path: out.to_owned(), what };
-    if layout::manifest(out).exists() || layout::journal(out).exists() {
-        return Err(occupied("a dataset of another layout").into());
-    }
-    if args.overwrite {
-        retract(out)?;
-    }
-    let there = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_own = |path: &Path| {
-        let name = path.file_name().and_then(|name| name.to_str());
-        name.is_some_and(|name| tars::is_of_part(name, part))
-    };
-    for path in there.filter(|path| is_own(path)) {
-        if args.overwrite {
-            std::fs::remove_file(&path)?;
-        } else if !args.resume {
-            return Err(occupied("tars").into());
-        }
-    }
-    Ok(())
-}
-
-fn end(out: &Path, made: &PartManifest) -> Outcome {
-    let mut failures: Vec<_> = made.tars.iter().flat_map(|tar| &tar.failures).collect();
+    let mut failures: Vec<_> = made.tars.iter().flat_map(|tar| tar.failures.clone()).collect();
     failures.sort_by(|p, q| p.source.cmp(&q.source));
     failures.dedup_by(|p, q| p.source == q.source);
-    for failure in &failures {
-        eprintln!("failed: {failure}");
-    }
+    report_failures(&failures);
     let clouds: u64 = made.tars.iter().map(|tar| tar.clouds).sum();
     let bytes: u64 = made.tars.iter().map(|tar| tar.bytes).sum();
-    let (tars, mib) = (made.tars.len(), bytes >> 20);
-    eprintln!("{tars} tars, {clouds} clouds, {mib} MiB: {}", out.display());
-    if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused }
+    let (tars, mib, out) = (made.tars.len(), bytes >> 20, plan.out.display());
+    eprintln!("{tars} tars, {clouds} clouds, {mib} MiB: {out}");
+    Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }
 
-/// Runs `command` for the file `tar` until it succeeds, or says why it did not.
-fn hand_over(command: &str, tar: &Path, is_over: &AtomicBool) -> Result<(), String> {
+/// Runs `command` for the file `tar` until it succeeds; the error is the cause of the last failure.
+fn hand_over(command: &str, tar: &Path, stop: &AtomicBool) -> Result<(), String> {
     let name = tar.file_name().unwrap_or_default().to_string_lossy();
     let words = command
         .replace("{name}", &shell::quoted(&name))
@@ -145,7 +80,7 @@ fn hand_over(command: &str, tar: &Path, is_over: &AtomicBool) -> Result<(), Stri
         let Some(&pause_s) = pauses_s.next() else { return Err(cause) };
         eprintln!("{cause}; trying again in {pause_s} s");
         for _ in 0..10 * pause_s {
-            if is_over.load(SeqCst) {
+            if stop.load(SeqCst) {
                 return Err(cause);
             }
             std::thread::sleep(Duration::from_millis(100));

@@ -1,15 +1,15 @@
-//! The file formats of clouds, recognised by name or by first bytes.
+//! The file formats of clouds, recognised by their extension or their first bytes.
 
 use std::path::Path;
 
 use crate::error::FormatError;
 use crate::npy;
 
-/// How many first bytes [`CloudFormat::of_content`] looks at.
+/// The number of first bytes that [`CloudFormat::of_content`] examines.
 pub(super) const SNIFFED_SIZE: usize = 512;
 
 crate::named! {
-    /// A file format of clouds, whether or not this build reads it.
+    /// A file format of clouds. A build need not include all of them.
     #[non_exhaustive]
     pub enum CloudFormat: "cloud format" {
         /// Stanford's polygon format.
@@ -20,7 +20,7 @@ crate::named! {
         Npy = "npy",
         /// The Point Cloud Library's format.
         Pcd = "pcd",
-        /// Text, a point a line.
+        /// Text with a line for each point.
         Text = "xyz",
         /// Text with commas and a line of column names.
         Csv = "csv",
@@ -32,11 +32,11 @@ crate::named! {
 }
 
 impl CloudFormat {
-    /// The format that `path`'s extension names, in whichever case.
+    /// The format of the extension of `path`, in upper or lower case.
     ///
     /// # Errors
-    /// [`FormatError::Malformed`] if the extension is unknown or a mesh's.
-    pub fn of(path: &Path) -> Result<Self, FormatError> {
+    /// [`FormatError::Malformed`] for an unknown extension or that of a mesh.
+    pub fn of_path(path: &Path) -> Result<Self, FormatError> {
         let refuse = |cause: String| Err(FormatError::malformed(path, "extension", cause));
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match extension.as_str() {
@@ -56,8 +56,8 @@ impl CloudFormat {
         }
     }
 
-    /// The format whose files begin with `start`. Errors call the file `name`.
-    /// Bytes without a zero that no other format begins with are text.
+    /// The format whose files begin with `start`, or text if no format does and no byte is zero.
+    /// Errors call the file `name`.
     ///
     /// # Errors
     /// [`FormatError::Malformed`] for a mesh and for unknown binary data.
@@ -66,7 +66,7 @@ impl CloudFormat {
         let begins = |sign: &[u8]| start.starts_with(sign);
         match () {
             () if begins(b"ply\n") || begins(b"ply\r") => Ok(Self::Ply),
-            // An archive without entries begins with the end of its contents.
+            // An archive without entries begins with the end of its directory.
             () if begins(b"PK\x03\x04") || begins(b"PK\x05\x06") => Ok(Self::Npz),
             () if begins(npy::MAGIC) => Ok(Self::Npy),
             () if begins(b"# .PCD") || begins(b"VERSION") => Ok(Self::Pcd),
@@ -78,7 +78,7 @@ impl CloudFormat {
     }
 }
 
-/// Why `.laz` is not read.
+/// The error of `.laz` files.
 pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";
 const MESH: &str = "expected a cloud, found a mesh: scan it first";
@@ -98,9 +98,9 @@ mod tests {
             ("lidar.pcd.bin", CloudFormat::Kitti),
             ("c.txt", CloudFormat::Text),
         ] {
-            assert_eq!(CloudFormat::of(Path::new(name)).unwrap(), format);
+            assert_eq!(CloudFormat::of_path(Path::new(name)).unwrap(), format);
         }
-        let refusal = |name: &str| CloudFormat::of(Path::new(name)).unwrap_err().to_string();
+        let refusal = |name: &str| CloudFormat::of_path(Path::new(name)).unwrap_err().to_string();
         assert_eq!(
             refusal("chair.off"),
             "chair.off: extension: expected a cloud, found a mesh: scan it first"

@@ -1,8 +1,8 @@
-//! Raw little-endian f32, as KITTI keeps its scans: x, y, z and intensity of
-//! one point after the other, without a header.
+//! Raw little-endian f32, the format of KITTI's scans: x, y, z and intensity of
+//! each point, without a header.
 //!
-//! Names state other numbers of columns: `NAME.f32x5.bin` has five, and so
-//! has nuScenes's `NAME.pcd.bin` (x, y, z, intensity, ring).
+//! The name can state another number of columns: `NAME.f32x5.bin` has five, and
+//! nuScenes's `NAME.pcd.bin` has five as well (x, y, z, intensity, ring).
 
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -37,7 +37,7 @@ pub(super) fn read_intensities(
     Ok(Some(intensities))
 }
 
-/// Gives the numbers of every point, by their place, to `take`.
+/// Passes the numbers of every point, by their index, to `take`.
 fn read_points(
     reader: &mut impl BufRead,
     name: &Path,
@@ -64,7 +64,7 @@ fn read_points(
     }
 }
 
-/// How many numbers a point has, by the file's name: at least three.
+/// The number of columns by the file's name, at least three.
 fn columns(name: &Path) -> usize {
     let name = name.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let stem = name.strip_suffix(".bin").unwrap_or(&name);
@@ -76,9 +76,8 @@ fn columns(name: &Path) -> usize {
     }
 }
 
-/// Whether `start` begins with two blocks of a Velodyne data packet: each has
-/// 100 bytes and begins with the flag 0xFFEE (VLP-16 user manual, 9.3). Such
-/// packets could be read as points.
+/// Whether `start` begins with two blocks of a Velodyne data packet, which could be mistaken for
+/// points: each has 100 bytes and begins with the flag 0xFFEE (VLP-16 user manual, 9.3).
 fn is_velodyne_packets(start: &[u8]) -> bool {
     const FLAG: &[u8] = &[0xff, 0xee];
     start.starts_with(FLAG) && start.get(100..102) == Some(FLAG)

@@ -1,8 +1,8 @@
 //! LAS, the ASPRS's format of airborne scans.
 //!
 //! The crate `las` reads the header and knows the point formats. Its reader of
-//! points is not used: it allocates what records after the points claim, so that
-//! a file of a hundred bytes can exhaust the memory.
+//! points is not used: it allocates memory by the stated sizes of records after the
+//! points, so that a file of a hundred bytes can exhaust the memory.
 
 use std::io::{self, BufRead, Read};
 use std::path::Path;
@@ -35,7 +35,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
     Ok(points)
 }
 
-/// The header and how many bytes it takes.
+/// The header and its size, bytes.
 fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
     let wrong = |error| match error {
         las::Error::Io(error) => error,
@@ -57,8 +57,8 @@ fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
     Ok((header, n_bytes.into()))
 }
 
-/// How many points follow. Where the field of LAS 1.3 and before says
-/// something, it holds (LAS 1.4 R15, 2.4).
+/// The number of points. The field of LAS 1.3 and before takes precedence unless it is 0 (LAS 1.4
+/// R15, 2.4).
 fn n_points(header: &Header) -> u64 {
     match (header.number_of_point_records, header.large_file) {
         (0, Some(large)) => large.number_of_point_records,

@@ -1,4 +1,4 @@
-//! LAS as it is written: version 1.2, point format 0, coordinates alone.
+//! Writes LAS: version 1.2, point format 0, coordinates only.
 //!
 //! LAS holds coordinates as whole multiples of a step, from an offset. The step
 //! is the finest power of ten, a nanometre at least, in which half the cloud's
@@ -12,19 +12,19 @@ use las::raw::Header;
 use crate::atomic;
 use crate::error::FormatError;
 
-/// Ten to this is the finest step: finer than any sensor or file needs.
+/// The finest step is ten to this power, finer than any sensor or file needs.
 const FINEST: i32 = -9;
-/// Steps from the middle of the cloud to its end, at most: some below `i32`'s.
+/// Most steps from the centre of the cloud to its end, somewhat fewer than `i32` can count.
 const MOST_STEPS: f64 = 2e9;
 
-/// Bytes of a point of format 0 beside its coordinates: nothing is known of them.
+/// The other fields of a point of format 0, which are unknown.
 const UNKNOWN: [u8; 8] = {
     // Return 1 of 1 (LAS 1.2, table 5), after an intensity of two bytes.
     const RETURN_1_OF_1: u8 = 0b001_001;
     [0, 0, RETURN_1_OF_1, 0, 0, 0, 0, 0]
 };
 
-/// Where one axis's whole numbers lie.
+/// The whole numbers of one axis.
 #[derive(Clone, Copy)]
 struct Axis {
     low: f64,
@@ -36,8 +36,8 @@ struct Axis {
 /// Writes `points` to `path`, atomically.
 ///
 /// # Errors
-/// A coordinate that is not finite; more points than 32 bits count; what the
-/// system reports.
+/// A coordinate that is not finite; more points than 32 bits count; errors of the
+/// system.
 pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let infinite = |point: &[f64; 3]| point.iter().any(|x| !x.is_finite());
     if let Some(i) = points.iter().position(infinite) {

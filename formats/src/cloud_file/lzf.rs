@@ -1,16 +1,16 @@
-//! LZF, the compression of PCD files.
+//! Decompresses LZF, the compression of PCD files.
 //!
-//! Marc Lehmann's format: a control byte below 32 announces so many literal
-//! bytes and one; any other a copy of earlier output, whose length stands in its
-//! upper three bits (7: and in the next byte), whose distance in the lower five
-//! and the next byte.
+//! Marc Lehmann's format: a control byte c below 32 is followed by c + 1 literal
+//! bytes. Any other control byte is a copy of earlier output. Its upper three bits
+//! are the length (if 7, the next byte is added), and its lower five bits and the
+//! next byte are the distance.
 
 use std::io;
 
 use crate::decoding::invalid;
 
-/// What `compressed` unfolds to, `n` bytes. Memory grows with the output, of
-/// which one byte of input makes at most 88.
+/// Decompresses `compressed` to `n` bytes. Memory grows with the output; one byte of input gives at
+/// most 88 bytes.
 pub(super) fn decompress(compressed: &[u8], n: u64) -> io::Result<Vec<u8>> {
     let mut output = Vec::new();
     let mut input = compressed.iter().copied();
@@ -30,7 +30,7 @@ pub(super) fn decompress(compressed: &[u8], n: u64) -> io::Result<Vec<u8>> {
         let distance = ((control & 0x1f) << 8) + usize::from(next()?) + 1;
         let start = output.len().checked_sub(distance);
         let start = start.ok_or_else(|| invalid("an LZF copy begins before the data"))?;
-        // The copy may overlap what it makes.
+        // The copy may overlap its own output.
         for i in start..start + length + 2 {
             output.push(output[i]);
         }

@@ -1,5 +1,5 @@
-//! Clouds of points, in the formats in which sensors, tools and datasets keep
-//! them: coordinates alone, in f64, whatever the file's own type.
+//! Reads and writes clouds of points in the formats of sensors, tools and datasets:
+//! coordinates only, in f64, whatever the type in the file.
 //!
 //! | format | read | written |
 //! | --- | --- | --- |
@@ -8,12 +8,11 @@
 //! | NPY | `[n, 3]` or wider, any numbers, C or Fortran order | `[n, 3]` |
 //! | PCD | ASCII, binary, LZF-compressed | binary |
 //! | XYZ, TXT, ASC, TSV, CSV | separated by blanks, tabs, commas or semicolons | blanks, in CSV commas |
-//! | KITTI `.bin` | f32, four to a point or as many as the name says | f32, intensity 0 |
+//! | KITTI `.bin` | f32, four for each point or as many as the name states | f32, intensity 0 |
 //! | LAS | 1.0 to 1.4 | 1.2, in steps of 1 nm or more |
 //!
-//! NaN and infinities are kept; the caller decides what to do with them. Memory
-//! grows with the bytes of the file (unpacked, where they are compressed), never
-//! with a count that a header states.
+//! NaN and infinities are kept; the caller decides how to treat them. Memory grows
+//! with the decompressed bytes of the file, never with a count in a header.
 
 mod format;
 mod kitti;
@@ -45,14 +44,14 @@ use crate::records;
 pub use format::CloudFormat;
 use precision::Precision;
 
-/// Reads the cloud at `path`, in the format that its extension names.
+/// Reads the cloud at `path` in the format of its extension.
 ///
 /// # Errors
 /// An unknown extension, a format that this build does not include, a mesh, a
 /// file that cannot be read or is not of its extension's format. The error names
 /// the file and the line, element or key at fault.
 pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
-    let format = CloudFormat::of(path)?;
+    let format = CloudFormat::of_path(path)?;
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     #[cfg(feature = "npz")]
     if format == CloudFormat::Npz {
@@ -61,13 +60,13 @@ pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     read_as(&mut BufReader::new(file), format, path)
 }
 
-/// Reads the intensities of the points at `path`, as they are there; `None` if its format is not
-/// KITTI's or has none.
+/// Reads the intensities of the points at `path`, unscaled, or returns `None` if its format is not
+/// KITTI's or has no intensities.
 ///
 /// # Errors
 /// As [`read_cloud`].
 pub fn read_intensities(path: &Path) -> Result<Option<Vec<f32>>, FormatError> {
-    if CloudFormat::of(path)? != CloudFormat::Kitti {
+    if CloudFormat::of_path(path)? != CloudFormat::Kitti {
         return Ok(None);
     }
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
@@ -76,12 +75,11 @@ pub fn read_intensities(path: &Path) -> Result<Option<Vec<f32>>, FormatError> {
 
 /// Reads a cloud from `reader`, which errors call `name`.
 ///
-/// Without a `format`, the first bytes tell it. Raw floats (KITTI) cannot be
-/// recognised and must be named. An NPZ archive is held in memory, because its
-/// table of contents comes last.
+/// Without a `format`, the first bytes decide. Raw floats (KITTI) cannot be recognised and must be
+/// named. An NPZ archive is held in memory, because its directory is at the end.
 ///
 /// # Errors
-/// As [`read_cloud`], and bytes of no known format.
+/// As [`read_cloud`]; bytes of an unknown format.
 pub fn read_cloud_from(
     mut reader: impl Read,
     format: Option<CloudFormat>,
@@ -124,22 +122,21 @@ fn read_as(
     }
 }
 
-/// Writes `points` to `path`, atomically, in the format that its extension names.
+/// Writes `points` to `path`, atomically, in the format of its extension.
 ///
-/// Coordinates are written as f32 where that loses nothing, as for clouds that
-/// were read as f32, and otherwise as f64; the same points give the same bytes.
-/// Three formats round. KITTI's holds f32 only. PCD gets f64 only where f32 would
-/// lose more than a millionth of the cloud's extent, because the usual clouds of
-/// PCL and Open3D read no other type. LAS holds whole steps: 1 nm in clouds of up
-/// to 4 m, 10 nm up to 40 m, and so on.
+/// Coordinates are written as f32 if that is exact, as for clouds that were read as f32, and
+/// otherwise as f64. The same points give the same bytes. Three formats round. KITTI's holds only
+/// f32. PCD gets f64 only if f32 would lose more than a millionth of the cloud's extent, because
+/// the usual clouds of PCL and Open3D read no other type. LAS holds whole steps: 1 nm in clouds of
+/// up to 4 m, 10 nm up to 40 m, and so on.
 ///
 /// # Errors
 /// As [`read_cloud`]; raw floats of a number of columns other than four; a
-/// coordinate beyond f32 in KITTI's format, or not finite in LAS; what the
-/// system reports.
+/// coordinate beyond f32 in KITTI's format, or not finite in LAS; errors of the
+/// system.
 pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let precision = Precision::lossless(points);
-    match CloudFormat::of(path)? {
+    match CloudFormat::of_path(path)? {
         CloudFormat::Text => atomic::write(path, |writer| text::write(writer, points)),
         CloudFormat::Csv => atomic::write(path, |writer| text::write_csv(writer, points)),
         CloudFormat::Npy => atomic::write(path, |writer| npy::write(writer, points, precision)),

@@ -1,4 +1,4 @@
-//! NumPy's arrays as clouds: a row a point, its first three columns x, y, z.
+//! NumPy's arrays as clouds: each row is a point, and the first three columns are x, y, z.
 
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -21,7 +21,7 @@ pub(super) fn holds_points(header: &Header) -> bool {
     matches!(header.shape[..], [_, columns] if columns >= 3) && header.number().is_some()
 }
 
-/// More values a point than sensors give: then the array is transposed.
+/// Most values of a point. A wider array of three rows is transposed.
 const WIDEST_POINT: usize = 64;
 
 /// Reads the points that follow `header`: numbers of any type.
@@ -51,7 +51,7 @@ pub(super) fn read_points(
     Ok(points)
 }
 
-/// Reads x, y and z that each lie together.
+/// Reads all x, then all y, then all z.
 fn read_columns(
     reader: &mut (impl Read + ?Sized),
     n: u64,

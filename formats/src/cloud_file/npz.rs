@@ -8,11 +8,10 @@ use super::precision::Precision;
 use crate::archive::{NpzReader, NpzWriter};
 use crate::error::FormatError;
 
-/// The key under which scans keep their points, and under which they are
-/// written here; `origin` is to be added to them.
+/// The key of the points of scans, to which `origin` is added, and of written clouds.
 const POSITIONS: &str = "positions";
 const ORIGIN: &str = "origin";
-/// The key under which most others keep them.
+/// The key of the points in most other archives.
 const POINTS: &str = "points";
 
 /// Reads the cloud that the archive holds.
@@ -24,7 +23,7 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Vec<[f64; 3]
     };
     let mut points = npz.entry(&key, |header, _, elements| {
         let points = npy::read_points(&header, elements)?;
-        // An array in Fortran order may have more columns.
+        // An array in Fortran order may have further columns after z.
         io::copy(elements, &mut io::sink())?;
         Ok(points)
     })?;

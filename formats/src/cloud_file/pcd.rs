@@ -1,8 +1,8 @@
 //! PCD, the Point Cloud Library's format: text, binary or LZF-compressed.
 //!
-//! The crate `pcd-rs` is not used: it indexes beyond its buffers where a
-//! compressed file holds less than its header says, and allocates a vector for
-//! every field of every point.
+//! The crate `pcd-rs` is not used: it indexes beyond its buffers if a compressed
+//! file is shorter than its header states, and allocates a vector for every field
+//! of every point.
 
 use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
@@ -63,7 +63,7 @@ fn read_ascii<R: BufRead>(
     Ok(points)
 }
 
-/// Reads compressed points: each field's numbers lie together.
+/// Reads compressed points, whose numbers are stored field by field.
 fn read_compressed(
     reader: &mut impl Read,
     header: &Header,

@@ -1,4 +1,4 @@
-//! The header of PCD files: lines of key words.
+//! The header of PCD files: lines that begin with keywords.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -8,11 +8,11 @@ use crate::error::FormatError;
 use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
 
-/// What a header says of the points.
+/// A header.
 pub(super) struct Header {
-    /// How many points there are.
+    /// The number of points.
     pub n: u64,
-    /// How they follow.
+    /// The encoding of the points.
     pub encoding: Encoding,
     fields: Vec<Field>,
 }
@@ -25,14 +25,14 @@ struct Field {
     count: u64,
 }
 
-/// How points follow the header.
+/// The encoding of points.
 #[derive(Clone, Copy)]
 pub(super) enum Encoding {
-    /// A line a point.
+    /// A line for each point.
     Ascii,
-    /// Point after point.
+    /// Binary, point by point.
     Binary,
-    /// LZF-compressed, field after field.
+    /// LZF-compressed, field by field.
     Compressed,
 }
 
@@ -41,9 +41,9 @@ pub(super) enum Encoding {
 pub(super) struct Coordinate {
     /// Its type.
     pub number: NumberType,
-    /// How many bytes of a point precede it.
+    /// Its offset in a point, bytes.
     pub offset: u64,
-    /// How many numbers of a point precede it.
+    /// Its index among the numbers of a point.
     pub column: u64,
 }
 
@@ -74,7 +74,7 @@ pub(super) fn read_header<R: BufRead>(
                 for (field, word) in fields.iter_mut().zip(words) {
                     match what {
                         "SIZE" => field.size = line.count(word)?,
-                        // The library reads 0 as 1.
+                        // The Point Cloud Library reads 0 as 1.
                         "COUNT" => field.count = line.count(word)?.max(1),
                         _ => field.kind = word.chars().next().unwrap_or_default(),
                     }
@@ -96,12 +96,12 @@ pub(super) fn read_header<R: BufRead>(
 }
 
 impl Header {
-    /// Bytes of a binary point; the largest u64 if the sum is larger.
+    /// Bytes of a binary point; `u64::MAX` if the sum overflows.
     pub fn point_size(&self) -> u64 {
         self.fields.iter().fold(0, |sum: u64, field| sum.saturating_add(field.n_bytes()))
     }
 
-    /// Where the coordinate called `axis` is, or what is wrong with it.
+    /// The coordinate `axis`, or the cause of an error.
     pub fn coordinate(&self, axis: &str) -> Result<Coordinate, String> {
         let at = self.fields.iter().position(|field| field.name.eq_ignore_ascii_case(axis));
         let at = at.ok_or_else(|| {

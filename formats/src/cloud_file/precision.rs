@@ -1,4 +1,4 @@
-//! What type coordinates are written in.
+//! The type in which coordinates are written.
 
 use std::io::{self, Write};
 
@@ -7,28 +7,28 @@ use crate::number::NumberType;
 /// The type of the coordinates of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Precision {
-    /// Every coordinate is an f32.
+    /// f32.
     Single,
-    /// Some are not.
+    /// f64.
     Double,
 }
 
-/// What rounding may cost, as a part of a cloud's extent. No sensor comes near
-/// it: a micrometre in a metre.
+/// The tolerable rounding error as a fraction of a cloud's extent: a micrometre in a metre, far below
+/// the error of any sensor.
 const TOLERABLE: f64 = 1e-6;
 
 impl Precision {
-    /// What holds `points` without loss.
+    /// The type that represents `points` exactly.
     pub fn lossless(points: &[[f64; 3]]) -> Self {
         let is_single = |x: &f64| f64::from(*x as f32) == *x || x.is_nan();
         if points.as_flattened().iter().all(is_single) { Self::Single } else { Self::Double }
     }
 
-    /// What holds `points` to a millionth of the longest side of their box.
+    /// The type that represents `points` to a millionth of the longest side of their box.
     pub fn tolerable(points: &[[f64; 3]]) -> Self {
         let finite = || points.as_flattened().iter().filter(|x| x.is_finite());
         let loss = finite().map(|&x| (f64::from(x as f32) - x).abs()).fold(0.0, f64::max);
-        // An infinite loss, of a number beyond f32, is never tolerable.
+        // The error of a number beyond f32 is infinite, and never tolerable.
         if loss < f64::INFINITY && loss <= TOLERABLE * extent(points) {
             Self::Single
         } else {

@@ -1,8 +1,8 @@
-//! Clouds as text: a point a line.
+//! Clouds as text, with a line for each point.
 //!
-//! Columns are separated by semicolons, commas, tabs or blanks: the first of
-//! these that the first line has. A first line of names states which columns are
-//! x, y and z; otherwise they are the first three. Text after a `#`, and a line
+//! Semicolons, commas, tabs or blanks separate columns: the first of these that the
+//! first line has. A first line of names states the columns of x, y and z; otherwise
+//! they are the first three. Text after a `#`, and a line
 //! that begins with `//`, is a comment.
 
 use std::io::{self, BufRead, Write};
@@ -13,14 +13,14 @@ use crate::lines::{Line, Lines};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What separates the columns of a line.
+/// The separator of the columns of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Separator {
     Letter(char),
     Blanks,
 }
 
-/// Where the coordinates of a file stand.
+/// The columns of the coordinates.
 struct Layout {
     separator: Separator,
     columns: [usize; 3],
@@ -39,7 +39,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
         match &layout {
             Some(layout) => points.push(layout.point(&line, content)?),
             None => {
-                let (first, is_header) = Layout::of(&line, content)?;
+                let (first, is_header) = Layout::from_first_line(&line, content)?;
                 if !is_header {
                     points.push(first.point(&line, content)?);
                 }
@@ -50,8 +50,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
     Ok(points)
 }
 
-/// A line without its comment, and without the byte order mark that may begin
-/// a file.
+/// A line without its comment and without a byte order mark.
 fn without_comment(line: &str) -> &str {
     let line = line.strip_prefix('\u{feff}').unwrap_or(line);
     let content = line.split('#').next().unwrap_or_default().trim();
@@ -59,9 +58,9 @@ fn without_comment(line: &str) -> &str {
 }
 
 impl Layout {
-    /// What the first line tells, and whether it holds names.
-    fn of(line: &Line<'_>, content: &str) -> Result<(Self, bool), FormatError> {
-        let separator = Separator::of(content);
+    /// The layout by the first line, and whether that has names.
+    fn from_first_line(line: &Line<'_>, content: &str) -> Result<(Self, bool), FormatError> {
+        let separator = Separator::in_line(content);
         let fields: Vec<_> = separator.fields(content).collect();
         if fields.len() < AXES.len() {
             let cause = format!("expected x, y and z, found {} column(s)", fields.len());
@@ -110,7 +109,7 @@ fn is_name(field: &str) -> bool {
 }
 
 impl Separator {
-    fn of(content: &str) -> Self {
+    fn in_line(content: &str) -> Self {
         let letter = [';', ',', '\t'].into_iter().find(|&letter| content.contains(letter));
         letter.map_or(Self::Blanks, Self::Letter)
     }
@@ -122,7 +121,7 @@ impl Separator {
             Self::Blanks => letter.is_ascii_whitespace(),
         };
         let fields = content.split(separates).map(|field| field.trim().trim_matches('"'));
-        // Several blanks separate as one does.
+        // Several blanks are one separator.
         fields.filter(move |field| !field.is_empty() || self != Self::Blanks)
     }
 }

@@ -1,4 +1,4 @@
-//! Labelled sets from their archives.
+//! Reads labelled sets from their archives.
 
 use std::collections::BTreeSet;
 use std::io::{Read, Seek};
@@ -11,7 +11,7 @@ use crate::error::FormatError;
 use crate::npy;
 use crate::number::NumberType;
 
-/// What 1.0 is in `points_i16`.
+/// The value of 1.0 in `points_i16`.
 const I16_SCALE: f32 = 32767.0;
 
 /// Reads the labelled set at `path`.
@@ -59,8 +59,8 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
             return Err(npz.error(key, cause));
         }
     }
-    // Not before the file is known to hold a label for each cloud: a shape may
-    // promise any number of clouds without points.
+    // Only once the file is known to hold a label for each cloud: a shape may state any
+    // number of clouds without points.
     let offsets = ragged.unwrap_or_else(|| equal_offsets(m, shape[1]));
     let columns = LabelledSet {
         names,
@@ -77,7 +77,7 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
     Ok(LabelledSet { points, offsets, labels, ..columns })
 }
 
-/// The array `key` by `read`, if the archive has it.
+/// The array `key`, which `read` reads, if the archive has it.
 fn column<R: Read + Seek, T>(
     npz: &mut NpzReader<R>,
     key: &str,
@@ -109,8 +109,8 @@ fn read_points<R: Read + Seek>(
             let descr = &header.descr;
             return Err(invalid(format!("expected elements of type {expected}, found {descr}")));
         }
-        // f32 holds every i16 and the scale, so that this quotient is rounded
-        // once, as NumPy's own in f32.
+        // f32 represents every i16 and the scale exactly, so that the quotient is rounded
+        // once, as in NumPy.
         let points = npy::read_numbers(elements, &header, |x| x as f32 / scale)?;
         Ok((header.shape, points))
     })
@@ -196,7 +196,7 @@ fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
 ) -> Result<Vec<T>, FormatError> {
     let numbers = read_list(npz, key, |number| number)?;
     let whole = |number: f64| {
-        // Up to 2^53, far beyond any class, f64 holds every whole number.
+        // f64 represents every whole number up to 2^53, far beyond any class.
         let is_whole = number >= 0.0 && number.fract() == 0.0 && number < 2f64.powi(53);
         is_whole.then_some(number as u64).and_then(|number| T::try_from(number).ok())
     };
@@ -205,7 +205,7 @@ fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
     numbers.into_iter().map(|number| whole(number).ok_or_else(|| expected(number))).collect()
 }
 
-/// The array `key`, a list of numbers, each through `convert`.
+/// The array `key`, a list of numbers that `convert` converts.
 fn read_list<R: Read + Seek, T: Copy>(
     npz: &mut NpzReader<R>,
     key: &str,

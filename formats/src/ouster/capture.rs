@@ -1,4 +1,4 @@
-//! Captures of a sensor's packets: their first whole frame as a scan.
+//! Reads the first whole frame of a capture as a scan.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -8,14 +8,13 @@ use crate::capture::{Points, each_packet};
 use crate::error::FormatError;
 use crate::scan::Scan;
 
-/// Reads the first frame in the capture at `path`, pcap or pcapng, of which every packet was
-/// caught: points in the sensor's frame, ranges, rings, times in seconds since the frame's first
-/// packet, and reflectivities in parts of 255. UDP packets of another length are not the sensor's
-/// lidar packets, and are passed over.
+/// Reads the first complete frame of the capture at `path`, pcap or pcapng: points in the sensor's
+/// frame, ranges, rings, times in seconds since the frame's first packet, and reflectivities divided
+/// by 255. UDP packets of another length than lidar packets are skipped.
 ///
 /// # Errors
-/// A file that is not such a capture or holds no whole frame; a packet that cannot be decoded, by
-/// its number.
+/// A file that is not such a capture or has no complete frame; a packet that cannot be decoded,
+/// with its number.
 pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError> {
     let decoder = Decoder::new(metadata);
     let (mut frame, mut most) = (Frame::default(), 0);
@@ -43,14 +42,14 @@ pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError>
     Ok(frame.points.scan())
 }
 
-/// A frame while it is read.
+/// A frame that is being read.
 #[derive(Default)]
 struct Frame {
-    /// Its first packet's.
+    /// The header of its first packet.
     first: Option<Header>,
-    /// Which columns were caught.
-    caught: Vec<bool>,
-    /// How many were, of those that the sensor sends.
+    /// Whether each column was received.
+    received: Vec<bool>,
+    /// Received columns, of those that the sensor sends.
     n_columns: usize,
     points: Points,
 }
@@ -65,8 +64,8 @@ impl Frame {
     ) -> Result<(), PacketError> {
         let header = decoder.header(payload)?;
         if self.first.is_none_or(|first| first.frame_id != header.frame_id) {
-            let caught = vec![false; usize::from(header.columns_per_frame)];
-            *self = Self { first: Some(header), caught, ..Self::default() };
+            let received = vec![false; usize::from(header.columns_per_frame)];
+            *self = Self { first: Some(header), received, ..Self::default() };
         }
         let per_frame = usize::from(header.columns_per_frame);
         let first = usize::from(metadata.column_window[0]);
@@ -75,13 +74,13 @@ impl Frame {
         let start = usize::from(header.measurement_id);
         let mut is_new = false;
         for column in start..start + usize::from(header.columns) {
-            if let Some(caught @ false) = self.caught.get_mut(column) {
-                *caught = true;
+            if let Some(received @ false) = self.received.get_mut(column) {
+                *received = true;
                 is_new = true;
                 self.n_columns += usize::from(is_sent(column));
             }
         }
-        // A network may bring a packet twice.
+        // A network may deliver a packet twice.
         if is_new {
             let since = self.first.map_or(0, |first| first.time_ns);
             let packet_us = header.time_ns.saturating_sub(since) as f64 * 1e-3;

@@ -1,4 +1,4 @@
-//! What a sensor tells of itself.
+//! The metadata of a sensor.
 
 use std::fs::File;
 use std::io::Read;
@@ -9,12 +9,12 @@ use serde_json::Value;
 
 use crate::error::FormatError;
 
-/// Metadata that are longer, bytes, are refused.
+/// The longest metadata, bytes.
 const LONGEST: u64 = 4 << 20;
 
 crate::named! {
-    /// What is in a packet's pixels, words of 32 bits each; ranges in millimetres unless it says
-    /// otherwise. Other fields than these are passed over.
+    /// The contents of a packet's pixels, in words of 32 bits. Ranges are in millimetres unless
+    /// stated otherwise. Other fields are skipped.
     #[derive(Default)]
     pub enum Profile: "lidar profile" {
         /// Three words: range of 20 bits; reflectivity u8 at byte 4.
@@ -29,7 +29,7 @@ crate::named! {
     }
 }
 
-/// What decoding needs of a sensor's metadata.
+/// The metadata of a sensor that decoding needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metadata {
     pub(super) profile: Profile,
@@ -37,13 +37,13 @@ pub struct Metadata {
     pub(super) is_fusa: bool,
     pub(super) columns_per_frame: u16,
     pub(super) columns_per_packet: u16,
-    /// The first and the last column that are sent; the first may be behind the last.
+    /// The first and the last column that are sent. The first may have the larger number.
     pub(super) column_window: [u16; 2],
-    /// Turns a second.
+    /// Turns per second.
     pub(super) rate_hz: f64,
     /// Altitude and azimuth of each row, degrees.
     pub(super) beams_deg: Vec<[f64; 2]>,
-    /// x and z of where beams begin as the encoder is at 0, metres, in the lidar frame.
+    /// x and z of the origin of the beams while the encoder is at 0, metres, in the lidar frame.
     pub(super) origin_m: [f64; 2],
     /// The upper three rows of the transform, metres.
     pub(super) lidar_to_sensor: [[f64; 4]; 3],
@@ -62,11 +62,11 @@ impl Metadata {
         Self::parse(&text, path)
     }
 
-    /// Interprets `text`, which errors say is from `path`. Both layouts are known: the nested one,
-    /// and that of older firmware and programs, in which most fields stand at the top.
+    /// Parses `text`, which errors attribute to `path`. It knows both layouts: the nested one, and
+    /// the flat one of older firmware and programs.
     ///
     /// # Errors
-    /// What is not JSON, or a field that decoding needs and that is missing or makes no sense.
+    /// Text that is not JSON; a required field that is missing or invalid.
     pub fn parse(text: &str, path: &Path) -> Result<Self, FormatError> {
         if text.len() as u64 > LONGEST {
             let cause = format!("expected at most {LONGEST} bytes, found more");
@@ -80,7 +80,7 @@ impl Metadata {
         let altitudes = fields.get(BEAMS, "beam_altitude_angles", |v| numbers(v, rows, 90.0))?;
         let azimuths = fields.get(BEAMS, "beam_azimuth_angles", |v| numbers(v, rows, 360.0))?;
         Ok(Self {
-            // Firmware before 2.1 knows no other, and does not name it.
+            // Firmware before 2.1 has only this profile and does not name it.
             profile: fields.optional(FORMAT, "udp_profile_lidar", profile)?.unwrap_or_default(),
             is_fusa: fields.optional(FORMAT, "header_type", is_fusa)?.unwrap_or_default(),
             columns_per_frame,
@@ -123,32 +123,32 @@ impl Metadata {
         self.columns_per_frame
     }
 
-    /// Turns a second.
+    /// Turns per second.
     #[must_use]
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Altitude, and azimuth clockwise from where the encoder points, of each row, degrees.
+    /// Altitude of each row, and azimuth clockwise from the encoder's direction, degrees.
     #[must_use]
     pub fn beams_deg(&self) -> &[[f64; 2]] {
         &self.beams_deg
     }
 
-    /// x and z of where beams begin while the encoder is at 0, metres, in the lidar frame.
+    /// x and z of the origin of the beams while the encoder is at 0, metres, in the lidar frame.
     #[must_use]
     pub fn origin_m(&self) -> [f64; 2] {
         self.origin_m
     }
 
-    /// How the lidar is turned in the sensor's frame, radians counterclockwise.
+    /// Rotation of the lidar frame in the sensor's frame about z, radians counterclockwise.
     #[must_use]
     pub fn yaw_rad(&self) -> f64 {
         self.lidar_to_sensor[1][0].atan2(self.lidar_to_sensor[0][0])
     }
 }
 
-/// Where fields stand, in the flat layout and in the nested one.
+/// The sections of fields, in the flat layout and in the nested one.
 type Section = [&'static str; 2];
 const FORMAT: Section = ["/data_format", "/lidar_data_format"];
 const BEAMS: Section = ["", "/beam_intrinsics"];
@@ -163,7 +163,7 @@ struct Fields<'a> {
 }
 
 impl Fields<'_> {
-    /// What `parse` makes of a field, if it is there.
+    /// The field `name`, which `parse` parses, if the file has it.
     fn optional<T>(
         &self,
         section: Section,
@@ -175,7 +175,7 @@ impl Fields<'_> {
         parsed.map_err(|cause| self.error(&pointer, cause))
     }
 
-    /// The same of a field that must be there.
+    /// As [`Fields::get`], for a required field.
     fn get<T>(
         &self,
         section: Section,
@@ -191,7 +191,7 @@ impl Fields<'_> {
         FormatError::malformed(self.path, pointer[1..].replace('/', "."), cause)
     }
 
-    /// Where beams begin: newer firmware tells more than the distance from the axis.
+    /// The origin of the beams. Older firmware has only the distance from the axis.
     fn origin_m(&self) -> Result<[f64; 2], FormatError> {
         let of_transform = |v: &Value| rows(v).map(|[x, _, z]| [x[3], z[3]]);
         if let Some(origin) = self.optional(BEAMS, "beam_to_lidar_transform", of_transform)? {
@@ -202,7 +202,7 @@ impl Fields<'_> {
     }
 }
 
-/// No part of a sensor is farther from another, millimetres.
+/// The largest distance between parts of a sensor, millimetres.
 const FARTHEST_MM: f64 = 1e4;
 
 fn whole(value: &Value, range: RangeInclusive<u16>) -> Result<u16, String> {
@@ -248,16 +248,16 @@ fn window(value: &Value, columns: u16) -> Result<[u16; 2], String> {
     Ok([column(0)?, column(1)?])
 }
 
-/// Turns a second, of a mode such as 1024x10.
+/// The turns per second of a mode such as 1024x10.
 fn rate_hz(value: &Value, columns: u16) -> Result<f64, String> {
     let rate = value.as_str().and_then(|mode| mode.strip_prefix(&format!("{columns}x")));
     let rate = rate.and_then(|rate| rate.parse().ok()).filter(|rate: &u8| (1..=100).contains(rate));
     let found =
-        rate.ok_or_else(|| format!("expected {columns}x10 or alike, found {}", shown(value)));
+        rate.ok_or_else(|| format!("expected a mode such as {columns}x10, found {}", shown(value)));
     found.map(f64::from)
 }
 
-/// The upper three rows of a transform in millimetres, in metres.
+/// The upper three rows of a transform, converted from millimetres to metres.
 fn rows(value: &Value) -> Result<[[f64; 4]; 3], String> {
     let found = numbers(value, 16, FARTHEST_MM)?;
     let mut rows = [[0.0; 4]; 3];
@@ -267,18 +267,18 @@ fn rows(value: &Value) -> Result<[[f64; 4]; 3], String> {
     Ok(rows)
 }
 
-/// The same of a transform that keeps lengths.
+/// As [`transform`], for a rotation and a translation.
 fn rigid(value: &Value) -> Result<[[f64; 4]; 3], String> {
     let rows = rows(value)?;
     let product = |i: usize, j: usize| (0..3).map(|k| rows[i][k] * rows[j][k]).sum::<f64>();
     let is_off = |i: usize, j: usize| (product(i, j) - f64::from(i == j)).abs() > 1e-3;
     if (0..3).any(|i| (0..3).any(|j| is_off(i, j))) {
-        return Err(format!("expected a rotation and a shift, found {}", shown(value)));
+        return Err(format!("expected a rotation and a translation, found {}", shown(value)));
     }
     Ok(rows)
 }
 
-/// The start of a value.
+/// The start of a value, for errors.
 fn shown(value: &Value) -> String {
     let text = value.to_string();
     let start: String = text.chars().take(40).collect();

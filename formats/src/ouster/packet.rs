@@ -1,4 +1,4 @@
-//! One lidar packet, decoded.
+//! Decodes one lidar packet.
 
 use super::{Metadata, Profile};
 use crate::returns::{Kind, Return};
@@ -10,15 +10,15 @@ const RANGE_UNIT_M: f64 = 0.001;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PacketError {
-    /// Another length, such as that of an IMU packet.
+    /// The payload has another length, such as that of an IMU packet.
     #[error("expected a lidar packet of {expected} bytes, found {found} bytes")]
     Length {
-        /// By the metadata.
+        /// The length by the metadata.
         expected: usize,
-        /// Of the payload.
+        /// The length of the payload.
         found: usize,
     },
-    /// Another type of packet.
+    /// The packet is of another type.
     #[error("expected a packet of type 1 (lidar), found type {0}")]
     Type(u8),
     /// A valid column that does not follow the column before it, or is not in the frame.
@@ -26,32 +26,32 @@ pub enum PacketError {
     Measurement {
         /// The column, from 0.
         column: usize,
-        /// Its number in the frame by the packet's first column.
+        /// Its number in the frame, counted from the packet's first column.
         expected: usize,
         /// The number of columns in a frame.
         per_frame: u16,
-        /// The number that it states.
+        /// The number in its header.
         found: u16,
     },
 }
 
-/// What a packet states about itself, and the metadata about all packets.
+/// The header of a packet, with the sizes from the metadata.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
-    /// The turn that it is of: counted up, and after the largest from 0 again.
+    /// The number of its turn, which wraps to 0 after the largest.
     pub frame_id: u32,
     /// The number of its first column in the frame, from 0. The others follow.
     pub measurement_id: u16,
-    /// When the first valid column was measured, or the first if none is: nanoseconds of the
-    /// sensor's clock.
+    /// The time of the first valid column, or of the first column if none is valid: nanoseconds of
+    /// the sensor's clock.
     pub time_ns: u64,
     /// Columns in a turn.
     pub columns_per_frame: u16,
     /// Columns in this packet, 64 at most.
     pub columns: u16,
-    /// Which columns were measured: the lowest bit is the first.
+    /// The valid columns as bits, the first column lowest.
     pub valid: u64,
-    /// Microseconds of turning that all columns take at the nominal rate.
+    /// The duration of all columns at the nominal rate, microseconds.
     pub duration_us: f64,
 }
 
@@ -72,16 +72,16 @@ struct Layout {
     column: usize,
     column_header: usize,
     pixel: usize,
-    /// Where a column states whether it is valid.
+    /// The offset of a column's valid bit.
     status: usize,
 }
 
 /// A row of pixels.
 #[derive(Clone, Copy, Debug)]
 struct Beam {
-    /// Counted from the lowest altitude.
+    /// Its ring, from the lowest altitude.
     ring: u16,
-    /// Of length 1 in the lidar frame, as the encoder is at 0.
+    /// Its direction in the lidar frame while the encoder is at 0, of length 1.
     direction: [f64; 3],
 }
 
@@ -129,12 +129,12 @@ impl Layout {
 }
 
 impl Decoder {
-    /// For packets of the sensor that `metadata` are of.
+    /// A decoder for packets of the sensor with these `metadata`.
     #[must_use]
     pub fn new(metadata: &Metadata) -> Self {
         let mut beams: Vec<_> =
             metadata.beams_deg.iter().map(|&angles| Beam::new(angles)).collect();
-        // Rows are listed from above: of two of the same altitude, the later one is the lower.
+        // Rows are listed from above: of two with the same altitude, the later one is lower.
         let mut rising: Vec<_> = (0..beams.len()).rev().collect();
         let altitude = |&row: &usize| metadata.beams_deg[row][0];
         rising.sort_by(|a, b| altitude(a).total_cmp(&altitude(b)));
@@ -156,14 +156,14 @@ impl Decoder {
         self.metadata.columns_per_packet
     }
 
-    /// How far ahead of the encoder, or behind it, the rows aim at most, radians.
+    /// The largest azimuth offset of a row from the encoder, radians.
     #[must_use]
     pub fn most_offset_rad(&self) -> f64 {
         let azimuths = self.metadata.beams_deg.iter().map(|[_, azimuth]| azimuth.abs());
         azimuths.fold(0.0, f64::max).to_radians()
     }
 
-    /// The altitudes of its rows, radians, by ring: ascending.
+    /// The altitudes of the rows by ring, ascending, radians.
     #[must_use]
     pub fn elevations_rad(&self) -> Vec<f32> {
         let rows = self.metadata.beams_deg.iter();
@@ -173,7 +173,7 @@ impl Decoder {
         elevations
     }
 
-    /// What `payload` states.
+    /// The header of `payload`.
     ///
     /// # Errors
     /// If it is not a lidar packet of this sensor.
@@ -214,11 +214,11 @@ impl Decoder {
         })
     }
 
-    /// Gives each return of `payload` to `each`, column by column and in these row by row. A pixel
-    /// without a range has none, nor has a column that is not valid.
+    /// Passes each return of `payload` to `each`, by column and then by row. Pixels without a range
+    /// and invalid columns have no returns.
     ///
     /// # Errors
-    /// If it is not a lidar packet of this sensor; nothing was given then.
+    /// If it is not a lidar packet of this sensor; `each` is not called then.
     pub fn decode(
         &self,
         payload: &[u8],
@@ -270,10 +270,10 @@ impl Decoder {
             .map(|[x, y, z, shift]| [x * cos + y * sin, y * cos - x * sin, z, shift])
     }
 
-    /// Where a beam met something, metres.
+    /// The point of a return, metres.
     fn point(&self, pose: &[[f64; 4]; 3], beam: &Beam, range: f64) -> [f64; 3] {
         let [x, z] = self.metadata.origin_m;
-        // The sensor counts ranges as if beams came from the lidar frame's origin.
+        // The sensor reports ranges from the origin of the lidar frame.
         let along = range - if z == 0.0 { x } else { x.hypot(z) };
         let [dx, dy, dz] = beam.direction.map(|component| along * component);
         pose.map(|row| row[0] * (dx + x) + row[1] * dy + row[2] * (dz + z) + row[3])
@@ -292,7 +292,7 @@ fn u16_at(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])
 }
 
-/// When a column was measured.
+/// The time of a column.
 fn time_ns(column: &[u8]) -> u64 {
     (0..4).map(|i| u64::from(u16_at(column, 2 * i)) << (16 * i)).sum()
 }

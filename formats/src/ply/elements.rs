@@ -1,4 +1,4 @@
-//! The elements of PLY files, as rows of numbers.
+//! Reads the elements of PLY files as rows of numbers.
 
 use std::io::{self, BufRead, Read};
 use std::path::Path;
@@ -10,20 +10,19 @@ use crate::lines::Lines;
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
-/// Reads the elements that `wanted` names of the PLY file in `reader`, which
-/// errors call `name`.
+/// Reads the elements `wanted` of the PLY file in `reader`, which errors call `name`.
 ///
-/// A kind is its place in `wanted`. For each of them, `choose` picks properties
-/// by their places. `each` is given the kind and one element's row: the numbers
-/// of the chosen properties in the order of the choice. A list may be chosen
-/// too, as the last property: its numbers end the row. Other properties and
-/// elements are skipped. Memory does not grow with the counts of the header.
+/// A kind of element is its index in `wanted`. For each kind, `choose` returns the indices of
+/// properties. `each` gets the kind and a row for each element: the numbers of the chosen
+/// properties, in the order of the choice. The last of them may be a list, whose numbers end the
+/// row. Other properties and elements are skipped. Memory does not grow with the counts of the
+/// header.
 ///
-/// Returns the `origin` that the header states: what to add to every position.
+/// Returns the `origin` of the header, an offset to add to every position.
 ///
 /// # Errors
 /// [`FormatError::Malformed`] for a file that is not PLY, lacks an element of
-/// `wanted`, does not please `choose`, or ends before all elements.
+/// `wanted`, is refused by `choose`, or ends before all elements.
 pub fn read_elements(
     reader: &mut impl BufRead,
     name: &Path,
@@ -41,10 +40,10 @@ pub fn read_elements(
         let chosen = choose(kind, &header.elements[at]).map_err(|cause| wrong(wanted, cause))?;
         choices[at] = Some((kind, chosen));
     }
-    // What follows the last wanted element is not looked at.
+    // The rest of the file after the last wanted element is ignored.
     let end = choices.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     for (element, choice) in header.elements.iter().zip(choices.into_iter().take(end)) {
-        // Such elements take no line and no byte.
+        // Elements without properties take no line and no byte.
         if element.properties.is_empty() {
             continue;
         }
@@ -119,8 +118,8 @@ fn read_binary(
     Ok(())
 }
 
-/// Reads one element and keeps the chosen numbers in `row`. `next` gives the
-/// next number of a property, or the length of a list, whose type it is told.
+/// Reads one element and stores the chosen numbers in `row`. `next` reads a number of the given
+/// type: that of a property, or the length of a list.
 fn read_row<E>(
     element: &Element,
     chosen: &[usize],

@@ -8,33 +8,33 @@ use crate::error::FormatError;
 use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
 
-/// What a header says.
+/// A header.
 pub(super) struct Header {
-    /// How the elements follow: as text, or in which byte order.
+    /// The encoding of the elements.
     pub encoding: Encoding,
-    /// What to add to every point, from the comment `origin X Y Z` of scans.
+    /// An offset to add to every point, from the comment `origin X Y Z` of scans.
     pub origin: Option<[f64; 3]>,
-    /// The elements in the order in which they follow.
+    /// The kinds of elements, in the order of the file.
     pub elements: Vec<Element>,
 }
 
-/// How elements follow the header.
+/// The encoding of elements.
 #[derive(Clone, Copy)]
 pub(super) enum Encoding {
-    /// A line each.
+    /// A line for each element.
     Ascii,
-    /// Number after number.
+    /// Binary numbers in this byte order.
     Binary(ByteOrder),
 }
 
-/// A kind of element, of which the file has `n`.
+/// A kind of element; the file has `n` of it.
 pub struct Element {
     pub(super) name: String,
     pub(super) n: u64,
     pub(super) properties: Vec<Property>,
 }
 
-/// A property that each element of a kind has.
+/// A property of each element of a kind.
 pub(super) struct Property {
     pub name: String,
     /// The type of its number, or of its list's numbers.
@@ -50,10 +50,10 @@ impl Element {
         self.properties.iter().any(|property| property.name == name)
     }
 
-    /// The place of the property `name`, a number.
+    /// The index of the property `name`, which must be a number.
     ///
     /// # Errors
-    /// If there is no such property, or if it is a list.
+    /// If the property is missing or is a list.
     pub fn scalar(&self, name: &str) -> Result<usize, String> {
         let at = self.properties.iter().position(|property| property.name == name);
         match at {
@@ -65,23 +65,23 @@ impl Element {
         }
     }
 
-    /// The place of the first list of one of these names.
+    /// The index of the first list with one of these names.
     ///
     /// # Errors
-    /// If there is none.
+    /// If no such list exists.
     pub fn list(&self, names: &[&str]) -> Result<usize, String> {
         let is_wanted = |p: &Property| p.length.is_some() && names.contains(&p.name.as_str());
         let at = self.properties.iter().position(is_wanted);
         at.ok_or_else(|| format!("expected a list called {}", names.join(" or ")))
     }
 
-    /// Whether the numbers of the property at this place are of type `float`.
+    /// Whether the property at this index is of type `float`.
     #[must_use]
     pub fn is_single(&self, at: usize) -> bool {
         self.properties[at].number == NumberType::F32
     }
 
-    /// Bytes of a binary element; none if it has a list.
+    /// Bytes of a binary element, or `None` if it has a list.
     pub(super) fn size(&self) -> Option<usize> {
         let size = |property: &Property| match property.length {
             Some(_) => None,

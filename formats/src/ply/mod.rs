@@ -1,5 +1,5 @@
-//! PLY, Stanford's polygon format: the one reader of its elements, ASCII or
-//! binary of either byte order, which clouds, scans and meshes share.
+//! PLY, Stanford's polygon format. Clouds, scans and meshes share the reader of its elements, which
+//! are ASCII, or binary of either byte order.
 
 mod elements;
 mod header;

@@ -1,9 +1,9 @@
-//! Scans as PLY files, binary little-endian, one `vertex` a point.
+//! Scans as PLY files, binary little-endian, with a `vertex` for each point.
 //!
 //! Properties: `x y z`, then `range` (float), `beam` (uint), `ring` (ushort),
 //! `time` (float), `triangle` (uint), `object` (uint), `intensity` (float),
-//! `nx ny nz` (float), those that the scan has. An origin other than 0 is the
-//! comment `origin X Y Z`. Open3D 0.20 reads the properties of type float and
+//! `nx ny nz` (float), if the scan has them. An origin other than 0 is the comment
+//! `origin X Y Z`. Open3D 0.20 reads the properties of type float and
 //! skips the others; from NPZ it reads all of them.
 
 use std::fs::File;
@@ -20,7 +20,7 @@ use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 /// `hashing` asks for.
 ///
 /// # Errors
-/// An attribute of another length than the positions; what the system reports.
+/// An attribute of another length than the positions; errors of the system.
 pub fn write_scan(
     path: &Path,
     hashing: Hashing,
@@ -72,8 +72,8 @@ fn header(scan: &Scan) -> String {
     header + "end_header\n"
 }
 
-/// Reads a scan from a PLY file, ASCII or binary, whatever the order of its
-/// properties. Properties of other names are skipped.
+/// Reads a scan from a PLY file, ASCII or binary, with properties in any order. Other properties are
+/// skipped.
 ///
 /// # Errors
 /// A file that is not PLY, lacks x, y or z, holds a number that does not fit its
@@ -116,7 +116,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     Ok(scan)
 }
 
-/// The numbers of all vertices, `width` of each.
+/// The numbers of all vertices, `width` for each.
 struct Rows<'a> {
     values: &'a [f64],
     width: usize,

@@ -1,4 +1,4 @@
-//! Captures of a sensor's packets: their first turn as a scan, and how many returns they hold.
+//! Reads the first turn of a capture as a scan, and counts returns.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -12,11 +12,11 @@ use crate::scan::Scan;
 use crate::vlp32c::packet::PAYLOAD_SIZE;
 use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, WHITE};
 
-/// Counts the beams that returned something in the capture of a VLP-32C at `path`: the two
-/// returns of one beam are one.
+/// Counts the beams with a return in the capture of a VLP-32C at `path`. Two returns of a beam count
+/// as one.
 ///
 /// # Errors
-/// A file that cannot be read or is not such a capture; the packet is named.
+/// A file that cannot be read or is not such a capture, with the number of the packet.
 pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
     let decoder = Decoder::new(Model::Vlp32c);
     let mut count = 0;
@@ -26,24 +26,24 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
             all += 1;
             strongest += u64::from(found.kind == Kind::Strongest);
         })?;
-        // Of a beam with two different returns, both were given.
+        // A beam with two different returns was counted twice.
         count += if header.returns == Returns::Dual { all - strongest } else { all };
         Ok::<_, PacketError>(ControlFlow::Continue(()))
     })?;
     Ok(count)
 }
 
-/// Reads the first whole turn of a VLP-16 or VLP-32C in the capture at `path`, pcap or pcapng: points
-/// in the sensor's frame, ranges, rings, times in seconds since the first packet, and reflectivities
-/// in parts of 100. UDP packets of another length are not the sensor's data, and are passed over.
+/// Reads the first complete turn of a VLP-16 or VLP-32C in the capture at `path`, pcap or pcapng:
+/// points in the sensor's frame, ranges, rings, times in seconds since the first packet, and
+/// reflectivities divided by 100. UDP packets of another length are skipped.
 ///
 /// # Errors
-/// A file that is not such a capture or holds no whole turn; a packet that cannot be decoded,
-/// by its number.
+/// A file that is not such a capture or has no complete turn; a packet that cannot be decoded,
+/// with its number.
 pub fn read_turn(path: &Path) -> Result<Scan, FormatError> {
     let mut turn = Turn::default();
     let n_packets = each_packet(path, |payload| turn.take(payload))?;
-    // A unit may be lost to rounding.
+    // Rounding may lose a unit.
     if turn.end() < f64::from(TURN) - 1.0 {
         let found = match turn.decoder {
             None => format!("none among {n_packets} UDP packets"),
@@ -55,13 +55,13 @@ pub fn read_turn(path: &Path) -> Result<Scan, FormatError> {
     Ok(turn.points.scan())
 }
 
-/// A turn while it is read.
+/// A turn that is being read.
 #[derive(Default)]
 struct Turn {
     decoder: Option<Decoder>,
-    /// The packet before.
+    /// The header of the packet before.
     before: Option<Header>,
-    /// Where the last packet began, azimuth units since the first one began.
+    /// Azimuth units from the start of the first packet to that of the last.
     start: f64,
     /// Microseconds since the first packet.
     time_us: f64,
@@ -69,18 +69,18 @@ struct Turn {
 }
 
 impl Turn {
-    /// Adds a packet, unless the turn was whole before.
+    /// Adds a packet, or breaks if the turn was complete before it.
     fn take(&mut self, payload: &[u8]) -> Result<ControlFlow<()>, PacketError> {
         if payload.len() != PAYLOAD_SIZE {
             return Ok(ControlFlow::Continue(()));
         }
-        let header = Header::of(payload)?;
+        let header = Header::parse(payload)?;
         if let Some(before) = self.before {
             self.start += f64::from(advance(before.azimuth, header.azimuth));
             if self.start >= f64::from(TURN) {
                 return Ok(ControlFlow::Break(()));
             }
-            // Past the hour, counting begins anew.
+            // Times restart every hour.
             self.time_us += f64::from(header.time_us.saturating_sub(before.time_us));
         }
         self.before = Some(header);
@@ -94,7 +94,7 @@ impl Turn {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// Where the last packet ended.
+    /// Azimuth units from the start of the first packet to the end of the last.
     fn end(&self) -> f64 {
         let span = |last: Header| last.units_per_us * last.duration_us();
         self.start + self.before.map_or(0.0, span)

@@ -3,7 +3,7 @@
 use crate::vlp32c::{BEAM_CROSSING_M, DISTANCE_UNIT_M, SEQUENCE_US};
 
 crate::named! {
-    /// A spinning sensor of Velodyne's.
+    /// A spinning sensor of Velodyne.
     pub enum Model: "sensor model" {
         /// VLP-16 "Puck".
         Vlp16 = "vlp16",
@@ -53,30 +53,30 @@ const VLP32C_DEG: [[f64; 2]; 32] = [
     [1.4, -1.333],
 ];
 
-/// From one firing of a sequence to the next, microseconds (both user manuals).
+/// Time between two firings of a sequence, microseconds (both user manuals).
 const FIRING_US: f64 = 2.304;
 
-/// How far the beams of a VLP-16 cross in front of the axis, metres: its vertical corrections in
-/// `VLP16db.yaml`, 11.2 mm at 15 degrees.
+/// Distance from the axis at which the beams of a VLP-16 cross, metres: from the vertical corrections
+/// in `VLP16db.yaml`, 11.2 mm at 15 degrees.
 const VLP16_CROSSING_M: f64 = 0.0419;
 
-/// Where a laser aims and when it fires.
+/// The direction and the firing time of a laser.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Laser {
-    /// Counted from the lowest elevation.
+    /// Its ring, from the lowest elevation.
     pub ring: u16,
-    /// Against the encoder's azimuth, radians.
+    /// Azimuth offset from the encoder, radians.
     pub azimuth_offset: f64,
     pub sin_elevation: f64,
     pub cos_elevation: f64,
-    /// Metres below where the beam would be if it crossed the axis at the origin.
+    /// Distance of the beam below a beam that crosses the axis at the origin, metres.
     pub drop_m: f64,
-    /// After the start of its firing sequence, microseconds.
+    /// Time after the start of the firing sequence, microseconds.
     pub fires_us: f64,
 }
 
 impl Model {
-    /// The model by the last byte of its packets.
+    /// The model with this last byte of packets.
     #[must_use]
     pub fn of_byte(byte: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|model| model.byte() == byte)
@@ -99,7 +99,7 @@ impl Model {
         }
     }
 
-    /// Firing sequences of each block.
+    /// Firing sequences in a block.
     pub(super) fn sequences_per_block(self) -> usize {
         match self {
             Self::Vlp16 => 2,
@@ -107,12 +107,12 @@ impl Model {
         }
     }
 
-    /// Microseconds of each block.
+    /// Duration of a block, microseconds.
     pub(super) fn block_us(self) -> f64 {
         self.sequences_per_block() as f64 * SEQUENCE_US
     }
 
-    /// Its lasers, as packets list them.
+    /// Its lasers, in the order of packets.
     pub(super) fn lasers(self) -> Vec<Laser> {
         let (angles_deg, crossing_m, at_once) = match self {
             Self::Vlp16 => {

@@ -1,4 +1,4 @@
-//! One data packet, decoded.
+//! Decodes one data packet.
 
 use super::Model;
 use super::model::Laser;
@@ -15,13 +15,13 @@ pub(super) const TURN: u16 = 36_000;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PacketError {
-    /// Another length.
+    /// The payload has another length.
     #[error("expected a data packet of 1206 bytes, found {0} bytes")]
     Length(usize),
-    /// A sensor that is not known here.
+    /// The sensor is not supported.
     #[error("expected a packet of a VLP-16 (byte 0x22) or VLP-32C (0x28), found byte {0:#04x}")]
     Model(u8),
-    /// Another sensor than the packets before.
+    /// The sensor is another one than that of the packets before.
     #[error("expected a packet of a {expected}, found one of a {found}")]
     OtherModel {
         /// The sensor of the packets before.
@@ -29,13 +29,13 @@ pub enum PacketError {
         /// The sensor of this packet.
         found: Model,
     },
-    /// A byte that names no return mode.
+    /// The byte of the return mode is unknown.
     #[error("expected the return mode 0x37, 0x38 or 0x39, found {0:#04x}")]
     Returns(u8),
-    /// A block without its flag.
+    /// A block has no flag.
     #[error("block {0}: expected the flag ff ee")]
     Flag(usize),
-    /// An azimuth beyond a turn.
+    /// An azimuth exceeds a turn.
     #[error("block {block}: expected an azimuth below 36000, found {found}")]
     Azimuth {
         /// The block, from 0.
@@ -45,20 +45,19 @@ pub enum PacketError {
     },
 }
 
-/// What a packet states about itself.
+/// The header of a packet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
     /// The sensor.
     pub model: Model,
-    /// Which returns it sends.
+    /// The returns that it sends.
     pub returns: Returns,
-    /// Microseconds past the hour at which the first block was fired.
+    /// Firing time of the first block, microseconds past the hour.
     pub time_us: u32,
     /// The encoder's azimuth at the first block, units of 0.01 degree.
     pub azimuth: u16,
-    /// Units of 0.01 degree that the head turns in a microsecond, by the packet's first and last
-    /// azimuth. A head that seems to go backwards has been stopped or started: it counts as
-    /// standing.
+    /// Rotation rate of the head, units of 0.01 degree per microsecond, from the packet's first and
+    /// last azimuth. It is 0 if the head seems to turn backwards, as while it starts or stops.
     pub units_per_us: f64,
 }
 
@@ -70,15 +69,15 @@ pub struct Decoder {
 }
 
 impl Header {
-    /// What `payload` states.
+    /// The header of `payload`.
     ///
     /// # Errors
-    /// If it is no data packet of a sensor that is known here.
-    pub fn of(payload: &[u8]) -> Result<Self, PacketError> {
+    /// If it is not a data packet of a supported sensor.
+    pub fn parse(payload: &[u8]) -> Result<Self, PacketError> {
         Self::of_blocks(payload, &blocks(payload)?)
     }
 
-    /// The same, of a payload whose blocks are at hand.
+    /// The header of a payload with these blocks.
     fn of_blocks(payload: &[u8], blocks: &[&[u8]; BLOCKS]) -> Result<Self, PacketError> {
         let [.., a, b, c, d, mode, model] = *payload else {
             return Err(PacketError::Length(payload.len()));
@@ -97,7 +96,7 @@ impl Header {
         })
     }
 
-    /// Microseconds from the packet's first firing sequence to the end of its last.
+    /// Time from the start of the packet's first firing sequence to the end of its last, microseconds.
     #[must_use]
     pub fn duration_us(&self) -> f64 {
         (BLOCKS / self.returns.blocks_per_sequence()) as f64 * self.model.block_us()
@@ -105,13 +104,13 @@ impl Header {
 }
 
 impl Decoder {
-    /// For packets of `model`.
+    /// A decoder for packets of `model`.
     #[must_use]
     pub fn new(model: Model) -> Self {
         Self { model, lasers: model.lasers() }
     }
 
-    /// How far ahead of the encoder, or behind it, the lasers aim at most, radians.
+    /// The largest azimuth offset of a laser from the encoder, radians.
     #[must_use]
     pub fn most_offset_rad(&self) -> f64 {
         self.lasers.iter().map(|laser| laser.azimuth_offset.abs()).fold(0.0, f64::max)
@@ -123,7 +122,7 @@ impl Decoder {
         self.model
     }
 
-    /// The elevations of its lasers, radians, by ring: ascending.
+    /// The elevations of its lasers by ring, ascending, radians.
     #[must_use]
     pub fn elevations_rad(&self) -> Vec<f32> {
         let elevation = |laser: &Laser| laser.sin_elevation.atan2(laser.cos_elevation) as f32;
@@ -132,11 +131,11 @@ impl Decoder {
         elevations
     }
 
-    /// Gives each return of `payload` to `each`, in the order of firing. Of a beam whose last
-    /// return is the strongest, there is one.
+    /// Passes each return of `payload` to `each`, in the order of firing. A beam whose last return is
+    /// the strongest has one return.
     ///
     /// # Errors
-    /// If it is no data packet of this sensor; nothing was given then.
+    /// If it is not a data packet of this sensor; `each` is not called then.
     pub fn decode(
         &self,
         payload: &[u8],
@@ -227,7 +226,7 @@ fn measurement(block: &[u8], i: usize) -> (u16, u8) {
     (u16::from_le_bytes([bytes[0], bytes[1]]), bytes[2])
 }
 
-/// Azimuth units from one azimuth to a later one; none if the later one seems to be earlier.
+/// Azimuth units from one azimuth to a later one, or 0 if the head seems to turn backwards.
 pub(super) fn advance(from: u16, to: u16) -> u16 {
     let turned = if to >= from { to - from } else { TURN - from + to };
     if turned > TURN / 2 { 0 } else { turned }

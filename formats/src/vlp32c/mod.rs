@@ -1,25 +1,24 @@
-//! Scans as a Velodyne VLP-32C sends them: data packets in a capture, which any
-//! driver of the sensor decodes, [`crate::velodyne`] among them.
+//! Writes scans as the data packets of a Velodyne VLP-32C in a capture, which drivers of the sensor
+//! decode, and [`crate::velodyne`] as well.
 //!
 //! Layout and timing: VLP-32C User Manual 63-9325, chapter 9. A packet's 1206
 //! bytes, little-endian, are sent to UDP port 2368:
 //!
-//! | bytes | what |
+//! | bytes | contents |
 //! | --- | --- |
 //! | 12 x 100 | blocks: `FF EE`, azimuth u16 in 0.01 degree, then for each laser distance u16 in 4 mm and reflectivity u8 |
-//! | 4 | microseconds past the hour at which the first block was fired |
+//! | 4 | firing time of the first block, microseconds past the hour |
 //! | 1 | returns: `37` strongest, `38` last, `39` both |
 //! | 1 | `28`, the model |
 //!
 //! A block is one firing sequence of 55.296 us: lasers 0 to 31, two at a time,
-//! 2.304 us apart. With both returns each sequence has two blocks, of the last
-//! and of the strongest return, or of the second strongest where the strongest is the last;
-//! where there is but one, they are identical (p. 57). A beam that saw nothing has distance 0. Sequences
-//! are written whether or not they saw something, from the one at azimuth 0 to
-//! the end of the revolution, and on to the end of the last packet without
-//! returns.
+//! 2.304 us apart. With both returns each sequence has two blocks: the last return,
+//! and the strongest one or, if the last is the strongest, the second strongest. With
+//! a single return they are identical (p. 57). A beam without a return has distance 0.
+//! All sequences are written, from azimuth 0 to the end of the revolution; sequences
+//! without returns fill the last packet.
 //!
-//! # What a decoder makes of it
+//! # Decoding
 //!
 //! Laser l, at azimuth offset a and elevation e, with distance r in a block of
 //! azimuth A, that fires t after the block's start while the head turns at w:
@@ -31,19 +30,19 @@
 //! z =  r sin(e) - 0.0424 m x tan(e)        beams cross 42.4 mm off the axis
 //! ```
 //!
-//! So distance counts from (0, 0, -0.0424 m x tan(e)) on the axis, and a scan
-//! whose beams were cast from there, at azimuths that are A + w t - a for a
-//! whole A, comes back but for the roundings:
+//! Distances are measured from (0, 0, -0.0424 m x tan(e)) on the axis. A scan whose
+//! beams were cast from there, at azimuths A + w t - a with a whole A, is decoded
+//! with rounding errors only:
 //!
 //! - range: half a unit, 2 mm;
-//! - azimuth: a decoder rounds A + w t to 0.01 degree, which is off by half of
-//!   that, and takes w from the azimuths of the packet's first and last block,
-//!   each off by half a unit, as well. Over t, 34.56 us at most, of the 11 (5 with
-//!   both returns) sequences between them that is 0.057 (0.125) unit. Together
+//! - azimuth: a decoder rounds A + w t to 0.01 degree, an error of half a unit. It
+//!   also takes w from the azimuths of the packet's first and last block, each with
+//!   an error of half a unit; over t, at most 34.56 us of the 11 (5 with both
+//!   returns) sequences between them, that is 0.057 (0.125) unit. The sum is
 //!   0.0056 (0.0063) degree.
 //!
-//! A scan that was cast from one point could not come back: no range along a
-//! line that starts 20 mm lower ends at the same point.
+//! A scan whose beams were cast from a single point could not be decoded so: a line
+//! that starts 20 mm lower does not reach the same point.
 
 pub(crate) mod packet;
 
@@ -62,7 +61,7 @@ use crate::pcap::{self, Sender};
 use crate::scan::{Attribute, Scan};
 use packet::{BLOCKS, LASERS, Measurement, Sequence};
 
-/// From one firing sequence to the next, microseconds.
+/// Time between two firing sequences, microseconds.
 pub const SEQUENCE_US: f64 = 55.296;
 
 /// Firing sequences of a packet that holds one return of each beam.
@@ -73,7 +72,7 @@ const HOUR_US: u64 = 3_600_000_000;
 /// The unit of distances, metres.
 pub const DISTANCE_UNIT_M: f64 = 0.004;
 
-/// The farthest distance that a packet can tell, metres.
+/// The largest distance in a packet, metres.
 pub const FARTHEST_M: f64 = u16::MAX as f64 * DISTANCE_UNIT_M;
 
 /// The unit of azimuths, degrees.
@@ -81,19 +80,19 @@ pub const AZIMUTH_UNIT_DEG: f64 = 0.01;
 
 const UNITS_PER_TURN: f64 = 360.0 / AZIMUTH_UNIT_DEG;
 
-/// All beams cross this far in front of the axis, metres: what velodyne-decoder
-/// 3.1.0 takes off its points' z.
+/// Distance from the axis at which all beams cross, metres: velodyne-decoder 3.1.0 corrects the z of
+/// its points by it.
 pub const BEAM_CROSSING_M: f64 = 0.0424;
 
-/// When every revolution and capture starts: 2000-01-01, 00:00:00 UTC, in Unix time, so
-/// that the same scan gives the same bytes.
+/// The start of every revolution and capture, so that the same scan gives the same bytes:
+/// 2000-01-01, 00:00:00 UTC, in Unix time.
 pub const START_S: u32 = 946_684_800;
 
 /// The reflectivity of every return of a scan without intensity: a white
 /// surface that scatters all light.
 pub const WHITE: u8 = 100;
 
-/// A sensor as it leaves the factory: its address, and a MAC of its maker's.
+/// A sensor with its factory settings: its IP address, and a MAC address of its maker.
 const SENSOR: Sender =
     Sender { mac: [0x60, 0x76, 0x88, 0, 0, 0], ip: [192, 168, 1, 201], port: 2368 };
 
@@ -102,41 +101,41 @@ const SENSOR: Sender =
 pub struct Revolution {
     /// Revolutions per minute, above 0.
     pub rpm: f64,
-    /// Beams that were fired; the last sequence may be cut short.
+    /// Beams that were fired. The last sequence may be incomplete.
     pub n_beams: u32,
 }
 
 crate::named! {
-    /// Which returns of a beam a sensor sends.
+    /// The returns of a beam that a sensor sends.
     #[derive(Default, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Returns: "return mode" {
-        /// The strongest, as sensors do by default.
+        /// The strongest, which is the sensor's default.
         #[default]
         Strongest = "strongest",
         /// The last.
         Last = "last",
-        /// The last and the strongest, or the second strongest where the strongest is the
-        /// last: two blocks of each sequence.
+        /// The last and the strongest, or the second strongest if the last is the strongest: two
+        /// blocks for each sequence.
         Dual = "dual",
     }
 }
 
 impl Revolution {
-    /// Firing sequences, the last of which may be cut short.
+    /// Firing sequences. The last may be incomplete.
     #[must_use]
     pub fn sequences(&self) -> u32 {
         self.n_beams.div_ceil(LASERS as u32)
     }
 
-    /// What the encoder reads when `sequence` starts, units of 0.01 degree.
+    /// The encoder's azimuth at the start of `sequence`, units of 0.01 degree.
     #[must_use]
     pub fn azimuth(&self, sequence: u32) -> u16 {
         self.units(sequence).rem_euclid(UNITS_PER_TURN) as u16
     }
 
-    /// How often the encoder has passed 0 when `sequence` of a sensor that keeps turning starts,
-    /// by what it reads then.
+    /// The number of times that the encoder of a sensor that keeps turning has passed 0 at the start
+    /// of `sequence`.
     #[must_use]
     pub fn turn(&self, sequence: u32) -> u32 {
         (self.units(sequence) / UNITS_PER_TURN) as u32
@@ -150,7 +149,7 @@ impl Revolution {
 }
 
 impl Returns {
-    /// Blocks of each firing sequence.
+    /// Blocks for each firing sequence.
     pub(crate) fn blocks_per_sequence(self) -> usize {
         if self == Self::Dual { 2 } else { 1 }
     }
@@ -171,18 +170,17 @@ impl Returns {
 /// Writes the packets of one `revolution` to `path`, atomically, and returns the
 /// hash of the file that `hashing` asks for.
 ///
-/// `scan` has the beam and the range of each point, beam b being laser b % 32
-/// of sequence b / 32; positions are not looked at. A reflectivity is written as
-/// it is: 0 to 100 for surfaces that scatter 0 to 100 % of the light, 101 to 255 for
-/// retro-reflectors (VLP-32C User Manual 63-9325, 6.1). Without one an intensity becomes a
-/// reflectivity of 0 to 100, and without either it is [`WHITE`]. A range that is not finite,
-/// below half a unit or beyond [`FARTHEST_M`] is no return. With both returns a beam may have
-/// two points, of which the second is the last return.
+/// `scan` needs the beam and the range of each point; beam b is laser b % 32 of sequence b / 32.
+/// Positions are ignored. Reflectivities are written unchanged: 0 to 100 for surfaces that
+/// scatter 0 to 100 % of the light, 101 to 255 for retro-reflectors (VLP-32C User Manual 63-9325,
+/// 6.1). Without reflectivities, intensities become reflectivities of 0 to 100; without either, all
+/// are [`WHITE`]. A range that is not finite, below half a unit or beyond [`FARTHEST_M`] gives no
+/// return. With both returns a beam may have two points, the second of which is the last return.
 ///
 /// # Errors
-/// A scan without beams or ranges, or with a beam beyond the revolution's or with more points
-/// than a beam has returns; an attribute of another length than the positions; what the system
-/// reports.
+/// A scan without beams or ranges, with a beam outside the revolution, or with more points than
+/// returns of a beam; an attribute of another length than the positions; errors of the
+/// system.
 #[cfg(feature = "dataset")]
 pub fn write(
     path: &Path,
@@ -219,7 +217,8 @@ fn write_packet(
     pcap::write_packet(writer, &SENSOR, stamp, &payload)
 }
 
-/// A capture of a sensor that keeps turning, written piece by piece. It appears under its name once it is finished.
+/// Writes the capture of a sensor that keeps turning, piece by piece. The file gets its name when it is
+/// finished.
 pub struct Capture {
     file: Unfinished,
     path: PathBuf,
@@ -229,11 +228,11 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Begins the capture at `path` of a sensor that turns `rpm` times a minute and tells these
+    /// Begins the capture at `path` of a sensor that turns `rpm` times per minute and sends these
     /// `returns`.
     ///
     /// # Errors
-    /// What the system reports.
+    /// Errors of the system.
     pub fn create(path: &Path, rpm: f64, returns: Returns) -> Result<Self, FormatError> {
         let mut file = Unfinished::create(path)?;
         file.append(pcap::write_header)?;
@@ -241,9 +240,8 @@ impl Capture {
         Ok(Self { file, path: path.to_path_buf(), piece, returns, sequences: 0 })
     }
 
-    /// Appends the next [`SEQUENCES_PER_PACKET`] firing sequences, as `write` does: beam b
-    /// of `scan` is laser b % 32 of their sequence b / 32. With both returns they are two
-    /// packets.
+    /// Appends the next [`SEQUENCES_PER_PACKET`] firing sequences, as `write` does: beam b of `scan`
+    /// is laser b % 32 of sequence b / 32 of these. With both returns they are two packets.
     ///
     /// # Errors
     /// As `write`.
@@ -258,16 +256,16 @@ impl Capture {
         Ok(())
     }
 
-    /// Gives the capture its name.
+    /// Completes the capture.
     ///
     /// # Errors
-    /// What the system reports.
+    /// Errors of the system.
     pub fn finish(self) -> Result<(), FormatError> {
         self.file.finish()
     }
 }
 
-/// What each sequence measured.
+/// The measurements of each sequence.
 fn measurements(
     path: &Path,
     revolution: &Revolution,
@@ -298,11 +296,11 @@ fn measurements(
         let (sequence, laser) = (beam as usize / LASERS, beam as usize % LASERS);
         let Sequence { last, other } = &mut fired[sequence];
         if told[beam as usize] == most {
-            let cause = format!("{beam} has more points than the {most} that \"{returns}\" tells");
+            let cause = format!("{beam} has more points than the {most} of \"{returns}\"");
             return Err(FormatError::malformed(path, "beam", cause));
         }
         let measured = Measurement::new(range_m, reflectivity);
-        // Of two the nearer comes first; one alone is both.
+        // The nearer of two points comes first; a single point is both returns.
         if told[beam as usize] == 0 {
             other[laser] = measured;
         }

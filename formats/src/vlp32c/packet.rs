@@ -1,4 +1,4 @@
-//! The bytes of one data packet.
+//! Encodes one data packet.
 
 use super::{DISTANCE_UNIT_M, Returns};
 
@@ -16,27 +16,27 @@ pub(crate) const BLOCK_SIZE: usize = BLOCK_HEADER_SIZE + LASERS * MEASUREMENT_SI
 /// Bytes of a packet.
 pub(crate) const PAYLOAD_SIZE: usize = BLOCKS * BLOCK_SIZE + 6;
 
-/// What each block begins with.
+/// The first bytes of each block.
 pub(crate) const FLAG: [u8; 2] = [0xff, 0xee];
-/// What a packet of a VLP-32C ends with.
+/// The last byte of a packet of a VLP-32C.
 pub(crate) const MODEL: u8 = 0x28;
 
-/// What one laser measured.
+/// The measurement of one laser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Measurement {
-    /// Units of [`DISTANCE_UNIT_M`]; 0 where nothing came back.
+    /// Distance in units of [`DISTANCE_UNIT_M`]; 0 without a return.
     distance: u16,
     reflectivity: u8,
 }
 
 impl Measurement {
-    /// Nothing came back.
+    /// No return.
     pub const NONE: Self = Self { distance: 0, reflectivity: 0 };
 
-    /// A return, unless a packet cannot tell its range.
+    /// A return, or none if its range does not fit a packet.
     pub fn new(range_m: f32, reflectivity: u8) -> Self {
         let units = (f64::from(range_m) / DISTANCE_UNIT_M).round();
-        // NaN is in no range.
+        // No range contains NaN.
         if (1.0..=f64::from(u16::MAX)).contains(&units) {
             Self { distance: units as u16, reflectivity }
         } else {
@@ -45,24 +45,23 @@ impl Measurement {
     }
 }
 
-/// What a firing sequence measured, laser by laser.
+/// The measurements of a firing sequence, by laser.
 #[derive(Clone)]
 pub(super) struct Sequence {
     /// The last return.
     pub last: [Measurement; LASERS],
-    /// The other one that dual returns tell: the same where there is but one.
+    /// The other return of dual returns, which equals the last if there is only one.
     pub other: [Measurement; LASERS],
 }
 
 impl Sequence {
-    /// Nothing came back.
+    /// No returns.
     pub const NONE: Self =
         Self { last: [Measurement::NONE; LASERS], other: [Measurement::NONE; LASERS] };
 }
 
-/// A packet that begins at `time_us` past the hour. `azimuth` tells what the
-/// encoder reads as the packet's i-th sequence starts; sequences beyond those
-/// that were `fired` saw nothing.
+/// A packet that begins at `time_us` past the hour. `azimuth` is the encoder's azimuth at the start of
+/// the packet's i-th sequence. Sequences beyond those that were `fired` have no returns.
 pub(super) fn payload(
     returns: Returns,
     time_us: u32,
@@ -74,7 +73,7 @@ pub(super) fn payload(
         let blocks_per_sequence = returns.blocks_per_sequence();
         let sequence = block / blocks_per_sequence;
         let Sequence { last, other } = fired.get(sequence).unwrap_or(&Sequence::NONE);
-        // The manual counts the blocks from 0: even ones hold the last return.
+        // Blocks are counted from 0, as in the manual: even ones hold the last return.
         let measured = if block % blocks_per_sequence == 0 { last } else { other };
         bytes.extend(FLAG);
         bytes.extend(azimuth(sequence).to_le_bytes());

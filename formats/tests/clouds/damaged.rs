@@ -19,7 +19,7 @@ fn whole_files() -> Vec<(CloudFormat, Vec<u8>)> {
         .map(|extension| {
             let path = folder.path().join("cloud").with_extension(extension);
             write_cloud(&path, &points).unwrap();
-            (CloudFormat::of(&path).unwrap(), std::fs::read(&path).unwrap())
+            (CloudFormat::of_path(&path).unwrap(), std::fs::read(&path).unwrap())
         })
         .collect();
     let ply = "element a 1\nproperty list uchar int l\nelement vertex 2\nproperty double x\n\

@@ -18,13 +18,13 @@ use formats::cloud_file::{CloudFormat, read_cloud_from};
 /// The points that `bytes` hold, taken for a file called `name`.
 fn read(name: &str, bytes: impl AsRef<[u8]>) -> Vec<[f64; 3]> {
     let name = Path::new(name);
-    read_cloud_from(bytes.as_ref(), Some(CloudFormat::of(name).unwrap()), name).unwrap()
+    read_cloud_from(bytes.as_ref(), Some(CloudFormat::of_path(name).unwrap()), name).unwrap()
 }
 
 /// What is wrong with `bytes`, taken for a file called `name`, after that name.
 fn error(name: &str, bytes: impl AsRef<[u8]>) -> String {
     let path = Path::new(name);
-    let read = read_cloud_from(bytes.as_ref(), Some(CloudFormat::of(path).unwrap()), path);
+    let read = read_cloud_from(bytes.as_ref(), Some(CloudFormat::of_path(path).unwrap()), path);
     let message = read.unwrap_err().to_string();
     message.strip_prefix(&format!("{name}: ")).unwrap_or(&message).to_owned()
 }

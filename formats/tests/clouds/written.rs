@@ -21,7 +21,7 @@ fn there_and_back(extension: &str, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let path = folder.path().join("cloud").with_extension(extension);
     write_cloud(&path, points).unwrap();
     let named = read_cloud(&path).unwrap();
-    let format = CloudFormat::of(&path).unwrap();
+    let format = CloudFormat::of_path(&path).unwrap();
     let told = Some(format).filter(|&format| format == CloudFormat::Kitti);
     let file = fs::File::open(&path).unwrap();
     assert_eq!(bits(&read_cloud_from(file, told, Path::new("-")).unwrap()), bits(&named));

@@ -189,7 +189,7 @@ fn a_scan_that_says_too_little_or_too_much_is_refused() {
             "attribute beam: expected 1 values, one for each point, found 2",
         ),
         (Scan { beam: Some(vec![57_870]), ..whole.clone() }, "beam: 57870 of 57870"),
-        (scan(&[(5, 1.0), (5, 2.0), (5, 3.0)]), "beam: 5 has more points than the 2 that"),
+        (scan(&[(5, 1.0), (5, 2.0), (5, 3.0)]), "beam: 5 has more points than the 2 of"),
     ] {
         let error: FormatError =
             write(&path, Hashing::None, &REVOLUTION, Returns::Dual, &scan).unwrap_err();

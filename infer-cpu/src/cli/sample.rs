@@ -63,7 +63,7 @@ pub struct Args {
 /// that cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     // What cannot be written should be known before a long choice.
-    CloudFormat::of(&args.output)?;
+    CloudFormat::of_path(&args.output)?;
     let mut points = input::read(&args.input, args.format)?;
     if args.drop_invalid {
         let n = points.len();

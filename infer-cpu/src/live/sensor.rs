@@ -74,7 +74,7 @@ impl Decoder {
     /// If that is no data packet.
     pub fn new(metadata: Option<&ouster::Metadata>, payload: &[u8]) -> Result<Self, Flaw> {
         let Some(metadata) = metadata else {
-            let header = velodyne::Header::of(payload)?;
+            let header = velodyne::Header::parse(payload)?;
             return Ok(Self::Velodyne(velodyne::Decoder::new(header.model)));
         };
         let decoder = Box::new(ouster::Decoder::new(metadata));

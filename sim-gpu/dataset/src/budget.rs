@@ -1,8 +1,8 @@
-//! Keeps the meshes under way within a memory budget.
+//! Keeps the meshes in progress within a memory budget.
 
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Bytes that meshes under way may hold together.
+/// The bytes that meshes in progress may hold together.
 #[derive(Debug)]
 pub struct Budget {
     limit: u64,
@@ -10,7 +10,7 @@ pub struct Budget {
     released: Condvar,
 }
 
-/// A share of a budget, given back when dropped.
+/// A share of a budget, which is returned when it is dropped.
 #[derive(Debug)]
 pub struct Share<'a> {
     budget: &'a Budget,
@@ -24,8 +24,8 @@ impl Budget {
         Self { limit, held: Mutex::new(0), released: Condvar::new() }
     }
 
-    /// Waits until `bytes` are free. More than the whole budget is granted
-    /// once nothing else is held, so that the largest mesh passes too.
+    /// Waits until `bytes` are free. A share that exceeds the whole budget is granted when nothing
+    /// else is held, so that the largest mesh passes as well.
     pub fn take(&self, bytes: u64) -> Share<'_> {
         let held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         let full = |held: &mut u64| *held > 0 && *held + bytes > self.limit;
@@ -48,7 +48,7 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 
     #[test]
-    fn no_more_than_the_budget_is_held_unless_by_one() {
+    fn only_a_single_share_exceeds_the_budget() {
         let budget = Budget::new(10);
         let (held, worst) = (AtomicU64::new(0), AtomicU64::new(0));
         std::thread::scope(|threads| {

@@ -1,14 +1,13 @@
-//! From scans to clouds as networks take them: one size, one scale.
+//! Draws clouds of one size and one scale, as networks take them, from scans.
 //!
-//! A cloud is drawn as its scan is written, and waits in memory until it is packed.
-//! Clouds of an earlier run and of shards, and those that memory has no room for, are
-//! drawn from the files of their scans.
+//! A cloud is drawn when its scan is written, and waits in memory until it is packed. Clouds of an
+//! earlier run, of shards, or beyond the limit of memory are drawn from the files of their scans.
 
-use super::config::{DatasetConfig, Layout, SetConfig, Variant};
-use super::error::DatasetError;
-use super::layout;
-use super::manifest::LeftOut;
-use super::record::{Cloud, Entry, MeshRecord, VariantRecord};
+use crate::config::{DatasetConfig, Layout, SetConfig, Variant};
+use crate::error::DatasetError;
+use crate::layout;
+use crate::manifest::LeftOut;
+use crate::record::{Cloud, Entry, MeshRecord, VariantRecord};
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, read_scan};
@@ -18,16 +17,16 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Bytes of all clouds that wait in memory from when their scans are written: 1 GiB,
-/// some 89,000 clouds of 1024 points.
+/// Bytes of the clouds that wait in memory until they are packed: 1 GiB, some 89,000 clouds of
+/// 1024 points.
 const KEPT_BYTES: usize = 1 << 30;
 
-/// Points of all clouds that wait to be taken, in one part: 12 MiB.
+/// Points of the clouds that are read together, for each part: 12 MiB.
 const POINTS_AT_ONCE: u32 = 1 << 20;
 
-/// Which scan a cloud is drawn from.
+/// The scan of a cloud.
 #[derive(Clone, Copy)]
-pub(super) struct Source<'a> {
+pub(crate) struct Source<'a> {
     pub set: &'a SetConfig,
     pub variant: Variant,
     pub entry: &'a Entry,
@@ -35,9 +34,9 @@ pub(super) struct Source<'a> {
 }
 
 impl Cloud {
-    /// The cloud of `scan`; `None` if it has fewer than
-    /// [`DatasetConfig::min_points`] points, or none.
-    pub(super) fn draw(config: &DatasetConfig, source: Source, scan: &Scan) -> Option<Self> {
+    /// The cloud of `scan`, or `None` if the scan has no points or fewer than
+    /// [`DatasetConfig::min_points`].
+    pub(crate) fn draw(config: &DatasetConfig, source: Source, scan: &Scan) -> Option<Self> {
         if (scan.len() as u64) < u64::from(config.min_points) {
             return None;
         }
@@ -47,15 +46,15 @@ impl Cloud {
         let n = config.packed_points as usize;
         let mut points = resample(&scan.positions, n, key)?;
         normalize_unit_sphere(&mut points);
-        // One key draws the same places from lists of one length.
+        // One key draws the same indices from lists of equal length.
         let normals = scan.normal.as_ref().filter(|_| config.layouts.contains(&Layout::Yanx27));
         let normals = normals.and_then(|normals| resample(normals, n, key));
         Some(Self { points, normals })
     }
 
-    /// The cloud of a scan that was just written, unless the clouds that are kept,
-    /// whose bytes are counted in `kept`, leave no room for it.
-    pub(super) fn keep(
+    /// The cloud of a scan that was just written, unless the clouds in memory, whose bytes `kept`
+    /// counts, leave no room for it.
+    pub(crate) fn keep(
         kept: &AtomicUsize,
         config: &DatasetConfig,
         source: Source,
@@ -71,12 +70,12 @@ impl Cloud {
     }
 }
 
-/// The scans that clouds are drawn from.
+/// The scans of a dataset.
 #[derive(Clone, Copy)]
-pub(super) struct Scans<'a> {
+pub(crate) struct Scans<'a> {
     /// The dataset's folder.
     pub out: &'a Path,
-    /// What it is to hold.
+    /// The settings of the dataset.
     pub config: &'a DatasetConfig,
     /// The meshes, sorted by entry.
     pub records: &'a [MeshRecord],
@@ -84,16 +83,16 @@ pub(super) struct Scans<'a> {
     pub classes: &'a [String],
 }
 
-/// Which of the scans.
+/// The scans of one set, variant and split.
 #[derive(Clone, Copy)]
-pub(super) struct Part<'a> {
+pub(crate) struct Part<'a> {
     pub set: &'a SetConfig,
     pub variant: Variant,
     pub split: Split,
 }
 
-/// A cloud and what it is called.
-pub(super) struct Packed<'a> {
+/// A cloud, its name and its label.
+pub(crate) struct Packed<'a> {
     /// The mesh.
     pub entry: &'a Entry,
     /// The view's number.
@@ -104,17 +103,16 @@ pub(super) struct Packed<'a> {
     pub label: usize,
     /// Points of the scan.
     pub n_raw: u32,
-    /// The points themselves.
+    /// The points.
     pub cloud: Cow<'a, Cloud>,
 }
 
 impl<'a> Scans<'a> {
-    /// Hands the clouds of `part` to `take`: by mesh, then by view. Those that are not
-    /// in memory are read on all cores, some at a time. Returns the scans that have too
-    /// few points.
+    /// Passes the clouds of `part` to `take`: by mesh, then by view. Clouds that are not in memory
+    /// are read on all cores, some at a time. Returns the scans that have too few points.
     ///
     /// # Errors
-    /// A scan that cannot be read or is not as recorded; what `take` returns.
+    /// A scan that cannot be read or differs from its record; errors of `take`.
     pub fn for_each_cloud(
         &self,
         part: &Part<'a>,
@@ -151,7 +149,7 @@ impl<'a> Scans<'a> {
         })
     }
 
-    /// The cloud of one scan, `None` if it has too few points.
+    /// The cloud of one scan, or `None` if the scan has too few points.
     fn cloud(
         &self,
         source: Source,
@@ -169,7 +167,7 @@ impl<'a> Scans<'a> {
         let scan = read_scan(&path)?;
         if scan.len() as u64 != points {
             let cause = format!("expected {points} points as recorded, found {}", scan.len());
-            return Err(DatasetError::Malformed { path, cause });
+            return Err(DatasetError::malformed(&path, cause));
         }
         Ok(Cloud::draw(self.config, source, &scan).map(Cow::Owned))
     }

@@ -1,4 +1,4 @@
-//! What a dataset is to hold. The manifest keeps it in full.
+//! The settings of a dataset. The manifest keeps them in full.
 
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
@@ -15,46 +15,45 @@ use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::sensor::{SensorProfile, Views};
 use sim_gpu::internals::simplify::Simplify;
 
-/// What a dataset is to hold: with the meshes and the adapter, this decides
-/// every byte of it.
+/// The settings of a dataset. With the meshes and the adapter, they decide every byte of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetConfig {
-    /// Keys every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// How meshes are scaled into the world.
     pub normalize: Normalize,
     /// The meshes' upward axis; `None` is each format's default.
     pub up: Option<Up>,
-    /// Whether and how far meshes are simplified.
+    /// How far meshes are simplified; not at all if `None`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simplify: Option<Simplify>,
-    /// What points carry besides positions.
+    /// The attributes of points besides their positions.
     pub attributes: AttributeSet,
-    /// The files each scan is written to; NPZ is always among them.
+    /// The formats in which each scan is written. NPZ must be among them.
     pub formats: Vec<ScanFormat>,
     /// The effects of [`Variant::Noisy`].
     pub effects: Effects,
-    /// Which variants are written.
+    /// The variants to write.
     pub variants: Vec<Variant>,
-    /// The sensors and where they stand.
+    /// The sensors and their viewpoints.
     pub sets: Vec<SetConfig>,
     /// Points in each packed cloud.
     pub packed_points: u32,
-    /// Scans with fewer points are left out of packed sets.
+    /// Points that a scan must have to be packed.
     pub min_points: u32,
-    /// Layouts of other projects, besides ours.
+    /// Layouts of other projects to write besides our own.
     pub layouts: Vec<Layout>,
-    /// Which returns packets hold, where they are among the formats.
+    /// The returns that packets hold, if packets are among the formats.
     #[serde(default, skip_serializing_if = "is_default")]
     pub returns: Returns,
-    /// How the manifest hashes the meshes and the files.
+    /// The hash of the meshes and the files in the manifest.
     #[serde(default, skip_serializing_if = "is_default")]
     pub hash: Hashing,
     /// The meshes' diffuse reflectivity, 0 to 1.
     #[serde(default = "white", skip_serializing_if = "is_white")]
     pub reflectivity: f64,
-    /// Where OBJ meshes have their colours from, if they have; what has none has the
-    /// reflectivity.
+    /// The source of the colours of OBJ meshes, which become reflectivities. Surfaces without
+    /// a colour have [`DatasetConfig::reflectivity`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colours: Option<ColourSource>,
 }
@@ -71,18 +70,18 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// One sensor and where it stands.
+/// One sensor and its viewpoints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetConfig {
-    /// The set's folder, such as `rotational`.
+    /// The name of the set and of its folder, such as `rotational`.
     pub name: String,
     /// The sensor, in full.
     pub sensor: SensorProfile,
-    /// Where it stands.
+    /// Its viewpoints.
     pub viewpoints: Viewpoints,
 }
 
-/// Where a sensor stands around each mesh.
+/// The viewpoints of a sensor around each mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Viewpoints {
@@ -93,19 +92,19 @@ pub enum Viewpoints {
 }
 
 formats::named! {
-    /// Which effects a scan has; its name is the folder's.
+    /// The effects of a scan; the name is that of its folder.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Variant: "variant" {
-        /// Exact ranges.
+        /// No effect but intensity: exact ranges.
         Clean = "clean",
-        /// All the effects asked for.
+        /// All effects of the settings.
         Noisy = "noisy",
     }
 }
 
 formats::named! {
-    /// A layout that another project reads as it is; its name is the folder's.
+    /// A layout that another project reads; the name is that of its folder.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Layout: "layout" {
@@ -113,16 +112,40 @@ formats::named! {
         Yanx27 = "yanx27",
         /// ModelNet40's HDF5 files.
         ModelnetH5 = "modelnet-h5",
-        /// Tars of samples, and no other file: see [`tars`](crate::tars).
+        /// Tars of samples, which [`make_tars`](crate::make_tars) writes.
         Webdataset = "webdataset",
     }
 }
 
 impl DatasetConfig {
-    /// The effects of one variant of one set. Intensity belongs to both.
+    /// The default settings for `sets`: meshes scaled to the unit sphere, clean scans as NPZ files,
+    /// and packed clouds of 1,024 points.
+    #[must_use]
+    pub fn new(sets: Vec<SetConfig>) -> Self {
+        Self {
+            seed: 0,
+            normalize: Normalize::default(),
+            up: None,
+            simplify: None,
+            attributes: AttributeSet::new(),
+            formats: vec![ScanFormat::Npz],
+            effects: Effects::default(),
+            variants: vec![Variant::Clean],
+            sets,
+            packed_points: 1024,
+            min_points: 64,
+            layouts: Vec::new(),
+            returns: Returns::default(),
+            hash: Hashing::default(),
+            reflectivity: white(),
+            colours: None,
+        }
+    }
+
+    /// The effects of `variant` of `set`. Intensity belongs to both variants.
     ///
     /// # Errors
-    /// If quantisation is wanted and the set's sensor states no quantum.
+    /// If the settings quantise ranges by the sensor's quantum and the sensor states none.
     pub fn effects_of(&self, set: &SetConfig, variant: Variant) -> Result<Effects, InvalidValue> {
         match variant {
             Variant::Clean => Ok(self.effects.clean()),
@@ -130,7 +153,7 @@ impl DatasetConfig {
         }
     }
 
-    /// The effects that must be cast for all variants.
+    /// The effects that the caster must model for all variants.
     #[must_use]
     pub fn cast_effects(&self) -> Effects {
         if self.variants.contains(&Variant::Noisy) {
@@ -141,7 +164,7 @@ impl DatasetConfig {
 }
 
 impl Viewpoints {
-    /// How many places there are.
+    /// The number of viewpoints.
     #[must_use]
     pub fn count(&self) -> usize {
         match self {
@@ -152,7 +175,7 @@ impl Viewpoints {
 }
 
 impl SetConfig {
-    /// The poses around the mesh called `id`, whose jitter, if any, is its own.
+    /// The poses around the mesh `id`. Jitter, if there is any, differs by mesh.
     #[must_use]
     pub fn poses(&self, seed: u64, id: &str) -> Vec<Pose> {
         match &self.viewpoints {
@@ -161,7 +184,7 @@ impl SetConfig {
         }
     }
 
-    /// Number `view` of [`SetConfig::poses`].
+    /// Pose `view` of [`SetConfig::poses`].
     #[must_use]
     pub fn pose(&self, seed: u64, id: &str, view: u32) -> Pose {
         match &self.viewpoints {
@@ -174,7 +197,7 @@ impl SetConfig {
         StreamKey::new(seed, &format!("views/{}/{id}", self.name), 0)
     }
 
-    /// The random stream of view `view` of the mesh called `id`.
+    /// The random stream of view `view` of the mesh `id`.
     #[must_use]
     pub fn stream(&self, seed: u64, id: &str, view: u32) -> StreamKey {
         StreamKey::new(seed, &format!("{}/{id}", self.name), view)

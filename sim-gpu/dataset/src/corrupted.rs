@@ -1,16 +1,15 @@
-//! Packed sets of the same views of the same meshes, each with something else that goes wrong: how
-//! robust a network is, as ModelNet-C measures it.
+//! Packed sets of the same views of the same meshes with one corruption each, which measure how
+//! robust a network is, as ModelNet-C does.
 
 use crate::error::DatasetError;
-use crate::mesh::{failed, failure, read};
+use crate::mesh::read;
+use crate::packed_sets::{Drawn, classes, write_packed_sets};
 use crate::record::{Entry, MeshFailure};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::hash::Hashing;
-use formats::packed::PackedWriter;
 use formats::rng::StreamKey;
 use glam::DVec3;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim_gpu::effects::Effects;
 use sim_gpu::internals::bvh::Builder;
@@ -22,74 +21,67 @@ use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{ScanError, ScanRequest, scan};
 use sim_gpu::internals::sensor::{BeamPattern, SensorProfile, Views};
 use sim_gpu::internals::target::{Surface, Target};
-use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What goes wrong with a clean scan of an object. The default is nothing.
+/// A corruption of the clean scan of an object. The default changes nothing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectCorruption {
-    /// What the sensor and the air do.
+    /// Effects of the sensor and of the air.
     pub effects: Effects,
-    /// Balls that hide parts of the object; they themselves are not in the cloud.
+    /// Number of balls that hide parts of the object. The balls are not in the cloud.
     pub occluders: u32,
-    /// The balls' radius, metres. Each stands two thirds of the way to a point that it hides.
+    /// The balls' radius, metres. Each ball stands at two thirds of the way to a point that it hides.
     pub radius_m: f64,
 }
 
-/// A set to write.
+/// A packed set to write.
 pub struct CorruptedSet {
-    /// Its name: `NAME-test.npz`.
+    /// Its name; the file is `NAME-test.npz`.
     pub name: String,
-    /// What goes wrong with it.
+    /// The corruption of its scans.
     pub corruption: ObjectCorruption,
-    /// Casts its rays: on the CPU, since test sets are small and have many effects.
+    /// Casts its rays, on the CPU, since test sets are small and differ in their effects.
     caster: OpenCaster,
-    /// The beams that it casts.
+    /// The beams of the sensor.
     pattern: BeamPattern,
 }
 
-/// What was written.
+/// The result of [`Corrupted::write`].
 pub struct Written {
-    /// Clouds of each set, in their order.
+    /// The number of clouds of each set.
     pub clouds: Vec<usize>,
-    /// Clouds that each would have if a point of everything were seen.
+    /// The number of clouds of a set in which every view sees a point.
     pub of: usize,
-    /// The meshes that cannot be used.
+    /// The meshes that cannot be scanned.
     pub failures: Vec<MeshFailure>,
 }
 
-/// What all sets have in common.
+/// The settings that all sets share.
 pub struct Corrupted<'a> {
     /// The folder to write to.
     pub out: &'a Path,
     /// The sensor.
     pub sensor: &'a SensorProfile,
-    /// Where it stands around each mesh.
+    /// Its viewpoints around each mesh.
     pub views: Views,
     /// The meshes' upward axis; `None` is each format's default.
     pub up: Option<Up>,
-    /// Points of each cloud; of a scan with fewer, some are there more than once.
+    /// Points of each cloud. The cloud of a scan with fewer has some points more than once.
     pub points: u32,
-    /// Keys every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// What is farther from the middle of the object than its radius of 1 m, and so much more, is not
-/// of it: a robot cuts its objects out of what it sees.
+/// Points farther than this from the centre of the object, whose radius is 1 m, are left out: a
+/// robot cuts an object out of its scan.
 const CUT_OUT_M: f32 = 1.1;
 
-/// Meshes that are in memory together.
-const AT_ONCE: usize = 32;
-
-/// A cloud, and how many points its scan had.
-type Drawn = Option<(Vec<[f32; 3]>, u32)>;
-
 impl ObjectCorruption {
-    /// Checks all numbers, which stand at `key`.
+    /// Checks all numbers of the table `key`.
     ///
     /// # Errors
-    /// On the first that is not finite or out of its bounds.
+    /// The first number that is not finite or out of its bounds.
     pub fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         let here =
             |error: InvalidValue| InvalidValue::new(format!("{key}.{}", error.key), error.cause);
@@ -105,7 +97,7 @@ impl ObjectCorruption {
 }
 
 impl CorruptedSet {
-    /// The set `name` by `sensor`.
+    /// The set `name`, scanned by `sensor`.
     ///
     /// # Errors
     /// Effects that do not fit the sensor.
@@ -122,8 +114,8 @@ impl CorruptedSet {
 }
 
 impl Corrupted<'_> {
-    /// Writes `sets` of those of `meshes` that are for testing. Labels count the classes of all
-    /// meshes. `each` is called after each mesh.
+    /// Writes `sets` of those of `meshes` that are for testing. Labels are indices into the classes
+    /// of all meshes. Calls `each` after each mesh.
     ///
     /// # Errors
     /// A caster that fails; a file that cannot be written.
@@ -133,73 +125,49 @@ impl Corrupted<'_> {
         sets: &[CorruptedSet],
         each: impl Fn() + Sync,
     ) -> Result<Written, DatasetError> {
-        let classes: BTreeSet<&String> = meshes.iter().map(|entry| &entry.class).collect();
-        let classes: Vec<String> = classes.into_iter().cloned().collect();
+        let path = |set: &CorruptedSet| self.out.join(format!("{}-test.npz", set.name));
+        let paths: Vec<_> = sets.iter().map(path).collect();
         let tested: Vec<&MeshEntry> =
             meshes.iter().filter(|entry| entry.split == Split::Test).collect();
-        let mut writers = Vec::with_capacity(sets.len());
-        for set in sets {
-            let path = self.out.join(format!("{}-test.npz", set.name));
-            writers.push(PackedWriter::create(&path, self.points as usize, classes.clone())?);
-        }
-        let (mut failures, mut of) = (Vec::new(), 0);
-        for some in tested.chunks(AT_ONCE) {
-            let clouds: Vec<Result<_, MeshFailure>> = some
-                .par_iter()
-                .map(|entry| {
-                    let clouds = self.of_mesh(entry, sets);
-                    each();
-                    clouds
-                })
-                .collect::<Result<_, DatasetError>>()?;
-            for (entry, clouds) in some.iter().zip(clouds) {
-                let label = classes.partition_point(|class| *class < entry.class);
-                match clouds {
-                    Err(failure) => failures.push(failure),
-                    Ok(views) => {
-                        of += views.len();
-                        push(&mut writers, entry, label, views)?;
-                    }
-                }
-            }
-        }
-        let clouds = writers.iter().map(PackedWriter::len).collect();
-        for writer in writers {
-            writer.finish(Hashing::None)?;
-        }
+        let draw = |entry: &MeshEntry| {
+            let drawn = self.draw(entry, sets);
+            each();
+            drawn
+        };
+        let (n, classes) = (self.points as usize, classes(meshes));
+        let (clouds, failures) = write_packed_sets(&paths, n, &classes, &tested, draw)?;
+        let of = (tested.len() - failures.len()) * self.views.count as usize;
         Ok(Written { clouds, of, failures })
     }
 
     /// The clouds of one mesh, by view and by set.
-    fn of_mesh(
-        &self,
-        entry: &MeshEntry,
-        sets: &[CorruptedSet],
-    ) -> Result<Result<Vec<Vec<Drawn>>, MeshFailure>, DatasetError> {
-        let (mesh, kept) = match read(entry, self.up, Normalize::UnitSphere, Hashing::None) {
-            Ok((_, mesh, kept)) => (mesh, kept),
-            Err(error) => return Ok(Err(failure(entry, &error))),
-        };
+    fn draw(&self, entry: &MeshEntry, sets: &[CorruptedSet]) -> Result<Vec<Drawn>, DatasetError> {
+        let (_, mesh, kept) = read(entry, self.up, Normalize::UnitSphere, Hashing::None)?;
         if kept.is_empty() {
-            let cause = "expected a triangle with an area, found none".to_owned();
-            return Ok(Err(failed(entry, None, cause)));
+            let cause = "expected a triangle with an area, found none";
+            return Err(MeshFailure::new(entry, cause).into());
         }
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         let id = Entry::from(entry).id();
         let jitter = StreamKey::new(self.seed, &format!("views/corrupted/{id}"), 0);
-        let poses = self.views.poses(DVec3::ZERO, jitter);
-        let of_view = |(pose, view): (Pose, u32)| {
+        let mut drawn = Vec::new();
+        for (pose, view) in self.views.poses(DVec3::ZERO, jitter).into_iter().zip(0..) {
             let stream = StreamKey::new(self.seed, &format!("corrupted/{id}"), view);
-            let of_set = |set: &CorruptedSet| {
-                Ok(self.cloud(&self.points_of(set, &target, pose, stream)?, stream))
-            };
-            sets.iter().map(of_set).collect::<Result<Vec<Drawn>, ScanError>>()
-        };
-        let views = poses.into_iter().zip(0..).map(of_view).collect::<Result<Vec<_>, _>>()?;
-        Ok(Ok(views))
+            for (set, corrupted) in sets.iter().enumerate() {
+                let seen = self.points_of(corrupted, &target, pose, stream)?;
+                // A view in which nothing is seen has no cloud.
+                let Some(mut points) = resample(&seen, self.points as usize, stream) else {
+                    continue;
+                };
+                normalize_unit_sphere(&mut points);
+                let (name, n_raw) = (format!("{id}_v{view}"), seen.len() as u32);
+                drawn.push(Drawn { set, name, points, n_raw });
+            }
+        }
+        Ok(drawn)
     }
 
-    /// What is seen of the object in one view, around its middle.
+    /// The points of the object in one view, around its centre.
     fn points_of(
         &self,
         set: &CorruptedSet,
@@ -211,10 +179,10 @@ impl Corrupted<'_> {
         request.stream = stream;
         let scan = scan(&set.caster, target, &request)?;
         let origin = DVec3::from_array(scan.origin);
-        let from_middle = |point: &[f32; 3]| origin + DVec3::from(point.map(f64::from));
-        let mut points: Vec<DVec3> = scan.positions.iter().map(from_middle).collect();
+        let from_centre = |point: &[f32; 3]| origin + DVec3::from(point.map(f64::from));
+        let mut points: Vec<DVec3> = scan.positions.iter().map(from_centre).collect();
         let ObjectCorruption { occluders, radius_m, .. } = set.corruption;
-        // Points of the cloud are drawn by the stream itself.
+        // The stream itself draws the points of the cloud.
         let [a, b] = stream.0;
         let places = StreamKey::new(u64::from(a) << 32 | u64::from(b), "corrupted/occluders", 0);
         let balls: Vec<DVec3> = (0..occluders)
@@ -231,37 +199,13 @@ impl Corrupted<'_> {
         let points = points.into_iter().map(|point| point.as_vec3());
         Ok(points.filter(|p| p.length() <= CUT_OUT_M).map(|p| p.to_array()).collect())
     }
-
-    fn cloud(&self, points: &[[f32; 3]], stream: StreamKey) -> Drawn {
-        let mut cloud = resample(points, self.points as usize, stream)?;
-        normalize_unit_sphere(&mut cloud);
-        Some((cloud, points.len() as u32))
-    }
 }
 
-/// Whether a ball stands between the sensor and a point.
+/// Whether a ball stands between the sensor and `point`.
 fn hides(ball: DVec3, radius_m: f64, sensor_m: DVec3, point: DVec3) -> bool {
     let (to_ball, to_point) = (ball - sensor_m, point - sensor_m);
     let along = to_ball.dot(to_point) / to_point.length_squared();
     (0.0..1.0).contains(&along) && ball.distance(sensor_m + to_point * along) < radius_m
-}
-
-/// Adds the views of one mesh to all sets.
-fn push(
-    writers: &mut [PackedWriter],
-    entry: &MeshEntry,
-    label: usize,
-    views: Vec<Vec<Drawn>>,
-) -> Result<(), DatasetError> {
-    for (clouds, view) in views.into_iter().zip(0u32..) {
-        let name = format!("{}_v{view}", Entry::from(entry).id());
-        for (writer, cloud) in writers.iter_mut().zip(clouds) {
-            if let Some((points, n_raw)) = cloud {
-                writer.push(&points, label, &name, n_raw)?;
-            }
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
-//! In what two configurations differ, said to a person.
+//! The difference of two configurations, in words.
 
 use serde::Serialize;
 use serde_json::Value;
 
-/// Longer values are cut: a table of beams helps nobody in a message.
+/// Characters of a value in a message. Longer values, such as tables of beams, are cut.
 const LONGEST: usize = 60;
 
 /// The first setting in which `first` and `second` differ, such as
-/// `sets[0].sensor.range.max_m: 100 against 200`; `None` if they are equal.
+/// `sets[0].sensor.range.max_m: 100 against 200`, or `None` if they are equal.
 #[must_use]
 pub fn difference(first: &impl Serialize, second: &impl Serialize) -> Option<String> {
     let value = |error: serde_json::Error| Value::String(error.to_string());

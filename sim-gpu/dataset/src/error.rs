@@ -1,17 +1,17 @@
 //! Why a dataset cannot be made, merged or verified.
 
-use super::record::MeshFailure;
+use crate::record::MeshFailure;
 use formats::FormatError;
 use sim_gpu::internals::cast_error::CastError;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::scan::ScanError;
 use std::path::{Path, PathBuf};
 
-/// Why a dataset cannot be made, merged or verified. A bad mesh is no such
-/// error: it is a [`super::MeshFailure`].
+/// Why a dataset cannot be made, merged or verified. A mesh that cannot be scanned does not stop a
+/// run: it is a [`MeshFailure`].
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The folder holds something already.
+    /// The folder holds files already.
     #[error(
         "{}: holds {what} already; continue it with --resume, replace it with --overwrite, or \
          choose another folder with --out", path.display()
@@ -19,56 +19,50 @@ pub enum DatasetError {
     Occupied {
         /// The folder.
         path: PathBuf,
-        /// What it holds.
+        /// The files.
         what: &'static str,
     },
-    /// A dataset that has been described already.
-    #[error("{}: is there already; replace it with --overwrite", path.display())]
-    Published {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A run that was not finished.
+    /// The dataset is not finished.
     #[error("{}: is not finished; continue it with --resume", path.display())]
     Unfinished {
         /// The folder.
         path: PathBuf,
     },
-    /// No manifest where a finished dataset has one.
+    /// The folder of a dataset has no manifest.
     #[error("{}: expected a finished dataset's manifest, found no file", path.display())]
     NoManifest {
-        /// The manifest's place.
+        /// The path of the manifest.
         path: PathBuf,
     },
-    /// The run was told to end.
+    /// The run was stopped.
     #[error("stopped after {done} of {of} {what}; continue with --resume")]
     Interrupted {
-        /// What is done.
+        /// The number that is done.
         done: usize,
-        /// Of how many.
+        /// The number of all.
         of: usize,
         /// Meshes or tars.
         what: &'static str,
     },
-    /// Tars are complete, but the command that takes them failed.
+    /// Tars are complete but could not be handed over.
     #[error("{tars} tars were not handed over, {first} the first: {cause}; --resume tries again")]
     NotHandedOver {
-        /// How many.
+        /// The number of tars.
         tars: usize,
         /// The name of the first.
         first: String,
-        /// Why it was not.
+        /// Why it could not be handed over.
         cause: String,
     },
-    /// A layout that cannot hold the dataset.
+    /// A layout cannot hold the dataset.
     #[error("layout {layout}: {cause}")]
     Layout {
         /// The layout's name.
         layout: &'static str,
-        /// Why.
+        /// The cause.
         cause: &'static str,
     },
-    /// An unfinished or finished run in the folder was another one.
+    /// The folder holds a dataset with other settings.
     #[error("{}: was begun with other settings: {difference}", path.display())]
     Different {
         /// The folder.
@@ -76,26 +70,18 @@ pub enum DatasetError {
         /// The first difference.
         difference: String,
     },
-    /// A record or a manifest cannot be read.
+    /// A file or a shard is not as expected.
     #[error("{}: {cause}", path.display())]
     Malformed {
-        /// The file.
+        /// The file, or the folder of the shard.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         cause: String,
     },
-    /// Shards do not make one dataset.
-    #[error("{}: {cause}", path.display())]
-    Shard {
-        /// The shard's folder.
-        path: PathBuf,
-        /// Why.
-        cause: String,
-    },
-    /// A mesh of which a cloud is wanted cannot be scanned.
+    /// A mesh cannot be scanned.
     #[error("{0}")]
     Mesh(MeshFailure),
-    /// No view that was tried of a mesh has enough points for a cloud.
+    /// No view of a mesh has enough points for a cloud.
     #[error(
         "{source_file}: expected a view of at least {least} points, found at most {most} in \
          {tried} views"
@@ -103,14 +89,14 @@ pub enum DatasetError {
     Sparse {
         /// The mesh, from the dataset's folder.
         source_file: String,
-        /// How many points a cloud takes.
+        /// The points that a view needs.
         least: u32,
-        /// How many points the best view has.
+        /// The points of the best view.
         most: u64,
-        /// How many views were tried.
+        /// The number of views that were tried.
         tried: u32,
     },
-    /// A setting is bad.
+    /// A setting is invalid.
     #[error(transparent)]
     Invalid(#[from] InvalidValue),
     /// A file cannot be read or written.
@@ -124,9 +110,19 @@ pub enum DatasetError {
     Scan(#[from] ScanError),
 }
 
+impl From<MeshFailure> for DatasetError {
+    fn from(failure: MeshFailure) -> Self {
+        Self::Mesh(failure)
+    }
+}
+
 impl DatasetError {
+    pub(crate) fn malformed(path: &Path, cause: impl ToString) -> Self {
+        Self::Malformed { path: path.into(), cause: cause.to_string() }
+    }
+
     /// The system's error `source` on `path`.
-    pub(super) fn io(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
         FormatError::io(path, source).into()
     }
 }

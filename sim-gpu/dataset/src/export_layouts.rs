@@ -1,11 +1,11 @@
-//! The layouts of other projects, beside our own.
+//! Writes the layouts of other projects.
 
-use super::clouds::{Packed, Part, Scans};
-use super::config::{DatasetConfig, Layout};
-use super::error::DatasetError;
-use super::layout;
-use super::manifest::LayoutFile;
-use super::record::{Entry, MeshRecord};
+use crate::clouds::{Packed, Part, Scans};
+use crate::config::{DatasetConfig, Layout};
+use crate::error::DatasetError;
+use crate::layout;
+use crate::manifest::LayoutFile;
+use crate::record::{Entry, MeshRecord};
 use formats::scan_file::ScanFormat;
 use formats::yanx27::Yanx27Writer;
 use formats::{Split, hash};
@@ -13,17 +13,17 @@ use sim_gpu::internals::config::InvalidValue;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Hexadecimal digits of a hash that set equal names apart.
+/// Hexadecimal digits of the hash that tells equal names apart.
 const HASH_DIGITS: usize = 12;
 
-/// Views of a mesh at most where each scan is a file of its own.
+/// Most views of a mesh if each scan is a file of its own.
 const MOST_VIEWS: usize = 65_535;
 
-/// Checks that the layouts that `config` asks for can hold a dataset of
-/// `classes`: before a run, since they are written at its very end.
+/// Checks that the layouts of `config` can hold a dataset of `classes`. It is called before a run,
+/// since layouts are written at the end.
 ///
 /// # Errors
-/// A layout this build cannot write, or one without room for the classes, the size of a cloud or
+/// A layout that this build cannot write, or that cannot hold the classes, the size of a cloud or
 /// the number of views.
 pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), DatasetError> {
     for &layout in &config.layouts {
@@ -61,12 +61,12 @@ fn refuse_if(unfit: bool, layout: Layout, cause: &'static str) -> Result<(), Dat
     if unfit { Err(DatasetError::Layout { layout: layout.name(), cause }) } else { Ok(()) }
 }
 
-/// Writes the layouts that are asked for; returns their files, sorted.
+/// Writes the layouts of the settings; returns their files, sorted.
 ///
 /// # Errors
-/// As [`check_layouts`]; a scan that cannot be read or is not as recorded; a
-/// file that cannot be written.
-pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<LayoutFile>, DatasetError> {
+/// As [`check_layouts`]; a scan that cannot be read or differs from its record; a file that cannot
+/// be written.
+pub(crate) fn write_layouts(scans: &Scans) -> Result<Vec<LayoutFile>, DatasetError> {
     check_layouts(scans.config, scans.classes)?;
     let mut files = Vec::new();
     for &layout in &scans.config.layouts {
@@ -80,7 +80,7 @@ pub(super) fn write_layouts(scans: &Scans) -> Result<Vec<LayoutFile>, DatasetErr
                     Layout::ModelnetH5 => write_modelnet_h5(scans, &parts, &folder)?,
                     #[cfg(not(feature = "hdf5"))]
                     Layout::ModelnetH5 => unreachable!("invariant: check_layouts refuses it"),
-                    Layout::Webdataset => unreachable!("invariant: it is made by `tars`"),
+                    Layout::Webdataset => unreachable!("invariant: `make` refuses it"),
                 });
             }
         }
@@ -112,9 +112,9 @@ fn write_yanx27<'a>(
     Ok(writer.finish()?)
 }
 
-/// New names for meshes that would share a file: both splits lie in one
-/// folder, where upper case may count as lower, and a class before the name
-/// does not count at all. Each gets a hash of its source appended.
+/// New names for meshes that would share a file, since both splits are in one folder, file systems
+/// may ignore case, and a class in front of the name is removed. A hash of the source is appended
+/// to each.
 fn yanx27_names(records: &[MeshRecord]) -> BTreeMap<&Entry, String> {
     let place = |entry: &Entry| {
         let prefix = format!("{}_", entry.class);

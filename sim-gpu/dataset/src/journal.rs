@@ -1,37 +1,35 @@
-//! What an unfinished run has done: one small file per mesh, written when all
-//! of its scans are there. A run that was killed goes on from these.
+//! The journal of an unfinished run: one small file for each mesh, written when all of its scans
+//! are there. A run that was killed is resumed from these files.
 
-use super::config::DatasetConfig;
-use super::error::DatasetError;
-use super::layout;
-use super::record::{Entry, MeshRecord};
+use crate::config::DatasetConfig;
+use crate::error::DatasetError;
+use crate::layout;
+use crate::record::{Entry, MeshRecord};
 use formats::atomic;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::mesh::tree::MeshEntry;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What must agree for a run to go on.
+/// The conditions of a run. A run is resumed only if they are equal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Terms {
     /// The tool's version.
     pub version: String,
-    /// What the dataset is to hold.
+    /// The settings of the dataset.
     pub config: DatasetConfig,
     /// The adapter's name.
     pub adapter: String,
-    /// Which meshes: a digest of their entries and the names of their files.
+    /// A digest of the entries of the meshes and of the names of their files.
     pub meshes: String,
-    /// Which part of the meshes: (number from 0, of how many).
+    /// The part of the meshes: (number from 0, number of parts).
     pub shard: Option<(u32, u32)>,
 }
 
 impl Terms {
     /// The terms of a run over `meshes`, or over part `shard` of them.
-    #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         config: DatasetConfig,
         caster: &OpenCaster,
         meshes: &[MeshEntry],
@@ -47,9 +45,8 @@ impl Terms {
     }
 }
 
-/// Says which meshes a run is about, whatever is in their files.
-#[must_use]
-pub(super) fn digest<'a>(meshes: impl Iterator<Item = (Entry, &'a str)>) -> String {
+/// A digest of the meshes of a run, which does not depend on the contents of their files.
+pub(crate) fn digest<'a>(meshes: impl Iterator<Item = (Entry, &'a str)>) -> String {
     let mut lines: Vec<String> = meshes
         .map(|(Entry { class, split, name }, source)| format!("{class}/{split}/{name} {source}\n"))
         .collect();
@@ -64,9 +61,9 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// The journal of the dataset in `out`, which need not have one.
+    /// The journal of the dataset in `out`, whether it exists or not.
     #[must_use]
-    pub fn of(out: &Path) -> Self {
+    pub fn at(out: &Path) -> Self {
         Self { folder: layout::journal(out) }
     }
 
@@ -92,7 +89,7 @@ impl Journal {
         read_json(&self.terms_file())
     }
 
-    /// The record of `entry`; `None` if its scans are not all there.
+    /// The record of `entry`, or `None` if some of its scans are missing.
     ///
     /// # Errors
     /// If there is a record that cannot be read.
@@ -101,7 +98,7 @@ impl Journal {
         if file.exists() { read_json(&file).map(Some) } else { Ok(None) }
     }
 
-    /// Notes that all scans of a mesh are there.
+    /// Records that all scans of a mesh are there.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -109,8 +106,8 @@ impl Journal {
         write_json(&self.record_file(&record.entry), record)
     }
 
-    /// Removes the journal of a finished run. If it is killed meanwhile, what
-    /// remains is no journal, and is removed when this is called again.
+    /// Removes the journal of a finished run, its terms first: if the process is killed meanwhile,
+    /// [`Journal::exists`] is false already, and the next call removes the rest.
     ///
     /// # Errors
     /// If a file cannot be removed.
@@ -130,19 +127,15 @@ impl Journal {
 }
 
 /// Reads a JSON file.
-pub(super) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetError> {
+pub(crate) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetError> {
     let text = std::fs::read(file).map_err(|error| DatasetError::io(file, error))?;
-    serde_json::from_slice(&text)
-        .map_err(|error| DatasetError::Malformed { path: file.into(), cause: error.to_string() })
+    serde_json::from_slice(&text).map_err(|error| DatasetError::malformed(file, error))
 }
 
 /// Writes a JSON file, whole or not at all.
-pub(super) fn write_json<T: Serialize>(file: &Path, value: &T) -> Result<(), DatasetError> {
-    let text = serde_json::to_vec_pretty(value)
-        .map_err(|error| DatasetError::Malformed { path: file.into(), cause: error.to_string() })?;
-    atomic::write(file, |out| {
-        out.write_all(&text)?;
-        out.write_all(b"\n")
-    })?;
-    Ok(())
+pub(crate) fn write_json<T: Serialize>(file: &Path, value: &T) -> Result<(), DatasetError> {
+    let mut text =
+        serde_json::to_vec_pretty(value).map_err(|error| DatasetError::malformed(file, error))?;
+    text.push(b'\n');
+    Ok(atomic::write_bytes(file, text)?)
 }

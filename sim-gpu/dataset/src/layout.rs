@@ -1,8 +1,8 @@
-//! Where everything lies in a dataset's folder.
+//! The paths of the files in a dataset's folder.
 
-use super::config::{DatasetConfig, Layout, SetConfig, Variant};
-use super::error::DatasetError;
-use super::record::Entry;
+use crate::config::{DatasetConfig, Layout, SetConfig, Variant};
+use crate::error::DatasetError;
+use crate::record::Entry;
 use formats::Split;
 use formats::scan_file::ScanFormat;
 use std::path::{Path, PathBuf};
@@ -14,25 +14,25 @@ pub fn manifest(out: &Path) -> PathBuf {
     out.join("manifest.json")
 }
 
-/// The list of meshes that could not be scanned; absent if there are none.
+/// The list of meshes that could not be scanned. It exists only if there are some.
 #[must_use]
 pub fn failures(out: &Path) -> PathBuf {
     out.join("failures.jsonl")
 }
 
-/// The records of an unfinished run; absent once it is finished.
+/// The folder of the journal, which exists only while a run is unfinished.
 #[must_use]
 pub fn journal(out: &Path) -> PathBuf {
     out.join("journal")
 }
 
-/// The picture of an example.
+/// The example picture.
 #[must_use]
 pub fn example(out: &Path) -> PathBuf {
     out.join("example.png")
 }
 
-/// One scan's file.
+/// A file of a scan.
 #[must_use]
 pub fn scan(
     out: &Path,
@@ -77,8 +77,7 @@ pub fn export(out: &Path, layout: Layout, set: &SetConfig, variant: Variant) -> 
     export_root(out).join(layout.name()).join(packed_name(set, variant))
 }
 
-/// The names of the folders that a dataset of `config` may hold, which are
-/// all its own.
+/// The names of the folders that a dataset of `config` may have. All of their files belong to it.
 #[must_use]
 pub fn folders(config: &DatasetConfig) -> Vec<String> {
     let mut names: Vec<String> = config.sets.iter().map(|set| set.name.clone()).collect();
@@ -86,7 +85,7 @@ pub fn folders(config: &DatasetConfig) -> Vec<String> {
     names
 }
 
-/// The top-level names that a dataset of `config` may hold.
+/// The names of the files and folders that a dataset of `config` may have at its top level.
 #[must_use]
 pub fn top_level(config: &DatasetConfig) -> Vec<String> {
     let mut names = folders(config);
@@ -94,8 +93,8 @@ pub fn top_level(config: &DatasetConfig) -> Vec<String> {
     names
 }
 
-/// Removes the file or folder at `path`, which need not be there.
-pub(super) fn remove(path: &Path) -> Result<(), DatasetError> {
+/// Removes the file or folder at `path`, if it exists.
+pub(crate) fn remove(path: &Path) -> Result<(), DatasetError> {
     let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
     match removed {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(DatasetError::io(path, error)),
@@ -103,7 +102,7 @@ pub(super) fn remove(path: &Path) -> Result<(), DatasetError> {
     }
 }
 
-/// A relative path as manifests have it: with forward slashes.
+/// A relative path with forward slashes, as manifests have it.
 #[must_use]
 pub fn slashed(path: &Path) -> String {
     let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();

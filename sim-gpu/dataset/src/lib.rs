@@ -1,39 +1,82 @@
-//! Datasets: many meshes, seen by sensors from many places, as files.
+//! Datasets of LiDAR scans: many meshes, scanned by sensors from many viewpoints.
 //!
-//! [`config`] says what is wanted, [`pipeline`] makes the scans and keeps a
-//! [`journal`] so that a killed run can go on, [`finish`] packs them and
-//! writes the manifest, which [`verify`] checks a dataset against. [`merge`]
-//! makes one dataset of parts. [`surfaces`] draws what scans are compared with, and
-//! [`corrupted`] makes sets in which something goes wrong. [`on_demand`] casts the clouds of a
-//! dataset as they are asked for, and writes none; [`tars`] writes them as WebDataset reads them.
-//! [`publish`] describes a finished dataset to those who find it.
+//! [`make()`] writes a dataset of files and a manifest, and resumes a run that was interrupted;
+//! [`make_tars`] writes the clouds as tars for WebDataset, on many machines. [`verify()`] checks a
+//! dataset against its manifest, [`merge()`] makes one dataset of parts, and [`publish()`] writes a
+//! card and metadata for it. [`Clouds`] casts the same clouds on demand, without files.
+//!
+//! ```
+//! use edgepuck_dataset::{DatasetConfig, Plan, Progress, SetConfig, Viewpoints, make, verify};
+//! use sim_gpu::{caster::Caster, mesh::tree::discover, sensor::Sensor};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = std::env::temp_dir().join(format!("edgepuck-dataset-{}", std::process::id()));
+//! # std::fs::create_dir_all(folder.join("meshes/cup/train"))?;
+//! # let cup = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 1\n3 0 1 2\n";
+//! # std::fs::write(folder.join("meshes/cup/train/cup_1.off"), cup)?;
+//!
+//! let sensor = Sensor::builtin("generic-static").ok_or("no such sensor")?;
+//! let viewpoints = Viewpoints::Views(sensor.default_views());
+//! let set = SetConfig { name: "static".to_owned(), sensor, viewpoints };
+//! let config = DatasetConfig::new(vec![set]);
+//!
+//! let meshes = discover(&folder.join("meshes"), config.seed)?;
+//! let caster = Caster::Cpu(config.cast_effects());
+//! let out = folder.join("dataset");
+//! let plan = Plan::new(&out, &config, &meshes);
+//! let manifest = make(&plan, &caster, &Progress::default())?;
+//! assert_eq!(manifest.packed[0].file, "packed/static-clean-train.npz");
+//! assert!(verify(&out)?.is_sound());
+//! # std::fs::remove_dir_all(folder)?;
+//! # Ok(())
+//! # }
+//! ```
 
 mod budget;
 mod clouds;
-pub mod config;
-pub mod corrupted;
-pub mod difference;
-pub mod error;
+mod config;
+mod corrupted;
+mod difference;
+mod error;
 mod export_layouts;
-pub mod finish;
-pub mod journal;
-pub mod layout;
-pub mod manifest;
-pub mod merge;
+mod finish;
+mod journal;
+mod layout;
+mod make;
+mod manifest;
+mod merge;
 mod mesh;
-pub mod on_demand;
-mod pack;
-pub mod pipeline;
-pub mod progress;
-pub mod publish;
-pub mod record;
-pub mod start;
-pub mod surfaces;
-pub mod tars;
-pub mod verify;
+mod on_demand;
+mod packed_sets;
+mod pipeline;
+mod progress;
+mod publish;
+mod record;
+mod surfaces;
+mod tars;
+mod verify;
+mod view;
 
-pub use config::{DatasetConfig, SetConfig, Variant, Viewpoints};
+pub use config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
+pub use corrupted::{Corrupted, CorruptedSet, ObjectCorruption, Written};
 pub use error::DatasetError;
 pub use export_layouts::check_layouts;
-pub use manifest::Manifest;
-pub use record::{Cloud, Entry, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+pub use make::{Begin, Plan, make};
+pub use manifest::{LayoutFile, LeftOut, Manifest, MeshPoses, PackedRecord, Poses, SetPoses};
+pub use merge::merge;
+pub use on_demand::{Clouds, Labelled, seed_of_epoch};
+pub use progress::{Progress, Stage};
+pub use publish::{Publication, publish};
+pub use record::{Cloud, Entry, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+pub use surfaces::{SurfaceConfig, write_surfaces};
+pub use tars::{Cut, HandOver, PartManifest, PartRecord, Sample, TarRecord, Tars, make_tars};
+pub use verify::{Problem, Report, verify};
+
+/// Parts of the library for Edgepuck's programs and tests, which may change in any version.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::finish::finish;
+    pub use crate::journal::{Journal, Terms};
+    pub mod layout {
+        pub use crate::layout::*;
+    }
+}

@@ -1,37 +1,36 @@
-//! The manifest: everything that a dataset is made of and was made by.
+//! The manifest of a dataset: its settings, its files, and what made it.
 //!
-//! It holds nothing of time, speed or threads, so that the same run gives the
-//! same bytes.
+//! It has no times, speeds or numbers of threads, so that the same run gives the same bytes.
 
-use super::config::{DatasetConfig, SetConfig, Viewpoints};
-use super::error::DatasetError;
-use super::journal::{Terms, digest, read_json, write_json};
-use super::layout;
-use super::record::{Entry, FileRecord, MeshFailure, MeshRecord, VariantRecord};
+use crate::config::{DatasetConfig, SetConfig, Viewpoints};
+use crate::error::DatasetError;
+use crate::journal::{Terms, digest, read_json, write_json};
+use crate::layout;
+use crate::record::{Entry, FileRecord, MeshFailure, MeshRecord, VariantRecord};
 use formats::hash::{FileHash, Hashing};
 use serde::{Deserialize, Serialize};
 use sim_gpu::internals::pose::Pose;
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
-/// What made the dataset; the manifest of anything else is refused.
+/// The tool that made the dataset; manifests of other tools are refused.
 pub const TOOL: &str = "edgepuck";
 
 /// A finished dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// [`TOOL`].
+    /// `edgepuck`.
     pub tool: String,
     /// Its version.
     pub version: String,
-    /// What cast the rays: each adapter once, sorted.
+    /// The adapters that cast the rays, once each, sorted.
     pub adapters: Vec<String>,
-    /// Which part of the meshes: (number from 0, of how many).
+    /// The part of the meshes: (number from 0, number of parts).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<(u32, u32)>,
-    /// What it was to hold.
+    /// The settings of the dataset.
     pub config: DatasetConfig,
-    /// Where the sensors stood, by set in the order of the configuration.
+    /// The poses of the sensors, by set in the order of the configuration.
     pub poses: Vec<SetPoses>,
     /// The packed files: by set, variant and split.
     pub packed: Vec<PackedRecord>,
@@ -43,7 +42,7 @@ pub struct Manifest {
     pub meshes: Vec<MeshRecord>,
 }
 
-/// Where one set's sensor stood.
+/// The poses of one set's sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetPoses {
     /// The set.
@@ -57,9 +56,9 @@ pub struct SetPoses {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Poses {
-    /// The same around every mesh.
+    /// The same poses around every mesh.
     EveryMesh(Vec<Pose>),
-    /// Each mesh has its own, since views are drawn. Sorted.
+    /// Each mesh has its own poses, since views are drawn at random; sorted.
     EachMesh(Vec<MeshPoses>),
 }
 
@@ -80,10 +79,10 @@ pub struct PackedRecord {
     /// The hash of its bytes, if the configuration asks for one.
     #[serde(flatten)]
     pub hash: Option<FileHash>,
-    /// Clouds in it.
+    /// Number of clouds in it.
     pub clouds: u64,
-    /// The scans that are not in it: they have fewer points than
-    /// [`DatasetConfig::min_points`], or none.
+    /// The scans that are left out because they have no points or fewer than
+    /// [`DatasetConfig::min_points`].
     pub left_out: Vec<LeftOut>,
 }
 
@@ -92,7 +91,7 @@ pub struct PackedRecord {
 pub struct LeftOut {
     /// `CLASS/NAME_vK`.
     pub name: String,
-    /// How many points it has.
+    /// Its number of points.
     pub points: u64,
 }
 
@@ -110,8 +109,8 @@ impl Manifest {
     /// Reads the manifest `file`.
     ///
     /// # Errors
-    /// [`DatasetError::NoManifest`] if there is none; a manifest that cannot be
-    /// read, is not ours, or holds a name that would lead out of the folder.
+    /// [`DatasetError::NoManifest`] if the file does not exist; a manifest that cannot be read, is
+    /// of another tool, or holds a name that leads out of the folder.
     pub fn read(file: &Path) -> Result<Self, DatasetError> {
         if !file.exists() {
             return Err(DatasetError::NoManifest { path: file.into() });
@@ -119,11 +118,11 @@ impl Manifest {
         let manifest: Self = read_json(file)?;
         match manifest.flaw() {
             None => Ok(manifest),
-            Some(cause) => Err(DatasetError::Malformed { path: file.into(), cause }),
+            Some(cause) => Err(DatasetError::malformed(file, cause)),
         }
     }
 
-    /// Writes it to `file`, whole or not at all.
+    /// Writes it to `file`, atomically.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -131,7 +130,7 @@ impl Manifest {
         write_json(file, self)
     }
 
-    /// The terms of the run that made the dataset.
+    /// The conditions of the run that made the dataset.
     #[must_use]
     pub fn terms(&self) -> Terms {
         Terms {
@@ -143,8 +142,8 @@ impl Manifest {
         }
     }
 
-    /// All classes, sorted: a label is an index into them. Those of meshes that
-    /// could not be scanned count, so that labels do not hang on failures.
+    /// All classes, sorted: a label is an index into them. They include those of meshes that could
+    /// not be scanned, so that labels do not depend on failures.
     #[must_use]
     pub fn classes(&self) -> Vec<String> {
         let classes: BTreeSet<&str> = self.entries().map(|entry| entry.class.as_str()).collect();
@@ -157,9 +156,9 @@ impl Manifest {
         self.meshes.iter().map(|record| &record.entry).chain(failed)
     }
 
-    /// The files of all scans: the path from the dataset's folder, what is recorded of
-    /// the file, and of its scan.
-    pub(super) fn scan_files(
+    /// The files of all scans: the path from the dataset's folder, the record of the file, and
+    /// that of its scan.
+    pub(crate) fn scan_files(
         &self,
     ) -> impl Iterator<Item = (PathBuf, &FileRecord, &VariantRecord)> {
         let scans = self.meshes.iter().flat_map(|mesh| mesh.scans.iter().map(move |s| (mesh, s)));
@@ -191,10 +190,10 @@ impl Manifest {
 
     fn flaw(&self) -> Option<String> {
         if self.tool != TOOL {
-            return Some(format!("made by `{}`, not by `{TOOL}`", self.tool));
+            return Some(format!("expected a dataset of `{TOOL}`, found one of `{}`", self.tool));
         }
         if let Some((number, of)) = self.shard.filter(|(number, of)| number >= of) {
-            return Some(format!("part {number} from 0 of {of} parts"));
+            return Some(format!("expected a part below {of}, found {number}"));
         }
         let hashing =
             |hash: &Option<FileHash>| hash.as_ref().map_or(Hashing::None, FileHash::hashing);
@@ -211,20 +210,20 @@ impl Manifest {
     }
 }
 
-/// Whether `name` leads to a file of that name in the folder it is joined to.
-pub(super) fn is_plain(name: &str) -> bool {
+/// Whether `name`, joined to a folder, is a file in that folder.
+pub(crate) fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     !name.contains(['/', '\\'])
         && matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
 }
 
 /// The poses of all sets around the meshes of `records`.
-pub(super) fn poses(config: &DatasetConfig, records: &[MeshRecord]) -> Vec<SetPoses> {
-    let of = |set: &SetConfig| SetPoses {
+pub(crate) fn poses(config: &DatasetConfig, records: &[MeshRecord]) -> Vec<SetPoses> {
+    let poses = |set: &SetConfig| SetPoses {
         set: set.name.clone(),
         poses: set_poses(config, set, records),
     };
-    config.sets.iter().map(of).collect()
+    config.sets.iter().map(poses).collect()
 }
 
 fn set_poses(config: &DatasetConfig, set: &SetConfig, records: &[MeshRecord]) -> Poses {
@@ -233,6 +232,6 @@ fn set_poses(config: &DatasetConfig, set: &SetConfig, records: &[MeshRecord]) ->
         return Poses::EveryMesh(set.poses(config.seed, ""));
     }
     let ids: BTreeSet<String> = records.iter().map(|record| record.entry.id()).collect();
-    let of = |id: String| MeshPoses { poses: set.poses(config.seed, &id), id };
-    Poses::EachMesh(ids.into_iter().map(of).collect())
+    let poses = |id: String| MeshPoses { poses: set.poses(config.seed, &id), id };
+    Poses::EachMesh(ids.into_iter().map(poses).collect())
 }

@@ -1,12 +1,12 @@
-//! One dataset from the parts that several machines made.
+//! Merges the parts of a dataset, which several machines made, into one.
 
-use super::difference::difference;
-use super::error::DatasetError;
-use super::finish::complete;
-use super::journal::Journal;
-use super::layout;
-use super::manifest::Manifest;
-use super::record::Entry;
+use crate::difference::difference;
+use crate::error::DatasetError;
+use crate::finish::complete;
+use crate::journal::Journal;
+use crate::layout;
+use crate::manifest::Manifest;
+use crate::record::Entry;
 use formats::atomic;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -14,16 +14,14 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Merges `shards`, all parts of one dataset, into `out`, which must be empty
-/// or absent. Scans are hard-linked where the file system can, else copied;
-/// the result has the bytes of one run over all meshes.
+/// Merges `shards`, which are all parts of one dataset, into `out`, which must be empty or absent.
+/// Scans are hard-linked if the file system allows it and copied otherwise. The result has the
+/// same bytes as one run over all meshes.
 ///
-/// On failure `out` is emptied again. A process that is killed leaves files,
-/// but no manifest that would make a dataset of them.
+/// On failure `out` is emptied again. A process that is killed leaves files, but no manifest.
 ///
 /// # Errors
-/// [`DatasetError::Shard`] where the shards do not make one dataset; a shard
-/// that is not finished; a file that cannot be read or written.
+/// Shards that do not make one dataset or are not finished; a file that cannot be read or written.
 pub fn merge(shards: &[PathBuf], out: &Path) -> Result<Manifest, DatasetError> {
     let parts: Vec<Part> = shards.iter().map(|path| Part::read(path)).collect::<Result<_, _>>()?;
     check_agreement(&parts)?;
@@ -33,13 +31,13 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> Result<Manifest, DatasetError> {
     let merged = parts.iter().try_for_each(|part| link_scans(part, out));
     let merged = merged.and_then(|()| complete(out, union(parts)));
     if merged.is_err() {
-        // The first error is the one to tell; what is left has no manifest.
+        // The first error is returned; the files that are left have no manifest.
         let _ = empty(out);
     }
     merged
 }
 
-/// A shard: which part of how many.
+/// A shard: part `number` of `of` parts.
 struct Part {
     path: PathBuf,
     manifest: Manifest,
@@ -49,12 +47,12 @@ struct Part {
 
 impl Part {
     fn read(path: &Path) -> Result<Self, DatasetError> {
-        if Journal::of(path).exists() {
+        if Journal::at(path).exists() {
             return Err(DatasetError::Unfinished { path: path.into() });
         }
         let manifest = Manifest::read(&layout::manifest(path))?;
         let Some((number, of)) = manifest.shard else {
-            return Err(shard_error(
+            return Err(DatasetError::malformed(
                 path,
                 "expected a shard, found a dataset that was made without --shard",
             ));
@@ -63,45 +61,44 @@ impl Part {
     }
 }
 
-fn shard_error(path: &Path, cause: impl Into<String>) -> DatasetError {
-    DatasetError::Shard { path: path.into(), cause: cause.into() }
-}
-
 fn check_agreement(parts: &[Part]) -> Result<(), DatasetError> {
     let ours = env!("CARGO_PKG_VERSION");
     for part in parts {
         let Part { path, manifest, of, .. } = part;
         if manifest.version != ours {
             let cause = format!("was made by version {}; this is {ours}", manifest.version);
-            return Err(shard_error(path, cause));
+            return Err(DatasetError::malformed(path, cause));
         }
         let first = &parts[0];
         if *of != first.of {
             let cause = format!("is one of {of}; {} is one of {}", first.path.display(), first.of);
-            return Err(shard_error(path, cause));
+            return Err(DatasetError::malformed(path, cause));
         }
         if let Some(difference) = difference(&manifest.config, &first.manifest.config) {
             let cause = format!("differs from {}: {difference}", first.path.display());
-            return Err(shard_error(path, cause));
+            return Err(DatasetError::malformed(path, cause));
         }
     }
     Ok(())
 }
 
-/// Checks that each part is there exactly once.
+/// Checks that each part occurs exactly once.
 fn check_numbers(parts: &[Part], out: &Path) -> Result<(), DatasetError> {
     let mut seen = BTreeMap::new();
     for part in parts {
         if let Some(first) = seen.insert(part.number, &part.path) {
             let cause = format!("is the same part as {}", first.display());
-            return Err(shard_error(&part.path, cause));
+            return Err(DatasetError::malformed(&part.path, cause));
         }
     }
     let of = parts.first().map_or(1, |part| part.of);
     match (0..of).find(|number| !seen.contains_key(number)) {
         Some(number) => {
             // The command line counts from 1.
-            Err(shard_error(out, format!("part {}/{of} is not among the shards", number + 1)))
+            Err(DatasetError::malformed(
+                out,
+                format!("part {}/{of} is not among the shards", number + 1),
+            ))
         }
         None => Ok(()),
     }
@@ -114,7 +111,7 @@ fn check_entries(parts: &[Part]) -> Result<(), DatasetError> {
             if let Some(first) = seen.insert(entry, &part.path) {
                 let Entry { split, .. } = entry;
                 let cause = format!("{} ({split}) is also in {}", entry.id(), first.display());
-                return Err(shard_error(&part.path, cause));
+                return Err(DatasetError::malformed(&part.path, cause));
             }
         }
     }
@@ -124,13 +121,15 @@ fn check_entries(parts: &[Part]) -> Result<(), DatasetError> {
 fn check_empty(out: &Path) -> Result<(), DatasetError> {
     match fs::read_dir(out).map(|mut items| items.next().is_none()) {
         Ok(true) => Ok(()),
-        Ok(false) => Err(shard_error(out, "holds files already; merge into an empty folder")),
+        Ok(false) => {
+            Err(DatasetError::malformed(out, "holds files already; merge into an empty folder"))
+        }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(error) => Err(DatasetError::io(out, error)),
     }
 }
 
-/// Puts all scans of one shard into `out`.
+/// Links or copies all scans of one shard into `out`.
 fn link_scans(part: &Part, out: &Path) -> Result<(), DatasetError> {
     let files: Vec<PathBuf> = part.manifest.scan_files().map(|(file, ..)| file).collect();
     files.par_iter().try_for_each(|file| link(&part.path.join(file), &out.join(file)))
@@ -147,7 +146,7 @@ fn link(from: &Path, to: &Path) -> Result<(), DatasetError> {
     Ok(atomic::write(to, |copy| io::copy(&mut scan, copy).map(|_| ()))?)
 }
 
-/// The manifest of one run, as far as the shards know it.
+/// The manifest of the whole, without poses, packed files and layouts.
 fn union(parts: Vec<Part>) -> Manifest {
     let mut manifests = parts.into_iter().map(|part| part.manifest);
     let mut whole = manifests.next().expect("invariant: check_numbers wants one part at least");

@@ -1,14 +1,11 @@
-//! The clouds of a dataset, cast as they are asked for.
-//!
-//! They are those that [`pipeline`](super::pipeline) and [`finish`](super::finish) would pack for
-//! the same configuration, to the byte: but nothing is written, and another seed gives other
-//! views of the same meshes.
+//! The clouds of a dataset, cast on demand.
 
-use super::clouds::Source;
-use super::config::{DatasetConfig, Variant, Viewpoints};
-use super::error::DatasetError;
-use super::mesh::{PlannedView, failure, materials, placed, read};
-use super::record::{Cloud, Entry};
+use crate::clouds::Source;
+use crate::config::{DatasetConfig, Variant, Viewpoints};
+use crate::error::DatasetError;
+use crate::mesh::{materials, read};
+use crate::record::{Cloud, Entry};
+use crate::view::{Rig, View, patterns};
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::{Scan, Split};
@@ -17,20 +14,22 @@ use sim_gpu::effects::Effects;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::job::{Cast, CastJob};
+use sim_gpu::internals::job::{CastJob, Culling};
 use sim_gpu::internals::material::Materials;
 use sim_gpu::internals::mesh::tree::MeshEntry;
-use sim_gpu::internals::resolve::resolve;
-use sim_gpu::internals::scan::{ObjectHits, assemble};
+use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
 use sim_gpu::internals::target::{Surface, Target};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// How many views of a mesh are tried until one has enough points.
+/// Views of a mesh that are tried until one has enough points.
 const ATTEMPTS: u32 = 8;
 
-/// Meshes from places around them: cloud `i` is of view `i % views` of mesh `i / views`.
+/// The clouds of a dataset, cast on demand: cloud `i` is view `i % views` of mesh `i / views`.
+///
+/// They are the clouds that [`make`](crate::make()) packs for the same settings, bit by bit, but
+/// nothing is written, and another seed gives other views of the same meshes.
 pub struct Clouds {
     config: DatasetConfig,
     variant: Variant,
@@ -56,13 +55,13 @@ pub struct Labelled {
 }
 
 impl Clouds {
-    /// The clouds of those of `meshes` that are of `split`, or of all, for the one set of `config`,
-    /// noisy ones where it asks for noise. `meshes`, sorted by class, are all of the dataset: labels
-    /// are places among their classes. Meshes that were read stay in memory up to `cache_bytes`.
+    /// The clouds of the meshes of `split`, or of all meshes, for the only set of `config`: noisy
+    /// clouds if it has the noisy variant. `meshes` are all meshes of the dataset, sorted by class,
+    /// since labels are indices into their classes. Up to `cache_bytes` of meshes stay in memory.
     ///
     /// # Errors
-    /// If there is not one set, if meshes are to be simplified, or if the effects do not fit the
-    /// sensor.
+    /// If there is not exactly one set, if the settings simplify meshes, or if the effects do not
+    /// fit the sensor.
     pub fn new(
         config: DatasetConfig,
         meshes: &[MeshEntry],
@@ -74,26 +73,26 @@ impl Clouds {
             return Err(InvalidValue::new("sets", cause));
         };
         if config.simplify.is_some() {
-            let cause = "expected none: meshes are read for one view at a time";
+            let cause = "expected no simplification: meshes are read for one view at a time";
             return Err(InvalidValue::new("simplify", cause));
         }
         if let Viewpoints::Views(views) = &set.viewpoints {
             views.validate()?;
         }
         config.effects.for_sensor(&set.sensor)?;
-        let patterns = vec![config.effects.widen(set.sensor.pattern(), &set.sensor)?];
+        let patterns = patterns(&config)?;
         let variant =
             if config.variants.contains(&Variant::Noisy) { Variant::Noisy } else { Variant::Clean };
         let cache = Mutex::new(Cache::new(cache_bytes));
         let config = DatasetConfig { hash: Hashing::None, ..config };
         let mut classes: Vec<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
         classes.dedup();
-        let is_asked = |mesh: &&MeshEntry| split.is_none_or(|split| mesh.split == split);
-        let meshes = meshes.iter().filter(is_asked).cloned().collect();
+        let is_wanted = |mesh: &&MeshEntry| split.is_none_or(|split| mesh.split == split);
+        let meshes = meshes.iter().filter(is_wanted).cloned().collect();
         Ok(Self { config, variant, meshes, classes, patterns, cache })
     }
 
-    /// How many clouds there are.
+    /// The number of clouds.
     #[must_use]
     pub fn len(&self) -> usize {
         self.meshes.len() * self.views()
@@ -111,7 +110,7 @@ impl Clouds {
         &self.classes
     }
 
-    /// The mesh that cloud `index` is of.
+    /// The mesh of cloud `index`.
     #[must_use]
     pub fn mesh(&self, index: usize) -> &MeshEntry {
         &self.meshes[index / self.views()]
@@ -124,29 +123,29 @@ impl Clouds {
         self.classes.partition_point(|known| known < class)
     }
 
-    /// What the clouds are of.
+    /// The settings of the dataset.
     #[must_use]
     pub fn config(&self) -> &DatasetConfig {
         &self.config
     }
 
-    /// Which view of its mesh cloud `index` is of.
+    /// The number of the view of cloud `index`.
     #[must_use]
     pub fn view(&self, index: usize) -> u32 {
         (index % self.views()) as u32
     }
 
-    /// The effects that a caster of these clouds models.
+    /// The effects that a caster of these clouds must model.
     #[must_use]
     pub fn cast_effects(&self) -> Effects {
         self.config.cast_effects()
     }
 
-    /// The clouds of these numbers, with the random numbers of `seed`. A view that has too few
-    /// points for a cloud is replaced by one of another seed.
+    /// The clouds at `indices`, with the random numbers of `seed`. A view that has too few points
+    /// for a cloud is replaced by a view of another seed.
     ///
     /// # Errors
-    /// A mesh that cannot be read, or of which no view has enough points; a failing adapter.
+    /// A mesh that cannot be read, or none of whose views has enough points; an adapter that fails.
     pub fn draw(
         &self,
         caster: &OpenCaster,
@@ -156,10 +155,10 @@ impl Clouds {
         self.draw_each(caster, seed, indices)?.into_iter().collect()
     }
 
-    /// As [`Clouds::draw`], where each cloud may fail by itself.
+    /// As [`Clouds::draw`], with a result for each cloud.
     ///
     /// # Errors
-    /// A failing adapter.
+    /// An adapter that fails.
     pub fn draw_each(
         &self,
         caster: &OpenCaster,
@@ -175,10 +174,10 @@ impl Clouds {
         Ok(drawn.into_iter().zip(indices).map(labelled).collect())
     }
 
-    /// The scans that those clouds are of, each of which may fail by itself.
+    /// The scans of those clouds, with a result for each.
     ///
     /// # Errors
-    /// A failing adapter.
+    /// An adapter that fails.
     pub fn scan_each(
         &self,
         caster: &OpenCaster,
@@ -190,8 +189,8 @@ impl Clouds {
         })
     }
 
-    /// What `make` makes of the scan of each view, or of one that takes its place if it makes
-    /// nothing of it.
+    /// The results of `make` for the scan of each view. If it returns `None`, another view takes
+    /// the place of that one.
     fn make_each<T: Send>(
         &self,
         caster: &OpenCaster,
@@ -199,113 +198,91 @@ impl Clouds {
         indices: &[usize],
         make: impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync,
     ) -> Result<Vec<Result<T, DatasetError>>, DatasetError> {
-        let mut most_points = vec![0; indices.len()];
-        let mut made: Vec<Option<Result<T, DatasetError>>> = indices.iter().map(|_| None).collect();
-        for attempt in 0..ATTEMPTS {
-            let missing: Vec<usize> = (0..indices.len()).filter(|&i| made[i].is_none()).collect();
-            if missing.is_empty() {
+        let mut made = self.cast(caster, seed, indices, &make)?;
+        for attempt in 1..ATTEMPTS {
+            let is_sparse = |&i: &usize| matches!(made[i], Err(DatasetError::Sparse { .. }));
+            let sparse: Vec<usize> = (0..made.len()).filter(is_sparse).collect();
+            if sparse.is_empty() {
                 break;
             }
-            let seed = match attempt {
-                0 => seed,
-                _ => other_seed(seed, "another view", attempt),
-            };
-            let config = DatasetConfig { seed, ..self.config.clone() };
-            let asked: Vec<usize> = missing.iter().map(|&i| indices[i]).collect();
-            for (&i, found) in missing.iter().zip(self.cast(caster, &config, &asked, &make)?) {
-                match found {
-                    Ok((points, of_view)) => {
-                        most_points[i] = points.max(most_points[i]);
-                        made[i] = of_view.map(Ok);
-                    }
-                    Err(error) => made[i] = Some(Err(error)),
+            let indices: Vec<usize> = sparse.iter().map(|&i| indices[i]).collect();
+            let other_seed = other_seed(seed, "another view", attempt);
+            let others = self.cast(caster, other_seed, &indices, &make)?;
+            for (i, mut other) in sparse.into_iter().zip(others) {
+                use DatasetError::Sparse;
+                if let (Err(Sparse { most, tried, .. }), Err(Sparse { most: before, .. })) =
+                    (&mut other, &made[i])
+                {
+                    (*most, *tried) = ((*most).max(*before), attempt + 1);
                 }
+                made[i] = other;
             }
         }
-        let made = made.into_iter().zip(indices).zip(most_points);
-        let sparse = |index, most| DatasetError::Sparse {
-            source_file: self.mesh(index).relative.clone(),
-            least: self.config.min_points,
-            most,
-            tried: ATTEMPTS,
-        };
-        Ok(made
-            .map(|((made, &index), most)| made.unwrap_or_else(|| Err(sparse(index, most))))
-            .collect())
+        Ok(made)
     }
 
     fn views(&self) -> usize {
         self.config.sets[0].viewpoints.count()
     }
 
-    /// Casts some views together. Of each, how many points its scan has, and what `make` makes of
-    /// it.
-    #[expect(clippy::type_complexity, reason = "what may fail for each view, and what for all")]
+    /// The results of `make` for some views, which are cast together. If it returns `None`, the
+    /// result is [`DatasetError::Sparse`].
     fn cast<T: Send>(
         &self,
         caster: &OpenCaster,
-        config: &DatasetConfig,
+        seed: u64,
         indices: &[usize],
         make: &(impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync),
-    ) -> Result<Vec<Result<(u64, Option<T>), DatasetError>>, DatasetError> {
+    ) -> Result<Vec<Result<T, DatasetError>>, DatasetError> {
+        let config = &DatasetConfig { seed, ..self.config.clone() };
+        let (patterns, cast_effects) = (&self.patterns, caster.effects());
+        let rig = Rig { config, patterns, cast_effects, culling: Culling::On };
         let aimed: Vec<Result<Aimed, DatasetError>> =
-            indices.par_iter().map(|&index| self.aim(config, index)).collect();
+            indices.par_iter().map(|&index| self.aim(rig, index)).collect();
         let jobs: Vec<CastJob> = aimed.iter().flatten().map(|aimed| aimed.job.clone()).collect();
         let fits = jobs.iter().all(|job| caster.fits(&job.target));
         let casts = if fits { caster.cast(&jobs)? } else { caster.cast_on_cpu(&jobs) };
-        let effects = config.cast_effects();
         let mut casts = casts.into_iter();
-        let aimed: Vec<_> = aimed
+        let cast: Vec<_> = aimed
             .into_iter()
             .map(|aimed| aimed.map(|aimed| (aimed, casts.next().unwrap_or_default())))
             .collect();
-        let made = aimed.into_par_iter().map(|aimed| {
-            let (aimed, cast) = aimed?;
-            self.make(config, &effects, &aimed, &cast, make)
+        let made = cast.into_par_iter().zip(indices).map(|(cast, &index)| {
+            let (Aimed { mesh, view, job }, cast) = cast?;
+            let hits = view.resolve(&job, &cast);
+            let hits = ObjectHits::alone(&job, &hits, mesh.materials.as_ref());
+            let (scan, tally) = view.scan(self.variant, &hits)?;
+            let (set, variant, entry) = (view.set, self.variant, &mesh.entry);
+            let source = Source { set, variant, entry, view: view.number };
+            make(config, source, scan).ok_or_else(|| DatasetError::Sparse {
+                source_file: self.mesh(index).relative.clone(),
+                least: config.min_points,
+                most: tally.points,
+                tried: 1,
+            })
         });
         Ok(made.collect())
     }
 
-    fn aim(&self, config: &DatasetConfig, index: usize) -> Result<Aimed, DatasetError> {
+    fn aim<'a>(&self, rig: Rig<'a>, index: usize) -> Result<Aimed<'a>, DatasetError> {
         let mesh = self.ready(index / self.views())?;
-        let (id, view) = (mesh.entry.id(), self.view(index));
-        let pose = config.sets[0].pose(config.seed, &id, view);
-        let planned = PlannedView::new(config, &self.patterns, 0, view, pose);
-        let request = planned.request(config, &self.patterns, &id);
-        let job = request.aim(&placed(config, &mesh.target, mesh.materials.as_ref()));
-        Ok(Aimed { mesh, planned, job })
+        let (id, number) = (mesh.entry.id(), self.view(index));
+        let pose = rig.config.sets[0].pose(rig.config.seed, &id, number);
+        let view = rig.view(0, number, pose, &id);
+        let job = view.aim(&mesh.target, mesh.materials.as_ref());
+        Ok(Aimed { mesh, view, job })
     }
 
-    fn make<T>(
-        &self,
-        config: &DatasetConfig,
-        cast_effects: &Effects,
-        Aimed { mesh, planned, job }: &Aimed,
-        cast: &Cast,
-        make: &impl Fn(&DatasetConfig, Source, Scan) -> Option<T>,
-    ) -> Result<(u64, Option<T>), DatasetError> {
-        let (set, entry) = (&config.sets[0], &mesh.entry);
-        let hits = resolve(job, cast, &self.patterns[0], cast_effects);
-        let objects = [ObjectHits::alone(job, &hits, mesh.materials.as_ref())];
-        let mut request = planned.request(config, &self.patterns, &entry.id());
-        request.effects = Some(config.effects_of(set, self.variant)?);
-        request.attributes = config.attributes.clone();
-        let (scan, tally) = assemble(&request, cast_effects, &objects)?;
-        let source = Source { set, variant: self.variant, entry, view: planned.view };
-        Ok((tally.points, make(config, source, scan)))
-    }
-
-    /// The mesh of this number, read if it is not in memory.
+    /// Mesh `number`, which is read unless it is in memory.
     fn ready(&self, number: usize) -> Result<Arc<Ready>, DatasetError> {
         let lock = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(ready) = lock().get(number) {
             return Ok(ready);
         }
         let (entry, config) = (&self.meshes[number], &self.config);
-        let (record, mesh, kept) = read(entry, config.up, config.normalize, Hashing::None)
-            .map_err(|error| DatasetError::Mesh(failure(entry, &error)))?;
-        let materials = materials(entry, config).map_err(DatasetError::Mesh)?;
-        // It is cast at in every epoch.
+        let (record, mesh, kept) = read(entry, config.up, config.normalize, Hashing::None)?;
+        let materials = materials(entry, config)?;
+        // Rays are cast at it in every epoch, which pays for the better tree.
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         let ready = Arc::new(Ready { entry: record.entry, target, materials });
         lock().put(number, &ready);
@@ -313,7 +290,7 @@ impl Clouds {
     }
 }
 
-/// The seed of epoch number `epoch` of a training that has `seed`: that seed itself in epoch 0.
+/// The seed of epoch `epoch` of a training that has `seed`, which is the seed of epoch 0.
 #[must_use]
 pub fn seed_of_epoch(seed: u64, epoch: u32) -> u64 {
     if epoch == 0 { seed } else { other_seed(seed, "epoch", epoch) }
@@ -324,14 +301,14 @@ fn other_seed(seed: u64, purpose: &str, number: u32) -> u64 {
     u64::from(high) << 32 | u64::from(low)
 }
 
-/// One view of one mesh, before it is cast.
-struct Aimed {
+/// One view of one mesh, before its rays are cast.
+struct Aimed<'a> {
     mesh: Arc<Ready>,
-    planned: PlannedView,
+    view: View<'a>,
     job: CastJob,
 }
 
-/// Meshes that were read, up to some bytes; those that were asked for longest ago leave first.
+/// Meshes in memory, up to `most_bytes`. The least recently used mesh leaves first.
 struct Cache {
     most_bytes: usize,
     bytes: usize,
@@ -346,8 +323,8 @@ impl Cache {
 
     fn get(&mut self, number: usize) -> Option<Arc<Ready>> {
         self.clock += 1;
-        let (asked, ready) = self.meshes.get_mut(&number)?;
-        *asked = self.clock;
+        let (used_at, ready) = self.meshes.get_mut(&number)?;
+        *used_at = self.clock;
         Some(Arc::clone(ready))
     }
 
@@ -357,7 +334,7 @@ impl Cache {
             return;
         }
         while self.bytes + size > self.most_bytes {
-            let oldest = self.meshes.iter().min_by_key(|(_, (asked, _))| *asked);
+            let oldest = self.meshes.iter().min_by_key(|(_, (used_at, _))| *used_at);
             let Some(oldest) = oldest.map(|(&number, _)| number) else { break };
             if let Some((_, leaving)) = self.meshes.remove(&oldest) {
                 self.bytes -= leaving.target.bytes();

@@ -1,15 +1,15 @@
-//! What a run has done so far, for bars and closing summaries.
+//! The progress of a run, and how to stop it.
 
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 formats::named! {
-    /// A part of the work on one mesh, in the order of the work.
+    /// A stage of the work, in order.
     pub enum Stage: "stage" {
         /// Reading and parsing the file, hashing it, scaling it, validating it.
         Read = "read",
-        /// Simplifying, where that is asked for, and building the hierarchy.
+        /// Simplifying, if the settings ask for it, and building the hierarchy.
         Build = "build",
         /// Aiming beams.
         Aim = "aim",
@@ -19,13 +19,21 @@ formats::named! {
         Resolve = "resolve",
         /// Writing files and records.
         Write = "write",
+        /// Packing clouds and writing layouts and the manifest, after all meshes.
+        Pack = "pack",
     }
 }
 
-/// Counters that all threads of a run add to.
+/// The progress of a run: counters that its threads add to, and the flag that stops it.
 #[derive(Debug, Default)]
 pub struct Progress {
-    /// Meshes finished, failed ones among them.
+    /// Set it to stop the run after the meshes, or before the end of the tar, in progress.
+    pub stop: Arc<AtomicBool>,
+    /// Set by the run when all meshes are scanned, after which it cannot be stopped.
+    pub is_scanned: Arc<AtomicBool>,
+    /// Meshes that the run has to scan or to find in its journal.
+    pub expected_meshes: AtomicU64,
+    /// Meshes finished, including failed ones.
     pub meshes: AtomicU64,
     /// Meshes that could not be scanned.
     pub failures: AtomicU64,
@@ -37,7 +45,7 @@ pub struct Progress {
     pub rays_cast: AtomicU64,
     /// Rays that could not hit and were not cast.
     pub rays_culled: AtomicU64,
-    /// Rays for which f64 had to choose between surfaces.
+    /// Rays for which the caster left the choice between surfaces to f64.
     pub rays_decided_in_f64: AtomicU64,
     stages: [AtomicU64; Stage::ALL.len()],
     notes: Mutex<Vec<String>>,
@@ -59,7 +67,7 @@ impl Progress {
         Duration::from_nanos(self.stages[stage as usize].load(Relaxed))
     }
 
-    /// Something the user should know of one mesh.
+    /// Notes a fact about one mesh for the user.
     pub fn note(&self, note: String) {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
     }

@@ -1,28 +1,28 @@
-//! What a finished dataset is published with: a card for people, `README.md` as Hugging Face shows it,
-//! and metadata for programs, `croissant.json`.
+//! The card of a finished dataset for people, `README.md` as Hugging Face shows it, and its metadata
+//! for programs, `croissant.json`.
 
 mod card;
 mod croissant;
 
-use super::config::DatasetConfig;
-use super::error::DatasetError;
-use super::journal::{read_json, write_json};
-use super::layout;
-use super::manifest::Manifest;
-use super::tars::{Cut, PartManifest, PartRecord, RootManifest, Sample, root_file};
-use super::verify::is_unfinished;
+use crate::config::DatasetConfig;
+use crate::error::DatasetError;
+use crate::journal::{read_json, write_json};
+use crate::layout;
+use crate::manifest::Manifest;
+use crate::tars::{Cut, PartManifest, PartRecord, RootManifest, Sample, root_file};
+use crate::verify::is_unfinished;
 use formats::hash::Hashing;
 use formats::{Split, atomic};
 use std::path::{Path, PathBuf};
 
-/// What nobody but its publisher knows of a dataset.
+/// The facts about a dataset that only its publisher knows.
 #[derive(Clone, Debug, Default)]
 pub struct Publication {
     /// Its name.
     pub name: String,
     /// Its licence, as an identifier of SPDX.
     pub license: Option<String>,
-    /// Where it is to be found.
+    /// Its address.
     pub url: Option<String>,
     /// Who made it.
     pub creator: Option<String>,
@@ -30,43 +30,44 @@ pub struct Publication {
     pub published: Option<String>,
 }
 
-/// What its manifest says of a dataset.
+/// The facts about a dataset in its manifest.
 struct Facts {
     /// The version of Edgepuck that made it.
     version: String,
     config: DatasetConfig,
-    /// A label is a place among them.
+    /// A label is an index into them.
     classes: Vec<String>,
     form: Form,
-    /// The manifest's name and, in hexadecimal digits, its SHA-256.
+    /// The manifest's name, and its SHA-256 in hexadecimal digits.
     manifest: (String, String),
 }
 
-/// How a dataset is kept.
+/// The files of a dataset.
 enum Form {
-    /// A file for each scan, and packed clouds: by packed file, how many.
+    /// A file for each scan, and packed files with their numbers of clouds.
     Files { scans: u64, packed: Vec<(String, u64)> },
-    /// Tars: of each split how many tars, and how many clouds or scans.
+    /// Tars: by split, the number of tars and of clouds or scans.
     Tars { cut: Cut, splits: Vec<(Split, u64, u64)> },
 }
 
 /// The card and the metadata.
 const FILES: [&str; 2] = ["README.md", "croissant.json"];
 
-/// Writes the card and the metadata of the finished dataset in `out`, and returns where they are.
+/// Writes the card and the metadata of the finished dataset in `out`, and returns their paths.
 ///
 /// # Errors
-/// No finished dataset, or one part of several; [`DatasetError::Published`] if there is a card or
-/// metadata already, unless `replace`; a file that cannot be read or written.
+/// A dataset that is not finished, or is one part of several; a card or metadata that exist already,
+/// unless `replace`; a file that cannot be read or written.
 pub fn publish(
     out: &Path,
     publication: &Publication,
     replace: bool,
 ) -> Result<[PathBuf; 2], DatasetError> {
-    let facts = Facts::of(out)?;
+    let facts = Facts::read(out)?;
     let files = FILES.map(|name| out.join(name));
     if let Some(path) = files.iter().find(|path| !replace && path.exists()) {
-        return Err(DatasetError::Published { path: path.clone() });
+        let cause = "exists already; replace it with --overwrite";
+        return Err(DatasetError::malformed(path, cause));
     }
     let (card, metadata) =
         (card::card(publication, &facts), croissant::metadata(publication, &facts));
@@ -75,8 +76,8 @@ pub fn publish(
     Ok(files)
 }
 
-/// Removes what [`publish`] wrote into `out`, which is not true of what replaces the dataset there. A
-/// `README.md` that it did not write stays.
+/// Removes the card and the metadata from `out`, since they do not describe the dataset that will
+/// replace this one. A `README.md` that [`publish`] did not write stays.
 ///
 /// # Errors
 /// A file that cannot be read or removed.
@@ -93,27 +94,27 @@ pub fn retract(out: &Path) -> Result<(), DatasetError> {
 }
 
 impl Facts {
-    fn of(out: &Path) -> Result<Self, DatasetError> {
+    fn read(out: &Path) -> Result<Self, DatasetError> {
         if is_unfinished(out) {
             return Err(DatasetError::Unfinished { path: out.into() });
         }
-        if root_file(out).exists() { Self::of_tars(out) } else { Self::of_files(out) }
+        if root_file(out).exists() { Self::from_tars(out) } else { Self::from_files(out) }
     }
 
-    fn of_tars(out: &Path) -> Result<Self, DatasetError> {
+    fn from_tars(out: &Path) -> Result<Self, DatasetError> {
         let path = root_file(out);
         let RootManifest { version, config, cut, classes, parts, .. } = read_json(&path)?;
         let form = Form::Tars { cut, splits: splits(out, &parts)? };
         Ok(Self { version, config, classes, form, manifest: named_hash(&path)? })
     }
 
-    fn of_files(out: &Path) -> Result<Self, DatasetError> {
+    fn from_files(out: &Path) -> Result<Self, DatasetError> {
         let path = layout::manifest(out);
         let manifest = Manifest::read(&path)?;
         if let Some((number, of)) = manifest.shard {
             let part = number + 1;
             let cause = format!("expected a whole dataset, found part {part} of {of}; merge them");
-            return Err(DatasetError::Shard { path: out.into(), cause });
+            return Err(DatasetError::malformed(out, cause));
         }
         let classes = manifest.classes();
         let scans = manifest.meshes.iter().flat_map(|mesh| &mesh.scans);
@@ -124,7 +125,7 @@ impl Facts {
         Ok(Self { version, config, classes, form, manifest: named_hash(&path)? })
     }
 
-    /// How many clouds, or scans, there are in all.
+    /// The number of clouds or scans.
     fn count(&self) -> u64 {
         match &self.form {
             Form::Files { scans, .. } => *scans,
@@ -132,7 +133,7 @@ impl Facts {
         }
     }
 
-    /// What is counted.
+    /// The noun for what [`Facts::count`] counts.
     fn noun(&self) -> &'static str {
         match self.form {
             Form::Tars { cut: Cut { sample: Sample::Clouds, .. }, .. } => "point clouds",
@@ -148,16 +149,16 @@ fn named_hash(path: &Path) -> Result<(String, String), DatasetError> {
     Ok((name, hash.digits().to_owned()))
 }
 
-/// The splits that have tars, each with how many it has and how many clouds or scans they hold.
+/// The splits that have tars, with their numbers of tars and of clouds or scans.
 fn splits(out: &Path, parts: &[PartRecord]) -> Result<Vec<(Split, u64, u64)>, DatasetError> {
     let mut tars = Vec::new();
     for part in parts {
         tars.extend(read_json::<PartManifest>(&out.join(&part.file))?.tars);
     }
-    let of = |split: Split| {
+    let count = |split: Split| {
         let own = tars.iter().filter(|tar| tar.file.starts_with(split.name()));
         let (tars, samples) = own.fold((0, 0), |(n, sum), tar| (n + 1, sum + tar.clouds));
         (split, tars, samples)
     };
-    Ok(Split::ALL.map(of).into_iter().filter(|(_, tars, _)| *tars > 0).collect())
+    Ok(Split::ALL.map(count).into_iter().filter(|(_, tars, _)| *tars > 0).collect())
 }

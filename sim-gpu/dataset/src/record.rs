@@ -1,10 +1,11 @@
-//! What is known of each mesh once its scans are written.
+//! The records of meshes and scans, which manifests list.
 
-use super::config::Variant;
+use crate::config::Variant;
 use formats::Split;
 use formats::hash::FileHash;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
+use sim_gpu::internals::mesh::MeshError;
 use sim_gpu::internals::mesh::frame::Up;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::mesh::validate::MeshDefects;
@@ -12,7 +13,7 @@ use sim_gpu::internals::scan::Tally;
 use sim_gpu::internals::simplify::Simplified;
 use std::fmt;
 
-/// Which mesh of a dataset: orders everything that is listed.
+/// A mesh of a dataset. Lists are sorted by it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Entry {
     /// Its class.
@@ -26,7 +27,7 @@ pub struct Entry {
 /// One mesh that was scanned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshRecord {
-    /// Which.
+    /// The mesh.
     #[serde(flatten)]
     pub entry: Entry,
     /// The file, from the dataset's folder, with forward slashes.
@@ -34,20 +35,20 @@ pub struct MeshRecord {
     /// The hash of the file's bytes, if the configuration asks for one.
     #[serde(flatten)]
     pub hash: Option<FileHash>,
-    /// The axis that was taken for upward.
+    /// The axis that points upwards.
     pub up: Up,
-    /// What was subtracted from the upright vertices.
+    /// The offset that was subtracted from the upright vertices.
     pub centre: [f64; 3],
-    /// What they were then multiplied by.
+    /// The factor by which they were then multiplied.
     pub scale: f64,
-    /// Triangles in the file, polygons cut up.
+    /// Triangles in the file, where polygons count as the triangles that they are cut into.
     pub triangles: u64,
     /// Faces of fewer than three corners.
     pub dropped_faces: u64,
-    /// What was found among the triangles and vertices.
+    /// Defects of the triangles and vertices.
     #[serde(flatten)]
     pub defects: MeshDefects,
-    /// What simplification made of it, where that was asked for.
+    /// The result of simplification, if the settings ask for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simplified: Option<Simplified>,
     /// Its scans: by set in the order of the configuration, then by view.
@@ -61,38 +62,37 @@ pub struct ScanRecord {
     pub set: String,
     /// The view's number.
     pub view: u32,
-    /// What was written, in the configuration's order of variants.
+    /// Its scans, in the order of the configured variants.
     pub variants: Vec<VariantRecord>,
 }
 
 /// One scan as written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VariantRecord {
-    /// Which effects.
+    /// Its effects.
     pub variant: Variant,
-    /// What became of the returns.
+    /// How many returns became points or were lost.
     #[serde(flatten)]
     pub tally: Tally,
     /// The files, in the configuration's order of formats.
     pub files: Vec<FileRecord>,
-    /// Its cloud, from when it was written to when it is packed. Files of records lack
-    /// it, and so do scans beyond the memory for clouds, which are read again.
+    /// Its cloud, which waits in memory until it is packed. Records that come from files have
+    /// none, nor do scans that exceed the memory for clouds: their scans are read again.
     #[serde(skip)]
     pub cloud: Option<Cloud>,
 }
 
-/// A scan at the size and scale of packed clouds.
+/// The cloud of a scan, at the size and scale of packed clouds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cloud {
-    /// As many points as [`DatasetConfig`](super::config::DatasetConfig) says, mean 0 and
-    /// largest radius 1.
+    /// [`DatasetConfig::packed_points`](crate::DatasetConfig) points with mean 0 and largest
+    /// radius 1.
     pub points: Vec<[f32; 3]>,
-    /// The surface's normal at each point, if a layout asks for normals and the scan
-    /// has them.
+    /// The surface's normal at each point, if a layout holds normals and the scan has them.
     pub normals: Option<Vec<[f32; 3]>>,
 }
 
-/// One file as written.
+/// One file of a scan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FileRecord {
     /// Its format.
@@ -105,15 +105,33 @@ pub struct FileRecord {
 /// One mesh that could not be scanned.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MeshFailure {
-    /// Which.
+    /// The mesh.
     #[serde(flatten)]
     pub entry: Entry,
     /// The file, from the dataset's folder.
     pub source: String,
-    /// The line where it went wrong, if the file has lines.
+    /// The line of the error, if the file has lines.
     pub line: Option<u64>,
-    /// Why.
+    /// The cause.
     pub cause: String,
+}
+
+impl MeshFailure {
+    /// The mesh of `entry` cannot be scanned, because of `cause`.
+    pub(crate) fn new(entry: &MeshEntry, cause: impl ToString) -> Self {
+        let (source, cause) = (entry.relative.clone(), cause.to_string());
+        Self { entry: entry.into(), source, line: None, cause }
+    }
+
+    /// The mesh of `entry` cannot be read, because of `error`.
+    pub(crate) fn unreadable(entry: &MeshEntry, error: &MeshError) -> Self {
+        match error {
+            MeshError::Malformed { line, cause, .. } => {
+                Self { line: line.map(|line| line as u64), ..Self::new(entry, cause) }
+            }
+            other => Self::new(entry, other),
+        }
+    }
 }
 
 impl fmt::Display for MeshFailure {
@@ -130,7 +148,7 @@ impl From<&MeshEntry> for Entry {
 }
 
 impl Entry {
-    /// `CLASS/NAME`: what random numbers are keyed by.
+    /// `CLASS/NAME`, which keys the random numbers of the mesh.
     #[must_use]
     pub fn id(&self) -> String {
         format!("{}/{}", self.class, self.name)

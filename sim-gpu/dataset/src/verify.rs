@@ -1,73 +1,74 @@
-//! Whether a dataset is what its manifest says.
+//! Checks a dataset against its manifest.
 
-use super::error::DatasetError;
-use super::finish::failure_lines;
-use super::journal::Journal;
-use super::layout;
-use super::manifest::Manifest;
-use super::tars;
+use crate::error::DatasetError;
+use crate::finish::failure_lines;
+use crate::journal::{Journal, read_json};
+use crate::layout;
+use crate::manifest::Manifest;
+use crate::tars::{self, PartManifest, RootManifest, root_file};
 use formats::hash::{FileHash, Hashing};
 use formats::labelled::read_labelled;
 use formats::scan_file::{ScanFormat, read_scan};
 use formats::{FormatError, velodyne};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
-/// What was found.
+/// The result of [`verify()`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// Files that the manifest names, scans and packed files among them.
+    /// Number of files that the manifests name.
     pub files: usize,
-    /// Scans, each of which is one or more files.
+    /// Number of scans, each of which is one or more files.
     pub scans: usize,
-    /// Clouds in packed files.
+    /// Number of clouds in packed files, or of clouds or scans in tars.
     pub clouds: u64,
-    /// The hash that files were compared by. With none, points and clouds were counted.
+    /// The hash by which files were compared. Without one, only sizes and numbers of points and
+    /// clouds were compared.
     pub hash: Hashing,
-    /// What is wrong, sorted by path; at most one problem a file.
+    /// The problems, sorted by path; at most one for each file.
     pub problems: Vec<Problem>,
 }
 
-/// What is wrong with one file.
+/// A problem of one file.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[error("{}: {what}", path.display())]
 pub struct Problem {
     /// The file, from the dataset's folder.
     pub path: PathBuf,
-    /// What is wrong.
+    /// The problem.
     pub what: String,
 }
 
 impl Report {
-    /// Whether everything is as the manifest says.
+    /// Whether every file is as the manifest says.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         self.problems.is_empty()
     }
 }
 
-/// Checks the dataset in `out` against its manifest: every file is there, has
-/// its hash, if it has one, and can be read with as many points or clouds as recorded; and
-/// the folders of scans, packed files and layouts hold nothing else. Other
-/// files beside the manifest are the user's.
+/// Checks the dataset in `out`, of files or of tars, against its manifest. Every file must exist,
+/// match its hash, if it has one, and hold the recorded number of points, clouds or bytes. The
+/// folders of scans, packed files and layouts must hold nothing else; other files beside the
+/// manifest are the user's.
 ///
 /// # Errors
-/// [`DatasetError::Unfinished`] or [`DatasetError::NoManifest`]; a manifest
-/// that cannot be read. What is wrong with other files is in the report.
+/// [`DatasetError::Unfinished`] or [`DatasetError::NoManifest`]; a manifest that cannot be read.
+/// The report has the problems of all other files.
 pub fn verify(out: &Path) -> Result<Report, DatasetError> {
+    if root_file(out).exists() {
+        return verify_tars(out);
+    }
     if is_unfinished(out) {
         return Err(DatasetError::Unfinished { path: out.into() });
     }
     let manifest = Manifest::read(&layout::manifest(out))?;
     let expected = expected_files(&manifest);
-    // Packed files fill the memory: one at a time.
-    let (packed, others): (Vec<_>, Vec<_>) =
-        expected.iter().partition(|file| matches!(file.holds, Holds::Clouds(_)));
-    let mut problems: Vec<Problem> = packed.iter().filter_map(|file| file.problem(out)).collect();
-    problems.par_extend(others.par_iter().filter_map(|file| file.problem(out)));
+    let mut problems = problems(out, &expected);
     problems.extend(failures_problem(out, &manifest));
     problems.extend(unexpected(out, &manifest, &expected));
     problems.sort();
@@ -80,46 +81,81 @@ pub fn verify(out: &Path) -> Result<Report, DatasetError> {
     })
 }
 
-/// Whether a run in `out` is to be gone on with.
-pub(super) fn is_unfinished(out: &Path) -> bool {
-    // Beside a manifest, other files are the user's.
-    Journal::of(out).exists() || !layout::manifest(out).exists() && tars::is_unfinished(out)
+fn verify_tars(out: &Path) -> Result<Report, DatasetError> {
+    let root: RootManifest = read_json(&root_file(out))?;
+    let clouds = root.parts.iter().map(|part| part.clouds).sum();
+    let (mut expected, mut unreadable) = (Vec::new(), Vec::new());
+    for part in root.parts {
+        let path = PathBuf::from(part.file);
+        match read_json::<PartManifest>(&out.join(&path)) {
+            Err(error) => unreadable.push(Problem { path, what: error.to_string() }),
+            Ok(manifest) => {
+                expected.push(Expected { path, hash: part.hash, holds: Holds::Anything });
+                expected.extend(manifest.tars.into_iter().map(|tar| Expected {
+                    path: tar.file.into(),
+                    hash: tar.hash,
+                    holds: Holds::Bytes(tar.bytes),
+                }));
+            }
+        }
+    }
+    let files = expected.len() + unreadable.len();
+    let mut problems = problems(out, &expected);
+    problems.extend(unreadable);
+    problems.sort();
+    Ok(Report { files, scans: 0, clouds, hash: root.config.hash, problems })
 }
 
-/// A file that the manifest names.
-struct Expected<'a> {
+/// Whether a run in `out` was begun and not finished.
+pub(crate) fn is_unfinished(out: &Path) -> bool {
+    // Beside a manifest, other files are the user's.
+    Journal::at(out).exists() || !layout::manifest(out).exists() && tars::is_unfinished(out)
+}
+
+/// A file that a manifest names.
+struct Expected {
     path: PathBuf,
-    hash: Option<&'a FileHash>,
+    hash: Option<FileHash>,
     holds: Holds,
 }
 
+/// The recorded contents of a file.
 enum Holds {
     Points(ScanFormat, u64),
     Clouds(u64),
+    Bytes(u64),
     Anything,
 }
 
-fn expected_files(manifest: &Manifest) -> Vec<Expected<'_>> {
+fn expected_files(manifest: &Manifest) -> Vec<Expected> {
     let scans = manifest.scan_files().map(|(path, file, written)| Expected {
         path,
-        hash: file.hash.as_ref(),
+        hash: file.hash.clone(),
         holds: Holds::Points(file.format, written.tally.points),
     });
-    let mut expected: Vec<Expected> = scans.collect();
-    expected.extend(manifest.packed.iter().map(|packed| Expected {
+    let packed = manifest.packed.iter().map(|packed| Expected {
         path: PathBuf::from(&packed.file),
-        hash: packed.hash.as_ref(),
+        hash: packed.hash.clone(),
         holds: Holds::Clouds(packed.clouds),
-    }));
-    expected.extend(manifest.layout_files.iter().map(|file| Expected {
+    });
+    let layouts = manifest.layout_files.iter().map(|file| Expected {
         path: PathBuf::from(&file.file),
-        hash: file.hash.as_ref(),
+        hash: file.hash.clone(),
         holds: Holds::Anything,
-    }));
-    expected
+    });
+    scans.chain(packed).chain(layouts).collect()
 }
 
-impl Expected<'_> {
+fn problems(out: &Path, expected: &[Expected]) -> Vec<Problem> {
+    // Packed files fill the memory: one at a time.
+    let (packed, others): (Vec<_>, Vec<_>) =
+        expected.iter().partition(|file| matches!(file.holds, Holds::Clouds(_)));
+    let mut problems: Vec<Problem> = packed.iter().filter_map(|file| file.problem(out)).collect();
+    problems.par_extend(others.par_iter().filter_map(|file| file.problem(out)));
+    problems
+}
+
+impl Expected {
     fn problem(&self, out: &Path) -> Option<Problem> {
         let path = out.join(&self.path);
         let what = if !path.exists() { Some("is missing".to_owned()) } else { self.flaw(&path) };
@@ -127,19 +163,21 @@ impl Expected<'_> {
     }
 
     fn flaw(&self, path: &Path) -> Option<String> {
-        match self.hash.map(|recorded| (recorded, recorded.hashing().of_file(path))) {
-            Some((_, Err(error))) => return Some(error.to_string()),
-            Some((recorded, Ok(Some(found)))) if found != *recorded => {
-                return Some(format!("was changed: its {found}, not {}", recorded.digits()));
+        if let Some(recorded) = &self.hash {
+            match recorded.hashing().of_file(path) {
+                Err(error) => return Some(error.to_string()),
+                Ok(Some(found)) if found != *recorded => {
+                    return Some(format!("was changed: its {found}, not {}", recorded.digits()));
+                }
+                Ok(_) => {}
             }
-            Some((_, Ok(_))) | None => {}
         }
         let (found, expected, what) = match self.holds {
             Holds::Points(ScanFormat::Csv, points) => (csv_points(path), points, "points"),
             Holds::Points(ScanFormat::Pcap, points) => {
                 return match velodyne::count_returns(path) {
                     Err(error) => Some(error.to_string()),
-                    // Of a range that no packet can tell there is no return.
+                    // Packets hold no return of a range that they cannot represent.
                     Ok(returns) => (returns > points)
                         .then(|| format!("holds {returns} returns of {points} points")),
                 };
@@ -150,8 +188,9 @@ impl Expected<'_> {
             Holds::Clouds(clouds) => {
                 (read_labelled(path).map(|set| set.len() as u64), clouds, "clouds")
             }
-            // The hash has told already whether it is as it was written.
-            Holds::Anything if self.hash.is_some() => return None,
+            // The hash was compared already.
+            Holds::Bytes(_) | Holds::Anything if self.hash.is_some() => return None,
+            Holds::Bytes(bytes) => (size_of(path), bytes, "bytes"),
             Holds::Anything => return read_through(path).err().map(|error| error.to_string()),
         };
         match found {
@@ -164,16 +203,21 @@ impl Expected<'_> {
     }
 }
 
+fn size_of(path: &Path) -> Result<u64, FormatError> {
+    let size = std::fs::metadata(path).map(|file| file.len());
+    size.map_err(|source| FormatError::io(path, source))
+}
+
 /// Reads the file to its end.
 fn read_through(path: &Path) -> Result<u64, FormatError> {
-    let read = || io::copy(&mut std::fs::File::open(path)?, &mut io::sink());
+    let read = || io::copy(&mut File::open(path)?, &mut io::sink());
     read().map_err(|source| FormatError::io(path, source))
 }
 
-/// Lines but for the header: a point each.
+/// The points of a CSV file: its lines without the header.
 fn csv_points(path: &Path) -> Result<u64, FormatError> {
     let count = || -> io::Result<u64> {
-        let mut lines = BufReader::new(std::fs::File::open(path)?).lines();
+        let mut lines = BufReader::new(File::open(path)?).lines();
         let points = lines.try_fold(0, |n, line| line.map(|_| n + 1_u64))?;
         Ok(points.saturating_sub(1))
     };
@@ -185,12 +229,10 @@ fn failures_problem(out: &Path, manifest: &Manifest) -> Option<Problem> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
         found => found,
     };
-    let what = match (found, failure_lines(&manifest.failures)) {
-        (Err(error), _) | (_, Err(error)) => error.to_string(),
-        (Ok(found), Ok(expected)) if found != expected => {
-            "does not list the manifest's failures".to_owned()
-        }
-        _ => return None,
+    let what = match found {
+        Err(error) => error.to_string(),
+        Ok(found) if found == failure_lines(&manifest.failures).as_bytes() => return None,
+        Ok(_) => "does not list the manifest's failures".to_owned(),
     };
     Some(Problem { path: layout::failures(Path::new("")), what })
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep as Points};
-use formats::clusters::{ClusterWriter, Remarks};
+use formats::packed::{ClusterWriter, Remarks};
 use rayon::prelude::*;
 
 use crate::clusters::{LabelledCluster, label_clusters};

@@ -45,7 +45,7 @@ impl Scan {
     /// `range`; an effect moves points off their beams.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
-        match ScanFormat::of(path)? {
+        match ScanFormat::of_path(path)? {
             ScanFormat::Pcap => {
                 let returns = packets::returns(&self.effects, None)?;
                 let revolution = packets::revolution(self.sensor.profile())?;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use formats::clusters::{ClusterWriter, Remarks};
 use formats::labelled::LabelledSet;
 use formats::model_card::{ModelCard, Normalization};
+use formats::packed::{ClusterWriter, Remarks};
 use formats::rng::StreamKey;
 use infer_cpu::{Classifier, Options};
 use train::augment::{TrainingCloud, augment};

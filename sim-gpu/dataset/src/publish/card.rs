@@ -8,13 +8,13 @@ use formats::hash::Hashing;
 use sim_gpu::internals::sensor::Views;
 use std::fmt::Write;
 
-/// What such datasets are found by.
+/// The tags by which such datasets are found.
 pub const TAGS: [&str; 4] = ["lidar", "point-cloud", "simulation", "synthetic"];
 
-/// How a card ends, by which it is known for one.
+/// The end of a card, by which [`retract`](super::retract) recognises it.
 pub const CLOSE: &str = "<!-- Written by `edgepuck card`. -->\n";
 
-/// How Hugging Face sorts datasets by size: the least number of samples, and the word.
+/// Hugging Face's size categories: the least number of samples, and the name.
 const SIZES: [(u64, &str); 10] = [
     (1_000_000_000_000, "n>1T"),
     (100_000_000_000, "100B<n<1T"),
@@ -28,7 +28,7 @@ const SIZES: [(u64, &str); 10] = [
     (1_000, "1K<n<10K"),
 ];
 
-/// The word for fewer than all of these.
+/// The category of smaller datasets.
 const SMALLEST: &str = "n<1K";
 
 /// The card of a dataset.
@@ -69,7 +69,7 @@ pub fn card(publication: &Publication, facts: &Facts) -> String {
     card
 }
 
-/// What is in the dataset, in a sentence or two.
+/// The dataset in a sentence.
 pub fn summary(facts: &Facts) -> String {
     let sensors: Vec<&str> = facts.config.sets.iter().map(|set| &*set.sensor.name).collect();
     format!(
@@ -105,7 +105,7 @@ fn front_matter(publication: &Publication, facts: &Facts) -> String {
     lines.join("\n")
 }
 
-/// A text of YAML, of which texts of JSON are some.
+/// A string of YAML: every string of JSON is one.
 fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }

@@ -1,8 +1,8 @@
 //! The metadata of a dataset in Croissant 1.1 (MLCommons, <https://docs.mlcommons.org/croissant/docs/croissant-spec-1.1.html>).
 //!
-//! The hash of the manifest stands for those of all files, which the manifest lists if the dataset has
-//! any; so the metadata of a billion scans are as short as those of a hundred. mlcroissant reads the classes
-//! and the list of files. It does not open NPZ files: their arrays are described for people and for search.
+//! The metadata have only the hash of the manifest, which lists the hashes of all files. The metadata
+//! of a billion scans are therefore as short as those of a hundred. mlcroissant reads the classes and
+//! the list of files. It does not open NPZ files: their arrays are described for people and for search.
 
 use super::{Facts, Form, Publication};
 use crate::config::Variant;
@@ -10,7 +10,7 @@ use crate::tars::Sample;
 use formats::scan::{ColumnSlot, Scan};
 use serde_json::{Map, Value, json};
 
-/// The words of Croissant that are used here, as its specification maps them.
+/// The vocabulary of Croissant that is used here, as its specification maps it.
 const CONTEXT: &str = include_str!("context.json");
 
 /// The metadata of a dataset.
@@ -70,11 +70,11 @@ pub fn metadata(publication: &Publication, facts: &Facts) -> Value {
         "recordSet": records,
     });
     let known = dataset.as_object_mut().expect("invariant: it is an object");
-    add_what_the_publisher_knows(known, publication);
+    add_publication(known, publication);
     dataset
 }
 
-fn add_what_the_publisher_knows(dataset: &mut Map<String, Value>, publication: &Publication) {
+fn add_publication(dataset: &mut Map<String, Value>, publication: &Publication) {
     let Publication { license, url, creator, published, .. } = publication;
     let license = license.as_ref().map(|id| format!("https://spdx.org/licenses/{id}.html"));
     let texts = [("license", &license), ("url", url), ("datePublished", published)];
@@ -92,8 +92,8 @@ fn add_what_the_publisher_knows(dataset: &mut Map<String, Value>, publication: &
     }
 }
 
-/// The files whose names are like one of `patterns`, in the archives of the set `within`, if that is
-/// one.
+/// The files whose names match one of `patterns`: in the dataset's folder, or in the archives of the
+/// file set `within`.
 fn file_set(id: &str, format: &str, patterns: Vec<String>, within: Option<&str>) -> Value {
     let mut set = json!({
         "@type": "cr:FileSet", "@id": id, "name": id, "encodingFormat": format,
@@ -107,8 +107,8 @@ fn file_set(id: &str, format: &str, patterns: Vec<String>, within: Option<&str>)
 
 fn scan_patterns(facts: &Facts) -> Vec<String> {
     let variants = |set: &str| {
-        let of = |variant: &Variant| format!("{set}/{variant}/*.npz");
-        facts.config.variants.iter().map(of).collect::<Vec<_>>()
+        let pattern = |variant: &Variant| format!("{set}/{variant}/*.npz");
+        facts.config.variants.iter().map(pattern).collect::<Vec<_>>()
     };
     facts.config.sets.iter().flat_map(|set| variants(&set.name)).collect()
 }
@@ -122,7 +122,7 @@ fn field(set: &str, name: &str, data_type: &str) -> Value {
     json!({"@type": "cr:Field", "@id": id, "name": name, "dataType": data_type})
 }
 
-/// A field of NPZ files of `file_set`: the array of this name and shape, -1 where it differs by file.
+/// The array `name` of the NPZ files of `file_set`; -1 in its shape is a size that differs by file.
 fn array(set: &str, name: &str, file_set: &str, shape: &str) -> Value {
     let data_type = if name == "labels" { "sc:Integer" } else { "sc:Float" };
     let mut array = field(set, name, data_type);
@@ -142,16 +142,16 @@ fn classes(names: &[String]) -> Value {
     set
 }
 
-/// The list `list` in the JSON files of `source`: by entry, the values of `keys`.
+/// The list `list` in the JSON files of `source`: the values of `keys` of each entry.
 fn listed(source: &Value, list: &str, keys: &[&str]) -> Value {
-    let of = |key: &&str| {
+    let column = |key: &&str| {
         let data_type = if *key == "file" { "sc:Text" } else { "sc:Integer" };
         let mut one = field(list, key, data_type);
         one["source"] = source.clone();
         one["source"]["extract"] = json!({"jsonPath": format!("$.{list}[*].{key}")});
         one
     };
-    record_set(list, keys.iter().map(of).collect())
+    record_set(list, keys.iter().map(column).collect())
 }
 
 fn clouds(file_set: &str, facts: &Facts) -> Value {
@@ -177,7 +177,7 @@ fn scans(file_set: &str, facts: &Facts) -> Value {
     set
 }
 
-/// The label of each scan of a tar, a file beside it.
+/// The label of each scan of a tar, which is a file beside the scan.
 fn labels() -> Value {
     let mut label = field("label", "label", "sc:Integer");
     label["source"] =

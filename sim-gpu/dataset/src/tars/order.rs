@@ -1,11 +1,11 @@
-//! Which cloud comes at which place of a split.
+//! The order of the clouds of a split.
 
 use crate::on_demand::Clouds;
 use formats::Split;
 use formats::rng::StreamKey;
 
-/// In which order clouds are put into tars: each mesh once, in random order, then each once more from
-/// another side. So a tar has all classes if it has as many clouds as there are meshes.
+/// The order in which clouds are put into tars: one view of each mesh, in random order, then the
+/// next view of each. A tar therefore has all classes if it has as many clouds as there are meshes.
 pub(super) struct Order {
     meshes: Vec<usize>,
     views: usize,
@@ -24,7 +24,7 @@ impl Order {
         self.meshes.len() * self.views
     }
 
-    /// The number among [`Clouds`] of what comes at this place.
+    /// The index among [`Clouds`] of the cloud at this place.
     pub(super) fn at(&self, place: usize) -> usize {
         let (view, rank) = (place / self.meshes.len(), place % self.meshes.len());
         self.meshes[rank] * self.views + view

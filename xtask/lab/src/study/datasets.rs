@@ -3,25 +3,18 @@
 
 use super::resume;
 use anyhow::{Context, bail};
-use edgepuck_dataset::config::{DatasetConfig, Viewpoints};
-use edgepuck_dataset::finish::finish;
-use edgepuck_dataset::journal::Terms;
-use edgepuck_dataset::manifest::Manifest;
-use edgepuck_dataset::pipeline::{Run, scan_all};
-use edgepuck_dataset::progress::Progress;
-use edgepuck_dataset::start::{Begin, Start, begin};
-use edgepuck_dataset::surfaces::{SurfaceConfig, write_surfaces};
+use edgepuck_dataset::{
+    Begin, DatasetConfig, Manifest, Plan, Progress, SurfaceConfig, Viewpoints, make, write_surfaces,
+};
 use edgepuck_program::gen_dataset;
 use edgepuck_shapes::write_tree;
 use formats::atomic;
 use formats::split::Split;
 use sim_gpu::internals::caster::{AdapterRequest, OpenCaster};
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile, Uniform, Views};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// The folder that was asked for, or else `folder`, with built-in shapes: `train` and `test` of
 /// each class.
@@ -62,17 +55,8 @@ pub fn scans(
     out: &Path,
 ) -> anyhow::Result<Manifest> {
     let caster = OpenCaster::open(adapter, &config.cast_effects())?;
-    let terms = Terms::new(config, &caster, meshes, None);
-    Ok(match begin(out, &terms, Begin::Resume)? {
-        Start::Complete(manifest) => *manifest,
-        Start::Go => {
-            let (config, caster, progress) = (&terms.config, &caster, &Progress::default());
-            let is_over = &AtomicBool::new(false);
-            let run = Run { out, config, caster, culling: Culling::On, progress, is_over };
-            let scanned = scan_all(&run, meshes)?;
-            finish(out, &terms, scanned.records, scanned.failures)?
-        }
-    })
+    let plan = Plan { begin: Begin::Resume, ..Plan::new(out, &config, meshes) };
+    Ok(make(&plan, &caster, &Progress::default())?)
 }
 
 /// Samples the surfaces of `meshes`, whole and as the views of `config` see them, into

@@ -5,7 +5,7 @@ use crate::measure::clock::{Workload, measured};
 use crate::study::datasets::{self, as_even_grid, keep_at_most};
 use crate::study::{plan, resume};
 use anyhow::{Context, ensure};
-use edgepuck_dataset::config::{DatasetConfig, SetConfig, Variant};
+use edgepuck_dataset::{DatasetConfig, SetConfig, Variant};
 use edgepuck_program::Outcome;
 use edgepuck_program::flags::need_folder_of_meshes;
 use edgepuck_program::gen_dataset::report_failures;

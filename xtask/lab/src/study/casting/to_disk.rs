@@ -6,17 +6,12 @@ use crate::measure::bench_mesh::some_of;
 use crate::measure::clock::{Cost, measured};
 use crate::render::table::{Table, digits};
 use anyhow::{Context, Result};
-use edgepuck_dataset::config::DatasetConfig;
-use edgepuck_dataset::journal::{Journal, Terms};
-use edgepuck_dataset::pipeline::{Run, scan_all};
-use edgepuck_dataset::progress::{Progress, Stage};
+use edgepuck_dataset::{DatasetConfig, Plan, Progress, Stage, make};
 use edgepuck_program::gen_dataset;
 use serde::Serialize;
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
 #[derive(Serialize)]
@@ -56,16 +51,12 @@ pub fn measure(
 
 fn once(config: &DatasetConfig, caster: &OpenCaster, meshes: &[MeshEntry]) -> Result<Dataset> {
     let folder = tempfile::tempdir()?;
-    let terms = Terms::new(config.clone(), caster, meshes, None);
-    Journal::of(folder.path()).begin(&terms)?;
-    let progress = Progress::default();
-    let (out, culling, is_over) = (folder.path(), Culling::On, &AtomicBool::new(false));
-    let run = Run { out, config, caster, culling, progress: &progress, is_over };
-    let (scanned, cost) = measured(|| scan_all(&run, meshes));
-    let scanned = scanned.context("making the default dataset")?;
+    let (plan, progress) = (Plan::new(folder.path(), config, meshes), Progress::default());
+    let (made, cost) = measured(|| make(&plan, caster, &progress));
+    let made = made.context("making the default dataset")?;
     Ok(Dataset {
         adapter: caster.name().to_owned(),
-        meshes: scanned.records.len(),
+        meshes: made.meshes.len(),
         scans: progress.scans.load(Relaxed),
         points: progress.points.load(Relaxed),
         rays_cast: progress.rays_cast.load(Relaxed),

@@ -5,7 +5,7 @@ use crate::measure::machine::Machine;
 use crate::render::table::{Column, Table, digits};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use edgepuck_dataset::tars::PartManifest;
+use edgepuck_dataset::PartManifest;
 use formats::atomic;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,0 +1,166 @@
+//! Makes a dataset of files: begins or resumes it, scans its meshes, packs the clouds and writes
+//! the manifest.
+
+use crate::config::{DatasetConfig, Layout};
+use crate::difference::difference;
+use crate::error::DatasetError;
+use crate::export_layouts::check_layouts;
+use crate::finish::finish;
+use crate::journal::{Journal, Terms};
+use crate::layout;
+use crate::manifest::{Manifest, is_plain};
+use crate::pipeline::scan_all;
+use crate::progress::{Progress, Stage};
+use crate::publish::retract;
+use formats::atomic;
+use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::mesh::tree::MeshEntry;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::atomic::Ordering::SeqCst;
+
+/// A dataset, or a part of one, to be made.
+#[derive(Clone, Copy)]
+pub struct Plan<'a> {
+    /// The folder of the dataset.
+    pub out: &'a Path,
+    /// The settings of the dataset.
+    pub config: &'a DatasetConfig,
+    /// All meshes of the dataset.
+    pub meshes: &'a [MeshEntry],
+    /// The part to make: (number from 0, number of parts). By default it is the whole dataset.
+    pub part: Option<(u32, u32)>,
+    /// How a dataset that is in the folder already is treated. It is refused by default.
+    pub begin: Begin,
+    /// Whether beams that cannot hit a mesh are cast as well. They are not by default; the bytes
+    /// are the same.
+    pub culling: Culling,
+}
+
+/// How a dataset that is in the folder already is treated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Begin {
+    /// It is refused.
+    #[default]
+    Fresh,
+    /// It is continued.
+    Resume,
+    /// It is removed first.
+    Overwrite,
+}
+
+impl<'a> Plan<'a> {
+    /// The whole dataset of `meshes` with the settings `config` in the folder `out`, which must
+    /// not hold a dataset yet.
+    #[must_use]
+    pub fn new(out: &'a Path, config: &'a DatasetConfig, meshes: &'a [MeshEntry]) -> Self {
+        Self { out, config, meshes, part: None, begin: Begin::Fresh, culling: Culling::On }
+    }
+}
+
+/// Makes the dataset of `plan` and returns its manifest. A part has every N-th mesh of the plan;
+/// [`merge()`](crate::merge()) makes one dataset of all parts. `caster` models
+/// [`DatasetConfig::cast_effects`].
+///
+/// The same settings, meshes and adapter give the same bytes, however often the run was
+/// interrupted. A mesh that cannot be scanned is no error, but a failure that the manifest lists.
+///
+/// # Errors
+/// - [`DatasetError::Occupied`] or [`DatasetError::Different`] if the folder holds files that
+///   [`Plan::begin`] does not allow;
+/// - settings that the layouts cannot hold, or effects that do not fit a sensor;
+/// - [`DatasetError::Interrupted`] if [`Progress::stop`] was set before all meshes were scanned;
+/// - a file that cannot be written, or an adapter that fails.
+pub fn make(
+    plan: &Plan,
+    caster: &OpenCaster,
+    progress: &Progress,
+) -> Result<Manifest, DatasetError> {
+    if plan.config.layouts.contains(&Layout::Webdataset) {
+        let cause = "expected a layout of files: `make_tars` makes tars";
+        return Err(DatasetError::Layout { layout: Layout::Webdataset.name(), cause });
+    }
+    let (number, of) = plan.part.unwrap_or((0, 1));
+    let meshes = plan.meshes.iter().skip(number as usize).step_by(of as usize);
+    let meshes: Vec<MeshEntry> = meshes.cloned().collect();
+    let classes: BTreeSet<String> = meshes.iter().map(|mesh| mesh.class.clone()).collect();
+    check_layouts(plan.config, &Vec::from_iter(classes))?;
+    let terms = Terms::new(plan.config.clone(), caster, &meshes, plan.part);
+    if let Some(manifest) = begin(plan.out, &terms, plan.begin)? {
+        return Ok(manifest);
+    }
+    progress.expected_meshes.store(meshes.len() as u64, SeqCst);
+    let (records, failures) = scan_all(&Plan { meshes: &meshes, ..*plan }, caster, progress)?;
+    progress.is_scanned.store(true, SeqCst);
+    progress.time(Stage::Pack, || finish(plan.out, &terms, records, failures))
+}
+
+/// Begins a run on `terms` in `out`; returns the manifest if the dataset is complete already.
+pub(crate) fn begin(
+    out: &Path,
+    terms: &Terms,
+    how: Begin,
+) -> Result<Option<Manifest>, DatasetError> {
+    let journal = Journal::at(out);
+    let finished = layout::manifest(out).exists();
+    match how {
+        Begin::Fresh => refuse_occupied(out, terms)?,
+        Begin::Overwrite if finished || journal.exists() => remove(out, terms)?,
+        Begin::Overwrite => refuse_occupied(out, terms)?,
+        Begin::Resume if journal.exists() => {
+            same_terms(out, &journal.terms()?, terms)?;
+            return Ok(None);
+        }
+        Begin::Resume if finished => {
+            let manifest = Manifest::read(&layout::manifest(out))?;
+            same_terms(out, &manifest.terms(), terms)?;
+            // A run that was killed at its very end leaves parts of its journal and of the files
+            // that it was writing.
+            journal.remove()?;
+            atomic::sweep_leftovers(out)?;
+            return Ok(Some(manifest));
+        }
+        Begin::Resume => {
+            // A run that was killed at its very beginning leaves a journal without terms.
+            journal.remove()?;
+            refuse_occupied(out, terms)?;
+        }
+    }
+    journal.begin(terms)?;
+    Ok(None)
+}
+
+fn refuse_occupied(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
+    let what = if layout::journal(out).exists() {
+        "an unfinished dataset"
+    } else if layout::manifest(out).exists() {
+        "a dataset"
+    } else if layout::top_level(&terms.config).iter().any(|name| out.join(name).exists()) {
+        "files where a dataset's would go"
+    } else {
+        return Ok(());
+    };
+    Err(DatasetError::Occupied { path: out.into(), what })
+}
+
+/// Removes the files of the dataset in `out`, and no other files beside them.
+fn remove(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
+    let mut names = layout::top_level(&terms.config);
+    let manifest = layout::manifest(out);
+    if manifest.exists() {
+        names.extend(layout::top_level(&Manifest::read(&manifest)?.config));
+    } else if let Ok(begun) = Journal::at(out).terms() {
+        names.extend(layout::top_level(&begun.config));
+    }
+    retract(out)?;
+    // The set names of a damaged journal must not lead out of the folder.
+    names.iter().filter(|name| is_plain(name)).try_for_each(|name| layout::remove(&out.join(name)))
+}
+
+fn same_terms(out: &Path, begun: &Terms, asked: &Terms) -> Result<(), DatasetError> {
+    match difference(begun, asked) {
+        None => Ok(()),
+        Some(difference) => Err(DatasetError::Different { path: out.into(), difference }),
+    }
+}

@@ -1,0 +1,128 @@
+//! One view of one mesh: the scan that a dataset asks for, aimed before the rays are cast and
+//! assembled after.
+
+use crate::config::{DatasetConfig, SetConfig, Variant};
+use formats::Scan;
+use formats::vlp32c::Revolution;
+use sim_gpu::effects::Effects;
+use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::internals::job::{Cast, CastJob, Culling};
+use sim_gpu::internals::material::Materials;
+use sim_gpu::internals::packets;
+use sim_gpu::internals::pose::Pose;
+use sim_gpu::internals::resolve::{Hits, resolve};
+use sim_gpu::internals::scan::{ObjectHits, PlacedTarget, ScanRequest, Tally, assemble};
+use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::target::Target;
+use std::slice::from_ref;
+use std::sync::Arc;
+
+/// What all views of a dataset share.
+#[derive(Clone, Copy)]
+pub(crate) struct Rig<'a> {
+    /// The settings of the dataset.
+    pub config: &'a DatasetConfig,
+    /// The beams of each set's sensor.
+    pub patterns: &'a [BeamPattern],
+    /// The effects that the caster models.
+    pub cast_effects: &'a Effects,
+    /// Whether beams that cannot hit the mesh are cast.
+    pub culling: Culling,
+}
+
+/// One view of one mesh.
+pub(crate) struct View<'a> {
+    /// The set.
+    pub set: &'a SetConfig,
+    /// The number of the view in its set.
+    pub number: u32,
+    rig: Rig<'a>,
+    request: ScanRequest<'a>,
+}
+
+/// The beams of each set's sensor, widened to the footprint that the effects ask for.
+pub(crate) fn patterns(config: &DatasetConfig) -> Result<Vec<BeamPattern>, InvalidValue> {
+    let widened = |set: &SetConfig| config.effects.widen(set.sensor.pattern(), &set.sensor);
+    config.sets.iter().map(widened).collect()
+}
+
+impl<'a> Rig<'a> {
+    /// All views of the mesh `id`: by set, then by number.
+    pub fn views(self, id: &str) -> Vec<View<'a>> {
+        let views_of_set = |set: usize| {
+            let poses = self.config.sets[set].poses(self.config.seed, id);
+            poses.into_iter().zip(0..).map(move |(pose, number)| self.view(set, number, pose, id))
+        };
+        (0..self.config.sets.len()).flat_map(views_of_set).collect()
+    }
+
+    /// View `number` of set number `set` of the mesh `id`, from `pose`.
+    pub fn view(self, set: usize, number: u32, pose: Pose, id: &str) -> View<'a> {
+        let Self { config, patterns, culling, .. } = self;
+        let (set, pattern) = (&config.sets[set], &patterns[set]);
+        let mut request = ScanRequest::new(&set.sensor, pattern, pose);
+        let trajectory = config.effects.motion.as_deref();
+        let trajectory = trajectory.map(|motion| motion.trajectory(pose, [0.0, pattern.last_s()]));
+        request.motion = trajectory.map(Arc::new);
+        request.stream = set.stream(config.seed, id, number);
+        request.attributes = config.attributes.clone();
+        request.culling = culling;
+        View { set, number, rig: self, request }
+    }
+}
+
+impl View<'_> {
+    /// The beams of the sensor.
+    pub fn pattern(&self) -> &BeamPattern {
+        self.request.pattern
+    }
+
+    /// Where the sensor stands.
+    pub fn pose(&self) -> &Pose {
+        &self.request.pose
+    }
+
+    /// The rays to cast at the mesh.
+    pub fn aim(&self, target: &Target, materials: Option<&Materials>) -> CastJob {
+        let mut placed = PlacedTarget::new(target);
+        placed.reflectivity = self.rig.config.reflectivity as f32;
+        placed.materials = materials;
+        self.request.aim(&placed)
+    }
+
+    /// Where the rays of `job` meet the mesh, from the answers of the caster.
+    pub fn resolve(&self, job: &CastJob, cast: &Cast) -> Hits {
+        resolve(job, cast, self.pattern(), self.rig.cast_effects)
+    }
+
+    /// The scan with the effects of `variant`.
+    ///
+    /// # Errors
+    /// Effects that do not fit the sensor.
+    pub fn scan(&self, variant: Variant, hits: &ObjectHits) -> Result<(Scan, Tally), InvalidValue> {
+        assemble(&self.request_of(variant)?, self.rig.cast_effects, from_ref(hits))
+    }
+
+    /// The scan with the attributes that packets hold, and the revolution of the sensor.
+    ///
+    /// # Errors
+    /// As [`View::scan`]; a sensor without packets.
+    pub fn packets(
+        &self,
+        variant: Variant,
+        hits: &ObjectHits,
+    ) -> Result<(Scan, Revolution), InvalidValue> {
+        let revolution = packets::revolution(&self.set.sensor)?;
+        let mut request = self.request_of(variant)?;
+        let effects = request.applied_effects(self.rig.cast_effects)?;
+        request.attributes = packets::attributes(&effects, &request.attributes);
+        let (scan, _) = assemble(&request, self.rig.cast_effects, from_ref(hits))?;
+        Ok((scan, revolution))
+    }
+
+    fn request_of(&self, variant: Variant) -> Result<ScanRequest<'_>, InvalidValue> {
+        let mut request = self.request.clone();
+        request.effects = Some(self.rig.config.effects_of(self.set, variant)?);
+        Ok(request)
+    }
+}
