@@ -1,5 +1,6 @@
 //! The processor that casts.
 
+use super::Error;
 use crate::cast_error::CastError;
 use crate::caster::{AdapterRequest, OpenCaster};
 use crate::effects::Effects;
@@ -52,7 +53,7 @@ impl Caster {
     ///
     /// # Errors
     /// No adapter has such a name (the message lists those that there are), or it does not open.
-    pub fn named(name: &str) -> Result<Self, CastError> {
+    pub fn named(name: &str) -> Result<Self, Error> {
         match name.parse() {
             Ok(AdapterRequest::Auto) => Ok(Self::auto()),
             Ok(AdapterRequest::Cpu) => Ok(Self::cpu()),

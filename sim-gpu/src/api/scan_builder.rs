@@ -30,13 +30,43 @@ pub struct ScanBuilder<'a> {
 
 /// What the random numbers of a scan belong to, besides its seed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Key<'a> {
-    pub name: &'a str,
-    pub number: u32,
+struct Key<'a> {
+    name: &'a str,
+    number: u32,
+}
+
+impl Scene {
+    /// A scan of the scene by `sensor` at `pose`: [`ScanBuilder::run`] makes it.
+    pub fn scan<'a>(&'a self, sensor: &'a Sensor, pose: Pose) -> ScanBuilder<'a> {
+        ScanBuilder::new(self, sensor, pose, Key { name: "scan", number: 0 })
+    }
+
+    /// A scan by each of the [`sensors`](Scene::sensors), in their order.
+    ///
+    /// # Errors
+    /// As [`ScanBuilder::run`].
+    pub fn scan_all(&self, caster: &Caster) -> Result<Vec<Scan>, Error> {
+        (0..self.sensors.len()).map(|number| self.scan_mounted(number).with(caster).run()).collect()
+    }
+
+    /// The scan by sensor number `number` of [`sensors`](Scene::sensors).
+    ///
+    /// # Panics
+    /// There is no such sensor.
+    pub fn scan_mounted(&self, number: usize) -> ScanBuilder<'_> {
+        let mounted = &self.sensors[number];
+        let key = Key { name: &mounted.name, number: number as u32 };
+        let scan = ScanBuilder::new(self, &mounted.sensor, mounted.pose, key);
+        let scan = scan.start_s(mounted.start_s).deskewed(mounted.deskew);
+        match &mounted.motion {
+            Some(motion) => scan.along(Arc::clone(motion)),
+            None => scan,
+        }
+    }
 }
 
 impl<'a> ScanBuilder<'a> {
-    pub(super) fn new(scene: &'a Scene, sensor: &'a Sensor, pose: Pose, key: Key<'a>) -> Self {
+    fn new(scene: &'a Scene, sensor: &'a Sensor, pose: Pose, key: Key<'a>) -> Self {
         Self {
             scene,
             sensor,

@@ -1,7 +1,6 @@
 //! Scenes: what stands where, and which sensors look at it.
 
-use super::scan_builder::Key;
-use super::{Caster, Error, Mesh, Scan, ScanBuilder, Sensor};
+use super::{Error, Mesh, Sensor};
 use crate::effects::Effects;
 use crate::material::Materials;
 use crate::pose::{Pose, Trajectory};
@@ -162,34 +161,6 @@ impl Scene {
     /// The handles of the instances, in their order.
     pub fn ids(&self) -> impl Iterator<Item = InstanceId> + use<> {
         (0..self.instances.len() as u32).map(InstanceId)
-    }
-
-    /// A scan of the scene by `sensor` at `pose`: [`ScanBuilder::run`] makes it.
-    pub fn scan<'a>(&'a self, sensor: &'a Sensor, pose: Pose) -> ScanBuilder<'a> {
-        ScanBuilder::new(self, sensor, pose, Key { name: "scan", number: 0 })
-    }
-
-    /// A scan by each of the [`sensors`](Scene::sensors), in their order.
-    ///
-    /// # Errors
-    /// As [`ScanBuilder::run`].
-    pub fn scan_all(&self, caster: &Caster) -> Result<Vec<Scan>, Error> {
-        (0..self.sensors.len()).map(|number| self.scan_mounted(number).with(caster).run()).collect()
-    }
-
-    /// The scan by sensor number `number` of [`sensors`](Scene::sensors).
-    ///
-    /// # Panics
-    /// There is no such sensor.
-    pub fn scan_mounted(&self, number: usize) -> ScanBuilder<'_> {
-        let mounted = &self.sensors[number];
-        let key = Key { name: &mounted.name, number: number as u32 };
-        let scan = ScanBuilder::new(self, &mounted.sensor, mounted.pose, key);
-        let scan = scan.start_s(mounted.start_s).deskewed(mounted.deskew);
-        match &mounted.motion {
-            Some(motion) => scan.along(Arc::clone(motion)),
-            None => scan,
-        }
     }
 
     /// All instances as a caster takes them. `stream` keys the random numbers of a name.
