@@ -125,3 +125,46 @@ def test_clusters_are_numbered_and_ground_is_told() -> None:
     # The recipe draws how low a robot takes points for ground; alone, it is the default.
     assert (own == -1).any()
     assert own.max() > 5
+
+
+def test_a_mesh_that_is_not_scaled_stays_where_its_source_has_it():
+    # The corners of a tetrahedron of 40 x 30 x 20 m, away from the origin.
+    corners = np.array([[0, 0, 0], [40, 0, 0], [0, 30, 0], [0, 0, 20]]) + [100.0, 0.0, 5.0]
+    faces = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]
+    mesh = ep.Mesh(corners, faces, normalize="none")
+    np.testing.assert_array_equal(mesh.vertices, corners)
+    assert mesh.scale == 1 and not mesh.centre.any()
+    pose = np.eye(4)
+    pose[:3, 3] = [90, 5, 8]
+    points = ep.Sensor("vlp32c").scan(mesh, pose=pose)
+    world = points.positions + points.origin
+    assert len(points) > 100
+    assert np.all(world >= corners.min(axis=0) - 1e-4)
+    assert np.all(world <= corners.max(axis=0) + 1e-4)
+
+
+def test_instances_share_a_mesh_and_move(cube):
+    mesh, sensor, scene = ep.Mesh(*cube, normalize="none"), ep.Sensor("vlp32c"), ep.Scene()
+    near = scene.add(mesh, position=(3, 0, 0), label="box")
+    far = scene.add(mesh, position=(5, 2, 0), scale=(1, 1, 3), reflectivity=0.2)
+    assert (len(scene), near, far) == (2, 0, 1)
+    both = scene.scan(sensor, pose=np.eye(4), attributes=["object", "range"])
+    assert set(both.object) == {near, far}
+    # The face towards the sensor is 2.5 m ahead.
+    assert both.positions[both.object == near][:, 0].min() == pytest.approx(2.5, abs=1e-6)
+    scene.move(near, position=(4, 0, 0))
+    moved = scene.scan(sensor, pose=np.eye(4), attributes=["object"])
+    assert moved.positions[moved.object == near][:, 0].min() == pytest.approx(3.5, abs=1e-6)
+    for wrong in [lambda: scene.move(2, position=(0, 0, 0)), lambda: scene.add("cube.off")]:
+        with pytest.raises(ep.Error, match="expected"):
+            wrong()
+    with pytest.raises(ep.Error, match="reflectivity"):
+        scene.add(mesh, reflectivity=2.0)
+        scene.scan(sensor)
+
+
+def test_a_scene_of_one_mesh_is_the_scan_of_that_mesh(cube):
+    mesh, sensor, scene = ep.Mesh(*cube), ep.Sensor("vlp32c"), ep.Scene()
+    scene.add(mesh)
+    alone = sensor.scan(mesh, noise=0.02, seed=3)
+    np.testing.assert_array_equal(scene.scan(sensor, noise=0.02, seed=3).positions, alone.positions)
