@@ -1,8 +1,8 @@
-// Makes rays from a sensor's beams in whole numbers, which every adapter computes alike:
-// what f32 rounds, a far sensor would magnify. Counterpart: `sim-gpu/src/cpu/aim.rs`,
-// which says what the numbers mean and how exact they are.
+// Makes rays from a sensor's beams in integers, which every adapter computes alike; the distance
+// of a sensor would magnify rounding to f32. Counterpart: `sim-gpu/src/cpu/aim.rs`, which documents
+// the units and the bounds of rounding.
 
-// How a sensor sees an object, and where its rays and beams begin in their buffers.
+// The frame of a sensor and an object, and the places of its rays and beams in their buffers.
 struct View {
     turn_x: vec3i,
     root: u32,
@@ -10,13 +10,13 @@ struct View {
     first_ray: u32,
     turn_z: vec3i,
     first_word: u32,
-    // 64 bits, the halves apart.
+    // Integers of 64 bits, in two halves.
     origin_low: vec3u,
     first_direction: u32,
     origin_high: vec3u,
     reach_low: u32,
     reach_high: u32,
-    // The object's, 0 to 1.
+    // The reflectivity of the object, 0 to 1.
     reflectivity: f32,
 }
 
@@ -77,7 +77,7 @@ fn aim(view: View, beam: vec3i) -> TraceRay {
         rounded(sum(y, product(direction.y, skipped)), 27u),
         rounded(sum(z, product(direction.z, skipped)), 27u),
     );
-    // Whole numbers of 24 bits are exact in f32, and so are their powers of two.
+    // Integers of 24 bits are exact in f32, and so are their multiples of powers of two.
     return TraceRay(
         vec3f(origin) / 8388608.0,
         view.root,

@@ -87,7 +87,8 @@ fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
     let near_edge = within(u, cx - bx, cy - by)
         || within(v, cx - ax, cy - ay)
         || within(w, bx - ax, by - ay);
-    // What the ray may truly meet: the neighbour, or nothing.
+    // Near an edge the ray may truly meet the neighbour instead; a triangle within its error of
+    // the origin may truly lie behind it.
     var rival = NO_HIT;
     if near_edge {
         rival = t - 2.0 * error - DISPLACEMENT * STEEPEST;

@@ -1,25 +1,24 @@
-// One ray per invocation: the nearest triangle's code, and what the effects
-// asked for. Counterpart: `sim-gpu/src/cpu/trace.rs`.
+// Traces one ray per invocation: the code of the nearest triangle, and the outputs of effects.
+// Counterpart: `sim-gpu/src/cpu/trace.rs`.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> triangles: array<LeafTriangle>;
-// A word for each ray that is made here: its beam. Eight, a `TraceRay`, for each other.
+// One word for each ray that is made here, its beam; eight, a `TraceRay`, for each that is sent.
 @group(0) @binding(2) var<storage, read> rays: array<u32>;
 @group(0) @binding(3) var<storage, read_write> codes: array<u32>;
-// In the order of their first rays.
+// Sorted by first ray.
 @group(0) @binding(4) var<storage, read> views: array<View>;
 // Three words for each beam of a pattern.
 @group(0) @binding(5) var<storage, read> directions: array<i32>;
-// Buffers are used again by batches of other sizes, so their lengths do not tell
-// how much of them counts. These numbers come with each dispatch, so that the
-// bindings stay as they are.
+// Batches of different sizes reuse the buffers, so that array lengths do not give the number of
+// elements. These counts come with each dispatch, so that the bind groups stay the same.
 struct Counts {
     rays: u32,
     views: u32,
 }
 var<immediate> counts: Counts;
 
-// The view that ray `i` belongs to: the last that begins at it or before it.
+// The view of ray `i`: the last whose first ray is not after it.
 fn view_of(i: u32) -> View {
     var low = 0u;
     var high = counts.views;

@@ -5,15 +5,14 @@ fn reciprocal(direction: vec3f) -> vec3f {
     return 1.0 / select(direction, away, abs(direction) < vec3f(LEAST_COMPONENT));
 }
 
-// A ray as slab tests see it: distance to a plane at x is
-// x * per_direction + offset. Rounding the offset moves the plane by 2 * 2^-24
-// at most, for which boxes are padded.
+// A ray prepared for slab tests: it meets the plane at x at distance x * per_direction + offset.
+// Rounding the offset moves the plane by at most 2 * 2^-24, for which boxes are padded.
 struct Slabs {
     per_direction: vec3f,
     offset: vec3f,
 }
 
-// Where the ray enters the box, or NO_HIT.
+// The distance at which the ray enters the box, or NO_HIT.
 fn enter(low: vec3f, high: vec3f, slabs: Slabs, farthest: f32) -> f32 {
     let t0 = fma(low, slabs.per_direction, slabs.offset);
     let t1 = fma(high, slabs.per_direction, slabs.offset);
@@ -88,7 +87,7 @@ fn traverse(ray: TraceRay) -> Nearest {
     return nearest;
 }
 
-// Says whether another triangle may truly be nearer by more than the promised
+// The caster's answer; ambiguous if another triangle may truly be nearer by more than the promised
 // accuracy.
 fn code_of(nearest: Nearest, skipped: f32) -> u32 {
     if nearest.index == MISS {

@@ -1,4 +1,4 @@
-// The record of `sim-gpu/src/ray.rs`, and what the caster answers.
+// The record of `sim-gpu/src/ray.rs`, and the nearest surface along a ray.
 
 struct TraceRay {
     origin: vec3f,
@@ -10,13 +10,13 @@ struct TraceRay {
 
 struct Nearest {
     t: f32,
-    // How far the true distance may be from `t`.
+    // Bound of the difference between `t` and the true distance.
     error: f32,
-    // Place in `triangles`.
+    // Index in `triangles`.
     leaf: u32,
     index: u32,
-    // No surface that starts beyond this can be the nearest.
+    // Surfaces that begin beyond this are not the nearest.
     farthest: f32,
-    // The lowest distance that another surface may truly have.
+    // Lower bound of the true distance of every other surface that the ray may meet.
     rival: f32,
 }

@@ -44,7 +44,7 @@ pub enum CastError {
     Lost {
         /// The adapter.
         name: String,
-        /// What the device reported.
+        /// The error of the device.
         cause: String,
     },
 }

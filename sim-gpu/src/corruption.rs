@@ -349,7 +349,7 @@ mod tests {
         let at = recorded(&scan, &bright, &is_ground);
         assert_eq!(at.wet_ground(0.0).positions, scan.positions);
         assert_eq!(at.too_weak_before(), 0);
-        // What loses nothing stays, however weak the limit takes it to be.
+        // Points that lose no power stay, even below the limit.
         let black = vec![1e-6; scan.len()];
         let black = recorded(&scan, &black, &is_ground);
         assert_eq!((black.dirty_window(1.0).len(), black.too_weak_before()), (800, 800));
@@ -358,7 +358,7 @@ mod tests {
         for (point, &left) in wet.positions.iter().zip(intensity) {
             assert!(if point[2] < 0.0 { left < 0.37 } else { left == 0.4 }, "{point:?}: {left}");
         }
-        // What was just detected is lost.
+        // Points at the limit are lost.
         let dim = vec![0.0033; scan.len()];
         let lost = recorded(&scan, &dim, &is_ground).wet_ground(1.0).len();
         assert!(lost < recorded(&scan, &dim, &is_ground).wet_ground(0.0).len());

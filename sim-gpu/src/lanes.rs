@@ -1,6 +1,7 @@
 //! Vectors in f64, one in each lane: plain loops that the compiler vectorizes, for AVX2 or AVX-512
 //! if [`widest`] finds them. Each lane equals the result of glam for one vector to the bit.
 
+use fearless_simd::{Level, Simd, dispatch};
 use glam::{DMat3, DVec3};
 use std::ops::{Add, Mul, Sub};
 
@@ -106,68 +107,22 @@ impl<const N: usize> Mul<[f64; N]> for Vectors<N> {
     }
 }
 
-/// The proof that the processor has AVX2 and what came with it.
-#[derive(Clone, Copy)]
-pub(crate) struct Avx2(());
-
 /// Work on lanes.
 pub(crate) trait Lanewise: Sized {
-    /// What it gives.
+    /// Its result.
     type Output;
 
-    /// Does the work, with AVX2 at hand if there is any; must be `#[inline(always)]`, or it
-    /// is not compiled anew for wider vectors.
-    fn run(self, avx2: Option<Avx2>) -> Self::Output;
+    /// Does the work with the instruction set of `simd`. Implementations are `#[inline(always)]`:
+    /// otherwise they are not compiled for each instruction set.
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// A way of doing work: what it is compiled for, and a function that does it.
-pub(crate) type Way<W> = (&'static str, fn(W) -> <W as Lanewise>::Output);
-
-/// The ways of doing work that this processor has, that of the widest vectors first.
-pub(crate) fn ways<W: Lanewise>() -> impl Iterator<Item = Way<W>> {
-    #[cfg(target_arch = "x86_64")]
-    let wide = {
-        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-        fn avx512<W: Lanewise>(work: W) -> W::Output {
-            work.run(Some(Avx2(())))
-        }
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-        fn avx2<W: Lanewise>(work: W) -> W::Output {
-            work.run(Some(Avx2(())))
-        }
-        // SAFETY: the way is given out only if the processor has the instructions.
-        let avx512: Way<W> = ("AVX-512", |work| unsafe { avx512(work) });
-        // SAFETY: as above.
-        let avx2: Way<W> = ("AVX2", |work| unsafe { avx2(work) });
-        [has_avx512().then_some(avx512), has_avx2().then_some(avx2)]
-    };
-    #[cfg(not(target_arch = "x86_64"))]
-    let wide: [Option<Way<W>>; 0] = [];
-    let portable: Way<W> = ("portable", |work| work.run(None));
-    wide.into_iter().flatten().chain([portable])
-}
-
-/// Does `work` with the widest vectors that the processor has.
+/// Does `work` with the widest vectors of the processor.
 pub(crate) fn widest<W: Lanewise>(work: W) -> W::Output {
-    let (_, way) = ways().next().expect("invariant: the portable way is always there");
-    way(work)
+    run_at(Level::new(), work)
 }
 
-#[cfg(target_arch = "x86_64")]
-fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-        && is_x86_feature_detected!("lzcnt")
-        && is_x86_feature_detected!("popcnt")
-}
-
-#[cfg(target_arch = "x86_64")]
-fn has_avx512() -> bool {
-    has_avx2()
-        && is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512vl")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512bw")
+/// Does `work` with the instruction set of `level`.
+pub(crate) fn run_at<W: Lanewise>(level: Level, work: W) -> W::Output {
+    dispatch!(level, simd => work.run(simd))
 }

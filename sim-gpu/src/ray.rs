@@ -1,11 +1,12 @@
 //! Rays in the unit frame of an object.
 
 use crate::fixed_frame::FixedFrame;
-use crate::lanes::{Avx2, LANES, Lanewise, Vectors, each, widest};
+use crate::lanes::{LANES, Lanewise, Vectors, each, widest};
 use crate::pose::Pose;
 use crate::sensor::{BeamPattern, Cone, starts};
 use crate::target::Surface;
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::Simd;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// A ray as casters read it. `shaders/shared/ray.wgsl` declares the same record; a test compares
@@ -199,7 +200,7 @@ impl Lanewise for Aiming<'_> {
     type Output = usize;
 
     #[inline(always)]
-    fn run(self, _: Option<Avx2>) -> usize {
+    fn run<S: Simd>(self, _: S) -> usize {
         let mut kept = 0;
         for from in (0..self.beams.len()).step_by(LANES) {
             let count = LANES.min(self.beams.len() - from);

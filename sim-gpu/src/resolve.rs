@@ -8,9 +8,10 @@ use crate::cpu::effects::append_outputs;
 use crate::cpu::oracle::{self, Crossing};
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
-use crate::lanes::{Avx2, LANES, Lanewise, each, widest};
+use crate::lanes::{LANES, Lanewise, each, widest};
 use crate::ray::{AMBIGUOUS, MISS};
 use crate::sensor::BeamPattern;
+use fearless_simd::Simd;
 
 /// The nearest surface along a ray.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +80,7 @@ impl Lanewise for Ranges<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
-    fn run(self, _: Option<Avx2>) -> Vec<f64> {
+    fn run<S: Simd>(self, _: S) -> Vec<f64> {
         let mut ranges_m = Vec::with_capacity(self.rays.len());
         for rays in self.rays.chunks(LANES) {
             let of_lane: [u32; LANES] = each(|lane| rays[lane.min(rays.len() - 1)]);

@@ -42,6 +42,7 @@ impl Bounds {
     /// Half the surface area; 0 for the empty box.
     #[must_use]
     pub fn half_area(self) -> f32 {
+        // Negative for the empty box.
         let size = (self.max - self.min).max(Vec3A::ZERO);
         size.x * size.y + size.y * size.z + size.z * size.x
     }

@@ -75,6 +75,7 @@ impl Bvh {
             .zip(0..)
             .map(|(corners, triangle)| Primitive { bounds: Bounds::around(corners), triangle })
             .collect();
+        // Builders also sort the primitives into leaf order.
         let nodes = match builder {
             Builder::Sah => sah::build(&mut primitives),
             Builder::Morton => morton::build(&mut primitives),

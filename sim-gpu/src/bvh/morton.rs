@@ -17,6 +17,7 @@ pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
         .zip(0..)
         .map(|(p, i)| (code(p.bounds.doubled_centre(), centres), i))
         .collect();
+    // The index breaks ties, so that the tree is the same on every run.
     keys.sort_unstable();
     let sorted: Vec<Primitive> = keys.iter().map(|&(_, i)| primitives[i as usize]).collect();
     primitives.copy_from_slice(&sorted);
@@ -54,6 +55,7 @@ fn subtree(
 
 /// The place where the highest differing bit changes, or half way if no bit differs.
 fn split(codes: &[u32], depth: usize) -> usize {
+    // Codes are sorted, so that the first and the last differ in the highest bit that any two do.
     let differing = codes[0] ^ codes[codes.len() - 1];
     if differing == 0 || depth >= HALVING_DEPTH {
         return codes.len() / 2;
@@ -66,6 +68,7 @@ fn split(codes: &[u32], depth: usize) -> usize {
 /// The Morton code of a doubled centre within the bounds of all of them.
 fn code(centre: Vec3A, centres: Bounds) -> u32 {
     let cells = (1 << BITS) as f32;
+    // A flat mesh has no size on some axis: 0 / MIN_POSITIVE is 0, and 0 / 0 would be NaN.
     let size = (centres.max - centres.min).max(Vec3A::splat(f32::MIN_POSITIVE));
     let at = (centre - centres.min) / size * cells;
     let spread = |axis: usize| spread_bits((at[axis] as u32).min((1 << BITS) - 1));

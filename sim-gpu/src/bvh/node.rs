@@ -59,14 +59,8 @@ impl Child {
 
 impl Node {
     pub(super) fn new(left: Child, right: Child) -> Self {
-        let padded = |child: Child| {
-            if child.bounds == Bounds::NOWHERE {
-                child.bounds
-            } else {
-                child.bounds.padded(BOX_PADDING)
-            }
-        };
-        let (l, r) = (padded(left), padded(right));
+        // Rounding leaves `Bounds::NOWHERE` as it is, by which a missing child is recognized.
+        let [l, r] = [left, right].map(|child| child.bounds.padded(BOX_PADDING));
         Self {
             left_min: l.min.to_array(),
             left: left.first,
@@ -83,6 +77,7 @@ impl Node {
     /// and its triangles at `triangle_base`.
     #[must_use]
     pub fn moved(mut self, node_base: u32, triangle_base: u32) -> Self {
+        // Children without triangles are nodes.
         let base = |count: u32| if count == 0 { node_base } else { triangle_base };
         self.left += base(self.left_count);
         self.right += base(self.right_count);
@@ -93,6 +88,7 @@ impl Node {
 /// `nodes`, or, if the whole tree is one leaf or empty, a node above it.
 pub(super) fn with_root(mut nodes: Vec<Node>, root: Child) -> Vec<Node> {
     if nodes.is_empty() {
+        // Traversal begins at a node, so that a single leaf needs one.
         let leaf = if root.count == 0 { Child::NONE } else { root };
         nodes.push(Node::new(leaf, Child::NONE));
     }
@@ -114,6 +110,7 @@ impl LeafTriangle {
 #[must_use]
 pub fn canonical_corners(mut corners: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
     corners.sort_unstable_by(|p, q| {
+        // A total order, so that -0 and 0 do not depend on the order of the file.
         let order = |i: usize| p[i].total_cmp(&q[i]);
         order(0).then_with(|| order(1)).then_with(|| order(2))
     });

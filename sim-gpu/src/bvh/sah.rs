@@ -35,6 +35,7 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
     if primitives.len() <= 1 {
         return leaf;
     }
+    // Unbalanced splits all the way down would exceed the depth of the casters' stacks.
     let middle = if depth >= HALVING_DEPTH {
         if primitives.len() <= MAX_LEAF {
             return leaf;
@@ -56,6 +57,7 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
     let at = nodes.len();
     nodes.push(Node::new(Child::NONE, Child::NONE));
     let right_first = first + middle as u32;
+    // A task must be worth its scheduling on both sides.
     let (left, right) = if left.len().min(right.len()) > PARALLEL_ABOVE {
         in_parallel((left, first), (right, right_first), depth + 1, nodes)
     } else {
@@ -141,6 +143,7 @@ fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
     let (mut best_axis, mut best) = (0, (1, f32::INFINITY));
     for axis in 0..3 {
         sort(primitives, axis);
+        // A bin for each primitive: every boundary between two of them is a split.
         let mut bins = [(Bounds::EMPTY, 1); EXACT];
         bins.iter_mut().zip(&*primitives).for_each(|(bin, p)| bin.0 = p.bounds);
         let (last_left, cost) = cheapest_boundary(&bins[..primitives.len()]);
@@ -167,6 +170,7 @@ fn best_split<const BINS: usize>(primitives: &[Primitive], centres: Bounds) -> O
     for p in primitives {
         let at = (p.bounds.doubled_centre() - centres.min) * bins_per_unit;
         for (axis, bins) in bins.iter_mut().enumerate() {
+            // The highest centre lies at the end of the last bin.
             let (bounds, count) = &mut bins[(at[axis] as usize).min(BINS - 1)];
             *bounds = bounds.union(p.bounds);
             *count += 1;
@@ -210,6 +214,7 @@ fn cheapest_boundary(bins: &[(Bounds, u32)]) -> (usize, f32) {
 
 /// Moves the primitives that satisfy `is_left` to the front, and returns their number.
 fn partition(primitives: &mut [Primitive], is_left: impl Fn(&Primitive) -> bool) -> usize {
+    // The order within each side does not matter: it is the same on every run.
     let mut left = 0;
     for i in 0..primitives.len() {
         if is_left(&primitives[i]) {

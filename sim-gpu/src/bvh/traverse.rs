@@ -59,6 +59,7 @@ impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
     fn pop(&mut self, search: &impl Search<Distance = Distance>) -> Option<WideChild> {
         loop {
             self.height = self.height.checked_sub(1)?;
+            // Surfaces found since the push may have made the child irrelevant.
             let (child, distance) = self.waiting[self.height];
             if search.matters(distance) {
                 return Some(child);

@@ -3,9 +3,8 @@
 use super::{Bounds, Bvh, LEAF, MAX_DEPTH, MAX_LEAF, Node, WIDTH, WideChild};
 use glam::Vec3A;
 
-/// Panics unless in both trees every triangle is reached exactly once, every box
-/// holds what lies below it, no leaf is larger than allowed and no path is too
-/// long for the casters' stacks. For tests.
+/// Panics unless in both trees every triangle is reached exactly once, every box contains its
+/// children, and leaves and paths are within the limits. For tests.
 ///
 /// # Panics
 /// With a message that names the node.

@@ -98,6 +98,7 @@ impl Leaf4 {
     /// A leaf of one to four `triangles`.
     fn new(triangles: &[LeafTriangle]) -> Self {
         let first = &triangles[0];
+        // A point of the first triangle stays inside the box of the leaf.
         let without_area = LeafTriangle { b: first.a, c: first.a, ..*first };
         let mut leaf = Self { len: triangles.len() as u32, ..Self::NOTHING };
         for i in 0..LEAF {
@@ -176,6 +177,7 @@ impl Collapse<'_> {
         let node = &self.nodes[at];
         let child = |min, max, child: u32, count| {
             let bounds = Bounds { min: Vec3A::from_array(min), max: Vec3A::from_array(max) };
+            // Trees of a single leaf have such a child.
             if bounds == Bounds::NOWHERE {
                 return Subtree { bounds, node: None, first: 0, count: 0 };
             }
@@ -218,10 +220,12 @@ impl Collapse<'_> {
             let [left, right] = &children;
             let area = left.bounds.union(right.bounds).half_area();
             let count = left.count + right.count;
+            // Builders put the triangles of a subtree side by side, the left ones first.
             let first = if left.count > 0 { left.first } else { right.first };
             let costs = children.each_ref().map(|child| self.costs(child));
             let as_node = self.distributed(&costs, WIDTH).0 + area;
             let is_leaf = count as usize <= LEAF;
+            // A subtree of few triangles becomes one leaf, which costs a single visit.
             let mut least = if is_leaf { area } else { as_node };
             let mut as_children = [least; WIDTH];
             for n in 2..=WIDTH {
@@ -239,6 +243,7 @@ impl Collapse<'_> {
         for (i, subtree) in subtrees.into_iter().enumerate() {
             let child = match subtree.node {
                 Some(at) => {
+                    // Allocated before its own children, which stand behind it.
                     let node = self.to.nodes.len();
                     self.to.nodes.push(WideNode::EMPTY);
                     self.fill(at, node);

@@ -39,11 +39,14 @@ impl FixedFrame {
     #[must_use]
     pub fn aim(&self, beam: [i32; 3]) -> FixedRay {
         let direction = self.turn.map(|row| rounded(dot(row, beam), 30) as i32);
+        // Units of 2^-23; with a direction in 2^-30, the product is in 2^-53 and `along` in 2^-20.
         let sensor = self.origin.map(|x| (x >> 27) as i32);
         let along = -((dot(sensor, direction) >> 33) as i32);
+        // w in units of 2^-16: 6 of it are 3/8 w in units of 2^-20.
         let within = ((self.reach + i64::from(along) * i64::from(along)) >> 24) as i32;
         let skipped = (along - 6 * within.max(0) - BEFORE).max(0);
         let origin = [0, 1, 2].map(|axis| {
+            // Both are in units of 2^-50.
             let forward = i64::from(direction[axis]) * i64::from(skipped);
             rounded(self.origin[axis] + forward, 27) as i32
         });

@@ -66,6 +66,7 @@ pub fn dropout(dropout: &Dropout, stream: StreamKey, beam: u32) -> bool {
 pub fn intensity(target: &Target, ray: &Ray, index: u32, reflectivity: f64) -> f64 {
     // Rounded as casters get it, so that both sources of a direction give the same intensity.
     let direction = ray.direction.as_vec3().as_dvec3();
+    // Both faces of a triangle reflect alike.
     let cosine = oracle::normal(target, index).dot(direction.normalize()).abs();
     cosine.min(1.0) * reflectivity
 }

@@ -90,6 +90,7 @@ impl Frustum {
 
 #[inline(always)]
 fn interval(values: &[f32]) -> Interval {
+    // One instruction each; `f32::min` and `max` would also have to handle NaN.
     let least = |a: f32, &b: &f32| if b < a { b } else { a };
     let most = |a: f32, &b: &f32| if b > a { b } else { a };
     let [first, ..] = values else { return [f32::NAN; 2] };

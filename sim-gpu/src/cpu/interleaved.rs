@@ -83,6 +83,7 @@ impl Interleaved {
                 if let Some(next) = to_begin.next() {
                     walks[turn].begin(next);
                 } else {
+                    // The last walk takes the turn of the one that ended.
                     let last = walks.len() - 1;
                     walks.swap(turn, last);
                     walks = &mut walks[..last];
@@ -108,6 +109,7 @@ fn prefetch(tree: &WideBvh, at: WideChild) {
                 ((&raw const *node).cast::<i8>(), size_of_val(node))
             }
         };
+        // A node and a leaf take several cache lines.
         for line in (0..size).step_by(CACHE_LINE) {
             // SAFETY: SSE is part of x86-64, and a prefetch neither reads nor faults, whatever the
             // address.

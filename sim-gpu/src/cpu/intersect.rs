@@ -1,6 +1,6 @@
 //! Watertight ray-triangle test: Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT
-//! 2(1), 2013. Twin of `shaders/intersect.wgsl`, for the four triangles of a leaf at once: each
-//! lane does to the bit what `reference` does for one triangle, as the shader does.
+//! 2(1), 2013. Twin of `shaders/intersect.wgsl`, for the four triangles of a leaf at once. Each
+//! lane equals the result of `reference` for one triangle to the bit.
 //!
 //! Subnormal numbers: WGSL allows adapters to flush them to 0, and the CPU does not flush. What this
 //! crate promises does not depend on it. In the unit frame, flushing moves a coordinate by less than
@@ -21,7 +21,7 @@ use glam::{Vec3, Vec4};
 pub struct Shear {
     /// The axes that become x, y and z: z is the ray's largest component.
     pub(super) axes: [usize; 3],
-    /// What x and y lose for each unit along z.
+    /// The decrease of x and y for each unit along z.
     pub(super) x: f32,
     pub(super) y: f32,
     /// Distance along the ray for each unit along z.

@@ -3,8 +3,6 @@
 
 pub mod aim;
 pub mod effects;
-#[cfg(target_arch = "x86_64")]
-mod f32x8;
 #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "packets need AVX2"))]
 mod frustum;
 mod interleaved;

@@ -89,6 +89,7 @@ pub(crate) fn ranges_to<const N: usize>(
     rays: &Rays<N>,
     triangles: [u32; N],
 ) -> [f64; N] {
+    // In the order of coordinates, so that the order in the file does not change a bit.
     let corners: [[DVec3; 3]; N] = each(|i| surface.sorted_corners(triangles[i]));
     let a = Vectors::new(each(|i| corners[i][0])) - rays.origin;
     let b = Vectors::new(each(|i| corners[i][1])) - rays.origin;
@@ -99,6 +100,7 @@ pub(crate) fn ranges_to<const N: usize>(
     let (height, drop) = (normal.dot(&a), normal.dot(&rays.direction));
     each(|i| {
         let [of_a, of_b, of_c] = [of_a, of_b, of_c].map(|along| along[i] / length_squared[i]);
+        // The extent of the triangle along the ray.
         let (low, high) = (of_a.min(of_b).min(of_c), of_a.max(of_b).max(of_c));
         let t = height[i] / drop[i];
         // Grazing rays divide by a `drop` near 0: the quotient may be anything.
@@ -127,6 +129,7 @@ fn enter(node: &WideNode, origin: DVec3, per_direction: DVec3, farthest: f64) ->
     for axis in 0..3 {
         let [low, high] = node.boxes.map(|corners| corners[axis]);
         for i in 0..WIDTH {
+            // Subtracted before multiplied: the precomputed offset of the f32 test loses digits.
             let t0 = (f64::from(low[i]) - origin[axis]) * per_direction[axis];
             let t1 = (f64::from(high[i]) - origin[axis]) * per_direction[axis];
             near[i] = near[i].max(t0.min(t1));
@@ -167,6 +170,7 @@ fn cross(origin: DVec3, shear: &Shear, corners: [DVec3; 3]) -> Option<f64> {
     let [a, b, c] = corners.map(|v| shear.apply(v - origin));
     let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
     let (u, v, w) = (edge(b, c), -edge(a, c), edge(a, b));
+    // Signs differ outside; zeros, on edges and corners, count as either.
     let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
     let determinant = u + v + w;
     if outside || determinant == 0.0 {

@@ -4,12 +4,17 @@
 use super::effects::append_outputs;
 use super::frustum::Frustum;
 use super::interleaved::Interleaved;
+#[cfg(target_arch = "x86_64")]
+use super::packet::Packets;
 use super::traverse::{Instructions, PACKET, Portable};
 use crate::bvh::WideBvh;
 use crate::effects::Effects;
 use crate::job::{Cast, CastJob};
-use crate::lanes::{Avx2, Lanewise, widest};
+use crate::lanes::{Lanewise, widest};
 use crate::ray::{AMBIGUOUS, MISS, Ray, TraceRay};
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::Level;
+use fearless_simd::Simd;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -38,10 +43,11 @@ impl Lanewise for Task<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self, avx2: Option<Avx2>) {
-        match avx2 {
+    fn run<S: Simd>(self, simd: S) {
+        match simd.level() {
+            // Packets need registers of eight lanes.
             #[cfg(target_arch = "x86_64")]
-            Some(avx2) => self.trace(avx2),
+            Level::Avx2(_) | Level::Avx512(_) => self.trace(Packets(simd)),
             _ => self.trace(Portable),
         }
     }
@@ -52,10 +58,12 @@ impl Task<'_> {
     #[inline(always)]
     fn trace<I: Instructions>(self, by: I) {
         let Self { tree, rays, codes } = self;
+        // Filled once per task, not once per ray.
         let mut stacks = I::Stacks::default();
         let mut interleaved = Interleaved::for_tree(tree);
         let mut from = 0;
         while from < rays.len() {
+            // Incoherent rays before the next packet go interleaved, up to the end if there is none.
             let packet = next_packet(rays, from);
             let at = packet.as_ref().map_or(rays.len(), |(at, ..)| *at);
             interleaved.trace(tree, &rays[from..at], &mut codes[from..at], by);
@@ -89,6 +97,7 @@ pub fn cast(job: &CastJob, effects: &Effects) -> Cast {
     }
     let mut effect_outputs = Vec::with_capacity(codes.len() * per_ray);
     for ((&code, &beam), ray) in codes.iter().zip(&job.beams).zip(job.rays()) {
+        // Outputs of misses are not meaningful, but keep the places of the others.
         if code == MISS {
             effect_outputs.resize(effect_outputs.len() + per_ray, 0.0);
             continue;

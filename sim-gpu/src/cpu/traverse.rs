@@ -130,6 +130,7 @@ impl Instructions for Portable {
 
     #[inline(always)]
     fn enter(self, ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32> {
+        // Every processor has vectors of four lanes.
         let (mut entered, mut distances) = (0, [[0.0; 4]; WIDTH / 4]);
         for four in 0..WIDTH / 4 {
             let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(farthest));
@@ -138,6 +139,7 @@ impl Instructions for Portable {
                     let planes: &[[f32; 4]; WIDTH / 4] = must_cast_ref(&node.boxes[side][axis]);
                     Vec4::from_array(planes[four]) * ray.per_direction[axis] + ray.offset[axis]
                 });
+                // Ordered by value: this needs no sign of the direction.
                 near = near.max(t0.min(t1));
                 far = far.min(t0.max(t1));
             }
@@ -167,6 +169,7 @@ impl Nearest {
     fn consider(&mut self, t: f32, error: f32, rival: f32, index: u32) {
         // Equal distances go to the lower index, so that the order of the tree has no say.
         let wins = t < self.t || (t == self.t && index < self.index);
+        // The loser may truly be the nearer one, by as much as its error.
         let loser = if wins { self.t - self.error } else { t - error };
         self.rival = self.rival.min(loser).min(rival);
         self.farthest = self.farthest.min(t + error);
@@ -195,6 +198,7 @@ impl Nearest {
         if self.index == MISS {
             return MISS;
         }
+        // How far the rival may lie before the winner.
         let doubt = self.t + self.error - self.rival;
         if doubt > ACCURACY * (skipped + self.t) { self.index | AMBIGUOUS } else { self.index }
     }

@@ -175,7 +175,7 @@ mod tests {
     fn the_result_is_the_same_for_every_unit() {
         for normalize in [Normalize::UnitSphere, Normalize::Bbox] {
             let plain = to_world(&tetrahedron(1.0, DVec3::ZERO), Up::Z, normalize);
-            // 1.7e12: ModelNet40's largest; the others, ends of what f64 holds.
+            // 1.7e12 is ModelNet40's largest; the others approach the limits of f64.
             for size in [1.7e12, 1e300, 8e307, 0.03, 1e-200, 1e-300] {
                 let world = to_world(&tetrahedron(size, DVec3::ZERO), Up::Z, normalize);
                 for (a, b) in world.mesh.vertices.iter().zip(&plain.mesh.vertices) {

@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn a_triangle_without_area_in_f32_is_degenerate() {
         let mut vertices = SQUARE.to_vec();
-        // On a side; and off a corner by less than f32 can tell from it, which is 2^-25 for
+        // On a side; and off a corner by less than f32 resolves, which is 2^-25 for
         // coordinates just below 1 (here half the side is 0.5, so that it becomes 1).
         vertices.extend([[0.5, 0.0, 0.0], [1.0 - 1e-9, 1.0, 0.0]]);
         let triangles = [[0, 4, 1], [0, 2, 5], [0, 1, 1], [0, 1, 2], [0, 4, 2]];

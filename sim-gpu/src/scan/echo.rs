@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn an_echo_is_of_what_most_of_its_light_comes_from() {
-        // Fog takes all of a beam, and a wall behind it 19 rays of it, each of which is weaker.
+        // Fog returns one echo of all of a beam, and the wall behind it 19 weaker ones.
         let medium = Medium::Fog;
         let mut echoes = echoes(&[(5.0, 5.8e-4); 19]);
         let signal = Signal { power: 1.65e-3, brightness: 0.0, retroreflection: 0.0 };

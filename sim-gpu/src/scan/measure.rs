@@ -27,7 +27,7 @@ pub(super) struct Return {
 }
 
 /// Measures the returns of a scan from `nearest`, the nearest hit of each ray that hit anything,
-/// by ray; and counts what became of the others.
+/// by ray; and counts the returns that are lost.
 pub(super) fn measure(receiver: &Receiver, nearest: &[HitId]) -> (Vec<Return>, Tally) {
     let mut measurer = Measurer {
         receiver,

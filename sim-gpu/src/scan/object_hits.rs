@@ -1,4 +1,4 @@
-//! What the beams of one scan hit of one object, and what became of a scan's returns.
+//! The hits of one object, and the counts of a scan's returns.
 
 use super::request::Glass;
 use crate::job::CastJob;
@@ -73,7 +73,7 @@ impl<'a> ObjectHits<'a> {
     }
 }
 
-/// Counts of what became of a scan's returns.
+/// Counts of a scan's returns by their fate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tally {
     /// Points in the scan.

@@ -1,5 +1,4 @@
-//! What one scan's receiver gets: which hits give an echo, and how strong echoes of surfaces and
-//! of the air are.
+//! The echoes that the receiver gets of surfaces and of the air, and their strength.
 
 use super::echo::{Echo, Signal, Source};
 use super::normals::Normals;
@@ -26,7 +25,7 @@ pub(super) struct Receiver<'a> {
     pub effects: Effects,
     /// The sensor's detection limit, if detection is among the effects.
     pub limit: Option<DetectionLimit>,
-    /// What is in the air, if anything.
+    /// Rain, snow, fog, haze and dust, if any.
     pub air: Option<Air>,
     /// The part of a beam's power in each of its rays; `None` for beams without width.
     ray_share: Option<f64>,

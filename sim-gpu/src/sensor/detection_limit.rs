@@ -1,4 +1,4 @@
-//! The weakest surface that a sensor detects, as its maker states it.
+//! The detection limit that a sensor's maker states.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,8 +8,8 @@ use crate::config::{InvalidValue, positive, within};
 /// finite in the f32 of shaders.
 pub(crate) const LARGEST_M: f64 = 1e9;
 
-/// A surface that a sensor just detects if it faces the sensor in clear air: what makers
-/// state as "80 % at 120 m".
+/// The weakest surface that a sensor detects, facing it in clear air, as makers state it: "80 % at
+/// 120 m".
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DetectionLimit {
@@ -20,8 +20,8 @@ pub struct DetectionLimit {
 }
 
 impl DetectionLimit {
-    /// The least power that is detected, relative to that received from a white surface
-    /// that faces the sensor 1 m away.
+    /// The least power that is detected, relative to that of a white surface that faces the sensor
+    /// at 1 m.
     #[must_use]
     pub fn power(&self) -> f64 {
         self.reflectivity / self.range_m.powi(2)

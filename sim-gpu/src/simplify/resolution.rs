@@ -22,7 +22,7 @@ pub struct Viewpoint<'a> {
 }
 
 /// The radius of a beam's footprint at the point of an object nearest to any of `viewpoints`, in the
-/// units of `mesh`, of which a metre has `units_per_m`. A surface displaced by less stays in its beam.
+/// units of `mesh`: `units_per_m` of them are a metre. A surface displaced by less stays in its beam.
 ///
 /// The nearest distance is that to the mesh's bounding box, but at least the nearest range that the
 /// sensor reports. The radius is 0 if a sensor without such a limit stands in the box, and infinite
@@ -36,7 +36,7 @@ pub fn resolved_m(mesh: &TriangleMesh, units_per_m: f64, viewpoints: &[Viewpoint
         let distance = |from: &DVec3| (from.clamp(low, high) - *from).length();
         let nearest = viewpoint.positions.iter().map(distance).fold(f64::INFINITY, f64::min);
         let nearest = nearest.max(viewpoint.sensor.range.min_m * units_per_m);
-        // The tangent of half an angle; a step of a half circle tells nothing.
+        // The tangent of half an angle, which grows without bound up to a step of half a circle.
         let half_footprint_rad = 0.5 * step_rad / FOOTPRINTS_PER_STEP;
         if half_footprint_rad >= std::f64::consts::FRAC_PI_2 {
             return f64::INFINITY;

@@ -23,8 +23,8 @@
 //! P = F exp(-2 a r) min(D^2 / w^2, 1) / r^2,    F = ((n - 1) / (n + 1))^2
 //! ```
 //!
-//! with n the index of refraction. The extinction of rain and snow is a power law fitted to what
-//! LISA integrates by Mie's theory, within 0.3 % (0.5 to 100 mm/h) and 0.5 % (0.5 to 10 mm/h).
+//! with n the index of refraction. The extinction of rain and snow is a power law fitted to
+//! LISA's integrals of Mie's theory, within 0.3 % (0.5 to 100 mm/h) and 0.5 % (0.5 to 10 mm/h).
 //!
 //! LISA draws all drops in a beam, some ten thousand, and takes the strongest. Only a few of them,
 //! near the sensor, are strong enough to be detected. Their number has a Poisson distribution whose

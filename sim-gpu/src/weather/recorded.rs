@@ -6,7 +6,7 @@ use formats::Scan;
 use formats::rng::StreamKey;
 use glam::DVec3;
 
-/// Counts of what became of the points of a scan in the weather.
+/// Counts of the points of a scan by their fate in the weather.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fates {
     /// Points at the same place, weaker.

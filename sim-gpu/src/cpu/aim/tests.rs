@@ -1,14 +1,14 @@
-//! Rays made in whole numbers pass as near to the true ones as the module says.
+//! Rays made in integers are within the documented distance of the true ones.
 
 use super::*;
 use crate::fixed_frame::fixed_direction;
 use formats::rng::StreamKey;
 use glam::{DMat3, DQuat, DVec3};
 
-/// A multiple of which all errors are stated.
+/// The unit of all errors.
 const U: f64 = 1.0 / 16_777_216.0;
 
-/// The radius of the bounding sphere of a cube of side 2, with what `Surface` adds.
+/// The radius of the bounding sphere of a cube of side 2, with the margin of `Surface`.
 const RADIUS: f64 = 1.732_050_807_6 + 1e-5;
 
 struct Random(StreamKey, u64);

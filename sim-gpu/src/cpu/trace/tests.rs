@@ -1,15 +1,16 @@
-//! However rays are traced, the answers are the same.
+//! Every way of tracing gives the same answers.
 
 use super::*;
 use crate::bvh::{Builder, Stack};
 use crate::cpu::traverse::traverse;
 use crate::job::Culling;
-use crate::lanes::ways;
+use crate::lanes::run_at;
 use crate::mesh::TriangleMesh;
 use crate::pose::Pose;
 use crate::ray::RayFrame;
 use crate::sensor::SensorProfile;
 use crate::target::{Surface, Target};
+use fearless_simd::Level;
 use formats::rng::StreamKey;
 use glam::{DAffine3, DVec3};
 
@@ -28,7 +29,7 @@ fn torus(side: u32) -> Target {
     Target::new(Surface::of_mesh(mesh), Builder::Sah)
 }
 
-/// A revolution around `target`, from beside it and from within.
+/// Two revolutions of a sensor, beside `target` and inside it.
 fn revolutions(target: &Target) -> Vec<TraceRay> {
     let pattern = SensorProfile::builtin("vlp16").unwrap().pattern();
     let places = [DVec3::new(3.0, 0.4, 0.5), DVec3::new(1.0, 0.0, 0.1)];
@@ -41,16 +42,16 @@ fn revolutions(target: &Target) -> Vec<TraceRay> {
     places.into_iter().flat_map(aim).collect()
 }
 
-/// `rays` in an order in which no two that follow each other run side by side.
+/// `rays` in an order in which consecutive ones are not coherent.
 fn shuffled(rays: &[TraceRay]) -> Vec<TraceRay> {
-    // A prime that does not divide their number: each comes once.
+    // A prime that does not divide the number of rays, so that each comes once.
     const STEP: usize = 7919;
     assert!(!rays.len().is_multiple_of(STEP));
     (0..rays.len()).map(|i| rays[i * STEP % rays.len()]).collect()
 }
 
-/// Rays along an axis, along a diagonal, of no direction, and of numbers that are
-/// not finite, among rays of `coherent`.
+/// The rays of `coherent`, some replaced by rays along axes and diagonals, without direction, and with
+/// numbers that are not finite.
 fn odd(coherent: &[TraceRay]) -> Vec<TraceRay> {
     let numbers = [0.0, -0.0, 1.0, -1.0, 1e-30, f32::INFINITY, f32::NAN];
     let mut rays = coherent.to_vec();
@@ -64,6 +65,18 @@ fn odd(coherent: &[TraceRay]) -> Vec<TraceRay> {
     rays
 }
 
+/// The instruction sets of this processor that differ in how they trace.
+fn levels() -> Vec<Level> {
+    let best = Level::new();
+    let mut levels = vec![best];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_sse2().map(Level::Sse2));
+    }
+    levels
+}
+
 fn one_by_one(tree: &WideBvh, rays: &[TraceRay]) -> Vec<u32> {
     let mut stack = Stack::default();
     rays.iter().map(|ray| traverse(tree, &mut stack, ray).code(ray.skipped)).collect()
@@ -71,7 +84,7 @@ fn one_by_one(tree: &WideBvh, rays: &[TraceRay]) -> Vec<u32> {
 
 #[test]
 fn packets_and_interleaved_rays_answer_as_rays_one_by_one() {
-    // The first tree stays in a cache and the second does not, which is traced otherwise.
+    // The first tree fits a cache; the second does not, so that its rays are interleaved.
     for target in [torus(20), torus(150)] {
         let tree = &target.bvh.wide;
         let coherent = revolutions(&target);
@@ -80,12 +93,11 @@ fn packets_and_interleaved_rays_answer_as_rays_one_by_one() {
             let expected = one_by_one(tree, rays);
             let hits = expected.iter().filter(|&&code| code != MISS).count();
             assert!(hits * 10 > rays.len(), "{hits} of {} {kind} rays hit", rays.len());
-            for nth in 0..ways::<Task<'_>>().count() {
+            for level in levels() {
                 let mut codes = vec![0; rays.len()];
-                let (name, way) = ways().nth(nth).unwrap();
-                way(Task { tree, rays, codes: &mut codes });
+                run_at(level, Task { tree, rays, codes: &mut codes });
                 let wrong = expected.iter().zip(&codes).position(|(a, b)| a != b);
-                assert_eq!(wrong, None, "{name}, {kind}, of {} bytes", tree.bytes());
+                assert_eq!(wrong, None, "{level:?}, {kind}, of {} bytes", tree.bytes());
             }
             assert_eq!(trace(tree, rays), expected);
         }

@@ -65,7 +65,7 @@ fn every_direction_is_of_unit_length_and_every_ray_once_in_the_order() {
 #[test]
 fn rings_are_ranked_from_below() {
     for name in builtin_names() {
-        // Lines behind prisms are told apart by their place.
+        // The ring of a line behind prisms is its index, not its elevation.
         if let Layout::Grid(_) | Layout::Risley(_) = sensor(name).layout {
             continue;
         }
@@ -333,7 +333,7 @@ fn a_table_is_fired_row_by_row_again_and_again() {
     let twice = own.clone().with_revolutions(NonZeroU32::new(2).unwrap()).unwrap().pattern();
     assert_near(twice.directions[4], at(0.0, 30.0));
     assert_eq!(twice.directions[6], pattern.directions[0]);
-    // What a scan does not need is not kept, and the scan is the same.
+    // Unused rows are dropped, and the scan is the same.
     let trimmed = own.clone().trimmed();
     assert!(matches!(&trimmed.layout, Layout::Table(table) if table.directions_deg.len() == 4));
     assert_eq!(trimmed.pattern(), pattern);
